@@ -1,0 +1,86 @@
+# The front door: `make` alone prints help.
+PYTHON ?= python3
+VENV   := .venv
+PY     := $(VENV)/bin/python
+READY  := $(VENV)/.ready
+
+TAIL ?= articulated
+M    ?= 1
+N    ?= 3
+# options of `make model`: REAL=float EMISSION=loops BAKED=1 FUNCTIONS=energy,momentum
+OPTIONS := $(if $(REAL),--real $(REAL)) $(if $(EMISSION),--emission $(EMISSION)) \
+           $(if $(BAKED),--baked) $(if $(FUNCTIONS),--functions $(FUNCTIONS))
+NAME    := $(TAIL)_m$(M)_n$(N)
+SCENE   ?= $(wildcard scenes/$(NAME).toml)
+MODEL   := $(if $(SCENE),$(basename $(notdir $(SCENE))),$(NAME))
+SOURCES := $(shell find codegen -name '*.py' -o -name '*.jinja')
+STAMP   := generated/$(MODEL)/.made
+WANTED  := $(if $(SCENE),$(SCENE),--tail $(TAIL) --segments $(M) --links $(N)) $(OPTIONS)
+
+.PHONY: help setup demo test test-all model verify bench lint golden clean
+.DELETE_ON_ERROR:
+
+help:
+	@echo "serpentail: dynamics of a floating body with a serpentine tail, generated"
+	@echo
+	@echo "  make setup                                 .venv with everything"
+	@echo "  make demo                                  the paper's rat: generate, compile, simulate, draw"
+	@echo "  make test                                  the tests;  make test-all: the slow suites too"
+	@echo "  make model  TAIL=articulated M=3 N=4       -> generated/articulated_m3_n4"
+	@echo "  make model  SCENE=scenes/kangaroo_rat_m3_n4.toml"
+	@echo "              options: REAL=float EMISSION=loops BAKED=1 FUNCTIONS=energy,momentum"
+	@echo "  make verify TAIL=articulated M=3 N=4       verification report of that model"
+	@echo "  make bench                                 benchmark report"
+	@echo "  make lint                                  style and import rules"
+	@echo "  make golden                                accept what the generator emits now as the golden models"
+	@echo "  make clean                                 remove generated/ and output/"
+
+setup: $(READY)
+
+$(READY): pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+	  { echo "Python 3.11 or newer is needed, $(PYTHON) is older: make setup PYTHON=python3.11"; exit 1; }
+	@test -x $(PY) || $(PYTHON) -m venv $(VENV)
+	$(PY) -m pip install --quiet --disable-pip-version-check --editable '.[dev,peers]'
+	@touch $@
+
+demo: $(READY)
+	$(PY) examples/demo.py
+
+test: $(READY)
+	$(PY) -m pytest -m "not slow"
+
+test-all: $(READY)
+	$(PY) -m pytest
+
+lint: $(READY)
+	$(VENV)/bin/ruff check .
+	$(VENV)/bin/ruff format --check .
+	$(VENV)/bin/lint-imports --no-cache
+
+model: $(STAMP)
+
+$(STAMP): $(SOURCES) $(SCENE) generated/.options/$(MODEL) | $(READY)
+	$(PY) -m serpentail_codegen $(WANTED)
+	$(VENV)/bin/serpentail info generated/$(MODEL)
+	@touch $@
+
+# holds the options of the last call: newer than the stamp only when they change
+generated/.options/$(MODEL): .FORCE
+	@mkdir -p $(@D)
+	@echo '$(WANTED)' | cmp -s - $@ || echo '$(WANTED)' > $@
+
+.PHONY: .FORCE
+.FORCE:
+
+verify: model
+	$(PY) tests/verify_model.py generated/$(MODEL)
+
+bench: $(READY)
+	$(PY) benchmarks/bench.py
+
+golden: $(READY)
+	$(PY) -m pytest tests/test_golden.py --update-golden
+
+clean:
+	rm -rf generated output

@@ -1,0 +1,362 @@
+// Takes the parameters of the articulated tail and a state in this project's conventions; gives H, C and v_dot
+// by the fastest path found through Pinocchio's public functions, as the peer of the generated code.
+//
+// The chain is a free-flyer and m n universal joints (RX, then RZ), 2 m n tail coordinates; the constant matrix G
+// repeats (alpha_i, beta_i) over the links of segment i, and H = G^T H_full G, C = G^T C_full.
+//
+// What was tried, best of each in ns at (m, n) = (1,3), (3,4), (6,6); Pinocchio 4.1, gcc 12, one AMD Zen 5 core:
+//   529  1577  4382  kept, `pinocchio_forward_dynamics`: nonLinearEffects, then updateGlobalPlacements and
+//                    computeJointJacobians on the same joint data, composite inertias summed over tied columns
+//   783  2209  5931  computeCentroidalMap instead: the kinematics are computed twice
+//   @CRBA@  kept, `pinocchio_forward_dynamics_crba`: the library's CRBA, blocks of H_full summed
+//   805  3030 11600  the same on 2 m n revolutes (RUBX, RUBZ); with RX, RZ, which repeat the trigonometry, more
+//   746  1963  4723  visitors of our own that fuse bias and inertias in one sweep, with Eigen's LLT
+//  1716  5166 15612  computeAllTerms
+// CRBA in LOCAL convention wins for short chains, in WORLD for long ones.  Of the rest, in per cent:
+//   Eigen's vectorisation on  +105: 3-vectors and 6-vectors split over 512-bit packets
+//   all 25 joint types in the variant  +20 to 30;  gcc's default inlining  +20;  its SLP vectoriser on  +8
+//   -O2  +3;  dense GEMM for G^T H G  +25 to 50;  rnea at zero acceleration instead of nonLinearEffects  0
+//   Eigen's LLT of dynamic size  +41, +20, +9; of fixed size  +17, +20, +12; its LDLT, slower still
+#define EIGEN_DONT_VECTORIZE
+#define BOOST_VARIANT_USE_RELAXED_GET_BY_DEFAULT // the library asks each joint whether it is a mimic one
+
+#include <string>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+#include "pinocchio/multibody.hpp"
+#include "pinocchio/multibody/joint.hpp"
+
+#include "pinocchio/algorithm/crba.hpp"
+#include "pinocchio/algorithm/jacobian.hpp"
+#include "pinocchio/algorithm/kinematics.hpp"
+#include "pinocchio/algorithm/rnea.hpp"
+
+#define PEER_API extern "C" __attribute__((visibility("default")))
+
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+using Matrix62 = Eigen::Matrix<double, 6, 2>;
+using Matrix66 = Eigen::Matrix<double, 6, 6>;
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+constexpr int BASE = 6;              // degrees of freedom of the torso
+constexpr int TORSO = 1;             // Pinocchio's index of the torso's joint; link j has TORSO + 1 + j
+constexpr int LONGEST_FOR_LOCAL = 16; // links up to which CRBA is faster in LOCAL convention than in WORLD
+
+// The two joint types of the chain, so that a visit chooses between two.
+template <typename S, int O> struct Joints {
+    using Scalar = S;
+    static constexpr int Options = O;
+    using JointModelVariant = boost::variant<pinocchio::JointModelFreeFlyerTpl<S, O>, //
+                                             pinocchio::JointModelUniversalTpl<S, O>>;
+    using JointDataVariant = boost::variant<pinocchio::JointDataFreeFlyerTpl<S, O>, //
+                                            pinocchio::JointDataUniversalTpl<S, O>>;
+};
+
+using Model = pinocchio::ModelTpl<double, 0, Joints>;
+using Data = pinocchio::DataTpl<double, 0, Joints>;
+using pinocchio::Inertia;
+using pinocchio::SE3;
+
+// In the order in which they are handed over.
+struct Parameters {
+    double gravity, torso_mass, torso_inertia[3], tail_mount[3], tail_mass, tail_length, link_inertia[3];
+};
+
+Inertia body(double mass, const Vector3d &com, const double *diagonal)
+{
+    return Inertia(mass, com, Vector3d::Map(diagonal).asDiagonal().toDenseMatrix());
+}
+
+Model chain_model(int count, const Parameters &p)
+{
+    Model model;
+    model.gravity.linear(Vector3d(0, 0, -p.gravity));
+    auto joint = model.addJoint(0, pinocchio::JointModelFreeFlyer(), SE3::Identity(), "torso");
+    model.appendBodyToJoint(joint, body(p.torso_mass, Vector3d::Zero(), p.torso_inertia));
+
+    const double length = p.tail_length / count;
+    const Inertia link = body(p.tail_mass / count, Vector3d(0, -length / 2, 0), p.link_inertia);
+    const pinocchio::JointModelUniversal universal(Vector3d::UnitX(), Vector3d::UnitZ());
+    Vector3d origin = Vector3d::Map(p.tail_mount);
+    for (int j = 0; j < count; ++j) {
+        const SE3 placement(Eigen::Matrix3d::Identity(), origin);
+        joint = model.addJoint(joint, universal, placement, "joint_" + std::to_string(j));
+        model.appendBodyToJoint(joint, link);
+        origin = Vector3d(0, -length, 0);
+    }
+    return model;
+}
+
+struct Chain {
+    Chain(int segments, int links, const Parameters &parameters)
+        : m(segments), n(links), model(chain_model(m * n, parameters)), data(model),
+          q(VectorXd::Zero(model.nq)), v(VectorXd::Zero(model.nv)), H(MatrixXd::Zero(BASE + 2 * m, BASE + 2 * m)),
+          x(VectorXd::Zero(BASE + 2 * m)), F(Eigen::Matrix<double, 6, Eigen::Dynamic>::Zero(6, 2 * m))
+    {
+    }
+
+    int m, n;
+    Model model;
+    Data data;
+    VectorXd q, v;                                // of the full chain
+    MatrixXd H;                                   // reduced; lower triangle
+    VectorXd x;                                   // reduced bias, then right-hand side, then solution
+    Eigen::Matrix<double, 6, Eigen::Dynamic> F;   // force columns summed over a segment, two a segment
+};
+
+// State of the full chain.  Position and p_dot stay zero: with v_b = 0, H and C do not depend on them, and the
+// linear rows are those of R^T p_ddot.
+void set_configuration(Chain &chain, const double *q)
+{
+    chain.q.segment<4>(3) << q[4], q[5], q[6], q[3]; // (w, x, y, z) to (x, y, z, w)
+    double *angle = chain.q.data() + 7;
+    for (int i = 0; i < chain.m; ++i)
+        for (int j = 0; j < chain.n; ++j) {
+            *angle++ = q[7 + 2 * i];
+            *angle++ = q[8 + 2 * i];
+        }
+}
+
+void set_velocity(Chain &chain, const double *v)
+{
+    chain.v.segment<3>(3) = Vector3d::Map(v + 3);
+    double *rate = chain.v.data() + BASE;
+    for (int i = 0; i < chain.m; ++i)
+        for (int j = 0; j < chain.n; ++j) {
+            *rate++ = v[BASE + 2 * i];
+            *rate++ = v[BASE + 1 + 2 * i];
+        }
+}
+
+// x = C = G^T C_full
+void bias_force(Chain &chain)
+{
+    const VectorXd &full = pinocchio::nonLinearEffects(chain.model, chain.data, chain.q, chain.v);
+    chain.x.head<BASE>() = full.head<BASE>();
+    const double *entry = full.data() + BASE;
+    for (int i = 0; i < chain.m; ++i) {
+        double alpha = 0, beta = 0;
+        for (int j = 0; j < chain.n; ++j) {
+            alpha += *entry++;
+            beta += *entry++;
+        }
+        chain.x[BASE + 2 * i] = alpha;
+        chain.x[BASE + 1 + 2 * i] = beta;
+    }
+}
+
+// Columns of segment i.  Y is the inertia of all links behind, and takes the segment's own in.  With F_j = Y_j J_j,
+// H_ii = sum_j (J_j^T F_j + J_j^T F_behind + F_behind^T J_j) and H_ki = (sum_k F)^T (sum_j J_j) for k behind i.
+void segment_columns(Chain &chain, int i, Inertia &Y)
+{
+    Data &data = chain.data;
+    Matrix62 F_behind = Matrix62::Zero(), J_sum = Matrix62::Zero(), F;
+    Eigen::Matrix2d diagonal = Eigen::Matrix2d::Zero();
+    for (int j = (i + 1) * chain.n - 1; j >= i * chain.n; --j) {
+        Y += data.oMi[TORSO + 1 + j].act(chain.model.inertias[TORSO + 1 + j]);
+        const Matrix62 J = data.J.middleCols<2>(BASE + 2 * j);
+        pinocchio::motionSet::inertiaAction(Y, J, F);
+        const Eigen::Matrix2d mixed = J.transpose() * F_behind;
+        diagonal += J.transpose() * F + mixed + mixed.transpose();
+        F_behind += F;
+        J_sum += J;
+    }
+    const int row = BASE + 2 * i;
+    chain.H.block<2, 2>(row, row) = diagonal;
+    chain.F.middleCols<2>(2 * i) = F_behind;
+    for (int k = i + 1; k < chain.m; ++k)
+        chain.H.block<2, 2>(BASE + 2 * k, row).noalias() = chain.F.middleCols<2>(2 * k).transpose() * J_sum;
+}
+
+// H by composite inertias in world axes, on the kinematics that bias_force has left in data.
+void composite_mass_matrix(Chain &chain)
+{
+    Data &data = chain.data;
+    pinocchio::updateGlobalPlacements(chain.model, data);
+    pinocchio::computeJointJacobians(chain.model, data);
+    Inertia Y = Inertia::Zero();
+    for (int i = chain.m - 1; i >= 0; --i)
+        segment_columns(chain, i, Y);
+    Y += data.oMi[TORSO].act(chain.model.inertias[TORSO]);
+
+    const Matrix66 J = data.J.leftCols<BASE>();
+    Matrix66 F;
+    pinocchio::motionSet::inertiaAction(Y, J, F);
+    chain.H.topLeftCorner<BASE, BASE>().noalias() = J.transpose() * F;
+    for (int k = 0; k < chain.m; ++k)
+        chain.H.block<2, BASE>(BASE + 2 * k, 0).noalias() = chain.F.middleCols<2>(2 * k).transpose() * J;
+}
+
+// Diagonal block of segment i from the upper triangle of H_full.
+void sum_own_blocks(Chain &chain, int i)
+{
+    const MatrixXd &full = chain.data.M;
+    const int first = BASE + 2 * i * chain.n;
+    double aa = 0, ab = 0, bb = 0;
+    for (int l = 0; l < chain.n; ++l) {
+        const double *alpha = &full(first, first + 2 * l), *beta = &full(first, first + 2 * l + 1);
+        for (int j = 0; j < l; ++j) {
+            aa += 2 * alpha[2 * j];
+            ab += alpha[2 * j + 1] + beta[2 * j];
+            bb += 2 * beta[2 * j + 1];
+        }
+        aa += alpha[2 * l];
+        ab += beta[2 * l];
+        bb += beta[2 * l + 1];
+    }
+    chain.H.block<2, 2>(BASE + 2 * i, BASE + 2 * i) << aa, ab, ab, bb;
+}
+
+// Row `row` of H, left of the diagonal block of segment i, from column `side` (alpha: 0, beta: 1) of each link.
+void sum_row(Chain &chain, int i, int side)
+{
+    const int row = BASE + 2 * i + side;
+    chain.H.row(row).head(BASE + 2 * i).setZero();
+    for (int l = 0; l < chain.n; ++l) {
+        const double *entry = chain.data.M.col(BASE + 2 * (i * chain.n + l) + side).data();
+        for (int j = 0; j < BASE; ++j)
+            chain.H(row, j) += *entry++;
+        for (int k = 0; k < i; ++k) {
+            double alpha = 0, beta = 0;
+            for (int j = 0; j < chain.n; ++j) {
+                alpha += *entry++;
+                beta += *entry++;
+            }
+            chain.H(row, BASE + 2 * k) += alpha;
+            chain.H(row, BASE + 2 * k + 1) += beta;
+        }
+    }
+}
+
+// H = G^T H_full G by Pinocchio's CRBA.
+void crba_mass_matrix(Chain &chain)
+{
+    const bool is_short = chain.m * chain.n <= LONGEST_FOR_LOCAL;
+    pinocchio::crba(chain.model, chain.data, chain.q,
+                    is_short ? pinocchio::Convention::LOCAL : pinocchio::Convention::WORLD);
+    chain.H.topLeftCorner<BASE, BASE>() = chain.data.M.topLeftCorner<BASE, BASE>().transpose();
+    for (int i = 0; i < chain.m; ++i) {
+        sum_row(chain, i, 0);
+        sum_row(chain, i, 1);
+        sum_own_blocks(chain, i);
+    }
+}
+
+// x := H^-1 x by LDL^T in place, columns of the lower triangle; false where H is not positive definite.
+bool solve(MatrixXd &H, VectorXd &x)
+{
+    const int size = static_cast<int>(x.size());
+    bool positive = true;
+    for (int j = 0; j < size; ++j) {
+        double *column = &H(0, j);
+        positive &= column[j] > 0;
+        const double inverse = 1 / column[j], x_j = x[j];
+        for (int k = j + 1; k < size; ++k) {
+            const double factor = column[k] * inverse;
+            double *later = &H(0, k);
+            for (int i = k; i < size; ++i)
+                later[i] -= column[i] * factor;
+            x[k] -= factor * x_j;
+        }
+        column[j] = inverse;
+    }
+    for (int j = size - 1; j >= 0; --j) {
+        const double *column = &H(0, j);
+        double sum = x[j];
+        for (int i = j + 1; i < size; ++i)
+            sum -= column[i] * x[i];
+        x[j] = sum * column[j];
+    }
+    return positive;
+}
+
+// From H and the bias in x to v_dot; the status that the caller returns.
+int accelerate(Chain &chain, const double *q, const double *tau, double *v_dot)
+{
+    VectorXd &x = chain.x;
+    x = -x;
+    x.tail(2 * chain.m) += VectorXd::Map(tau, 2 * chain.m);
+    const bool solved = solve(chain.H, x);
+    VectorXd::Map(v_dot, x.size()) = x;
+    Vector3d::Map(v_dot) = Quaterniond(q[3], q[4], q[5], q[6]) * x.head<3>(); // R^T p_ddot to the world
+    return solved ? 0 : 1;
+}
+
+} // namespace
+
+// parameters: gravity, torso_mass, torso_inertia (3), tail_mount (3), tail_mass, tail_length, link_inertia (3).
+// A null pointer where the chain cannot be built.
+PEER_API void *pinocchio_chain_new(int segments, int links, const double *parameters)
+{
+    static_assert(sizeof(Parameters) == 13 * sizeof(double), "parameters are an array of 13");
+    try {
+        return new Chain(segments, links, *reinterpret_cast<const Parameters *>(parameters));
+    } catch (const std::exception &) {
+        return nullptr;
+    }
+}
+
+PEER_API void pinocchio_chain_free(void *chain)
+{
+    delete static_cast<Chain *>(chain);
+}
+
+// v_dot by the fastest path; 0, or 1 where H is not positive definite.  The quaternion in q is a unit one.
+PEER_API int pinocchio_forward_dynamics(void *context, const double *q, const double *v, const double *tau,
+                                        double *v_dot)
+{
+    Chain &chain = *static_cast<Chain *>(context);
+    set_configuration(chain, q);
+    set_velocity(chain, v);
+    bias_force(chain);
+    composite_mass_matrix(chain);
+    return accelerate(chain, q, tau, v_dot);
+}
+
+// v_dot by Pinocchio's CRBA on the full chain; else as above.
+PEER_API int pinocchio_forward_dynamics_crba(void *context, const double *q, const double *v, const double *tau,
+                                             double *v_dot)
+{
+    Chain &chain = *static_cast<Chain *>(context);
+    set_configuration(chain, q);
+    set_velocity(chain, v);
+    crba_mass_matrix(chain);
+    bias_force(chain);
+    return accelerate(chain, q, tau, v_dot);
+}
+
+// H (nv x nv), row-major, by the fastest path.
+PEER_API int pinocchio_mass_matrix(void *context, const double *q, double *H)
+{
+    Chain &chain = *static_cast<Chain *>(context);
+    set_configuration(chain, q);
+    chain.v.setZero();
+    bias_force(chain);
+    composite_mass_matrix(chain);
+    const auto size = chain.H.rows();
+    Eigen::Map<RowMajor> out(H, size, size);
+    out = chain.H.selfadjointView<Eigen::Lower>();
+    const Eigen::Matrix3d R = Quaterniond(q[3], q[4], q[5], q[6]).toRotationMatrix();
+    out.topRows<3>() = (R * out.topRows<3>()).eval();
+    out.leftCols<3>() = (out.leftCols<3>() * R.transpose()).eval();
+    return 0;
+}
+
+// C (nv), gravity included.
+PEER_API int pinocchio_bias_force(void *context, const double *q, const double *v, double *C)
+{
+    Chain &chain = *static_cast<Chain *>(context);
+    set_configuration(chain, q);
+    set_velocity(chain, v);
+    bias_force(chain);
+    VectorXd::Map(C, chain.x.size()) = chain.x;
+    Vector3d::Map(C) = Quaterniond(q[3], q[4], q[5], q[6]) * chain.x.head<3>();
+    return 0;
+}

@@ -1,0 +1,65 @@
+"""Command line of the generator: a scene file, or a tail and its sizes, go in; a generated folder comes out."""
+
+import argparse
+import sys
+import time
+from pathlib import Path
+
+from .scene import FUNCTIONS, KINDS, SceneError, load_scene, scene_for
+
+
+def parser() -> argparse.ArgumentParser:
+    """Return the argument parser."""
+    p = argparse.ArgumentParser(prog="python -m serpentail_codegen", description=__doc__)
+    p.add_argument(
+        "scene", nargs="?", type=Path, help="scene file (TOML); leave out and give --tail, --segments, --links"
+    )
+    p.add_argument("--tail", choices=KINDS, help="tail of a model without a scene file")
+    p.add_argument("--segments", type=int, help="m")
+    p.add_argument("--links", type=int, help="n, in each segment")
+    p.add_argument("--functions", help=f"comma-separated, of {', '.join(FUNCTIONS)} (default: all)")
+    p.add_argument("--real", help="double or float")
+    p.add_argument("--emission", help="auto, straight or loops")
+    p.add_argument("--baked", action="store_true", help="fold the parameters into the code")
+    p.add_argument("--output", type=Path, default=Path("generated"), help="parent of the generated folder")
+    return p
+
+
+def scene_of(arguments: argparse.Namespace):
+    """Return the scene that the arguments describe."""
+    if arguments.scene:
+        return load_scene(arguments.scene)
+    if None in (arguments.tail, arguments.segments):
+        raise SystemExit("give a scene file, or --tail, --segments and --links: see --help")
+    chosen = {name: getattr(arguments, name) for name in ("real", "emission") if getattr(arguments, name)}
+    if arguments.functions:
+        chosen["functions"] = arguments.functions.split(",")
+    if arguments.baked:
+        chosen["baked"] = True
+    return scene_for(arguments.tail, arguments.segments, arguments.links, **chosen)
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Generate; return the exit status."""
+    try:
+        arguments = parser().parse_args(argv)
+        scene = scene_of(arguments)
+    except SceneError as error:
+        print(error, file=sys.stderr)
+        return 2
+    from .pipeline import generate  # sympy is imported only now
+
+    start = time.perf_counter()
+    changed = generate(scene, arguments.output)
+    seconds = time.perf_counter() - start
+    folder = arguments.output / scene.name
+    print(
+        f"{folder}: {len(changed)} files written, {seconds:.2f} s"
+        if changed
+        else f"{folder}: up to date, {seconds:.2f} s"
+    )
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

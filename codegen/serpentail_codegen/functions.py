@@ -1,0 +1,266 @@
+"""The functions a scene can ask for: a tail's sizes go in, the loop nest of each function comes out."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from math import prod
+
+from . import dynamics as dyn
+from . import kinematics as kin
+from . import sweeps
+from .program import Array, Index, Program
+from .scene import PARAMETERS
+from .sweeps import Draft, Tail, column_of
+
+
+@dataclass(frozen=True)
+class Argument:
+    """One array argument of a function: its shape from the tail's sizes, and what it means."""
+
+    name: str
+    shape: Callable[[Tail], tuple[int, ...]]
+    meaning: str
+
+    def length(self, tail: Tail) -> int:
+        """Number of scalars."""
+        return prod(self.shape(tail))
+
+
+Q = Argument("q", lambda t: (t.nq,), "configuration: position of B (m, world), quaternion w x y z, joint angles (rad)")
+V = Argument("v", lambda t: (t.nv,), "velocity: of B (m/s, world), omega (rad/s, body), joint rates (rad/s)")
+V_DOT = Argument("v_dot", lambda t: (t.nv,), "time derivative of v")
+TAU = Argument("tau", lambda t: (t.nt,), "joint torques (N m), conjugate to the joint angles")
+F_EXT = Argument(
+    "f_ext",
+    lambda t: (6 + 3 * (t.total + 1),),
+    "force at B (N, world), moment (N m, body), then a force (N, world) at each of the N + 1 tail points",
+)
+INERTIAL = tuple(p.name for p in PARAMETERS if p.name != "link_radius")  # what the equations of motion read
+GENERALISED = "generalised force: on p_dot (N, world), on omega (N m, body), on the joint rates (N m)"
+
+
+@dataclass(frozen=True)
+class Function:
+    """A function that a scene can ask for: name, arguments, and how to assemble it."""
+
+    name: str
+    doc: str
+    inputs: tuple[Argument, ...]
+    outputs: tuple[Argument, ...]
+    assemble: Callable[[Draft, dict[str, Array]], None]
+
+
+def program(function: Function, tail: Tail) -> Program:
+    """Assemble one function for given sizes."""
+    draft = Draft(function.name, function.doc, tail=tail)
+    for parameter in PARAMETERS:
+        if parameter.name in INERTIAL:
+            draft.known[parameter.name] = draft.array(parameter.name, parameter.size, role="parameters")[0]
+    arrays = {a.name: draft.array(a.name, a.length(tail), role="input") for a in function.inputs}
+    arrays |= {a.name: draft.array(a.name, a.length(tail), role="output") for a in function.outputs}
+    if "q" in arrays:
+        draft.known |= {"p": arrays["q"].part(0, 3), "quaternion": arrays["q"].part(3, 4)}
+    if "v" in arrays:
+        draft.known |= {"p_dot": arrays["v"].part(0, 3), "omega": arrays["v"].part(3, 3)}
+    function.assemble(draft, arrays)
+    return draft.finish()
+
+
+def assemble_mass_matrix(d: Draft, arrays: dict[str, Array], world: bool = False) -> None:
+    """H, both triangles."""
+    H, nv, tail = arrays["H"], d.tail.nv, d.tail
+    d.store(kin.quaternion_rotation, R=9)
+
+    def H_tail(k, other, size=1):
+        return H.part((6 + k) * nv + 6 + other, size)
+
+    columns = sweeps.tail_inertia(d, arrays["q"], H_tail, world)
+    if world:
+        composite = {name: d.known[name] for name in ("h", "I")}
+        d.step(dyn.world_composite, **composite)
+        d.known["R"] = d.constant("identity", sweeps.IDENTITY)[0]
+    d.step(dyn.mass_matrix_base, **{f"H_{r}": H.part(r * nv, 6) for r in range(6)})
+    with d.loop("k", tail.nt) as k:
+        row, column = H.part((6 + k) * nv, 6), H.part(6 + k, 6, stride=nv)
+        d.step(dyn.mass_matrix_column, {"column": column_of(columns, k)}, H_row=row, H_column=column)
+        with d.loop("l", k) as other:
+            d.copy(H.part((6 + other) * nv + 6 + k, 1), H_tail(k, other))
+
+
+def assemble_inverse_dynamics(d: Draft, arrays: dict[str, Array], world: bool = False) -> None:
+    """H v_dot + C by Newton and Euler; without ``v_dot`` among the arguments it is C."""
+    force, v_dot = arrays["force"], arrays.get("v_dot")
+    still = d.constant("still", [0, 0, 0])[0]
+    d.store(kin.quaternion_rotation, R=9)
+    sweeps.prepare_links(d)
+    sweeps.prepare_joints(d, arrays["q"])
+    d.known |= {"w": d.known["omega"], "w_dot": v_dot.part(3, 3) if v_dot else still}
+    d.known["p_ddot"] = v_dot.part(0, 3) if v_dot else still
+    d.store(kin.torso_acceleration, a=3)
+    wrench = sweeps.forward_wrenches(d, arrays["v"], v_dot)
+    sweeps.gather_wrenches(d, wrench, lambda i: force.part(6 + 2 * i, 2))
+    d.step(dyn.torso_wrench, force=force.part(0, 3), moment=force.part(3, 3))
+    d.step(dyn.world_vector, {"vector": force.part(0, 3)}, vector=force.part(0, 3))
+    if world:
+        d.step(dyn.world_vector, {"vector": force.part(3, 3)}, vector=force.part(3, 3))
+
+
+def assemble_forward_dynamics(d: Draft, arrays: dict[str, Array]) -> None:
+    """v_dot from H v_dot + C = [0; tau] + J^T f: translation eliminated, then LDL^T for omega_dot and q_t_ddot."""
+    tail, v_dot = d.tail, arrays["v_dot"]
+    size = 3 + tail.nt
+    A = d.array("A", size * size)
+
+    def A_tail(k, other, entries=1):
+        return A.part((3 + k) * size + 3 + other, entries)
+
+    d.store(kin.quaternion_rotation, R=9)
+    columns = sweeps.tail_inertia(d, arrays["q"], A_tail)
+    inertial = sweeps.core_bias(d, arrays["v"])
+    torques = applied_load(d, arrays)
+    d.vector("inverse_mass", 1)
+    d.vector("com", 3)
+    rows = {f"A_{r}": A.part(r * size, r + 1) for r in range(3)}
+    d.step(dyn.without_translation, inverse_mass=d.known["inverse_mass"], com=d.known["com"], **rows)
+    d.vector("net", 3)
+    d.step(dyn.rotational_load, net=d.known["net"], rhs=v_dot.part(3, 3))
+    with d.loop("k", tail.nt) as k:
+        column = column_of(columns, k)
+        d.step(dyn.column_without_translation, {"column": column}, A_row=A.part((3 + k) * size, 3))
+        with d.loop("l", k + 1) as other:
+            reads = {"column": column, "other": column_of(columns, other)}
+            d.step(dyn.pair_without_translation, reads, A_entry_=A_tail(k, other))
+        loads = {"column": column, "inertial": inertial.part(k, 1), "tau": torques.part(k, 1)}
+        d.step(dyn.tail_load, loads, rhs=v_dot.part(6 + k, 1))
+    d.solve(A, v_dot.part(3, size))
+    recover_translation(d, columns, v_dot)
+
+
+def recover_translation(d: Draft, columns: Array, v_dot: Array) -> None:
+    """p_b_ddot from the momentum balance, once omega_dot and q_t_ddot are known."""
+    tail_force = d.vector("tail_force", 3)[0]
+    d.fill(tail_force, 0)
+    with d.loop("k", d.tail.nt) as k:
+        reads = {"column": column_of(columns, k), "acceleration": v_dot.part(6 + k, 1)}
+        d.step(dyn.column_acceleration, reads, tail_force_=tail_force)
+    d.step(dyn.base_acceleration, {"w_dot": v_dot.part(3, 3)}, p_ddot=v_dot.part(0, 3))
+
+
+def applied_load(d: Draft, arrays: dict[str, Array]) -> Array:
+    """Loads from outside, at B in torso axes; returns the torques of actuators and loads together."""
+    if "f_ext" not in arrays:
+        d.known["load_force"] = d.known["load_moment"] = d.constant("unloaded", [0, 0, 0])[0]
+        return arrays["tau"]
+    torques = d.array("applied", d.tail.nt)
+    with d.loop("k", d.tail.nt) as k:
+        d.copy(torques.part(k, 1), arrays["tau"].part(k, 1))
+    sweeps.gather_loads(d, arrays["f_ext"], torques)
+    return torques
+
+
+def assemble_momentum(d: Draft, arrays: dict[str, Array]) -> None:
+    """Momentum, and angular momentum about the COM; the sweep sees the motion relative to B."""
+    still = d.constant("still", [0, 0, 0])[0]
+    d.store(kin.quaternion_rotation, R=9)
+    sweeps.gather_momentum(d, arrays, still)
+    d.step(dyn.momentum_at_com, linear=arrays["linear"][0], angular=arrays["angular"][0])
+
+
+def assemble_energy(d: Draft, arrays: dict[str, Array]) -> None:
+    """Kinetic energy link by link, potential energy of the COM's height."""
+    d.store(kin.quaternion_rotation, R=9)
+    sweeps.gather_momentum(d, arrays, d.known["p_dot"], kinetic=arrays["kinetic"][0])
+    d.step(dyn.potential_energy, potential=arrays["potential"][0])
+
+
+def assemble_tail_points(d: Draft, arrays: dict[str, Array]) -> None:
+    """The joints, then the tip."""
+    points = arrays["points"]
+    d.store(kin.quaternion_rotation, R=9)
+    sweeps.prepare_links(d)
+    sweeps.prepare_joints(d, arrays["q"])
+    R, P = d.vector("R_link", 9)[0], d.vector("P_link", 3)[0]
+    d.copy(R, d.known["R"])
+    d.step(kin.mount_position, P=P)
+    d.copy(points.part(0, 3), P)
+    with d.loop("i", d.tail.segments) as i, d.links(i) as j:
+        d.step(kin.link_pose, {"R": R, "P": P} | sweeps.at_segment(d, i), R=R, P=P)
+        d.copy(points.part(3 * (d.link_number(i, j) + 1), 3), P)
+
+
+def assemble_tail_point_jacobians(d: Draft, arrays: dict[str, Array]) -> None:
+    """d(point)/dt = J v for every tail point; arms start at B, so distance from the origin costs no accuracy."""
+    J, tail = arrays["J"], d.tail
+    d.store(kin.quaternion_rotation, R=9)
+    sweeps.prepare_links(d)
+    sweeps.prepare_joints(d, arrays["q"])
+    S = d.array("S", 12, tail.segments)
+    R, P = d.vector("R_link", 9)[0], d.vector("P_link", 3)[0]
+    here = {"R": R, "P": P}
+
+    def row(point: Index, axis: int, first: Index | int, size: int):
+        return J.part((3 * tail.nv) * point + axis * tail.nv + first, size)
+
+    def base_rows(point: Index):
+        d.fill(J.part((3 * tail.nv) * point, 3 * tail.nv), 0)
+        for axis in range(3):
+            d.fill(row(point, axis, axis, 1), 1)
+        rows = {f"J_{name}": row(point, axis, 3, 3) for axis, name in enumerate("xyz")}
+        d.step(kin.point_jacobian_base, {"arm": P}, **rows)
+
+    d.copy(R, d.known["R"])
+    d.step(kin.mount_position, {"p": d.constant("origin", [0, 0, 0])[0]}, P=P)
+    base_rows(Index())
+    with d.loop("i", tail.segments) as i:
+        d.fill(S[i], 0)
+        with d.links(i) as j:
+            point = d.link_number(i, j) + 1
+            d.step(kin.joint_twist, here | sweeps.at_segment(d, i), S_=S[i])
+            d.step(kin.link_pose, here | sweeps.at_segment(d, i), **here)
+            base_rows(point)
+            with d.loop("l", i + 1) as segment:
+                rows = {f"J_{name}": row(point, axis, 6 + 2 * segment, 2) for axis, name in enumerate("xyz")}
+                d.step(kin.point_jacobian_tail, {"S": S[segment], "arm": P}, **rows)
+
+
+FORCE = Argument("force", lambda t: (t.nv,), GENERALISED)
+H = Argument("H", lambda t: (t.nv, t.nv), "inertia matrix, symmetric positive definite (kg, kg m, kg m^2)")
+POINTS = Argument("points", lambda t: (t.total + 1, 3), "joint positions, then the tip (m, world)")
+JACOBIANS = Argument("J", lambda t: (t.total + 1, 3, t.nv), "d(point)/dt = J v")
+KINETIC = Argument("kinetic", lambda t: (1,), "kinetic energy (J)")
+POTENTIAL = Argument("potential", lambda t: (1,), "potential energy, zero at the height of the world's origin (J)")
+LINEAR = Argument("linear", lambda t: (3,), "momentum (kg m/s, world)")
+ANGULAR = Argument("angular", lambda t: (3,), "angular momentum about the centre of mass (kg m^2/s, world)")
+
+_TABLE = (
+    Function("mass_matrix", "H(q) of Eq. 2", (Q,), (H,), assemble_mass_matrix),
+    Function("bias_force", "C(q, v) of Eq. 3, gravity included", (Q, V), (FORCE,), assemble_inverse_dynamics),
+    Function("inverse_dynamics", "H v_dot + C", (Q, V, V_DOT), (FORCE,), assemble_inverse_dynamics),
+    Function("forward_dynamics", "v_dot from Eq. 1", (Q, V, TAU), (V_DOT,), assemble_forward_dynamics),
+    Function(
+        "forward_dynamics_external",
+        "v_dot from Eq. 1, loads applied",
+        (Q, V, TAU, F_EXT),
+        (V_DOT,),
+        assemble_forward_dynamics,
+    ),
+    Function("energy", "kinetic and potential energy", (Q, V), (KINETIC, POTENTIAL), assemble_energy),
+    Function("momentum", "linear and angular momentum", (Q, V), (LINEAR, ANGULAR), assemble_momentum),
+    Function("tail_points", "Eqs. 13 to 15", (Q,), (POINTS,), assemble_tail_points),
+    Function("tail_point_jacobians", "Eqs. A5 to A8", (Q,), (JACOBIANS,), assemble_tail_point_jacobians),
+    Function(
+        "mass_matrix_world",
+        "H for (p_dot, omega in world axes, q_t_dot)",
+        (Q,),
+        (H,),
+        partial(assemble_mass_matrix, world=True),
+    ),
+    Function(
+        "bias_force_world",
+        "C for (p_dot, omega in world axes, q_t_dot)",
+        (Q, V),
+        (FORCE,),
+        partial(assemble_inverse_dynamics, world=True),
+    ),
+)
+FUNCTIONS = {function.name: function for function in _TABLE}

@@ -1,0 +1,114 @@
+"""From SymPy to the tape: a function of SymPy vectors goes in, a straight-line step comes out."""
+
+import inspect
+from functools import cache
+
+import sympy
+
+from .tape import Step, Tape, compacted
+
+# scalars of every named quantity; all others are 3-vectors
+SIZES = {
+    **dict.fromkeys(["gravity", "torso_mass", "tail_mass", "tail_length", "share", "mass", "inverse_mass"], 1),
+    **dict.fromkeys(["inertial", "tau", "acceleration"], 1),
+    **dict.fromkeys(["angles", "rates", "accelerations"], 2),
+    **dict.fromkeys(["quaternion", "joint"], 4),
+    **dict.fromkeys(["link", "I", "F", "F_next", "F_beyond", "pitch", "yaw", "column", "other", "f_torso"], 6),
+    **{"twice": 8, "R": 9, "S": 12, "columns": 12},
+}
+
+
+class Recorder:
+    """Lowers SymPy expressions to one tape; its ``let`` names intermediate results by fresh symbols."""
+
+    def __init__(self):
+        self.tape = Tape()
+        self.node_of: dict[sympy.Basic, int] = {}
+        self.count = 0
+
+    def symbol(self, name: str, node: int) -> sympy.Symbol:
+        """Return a fresh symbol that stands for a node."""
+        self.count += 1
+        symbol = sympy.Symbol(f"{name}_{self.count:04d}")
+        self.node_of[symbol] = node
+        return symbol
+
+    def vector(self, name: str, first: int, size: int) -> sympy.Matrix:
+        """Return fresh symbols for input scalars ``first`` to ``first + size``."""
+        return sympy.Matrix([self.symbol(name, self.tape.input(first + k)) for k in range(size)])
+
+    def let(self, name: str, value):
+        """Lower an expression or matrix now and return symbols of the same shape for it."""
+        if isinstance(value, sympy.MatrixBase):
+            return sympy.Matrix(value.rows, value.cols, [self.let(name, entry) for entry in value])
+        value = sympy.sympify(value)
+        return value if value.is_Atom else self.symbol(name, self.lower(value))
+
+    def lower(self, e: sympy.Basic) -> int:
+        """Return the node of an expression."""
+        if e not in self.node_of:
+            self.node_of[e] = self._lower(e)
+        return self.node_of[e]
+
+    def _lower(self, e: sympy.Basic) -> int:
+        if e.is_Number:
+            return self.tape.const(exact(e))
+        if e.is_Add:
+            return self._chain(self.tape.add, e.args)
+        if e.is_Mul:
+            return self._product(e)
+        if e.is_Pow:
+            return self._power(e.base, e.exp)
+        if isinstance(e, sympy.sin | sympy.cos):
+            return getattr(self.tape, type(e).__name__)(self.lower(e.args[0]))
+        raise TypeError(f"no rule lowers {type(e).__name__}: {e}")
+
+    def _chain(self, operation, terms) -> int:
+        total = self.lower(terms[0])
+        for term in terms[1:]:
+            total = operation(total, self.lower(term))
+        return total
+
+    def _product(self, e: sympy.Mul) -> int:
+        above, below = e.as_numer_denom() if e.args[0].is_Rational else sympy.fraction(e)
+        if below == 1:
+            return self._chain(self.tape.mul, e.args)
+        return self.tape.div(self.lower(above), self.lower(below))
+
+    def _power(self, base: sympy.Basic, exponent: sympy.Basic) -> int:
+        if exponent == sympy.Rational(1, 2):
+            return self.tape.sqrt(self.lower(base))
+        if not exponent.is_Integer:
+            raise TypeError(f"no rule lowers the exponent {exponent}")
+        product = self._chain(self.tape.mul, [base] * abs(int(exponent)))
+        return product if exponent > 0 else self.tape.div(self.tape.const(1), product)
+
+
+def exact(number: sympy.Number):
+    """Return an exact Python number."""
+    if number.is_Integer:
+        return int(number)
+    return sympy_fraction(number) if number.is_Rational else float(number)
+
+
+def sympy_fraction(number: sympy.Rational):
+    """Return a SymPy rational as a fraction."""
+    from fractions import Fraction
+
+    return Fraction(int(number.p), int(number.q))
+
+
+@cache
+def derive(function) -> Step:
+    """Derive a step: call ``function(let, *vectors)`` with SymPy vectors named by its arguments, lower its result."""
+    recorder, first, vectors, inputs = Recorder(), 0, [], []
+    for name in list(inspect.signature(function).parameters)[1:]:
+        size = SIZES.get(name, 3)
+        vectors.append(recorder.vector(name, first, size))
+        inputs.append((name, size))
+        first += size
+    outputs = {name: list(value) for name, value in function(recorder.let, *vectors).items()}
+    results = tuple(recorder.lower(sympy.sympify(e)) for values in outputs.values() for e in values)
+    sizes = tuple((name, len(values)) for name, values in outputs.items())
+    doc = inspect.getdoc(function).splitlines()[0]
+    return compacted(Step(function.__name__, doc, tuple(inputs), sizes, tuple(recorder.tape.nodes), results))

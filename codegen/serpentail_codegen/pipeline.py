@@ -1,0 +1,31 @@
+"""The stages in order: a scene goes in, its generated folder comes out."""
+
+from pathlib import Path
+
+from . import __version__
+from .functions import FUNCTIONS
+from .scene import Scene
+from .sweeps import Tail
+from .targets.c import c_context, c_files, emit
+from .targets.casadi import casadi_module
+from .targets.manifest import manifest
+from .write import digest, write_folder
+
+
+def generate(scene: Scene, output: Path) -> list[str]:
+    """Derive, lower, emit and write what the scene asks for into ``output/<scene>``; return the changed files."""
+    tail = Tail(scene.segments, scene.links)
+    wanted = [FUNCTIONS[name] for name in needed(scene.functions)]
+    emitted = [emit(scene, tail, function) for function in wanted]
+    context = c_context(scene, tail, emitted, __version__)
+    context["content_hash"] = digest("".join(c_files(scene, context).values()))[:16]
+    files = c_files(scene, context)
+    module = casadi_module(scene, tail, wanted, __version__, context["content_hash"])
+    files[f"{scene.name}_casadi.py"] = module
+    return write_folder(output / scene.name, files, manifest(scene, context, emitted))
+
+
+def needed(names: tuple[str, ...]) -> list[str]:
+    """Return the functions to derive: those asked for, and forward dynamics where a rollout calls it."""
+    names = (*names, "forward_dynamics") if "rollout" in names else names
+    return [name for name in FUNCTIONS if name in names]

@@ -1,0 +1,228 @@
+"""Loop nests over steps: the order in which steps are applied to flat arrays, for one emitted function."""
+
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from functools import cache
+
+from .tape import Number, Step, compacted
+
+
+@dataclass(frozen=True)
+class Index:
+    """An affine index: offset + sum of coefficient * loop variable."""
+
+    terms: tuple[tuple[str, int], ...] = ()
+    offset: int = 0
+
+    def __add__(self, other: "Index | int") -> "Index":
+        other = as_index(other)
+        total = dict(self.terms)
+        for name, factor in other.terms:
+            total[name] = total.get(name, 0) + factor
+        return Index(tuple((k, c) for k, c in total.items() if c), self.offset + other.offset)
+
+    __radd__ = __add__
+
+    def __mul__(self, factor: int) -> "Index":
+        return Index(tuple((k, c * factor) for k, c in self.terms), self.offset * factor)
+
+    __rmul__ = __mul__
+
+    def at(self, values: dict[str, int]) -> int:
+        """Return the value under given loop variables."""
+        return self.offset + sum(factor * values[name] for name, factor in self.terms)
+
+
+def as_index(value: Index | int) -> Index:
+    """Return an index from an index or an integer."""
+    return value if isinstance(value, Index) else Index((), value)
+
+
+@dataclass(frozen=True)
+class Array:
+    """A flat array of ``count`` vectors of ``size`` scalars.
+
+    role: ``input`` and ``output`` are the function's arguments, ``parameters`` the parameter struct, ``constant`` has
+    values known at generation, ``local`` lives during one call.
+    """
+
+    name: str
+    role: str
+    size: int
+    count: int = 1
+    values: tuple[Number, ...] = ()
+
+    def __getitem__(self, index: Index | int) -> "Ref":
+        return Ref(self, as_index(index) * self.size, self.size)
+
+    def part(self, offset: Index | int, size: int, stride: int = 1) -> "Ref":
+        """Return ``size`` scalars from a scalar offset on."""
+        return Ref(self, as_index(offset), size, stride)
+
+    @property
+    def length(self) -> int:
+        """Number of scalars."""
+        return self.size * self.count
+
+
+@dataclass(frozen=True)
+class Ref:
+    """``size`` scalars of an array from an offset on, ``stride`` apart."""
+
+    array: Array
+    offset: Index
+    size: int
+    stride: int = 1
+
+
+@dataclass(frozen=True)
+class Apply:
+    """Apply a step: read vectors, then write its outputs; ``adds`` are the outputs that are added, not stored."""
+
+    step: Step
+    reads: tuple[Ref, ...]
+    writes: tuple[Ref, ...]
+    adds: tuple[bool, ...]
+
+
+@dataclass(frozen=True)
+class Fill:
+    """Store constants."""
+
+    target: Ref
+    values: tuple[Number, ...]
+
+
+@dataclass(frozen=True)
+class Copy:
+    """Copy scalars."""
+
+    target: Ref
+    source: Ref
+
+
+@dataclass(frozen=True)
+class Loop:
+    """Run the body for ``var`` in [start, stop), upward or downward; ``start`` and ``stop`` are affine."""
+
+    var: str
+    start: Index
+    stop: Index
+    downward: bool
+    body: tuple
+
+
+@dataclass(frozen=True)
+class Solve:
+    """Solve A x = x in place by LDL^T; A symmetric positive definite, its lower triangle row-major, overwritten."""
+
+    matrix: Array
+    x: Ref
+
+
+@dataclass(frozen=True)
+class Program:
+    """One function: its arrays and its loop nest."""
+
+    name: str
+    doc: str
+    arrays: tuple[Array, ...]
+    body: tuple
+
+    def of_role(self, role: str) -> tuple[Array, ...]:
+        """Return the arrays of a role, in the order in which they were declared."""
+        return tuple(a for a in self.arrays if a.role == role)
+
+
+@dataclass
+class Builder:
+    """Records a program: declare arrays, open loops, apply steps."""
+
+    name: str
+    doc: str
+    arrays: list[Array] = field(default_factory=list)
+    _bodies: list[list] = field(default_factory=lambda: [[]])
+
+    def array(self, name: str, size: int, count: int = 1, role: str = "local", values=()) -> Array:
+        """Declare an array; local names are unique within a program."""
+        if any(a.name == name for a in self.arrays):
+            raise ValueError(f"array {name} is declared twice in {self.name}")
+        self.arrays.append(Array(name, role, size, count, tuple(values)))
+        return self.arrays[-1]
+
+    def constant(self, name: str, values) -> Array:
+        """Declare an array whose values are known at generation."""
+        return self.array(name, len(values), role="constant", values=values)
+
+    def emit(self, statement) -> None:
+        """Append a statement to the innermost open loop."""
+        self._bodies[-1].append(statement)
+
+    def apply(self, step: Step, reads: dict[str, Ref], **writes: Ref) -> None:
+        """Apply a step to named vectors; outputs not named are dropped, a trailing ``_`` adds instead of storing."""
+        step = narrowed(step, {name.rstrip("_") for name in writes})
+        inputs = tuple(reads[name] for name, _ in step.inputs)
+        targets = tuple(writes.get(name, writes.get(name + "_")) for name, _ in step.outputs)
+        for (name, size), ref in zip(step.inputs + step.outputs, inputs + targets, strict=True):
+            if ref.size != size:
+                raise ValueError(f"{step.name} in {self.name}: {name} has {size} scalars, not {ref.size}")
+        self.emit(Apply(step, inputs, targets, tuple(name + "_" in writes for name, _ in step.outputs)))
+
+    def fill(self, target: Ref, *values: Number) -> None:
+        """Store constants; one value is repeated."""
+        self.emit(Fill(target, values * target.size if len(values) == 1 else values))
+
+    def copy(self, target: Ref, source: Ref) -> None:
+        """Copy scalars."""
+        if target.size != source.size:
+            raise ValueError(
+                f"{self.name}: {source.size} scalars of {source.array.name} do not fit {target.array.name}"
+            )
+        self.emit(Copy(target, source))
+
+    def solve(self, matrix: Array, x: Ref) -> None:
+        """Solve in place."""
+        self.emit(Solve(matrix, x))
+
+    @contextmanager
+    def loop(self, var: str, count: Index | int, downward: bool = False, start: Index | int = 0):
+        """Open a loop; yields its variable as an index."""
+        self._bodies.append([])
+        yield Index(((var, 1),))
+        body = tuple(self._bodies.pop())
+        if as_index(start) != as_index(count) and body:
+            self.emit(Loop(var, as_index(start), as_index(count), downward, body))
+
+    def finish(self) -> Program:
+        """Return the recorded program."""
+        return Program(self.name, self.doc, tuple(self.arrays), tuple(self._bodies[0]))
+
+
+@cache
+def _narrowed(step: Step, wanted: frozenset[str]) -> Step:
+    outputs, results, first = [], [], 0
+    for name, size in step.outputs:
+        if name in wanted:
+            outputs.append((name, size))
+            results += step.results[first : first + size]
+        first += size
+    name = step.name if len(outputs) == len(step.outputs) else "_".join([step.name, *(n for n, _ in outputs)])
+    return compacted(replace(step, name=name, outputs=tuple(outputs), results=tuple(results)))
+
+
+def narrowed(step: Step, wanted: set[str]) -> Step:
+    """Return the step with only the wanted outputs and what they need."""
+    unknown = wanted - {name for name, _ in step.outputs}
+    if unknown:
+        raise ValueError(f"{step.name} has no output {sorted(unknown)}")
+    return _narrowed(step, frozenset(wanted))
+
+
+def statements(body):
+    """Yield every statement of a loop nest with the loops around it, outermost first."""
+    for statement in body:
+        if isinstance(statement, Loop):
+            for inner, loops in statements(statement.body):
+                yield inner, (statement, *loops)
+        else:
+            yield statement, ()

@@ -1,0 +1,338 @@
+"""A scene file or table goes in (what to model, with which numbers); a frozen, checked Scene comes out."""
+
+import math
+import re
+import sys
+import tomllib
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+# fmt: off
+KINDS = ("articulated",)
+FUNCTIONS = (
+    "mass_matrix", "bias_force", "inverse_dynamics", "forward_dynamics", "forward_dynamics_external",
+    "energy", "momentum", "tail_points", "tail_point_jacobians",
+    "mass_matrix_world", "bias_force_world", "rollout",
+)
+# Names used elsewhere for the same things: suggested, never accepted.
+ALIASES = {"crba": "mass_matrix", "nle": "bias_force", "rnea": "inverse_dynamics", "aba": "forward_dynamics",
+           "m": "segments", "n": "links", "tail": "kind"}
+# fmt: on
+MOST_LINKS = 100_000  # segments * links: beyond it a slip, not a tail
+
+Value = float | tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Rule:
+    """What a value must fulfil: in words that complete "needs ...", and as a test."""
+
+    text: str
+    holds: Callable[[Any], bool]
+
+
+def _one_of(names: Sequence[str], remark: str = "") -> Rule:
+    """Return the rule that a value is one of these names."""
+    text = " or ".join(f'"{name}"' for name in names)
+    return Rule(text + remark, lambda x: isinstance(x, str) and x in names)
+
+
+def _is_whole(x: object) -> bool:
+    """Tell if x is an integer; true and false are none."""
+    return isinstance(x, int) and not isinstance(x, bool)
+
+
+ANY = Rule("", lambda _: True)
+FLAG = Rule("true or false, without quotes", lambda x: isinstance(x, bool))
+COUNT = Rule("a whole number, 1 or above", lambda x: _is_whole(x) and x >= 1)
+TEXT = Rule('a text, in "quotes"', lambda x: isinstance(x, str))
+NAME = Rule(
+    'a text of a-z, 0-9 and _ that starts with a letter: rename the file, or set name = "..." in it',
+    lambda x: isinstance(x, str) and re.fullmatch("[a-z][a-z0-9_]*", x) is not None,
+)
+# Rules for the numbers of a parameter; 1e-12 lets a flat body, with equal sums, pass in spite of rounding.
+POSITIVE = Rule(" above 0", lambda x: min(x) > 0)
+NOT_NEGATIVE = Rule(", 0 or above", lambda x: min(x) >= 0)
+BODY_INERTIA = Rule(
+    " above 0, none above the sum of the other two",
+    lambda x: min(x) > 0 and 2 * max(x) <= sum(x) * (1 + 1e-12),
+)
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One physical parameter: `size` numbers in `unit`; a default of None is computed from the others."""
+
+    name: str
+    size: int
+    default: Value | None
+    unit: str
+    check: Rule
+    meaning: str
+
+
+# The defaults are the kangaroo rat of the paper's Table 1. B is the torso frame, at the torso COM.
+# fmt: off
+PARAMETERS = (
+    Parameter("gravity", 1, 9.8, "m/s^2", NOT_NEGATIVE, "gravitational acceleration, along -z of the world"),
+    Parameter("torso_mass", 1, 0.10572, "kg", POSITIVE, "mass of the torso"),
+    Parameter("torso_inertia", 3, (6.722e-05, 3.639e-05, 7.279e-05), "kg m^2", BODY_INERTIA,
+              "principal moments of inertia of the torso about its COM, axes of B"),
+    Parameter("tail_mount", 3, (0.0, -0.0405, 0.0045), "m", ANY, "root of the tail from the torso COM, in B"),
+    Parameter("tail_mass", 1, 0.00351, "kg", POSITIVE, "mass of the whole tail"),
+    Parameter("tail_length", 1, 0.19466, "m", POSITIVE, "length of the whole tail"),
+    Parameter("link_radius", 1, 0.0029, "m", NOT_NEGATIVE, "radius of the ellipsoid that gives link_inertia"),
+    Parameter("link_inertia", 3, None, "kg m^2", NOT_NEGATIVE,
+              "principal moments of inertia of one link about its COM, y along the link"),
+)
+# fmt: on
+
+
+@dataclass(frozen=True, eq=False)
+class Parameters(Mapping[str, Value]):
+    """Resolved parameters by name, in PARAMETERS' order; no link_radius where link_inertia was given."""
+
+    entries: tuple[tuple[str, Value], ...]
+
+    def __getitem__(self, name: str) -> Value:
+        return dict(self.entries)[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(dict(self.entries))
+
+    def __len__(self) -> int:
+        return len(self.entries)
+
+    def __hash__(self) -> int:
+        return hash(frozenset(self.entries))
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What to generate: a tail of `segments` x `links`, its parameters, the functions, and in which form."""
+
+    name: str  # prefix of every C symbol and generated file
+    kind: str
+    segments: int  # m
+    links: int  # n, in each segment
+    functions: tuple[str, ...]  # in the order of FUNCTIONS
+    parameters: Parameters
+    coordinates: str = "joint"  # what q_t holds: the joint angles alpha_i, beta_i
+    baked: bool = False  # parameters folded into the code, behind the same ABI
+    real: str = "double"
+    emission: str = "auto"
+
+
+# The keys of a scene file: default (None: required) and rule; ANY where a function of its own checks.
+KEYS: dict[str, tuple[Any, Rule]] = {
+    "name": (None, NAME),
+    "description": ("", TEXT),
+    "kind": (None, _one_of(KINDS)),
+    "segments": (None, COUNT),
+    "links": (None, COUNT),
+    "functions": (FUNCTIONS, ANY),
+    "parameters": ({}, ANY),
+    "coordinates": (Scene.coordinates, _one_of(["joint"], "; polar angles are singular at theta = 0")),
+    "baked": (Scene.baked, FLAG),
+    "real": (Scene.real, _one_of(["double", "float"])),
+    "emission": (Scene.emission, _one_of(["auto", "straight", "loops"])),
+}
+NAMES = tuple(parameter.name for parameter in PARAMETERS)
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One thing that is wrong with a scene: where, the value found (None: nothing), and what to do."""
+
+    field: str
+    value: object
+    remedy: str
+
+    def __str__(self) -> str:
+        return f"{_one_line(self.field)}: {_show(self.value)}: {self.remedy}"
+
+
+class SceneError(ValueError):
+    """A scene that cannot be used; `problems` has all that is wrong with it, str() one line for each."""
+
+    def __init__(self, problems: Iterable[Problem]) -> None:
+        self.problems = tuple(problems)
+        super().__init__(self.problems)
+
+    def __str__(self) -> str:
+        return "\n".join(map(str, self.problems))
+
+
+def load_scene(path: str | Path) -> Scene:
+    """Read a scene file, named by its stem unless it has a `name`; raises SceneError."""
+    path = Path(path)
+    try:
+        table = tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+    except OSError as error:
+        remedy = f"{error.strerror}; give the path of a scene file (.toml)"
+    except UnicodeDecodeError as error:
+        remedy = f"not UTF-8 from byte {error.start} on; save it as UTF-8 text"
+    except (ValueError, RecursionError) as error:  # all that the TOML parser raises, or a NUL in the path
+        remedy = f"cannot be read as TOML: {error}"
+    else:
+        return parse_scene(table, path.stem)
+    raise SceneError([Problem("scene file", str(path), remedy)])
+
+
+def scene_for(tail: str, segments: int, links: int, **overrides: object) -> Scene:
+    """Return the scene of `make model TAIL= M= N=`, with more keys of a scene file; raises SceneError."""
+    table = {"kind": tail, "segments": segments, "links": links, **overrides}
+    return parse_scene(table, re.sub("[^a-z0-9_]", "_", f"{tail}_m{segments}_n{links}".lower()))
+
+
+def parse_scene(table: Mapping[str, Any], name: str) -> Scene:
+    """Return the Scene of a scene file's table, called `name` unless it has a name; raises SceneError."""
+    values = {key: default for key, (default, _) in KEYS.items()} | {"name": name} | dict(table)
+    problems = _unknown_keys(table, "", KEYS) + _key_problems(values)
+    problems += _function_problems(values["functions"])
+    try:
+        values["parameters"] = resolve_parameters(values["parameters"], min(_tail_links(values), MOST_LINKS))
+    except SceneError as error:
+        problems += error.problems
+    if problems:
+        raise SceneError(problems)
+    values["functions"] = tuple(function for function in FUNCTIONS if function in values["functions"])
+    return Scene(**{field.name: values[field.name] for field in fields(Scene)})
+
+
+def resolve_parameters(given: Mapping[str, Any], tail_links: int) -> Parameters:
+    """Check the given parameters and fill in the others, for N = m n links; raises SceneError."""
+    if not isinstance(given, Mapping):
+        raise SceneError([Problem("parameters", given, "needs to be a table, under a line [parameters]")])
+    unused = "link_radius" if "link_inertia" in given else "link_inertia"
+    values = {p.name: p.default for p in PARAMETERS if p.name != unused} | dict(given)
+    problems = _unknown_keys(given, "parameters.", NAMES)
+    if "link_inertia" in given and "link_radius" in given:
+        remedy = "given together with link_radius, which it overrides; remove one of the two"
+        problems.append(Problem("parameters.link_inertia", given["link_inertia"], remedy))
+    wrong = [p for p in PARAMETERS if p.name in given and not _fits(p, given[p.name])]
+    problems += [_number_problem(p, given[p.name]) for p in wrong]
+    if problems:
+        raise SceneError(problems)
+    resolved = {name: _floats(value) for name, value in values.items()}
+    if unused == "link_inertia":
+        resolved["link_inertia"] = _ellipsoid_inertia(resolved, tail_links)
+    return Parameters(tuple((name, resolved[name]) for name in NAMES if name in resolved))
+
+
+def scene_to_dict(scene: Scene) -> dict[str, Any]:
+    """Return the table that parse_scene turns into this scene again: ordered, JSON-ready, floats exact."""
+    computed = "link_inertia" if "link_radius" in scene.parameters else ""
+    given = {name: value for name, value in scene.parameters.items() if name != computed}
+    table = {field.name: getattr(scene, field.name) for field in fields(Scene)}
+    table["functions"] = list(scene.functions)
+    table["parameters"] = {name: _plain(value) for name, value in given.items()}
+    return table
+
+
+def _ellipsoid_inertia(parameters: Mapping[str, Any], tail_links: int) -> tuple[float, ...]:
+    """I = m/5 [L^2/4 + r^2, 2 r^2, L^2/4 + r^2]: uniform ellipsoid of semi-axes (r, L/2, r), long in y."""
+    m, L = parameters["tail_mass"] / tail_links, parameters["tail_length"] / tail_links
+    r = parameters["link_radius"]
+    across, along = m / 5 * (L * L / 4 + r * r), m / 5 * (2 * r * r)
+    if not math.isfinite(across + along):
+        remedy = "computed from tail_mass, tail_length and link_radius, but not finite; use kg and m"
+        raise SceneError([Problem("parameters.link_inertia", [across, along, across], remedy)])
+    return (across, along, across)
+
+
+def _floats(value: Any) -> Value:
+    """Return checked numbers as floats; + 0.0 turns -0.0 into 0.0."""
+    return tuple(float(x) + 0.0 for x in value) if isinstance(value, list | tuple) else float(value) + 0.0
+
+
+def _plain(value: Value) -> float | list[float]:
+    """Return a value as TOML and JSON have it."""
+    return list(value) if isinstance(value, tuple) else value
+
+
+def _fits(parameter: Parameter, value: Any) -> bool:
+    """Tell if a value has the parameter's size, is made of finite numbers, and keeps the parameter's rule."""
+    if (parameter.size > 1) != isinstance(value, list | tuple):
+        return False
+    numbers = value if parameter.size > 1 else [value]
+    return len(numbers) == parameter.size and all(map(_is_finite, numbers)) and parameter.check.holds(numbers)
+
+
+def _is_finite(x: Any) -> bool:
+    """Tell if x is a number that a float can hold."""
+    return (_is_whole(x) or isinstance(x, float)) and abs(x) <= sys.float_info.max
+
+
+def _number_problem(parameter: Parameter, value: object) -> Problem:
+    """Say what the parameter needs: size, rule, unit and default."""
+    shape = "a finite number" if parameter.size == 1 else f"an array of {parameter.size} finite numbers"
+    default = "computed" if parameter.default is None else _plain(parameter.default)
+    remedy = f"needs {shape}{parameter.check.text}, in {parameter.unit} (default: {default})"
+    return Problem(f"parameters.{parameter.name}", value, remedy)
+
+
+def _key_problems(values: Mapping[str, Any]) -> list[Problem]:
+    """Return a problem for each key whose rule is broken, and for a tail of too many links."""
+    broken = [(key, rule) for key, (_, rule) in KEYS.items() if not rule.holds(values[key])]
+    problems = [Problem(key, values[key], f"needs {rule.text}") for key, rule in broken]
+    if _tail_links(values) > MOST_LINKS:
+        remedy = f"more than {MOST_LINKS} links in all; choose fewer segments or links"
+        problems.append(Problem("segments * links", _tail_links(values), remedy))
+    return problems
+
+
+def _tail_links(values: Mapping[str, Any]) -> int:
+    """N = m n, or 1 where m or n is wrong."""
+    m, n = values["segments"], values["links"]
+    return m * n if COUNT.holds(m) and COUNT.holds(n) else 1
+
+
+def _function_problems(wanted: Any) -> list[Problem]:
+    """Return a problem for each entry that is unknown or listed before, or one for what is no array."""
+    if not isinstance(wanted, list | tuple) or not wanted:
+        remedy = 'needs an array of names, such as ["mass_matrix"]; leave it out for all functions'
+        return [Problem("functions", wanted, remedy)]
+    problems = []
+    for i, name in enumerate(wanted):
+        if name not in FUNCTIONS:
+            problems.append(Problem(f"functions[{i}]", name, f"unknown; {_suggest(name, FUNCTIONS)}"))
+        elif name in wanted[:i]:
+            problems.append(Problem(f"functions[{i}]", name, "listed before; remove one of the two"))
+    return problems
+
+
+def _unknown_keys(table: Mapping[str, Any], prefix: str, known: Collection[str]) -> list[Problem]:
+    """Return a problem for each key that is not known, with its likely place or spelling."""
+    elsewhere, place = (KEYS, "above") if prefix else (NAMES, "below")
+    problems = []
+    for key in [key for key in table if key not in known]:
+        hint = f"belongs {place} the line [parameters]" if key in elsewhere else _suggest(key, known)
+        problems.append(Problem(f"{prefix}{key}", table[key], f"unknown here; {hint}"))
+    return problems
+
+
+def _suggest(word: object, known: Collection[str]) -> str:
+    """Return "did you mean ...?", or all that is known."""
+    text = word[:64].lower() if isinstance(word, str) else ""
+    near = [ALIASES[text]] if ALIASES.get(text) in known else get_close_matches(text, known, 1)
+    return f"did you mean '{near[0]}'?" if near else f"known: {', '.join(known)}"
+
+
+def _show(value: object) -> str:
+    """Return "value ..." as a reader of the file would write it."""
+    if value is None:
+        return "no value"
+    try:
+        return "value " + _one_line(repr(value).lower() if isinstance(value, bool) else repr(value))
+    except (ValueError, RecursionError):  # repr refuses integers of more than 4300 digits
+        return "value too long to show"
+
+
+def _one_line(text: str) -> str:
+    """Return the text on one line of at most 80 characters."""
+    line = text if text.isprintable() else repr(text)
+    return line if len(line) <= 80 else line[:77] + "..."

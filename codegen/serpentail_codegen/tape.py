@@ -1,0 +1,215 @@
+"""A hash-consed tape: scalar operations go in, each distinct one is stored once, in evaluation order."""
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+Number = int | float | Fraction
+UNARY = ("neg", "sin", "cos", "sqrt")
+BINARY = ("add", "sub", "mul", "div")
+
+
+class Tape:
+    """An append-only list of operations; a node is its position in the list.
+
+    The methods are an algebra on nodes: whatever computes with ``add, sub, mul, div, neg, sin, cos, sqrt`` and
+    ``const`` can be recorded here.  Rules: constants fold, 0 and 1 vanish, negation moves outward, operands of
+    commutative operations are ordered by node.  Nothing is re-associated or distributed, so rounding is kept.
+    """
+
+    def __init__(self):
+        self.nodes: list[tuple] = []
+        self._known: dict[tuple, int] = {}
+
+    def _node(self, *key) -> int:
+        found = self._known.get(key)
+        if found is None:
+            found = self._known[key] = len(self.nodes)
+            self.nodes.append(key)
+        return found
+
+    def input(self, index: int) -> int:
+        """Return the node of scalar input number ``index``."""
+        return self._node("input", index)
+
+    def const(self, value: Number) -> int:
+        """Return the node of an exact constant; integral values are stored as int, so 1 and 1.0 are one node."""
+        value = int(value) if value == int(value) else value
+        return self.neg(self._node("const", -value)) if value < 0 else self._node("const", value)
+
+    def value(self, node: int) -> Number | None:
+        """Return the constant that a node stands for, or None."""
+        op, *args = self.nodes[node]
+        if op == "neg" and self.nodes[args[0]][0] == "const":
+            return -self.nodes[args[0]][1]
+        return args[0] if op == "const" else None
+
+    def _negated(self, node: int) -> int | None:
+        op, *args = self.nodes[node]
+        return args[0] if op == "neg" else None
+
+    def neg(self, a: int) -> int:
+        """Return -a."""
+        op, *args = self.nodes[a]
+        if op == "neg" or (op == "const" and args[0] == 0):
+            return args[0] if op == "neg" else a
+        return self.sub(args[1], args[0]) if op == "sub" else self._node("neg", a)
+
+    def add(self, a: int, b: int) -> int:
+        """Return a + b."""
+        x, y = self.value(a), self.value(b)
+        if x is not None and y is not None:
+            return self.const(x + y)
+        if x == 0 or y == 0:
+            return b if x == 0 else a
+        minus_a, minus_b = self._negated(a), self._negated(b)
+        if minus_a is not None and minus_b is not None:
+            return self.neg(self.add(minus_a, minus_b))
+        if minus_a is not None or minus_b is not None:
+            return self.sub(a, minus_b) if minus_a is None else self.sub(b, minus_a)
+        return self._node("add", min(a, b), max(a, b))
+
+    def sub(self, a: int, b: int) -> int:
+        """Return a - b."""
+        x, y = self.value(a), self.value(b)
+        if x is not None and y is not None:
+            return self.const(x - y)
+        if a == b:
+            return self.const(0)
+        if x == 0 or y == 0:
+            return self.neg(b) if x == 0 else a
+        minus_a, minus_b = self._negated(a), self._negated(b)
+        if minus_b is not None:
+            return self.add(a, minus_b)
+        return self.neg(self.add(minus_a, b)) if minus_a is not None else self._node("sub", a, b)
+
+    def mul(self, a: int, b: int) -> int:
+        """Return a * b."""
+        x, y = self.value(a), self.value(b)
+        if x is not None and y is not None:
+            return self.const(x * y)
+        if x == 0 or y == 0:
+            return self.const(0)
+        if x == 1 or y == 1:
+            return b if x == 1 else a
+        minus_a, minus_b = self._negated(a), self._negated(b)
+        if minus_a is not None or minus_b is not None:
+            product = self.mul(a if minus_a is None else minus_a, b if minus_b is None else minus_b)
+            return product if minus_a is not None and minus_b is not None else self.neg(product)
+        return self._node("mul", min(a, b), max(a, b))
+
+    def div(self, a: int, b: int) -> int:
+        """Return a / b."""
+        x, y = self.value(a), self.value(b)
+        if y == 0:
+            raise ZeroDivisionError("the derivation divides by the constant zero")
+        if x is not None and y is not None:
+            return self.const(exact_quotient(x, y))
+        if x == 0 or y == 1:
+            return a
+        minus_a, minus_b = self._negated(a), self._negated(b)
+        if minus_a is not None or minus_b is not None:
+            quotient = self.div(a if minus_a is None else minus_a, b if minus_b is None else minus_b)
+            return quotient if minus_a is not None and minus_b is not None else self.neg(quotient)
+        return self._node("div", a, b)
+
+    def sin(self, a: int) -> int:
+        """Return sin(a); odd, so a sign moves outward."""
+        if self.value(a) == 0:
+            return a
+        minus = self._negated(a)
+        return self._node("sin", a) if minus is None else self.neg(self.sin(minus))
+
+    def cos(self, a: int) -> int:
+        """Return cos(a); even, so a sign vanishes."""
+        if self.value(a) == 0:
+            return self.const(1)
+        minus = self._negated(a)
+        return self._node("cos", a if minus is None else minus)
+
+    def sqrt(self, a: int) -> int:
+        """Return the square root of a."""
+        return a if self.value(a) in (0, 1) else self._node("sqrt", a)
+
+
+def exact_quotient(x: Number, y: Number) -> Number:
+    """Return x / y, exact where both are rational."""
+    return x / y if isinstance(x, float) or isinstance(y, float) else Fraction(x) / Fraction(y)
+
+
+@dataclass(frozen=True)
+class Step:
+    """A straight-line function: named vectors in, named vectors out.
+
+    ``nodes`` are operations of a tape whose inputs are the scalars of ``inputs`` in order; ``results`` are the nodes
+    of the scalars of ``outputs`` in order.
+    """
+
+    name: str
+    doc: str
+    inputs: tuple[tuple[str, int], ...]
+    outputs: tuple[tuple[str, int], ...]
+    nodes: tuple[tuple, ...]
+    results: tuple[int, ...]
+
+
+def replay(nodes, scalars, algebra) -> list:
+    """Evaluate nodes in an algebra (numbers, another tape, CasADi symbols) with the given input scalars."""
+    values = []
+    for op, *args in nodes:
+        if op == "input":
+            values.append(scalars[args[0]])
+        elif op == "const":
+            values.append(algebra.const(args[0]))
+        else:
+            values.append(getattr(algebra, op)(*(values[a] for a in args)))
+    return values
+
+
+def live_nodes(nodes, results) -> list[int]:
+    """Return the nodes that the results need, in order (dead-code elimination)."""
+    needed = set(results)
+    for node in range(len(nodes) - 1, -1, -1):
+        if node in needed and nodes[node][0] not in ("input", "const"):
+            needed.update(nodes[node][1:])
+    return sorted(needed)
+
+
+def compacted(step: Step) -> Step:
+    """Drop nodes and input vectors that no output needs."""
+    live = live_nodes(step.nodes, step.results)
+    used = {step.nodes[n][1] for n in live if step.nodes[n][0] == "input"}
+    inputs, slot, first = [], {}, 0
+    for name, size in step.inputs:
+        span = range(first, first + size)
+        if used.intersection(span):
+            slot |= {k: len(slot) + k - first for k in span}
+            inputs.append((name, size))
+        first += size
+    position = {node: k for k, node in enumerate(live)}
+    nodes = tuple(_moved(step.nodes[n], slot, position) for n in live)
+    results = tuple(position[r] for r in step.results)
+    return Step(step.name, step.doc, tuple(inputs), step.outputs, nodes, results)
+
+
+def _moved(node: tuple, slot: dict[int, int], position: dict[int, int]) -> tuple:
+    op, *args = node
+    if op == "const":
+        return node
+    return (op, slot[args[0]]) if op == "input" else (op, *(position[a] for a in args))
+
+
+def specialised(step: Step, name: str, **constants: tuple[Number, ...]) -> Step:
+    """Return the step with some input vectors held constant, folded and compacted."""
+    tape, scalars, first = Tape(), [], 0
+    for vector, size in step.inputs:
+        values = constants.get(vector)
+        scalars += [tape.input(first + k) if values is None else tape.const(values[k]) for k in range(size)]
+        first += size
+    nodes = replay(step.nodes, scalars, tape)
+    results = tuple(nodes[r] for r in step.results)
+    return compacted(Step(name, step.doc, step.inputs, step.outputs, tuple(tape.nodes), results))
+
+
+def operation_count(nodes, results) -> int:
+    """Return the number of arithmetic operations that the results need, negation not counted."""
+    return sum(nodes[node][0] in BINARY for node in live_nodes(nodes, results))

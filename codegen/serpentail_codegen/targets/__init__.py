@@ -1,0 +1,1 @@
+"""Output languages: programs go in, the text of one language comes out."""

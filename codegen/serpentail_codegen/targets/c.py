@@ -1,0 +1,180 @@
+"""The C target: a scene's programs go in, the text of every C file comes out."""
+
+import hashlib
+import json
+from dataclasses import dataclass
+
+from ..functions import INERTIAL, Argument, Function
+from ..functions import program as assemble
+from ..scene import PARAMETERS, Scene
+from ..sweeps import Tail
+from ..templating import render
+from .c_function import CFunction, dialect, in_loops, step_lines, straight_line
+
+STRAIGHT_UP_TO = 5000  # operations: beyond, the text leaves the instruction cache and compile time grows
+ROLLOUT_DOC = "fixed-step RK4"
+
+
+@dataclass(frozen=True)
+class Emitted:
+    """One emitted function: what it computes, its C body, and how it was emitted."""
+
+    function: Function
+    body: CFunction
+    emission: str
+
+
+def emit(scene: Scene, tail: Tail, function: Function) -> Emitted:
+    """Print one function in the form that the scene asks for; ``auto`` is straight while that is small."""
+    program = assemble(function, tail)
+    fixed = baked_values(scene)
+    if scene.emission != "loops":
+        body = straight_line(program, scene.real, fixed)
+        if scene.emission == "straight" or body.operations <= STRAIGHT_UP_TO:
+            return Emitted(function, body, "straight")
+    return Emitted(function, in_loops(program, scene.real, scene.name, fixed), "loops")
+
+
+def baked_values(scene: Scene) -> dict[str, list]:
+    """Return the parameters to fold into the code."""
+    return {name: values(scene, name) for name in INERTIAL} if scene.baked else {}
+
+
+def values(scene: Scene, name: str) -> list[float]:
+    """Return a parameter as a list of scalars."""
+    value = scene.parameters[name]
+    return list(value) if isinstance(value, tuple) else [value]
+
+
+class ArgumentView:
+    """An argument as the templates see it."""
+
+    def __init__(self, argument: Argument, tail: Tail, first: int = 0):
+        shape = argument.shape(tail)
+        self.name, self.meaning, self.first = argument.name, argument.meaning, first
+        self.length = argument.length(tail)
+        self.dims = "][".join(map(str, shape))
+        self.columns = shape[-1] if len(shape) > 1 else 1
+        self.rows = self.length // self.columns
+
+
+class FunctionView:
+    """A function as the templates see it: prototypes, call texts, lines."""
+
+    def __init__(self, emitted: Emitted, tail: Tail, prefix: str):
+        function, self.lines, self.work = emitted.function, emitted.body.lines, emitted.body.work
+        self.name, self.doc = function.name, function.doc
+        views, first = [], 0
+        for a in (*function.inputs, *function.outputs):
+            views.append(ArgumentView(a, tail, first))
+            first += views[-1].length
+        self.inputs, self.outputs = views[: len(function.inputs)], views[len(function.inputs) :]
+        self.scratch, self.casadi = first, f"{prefix}_casadi_{self.name}"
+        real = f"{prefix}_real"
+        arguments = [f"const {real} *{a.name}" for a in self.inputs] + [f"{real} *{a.name}" for a in self.outputs]
+        head = f"const {prefix}_parameters *parameters"
+        self.prototype = wrapped(f"int {prefix}_{self.name}(", [head, *arguments, f"{real} *work"])
+        self.names = ", ".join(a.name for a in views)
+        text = "\n".join(self.lines)
+        self.unused = [name for name, word in (("parameters", "parameters->"), ("work", "work +")) if word not in text]
+        self.unused += [a.name for a in self.inputs if f"{a.name}[" not in text and f"{a.name} +" not in text]
+
+
+def wrapped(head: str, arguments: list[str]) -> str:
+    """Print a prototype, its arguments on as many lines as 118 columns need."""
+    lines, indent = [head + arguments[0]], " " * len(head)
+    for argument in arguments[1:]:
+        if len(lines[-1]) + len(argument) > 116:
+            lines[-1] += ","
+            lines.append(indent + argument)
+        else:
+            lines[-1] += f", {argument}"
+    return "\n".join(lines) + ")"
+
+
+def parameter_views(scene: Scene) -> list[dict]:
+    """Return the fields of the parameter struct."""
+    literal = dialect(scene.real).literal
+    fields = [p for p in PARAMETERS if p.name in INERTIAL]
+    return [
+        {
+            "name": p.name,
+            "size": p.size,
+            "unit": p.unit,
+            "meaning": p.meaning,
+            "literals": list(map(literal, values(scene, p.name))),
+        }
+        for p in fields
+    ]
+
+
+def step_views(emitted: list[Emitted], real: str) -> list[dict]:
+    """Return every step that some loop calls, once."""
+    steps = {step.name: step for e in emitted for step in e.body.steps}
+    return [
+        {
+            "name": step.name,
+            "doc": step.doc,
+            "lines": step_lines(step, real),
+            "arguments": ", ".join(
+                [f"const real *{name}" for name, _ in step.inputs] + [f"real *{name}_out" for name, _ in step.outputs]
+            ),
+        }
+        for step in steps.values()
+    ]
+
+
+def rollout_work(emitted: list[Emitted], tail: Tail) -> int:
+    """Return the workspace of a rollout: its stages and what forward dynamics needs."""
+    inner = next(e.body.work for e in emitted if e.function.name == "forward_dynamics")
+    return 3 * (tail.nq + tail.nv) + tail.nt + inner
+
+
+def abi_hash(scene: Scene, views: list[FunctionView]) -> str:
+    """Digest of what a caller relies on: symbols, argument sizes, workspace, the parameter struct."""
+    interface = [scene.name, scene.real, [[p.name, p.size] for p in PARAMETERS if p.name in INERTIAL]]
+    interface += [[f.name, [[a.name, a.length] for a in (*f.inputs, *f.outputs)], f.work] for f in views]
+    return hashlib.sha256(json.dumps(interface).encode()).hexdigest()[:16]
+
+
+def c_context(scene: Scene, tail: Tail, emitted: list[Emitted], version: str) -> dict:
+    """Return everything that the C templates lay out."""
+    views = [FunctionView(e, tail, scene.name) for e in emitted]
+    literal = dialect(scene.real).literal
+    numbers = {"zero": 0, "one": 1, "half": 0.5, "third": 1 / 3, "sixth": 1 / 6}
+    rollout = "rollout" in scene.functions
+    works = [{"name": f.name, "work": f.work} for f in views]
+    if rollout:
+        works.append({"name": "rollout", "work": rollout_work(emitted, tail)})
+    return {name: literal(value) for name, value in numbers.items()} | {
+        "title": f"{scene.kind} tail, {tail.segments} segments x {tail.links} links",
+        "prefix": scene.name,
+        "upper": scene.name.upper(),
+        "real": scene.real,
+        "sqrt": dialect(scene.real).functions["sqrt"],
+        "version": version,
+        "coordinates": "alpha_1, beta_1, ... of the joints",
+        "content_hash": "",
+        "abi_hash": abi_hash(scene, views),
+        "tail": tail,
+        "baked": scene.baked,
+        "parameters": parameter_views(scene),
+        "parameter_count": sum(p.size for p in PARAMETERS if p.name in INERTIAL),
+        "functions": views,
+        "most_arrays": max(len(f.inputs) + len(f.outputs) for f in views),
+        "works": works,
+        "steps": step_views(emitted, scene.real),
+        "solves": any(e.body.solves for e in emitted),
+        "rollout": rollout,
+    }
+
+
+def c_files(scene: Scene, context: dict) -> dict[str, str]:
+    """Render the header, the model, its host entries and an example."""
+    name = scene.name
+    return {
+        f"include/{name}.h": render("header.h.jinja", context),
+        f"src/{name}.c": render("model.c.jinja", context),
+        f"src/{name}_host.c": render("host.c.jinja", context),
+        "example/main.c": render("example.c.jinja", context),
+    }

@@ -1,0 +1,176 @@
+"""C function bodies: programs go in, the lines of their C functions come out, straight or as loops over steps."""
+
+from dataclasses import dataclass
+
+from ..interpret import unroll
+from ..program import Apply, Array, Copy, Fill, Index, Loop, Program, Ref, Solve
+from ..tape import BINARY, Step, operation_count
+from .scalars import Dialect, Scalars
+
+ON_STACK = 12  # scalars: larger local arrays go to the caller's workspace
+
+
+@dataclass(frozen=True)
+class CFunction:
+    """One C function body: its lines, the scalars of workspace it needs, its steps, and what it costs."""
+
+    lines: tuple[str, ...]
+    work: int
+    steps: tuple[Step, ...]
+    solves: bool
+    operations: int
+    uses_parameters: bool
+
+
+def dialect(real: str) -> Dialect:
+    """Return how C writes scalars of a real type."""
+    suffix = "f" if real == "float" else ""
+    return Dialect("const real {name} = {text};", suffix, {op: op + suffix for op in ("sin", "cos", "sqrt")})
+
+
+def index_text(index: Index) -> str:
+    """Print an affine index."""
+    terms = [name if factor == 1 else f"{factor} * {name}" for name, factor in index.terms]
+    return " + ".join([*terms, *([str(index.offset)] if index.offset or not terms else [])])
+
+
+def pointer(ref: Ref) -> str:
+    """Print the address of a reference's first scalar."""
+    name = argument_name(ref.array)
+    if ref.array.role == "parameters":
+        return name if ref.array.length > 1 else f"&{name}"
+    offset = index_text(ref.offset)
+    return name if offset == "0" else f"{name} + {offset}"
+
+
+def scalar(ref: Ref, k: int) -> str:
+    """Print scalar number k of a reference."""
+    name = argument_name(ref.array)
+    if ref.array.role == "parameters" and ref.array.length == 1:
+        return name
+    return f"{name}[{index_text(ref.offset + k * ref.stride)}]"
+
+
+def argument_name(array: Array) -> str:
+    """Print what a C function calls an array."""
+    return f"parameters->{array.name}" if array.role == "parameters" else array.name
+
+
+def step_lines(step: Step, real: str) -> list[str]:
+    """Print the body of a step: inputs by their names, outputs as ``<name>_out``."""
+    names = [f"{name}[{k}]" for name, size in step.inputs for k in range(size)]
+    scalars = Scalars(step.nodes, step.results, names, dialect(real))
+    lines = scalars.lines()
+    targets = [f"{name}_out[{k}]" for name, size in step.outputs for k in range(size)]
+    # every input is read before an output is written: outputs may overwrite inputs
+    texts = [scalars.text[r] for r in step.results]
+    late = {text: f"r{k}" for k, text in enumerate(texts) if "[" in text}
+    lines += [f"const real {name} = {text};" for text, name in late.items()]
+    return lines + [f"{target} = {late.get(text, text)};" for target, text in zip(targets, texts, strict=True)]
+
+
+def straight_line(program: Program, real: str, fixed=None) -> CFunction:
+    """Print a program without loops."""
+    tape, outputs, pivots = unroll(program, fixed)
+    results = [node for a in program.of_role("output") for node in outputs[a.name]]
+    arrays = (*program.of_role("parameters"), *program.of_role("input"))
+    names = [scalar(a.part(0, a.length), k) for a in arrays for k in range(a.length)]
+    scalars = Scalars(tape.nodes, results + pivots, names, dialect(real))
+    lines = scalars.lines()
+    targets = [scalar(a.part(0, a.length), k) for a in program.of_role("output") for k in range(a.length)]
+    lines += [f"{target} = {scalars.text[node]};" for target, node in zip(targets, results, strict=True)]
+    zero = dialect(real).literal(0)
+    guards = " && ".join(f"{scalars.text[p]} > {zero}" for p in pivots)
+    lines.append(f"return {guards} ? STATUS_OK : STATUS_NOT_POSITIVE_DEFINITE;" if guards else "return STATUS_OK;")
+    operations = sum(tape.nodes[n][0] in BINARY for n in scalars.live)
+    return CFunction(tuple(lines), 0, (), False, operations, any("parameters->" in line for line in lines))
+
+
+class LoopPrinter:
+    """Prints a program as C loops that call its steps."""
+
+    def __init__(self, program: Program, real: str, prefix: str, fixed=None):
+        self.program, self.prefix, self.fixed = program, prefix, fixed or {}
+        self.dialect = dialect(real)
+        self.steps: dict[str, Step] = {}
+        self.solves = False
+        self.operations = 0
+        self.used: dict[str, Array] = {}
+
+    def function(self) -> CFunction:
+        """Return the printed function."""
+        body = self._body(self.program.body, 1)
+        declarations, work = self._declarations()
+        uses = any(a.role == "parameters" and a.name not in self.fixed for a in self.used.values())
+        lines = (*declarations, *body, "return STATUS_OK;")
+        return CFunction(lines, work, tuple(self.steps.values()), self.solves, self.operations, uses)
+
+    def _declarations(self) -> tuple[list[str], int]:
+        lines, work = [], 0
+        for array in self.used.values():
+            values = self.fixed.get(array.name, array.values)
+            if array.role == "constant" or array.name in self.fixed:
+                text = ", ".join(self.dialect.literal(v) for v in values)
+                lines.append(f"static const real {array.name}[{array.length}] = {{{text}}};")
+            elif array.role == "local" and array.length <= ON_STACK:
+                lines.append(f"real {array.name}[{array.length}];")
+            elif array.role == "local":
+                lines.append(f"real *const {array.name} = work + {work};")
+                work += array.length
+        return lines, work
+
+    def _ref(self, ref: Ref) -> Ref:
+        if ref.array.name in self.fixed:
+            values = tuple(self.fixed[ref.array.name])
+            ref = Ref(Array(ref.array.name, "constant", ref.array.size, 1, values), ref.offset, ref.size)
+        self.used.setdefault(ref.array.name, ref.array)
+        return ref
+
+    def _body(self, body, trips: int) -> list[str]:
+        return [line for s in body for line in getattr(self, f"_{type(s).__name__.lower()}")(s, trips)]
+
+    def _loop(self, loop: Loop, trips: int) -> list[str]:
+        start, stop, var = index_text(loop.start), index_text(loop.stop), loop.var
+        average = (loop.stop.offset or 2) - loop.start.offset
+        head = f"for (int {var} = {start}; {var} < {stop}; ++{var}) {{"
+        if loop.downward:
+            head = f"for (int {var} = {stop} - 1; {var} >= {start}; --{var}) {{"
+        return [head, *("  " + line for line in self._body(loop.body, trips * average)), "}"]
+
+    def _fill(self, fill: Fill, trips: int) -> list[str]:
+        target = self._ref(fill.target)
+        if target.size > ON_STACK and len(set(fill.values)) == 1:
+            value = self.dialect.literal(fill.values[0])
+            return [f"for (int s = 0; s < {target.size}; ++s) {{", f"  ({pointer(target)})[s] = {value};", "}"]
+        return [f"{scalar(target, k)} = {self.dialect.literal(v)};" for k, v in enumerate(fill.values)]
+
+    def _copy(self, copy: Copy, trips: int) -> list[str]:
+        target, source = self._ref(copy.target), self._ref(copy.source)
+        return [f"{scalar(target, k)} = {scalar(source, k)};" for k in range(target.size)]
+
+    def _solve(self, solve: Solve, trips: int) -> list[str]:
+        self.solves = True
+        matrix, x = self._ref(solve.matrix[0]), self._ref(solve.x)
+        call = f"{self.prefix}_ldl_solve({x.size}, {pointer(matrix)}, {pointer(x)})"
+        return [f"if ({call} != STATUS_OK) {{", "  return STATUS_NOT_POSITIVE_DEFINITE;", "}"]
+
+    def _apply(self, call: Apply, trips: int) -> list[str]:
+        self.steps.setdefault(call.step.name, call.step)
+        self.operations += trips * operation_count(call.step.nodes, call.step.results)
+        arguments = [pointer(self._ref(ref)) for ref in call.reads]
+        before, after = [], []
+        for (name, size), target, adds in zip(call.step.outputs, map(self._ref, call.writes), call.adds, strict=True):
+            if not adds and target.stride == 1:
+                arguments.append(pointer(target))
+                continue
+            before.append(f"real {name}_new[{size}];")
+            sign = "+=" if adds else "="
+            after += [f"{scalar(target, k)} {sign} {name}_new[{k}];" for k in range(size)]
+            arguments.append(f"{name}_new")
+        line = f"{self.prefix}_{call.step.name}({', '.join(arguments)});"
+        return [line] if not before else ["{", *("  " + x for x in (*before, line, *after)), "}"]
+
+
+def in_loops(program: Program, real: str, prefix: str, fixed=None) -> CFunction:
+    """Print a program as loops."""
+    return LoopPrinter(program, real, prefix, fixed).function()

@@ -1,0 +1,111 @@
+"""The CasADi target: a scene's programs go in, a Python module that builds ``casadi.Function``s comes out."""
+
+from ..functions import INERTIAL
+from ..functions import program as assemble
+from ..program import Apply, Copy, Fill, Index, Loop, Program, Ref, Solve
+from ..scene import PARAMETERS, Scene
+from ..sweeps import Tail
+from ..tape import Step
+from ..templating import render
+from .scalars import Dialect, Scalars
+
+PYTHON = Dialect("{name} = {text}", "", {"sin": "sin", "cos": "cos", "sqrt": "sqrt"})
+
+
+def index_text(index: Index) -> str:
+    """Print an affine index."""
+    terms = [name if factor == 1 else f"{factor} * {name}" for name, factor in index.terms]
+    return " + ".join([*terms, *([str(index.offset)] if index.offset or not terms else [])])
+
+
+def slice_text(ref: Ref) -> str:
+    """Print the slice of a list that a reference means."""
+    name = f'parameters["{ref.array.name}"]' if ref.array.role == "parameters" else ref.array.name
+    if ref.size == ref.array.length:
+        return f"{name}[:]"
+    stop = index_text(ref.offset + ((ref.size - 1) * ref.stride + 1))
+    return f"{name}[{index_text(ref.offset)} : {stop}{f' : {ref.stride}' if ref.stride > 1 else ''}]"
+
+
+def step_view(step: Step) -> dict:
+    """Return a step as a Python function of lists."""
+    names = [f"{name}[{k}]" for name, size in step.inputs for k in range(size)]
+    scalars = Scalars(step.nodes, step.results, names, PYTHON)
+    lines, results = scalars.lines(), iter(step.results)
+    outputs = [[scalars.text[next(results)] for _ in range(size)] for _, size in step.outputs]
+    final = ", ".join(f"[{', '.join(texts)}]" for texts in outputs)
+    arguments = ", ".join(name for name, _ in step.inputs)
+    return {"name": step.name, "doc": step.doc, "arguments": arguments, "lines": [*lines, f"return ({final},)"]}
+
+
+class PythonPrinter:
+    """Prints a program as Python loops over lists."""
+
+    def __init__(self, program: Program):
+        self.program = program
+        self.steps: dict[str, Step] = {}
+
+    def lines(self) -> list[str]:
+        """Return the body of the function."""
+        body = self._body(self.program.body)
+        arrays = [a for a in self.program.arrays if a.role in ("local", "output")]
+        lines = [f"{a.name} = [0.0] * {a.length}" for a in arrays]
+        lines += [f"{a.name} = [{', '.join(map(PYTHON.literal, a.values))}]" for a in self.program.of_role("constant")]
+        outputs = ", ".join(f'"{a.name}": {a.name}' for a in self.program.of_role("output"))
+        return [*lines, *body, f"return {{{outputs}}}"]
+
+    def _body(self, body) -> list[str]:
+        return [line for s in body for line in getattr(self, f"_{type(s).__name__.lower()}")(s)]
+
+    def _loop(self, loop: Loop) -> list[str]:
+        span = f"range({index_text(loop.start)}, {index_text(loop.stop)})"
+        head = f"for {loop.var} in {f'reversed({span})' if loop.downward else span}:"
+        return [head, *("    " + line for line in self._body(loop.body))]
+
+    def _fill(self, fill: Fill) -> list[str]:
+        values = ", ".join(map(PYTHON.literal, fill.values))
+        if len(set(fill.values)) == 1:
+            return [f"{slice_text(fill.target)} = [{PYTHON.literal(fill.values[0])}] * {fill.target.size}"]
+        return [f"{slice_text(fill.target)} = [{values}]"]
+
+    def _copy(self, copy: Copy) -> list[str]:
+        return [f"{slice_text(copy.target)} = {slice_text(copy.source)}"]
+
+    def _solve(self, solve: Solve) -> list[str]:
+        return [f"{slice_text(solve.x)} = ldl_solve({solve.matrix.name}, {slice_text(solve.x)})"]
+
+    def _apply(self, call: Apply) -> list[str]:
+        self.steps.setdefault(call.step.name, call.step)
+        call_text = f"{call.step.name}({', '.join(map(slice_text, call.reads))})"
+        targets = [
+            f"new_{k}" if adds else slice_text(w)
+            for k, (w, adds) in enumerate(zip(call.writes, call.adds, strict=True))
+        ]
+        sums = [
+            f"{slice_text(w)} = added({slice_text(w)}, new_{k})"
+            for k, (w, adds) in enumerate(zip(call.writes, call.adds, strict=True))
+            if adds
+        ]
+        return [f"({', '.join(targets)},) = {call_text}", *sums]
+
+
+def casadi_module(scene: Scene, tail: Tail, functions, version: str, content_hash: str) -> str:
+    """Render the module."""
+    views, steps = [], {}
+    for function in functions:
+        printer = PythonPrinter(assemble(function, tail))
+        shapes = {a.name: list(a.shape(tail)) for a in (*function.inputs, *function.outputs)}
+        views.append(
+            {
+                "name": function.name,
+                "doc": function.doc,
+                "inputs": [a.name for a in function.inputs],
+                "outputs": [a.name for a in function.outputs],
+                "shapes": shapes,
+                "lines": printer.lines(),
+            }
+        )
+        steps |= printer.steps
+    sizes = {p.name: p.size for p in PARAMETERS if p.name in INERTIAL}
+    data = {"scene": scene, "version": version, "content_hash": content_hash, "functions": views, "sizes": sizes}
+    return render("casadi.py.jinja", data | {"steps": [step_view(s) for s in steps.values()]})

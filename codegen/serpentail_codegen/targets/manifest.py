@@ -1,0 +1,56 @@
+"""The manifest: what was emitted goes in, what a loader needs to know comes out as plain data."""
+
+from ..functions import INERTIAL
+from ..scene import ANY, BODY_INERTIA, NOT_NEGATIVE, PARAMETERS, POSITIVE, Scene, scene_to_dict
+
+FORMAT = 1
+CHECKS = {ANY: "finite", POSITIVE: "positive", NOT_NEGATIVE: "not_negative", BODY_INERTIA: "body_inertia"}
+
+
+def manifest(scene: Scene, context: dict, emitted: list) -> dict:
+    """Return the manifest of a generated folder, without its files."""
+    return {
+        "format": FORMAT,
+        "generator": context["version"],
+        "content_hash": context["content_hash"],
+        "abi_hash": context["abi_hash"],
+        "prefix": context["prefix"],
+        "real": context["real"],
+        "scene": scene_to_dict(scene),
+        "dimensions": {
+            name: getattr(context["tail"], name) for name in ("segments", "links", "total", "nq", "nv", "nt")
+        },
+        "parameters": [parameter_entry(scene, p) for p in PARAMETERS],
+        "functions": {e.function.name: function_entry(e, context["tail"]) for e in emitted},
+        "work": {f["name"]: f["work"] for f in context["works"]},
+    }
+
+
+def parameter_entry(scene: Scene, parameter) -> dict:
+    """Return what a caller must know of a parameter; its default is the scene's value, null where it is computed."""
+    value = scene.parameters.get(parameter.name)
+    return {
+        "name": parameter.name,
+        "size": parameter.size,
+        "unit": parameter.unit,
+        "meaning": parameter.meaning,
+        "check": CHECKS[parameter.check],
+        "default": list(value) if isinstance(value, tuple) else value,
+        "in_struct": parameter.name in INERTIAL,
+    }
+
+
+def function_entry(emitted, tail) -> dict:
+    """Return what a caller must know of a function."""
+    function = emitted.function
+
+    def entries(arguments):
+        return [{"name": a.name, "shape": list(a.shape(tail)), "meaning": a.meaning} for a in arguments]
+
+    return {
+        "doc": function.doc,
+        "inputs": entries(function.inputs),
+        "outputs": entries(function.outputs),
+        "emission": emitted.emission,
+        "operations": emitted.body.operations,
+    }

@@ -1,0 +1,61 @@
+"""Straight lines of text: nodes of a tape and a dialect go in, one definition a line comes out."""
+
+from collections import Counter
+from dataclasses import dataclass
+
+from ..tape import BINARY, live_nodes
+
+SYMBOL = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """How a language defines a name, ends a real constant and calls functions."""
+
+    definition: str
+    suffix: str
+    functions: dict[str, str]
+
+    def literal(self, value) -> str:
+        """Print a number by its shortest exact decimal."""
+        return repr(float(value)) + self.suffix
+
+
+class Scalars:
+    """Prints the nodes that the results need; a product or sign that is used once goes into its use."""
+
+    def __init__(self, nodes, results, names, dialect: Dialect):
+        self.nodes, self.names, self.dialect = nodes, names, dialect
+        self.live = live_nodes(nodes, results)
+        self.uses = Counter(a for n in self.live if nodes[n][0] not in ("input", "const") for a in nodes[n][1:])
+        self.uses.update(results)
+        self.text: dict[int, str] = {}
+
+    def lines(self) -> list[str]:
+        """Return the definitions in evaluation order; ``text`` then tells how to write any node."""
+        out = []
+        for node in self.live:
+            op, *args = self.nodes[node]
+            text = self._expression(op, args)
+            if op in ("input", "const") or (op in ("mul", "neg") and self.uses[node] == 1):
+                self.text[node] = text
+            else:
+                self.text[node] = name = f"t{len(out)}"
+                out.append(self.dialect.definition.format(name=name, text=text))
+        return out
+
+    def _expression(self, op: str, args) -> str:
+        if op == "input":
+            return self.names[args[0]]
+        if op == "const":
+            return self.dialect.literal(args[0])
+        if op in BINARY:
+            return f"{self._operand(args[0], op)} {SYMBOL[op]} {self._operand(args[1], op)}"
+        if op == "neg":
+            return f"-{self._operand(args[0], op)}"
+        return f"{self.dialect.functions[op]}({self.text[args[0]]})"
+
+    def _operand(self, node: int, op: str) -> str:
+        text, product = self.text[node], self.nodes[node][0] == "mul"
+        plain = not text.startswith("-") and (" " not in text or self.nodes[node][0] == "input")
+        return text if plain or (product and op in ("add", "sub")) else f"({text})"

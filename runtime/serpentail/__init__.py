@@ -1,0 +1,29 @@
+"""Runtime: generated folders go in; dynamics, simulations and plots of their models come out."""
+
+from importlib import import_module
+
+__version__ = "0.1.0"
+_HOME = {
+    **dict.fromkeys(["load", "Model"], "model"),
+    **dict.fromkeys(["simulate", "Damping", "TorqueTable"], "simulate"),
+    **dict.fromkeys(["Trajectory", "pitch_roll_yaw", "rotation_matrix"], "trajectory"),
+    **dict.fromkeys(["filmstrip", "time_plots"], "plot"),
+    **dict.fromkeys(
+        ["SerpentailError", "CompilerNotFound", "CompileFailed", "ModelError", "StateError", "SimulationError"],
+        "errors",
+    ),
+}
+__all__ = sorted(_HOME)
+
+
+def __getattr__(name: str):
+    """Import a public name when it is first used: importing the package loads nothing else."""
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}; it has {', '.join(__all__)}")
+    value = getattr(import_module(f".{_HOME[name]}", __name__), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

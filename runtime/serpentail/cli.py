@@ -1,0 +1,83 @@
+"""Command line of the runtime: a verb and a generated folder go in, a report comes out."""
+
+import argparse
+import json
+import sys
+
+from .errors import SerpentailError
+
+
+def info(folder: str) -> dict:
+    """Return what a model is: sizes, functions, how each was emitted, what it costs."""
+    from .model import load
+
+    model = load(folder)
+    functions = {
+        name: {
+            "inputs": {a["name"]: a["shape"] for a in f["inputs"]},
+            "outputs": {a["name"]: a["shape"] for a in f["outputs"]},
+            "emission": f["emission"],
+            "operations": f["operations"],
+        }
+        for name, f in model.manifest["functions"].items()
+    }
+    sizes = {"segments": model.segments, "links": model.links, "nq": model.nq, "nv": model.nv}
+    parameters = {name: list(value) if isinstance(value, tuple) else value for name, value in model.parameters.items()}
+    return {
+        "name": model.name,
+        "real": model.manifest["real"],
+        **sizes,
+        "parameters": parameters,
+        "functions": functions,
+    }
+
+
+def describe(report: dict) -> str:
+    """Return an info report as text."""
+    head = "{name}: {segments} segments x {links} links, nq {nq}, nv {nv}, {real}".format(**report)
+    rows = [
+        f"  {name:<28}{f['emission']:<10}{f['operations']:>8} operations" for name, f in report["functions"].items()
+    ]
+    return "\n".join([head, *rows])
+
+
+def parser() -> argparse.ArgumentParser:
+    """Return the argument parser."""
+    p = argparse.ArgumentParser(
+        prog="serpentail", description="Work with generated models of tailed animals and robots."
+    )
+    verbs = p.add_subparsers(dest="verb", required=True)
+    for name, words in (("info", "what a generated model is"), ("verify", "check the laws that a model must obey")):
+        verb = verbs.add_parser(name, help=words)
+        verb.add_argument("folder", help="a generated folder, such as generated/articulated_m3_n4")
+        verb.add_argument("--json", choices=["-"], help="print one JSON object on stdout instead of text")
+    return p
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run a verb; 0 if it went well, 1 if a check failed, 2 if the input was refused."""
+    arguments = parser().parse_args(argv)
+    try:
+        report, text, good = run(arguments)
+    except SerpentailError as error:
+        print(error, file=sys.stderr)
+        return 2
+    print(json.dumps(report) if arguments.json else text)
+    return 0 if good else 1
+
+
+def run(arguments: argparse.Namespace) -> tuple[dict, str, bool]:
+    """Return the report of a verb, as data and as text, and whether all is well."""
+    if arguments.verb == "info":
+        report = info(arguments.folder)
+        return report, describe(report), True
+    from .model import load
+    from .verify import as_text, laws, summary
+
+    model = load(arguments.folder)
+    checks = laws(model)
+    return summary(model, checks), as_text(model, checks), all(c.passed for c in checks)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

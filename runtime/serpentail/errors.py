@@ -1,0 +1,31 @@
+"""The exceptions of the runtime: each names what is wrong and what to do about it."""
+
+from __future__ import annotations
+
+
+class SerpentailError(Exception):
+    """Anything that the runtime refuses; the base of all its exceptions."""
+
+
+class CompilerNotFound(SerpentailError):
+    """No C compiler works here; the message names what was tried."""
+
+
+class CompileFailed(SerpentailError):
+    """The C compiler failed; `command`, `returncode` and `stderr` are its own words."""
+
+    command: tuple[str, ...] = ()
+    returncode: int = 0
+    stderr: str = ""
+
+
+class ModelError(SerpentailError):
+    """A generated folder is stale, tampered with, incomplete or of another ABI."""
+
+
+class StateError(SerpentailError, ValueError):
+    """A state, rate, torque or force has a wrong shape or a value that is not finite."""
+
+
+class SimulationError(SerpentailError):
+    """A simulation cannot go on."""

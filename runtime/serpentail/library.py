@@ -1,0 +1,135 @@
+"""Compiled models: a manifest and a parameter vector go in, callables on NumPy arrays come out."""
+
+import ctypes
+import threading
+from pathlib import Path
+
+import numpy as np
+
+from .compiler import compile_library
+from .errors import ModelError, StateError
+from .manifest import remedy
+
+NOT_POSITIVE_DEFINITE, NOT_FINITE = 1, 2
+
+
+def open_library(folder: Path, manifest: dict, profile: str) -> ctypes.CDLL:
+    """Compile (or find in the cache) and load a model's C; ModelError where it is not what the manifest says."""
+    prefix = manifest["prefix"]
+    sources = [folder / "src" / f"{prefix}.c", folder / "src" / f"{prefix}_host.c"]
+    path = compile_library(sources, folder / "include", profile)
+    library = ctypes.CDLL(str(path))
+    abi_hash = getattr(library, f"{prefix}_abi_hash")
+    abi_hash.restype = ctypes.c_char_p
+    if abi_hash().decode() != manifest["abi_hash"]:
+        raise ModelError(
+            f"{path} has interface {abi_hash().decode()}, the manifest {manifest['abi_hash']}: {remedy(folder)}"
+        )
+    return library
+
+
+MOST_ARRAYS = 8
+
+
+class Call(ctypes.Structure):
+    """The generated C's argument record: parameters, batch size, the state that failed, workspace, arrays."""
+
+    _fields_ = (
+        ("parameters", ctypes.c_void_p),
+        ("count", ctypes.c_size_t),
+        ("failed", ctypes.c_size_t),
+        ("work", ctypes.c_void_p),
+        ("arrays", ctypes.c_void_p * MOST_ARRAYS),
+    )
+
+
+def call_record(parameters: np.ndarray, count: int, work: np.ndarray, arrays) -> Call:
+    """Return a record of arrays, which the caller keeps alive."""
+    addresses = (ctypes.c_void_p * MOST_ARRAYS)(*(a.ctypes.data for a in arrays))
+    return Call(parameters.ctypes.data, count, 0, work.ctypes.data, addresses)
+
+
+class Buffers(threading.local):
+    """Arrays that one thread hands to C: their addresses are taken once, so a call on one state costs little."""
+
+    def __init__(self, dtype, inputs, outputs, work: int, parameters: np.ndarray):
+        self.inputs = [np.zeros(shape, dtype) for shape in inputs]
+        self.outputs = [np.zeros(shape, dtype) for shape in outputs]
+        self.work = np.zeros(work + 1, dtype)
+        self.call = call_record(parameters, 1, self.work, (*self.inputs, *self.outputs))
+        self.address = ctypes.addressof(self.call)
+
+
+class Kernel:
+    """One compiled function of a model: single states, or arrays with a leading batch axis."""
+
+    def __init__(self, library: ctypes.CDLL, manifest: dict, name: str, parameters: np.ndarray):
+        entry = manifest["functions"][name]
+        self.name, self.dtype = name, parameters.dtype
+        self.names = [a["name"] for a in entry["inputs"]]
+        self.shapes = [tuple(a["shape"]) for a in entry["inputs"]]
+        self.out_shapes = [() if a["shape"] == [1] else tuple(a["shape"]) for a in entry["outputs"]]
+        self.function = getattr(library, f"{manifest['prefix']}_batch_{name}")
+        self.function.argtypes = [ctypes.c_void_p]
+        self.parameters = parameters
+        self.buffers = Buffers(self.dtype, self.shapes, self.out_shapes, manifest["work"][name], parameters)
+
+    def __call__(self, *arrays):
+        """Evaluate; StateError names the argument that has a wrong shape or a value that is not finite."""
+        buffers, dtype = self.buffers, self.dtype
+        for array, shape, buffer in zip(arrays, self.shapes, buffers.inputs, strict=True):
+            if type(array) is not np.ndarray or array.shape != shape or array.dtype is not dtype:
+                return self._any(arrays)
+            buffer[...] = array
+        status = self.function(buffers.address)
+        if status:
+            self._fail(buffers.call, [b[None] for b in buffers.inputs])
+        outputs = buffers.outputs
+        return outputs[0].copy() if len(outputs) == 1 else tuple(o[()] if o.ndim == 0 else o.copy() for o in outputs)
+
+    def _any(self, arrays):
+        arrays = [self._checked(*item) for item in zip(self.names, self.shapes, arrays, strict=True)]
+        counts = {a.shape[0] for a, shape in zip(arrays, self.shapes, strict=True) if a.ndim > len(shape)}
+        if not counts:
+            return self(*arrays)
+        if len(counts) > 1:
+            raise StateError(f"{self.name}: batch sizes differ ({', '.join(map(str, sorted(counts)))}): give one")
+        return self._batch(counts.pop(), arrays)
+
+    def _checked(self, name: str, shape: tuple[int, ...], value) -> np.ndarray:
+        try:
+            array = np.asarray(value)
+            if array.dtype.kind not in "fiu":
+                raise TypeError(f"{array.dtype} is no real number type")
+            array = np.ascontiguousarray(array, self.dtype)
+        except (TypeError, ValueError) as error:
+            raise StateError(f"{self.name}: {name} is not an array of real numbers: {error}") from error
+        if array.shape[array.ndim - len(shape) :] != shape or array.ndim > len(shape) + 1 or array.ndim < len(shape):
+            size = ", ".join(map(str, shape))
+            raise StateError(f"{self.name}: {name} has shape {array.shape}, not ({size},) or (batch, {size})")
+        return array
+
+    def _batch(self, count: int, arrays):
+        whole = [
+            np.ascontiguousarray(np.broadcast_to(a, (count, *shape)))
+            for a, shape in zip(arrays, self.shapes, strict=True)
+        ]
+        outputs = [np.empty((count, *shape), self.dtype) for shape in self.out_shapes]
+        call = call_record(self.parameters, count, self.buffers.work, (*whole, *outputs))
+        if self.function(ctypes.addressof(call)):
+            self._fail(call, whole)
+        return outputs[0] if len(outputs) == 1 else tuple(outputs)
+
+    def _fail(self, call: Call, arrays):
+        index = call.failed
+        for name, array in zip(self.names, arrays, strict=True):
+            bad = np.argwhere(~np.isfinite(array[index]))
+            if len(bad):
+                where = f"[{', '.join(map(str, bad[0]))}]" + (f" of state {index}" if len(array) > 1 else "")
+                value = array[index][tuple(bad[0])]
+                raise StateError(f"{self.name}: {name}{where} is {value}: give finite numbers")
+        state = f" of state {index}" if len(arrays[0]) > 1 else ""
+        raise StateError(
+            f"{self.name}: the inertia matrix{state} is not positive definite: is the quaternion q[3:7] zero, "
+            "a value too large, or a parameter unphysical?"
+        )

@@ -1,0 +1,41 @@
+"""Generated folders: a folder goes in, its manifest comes out, checked against the files beside it."""
+
+import hashlib
+import json
+from pathlib import Path
+
+from . import __version__
+from .errors import ModelError
+
+FORMAT = 1
+
+
+def read_manifest(folder: Path) -> dict:
+    """Return the manifest of a generated folder; ModelError where it is missing, stale or does not fit its files."""
+    path = folder / "manifest.json"
+    if not path.is_file():
+        raise ModelError(f"{folder} is no generated folder (it has no manifest.json): run `make model TAIL= M= N=`")
+    try:
+        manifest = json.loads(path.read_text(encoding="utf-8"))
+        _check(folder, manifest)
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise ModelError(f"{path} is damaged ({error}): {remedy(folder)}") from error
+    return manifest
+
+
+def remedy(folder: Path) -> str:
+    """Say how to make a folder anew."""
+    return f"delete {folder} and generate it again (`make model`, or python -m serpentail_codegen SCENE.toml)"
+
+
+def _check(folder: Path, manifest: dict) -> None:
+    if (manifest["format"], manifest["generator"]) != (FORMAT, __version__):
+        made = f"format {manifest['format']}, generator {manifest['generator']}"
+        raise ModelError(f"{folder} is stale: made by {made}, this is format {FORMAT}, {__version__}: {remedy(folder)}")
+    for name, digest in manifest["files"].items():
+        try:
+            found = hashlib.sha256((folder / name).read_bytes()).hexdigest()
+        except OSError as error:
+            raise ModelError(f"{folder / name} cannot be read ({error.strerror}): {remedy(folder)}") from error
+        if found != digest:
+            raise ModelError(f"{folder / name} was changed after it was generated: {remedy(folder)}")

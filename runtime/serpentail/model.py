@@ -1,0 +1,134 @@
+"""Models: a generated folder goes in, a model whose methods evaluate its equations of motion comes out."""
+
+from collections.abc import Mapping
+from functools import cached_property
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+
+from .errors import ModelError
+from .library import Kernel, open_library
+from .manifest import read_manifest
+from .parameters import flat, resolve
+
+
+def load(folder: str | PathLike[str], parameters: Mapping[str, object] | None = None, profile: str = "fast") -> "Model":
+    """Return the model of a generated folder, its C compiled (or taken from the cache) and loaded.
+
+    parameters: name -> number or 3 numbers, SI; override the scene's, without recompiling.
+    profile: "fast" (this CPU, FMA) or "reproducible" (same bits everywhere).
+    Raises ModelError (folder missing, stale or changed; parameter unknown or unphysical), CompilerNotFound,
+    CompileFailed.
+    """
+    folder = Path(folder)
+    manifest = read_manifest(folder)
+    values = resolve(manifest, parameters)
+    return Model(folder, manifest, values, open_library(folder, manifest, profile))
+
+
+class Model:
+    """Equations of motion H(q) v_dot + C(q, v) = [0 (6); tau] + J^T f of one tail, SI units.
+
+    q (nq = 7 + 2m): position of B in the world, quaternion (w, x, y, z) of any norm but 0, joint angles.
+    v (nv = 6 + 2m): velocity of B in the world, angular velocity in the body frame, joint rates.
+    Every method also takes arrays with a leading batch axis; a single state is repeated over a batch.  All raise
+    StateError on a wrong shape or a value that is not finite, ModelError where the scene left the function out.
+    """
+
+    def __init__(self, folder: Path, manifest: dict, parameters: Mapping, library):
+        self.folder, self.manifest, self.parameters, self.library = folder, manifest, parameters, library
+        sizes = manifest["dimensions"]
+        self.name = manifest["prefix"]
+        self.segments, self.links = sizes["segments"], sizes["links"]
+        self.nq, self.nv = sizes["nq"], sizes["nv"]
+        dtype = np.float32 if manifest["real"] == "float" else np.float64
+        self.parameter_vector = np.array(flat(manifest, parameters), dtype)
+        self.kernels = {name: Kernel(library, manifest, name, self.parameter_vector) for name in manifest["functions"]}
+
+    def __repr__(self) -> str:
+        return f"<serpentail.Model {self.name}: {self.segments} x {self.links} links, nv = {self.nv}>"
+
+    def with_parameters(self, **changes) -> "Model":
+        """Return this model with other parameters; nothing is compiled."""
+        own = {k: v for k, v in self.parameters.items() if k != "link_inertia" or "link_radius" not in self.parameters}
+        if "link_inertia" in changes:
+            own.pop("link_radius", None)
+        if "link_radius" in changes:
+            own.pop("link_inertia", None)
+        return Model(self.folder, self.manifest, resolve(self.manifest, own | changes), self.library)
+
+    def kernel(self, name: str) -> Kernel:
+        """Return a compiled function; ModelError where the scene did not ask for it."""
+        found = self.kernels.get(name)
+        if found is None:
+            has = ", ".join(self.kernels)
+            raise ModelError(
+                f"{self.name} was generated without {name!r} (it has {has}): add it to `functions` of the scene, "
+                "then generate it again"
+            )
+        return found
+
+    def mass_matrix(self, q):
+        """Inertia matrix H(q) (nv, nv), Eq. 2."""
+        return self.kernel("mass_matrix")(q)
+
+    def bias_force(self, q, v):
+        """C(q, v) (nv,), Eq. 3: gravity, centrifugal and Coriolis forces."""
+        return self.kernel("bias_force")(q, v)
+
+    def inverse_dynamics(self, q, v, v_dot):
+        """H v_dot + C (nv,): force (N, world), moment (N m, body), joint torques (N m)."""
+        return self.kernel("inverse_dynamics")(q, v, v_dot)
+
+    def forward_dynamics(self, q, v, tau, f_ext=None):
+        """v_dot (nv,) of Eq. 1 for joint torques tau (2m,).
+
+        f_ext (6 + 3 (N + 1),): force at B (N, world), moment (N m, body), a force (N, world) at every tail point;
+        see ``external_force``.
+        """
+        if f_ext is None:
+            return self.kernel("forward_dynamics")(q, v, tau)
+        return self.kernel("forward_dynamics_external")(q, v, tau, f_ext)
+
+    def external_force(self, force=(0, 0, 0), moment=(0, 0, 0), tail=None):
+        """Return f_ext: force at B (3, N, world), moment (3, N m, body), tail forces (N + 1, 3, N, world) or None."""
+        points = self.manifest["dimensions"]["total"] + 1
+        tail = np.zeros((points, 3)) if tail is None else np.reshape(tail, (points, 3))
+        return np.concatenate([np.reshape(force, 3), np.reshape(moment, 3), tail.ravel()]).astype(float)
+
+    def energy(self, q, v):
+        """(kinetic, potential) energy (J); potential is zero at the height of the world's origin."""
+        return self.kernel("energy")(q, v)
+
+    def momentum(self, q, v):
+        """(linear (3,) (kg m/s), angular (3,) about the centre of mass (kg m^2/s)), world axes."""
+        return self.kernel("momentum")(q, v)
+
+    def tail_points(self, q):
+        """Joint positions, then the tip (N + 1, 3), world (m), Eqs. 13 to 15."""
+        return self.kernel("tail_points")(q)
+
+    def tail_point_jacobians(self, q):
+        """J (N + 1, 3, nv) of the tail points: d(point)/dt = J v, Eqs. A5 to A8."""
+        return self.kernel("tail_point_jacobians")(q)
+
+    def mass_matrix_world(self, q):
+        """H (nv, nv) for velocities (p_dot, omega in world axes, q_t_dot), the paper's frame."""
+        return self.kernel("mass_matrix_world")(q)
+
+    def bias_force_world(self, q, v):
+        """C (nv,) for velocities (p_dot, omega in world axes, q_t_dot); the argument v has omega in the body frame."""
+        return self.kernel("bias_force_world")(q, v)
+
+    crba = mass_matrix
+    nle = bias_force
+    rnea = inverse_dynamics
+    aba = forward_dynamics
+
+    @cached_property
+    def casadi(self):
+        """``casadi.Function``s by name, the parameters folded in: ``model.casadi.forward_dynamics(q, v, tau)``."""
+        from .casadi_functions import CasadiFunctions
+
+        return CasadiFunctions(self)

@@ -1,0 +1,81 @@
+"""Parameters: a manifest's parameters and a caller's changes go in, checked values come out."""
+
+import math
+from collections.abc import Mapping
+from difflib import get_close_matches
+from types import MappingProxyType
+
+from .errors import ModelError
+
+Value = float | tuple[float, ...]
+CHECKS = {
+    "positive": (lambda x: min(x) > 0, "above 0"),
+    "not_negative": (lambda x: min(x) >= 0, "0 or above"),
+    "finite": (lambda x: True, "finite"),
+    "body_inertia": (
+        lambda x: min(x) > 0 and 2 * max(x) <= sum(x) * (1 + 1e-12),
+        "above 0, none above the sum of the other two",
+    ),
+}
+
+
+def resolve(manifest: dict, changes: Mapping[str, object] | None) -> MappingProxyType:
+    """Return name -> float or tuple (SI) of all parameters; ModelError lists everything that is wrong."""
+    fields = {p["name"]: p for p in manifest["parameters"]}
+    values = {name: p["default"] for name, p in fields.items() if p["default"] is not None}
+    problems, given = [], {}
+    for name, value in (changes or {}).items():
+        checked = _checked(fields, name, value)
+        (problems.append if isinstance(checked, str) else lambda c, n=name: given.__setitem__(n, c))(checked)
+    if {"link_radius", "link_inertia"} <= given.keys():
+        problems.append("link_radius and link_inertia: give one of them, not both")
+    if given and manifest["scene"]["baked"]:
+        problems.append(
+            "the parameters are baked into this model: set `baked = false` in its scene and generate it again"
+        )
+    if problems:
+        raise ModelError("parameters: " + "\n            ".join(problems))
+    values |= given
+    if "link_inertia" in given:
+        values.pop("link_radius", None)
+    elif "link_radius" in given or "link_radius" in values:
+        values["link_inertia"] = ellipsoid(values, manifest["dimensions"]["total"])
+    return MappingProxyType(
+        {n: tuple(map(float, v)) if isinstance(v, list | tuple) else float(v) for n, v in values.items()}
+    )
+
+
+def ellipsoid(values: Mapping[str, Value], links: int) -> tuple[float, float, float]:
+    """Moments of inertia (kg m^2) of one link, an ellipsoid with semi-axes (r, L / 2, r) and the link along y."""
+    m, length, r = values["tail_mass"] / links, values["tail_length"] / links, values["link_radius"]
+    across = m / 5 * (length**2 / 4 + r**2)
+    return across, m / 5 * 2 * r**2, across
+
+
+def flat(manifest: dict, values: Mapping[str, Value]) -> list[float]:
+    """Return the scalars of the C parameter struct in order."""
+    out = []
+    for p in manifest["parameters"]:
+        if p["in_struct"]:
+            value = values[p["name"]]
+            out += value if isinstance(value, tuple) else [value]
+    return out
+
+
+def _checked(fields: dict, name: str, value: object) -> Value | str:
+    """Return the value, or what is wrong with it."""
+    if name not in fields:
+        near = get_close_matches(name, fields, 1)
+        return f"{name}: no such parameter; " + (
+            f"did you mean {near[0]!r}?" if near else f"there are {', '.join(fields)}"
+        )
+    size = fields[name]["size"]
+    try:
+        numbers = [float(x) for x in (value if size > 1 else [value])]
+    except (TypeError, ValueError):
+        numbers = []
+    holds, words = CHECKS[fields[name]["check"]]
+    if len(numbers) != size or not all(map(math.isfinite, numbers)) or not holds(numbers):
+        kind = "a finite number" if size == 1 else f"{size} finite numbers"
+        return f"{name}: value {value!r}: needs {kind} ({fields[name]['unit']}), {words}"
+    return tuple(numbers) if size > 1 else numbers[0]

@@ -1,0 +1,316 @@
+"""Sampled motions: states, torques, energies and momenta at given times in, files and new samplings out."""
+
+import contextlib
+import dataclasses
+import json
+import os
+import secrets
+import zipfile
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+SUFFIX = ".npz"
+UNIT_TOLERANCE = 1e-3  # how far a stored quaternion's norm may drift from 1
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """K samples of a motion with m tail segments, SI; the arrays are read-only copies, ValueError if unsound.
+
+    t (K,) s, increasing; q (K, 7+2m), v (K, 6+2m); tau (K, 2m) N m; kinetic, potential (K,) J; in the world
+    linear_momentum (K, 3) kg m/s and, about the COM, angular_momentum (K, 3) kg m2/s; info: JSON-ready dict.
+    """
+
+    t: Array
+    q: Array
+    v: Array
+    tau: Array
+    kinetic: Array
+    potential: Array
+    linear_momentum: Array
+    angular_momentum: Array
+    info: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Freeze private copies of the fields once each has been found sound."""
+        for name in ARRAYS:
+            object.__setattr__(self, name, _real(name, getattr(self, name)))
+        for name, shape in _shapes(self.t, self.q).items():
+            found = getattr(self, name).shape
+            if found != shape:
+                raise ValueError(f"{name} has shape {found}: give {shape}, to match the shapes of t and q")
+        _check_time(self.t)
+        _check_unit(self.attitude)
+        object.__setattr__(self, "info", json.loads(_json(self.info)))
+
+    @property
+    def energy(self) -> Array:
+        """Total energy T + V, (K,), J."""
+        return self.kinetic + self.potential
+
+    @property
+    def segments(self) -> int:
+        """Number of tail segments m."""
+        return int(self.q.shape[1] - 7) // 2
+
+    @property
+    def attitude(self) -> Array:
+        """Torso quaternions (w, x, y, z), torso to world, (K, 4)."""
+        return self.q[:, 3:7]
+
+    @property
+    def tail(self) -> Array:
+        """Tail coordinates q_t, (K, 2m), rad."""
+        return self.q[:, 7:]
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write one npz file (suffix added if absent), whole or not at all, and return its path."""
+        target = _npz(path)
+        arrays = {name: getattr(self, name) for name in ARRAYS}
+        with replacing(target) as part, part.open("wb") as stream:
+            np.savez(stream, info=np.array(_json(self.info)), **arrays)
+        return target
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Self:
+        """Read a saved file; FileNotFoundError if absent, ValueError if damaged or not a trajectory."""
+        source = _npz(path)
+        if not source.is_file():
+            raise FileNotFoundError(f"no trajectory file {str(source)!r}: check the name, or save one first")
+        fields = _read(source)
+        try:
+            return cls(**fields | {"info": json.loads(str(fields["info"]))})
+        except ValueError as error:
+            raise ValueError(f"{str(source)!r} holds no sound trajectory: {error}") from error
+
+    def resample(self, t: ArrayLike) -> Self:
+        """The motion at the increasing times t (n,), s, inside its span; ValueError names the first outside.
+
+        p and q_t: cubic Hermite through positions and velocities. Attitude: the same on the quaternion with
+        q_dot = q (0, omega) / 2, normalised (samples less than half a turn apart). v, energies and momenta:
+        monotone cubic, so no overshoot at impacts. tau: linear, since torques may jump.
+        """
+        times = _inside(_real("t", t), self.t)
+        rows = _Rows.at(times, self.t)
+        smooth: dict[str, Any] = {name: _monotone(self.t, getattr(self, name), times) for name in SMOOTH}
+        q = _hermite_q(rows, self.q, self.v)
+        return dataclasses.replace(self, t=times, q=q, tau=rows.linear(self.tau), **smooth)
+
+
+ARRAYS = tuple(entry.name for entry in dataclasses.fields(Trajectory) if entry.name != "info")
+SMOOTH = ("v", "kinetic", "potential", "linear_momentum", "angular_momentum")
+
+
+def rotation_matrix(quaternion: ArrayLike) -> Array:
+    """R, torso to world, (..., 3, 3), of quaternions (w, x, y, z), (..., 4), of any norm but zero."""
+    quaternion = np.asarray(quaternion, dtype=float)
+    w, x, y, z = np.moveaxis(quaternion / np.linalg.norm(quaternion, axis=-1, keepdims=True), -1, 0)
+    first = np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)], axis=-1)
+    second = np.stack([2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)], axis=-1)
+    third = np.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)], axis=-1)
+    return np.stack([first, second, third], axis=-2)
+
+
+def pitch_roll_yaw(q: ArrayLike, unwrap: bool = False) -> Array:
+    """Angles (phi_x, phi_y, phi_z), (..., 3), rad, R = Rz(phi_z) Rx(phi_x) Ry(phi_y), of q (..., 7+2m).
+
+    |phi_x| <= pi/2; at pi/2 itself one of the valid answers. unwrap, for q (K, 7+2m): continued along time
+    over whole turns and through phi_x = +-pi/2.
+    """
+    rotation = rotation_matrix(np.asarray(q, dtype=float)[..., 3:7])
+    first, second, third = (rotation[..., row, :] for row in range(3))
+    yaw = np.arctan2(-first[..., 1], second[..., 1])
+    c, s = np.cos(yaw)[..., None], np.sin(yaw)[..., None]
+    first, second = c * first + s * second, c * second - s * first  # Rz(-phi_z) R = Rx(phi_x) Ry(phi_y)
+    pitch = np.arctan2(third[..., 1], second[..., 1])
+    angles = np.stack([pitch, np.arctan2(first[..., 2], first[..., 0]), yaw], axis=-1)
+    return _continued(angles) if unwrap else angles
+
+
+@contextlib.contextmanager
+def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """A file to write beside path, made to replace it on success and removed on failure; makes the folder."""
+    target = Path(path)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    part = target.with_name(f".{target.name}.{secrets.token_hex(4)}.part")
+    try:
+        yield part
+        part.replace(target)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def _real(name: str, value: ArrayLike) -> Array:
+    """A finite, read-only float64 copy of value."""
+    try:
+        array = np.asarray(value)
+    except ValueError as error:
+        raise ValueError(f"{name} is ragged: give rows of equal length") from error
+    if not np.can_cast(array.dtype, np.float64, "same_kind"):
+        raise ValueError(f"{name} has shape {array.shape} and type {array.dtype}: give real numbers")
+    array = array.astype(np.float64, order="C")
+    if not np.isfinite(array).all():
+        first = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
+        raise ValueError(f"{name}{list(first)} is {array[first]} (shape {array.shape}): give finite numbers only")
+    array.setflags(write=False)
+    return array
+
+
+def _shapes(t: Array, q: Array) -> dict[str, tuple[int, ...]]:
+    """The shape each array must have, from the number of samples of t and the columns of q."""
+    samples = len(t) if t.ndim == 1 else 0
+    if not samples:
+        raise ValueError(f"t has shape {t.shape}: give one row of at least one time")
+    width = q.shape[1] if q.ndim == 2 else 0
+    if width < 7 or width % 2 == 0:
+        raise ValueError(
+            f"q has shape {q.shape}: give ({samples}, 7 + 2m), position, quaternion and 2m tail coordinates"
+        )
+    vectors = {"v": width - 1, "tau": width - 7, "linear_momentum": 3, "angular_momentum": 3}
+    columns = {name: (samples, count) for name, count in vectors.items()}
+    return {"q": (samples, width), **columns, "kinetic": (samples,), "potential": (samples,)}
+
+
+def _check_time(t: Array) -> None:
+    """ValueError unless t increases."""
+    late = np.flatnonzero(np.diff(t) <= 0)
+    if late.size:
+        k = int(late[0]) + 1
+        raise ValueError(
+            f"t has shape {t.shape} and t[{k}] = {t[k]} follows {t[k - 1]}: give strictly increasing times"
+        )
+
+
+def _check_unit(attitude: Array) -> None:
+    """ValueError unless the quaternions have unit norm."""
+    norm = np.linalg.norm(attitude, axis=1)
+    k = int(np.argmax(np.abs(norm - 1)))
+    if abs(norm[k] - 1) > UNIT_TOLERANCE:
+        raise ValueError(f"q[{k}, 3:7] has norm {norm[k]:.6g}: give unit quaternions (w, x, y, z)")
+
+
+def _json(info: Any) -> str:
+    """The text of info, a dict of plain JSON values."""
+    try:
+        if isinstance(info, dict):
+            return json.dumps(info, allow_nan=False)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"info is not JSON-ready ({error}): convert arrays by tolist(), use None for nan") from error
+    raise ValueError(f"info is a {type(info).__name__}: give a dict of plain JSON values")
+
+
+def _npz(path: str | os.PathLike[str]) -> Path:
+    """The path with the suffix .npz."""
+    path = Path(path)
+    return path if path.suffix == SUFFIX else path.with_name(path.name + SUFFIX)
+
+
+def _read(source: Path) -> dict[str, Any]:
+    """The fields of a trajectory file, as stored, after a check of every checksum."""
+    try:
+        with zipfile.ZipFile(source) as archive:
+            damaged = archive.testzip()
+        if damaged:
+            raise ValueError(f"the checksum of {damaged} is wrong")
+        with np.load(source, allow_pickle=False) as stored:
+            return {name: stored[name] for name in (*ARRAYS, "info")}
+    except KeyError as error:
+        raise ValueError(f"{str(source)!r} is not a trajectory: {error.args[0]}") from error
+    except (ValueError, EOFError, NotImplementedError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
+        raise ValueError(f"{str(source)!r} is damaged or not a trajectory ({error}): save it again") from error
+
+
+def _inside(times: Array, span: Array) -> Array:
+    """The times, one-dimensional and inside the span up to rounding."""
+    if times.ndim != 1:
+        raise ValueError(f"t has shape {times.shape}: give one row of times")
+    slack = 4 * np.finfo(float).eps * max(abs(span[0]), abs(span[-1]))
+    outside = times[(times < span[0] - slack) | (times > span[-1] + slack)]
+    if outside.size:
+        raise ValueError(f"t = {outside[0]} s is outside the trajectory: give times from {span[0]} to {span[-1]} s")
+    return np.clip(times, span[0], span[-1])
+
+
+@dataclass(frozen=True)
+class _Rows:
+    """Where n times lie among samples: the rows before and after, the fraction between, the step (n, 1)."""
+
+    before: NDArray[np.intp]
+    after: NDArray[np.intp]
+    fraction: Array
+    step: Array
+
+    @classmethod
+    def at(cls, times: Array, samples: Array) -> "_Rows":
+        """Locate times inside the span of the samples."""
+        before = np.clip(np.searchsorted(samples, times, side="right") - 1, 0, max(len(samples) - 2, 0))
+        after = np.minimum(before + 1, len(samples) - 1)
+        step = samples[after] - samples[before]
+        fraction = (times - samples[before]) / np.where(step > 0, step, 1)
+        return cls(before, after, fraction[:, None], step[:, None])
+
+    def linear(self, values: Array) -> Array:
+        """Straight lines between the rows of values."""
+        return (1 - self.fraction) * values[self.before] + self.fraction * values[self.after]
+
+    def hermite(self, values: Array, rates: Array) -> Array:
+        """Cubics that match the rows of values and their rates at both ends."""
+        s, h = self.fraction, self.step
+        start = (1 - s) ** 2 * ((1 + 2 * s) * values[self.before] + s * h * rates[self.before])
+        return start + s**2 * ((3 - 2 * s) * values[self.after] + (s - 1) * h * rates[self.after])
+
+
+def _hermite_q(rows: _Rows, q: Array, v: Array) -> Array:
+    """Configurations between the samples q with velocities v."""
+    attitude = _sign_continuous(q[:, 3:7])
+    positions = np.hstack([q[:, :3], attitude, q[:, 7:]])
+    rates = np.hstack([v[:, :3], _quaternion_rate(attitude, v[:, 3:6]), v[:, 6:]])
+    result = rows.hermite(positions, rates)
+    result[:, 3:7] /= np.linalg.norm(result[:, 3:7], axis=1, keepdims=True)
+    return result
+
+
+def _sign_continuous(quaternion: Array) -> Array:
+    """The same rotations, each quaternion in the half-space of the one before it."""
+    turned = np.sum(quaternion[1:] * quaternion[:-1], axis=1) < 0
+    signs = np.cumprod(np.where(turned, -1.0, 1.0), dtype=np.float64)
+    return np.vstack([quaternion[:1], signs[:, None] * quaternion[1:]])
+
+
+def _quaternion_rate(quaternion: Array, omega: Array) -> Array:
+    """q_dot = q (0, omega) / 2 with omega in the body frame."""
+    w, u = quaternion[:, :1], quaternion[:, 1:]
+    return np.hstack([-np.sum(u * omega, axis=1, keepdims=True), w * omega + np.cross(u, omega)]) / 2
+
+
+def _monotone(t: Array, values: Array, times: Array) -> Array:
+    """Shape-preserving cubics (PCHIP) through the rows of values."""
+    from scipy.interpolate import PchipInterpolator
+
+    if len(t) == 1:
+        return np.repeat(values, len(times), axis=0)
+    return np.asarray(PchipInterpolator(t, values, axis=0)(times))
+
+
+def _continued(angles: Array) -> Array:
+    """Angles (K, 3) followed along time over whole turns and both Euler branches."""
+    if angles.ndim != 2:
+        raise ValueError(f"q of {angles.ndim} dimensions cannot be unwrapped: give (K, 7 + 2m), time first")
+    followed = angles.copy()
+    for k in range(1, len(angles)):
+        followed[k] = _nearest(angles[k], followed[k - 1])
+    return followed
+
+
+def _nearest(angles: Array, reference: Array) -> Array:
+    """The angles of one attitude, (x, y, z) or (pi - x, y + pi, z + pi) plus turns, closest to reference."""
+    branches = np.stack([angles, angles * (-1, 1, 1) + np.pi])
+    branches += 2 * np.pi * np.round((reference - branches) / (2 * np.pi))
+    return np.asarray(branches[np.argmin(np.abs(branches - reference).sum(axis=1))])

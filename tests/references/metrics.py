@@ -1,0 +1,31 @@
+"""From a mass matrix or a (force, torque, tail) vector, and its reference, to an error without units."""
+
+import numpy as np
+
+BLOCKS = (slice(0, 3), slice(3, 6), slice(6, None))
+NEGLIGIBLE = 1e-6
+
+
+def mass_matrix_error(mass, mass_ref):
+    """Largest |dH_ij| / sqrt(H_ii H_jj), so that the torso's mass does not hide the tail."""
+    scale = np.sqrt(np.diag(mass_ref))
+    return float(np.max(np.abs(mass - mass_ref) / np.outer(scale, scale)))
+
+
+def block_error(x, x_ref):
+    """Largest over (force, torque, tail) of max|d| / max|ref|; a zero block is scaled by the others."""
+    x, x_ref = np.asarray(x), np.asarray(x_ref)
+    floor = NEGLIGIBLE * np.max(np.abs(x_ref)) or 1.0
+    return float(max(_scaled_error(x[block], x_ref[block], floor) for block in BLOCKS))
+
+
+def equilibrated_condition(mass):
+    """2-norm condition number of H after the symmetric scaling to a unit diagonal."""
+    scale = np.sqrt(np.diag(mass))
+    return float(np.linalg.cond(mass / np.outer(scale, scale)))
+
+
+def _scaled_error(x, x_ref, floor):
+    """max|d| / max|ref|, the scale never below the floor."""
+    scale = np.max(np.abs(x_ref), initial=0.0)
+    return np.max(np.abs(x - x_ref), initial=0.0) / max(scale, floor)

@@ -1,0 +1,129 @@
+"""From parameters and (m, n) to the articulated tail's dynamics, by Pinocchio on a reduced revolute chain."""
+
+import numpy as np
+import pinocchio as pin
+from scipy.linalg import cho_factor, cho_solve
+
+
+class PinocchioChain:
+    """A free-flyer with 2 m n revolute joints (RX, RZ alternating), reduced to nv = 6 + 2m by G."""
+
+    def __init__(self, parameters, segments, links):
+        """Build the full chain and the matrix G that repeats (alpha_i, beta_i) over segment i."""
+        self.segments, self.links = segments, links
+        self.nq, self.nv = 7 + 2 * segments, 6 + 2 * segments
+        self.repeat = np.kron(np.kron(np.eye(segments), np.ones((links, 1))), np.eye(2))
+        self.model, self.points = _build(parameters, segments * links)
+        self.data = self.model.createData()
+
+    def mass_matrix(self, q):
+        """H = T^T H_full T."""
+        full_q, transform = self._full_configuration(q)
+        # LOCAL: WORLD sums inertias about the world origin, which costs two digits when p is a metre away
+        upper = np.triu(pin.crba(self.model, self.data, full_q, pin.Convention.LOCAL))
+        full_mass = upper + np.triu(upper, 1).T
+        return transform.T @ full_mass @ transform
+
+    def bias_force(self, q, v):
+        """C, gravity included: the inverse dynamics at v_dot = 0."""
+        return self.inverse_dynamics(q, v, np.zeros(self.nv))
+
+    def inverse_dynamics(self, q, v, v_dot):
+        """H v_dot + C = T^T rnea(q_full, T v, T v_dot + T_dot v)."""
+        full_q, transform = self._full_configuration(q)
+        full_v = transform @ v
+        full_v_dot = transform @ v_dot
+        full_v_dot[:3] -= np.cross(v[3:6], full_v[:3])  # d(R^T p_dot)/dt = R^T p_ddot - omega x R^T p_dot
+        return transform.T @ pin.rnea(self.model, self.data, full_q, full_v, full_v_dot)
+
+    def forward_dynamics(self, q, v, tau, generalized_force=None):
+        """v_dot of H v_dot + C = [0; tau] + generalized_force."""
+        force = -self.bias_force(q, v)
+        force[6:] += tau
+        if generalized_force is not None:
+            force += generalized_force
+        return cho_solve(cho_factor(self.mass_matrix(q)), force)
+
+    def energy(self, q, v):
+        """(kinetic, potential), the potential sum m g z."""
+        full_q, transform = self._full_configuration(q)
+        kinetic = pin.computeKineticEnergy(self.model, self.data, full_q, transform @ v)
+        return kinetic, pin.computePotentialEnergy(self.model, self.data, full_q)
+
+    def momentum(self, q, v):
+        """(linear, angular about the COM), in world axes."""
+        full_q, transform = self._full_configuration(q)
+        centroidal = pin.computeCentroidalMomentum(self.model, self.data, full_q, transform @ v)
+        return centroidal.linear.copy(), centroidal.angular.copy()
+
+    def tail_points(self, q):
+        """World positions (N+1, 3) of the N joints and the tip."""
+        pin.framesForwardKinematics(self.model, self.data, self._full_configuration(q)[0])
+        return np.array([self.data.oMf[point].translation for point in self.points])
+
+    def tail_point_jacobians(self, q):
+        """J (N+1, 3, nv) of the tail points, world axes: d(point)/dt = J v."""
+        full_q, transform = self._full_configuration(q)
+        pin.computeJointJacobians(self.model, self.data, full_q)
+        pin.updateFramePlacements(self.model, self.data)
+        return np.array([self._full_jacobian(point) @ transform for point in self.points])
+
+    def _full_jacobian(self, point):
+        """Linear rows of one point's Jacobian on the full chain, world axes."""
+        return pin.getFrameJacobian(self.model, self.data, point, pin.LOCAL_WORLD_ALIGNED)[:3]
+
+    def _full_configuration(self, q):
+        """q_full, its quaternion (x, y, z, w), and T with v_full = T v = [R^T p_dot, omega, G q_t_dot]."""
+        w, x, y, z = q[3:7] / np.linalg.norm(q[3:7])
+        transform = np.zeros((self.model.nv, self.nv))
+        transform[:3, :3] = pin.Quaternion(w, x, y, z).toRotationMatrix().T
+        transform[3:6, 3:6] = np.eye(3)
+        transform[6:, 6:] = self.repeat
+        return np.concatenate([q[:3], [x, y, z, w], self.repeat @ q[7:]]), transform
+
+
+def _build(parameters, count):
+    """Pinocchio's model of the torso and `count` links, and the frame ids of the tail points."""
+    model = pin.Model()
+    model.gravity.linear = np.array([0.0, 0.0, -parameters["gravity"]])
+    joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "torso")
+    model.appendBodyToJoint(joint, _torso_inertia(parameters), pin.SE3.Identity())
+    step, inertia = np.array([0.0, -parameters["tail_length"] / count, 0.0]), _link_inertia(parameters, count)
+    points, origin = [], np.array(parameters["tail_mount"], dtype=float)
+    for index in range(count):
+        points.append(_add_point(model, joint, origin, f"joint_{index}"))
+        joint = _add_link(model, joint, origin, inertia, index)
+        origin = step
+    return model, [*points, _add_point(model, joint, step, "tip")]
+
+
+def _add_link(model, parent, origin, inertia, index):
+    """Append Rx, then Rz with the link on it; the id of the Rz joint."""
+    placement = pin.SE3(np.eye(3), origin)
+    pitch = model.addJoint(parent, pin.JointModelRX(), placement, f"alpha_{index}")
+    yaw = model.addJoint(pitch, pin.JointModelRZ(), pin.SE3.Identity(), f"beta_{index}")
+    model.appendBodyToJoint(yaw, inertia, pin.SE3.Identity())
+    return yaw
+
+
+def _add_point(model, joint, position, name):
+    """A frame at a fixed position of a joint's frame; its id."""
+    placement = pin.SE3(np.eye(3), position)
+    return model.addFrame(pin.Frame(f"point_{name}", joint, placement, pin.FrameType.OP_FRAME))
+
+
+def _torso_inertia(parameters):
+    """The torso's inertia, its COM at B."""
+    return pin.Inertia(parameters["torso_mass"], np.zeros(3), np.diag(parameters["torso_inertia"]))
+
+
+def _link_inertia(parameters, count):
+    """One link's inertia, its COM mid-link: the given diagonal, or Pinocchio's own ellipsoid (r, L/2, r)."""
+    mass, half = parameters["tail_mass"] / count, parameters["tail_length"] / count / 2
+    diagonal = parameters.get("link_inertia")
+    if diagonal is None:
+        radius = parameters["link_radius"]
+        rotational = pin.Inertia.FromEllipsoid(mass, radius, half, radius).inertia
+    else:
+        rotational = np.diag(diagonal)
+    return pin.Inertia(mass, np.array([0.0, -half, 0.0]), rotational)

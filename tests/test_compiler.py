@@ -1,0 +1,357 @@
+"""The compiler cache: one text gives one working library, and whatever goes wrong is named."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import pickle
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from serpentail import compiler
+from serpentail.errors import CompileFailed, CompilerNotFound, ModelError, SerpentailError, StateError
+
+TWICE = '#include "scale.h"\ndouble twice(double x) { return SCALE * x; }\n'
+
+
+@pytest.fixture(autouse=True)
+def cache(tmp_path, monkeypatch):
+    """An empty cache and no $CC."""
+    monkeypatch.delenv("CC", raising=False)
+    monkeypatch.setenv("SERPENTAIL_CACHE", str(tmp_path / "cache"))
+    return tmp_path / "cache"
+
+
+@pytest.fixture
+def model(tmp_path):
+    """The sources and the header folder of a library with one function, twice."""
+    include = tmp_path / "model" / "include"
+    source = tmp_path / "model" / "src" / "twice.c"
+    include.mkdir(parents=True)
+    source.parent.mkdir()
+    (include / "scale.h").write_text("#define SCALE 2.0\n")
+    source.write_text(TWICE)
+    return [source], include
+
+
+@pytest.fixture
+def script(tmp_path, monkeypatch):
+    """Make $CC a shell script that logs its arguments, does `body` and then what cc does."""
+    real = shutil.which("cc") or shutil.which("gcc")
+    log = tmp_path / "calls"
+
+    def install(body=""):
+        path = tmp_path / "mycc"
+        path.write_text(f'#!/bin/sh\necho "$@" >> {log}\n{body}\nexec {real} "$@"\n')
+        path.chmod(0o755)
+        monkeypatch.setenv("CC", str(path))
+        return log
+
+    return install
+
+
+def call_twice(library):
+    """What the library's function gives for 21."""
+    function = ctypes.CDLL(str(library)).twice
+    function.restype, function.argtypes = ctypes.c_double, [ctypes.c_double]
+    return function(21.0)
+
+
+def libraries(cache):
+    """Every library in the cache, and every part of one."""
+    return [path for path in cache.rglob("*") if path.suffix in {".so", ".part"}]
+
+
+def forbid_processes(monkeypatch):
+    """Make every attempt to start a process fail the test."""
+
+    def refuse(*_args, **_options):
+        raise AssertionError("a process was started")
+
+    monkeypatch.setattr(subprocess, "Popen", refuse)
+
+
+@pytest.mark.parametrize("profile", ["fast", "reproducible"])
+def test_library_works(model, profile, cache):
+    library = compiler.compile_library(*model, profile=profile)
+    assert call_twice(library) == 42.0
+    assert libraries(cache) == [library]
+
+
+def test_second_call_starts_no_process(model, monkeypatch):
+    first = compiler.compile_library(*model)
+    forbid_processes(monkeypatch)
+    started = time.perf_counter()
+    assert compiler.compile_library(*model) == first
+    assert time.perf_counter() - started < 0.1
+
+
+def test_text_compiles_once_wherever_it_lies(model, tmp_path, script):
+    calls = script()
+    first = compiler.compile_library(*model)
+    moved = tmp_path / "elsewhere"
+    shutil.copytree(tmp_path / "model", moved)
+    assert compiler.compile_library([moved / "src/twice.c"], moved / "include") == first
+    assert calls.read_text().count("twice.c") == 1
+
+
+def test_every_input_reaches_the_key(model, tmp_path):
+    (source,), include = model
+    built = [compiler.compile_library(*model, profile=profile) for profile in ("fast", "reproducible")]
+    (source.parent / "private.h").write_text("#define PRIVATE 1\n")
+    built.append(compiler.compile_library(*model))
+    (include / "scale.h").write_text("#define SCALE 3.0\n")
+    built.append(compiler.compile_library(*model))
+    source.write_text(TWICE.replace("* x", "* x + 1.0"))
+    built.append(compiler.compile_library(*model))
+    renamed = source.rename(source.with_name("renamed.c"))
+    built.append(compiler.compile_library([renamed], include))
+    assert len({library.parent for library in built}) == len(built)
+    assert [call_twice(library) for library in built] == [42.0, 42.0, 42.0, 63.0, 64.0, 64.0]
+
+
+def test_arguments_of_cc_reach_the_key_and_the_compiler(model, monkeypatch):
+    (source,), include = model
+    source.write_text('#include "scale.h"\ndouble twice(double x) { return (SCALE + MORE) * x; }\n')
+    built = []
+    for more in ("1.0", "2.0"):
+        monkeypatch.setenv("CC", f"cc -DMORE={more}")
+        built.append(call_twice(compiler.compile_library([source], include)))
+    assert built == [63.0, 84.0]
+
+
+def test_another_processor_gets_another_library(model, monkeypatch, script):
+    script('case "$*" in *help=target*) echo "-march= $PROCESSOR"; exit 0;; esac')
+    built = []
+    for processor in ("zen", "lake"):
+        monkeypatch.setenv("PROCESSOR", processor)
+        monkeypatch.setattr(compiler, "_processor", lambda processor=processor: processor)
+        built.append(compiler.compile_library(*model))
+    assert built[0].parent != built[1].parent
+    forbid_processes(monkeypatch)
+    assert compiler.compile_library(*model) == built[1]
+
+
+def test_upgrade_behind_a_wrapper_reaches_the_next_key(model, monkeypatch, script, tmp_path):
+    script(f'case "$*" in *--version*) cat {tmp_path}/version; exit 0;; esac')
+    (tmp_path / "version").write_text("mycc 1\n")
+    old = compiler.compile_library(*model)
+    (tmp_path / "version").write_text("mycc 2\n")
+    shutil.rmtree(old.parent)
+    new = compiler.compile_library(*model)
+    assert new.parent != old.parent
+    assert compiler.describe_compiler()["version"] == "mycc 2"
+
+
+def test_native_flag_falls_back(model, script):
+    refusal = 'case "$*" in *{}*) echo "unknown argument" >&2; exit 1;; esac'
+    script(refusal.format("-march=native"))
+    assert "-march=native" not in compiler.describe_compiler()["flags"]
+    script(refusal.format("=native"))
+    flags = compiler.describe_compiler()["flags"]
+    assert not [flag for flag in flags if flag.endswith("=native")]
+    assert call_twice(compiler.compile_library(*model)) == 42.0
+
+
+def test_profiles_differ_in_contraction():
+    fast, exact = (compiler.describe_compiler(profile)["flags"] for profile in ("fast", "reproducible"))
+    assert "-ffp-contract=fast" in fast and "-ffp-contract=off" in exact
+    assert not [flag for flag in exact if "native" in flag]
+    assert "-ffast-math" not in fast + exact
+
+
+def test_description_tells_no_folder(monkeypatch):
+    monkeypatch.setenv("CC", f"{shutil.which('cc')} -pipe")
+    described = compiler.describe_compiler()
+    assert described["command"] == "cc -pipe"
+    assert described["version"]
+
+
+@pytest.mark.parametrize("chosen", ["no-such-cc -O3", "false", 'unbalanced "quote', "env no-such-cc"])
+def test_broken_cc_is_named_and_not_replaced(model, monkeypatch, cache, chosen):
+    monkeypatch.setenv("CC", chosen)
+    with pytest.raises(CompilerNotFound) as caught:
+        compiler.compile_library(*model)
+    assert f"CC={chosen!r}" in str(caught.value)
+    assert not libraries(cache)
+
+
+@pytest.mark.parametrize("chosen", ["echo", "true"])
+def test_compiler_that_writes_nothing(model, monkeypatch, cache, chosen):
+    monkeypatch.setenv("CC", chosen)
+    with pytest.raises(CompileFailed, match="wrote no library"):
+        compiler.compile_library(*model)
+    assert not libraries(cache)
+
+
+def test_no_compiler_names_what_was_tried(model, monkeypatch, tmp_path):
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setitem(sys.modules, "ziglang", None)
+    with pytest.raises(CompilerNotFound) as caught:
+        compiler.compile_library(*model)
+    for words in (
+        "cc (not on PATH)",
+        "gcc",
+        "clang",
+        "ziglang wheel",
+        "apt install gcc",
+        "xcode-select",
+        "CasADi",
+    ):
+        assert words in str(caught.value)
+
+
+def test_broken_compiler_on_path_gives_way_to_the_next(model, monkeypatch, tmp_path):
+    programs = tmp_path / "bin"
+    programs.mkdir()
+    broken, working = programs / "cc", programs / "gcc"
+    broken.write_text("#!/bin/sh\nexit 1\n")
+    working.write_text(f'#!/bin/sh\nPATH={os.environ["PATH"]} exec {shutil.which("cc")} "$@"\n')
+    broken.chmod(0o755)
+    working.chmod(0o755)
+    monkeypatch.setenv("PATH", str(programs))
+    library = compiler.compile_library(*model)
+    assert call_twice(library) == 42.0
+    forbid_processes(monkeypatch)
+    assert compiler.compile_library(*model) == library
+
+
+def test_ziglang_wheel_comes_last(monkeypatch, tmp_path):
+    package = tmp_path / "ziglang"
+    package.mkdir()
+    (package / "__init__.py").touch()
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setenv("PATH", str(package))
+    assert list(compiler._candidates()) == [(sys.executable, "-m", "ziglang", "cc")]
+
+
+def test_failing_source_shows_the_compilers_words(model, cache):
+    (source,), include = model
+    source.write_text("double twice(double x) { return undeclared_name; }\n")
+    with pytest.raises(CompileFailed, match="undeclared_name") as caught:
+        compiler.compile_library([source], include)
+    failure = caught.value
+    assert "exit code 1" in str(failure) and str(source) in str(failure)
+    assert failure.returncode == 1 and str(source) in failure.command and "undeclared_name" in failure.stderr
+    assert pickle.loads(pickle.dumps(failure)).stderr == failure.stderr
+    assert not libraries(cache)
+
+
+def test_long_report_loses_its_middle(model):
+    (source,), include = model
+    source.write_text("".join(f"#error mistake_{n}_ {'x' * 2000}\n" for n in range(10)))
+    with pytest.raises(CompileFailed, match="mistake_0_") as caught:
+        compiler.compile_library([source], include)
+    assert "mistake_9_" in str(caught.value) and "characters left out" in str(caught.value)
+    assert len(str(caught.value)) < 2 * compiler.LONGEST_REPORT < len(caught.value.stderr)
+
+
+@pytest.mark.parametrize("kept", [0, 1000])
+def test_truncated_library_is_rebuilt(model, kept):
+    library = compiler.compile_library(*model)
+    whole = library.read_bytes()
+    library.write_bytes(whole[:kept])
+    rebuilt = compiler.compile_library(*model)
+    assert rebuilt.read_bytes() == whole
+    assert call_twice(rebuilt) == 42.0
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", "{}"])
+def test_damaged_note_is_ignored(model, cache, text):
+    library = compiler.compile_library(*model)
+    (note,) = (cache / "compilers").iterdir()
+    note.write_text(text)
+    assert compiler.compile_library(*model) == library
+    assert len(note.read_text()) > 2
+
+
+def test_eight_processes_at_once(model, cache):
+    (source,), include = model
+    program = (
+        "import ctypes, pathlib, sys; from serpentail import compiler; path = pathlib.Path\n"
+        "library = ctypes.CDLL(str(compiler.compile_library([path(sys.argv[1])], path(sys.argv[2]))))\n"
+        "library.twice.restype = ctypes.c_double; print(library.twice(ctypes.c_double(21.0)))"
+    )
+    command = [sys.executable, "-c", program, str(source), str(include)]
+    surroundings = {**os.environ, "PYTHONPATH": str(Path(compiler.__file__).parents[1])}
+    crowd = [
+        subprocess.Popen(command, env=surroundings, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        for _ in range(8)
+    ]
+    assert [process.communicate() for process in crowd] == [("42.0\n", "")] * 8
+    assert len({path.parent for path in libraries(cache)}) == 1
+
+
+def test_killed_compile_leaves_no_library(model, script, cache, monkeypatch):
+    (source,), include = model
+    script('for word; do case $word in *.part) echo half > $word; touch "$0.busy"; sleep 60;; esac; done')
+    program = (
+        "import pathlib, sys; from serpentail import compiler; path = pathlib.Path\n"
+        "compiler.compile_library([path(sys.argv[1])], path(sys.argv[2]))"
+    )
+    surroundings = {**os.environ, "PYTHONPATH": str(Path(compiler.__file__).parents[1])}
+    command = [sys.executable, "-c", program, str(source), str(include)]
+    with subprocess.Popen(command, env=surroundings, start_new_session=True) as process:
+        busy = Path(os.environ["CC"] + ".busy")
+        patience = time.monotonic() + 60.0
+        while not busy.exists() and time.monotonic() < patience:
+            time.sleep(0.01)
+        os.killpg(process.pid, signal.SIGKILL)
+    assert [path.read_text() for path in libraries(cache)] == ["half\n"]
+    assert not list(cache.rglob("*.so"))
+    monkeypatch.delenv("CC")
+    assert call_twice(compiler.compile_library(*model)) == 42.0
+
+
+def test_sources_that_change_meanwhile_are_not_kept(model, script, cache):
+    (source,), _ = model
+    script(f'case "$*" in *-shared*) echo "/* edited */" >> {source};; esac')
+    with pytest.raises(ModelError, match="changed while"):
+        compiler.compile_library(*model)
+    assert not libraries(cache)
+
+
+def test_unwritable_cache_names_the_variable(model, monkeypatch, tmp_path):
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("SERPENTAIL_CACHE", str(tmp_path / "file" / "cache"))
+    with pytest.raises(SerpentailError, match="SERPENTAIL_CACHE") as caught:
+        compiler.compile_library(*model)
+    assert str(tmp_path / "file") in str(caught.value)
+
+
+def test_cache_folder_by_precedence(monkeypatch, tmp_path):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setenv("XDG_CACHE_HOME", "/xdg")
+    assert compiler._cache_folder(tmp_path / "argument") == tmp_path / "argument"
+    assert compiler._cache_folder(None) == tmp_path / "cache"
+    monkeypatch.delenv("SERPENTAIL_CACHE")
+    assert compiler._cache_folder(None) == Path("/xdg/serpentail")
+    monkeypatch.setenv("XDG_CACHE_HOME", "relative")
+    assert compiler._cache_folder(None) == tmp_path / ".cache" / "serpentail"
+
+
+def test_missing_files_are_a_model_error(model, tmp_path):
+    sources, include = model
+    with pytest.raises(ModelError, match=r"nowhere\.c"):
+        compiler.compile_library([tmp_path / "nowhere.c"], include)
+    with pytest.raises(ModelError, match="nowhere"):
+        compiler.compile_library(sources, tmp_path / "nowhere")
+    with pytest.raises(ModelError):
+        compiler.compile_library([], include)
+
+
+def test_profile_names_are_checked(model):
+    with pytest.raises(SerpentailError, match="unknown build profile 'quick'; choose one of fast, reproducible"):
+        compiler.compile_library(*model, profile="quick")
+    with pytest.raises(SerpentailError, match="'quick'"):
+        compiler.describe_compiler("quick")
+
+
+def test_state_errors_are_value_errors():
+    assert issubclass(StateError, SerpentailError) and issubclass(StateError, ValueError)
