@@ -164,7 +164,7 @@ def c_context(scene: Scene, tail: Tail, emitted: list[Emitted], version: str) ->
         "most_arrays": max(len(f.inputs) + len(f.outputs) for f in views),
         "works": works,
         "steps": step_views(emitted, scene.real),
-        "solves": any(e.body.solves for e in emitted),
+        "helpers": sorted(set().union(*(e.body.helpers for e in emitted)) | ({"copy"} if rollout else set())),
         "rollout": rollout,
     }
 

@@ -7,19 +7,19 @@ from ..program import Apply, Array, Copy, Fill, Index, Loop, Program, Ref, Solve
 from ..tape import BINARY, Step, operation_count
 from .scalars import Dialect, Scalars
 
+FEW = 3  # scalars are written one by one, more by a helper
 ON_STACK = 12  # scalars: larger local arrays go to the caller's workspace
 
 
 @dataclass(frozen=True)
 class CFunction:
-    """One C function body: its lines, the scalars of workspace it needs, its steps, and what it costs."""
+    """One C function body: its lines, the scalars of workspace, the steps and helpers it calls, what it costs."""
 
     lines: tuple[str, ...]
     work: int
     steps: tuple[Step, ...]
-    solves: bool
+    helpers: frozenset[str]
     operations: int
-    uses_parameters: bool
 
 
 def dialect(real: str) -> Dialect:
@@ -83,7 +83,7 @@ def straight_line(program: Program, real: str, fixed=None) -> CFunction:
     guards = " && ".join(f"{scalars.text[p]} > {zero}" for p in pivots)
     lines.append(f"return {guards} ? STATUS_OK : STATUS_NOT_POSITIVE_DEFINITE;" if guards else "return STATUS_OK;")
     operations = sum(tape.nodes[n][0] in BINARY for n in scalars.live)
-    return CFunction(tuple(lines), 0, (), False, operations, any("parameters->" in line for line in lines))
+    return CFunction(tuple(lines), 0, (), frozenset(), operations)
 
 
 class LoopPrinter:
@@ -93,7 +93,7 @@ class LoopPrinter:
         self.program, self.prefix, self.fixed = program, prefix, fixed or {}
         self.dialect = dialect(real)
         self.steps: dict[str, Step] = {}
-        self.solves = False
+        self.helpers: set[str] = set()
         self.operations = 0
         self.used: dict[str, Array] = {}
 
@@ -101,9 +101,8 @@ class LoopPrinter:
         """Return the printed function."""
         body = self._body(self.program.body, 1)
         declarations, work = self._declarations()
-        uses = any(a.role == "parameters" and a.name not in self.fixed for a in self.used.values())
         lines = (*declarations, *body, "return STATUS_OK;")
-        return CFunction(lines, work, tuple(self.steps.values()), self.solves, self.operations, uses)
+        return CFunction(lines, work, tuple(self.steps.values()), frozenset(self.helpers), self.operations)
 
     def _declarations(self) -> tuple[list[str], int]:
         lines, work = [], 0
@@ -134,24 +133,29 @@ class LoopPrinter:
         average = (loop.stop.offset or 2) - loop.start.offset
         head = f"for (int {var} = {start}; {var} < {stop}; ++{var}) {{"
         if loop.downward:
-            head = f"for (int {var} = {stop} - 1; {var} >= {start}; --{var}) {{"
+            head = f"for (int {var} = {index_text(loop.stop + -1)}; {var} >= {start}; --{var}) {{"
         return [head, *("  " + line for line in self._body(loop.body, trips * average)), "}"]
 
     def _fill(self, fill: Fill, trips: int) -> list[str]:
         target = self._ref(fill.target)
-        if target.size > ON_STACK and len(set(fill.values)) == 1:
+        if target.size > FEW and len(set(fill.values)) == 1:
             value = self.dialect.literal(fill.values[0])
-            return [f"for (int s = 0; s < {target.size}; ++s) {{", f"  ({pointer(target)})[s] = {value};", "}"]
+            return [f"{self._helper('fill')}({target.size}, {value}, {pointer(target)});"]
         return [f"{scalar(target, k)} = {self.dialect.literal(v)};" for k, v in enumerate(fill.values)]
 
     def _copy(self, copy: Copy, trips: int) -> list[str]:
         target, source = self._ref(copy.target), self._ref(copy.source)
+        if target.size > FEW:
+            return [f"{self._helper('copy')}({target.size}, {pointer(source)}, {pointer(target)});"]
         return [f"{scalar(target, k)} = {scalar(source, k)};" for k in range(target.size)]
 
+    def _helper(self, name: str) -> str:
+        self.helpers.add(name)
+        return f"{self.prefix}_{name}"
+
     def _solve(self, solve: Solve, trips: int) -> list[str]:
-        self.solves = True
         matrix, x = self._ref(solve.matrix[0]), self._ref(solve.x)
-        call = f"{self.prefix}_ldl_solve({x.size}, {pointer(matrix)}, {pointer(x)})"
+        call = f"{self._helper('ldl_solve')}({x.size}, {pointer(matrix)}, {pointer(x)})"
         return [f"if ({call} != STATUS_OK) {{", "  return STATUS_NOT_POSITIVE_DEFINITE;", "}"]
 
     def _apply(self, call: Apply, trips: int) -> list[str]:
@@ -165,7 +169,10 @@ class LoopPrinter:
                 continue
             before.append(f"real {name}_new[{size}];")
             sign = "+=" if adds else "="
-            after += [f"{scalar(target, k)} {sign} {name}_new[{k}];" for k in range(size)]
+            if adds and size > FEW:
+                after.append(f"{self._helper('add')}({size}, {name}_new, {pointer(target)});")
+            else:
+                after += [f"{scalar(target, k)} {sign} {name}_new[{k}];" for k in range(size)]
             arguments.append(f"{name}_new")
         line = f"{self.prefix}_{call.step.name}({', '.join(arguments)});"
         return [line] if not before else ["{", *("  " + x for x in (*before, line, *after)), "}"]
