@@ -10,12 +10,12 @@ N    ?= 3
 # options of `make model`: REAL=float EMISSION=loops BAKED=1 FUNCTIONS=energy,momentum
 OPTIONS := $(if $(REAL),--real $(REAL)) $(if $(EMISSION),--emission $(EMISSION)) \
            $(if $(BAKED),--baked) $(if $(FUNCTIONS),--functions $(FUNCTIONS))
-NAME    := $(TAIL)_m$(M)_n$(N)
+NAME    := $(TAIL)_m$(M)$(if $(filter continuum,$(TAIL)),,_n$(N))
 SCENE   ?= $(wildcard scenes/$(NAME).toml)
 MODEL   := $(if $(SCENE),$(basename $(notdir $(SCENE))),$(NAME))
 SOURCES := $(shell find codegen -name '*.py' -o -name '*.jinja')
 STAMP   := generated/$(MODEL)/.made
-WANTED  := $(if $(SCENE),$(SCENE),--tail $(TAIL) --segments $(M) --links $(N)) $(OPTIONS)
+WANTED  := $(if $(SCENE),$(SCENE),--tail $(TAIL) --segments $(M) $(if $(filter continuum,$(TAIL)),,--links $(N))) $(OPTIONS)
 
 .PHONY: help setup demo test test-all model verify bench lint golden clean
 .DELETE_ON_ERROR:

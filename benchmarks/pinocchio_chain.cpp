@@ -1,25 +1,31 @@
-// Takes the parameters of the articulated tail and a state in this project's conventions; gives H, C and v_dot
-// by the fastest path found through Pinocchio's public functions, as the peer of the generated code.
+// From parameters of the articulated tail and states in this project's conventions to H, C and v_dot, by the
+// fastest path found through Pinocchio's public functions: the peer of the generated code.
 //
-// The chain is a free-flyer and m n universal joints (RX, then RZ), 2 m n tail coordinates; the constant matrix G
-// repeats (alpha_i, beta_i) over the links of segment i, and H = G^T H_full G, C = G^T C_full.
+// The chain is a free-flyer and m n universal joints (x, then z), 2 m n tail coordinates in all; the constant
+// matrix G repeats (alpha_i, beta_i) over the links of segment i: H = G^T H_full G, C = G^T C_full.
 //
-// What was tried, best of each in ns at (m, n) = (1,3), (3,4), (6,6); Pinocchio 4.1, gcc 12, one AMD Zen 5 core:
-//   529  1577  4382  kept, `pinocchio_forward_dynamics`: nonLinearEffects, then updateGlobalPlacements and
-//                    computeJointJacobians on the same joint data, composite inertias summed over tied columns
-//   783  2209  5931  computeCentroidalMap instead: the kinematics are computed twice
-//   @CRBA@  kept, `pinocchio_forward_dynamics_crba`: the library's CRBA, blocks of H_full summed
-//   805  3030 11600  the same on 2 m n revolutes (RUBX, RUBZ); with RX, RZ, which repeat the trigonometry, more
-//   746  1963  4723  visitors of our own that fuse bias and inertias in one sweep, with Eigen's LLT
-//  1716  5166 15612  computeAllTerms
-// CRBA in LOCAL convention wins for short chains, in WORLD for long ones.  Of the rest, in per cent:
-//   Eigen's vectorisation on  +105: 3-vectors and 6-vectors split over 512-bit packets
-//   all 25 joint types in the variant  +20 to 30;  gcc's default inlining  +20;  its SLP vectoriser on  +8
-//   -O2  +3;  dense GEMM for G^T H G  +25 to 50;  rnea at zero acceleration instead of nonLinearEffects  0
-//   Eigen's LLT of dynamic size  +41, +20, +9; of fixed size  +17, +20, +12; its LDLT, slower still
+// What was tried: ns at (1,3), (3,4), (6,6), minimum over interleaved rounds; Pinocchio 4.1, Eigen 3.4,
+// gcc 12, one core of an AMD Zen 5 with AVX-512.  The first two are in this file.
+//    588  1729  4704  composite: nonLinearEffects, then, on the same joint data, updateGlobalPlacements and
+//                     computeJointJacobians, and composite inertias times the Jacobian's columns, summed
+//    652  2611 11407  CRBA: crba and nonLinearEffects, the blocks of H_full summed; LOCAL for short chains
+//    639  2804 11270  CRBA on 2 m n revolutes that take (cos, sin), RUBX and RUBZ: one sincos a segment
+//    756  3252 12934  CRBA on 2 m n revolutes RX and RZ
+//    636  2071  5640  composite on 2 m n revolutes RX and RZ
+//    716  2165  5741  computeCentroidalMap for the columns: the kinematics are computed twice
+//    599  1725  4521  visitors of one's own, inertias and bias in one sweep
+//   1239  3881 13825  computeAllTerms
+//   1518  6382 28530  mimic joints, which need no G, and all joint types
+//   1572  5871 17669  CRBA on RX and RZ as it comes: all joint types, Eigen vectorised and its LLT, plain -O3
+// What single choices add, each measured on one of these paths:
+//   Eigen vectorised (3-vectors and 6-vectors in 512-bit packets)  +105 %;  gcc's own inlining limits  +19 %
+//   all 25 joint types in the variant  +23 to +31 %;  SLP vectoriser  +8 %;  -O2  0 to +3 %
+//   Eigen's LLT  +41, +20, +9 %, of fixed size  +17, +20, +12 %, instead of the LDL^T below
+//   G^T H_full G by dense products  +26, +25, +49 %;  rnea at v_dot = 0 for nonLinearEffects  0 to +2 %
 #define EIGEN_DONT_VECTORIZE
 #define BOOST_VARIANT_USE_RELAXED_GET_BY_DEFAULT // the library asks each joint whether it is a mimic one
 
+#include <exception>
 #include <string>
 
 #include <Eigen/Core>
@@ -45,8 +51,8 @@ using Matrix62 = Eigen::Matrix<double, 6, 2>;
 using Matrix66 = Eigen::Matrix<double, 6, 6>;
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-constexpr int BASE = 6;              // degrees of freedom of the torso
-constexpr int TORSO = 1;             // Pinocchio's index of the torso's joint; link j has TORSO + 1 + j
+constexpr int BASE = 6;               // degrees of freedom of the torso
+constexpr int TORSO = 1;              // Pinocchio's index of the torso's joint; link j has TORSO + 1 + j
 constexpr int LONGEST_FOR_LOCAL = 16; // links up to which CRBA is faster in LOCAL convention than in WORLD
 
 // The two joint types of the chain, so that a visit chooses between two.
@@ -97,22 +103,22 @@ Model chain_model(int count, const Parameters &p)
 struct Chain {
     Chain(int segments, int links, const Parameters &parameters)
         : m(segments), n(links), model(chain_model(m * n, parameters)), data(model),
-          q(VectorXd::Zero(model.nq)), v(VectorXd::Zero(model.nv)), H(MatrixXd::Zero(BASE + 2 * m, BASE + 2 * m)),
-          x(VectorXd::Zero(BASE + 2 * m)), F(Eigen::Matrix<double, 6, Eigen::Dynamic>::Zero(6, 2 * m))
+          q(VectorXd::Zero(model.nq)), v(VectorXd::Zero(model.nv)),
+          H(MatrixXd::Zero(BASE + 2 * m, BASE + 2 * m)), x(VectorXd::Zero(BASE + 2 * m)), F(6, 2 * m)
     {
     }
 
     int m, n;
     Model model;
     Data data;
-    VectorXd q, v;                                // of the full chain
-    MatrixXd H;                                   // reduced; lower triangle
-    VectorXd x;                                   // reduced bias, then right-hand side, then solution
-    Eigen::Matrix<double, 6, Eigen::Dynamic> F;   // force columns summed over a segment, two a segment
+    VectorXd q, v;                              // of the full chain
+    MatrixXd H;                                 // reduced; lower triangle
+    VectorXd x;                                 // reduced bias, then right-hand side, then solution
+    Eigen::Matrix<double, 6, Eigen::Dynamic> F; // force columns summed over a segment, two a segment
 };
 
-// State of the full chain.  Position and p_dot stay zero: with v_b = 0, H and C do not depend on them, and the
-// linear rows are those of R^T p_ddot.
+// State of the full chain.  Position and p_dot stay zero: H and C do not depend on them, and with v_b = 0 the
+// first three accelerations are R^T p_ddot.
 void set_configuration(Chain &chain, const double *q)
 {
     chain.q.segment<4>(3) << q[4], q[5], q[6], q[3]; // (w, x, y, z) to (x, y, z, w)
@@ -152,24 +158,26 @@ void bias_force(Chain &chain)
     }
 }
 
-// Columns of segment i.  Y is the inertia of all links behind, and takes the segment's own in.  With F_j = Y_j J_j,
-// H_ii = sum_j (J_j^T F_j + J_j^T F_behind + F_behind^T J_j) and H_ki = (sum_k F)^T (sum_j J_j) for k behind i.
+// Columns of segment i.  Y is the inertia of all links behind, and takes its own in; F_j = Y_j J_j,
+// H_ii = sum_j (J_j^T F_j + J_j^T F_behind + F_behind^T J_j), H_ki = (sum_k F)^T (sum_j J_j) for k behind i.
 void segment_columns(Chain &chain, int i, Inertia &Y)
 {
     Data &data = chain.data;
     Matrix62 F_behind = Matrix62::Zero(), J_sum = Matrix62::Zero(), F;
-    Eigen::Matrix2d diagonal = Eigen::Matrix2d::Zero();
+    Eigen::Matrix2d H_ii = Eigen::Matrix2d::Zero();
     for (int j = (i + 1) * chain.n - 1; j >= i * chain.n; --j) {
         Y += data.oMi[TORSO + 1 + j].act(chain.model.inertias[TORSO + 1 + j]);
         const Matrix62 J = data.J.middleCols<2>(BASE + 2 * j);
         pinocchio::motionSet::inertiaAction(Y, J, F);
-        const Eigen::Matrix2d mixed = J.transpose() * F_behind;
-        diagonal += J.transpose() * F + mixed + mixed.transpose();
+        const auto alpha = J.col(0), beta = J.col(1); // scalar products: faster than the 2 x 2 expressions
+        H_ii(0, 0) += alpha.dot(F.col(0)) + 2 * alpha.dot(F_behind.col(0));
+        H_ii(1, 0) += alpha.dot(F.col(1)) + alpha.dot(F_behind.col(1)) + beta.dot(F_behind.col(0));
+        H_ii(1, 1) += beta.dot(F.col(1)) + 2 * beta.dot(F_behind.col(1));
         F_behind += F;
         J_sum += J;
     }
     const int row = BASE + 2 * i;
-    chain.H.block<2, 2>(row, row) = diagonal;
+    chain.H.block<2, 2>(row, row) = H_ii;
     chain.F.middleCols<2>(2 * i) = F_behind;
     for (int k = i + 1; k < chain.m; ++k)
         chain.H.block<2, 2>(BASE + 2 * k, row).noalias() = chain.F.middleCols<2>(2 * k).transpose() * J_sum;
@@ -214,7 +222,7 @@ void sum_own_blocks(Chain &chain, int i)
     chain.H.block<2, 2>(BASE + 2 * i, BASE + 2 * i) << aa, ab, ab, bb;
 }
 
-// Row `row` of H, left of the diagonal block of segment i, from column `side` (alpha: 0, beta: 1) of each link.
+// Row of H left of the diagonal block of segment i, from column `side` (alpha: 0, beta: 1) of each link.
 void sum_row(Chain &chain, int i, int side)
 {
     const int row = BASE + 2 * i + side;
@@ -291,8 +299,8 @@ int accelerate(Chain &chain, const double *q, const double *tau, double *v_dot)
 
 } // namespace
 
-// parameters: gravity, torso_mass, torso_inertia (3), tail_mount (3), tail_mass, tail_length, link_inertia (3).
-// A null pointer where the chain cannot be built.
+// From gravity, torso_mass, torso_inertia (3), tail_mount (3), tail_mass, tail_length, link_inertia (3) to a
+// chain, or to a null pointer where it cannot be built.
 PEER_API void *pinocchio_chain_new(int segments, int links, const double *parameters)
 {
     static_assert(sizeof(Parameters) == 13 * sizeof(double), "parameters are an array of 13");
@@ -321,8 +329,8 @@ PEER_API int pinocchio_forward_dynamics(void *context, const double *q, const do
 }
 
 // v_dot by Pinocchio's CRBA on the full chain; else as above.
-PEER_API int pinocchio_forward_dynamics_crba(void *context, const double *q, const double *v, const double *tau,
-                                             double *v_dot)
+PEER_API int pinocchio_forward_dynamics_crba(void *context, const double *q, const double *v,
+                                             const double *tau, double *v_dot)
 {
     Chain &chain = *static_cast<Chain *>(context);
     set_configuration(chain, q);

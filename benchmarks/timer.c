@@ -1,6 +1,5 @@
 /* Takes closures with the signature of a forward dynamics and a set of states; gives the minimum and the
    median nanoseconds of one call of each, over interleaved rounds in one process. */
-#include <stdint.h>
 #include <stdlib.h>
 #include <time.h>
 
@@ -14,7 +13,7 @@ struct closure {
 
 /* `count` states, one after the other in each of the three arrays */
 struct states {
-    int32_t count, nq, nv, n_tau;
+    size_t count, nq, nv, n_tau;
     const double *q, *v, *tau;
 };
 
@@ -32,10 +31,12 @@ static int failed_calls(const struct closure *closure, const struct states *x, i
 {
     int failures = 0;
     double sum = 0.0;
-    for (int call = 0, k = 0; call < calls; ++call, k = k + 1 == x->count ? 0 : k + 1) {
-        failures += closure->function(closure->context, x->q + (size_t)k * x->nq, x->v + (size_t)k * x->nv,
-                                      x->tau + (size_t)k * x->n_tau, v_dot) != 0;
+    size_t k = 0;
+    for (int call = 0; call < calls; ++call) {
+        failures += closure->function(closure->context, x->q + k * x->nq, x->v + k * x->nv,
+                                      x->tau + k * x->n_tau, v_dot) != 0;
         sum += v_dot[0] + v_dot[x->nv - 1];
+        k = k + 1 == x->count ? 0 : k + 1;
     }
     checksum += sum;
     return failures;
@@ -53,7 +54,7 @@ int time_rounds(int competitors, const struct closure *closures, const struct st
                 int calls, double *min_ns, double *median_ns)
 {
     double *times = malloc((size_t)competitors * (size_t)rounds * sizeof *times);
-    double *v_dot = malloc((size_t)states->nv * sizeof *v_dot);
+    double *v_dot = malloc(states->nv * sizeof *v_dot);
     int failures = times && v_dot ? 0 : -1;
 
     for (int round = -1; failures == 0 && round < rounds; ++round)
@@ -62,10 +63,10 @@ int time_rounds(int competitors, const struct closure *closures, const struct st
             failures += failed_calls(&closures[c], states, calls, v_dot);
             const double elapsed = now_ns() - start;
             if (round >= 0)
-                times[(size_t)c * rounds + round] = elapsed / calls;
+                times[c * rounds + round] = elapsed / calls;
         }
     for (int c = 0; failures == 0 && c < competitors; ++c) {
-        double *mine = times + (size_t)c * rounds;
+        double *mine = times + c * rounds;
         qsort(mine, (size_t)rounds, sizeof *mine, ascending);
         min_ns[c] = mine[0];
         median_ns[c] = 0.5 * (mine[(rounds - 1) / 2] + mine[rounds / 2]);

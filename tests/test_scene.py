@@ -14,6 +14,7 @@ from serpentail_codegen import scene as scene_module
 from serpentail_codegen.scene import (
     FUNCTIONS,
     KEYS,
+    ONLY,
     PARAMETERS,
     Problem,
     Scene,
@@ -128,7 +129,7 @@ def test_scene_for_make_model():
     scene = scene_for("articulated", 3, 4, baked=True, functions=["energy"], parameters={"gravity": 0})
     assert (scene.name, scene.segments, scene.links) == ("articulated_m3_n4", 3, 4)
     assert (scene.baked, scene.functions, scene.parameters["gravity"]) == (True, ("energy",), 0.0)
-    with pytest.raises(SceneError, match=r"^kind: value 'Elastic-2': needs \"articulated\"$"):
+    with pytest.raises(SceneError, match=r"^kind: value 'Elastic-2': needs \"articulated\" or \"continuum\"$"):
         scene_for("Elastic-2", 3, 4)
 
 
@@ -161,7 +162,7 @@ def test_the_paper_rats(segments, links):
 
 def test_the_full_scene_file_shows_every_key():
     text = (SCENES / "kangaroo_rat_m1_n3.toml").read_text()
-    words = [*(set(KEYS) - {"name", "parameters"}), *(p.name for p in PARAMETERS)]
+    words = [*(set(KEYS) - {"name", "parameters", *ONLY["continuum"].keys}), *(p.name for p in PARAMETERS)]
     assert [word for word in words if f"{word} =" not in text] == []
 
 
@@ -289,7 +290,7 @@ def test_choices(refuse, key, value):
 
 def test_polar_coordinates_are_refused_with_the_reason(refuse):
     remedy = refuse('coordinates = "polar"\n' + VALID)["coordinates"].remedy
-    assert remedy == 'needs "joint"; polar angles are singular at theta = 0'
+    assert remedy == 'needs "joint"; polar angles are singular at theta = 0, convert states'
 
 
 @pytest.mark.parametrize("value", ["1", "0", '"true"', "[]"])
@@ -410,3 +411,28 @@ def test_importing_the_loader_does_not_import_sympy():
     code = f"import sys; import {scene_module.__name__}; print('sympy' in sys.modules)"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert run.stdout.strip() == "False"
+
+
+CONTINUUM = 'kind = "continuum"\nsegments = 3\n'
+
+
+def test_a_continuum_has_no_links(refuse):
+    problems = refuse(CONTINUUM + "links = 4\n[parameters]\nlink_radius = 0.003\n")
+    assert set(problems) == {"links", "parameters.link_radius"}
+    assert all("remove it" in problem.remedy for problem in problems.values())
+
+
+@pytest.mark.parametrize("value", ["0", "-1.0", "nan", "inf", "101", "true", '"2"'])
+def test_bend_range_is_an_angle(refuse, value):
+    assert set(refuse(CONTINUUM + f"bend_range = {value}\n")) == {"bend_range"}
+
+
+def test_a_continuum_scene(tmp_path):
+    scene = scene_for("continuum", 3, samples=7)
+    assert (scene.name, scene.segments, scene.samples, scene.coordinates) == ("continuum_m3", 3, 7, "bend")
+    assert "link_inertia" not in scene.parameters
+    assert parse_scene(scene_to_dict(scene), "other") == scene
+
+
+def test_bend_range_and_samples_are_a_continuums_alone(refuse):
+    assert set(refuse(VALID + "samples = 3\n")) == {"samples"}

@@ -5,7 +5,7 @@ import sys
 import time
 from pathlib import Path
 
-from .scene import FUNCTIONS, KINDS, SceneError, load_scene, scene_for
+from .scene import FUNCTIONS, KINDS, SceneError, load_scene, parse_scene, scene_for, scene_to_dict
 
 
 def parser() -> argparse.ArgumentParser:
@@ -27,15 +27,16 @@ def parser() -> argparse.ArgumentParser:
 
 def scene_of(arguments: argparse.Namespace):
     """Return the scene that the arguments describe."""
-    if arguments.scene:
-        return load_scene(arguments.scene)
-    if None in (arguments.tail, arguments.segments):
-        raise SystemExit("give a scene file, or --tail, --segments and --links: see --help")
     chosen = {name: getattr(arguments, name) for name in ("real", "emission") if getattr(arguments, name)}
     if arguments.functions:
         chosen["functions"] = arguments.functions.split(",")
     if arguments.baked:
         chosen["baked"] = True
+    if arguments.scene:
+        scene = load_scene(arguments.scene)
+        return parse_scene(scene_to_dict(scene) | chosen, scene.name)
+    if None in (arguments.tail, arguments.segments):
+        raise SystemExit("give a scene file, or --tail and --segments (and --links): see --help")
     return scene_for(arguments.tail, arguments.segments, arguments.links, **chosen)
 
 

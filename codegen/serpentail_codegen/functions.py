@@ -8,9 +8,10 @@ from math import prod
 from . import dynamics as dyn
 from . import kinematics as kin
 from . import sweeps
+from .draft import Draft, Tail
 from .program import Array, Index, Program
-from .scene import PARAMETERS
-from .sweeps import Draft, Tail, column_of
+from .scene import Parameter, parameters_of
+from .sweeps import column_of, mechanism
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,6 @@ F_EXT = Argument(
     lambda t: (6 + 3 * (t.total + 1),),
     "force at B (N, world), moment (N m, body), then a force (N, world) at each of the N + 1 tail points",
 )
-INERTIAL = tuple(p.name for p in PARAMETERS if p.name != "link_radius")  # what the equations of motion read
 GENERALISED = "generalised force: on p_dot (N, world), on omega (N m, body), on the joint rates (N m)"
 
 
@@ -50,14 +50,19 @@ class Function:
     assemble: Callable[[Draft, dict[str, Array]], None]
 
 
+def inertial(kind: str) -> tuple[Parameter, ...]:
+    """Return the parameters that the equations of motion of a kind of tail read."""
+    return tuple(p for p in parameters_of(kind) if p.name != "link_radius")
+
+
 def program(function: Function, tail: Tail) -> Program:
     """Assemble one function for given sizes."""
     draft = Draft(function.name, function.doc, tail=tail)
-    for parameter in PARAMETERS:
-        if parameter.name in INERTIAL:
-            draft.known[parameter.name] = draft.array(parameter.name, parameter.size, role="parameters")[0]
+    for parameter in inertial(tail.kind):
+        draft.known[parameter.name] = draft.array(parameter.name, parameter.size, role="parameters")[0]
     arrays = {a.name: draft.array(a.name, a.length(tail), role="input") for a in function.inputs}
     arrays |= {a.name: draft.array(a.name, a.length(tail), role="output") for a in function.outputs}
+    draft.known |= {a.name: arrays[a.name][0] for a in function.inputs}
     if "q" in arrays:
         draft.known |= {"p": arrays["q"].part(0, 3), "quaternion": arrays["q"].part(3, 4)}
     if "v" in arrays:
@@ -74,7 +79,7 @@ def assemble_mass_matrix(d: Draft, arrays: dict[str, Array], world: bool = False
     def H_tail(k, other, size=1):
         return H.part((6 + k) * nv + 6 + other, size)
 
-    columns = sweeps.tail_inertia(d, arrays["q"], H_tail, world)
+    columns = sweeps.tail_inertia(d, H_tail, world)
     if world:
         composite = {name: d.known[name] for name in ("h", "I")}
         d.step(dyn.world_composite, **composite)
@@ -92,12 +97,11 @@ def assemble_inverse_dynamics(d: Draft, arrays: dict[str, Array], world: bool = 
     force, v_dot = arrays["force"], arrays.get("v_dot")
     still = d.constant("still", [0, 0, 0])[0]
     d.store(kin.quaternion_rotation, R=9)
-    sweeps.prepare_links(d)
-    sweeps.prepare_joints(d, arrays["q"])
+    mechanism(d).prepare(d)
     d.known |= {"w": d.known["omega"], "w_dot": v_dot.part(3, 3) if v_dot else still}
     d.known["p_ddot"] = v_dot.part(0, 3) if v_dot else still
     d.store(kin.torso_acceleration, a=3)
-    wrench = sweeps.forward_wrenches(d, arrays["v"], v_dot)
+    wrench = sweeps.forward_wrenches(d, v_dot)
     sweeps.gather_wrenches(d, wrench, lambda i: force.part(6 + 2 * i, 2))
     d.step(dyn.torso_wrench, force=force.part(0, 3), moment=force.part(3, 3))
     d.step(dyn.world_vector, {"vector": force.part(0, 3)}, vector=force.part(0, 3))
@@ -115,8 +119,8 @@ def assemble_forward_dynamics(d: Draft, arrays: dict[str, Array]) -> None:
         return A.part((3 + k) * size + 3 + other, entries)
 
     d.store(kin.quaternion_rotation, R=9)
-    columns = sweeps.tail_inertia(d, arrays["q"], A_tail)
-    inertial = sweeps.core_bias(d, arrays["v"])
+    columns = sweeps.tail_inertia(d, A_tail)
+    inertial = sweeps.core_bias(d)
     torques = applied_load(d, arrays)
     d.vector("inverse_mass", 1)
     d.vector("com", 3)
@@ -138,7 +142,7 @@ def assemble_forward_dynamics(d: Draft, arrays: dict[str, Array]) -> None:
 
 def recover_translation(d: Draft, columns: Array, v_dot: Array) -> None:
     """p_b_ddot from the momentum balance, once omega_dot and q_t_ddot are known."""
-    tail_force = d.vector("tail_force", 3)[0]
+    tail_force = d.vector("tail_force", 3)
     d.fill(tail_force, 0)
     with d.loop("k", d.tail.nt) as k:
         reads = {"column": column_of(columns, k), "acceleration": v_dot.part(6 + k, 1)}
@@ -162,41 +166,36 @@ def assemble_momentum(d: Draft, arrays: dict[str, Array]) -> None:
     """Momentum, and angular momentum about the COM; the sweep sees the motion relative to B."""
     still = d.constant("still", [0, 0, 0])[0]
     d.store(kin.quaternion_rotation, R=9)
-    sweeps.gather_momentum(d, arrays, still)
+    sweeps.gather_momentum(d, still)
     d.step(dyn.momentum_at_com, linear=arrays["linear"][0], angular=arrays["angular"][0])
 
 
 def assemble_energy(d: Draft, arrays: dict[str, Array]) -> None:
     """Kinetic energy link by link, potential energy of the COM's height."""
     d.store(kin.quaternion_rotation, R=9)
-    sweeps.gather_momentum(d, arrays, d.known["p_dot"], kinetic=arrays["kinetic"][0])
+    sweeps.gather_momentum(d, d.known["p_dot"], kinetic=arrays["kinetic"][0])
     d.step(dyn.potential_energy, potential=arrays["potential"][0])
 
 
 def assemble_tail_points(d: Draft, arrays: dict[str, Array]) -> None:
-    """The joints, then the tip."""
-    points = arrays["points"]
+    """The joints and the tip, or equally spaced samples of every segment."""
+    points, tail = arrays["points"], d.tail
     d.store(kin.quaternion_rotation, R=9)
-    sweeps.prepare_links(d)
-    sweeps.prepare_joints(d, arrays["q"])
-    R, P = d.vector("R_link", 9)[0], d.vector("P_link", 3)[0]
-    d.copy(R, d.known["R"])
-    d.step(kin.mount_position, P=P)
-    d.copy(points.part(0, 3), P)
-    with d.loop("i", d.tail.segments) as i, d.links(i) as j:
-        d.step(kin.link_pose, {"R": R, "P": P} | sweeps.at_segment(d, i), R=R, P=P)
-        d.copy(points.part(3 * (d.link_number(i, j) + 1), 3), P)
+    mechanism(d).prepare_samples(d)
+    here = sweeps.torso_pose(d, True, d.known["p"])
+    d.copy(points.part(0, 3), here["P"])
+    with d.loop("i", tail.segments) as i, d.loop("j", tail.links) as j:
+        d.step(mechanism(d).pose, here | d.sample(i), **here)
+        d.copy(points.part(3 * (tail.links * i + j + 1), 3), here["P"])
 
 
 def assemble_tail_point_jacobians(d: Draft, arrays: dict[str, Array]) -> None:
     """d(point)/dt = J v for every tail point; arms start at B, so distance from the origin costs no accuracy."""
     J, tail = arrays["J"], d.tail
     d.store(kin.quaternion_rotation, R=9)
-    sweeps.prepare_links(d)
-    sweeps.prepare_joints(d, arrays["q"])
+    mechanism(d).prepare_samples(d)
     S = d.array("S", 12, tail.segments)
-    R, P = d.vector("R_link", 9)[0], d.vector("P_link", 3)[0]
-    here = {"R": R, "P": P}
+    here = sweeps.torso_pose(d, True)
 
     def row(point: Index, axis: int, first: Index | int, size: int):
         return J.part((3 * tail.nv) * point + axis * tail.nv + first, size)
@@ -206,21 +205,19 @@ def assemble_tail_point_jacobians(d: Draft, arrays: dict[str, Array]) -> None:
         for axis in range(3):
             d.fill(row(point, axis, axis, 1), 1)
         rows = {f"J_{name}": row(point, axis, 3, 3) for axis, name in enumerate("xyz")}
-        d.step(kin.point_jacobian_base, {"arm": P}, **rows)
+        d.step(kin.point_jacobian_base, {"arm": here["P"]}, **rows)
 
-    d.copy(R, d.known["R"])
-    d.step(kin.mount_position, {"p": d.constant("origin", [0, 0, 0])[0]}, P=P)
     base_rows(Index())
     with d.loop("i", tail.segments) as i:
         d.fill(S[i], 0)
-        with d.links(i) as j:
-            point = d.link_number(i, j) + 1
-            d.step(kin.joint_twist, here | sweeps.at_segment(d, i), S_=S[i])
-            d.step(kin.link_pose, here | sweeps.at_segment(d, i), **here)
+        with d.loop("j", tail.links) as j:
+            d.step(mechanism(d).twist, here | d.sample(i), S_=S[i])
+            d.step(mechanism(d).pose, here | d.sample(i), **here)
+            point = tail.links * i + j + 1
             base_rows(point)
             with d.loop("l", i + 1) as segment:
                 rows = {f"J_{name}": row(point, axis, 6 + 2 * segment, 2) for axis, name in enumerate("xyz")}
-                d.step(kin.point_jacobian_tail, {"S": S[segment], "arm": P}, **rows)
+                d.step(kin.point_jacobian_tail, {"S": S[segment], "arm": here["P"]}, **rows)
 
 
 FORCE = Argument("force", lambda t: (t.nv,), GENERALISED)

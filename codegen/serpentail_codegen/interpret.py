@@ -6,7 +6,7 @@ With numbers as the algebra this is the reference for every emitted text; with a
 import math
 from fractions import Fraction
 
-from .program import Apply, Copy, Fill, Loop, Program, Ref, Solve
+from .program import Apply, Copy, Fill, Guard, Loop, Program, Ref, Solve
 from .tape import Tape, replay
 
 
@@ -53,10 +53,10 @@ def ldl_solve(algebra, A: list[list], b: list) -> tuple[list, list]:
 
 
 class Run:
-    """One run of a program over an algebra; ``values`` maps array names to lists of scalars."""
+    """One run of a program over an algebra: ``values`` are arrays by name, ``guards`` what must be positive."""
 
     def __init__(self, program: Program, algebra, arguments: dict[str, list]):
-        self.algebra, self.pivots = algebra, []
+        self.algebra, self.guards = algebra, []
         self.values = {a.name: [None] * a.length for a in program.arrays}
         self.values |= {a.name: [algebra.const(v) for v in a.values] for a in program.of_role("constant")}
         self.values |= {name: list(scalars) for name, scalars in arguments.items()}
@@ -108,20 +108,25 @@ class Run:
         """Copy scalars."""
         self.write(copy.target, at, self.read(copy.source, at))
 
+    def guard(self, guard: Guard, at: dict[str, int]) -> None:
+        """Note what must be positive."""
+        self.guards.append((guard.status, self.read(guard.scalar, at)[0]))
+
     def solve(self, solve: Solve, at: dict[str, int]) -> None:
         """Solve a symmetric system."""
         size = solve.x.size
         flat = self.values[solve.matrix.name]
         rows = [flat[k * size : k * size + k + 1] for k in range(size)]
-        x, self.pivots = ldl_solve(self.algebra, rows, self.read(solve.x, at))
+        x, pivots = ldl_solve(self.algebra, rows, self.read(solve.x, at))
+        self.guards += [("NOT_POSITIVE_DEFINITE", pivot) for pivot in pivots]
         self.write(solve.x, at, x)
 
 
-def unroll(program: Program, fixed: dict[str, list] | None = None) -> tuple[Tape, dict, list[int]]:
+def unroll(program: Program, fixed: dict[str, list] | None = None) -> tuple[Tape, dict, list[tuple[str, int]]]:
     """Record a program as one straight line.
 
     Inputs are numbered array by array in the order of declaration; ``fixed`` arrays are constants.  Returns the tape,
-    the nodes of every output array, and the nodes that must be positive.
+    the nodes of every output array, and what must be positive: pairs of status and node.
     """
     tape, arguments, first = Tape(), {}, 0
     for array in (*program.of_role("parameters"), *program.of_role("input")):
@@ -131,4 +136,4 @@ def unroll(program: Program, fixed: dict[str, list] | None = None) -> tuple[Tape
             arguments[array.name] = [tape.input(first + k) for k in range(array.length)]
         first += array.length
     run = Run(program, tape, arguments)
-    return tape, {a.name: run.values[a.name] for a in program.of_role("output")}, run.pivots
+    return tape, {a.name: run.values[a.name] for a in program.of_role("output")}, run.guards

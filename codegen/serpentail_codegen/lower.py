@@ -7,13 +7,28 @@ import sympy
 
 from .tape import Step, Tape, compacted
 
-# scalars of every named quantity; all others are 3-vectors
+# scalars of every named quantity that is no 3-vector
 SIZES = {
-    **dict.fromkeys(["gravity", "torso_mass", "tail_mass", "tail_length", "share", "mass", "inverse_mass"], 1),
+    **dict.fromkeys(
+        [
+            "gravity",
+            "torso_mass",
+            "tail_mass",
+            "tail_length",
+            "share",
+            "fraction",
+            "bend_range",
+            "mass",
+            "inverse_mass",
+        ],
+        1,
+    ),
     **dict.fromkeys(["inertial", "tau", "acceleration"], 1),
     **dict.fromkeys(["angles", "rates", "accelerations"], 2),
     **dict.fromkeys(["quaternion", "joint"], 4),
     **dict.fromkeys(["link", "I", "F", "F_next", "F_beyond", "pitch", "yaw", "column", "other", "f_torso"], 6),
+    **{"section": 2, "H_own": 3, "torque_own": 2, "I_own": 6, "pitch_own": 6, "yaw_own": 6, "tip": 8, "shape": 20},
+    **{"E": 9, "bend": 12},
     **{"twice": 8, "R": 9, "S": 12, "columns": 12},
 }
 
@@ -99,15 +114,19 @@ def sympy_fraction(number: sympy.Rational):
 
 
 @cache
-def derive(function) -> Step:
-    """Derive a step: call ``function(let, *vectors)`` with SymPy vectors named by its arguments, lower its result."""
+def derive(function, **settings) -> Step:
+    """Derive a step: call ``function(let, *vectors)`` with SymPy vectors named by its arguments, lower its result.
+
+    Arguments with a default are settings of the derivation, not vectors.
+    """
     recorder, first, vectors, inputs = Recorder(), 0, [], []
-    for name in list(inspect.signature(function).parameters)[1:]:
+    arguments = inspect.signature(function).parameters.values()
+    for name in [a.name for a in arguments if a.default is a.empty][1:]:
         size = SIZES.get(name, 3)
         vectors.append(recorder.vector(name, first, size))
         inputs.append((name, size))
         first += size
-    outputs = {name: list(value) for name, value in function(recorder.let, *vectors).items()}
+    outputs = {name: list(value) for name, value in function(recorder.let, *vectors, **settings).items()}
     results = tuple(recorder.lower(sympy.sympify(e)) for values in outputs.values() for e in values)
     sizes = tuple((name, len(values)) for name, values in outputs.items())
     doc = inspect.getdoc(function).splitlines()[0]

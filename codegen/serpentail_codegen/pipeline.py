@@ -3,9 +3,9 @@
 from pathlib import Path
 
 from . import __version__
+from .draft import Tail
 from .functions import FUNCTIONS
 from .scene import Scene
-from .sweeps import Tail
 from .targets.c import c_context, c_files, emit
 from .targets.casadi import casadi_module
 from .targets.manifest import manifest
@@ -14,7 +14,7 @@ from .write import digest, write_folder
 
 def generate(scene: Scene, output: Path) -> list[str]:
     """Derive, lower, emit and write what the scene asks for into ``output/<scene>``; return the changed files."""
-    tail = Tail(scene.segments, scene.links)
+    tail = tail_of(scene)
     wanted = [FUNCTIONS[name] for name in needed(scene.functions)]
     emitted = [emit(scene, tail, function) for function in wanted]
     context = c_context(scene, tail, emitted, __version__)
@@ -23,6 +23,12 @@ def generate(scene: Scene, output: Path) -> list[str]:
     module = casadi_module(scene, tail, wanted, __version__, context["content_hash"])
     files[f"{scene.name}_casadi.py"] = module
     return write_folder(output / scene.name, files, manifest(scene, context, emitted))
+
+
+def tail_of(scene: Scene) -> Tail:
+    """Return the sizes of a scene's tail."""
+    pieces = scene.links if scene.kind == "articulated" else scene.samples
+    return Tail(scene.segments, pieces, scene.kind, scene.bend_range)
 
 
 def needed(names: tuple[str, ...]) -> list[str]:

@@ -121,6 +121,15 @@ class Solve:
 
 
 @dataclass(frozen=True)
+class Guard:
+    """Give up with a status unless a scalar is positive; ``protects`` is what must not be used then."""
+
+    scalar: Ref
+    status: str
+    protects: tuple[Ref, ...]
+
+
+@dataclass(frozen=True)
 class Program:
     """One function: its arrays and its loop nest."""
 
@@ -183,6 +192,10 @@ class Builder:
     def solve(self, matrix: Array, x: Ref) -> None:
         """Solve in place."""
         self.emit(Solve(matrix, x))
+
+    def guard(self, scalar: Ref, status: str, *protects: Ref) -> None:
+        """Give up with a status unless a scalar is positive."""
+        self.emit(Guard(scalar, status, protects))
 
     @contextmanager
     def loop(self, var: str, count: Index | int, downward: bool = False, start: Index | int = 0):

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 # fmt: off
-KINDS = ("articulated",)
+KINDS = ("articulated", "continuum")
 FUNCTIONS = (
     "mass_matrix", "bias_force", "inverse_dynamics", "forward_dynamics", "forward_dynamics_external",
     "energy", "momentum", "tail_points", "tail_point_jacobians",
@@ -52,6 +52,10 @@ TEXT = Rule('a text, in "quotes"', lambda x: isinstance(x, str))
 NAME = Rule(
     'a text of a-z, 0-9 and _ that starts with a letter: rename the file, or set name = "..." in it',
     lambda x: isinstance(x, str) and re.fullmatch("[a-z][a-z0-9_]*", x) is not None,
+)
+BEND = Rule(
+    "a number of radians above 0 and up to 100",
+    lambda x: not isinstance(x, bool) and isinstance(x, int | float) and 0 < x <= 100,
 )
 # Rules for the numbers of a parameter; 1e-12 lets a flat body, with equal sums, pass in spite of rounding.
 POSITIVE = Rule(" above 0", lambda x: min(x) > 0)
@@ -117,10 +121,12 @@ class Scene:
     name: str  # prefix of every C symbol and generated file
     kind: str
     segments: int  # m
-    links: int  # n, in each segment
+    links: int  # n, in each segment; 1 for a continuum
     functions: tuple[str, ...]  # in the order of FUNCTIONS
     parameters: Parameters
-    coordinates: str = "joint"  # what q_t holds: the joint angles alpha_i, beta_i
+    coordinates: str = "joint"  # what q_t holds: joint angles alpha_i, beta_i; "bend": bend components a_i, b_i
+    samples: int = 5  # tail points in each segment of a continuum
+    bend_range: float = 2 * math.pi  # rad, largest bend of a continuum segment
     baked: bool = False  # parameters folded into the code, behind the same ABI
     real: str = "double"
     emission: str = "auto"
@@ -132,15 +138,33 @@ KEYS: dict[str, tuple[Any, Rule]] = {
     "description": ("", TEXT),
     "kind": (None, _one_of(KINDS)),
     "segments": (None, COUNT),
-    "links": (None, COUNT),
+    "links": (1, COUNT),
+    "samples": (Scene.samples, COUNT),
+    "bend_range": (Scene.bend_range, BEND),
     "functions": (FUNCTIONS, ANY),
     "parameters": ({}, ANY),
-    "coordinates": (Scene.coordinates, _one_of(["joint"], "; polar angles are singular at theta = 0")),
+    "coordinates": (Scene.coordinates, ANY),
     "baked": (Scene.baked, FLAG),
     "real": (Scene.real, _one_of(["double", "float"])),
     "emission": (Scene.emission, _one_of(["auto", "straight", "loops"])),
 }
 NAMES = tuple(parameter.name for parameter in PARAMETERS)
+
+
+@dataclass(frozen=True)
+class Only:
+    """What only one kind of tail has: keys, parameters, and its coordinates."""
+
+    keys: tuple[str, ...]
+    required: tuple[str, ...]
+    parameters: tuple[str, ...]
+    coordinates: str
+
+
+ONLY = {
+    "articulated": Only(("links",), ("links",), ("link_radius", "link_inertia"), "joint"),
+    "continuum": Only(("samples", "bend_range"), (), (), "bend"),
+}
 
 
 @dataclass(frozen=True)
@@ -182,19 +206,24 @@ def load_scene(path: str | Path) -> Scene:
     raise SceneError([Problem("scene file", str(path), remedy)])
 
 
-def scene_for(tail: str, segments: int, links: int, **overrides: object) -> Scene:
-    """Return the scene of `make model TAIL= M= N=`, with more keys of a scene file; raises SceneError."""
-    table = {"kind": tail, "segments": segments, "links": links, **overrides}
-    return parse_scene(table, re.sub("[^a-z0-9_]", "_", f"{tail}_m{segments}_n{links}".lower()))
+def scene_for(tail: str, segments: int, links: int | None = None, **overrides: object) -> Scene:
+    """Return the scene of `make model TAIL= M= N=` (no N for a continuum), with more keys; raises SceneError."""
+    size = f"_n{links}" if links is not None else ""
+    table = {"kind": tail, "segments": segments} | ({"links": links} if size else {}) | overrides
+    return parse_scene(table, re.sub("[^a-z0-9_]", "_", f"{tail}_m{segments}{size}".lower()))
 
 
 def parse_scene(table: Mapping[str, Any], name: str) -> Scene:
     """Return the Scene of a scene file's table, called `name` unless it has a name; raises SceneError."""
-    values = {key: default for key, (default, _) in KEYS.items()} | {"name": name} | dict(table)
-    problems = _unknown_keys(table, "", KEYS) + _key_problems(values)
+    kind = table["kind"] if isinstance(table.get("kind"), str) and table["kind"] in ONLY else "articulated"
+    own = ONLY[kind]
+    values = {key: default for key, (default, _) in KEYS.items()} | {"name": name, "coordinates": own.coordinates}
+    values |= dict.fromkeys(own.required) | dict(table)
+    problems = _unknown_keys(table, "", KEYS) + _key_problems(values) + _kind_problems(table, own)
     problems += _function_problems(values["functions"])
     try:
-        values["parameters"] = resolve_parameters(values["parameters"], min(_tail_links(values), MOST_LINKS))
+        links = min(_tail_links(values), MOST_LINKS)
+        values["parameters"] = resolve_parameters(values["parameters"], links, kind)
     except SceneError as error:
         problems += error.problems
     if problems:
@@ -203,12 +232,18 @@ def parse_scene(table: Mapping[str, Any], name: str) -> Scene:
     return Scene(**{field.name: values[field.name] for field in fields(Scene)})
 
 
-def resolve_parameters(given: Mapping[str, Any], tail_links: int) -> Parameters:
+def parameters_of(kind: str) -> tuple[Parameter, ...]:
+    """Return the parameters that a kind of tail has."""
+    foreign = {name for other, only in ONLY.items() if other != kind for name in only.parameters}
+    return tuple(parameter for parameter in PARAMETERS if parameter.name not in foreign)
+
+
+def resolve_parameters(given: Mapping[str, Any], tail_links: int, kind: str = "articulated") -> Parameters:
     """Check the given parameters and fill in the others, for N = m n links; raises SceneError."""
     if not isinstance(given, Mapping):
         raise SceneError([Problem("parameters", given, "needs to be a table, under a line [parameters]")])
     unused = "link_radius" if "link_inertia" in given else "link_inertia"
-    values = {p.name: p.default for p in PARAMETERS if p.name != unused} | dict(given)
+    values = {p.name: p.default for p in parameters_of(kind) if p.name != unused} | dict(given)
     problems = _unknown_keys(given, "parameters.", NAMES)
     if "link_inertia" in given and "link_radius" in given:
         remedy = "given together with link_radius, which it overrides; remove one of the two"
@@ -218,7 +253,7 @@ def resolve_parameters(given: Mapping[str, Any], tail_links: int) -> Parameters:
     if problems:
         raise SceneError(problems)
     resolved = {name: _floats(value) for name, value in values.items()}
-    if unused == "link_inertia":
+    if "link_radius" in resolved:
         resolved["link_inertia"] = _ellipsoid_inertia(resolved, tail_links)
     return Parameters(tuple((name, resolved[name]) for name in NAMES if name in resolved))
 
@@ -227,7 +262,8 @@ def scene_to_dict(scene: Scene) -> dict[str, Any]:
     """Return the table that parse_scene turns into this scene again: ordered, JSON-ready, floats exact."""
     computed = "link_inertia" if "link_radius" in scene.parameters else ""
     given = {name: value for name, value in scene.parameters.items() if name != computed}
-    table = {field.name: getattr(scene, field.name) for field in fields(Scene)}
+    foreign = {key for kind, only in ONLY.items() if kind != scene.kind for key in only.keys}
+    table = {field.name: getattr(scene, field.name) for field in fields(Scene) if field.name not in foreign}
     table["functions"] = list(scene.functions)
     table["parameters"] = {name: _plain(value) for name, value in given.items()}
     return table
@@ -282,6 +318,20 @@ def _key_problems(values: Mapping[str, Any]) -> list[Problem]:
     if _tail_links(values) > MOST_LINKS:
         remedy = f"more than {MOST_LINKS} links in all; choose fewer segments or links"
         problems.append(Problem("segments * links", _tail_links(values), remedy))
+    return problems
+
+
+def _kind_problems(table: Mapping[str, Any], own: Only) -> list[Problem]:
+    """Return a problem for all that the tail's kind does not have."""
+    problems, given = [], table.get("parameters", {})
+    for only in (only for only in ONLY.values() if only is not own):
+        remedy = "this kind of tail has none; remove it, or choose another kind"
+        problems += [Problem(key, table[key], remedy) for key in only.keys if key in table]
+        wrong = [key for key in only.parameters if isinstance(given, Mapping) and key in given]
+        problems += [Problem(f"parameters.{key}", given[key], remedy) for key in wrong]
+    if table.get("coordinates", own.coordinates) != own.coordinates:
+        remedy = f'needs "{own.coordinates}"; polar angles are singular at theta = 0, convert states'
+        problems.append(Problem("coordinates", table["coordinates"], remedy))
     return problems
 
 

@@ -5,7 +5,7 @@ from importlib import import_module
 __version__ = "0.1.0"
 _HOME = {
     **dict.fromkeys(["load", "Model"], "model"),
-    **dict.fromkeys(["simulate", "Damping", "TorqueTable"], "simulate"),
+    **dict.fromkeys(["simulate", "Damping", "TorqueTable"], "simulation"),
     **dict.fromkeys(["Trajectory", "pitch_roll_yaw", "rotation_matrix"], "trajectory"),
     **dict.fromkeys(["filmstrip", "time_plots"], "plot"),
     **dict.fromkeys(
@@ -13,7 +13,7 @@ _HOME = {
         "errors",
     ),
 }
-__all__ = sorted(_HOME)
+__all__ = list(_HOME)
 
 
 def __getattr__(name: str):

@@ -16,7 +16,7 @@ class CasadiFunctions:
         self._module = _module(model)
 
     def __getattr__(self, name: str) -> casadi.Function:
-        if name.startswith("__"):
+        if name.startswith("_"):
             raise AttributeError(name)
         values = {
             p["name"]: self._model.parameters[p["name"]] for p in self._model.manifest["parameters"] if p["in_struct"]

@@ -1,13 +1,14 @@
 """Compiled models: a manifest and a parameter vector go in, callables on NumPy arrays come out."""
 
 import ctypes
+import math
 import threading
 from pathlib import Path
 
 import numpy as np
 
 from .compiler import compile_library
-from .errors import ModelError, StateError
+from .errors import ModelError, SerpentailError, StateError
 from .manifest import remedy
 
 NOT_POSITIVE_DEFINITE, NOT_FINITE = 1, 2
@@ -18,7 +19,10 @@ def open_library(folder: Path, manifest: dict, profile: str) -> ctypes.CDLL:
     prefix = manifest["prefix"]
     sources = [folder / "src" / f"{prefix}.c", folder / "src" / f"{prefix}_host.c"]
     path = compile_library(sources, folder / "include", profile)
-    library = ctypes.CDLL(str(path))
+    try:
+        library = ctypes.CDLL(str(path))
+    except OSError as error:
+        raise SerpentailError(f"the compiled model cannot be loaded ({error}): set SERPENTAIL_CACHE") from error
     abi_hash = getattr(library, f"{prefix}_abi_hash")
     abi_hash.restype = ctypes.c_char_p
     if abi_hash().decode() != manifest["abi_hash"]:
@@ -29,6 +33,18 @@ def open_library(folder: Path, manifest: dict, profile: str) -> ctypes.CDLL:
 
 
 MOST_ARRAYS = 8
+
+
+def real_array(what: str, value, dtype=np.float64, error=StateError) -> np.ndarray:
+    """Return a value as a contiguous array; raise ``error`` where it is none of real numbers."""
+    try:
+        array = np.asarray(value)
+    except Exception as reason:  # whatever the __array__ of a foreign type raises
+        raise error(f"{what} is not made of real numbers: {reason}") from reason
+    if array.dtype.kind not in "fiu":
+        raise error(f"{what} is not made of real numbers: its type is {array.dtype}")
+    with np.errstate(over="ignore"):  # what float cannot hold becomes inf, which is refused later
+        return np.asarray(array, dtype, order="C")
 
 
 class Call(ctypes.Structure):
@@ -55,6 +71,7 @@ class Buffers(threading.local):
     def __init__(self, dtype, inputs, outputs, work: int, parameters: np.ndarray):
         self.inputs = [np.zeros(shape, dtype) for shape in inputs]
         self.outputs = [np.zeros(shape, dtype) for shape in outputs]
+        self.quaternion = self.inputs[0][3:7]
         self.work = np.zeros(work + 1, dtype)
         self.call = call_record(parameters, 1, self.work, (*self.inputs, *self.outputs))
         self.address = ctypes.addressof(self.call)
@@ -72,6 +89,8 @@ class Kernel:
         self.function = getattr(library, f"{manifest['prefix']}_batch_{name}")
         self.function.argtypes = [ctypes.c_void_p]
         self.parameters = parameters
+        limits = np.finfo(self.dtype)  # of the quaternion's squared norm, beyond which R would be wrong
+        self.least, self.most = float(limits.tiny), float(limits.max)
         self.buffers = Buffers(self.dtype, self.shapes, self.out_shapes, manifest["work"][name], parameters)
 
     def __call__(self, *arrays):
@@ -81,9 +100,13 @@ class Kernel:
             if type(array) is not np.ndarray or array.shape != shape or array.dtype is not dtype:
                 return self._any(arrays)
             buffer[...] = array
+        return self._single(buffers)
+
+    def _single(self, buffers: Buffers):
         status = self.function(buffers.address)
-        if status:
-            self._fail(buffers.call, [b[None] for b in buffers.inputs])
+        w, x, y, z = buffers.quaternion.tolist()
+        if status or w * w + x * x + y * y + z * z > self.most:
+            self._fail(status, 0, [b[None] for b in buffers.inputs])
         outputs = buffers.outputs
         return outputs[0].copy() if len(outputs) == 1 else tuple(o[()] if o.ndim == 0 else o.copy() for o in outputs)
 
@@ -91,19 +114,15 @@ class Kernel:
         arrays = [self._checked(*item) for item in zip(self.names, self.shapes, arrays, strict=True)]
         counts = {a.shape[0] for a, shape in zip(arrays, self.shapes, strict=True) if a.ndim > len(shape)}
         if not counts:
-            return self(*arrays)
+            for array, buffer in zip(arrays, self.buffers.inputs, strict=True):
+                buffer[...] = array
+            return self._single(self.buffers)
         if len(counts) > 1:
             raise StateError(f"{self.name}: batch sizes differ ({', '.join(map(str, sorted(counts)))}): give one")
         return self._batch(counts.pop(), arrays)
 
     def _checked(self, name: str, shape: tuple[int, ...], value) -> np.ndarray:
-        try:
-            array = np.asarray(value)
-            if array.dtype.kind not in "fiu":
-                raise TypeError(f"{array.dtype} is no real number type")
-            array = np.ascontiguousarray(array, self.dtype)
-        except (TypeError, ValueError) as error:
-            raise StateError(f"{self.name}: {name} is not an array of real numbers: {error}") from error
+        array = real_array(f"{self.name}: {name}", value, self.dtype)
         if array.shape[array.ndim - len(shape) :] != shape or array.ndim > len(shape) + 1 or array.ndim < len(shape):
             size = ", ".join(map(str, shape))
             raise StateError(f"{self.name}: {name} has shape {array.shape}, not ({size},) or (batch, {size})")
@@ -116,20 +135,28 @@ class Kernel:
         ]
         outputs = [np.empty((count, *shape), self.dtype) for shape in self.out_shapes]
         call = call_record(self.parameters, count, self.buffers.work, (*whole, *outputs))
-        if self.function(ctypes.addressof(call)):
-            self._fail(call, whole)
+        status = self.function(ctypes.addressof(call))
+        if status:
+            self._fail(status, call.failed, whole)
+        with np.errstate(over="ignore"):
+            norms = np.square(whole[0][:, 3:7]).sum(axis=1)
+        bad = np.flatnonzero(norms > self.most)
+        if bad.size:
+            self._fail(status, bad[0], whole)
         return outputs[0] if len(outputs) == 1 else tuple(outputs)
 
-    def _fail(self, call: Call, arrays):
-        index = call.failed
+    def _fail(self, status: int, index: int, arrays):
+        state = f" of state {index}" if len(arrays[0]) > 1 else ""
         for name, array in zip(self.names, arrays, strict=True):
             bad = np.argwhere(~np.isfinite(array[index]))
             if len(bad):
-                where = f"[{', '.join(map(str, bad[0]))}]" + (f" of state {index}" if len(array) > 1 else "")
+                where = f"[{', '.join(map(str, bad[0]))}]{state}"
                 value = array[index][tuple(bad[0])]
                 raise StateError(f"{self.name}: {name}{where} is {value}: give finite numbers")
-        state = f" of state {index}" if len(arrays[0]) > 1 else ""
-        raise StateError(
-            f"{self.name}: the inertia matrix{state} is not positive definite: is the quaternion q[3:7] zero, "
-            "a value too large, or a parameter unphysical?"
-        )
+        norm = math.hypot(*arrays[0][index, 3:7])
+        if not self.least <= norm * norm <= self.most:
+            words = f"has norm {norm:.3g}" if norm else "is zero"
+            raise StateError(f"{self.name}: the quaternion q[3:7]{state} {words}: upright is (1, 0, 0, 0)")
+        indefinite = f"the inertia matrix{state} is not positive definite"
+        what = indefinite if status == NOT_POSITIVE_DEFINITE else f"the result{state} is not finite"
+        raise StateError(f"{self.name}: {what}: is a value too large, or a parameter unphysical?")

@@ -8,17 +8,21 @@ from . import __version__
 from .errors import ModelError
 
 FORMAT = 1
+KEYS = ("abi_hash", "prefix", "real", "scene", "dimensions", "parameters", "functions", "work", "files")
 
 
 def read_manifest(folder: Path) -> dict:
     """Return the manifest of a generated folder; ModelError where it is missing, stale or does not fit its files."""
     path = folder / "manifest.json"
     if not path.is_file():
-        raise ModelError(f"{folder} is no generated folder (it has no manifest.json): run `make model TAIL= M= N=`")
+        raise ModelError(
+            f"{folder} is no generated folder (it has no manifest.json): make one, as by `make model TAIL=articulated "
+            "M=3 N=4`, or python -m serpentail_codegen SCENE.toml"
+        )
     try:
         manifest = json.loads(path.read_text(encoding="utf-8"))
         _check(folder, manifest)
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise ModelError(f"{path} is damaged ({error}): {remedy(folder)}") from error
     return manifest
 
@@ -32,6 +36,9 @@ def _check(folder: Path, manifest: dict) -> None:
     if (manifest["format"], manifest["generator"]) != (FORMAT, __version__):
         made = f"format {manifest['format']}, generator {manifest['generator']}"
         raise ModelError(f"{folder} is stale: made by {made}, this is format {FORMAT}, {__version__}: {remedy(folder)}")
+    absent = [key for key in KEYS if key not in manifest]
+    if absent:
+        raise ValueError(f"it lacks {', '.join(absent)}")
     for name, digest in manifest["files"].items():
         try:
             found = hashlib.sha256((folder / name).read_bytes()).hexdigest()

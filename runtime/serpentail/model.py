@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from .errors import ModelError
-from .library import Kernel, open_library
+from .errors import ModelError, StateError
+from .library import Kernel, open_library, real_array
 from .manifest import read_manifest
 from .parameters import flat, resolve
 
@@ -24,7 +24,7 @@ def load(folder: str | PathLike[str], parameters: Mapping[str, object] | None = 
     folder = Path(folder)
     manifest = read_manifest(folder)
     values = resolve(manifest, parameters)
-    return Model(folder, manifest, values, open_library(folder, manifest, profile))
+    return Model(folder, manifest, values, open_library(folder, manifest, profile), profile)
 
 
 class Model:
@@ -34,10 +34,12 @@ class Model:
     v (nv = 6 + 2m): velocity of B in the world, angular velocity in the body frame, joint rates.
     Every method also takes arrays with a leading batch axis; a single state is repeated over a batch.  All raise
     StateError on a wrong shape or a value that is not finite, ModelError where the scene left the function out.
+    Threads may share a model; a pickled one is loaded anew from its folder.
     """
 
-    def __init__(self, folder: Path, manifest: dict, parameters: Mapping, library):
-        self.folder, self.manifest, self.parameters, self.library = folder, manifest, parameters, library
+    def __init__(self, folder: Path, manifest: dict, parameters: Mapping, library, profile: str = "fast"):
+        self.folder, self.manifest, self.parameters = folder, manifest, parameters
+        self.library, self.profile = library, profile
         sizes = manifest["dimensions"]
         self.name = manifest["prefix"]
         self.segments, self.links = sizes["segments"], sizes["links"]
@@ -51,23 +53,37 @@ class Model:
 
     def with_parameters(self, **changes) -> "Model":
         """Return this model with other parameters; nothing is compiled."""
-        own = {k: v for k, v in self.parameters.items() if k != "link_inertia" or "link_radius" not in self.parameters}
+        own = self._given()
         if "link_inertia" in changes:
             own.pop("link_radius", None)
         if "link_radius" in changes:
             own.pop("link_inertia", None)
-        return Model(self.folder, self.manifest, resolve(self.manifest, own | changes), self.library)
+        return Model(self.folder, self.manifest, resolve(self.manifest, own | changes), self.library, self.profile)
+
+    def _given(self) -> dict:
+        """Return the parameters that the others follow from; none where they are baked."""
+        if self.manifest["scene"]["baked"]:
+            return {}
+        computed = "link_inertia" if "link_radius" in self.parameters else ""
+        return {name: value for name, value in self.parameters.items() if name != computed}
+
+    def __reduce__(self):
+        return load, (self.folder.absolute(), self._given(), self.profile)
 
     def kernel(self, name: str) -> Kernel:
         """Return a compiled function; ModelError where the scene did not ask for it."""
         found = self.kernels.get(name)
         if found is None:
-            has = ", ".join(self.kernels)
-            raise ModelError(
-                f"{self.name} was generated without {name!r} (it has {has}): add it to `functions` of the scene, "
-                "then generate it again"
-            )
+            raise self.without(name)
         return found
+
+    def without(self, *names: str) -> ModelError:
+        """Return the error that functions are not there."""
+        has = ", ".join(self.manifest["work"])
+        return ModelError(
+            f"{self.name} was generated without {', '.join(map(repr, names))} (it has {has}): add it to `functions` of "
+            "the scene, then generate it again"
+        )
 
     def mass_matrix(self, q):
         """Inertia matrix H(q) (nv, nv), Eq. 2."""
@@ -94,8 +110,13 @@ class Model:
     def external_force(self, force=(0, 0, 0), moment=(0, 0, 0), tail=None):
         """Return f_ext: force at B (3, N, world), moment (3, N m, body), tail forces (N + 1, 3, N, world) or None."""
         points = self.manifest["dimensions"]["total"] + 1
-        tail = np.zeros((points, 3)) if tail is None else np.reshape(tail, (points, 3))
-        return np.concatenate([np.reshape(force, 3), np.reshape(moment, 3), tail.ravel()]).astype(float)
+        shapes = {"force": (3,), "moment": (3,), "tail": (points, 3)}
+        given = {"force": force, "moment": moment, "tail": np.zeros((points, 3)) if tail is None else tail}
+        arrays = {name: real_array(name, value) for name, value in given.items()}
+        for name, shape in shapes.items():
+            if arrays[name].shape != shape:
+                raise StateError(f"external_force: {name} has shape {arrays[name].shape}, not {shape}")
+        return np.concatenate([array.ravel() for array in arrays.values()])
 
     def energy(self, q, v):
         """(kinetic, potential) energy (J); potential is zero at the height of the world's origin."""

@@ -5,6 +5,8 @@ from collections.abc import Mapping
 from difflib import get_close_matches
 from types import MappingProxyType
 
+import numpy as np
+
 from .errors import ModelError
 
 Value = float | tuple[float, ...]
@@ -25,8 +27,11 @@ def resolve(manifest: dict, changes: Mapping[str, object] | None) -> MappingProx
     values = {name: p["default"] for name, p in fields.items() if p["default"] is not None}
     problems, given = [], {}
     for name, value in (changes or {}).items():
-        checked = _checked(fields, name, value)
-        (problems.append if isinstance(checked, str) else lambda c, n=name: given.__setitem__(n, c))(checked)
+        checked = _checked(fields, str(name), value)
+        if isinstance(checked, str):
+            problems.append(checked)
+        else:
+            given[name] = checked
     if {"link_radius", "link_inertia"} <= given.keys():
         problems.append("link_radius and link_inertia: give one of them, not both")
     if given and manifest["scene"]["baked"]:
@@ -38,7 +43,7 @@ def resolve(manifest: dict, changes: Mapping[str, object] | None) -> MappingProx
     values |= given
     if "link_inertia" in given:
         values.pop("link_radius", None)
-    elif "link_radius" in given or "link_radius" in values:
+    elif "link_radius" in values:
         values["link_inertia"] = ellipsoid(values, manifest["dimensions"]["total"])
     return MappingProxyType(
         {n: tuple(map(float, v)) if isinstance(v, list | tuple) else float(v) for n, v in values.items()}
@@ -48,8 +53,10 @@ def resolve(manifest: dict, changes: Mapping[str, object] | None) -> MappingProx
 def ellipsoid(values: Mapping[str, Value], links: int) -> tuple[float, float, float]:
     """Moments of inertia (kg m^2) of one link, an ellipsoid with semi-axes (r, L / 2, r) and the link along y."""
     m, length, r = values["tail_mass"] / links, values["tail_length"] / links, values["link_radius"]
-    across = m / 5 * (length**2 / 4 + r**2)
-    return across, m / 5 * 2 * r**2, across
+    across, along = m / 5 * (length * length / 4 + r * r), m / 5 * (2 * r * r)
+    if not math.isfinite(across + along):
+        raise ModelError("parameters: tail_mass, tail_length and link_radius give no finite link_inertia: use kg and m")
+    return across, along, across
 
 
 def flat(manifest: dict, values: Mapping[str, Value]) -> list[float]:
@@ -70,12 +77,19 @@ def _checked(fields: dict, name: str, value: object) -> Value | str:
             f"did you mean {near[0]!r}?" if near else f"there are {', '.join(fields)}"
         )
     size = fields[name]["size"]
-    try:
-        numbers = [float(x) for x in (value if size > 1 else [value])]
-    except (TypeError, ValueError):
-        numbers = []
+    numbers = _numbers(value, (size,) if size > 1 else ())
     holds, words = CHECKS[fields[name]["check"]]
     if len(numbers) != size or not all(map(math.isfinite, numbers)) or not holds(numbers):
         kind = "a finite number" if size == 1 else f"{size} finite numbers"
         return f"{name}: value {value!r}: needs {kind} ({fields[name]['unit']}), {words}"
     return tuple(numbers) if size > 1 else numbers[0]
+
+
+def _numbers(value: object, shape: tuple[int, ...]) -> list[float]:
+    """Return the real numbers of an array of this shape; none where it is something else."""
+    try:
+        array = np.asarray(value)
+    except ValueError:
+        return []
+    fits = array.dtype.kind in "fiu" and array.shape == shape
+    return [float(x) for x in array.ravel()] if fits else []

@@ -304,13 +304,26 @@ def _continued(angles: Array) -> Array:
     if angles.ndim != 2:
         raise ValueError(f"q of {angles.ndim} dimensions cannot be unwrapped: give (K, 7 + 2m), time first")
     followed = angles.copy()
+    followed[:1] = [_upright(first) for first in angles[:1]]
     for k in range(1, len(angles)):
         followed[k] = _nearest(angles[k], followed[k - 1])
     return followed
 
 
+def _branches(angles: Array) -> Array:
+    """Both Euler branches of one attitude: (x, y, z) and (pi - x, y + pi, z + pi), (2, 3)."""
+    return np.stack([angles, angles * (-1, 1, 1) + np.pi])
+
+
+def _upright(angles: Array) -> Array:
+    """The angles of one attitude with the least roll and yaw, which are within half a turn: a somersault is pitch."""
+    branches = _branches(angles)
+    branches[:, 1:] -= 2 * np.pi * np.round(branches[:, 1:] / (2 * np.pi))
+    return np.asarray(branches[np.argmin(np.abs(branches[:, 1:]).sum(axis=1))])
+
+
 def _nearest(angles: Array, reference: Array) -> Array:
     """The angles of one attitude, (x, y, z) or (pi - x, y + pi, z + pi) plus turns, closest to reference."""
-    branches = np.stack([angles, angles * (-1, 1, 1) + np.pi])
+    branches = _branches(angles)
     branches += 2 * np.pi * np.round((reference - branches) / (2 * np.pi))
     return np.asarray(branches[np.argmin(np.abs(branches - reference).sum(axis=1))])

@@ -4,15 +4,16 @@ import hashlib
 import json
 from dataclasses import dataclass
 
-from ..functions import INERTIAL, Argument, Function
+from ..draft import Tail
+from ..functions import Argument, Function, inertial
 from ..functions import program as assemble
-from ..scene import PARAMETERS, Scene
-from ..sweeps import Tail
+from ..scene import Scene
 from ..templating import render
 from .c_function import CFunction, dialect, in_loops, step_lines, straight_line
 
 STRAIGHT_UP_TO = 5000  # operations: beyond, the text leaves the instruction cache and compile time grows
-ROLLOUT_DOC = "fixed-step RK4"
+COORDINATES = {"articulated": "alpha_1, beta_1, ... of the joints", "continuum": "a_1, b_1, ... of the segments' bend"}
+PIECES = {"articulated": "links", "continuum": "samples"}
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,7 @@ def emit(scene: Scene, tail: Tail, function: Function) -> Emitted:
     program = assemble(function, tail)
     fixed = baked_values(scene)
     if scene.emission != "loops":
-        body = straight_line(program, scene.real, fixed)
+        body = straight_line(program, scene.real, scene.name, fixed)
         if scene.emission == "straight" or body.operations <= STRAIGHT_UP_TO:
             return Emitted(function, body, "straight")
     return Emitted(function, in_loops(program, scene.real, scene.name, fixed), "loops")
@@ -37,7 +38,7 @@ def emit(scene: Scene, tail: Tail, function: Function) -> Emitted:
 
 def baked_values(scene: Scene) -> dict[str, list]:
     """Return the parameters to fold into the code."""
-    return {name: values(scene, name) for name in INERTIAL} if scene.baked else {}
+    return {p.name: values(scene, p.name) for p in inertial(scene.kind)} if scene.baked else {}
 
 
 def values(scene: Scene, name: str) -> list[float]:
@@ -95,7 +96,7 @@ def wrapped(head: str, arguments: list[str]) -> str:
 def parameter_views(scene: Scene) -> list[dict]:
     """Return the fields of the parameter struct."""
     literal = dialect(scene.real).literal
-    fields = [p for p in PARAMETERS if p.name in INERTIAL]
+    fields = inertial(scene.kind)
     return [
         {
             "name": p.name,
@@ -108,14 +109,14 @@ def parameter_views(scene: Scene) -> list[dict]:
     ]
 
 
-def step_views(emitted: list[Emitted], real: str) -> list[dict]:
+def step_views(emitted: list[Emitted], real: str, prefix: str) -> list[dict]:
     """Return every step that some loop calls, once."""
     steps = {step.name: step for e in emitted for step in e.body.steps}
     return [
         {
             "name": step.name,
             "doc": step.doc,
-            "lines": step_lines(step, real),
+            "lines": step_lines(step, real, prefix),
             "arguments": ", ".join(
                 [f"const real *{name}" for name, _ in step.inputs] + [f"real *{name}_out" for name, _ in step.outputs]
             ),
@@ -132,7 +133,7 @@ def rollout_work(emitted: list[Emitted], tail: Tail) -> int:
 
 def abi_hash(scene: Scene, views: list[FunctionView]) -> str:
     """Digest of what a caller relies on: symbols, argument sizes, workspace, the parameter struct."""
-    interface = [scene.name, scene.real, [[p.name, p.size] for p in PARAMETERS if p.name in INERTIAL]]
+    interface = [scene.name, scene.real, [[p.name, p.size] for p in inertial(scene.kind)]]
     interface += [[f.name, [[a.name, a.length] for a in (*f.inputs, *f.outputs)], f.work] for f in views]
     return hashlib.sha256(json.dumps(interface).encode()).hexdigest()[:16]
 
@@ -147,23 +148,24 @@ def c_context(scene: Scene, tail: Tail, emitted: list[Emitted], version: str) ->
     if rollout:
         works.append({"name": "rollout", "work": rollout_work(emitted, tail)})
     return {name: literal(value) for name, value in numbers.items()} | {
-        "title": f"{scene.kind} tail, {tail.segments} segments x {tail.links} links",
+        "title": f"{scene.kind} tail, {tail.segments} segments x {tail.links} {PIECES[scene.kind]}",
+        "pieces": PIECES[scene.kind],
         "prefix": scene.name,
         "upper": scene.name.upper(),
         "real": scene.real,
         "sqrt": dialect(scene.real).functions["sqrt"],
         "version": version,
-        "coordinates": "alpha_1, beta_1, ... of the joints",
+        "coordinates": COORDINATES[scene.kind],
         "content_hash": "",
         "abi_hash": abi_hash(scene, views),
         "tail": tail,
         "baked": scene.baked,
         "parameters": parameter_views(scene),
-        "parameter_count": sum(p.size for p in PARAMETERS if p.name in INERTIAL),
+        "parameter_count": sum(p.size for p in inertial(scene.kind)),
         "functions": views,
         "most_arrays": max(len(f.inputs) + len(f.outputs) for f in views),
         "works": works,
-        "steps": step_views(emitted, scene.real),
+        "steps": step_views(emitted, scene.real, scene.name),
         "helpers": sorted(set().union(*(e.body.helpers for e in emitted)) | ({"copy"} if rollout else set())),
         "rollout": rollout,
     }

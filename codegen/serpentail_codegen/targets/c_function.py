@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from ..interpret import unroll
-from ..program import Apply, Array, Copy, Fill, Index, Loop, Program, Ref, Solve
+from ..program import Apply, Array, Copy, Fill, Guard, Index, Loop, Program, Ref, Solve
 from ..tape import BINARY, Step, operation_count
 from .scalars import Dialect, Scalars
 
@@ -22,10 +22,11 @@ class CFunction:
     operations: int
 
 
-def dialect(real: str) -> Dialect:
+def dialect(real: str, prefix: str = "") -> Dialect:
     """Return how C writes scalars of a real type."""
     suffix = "f" if real == "float" else ""
-    return Dialect("const real {name} = {text};", suffix, {op: op + suffix for op in ("sin", "cos", "sqrt")})
+    sincos = f"real {{sine}}, {{cosine}}; {prefix}_sincos({{argument}}, &{{sine}}, &{{cosine}});"
+    return Dialect("const real {name} = {text};", suffix, {"sqrt": "sqrt" + suffix}, sincos)
 
 
 def index_text(index: Index) -> str:
@@ -56,10 +57,10 @@ def argument_name(array: Array) -> str:
     return f"parameters->{array.name}" if array.role == "parameters" else array.name
 
 
-def step_lines(step: Step, real: str) -> list[str]:
+def step_lines(step: Step, real: str, prefix: str) -> list[str]:
     """Print the body of a step: inputs by their names, outputs as ``<name>_out``."""
     names = [f"{name}[{k}]" for name, size in step.inputs for k in range(size)]
-    scalars = Scalars(step.nodes, step.results, names, dialect(real))
+    scalars = Scalars(step.nodes, step.results, names, dialect(real, prefix))
     lines = scalars.lines()
     targets = [f"{name}_out[{k}]" for name, size in step.outputs for k in range(size)]
     # every input is read before an output is written: outputs may overwrite inputs
@@ -69,21 +70,23 @@ def step_lines(step: Step, real: str) -> list[str]:
     return lines + [f"{target} = {late.get(text, text)};" for target, text in zip(targets, texts, strict=True)]
 
 
-def straight_line(program: Program, real: str, fixed=None) -> CFunction:
+def straight_line(program: Program, real: str, prefix: str, fixed=None) -> CFunction:
     """Print a program without loops."""
-    tape, outputs, pivots = unroll(program, fixed)
+    tape, outputs, guards = unroll(program, fixed)
     results = [node for a in program.of_role("output") for node in outputs[a.name]]
     arrays = (*program.of_role("parameters"), *program.of_role("input"))
     names = [scalar(a.part(0, a.length), k) for a in arrays for k in range(a.length)]
-    scalars = Scalars(tape.nodes, results + pivots, names, dialect(real))
+    scalars = Scalars(tape.nodes, [*results, *(node for _, node in guards)], names, dialect(real, prefix))
     lines = scalars.lines()
     targets = [scalar(a.part(0, a.length), k) for a in program.of_role("output") for k in range(a.length)]
     lines += [f"{target} = {scalars.text[node]};" for target, node in zip(targets, results, strict=True)]
     zero = dialect(real).literal(0)
-    guards = " && ".join(f"{scalars.text[p]} > {zero}" for p in pivots)
-    lines.append(f"return {guards} ? STATUS_OK : STATUS_NOT_POSITIVE_DEFINITE;" if guards else "return STATUS_OK;")
+    for status in dict.fromkeys(status for status, _ in guards):
+        tests = " && ".join(f"{scalars.text[node]} > {zero}" for name, node in guards if name == status)
+        lines += [f"if (!({tests})) {{", f"  return STATUS_{status};", "}"]
+    lines.append("return STATUS_OK;")
     operations = sum(tape.nodes[n][0] in BINARY for n in scalars.live)
-    return CFunction(tuple(lines), 0, (), frozenset(), operations)
+    return CFunction(tuple(lines), 0, (), frozenset(called(tape.nodes)), operations)
 
 
 class LoopPrinter:
@@ -153,6 +156,10 @@ class LoopPrinter:
         self.helpers.add(name)
         return f"{self.prefix}_{name}"
 
+    def _guard(self, guard: Guard, trips: int) -> list[str]:
+        test = f"!({scalar(self._ref(guard.scalar), 0)} > {self.dialect.literal(0)})"
+        return [f"if ({test}) {{", f"  return STATUS_{guard.status};", "}"]
+
     def _solve(self, solve: Solve, trips: int) -> list[str]:
         matrix, x = self._ref(solve.matrix[0]), self._ref(solve.x)
         call = f"{self._helper('ldl_solve')}({x.size}, {pointer(matrix)}, {pointer(x)})"
@@ -160,6 +167,7 @@ class LoopPrinter:
 
     def _apply(self, call: Apply, trips: int) -> list[str]:
         self.steps.setdefault(call.step.name, call.step)
+        self.helpers |= called(call.step.nodes)
         self.operations += trips * operation_count(call.step.nodes, call.step.results)
         arguments = [pointer(self._ref(ref)) for ref in call.reads]
         before, after = [], []
@@ -176,6 +184,11 @@ class LoopPrinter:
             arguments.append(f"{name}_new")
         line = f"{self.prefix}_{call.step.name}({', '.join(arguments)});"
         return [line] if not before else ["{", *("  " + x for x in (*before, line, *after)), "}"]
+
+
+def called(nodes) -> set[str]:
+    """Return the helpers that nodes call."""
+    return {"sincos"} if any(op in ("sin", "cos") for op, *_ in nodes) else set()
 
 
 def in_loops(program: Program, real: str, prefix: str, fixed=None) -> CFunction:

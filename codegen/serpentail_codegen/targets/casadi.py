@@ -1,10 +1,10 @@
 """The CasADi target: a scene's programs go in, a Python module that builds ``casadi.Function``s comes out."""
 
-from ..functions import INERTIAL
+from ..draft import Tail
+from ..functions import inertial
 from ..functions import program as assemble
-from ..program import Apply, Copy, Fill, Index, Loop, Program, Ref, Solve
-from ..scene import PARAMETERS, Scene
-from ..sweeps import Tail
+from ..program import Apply, Copy, Fill, Guard, Index, Loop, Program, Ref, Solve
+from ..scene import Scene
 from ..tape import Step
 from ..templating import render
 from .scalars import Dialect, Scalars
@@ -71,6 +71,9 @@ class PythonPrinter:
     def _copy(self, copy: Copy) -> list[str]:
         return [f"{slice_text(copy.target)} = {slice_text(copy.source)}"]
 
+    def _guard(self, guard: Guard) -> list[str]:
+        return [f"{slice_text(ref)} = where({slice_text(guard.scalar)}, {slice_text(ref)})" for ref in guard.protects]
+
     def _solve(self, solve: Solve) -> list[str]:
         return [f"{slice_text(solve.x)} = ldl_solve({solve.matrix.name}, {slice_text(solve.x)})"]
 
@@ -106,6 +109,6 @@ def casadi_module(scene: Scene, tail: Tail, functions, version: str, content_has
             }
         )
         steps |= printer.steps
-    sizes = {p.name: p.size for p in PARAMETERS if p.name in INERTIAL}
+    sizes = {p.name: p.size for p in inertial(scene.kind)}
     data = {"scene": scene, "version": version, "content_hash": content_hash, "functions": views, "sizes": sizes}
     return render("casadi.py.jinja", data | {"steps": [step_view(s) for s in steps.values()]})

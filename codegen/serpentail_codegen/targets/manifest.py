@@ -1,7 +1,6 @@
 """The manifest: what was emitted goes in, what a loader needs to know comes out as plain data."""
 
-from ..functions import INERTIAL
-from ..scene import ANY, BODY_INERTIA, NOT_NEGATIVE, PARAMETERS, POSITIVE, Scene, scene_to_dict
+from ..scene import ANY, BODY_INERTIA, NOT_NEGATIVE, POSITIVE, Scene, parameters_of, scene_to_dict
 
 FORMAT = 1
 CHECKS = {ANY: "finite", POSITIVE: "positive", NOT_NEGATIVE: "not_negative", BODY_INERTIA: "body_inertia"}
@@ -20,7 +19,7 @@ def manifest(scene: Scene, context: dict, emitted: list) -> dict:
         "dimensions": {
             name: getattr(context["tail"], name) for name in ("segments", "links", "total", "nq", "nv", "nt")
         },
-        "parameters": [parameter_entry(scene, p) for p in PARAMETERS],
+        "parameters": [parameter_entry(scene, p) for p in parameters_of(scene.kind)],
         "functions": {e.function.name: function_entry(e, context["tail"]) for e in emitted},
         "work": {f["name"]: f["work"] for f in context["works"]},
     }
@@ -36,7 +35,7 @@ def parameter_entry(scene: Scene, parameter) -> dict:
         "meaning": parameter.meaning,
         "check": CHECKS[parameter.check],
         "default": list(value) if isinstance(value, tuple) else value,
-        "in_struct": parameter.name in INERTIAL,
+        "in_struct": parameter.name != "link_radius",
     }
 
 

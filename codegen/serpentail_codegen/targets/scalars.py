@@ -15,6 +15,7 @@ class Dialect:
     definition: str
     suffix: str
     functions: dict[str, str]
+    sincos: str = ""  # defines sine and cosine of one argument at once; empty: by two functions
 
     def literal(self, value) -> str:
         """Print a number by its shortest exact decimal."""
@@ -29,13 +30,17 @@ class Scalars:
         self.live = live_nodes(nodes, results)
         self.uses = Counter(a for n in self.live if nodes[n][0] not in ("input", "const") for a in nodes[n][1:])
         self.uses.update(results)
-        self.text: dict[int, str] = {}
+        self.text: dict[object, str] = {}
 
     def lines(self) -> list[str]:
         """Return the definitions in evaluation order; ``text`` then tells how to write any node."""
         out = []
         for node in self.live:
             op, *args = self.nodes[node]
+            if op in ("sin", "cos") and self.dialect.sincos:
+                out += self._sincos(args[0], len(out))
+                self.text[node] = self.text[op, args[0]]
+                continue
             text = self._expression(op, args)
             if op in ("input", "const") or (op in ("mul", "neg") and self.uses[node] == 1):
                 self.text[node] = text
@@ -43,6 +48,14 @@ class Scalars:
                 self.text[node] = name = f"t{len(out)}"
                 out.append(self.dialect.definition.format(name=name, text=text))
         return out
+
+    def _sincos(self, argument: int, count: int) -> list[str]:
+        """Define both sine and cosine of an argument when the first of them is needed."""
+        if ("sin", argument) in self.text:
+            return []
+        names = {"sine": f"t{count}", "cosine": f"t{count}c"}
+        self.text["sin", argument], self.text["cos", argument] = names.values()
+        return [self.dialect.sincos.format(argument=self.text[argument], **names)]
 
     def _expression(self, op: str, args) -> str:
         if op == "input":

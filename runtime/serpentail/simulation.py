@@ -1,6 +1,7 @@
 """Simulation: a model, a state and a torque law go in, a trajectory comes out."""
 
 import ctypes
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -8,11 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from .errors import SimulationError, StateError
-from .library import NOT_FINITE
+from .library import NOT_FINITE, real_array
 from .model import Model
 from .trajectory import Trajectory
 
 METHODS = ("rk4", "dop853")
+NO_NUMBERS = "the state is not finite any more"
 
 
 @dataclass(frozen=True)
@@ -43,10 +45,14 @@ def simulate(
     controller: None (no torque), Damping, TorqueTable, or a function (t (s), q, v) -> tau (2m,) in N m.
     t_span: (start, end) in s, or the end alone.
     method: "rk4", a generated C loop of fixed steps, or "dop853", SciPy's adaptive method on the compiled model.
-    settings: output_step (s, default 1/200 of the span); for rk4 step (s, default 1e-4, shortened to divide
-    output_step), for dop853 rtol, atol (defaults 1e-10, 1e-12).
-    Raises StateError (shapes, values), SimulationError (settings; the state left what numbers can hold).
+    settings: output_step (s, default 1/200 of the span, rounded to divide it); for rk4 step (s, default 1e-4,
+    shortened to divide output_step), for dop853 rtol, atol (defaults 1e-10, 1e-12; 1e-6 both for a float model).
+    Raises StateError (shapes, values), SimulationError (settings; the state left what numbers can hold), ModelError
+    (the scene left out rollout, energy or momentum).
     """
+    missing = [name for name in ("rollout", "energy", "momentum") if name not in model.manifest["work"]]
+    if missing:
+        raise model.without(*missing)
     run = Run.checked(model, q0, v0, t_span, settings.pop("output_step", None))
     if method not in METHODS:
         raise SimulationError(f"method {method!r}: choose one of {', '.join(METHODS)}")
@@ -54,10 +60,13 @@ def simulate(
     begun = time.perf_counter()
     t, q, v, tau, info = (_rk4 if method == "rk4" else _dop853)(model, law, run, settings)
     info |= {"method": method, "seconds": time.perf_counter() - begun, "model": model.name}
-    kinetic, potential = model.energy(q, v)
-    linear, angular = model.momentum(q, v)
+    _check_finite(t, q, v, tau)
+    try:
+        measured = *model.energy(q, v), *model.momentum(q, v)
+    except StateError as error:
+        raise SimulationError(f"from t = {t[0]:.6g} s to {t[-1]:.6g} s, by sample: {error}") from error
     info["parameters"] = {name: list(x) if isinstance(x, tuple) else x for name, x in model.parameters.items()}
-    return Trajectory(t, q, v, tau, kinetic, potential, linear, angular, info)
+    return Trajectory(t, q, v, tau, *measured, info)
 
 
 @dataclass(frozen=True)
@@ -67,46 +76,62 @@ class Run:
     q0: np.ndarray
     v0: np.ndarray
     start: float
+    end: float
     intervals: int
-    interval: float
 
     @classmethod
     def checked(cls, model: Model, q0, v0, t_span, output_step) -> "Run":
         """Return a run; StateError or SimulationError where an argument is wrong."""
         q0, v0 = _state("q0", q0, model.nq), _state("v0", v0, model.nv)
-        norm = np.linalg.norm(q0[3:7])
+        norm = math.hypot(*q0[3:7])
         if norm == 0:
             raise StateError("q0[3:7] is the zero quaternion: upright is (1, 0, 0, 0)")
         q0[3:7] /= norm
-        try:
-            start, end = (0.0, float(t_span)) if np.ndim(t_span) == 0 else map(float, t_span)
-        except (TypeError, ValueError) as error:
-            raise SimulationError(f"t_span {t_span!r}: give (start, end) in s, or the end") from error
+        span = real_array("t_span", t_span, error=SimulationError)
+        if span.shape not in ((), (2,)):
+            raise SimulationError(f"t_span {t_span!r}: give (start, end) in s, or the end")
+        start, end = span.tolist() if span.ndim else (0.0, float(span))
         if not (np.isfinite([start, end]).all() and end > start):
             raise SimulationError(f"t_span {t_span!r}: the end must be finite and after the start")
         step = _positive("output_step", (end - start) / 200 if output_step is None else output_step)
         intervals = max(1, round((end - start) / step))
-        return cls(q0, v0, start, intervals, (end - start) / intervals)
+        return cls(q0, v0, start, end, intervals)
+
+    @property
+    def interval(self) -> float:
+        """Time between outputs."""
+        return (self.end - self.start) / self.intervals
 
     @property
     def times(self) -> np.ndarray:
         """Output times (intervals + 1,)."""
-        return self.start + self.interval * np.arange(self.intervals + 1)
+        return np.linspace(self.start, self.end, self.intervals + 1)
 
 
 def _state(name: str, value, size: int) -> np.ndarray:
-    array = np.array(value, float) if np.ndim(value) == 1 else np.empty((0, 0))
+    array = real_array(name, value).copy()
     if array.shape != (size,):
-        raise StateError(f"{name} has shape {np.shape(value)}, not ({size},): one start state")
+        raise StateError(f"{name} has shape {array.shape}, not ({size},): one start state")
     if not np.isfinite(array).all():
         raise StateError(f"{name}[{np.flatnonzero(~np.isfinite(array))[0]}] is not finite")
     return array
 
 
 def _positive(name: str, value) -> float:
-    if not (isinstance(value, int | float | np.number) and np.isfinite(value) and value > 0):
+    number = real_array(name, value, error=SimulationError)
+    if number.shape != () or not 0 < number < np.inf:
         raise SimulationError(f"{name} {value!r}: give a number above 0")
-    return float(value)
+    return float(number)
+
+
+def _check_finite(t: np.ndarray, *columns: np.ndarray) -> None:
+    lost = np.flatnonzero(~np.isfinite(np.column_stack(columns)).all(axis=1))
+    if lost.size:
+        raise _lost(t[lost[0]], NO_NUMBERS)
+
+
+def _lost(t: float, what: str) -> SimulationError:
+    return SimulationError(f"at t = {t:.6g} s {what}: is the step too long, or a velocity or torque too large?")
 
 
 class Law:
@@ -116,6 +141,7 @@ class Law:
         self.model, self.start, self.error = model, start, None
         self.real = np.ctypeslib.as_ctypes_type(model.parameter_vector.dtype)
         self.nt = model.nv - 6
+        self.float_errors = np.geterr()  # the user's: dop853 works with its own
         pointer = ctypes.c_void_p
         self.prototype = ctypes.CFUNCTYPE(None, pointer, self.real, *[ctypes.POINTER(self.real)] * 3)
         if callable(controller):
@@ -149,16 +175,18 @@ class Law:
         return ctypes.addressof(self.structure)
 
     def _damping(self, damping) -> np.ndarray:
-        try:
-            values = np.broadcast_to(np.asarray(damping, float), (self.nt,))
-        except (TypeError, ValueError) as error:
-            raise SimulationError(f"damping {damping!r}: give one number or {self.nt}, in N m s") from error
+        values = real_array("damping", damping, error=SimulationError)
+        if values.shape not in ((), (self.nt,)):
+            raise SimulationError(f"damping {damping!r}: give one number or {self.nt}, in N m s")
         if not (np.isfinite(values).all() and (values >= 0).all()):
             raise SimulationError(f"damping {damping!r}: give finite numbers, 0 or above, in N m s")
-        return values
+        return np.broadcast_to(values, (self.nt,))
 
     def _nodes(self, table: TorqueTable) -> tuple[np.ndarray, np.ndarray]:
-        times, torques = np.asarray(table.times, float), np.asarray(table.torques, float)
+        times, torques = (
+            real_array(f"TorqueTable: {name}", getattr(table, name), error=SimulationError)
+            for name in ("times", "torques")
+        )
         if times.ndim != 1 or len(times) == 0 or torques.shape != (len(times), self.nt):
             raise SimulationError(
                 f"TorqueTable: times {times.shape} and torques {torques.shape}, not (K,) and (K, {self.nt})"
@@ -168,35 +196,35 @@ class Law:
         return times - self.start, torques
 
     def _call_user(self, _context, t, q, v, tau):
-        """Call the user's function; its exception stops the run by torques that are not numbers."""
+        """Call the user's function on a sound state; its exception stops the run by torques that are not numbers."""
+        q, v = (np.ctypeslib.as_array(a, (n,)).copy() for a, n in ((q, self.model.nq), (v, self.model.nv)))
+        result = np.full(self.nt, np.nan)
         try:
-            q, v = (np.ctypeslib.as_array(a, (n,)).copy() for a, n in ((q, self.model.nq), (v, self.model.nv)))
-            result = np.asarray(self.user(self.start + t, q, v), float)
-            if result.shape != (self.nt,) or not np.isfinite(result).all():
-                raise SimulationError(
-                    f"the controller gave {result!r} at t = {self.start + t}, not {self.nt} finite torques"
-                )
+            if np.isfinite(q).all() and np.isfinite(v).all():
+                result = self._user_torque(t, q, v)
         except BaseException as error:
-            self.error, result = self.error or error, np.full(self.nt, np.nan)
+            self.error = error
         np.ctypeslib.as_array(tau, (self.nt,))[:] = result
+
+    def _user_torque(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        with np.errstate(**self.float_errors):
+            result = np.asarray(self.user(self.start + t, q, v), float)
+        if result.shape != (self.nt,) or not np.isfinite(result).all():
+            raise SimulationError(
+                f"the controller gave {result!r} at t = {self.start + t:.6g} s, not {self.nt} finite torques"
+            )
+        return result
 
     def check(self, status: int, t: float) -> None:
         """Raise what a status of the C interface means."""
         if self.error is not None:
             raise self.error
         if status:
-            what = (
-                "the state is not finite any more"
-                if status == NOT_FINITE
-                else "the inertia matrix is not positive definite"
-            )
-            raise SimulationError(f"at t = {t:.6g} s {what}: is the step too long, or a velocity or torque too large?")
+            indefinite = "the inertia matrix is not positive definite"
+            raise _lost(t, NO_NUMBERS if status == NOT_FINITE else indefinite)
 
 
 def _c_function(model: Model, name: str, arguments):
-    model.kernel("forward_dynamics")
-    if "rollout" not in model.manifest["work"]:
-        raise SimulationError(f'{model.name} was generated without "rollout": add it to `functions` of its scene')
     function = getattr(model.library, f"{model.name}_{name}")
     function.argtypes = arguments
     return function
@@ -226,25 +254,28 @@ def _rk4(model: Model, law: Law, run: Run, settings: dict):
         work.ctypes.data,
     )
     law.check(status, run.start + done.value * h)
-    if not all(np.isfinite(a).all() for a in out):
-        law.check(NOT_FINITE, run.start + run.times[-1])
     return run.times, *map(np.float64, out), {"steps": steps, "step": h, "evaluations": 4 * steps}
 
 
+@np.errstate(all="ignore")  # a trial step may overflow, and is then taken again, shorter
 def _dop853(model: Model, law: Law, run: Run, settings: dict):
     from scipy.integrate import DOP853
 
-    rtol, atol = (_positive(name, settings.pop(name, value)) for name, value in (("rtol", 1e-10), ("atol", 1e-12)))
+    defaults = {"rtol": 1e-10, "atol": 1e-12} if law.real is ctypes.c_double else {"rtol": 1e-6, "atol": 1e-6}
+    rtol, atol = (_positive(name, settings.pop(name, value)) for name, value in defaults.items())
     _refuse(settings, "dop853", "rtol, atol, output_step")
-    rate = StateRate(model, law)
-    solver = DOP853(rate, 0.0, np.concatenate([run.q0, run.v0]), run.interval * run.intervals, rtol=rtol, atol=atol)
+    rate, y0 = StateRate(model, law), np.concatenate([run.q0, run.v0])
+    if not np.isfinite(rate(0.0, y0)).all():
+        law.check(NOT_FINITE, run.start)
+    solver = DOP853(rate, 0.0, y0, run.end - run.start, rtol=rtol, atol=atol)
     times, samples, steps = run.times - run.start, [solver.y.copy()], 0
     while solver.status == "running":
         message = solver.step()
         law.check(0, solver.t)
         if solver.status == "failed":
+            reason = message.rstrip(".").lower()
             raise SimulationError(
-                f"at t = {run.start + solver.t:.6g} s {message}: is the scene stiff, or rtol too small?"
+                f"at t = {run.start + solver.t:.6g} s {reason}: is the motion stiff, or rtol too small?"
             )
         steps += 1
         due = times[len(samples) : np.searchsorted(times, solver.t, "right")]

@@ -1,0 +1,231 @@
+"""`make bench`: measures generation, speed, drift and precision in one run; writes output/bench/report.md and .json."""
+
+import inspect
+import json
+import os
+import platform
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+import peers
+import serpentail as st
+from fixtures import COLUMNS, Fixture, fixture
+
+ROOT = Path(__file__).resolve().parent.parent
+OUTPUT = ROOT / "output" / "bench"
+ROUNDS, CALLS = 200, 256
+
+
+def main() -> int:
+    """Measure everything, write the report, print it."""
+    report = {"machine": machine()}
+    with tempfile.TemporaryDirectory() as folder:
+        for name, measure in MEASURES.items():
+            print(f"measuring {name} ...", file=sys.stderr, flush=True)
+            report[name] = measure(Path(folder))
+    OUTPUT.mkdir(parents=True, exist_ok=True)
+    (OUTPUT / "report.json").write_text(json.dumps(report, indent=1))
+    text = markdown(report)
+    (OUTPUT / "report.md").write_text(text)
+    print(text)
+    print(f"written: {OUTPUT / 'report.md'} and report.json", file=sys.stderr)
+    return 0
+
+
+def machine() -> dict:
+    """Return the processor and compiler."""
+    from serpentail.compiler import describe_compiler
+
+    lines = Path("/proc/cpuinfo").read_text().splitlines() if Path("/proc/cpuinfo").exists() else []
+    processor = next(
+        (line.split(":")[1].strip() for line in lines if line.startswith("model name")), platform.machine()
+    )
+    return {"processor": processor, "cores": os.cpu_count(), "compiler": describe_compiler()["version"].splitlines()[0]}
+
+
+def generation(folder: Path) -> list[dict]:
+    """Seconds from nothing to a loaded model: a new process generates, an empty cache compiles."""
+    rows = []
+    for size in ((1, 3), (3, 4), (8, 16)):
+        begun = time.perf_counter()
+        path = generated(folder / "timed", *size)
+        made = time.perf_counter()
+        subprocess.run(
+            [sys.executable, "-c", f"import serpentail; serpentail.load({str(path)!r})"],
+            env=os.environ | {"SERPENTAIL_CACHE": str(folder / "empty" / path.name)},
+            check=True,
+        )
+        done = time.perf_counter()
+        text = (path / "src" / f"{path.name}.c").stat().st_size
+        emission = st.load(path).manifest["functions"]["forward_dynamics"]["emission"]
+        rows.append({"model": label(*size), "generate_s": made - begun, "compile_s": done - made} | {"c_bytes": text})
+        rows[-1] |= {"total_s": done - begun, "emission": emission}
+    return rows
+
+
+def generated(parent: Path, segments: int, links: int) -> Path:
+    """Run the generator as `make model` does; return the generated folder."""
+    size = ["--segments", str(segments), "--links", str(links)]
+    command = [sys.executable, "-m", "serpentail_codegen", "--tail", "articulated", *size, "--output", str(parent)]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    return parent / f"articulated_m{segments}_n{links}"
+
+
+def label(segments: int, links: int) -> str:
+    """Return (m, n) as text."""
+    return f"({segments}, {links})"
+
+
+def speed(folder: Path) -> list[dict]:
+    """Nanoseconds of one forward dynamics call from C, beside Pinocchio's coupled path, rounds interleaved.
+
+    Ratios by minima (by medians in brackets).  Pinocchio: as its documentation shows it; its CRBA with all that was
+    found to speed it up; the tied columns summed by own code on its types (pinocchio_chain.cpp).
+    """
+    rows = []
+    for size in ((1, 3), (3, 4), (6, 6), (8, 16)):
+        ours = fixture(generated(folder / "speed", *size), folder / "speed")
+        plain_library = peers.build_library(peers.PLAIN, peers.CACHE)
+        with (
+            peers.PinocchioBench(*size, ours.parameters) as tuned,
+            peers.PinocchioBench(*size, ours.parameters, plain_library) as plain,
+        ):
+            states = peers.random_states(size[0])
+            error = max(difference(ours, tuned, states), difference(ours, plain, states))
+            closures = [ours.closure, plain.closure, tuned.crba_closure, tuned.closure]
+            times = peers.time_rounds(closures, states, ROUNDS, CALLS)
+        row = {"model": label(*size), "ns": times[0][0], "median_ns": times[0][1], "v_dot_difference": error}
+        for name, (least, median) in zip(("plain", "tuned", "own"), times[1:], strict=True):
+            row |= {f"{name}_ns": least, f"{name}_ratio": f"{least / times[0][0]:.1f}x ({median / times[0][1]:.1f}x)"}
+        rows.append(row)
+    return rows
+
+
+def difference(ours: Fixture, pinocchio, states) -> float:
+    """Largest relative difference of the two results: they compute the same."""
+    errors = []
+    for q, v, tau in zip(*states, strict=True):
+        a, b = ours.model.forward_dynamics(q, v, tau), pinocchio.forward_dynamics(q, v, tau)
+        errors.append(np.abs(a - b).max() / np.abs(a).max())
+    return max(errors)
+
+
+def python_overhead(folder: Path) -> list[dict]:
+    """Microseconds of one call from Python, and what of it is not the C function."""
+    rows = []
+    for size in ((1, 3), (3, 4)):
+        ours = fixture(generated(folder / "speed", *size), folder / "speed")
+        q, v, tau = (x[0] for x in peers.random_states(size[0]))
+        inside = peers.time_rounds([ours.closure], peers.random_states(size[0]), ROUNDS, CALLS)[0][0] / 1e3
+        for name, call in (
+            ("forward_dynamics", lambda m=ours.model, a=(q, v, tau): m.forward_dynamics(*a)),
+            ("mass_matrix", lambda m=ours.model, a=(q,): m.mass_matrix(*a)),
+        ):
+            total = best_us(call)
+            own = inside if name == "forward_dynamics" else float("nan")
+            rows.append({"model": label(*size), "call": name, "us": total, "overhead_us": total - own})
+    return rows
+
+
+def best_us(call: Callable, count: int = 5000, repeats: int = 9) -> float:
+    """Return the least microseconds of one call."""
+    best = float("inf")
+    for _ in range(repeats):
+        begun = time.perf_counter()
+        for _ in range(count):
+            call()
+        best = min(best, (time.perf_counter() - begun) / count)
+    return best * 1e6
+
+
+def drift(folder: Path) -> list[dict]:
+    """Relative drift of energy and angular momentum in 10 s of undamped flight, RK4 at 0.1 ms, and its run time."""
+    rows = []
+    for size in ((1, 3), (3, 4)):
+        model = st.load(generated(folder / "speed", *size))
+        flight = st.simulate(model, *thrown(model), t_span=10.0, step=1e-4)
+        energy, momentum = internal_energy(flight, model), flight.angular_momentum
+        rows.append(
+            {
+                "model": label(*size),
+                "energy_drift": float(np.abs(energy - energy[0]).max() / energy[0]),
+                "momentum_drift": float(np.abs(momentum - momentum[0]).max() / np.linalg.norm(momentum[0])),
+                "quaternion": float(np.abs(np.linalg.norm(flight.attitude, axis=1) - 1).max()),
+                "seconds": flight.info["seconds"],
+            }
+        )
+    return rows
+
+
+def thrown(model) -> tuple[np.ndarray, np.ndarray]:
+    """Return a state that spins about all axes with a bent tail."""
+    q, v = np.zeros(model.nq), np.zeros(model.nv)
+    q[3], q[7::2], q[8::2] = 1.0, 0.4 / model.links, 0.2 / model.links
+    v[2], v[3:6] = 2.0, (6.0, 1.0, -2.0)
+    return q, v
+
+
+def internal_energy(flight, model) -> np.ndarray:
+    """Kinetic energy less that of the centre of mass: constant in free flight without torques."""
+    mass = model.parameters["torso_mass"] + model.parameters["tail_mass"]
+    return flight.kinetic - (flight.linear_momentum**2).sum(axis=1) / (2 * mass)
+
+
+def work_precision(folder: Path) -> list[dict]:
+    """Run time against error of 0.58 s of damped flight: RK4 in C at several steps, DOP853 at several tolerances."""
+    model = st.load(generated(folder / "speed", 1, 3))
+    start = thrown(model)
+    settings = [("rk4", {"step": h}) for h in (4e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4)]
+    settings += [("dop853", {"rtol": r, "atol": r * 1e-2}) for r in (1e-4, 1e-6, 1e-8, 1e-10)]
+
+    def fly(method, options):
+        return st.simulate(model, *start, controller=st.Damping(1e-4), t_span=0.58, method=method, **options)
+
+    exact = fly("dop853", {"rtol": 1e-13, "atol": 1e-15})
+    rows = []
+    for method, options in settings:
+        flights = [fly(method, options | {"output_step": 0.58 / 5}) for _ in range(3)]
+        error = np.abs(flights[0].q[-1] - exact.q[-1]).max()
+        name, value = next(iter(options.items()))
+        milliseconds = 1e3 * min(f.info["seconds"] for f in flights)
+        rows.append({"method": method, "setting": f"{name} {value:g}", "ms": milliseconds, "error": float(error)})
+    return rows
+
+
+MEASURES = {
+    "generation": generation,
+    "speed": speed,
+    "python_overhead": python_overhead,
+    "drift": drift,
+    "work_precision": work_precision,
+}
+
+
+def markdown(report: dict) -> str:
+    """Return the report as text: a heading and a table for each measure."""
+    lines = ["# Benchmark", "", ", ".join(str(value) for value in report["machine"].values()), ""]
+    for name, measure in MEASURES.items():
+        lines += [f"## {name.replace('_', ' ')}", "", inspect.cleandoc(measure.__doc__), "", *table(report[name]), ""]
+    return "\n".join(lines)
+
+
+def table(rows: list[dict]) -> list[str]:
+    """Return rows as a Markdown table."""
+    head = [COLUMNS.get(key, key) for key in rows[0]]
+    body = [[cell(value) for value in row.values()] for row in rows]
+    return ["| " + " | ".join(line) + " |" for line in (head, ["---"] * len(head), *body)]
+
+
+def cell(value) -> str:
+    """Return a table cell; numbers to three digits."""
+    return f"{value:.3g}" if isinstance(value, float) else str(value)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,81 @@
+"""Drafts: a tail's sizes go in; a builder comes out that finds the vectors its steps read by their names."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from math import pi
+
+from .lower import derive
+from .program import Array, Builder, Index, Ref
+
+
+@dataclass(frozen=True)
+class Tail:
+    """Sizes of a tail of m segments: n links each, or a continuum with n samples each, bent by bend_range at most."""
+
+    segments: int
+    links: int
+    kind: str = "articulated"
+    bend_range: float = 2 * pi
+
+    @property
+    def total(self) -> int:
+        """N = m n links or samples: tail points but the first."""
+        return self.segments * self.links
+
+    @property
+    def nt(self) -> int:
+        """Tail coordinates."""
+        return 2 * self.segments
+
+    @property
+    def nq(self) -> int:
+        """Scalars of a configuration."""
+        return 7 + self.nt
+
+    @property
+    def nv(self) -> int:
+        """Scalars of a velocity."""
+        return 6 + self.nt
+
+
+@dataclass
+class Draft(Builder):
+    """A function being assembled: the builder, the tail's sizes, and the vectors that steps find by name.
+
+    ``pieces`` are arrays with one entry a segment that describe its rigid links or its arc, ``samples`` those that
+    describe what lies between two tail points.
+    """
+
+    tail: Tail | None = None
+    known: dict[str, Ref] = field(default_factory=dict)
+    pieces: dict[str, Array] = field(default_factory=dict)
+    samples: dict[str, Array] = field(default_factory=dict)
+
+    def step(self, function: Callable, reads: dict[str, Ref] | None = None, **writes: Ref) -> None:
+        """Apply the step derived from a kinematics or dynamics function."""
+        self.apply(derive(function), self.known | (reads or {}), **writes)
+
+    def vector(self, name: str, size: int) -> Ref:
+        """Declare a local vector that steps find by its name."""
+        self.known[name] = self.array(name, size)[0]
+        return self.known[name]
+
+    def store(self, function: Callable, **sizes: int) -> None:
+        """Apply a step, keeping its outputs in new local vectors of the same names."""
+        self.step(function, **{name: self.vector(name, size) for name, size in sizes.items()})
+
+    def angles(self, i: Index) -> Ref:
+        """Coordinates of segment i."""
+        return self.known["q"].array.part(7 + 2 * i, 2)
+
+    def rates(self, i: Index) -> Ref:
+        """Rates of the coordinates of segment i."""
+        return self.known["v"].array.part(6 + 2 * i, 2)
+
+    def piece(self, i: Index) -> dict[str, Ref]:
+        """What describes the links or the arc of segment i."""
+        return {name: array[i] for name, array in self.pieces.items()} | {"angles": self.angles(i)}
+
+    def sample(self, i: Index) -> dict[str, Ref]:
+        """What describes segment i between two tail points."""
+        return {name: array[i] for name, array in self.samples.items()}

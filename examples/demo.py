@@ -1,0 +1,114 @@
+"""The kangaroo rat in flight after its kick: two scenes go in; trajectories, pictures and a report come out.
+
+Usage: python examples/demo.py [FOLDER], by default output/demo
+"""
+
+import subprocess
+import sys
+import time
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+from scipy.integrate import simpson
+
+import serpentail as st
+
+ROOT = Path(__file__).resolve().parent.parent
+SCENES = ("kangaroo_rat_m1_n3", "kangaroo_rat_m3_n4")
+# The state 0.1 s after the kick: height (m), velocity (m/s), pitch (rad), spin (rad/s).
+HEIGHT, VELOCITY, PITCH, SPIN = 0.34, (0.0, -0.302, 2.385), 3.80, 26.2
+BEND, BEND_RATE = 3 * -0.558, 3 * 4.70  # rad, rad/s: of the whole tail, in pitch
+FLIGHT = 0.58  # s, until shortly before landing
+FRAME = 1e-3  # s, between samples
+K_DMP = 1e-3  # N m s, the passive tail of the paper's Table 1
+
+
+@contextmanager
+def step(words: str):
+    """Tell what is being done, then how long it took."""
+    print(f"  {words:<52}", end="", flush=True)
+    start = time.perf_counter()
+    yield
+    print(f"{time.perf_counter() - start:8.3f} s", flush=True)
+
+
+def generate(scene: str, folder: Path) -> Path:
+    """Run the generator in a process of its own; the runtime needs only the folder that it writes."""
+    source = ROOT / "scenes" / f"{scene}.toml"
+    command = [sys.executable, "-m", "serpentail_codegen", str(source), "--output", str(folder)]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    return folder / scene
+
+
+def start(model: st.Model) -> tuple[np.ndarray, np.ndarray]:
+    """Return q and v after the kick; every joint takes the same share of the tail's bend."""
+    share = np.tile([1.0, 0.0], model.segments) / (model.segments * model.links)
+    q = [0, 0, HEIGHT, np.cos(PITCH / 2), np.sin(PITCH / 2), 0, 0, *BEND * share]
+    return np.array(q), np.array([*VELOCITY, SPIN, 0, 0, *BEND_RATE * share])
+
+
+def centre_of_mass(model: st.Model, flight: st.Trajectory, points: np.ndarray) -> np.ndarray:
+    """Return the centre of mass (K, 3) in m: links are equal, each has its own half-way along."""
+    torso, tail = model.parameters["torso_mass"], model.parameters["tail_mass"]
+    links = (points[:, 1:] + points[:, :-1]) / 2
+    return (torso * flight.q[:, :3] + tail * links.mean(axis=1)) / (torso + tail)
+
+
+def drift(vectors: np.ndarray) -> float:
+    """Return the largest change of a vector (K, 3), relative to its start."""
+    return np.abs(vectors - vectors[0]).max() / np.linalg.norm(vectors[0])
+
+
+def report(model: st.Model, flight: st.Trajectory, check: st.Trajectory) -> str:
+    """Return what the conservation laws and the other integrator say about a flight."""
+    weight = model.parameters["gravity"] * (model.parameters["torso_mass"] + model.parameters["tail_mass"])
+    level = flight.linear_momentum + weight * flight.t[:, None] * [0, 0, 1]
+    damped = simpson(-np.sum(flight.tau * flight.v[:, 6:], axis=1), x=flight.t)
+    lost = flight.energy[0] - flight.energy[-1]
+    turned = np.ptp(st.pitch_roll_yaw(flight.q, unwrap=True)[:, 0])
+    rows = {
+        "pitch": f"{turned:.2f} rad in {FLIGHT} s of flight",
+        "speed": f"{flight.info['steps']} RK4 steps, {FLIGHT / flight.info['seconds']:.0f} times faster than real time",
+        "momentum": f"constant to {drift(level):.0e}, gravity's impulse taken off",
+        "angular momentum": f"constant to {drift(flight.angular_momentum):.0e}, about the centre of mass",
+        "energy": f"{1e3 * lost:.4f} mJ less; the tail's damping took {1e3 * damped:.4f} mJ",
+        "RK4 and DOP853": f"differ by {np.abs(flight.q - check.q).max():.0e} at most (q, in m and rad)",
+    }
+    return "\n".join(f"  {name + ':':<18}{words}" for name, words in rows.items())
+
+
+def fly(scene: str, folder: Path) -> None:
+    """Do everything for one scene."""
+    print(scene)
+    with step("generate C and CasADi from the scene"):
+        generated = generate(scene, folder / "generated")
+    with step("compile the C (or find it in the cache) and load"):
+        model = st.load(generated)
+    q, v = start(model)
+    with step(f"simulate {FLIGHT} s of flight, RK4 in C"):
+        flight = st.simulate(model, q, v, controller=st.Damping(K_DMP), t_span=FLIGHT, output_step=FRAME)
+    with step("simulate it again, SciPy's DOP853"):
+        check = st.simulate(
+            model, q, v, controller=st.Damping(K_DMP), t_span=FLIGHT, output_step=FRAME, method="dop853"
+        )
+    with step("draw and save"):
+        points = model.tail_points(flight.q)
+        st.filmstrip(flight, points, folder / f"{scene}_film.png", com=centre_of_mass(model, flight, points))
+        st.time_plots(flight, folder / f"{scene}_time.png")
+        flight.save(folder / f"{scene}.npz")
+    print(report(model, flight, check), end="\n\n")
+
+
+def main(folder: Path) -> None:
+    """Fly both scenes."""
+    for scene in SCENES:
+        fly(scene, folder)
+    print(f"Pictures (*_film.png, *_time.png) and trajectories (*.npz): {folder}")
+
+
+if __name__ == "__main__":
+    try:
+        main(Path(sys.argv[1]).absolute() if sys.argv[1:] else ROOT / "output" / "demo")
+    except st.SerpentailError as error:
+        sys.exit(str(error))

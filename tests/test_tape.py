@@ -1,0 +1,273 @@
+"""The tape: each distinct operation once, folded by identities that hold exactly and round alike."""
+
+import math
+import random
+from fractions import Fraction
+from types import SimpleNamespace
+
+import mpmath
+import pytest
+
+from serpentail_codegen.interpret import Numbers
+from serpentail_codegen.tape import (
+    BINARY,
+    UNARY,
+    Step,
+    Tape,
+    compacted,
+    exact_quotient,
+    live_nodes,
+    operation_count,
+    replay,
+    specialised,
+)
+
+INPUTS = 4
+SEEDS = range(40)
+CONSTANTS = (0, 1, -1, 2, -2, 0.5, -1.0, Fraction(1, 4))  # their sums and products are exact in float64
+
+# Exact stand-ins with the only laws that folding may use: sin is odd, cos even, and their values at 0 and 1.
+RATIONAL = Numbers(
+    SimpleNamespace(sin=lambda x: x / (1 + x * x), cos=lambda x: 1 / (1 + x * x), sqrt=lambda x: x * x), Fraction
+)
+FLOATS = Numbers(math, float)
+
+
+@pytest.fixture
+def tape():
+    """A tape with its inputs recorded."""
+    tape = Tape()
+    for index in range(INPUTS):
+        tape.input(index)
+    return tape
+
+
+def grow(rng, algebra, tape, leaves, length=80):
+    """Record random operations; return pairs (node, the value computed directly)."""
+    pool = [(tape.input(k), leaf) for k, leaf in enumerate(leaves)]
+    while len(pool) < length:
+        op = rng.choice(BINARY * 2 + UNARY)
+        nodes, values = zip(*(_operand(rng, algebra, tape, pool) for _ in range(2 if op in BINARY else 1)), strict=True)
+        if op == "div" and (values[1] == 0 or (algebra is FLOATS and None not in map(tape.value, nodes))):
+            continue
+        if op == "sqrt" and values[0] < 0:
+            continue
+        value = getattr(algebra, op)(*values)
+        if abs(value) < 1e60 and (algebra is FLOATS or value.denominator < 10**60):
+            pool.append((getattr(tape, op)(*nodes), value))
+    return pool
+
+
+def _operand(rng, algebra, tape, pool):
+    constant = rng.choice(CONSTANTS)
+    return (tape.const(constant), algebra.const(constant)) if rng.random() < 0.2 else rng.choice(pool)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_recording_is_exact_in_rational_arithmetic(seed):
+    rng, tape = random.Random(seed), Tape()
+    leaves = [Fraction(rng.randint(-9, 9), rng.randint(1, 9)) for _ in range(INPUTS)]
+    pool = grow(rng, RATIONAL, tape, leaves)
+    values = replay(tape.nodes, leaves, RATIONAL)
+    assert [values[node] for node, _ in pool] == [value for _, value in pool]
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_recording_rounds_as_direct_evaluation_does(seed):
+    """Bit for bit but for the sign of a zero: folding adds no rounding and drops none."""
+    rng, tape = random.Random(seed), Tape()
+    leaves = [rng.uniform(-3, 3) for _ in range(INPUTS)]
+    pool = grow(rng, FLOATS, tape, leaves)
+    values = replay(tape.nodes, leaves, FLOATS)
+    assert [values[node].hex() for node, value in pool if value] == [value.hex() for _, value in pool if value]
+    assert all(values[node] == 0 for node, value in pool if not value)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_recording_twice_gives_the_same_nodes(seed):
+    rng, tape, again = random.Random(seed), Tape(), Tape()
+    grow(rng, FLOATS, tape, [rng.uniform(-3, 3) for _ in range(INPUTS)])
+    replay(tape.nodes, [again.input(k) for k in range(INPUTS)], again)
+    assert again.nodes == tape.nodes
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_nodes_are_distinct_ordered_and_in_normal_form(seed):
+    rng, tape = random.Random(seed), Tape()
+    grow(rng, FLOATS, tape, [rng.uniform(-3, 3) for _ in range(INPUTS)])
+    assert len(set(tape.nodes)) == len(tape.nodes)
+    for position, (op, *args) in enumerate(tape.nodes):
+        if op in ("input", "const"):
+            continue
+        assert all(arg < position for arg in args)
+        below = [tape.nodes[arg][0] for arg in args]
+        assert "neg" not in below or op == "sqrt"
+        assert op not in ("add", "mul") or args == sorted(args)
+        assert below != ["const", "const"]
+        assert op != "neg" or below[0] not in ("sub",)
+
+
+@pytest.mark.parametrize("op", UNARY + BINARY)
+def test_same_operation_is_the_same_node(tape, op):
+    arguments = (2, 1) if op in BINARY else (2,)
+    node = getattr(tape, op)(*arguments)
+    size = len(tape.nodes)
+    assert getattr(tape, op)(*arguments) == node
+    assert len(tape.nodes) == size
+    assert node == size - 1
+
+
+def test_equal_constants_are_one_node():
+    tape = Tape()
+    assert len({tape.const(value) for value in (1, 1.0, Fraction(1), True)}) == 1
+    assert len({tape.const(value) for value in (0, 0.0, -0.0)}) == 1
+    assert tape.const(0.5) == tape.const(Fraction(1, 2))
+    assert isinstance(tape.value(tape.const(3.0)), int)
+    assert tape.const(Fraction(1, 3)) != tape.const(1 / 3)
+    assert tape.value(tape.const(-2.5)) == -2.5
+
+
+def test_input_is_not_a_constant(tape):
+    assert [tape.value(node) for node in (0, tape.neg(0), tape.add(0, 1))] == [None] * 3
+
+
+def test_zero_and_one_vanish(tape):
+    a, zero, one = 0, tape.const(0), tape.const(1)
+    assert tape.add(a, zero) == tape.add(zero, a) == tape.sub(a, zero) == a
+    assert tape.mul(a, one) == tape.mul(one, a) == tape.div(a, one) == a
+    assert tape.mul(a, zero) == tape.mul(zero, a) == tape.div(zero, a) == tape.sub(a, a) == zero
+    assert tape.sub(zero, a) == tape.mul(a, tape.const(-1)) == tape.div(a, tape.const(-1)) == tape.neg(a)
+    assert tape.sin(zero) == tape.sqrt(zero) == zero
+    assert tape.cos(zero) == tape.sqrt(one) == one
+
+
+def test_functions_of_other_constants_are_left_to_the_target(tape):
+    for op in ("sin", "cos", "sqrt"):
+        four = tape.const(4)
+        assert tape.nodes[getattr(tape, op)(four)] == (op, four)
+
+
+def test_negation_moves_outward(tape):
+    a, b, minus_a, minus_b = 0, 1, tape.neg(0), tape.neg(1)
+    assert tape.neg(minus_a) == a
+    assert tape.neg(tape.sub(a, b)) == tape.sub(b, a)
+    assert tape.add(a, minus_b) == tape.add(minus_b, a) == tape.sub(a, b)
+    assert tape.add(minus_a, minus_b) == tape.sub(minus_a, b) == tape.neg(tape.add(a, b))
+    assert tape.sub(a, minus_b) == tape.add(a, b)
+    assert tape.sub(minus_a, minus_b) == tape.sub(b, a)
+    for op in (tape.mul, tape.div):
+        assert op(minus_a, b) == op(a, minus_b) == tape.neg(op(a, b))
+        assert op(minus_a, minus_b) == op(a, b)
+    assert tape.sin(minus_a) == tape.neg(tape.sin(a))
+    assert tape.cos(minus_a) == tape.cos(a)
+
+
+def test_operands_of_sums_and_products_are_ordered_by_node(tape):
+    for op in (tape.add, tape.mul):
+        assert op(3, 1) == op(1, 3)
+        assert tape.nodes[op(3, 1)][1:] == (1, 3)
+    assert tape.sub(3, 1) != tape.sub(1, 3)
+    assert tape.div(3, 1) != tape.div(1, 3)
+
+
+def test_nothing_is_reassociated_or_distributed(tape):
+    a, b, c = 0, 1, 2
+    for op in (tape.add, tape.mul):
+        assert op(op(a, b), c) != op(a, op(b, c))
+    assert tape.mul(a, tape.add(b, c)) != tape.add(tape.mul(a, b), tape.mul(a, c))
+    assert tape.mul(tape.div(a, b), b) != a
+    assert tape.sub(tape.add(a, b), b) != a
+    two = tape.const(2)
+    assert tape.mul(two, tape.mul(two, a)) != tape.mul(tape.const(4), a)
+
+
+def test_constants_fold_exactly():
+    tape = Tape()
+    third, half = tape.div(tape.const(1), tape.const(3)), tape.const(Fraction(1, 2))
+    assert tape.value(third) == Fraction(1, 3)
+    assert tape.value(tape.add(third, half)) == Fraction(5, 6)
+    assert tape.value(tape.sub(third, half)) == Fraction(-1, 6)
+    assert tape.value(tape.mul(third, tape.const(3))) == 1
+    assert tape.value(tape.div(half, third)) == Fraction(3, 2)
+    assert tape.value(tape.div(tape.const(1.0), tape.const(3.0))) == Fraction(1, 3)
+    assert exact_quotient(1, 3) == Fraction(1, 3)
+    assert exact_quotient(1.0, 3) == 1 / 3
+
+
+@mpmath.workdps(50)
+def test_constants_are_divided_in_the_arithmetic_of_the_run():
+    algebra = Numbers(mpmath.mp, mpmath.mpf)
+    assert abs(3 * algebra.const(Fraction(1, 3)) - 1) < mpmath.mpf(10) ** -49
+    assert algebra.const(0.1) == mpmath.mpf(Fraction(0.1).numerator) / Fraction(0.1).denominator
+    assert FLOATS.const(Fraction(1, 3)) == 1 / 3
+
+
+def test_division_by_the_constant_zero_is_an_error(tape):
+    for numerator in (0, tape.const(0), tape.const(1)):
+        with pytest.raises(ZeroDivisionError, match="divides by the constant zero"):
+            tape.div(numerator, tape.const(0))
+
+
+def reachable(nodes, node, found):
+    """Collect a node and all below it."""
+    if node not in found:
+        found.add(node)
+        if nodes[node][0] not in ("input", "const"):
+            for arg in nodes[node][1:]:
+                reachable(nodes, arg, found)
+    return found
+
+
+def random_step(seed):
+    """A step of two 2-vectors with three scalars of output, most of its nodes dead."""
+    rng, tape = random.Random(seed), Tape()
+    pool = grow(rng, FLOATS, tape, [rng.uniform(-3, 3) for _ in range(INPUTS)], 25)
+    results = tuple(node for node, _ in rng.sample(pool, 3))
+    return Step("step", "Random.", (("x", 2), ("y", 2)), (("u", 1), ("w", 2)), tuple(tape.nodes), results)
+
+
+def evaluated(step, **vectors):
+    """Return the scalars of a step's outputs."""
+    nodes = replay(step.nodes, [scalar for name, _ in step.inputs for scalar in vectors[name]], FLOATS)
+    return [nodes[result] for result in step.results]
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_live_nodes_are_what_the_results_reach(seed):
+    step = random_step(seed)
+    live = set()
+    for result in step.results:
+        reachable(step.nodes, result, live)
+    assert live_nodes(step.nodes, step.results) == sorted(live)
+    assert operation_count(step.nodes, step.results) == sum(step.nodes[node][0] in BINARY for node in live)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_compacted_step_keeps_meaning_and_drops_the_rest(seed):
+    step = random_step(seed)
+    small = compacted(step)
+    rng = random.Random(seed)  # the scalars with which the step grew: none of its square roots is of a negative
+    vectors = {name: [rng.uniform(-3, 3) for _ in range(size)] for name, size in step.inputs}
+    assert evaluated(small, **vectors) == evaluated(step, **vectors)
+    assert live_nodes(small.nodes, small.results) == list(range(len(small.nodes)))
+    assert small.outputs == step.outputs
+    assert set(small.inputs) <= set(step.inputs)
+    read = {index for op, index, *_ in small.nodes if op == "input"}
+    spans, first = [], 0
+    for _, size in small.inputs:
+        spans.append(set(range(first, first + size)))
+        first += size
+    assert all(span & read for span in spans) and read <= set().union(*spans)
+    assert compacted(small) == small
+
+
+def test_specialised_step_is_the_step_at_these_values():
+    tape = Tape()
+    x, y, z, w = (tape.input(k) for k in range(4))
+    results = (tape.add(tape.mul(x, y), z), tape.div(w, y))
+    step = Step("step", "Two vectors.", (("a", 2), ("b", 2)), (("u", 2),), tuple(tape.nodes), results)
+    still = specialised(step, "still", a=(0, 2))
+    assert (still.name, still.doc, still.inputs, still.outputs) == ("still", step.doc, (("b", 2),), step.outputs)
+    assert evaluated(still, b=(3.0, 5.0)) == evaluated(step, a=(0, 2), b=(3.0, 5.0)) == [3.0, 2.5]
+    assert operation_count(still.nodes, still.results) == 1
+    assert specialised(step, "step") == step
