@@ -12,7 +12,8 @@ OPTIONS := $(if $(REAL),--real $(REAL)) $(if $(EMISSION),--emission $(EMISSION))
            $(if $(BAKED),--baked) $(if $(FUNCTIONS),--functions $(FUNCTIONS))
 NAME    := $(TAIL)_m$(M)$(if $(filter continuum,$(TAIL)),,_n$(N))
 SCENE   ?= $(wildcard scenes/$(NAME).toml)
-MODEL   := $(if $(SCENE),$(basename $(notdir $(SCENE))),$(NAME))
+OWN     := $(if $(SCENE),$(shell sed -n 's/^name *= *"\([^"]*\)".*/\1/p' $(SCENE) 2>/dev/null))
+MODEL   := $(if $(OWN),$(OWN),$(if $(SCENE),$(basename $(notdir $(SCENE))),$(NAME)))
 SOURCES := $(shell find codegen -name '*.py' -o -name '*.jinja')
 STAMP   := generated/$(MODEL)/.made
 WANTED  := $(if $(SCENE),$(SCENE),--tail $(TAIL) --segments $(M) $(if $(filter continuum,$(TAIL)),,--links $(N))) $(OPTIONS)
@@ -59,6 +60,7 @@ lint: $(READY)
 	$(VENV)/bin/lint-imports --no-cache
 
 model: $(STAMP)
+	@echo "generated/$(MODEL) is up to date"
 
 $(STAMP): $(SOURCES) $(SCENE) generated/.options/$(MODEL) | $(READY)
 	$(PY) -m serpentail_codegen $(WANTED)

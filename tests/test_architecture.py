@@ -135,7 +135,9 @@ SILENT = '"""Sample."""\n\n\ndef silent():\n    return 1\n'
 
 @pytest.mark.parametrize("package", ["codegen/serpentail_codegen", "runtime/serpentail"])
 @pytest.mark.parametrize(
-    ("text", "rule"), [(LONG, "PLR0915"), (TANGLED, "C901"), (CROWDED, "PLR0913"), (SILENT, "D103")]
+    ("text", "rule"),
+    [(LONG, "PLR0915"), (TANGLED, "C901"), (CROWDED, "PLR0913"), (SILENT, "D103")],
+    ids=["long", "tangled", "crowded", "silent"],
 )
 def test_linter_refuses_what_the_rules_refuse(package, text, rule):
     command = [

@@ -582,7 +582,7 @@ def driver(model):
     return text.replace("@@", model.name.upper()).replace("@", model.name)
 
 
-@slow_but("m1_n1_double_straight", "m1_n1_float_loops")
+@slow_but("m1_n1_double_straight", "m1_n1_double_loops")
 def test_sanitizers_find_nothing(models, tmp_path, name):
     model, main = models(name), tmp_path / "main.c"
     main.write_text(driver(model))

@@ -45,7 +45,9 @@ class Reference:
 
     def rows(self, model: st.Model, cases: list[State]) -> Iterator[tuple[str, str, list[State], float]]:
         """Yield title, function, states and limit (in roundings) of every comparison."""
-        long = 2 * model.segments * model.links  # libraries are off by 6e-13 for 48 links, folded, by 9e-12 for 128
+        long = (
+            2 * model.segments * (model.links or 1)
+        )  # libraries are off by 6e-13 for 48 links, folded, by 9e-12 for 128
         for name in self.names:
             if not (self.exact and name == "forward_dynamics"):
                 yield name, name, cases, NEAR if self.exact else NEAR * max(10, long)
@@ -96,9 +98,9 @@ def interpreted(model: st.Model, name: str) -> Callable:
     written = cache(lambda: program(function, tail_of(scene)))
 
     def error(model: st.Model, s: State) -> float:
-        arguments = {a.name: getattr(s, a.name).tolist() for a in function.inputs}
-        arguments |= {key: np.ravel(value).tolist() for key, value in parameters(model).items()}
-        values = Run(written(), Numbers(), arguments).values
+        given = {a.name: getattr(s, a.name).tolist() for a in function.inputs}
+        given |= {key: np.ravel(value).tolist() for key, value in parameters(model).items()}
+        values = Run(written(), Numbers(), given).values
         results = outputs(model, name, s)
         return differences(model, name, s, [np.reshape(values[key], x.shape) for key, x in results.items()])
 
@@ -241,10 +243,10 @@ def largest(rows: list[Check]) -> str:
 
 def main(argv: list[str] | None = None) -> int:
     """Verify a folder, write the reports, print a short table; 1 if a check failed."""
-    arguments = argparse.ArgumentParser(description=__doc__)
-    arguments.add_argument("folder", type=Path, help="a generated folder")
-    arguments.add_argument("--output", type=Path, default=Path("output/verify"), help="folder of the reports")
-    chosen = arguments.parse_args(argv)
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path, help="a generated folder")
+    parser.add_argument("--output", type=Path, default=Path("output/verify"), help="folder of the reports")
+    chosen = parser.parse_args(argv)
     try:
         checks, model = verify(chosen.folder), st.load(chosen.folder)
     except st.SerpentailError as error:

@@ -5,8 +5,8 @@ lies at ``L (-sigma y + gamma u)`` from the segment's root, with u = (b, 0, -a),
 gamma = x^2 c2(x^2 z), c_k being Stumpff's functions.  These are entire functions of z: nothing is singular or lost
 where the segment is straight.
 
-The integrals over x of Eqs. 18, 19, which Appendix B writes in sines and powers of 1 / theta, are here exact rational
-combinations of c_k(z) and c_k(4 z), k <= 11.
+The integrals over x of Eqs. 18, 19, which Appendix B writes in sines and powers of 1 / theta, are here seven form
+factors, exact rational combinations of c_k(z) and c_k(4 z), and their z-derivatives.
 """
 
 from math import factorial
@@ -16,34 +16,35 @@ from sympy import Matrix, Rational, eye
 from .dynamics import entries, symmetric
 from .kinematics import X, Y, Z, square
 
-HIGHEST = 11  # of Stumpff's functions that the integrals need
+HIGHEST = 9  # of Stumpff's functions that the form factors need
 SERIES_REACH = 6.4  # rad: up to there TERMS terms leave no more than rounding
 TERMS = 16
 
-# integral over x of a product of sigma, gamma and their z-derivatives (s, sz, szz; g, gz, gzz):
-# (coefficients k: of c_k(z), coefficients k: of c_k(4 z))
-INTEGRALS = {
-    "s": ({2: 1}, {}),
-    "g": ({3: 1}, {}),
-    "sz": ({3: Rational(-1, 2), 4: 1}, {}),
-    "gz": ({4: Rational(-1, 2), 5: Rational(3, 2)}, {}),
-    "szz": ({4: Rational(1, 4), 5: Rational(-5, 4), 6: 2}, {}),
-    "gzz": ({5: Rational(1, 4), 6: Rational(-7, 4), 7: Rational(15, 4)}, {}),
-    "s_s": ({}, {3: 2}),
-    "s_g": ({4: -1}, {4: 4}),
-    "g_g": ({5: -2}, {5: 8}),
-    "s_sz": ({}, {4: -2, 5: 6}),
-    "s_gz": ({6: -1}, {5: -4, 6: 20}),
-    "sz_g": ({5: Rational(1, 2), 6: -1}, {5: -4, 6: 12}),
-    "g_gz": ({6: Rational(1, 2), 7: Rational(-5, 2)}, {6: -8, 7: 40}),
-    "sz_sz": ({}, {5: 2, 6: -12, 7: 20}),
-    "gz_gz": ({8: 1, 9: -3}, {7: 8, 8: -80, 9: 208}),
-    "s_gzz": ({8: -2}, {6: 4, 7: -48, 8: 176}),
-    "szz_g": ({6: Rational(-1, 4), 7: Rational(5, 4), 8: -2}, {6: 4, 7: -32, 8: 80}),
-    "g_gzz": ({7: Rational(-1, 4), 8: Rational(7, 4), 9: Rational(-23, 4)}, {7: 8, 8: -96, 9: 352}),
-    "sz_szz": ({}, {6: -2, 7: 22, 8: -92, 9: 140}),
-    "gz_gzz": ({9: Rational(-1, 4), 10: Rational(11, 4), 11: Rational(-27, 4)}, {8: -8, 9: 136, 10: -848, 11: 1872}),
+# form factor: (coefficients k: of c_k(z), coefficients k: of c_k(4 z), order of the highest z-derivative)
+FACTORS = {
+    "s": ({2: 1}, {}, 2),  # integral of sigma
+    "g": ({3: 1}, {}, 2),  # of gamma; also half that of sigma^2 + z gamma^2
+    "ss": ({}, {3: 2}, 1),  # of sigma^2
+    "sg": ({4: -1}, {4: 4}, 1),  # of sigma gamma
+    "gg": ({5: -2}, {5: 8}, 1),  # of gamma^2
+    "along": ({6: -2, 7: 2}, {7: 32}, 1),  # of 4 (sigma_z^2 + gamma gamma_z + z gamma_z^2)
+    "side": ({5: Rational(1, 2)}, {6: -8}, 1),  # of sigma_z gamma - sigma gamma_z
 }
+SHAPE = tuple(
+    name + order * "_z" if order < 2 else name + "_zz"
+    for name, (_, _, top) in FACTORS.items()
+    for order in range(top + 1)
+)
+
+
+def z_derivative(near: dict, far: dict) -> tuple[dict, dict]:
+    """Differentiate a combination by c_k' = (k c_{k+2} - c_{k+1}) / 2; the argument 4 z gives a factor 4."""
+    out = ({}, {})
+    for total, terms, inner in zip(out, (near, far), (1, 4), strict=True):
+        for k, factor in terms.items():
+            for step, weight in ((2, Rational(k, 2)), (1, Rational(-1, 2))):
+                total[k + step] = total.get(k + step, 0) + inner * factor * weight
+    return out
 
 
 def section_properties(let, tail_mass, tail_length, share) -> dict:
@@ -83,7 +84,7 @@ def quadrupled(let, c: list) -> list:
 
 
 def segment_shape(let, angles, levels: int = 1) -> dict:
-    """What bend does to a segment: the integrals over x, and c_1, c_2, c_3 with z-derivatives at the tip.
+    """What bend does to a segment: its form factors, and c_1, c_2, c_3 with z-derivatives, which place the tip.
 
     ``levels`` quadruplings carry the series from z / 4^levels to z, so bends up to SERIES_REACH * 2^levels are covered.
     """
@@ -93,10 +94,13 @@ def segment_shape(let, angles, levels: int = 1) -> dict:
     for _ in range(levels):
         c = quadrupled(let, c)
     c4 = quadrupled(let, c)
-    shape = [
-        let(name, sum(f * c[k] for k, f in p.items()) + sum(f * c4[k] for k, f in q.items()))
-        for name, (p, q) in INTEGRALS.items()
-    ]
+    shape = []
+    for near, far, highest in FACTORS.values():
+        terms = near, far
+        for _ in range(highest + 1):
+            value = sum(f * c[k] for k, f in terms[0].items()) + sum(f * c4[k] for k, f in terms[1].items())
+            shape.append(let("factor", value))
+            terms = z_derivative(*terms)
     first = [let("c_z", (k * c[k + 2] - c[k + 1]) / 2) for k in (1, 2, 3)]
     second = [let("c_zz", (k * (k + 2) * c[k + 4] - (2 * k + 1) * c[k + 3] + c[k + 2]) / 4) for k in (1, 2)]
     return {"tip": Matrix([c[1], c[2], c[3], *first, *second]), "shape": Matrix(shape)}
@@ -133,61 +137,30 @@ def segment_tip(let, angles, tip, section) -> dict:
     }
 
 
-def profiles(let, angles) -> tuple:
-    """r, dr/da and dr/db over L as functions of x -> vector (Eqs. 20, 25)."""
-    a, b, _, u, du = geometry(let, angles)
-    partial = [{"sz": -2 * q * Y, "gz": 2 * q * u, "g": d} for q, d in zip((a, b), du, strict=True)]
-    return {"s": -Y, "g": u}, *partial
-
-
-def integrate(let, shape, product, *factors):
-    """Integral over x of a bilinear product of profiles, or of one profile (product None)."""
-    value = dict(zip(INTEGRALS, shape, strict=True))
-    if product is None:
-        return let("integral", sum((value[f] * vector for f, vector in factors[0].items()), 0 * Y))
-    terms: dict[str, object] = {}
-    for f, p in factors[0].items():
-        for g, q in factors[1].items():
-            name = next((n for n in (f"{f}_{g}", f"{g}_{f}") if n in value), "_".join(sorted((f, g))))
-            term = product(p, q)
-            terms[name] = terms[name] + term if name in terms else term
-    kept = [value[name] * term for name, term in terms.items() if any(e.expand() != 0 for e in Matrix([term]))]
-    return let("integral", sum(kept[1:], kept[0]))
-
-
-def cross(p, q) -> Matrix:
-    """p x q."""
-    return p.cross(q)
-
-
-def dot(p, q):
-    """p . q."""
-    return p.dot(q)
-
-
-def outer(p, q) -> Matrix:
-    """p q^T."""
-    return p * q.T
+def factors(shape) -> dict:
+    """Return the form factors by name, and the two halves of sg_z."""
+    f = dict(zip(SHAPE, shape, strict=True))
+    return f | {"sz_g": (f["sg_z"] + f["side"]) / 2, "s_gz": (f["sg_z"] - f["side"]) / 2}
 
 
 def segment_inertia(let, angles, shape, section) -> dict:
     """A segment's first moment and inertia at its root, momentum columns of a and b, and 2 x 2 block of H (Eq. 18)."""
-    r, r_a, r_b = profiles(let, angles)
+    a, b, _, u, du = geometry(let, angles)
     m, length = section
-    moment, spread = let("mL", m * length), let("mLL", m * length * length)
-    second = integrate(let, shape, outer, r, r)
-    inertia = let("trace", second.trace()) * eye(3) - second
-    columns = [
-        Matrix([moment * integrate(let, shape, None, p), spread * integrate(let, shape, cross, r, p)])
-        for p in (r_a, r_b)
-    ]
-    block = [integrate(let, shape, dot, p, q) for p, q in ((r_a, r_a), (r_a, r_b), (r_b, r_b))]
+    f, (moment, spread) = factors(shape), let("mL", Matrix([m * length, m * length * length]))
+    second = f["ss"] * Y * Y.T - f["sg"] * (Y * u.T + u * Y.T) + f["gg"] * u * u.T
+    columns = []
+    for q, d in zip((a, b), du, strict=True):
+        linear = 2 * q * (f["g_z"] * u - f["s_z"] * Y) + f["g"] * d
+        angular = 2 * q * f["side"] * Y.cross(u) - f["sg"] * Y.cross(d) + f["gg"] * u.cross(d)
+        columns.append(Matrix([moment * let("p", linear), spread * let("L", angular)]))
+    block = Matrix([f["gg"] + a * a * f["along"], a * b * f["along"], f["gg"] + b * b * f["along"]])
     return {
-        "h_own": moment * integrate(let, shape, None, r),
-        "I_own": entries(spread * inertia),
+        "h_own": moment * let("h", f["g"] * u - f["s"] * Y),
+        "I_own": entries(spread * let("I", 2 * f["g"] * eye(3) - second)),
         "pitch_own": columns[0],
         "yaw_own": columns[1],
-        "H_own": spread * Matrix(block),
+        "H_own": spread * let("H", block),
     }
 
 
@@ -202,56 +175,43 @@ def bending_rates(let, angles, rates) -> tuple:
 def relative_wrench(let, angles, rates, shape, w) -> tuple[Matrix, Matrix]:
     """What bending adds at fixed rates: integrals of r_ddot over m L, of r x (2 w x r_dot + r_ddot) over m L^2.
 
-    r = -s y + g u; with N the integral of r r_dot^T, the integral of r x (w x r_dot) is tr(N) w - N^T w.
+    r = -sigma y + gamma u; with N the integral of r r_dot^T, that of r x (w x r_dot) is tr(N) w - N^T w.
     """
-    i = dict(zip(INTEGRALS, shape, strict=True))
-    a, b, _, u, _ = geometry(let, angles)
+    f = factors(shape)
+    _, _, _, u, _ = geometry(let, angles)
     z_dot, z_ddot, area, u_dot = bending_rates(let, angles, rates)
-    square_rate, w_u = let("square_rate", z_dot**2), let("w_u", w.dot(u))
-    f_y = i["szz"] * square_rate + i["sz"] * z_ddot
-    f_u = i["gzz"] * square_rate + i["gz"] * z_ddot
-    force = let("f_u", f_u) * u + 2 * let("f_d", i["gz"] * z_dot) * u_dot - f_y * Y
-    trace = z_dot * (i["s_sz"] + (a * a + b * b) * i["g_gz"]) + i["g_g"] * z_dot / 2
-    on_y, on_u = i["s_sz"] * w[1] - i["sz_g"] * w_u, i["g_gz"] * w_u - i["s_gz"] * w[1]
-    across = let("across", i["g_g"] * w_u - i["s_g"] * w[1])
-    coriolis = let("trace", trace) * w - z_dot * let("on_y", on_y) * Y - let("on_u", z_dot * on_u) * u - across * u_dot
-    # r x r_ddot: y x u = (-a, 0, -b), y x u_dot = (-a_dot, 0, -b_dot), u x u_dot = area y
-    sidewise = (i["szz_g"] - i["s_gzz"]) * square_rate + (i["sz_g"] - i["s_gz"]) * z_ddot
-    moment = let("sidewise", sidewise) * Matrix([-a, 0, -b])
-    moment -= let("lean", 2 * i["s_gz"] * z_dot) * Matrix([-rates[0], 0, -rates[1]])
-    moment += 2 * i["g_gz"] * z_dot * area * Y
+    square_rate, w_u, wy = let("square_rate", z_dot**2), let("w_u", w.dot(u)), w[1]
+    on_y, on_u = (let("r_ddot", f[n + "_zz"] * square_rate + f[n + "_z"] * z_ddot) for n in "sg")
+    force = on_u * u + 2 * let("lean", f["g_z"] * z_dot) * u_dot - on_y * Y
+    N_y = let("N_y", z_dot * (f["ss_z"] / 2 * wy - f["sz_g"] * w_u))
+    N_u = let("N_u", z_dot * (f["gg_z"] / 2 * w_u - f["s_gz"] * wy))
+    coriolis = let("trace", f["g_z"] * z_dot) * w - N_y * Y - N_u * u - let("N_d", f["gg"] * w_u - f["sg"] * wy) * u_dot
+    moment = let("side", f["side_z"] * square_rate + f["side"] * z_ddot) * Y.cross(u)
+    moment += f["gg_z"] * z_dot * area * Y - let("tilt", 2 * f["s_gz"] * z_dot) * Y.cross(u_dot)
     return force, 2 * coriolis + moment
 
 
 def relative_loads(let, angles, rates, shape, w) -> list:
-    """Integrals of dr/da and dr/db times w x (w x r) + 2 w x r_dot + r_ddot at fixed rates, over m L^2."""
-    i = dict(zip(INTEGRALS, shape, strict=True))
+    """Integrals of dr/da and dr/db times w x (w x r) + 2 w x r_dot + r_ddot at fixed rates, over m L^2.
+
+    The last is Lagrange's: bending alone has the energy (gg (a_dot^2 + b_dot^2) + along (z_dot / 2)^2) / 2.
+    """
+    f = factors(shape)
     a, b, _, u, du = geometry(let, angles)
-    z = a * a + b * b
     z_dot, z_ddot, area, _ = bending_rates(let, angles, rates)
-    square_rate, w_u, wy = let("square_rate", z_dot**2), let("w_u", w.dot(u)), w[1]
-    spread = let("spread", 2 * (i["s_sz"] + z * i["g_gz"]) + i["g_g"])
-    quadratic = i["s_sz"] * wy**2 - (i["s_gz"] + i["sz_g"]) * wy * w_u + i["g_gz"] * w_u**2
-    lever = let("lever", i["g_g"] * w_u - i["s_g"] * wy)
-    # along z: dr/dz = -sz y + gz u; across it: g du
-    gyro_z = -i["sz_g"] * (rates[0] * w[0] + rates[1] * w[2]) - i["g_gz"] * area * wy
-    along = 2 * quadratic - let("ww", w.dot(w)) * spread + 4 * gyro_z
-    rate_z = (
-        (i["sz_szz"] + z * i["gz_gzz"]) * square_rate
-        + (i["sz_sz"] + z * i["gz_gz"]) * z_ddot
-        + i["gz_gz"] * square_rate
-    )
-    along += 2 * rate_z + i["g_gzz"] * square_rate + i["g_gz"] * z_ddot
-    along = let("along", along)
-    turn = [let("turn", z_dot * i["g_gz"] * wy), let("tilt", z_dot * i["sz_g"])]
-    out = []
-    for q, q_dot, d, swing, tilt in (
-        (a, rates[0], du[0], (b, rates[1]), w[0]),
-        (b, rates[1], du[1], (-a, -rates[0]), w[2]),
-    ):
-        across = lever * w.dot(d) + 2 * (tilt * turn[1] + turn[0] * swing[0] + i["g_g"] * wy * swing[1])
-        out.append(q * along + across + 2 * i["g_gz"] * z_dot * q_dot)
-    return out
+    w_u, wy = let("w_u", w.dot(u)), w[1]
+    quadratic = f["ss_z"] * wy**2 - 2 * f["sg_z"] * wy * w_u + f["gg_z"] * w_u**2
+    gyro = 2 * f["sz_g"] * (rates[0] * w[0] + rates[1] * w[2]) + f["gg_z"] * area * wy
+    own = f["along_z"] / 4 * z_dot**2 + (f["along"] - f["gg_z"]) / 2 * z_ddot
+    common = let("common", quadratic - 2 * f["g_z"] * let("ww", w.dot(w)) - 2 * gyro + own)
+    lever = let("lever", f["gg"] * w_u - f["sg"] * wy)
+    tilt, turn = let("tilt", 2 * f["sz_g"] * z_dot), let("turn", f["gg_z"] * z_dot * wy)
+    swing = let("swing", 2 * f["gg"] * wy)
+    loads = []
+    for k, (across, across_rate) in enumerate(((b, rates[1]), (-a, -rates[0]))):
+        relative = tilt * w[2 * k] + turn * across + swing * across_rate + f["gg_z"] * z_dot * rates[k]
+        loads.append(angles[k] * common + lever * w.dot(du[k]) + relative)
+    return loads
 
 
 def segment_wrench(
@@ -262,7 +222,7 @@ def segment_wrench(
     ``w, w_dot, a`` are of the root frame.
     """
     m, length = section
-    moment, spread = let("mL", m * length), let("mLL", m * length * length)
+    moment, spread = let("mL", Matrix([m * length, m * length * length]))
     force_r, moment_r = relative_wrench(let, angles, rates, shape, w)
     loads = relative_loads(let, angles, rates, shape, w)
     p = let("p", rates[0] * pitch_own[0:3, :] + rates[1] * yaw_own[0:3, :])

@@ -103,7 +103,7 @@ ARTICULATED = Mechanism(
 
 # ---- continuum: arc by arc in the arcs' root frames ---------------------------------------------------------------
 
-ARC = {"tip": 8, "shape": 20, "E": 9, "r": 3, "bend": 12}
+ARC = {"tip": 8, "shape": 16, "E": 9, "r": 3, "bend": 12}
 OWN = {"h_own": 3, "I_own": 6, "pitch_own": 6, "yaw_own": 6, "H_own": 3}
 
 

@@ -26,7 +26,7 @@ class CasadiFunctions:
         return function
 
     def __dir__(self) -> list[str]:
-        return [*self._model.kernels, "symbolic", "external", "parameter_vector"]
+        return [*self._model.manifest["functions"], "symbolic", "external", "parameter_vector"]
 
     @property
     def parameter_vector(self) -> casadi.DM:
@@ -44,10 +44,13 @@ class CasadiFunctions:
             raise ModelError(
                 f'{prefix} is a {self._model.manifest["real"]} model: casadi.external needs real = "double"'
             )
+        if self._model.library is None:
+            raise ModelError(f"{prefix} was loaded with compiled=False: load it again to use its C")
         return casadi.external(f"{prefix}_casadi_{self._known(name)}", self._model.library._name)
 
     def _known(self, name: str) -> str:
-        self._model.kernel(name)
+        if name not in self._model.manifest["functions"]:
+            raise self._model.without(name)
         return name
 
 

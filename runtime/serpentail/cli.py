@@ -21,7 +21,8 @@ def info(folder: str) -> dict:
         }
         for name, f in model.manifest["functions"].items()
     }
-    sizes = {"segments": model.segments, "links": model.links, "nq": model.nq, "nv": model.nv}
+    pieces = f"{model.links} links" if model.links else f"{model.samples} samples"
+    sizes = {"kind": model.kind, "segments": model.segments, "pieces": pieces, "nq": model.nq, "nv": model.nv}
     parameters = {name: list(value) if isinstance(value, tuple) else value for name, value in model.parameters.items()}
     return {
         "name": model.name,
@@ -34,7 +35,7 @@ def info(folder: str) -> dict:
 
 def describe(report: dict) -> str:
     """Return an info report as text."""
-    head = "{name}: {segments} segments x {links} links, nq {nq}, nv {nv}, {real}".format(**report)
+    head = "{name}: {kind}, {segments} segments, {pieces} in each, nq {nq}, nv {nv}, {real}".format(**report)
     rows = [
         f"  {name:<28}{f['emission']:<10}{f['operations']:>8} operations" for name, f in report["functions"].items()
     ]

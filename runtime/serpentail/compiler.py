@@ -20,7 +20,7 @@ from serpentail.errors import CompileFailed, CompilerNotFound, ModelError, Serpe
 
 # -std=c99 alone turns contraction off, so the fast profile asks for it by name.
 PROFILES = {
-    "fast": ("-std=c99", "-O2", "-ffp-contract=fast", "-fno-tree-vectorize", "-fno-math-errno"),
+    "fast": ("-std=c99", "-O2", "-ffp-contract=fast", "-fno-tree-vectorize", "-fno-math-errno", "-fno-trapping-math"),
     "reproducible": ("-std=c99", "-O2", "-ffp-contract=off"),
 }
 # The first of these that the compiler takes joins the profile. Only zig takes `baseline`: unasked, it builds

@@ -51,8 +51,8 @@ class Law:
     def limit(self, model: Model) -> float:
         """Return the limit; beyond a few links, the n^2 pairs that an entry of H sums cancel where they are folded."""
         units = self.units
-        if units and model.links > FEW:
-            units = max(units, model.segments * model.links**2)
+        if units and (model.links or model.samples) > FEW:
+            units = max(units, model.segments * (model.links or model.samples) ** 2)
         return self.floor + units * rounding(model)
 
 
@@ -100,7 +100,7 @@ def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 def fastest(model: Model, v: np.ndarray) -> float:
     """Return a bound on the angular velocity of every link (rad/s)."""
-    return np.linalg.norm(v[3:6]) + model.links * np.sum(abs(v[6:]))
+    return np.linalg.norm(v[3:6]) + (model.links or 1) * np.sum(abs(v[6:]))
 
 
 def changed_axes(top: np.ndarray, middle: np.ndarray, size: int) -> np.ndarray:

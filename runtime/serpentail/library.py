@@ -11,7 +11,7 @@ from .compiler import compile_library
 from .errors import ModelError, SerpentailError, StateError
 from .manifest import remedy
 
-NOT_POSITIVE_DEFINITE, NOT_FINITE = 1, 2
+NOT_POSITIVE_DEFINITE, NOT_FINITE, OUT_OF_RANGE = 1, 2, 3
 
 
 def open_library(folder: Path, manifest: dict, profile: str) -> ctypes.CDLL:
@@ -71,7 +71,6 @@ class Buffers(threading.local):
     def __init__(self, dtype, inputs, outputs, work: int, parameters: np.ndarray):
         self.inputs = [np.zeros(shape, dtype) for shape in inputs]
         self.outputs = [np.zeros(shape, dtype) for shape in outputs]
-        self.quaternion = self.inputs[0][3:7]
         self.work = np.zeros(work + 1, dtype)
         self.call = call_record(parameters, 1, self.work, (*self.inputs, *self.outputs))
         self.address = ctypes.addressof(self.call)
@@ -89,8 +88,7 @@ class Kernel:
         self.function = getattr(library, f"{manifest['prefix']}_batch_{name}")
         self.function.argtypes = [ctypes.c_void_p]
         self.parameters = parameters
-        limits = np.finfo(self.dtype)  # of the quaternion's squared norm, beyond which R would be wrong
-        self.least, self.most = float(limits.tiny), float(limits.max)
+        self.bend_range = manifest["scene"].get("bend_range")
         self.buffers = Buffers(self.dtype, self.shapes, self.out_shapes, manifest["work"][name], parameters)
 
     def __call__(self, *arrays):
@@ -104,8 +102,7 @@ class Kernel:
 
     def _single(self, buffers: Buffers):
         status = self.function(buffers.address)
-        w, x, y, z = buffers.quaternion.tolist()
-        if status or w * w + x * x + y * y + z * z > self.most:
+        if status:
             self._fail(status, 0, [b[None] for b in buffers.inputs])
         outputs = buffers.outputs
         return outputs[0].copy() if len(outputs) == 1 else tuple(o[()] if o.ndim == 0 else o.copy() for o in outputs)
@@ -138,11 +135,6 @@ class Kernel:
         status = self.function(ctypes.addressof(call))
         if status:
             self._fail(status, call.failed, whole)
-        with np.errstate(over="ignore"):
-            norms = np.square(whole[0][:, 3:7]).sum(axis=1)
-        bad = np.flatnonzero(norms > self.most)
-        if bad.size:
-            self._fail(status, bad[0], whole)
         return outputs[0] if len(outputs) == 1 else tuple(outputs)
 
     def _fail(self, status: int, index: int, arrays):
@@ -153,10 +145,17 @@ class Kernel:
                 where = f"[{', '.join(map(str, bad[0]))}]{state}"
                 value = array[index][tuple(bad[0])]
                 raise StateError(f"{self.name}: {name}{where} is {value}: give finite numbers")
-        norm = math.hypot(*arrays[0][index, 3:7])
-        if not self.least <= norm * norm <= self.most:
+        q, limits = arrays[0][index].astype(float), np.finfo(self.dtype)
+        norm = math.hypot(*q[3:7])
+        if not limits.tiny <= norm * norm <= limits.max:
             words = f"has norm {norm:.3g}" if norm else "is zero"
             raise StateError(f"{self.name}: the quaternion q[3:7]{state} {words}: upright is (1, 0, 0, 0)")
+        if status == OUT_OF_RANGE:
+            bends = np.hypot(q[7::2], q[8::2])
+            worst = int(bends.argmax())
+            remedy = "set a larger `bend_range` in the scene, then generate the model again"
+            what = f"segment {worst + 1}{state} is bent by {bends[worst]:.6g} rad"
+            raise StateError(f"{self.name}: {what}, beyond the scene's {self.bend_range:.6g}: {remedy}")
         indefinite = f"the inertia matrix{state} is not positive definite"
         what = indefinite if status == NOT_POSITIVE_DEFINITE else f"the result{state} is not finite"
         raise StateError(f"{self.name}: {what}: is a value too large, or a parameter unphysical?")

@@ -13,25 +13,33 @@ from .manifest import read_manifest
 from .parameters import flat, resolve
 
 
-def load(folder: str | PathLike[str], parameters: Mapping[str, object] | None = None, profile: str = "fast") -> "Model":
+def load(
+    folder: str | PathLike[str],
+    parameters: Mapping[str, object] | None = None,
+    profile: str = "fast",
+    compiled: bool = True,
+) -> "Model":
     """Return the model of a generated folder, its C compiled (or taken from the cache) and loaded.
 
     parameters: name -> number or 3 numbers, SI; override the scene's, without recompiling.
     profile: "fast" (this CPU, FMA) or "reproducible" (same bits everywhere).
+    compiled: False needs no C compiler; then only ``model.casadi`` evaluates.
     Raises ModelError (folder missing, stale or changed; parameter unknown or unphysical), CompilerNotFound,
     CompileFailed.
     """
     folder = Path(folder)
     manifest = read_manifest(folder)
     values = resolve(manifest, parameters)
-    return Model(folder, manifest, values, open_library(folder, manifest, profile), profile)
+    library = open_library(folder, manifest, profile) if compiled else None
+    return Model(folder, manifest, values, library, profile)
 
 
 class Model:
     """Equations of motion H(q) v_dot + C(q, v) = [0 (6); tau] + J^T f of one tail, SI units.
 
-    q (nq = 7 + 2m): position of B in the world, quaternion (w, x, y, z) of any norm but 0, joint angles.
-    v (nv = 6 + 2m): velocity of B in the world, angular velocity in the body frame, joint rates.
+    q (nq = 7 + 2m): position of B in the world, quaternion (w, x, y, z) of any norm but 0, tail coordinates: joint
+    angles (alpha_i, beta_i) of an articulated tail, bend components (a_i, b_i) of a continuum.
+    v (nv = 6 + 2m): velocity of B in the world, angular velocity in the body frame, rates of the tail coordinates.
     Every method also takes arrays with a leading batch axis; a single state is repeated over a batch.  All raise
     StateError on a wrong shape or a value that is not finite, ModelError where the scene left the function out.
     Threads may share a model; a pickled one is loaded anew from its folder.
@@ -42,14 +50,19 @@ class Model:
         self.library, self.profile = library, profile
         sizes = manifest["dimensions"]
         self.name = manifest["prefix"]
-        self.segments, self.links = sizes["segments"], sizes["links"]
+        self.kind = manifest["scene"]["kind"]
+        self.segments = sizes["segments"]
+        pieces = sizes["links"]
+        self.links, self.samples = (pieces, None) if self.kind == "articulated" else (None, pieces)
         self.nq, self.nv = sizes["nq"], sizes["nv"]
         dtype = np.float32 if manifest["real"] == "float" else np.float64
         self.parameter_vector = np.array(flat(manifest, parameters), dtype)
-        self.kernels = {name: Kernel(library, manifest, name, self.parameter_vector) for name in manifest["functions"]}
+        made = manifest["functions"] if library else ()
+        self.kernels = {name: Kernel(library, manifest, name, self.parameter_vector) for name in made}
 
     def __repr__(self) -> str:
-        return f"<serpentail.Model {self.name}: {self.segments} x {self.links} links, nv = {self.nv}>"
+        pieces = f" x {self.links} links" if self.links else " continuum segments"
+        return f"<serpentail.Model {self.name}: {self.segments}{pieces}, nv = {self.nv}>"
 
     def with_parameters(self, **changes) -> "Model":
         """Return this model with other parameters; nothing is compiled."""
@@ -68,11 +81,13 @@ class Model:
         return {name: value for name, value in self.parameters.items() if name != computed}
 
     def __reduce__(self):
-        return load, (self.folder.absolute(), self._given(), self.profile)
+        return load, (self.folder.absolute(), self._given(), self.profile, self.library is not None)
 
     def kernel(self, name: str) -> Kernel:
         """Return a compiled function; ModelError where the scene did not ask for it."""
         found = self.kernels.get(name)
+        if found is None and self.library is None:
+            raise ModelError(f"{self.name} was loaded with compiled=False: only model.casadi evaluates; load it again")
         if found is None:
             raise self.without(name)
         return found
@@ -127,7 +142,7 @@ class Model:
         return self.kernel("momentum")(q, v)
 
     def tail_points(self, q):
-        """Joint positions, then the tip (N + 1, 3), world (m), Eqs. 13 to 15."""
+        """Joint positions, then the tip (N + 1, 3), world (m), Eqs. 13 to 15; of a continuum, samples of its arcs."""
         return self.kernel("tail_points")(q)
 
     def tail_point_jacobians(self, q):

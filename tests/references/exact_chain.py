@@ -173,9 +173,7 @@ class ExactChain:
             for row, momentum in enumerate(momenta):
                 for column in range(row + 1):
                     lower[row][column] += self.mp.fdot(columns[column], momentum)
-        return [
-            [lower[max(row, column)][min(row, column)] for column in range(self.nv)] for row in range(self.nv)
-        ]
+        return [[lower[max(row, column)][min(row, column)] for column in range(self.nv)] for row in range(self.nv)]
 
     def _force(self, bodies, v, v_dot):
         """sum_j J_com^T m (v_dot + g) + J_omega^T (I omega_dot + omega~ I omega) (Eqs. 3, 17)."""

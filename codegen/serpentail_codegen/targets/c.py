@@ -153,6 +153,8 @@ def c_context(scene: Scene, tail: Tail, emitted: list[Emitted], version: str) ->
         "prefix": scene.name,
         "upper": scene.name.upper(),
         "real": scene.real,
+        "least": "FLT_MIN" if scene.real == "float" else "DBL_MIN",
+        "most": "FLT_MAX" if scene.real == "float" else "DBL_MAX",
         "sqrt": dialect(scene.real).functions["sqrt"],
         "version": version,
         "coordinates": COORDINATES[scene.kind],
