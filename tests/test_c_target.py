@@ -227,10 +227,17 @@ def float_of(real):
     return (np.float32, ctypes.c_float) if real == "float" else (np.float64, ctypes.c_double)
 
 
-def algebra(library):
-    """The arithmetic of C: the same rounding, and the model's own sine and cosine."""
-    functions = SimpleNamespace(sin=lambda x: library.sincos(x)[0], cos=lambda x: library.sincos(x)[1], sqrt=None)
-    return Numbers(functions, library.number)
+class Arithmetic(Numbers):
+    """The arithmetic of a model's C: its rounding, its constants, its own sine and cosine."""
+
+    def __init__(self, library):
+        functions = SimpleNamespace(sin=lambda x: library.sincos(x)[0], cos=lambda x: library.sincos(x)[1], sqrt=None)
+        super().__init__(functions, library.number)
+
+    def const(self, value):
+        """The nearest number of the C type, zero where that type has no normal number so small."""
+        nearest = self.convert(float(value))
+        return nearest if abs(nearest) >= np.finfo(self.convert).tiny else self.convert(0)
 
 
 def parameter_values(model):
@@ -326,7 +333,7 @@ def assert_means_the_program(model, *flags):
     library = Library(model, *flags)
     for state in states_of(model):
         for function in model.manifest["functions"]:
-            found, expected = library.call(function, state), interpreted(model, function, state, algebra(library))
+            found, expected = library.call(function, state), interpreted(model, function, state, Arithmetic(library))
             if model.scene.baked and model.scene.real == "float":  # parameters are folded in double
                 for key, values in expected.items():
                     np.testing.assert_allclose(found[key], values, rtol=1e-3, atol=1e-3 * np.abs(values).max())

@@ -234,9 +234,10 @@ def test_trigonometry_of_a_joint(state):
     twice = call(kin.double_angles, joint=joint)["twice"]
     angle = sympy.Symbol("angle", real=True)
     for k, (c, s) in enumerate((joint[:2], joint[2:])):
-        expected = [sympy.sin(angle) ** 2, sympy.sin(2 * angle) / 2, sympy.sin(2 * angle), sympy.cos(2 * angle)]
+        sine, cosine, double = sympy.sin(angle), sympy.cos(angle), 2 * angle
+        expected = [sine**2, sympy.sin(double) / 2, sympy.sin(double), sympy.cos(double), cosine**2]
         numbers = {sympy.cos(angle): c, sympy.sin(angle): s}
-        assert twice[4 * k : 4 * k + 4, :] == Matrix([sympy.expand_trig(e).xreplace(numbers) for e in expected])
+        assert twice[5 * k : 5 * k + 5, :] == Matrix([sympy.expand_trig(e).xreplace(numbers) for e in expected])
 
 
 def test_angular_velocity_is_that_of_the_rotation(state, links):
@@ -327,14 +328,14 @@ def test_link_momentum_and_kinetic_energy_are_their_definitions(state, links):
         assert found["kinetic"][0] == kinetic_form([body], [body]) / 2
 
 
-@pytest.mark.parametrize(("axes", "axis", "part"), [((0, 1, 2), Z, slice(4, 8)), ((1, 2, 0), X, slice(0, 4))])
+@pytest.mark.parametrize(("axes", "axis", "part"), [((0, 1, 2), Z, 1), ((1, 2, 0), X, 0)])
 def test_double_angles_turn_an_inertia(state, axes, axis, part):
     joint, inertia = state.joint(0), Matrix([3, 5, 7, Rational(1, 2), -2, Rational(4, 3)])
     twice = call(kin.double_angles, joint=joint)["twice"]
     angle = sympy.Symbol("angle")
-    c, s = joint[part.start // 2 : part.start // 2 + 2]
+    c, s = joint[2 * part : 2 * part + 2]
     turn = rotation(axis, angle).xreplace({sympy.cos(angle): c, sympy.sin(angle): s})
-    found = dyn.turned_inertia(lambda _, value: value, axes, turn, list(twice[part, :]), inertia)
+    found = dyn.turned_inertia(lambda _, value: value, axes, turn, twice[5 * part : 5 * part + 5], inertia)
     assert dyn.symmetric(found) == turn * dyn.symmetric(inertia) * turn.T
 
 
@@ -535,11 +536,11 @@ def step_cost(*functions):
 
 
 def test_steps_stay_within_their_budgets():
-    assert step_cost(dyn.gather_links) <= 135
+    assert step_cost(dyn.gather_links) <= 140
     assert step_cost(kin.link_motion, dyn.link_wrench) <= 95
     assert step_cost(dyn.gather_wrench) <= 36
 
 
 def test_functions_stay_within_their_budgets():
-    assert straight("forward_dynamics", 1, 3) <= 1030
-    assert executed("forward_dynamics", 3, 4) <= 5230
+    assert straight("forward_dynamics", 1, 3) <= 1040
+    assert executed("forward_dynamics", 3, 4) <= 5340

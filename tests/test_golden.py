@@ -21,11 +21,15 @@ LONGEST_REPORT = 200  # lines of difference that a failure shows
 
 
 def emitted(name, root):
-    """The header, the model and the CasADi module that the generator emits, by their place in the golden folder."""
+    """The header, the model and the CasADi module that the generator emits, by their names in the golden folder.
+
+    Python is stored as text, so that no tool formats or checks it.
+    """
     options = dict(MODELS[name])
     generate(scene_for("articulated", *options.pop("size"), name=name, **options), root)
     files = (f"include/{name}.h", f"src/{name}.c", f"{name}_casadi.py")
-    return {Path(file).name: (root / name / file).read_text() for file in files}
+    names = [Path(file).name + ".txt" * file.endswith(".py") for file in files]
+    return {stored: (root / name / file).read_text() for stored, file in zip(names, files, strict=True)}
 
 
 def differences(folder, texts):

@@ -11,8 +11,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+import serpentail.film
 import serpentail.plot
-from serpentail.plot import SIDE, TOP, filmstrip, silhouette, time_plots
+from serpentail.film import SIDE, TOP, filmstrip, silhouette
+from serpentail.plot import time_plots
 from serpentail.trajectory import Trajectory, rotation_matrix
 
 SEMI_AXES = np.array([0.0315, 0.0495, 0.027])
@@ -70,16 +72,16 @@ def film_frame(seed):
     q[:, 3:7] = Rotation.random(rng=seed).as_quat()
     trajectory = dataclasses.replace(trajectory, q=q)
     points = tail_points(trajectory)
-    return serpentail.plot._frame(trajectory, points, q[:, :3], serpentail.plot.Body(), 0)
+    return serpentail.film._frame(trajectory, points, q[:, :3], serpentail.film.Body(), 0)
 
 
 def drawn_film(trajectory, frames=8, com=None):
     """The film's figure and frames, unwritten."""
     com = trajectory.q[:, :3] if com is None else com
-    points, moments = tail_points(trajectory), serpentail.plot._moments(trajectory.t, frames)
-    body = serpentail.plot.Body()
-    film = [serpentail.plot._frame(trajectory, points, com, body, k) for k in moments]
-    return serpentail.plot._draw_film(film, com), film
+    points, moments = tail_points(trajectory), serpentail.film._moments(trajectory.t, frames)
+    body = serpentail.film.Body()
+    film = [serpentail.film._frame(trajectory, points, com, body, k) for k in moments]
+    return serpentail.film._draw_film(film, com), film
 
 
 @pytest.mark.parametrize("view", [SIDE, TOP], ids=lambda view: view.name)
@@ -148,10 +150,10 @@ def test_the_same_bytes_twice_whatever_the_user_has_set(tmp_path, suffix):
 
 def test_drawing_leaves_pyplot_alone_and_importing_leaves_matplotlib_alone(tmp_path):
     code = (
-        "import sys, serpentail.plot, serpentail.trajectory\n"
+        "import sys, serpentail.film, serpentail.plot, serpentail.trajectory\n"
         "assert 'matplotlib' not in sys.modules and 'scipy' not in sys.modules\n"
         "from test_plot import flight, tail_points\n"
-        "serpentail.plot.filmstrip(flight(), tail_points(flight()), 'film.svg')\n"
+        "serpentail.film.filmstrip(flight(), tail_points(flight()), 'film.svg')\n"
         "serpentail.plot.time_plots(flight(), 'times.svg')\n"
         "assert 'matplotlib.pyplot' not in sys.modules\n"
     )
@@ -221,10 +223,10 @@ def test_one_sample_cannot_be_drawn_over_time(tmp_path):
 @pytest.mark.parametrize("frames", [1, 2, 7, 8, 40])
 def test_frames_are_the_samples_nearest_to_even_times(frames):
     t = np.sort(np.random.default_rng(5).uniform(0, 1, 400))
-    moments = serpentail.plot._moments(t, frames)
+    moments = serpentail.film._moments(t, frames)
     assert len(moments) == frames
     assert np.abs(t[moments] - np.linspace(t[0], t[-1], frames)).max() <= np.diff(t).max() / 2
-    assert serpentail.plot._moments(t[:3], 8) == [0, 1, 2]
+    assert serpentail.film._moments(t[:3], 8) == [0, 1, 2]
 
 
 @pytest.mark.parametrize("speed", SPEEDS)

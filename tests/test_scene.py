@@ -436,3 +436,15 @@ def test_a_continuum_scene(tmp_path):
 
 def test_bend_range_and_samples_are_a_continuums_alone(refuse):
     assert set(refuse(VALID + "samples = 3\n")) == {"samples"}
+
+
+@pytest.mark.parametrize("name", ["math", "stdio", "features"])
+def test_a_model_hides_no_c_header(name):
+    with pytest.raises(SceneError, match="names no C header"):
+        scene_for("articulated", 1, 1, name=name)
+
+
+@pytest.mark.parametrize("mass", [1e-50, 1e300])
+def test_single_precision_holds_its_parameters(mass):
+    with pytest.raises(SceneError, match="beyond single precision"):
+        scene_for("articulated", 1, 1, real="float", parameters={"torso_mass": mass})

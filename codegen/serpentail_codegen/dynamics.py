@@ -66,12 +66,15 @@ def turned_inertia(let, axes, turn, twice, I) -> Matrix:
     """R I R^T for a turn in the plane of axes (i, j), k normal to it, by the double angle."""
     i, j, k = axes
     c, s = turn[i, i], turn[j, i]
-    sine_squared, product, double_product, cosine = twice
+    sine_squared, product, double_product, cosine, cosine_squared = twice
     tensor = symmetric(I)
     d = let("d", tensor[i, i] - tensor[j, j])
-    t = let("t", sine_squared * d + double_product * tensor[i, j])
+    t = let("t", double_product * tensor[i, j])
     out = zeros(3, 3)
-    out[i, i], out[j, j], out[k, k] = tensor[i, i] - t, tensor[j, j] + t, tensor[k, k]
+    # sums, not I_ii - s^2 d: a thin link turned by 90 degrees would be the difference of two thick ones
+    out[i, i] = cosine_squared * tensor[i, i] + sine_squared * tensor[j, j] - t
+    out[j, j] = sine_squared * tensor[i, i] + cosine_squared * tensor[j, j] + t
+    out[k, k] = tensor[k, k]
     out[i, j] = product * d + cosine * tensor[i, j]
     out[i, k] = c * tensor[i, k] - s * tensor[j, k]
     out[j, k] = s * tensor[i, k] + c * tensor[j, k]
@@ -101,7 +104,7 @@ def gather_links(let, joint, twice, link, mass, h, I, pitch, yaw) -> dict:
     H_yy, H_py = 2 * yaw[5] + I[2], pitch[5]
     yaw = let("yaw_here", yaw + Matrix([Z.cross(h), symmetric(I) * Z]))
 
-    h, I = let("h_mid", turn_z * h), let("I_mid", turned_inertia(let, (0, 1, 2), turn_z, twice[4:8], I))
+    h, I = let("h_mid", turn_z * h), let("I_mid", turned_inertia(let, (0, 1, 2), turn_z, twice[5:10], I))
     pitch, yaw = turned(let, "pitch_mid", turn_z, pitch), turned(let, "yaw_mid", turn_z, yaw)
     H_pp, H_py = 2 * pitch[3] + I[0], H_py + yaw[3]
     pitch = let("pitch_here", pitch + Matrix([X.cross(h), symmetric(I) * X]))
@@ -109,7 +112,7 @@ def gather_links(let, joint, twice, link, mass, h, I, pitch, yaw) -> dict:
     return {
         "mass": mass + Matrix([link[0]]),
         "h": turn_x * h,
-        "I": turned_inertia(let, (1, 2, 0), turn_x, twice[0:4], I),
+        "I": turned_inertia(let, (1, 2, 0), turn_x, twice[0:5], I),
         "pitch": turned(let, "pitch_out", turn_x, pitch),
         "yaw": turned(let, "yaw_out", turn_x, yaw),
         "H_pp": [H_pp],

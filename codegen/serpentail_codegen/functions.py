@@ -9,8 +9,9 @@ from . import dynamics as dyn
 from . import kinematics as kin
 from . import sweeps
 from .draft import Draft, Tail
+from .parameters import Parameter
 from .program import Array, Index, Program
-from .scene import Parameter, parameters_of
+from .scene import parameters_of
 from .sweeps import column_of, mechanism
 
 

@@ -4,29 +4,53 @@ With numbers as the algebra this is the reference for every emitted text; with a
 """
 
 import math
-from fractions import Fraction
 
 from .program import Apply, Copy, Fill, Guard, Loop, Program, Ref, Solve
 from .tape import Tape, replay
 
 
 class Numbers:
-    """The algebra of NumPy arrays, or of any numbers that ``functions`` knows sin, cos and sqrt of."""
+    """The algebra of numbers that ``functions`` knows sin, cos and sqrt of; ``convert`` rounds an exact constant."""
 
     def __init__(self, functions=math, convert=float):
         self.sin, self.cos, self.sqrt, self.convert = functions.sin, functions.cos, functions.sqrt, convert
 
     def const(self, value):
-        """Return an exact constant as a number; fractions are divided in the target arithmetic."""
-        if isinstance(value, Fraction):
+        """Return an exact constant as a number; what cannot take a fraction divides it."""
+        try:
+            return self.convert(value)
+        except TypeError:
             return self.convert(value.numerator) / self.convert(value.denominator)
-        return self.convert(value)
 
     add = staticmethod(lambda a, b: a + b)
     sub = staticmethod(lambda a, b: a - b)
     mul = staticmethod(lambda a, b: a * b)
     div = staticmethod(lambda a, b: a / b)
     neg = staticmethod(lambda a: -a)
+
+
+class Counter:
+    """The algebra that counts operations; its only value is None."""
+
+    def __init__(self):
+        self.count = 0
+
+    def _one(self, *_):
+        self.count += 1
+
+    def _none(self, *_):
+        pass
+
+    add = sub = mul = div = _one
+    const = neg = sin = cos = sqrt = _none
+
+
+def executed(program: Program) -> int:
+    """Return the additions, multiplications and divisions of one run."""
+    counter = Counter()
+    arguments = (*program.of_role("parameters"), *program.of_role("input"))
+    Run(program, counter, {a.name: [None] * a.length for a in arguments})
+    return counter.count
 
 
 def ldl_solve(algebra, A: list[list], b: list) -> tuple[list, list]:

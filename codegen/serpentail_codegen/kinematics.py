@@ -48,11 +48,11 @@ def joint_trigonometry(let, angles) -> dict:
 
 
 def double_angles(let, joint) -> dict:
-    """s^2, s c, 2 s c and c^2 - s^2 of both joint angles: what turns a symmetric tensor in the plane."""
+    """s^2, s c, 2 s c, c^2 - s^2 and c^2 of both joint angles: what turns a symmetric tensor in the plane."""
     rows = []
     for c, s in (joint[0:2], joint[2:4]):
         sine_squared, product = let("k", Matrix([s * s, s * c]))
-        rows += [sine_squared, product, 2 * product, 1 - 2 * sine_squared]
+        rows += [sine_squared, product, 2 * product, 1 - 2 * sine_squared, c * c]
     return {"twice": Matrix(rows)}
 
 

@@ -29,7 +29,7 @@ SIZES = {
     **dict.fromkeys(["link", "I", "F", "F_next", "F_beyond", "pitch", "yaw", "column", "other", "f_torso"], 6),
     **{"section": 2, "H_own": 3, "torque_own": 2, "I_own": 6, "pitch_own": 6, "yaw_own": 6, "tip": 8, "shape": 16},
     **{"E": 9, "bend": 12},
-    **{"twice": 8, "R": 9, "S": 12, "columns": 12},
+    **{"twice": 10, "R": 9, "S": 12, "columns": 12},
 }
 
 
@@ -85,10 +85,11 @@ class Recorder:
         return total
 
     def _product(self, e: sympy.Mul) -> int:
-        above, below = e.as_numer_denom() if e.args[0].is_Rational else sympy.fraction(e)
-        if below == 1:
-            return self._chain(self.tape.mul, e.args)
-        return self.tape.div(self.lower(above), self.lower(below))
+        coefficient, rest = e.as_coeff_Mul()
+        above, below = sympy.fraction(rest)
+        factors = above.args if above.is_Mul else (above,)
+        node = self._chain(self.tape.mul, factors if coefficient == 1 else (coefficient, *factors))
+        return node if below == 1 else self.tape.div(node, self.lower(below))
 
     def _power(self, base: sympy.Basic, exponent: sympy.Basic) -> int:
         if exponent == sympy.Rational(1, 2):
@@ -130,4 +131,5 @@ def derive(function, **settings) -> Step:
     results = tuple(recorder.lower(sympy.sympify(e)) for values in outputs.values() for e in values)
     sizes = tuple((name, len(values)) for name, values in outputs.items())
     doc = inspect.getdoc(function).splitlines()[0]
-    return compacted(Step(function.__name__, doc, tuple(inputs), sizes, tuple(recorder.tape.nodes), results))
+    name = function.__name__ + "".join(f"_{key}_{value}" for key, value in settings.items() if value)
+    return compacted(Step(name, doc, tuple(inputs), sizes, tuple(recorder.tape.nodes), results))

@@ -52,7 +52,7 @@ def prepare_links(d: Draft, doubled: bool = False) -> None:
     d.known["share"] = d.constant("share", [Fraction(1, d.tail.total)])[0]
     d.store(dyn.link_properties, link=6)
     d.pieces["joint"] = joint = d.array("joint", 4, d.tail.segments)
-    twice = d.array("twice", 8, d.tail.segments) if doubled else None
+    twice = d.array("twice", 10, d.tail.segments) if doubled else None
     with d.loop("i", d.tail.segments) as i:
         d.step(kin.joint_trigonometry, {"angles": d.angles(i)}, joint=joint[i])
         if doubled:

@@ -4,11 +4,13 @@ import math
 import re
 import sys
 import tomllib
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
+
+from .parameters import ANY, PARAMETERS, SINGLE, Parameter, Parameters, Rule, Value
 
 # fmt: off
 KINDS = ("articulated", "continuum")
@@ -21,17 +23,36 @@ FUNCTIONS = (
 ALIASES = {"crba": "mass_matrix", "nle": "bias_force", "rnea": "inverse_dynamics", "aba": "forward_dynamics",
            "m": "segments", "n": "links", "tail": "kind"}
 # fmt: on
+C_HEADERS = frozenset(
+    [
+        "assert",
+        "complex",
+        "ctype",
+        "errno",
+        "features",
+        "fenv",
+        "float",
+        "inttypes",
+        "iso646",
+        "limits",
+        "locale",
+        "math",
+        "setjmp",
+        "signal",
+        "stdarg",
+        "stdbool",
+        "stddef",
+        "stdint",
+        "stdio",
+        "stdlib",
+        "string",
+        "tgmath",
+        "time",
+        "wchar",
+        "wctype",
+    ]
+)  # a model of such a name would hide the system's header
 MOST_LINKS = 100_000  # segments * links: beyond it a slip, not a tail
-
-Value = float | tuple[float, ...]
-
-
-@dataclass(frozen=True)
-class Rule:
-    """What a value must fulfil: in words that complete "needs ...", and as a test."""
-
-    text: str
-    holds: Callable[[Any], bool]
 
 
 def _one_of(names: Sequence[str], remark: str = "") -> Rule:
@@ -45,73 +66,17 @@ def _is_whole(x: object) -> bool:
     return isinstance(x, int) and not isinstance(x, bool)
 
 
-ANY = Rule("", lambda _: True)
 FLAG = Rule("true or false, without quotes", lambda x: isinstance(x, bool))
 COUNT = Rule("a whole number, 1 or above", lambda x: _is_whole(x) and x >= 1)
 TEXT = Rule('a text, in "quotes"', lambda x: isinstance(x, str))
 NAME = Rule(
-    'a text of a-z, 0-9 and _ that starts with a letter: rename the file, or set name = "..." in it',
-    lambda x: isinstance(x, str) and re.fullmatch("[a-z][a-z0-9_]*", x) is not None,
+    'a text of a-z, 0-9 and _, a letter first, that names no C header: rename the file, or set name = "..." in it',
+    lambda x: isinstance(x, str) and re.fullmatch("[a-z][a-z0-9_]*", x) is not None and x not in C_HEADERS,
 )
 BEND = Rule(
     "a number of radians above 0 and up to 100",
     lambda x: not isinstance(x, bool) and isinstance(x, int | float) and 0 < x <= 100,
 )
-# Rules for the numbers of a parameter; 1e-12 lets a flat body, with equal sums, pass in spite of rounding.
-POSITIVE = Rule(" above 0", lambda x: min(x) > 0)
-NOT_NEGATIVE = Rule(", 0 or above", lambda x: min(x) >= 0)
-BODY_INERTIA = Rule(
-    " above 0, none above the sum of the other two",
-    lambda x: min(x) > 0 and 2 * max(x) <= sum(x) * (1 + 1e-12),
-)
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """One physical parameter: `size` numbers in `unit`; a default of None is computed from the others."""
-
-    name: str
-    size: int
-    default: Value | None
-    unit: str
-    check: Rule
-    meaning: str
-
-
-# The defaults are the kangaroo rat of the paper's Table 1. B is the torso frame, at the torso COM.
-# fmt: off
-PARAMETERS = (
-    Parameter("gravity", 1, 9.8, "m/s^2", NOT_NEGATIVE, "gravitational acceleration, along -z of the world"),
-    Parameter("torso_mass", 1, 0.10572, "kg", POSITIVE, "mass of the torso"),
-    Parameter("torso_inertia", 3, (6.722e-05, 3.639e-05, 7.279e-05), "kg m^2", BODY_INERTIA,
-              "principal moments of inertia of the torso about its COM, axes of B"),
-    Parameter("tail_mount", 3, (0.0, -0.0405, 0.0045), "m", ANY, "root of the tail from the torso COM, in B"),
-    Parameter("tail_mass", 1, 0.00351, "kg", POSITIVE, "mass of the whole tail"),
-    Parameter("tail_length", 1, 0.19466, "m", POSITIVE, "length of the whole tail"),
-    Parameter("link_radius", 1, 0.0029, "m", NOT_NEGATIVE, "radius of the ellipsoid that gives link_inertia"),
-    Parameter("link_inertia", 3, None, "kg m^2", NOT_NEGATIVE,
-              "principal moments of inertia of one link about its COM, y along the link"),
-)
-# fmt: on
-
-
-@dataclass(frozen=True, eq=False)
-class Parameters(Mapping[str, Value]):
-    """Resolved parameters by name, in PARAMETERS' order; no link_radius where link_inertia was given."""
-
-    entries: tuple[tuple[str, Value], ...]
-
-    def __getitem__(self, name: str) -> Value:
-        return dict(self.entries)[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(dict(self.entries))
-
-    def __len__(self) -> int:
-        return len(self.entries)
-
-    def __hash__(self) -> int:
-        return hash(frozenset(self.entries))
 
 
 @dataclass(frozen=True)
@@ -226,6 +191,8 @@ def parse_scene(table: Mapping[str, Any], name: str) -> Scene:
         values["parameters"] = resolve_parameters(values["parameters"], links, kind)
     except SceneError as error:
         problems += error.problems
+    if not problems and values["real"] == "float":
+        problems += _single_problems(values["parameters"])
     if problems:
         raise SceneError(problems)
     values["functions"] = tuple(function for function in FUNCTIONS if function in values["functions"])
@@ -333,6 +300,14 @@ def _kind_problems(table: Mapping[str, Any], own: Only) -> list[Problem]:
         remedy = f'needs "{own.coordinates}"; polar angles are singular at theta = 0, convert states'
         problems.append(Problem("coordinates", table["coordinates"], remedy))
     return problems
+
+
+def _single_problems(parameters: Mapping[str, Value]) -> list[Problem]:
+    """Return a problem for each parameter that single precision cannot hold."""
+    flat = {name: value if isinstance(value, tuple) else (value,) for name, value in parameters.items()}
+    wrong = [n for n, xs in flat.items() if any(x and not SINGLE[0] <= abs(x) <= SINGLE[1] for x in xs)]
+    remedy = 'beyond single precision, 1.2e-38 to 3.4e38; set real = "double"'
+    return [Problem(f"parameters.{name}", _plain(parameters[name]), remedy) for name in wrong]
 
 
 def _tail_links(values: Mapping[str, Any]) -> int:

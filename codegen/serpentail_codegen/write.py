@@ -32,12 +32,11 @@ def write_folder(folder: Path, files: dict[str, str], manifest: dict) -> list[st
 
 
 def _remove_stale(folder: Path, names: set[str]) -> None:
-    manifest = folder / "manifest.json"
     try:
-        earlier = json.loads(manifest.read_text())["files"]
+        earlier = set(json.loads((folder / "manifest.json").read_text())["files"])
     except (OSError, ValueError, KeyError, TypeError):
         return
-    for name in set(earlier) - names:
+    for name in earlier - names:
         target = (folder / name).resolve()
         if folder.resolve() in target.parents:
             target.unlink(missing_ok=True)

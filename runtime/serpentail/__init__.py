@@ -8,7 +8,8 @@ _HOME = {
     **dict.fromkeys(["simulate", "Damping", "TorqueTable"], "simulation"),
     **dict.fromkeys(["Trajectory", "pitch_roll_yaw", "rotation_matrix"], "trajectory"),
     **dict.fromkeys(["polar_to_bend", "bend_to_polar"], "polar"),
-    **dict.fromkeys(["filmstrip", "time_plots"], "plot"),
+    "filmstrip": "film",
+    "time_plots": "plot",
     **dict.fromkeys(
         ["SerpentailError", "CompilerNotFound", "CompileFailed", "ModelError", "StateError", "SimulationError"],
         "errors",

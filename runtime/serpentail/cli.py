@@ -21,8 +21,7 @@ def info(folder: str) -> dict:
         }
         for name, f in model.manifest["functions"].items()
     }
-    pieces = f"{model.links} links" if model.links else f"{model.samples} samples"
-    sizes = {"kind": model.kind, "segments": model.segments, "pieces": pieces, "nq": model.nq, "nv": model.nv}
+    sizes = {name: getattr(model, name) for name in ("kind", "segments", "links", "samples", "nq", "nv")}
     parameters = {name: list(value) if isinstance(value, tuple) else value for name, value in model.parameters.items()}
     return {
         "name": model.name,
@@ -35,7 +34,8 @@ def info(folder: str) -> dict:
 
 def describe(report: dict) -> str:
     """Return an info report as text."""
-    head = "{name}: {kind}, {segments} segments, {pieces} in each, nq {nq}, nv {nv}, {real}".format(**report)
+    shape = "{segments} segments x {links} links" if report["links"] else "{segments} continuum segments"
+    head = ("{name}: " + shape + ", nq {nq}, nv {nv}, {real}").format(**report)
     rows = [
         f"  {name:<28}{f['emission']:<10}{f['operations']:>8} operations" for name, f in report["functions"].items()
     ]

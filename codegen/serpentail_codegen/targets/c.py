@@ -78,7 +78,6 @@ class FunctionView:
         self.names = ", ".join(a.name for a in views)
         text = "\n".join(self.lines)
         self.unused = [name for name, word in (("parameters", "parameters->"), ("work", "work +")) if word not in text]
-        self.unused += [a.name for a in self.inputs if f"{a.name}[" not in text and f"{a.name} +" not in text]
 
 
 def wrapped(head: str, arguments: list[str]) -> str:

@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
-from ..interpret import unroll
+from ..interpret import executed, unroll
 from ..program import Apply, Array, Copy, Fill, Guard, Index, Loop, Program, Ref, Solve
-from ..tape import BINARY, Step, operation_count
+from ..tape import BINARY, Step
 from .scalars import Dialect, Scalars
 
 FEW = 3  # scalars are written one by one, more by a helper
@@ -97,15 +97,14 @@ class LoopPrinter:
         self.dialect = dialect(real)
         self.steps: dict[str, Step] = {}
         self.helpers: set[str] = set()
-        self.operations = 0
         self.used: dict[str, Array] = {}
 
     def function(self) -> CFunction:
         """Return the printed function."""
-        body = self._body(self.program.body, 1)
+        body = self._body(self.program.body)
         declarations, work = self._declarations()
         lines = (*declarations, *body, "return STATUS_OK;")
-        return CFunction(lines, work, tuple(self.steps.values()), frozenset(self.helpers), self.operations)
+        return CFunction(lines, work, tuple(self.steps.values()), frozenset(self.helpers), executed(self.program))
 
     def _declarations(self) -> tuple[list[str], int]:
         lines, work = [], 0
@@ -128,25 +127,24 @@ class LoopPrinter:
         self.used.setdefault(ref.array.name, ref.array)
         return ref
 
-    def _body(self, body, trips: int) -> list[str]:
-        return [line for s in body for line in getattr(self, f"_{type(s).__name__.lower()}")(s, trips)]
+    def _body(self, body) -> list[str]:
+        return [line for s in body for line in getattr(self, f"_{type(s).__name__.lower()}")(s)]
 
-    def _loop(self, loop: Loop, trips: int) -> list[str]:
+    def _loop(self, loop: Loop) -> list[str]:
         start, stop, var = index_text(loop.start), index_text(loop.stop), loop.var
-        average = (loop.stop.offset or 2) - loop.start.offset
         head = f"for (int {var} = {start}; {var} < {stop}; ++{var}) {{"
         if loop.downward:
             head = f"for (int {var} = {index_text(loop.stop + -1)}; {var} >= {start}; --{var}) {{"
-        return [head, *("  " + line for line in self._body(loop.body, trips * average)), "}"]
+        return [head, *("  " + line for line in self._body(loop.body)), "}"]
 
-    def _fill(self, fill: Fill, trips: int) -> list[str]:
+    def _fill(self, fill: Fill) -> list[str]:
         target = self._ref(fill.target)
         if target.size > FEW and len(set(fill.values)) == 1:
             value = self.dialect.literal(fill.values[0])
             return [f"{self._helper('fill')}({target.size}, {value}, {pointer(target)});"]
         return [f"{scalar(target, k)} = {self.dialect.literal(v)};" for k, v in enumerate(fill.values)]
 
-    def _copy(self, copy: Copy, trips: int) -> list[str]:
+    def _copy(self, copy: Copy) -> list[str]:
         target, source = self._ref(copy.target), self._ref(copy.source)
         if target.size > FEW:
             return [f"{self._helper('copy')}({target.size}, {pointer(source)}, {pointer(target)});"]
@@ -156,19 +154,18 @@ class LoopPrinter:
         self.helpers.add(name)
         return f"{self.prefix}_{name}"
 
-    def _guard(self, guard: Guard, trips: int) -> list[str]:
+    def _guard(self, guard: Guard) -> list[str]:
         test = f"!({scalar(self._ref(guard.scalar), 0)} > {self.dialect.literal(0)})"
         return [f"if ({test}) {{", f"  return STATUS_{guard.status};", "}"]
 
-    def _solve(self, solve: Solve, trips: int) -> list[str]:
+    def _solve(self, solve: Solve) -> list[str]:
         matrix, x = self._ref(solve.matrix[0]), self._ref(solve.x)
         call = f"{self._helper('ldl_solve')}({x.size}, {pointer(matrix)}, {pointer(x)})"
         return [f"if ({call} != STATUS_OK) {{", "  return STATUS_NOT_POSITIVE_DEFINITE;", "}"]
 
-    def _apply(self, call: Apply, trips: int) -> list[str]:
+    def _apply(self, call: Apply) -> list[str]:
         self.steps.setdefault(call.step.name, call.step)
         self.helpers |= called(call.step.nodes)
-        self.operations += trips * operation_count(call.step.nodes, call.step.results)
         arguments = [pointer(self._ref(ref)) for ref in call.reads]
         before, after = [], []
         for (name, size), target, adds in zip(call.step.outputs, map(self._ref, call.writes), call.adds, strict=True):

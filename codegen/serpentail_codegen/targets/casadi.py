@@ -1,5 +1,7 @@
 """The CasADi target: a scene's programs go in, a Python module that builds ``casadi.Function``s comes out."""
 
+import re
+
 from ..draft import Tail
 from ..functions import inertial
 from ..functions import program as assemble
@@ -48,9 +50,11 @@ class PythonPrinter:
     def lines(self) -> list[str]:
         """Return the body of the function."""
         body = self._body(self.program.body)
-        arrays = [a for a in self.program.arrays if a.role in ("local", "output")]
+        used = set(re.findall(r"\w+", " ".join(body)))
+        arrays = [a for a in self.program.arrays if a.role == "output" or (a.role == "local" and a.name in used)]
         lines = [f"{a.name} = [0.0] * {a.length}" for a in arrays]
-        lines += [f"{a.name} = [{', '.join(map(PYTHON.literal, a.values))}]" for a in self.program.of_role("constant")]
+        constants = [a for a in self.program.of_role("constant") if a.name in used]
+        lines += [f"{a.name} = [{', '.join(map(PYTHON.literal, a.values))}]" for a in constants]
         outputs = ", ".join(f'"{a.name}": {a.name}' for a in self.program.of_role("output"))
         return [*lines, *body, f"return {{{outputs}}}"]
 

@@ -1,6 +1,7 @@
 """The manifest: what was emitted goes in, what a loader needs to know comes out as plain data."""
 
-from ..scene import ANY, BODY_INERTIA, NOT_NEGATIVE, POSITIVE, Scene, parameters_of, scene_to_dict
+from ..parameters import ANY, BODY_INERTIA, NOT_NEGATIVE, POSITIVE
+from ..scene import Scene, parameters_of, scene_to_dict
 
 FORMAT = 1
 CHECKS = {ANY: "finite", POSITIVE: "positive", NOT_NEGATIVE: "not_negative", BODY_INERTIA: "body_inertia"}

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from ..tape import BINARY, live_nodes
 
+LEAST_SINGLE = 2.0**-126
 SYMBOL = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
 
 
@@ -18,8 +19,9 @@ class Dialect:
     sincos: str = ""  # defines sine and cosine of one argument at once; empty: by two functions
 
     def literal(self, value) -> str:
-        """Print a number by its shortest exact decimal."""
-        return repr(float(value)) + self.suffix
+        """Print a number by its shortest exact decimal; what a single-precision real cannot hold is zero."""
+        tiny = self.suffix and abs(value) < LEAST_SINGLE
+        return repr(0.0 if tiny else float(value)) + self.suffix
 
 
 class Scalars:

@@ -129,8 +129,8 @@ STEP golden_loops_link_properties(const real *tail_mass, const real *tail_length
 {
   const real t0 = tail_mass[0] * share[0];
   const real t1 = tail_length[0] * share[0];
-  const real t2 = (t0 * t1) / 2.0;
-  const real t3 = (t1 * t2) / 2.0;
+  const real t2 = t1 * (t0 * 0.5);
+  const real t3 = t1 * (0.5 * t2);
   const real t4 = link_inertia[0] + t3;
   const real t5 = link_inertia[2] + t3;
   const real r4 = link_inertia[1];
@@ -343,7 +343,7 @@ STEP golden_loops_world_vector(const real *R, const real *vector, real *vector_o
   vector_out[2] = t5;
 }
 
-/* s^2, s c, 2 s c and c^2 - s^2 of both joint angles: what turns a symmetric tensor in the plane. */
+/* s^2, s c, 2 s c, c^2 - s^2 and c^2 of both joint angles: what turns a symmetric tensor in the plane. */
 STEP golden_loops_double_angles(const real *joint, real *twice_out)
 {
   const real t0 = joint[1] * joint[1];
@@ -352,14 +352,18 @@ STEP golden_loops_double_angles(const real *joint, real *twice_out)
   const real t3 = joint[2] * joint[3];
   const real t4 = 1.0 - t0 * 2.0;
   const real t5 = 1.0 - t2 * 2.0;
+  const real r4 = joint[0] * joint[0];
+  const real r9 = joint[2] * joint[2];
   twice_out[0] = t0;
   twice_out[1] = t1;
   twice_out[2] = t1 * 2.0;
   twice_out[3] = t4;
-  twice_out[4] = t2;
-  twice_out[5] = t3;
-  twice_out[6] = t3 * 2.0;
-  twice_out[7] = t5;
+  twice_out[4] = r4;
+  twice_out[5] = t2;
+  twice_out[6] = t3;
+  twice_out[7] = t3 * 2.0;
+  twice_out[8] = t5;
+  twice_out[9] = r9;
 }
 
 /* Spatial columns of one joint at B: (x_{j-1}, p_j x x_{j-1}) and (z_j, p_j x z_j) (Eqs. A5, A7). */
@@ -450,75 +454,79 @@ STEP golden_loops_gather_links(const real *joint, const real *twice, const real 
   const real t21 = joint[2] * h[0] + joint[3] * t15;
   const real t22 = joint[3] * h[0] + joint[2] * t3;
   const real t23 = t5 - t6;
-  const real t24 = twice[6] * t9 + twice[4] * t23;
-  const real t25 = t5 - t24;
-  const real t26 = t6 + t24;
-  const real t27 = twice[7] * t9 + twice[5] * t23;
-  const real t28 = joint[2] * I[4];
-  const real t29 = joint[3] * t10;
-  const real t30 = t28 - t29;
-  const real t31 = joint[3] * I[4] + joint[2] * t10;
-  const real t32 = joint[2] * pitch[0] - joint[3] * pitch[1];
-  const real t33 = joint[2] * pitch[1] + joint[3] * pitch[0];
-  const real t34 = joint[2] * t11 - joint[3] * pitch[4];
-  const real t35 = joint[2] * pitch[4] + joint[3] * t11;
-  const real t36 = joint[2] * t16 - joint[3] * t17;
-  const real t37 = joint[2] * t17 + joint[3] * t16;
-  const real t38 = joint[2] * t18 - joint[3] * t19;
-  const real t39 = joint[2] * t19 + joint[3] * t18;
-  const real t40 = t33 - h[2];
-  const real t41 = pitch[2] + t22;
-  const real t42 = t25 + t34;
-  const real t43 = t27 + t35;
-  const real t44 = t12 + t30;
-  const real t45 = t2 - t7;
-  const real t46 = t26 + t45;
-  const real t47 = twice[2] * t31 + twice[0] * t46;
-  const real t48 = joint[0] * t40 - joint[1] * t41;
-  const real t49 = joint[0] * t41 + joint[1] * t40;
-  const real t50 = joint[0] * t43 - joint[1] * t44;
-  const real t51 = joint[0] * t44 + joint[1] * t43;
-  const real t52 = joint[0] * t37 - joint[1] * yaw[2];
-  const real t53 = joint[0] * yaw[2] + joint[1] * t37;
-  const real t54 = joint[0] * t39 - joint[1] * t20;
-  const real t55 = joint[0] * t20 + joint[1] * t39;
-  const real t56 = link[0] + mass[0];
-  const real t57 = joint[0] * t22 - joint[1] * h[2];
-  const real t58 = joint[0] * h[2] + joint[1] * t22;
-  const real t59 = t26 - t47;
-  const real t60 = t8 + t47;
-  const real t61 = t29 - t28;
-  const real t62 = joint[0] * t27 + joint[1] * t61;
-  const real t63 = joint[1] * t27 + joint[0] * t30;
-  const real t64 = twice[3] * t31 + twice[1] * t46;
-  const real t65 = t25 + t34 * 2.0;
-  const real t66 = t12 + t38;
-  const real t67 = t8 + t14 * 2.0;
-  mass_out[0] = t56;
+  const real t24 = twice[7] * t9;
+  const real t25 = twice[9] * t5 - t24;
+  const real t26 = t25 + twice[5] * t6;
+  const real t27 = t24 + twice[5] * t5;
+  const real t28 = t27 + twice[9] * t6;
+  const real t29 = twice[8] * t9 + twice[6] * t23;
+  const real t30 = joint[2] * I[4];
+  const real t31 = joint[3] * t10;
+  const real t32 = t30 - t31;
+  const real t33 = joint[3] * I[4] + joint[2] * t10;
+  const real t34 = joint[2] * pitch[0] - joint[3] * pitch[1];
+  const real t35 = joint[2] * pitch[1] + joint[3] * pitch[0];
+  const real t36 = joint[2] * t11 - joint[3] * pitch[4];
+  const real t37 = joint[2] * pitch[4] + joint[3] * t11;
+  const real t38 = joint[2] * t16 - joint[3] * t17;
+  const real t39 = joint[2] * t17 + joint[3] * t16;
+  const real t40 = joint[2] * t18 - joint[3] * t19;
+  const real t41 = joint[2] * t19 + joint[3] * t18;
+  const real t42 = t35 - h[2];
+  const real t43 = pitch[2] + t22;
+  const real t44 = t26 + t36;
+  const real t45 = t29 + t37;
+  const real t46 = t12 + t32;
+  const real t47 = t2 - t7;
+  const real t48 = t28 + t47;
+  const real t49 = twice[2] * t33;
+  const real t50 = joint[0] * t42 - joint[1] * t43;
+  const real t51 = joint[0] * t43 + joint[1] * t42;
+  const real t52 = joint[0] * t45 - joint[1] * t46;
+  const real t53 = joint[0] * t46 + joint[1] * t45;
+  const real t54 = joint[0] * t39 - joint[1] * yaw[2];
+  const real t55 = joint[0] * yaw[2] + joint[1] * t39;
+  const real t56 = joint[0] * t41 - joint[1] * t20;
+  const real t57 = joint[0] * t20 + joint[1] * t41;
+  const real t58 = link[0] + mass[0];
+  const real t59 = joint[0] * t22 - joint[1] * h[2];
+  const real t60 = joint[0] * h[2] + joint[1] * t22;
+  const real t61 = twice[4] * t28 - t49;
+  const real t62 = t61 + twice[0] * t8;
+  const real t63 = t49 + twice[0] * t28;
+  const real t64 = t63 + twice[4] * t8;
+  const real t65 = t31 - t30;
+  const real t66 = joint[0] * t29 + joint[1] * t65;
+  const real t67 = joint[1] * t29 + joint[0] * t32;
+  const real t68 = twice[3] * t33 + twice[1] * t48;
+  const real t69 = t26 + t36 * 2.0;
+  const real t70 = t12 + t40;
+  const real t71 = t8 + t14 * 2.0;
+  mass_out[0] = t58;
   h_out[0] = t21;
-  h_out[1] = t57;
-  h_out[2] = t58;
-  I_out[0] = t25;
-  I_out[1] = t59;
-  I_out[2] = t60;
-  I_out[3] = t62;
-  I_out[4] = t63;
-  I_out[5] = t64;
-  pitch_out[0] = t32;
-  pitch_out[1] = t48;
-  pitch_out[2] = t49;
-  pitch_out[3] = t42;
-  pitch_out[4] = t50;
-  pitch_out[5] = t51;
-  yaw_out[0] = t36;
-  yaw_out[1] = t52;
-  yaw_out[2] = t53;
-  yaw_out[3] = t38;
-  yaw_out[4] = t54;
-  yaw_out[5] = t55;
-  H_pp_out[0] = t65;
-  H_py_out[0] = t66;
-  H_yy_out[0] = t67;
+  h_out[1] = t59;
+  h_out[2] = t60;
+  I_out[0] = t26;
+  I_out[1] = t62;
+  I_out[2] = t64;
+  I_out[3] = t66;
+  I_out[4] = t67;
+  I_out[5] = t68;
+  pitch_out[0] = t34;
+  pitch_out[1] = t50;
+  pitch_out[2] = t51;
+  pitch_out[3] = t44;
+  pitch_out[4] = t52;
+  pitch_out[5] = t53;
+  yaw_out[0] = t38;
+  yaw_out[1] = t54;
+  yaw_out[2] = t55;
+  yaw_out[3] = t40;
+  yaw_out[4] = t56;
+  yaw_out[5] = t57;
+  H_pp_out[0] = t69;
+  H_py_out[0] = t70;
+  H_yy_out[0] = t71;
 }
 
 /* Momentum columns of a segment, from its root frame at ``P`` to the torso frame at B. */
@@ -867,7 +875,7 @@ int golden_loops_forward_dynamics(const golden_loops_parameters *parameters, con
   real *const twice = work + 0;
   real R_link[9];
   real P_link[3];
-  real *const R_root = work + 16;
+  real *const R_root = work + 20;
   real P_root[6];
   real S[12];
   real mass[1];
@@ -875,15 +883,15 @@ int golden_loops_forward_dynamics(const golden_loops_parameters *parameters, con
   real I[6];
   real pitch[6];
   real yaw[6];
-  real *const A = work + 34;
-  real *const columns = work + 83;
+  real *const A = work + 38;
+  real *const columns = work + 87;
   real w_here[3];
   real w_dot_here[3];
   static const real zero[3] = {0.0, 0.0, 0.0};
   real a_here[3];
   real a_joint[3];
   real swing[3];
-  real *const wrench = work + 107;
+  real *const wrench = work + 111;
   real F_next[6];
   real inertial[4];
   real force[3];
@@ -897,7 +905,7 @@ int golden_loops_forward_dynamics(const golden_loops_parameters *parameters, con
   golden_loops_link_properties(&parameters->tail_mass, &parameters->tail_length, parameters->link_inertia, share, link);
   for (int i = 0; i < 2; ++i) {
     golden_loops_joint_trigonometry(q + 2 * i + 7, joint + 4 * i);
-    golden_loops_double_angles(joint + 4 * i, twice + 8 * i);
+    golden_loops_double_angles(joint + 4 * i, twice + 10 * i);
   }
   R_link[0] = 1.0;
   R_link[1] = 0.0;
@@ -946,7 +954,7 @@ int golden_loops_forward_dynamics(const golden_loops_parameters *parameters, con
         real H_pp_new[1];
         real H_py_new[1];
         real H_yy_new[1];
-        golden_loops_gather_links(joint + 4 * i, twice + 8 * i, link, mass, h, I, pitch, yaw, mass, h, I, pitch, yaw, H_pp_new, H_py_new, H_yy_new);
+        golden_loops_gather_links(joint + 4 * i, twice + 10 * i, link, mass, h, I, pitch, yaw, mass, h, I, pitch, yaw, H_pp_new, H_py_new, H_yy_new);
         A[16 * i + 24] += H_pp_new[0];
         A[16 * i + 31] += H_py_new[0];
         A[16 * i + 32] += H_yy_new[0];
