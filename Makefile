@@ -28,6 +28,7 @@ help:
 	@echo "  make demo                                  the paper's rat: generate, compile, simulate, draw"
 	@echo "  make test                                  the tests;  make test-all: the slow suites too"
 	@echo "  make model  TAIL=articulated M=3 N=4       -> generated/articulated_m3_n4"
+	@echo "  make model  TAIL=continuum M=3             -> generated/continuum_m3"
 	@echo "  make model  SCENE=scenes/kangaroo_rat_m3_n4.toml"
 	@echo "              options: REAL=float EMISSION=loops BAKED=1 FUNCTIONS=energy,momentum"
 	@echo "  make verify TAIL=articulated M=3 N=4       verification report of that model"

@@ -1,5 +1,6 @@
 """The continuum tail in the runtime: right at every bend, refused beyond its range, convertible to polar angles."""
 
+import casadi
 import numpy as np
 import pytest
 
@@ -43,7 +44,6 @@ def test_every_bend_is_right_to_rounding(model, exact, theta):
 
 @pytest.mark.parametrize("theta", [0.0, 1e-9, 1e-3, 3.0])
 def test_casadi_derivatives_are_those_of_the_definition(model, exact, theta):
-    casadi = pytest.importorskip("casadi")
     q, v, _ = bent(theta, 1)
     force = model.casadi.bias_force
     x = casadi.SX.sym("x", 9)
