@@ -197,7 +197,7 @@ def markdown(model: st.Model, checks: list[Check]) -> str:
     lines = [
         f"# Verification of {model.name}",
         "",
-        f"{model.segments} segments of {model.links} links, {model.manifest['real']}; "
+        f"{model.segments} segments{f' of {model.links} links' if model.links else ''}, {model.manifest['real']}; "
         + ", ".join(f"{count} {status}" for status, count in counts.items())
         + ".",
         "",

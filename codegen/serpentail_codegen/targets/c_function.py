@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 from ..interpret import executed, unroll
-from ..program import Apply, Array, Copy, Fill, Guard, Index, Loop, Program, Ref, Solve
+from ..program import Apply, Array, Copy, Fill, Guard, Loop, Program, Ref, Solve
 from ..tape import BINARY, Step
-from .scalars import Dialect, Scalars
+from .scalars import Dialect, Scalars, index_text
 
 FEW = 3  # scalars are written one by one, more by a helper
 ON_STACK = 12  # scalars: larger local arrays go to the caller's workspace
@@ -27,12 +27,6 @@ def dialect(real: str, prefix: str = "") -> Dialect:
     suffix = "f" if real == "float" else ""
     sincos = f"real {{sine}}, {{cosine}}; {prefix}_sincos({{argument}}, &{{sine}}, &{{cosine}});"
     return Dialect("const real {name} = {text};", suffix, {"sqrt": "sqrt" + suffix}, sincos)
-
-
-def index_text(index: Index) -> str:
-    """Print an affine index."""
-    terms = [name if factor == 1 else f"{factor} * {name}" for name, factor in index.terms]
-    return " + ".join([*terms, *([str(index.offset)] if index.offset or not terms else [])])
 
 
 def pointer(ref: Ref) -> str:

@@ -5,19 +5,13 @@ import re
 from ..draft import Tail
 from ..functions import inertial
 from ..functions import program as assemble
-from ..program import Apply, Copy, Fill, Guard, Index, Loop, Program, Ref, Solve
+from ..program import Apply, Copy, Fill, Guard, Loop, Program, Ref, Solve
 from ..scene import Scene
 from ..tape import Step
 from ..templating import render
-from .scalars import Dialect, Scalars
+from .scalars import Dialect, Scalars, index_text
 
 PYTHON = Dialect("{name} = {text}", "", {"sin": "sin", "cos": "cos", "sqrt": "sqrt"})
-
-
-def index_text(index: Index) -> str:
-    """Print an affine index."""
-    terms = [name if factor == 1 else f"{factor} * {name}" for name, factor in index.terms]
-    return " + ".join([*terms, *([str(index.offset)] if index.offset or not terms else [])])
 
 
 def slice_text(ref: Ref) -> str:

@@ -1,12 +1,19 @@
-"""Straight lines of text: nodes of a tape and a dialect go in, one definition a line comes out."""
+"""Text that all targets share: nodes of a tape and a dialect go in, one definition a line comes out."""
 
 from collections import Counter
 from dataclasses import dataclass
 
+from ..program import Index
 from ..tape import BINARY, live_nodes
 
 LEAST_SINGLE = 2.0**-126
 SYMBOL = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
+
+
+def index_text(index: Index) -> str:
+    """Print an affine index."""
+    terms = [name if factor == 1 else f"{factor} * {name}" for name, factor in index.terms]
+    return " + ".join([*terms, *([str(index.offset)] if index.offset or not terms else [])])
 
 
 @dataclass(frozen=True)
