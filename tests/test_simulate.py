@@ -196,6 +196,8 @@ def test_table_of_one_node_is_a_constant(fly):
 @both
 def test_start_time_is_the_clock_of_the_laws(fly, settings):
     times = []
+    if settings.get("method") == "dop853":  # the table has kinks, where steps depend on the last bit of t
+        settings = settings | {"rtol": 1e-12, "atol": 1e-14}
     early = fly(t_span=0.05, controller=st.TorqueTable([0.01, 0.02], TORQUES[:2]), **settings)
     late = fly(t_span=(3.0, 3.05), controller=st.TorqueTable([3.01, 3.02], TORQUES[:2]), **settings)
     fly(t_span=(-1.0, -0.95), controller=lambda t, q, v: times.append(t) or TORQUES[0], **settings)

@@ -493,7 +493,7 @@ def exact_errors(model, chain, s):
 
 def limits(model, kind):
     """Where every joint is folded, what H sums cancels: libraries' v_dot is off by 1e-14 to 2e-14, H by 3e-13."""
-    crowd = 5 if kind == "folded" and model.links > 8 else 1
+    crowd = 5 if kind == "folded" and (model.links or 0) > 8 else 1
     return {"H": 1e-13 * crowd, "C": 1e-13 * crowd, "v_dot": 2e-14 * crowd if kind == "folded" else 5e-15}
 
 

@@ -4,6 +4,7 @@ from collections import Counter
 from dataclasses import dataclass
 
 from ..program import Index
+from ..schedule import scheduled
 from ..tape import BINARY, live_nodes
 
 LEAST_SINGLE = 2.0**-126
@@ -36,7 +37,7 @@ class Scalars:
 
     def __init__(self, nodes, results, names, dialect: Dialect):
         self.nodes, self.names, self.dialect = nodes, names, dialect
-        self.live = live_nodes(nodes, results)
+        self.live = scheduled(nodes, live_nodes(nodes, results), results)
         self.uses = Counter(a for n in self.live if nodes[n][0] not in ("input", "const") for a in nodes[n][1:])
         self.uses.update(results)
         self.text: dict[object, str] = {}

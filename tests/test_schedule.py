@@ -1,0 +1,70 @@
+"""The schedule of straight lines: every value once, after what it needs, and the same results."""
+
+import random
+
+import pytest
+
+from serpentail_codegen import schedule
+from serpentail_codegen.draft import Tail
+from serpentail_codegen.functions import FUNCTIONS, program
+from serpentail_codegen.interpret import unroll
+from serpentail_codegen.tape import Tape, live_nodes
+
+
+def straight(segments, links):
+    """Nodes and results of forward dynamics."""
+    tape, outputs, guards = unroll(program(FUNCTIONS["forward_dynamics"], Tail(segments, links)))
+    return tape.nodes, [*outputs["v_dot"], *(node for _, node in guards)]
+
+
+def random_line(seed, length=300):
+    """Nodes of a random straight line over three inputs, and its last values."""
+    rng, tape = random.Random(seed), Tape()
+    nodes = [tape.input(k) for k in range(3)]
+    while len(tape.nodes) < length:
+        a, b = rng.choice(nodes[-12:]), rng.choice(nodes)
+        nodes.append(getattr(tape, rng.choice(["add", "sub", "mul"]))(a, b))
+    return tape.nodes, nodes[-3:]
+
+
+def assert_valid(nodes, live, order):
+    """The order has every live node once, operands before their use."""
+    assert sorted(order) == sorted(live)
+    place = {n: k for k, n in enumerate(order)}
+    for n in order:
+        if nodes[n][0] not in schedule.LEAVES:
+            assert all(place[a] < place[n] for a in nodes[n][1:])
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_random_lines_keep_their_dependencies(seed):
+    nodes, results = random_line(seed)
+    live = live_nodes(nodes, results)
+    assert_valid(nodes, live, schedule.scheduled(nodes, live, results))
+
+
+@pytest.mark.parametrize("size", [(1, 1), (1, 3), (3, 2)])
+def test_functions_keep_their_dependencies_and_change_their_order(size):
+    nodes, results = straight(*size)
+    live = live_nodes(nodes, results)
+    order = schedule.scheduled(nodes, live, results)
+    assert_valid(nodes, live, order)
+    assert order != live
+    assert order == schedule.scheduled(nodes, live, results)
+
+
+def test_long_lines_are_left_alone():
+    nodes, results = straight(3, 4)
+    live = live_nodes(nodes, results)
+    assert schedule.scheduled(nodes, live, results) == live
+
+
+def test_the_longest_path_starts_first():
+    tape = Tape()
+    x, y = tape.input(0), tape.input(1)
+    short = tape.add(x, y)
+    slow = tape.div(x, y)
+    last = tape.mul(tape.mul(slow, x), y)
+    live = live_nodes(tape.nodes, [short, last])
+    order = [n for n in schedule.scheduled(tape.nodes, live, [short, last]) if n not in (x, y)]
+    assert order[0] == slow and order[-1] == short
