@@ -508,7 +508,7 @@ def test_pickled_model_goes_to_another_process(monkeypatch, tmp_path):
 
 
 def test_one_state_costs_few_calls(model):
-    """A call on matching arrays runs four Python functions; a conversion of arguments would show here."""
+    """A call on matching arrays runs three Python functions; a conversion of arguments would show here."""
     s, events = state(), []
     model.forward_dynamics(s["q"], s["v"], s["tau"])
     sys.setprofile(lambda frame, event, _: events.append((event, frame.f_code.co_name)))
@@ -517,6 +517,6 @@ def test_one_state_costs_few_calls(model):
     finally:
         sys.setprofile(None)
     entered = [name for event, name in events if event == "call"]
-    assert entered == ["forward_dynamics", "kernel", "__call__", "_single"]
+    assert entered == ["forward_dynamics", "kernel", "__call__"]
     assert sum(event == "c_call" for event, _ in events) < 10
     assert math.isfinite(model.energy(s["q"], s["v"])[0])
