@@ -69,12 +69,12 @@ def generation(folder: Path) -> list[dict]:
     return rows
 
 
-def generated(parent: Path, segments: int, links: int) -> Path:
-    """Run the generator as `make model` does; return the generated folder."""
-    size = ["--segments", str(segments), "--links", str(links)]
-    command = [sys.executable, "-m", "serpentail_codegen", "--tail", "articulated", *size, "--output", str(parent)]
+def generated(parent: Path, segments: int, links: int | None = None) -> Path:
+    """Run the generator as `make model` does, for a continuum if there are no links; return the generated folder."""
+    tail = ["--tail", "articulated", "--links", str(links)] if links else ["--tail", "continuum"]
+    command = [sys.executable, "-m", "serpentail_codegen", *tail, "--segments", str(segments), "--output", str(parent)]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-    return parent / f"articulated_m{segments}_n{links}"
+    return parent / (f"articulated_m{segments}_n{links}" if links else f"continuum_m{segments}")
 
 
 def label(segments: int, links: int) -> str:
@@ -114,6 +114,17 @@ def difference(ours: Fixture, pinocchio, states) -> float:
         a, b = ours.model.forward_dynamics(q, v, tau), pinocchio.forward_dynamics(q, v, tau)
         errors.append(np.abs(a - b).max() / np.abs(a).max())
     return max(errors)
+
+
+def tails(folder: Path) -> list[dict]:
+    """Nanoseconds of forward dynamics of a continuum beside an articulated tail of three links a segment."""
+    rows = []
+    for m in (1, 3, 6):
+        pair = [fixture(generated(folder / "speed", m, links), folder / "speed") for links in (None, 3)]
+        states = peers.random_states(m)
+        (arcs, _), (links, _) = peers.time_rounds([entry.closure for entry in pair], states, ROUNDS, CALLS)
+        rows.append({"segments": m, "continuum_ns": arcs, "articulated_ns": links, "ratio": arcs / links})
+    return rows
 
 
 def python_overhead(folder: Path) -> list[dict]:
@@ -198,6 +209,7 @@ def work_precision(folder: Path) -> list[dict]:
 MEASURES = {
     "generation": generation,
     "speed": speed,
+    "tails": tails,
     "python_overhead": python_overhead,
     "drift": drift,
     "work_precision": work_precision,

@@ -35,6 +35,8 @@ COLUMNS = {
     "tuned_ratio": "times slower",
     "own_ns": "own sums on its types, ns",
     "own_ratio": "times slower",
+    "continuum_ns": "continuum, ns",
+    "articulated_ns": "articulated (m, 3), ns",
     "us": "us a call",
     "overhead_us": "of it outside C",
     "energy_drift": "energy drift",
