@@ -140,8 +140,3 @@ def point_jacobian_tail(let, S, arm) -> dict:
 def rows(block) -> dict:
     """Name the x, y and z rows of a 3-row block."""
     return {f"J_{axis}": block.row(r).T for r, axis in enumerate("xyz")}
-
-
-def point_position(let, p, arm) -> dict:
-    """A point from its arm."""
-    return {"point": p + arm}

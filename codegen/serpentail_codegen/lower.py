@@ -1,6 +1,7 @@
 """From SymPy to the tape: a function of SymPy vectors goes in, a straight-line step comes out."""
 
 import inspect
+from fractions import Fraction
 from functools import cache
 
 import sympy
@@ -104,14 +105,7 @@ def exact(number: sympy.Number):
     """Return an exact Python number."""
     if number.is_Integer:
         return int(number)
-    return sympy_fraction(number) if number.is_Rational else float(number)
-
-
-def sympy_fraction(number: sympy.Rational):
-    """Return a SymPy rational as a fraction."""
-    from fractions import Fraction
-
-    return Fraction(int(number.p), int(number.q))
+    return Fraction(int(number.p), int(number.q)) if number.is_Rational else float(number)
 
 
 @cache
