@@ -30,11 +30,7 @@ FACTORS = {
     "along": ({6: -2, 7: 2}, {7: 32}, 1),  # of 4 (sigma_z^2 + gamma gamma_z + z gamma_z^2)
     "side": ({5: Rational(1, 2)}, {6: -8}, 1),  # of sigma_z gamma - sigma gamma_z
 }
-SHAPE = tuple(
-    name + order * "_z" if order < 2 else name + "_zz"
-    for name, (_, _, top) in FACTORS.items()
-    for order in range(top + 1)
-)
+SHAPE = tuple(name + suffix for name, (*_, top) in FACTORS.items() for suffix in ("", "_z", "_zz")[: top + 1])
 
 
 def z_derivative(near: dict, far: dict) -> tuple[dict, dict]:

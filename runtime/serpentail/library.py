@@ -115,7 +115,8 @@ class Kernel:
         arrays = [self._checked(*item) for item in zip(self.names, self.shapes, arrays, strict=True)]
         counts = {a.shape[0] for a, shape in zip(arrays, self.shapes, strict=True) if a.ndim > len(shape)}
         if not counts:
-            return self(*arrays)
+            outputs = self._batch(1, arrays)
+            return tuple(o[0] for o in outputs) if isinstance(outputs, tuple) else outputs[0]
         if len(counts) > 1:
             raise StateError(f"{self.name}: batch sizes differ ({', '.join(map(str, sorted(counts)))}): give one")
         return self._batch(counts.pop(), arrays)
