@@ -53,15 +53,6 @@ PARAMETERS = (
     "tail_length",
     "link_inertia",
 )
-RAT = {  # Table 1
-    "gravity": 9.8,
-    "torso_mass": 0.10572,
-    "torso_inertia": (672.2e-7, 363.9e-7, 727.9e-7),
-    "tail_mount": (0.0, -40.5e-3, 4.5e-3),
-    "tail_mass": 3.51e-3,
-    "tail_length": 194.66e-3,
-    "link_radius": 2.9e-3,
-}
 
 
 class PeerUnavailable(RuntimeError):
@@ -101,10 +92,10 @@ class PinocchioBench:
     """The articulated tail in Pinocchio: v_dot, H and C of one state, and closures for the timer."""
 
     def __init__(self, segments: int, links: int, parameters: Mapping, library: Path | None = None):
-        """Build the chain from parameters by name (SI); link_radius stands in for an absent link_inertia."""
+        """Build the chain from parameters by name (SI), link_inertia among them."""
         self.nv = 6 + 2 * segments
         self._library = _declared(library or build_library(TUNED, CACHE))
-        values = np.hstack([_complete(parameters, segments * links)[name] for name in PARAMETERS])
+        values = np.hstack([parameters[name] for name in PARAMETERS])
         self._chain = self._library.pinocchio_chain_new(segments, links, _pointer(values))
         if not self._chain:
             raise PeerUnavailable(f"Pinocchio could not build a chain of {segments} x {links} links.")
@@ -236,16 +227,6 @@ def _pointer(array: np.ndarray) -> int:
     return array.ctypes.data
 
 
-def _complete(parameters: Mapping, count: int) -> dict:
-    """The parameters with link_inertia, by default that of an ellipsoid with semi-axes (r, L/2, r)."""
-    values = dict(parameters)
-    if "link_inertia" not in values:
-        mass, length = values["tail_mass"] / count, values["tail_length"] / count
-        across = mass / 5 * (values["link_radius"] ** 2 + length**2 / 4)
-        values["link_inertia"] = (across, mass / 5 * 2 * values["link_radius"] ** 2, across)
-    return values
-
-
 def _toolchain(source: Path) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Compiler and flags for a source, by its suffix."""
     if source.suffix == ".c":
@@ -293,26 +274,3 @@ def _run(command: Sequence[str]) -> str:
     if done.returncode:
         raise PeerUnavailable(f"{shlex.join(command)}\nfailed:\n{done.stderr[-3000:]}")
     return done.stdout + done.stderr
-
-
-def main(sizes: Sequence[tuple[int, int]] = ((1, 3), (3, 4))) -> None:
-    """Print the time of Pinocchio's two paths and how far apart their results are."""
-    for segments, links in sizes:
-        states = random_states(segments)
-        with PinocchioBench(segments, links, RAT) as peer:
-            times = time_rounds([peer.closure, peer.crba_closure], states, rounds=40, calls=500)
-            apart = max(_difference(peer, *state) for state in zip(*states, strict=True))
-        for name, (least, median) in zip(("fastest", "CRBA"), times, strict=True):
-            print(f"({segments},{links}) {name:8} {least:6.0f} ns minimum {median:6.0f} ns median")
-        print(f"({segments},{links}) largest difference between the two {apart:.1e}")
-
-
-def _difference(peer: PinocchioBench, q, v, tau) -> float:
-    """Largest difference between the two paths, relative per block (force, torque, tail)."""
-    ours, crba = peer.forward_dynamics(q, v, tau), peer.forward_dynamics_crba(q, v, tau)
-    blocks = (slice(0, 3), slice(3, 6), slice(6, None))
-    return max(np.max(np.abs(ours[b] - crba[b])) / np.max(np.abs(crba[b])) for b in blocks)
-
-
-if __name__ == "__main__":
-    main()
