@@ -28,16 +28,20 @@ class Argument:
         return prod(self.shape(tail))
 
 
-Q = Argument("q", lambda t: (t.nq,), "configuration: position of B (m, world), quaternion w x y z, joint angles (rad)")
-V = Argument("v", lambda t: (t.nv,), "velocity: of B (m/s, world), omega (rad/s, body), joint rates (rad/s)")
+Q = Argument(
+    "q", lambda t: (t.nq,), "configuration: position of B (m, world), quaternion w x y z, tail coordinates (rad)"
+)
+V = Argument(
+    "v", lambda t: (t.nv,), "velocity: of B (m/s, world), omega (rad/s, body), rates of the tail coordinates (rad/s)"
+)
 V_DOT = Argument("v_dot", lambda t: (t.nv,), "time derivative of v")
-TAU = Argument("tau", lambda t: (t.nt,), "joint torques (N m), conjugate to the joint angles")
+TAU = Argument("tau", lambda t: (t.nt,), "torques (N m), conjugate to the tail coordinates")
 F_EXT = Argument(
     "f_ext",
     lambda t: (6 + 3 * (t.total + 1),),
     "force at B (N, world), moment (N m, body), then a force (N, world) at each of the N + 1 tail points",
 )
-GENERALISED = "generalised force: on p_dot (N, world), on omega (N m, body), on the joint rates (N m)"
+GENERALISED = "generalised force: on p_dot (N, world), on omega (N m, body), on the rates of the tail coordinates (N m)"
 
 
 @dataclass(frozen=True)
