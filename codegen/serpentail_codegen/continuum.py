@@ -261,6 +261,40 @@ def segment_motion(let, angles, rates, accelerations, section, tip, E, r, bend, 
     return {"w": E * let("w", w + turn), "w_dot": E * let("w_dot", w_tip_dot), "a": E * let("a", a_tip)}
 
 
+def segment_power(
+    let,
+    angles,
+    rates,
+    accelerations,
+    virtual_rates,
+    shape,
+    section,
+    tip,
+    E,
+    r,
+    bend,
+    h_own,
+    I_own,
+    pitch_own,
+    yaw_own,
+    H_own,
+    w,
+    w_dot,
+    a,
+    w_virtual,
+    u_virtual,
+) -> dict:
+    """Power of the inertial wrench of a segment and of its generalised forces (Eq. 19) under a virtual motion."""
+    own = segment_wrench(
+        let, angles, rates, accelerations, shape, section, h_own, I_own, pitch_own, yaw_own, H_own, w, w_dot, a
+    )
+    F, torque = let("F", own["F"]), let("torque", own["torque_own"])
+    power = F[0:3, :].dot(u_virtual) + F[3:6, :].dot(w_virtual) + torque.dot(virtual_rates)
+    motion = segment_motion(let, angles, rates, accelerations, section, tip, E, r, bend, w, w_dot, a)
+    virtual = segment_velocity(let, virtual_rates, E, r, bend, w_virtual, u_virtual)
+    return {"power": [power], **motion, "w_virtual": virtual["w"], "u_virtual": virtual["u"]}
+
+
 def velocity_columns(let, bend, rates) -> tuple[Matrix, Matrix]:
     """Angular and linear velocity of the tip relative to the root for rates of (a, b)."""
     total = let("relative", rates[0] * bend[0:6, :] + rates[1] * bend[6:12, :])

@@ -60,6 +60,13 @@ class Draft(Builder):
         self.known[name] = self.array(name, size)[0]
         return self.known[name]
 
+    def zero(self, size: int) -> Ref:
+        """Return zeros."""
+        name = f"zero_{size}"
+        if name not in self.known:
+            self.known[name] = self.constant(name, [0] * size)[0]
+        return self.known[name]
+
     def store(self, function: Callable, **sizes: int) -> None:
         """Apply a step, keeping its outputs in new local vectors of the same names."""
         self.step(function, **{name: self.vector(name, size) for name, size in sizes.items()})

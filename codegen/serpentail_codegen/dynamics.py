@@ -7,7 +7,7 @@ wrench or momentum ``F`` = (force or momentum, its moment about the origin).
 
 from sympy import Matrix, eye, zeros
 
-from .kinematics import X, Z, joint_turns, square
+from .kinematics import X, Y, Z, joint_turns, link_angular_velocity, link_linear_velocity, link_motion, square
 
 
 def symmetric(I) -> Matrix:
@@ -42,6 +42,23 @@ def link_wrench(let, link, w, w_dot, a_joint, swing) -> dict:
         ]
     )
     return {"F": Matrix([force, euler + b * Matrix([-a_joint[2], 0, a_joint[0]])])}
+
+
+def link_power(let, joint, rates, accelerations, virtual_rates, link, w, w_dot, a, w_virtual, u_virtual) -> dict:
+    """Power of the inertial wrench of one link (Eq. 17) under a virtual motion; both motions carried on."""
+    motion = {k: let(k, x) for k, x in link_motion(let, joint, rates, accelerations, link, w, w_dot, a).items()}
+    F = let("F", link_wrench(let, link, motion["w"], motion["w_dot"], motion["a_joint"], motion["swing"])["F"])
+    turn = let("turn", link_angular_velocity(let, joint, virtual_rates, w_virtual)["w"])
+    slide = {k: let(k, x) for k, x in link_linear_velocity(let, joint, link, turn, u_virtual).items()}
+    power = F[0:3, :].dot(slide["u_joint"]) + F[3:6, :].dot(turn)
+    carried = {name: motion[name] for name in ("w", "w_dot", "a")}
+    return {"power": [power], **carried, "w_virtual": turn, "u_virtual": slide["u"]}
+
+
+def torso_power(let, torso_mass, torso_inertia, w, w_dot, a, w_virtual, u_virtual) -> dict:
+    """Power of the torso's inertial wrench at B (Eq. 3) under a virtual motion, torso axes."""
+    euler = torso_inertia.multiply_elementwise(w_dot) + w.cross(let("I_w", torso_inertia.multiply_elementwise(w)))
+    return {"power": [torso_mass[0] * let("a_u", a.dot(u_virtual)) + w_virtual.dot(let("euler", euler))]}
 
 
 def along_link(let, length, F) -> Matrix:
@@ -265,6 +282,17 @@ def base_acceleration(let, R, gravity, inverse_mass, h, net, w_dot, tail_force) 
     """p_b_ddot = R_b (net - omega_dot x h - sum f_k q_ddot_k) / M - g z."""
     a = let("a", inverse_mass[0] * (net - w_dot.cross(h) - tail_force))
     return {"p_ddot": square(R) * a - gravity[0] * Z}
+
+
+def turned_acceleration(let, R, a) -> dict:
+    """How p_b_ddot = R_b a - g z moves with a turn of the torso in body axes: columns R_b (e_k x a), row by row."""
+    columns = [square(R) * axis.cross(a) for axis in (X, Y, Z)]
+    return {f"row_{r}": Matrix([column[r] for column in columns]) for r in range(3)}
+
+
+def turning_acceleration(let, R, a, turn, p_ddot) -> dict:
+    """Add what a turn of the torso in body axes does to p_b_ddot = R_b a - g z."""
+    return {"p_ddot": p_ddot + square(R) * let("swept", turn.cross(a))}
 
 
 def load_at_torso(let, R, f_torso, F_beyond) -> dict:

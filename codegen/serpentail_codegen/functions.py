@@ -10,7 +10,7 @@ from . import kinematics as kin
 from . import sweeps
 from .draft import Draft, Tail
 from .parameters import Parameter
-from .program import Array, Index, Program
+from .program import Array, Index, Program, Ref
 from .scene import parameters_of
 from .sweeps import column_of, mechanism
 
@@ -114,7 +114,7 @@ def assemble_inverse_dynamics(d: Draft, arrays: dict[str, Array], world: bool = 
         d.step(dyn.world_vector, {"vector": force.part(3, 3)}, vector=force.part(3, 3))
 
 
-def assemble_forward_dynamics(d: Draft, arrays: dict[str, Array]) -> None:
+def assemble_forward_dynamics(d: Draft, arrays: dict[str, Array]) -> "Balance":
     """v_dot from H v_dot + C = [0; tau] + J^T f: translation eliminated, then LDL^T for omega_dot and q_t_ddot."""
     tail, v_dot = d.tail, arrays["v_dot"]
     size = 3 + tail.nt
@@ -131,28 +131,56 @@ def assemble_forward_dynamics(d: Draft, arrays: dict[str, Array]) -> None:
     d.vector("com", 3)
     rows = {f"A_{r}": A.part(r * size, r + 1) for r in range(3)}
     d.step(dyn.without_translation, inverse_mass=d.known["inverse_mass"], com=d.known["com"], **rows)
-    d.vector("net", 3)
-    d.step(dyn.rotational_load, net=d.known["net"], rhs=v_dot.part(3, 3))
     with d.loop("k", tail.nt) as k:
         column = column_of(columns, k)
         d.step(dyn.column_without_translation, {"column": column}, A_row=A.part((3 + k) * size, 3))
         with d.loop("l", k + 1) as other:
             reads = {"column": column, "other": column_of(columns, other)}
             d.step(dyn.pair_without_translation, reads, A_entry_=A_tail(k, other))
-        loads = {"column": column, "inertial": inertial.part(k, 1), "tau": torques.part(k, 1)}
-        d.step(dyn.tail_load, loads, rhs=v_dot.part(6 + k, 1))
-    d.solve(A, v_dot.part(3, size))
-    recover_translation(d, columns, v_dot)
+    d.factor(A, size)
+    balance = Balance(A, columns)
+    balance.solve(d, Loads({}, lambda k: inertial.part(k, 1), lambda k: torques.part(k, 1)), v_dot)
+    return balance
 
 
-def recover_translation(d: Draft, columns: Array, v_dot: Array) -> None:
-    """p_b_ddot from the momentum balance, once omega_dot and q_t_ddot are known."""
-    tail_force = d.vector("tail_force", 3)
-    d.fill(tail_force, 0)
-    with d.loop("k", d.tail.nt) as k:
-        reads = {"column": column_of(columns, k), "acceleration": v_dot.part(6 + k, 1)}
-        d.step(dyn.column_acceleration, reads, tail_force_=tail_force)
-    d.step(dyn.base_acceleration, {"w_dot": v_dot.part(3, 3)}, p_ddot=v_dot.part(0, 3))
+@dataclass(frozen=True)
+class Loads:
+    """What accelerates the animal: ``load_force, load_moment`` less ``force, moment`` at B in torso axes, and torques.
+
+    ``inertial(k)`` is taken from the torque ``tau(k)``; None stands for zero.
+    """
+
+    at_torso: dict[str, Ref]
+    inertial: Callable[[Index], Ref] | None = None
+    tau: Callable[[Index], Ref] | None = None
+
+
+@dataclass(frozen=True)
+class Balance:
+    """H with translation eliminated, factored, and the tail's momentum columns: all that solving H x = loads needs."""
+
+    A: Array
+    columns: Array
+
+    def solve(self, d: Draft, loads: Loads, x: Array) -> None:
+        """Solve for p_b_ddot (world), omega_dot and q_t_ddot."""
+        size, lanes = 3 + d.tail.nt, x.lanes
+        zero = d.zero(1)
+        net = d.declare(Array(f"net_{x.name}", "local", 3, lanes=lanes))[0]
+        d.step(dyn.rotational_load, loads.at_torso, net=net, rhs=x.part(3, 3))
+        with d.loop("k", d.tail.nt) as k:
+            reads = {"column": column_of(self.columns, k), "net": net}
+            reads["inertial"] = loads.inertial(k) if loads.inertial else zero
+            reads["tau"] = loads.tau(k) if loads.tau else zero
+            d.step(dyn.tail_load, reads, rhs=x.part(6 + k, 1))
+        d.solve(self.A, x.part(3, size))
+        tail_force = d.declare(Array(f"tail_force_{x.name}", "local", 3, lanes=lanes))[0]
+        d.fill(tail_force, 0)
+        with d.loop("k", d.tail.nt) as k:
+            reads = {"column": column_of(self.columns, k), "acceleration": x.part(6 + k, 1)}
+            d.step(dyn.column_acceleration, reads, tail_force_=tail_force)
+        reads = {"net": net, "tail_force": tail_force, "w_dot": x.part(3, 3)}
+        d.step(dyn.base_acceleration, reads, p_ddot=x.part(0, 3))
 
 
 def applied_load(d: Draft, arrays: dict[str, Array]) -> Array:

@@ -5,7 +5,9 @@ With numbers as the algebra this is the reference for every emitted text; with a
 
 import math
 
-from .program import Apply, Copy, Fill, Guard, Loop, Program, Ref, Solve
+import numpy as np
+
+from .program import Apply, Array, Copy, Factor, Fill, Guard, Loop, Program, Ref, Solve, Unit
 from .tape import Tape, replay
 
 
@@ -22,6 +24,15 @@ class Numbers:
         except TypeError:
             return self.convert(value.numerator) / self.convert(value.denominator)
 
+    def unit(self, lane: int, lanes: int):
+        """Return a unit row."""
+        return np.array([self.const(int(k == lane)) for k in range(lanes)])
+
+    @staticmethod
+    def lane(row, lane: int):
+        """Return one lane of a row; a number is the same in all."""
+        return row[lane] if isinstance(row, np.ndarray) else row
+
     add = staticmethod(lambda a, b: a + b)
     sub = staticmethod(lambda a, b: a - b)
     mul = staticmethod(lambda a, b: a * b)
@@ -30,50 +41,60 @@ class Numbers:
 
 
 class Counter:
-    """The algebra that counts operations; its only value is None."""
+    """The algebra that counts operations; its values are the numbers of lanes, 0 for a narrow scalar."""
 
     def __init__(self):
         self.count = 0
 
-    def _one(self, *_):
-        self.count += 1
+    def _binary(self, a: int, b: int) -> int:
+        self.count += max(a, b, 1)
+        return max(a, b)
 
-    def _none(self, *_):
-        pass
+    def _same(self, a: int) -> int:
+        return a
 
-    add = sub = mul = div = _one
-    const = neg = sin = cos = sqrt = _none
+    add = sub = mul = div = _binary
+    neg = sin = cos = sqrt = _same
+    const = staticmethod(lambda value: 0)
+    lane = staticmethod(lambda row, lane: 0)
+    unit = staticmethod(lambda lane, lanes: lanes)
 
 
 def executed(program: Program) -> int:
     """Return the additions, multiplications and divisions of one run."""
     counter = Counter()
     arguments = (*program.of_role("parameters"), *program.of_role("input"))
-    Run(program, counter, {a.name: [None] * a.length for a in arguments})
+    Run(program, counter, {a.name: [0] * a.length for a in arguments})
     return counter.count
 
 
-def ldl_solve(algebra, A: list[list], b: list) -> tuple[list, list]:
-    """Solve A x = b by LDL^T without pivoting; ``A`` holds the lower triangle.  Returns x and the pivots."""
-    size, A, b = len(b), [list(row) for row in A], list(b)
-    sub, mul = algebra.sub, algebra.mul
-    pivots, inverses = [], []
-    for k in range(size):
+def ldl_factor(algebra, A: list[list]) -> tuple[list[list], list]:
+    """Factor A = L D L^T without pivoting, of its lower triangle; L below 1 / D on the diagonal, and the pivots D."""
+    A, pivots = [list(row) for row in A], []
+    for k in range(len(A)):
         pivots.append(A[k][k])
-        inverses.append(algebra.div(algebra.const(1), A[k][k]))
-        for i in range(k + 1, size):
+        A[k][k] = algebra.div(algebra.const(1), A[k][k])
+        for i in range(k + 1, len(A)):
             column = A[i][k]
-            factor = mul(column, inverses[k])
-            b[i] = sub(b[i], mul(factor, b[k]))
+            factor = algebra.mul(column, A[k][k])
             for j in range(k + 1, i):
-                A[i][j] = sub(A[i][j], mul(A[j][k], column))
-            A[i][i] = sub(A[i][i], mul(factor, column))
+                A[i][j] = algebra.sub(A[i][j], algebra.mul(A[j][k], column))
+            A[i][i] = algebra.sub(A[i][i], algebra.mul(factor, column))
             A[i][k] = factor
-    b = [mul(value, inverse) for value, inverse in zip(b, inverses, strict=True)]
+    return A, pivots
+
+
+def ldl_solve(algebra, A: list[list], b: list) -> list:
+    """Solve L D L^T x = b with what ``ldl_factor`` returns."""
+    size, b = len(b), list(b)
+    for k in range(size):
+        for i in range(k + 1, size):
+            b[i] = algebra.sub(b[i], algebra.mul(A[i][k], b[k]))
+    b = [algebra.mul(value, A[k][k]) for k, value in enumerate(b)]
     for k in range(size - 1, -1, -1):
         for i in range(k):
-            b[i] = sub(b[i], mul(A[k][i], b[k]))
-    return b, pivots
+            b[i] = algebra.sub(b[i], algebra.mul(A[k][i], b[k]))
+    return b
 
 
 class Run:
@@ -94,6 +115,9 @@ class Run:
     def read(self, ref: Ref, at: dict[str, int]) -> list:
         """Return the scalars of a reference."""
         array = self.values[ref.array.name]
+        if ref.lane:
+            row, first = array[ref.offset.at(at)], ref.lane.at(at)
+            return [self.algebra.lane(row, first + k) for k in range(ref.size)]
         return [array[k] for k in self.slots(ref, at)]
 
     def write(self, ref: Ref, at: dict[str, int], scalars) -> None:
@@ -128,22 +152,38 @@ class Run:
         """Store constants."""
         self.write(fill.target, at, [self.algebra.const(v) for v in fill.values])
 
+    def unit(self, unit: Unit, at: dict[str, int]) -> None:
+        """Store unit rows."""
+        first, lanes = unit.first.at(at), unit.target.lanes
+        self.write(unit.target, at, [self.algebra.unit(first + k, lanes) for k in range(unit.target.size)])
+
     def copy(self, copy: Copy, at: dict[str, int]) -> None:
-        """Copy scalars."""
-        self.write(copy.target, at, self.read(copy.source, at))
+        """Copy or add scalars."""
+        values = self.read(copy.source, at)
+        if copy.adds:
+            values = [self.algebra.add(a, b) for a, b in zip(self.read(copy.target, at), values, strict=True)]
+        self.write(copy.target, at, values)
 
     def guard(self, guard: Guard, at: dict[str, int]) -> None:
         """Note what must be positive."""
         self.guards.append((guard.status, self.read(guard.scalar, at)[0]))
 
-    def solve(self, solve: Solve, at: dict[str, int]) -> None:
-        """Solve a symmetric system."""
-        size = solve.x.size
-        flat = self.values[solve.matrix.name]
-        rows = [flat[k * size : k * size + k + 1] for k in range(size)]
-        x, pivots = ldl_solve(self.algebra, rows, self.read(solve.x, at))
+    def rows(self, matrix: Array, size: int) -> list[list]:
+        """Return the lower triangle of a matrix, row by row."""
+        flat = self.values[matrix.name]
+        return [flat[k * size : k * size + k + 1] for k in range(size)]
+
+    def factor(self, factor: Factor, at: dict[str, int]) -> None:
+        """Factor a symmetric matrix."""
+        rows, pivots = ldl_factor(self.algebra, self.rows(factor.matrix, factor.size))
         self.guards += [("NOT_POSITIVE_DEFINITE", pivot) for pivot in pivots]
-        self.write(solve.x, at, x)
+        for k, row in enumerate(rows):
+            self.values[factor.matrix.name][k * factor.size : k * factor.size + k + 1] = row
+
+    def solve(self, solve: Solve, at: dict[str, int]) -> None:
+        """Solve with a factored matrix."""
+        rows = self.rows(solve.matrix, solve.x.size)
+        self.write(solve.x, at, ldl_solve(self.algebra, rows, self.read(solve.x, at)))
 
 
 def unroll(program: Program, fixed: dict[str, list] | None = None) -> tuple[Tape, dict, list[tuple[str, int]]]:

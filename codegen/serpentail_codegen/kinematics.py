@@ -41,6 +41,31 @@ def quaternion_rotation(let, quaternion) -> dict:
     return {"R": Matrix(rows)}
 
 
+def turned_quaternion(let, quaternion, turn) -> dict:
+    """Rate of the quaternion for a rate of turn in body axes: q (0, turn) / 2, times |q| as q is."""
+    w, x, y, z = quaternion
+    half = [let("half", entry / 2) for entry in turn]
+    rates = [
+        -(x * half[0] + y * half[1] + z * half[2]),
+        w * half[0] + y * half[2] - z * half[1],
+        w * half[1] + z * half[0] - x * half[2],
+        w * half[2] + x * half[1] - y * half[0],
+    ]
+    return {"rate": Matrix(rates)}
+
+
+def turn_gradient(let, quaternion, gradient) -> dict:
+    """Gradient with respect to a turn in body axes, from that with respect to the quaternion's four numbers."""
+    w, x, y, z = quaternion
+    gw, gx, gy, gz = gradient
+    twice = [
+        w * gx - x * gw + z * gy - y * gz,
+        w * gy - y * gw + x * gz - z * gx,
+        w * gz - z * gw + y * gx - x * gy,
+    ]
+    return {"turn": Matrix(twice) / 2}
+
+
 def joint_trigonometry(let, angles) -> dict:
     """Cosines and sines of (alpha_i, beta_i), once for the n equal joints of segment i."""
     alpha, beta = angles

@@ -31,6 +31,7 @@ class Mechanism:
     gather_moment: Callable
     move: Callable[[Draft, Index, dict[str, Ref], Array | None, Ref], None]
     momentum: Callable[[Draft, Index, dict[str, Ref]], None]
+    power: Callable
 
 
 def still(function: Callable, moving: bool):
@@ -98,6 +99,7 @@ ARTICULATED = Mechanism(
     gather_moment=dyn.gather_moment,
     move=move_link,
     momentum=link_momentum,
+    power=dyn.link_power,
 )
 
 
@@ -178,6 +180,7 @@ CONTINUUM = Mechanism(
     gather_moment=con.gather_segment_moment,
     move=move_arc,
     momentum=arc_momentum,
+    power=con.segment_power,
 )
 
 MECHANISMS = {"articulated": ARTICULATED, "continuum": CONTINUUM}

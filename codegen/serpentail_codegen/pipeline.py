@@ -4,6 +4,7 @@ from pathlib import Path
 
 from . import __version__
 from .draft import Tail
+from .derivatives import CATALOGUE
 from .functions import FUNCTIONS
 from .scene import Scene
 from .targets.c import c_context, c_files, emit
@@ -15,12 +16,12 @@ from .write import digest, write_folder
 def generate(scene: Scene, output: Path) -> list[str]:
     """Derive, lower, emit and write what the scene asks for into ``output/<scene>``; return the changed files."""
     tail = tail_of(scene)
-    wanted = [FUNCTIONS[name] for name in needed(scene.functions)]
+    wanted = [CATALOGUE[name] for name in needed(scene.functions)]
     emitted = [emit(scene, tail, function) for function in wanted]
     context = c_context(scene, tail, emitted, __version__)
     context["content_hash"] = digest("".join(c_files(scene, context).values()))[:16]
     files = c_files(scene, context)
-    module = casadi_module(scene, tail, wanted, __version__, context["content_hash"])
+    module = casadi_module(scene, tail, [f for f in wanted if f.name in FUNCTIONS], __version__, context["content_hash"])
     files[f"{scene.name}_casadi.py"] = module
     return write_folder(output / scene.name, files, manifest(scene, context, emitted))
 
@@ -34,4 +35,4 @@ def tail_of(scene: Scene) -> Tail:
 def needed(names: tuple[str, ...]) -> list[str]:
     """Return the functions to derive: those asked for, and forward dynamics where a rollout calls it."""
     names = (*names, "forward_dynamics") if "rollout" in names else names
-    return [name for name in FUNCTIONS if name in names]
+    return [name for name in CATALOGUE if name in names]

@@ -6,6 +6,13 @@ from functools import cache
 
 from .tape import Number, Step, compacted
 
+VECTOR = 8  # lanes of the widest vector
+
+
+def padded(lanes: int) -> int:
+    """Return how many numbers store a row: whole vectors."""
+    return -(-lanes // VECTOR) * VECTOR
+
 
 @dataclass(frozen=True)
 class Index:
@@ -44,6 +51,7 @@ class Array:
 
     role: ``input`` and ``output`` are the function's arguments, ``parameters`` the parameter struct, ``constant`` has
     values known at generation, ``local`` lives during one call.
+    lanes: each scalar of a wide array is a row of so many numbers, stored ``row`` apart; 0 for ordinary scalars.
     """
 
     name: str
@@ -51,6 +59,7 @@ class Array:
     size: int
     count: int = 1
     values: tuple[Number, ...] = ()
+    lanes: int = 0
 
     def __getitem__(self, index: Index | int) -> "Ref":
         return Ref(self, as_index(index) * self.size, self.size)
@@ -59,30 +68,49 @@ class Array:
         """Return ``size`` scalars from a scalar offset on."""
         return Ref(self, as_index(offset), size, stride)
 
+    def lane(self, scalar: Index | int, first: Index | int, size: int = 1) -> "Ref":
+        """Return ``size`` lanes of one wide scalar, from lane ``first`` on."""
+        return Ref(self, as_index(scalar), size, 1, as_index(first))
+
     @property
     def length(self) -> int:
         """Number of scalars."""
         return self.size * self.count
 
+    @property
+    def row(self) -> int:
+        """Numbers stored for one scalar."""
+        return padded(self.lanes) or 1
+
 
 @dataclass(frozen=True)
 class Ref:
-    """``size`` scalars of an array from an offset on, ``stride`` apart."""
+    """``size`` scalars of an array from an offset on, ``stride`` apart; with ``lane``, lanes of the one at the offset."""
 
     array: Array
     offset: Index
     size: int
     stride: int = 1
+    lane: Index | None = None
+
+    @property
+    def lanes(self) -> int:
+        """Lanes of each scalar, 0 if they are numbers."""
+        return 0 if self.lane else self.array.lanes
 
 
 @dataclass(frozen=True)
 class Apply:
-    """Apply a step: read vectors, then write its outputs; ``adds`` are the outputs that are added, not stored."""
+    """Apply a step: read vectors, then write its outputs; ``adds`` are the outputs that are added, not stored.
+
+    ``columns``: of wide vectors only so many lanes are needed, the others are zero or not looked at; None: all.
+    """
 
     step: Step
     reads: tuple[Ref, ...]
     writes: tuple[Ref, ...]
     adds: tuple[bool, ...]
+    columns: Index | None = None
 
 
 @dataclass(frozen=True)
@@ -94,11 +122,20 @@ class Fill:
 
 
 @dataclass(frozen=True)
+class Unit:
+    """Store unit rows: scalar k of the target is 1 in lane ``first`` + k and 0 elsewhere."""
+
+    target: Ref
+    first: Index
+
+
+@dataclass(frozen=True)
 class Copy:
-    """Copy scalars."""
+    """Copy scalars, or add them."""
 
     target: Ref
     source: Ref
+    adds: bool = False
 
 
 @dataclass(frozen=True)
@@ -113,8 +150,16 @@ class Loop:
 
 
 @dataclass(frozen=True)
+class Factor:
+    """Factor A = L D L^T in place; A symmetric positive definite, its lower triangle row-major."""
+
+    matrix: Array
+    size: int
+
+
+@dataclass(frozen=True)
 class Solve:
-    """Solve A x = x in place by LDL^T; A symmetric positive definite, its lower triangle row-major, overwritten."""
+    """Solve L D L^T x = x in place with a factored matrix; a wide x is solved for all lanes."""
 
     matrix: Array
     x: Ref
@@ -152,16 +197,24 @@ class Builder:
     arrays: list[Array] = field(default_factory=list)
     _bodies: list[list] = field(default_factory=lambda: [[]])
 
-    def array(self, name: str, size: int, count: int = 1, role: str = "local", values=()) -> Array:
+    def declare(self, array: Array) -> Array:
         """Declare an array; local names are unique within a program."""
-        if any(a.name == name for a in self.arrays):
-            raise ValueError(f"array {name} is declared twice in {self.name}")
-        self.arrays.append(Array(name, role, size, count, tuple(values)))
-        return self.arrays[-1]
+        if any(a.name == array.name for a in self.arrays):
+            raise ValueError(f"array {array.name} is declared twice in {self.name}")
+        self.arrays.append(array)
+        return array
+
+    def array(self, name: str, size: int, count: int = 1, role: str = "local") -> Array:
+        """Declare an array of scalars."""
+        return self.declare(Array(name, role, size, count))
+
+    def wide(self, name: str, size: int, lanes: int) -> Array:
+        """Declare a local array of rows."""
+        return self.declare(Array(name, "local", size, lanes=lanes))
 
     def constant(self, name: str, values) -> Array:
         """Declare an array whose values are known at generation."""
-        return self.array(name, len(values), role="constant", values=values)
+        return self.declare(Array(name, "constant", len(values), values=tuple(values)))
 
     def emit(self, statement) -> None:
         """Append a statement to the innermost open loop."""
@@ -181,16 +234,24 @@ class Builder:
         """Store constants; one value is repeated."""
         self.emit(Fill(target, values * target.size if len(values) == 1 else values))
 
-    def copy(self, target: Ref, source: Ref) -> None:
-        """Copy scalars."""
+    def copy(self, target: Ref, source: Ref, adds: bool = False) -> None:
+        """Copy scalars, or add them."""
         if target.size != source.size:
             raise ValueError(
                 f"{self.name}: {source.size} scalars of {source.array.name} do not fit {target.array.name}"
             )
-        self.emit(Copy(target, source))
+        self.emit(Copy(target, source, adds))
+
+    def unit(self, target: Ref, first: Index | int) -> None:
+        """Store unit rows."""
+        self.emit(Unit(target, as_index(first)))
+
+    def factor(self, matrix: Array, size: int) -> None:
+        """Factor a matrix in place."""
+        self.emit(Factor(matrix, size))
 
     def solve(self, matrix: Array, x: Ref) -> None:
-        """Solve in place."""
+        """Solve in place with a factored matrix."""
         self.emit(Solve(matrix, x))
 
     def guard(self, scalar: Ref, status: str, *protects: Ref) -> None:

@@ -18,6 +18,10 @@ FUNCTIONS = (
     "mass_matrix", "bias_force", "inverse_dynamics", "forward_dynamics", "forward_dynamics_external",
     "energy", "momentum", "tail_points", "tail_point_jacobians",
     "mass_matrix_world", "bias_force_world", "rollout",
+    "inverse_dynamics_derivatives", "forward_dynamics_derivatives",
+    "inverse_dynamics_parameter_derivatives", "forward_dynamics_parameter_derivatives",
+    "inverse_dynamics_vjp", "forward_dynamics_jvp", "forward_dynamics_vjp", "inverse_dynamics_hessian",
+    "energy_derivatives", "momentum_derivatives",
 )
 # Names used elsewhere for the same things: suggested, never accepted.
 ALIASES = {"crba": "mass_matrix", "nle": "bias_force", "rnea": "inverse_dynamics", "aba": "forward_dynamics",

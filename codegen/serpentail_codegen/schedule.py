@@ -7,12 +7,11 @@ what frees registers goes first.
 
 from collections import Counter
 
-from .tape import BINARY
+from .tape import BINARY, LEAVES, operands
 
 REGISTERS = 24  # of 32 vector registers; on 16 it still pays
 MOST_OPERATIONS = 2800  # beyond, spilled values cost more than latency
 LATENCY = {"div": 13, "sqrt": 15, "sin": 30, "cos": 30, "neg": 1}  # cycles; 4 for all others
-LEAVES = ("input", "const")
 
 
 def scheduled(nodes, live: list[int], results) -> list[int]:
@@ -29,16 +28,16 @@ class _List:
 
     def __init__(self, nodes, operations: list[int], results: set[int]):
         known = set(operations)
-        self.operands = {n: {a for a in nodes[n][1:] if a in known} for n in operations}
+        self.operands = {n: {a for a in operands(nodes[n]) if a in known} for n in operations}
         self.users = {n: [] for n in operations}
-        for n, operands in self.operands.items():
-            for a in operands:
+        for n, needed in self.operands.items():
+            for a in needed:
                 self.users[a].append(n)
         self.height = {}
         for n in reversed(operations):
             tail = max((self.height[u] for u in self.users[n]), default=0)
             self.height[n] = tail + LATENCY.get(nodes[n][0], 4)
-        self.waiting = Counter({n: len(operands) for n, operands in self.operands.items()})
+        self.waiting = Counter({n: len(needed) for n, needed in self.operands.items()})
         self.uses = Counter({n: len(users) + (n in results) for n, users in self.users.items()})
 
     def order(self) -> list[int]:

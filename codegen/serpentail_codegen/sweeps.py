@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from . import dynamics as dyn
 from . import kinematics as kin
 from .draft import Draft
-from .mechanisms import MECHANISMS, Mechanism
+from .mechanisms import MECHANISMS, Mechanism, motion
 from .program import Array, Index, Ref
 
 IDENTITY = (1, 0, 0, 0, 1, 0, 0, 0, 1)
@@ -55,6 +55,22 @@ def gather_wrenches(d: Draft, wrench: Array, torque: Callable[[Index], Ref] | No
             writes["torque_"] = torque(i)
         with d.loop("j", pieces, downward=True) as j:
             d.step(mechanism(d).gather_wrench, d.piece(i) | {"F": wrench[pieces * i + j]}, **writes)
+
+
+def virtual_power(d: Draft, power: Ref, multiplier: Array, v_dot: Array) -> None:
+    """Sum the power of all inertial wrenches when the animal moves with the velocity ``multiplier``.
+
+    Starts from ``w``, ``w_dot``, ``a`` of the torso and ``w_virtual``, ``u_virtual``, its virtual velocities.
+    """
+    carried = {name: d.array(f"{name}_here", 3)[0] for name in ("w", "w_dot", "a", "w_virtual", "u_virtual")}
+    d.step(dyn.torso_power, power=power)
+    d.step(kin.mount_acceleration, a_mount=carried["a"])
+    d.step(kin.mount_velocity, {"w": d.known["w_virtual"], "u": d.known["u_virtual"]}, u=carried["u_virtual"])
+    for name in ("w", "w_dot", "w_virtual"):
+        d.copy(carried[name], d.known[name])
+    with each_piece(d) as (i, _):
+        reads = d.piece(i) | motion(d, i, v_dot) | {"virtual_rates": multiplier.part(6 + 2 * i, 2)}
+        d.step(mechanism(d).power, reads | carried, power_=power, **carried)
 
 
 def gather_momentum(d: Draft, p_dot: Ref, kinetic: Ref | None = None) -> None:

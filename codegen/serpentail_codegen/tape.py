@@ -6,6 +6,15 @@ from fractions import Fraction
 Number = int | float | Fraction
 UNARY = ("neg", "sin", "cos", "sqrt")
 BINARY = ("add", "sub", "mul", "div")
+LEAVES = ("input", "const", "unit")
+
+
+def operands(node: tuple) -> tuple[int, ...]:
+    """Return the nodes that a node is computed from."""
+    op, *args = node
+    if op in LEAVES:
+        return ()
+    return (args[0],) if op == "lane" else tuple(args)
 
 
 class Tape:
@@ -14,10 +23,14 @@ class Tape:
     The methods are an algebra on nodes: whatever computes with ``add, sub, mul, div, neg, sin, cos, sqrt`` and
     ``const`` can be recorded here.  Rules: constants fold, 0 and 1 vanish, negation moves outward, operands of
     commutative operations are ordered by node.  Nothing is re-associated or distributed, so rounding is kept.
+
+    A node may be wide: a row of numbers, its lanes, one for each direction of differentiation.  Unit rows are wide,
+    and so is what is computed from a wide node; a narrow operand counts for every lane.
     """
 
     def __init__(self):
         self.nodes: list[tuple] = []
+        self.lanes: list[int] = []
         self._known: dict[tuple, int] = {}
 
     def _node(self, *key) -> int:
@@ -25,7 +38,19 @@ class Tape:
         if found is None:
             found = self._known[key] = len(self.nodes)
             self.nodes.append(key)
+            self.lanes.append(lanes_of(key, self.lanes))
         return found
+
+    def unit(self, lane: int, lanes: int) -> int:
+        """Return the row of ``lanes`` numbers that is 1 in one lane and 0 elsewhere."""
+        return self._node("unit", lane, lanes)
+
+    def lane(self, a: int, lane: int) -> int:
+        """Return one lane of a row; a narrow node is the same in all."""
+        if not self.lanes[a]:
+            return a
+        op, *args = self.nodes[a]
+        return self.const(int(args[0] == lane)) if op == "unit" else self._node("lane", a, lane)
 
     def input(self, index: int) -> int:
         """Return the node of scalar input number ``index``."""
@@ -131,6 +156,19 @@ class Tape:
         return a if self.value(a) in (0, 1) else self._node("sqrt", a)
 
 
+def lanes_of(node: tuple, lanes, inputs=()) -> int:
+    """Return how many lanes a node has, 0 if it is narrow, from those of earlier nodes and of the inputs."""
+    op, *args = node
+    if op in LEAVES:
+        return args[1] if op == "unit" else inputs[args[0]] if inputs and op == "input" else 0
+    if op == "lane":
+        return 0
+    widths = {lanes[a] for a in args} - {0}
+    if len(widths) > 1:
+        raise ValueError(f"{op} joins rows of {sorted(widths)} lanes")
+    return max(widths, default=0)
+
+
 def exact_quotient(x: Number, y: Number) -> Number:
     """Return x / y, exact where both are rational."""
     return x / y if isinstance(x, float) or isinstance(y, float) else Fraction(x) / Fraction(y)
@@ -160,6 +198,10 @@ def replay(nodes, scalars, algebra) -> list:
             values.append(scalars[args[0]])
         elif op == "const":
             values.append(algebra.const(args[0]))
+        elif op == "unit":
+            values.append(algebra.unit(*args))
+        elif op == "lane":
+            values.append(algebra.lane(values[args[0]], args[1]))
         else:
             values.append(getattr(algebra, op)(*(values[a] for a in args)))
     return values
@@ -169,8 +211,8 @@ def live_nodes(nodes, results) -> list[int]:
     """Return the nodes that the results need, in order (dead-code elimination)."""
     needed = set(results)
     for node in range(len(nodes) - 1, -1, -1):
-        if node in needed and nodes[node][0] not in ("input", "const"):
-            needed.update(nodes[node][1:])
+        if node in needed:
+            needed.update(operands(nodes[node]))
     return sorted(needed)
 
 
@@ -193,9 +235,9 @@ def compacted(step: Step) -> Step:
 
 def _moved(node: tuple, slot: dict[int, int], position: dict[int, int]) -> tuple:
     op, *args = node
-    if op == "const":
-        return node
-    return (op, slot[args[0]]) if op == "input" else (op, *(position[a] for a in args))
+    if op in LEAVES:
+        return (op, slot[args[0]]) if op == "input" else node
+    return (op, *(position[a] for a in operands(node)), *args[len(operands(node)) :])
 
 
 def specialised(step: Step, name: str, **constants: tuple[Number, ...]) -> Step:

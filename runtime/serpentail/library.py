@@ -66,6 +66,16 @@ def call_record(parameters: np.ndarray, count: int, work: np.ndarray, arrays) ->
     return Call(parameters.ctypes.data, count, 0, work.ctypes.data, addresses)
 
 
+CACHE_LINE = 64  # bytes, and the widest vector
+
+
+def aligned(count: int, dtype) -> np.ndarray:
+    """Return a workspace that begins at a cache line, so that no vector in it lies across two."""
+    memory = np.zeros((count + 1) * np.dtype(dtype).itemsize + CACHE_LINE, np.uint8)
+    first = -memory.ctypes.data % CACHE_LINE
+    return memory[first : first + (count + 1) * np.dtype(dtype).itemsize].view(dtype)
+
+
 class Buffers(threading.local):
     """Arrays that one thread hands to C: their addresses are taken once, so a call on one state costs little."""
 
@@ -74,7 +84,7 @@ class Buffers(threading.local):
         self.outputs = [np.zeros(shape, dtype) for shape in outputs]
         self.slots = [(array.shape, array) for array in self.inputs]
         self.only = self.outputs[0] if len(self.outputs) == 1 else None
-        self.work = np.zeros(work + 1, dtype)
+        self.work = aligned(work, dtype)
         self.call = call_record(parameters, 1, self.work, (*self.inputs, *self.outputs))
         self.address = ctypes.addressof(self.call)
 

@@ -9,7 +9,7 @@ from ..functions import Argument, Function, inertial
 from ..functions import program as assemble
 from ..scene import Scene
 from ..templating import render
-from .c_function import CFunction, dialect, in_loops, step_lines, straight_line
+from .c_function import CFunction, Routine, dialect, in_loops, routine_arguments, routine_lines, straight_line
 
 STRAIGHT_UP_TO = 5000  # operations: beyond, the text leaves the instruction cache and compile time grows
 COORDINATES = {"articulated": "alpha_1, beta_1, ... of the joints", "continuum": "a_1, b_1, ... of the segments' bend"}
@@ -77,7 +77,7 @@ class FunctionView:
         self.prototype = wrapped(f"int {prefix}_{self.name}(", [head, *arguments, f"{real} *work"])
         self.names = ", ".join(a.name for a in views)
         text = "\n".join(self.lines)
-        self.unused = [name for name, word in (("parameters", "parameters->"), ("work", "work +")) if word not in text]
+        self.unused = [name for name, word in (("parameters", "parameters->"), ("work", "work")) if word not in text]
 
 
 def wrapped(head: str, arguments: list[str]) -> str:
@@ -110,17 +110,18 @@ def parameter_views(scene: Scene) -> list[dict]:
 
 def step_views(emitted: list[Emitted], real: str, prefix: str) -> list[dict]:
     """Return every step that some loop calls, once."""
-    steps = {step.name: step for e in emitted for step in e.body.steps}
+    routines: dict[str, Routine] = {}
+    for routine in (r for e in emitted for r in e.body.routines):
+        if routines.setdefault(routine.name, routine) != routine:
+            raise ValueError(f"two steps are called {routine.name}")
     return [
         {
-            "name": step.name,
-            "doc": step.doc,
-            "lines": step_lines(step, real, prefix),
-            "arguments": ", ".join(
-                [f"const real *{name}" for name, _ in step.inputs] + [f"real *{name}_out" for name, _ in step.outputs]
-            ),
+            "name": routine.name,
+            "doc": routine.step.doc,
+            "lines": routine_lines(routine, real, prefix),
+            "arguments": routine_arguments(routine),
         }
-        for step in steps.values()
+        for routine in routines.values()
     ]
 
 

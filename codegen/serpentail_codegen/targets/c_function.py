@@ -1,23 +1,43 @@
 """C function bodies: programs go in, the lines of their C functions come out, straight or as loops over steps."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from ..interpret import executed, unroll
-from ..program import Apply, Array, Copy, Fill, Guard, Loop, Program, Ref, Solve
+from ..program import Apply, Array, Copy, Factor, Fill, Guard, Loop, Program, Ref, Solve, Unit, padded
 from ..tape import BINARY, Step
-from .scalars import Dialect, Scalars, index_text
+from .scalars import EARLY, LATE, Dialect, Scalars, index_text
 
 FEW = 3  # scalars are written one by one, more by a helper
 ON_STACK = 12  # scalars: larger local arrays go to the caller's workspace
 
 
 @dataclass(frozen=True)
+class Routine:
+    """A step as one C function: which of its vectors are rows, how far apart, and which outputs are added."""
+
+    step: Step
+    rows: frozenset[str] = frozenset()
+    row: int = 1
+    adds: frozenset[str] = frozenset()
+
+    @property
+    def name(self) -> str:
+        """Name that tells routines of one step apart."""
+        usual = {n for n, _ in (*self.step.inputs, *self.step.outputs) if n.startswith("d_")}
+        odd = sorted(self.rows ^ usual) if self.rows else []
+        lanes = [f"rows_of_{self.row}", *odd] if self.rows else []
+        adds = ["add", *sorted(self.adds)] if self.adds else []
+        return "_".join([self.step.name, *lanes, *adds])
+
+
+@dataclass(frozen=True)
 class CFunction:
-    """One C function body: its lines, the scalars of workspace, the steps and helpers it calls, what it costs."""
+    """One C function body: its lines, the scalars of workspace, the routines and helpers it calls, what it costs."""
 
     lines: tuple[str, ...]
     work: int
-    steps: tuple[Step, ...]
+    routines: tuple[Routine, ...]
     helpers: frozenset[str]
     operations: int
 
@@ -26,7 +46,15 @@ def dialect(real: str, prefix: str = "") -> Dialect:
     """Return how C writes scalars of a real type."""
     suffix = "f" if real == "float" else ""
     sincos = f"real {{sine}}, {{cosine}}; {prefix}_sincos({{argument}}, &{{sine}}, &{{cosine}});"
-    return Dialect("const real {name} = {text};", suffix, {"sqrt": "sqrt" + suffix}, sincos)
+    functions = {"sqrt": "sqrt" + suffix}
+    row, load = "const lanes {name} = {text};", "LOAD({address} + c)"
+    return Dialect("const real {name} = {text};", suffix, functions, sincos, row, load)
+
+
+def offset_text(ref: Ref) -> str:
+    """Print where a reference begins, in numbers."""
+    start = ref.offset * ref.array.row + (ref.lane or 0)
+    return index_text(start)
 
 
 def pointer(ref: Ref) -> str:
@@ -34,7 +62,7 @@ def pointer(ref: Ref) -> str:
     name = argument_name(ref.array)
     if ref.array.role == "parameters":
         return name if ref.array.length > 1 else f"&{name}"
-    offset = index_text(ref.offset)
+    offset = offset_text(ref)
     return name if offset == "0" else f"{name} + {offset}"
 
 
@@ -43,6 +71,8 @@ def scalar(ref: Ref, k: int) -> str:
     name = argument_name(ref.array)
     if ref.array.role == "parameters" and ref.array.length == 1:
         return name
+    if ref.lane:
+        return f"{name}[{index_text(ref.offset * ref.array.row + ref.lane + k)}]"
     return f"{name}[{index_text(ref.offset + k * ref.stride)}]"
 
 
@@ -51,27 +81,60 @@ def argument_name(array: Array) -> str:
     return f"parameters->{array.name}" if array.role == "parameters" else array.name
 
 
-def step_lines(step: Step, real: str, prefix: str) -> list[str]:
-    """Print the body of a step: inputs by their names, outputs as ``<name>_out``."""
-    names = [f"{name}[{k}]" for name, size in step.inputs for k in range(size)]
-    scalars = Scalars(step.nodes, step.results, names, dialect(real, prefix))
+def each_lane(columns: str, lines: Iterable[str]) -> list[str]:
+    """Print a loop over lanes, as many in turn as a vector holds."""
+    return [f"for (int c = 0; c < {columns}; c += LANES) {{", *("  " + line for line in lines), "}"]
+
+
+def routine_arguments(routine: Routine) -> str:
+    """Print the arguments of a step."""
+    inputs = [f"const real *{name}" for name, _ in routine.step.inputs]
+    outputs = [f"real *{name}_out" for name, _ in routine.step.outputs]
+    return ", ".join([*inputs, *outputs, *(["int columns"] if routine.rows else [])])
+
+
+def routine_lines(routine: Routine, real: str, prefix: str) -> list[str]:
+    """Print the body of a step: inputs by their names, outputs as ``<name>_out``; rows in a loop over lanes."""
+    step, row = routine.step, routine.row
+    names, rows = [], {}
+    for name, size in step.inputs:
+        if name in routine.rows:
+            rows |= {len(names) + k: row for k in range(size)}
+            names += [f"&{name}[{k * row}]" for k in range(size)]
+        else:
+            names += [f"{name}[{k}]" for k in range(size)]
+    scalars = Scalars(step.nodes, step.results, names, dialect(real, prefix), rows)
     lines = scalars.lines()
-    targets = [f"{name}_out[{k}]" for name, size in step.outputs for k in range(size)]
+    wide, narrow, results = scalars.lines(row) if routine.rows else [], [], iter(step.results)
+    stores = []
+    for name, size in step.outputs:
+        for k in range(size):
+            node = next(results)
+            if name in routine.rows:
+                text = scalars.text[node] if scalars.lanes[node] else f"WIDE({scalars.text[node]})"
+                address = f"&{name}_out[{k * row}] + c"
+                stores.append(f"STORE({address}, {f'LOAD({address}) + {text}' if name in routine.adds else text});")
+            else:
+                narrow.append((name, k, scalars.text[node]))
     # every input is read before an output is written: outputs may overwrite inputs
-    texts = [scalars.text[r] for r in step.results]
-    late = {text: f"r{k}" for k, text in enumerate(texts) if "[" in text}
+    late = {text: f"r{k}" for k, (_, _, text) in enumerate(narrow) if "[" in text}
     lines += [f"const real {name} = {text};" for text, name in late.items()]
-    return lines + [f"{target} = {late.get(text, text)};" for target, text in zip(targets, texts, strict=True)]
+    lines += each_lane("columns", wide + stores) if stores else []
+    for name, k, text in narrow:
+        lines.append(f"{name}_out[{k}] {'+=' if name in routine.adds else '='} {late.get(text, text)};")
+    return lines
 
 
 def straight_line(program: Program, real: str, prefix: str, fixed=None) -> CFunction:
-    """Print a program without loops."""
+    """Print a program without loops but those over lanes."""
     tape, outputs, guards = unroll(program, fixed)
     results = [node for a in program.of_role("output") for node in outputs[a.name]]
     arrays = (*program.of_role("parameters"), *program.of_role("input"))
     names = [scalar(a.part(0, a.length), k) for a in arrays for k in range(a.length)]
     scalars = Scalars(tape.nodes, [*results, *(node for _, node in guards)], names, dialect(real, prefix))
-    lines = scalars.lines()
+    lines = scalars.lines(EARLY)
+    rows, work = wide_lines(scalars)
+    lines += rows + scalars.lines(LATE)
     targets = [scalar(a.part(0, a.length), k) for a in program.of_role("output") for k in range(a.length)]
     lines += [f"{target} = {scalars.text[node]};" for target, node in zip(targets, results, strict=True)]
     zero = dialect(real).literal(0)
@@ -79,8 +142,29 @@ def straight_line(program: Program, real: str, prefix: str, fixed=None) -> CFunc
         tests = " && ".join(f"{scalars.text[node]} > {zero}" for name, node in guards if name == status)
         lines += [f"if (!({tests})) {{", f"  return STATUS_{status};", "}"]
     lines.append("return STATUS_OK;")
-    operations = sum(tape.nodes[n][0] in BINARY for n in scalars.live)
-    return CFunction(tuple(lines), 0, (), frozenset(called(tape.nodes)), operations)
+    operations = sum((tape.lanes[n] or 1) for n in scalars.live if tape.nodes[n][0] in BINARY)
+    helpers = called(tape.nodes) | ({"lanes"} if rows else set())
+    return CFunction(tuple(lines), work, (), frozenset(helpers), operations)
+
+
+def wide_lines(scalars: Scalars) -> tuple[list[str], int]:
+    """Print the rows, those of equal length in one loop; rows of which a lane is needed go to the workspace."""
+    lines, work = [], 0
+    needed = sorted({scalars.nodes[n][1] for n in scalars.live if scalars.nodes[n][0] == "lane"})
+    for lanes in sorted({scalars.lanes[n] for n in scalars.live} - {0}):
+        row, inner = padded(lanes), scalars.lines(lanes)
+        for node in needed:
+            if scalars.lanes[node] == lanes:
+                inner.append(f"STORE(&work[{work}] + c, {scalars.text[node]});")
+                scalars.stored[node] = work
+                work += row
+        if any("&one[" in line for line in inner):
+            ones = ", ".join("1" if k == lanes - 1 else "0" for k in range(lanes + row))
+            lines += ["{", f"  static const real one[{lanes + row}] = {{{ones}}};"]
+            lines += ["  " + line for line in each_lane(str(lanes), inner)] + ["}"]
+        else:
+            lines += each_lane(str(lanes), inner)
+    return lines, work
 
 
 class LoopPrinter:
@@ -89,7 +173,7 @@ class LoopPrinter:
     def __init__(self, program: Program, real: str, prefix: str, fixed=None):
         self.program, self.prefix, self.fixed = program, prefix, fixed or {}
         self.dialect = dialect(real)
-        self.steps: dict[str, Step] = {}
+        self.routines: dict[str, Routine] = {}
         self.helpers: set[str] = set()
         self.used: dict[str, Array] = {}
 
@@ -98,20 +182,20 @@ class LoopPrinter:
         body = self._body(self.program.body)
         declarations, work = self._declarations()
         lines = (*declarations, *body, "return STATUS_OK;")
-        return CFunction(lines, work, tuple(self.steps.values()), frozenset(self.helpers), executed(self.program))
+        return CFunction(lines, work, tuple(self.routines.values()), frozenset(self.helpers), executed(self.program))
 
     def _declarations(self) -> tuple[list[str], int]:
         lines, work = [], 0
-        for array in self.used.values():
+        for array in sorted(self.used.values(), key=lambda a: not a.lanes):  # rows first, where vectors are aligned
             values = self.fixed.get(array.name, array.values)
             if array.role == "constant" or array.name in self.fixed:
                 text = ", ".join(self.dialect.literal(v) for v in values)
                 lines.append(f"static const real {array.name}[{array.length}] = {{{text}}};")
-            elif array.role == "local" and array.length <= ON_STACK:
+            elif array.role == "local" and array.length * array.row <= ON_STACK:
                 lines.append(f"real {array.name}[{array.length}];")
             elif array.role == "local":
                 lines.append(f"real *const {array.name} = work + {work};")
-                work += array.length
+                work += array.length * array.row
         return lines, work
 
     def _ref(self, ref: Ref) -> Ref:
@@ -133,16 +217,29 @@ class LoopPrinter:
 
     def _fill(self, fill: Fill) -> list[str]:
         target = self._ref(fill.target)
+        if target.lanes:
+            return [f"{self._helper('clear_rows')}({target.size * target.array.row}, {pointer(target)});"]
         if target.size > FEW and len(set(fill.values)) == 1:
             value = self.dialect.literal(fill.values[0])
             return [f"{self._helper('fill')}({target.size}, {value}, {pointer(target)});"]
         return [f"{scalar(target, k)} = {self.dialect.literal(v)};" for k, v in enumerate(fill.values)]
 
+    def _unit(self, unit: Unit) -> list[str]:
+        target, row = self._ref(unit.target), unit.target.array.row
+        zeros = f"{self._helper('clear_rows')}({target.size * row}, {pointer(target)});"
+        ones = [target.offset * row + k * row + unit.first + k for k in range(target.size)]
+        return [zeros, *(f"{target.array.name}[{index_text(at)}] = {self.dialect.literal(1)};" for at in ones)]
+
     def _copy(self, copy: Copy) -> list[str]:
         target, source = self._ref(copy.target), self._ref(copy.source)
-        if target.size > FEW:
-            return [f"{self._helper('copy')}({target.size}, {pointer(source)}, {pointer(target)});"]
-        return [f"{scalar(target, k)} = {scalar(source, k)};" for k in range(target.size)]
+        if target.lanes:
+            helper = self._helper("add_rows" if copy.adds else "copy_rows")
+            return [f"{helper}({target.size * target.array.row}, {pointer(source)}, {pointer(target)});"]
+        if target.size > FEW and target.stride == source.stride == 1:
+            helper = self._helper("add" if copy.adds else "copy")
+            return [f"{helper}({target.size}, {pointer(source)}, {pointer(target)});"]
+        sign = "+=" if copy.adds else "="
+        return [f"{scalar(target, k)} {sign} {scalar(source, k)};" for k in range(target.size)]
 
     def _helper(self, name: str) -> str:
         self.helpers.add(name)
@@ -152,29 +249,50 @@ class LoopPrinter:
         test = f"!({scalar(self._ref(guard.scalar), 0)} > {self.dialect.literal(0)})"
         return [f"if ({test}) {{", f"  return STATUS_{guard.status};", "}"]
 
-    def _solve(self, solve: Solve) -> list[str]:
-        matrix, x = self._ref(solve.matrix[0]), self._ref(solve.x)
-        call = f"{self._helper('ldl_solve')}({x.size}, {pointer(matrix)}, {pointer(x)})"
+    def _factor(self, factor: Factor) -> list[str]:
+        call = f"{self._helper('ldl_factor')}({factor.size}, {pointer(self._ref(factor.matrix[0]))})"
         return [f"if ({call} != STATUS_OK) {{", "  return STATUS_NOT_POSITIVE_DEFINITE;", "}"]
 
+    def _solve(self, solve: Solve) -> list[str]:
+        matrix, x = self._ref(solve.matrix[0]), self._ref(solve.x)
+        if not x.lanes:
+            return [f"{self._helper('ldl_solve')}({x.size}, {pointer(matrix)}, {pointer(x)});"]
+        self.helpers.add("lanes")
+        helper = self._helper("ldl_solve_rows")
+        return [f"{helper}({x.size}, {x.lanes}, {x.array.row}, {pointer(matrix)}, {pointer(x)});"]
+
     def _apply(self, call: Apply) -> list[str]:
-        self.steps.setdefault(call.step.name, call.step)
-        self.helpers |= called(call.step.nodes)
+        outputs = list(zip(call.step.outputs, map(self._ref, call.writes), call.adds, strict=True))
+        routine, lanes = self._routine(call)
         arguments = [pointer(self._ref(ref)) for ref in call.reads]
         before, after = [], []
-        for (name, size), target, adds in zip(call.step.outputs, map(self._ref, call.writes), call.adds, strict=True):
-            if not adds and target.stride == 1:
+        for (name, size), target, adds in outputs:
+            if target.stride == 1:
                 arguments.append(pointer(target))
                 continue
             before.append(f"real {name}_new[{size}];")
-            sign = "+=" if adds else "="
-            if adds and size > FEW:
-                after.append(f"{self._helper('add')}({size}, {name}_new, {pointer(target)});")
-            else:
-                after += [f"{scalar(target, k)} {sign} {name}_new[{k}];" for k in range(size)]
+            after += [f"{scalar(target, k)} {'+=' if adds else '='} {name}_new[{k}];" for k in range(size)]
             arguments.append(f"{name}_new")
-        line = f"{self.prefix}_{call.step.name}({', '.join(arguments)});"
+        if lanes:
+            arguments.append(index_text(call.columns) if call.columns else str(lanes))
+        line = f"{self.prefix}_{routine.name}({', '.join(arguments)});"
         return [line] if not before else ["{", *("  " + x for x in (*before, line, *after)), "}"]
+
+    def _routine(self, call: Apply) -> tuple[Routine, int]:
+        """Return what to call, and the lanes of its rows."""
+        vectors = list(zip((*call.step.inputs, *call.step.outputs), (*call.reads, *call.writes), strict=True))
+        wide = {name: ref for (name, _), ref in vectors if ref.lanes}
+        adds = {
+            name
+            for (name, _), ref, adds in zip(call.step.outputs, call.writes, call.adds, strict=True)
+            if adds and ref.stride == 1
+        }
+        row = next((ref.array.row for ref in wide.values()), 1)
+        routine = Routine(call.step, frozenset(wide), row, frozenset(adds))
+        if self.routines.setdefault(routine.name, routine) != routine:
+            raise ValueError(f"two steps are called {routine.name}")
+        self.helpers |= called(call.step.nodes) | ({"lanes"} if wide else set())
+        return routine, next((ref.lanes for ref in wide.values()), 0)
 
 
 def called(nodes) -> set[str]:

@@ -5,7 +5,7 @@ import re
 from ..draft import Tail
 from ..functions import inertial
 from ..functions import program as assemble
-from ..program import Apply, Copy, Fill, Guard, Loop, Program, Ref, Solve
+from ..program import Apply, Copy, Factor, Fill, Guard, Loop, Program, Ref, Solve
 from ..scene import Scene
 from ..tape import Step
 from ..templating import render
@@ -71,6 +71,9 @@ class PythonPrinter:
 
     def _guard(self, guard: Guard) -> list[str]:
         return [f"{slice_text(ref)} = where({slice_text(guard.scalar)}, {slice_text(ref)})" for ref in guard.protects]
+
+    def _factor(self, factor: Factor) -> list[str]:
+        return [f"{factor.matrix.name} = ldl_factor({factor.matrix.name}, {factor.size})"]
 
     def _solve(self, solve: Solve) -> list[str]:
         return [f"{slice_text(solve.x)} = ldl_solve({solve.matrix.name}, {slice_text(solve.x)})"]

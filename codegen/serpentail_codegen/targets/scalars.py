@@ -1,11 +1,11 @@
 """Text that all targets share: nodes of a tape and a dialect go in, one definition a line comes out."""
 
-from collections import Counter
+from collections import Counter, defaultdict
 from dataclasses import dataclass
 
 from ..program import Index
 from ..schedule import scheduled
-from ..tape import BINARY, live_nodes
+from ..tape import BINARY, lanes_of, live_nodes, operands
 
 LEAST_SINGLE = 2.0**-126
 SYMBOL = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
@@ -25,6 +25,8 @@ class Dialect:
     suffix: str
     functions: dict[str, str]
     sincos: str = ""  # defines sine and cosine of one argument at once; empty: by two functions
+    row: str = ""  # defines a row of lanes
+    load: str = ""  # the lanes at an address that are in turn
 
     def literal(self, value) -> str:
         """Print a number by its shortest exact decimal; what a single-precision real cannot hold is zero."""
@@ -32,44 +34,82 @@ class Dialect:
         return repr(0.0 if tiny else float(value)) + self.suffix
 
 
-class Scalars:
-    """Prints the nodes that the results need; a product or sign that is used once goes into its use."""
+EARLY, LATE = "early", "late"  # narrow nodes; LATE ones need a lane of some row
 
-    def __init__(self, nodes, results, names, dialect: Dialect):
+
+class Scalars:
+    """Prints the nodes that the results need; a product or sign that is used once goes into its use.
+
+    ``rows`` are the lanes of the inputs that are rows, by number.  Nodes are printed part by part: narrow ones first,
+    then those of so many lanes, then narrow ones that need a lane.
+    """
+
+    def __init__(self, nodes, results, names, dialect: Dialect, rows: dict[int, int] | None = None):
         self.nodes, self.names, self.dialect = nodes, names, dialect
         self.live = scheduled(nodes, live_nodes(nodes, results), results)
-        self.uses = Counter(a for n in self.live if nodes[n][0] not in ("input", "const") for a in nodes[n][1:])
+        self.uses = Counter(a for n in self.live for a in operands(nodes[n]))
         self.uses.update(results)
         self.text: dict[object, str] = {}
+        self.stored: dict[int, int] = {}  # rows of which a lane is needed: where they are in the workspace
+        self.count = 0
+        self.part, self.lanes = self._parts(rows or {})
+        self.abroad = {a for n in self.live for a in operands(nodes[n]) if self.part[a] != self.part[n]}
 
-    def lines(self) -> list[str]:
-        """Return the definitions in evaluation order; ``text`` then tells how to write any node."""
+    def _parts(self, rows: dict[int, int]) -> tuple[dict, dict]:
+        inputs = defaultdict(int, rows)
+        lanes, part = {}, {}
+        for n in sorted(self.live):
+            lanes[n] = lanes_of(self.nodes[n], lanes, inputs)
+            late = self.nodes[n][0] == "lane" or any(part[a] == LATE for a in operands(self.nodes[n]))
+            if late and lanes[n]:
+                raise ValueError("a row that needs a lane of another row cannot be printed")
+            part[n] = LATE if late else lanes[n] or EARLY
+        return part, lanes
+
+    def lines(self, part=EARLY) -> list[str]:
+        """Return the definitions of a part in evaluation order; ``text`` then tells how to write any node."""
         out = []
         for node in self.live:
+            if self.part[node] != part:
+                continue
             op, *args = self.nodes[node]
             if op in ("sin", "cos") and self.dialect.sincos:
-                out += self._sincos(args[0], len(out))
+                out += self._sincos(args[0])
                 self.text[node] = self.text[op, args[0]]
                 continue
             text = self._expression(op, args)
-            if op in ("input", "const") or (op in ("mul", "neg") and self.uses[node] == 1):
+            once = self.uses[node] == 1 and node not in self.abroad
+            if op in ("const", "lane") or (op == "input" and not self.lanes[node]):
+                self.text[node] = text
+            elif op in ("mul", "neg") and once:
                 self.text[node] = text
             else:
-                self.text[node] = name = f"t{len(out)}"
-                out.append(self.dialect.definition.format(name=name, text=text))
+                self.text[node] = name = self._name()
+                form = self.dialect.row if self.lanes[node] else self.dialect.definition
+                out.append(form.format(name=name, text=text))
         return out
 
-    def _sincos(self, argument: int, count: int) -> list[str]:
+    def _name(self) -> str:
+        self.count += 1
+        return f"t{self.count - 1}"
+
+    def _sincos(self, argument: int) -> list[str]:
         """Define both sine and cosine of an argument when the first of them is needed."""
         if ("sin", argument) in self.text:
             return []
-        names = {"sine": f"t{count}", "cosine": f"t{count}c"}
+        name = self._name()
+        names = {"sine": name, "cosine": f"{name}c"}
         self.text["sin", argument], self.text["cos", argument] = names.values()
         return [self.dialect.sincos.format(argument=self.text[argument], **names)]
 
     def _expression(self, op: str, args) -> str:
         if op == "input":
-            return self.names[args[0]]
+            name = self.names[args[0]]
+            return self.dialect.load.format(address=name) if name.startswith("&") else name
+        if op == "unit":
+            return self.dialect.load.format(address=f"&one[{args[1] - 1 - args[0]}]")
+        if op == "lane":
+            return f"work[{self.stored[args[0]] + args[1]}]"
         if op == "const":
             return self.dialect.literal(args[0])
         if op in BINARY:

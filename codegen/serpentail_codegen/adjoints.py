@@ -1,0 +1,144 @@
+"""Adjoints of programs: a loop nest goes in, the loop nest that runs it, then runs it backward, comes out.
+
+Each array ``x`` that matters gets a companion ``b_x``, what the weighted outputs change by with x.  A value that is
+overwritten before the way back needs it is kept, one copy for each turn of its loops.
+"""
+
+from collections.abc import Collection
+from dataclasses import dataclass, field, replace
+
+from .compose import influencing, names, pruned, reached, writes
+from .differentiate import adjoint
+from .program import Apply, Array, Copy, Fill, Guard, Index, Loop, Program, Ref, as_index, statements
+
+
+def adjoint_program(program: Program, wanted: Collection[str], given: Collection[str]) -> Program:
+    """Return the program that takes ``b_<output>`` of the given outputs to ``b_<input>`` of the wanted inputs."""
+    matters = reached(program.body, wanted) & influencing(program.body, given)
+    companions = {a.name: Array(f"b_{a.name}", "local", a.size, a.count) for a in program.arrays if a.name in matters}
+    weights = [Array(f"b_{name}", "input", companions[name].size, companions[name].count) for name in given]
+    results = [Array(f"b_{name}", "output", companions[name].size, companions[name].count) for name in wanted]
+    companions |= {name: replace(companions[name], name=f"b_{name}_sum") for name in (*wanted, *given)}
+    way = _WayBack(program, companions)
+    start = [Fill(b.part(0, b.length), (0,) * b.length) for b in companions.values()]
+    start += [Copy(_all(companions[name]), _all(w)) for name, w in zip(given, weights, strict=True)]
+    forward, backward = way.both(program.body, ())
+    end = tuple(Copy(_all(b), _all(companions[name])) for name, b in zip(wanted, results, strict=True))
+    arrays = tuple(replace(a, role="local") if a.role == "output" else a for a in program.arrays)
+    arrays += (*companions.values(), *weights, *results, *way.kept)
+    body = (*forward, *start, *backward, *end)
+    return pruned(replace(program, name=f"b_{program.name}", arrays=arrays, body=body))
+
+
+def _all(array: Array) -> Ref:
+    return array.part(0, array.length)
+
+
+def turns(loops: tuple[Loop, ...]) -> tuple[Index, int]:
+    """Return the number of the current turn of nested loops, and how many turns there are."""
+    number, count = as_index(0), 1
+    for loop in reversed(loops):
+        if loop.start.terms or loop.stop.terms or loop.start.offset:
+            raise ValueError(f"loop {loop.var} is no rectangle from 0 on: its turns cannot be numbered")
+        number, count = number + count * Index(((loop.var, 1),)), count * loop.stop.offset
+    return number, count
+
+
+@dataclass
+class _WayBack:
+    """Reverses statements; ``companions`` are the adjoint arrays by the names of their arrays."""
+
+    program: Program
+    companions: dict[str, Array]
+    kept: list[Array] = field(default_factory=list)
+
+    def __post_init__(self):
+        writers: dict[str, int] = {}
+        self.overwritten: set[str] = set()
+        for statement, loops in statements(self.program.body):
+            for ref in writes(statement):
+                name = ref.array.name
+                writers[name] = writers.get(name, 0) + 1
+                fixed = {loop.var for loop in loops} - {var for var, _ in ref.offset.terms}
+                if writers[name] > 1 or fixed:
+                    self.overwritten.add(name)
+
+    def of(self, ref: Ref) -> Ref:
+        """Return the adjoints of a reference."""
+        return replace(ref, array=self.companions[ref.array.name])
+
+    def matters(self, ref: Ref) -> bool:
+        """Tell if the scalars of a reference have adjoints."""
+        return ref.array.name in self.companions
+
+    def both(self, body: tuple, loops: tuple[Loop, ...]) -> tuple[tuple, tuple]:
+        """Return a loop nest with what it keeps, and the way back."""
+        forward, backward = [], []
+        for statement in body:
+            if isinstance(statement, Loop):
+                there, back = self.both(statement.body, (*loops, statement))
+                forward.append(replace(statement, body=there))
+                if back:
+                    backward.insert(0, replace(statement, body=back, downward=not statement.downward))
+                continue
+            there, back = self.statement(statement, loops)
+            forward += there
+            backward = [*back, *backward]
+        return tuple(forward), tuple(backward)
+
+    def statement(self, statement, loops) -> tuple[list, list]:
+        """Return a statement with what it keeps, and its reverse."""
+        if isinstance(statement, Apply):
+            return self.apply(statement, loops)
+        if isinstance(statement, Copy):
+            return [statement], self.copy(statement)
+        if isinstance(statement, Fill):
+            return [statement], self.cleared(statement.target)
+        if isinstance(statement, Guard):
+            return [statement], []
+        raise TypeError(f"no rule reverses {type(statement).__name__}")
+
+    def cleared(self, *targets: Ref) -> list:
+        """Return the statements that forget the adjoints of what was overwritten."""
+        found = [ref for ref in targets if self.matters(ref) and ref.array.name in self.overwritten]
+        return [Fill(self.of(ref), (0,) * ref.size) for ref in found]
+
+    def copy(self, copy: Copy) -> list:
+        """Return the reverse of a copy."""
+        back = []
+        if self.matters(copy.target) and self.matters(copy.source):
+            back.append(Copy(self.of(copy.source), self.of(copy.target), adds=True))
+        return back if copy.adds else back + self.cleared(copy.target)
+
+    def apply(self, call: Apply, loops) -> tuple[list, list]:
+        """Return a step, keeping what its reverse reads, and its reverse."""
+        read = {n: ref for (n, _), ref in zip(call.step.inputs, call.reads, strict=True)}
+        written = {n: ref for (n, _), ref in zip(call.step.outputs, call.writes, strict=True)}
+        stored = [ref for ref, adds in zip(call.writes, call.adds, strict=True) if not adds]
+        given = frozenset(n for n, ref in written.items() if self.matters(ref))
+        wanted = frozenset(n for n, ref in read.items() if self.matters(ref))
+        if not given or not wanted:
+            return [call], self.cleared(*stored)
+        step = adjoint(call.step, wanted, given)
+        values = read | {f"b_{n}": self.of(ref) for n, ref in written.items() if n in given}
+        keeps = []
+        for name, _ in step.inputs:
+            if name in read and read[name].array.name in self.overwritten:
+                keeps.append(self.keep(read[name], loops))
+                values[name] = keeps[-1].target
+        targets = [read[name.removeprefix("b_")] for name, _ in step.outputs]
+        in_place = [ref in stored for ref in targets]
+        back = Apply(
+            step,
+            tuple(values[name] for name, _ in step.inputs),
+            tuple(map(self.of, targets)),
+            tuple(not here for here in in_place),
+        )
+        return [*keeps, call], [back, *self.cleared(*(ref for ref in stored if ref not in targets))]
+
+    def keep(self, ref: Ref, loops) -> Copy:
+        """Return the copy of a value that will be overwritten."""
+        number, count = turns(loops)
+        array = Array(f"kept_{len(self.kept)}_{ref.array.name}", "local", ref.size, count)
+        self.kept.append(array)
+        return Copy(array[number], ref)

@@ -1,0 +1,156 @@
+"""Programs as parts of others: rewriting a loop nest, dropping what nothing needs, writing one program into another."""
+
+from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import replace
+
+from .program import (
+    Apply,
+    Array,
+    Builder,
+    Copy,
+    Factor,
+    Fill,
+    Guard,
+    Loop,
+    Program,
+    Ref,
+    Solve,
+    Unit,
+    narrowed,
+    statements,
+)
+
+
+def reads(statement) -> tuple[Ref, ...]:
+    """Return what a statement reads; sums and what is overwritten in place are read too."""
+    if isinstance(statement, Apply):
+        return statement.reads + tuple(w for w, adds in zip(statement.writes, statement.adds, strict=True) if adds)
+    if isinstance(statement, Copy):
+        return (statement.source, statement.target) if statement.adds else (statement.source,)
+    if isinstance(statement, Factor):
+        return (statement.matrix[0],)
+    if isinstance(statement, Solve):
+        return (statement.matrix[0], statement.x)
+    return (statement.scalar,) if isinstance(statement, Guard) else ()
+
+
+def writes(statement) -> tuple[Ref, ...]:
+    """Return what a statement writes."""
+    if isinstance(statement, Apply):
+        return statement.writes
+    if isinstance(statement, Copy | Fill | Unit):
+        return (statement.target,)
+    if isinstance(statement, Factor):
+        return (statement.matrix[0],)
+    return (statement.x,) if isinstance(statement, Solve) else ()
+
+
+def names(refs) -> set[str]:
+    """Return the names of the arrays that references point into."""
+    return {ref.array.name for ref in refs}
+
+
+def rewritten(body: tuple, rewrite: Callable[[object], Iterator]) -> tuple:
+    """Return a loop nest with each statement replaced by those that ``rewrite`` yields; empty loops vanish."""
+    out = []
+    for statement in body:
+        if isinstance(statement, Loop):
+            inner = rewritten(statement.body, rewrite)
+            out += [replace(statement, body=inner)] if inner else []
+        else:
+            out += rewrite(statement)
+    return tuple(out)
+
+
+def reached(body: tuple, start: Collection[str]) -> set[str]:
+    """Return the arrays that may depend on the arrays ``start``, by name."""
+    found, before = set(start), -1
+    while before < len(found):
+        before = len(found)
+        for statement, _ in statements(body):
+            if names(reads(statement)) & found:
+                found |= names(writes(statement))
+    return found
+
+
+def influencing(body: tuple, end: Collection[str]) -> set[str]:
+    """Return the arrays that the arrays ``end`` may depend on, by name."""
+    found, before = set(end), -1
+    while before < len(found):
+        before = len(found)
+        for statement, _ in statements(body):
+            if names(writes(statement)) & found:
+                found |= names(reads(_with_outputs(statement, found)))
+            elif isinstance(statement, Guard) and names(statement.protects) & found:
+                found |= names(reads(statement))
+    return found
+
+
+def _with_outputs(statement, needed: Collection[str]):
+    """Return an Apply without the outputs that go to unneeded arrays."""
+    if not isinstance(statement, Apply):
+        return statement
+    kept = [k for k, ref in enumerate(statement.writes) if ref.array.name in needed]
+    if len(kept) == len(statement.writes):
+        return statement
+    step = narrowed(statement.step, {statement.step.outputs[k][0] for k in kept})
+    given = dict(zip((name for name, _ in statement.step.inputs), statement.reads, strict=True))
+    return replace(
+        statement,
+        step=step,
+        reads=tuple(given[name] for name, _ in step.inputs),
+        writes=tuple(statement.writes[k] for k in kept),
+        adds=tuple(statement.adds[k] for k in kept),
+    )
+
+
+def pruned(program: Program) -> Program:
+    """Return a program without the statements and arrays that no output needs."""
+    needed = influencing(program.body, {a.name for a in program.of_role("output")})
+
+    def rewrite(statement):
+        if isinstance(statement, Guard):
+            protects = tuple(ref for ref in statement.protects if ref.array.name in needed)
+            if protects:
+                yield replace(statement, protects=protects)
+        elif names(writes(statement)) & needed:
+            yield _with_outputs(statement, needed)
+
+    body = rewritten(program.body, rewrite)
+    kept = {a.name for a in program.arrays if a.role in ("input", "output", "parameters")} | needed
+    return replace(program, arrays=tuple(a for a in program.arrays if a.name in kept), body=body)
+
+
+def with_arrays(statement, array: Mapping[str, Array]):
+    """Return a statement on other arrays."""
+
+    def moved(ref: Ref) -> Ref:
+        return replace(ref, array=array[ref.array.name])
+
+    changes = {}
+    for name in ("target", "source", "scalar", "x"):
+        if hasattr(statement, name):
+            changes[name] = moved(getattr(statement, name))
+    for name in ("reads", "writes", "protects"):
+        if hasattr(statement, name):
+            changes[name] = tuple(map(moved, getattr(statement, name)))
+    if hasattr(statement, "matrix"):
+        changes["matrix"] = array[statement.matrix.name]
+    return replace(statement, **changes)
+
+
+def inline(builder: Builder, program: Program, **arguments: Array) -> None:
+    """Write a program into a builder: arguments are bound by name, parameters are shared, the rest is renamed."""
+    own = {a.name: a for a in builder.arrays}
+    array = {}
+    for a in program.arrays:
+        if a.name in arguments:
+            array[a.name] = arguments[a.name]
+        elif a.role == "parameters":
+            array[a.name] = own[a.name]
+        elif a.role in ("local", "constant"):
+            array[a.name] = builder.declare(replace(a, name=f"{program.name}_{a.name}"))
+        else:
+            raise ValueError(f"{program.name} in {builder.name}: {a.role} {a.name} is not bound")
+    for statement in rewritten(program.body, lambda s: (with_arrays(s, array),)):
+        builder.emit(statement)

@@ -1,0 +1,111 @@
+"""Tangents of programs: a loop nest goes in, the loop nest that carries its derivatives along comes out.
+
+Each active array ``x`` gets a companion ``d_x``.  With lanes, every scalar of it is a row with one number for each
+direction; without, it holds the derivative in one direction.
+"""
+
+from collections.abc import Callable, Collection
+from dataclasses import replace
+
+from .compose import pruned, reached, reads, writes
+from .differentiate import tangent
+from .program import Apply, Array, Copy, Fill, Guard, Index, Loop, Program, Ref, statements
+
+Bound = Callable[[tuple[Loop, ...]], Index | None]
+
+
+def everywhere(loops: tuple[Loop, ...]) -> None:
+    """Need all lanes in every loop."""
+
+
+def tangent_program(program: Program, active: Collection[str], lanes: int = 0, bound: Bound = everywhere) -> Program:
+    """Return the program that takes ``d_<input>`` of the active inputs along and gives ``d_<output>``.
+
+    ``bound`` tells how many lanes are needed inside given loops.
+    """
+    moving = reached(program.body, active)
+    companions = {
+        a.name: Array(f"d_{a.name}", _role(a), a.size, a.count, lanes=lanes) for a in program.arrays if a.name in moving
+    }
+    transform = _Transform(companions, bound)
+    body = transform.body(program.body, ())
+    fills = tuple(Fill(ref, (0,) * ref.size) for ref in _partly_written(body))
+    arrays = tuple(replace(a, role="local") if a.role == "output" else a for a in program.arrays)
+    return pruned(replace(program, name=f"d_{program.name}", arrays=arrays + tuple(companions.values()), body=fills + body))
+
+
+def _role(array: Array) -> str:
+    return "input" if array.role == "parameters" else array.role
+
+
+def _partly_written(body: tuple) -> list[Ref]:
+    """Return the wide arrays that some statement writes in fewer lanes than another one reads."""
+    written, read = {}, {}
+    for statement, _ in statements(body):
+        columns = getattr(statement, "columns", None)
+        for found, refs in ((written, writes(statement)), (read, reads(statement))):
+            for ref in refs:
+                if ref.array.lanes and ref.array.role == "local":
+                    found.setdefault(ref.array, set()).add(columns)
+    return [a.part(0, a.length) for a, columns in written.items() if len(columns | read.get(a, set())) > 1]
+
+
+class _Transform:
+    """Rewrites statements; ``companions`` are the tangent arrays by the names of their arrays."""
+
+    def __init__(self, companions: dict[str, Array], bound: Bound):
+        self.companions, self.bound = companions, bound
+
+    def moves(self, ref: Ref) -> bool:
+        """Tell if the scalars of a reference have tangents."""
+        return ref.array.name in self.companions
+
+    def of(self, ref: Ref) -> Ref:
+        """Return the tangents of a reference."""
+        return replace(ref, array=self.companions[ref.array.name])
+
+    def body(self, body: tuple, loops: tuple[Loop, ...]) -> tuple:
+        """Return the transformed loop nest."""
+        out = []
+        for statement in body:
+            if isinstance(statement, Loop):
+                out.append(replace(statement, body=self.body(statement.body, (*loops, statement))))
+            elif isinstance(statement, Apply):
+                out += self.apply(statement, self.bound(loops))
+            elif isinstance(statement, Copy | Fill):
+                out += self.store(statement)
+            elif isinstance(statement, Guard):
+                out.append(statement)
+            else:
+                raise TypeError(f"no rule differentiates {type(statement).__name__}")
+        return tuple(out)
+
+    def store(self, statement: Copy | Fill):
+        """Yield a copy or fill and what it does to tangents."""
+        yield statement
+        if self.moves(statement.target):
+            target = self.of(statement.target)
+            if isinstance(statement, Copy) and self.moves(statement.source):
+                yield replace(statement, target=target, source=self.of(statement.source))
+            elif not getattr(statement, "adds", False):
+                yield Fill(target, (0,) * target.size)
+
+    def apply(self, call: Apply, columns: Index | None):
+        """Yield a step with its tangents."""
+        active = [(name, ref) for (name, _), ref in zip(call.step.inputs, call.reads, strict=True) if self.moves(ref)]
+        if not active:
+            yield call
+            for ref, adds in zip(call.writes, call.adds, strict=True):
+                if self.moves(ref) and not adds:
+                    yield Fill(self.of(ref), (0,) * ref.size)
+            return
+        step = tangent(call.step, frozenset(name for name, _ in active))
+        values = dict(zip((name for name, _ in call.step.inputs), call.reads, strict=True))
+        values |= {f"d_{name}": self.of(ref) for name, ref in active}
+        yield Apply(
+            step,
+            tuple(values[name] for name, _ in step.inputs),
+            call.writes + tuple(map(self.of, call.writes)),
+            call.adds * 2,
+            columns,
+        )
