@@ -21,7 +21,7 @@ THIN = {
     "linewidth": 1.0,
     "label": "links without inertia of their own",
 }
-SIGNS = "lower pieces ($n = 1$; 1 and 2): the torso turns less than with the continuum\nupper pieces: it turns further"
+SIGNS = "a gap in a line: the difference changes its sign here"
 FEWEST, MOST = 2, 64  # links in Fig. 8b
 # where a number of links is written, points from its mark
 LABELS = dict.fromkeys((1, 3, 4, 6, 8, 12, 16, 24, 32, 64, 128, 256), (-7, -1)) | {2: (0, -13)}
