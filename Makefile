@@ -18,7 +18,7 @@ SOURCES := $(shell find codegen -name '*.py' -o -name '*.jinja')
 STAMP   := generated/$(MODEL)/.made
 WANTED  := $(if $(SCENE),$(SCENE),--tail $(TAIL) --segments $(M) $(if $(filter continuum,$(TAIL)),,--links $(N))) $(OPTIONS)
 
-.PHONY: help setup demo test test-all model verify bench lint golden clean
+.PHONY: help setup demo test test-all model verify bench study-models lint golden clean
 .DELETE_ON_ERROR:
 
 help:
@@ -33,6 +33,7 @@ help:
 	@echo "              options: REAL=float EMISSION=loops BAKED=1 FUNCTIONS=energy,momentum"
 	@echo "  make verify TAIL=articulated M=3 N=4       verification report of that model"
 	@echo "  make bench                                 benchmark report"
+	@echo "  make study-models                          the paper's Fig. 8: both tails compared, and what each costs"
 	@echo "  make lint                                  style and import rules"
 	@echo "  make golden                                accept what the generator emits now as the golden models"
 	@echo "  make clean                                 remove generated/ and output/"
@@ -81,6 +82,9 @@ verify: model
 
 bench: $(READY)
 	$(PY) benchmarks/bench.py
+
+study-models: $(READY)
+	PYTHONPATH=benchmarks $(PY) examples/study_models.py
 
 golden: $(READY)
 	$(PY) -m pytest tests/test_golden.py --update-golden

@@ -52,7 +52,7 @@ def machine() -> dict:
 def generation(folder: Path) -> list[dict]:
     """Seconds from nothing to a loaded model: a new process generates, an empty cache compiles."""
     rows = []
-    for size in ((1, 3), (3, 4), (8, 16)):
+    for size in ((1, 3), (3, 4), (8, 16), (6, None)):
         begun = time.perf_counter()
         path = generated(folder / "timed", *size)
         made = time.perf_counter()
@@ -77,9 +77,9 @@ def generated(parent: Path, segments: int, links: int | None = None) -> Path:
     return parent / (f"articulated_m{segments}_n{links}" if links else f"continuum_m{segments}")
 
 
-def label(segments: int, links: int) -> str:
-    """Return (m, n) as text."""
-    return f"({segments}, {links})"
+def label(segments: int, links: int | None) -> str:
+    """Return (m, n) as text; a continuum has no links."""
+    return f"({segments}, {links})" if links else f"continuum, m = {segments}"
 
 
 def speed(folder: Path) -> list[dict]:

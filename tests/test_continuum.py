@@ -1,6 +1,5 @@
 """The continuum tail in the runtime: right at every bend, refused beyond its range, convertible to polar angles."""
 
-import casadi
 import numpy as np
 import pytest
 
@@ -40,20 +39,6 @@ def test_every_bend_is_right_to_rounding(model, exact, theta):
     assert block_error(model.bias_force(q, v), exact.bias_force(q, v)) <= 2e-14
     error = block_error(model.forward_dynamics(q, v, tau), exact.forward_dynamics(q, v, tau))
     assert error <= 5e-15 * equilibrated_condition(H)
-
-
-@pytest.mark.parametrize("theta", [0.0, 1e-9, 1e-3, 3.0])
-def test_casadi_derivatives_are_those_of_the_definition(model, exact, theta):
-    q, v, _ = bent(theta, 1)
-    force = model.casadi.bias_force
-    x = casadi.SX.sym("x", 9)
-    jacobian = casadi.Function("J", [x], [casadi.jacobian(force(x, v), x[7:])])
-    step = 1e-4  # central differences of fourth order on the exact reference
-    for k in (7, 8):
-        e = np.eye(9)[k] * step
-        far, near = (exact.bias_force(q + s * e, v) - exact.bias_force(q - s * e, v) for s in (2, 1))
-        expected = (8 * near - far) / (12 * step)
-        assert block_error(np.array(jacobian(q))[:, k - 7], expected) <= 1e-8
 
 
 def test_beyond_the_range_is_refused(model):

@@ -1,86 +1,88 @@
 """The paper's figures: numbers that independent computations of its studies gave must come out of the models."""
 
-from itertools import pairwise
+import json
+import os
+import subprocess
+import sys
+from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import serpentail as st
+import study_models
 from models import model_folder
 
-STEPS = 200
+ROOT = Path(__file__).parent.parent
 DIFFERENCE = {2: -0.148, 4: -0.400, 8: -0.333, 16: -0.211, 32: -0.120}  # deg, articulated less continuum, Fig. 8b
+THIN = {"link_inertia": study_models.THIN}
 
 
-def com_direction(x, y):
-    """Angle of a tail's centre of mass from the straight tail, Eq. 49."""
-    return np.arctan2(x, -y)
+@cache
+def motion(links, thin=False):
+    """Yaw (deg) of the torso in Sect. 4.1's motion, of the continuum for no links."""
+    model = st.load(model_folder(1, links, functions=["mass_matrix"]), THIN if thin else None)
+    return study_models.yaw_motion(model)
 
 
-def articulated_com(links, beta):
-    """Direction of the COM of n equal links, each turned by beta against the one before."""
-    angles = beta * np.arange(1, links + 1)
-    middle = np.cumsum(np.stack([np.sin(angles), -np.cos(angles)], axis=1), axis=0)
-    middle -= 0.5 * np.stack([np.sin(angles), -np.cos(angles)], axis=1)
-    return com_direction(*middle.mean(axis=0))
+def difference(links, thin=False):
+    """Final yaw (deg), articulated less continuum."""
+    return motion(links, thin)[-1] - motion(None)[-1]
 
 
-def joint_angle(links, target):
-    """The joint angle that gives a COM direction, by bisection."""
-    low, high = 0.0, np.pi / links * 1.5
-    for _ in range(60):
-        middle = (low + high) / 2
-        low, high = (middle, high) if articulated_com(links, middle) < target else (low, middle)
-    return (low + high) / 2
-
-
-def continuum_com(theta):
-    """Direction of the COM of an arc bent by theta."""
-    return np.arctan2(theta - np.sin(theta), 1 - np.cos(theta)) if theta else 0.0
-
-
-def final_yaw(model, shapes):
-    """Yaw (deg) that the torso is left with when the tail goes through shapes at zero momentum."""
-    q = np.zeros(model.nq)
-    q[3] = 1.0
-    for before, after in pairwise(shapes):
-        q[8] = (before + after) / 2
-        H = model.mass_matrix(q)
-        turn = -np.linalg.solve(H[:6, :6], H[:6, 7])[3:] * (after - before)
-        q[3:7] = multiplied(q[3:7], turn)
-    q[8] = shapes[-1]
-    return np.degrees(st.pitch_roll_yaw(q)[2])
-
-
-def multiplied(quaternion, turn):
-    """Quaternion after a small rotation vector in the body frame."""
-    angle = np.linalg.norm(turn)
-    w, x, y, z = quaternion
-    dw = np.cos(angle / 2)
-    dx, dy, dz = 0.5 * np.sinc(angle / 2 / np.pi) * turn
-    return np.array(
-        [
-            w * dw - x * dx - y * dy - z * dz,
-            w * dx + x * dw + y * dz - z * dy,
-            w * dy - x * dz + y * dw + z * dx,
-            w * dz + x * dy - y * dx + z * dw,
-        ]
-    )
-
-
-@pytest.fixture(scope="module")
-def continuum_yaw():
-    model = st.load(model_folder(1, None, functions=["mass_matrix"]))
-    return final_yaw(model, np.linspace(0, np.pi, STEPS + 1))
-
-
-def test_the_continuum_turns_the_torso_as_in_fig_8a(continuum_yaw):
-    assert continuum_yaw == pytest.approx(-21.450, abs=1e-3)
+def test_the_continuum_turns_the_torso_as_in_fig_8a():
+    assert motion(None)[0] == 0.0
+    assert motion(None)[-1] == pytest.approx(-21.450, abs=1e-3)
+    assert np.all(np.diff(motion(None)) < 0)
 
 
 @pytest.mark.parametrize("links", DIFFERENCE)
-def test_the_articulated_tail_differs_as_in_fig_8b(continuum_yaw, links):
-    model = st.load(model_folder(1, links, functions=["mass_matrix"]))
-    targets = [continuum_com(theta) for theta in np.linspace(0, np.pi, STEPS + 1)]
-    yaw = final_yaw(model, np.array([joint_angle(links, target) for target in targets]))
-    assert yaw - continuum_yaw == pytest.approx(DIFFERENCE[links], abs=1e-3)
+def test_the_articulated_tail_differs_as_in_fig_8b(links):
+    assert difference(links) == pytest.approx(DIFFERENCE[links], abs=1e-3)
+
+
+def test_four_links_differ_most_and_by_less_than_half_a_degree():
+    sizes = {links: abs(difference(links)) for links in range(2, 9)}
+    assert max(sizes, key=sizes.get) == study_models.SHOWN
+    assert sizes[study_models.SHOWN] < 0.5
+
+
+def test_thin_links_tend_to_the_continuum_and_thick_ones_keep_their_thickness():
+    coarse, fine = (difference(links, thin=True) for links in (128, 256))
+    assert coarse / fine == pytest.approx(2, abs=0.05)
+    assert difference(256) - fine == pytest.approx(-0.0030, abs=1e-4)
+
+
+def test_directions_of_the_com_are_those_of_its_position():
+    bend, links, samples = 2.0, 5, 20_000
+    joints = bend * np.arange(1, links + 1) / links
+    ends = np.cumsum(np.stack([np.sin(joints), np.cos(joints)]), axis=1)
+    x, y = (ends - np.stack([np.sin(joints), np.cos(joints)]) / 2).mean(axis=1)
+    assert study_models.chain_direction(np.array(bend), links) == pytest.approx(np.arctan2(x, y), rel=1e-14)
+    assert study_models.chain_direction(np.array(bend), samples) == pytest.approx(
+        study_models.arc_direction(bend), abs=2 / samples
+    )
+
+
+def test_bends_have_the_wanted_directions():
+    targets = study_models.com_directions()
+    bends = study_models.bend_towards(study_models.arc_direction, targets)
+    assert (bends[0], bends[-1]) == (pytest.approx(0, abs=1e-12), pytest.approx(np.pi, rel=1e-12))
+    np.testing.assert_allclose(study_models.arc_direction(bends[1:]), targets[1:], rtol=0, atol=1e-11)
+
+
+@pytest.mark.slow
+def test_the_study_runs_anywhere_and_writes_its_files(tmp_path):
+    command = [sys.executable, str(ROOT / "examples" / "study_models.py"), "study"]
+    path = {"PYTHONPATH": str(ROOT / "benchmarks")}
+    done = subprocess.run(command, cwd=tmp_path, env=os.environ | path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "continuum: final yaw -21.450 deg" in done.stdout
+    study = json.loads((tmp_path / "study" / "summary.json").read_text())
+    rows = {row["links"]: row for row in study["articulated"]}
+    for links, expected in DIFFERENCE.items():
+        assert rows[links]["difference"] == pytest.approx(expected, abs=1e-3)
+    assert rows[256]["ns"] > 10 * study["continuum"]["ns"] > 0
+    for picture in ("fig8", "cost_against_difference"):
+        assert (tmp_path / "study" / f"{picture}.png").read_bytes()[:4] == b"\x89PNG"
