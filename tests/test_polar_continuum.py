@@ -148,13 +148,15 @@ def test_error_grows_as_theta_to_the_minus_four_and_that_of_the_bend_form_does_n
 
 
 @pytest.mark.parametrize("theta", [1e-4, 1e-6])
-def test_far_above_the_paper_s_switch_the_inertia_matrix_is_none(theta):
+def test_down_to_the_paper_s_switch_no_digit_is_left(theta):
     polar, bend = model(1), model(1, "bend")
     for seed in range(3):
-        q, v, _, tau = state = polar_state(1, theta, seed)
+        q, *_ = state = polar_state(1, theta, seed)
         assert mass_matrix_error(polar.mass_matrix(q), reference(1).mass_matrix(q)) >= 0.1
-        with pytest.raises(st.StateError, match=r"not positive definite|not finite"):
-            polar.forward_dynamics(q, v, tau)
+        try:  # H is rounding, so it may happen to be positive definite
+            assert errors(polar, state)[2] >= 0.1
+        except st.StateError as refusal:
+            assert "not positive definite" in str(refusal)
         assert max(bend_errors(bend, state)) <= 1e-14
 
 
