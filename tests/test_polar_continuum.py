@@ -1,5 +1,6 @@
 """The paper's closed forms in polar angles: right where they can be, wrong by 1 / theta^4, refused at theta = 0."""
 
+import subprocess
 from functools import cache
 
 import mpmath
@@ -200,6 +201,17 @@ def test_a_flight_far_from_straight_is_that_of_the_bend_form():
     end = in_bend(flights[0].q[-1], flights[0].v[-1])
     np.testing.assert_allclose(end[0], flights[1].q[-1], atol=1e-10)
     np.testing.assert_allclose(end[1], flights[1].v[-1], atol=1e-8)
+
+
+def test_c_example_runs_at_a_bend(tmp_path):
+    polar = model(2)
+    sources = [polar.folder / "example" / "main.c", polar.folder / "src" / f"{polar.name}.c"]
+    strict = ["-std=c99", "-O2", "-pedantic", "-Wall", "-Wextra", "-Werror", "-I", polar.folder / "include"]
+    subprocess.run(["cc", *strict, *sources, "-lm", "-o", tmp_path / "example"], check=True)
+    run = subprocess.run([tmp_path / "example"], capture_output=True, text=True, check=True)
+    printed = [float(line.split(" = ")[1]) for line in run.stdout.splitlines()]
+    q = np.array([0, 0, 0, 1.0, 0, 0, 0, 0, 0.5, 0, 0.5])
+    np.testing.assert_allclose(printed, polar.forward_dynamics(q, np.zeros(10), np.zeros(4)), rtol=1e-6, atol=1e-6)
 
 
 @pytest.mark.parametrize("name", [name for name in FUNCTIONS if name != "rollout"])
