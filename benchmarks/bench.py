@@ -1,4 +1,4 @@
-"""`make bench`: measures generation, speed, drift and precision in one run; writes output/bench/report.md and .json."""
+"""`make bench`: measures generation, speed, drift and precision in one run; writes a report to output/bench."""
 
 import inspect
 import json
@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+import continuum_forms
 import peers
 import serpentail as st
 from fixtures import COLUMNS, Fixture, fixture
@@ -31,10 +32,12 @@ def main() -> int:
             report[name] = measure(Path(folder))
     OUTPUT.mkdir(parents=True, exist_ok=True)
     (OUTPUT / "report.json").write_text(json.dumps(report, indent=1))
+    picture = OUTPUT / "continuum_forms.png"
+    continuum_forms.draw(report["continuum_forms"], report["continuum_form_times"], picture)
     text = markdown(report)
     (OUTPUT / "report.md").write_text(text)
     print(text)
-    print(f"written: {OUTPUT / 'report.md'} and report.json", file=sys.stderr)
+    print(f"written: {OUTPUT / 'report.md'}, report.json and {picture.name}", file=sys.stderr)
     return 0
 
 
@@ -213,6 +216,8 @@ MEASURES = {
     "python_overhead": python_overhead,
     "drift": drift,
     "work_precision": work_precision,
+    "continuum_forms": continuum_forms.form_errors,
+    "continuum_form_times": continuum_forms.form_times,
 }
 
 

@@ -43,6 +43,15 @@ COLUMNS = {
     "momentum_drift": "momentum drift",
     "quaternion": "norm error",
     "seconds": "run time, s",
+    "bend_H": "H, bend",
+    "polar_H": "H, polar",
+    "bend_v_dot": "v_dot, bend",
+    "polar_v_dot": "v_dot, polar",
+    "bend_ns": "bend, ns",
+    "polar_ns": "polar, ns",
+    "form_ratio": "ratio (of medians)",
+    "bend_operations": "operations, bend",
+    "polar_operations": "operations, polar",
 }
 
 

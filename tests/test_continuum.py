@@ -1,5 +1,7 @@
 """The continuum tail in the runtime: right at every bend, refused beyond its range, convertible to polar angles."""
 
+import subprocess
+
 import numpy as np
 import pytest
 
@@ -114,3 +116,11 @@ def test_info_tells_of_arcs(model):
     assert (model.kind, model.links, model.samples) == ("continuum", None, 5)
     assert "1 continuum segments" in repr(model)
     assert model.tail_points(bent(1.0)[0]).shape == (6, 3)
+
+
+def test_the_c_example_without_forward_dynamics_tells_the_sizes(tmp_path):
+    folder = model_folder(2, None, functions=["energy"])
+    sources = [folder / "example" / "main.c", folder / "src" / f"{folder.name}.c"]
+    subprocess.run(["cc", "-std=c99", "-I", folder / "include", *sources, "-lm", "-o", tmp_path / "main"], check=True)
+    printed = subprocess.run([tmp_path / "main"], capture_output=True, text=True, check=True).stdout
+    assert printed == "continuum_m2: 2 segments, 5 samples each\n"

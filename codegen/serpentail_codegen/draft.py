@@ -16,6 +16,7 @@ class Tail:
     links: int
     kind: str = "articulated"
     bend_range: float = 2 * pi
+    polar: bool = False  # a continuum in the paper's coordinates
 
     @property
     def total(self) -> int:

@@ -29,7 +29,7 @@ def generate(scene: Scene, output: Path) -> list[str]:
 def tail_of(scene: Scene) -> Tail:
     """Return the sizes of a scene's tail."""
     pieces = scene.links if scene.kind == "articulated" else scene.samples
-    return Tail(scene.segments, pieces, scene.kind, scene.bend_range)
+    return Tail(scene.segments, pieces, scene.kind, scene.bend_range, scene.coordinates == "polar")
 
 
 def needed(names: tuple[str, ...]) -> list[str]:

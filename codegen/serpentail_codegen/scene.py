@@ -93,7 +93,7 @@ class Scene:
     links: int  # n, in each segment; 1 for a continuum
     functions: tuple[str, ...]  # in the order of FUNCTIONS
     parameters: Parameters
-    coordinates: str = "joint"  # what q_t holds: joint angles alpha_i, beta_i; "bend": bend components a_i, b_i
+    coordinates: str = "joint"  # of q_t: joint angles alpha_i, beta_i; "bend": a_i, b_i; "polar": phi_i, theta_i
     samples: int = 5  # tail points in each segment of a continuum
     bend_range: float = 2 * math.pi  # rad, largest bend of a continuum segment
     baked: bool = False  # parameters folded into the code, behind the same ABI
@@ -122,17 +122,17 @@ NAMES = tuple(parameter.name for parameter in PARAMETERS)
 
 @dataclass(frozen=True)
 class Only:
-    """What only one kind of tail has: keys, parameters, and its coordinates."""
+    """What only one kind of tail has: keys, parameters, and its coordinates, the default first."""
 
     keys: tuple[str, ...]
     required: tuple[str, ...]
     parameters: tuple[str, ...]
-    coordinates: str
+    coordinates: tuple[str, ...]
 
 
 ONLY = {
-    "articulated": Only(("links",), ("links",), ("link_radius", "link_inertia"), "joint"),
-    "continuum": Only(("samples", "bend_range"), (), (), "bend"),
+    "articulated": Only(("links",), ("links",), ("link_radius", "link_inertia"), ("joint",)),
+    "continuum": Only(("samples", "bend_range"), (), (), ("bend", "polar")),
 }
 
 
@@ -186,7 +186,7 @@ def parse_scene(table: Mapping[str, Any], name: str) -> Scene:
     """Return the Scene of a scene file's table, called `name` unless it has a name; raises SceneError."""
     kind = table["kind"] if isinstance(table.get("kind"), str) and table["kind"] in ONLY else "articulated"
     own = ONLY[kind]
-    values = {key: default for key, (default, _) in KEYS.items()} | {"name": name, "coordinates": own.coordinates}
+    values = {key: default for key, (default, _) in KEYS.items()} | {"name": name, "coordinates": own.coordinates[0]}
     values |= dict.fromkeys(own.required) | dict(table)
     problems = _unknown_keys(table, "", KEYS) + _key_problems(values) + _kind_problems(table, own)
     problems += _function_problems(values["functions"])
@@ -300,8 +300,9 @@ def _kind_problems(table: Mapping[str, Any], own: Only) -> list[Problem]:
         problems += [Problem(key, table[key], remedy) for key in only.keys if key in table]
         wrong = [key for key in only.parameters if isinstance(given, Mapping) and key in given]
         problems += [Problem(f"parameters.{key}", given[key], remedy) for key in wrong]
-    if table.get("coordinates", own.coordinates) != own.coordinates:
-        remedy = f'needs "{own.coordinates}"; polar angles are singular at theta = 0, convert states'
+    if table.get("coordinates", own.coordinates[0]) not in own.coordinates:
+        choices = " or ".join(f'"{name}"' for name in own.coordinates)
+        remedy = f"needs {choices}; polar angles are singular at theta = 0, convert states"
         problems.append(Problem("coordinates", table["coordinates"], remedy))
     return problems
 

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from . import dynamics as dyn
 from . import kinematics as kin
 from .draft import Draft
-from .mechanisms import MECHANISMS, Mechanism, motion
+from .mechanisms import Mechanism, mechanism_of, motion
 from .program import Array, Index, Ref
 
 IDENTITY = (1, 0, 0, 0, 1, 0, 0, 0, 1)
@@ -18,7 +18,7 @@ IDENTITY = (1, 0, 0, 0, 1, 0, 0, 0, 1)
 
 def mechanism(d: Draft) -> Mechanism:
     """Return the steps of the draft's tail."""
-    return MECHANISMS[d.tail.kind]
+    return mechanism_of(d.tail)
 
 
 @contextmanager

@@ -106,6 +106,7 @@ class Kernel:
         self.function.argtypes = [ctypes.c_void_p]
         self.parameters = parameters
         self.bend_range = manifest["scene"].get("bend_range")
+        self.polar = manifest["scene"]["coordinates"] == "polar"
         self.buffers = Buffers(self.dtype, self.shapes, self.out_shapes, manifest["work"][name], parameters)
 
     def __call__(self, *arrays):
@@ -164,11 +165,17 @@ class Kernel:
             words = f"has norm {norm:.3g}" if norm else "is zero"
             raise StateError(f"{self.name}: the quaternion q[3:7]{state} {words}: upright is (1, 0, 0, 0)")
         if status == OUT_OF_RANGE:
-            bends = np.hypot(q[7::2], q[8::2])
-            worst = int(bends.argmax())
-            remedy = "set a larger `bend_range` in the scene, then generate the model again"
-            what = f"segment {worst + 1}{state} is bent by {bends[worst]:.6g} rad"
-            raise StateError(f"{self.name}: {what}, beyond the scene's {self.bend_range:.6g}: {remedy}")
+            raise StateError(f"{self.name}: {self._out_of_range(q, state)}")
         indefinite = f"the inertia matrix{state} is not positive definite"
         what = indefinite if status == NOT_POSITIVE_DEFINITE else f"the result{state} is not finite"
         raise StateError(f"{self.name}: {what}: is a value too large, or a parameter unphysical?")
+
+    def _out_of_range(self, q, state: str) -> str:
+        """Say which segment has a bend that the model does not cover, and what to do."""
+        bends = abs(q[8::2]) if self.polar else np.hypot(q[7::2], q[8::2])
+        least, worst = int(bends.argmin()), int(bends.argmax())
+        if self.polar and bends[worst] <= self.bend_range:
+            what = f"segment {least + 1}{state} has theta = {bends[least]:.6g} rad"
+            return f'{what}: polar coordinates have no value at theta = 0; use coordinates = "bend" in the scene'
+        what = f"segment {worst + 1}{state} is bent by {bends[worst]:.6g} rad, beyond the scene's {self.bend_range:.6g}"
+        return f"{what}: set a larger `bend_range` in the scene, then generate the model again"

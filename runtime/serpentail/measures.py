@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .errors import ModelError
 from .model import Model
 
 KINDS = ("random", "straight", "folded")
@@ -30,7 +31,10 @@ def rounding(model: Model) -> float:
 
 
 def states(model: Model, count: int = 4, seed: int = 1) -> Iterator[State]:
-    """Yield ``count`` states of each kind, every number exact in the model's real type."""
+    """Yield ``count`` states of each kind, every number exact in the model's real type; ModelError for polar angles."""
+    if model.manifest["scene"]["coordinates"] == "polar":
+        remedy = 'verify the same scene with coordinates = "bend"'
+        raise ModelError(f"{model.name}: polar coordinates lose digits and have no straight tail: {remedy}")
     torque = 10 * model.parameters["tail_mass"] * model.parameters["tail_length"] ** 2  # at 10 rad/s^2
     rng, real = np.random.default_rng(seed), model.parameter_vector.dtype
     for kind in KINDS:

@@ -38,7 +38,8 @@ class Model:
     """Equations of motion H(q) v_dot + C(q, v) = [0 (6); tau] + J^T f of one tail, SI units.
 
     q (nq = 7 + 2m): position of B in the world, quaternion (w, x, y, z) of any norm but 0, tail coordinates: joint
-    angles (alpha_i, beta_i) of an articulated tail, bend components (a_i, b_i) of a continuum.
+    angles (alpha_i, beta_i) of an articulated tail, bend components (a_i, b_i) of a continuum, or polar angles
+    (phi_i, theta_i) of one whose scene has coordinates = "polar", which is for comparison only.
     v (nv = 6 + 2m): velocity of B in the world, angular velocity in the body frame, rates of the tail coordinates.
     Every method also takes arrays with a leading batch axis; a single state is repeated over a batch.  All raise
     StateError on a wrong shape or a value that is not finite, ModelError where the scene left the function out.

@@ -80,8 +80,8 @@ class ExactContinuum:
         return _rounded(np.concatenate([frames[0][0][0], *slices]))
 
     def _exact(self, vector):
-        """The float64 entries as numbers of this continuum's context."""
-        return np.array([self.mp.mpf(entry) for entry in np.asarray(vector, dtype=float).tolist()])
+        """The entries, float64 or already numbers of this continuum's context, as such numbers."""
+        return np.array([entry if isinstance(entry, self.mp.mpf) else self.mp.mpf(float(entry)) for entry in vector])
 
     def _jacobian(self, q):
         """J^T (nv, 3 points): the rates of all points in the motion along each coordinate."""

@@ -12,7 +12,11 @@ from ..templating import render
 from .c_function import CFunction, Routine, dialect, in_loops, routine_arguments, routine_lines, straight_line
 
 STRAIGHT_UP_TO = 5000  # operations: beyond, the text leaves the instruction cache and compile time grows
-COORDINATES = {"articulated": "alpha_1, beta_1, ... of the joints", "continuum": "a_1, b_1, ... of the segments' bend"}
+COORDINATES = {
+    "joint": "alpha_1, beta_1, ... of the joints",
+    "bend": "a_1, b_1, ... of the segments' bend",
+    "polar": "phi_1, theta_1, ... of the segments' bend",
+}
 PIECES = {"articulated": "links", "continuum": "samples"}
 
 
@@ -157,7 +161,8 @@ def c_context(scene: Scene, tail: Tail, emitted: list[Emitted], version: str) ->
         "most": "FLT_MAX" if scene.real == "float" else "DBL_MAX",
         "sqrt": dialect(scene.real).functions["sqrt"],
         "version": version,
-        "coordinates": COORDINATES[scene.kind],
+        "coordinates": COORDINATES[scene.coordinates],
+        "polar": tail.polar,
         "content_hash": "",
         "abi_hash": abi_hash(scene, views),
         "tail": tail,
