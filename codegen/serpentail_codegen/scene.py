@@ -17,12 +17,15 @@ KINDS = ("articulated", "continuum")
 FUNCTIONS = (
     "mass_matrix", "bias_force", "inverse_dynamics", "forward_dynamics", "forward_dynamics_external",
     "energy", "momentum", "tail_points", "tail_point_jacobians",
-    "mass_matrix_world", "bias_force_world", "rollout",
-    "inverse_dynamics_derivatives", "forward_dynamics_derivatives",
-    "inverse_dynamics_parameter_derivatives", "forward_dynamics_parameter_derivatives",
+    "mass_matrix_world", "bias_force_world", "rollout", "forward_dynamics_derivatives",
+)
+ON_DEMAND = (  # emitted where a scene names them
+    "inverse_dynamics_derivatives", "inverse_dynamics_parameter_derivatives", "forward_dynamics_parameter_derivatives",
     "inverse_dynamics_vjp", "forward_dynamics_jvp", "forward_dynamics_vjp", "inverse_dynamics_hessian",
     "energy_derivatives", "momentum_derivatives",
 )
+ALL = (*FUNCTIONS, *ON_DEMAND)
+DERIVATIVES = (*ON_DEMAND, "forward_dynamics_derivatives")
 # Names used elsewhere for the same things: suggested, never accepted.
 ALIASES = {"crba": "mass_matrix", "nle": "bias_force", "rnea": "inverse_dynamics", "aba": "forward_dynamics",
            "m": "segments", "n": "links", "tail": "kind"}
@@ -188,6 +191,10 @@ def parse_scene(table: Mapping[str, Any], name: str) -> Scene:
     own = ONLY[kind]
     values = {key: default for key, (default, _) in KEYS.items()} | {"name": name, "coordinates": own.coordinates[0]}
     values |= dict.fromkeys(own.required) | dict(table)
+    if values["functions"] == "all":
+        values["functions"] = ALL
+    if values["coordinates"] == "polar" and "functions" not in table:
+        values["functions"] = tuple(name for name in FUNCTIONS if name not in DERIVATIVES)
     problems = _unknown_keys(table, "", KEYS) + _key_problems(values) + _kind_problems(table, own)
     problems += _function_problems(values["functions"])
     try:
@@ -199,7 +206,7 @@ def parse_scene(table: Mapping[str, Any], name: str) -> Scene:
         problems += _single_problems(values["parameters"])
     if problems:
         raise SceneError(problems)
-    values["functions"] = tuple(function for function in FUNCTIONS if function in values["functions"])
+    values["functions"] = tuple(function for function in ALL if function in values["functions"])
     return Scene(**{field.name: values[field.name] for field in fields(Scene)})
 
 
@@ -304,7 +311,16 @@ def _kind_problems(table: Mapping[str, Any], own: Only) -> list[Problem]:
         choices = " or ".join(f'"{name}"' for name in own.coordinates)
         remedy = f"needs {choices}; polar angles are singular at theta = 0, convert states"
         problems.append(Problem("coordinates", table["coordinates"], remedy))
+    elif table.get("coordinates") == "polar" and (wanted := _derivatives_in(table.get("functions"))):
+        remedy = f'has no derivatives, such as {wanted[0]}: use "bend", which has'
+        problems.append(Problem("coordinates", "polar", remedy))
     return problems
+
+
+def _derivatives_in(wanted: Any) -> list[str]:
+    """Return the derivatives among wanted functions."""
+    names = ALL if wanted == "all" else wanted if isinstance(wanted, list | tuple) else ()
+    return [name for name in names if name in DERIVATIVES]
 
 
 def _single_problems(parameters: Mapping[str, Value]) -> list[Problem]:
@@ -324,12 +340,12 @@ def _tail_links(values: Mapping[str, Any]) -> int:
 def _function_problems(wanted: Any) -> list[Problem]:
     """Return a problem for each entry that is unknown or listed before, or one for what is no array."""
     if not isinstance(wanted, list | tuple) or not wanted:
-        remedy = 'needs an array of names, such as ["mass_matrix"]; leave it out for all functions'
+        remedy = 'needs an array of names, such as ["mass_matrix"]; leave it out for the usual ones, or "all"'
         return [Problem("functions", wanted, remedy)]
     problems = []
     for i, name in enumerate(wanted):
-        if name not in FUNCTIONS:
-            problems.append(Problem(f"functions[{i}]", name, f"unknown; {_suggest(name, FUNCTIONS)}"))
+        if name not in ALL:
+            problems.append(Problem(f"functions[{i}]", name, f"unknown; {_suggest(name, ALL)}"))
         elif name in wanted[:i]:
             problems.append(Problem(f"functions[{i}]", name, "listed before; remove one of the two"))
     return problems

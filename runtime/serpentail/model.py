@@ -158,6 +158,54 @@ class Model:
         """C (nv,) for velocities (p_dot, omega in world axes, q_t_dot); the argument v has omega in the body frame."""
         return self.kernel("bias_force_world")(q, v)
 
+    def forward_dynamics_derivatives(self, q, v, tau):
+        """(dq (nv, nv), dv (nv, nv), dtau (nv, 2m)): exact Jacobians of v_dot of Eq. 1, -H^-1 d(H v_dot + C).
+
+        dq is taken in the tangent space of q, as all derivatives are: column k is the rate of v_dot when q moves with
+        the velocity e_k, so columns 3 to 5 are turns of the torso in the body frame.
+        """
+        return self.kernel("forward_dynamics_derivatives")(q, v, tau)
+
+    def forward_dynamics_parameter_derivatives(self, q, v, tau):
+        """(nv, number of parameters): Jacobian of v_dot, in the order of ``casadi.parameter_vector``."""
+        return self.kernel("forward_dynamics_parameter_derivatives")(q, v, tau)
+
+    def forward_dynamics_jvp(self, q, v, tau, dq, dv, dtau):
+        """Derivative of v_dot (nv,) in the direction dq (nv,), dv (nv,), dtau (2m,), without forming Jacobians."""
+        return self.kernel("forward_dynamics_jvp")(q, v, tau, dq, dv, dtau)
+
+    def forward_dynamics_vjp(self, q, v, tau, multiplier):
+        """(dq (nv,), dv (nv,), dtau (2m,)): gradient of multiplier^T v_dot, without forming Jacobians."""
+        return self.kernel("forward_dynamics_vjp")(q, v, tau, multiplier)
+
+    def inverse_dynamics_derivatives(self, q, v, v_dot):
+        """(dq (nv, nv), dv (nv, nv)): exact Jacobians of H v_dot + C; that with respect to v_dot is H."""
+        return self.kernel("inverse_dynamics_derivatives")(q, v, v_dot)
+
+    def inverse_dynamics_parameter_derivatives(self, q, v, v_dot):
+        """(nv, number of parameters): Jacobian of H v_dot + C, in the order of ``casadi.parameter_vector``."""
+        return self.kernel("inverse_dynamics_parameter_derivatives")(q, v, v_dot)
+
+    def inverse_dynamics_vjp(self, q, v, v_dot, multiplier):
+        """(dq (nv,), dv (nv,), dv_dot (nv,)): gradient of multiplier^T (H v_dot + C)."""
+        return self.kernel("inverse_dynamics_vjp")(q, v, v_dot, multiplier)
+
+    def inverse_dynamics_hessian(self, q, v, v_dot, multiplier):
+        """(qq, qv, vv, aq), each (nv, nv): second derivatives of multiplier^T (H v_dot + C).
+
+        qq by turns through the exponential map, symmetric; qv has rows of q; aq = d(H multiplier)/dq has rows of v_dot.
+        The blocks (v_dot, v_dot) and (v_dot, v) are zero.
+        """
+        return self.kernel("inverse_dynamics_hessian")(q, v, v_dot, multiplier)
+
+    def energy_derivatives(self, q, v):
+        """(kinetic_dq, kinetic_dv, potential_dq), each (nv,): gradients of both energies."""
+        return self.kernel("energy_derivatives")(q, v)
+
+    def momentum_derivatives(self, q, v):
+        """(linear_dq, linear_dv, angular_dq, angular_dv), each (3, nv): Jacobians of ``momentum``."""
+        return self.kernel("momentum_derivatives")(q, v)
+
     crba = mass_matrix
     nle = bias_force
     rnea = inverse_dynamics
