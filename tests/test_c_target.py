@@ -16,13 +16,14 @@ import pytest
 
 from models import model_folder
 from references.parameters import random_states
-from serpentail_codegen.functions import FUNCTIONS, program
+from serpentail_codegen.catalogue import CATALOGUE
+from serpentail_codegen.functions import program
 from serpentail_codegen.interpret import Numbers, Run
 from serpentail_codegen.pipeline import tail_of
 from serpentail_codegen.scene import FUNCTIONS as NAMES
 from serpentail_codegen.scene import parse_scene
 from serpentail_codegen.tape import Step
-from serpentail_codegen.targets.c_function import step_lines
+from serpentail_codegen.targets.c_function import Routine, routine_lines
 
 STRICT = ("-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Wdouble-promotion", "-Wshadow", "-Werror")
 C99 = ("-std=c99", *STRICT)
@@ -247,7 +248,7 @@ def parameter_values(model):
 
 def interpreted(model, name, arguments, arithmetic):
     """Run a function's program; return its outputs."""
-    p = program(FUNCTIONS[name], tail_of(model.scene))
+    p = program(CATALOGUE[name], tail_of(model.scene))
     known = parameter_values(model) | arguments
     arrays = (*p.of_role("parameters"), *p.of_role("input"))
     values = Run(p, arithmetic, {a.name: [arithmetic.convert(x) for x in known[a.name]] for a in arrays}).values
@@ -432,7 +433,7 @@ SWAP = Step("swap", "Exchange.", (("x", 3),), (("x", 3),), (("input", 0), ("inpu
 
 
 def test_outputs_of_a_step_may_overwrite_its_inputs(tmp_path):
-    lines = "\n".join(step_lines(SWAP, "double", "x"))
+    lines = "\n".join(routine_lines(Routine(SWAP), "double", "x"))
     source, path = tmp_path / "swap.c", tmp_path / "swap.so"
     source.write_text(f"#define real double\nvoid swap(const real *x, real *x_out)\n{{\n{lines}\n}}\n")
     run("gcc", "-std=c99", "-shared", "-fPIC", source, "-o", path)

@@ -7,7 +7,7 @@ overwritten before the way back needs it is kept, one copy for each turn of its 
 from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 
-from .compose import influencing, names, pruned, reached, writes
+from .compose import influencing, pruned, reached, writes
 from .differentiate import adjoint
 from .program import Apply, Array, Copy, Fill, Guard, Index, Loop, Program, Ref, as_index, statements
 

@@ -9,6 +9,24 @@ from functools import cache
 from .tape import Step, Tape, compacted, live_nodes, replay
 
 
+def _quotient(tape: Tape, y: int, a: int, b: int) -> tuple[int, int]:
+    inverse = tape.div(tape.const(1), b)
+    return inverse, tape.neg(tape.mul(y, inverse))
+
+
+# partial derivatives of y = op(operands) with respect to each operand
+PARTIALS = {
+    "add": lambda tape, y, a, b: (tape.const(1), tape.const(1)),
+    "sub": lambda tape, y, a, b: (tape.const(1), tape.const(-1)),
+    "mul": lambda tape, y, a, b: (b, a),
+    "div": _quotient,
+    "neg": lambda tape, y, a: (tape.const(-1),),
+    "sin": lambda tape, y, a: (tape.cos(a),),
+    "cos": lambda tape, y, a: (tape.neg(tape.sin(a)),),
+    "sqrt": lambda tape, y, a: (tape.div(tape.const(0.5), y),),
+}
+
+
 class Rules:
     """Partial derivatives of the operations, recorded on a tape beside the values."""
 
@@ -17,26 +35,15 @@ class Rules:
         self.count = sum(size for _, size in step.inputs)
         self.values = replay(step.nodes, [self.tape.input(k) for k in range(self.count)], self.tape)
 
-    def partials(self, node: int) -> list[tuple[int, int]]:
-        """Return (operand, node of the partial derivative) for each operand of an operation."""
-        tape, values = self.tape, self.values
+    def partials(self, node: int) -> dict[int, int]:
+        """Return the node of the partial derivative for each operand of an operation."""
         op, *args = self.step.nodes[node]
-        one = tape.const(1)
-        if op == "mul" and args[0] == args[1]:
-            return [(args[0], tape.add(values[args[0]], values[args[0]]))]
-        if op == "mul":
-            return [(args[0], values[args[1]]), (args[1], values[args[0]])]
-        if op == "div":
-            inverse = tape.div(one, values[args[1]])
-            return [(args[0], inverse), (args[1], tape.neg(tape.mul(values[node], inverse)))]
-        if op == "sin":
-            return [(args[0], tape.cos(values[args[0]]))]
-        if op == "cos":
-            return [(args[0], tape.neg(tape.sin(values[args[0]])))]
-        if op == "sqrt":
-            return [(args[0], tape.div(tape.const(0.5), values[node]))]
-        signs = {"add": (1, 1), "sub": (1, -1), "neg": (-1,)}[op]
-        return [(a, tape.const(sign)) for a, sign in zip(args, signs, strict=True)]
+        out: dict[int, int] = {}
+        for operand, partial in zip(
+            args, PARTIALS[op](self.tape, self.values[node], *(self.values[a] for a in args)), strict=True
+        ):
+            out[operand] = self.tape.add(out[operand], partial) if operand in out else partial
+        return out
 
     def finish(self, prefix: str, doc: str, inputs, outputs, results) -> Step:
         """Return what was recorded as a step."""
@@ -68,7 +75,7 @@ def tangent(step: Step, active: frozenset[str]) -> Step:
     for node, (op, *args) in enumerate(step.nodes):
         total = slopes.get(args[0], tape.const(0)) if op == "input" else tape.const(0)
         if op not in ("input", "const"):
-            for operand, partial in rules.partials(node):
+            for operand, partial in rules.partials(node).items():
                 total = tape.add(total, tape.mul(partial, change[operand]))
         change.append(total)
     outputs = (*step.outputs, *((f"d_{name}", size) for name, size in step.outputs))
@@ -91,7 +98,7 @@ def adjoint(step: Step, wanted: frozenset[str], given: frozenset[str]) -> Step:
             count += len(span)
     for node in reversed(live_nodes(step.nodes, step.results)):
         if step.nodes[node][0] not in ("input", "const"):
-            for operand, partial in rules.partials(node):
+            for operand, partial in rules.partials(node).items():
                 weight[operand] = tape.add(weight[operand], tape.mul(partial, weight[node]))
     position = {args[0]: node for node, (op, *args) in enumerate(step.nodes) if op == "input"}
     outputs, results = [], []

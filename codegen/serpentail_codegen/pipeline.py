@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from . import __version__
+from .catalogue import CATALOGUE
 from .draft import Tail
-from .derivatives import CATALOGUE
 from .functions import FUNCTIONS
 from .scene import Scene
 from .targets.c import c_context, c_files, emit
@@ -21,7 +21,9 @@ def generate(scene: Scene, output: Path) -> list[str]:
     context = c_context(scene, tail, emitted, __version__)
     context["content_hash"] = digest("".join(c_files(scene, context).values()))[:16]
     files = c_files(scene, context)
-    module = casadi_module(scene, tail, [f for f in wanted if f.name in FUNCTIONS], __version__, context["content_hash"])
+    module = casadi_module(
+        scene, tail, [f for f in wanted if f.name in FUNCTIONS], __version__, context["content_hash"]
+    )
     files[f"{scene.name}_casadi.py"] = module
     return write_folder(output / scene.name, files, manifest(scene, context, emitted))
 

@@ -85,7 +85,7 @@ class Array:
 
 @dataclass(frozen=True)
 class Ref:
-    """``size`` scalars of an array from an offset on, ``stride`` apart; with ``lane``, lanes of the one at the offset."""
+    """``size`` scalars of an array from an offset on, ``stride`` apart; with ``lane``, lanes of the first."""
 
     array: Array
     offset: Index

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from ..program import Index
 from ..schedule import scheduled
-from ..tape import BINARY, lanes_of, live_nodes, operands
+from ..tape import BINARY, LEAVES, lanes_of, live_nodes, operands
 
 LEAST_SINGLE = 2.0**-126
 SYMBOL = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
@@ -78,16 +78,19 @@ class Scalars:
                 self.text[node] = self.text[op, args[0]]
                 continue
             text = self._expression(op, args)
-            once = self.uses[node] == 1 and node not in self.abroad
-            if op in ("const", "lane") or (op == "input" and not self.lanes[node]):
-                self.text[node] = text
-            elif op in ("mul", "neg") and once:
+            if self._goes_into_its_use(node):
                 self.text[node] = text
             else:
                 self.text[node] = name = self._name()
                 form = self.dialect.row if self.lanes[node] else self.dialect.definition
                 out.append(form.format(name=name, text=text))
         return out
+
+    def _goes_into_its_use(self, node: int) -> bool:
+        op = self.nodes[node][0]
+        if op in ("mul", "neg"):
+            return self.uses[node] == 1 and node not in self.abroad
+        return op in ("const", "lane") or (op == "input" and not self.lanes[node])
 
     def _name(self) -> str:
         self.count += 1
@@ -103,20 +106,19 @@ class Scalars:
         return [self.dialect.sincos.format(argument=self.text[argument], **names)]
 
     def _expression(self, op: str, args) -> str:
-        if op == "input":
-            name = self.names[args[0]]
-            return self.dialect.load.format(address=name) if name.startswith("&") else name
-        if op == "unit":
-            return self.dialect.load.format(address=f"&one[{args[1] - 1 - args[0]}]")
-        if op == "lane":
-            return f"work[{self.stored[args[0]] + args[1]}]"
-        if op == "const":
-            return self.dialect.literal(args[0])
         if op in BINARY:
             return f"{self._operand(args[0], op)} {SYMBOL[op]} {self._operand(args[1], op)}"
         if op == "neg":
             return f"-{self._operand(args[0], op)}"
-        return f"{self.dialect.functions[op]}({self.text[args[0]]})"
+        if op == "lane":
+            return f"work[{self.stored[args[0]] + args[1]}]"
+        return self._leaf(op, args) if op in LEAVES else f"{self.dialect.functions[op]}({self.text[args[0]]})"
+
+    def _leaf(self, op: str, args) -> str:
+        if op == "const":
+            return self.dialect.literal(args[0])
+        address = f"&one[{args[1] - 1 - args[0]}]" if op == "unit" else self.names[args[0]]
+        return self.dialect.load.format(address=address) if address.startswith("&") else address
 
     def _operand(self, node: int, op: str) -> str:
         text, product = self.text[node], self.nodes[node][0] == "mul"

@@ -77,13 +77,6 @@ STEP golden_loops_copy(int size, const real *source, real *target)
   }
 }
 
-STEP golden_loops_add(int size, const real *terms, real *sums)
-{
-  for (int k = 0; k < size; ++k) {
-    sums[k] += terms[k];
-  }
-}
-
 /* R_b from (w, x, y, z); only the direction of the quaternion counts, so it need not be normalised. */
 STEP golden_loops_quaternion_rotation(const real *quaternion, real *R_out)
 {
@@ -269,7 +262,7 @@ STEP golden_loops_link_wrench(const real *link, const real *w, const real *w_dot
 }
 
 /* Add what the next link passes on, read the joint torques (A5 on Eq. 17), pass on to the parent frame. */
-STEP golden_loops_gather_wrench(const real *joint, const real *link, const real *F, const real *F_next, real *F_next_out, real *torque_out)
+STEP golden_loops_gather_wrench_add_torque(const real *joint, const real *link, const real *F, const real *F_next, real *F_next_out, real *torque_out)
 {
   const real t0 = F_next[3] - link[1] * F_next[2];
   const real t1 = F[3] + t0;
@@ -293,8 +286,8 @@ STEP golden_loops_gather_wrench(const real *joint, const real *link, const real 
   F_next_out[3] = t11;
   F_next_out[4] = t14;
   F_next_out[5] = t15;
-  torque_out[0] = t11;
-  torque_out[1] = t8;
+  torque_out[0] += t11;
+  torque_out[1] += t8;
 }
 
 /* Inertial wrench of torso and tail at B (Eq. 3), ``F_next`` being the tail's at its mount. */
@@ -367,7 +360,7 @@ STEP golden_loops_double_angles(const real *joint, real *twice_out)
 }
 
 /* Spatial columns of one joint at B: (x_{j-1}, p_j x x_{j-1}) and (z_j, p_j x z_j) (Eqs. A5, A7). */
-STEP golden_loops_joint_twist(const real *joint, const real *R, const real *P, real *S_out)
+STEP golden_loops_joint_twist_add_S(const real *joint, const real *R, const real *P, real *S_out)
 {
   const real t0 = joint[0] * R[2] - joint[1] * R[1];
   const real t1 = joint[0] * R[5] - joint[1] * R[4];
@@ -381,18 +374,18 @@ STEP golden_loops_joint_twist(const real *joint, const real *R, const real *P, r
   const real r0 = R[0];
   const real r1 = R[3];
   const real r2 = R[6];
-  S_out[0] = r0;
-  S_out[1] = r1;
-  S_out[2] = r2;
-  S_out[3] = t3;
-  S_out[4] = t4;
-  S_out[5] = t5;
-  S_out[6] = t0;
-  S_out[7] = t1;
-  S_out[8] = t2;
-  S_out[9] = t6;
-  S_out[10] = t7;
-  S_out[11] = t8;
+  S_out[0] += r0;
+  S_out[1] += r1;
+  S_out[2] += r2;
+  S_out[3] += t3;
+  S_out[4] += t4;
+  S_out[5] += t5;
+  S_out[6] += t0;
+  S_out[7] += t1;
+  S_out[8] += t2;
+  S_out[9] += t6;
+  S_out[10] += t7;
+  S_out[11] += t8;
 }
 
 /* R_j = R_{j-1} R_x R_z (Eqs. 11, 12) and the next joint p_j+1 = p_j - L y_j (Eqs. 14, 15). */
@@ -428,7 +421,7 @@ STEP golden_loops_link_pose(const real *joint, const real *link, const real *R, 
 }
 
 /* One link of the tip-to-base sweep of Eq. 16: composite inertia and the momentum columns of the segment. */
-STEP golden_loops_gather_links(const real *joint, const real *twice, const real *link, const real *mass, const real *h, const real *I, const real *pitch, const real *yaw, real *mass_out, real *h_out, real *I_out, real *pitch_out, real *yaw_out, real *H_pp_out, real *H_py_out, real *H_yy_out)
+STEP golden_loops_gather_links_add_H_pp_H_py_H_yy(const real *joint, const real *twice, const real *link, const real *mass, const real *h, const real *I, const real *pitch, const real *yaw, real *mass_out, real *h_out, real *I_out, real *pitch_out, real *yaw_out, real *H_pp_out, real *H_py_out, real *H_yy_out)
 {
   const real t0 = h[1] - link[1] * mass[0];
   const real t1 = h[1] + t0;
@@ -524,9 +517,9 @@ STEP golden_loops_gather_links(const real *joint, const real *twice, const real 
   yaw_out[3] = t45;
   yaw_out[4] = t61;
   yaw_out[5] = t62;
-  H_pp_out[0] = t70;
-  H_py_out[0] = t53;
-  H_yy_out[0] = t54;
+  H_pp_out[0] += t70;
+  H_py_out[0] += t53;
+  H_yy_out[0] += t54;
 }
 
 /* Momentum columns of a segment, from its root frame at ``P`` to the torso frame at B. */
@@ -686,6 +679,29 @@ STEP golden_loops_without_translation(const real *mass, const real *h, const rea
   A_2_out[2] = t14;
 }
 
+/* Coupling of omega with one tail coordinate about the COM: n_k - c x f_k. */
+STEP golden_loops_column_without_translation(const real *com, const real *column, real *A_row_out)
+{
+  const real t0 = column[3] + com[2] * column[1];
+  const real t1 = column[4] + com[0] * column[2];
+  const real t2 = column[5] + com[1] * column[0];
+  const real t3 = t0 - com[1] * column[2];
+  const real t4 = t1 - com[2] * column[0];
+  const real t5 = t2 - com[0] * column[1];
+  A_row_out[0] = t3;
+  A_row_out[1] = t4;
+  A_row_out[2] = t5;
+}
+
+/* What eliminating translation takes from H_kl: f_k . f_l / M. */
+STEP golden_loops_pair_without_translation_add_A_entry(const real *inverse_mass, const real *column, const real *other, real *A_entry_out)
+{
+  const real t0 = column[0] * other[0] + column[1] * other[1];
+  const real t1 = t0 + column[2] * other[2];
+  const real r0 = -(inverse_mass[0] * t1);
+  A_entry_out[0] += r0;
+}
+
 /* Right-hand side for omega_dot: applied minus inertial moment about the COM; and the net force. */
 STEP golden_loops_rotational_load(const real *com, const real *force, const real *moment, const real *load_force, const real *load_moment, real *net_out, real *rhs_out)
 {
@@ -709,29 +725,6 @@ STEP golden_loops_rotational_load(const real *com, const real *force, const real
   rhs_out[2] = t11;
 }
 
-/* Coupling of omega with one tail coordinate about the COM: n_k - c x f_k. */
-STEP golden_loops_column_without_translation(const real *com, const real *column, real *A_row_out)
-{
-  const real t0 = column[3] + com[2] * column[1];
-  const real t1 = column[4] + com[0] * column[2];
-  const real t2 = column[5] + com[1] * column[0];
-  const real t3 = t0 - com[1] * column[2];
-  const real t4 = t1 - com[2] * column[0];
-  const real t5 = t2 - com[0] * column[1];
-  A_row_out[0] = t3;
-  A_row_out[1] = t4;
-  A_row_out[2] = t5;
-}
-
-/* What eliminating translation takes from H_kl: f_k . f_l / M. */
-STEP golden_loops_pair_without_translation(const real *inverse_mass, const real *column, const real *other, real *A_entry_out)
-{
-  const real t0 = column[0] * other[0] + column[1] * other[1];
-  const real t1 = t0 + column[2] * other[2];
-  const real r0 = -(inverse_mass[0] * t1);
-  A_entry_out[0] = r0;
-}
-
 /* Right-hand side for one tail coordinate, translation eliminated: tau - c_k - f_k . net / M. */
 STEP golden_loops_tail_load(const real *inverse_mass, const real *net, const real *column, const real *inertial, const real *tau, real *rhs_out)
 {
@@ -743,14 +736,14 @@ STEP golden_loops_tail_load(const real *inverse_mass, const real *net, const rea
 }
 
 /* f_k q_ddot_k: the momentum rate that one tail coordinate gives at rest of B. */
-STEP golden_loops_column_acceleration(const real *column, const real *acceleration, real *tail_force_out)
+STEP golden_loops_column_acceleration_add_tail_force(const real *column, const real *acceleration, real *tail_force_out)
 {
   const real r0 = column[0] * acceleration[0];
   const real r1 = column[1] * acceleration[0];
   const real r2 = column[2] * acceleration[0];
-  tail_force_out[0] = r0;
-  tail_force_out[1] = r1;
-  tail_force_out[2] = r2;
+  tail_force_out[0] += r0;
+  tail_force_out[1] += r1;
+  tail_force_out[2] += r2;
 }
 
 /* p_b_ddot = R_b (net - omega_dot x h - sum f_k q_ddot_k) / M - g z. */
@@ -780,8 +773,8 @@ STEP golden_loops_base_acceleration(const real *R, const real *gravity, const re
   p_ddot_out[2] = t18;
 }
 
-/* Solve A x = x in place by LDL^T without pivoting; A (lower triangle, row-major) is overwritten. */
-static int golden_loops_ldl_solve(int size, real *A, real *x)
+/* Factor A = L D L^T in place without pivoting (lower triangle, row-major): L below 1 / D on the diagonal. */
+static int golden_loops_ldl_factor(int size, real *A)
 {
   for (int k = 0; k < size; ++k) {
     const real pivot = A[k * size + k];
@@ -792,21 +785,33 @@ static int golden_loops_ldl_solve(int size, real *A, real *x)
     for (int i = k + 1; i < size; ++i) {
       const real column = A[i * size + k];
       const real factor = column * inverse;
-      x[i] -= factor * x[k];
       for (int j = k + 1; j < i; ++j) {
         A[i * size + j] -= A[j * size + k] * column;
       }
       A[i * size + i] -= factor * column;
       A[i * size + k] = factor;
     }
-    x[k] *= inverse;
+    A[k * size + k] = inverse;
+  }
+  return STATUS_OK;
+}
+
+/* Solve L D L^T x = x in place. */
+static void golden_loops_ldl_solve(int size, const real *A, real *x)
+{
+  for (int k = 0; k < size; ++k) {
+    for (int i = k + 1; i < size; ++i) {
+      x[i] -= A[i * size + k] * x[k];
+    }
+  }
+  for (int k = 0; k < size; ++k) {
+    x[k] *= A[k * size + k];
   }
   for (int k = size - 1; k > 0; --k) {
     for (int i = 0; i < k; ++i) {
       x[i] -= A[k * size + i] * x[k];
     }
   }
-  return STATUS_OK;
 }
 
 /* C(q, v) of Eq. 3, gravity included */
@@ -814,11 +819,11 @@ int golden_loops_bias_force(const golden_loops_parameters *parameters, const gol
                             const golden_loops_real *v, golden_loops_real *force, golden_loops_real *work)
 {
   real R[9];
-  static const real share[1] = {0.25};
   real link[6];
+  static const real share[1] = {0.25};
   real joint[8];
-  static const real still[3] = {0.0, 0.0, 0.0};
   real a[3];
+  static const real still[3] = {0.0, 0.0, 0.0};
   real w_here[3];
   real w_dot_here[3];
   real a_here[3];
@@ -850,12 +855,7 @@ int golden_loops_bias_force(const golden_loops_parameters *parameters, const gol
     force[2 * i + 6] = 0.0;
     force[2 * i + 7] = 0.0;
     for (int j = 1; j >= 0; --j) {
-      {
-        real torque_new[2];
-        golden_loops_gather_wrench(joint + 4 * i, link, wrench + 12 * i + 6 * j, F_next, F_next, torque_new);
-        force[2 * i + 6] += torque_new[0];
-        force[2 * i + 7] += torque_new[1];
-      }
+      golden_loops_gather_wrench_add_torque(joint + 4 * i, link, wrench + 12 * i + 6 * j, F_next, F_next, force + 2 * i + 6);
     }
   }
   golden_loops_torso_wrench(parameters->tail_mount, &parameters->torso_mass, parameters->torso_inertia, v + 3, still, a, F_next, force, force + 3);
@@ -869,8 +869,8 @@ int golden_loops_forward_dynamics(const golden_loops_parameters *parameters, con
                                   golden_loops_real *work)
 {
   real R[9];
-  static const real share[1] = {0.25};
   real link[6];
+  static const real share[1] = {0.25};
   real joint[8];
   real *const twice = work + 0;
   real R_link[9];
@@ -898,9 +898,9 @@ int golden_loops_forward_dynamics(const golden_loops_parameters *parameters, con
   real moment[3];
   real inverse_mass[1];
   real com[3];
+  real net_v_dot[3];
   static const real unloaded[3] = {0.0, 0.0, 0.0};
-  real net[3];
-  real tail_force[3];
+  real tail_force_v_dot[3];
   golden_loops_quaternion_rotation(q + 3, R);
   golden_loops_link_properties(&parameters->tail_mass, &parameters->tail_length, parameters->link_inertia, share, link);
   for (int i = 0; i < 2; ++i) {
@@ -926,11 +926,7 @@ int golden_loops_forward_dynamics(const golden_loops_parameters *parameters, con
     P_root[3 * i + 2] = P_link[2];
     golden_loops_fill(12, 0.0, S + 12 * i);
     for (int j = 0; j < 2; ++j) {
-      {
-        real S_new[12];
-        golden_loops_joint_twist(joint + 4 * i, R_link, P_link, S_new);
-        golden_loops_add(12, S_new, S + 12 * i);
-      }
+      golden_loops_joint_twist_add_S(joint + 4 * i, R_link, P_link, S + 12 * i);
       golden_loops_link_pose(joint + 4 * i, link, R_link, P_link, R_link, P_link);
     }
   }
@@ -950,15 +946,7 @@ int golden_loops_forward_dynamics(const golden_loops_parameters *parameters, con
     A[16 * i + 31] = 0.0;
     A[16 * i + 32] = 0.0;
     for (int j = 1; j >= 0; --j) {
-      {
-        real H_pp_new[1];
-        real H_py_new[1];
-        real H_yy_new[1];
-        golden_loops_gather_links(joint + 4 * i, twice + 10 * i, link, mass, h, I, pitch, yaw, mass, h, I, pitch, yaw, H_pp_new, H_py_new, H_yy_new);
-        A[16 * i + 24] += H_pp_new[0];
-        A[16 * i + 31] += H_py_new[0];
-        A[16 * i + 32] += H_yy_new[0];
-      }
+      golden_loops_gather_links_add_H_pp_H_py_H_yy(joint + 4 * i, twice + 10 * i, link, mass, h, I, pitch, yaw, mass, h, I, pitch, yaw, A + 16 * i + 24, A + 16 * i + 31, A + 16 * i + 32);
     }
     golden_loops_column_at_torso(R_root + 9 * i, P_root + 3 * i, pitch, yaw, columns + 12 * i);
   }
@@ -986,44 +974,32 @@ int golden_loops_forward_dynamics(const golden_loops_parameters *parameters, con
     inertial[2 * i] = 0.0;
     inertial[2 * i + 1] = 0.0;
     for (int j = 1; j >= 0; --j) {
-      {
-        real torque_new[2];
-        golden_loops_gather_wrench(joint + 4 * i, link, wrench + 12 * i + 6 * j, F_next, F_next, torque_new);
-        inertial[2 * i] += torque_new[0];
-        inertial[2 * i + 1] += torque_new[1];
-      }
+      golden_loops_gather_wrench_add_torque(joint + 4 * i, link, wrench + 12 * i + 6 * j, F_next, F_next, inertial + 2 * i);
     }
   }
   golden_loops_torso_wrench(parameters->tail_mount, &parameters->torso_mass, parameters->torso_inertia, v + 3, zero, zero, F_next, force, moment);
   golden_loops_without_translation(mass, h, I, inverse_mass, com, A, A + 7, A + 14);
-  golden_loops_rotational_load(com, force, moment, unloaded, unloaded, net, v_dot + 3);
   for (int k = 0; k < 4; ++k) {
     golden_loops_column_without_translation(com, columns + 6 * k, A + 7 * k + 21);
     for (int l = 0; l < k + 1; ++l) {
-      {
-        real A_entry_new[1];
-        golden_loops_pair_without_translation(inverse_mass, columns + 6 * k, columns + 6 * l, A_entry_new);
-        A[7 * k + l + 24] += A_entry_new[0];
-      }
+      golden_loops_pair_without_translation_add_A_entry(inverse_mass, columns + 6 * k, columns + 6 * l, A + 7 * k + l + 24);
     }
-    golden_loops_tail_load(inverse_mass, net, columns + 6 * k, inertial + k, tau + k, v_dot + k + 6);
   }
-  if (golden_loops_ldl_solve(7, A, v_dot + 3) != STATUS_OK) {
+  if (golden_loops_ldl_factor(7, A) != STATUS_OK) {
     return STATUS_NOT_POSITIVE_DEFINITE;
   }
-  tail_force[0] = 0.0;
-  tail_force[1] = 0.0;
-  tail_force[2] = 0.0;
+  golden_loops_rotational_load(com, force, moment, unloaded, unloaded, net_v_dot, v_dot + 3);
   for (int k = 0; k < 4; ++k) {
-    {
-      real tail_force_new[3];
-      golden_loops_column_acceleration(columns + 6 * k, v_dot + k + 6, tail_force_new);
-      tail_force[0] += tail_force_new[0];
-      tail_force[1] += tail_force_new[1];
-      tail_force[2] += tail_force_new[2];
-    }
+    golden_loops_tail_load(inverse_mass, net_v_dot, columns + 6 * k, inertial + k, tau + k, v_dot + k + 6);
   }
-  golden_loops_base_acceleration(R, &parameters->gravity, inverse_mass, h, net, v_dot + 3, tail_force, v_dot);
+  golden_loops_ldl_solve(7, A, v_dot + 3);
+  tail_force_v_dot[0] = 0.0;
+  tail_force_v_dot[1] = 0.0;
+  tail_force_v_dot[2] = 0.0;
+  for (int k = 0; k < 4; ++k) {
+    golden_loops_column_acceleration_add_tail_force(columns + 6 * k, v_dot + k + 6, tail_force_v_dot);
+  }
+  golden_loops_base_acceleration(R, &parameters->gravity, inverse_mass, h, net_v_dot, v_dot + 3, tail_force_v_dot, v_dot);
   return STATUS_OK;
 }
 

@@ -1,0 +1,76 @@
+"""Second derivatives: a tail's sizes go in, the loop nest of the Hessian of lambda^T (H v_dot + C) comes out."""
+
+from . import kinematics as kin
+from .adjoints import adjoint_program
+from .compose import inline
+from .derivatives import INERTIA_FORCE, VIRTUAL_POWER
+from .directions import TORSO, Directions
+from .draft import Draft
+from .functions import program
+from .program import Array, Index, Ref, as_index
+from .tangents import tangent_program
+
+
+def assemble_inverse_dynamics_hessian(d: Draft, arrays: dict[str, Array]) -> None:
+    """Tangents of the gradient of lambda^T (H v_dot + C) with respect to q and v; its mixed block by those of H lambda.
+
+    Only the lower triangle is computed: rows of segment i in the lanes of segments up to i.
+    """
+    tail, nv = d.tail, d.tail.nv
+    directions = Directions(tail, ("turn", "omega"))
+    inner = adjoint_program(program(VIRTUAL_POWER, tail), ("q", "v"), ("power",))
+    inner = tangent_program(inner, ("q", "v"), directions.count, directions.up_to)
+    b_q, b_v = d.wide("d_b_q", tail.nq, directions.count), d.wide("d_b_v", nv, directions.count)
+    given = {name: arrays[name] for name in ("q", "v", "v_dot", "multiplier")}
+    d_q = directions.tangents(d)
+    inline(d, inner, b_power=d.constant("one", [1]), d_b_q=b_q, d_b_v=b_v, **given, **d_q)
+    turn = d.wide("d_b_turn", 3, directions.count)
+    d.step(kin.turn_gradient, {"gradient": b_q.part(3, 4)}, turn=turn[0])
+    mirror(d, directions, {"turn": turn[0], "omega": b_v.part(3, 3)}, (b_q, b_v), arrays)
+    mixed_block(d, arrays)
+
+
+def mirror(d: Draft, directions: Directions, torso: dict[str, Ref], rows: tuple[Array, Array], out: dict) -> None:
+    """Copy the lower triangle of the Hessian to the blocks qq, qv and vv, and mirror it."""
+    nv, m = d.tail.nv, d.tail.segments
+    for name in ("qq", "qv", "vv"):
+        d.fill(out[name].part(0, nv * nv), 0)
+
+    def place(row: Ref, of_row: tuple[Index, bool], lane: Index, of_lane: tuple[Index, bool], size: int) -> None:
+        """Copy lanes of one row to the block it belongs to, and to the mirrored place."""
+        (r, row_is_q), (c, lane_is_q) = of_row, of_lane
+        source = row.array.lane(row.offset, lane, size)
+        block = out["qq" if row_is_q and lane_is_q else "qv" if row_is_q or lane_is_q else "vv"]
+        if row_is_q or not lane_is_q:
+            d.copy(block.part(nv * r + c, size), source)
+        if lane_is_q or not row_is_q:
+            d.copy(block.part(nv * c + r, size, nv), source)
+
+    def place_row(row: Ref, of_row: tuple[Index, bool], segments: Index | None) -> None:
+        for lane, name in enumerate(directions.torso):
+            column, is_q = TORSO[name]
+            place(row, of_row, as_index(3 * lane), (as_index(column), is_q), 3)
+        if segments:
+            with d.loop("l", segments) as other:
+                place(row, of_row, directions.of_q(other), (2 * other + 6, True), 2)
+                place(row, of_row, directions.of_v(other), (2 * other + 6, False), 2)
+
+    for name in directions.torso:
+        column, is_q = TORSO[name]
+        with d.loop("k", 3) as k:
+            place_row(torso[name].array.part(torso[name].offset + k, 1), (k + column, is_q), None)
+    with d.loop("i", m) as i, d.loop("k", 2) as k:
+        place_row(rows[0].part(2 * i + k + 7, 1), (2 * i + k + 6, True), i + 1)
+        place_row(rows[1].part(2 * i + k + 6, 1), (2 * i + k + 6, False), i + 1)
+
+
+def mixed_block(d: Draft, arrays: dict[str, Array]) -> None:
+    """d(H lambda)/dq: tangents of the inverse dynamics of the acceleration lambda at rest, without gravity."""
+    directions = Directions(d.tail, ("turn",), rates=False)
+    inner = tangent_program(program(INERTIA_FORCE, d.tail), ("q",), directions.count, directions.outward)
+    rows = d.wide("inertial_rows", d.tail.nv, directions.count)
+    still = d.array("at_rest", d.tail.nv)
+    d.fill(still.part(0, d.tail.nv), 0)
+    tangents = directions.tangents(d)
+    inline(d, inner, q=arrays["q"], v=still, v_dot=arrays["multiplier"], d_force=rows, **tangents)
+    directions.spread(d, rows, arrays["aq"])
