@@ -48,7 +48,7 @@ FIRST = {
 def derivative_model(segments, links, emission, **options):
     """A compiled model with all derivatives and what they are compared with."""
     wanted = [*DERIVATIVES, "mass_matrix", "inverse_dynamics", "forward_dynamics", "energy", "momentum"]
-    options = {"functions": wanted, "emission": emission, "name": "tail"} | options
+    options = {"emission": emission, "name": "tail", "functions": [*options.pop("functions", wanted)]} | options
     return st.load(model_folder(segments, links, **options))
 
 
@@ -112,13 +112,13 @@ def spans(size, nv):
     return BLOCKS if size == nv else (slice(None),)
 
 
-def jacobian_error(found, expected, nv):
+def jacobian_error(found, expected, nv, negligible=NEGLIGIBLE):
     """Largest over blocks of max|d| / max|ref|; a block that is negligible in its rows is scaled by them."""
     found, expected = np.atleast_2d(found), np.atleast_2d(expected)
     assert found.shape == expected.shape
     worst = 0.0
     for rows in spans(len(expected), nv):
-        floor = NEGLIGIBLE * np.max(np.abs(expected[rows]), initial=0) or 1.0
+        floor = negligible * np.max(np.abs(expected[rows]), initial=0) or 1.0
         for columns in spans(expected.shape[1], nv):
             one, other = found[rows, columns], expected[rows, columns]
             scale = max(np.max(np.abs(other), initial=0), floor)
