@@ -1,6 +1,5 @@
 """Derivatives by other means: states to try, a complex step through the loops of a function, and a fair measure."""
 
-import json
 from functools import cache
 from math import pi
 
@@ -10,7 +9,8 @@ import serpentail as st
 from models import model_folder
 from references.metrics import BLOCKS
 from references.parameters import random_states
-from serpentail_codegen.functions import FUNCTIONS, program
+from serpentail_codegen.derivatives import CATALOGUE
+from serpentail_codegen.functions import program
 from serpentail_codegen.interpret import Numbers, Run
 from serpentail_codegen.pipeline import tail_of
 from serpentail_codegen.scene import DERIVATIVES, parse_scene
@@ -79,21 +79,25 @@ def tangent_of_q(q):
 
 
 @cache
-def _program(folder, function):
-    manifest = json.loads((folder / "manifest.json").read_text())
-    scene = parse_scene(manifest["scene"], manifest["prefix"])
-    return program(FUNCTIONS[function], tail_of(scene))
+def nest_of(model, function):
+    """The loop nest of a model's function."""
+    scene = parse_scene(model.manifest["scene"], model.name)
+    return program(CATALOGUE[function], tail_of(scene))
+
+
+def parameters_of(model):
+    """The parameters of a model's functions by name."""
+    sizes = {a.name: a.length for a in nest_of(model, "mass_matrix").of_role("parameters")}
+    return dict(zip(sizes, np.split(model.parameter_vector, np.cumsum([*sizes.values()])[:-1]), strict=True))
 
 
 def complex_step(model, function, state, argument):
     """Derivatives of the outputs of a function with respect to one argument: name -> (length, directions)."""
-    nest = _program(model.folder, function)
-    sizes = {a.name: a.length for a in nest.of_role("parameters")}
-    vectors = dict(zip(sizes, np.split(model.parameter_vector, np.cumsum([*sizes.values()])[:-1]), strict=True))
-    vectors |= {a.name: state[a.name] for a in nest.of_role("input")}
+    nest, parameters = nest_of(model, function), parameters_of(model)
+    vectors = parameters | {a.name: state[a.name] for a in nest.of_role("input")}
     if argument == "parameters":
-        rows = np.split(np.eye(sum(sizes.values())), np.cumsum([*sizes.values()])[:-1])
-        directions = dict(zip(sizes, rows, strict=True))
+        unit = iter(np.eye(len(model.parameter_vector)))
+        directions = {name: np.array([next(unit) for _ in x]) for name, x in parameters.items()}
     else:
         x = state[argument]
         directions = {argument: tangent_of_q(x) if argument == "q" else np.eye(len(x))}
@@ -128,6 +132,4 @@ def jacobian_error(found, expected, nv, negligible=NEGLIGIBLE):
 
 def parameter_scales(model):
     """The magnitude of each parameter, so that its derivatives are forces; a zero has that of its vector."""
-    sizes = {a.name: a.length for a in _program(model.folder, "mass_matrix").of_role("parameters")}
-    parts = np.split(np.abs(model.parameter_vector), np.cumsum([*sizes.values()])[:-1])
-    return np.concatenate([np.full(len(part), part.max()) for part in parts])
+    return np.concatenate([np.full(len(part), np.abs(part).max()) for part in parameters_of(model).values()])
