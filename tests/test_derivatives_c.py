@@ -20,8 +20,7 @@ from serpentail_codegen.program import Apply, statements
 from serpentail_codegen.scene import DERIVATIVES
 
 FLOATS = Numbers(np, float)
-NAMES = (*DERIVATIVES, "mass_matrix")
-SIZES = [(2, 1, "loops"), (1, 2, "straight")]
+SIZES = [(2, 2, "loops"), (1, 3, "straight")]
 SIZES += [
     pytest.param(size, marks=pytest.mark.slow) for size in [(3, 2, "loops"), (2, None, "loops"), (1, None, "straight")]
 ]
@@ -36,7 +35,7 @@ every_function = pytest.mark.parametrize("name", DERIVATIVES)
 @pytest.fixture(scope="module", params=SIZES, ids=str)
 def model(request):
     """A compiled model with all derivatives."""
-    return derivative_model(*request.param, functions=NAMES)
+    return derivative_model(*request.param)
 
 
 def state_of(model, seed=5):
@@ -123,7 +122,7 @@ def test_lanes_that_are_left_out_are_not_looked_at(model, name):
 
 def test_some_lanes_are_left_out():
     """The check above has something to check: sweeps over segments compute what depends on them alone."""
-    model = derivative_model(2, 1, "loops", functions=NAMES)
+    model = derivative_model(2, 2, "loops")
     for name in ("inverse_dynamics_derivatives", "forward_dynamics_derivatives", "inverse_dynamics_hessian"):
         calls = [s for s, _ in statements(nest_of(model, name).body) if isinstance(s, Apply)]
         assert any(call.columns for call in calls), name
@@ -161,8 +160,8 @@ def test_batches_are_their_states_one_by_one(model, name):
 @pytest.mark.parametrize("emission", ["loops", pytest.param("straight", marks=pytest.mark.slow)])
 def test_single_precision(emission):
     """In float the same text holds twice the lanes; what comes out is right to single precision."""
-    options = {"functions": NAMES, "real": "float", "name": "tail_float"}
-    single, double = derivative_model(2, 1, emission, **options), derivative_model(2, 1, "loops", functions=NAMES)
+    options = {"functions": DERIVATIVES, "real": "float", "name": "tail_float"}
+    single, double = derivative_model(2, 2, emission, **options), derivative_model(2, 2, "loops")
     state = state_of(double)
     for name in DERIVATIVES:
         found = outputs(single, name, {key: x.astype(np.float32) for key, x in state.items()})
@@ -173,8 +172,8 @@ def test_single_precision(emission):
 @pytest.mark.parametrize("emission", ["loops", "straight"])
 def test_parameters_given_late_count_in_derivatives(emission):
     """Derivatives scale with the masses as forces do: exactly, by two."""
-    size = (2, 1, "loops") if emission == "loops" else (1, 2, "straight")
-    model = derivative_model(*size, functions=NAMES)
+    size = (2, 2, "loops") if emission == "loops" else (1, 3, "straight")
+    model = derivative_model(*size)
     p, state = model.parameters, state_of(model)
     twice = {name: 2 * np.array(p[name]) for name in ("torso_mass", "torso_inertia", "tail_mass", "link_inertia")}
     heavy = model.with_parameters(**{n: x.tolist() for n, x in twice.items()})
@@ -204,7 +203,7 @@ def test_function_left_out_is_named(name):
 
 @every_function
 def test_wrong_arguments_are_named(name):
-    model = derivative_model(2, 1, "loops", functions=NAMES)
+    model = derivative_model(2, 2, "loops")
     state = state_of(model)
     for k, argument in enumerate(a["name"] for a in model.manifest["functions"][name]["inputs"]):
         size = len(state[argument])
@@ -223,7 +222,7 @@ def test_wrong_arguments_are_named(name):
 
 @every_function
 def test_quaternions_without_direction_are_named(name):
-    model = derivative_model(2, 1, "loops", functions=NAMES)
+    model = derivative_model(2, 2, "loops")
     state = state_of(model)
     state["q"][3:7] = 0
     with pytest.raises(st.StateError, match=re.escape(f"{name}: the quaternion q[3:7] is zero")):
