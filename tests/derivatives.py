@@ -111,6 +111,12 @@ def complex_step(model, function, state, argument):
     }
 
 
+def tail_name(size):
+    """A name for a size and an emission."""
+    m, n, emission = size
+    return f"m{m}_n{n}_{emission}" if n else f"arcs{m}_{emission}"
+
+
 def spans(size, nv):
     """Blocks of rows or columns with the same unit."""
     return BLOCKS if size == nv else (slice(None),)

@@ -14,6 +14,7 @@ from derivatives import (
     jacobian_error,
     parameter_scales,
     states,
+    tail_name,
     tangent_of_q,
 )
 from references.metrics import block_error, equilibrated_condition
@@ -24,12 +25,6 @@ SLOW = [(1, 3, "loops"), (2, 2, "straight"), (3, 4, "straight"), (6, 6, "loops")
 SLOW += [(1, None, "straight"), (2, None, "loops"), (2, None, "straight"), (3, None, "loops")]
 ROUNDING = 1e-12  # largest error of a block, relative
 SOLVED = 1e-13  # the same for each unit of the condition number, where H is solved with
-
-
-def tail_name(size):
-    """A name for a size and an emission."""
-    m, n, emission = size
-    return f"m{m}_n{n}_{emission}" if n else f"arcs{m}_{emission}"
 
 
 PARAMS = [

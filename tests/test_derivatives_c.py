@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from derivatives import derivative_model, jacobian_error, nest_of, parameters_of, states
+from derivatives import derivative_model, jacobian_error, nest_of, parameters_of, states, tail_name
 from models import model_folder
 from programs import Narrow
 from references.metrics import equilibrated_condition
@@ -32,7 +32,7 @@ every_build = pytest.mark.parametrize(
 every_function = pytest.mark.parametrize("name", DERIVATIVES)
 
 
-@pytest.fixture(scope="module", params=SIZES, ids=str)
+@pytest.fixture(scope="module", params=SIZES, ids=tail_name)
 def model(request):
     """A compiled model with all derivatives."""
     return derivative_model(*request.param)
