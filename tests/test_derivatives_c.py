@@ -24,7 +24,8 @@ SIZES = [(2, 2, "loops"), (1, 3, "straight")]
 SIZES += [
     pytest.param(size, marks=pytest.mark.slow) for size in [(3, 2, "loops"), (2, None, "loops"), (1, None, "straight")]
 ]
-ROUNDING = 1e-12
+ROUNDING = 1e-12  # largest error of a block, relative, where products and sums are fused
+UNFUSED = 1e-13  # the same where they are not
 BUILDS = {"as loaded": None, "plain": (), "avx": ("-mavx2", "-mno-avx512f"), "one lane": ()}
 every_build = pytest.mark.parametrize(
     "build", [pytest.param(b, marks=pytest.mark.slow) if b == "avx" else b for b in BUILDS]
@@ -109,8 +110,9 @@ def built(model, build):
 @every_function
 @every_build
 def test_compiled_text_means_the_program(model, build, name):
-    state = state_of(model)
-    assert_close(outputs(built(model, build), name, state), interpreted(model, name), model, limit(model, name, state))
+    state, found = state_of(model), outputs(built(model, build), name, state_of(model))
+    rounding = ROUNDING if build == "as loaded" else UNFUSED
+    assert_close(found, interpreted(model, name), model, limit(model, name, state, rounding))
 
 
 @every_function
