@@ -10,16 +10,19 @@ from dataclasses import dataclass, field, replace
 from .compose import influencing, pruned, reached, writes
 from .differentiate import adjoint
 from .program import Apply, Array, Copy, Fill, Guard, Index, Loop, Program, Ref, as_index, statements
+from .turned_arrays import TurnedArray, turned_arrays
 
 
 def adjoint_program(program: Program, wanted: Collection[str], given: Collection[str]) -> Program:
     """Return the program that takes ``b_<output>`` of the given outputs to ``b_<input>`` of the wanted inputs."""
     matters = reached(program.body, wanted) & influencing(program.body, given)
+    turned = {name: found for name, found in turned_arrays(program).items() if name in matters}
+    matters -= turned.keys()
     companions = {a.name: Array(f"b_{a.name}", "local", a.size, a.count) for a in program.arrays if a.name in matters}
     weights = [Array(f"b_{name}", "input", companions[name].size, companions[name].count) for name in given]
     results = [Array(f"b_{name}", "output", companions[name].size, companions[name].count) for name in wanted]
     companions |= {name: replace(companions[name], name=f"b_{name}_sum") for name in (*wanted, *given)}
-    way = _WayBack(program, companions)
+    way = _WayBack(program, companions, turned)
     start = [Fill(b.part(0, b.length), (0,) * b.length) for b in companions.values()]
     start += [Copy(_all(companions[name]), _all(w)) for name, w in zip(given, weights, strict=True)]
     forward, backward = way.both(program.body, ())
@@ -46,10 +49,14 @@ def turns(loops: tuple[Loop, ...]) -> tuple[Index, int]:
 
 @dataclass
 class _WayBack:
-    """Reverses statements; ``companions`` are the adjoint arrays by the names of their arrays."""
+    """Reverses statements; ``companions`` are the adjoint arrays by the names of their arrays.
+
+    Arrays of sines and cosines, ``turned``, have none: the adjoints of their angles serve.
+    """
 
     program: Program
     companions: dict[str, Array]
+    turned: dict[str, TurnedArray]
     kept: list[Array] = field(default_factory=list)
 
     def __post_init__(self):
@@ -116,17 +123,21 @@ class _WayBack:
         written = {n: ref for (n, _), ref in zip(call.step.outputs, call.writes, strict=True)}
         stored = [ref for ref, adds in zip(call.writes, call.adds, strict=True) if not adds]
         given = frozenset(n for n, ref in written.items() if self.matters(ref))
-        wanted = frozenset(n for n, ref in read.items() if self.matters(ref))
+        turns = {n: self.turned[ref.array.name] for n, ref in read.items() if ref.array.name in self.turned}
+        wanted = frozenset(n for n, ref in read.items() if self.matters(ref)) | turns.keys()
         if not given or not wanted:
             return [call], self.cleared(*stored)
-        step = adjoint(call.step, wanted, given)
+        kinds = frozenset((n, found.turned) for n, found in turns.items())
+        step = adjoint(call.step, frozenset(wanted), given, kinds)
         values = read | {f"b_{n}": self.of(ref) for n, ref in written.items() if n in given}
         keeps = []
         for name, _ in step.inputs:
             if name in read and read[name].array.name in self.overwritten:
                 keeps.append(self.keep(read[name], loops))
                 values[name] = keeps[-1].target
-        targets = [read[name.removeprefix("b_")] for name, _ in step.outputs]
+        places = {f"b_{n}": ref for n, ref in read.items()}
+        places |= {f"b_{n}_angles": found.angles(read[n]) for n, found in turns.items()}
+        targets = [places[name] for name, _ in step.outputs]
         in_place = [ref in stored for ref in targets]
         back = Apply(
             step,

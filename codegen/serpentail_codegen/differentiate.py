@@ -4,9 +4,11 @@ Both walk the tape once and differentiate each operation by its rule.  Tangents 
 ``b_<vector>``; where a tangent is wide it stands for all directions at once.
 """
 
+from collections import Counter
 from functools import cache
 
-from .tape import Step, Tape, compacted, live_nodes, replay
+from .tape import LEAVES, Step, Tape, compacted, live_nodes, operands, replay
+from .turns import Turned
 
 
 def _quotient(tape: Tape, y: int, a: int, b: int) -> tuple[int, int]:
@@ -60,34 +62,92 @@ def spans(vectors) -> dict[str, range]:
     return out
 
 
-@cache
-def tangent(step: Step, active: frozenset[str]) -> Step:
-    """Return the step with ``d_<output>`` for tangents ``d_<input>`` of the active inputs, and its own outputs."""
-    rules, moving = Rules(step), []
-    tape, count = rules.tape, rules.count
-    slopes: dict[int, int] = {}
-    for name, span in spans(step.inputs).items():
-        if name in active:
+class Combinations:
+    """Tangents as combinations of rows with narrow coefficients, summed up only where that saves work on rows.
+
+    A node that is used once goes into its use: d(a (b + c)) = a db + a dc + (b + c) da needs no row for d(b + c).
+    """
+
+    MOST = 2  # terms that are scaled one by one; more are summed first
+
+    def __init__(self, rules: Rules):
+        self.rules, self.tape, self.step = rules, rules.tape, rules.step
+        live = live_nodes(self.step.nodes, self.step.results)
+        self.uses = Counter(a for n in live for a in operands(self.step.nodes[n]))
+        self.uses.update(self.step.results)
+
+    def summed(self, terms: dict[int, int]) -> int:
+        """Return one node for a combination."""
+        total = self.tape.const(0)
+        for row, coefficient in terms.items():
+            total = self.tape.add(total, self.tape.mul(coefficient, row))
+        return total
+
+    def one_row(self, terms: dict[int, int]) -> dict[int, int]:
+        """Return a combination of several rows as one row."""
+        return {self.summed(terms): self.tape.const(1)} if len(terms) > 1 else terms
+
+    def of(self, node: int, changes: list[dict[int, int]]) -> dict[int, int]:
+        """Return the tangent of an operation from those of earlier nodes."""
+        tape, total = self.tape, {}
+        for operand, partial in self.rules.partials(node).items():
+            terms = changes[operand]
+            if len(terms) > self.MOST and tape.value(partial) not in (1, -1):
+                terms = changes[operand] = self.one_row(terms)
+            for row, coefficient in terms.items():
+                total[row] = tape.add(total.get(row, tape.const(0)), tape.mul(partial, coefficient))
+        total = {row: coefficient for row, coefficient in total.items() if tape.value(coefficient) != 0}
+        return self.one_row(total) if self.uses[node] > 1 else total
+
+
+Turns = frozenset[tuple[str, Turned]]
+
+
+def moved_inputs(rules: Rules, active: frozenset[str], turns: dict[str, Turned]):
+    """Return the tangents that a step takes, and the tangent of each of its input scalars as a combination of them."""
+    tape, count, moving, slopes = rules.tape, rules.count, [], {}
+    for name, span in spans(rules.step.inputs).items():
+        if name in turns:
+            for k, (angle, sign, other) in zip(span, turns[name].scalars, strict=True):
+                partner = tape.input(span[other])
+                slopes[k] = {tape.input(count + angle): partner if sign > 0 else tape.neg(partner)}
+            moving.append((f"d_{name}_angles", turns[name].angles))
+        elif name in active:
+            slopes |= {k: {tape.input(count + n): tape.const(1)} for n, k in enumerate(span)}
             moving.append((f"d_{name}", len(span)))
-            slopes |= {k: tape.input(count + n) for n, k in enumerate(span)}
-            count += len(span)
-    change = []
+        else:
+            continue
+        count += moving[-1][1]
+    return moving, slopes
+
+
+@cache
+def tangent(step: Step, active: frozenset[str], turns: Turns = frozenset()) -> Step:
+    """Return the step with ``d_<output>`` for tangents ``d_<input>`` of the active inputs, and its own outputs.
+
+    Of the inputs in ``turns``, which are sines and cosines, it takes ``d_<input>_angles``.
+    """
+    rules = Rules(step)
+    moving, slopes = moved_inputs(rules, active, dict(turns))
+    combinations, changes = Combinations(rules), []
     for node, (op, *args) in enumerate(step.nodes):
-        total = slopes.get(args[0], tape.const(0)) if op == "input" else tape.const(0)
-        if op not in ("input", "const"):
-            for operand, partial in rules.partials(node).items():
-                total = tape.add(total, tape.mul(partial, change[operand]))
-        change.append(total)
+        if op in LEAVES:
+            changes.append(slopes.get(args[0], {}) if op == "input" else {})
+        else:
+            changes.append(combinations.of(node, changes))
     outputs = (*step.outputs, *((f"d_{name}", size) for name, size in step.outputs))
-    results = [rules.values[r] for r in step.results] + [change[r] for r in step.results]
+    results = [rules.values[r] for r in step.results] + [combinations.summed(changes[r]) for r in step.results]
     partly = "" if len(active) == len(step.inputs) else "_" + "_".join(n for n, _ in step.inputs if n in active)
     return rules.finish(f"d{partly}", f"Tangents of {step.name}.", (*step.inputs, *moving), outputs, results)
 
 
 @cache
-def adjoint(step: Step, wanted: frozenset[str], given: frozenset[str]) -> Step:
-    """Return the step that takes ``b_<output>`` of the given outputs to ``b_<input>`` of the wanted inputs."""
-    rules = Rules(step)
+def adjoint(step: Step, wanted: frozenset[str], given: frozenset[str], turns: Turns = frozenset()) -> Step:
+    """Return the step that takes ``b_<output>`` of the given outputs to ``b_<input>`` of the wanted inputs.
+
+    Of the inputs in ``turns``, which are sines and cosines, it gives ``b_<input>_angles``.
+    """
+    rules, turned = Rules(step), dict(turns)
     tape, count, incoming = rules.tape, rules.count, []
     weight = [tape.const(0)] * len(step.nodes)
     for name, span in spans(step.outputs).items():
@@ -97,15 +157,26 @@ def adjoint(step: Step, wanted: frozenset[str], given: frozenset[str]) -> Step:
                 weight[step.results[k]] = tape.add(weight[step.results[k]], tape.input(count + n))
             count += len(span)
     for node in reversed(live_nodes(step.nodes, step.results)):
-        if step.nodes[node][0] not in ("input", "const"):
+        if step.nodes[node][0] not in LEAVES:
             for operand, partial in rules.partials(node).items():
                 weight[operand] = tape.add(weight[operand], tape.mul(partial, weight[node]))
     position = {args[0]: node for node, (op, *args) in enumerate(step.nodes) if op == "input"}
     outputs, results = [], []
     for name, span in spans(step.inputs).items():
         if name in wanted:
-            outputs.append((f"b_{name}", len(span)))
-            results += [weight[position[k]] if k in position else tape.const(0) for k in span]
+            own = [weight[position[k]] if k in position else tape.const(0) for k in span]
+            own = by_angles(tape, span, turned[name], own) if name in turned else own
+            outputs.append((f"b_{name}_angles" if name in turned else f"b_{name}", len(own)))
+            results += own
     partly = "" if len(wanted) == len(step.inputs) else "_" + "_".join(n for n, _ in step.inputs if n in wanted)
     partly += "" if len(given) == len(step.outputs) else "_of_" + "_".join(n for n, _ in step.outputs if n in given)
     return rules.finish(f"b{partly}", f"Adjoints of {step.name}.", (*step.inputs, *incoming), outputs, results)
+
+
+def by_angles(tape: Tape, span: range, turned: Turned, weights: list[int]) -> list[int]:
+    """Return the adjoints of angles from those of their sines and cosines."""
+    out = [tape.const(0)] * turned.angles
+    for (angle, sign, other), weight in zip(turned.scalars, weights, strict=True):
+        term = tape.mul(tape.input(span[other]), weight)
+        out[angle] = tape.add(out[angle], term if sign > 0 else tape.neg(term))
+    return out

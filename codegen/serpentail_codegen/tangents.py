@@ -10,6 +10,7 @@ from dataclasses import replace
 from .compose import pruned, reached, reads, writes
 from .differentiate import tangent
 from .program import Apply, Array, Copy, Fill, Guard, Index, Loop, Program, Ref, statements
+from .turned_arrays import TurnedArray, turned_arrays
 
 Bound = Callable[[tuple[Loop, ...]], Index | None]
 
@@ -23,11 +24,11 @@ def tangent_program(program: Program, active: Collection[str], lanes: int = 0, b
 
     ``bound`` tells how many lanes are needed inside given loops.
     """
-    moving = reached(program.body, active)
-    companions = {
-        a.name: Array(f"d_{a.name}", _role(a), a.size, a.count, lanes=lanes) for a in program.arrays if a.name in moving
-    }
-    transform = _Transform(companions, bound)
+    moving, turned = reached(program.body, active), turned_arrays(program)
+    turned = {name: found for name, found in turned.items() if name in moving}
+    own = [a for a in program.arrays if a.name in moving - turned.keys()]
+    companions = {a.name: Array(f"d_{a.name}", _role(a), a.size, a.count, lanes=lanes) for a in own}
+    transform = _Transform(companions, turned, bound)
     body = transform.body(program.body, ())
     fills = tuple(Fill(ref, (0,) * ref.size) for ref in _partly_written(body))
     arrays = tuple(replace(a, role="local") if a.role == "output" else a for a in program.arrays)
@@ -52,10 +53,13 @@ def _partly_written(body: tuple) -> list[Ref]:
 
 
 class _Transform:
-    """Rewrites statements; ``companions`` are the tangent arrays by the names of their arrays."""
+    """Rewrites statements; ``companions`` are the tangent arrays by the names of their arrays.
 
-    def __init__(self, companions: dict[str, Array], bound: Bound):
-        self.companions, self.bound = companions, bound
+    Arrays of sines and cosines, ``turned``, have none: the tangents of their angles serve.
+    """
+
+    def __init__(self, companions: dict[str, Array], turned: dict[str, TurnedArray], bound: Bound):
+        self.companions, self.turned, self.bound = companions, turned, bound
 
     def moves(self, ref: Ref) -> bool:
         """Tell if the scalars of a reference have tangents."""
@@ -93,16 +97,19 @@ class _Transform:
 
     def apply(self, call: Apply, columns: Index | None):
         """Yield a step with its tangents."""
-        active = [(name, ref) for (name, _), ref in zip(call.step.inputs, call.reads, strict=True) if self.moves(ref)]
-        if not active:
+        values = {name: ref for (name, _), ref in zip(call.step.inputs, call.reads, strict=True)}
+        turns = {name: self.turned[ref.array.name] for name, ref in values.items() if ref.array.name in self.turned}
+        active = {name for name, ref in values.items() if self.moves(ref)}
+        if any(ref.array.name in self.turned for ref in call.writes) or not active | turns.keys():
             yield call
             for ref, adds in zip(call.writes, call.adds, strict=True):
                 if self.moves(ref) and not adds:
                     yield Fill(self.of(ref), (0,) * ref.size)
             return
-        step = tangent(call.step, frozenset(name for name, _ in active))
-        values = dict(zip((name for name, _ in call.step.inputs), call.reads, strict=True))
-        values |= {f"d_{name}": self.of(ref) for name, ref in active}
+        kinds = frozenset((name, found.turned) for name, found in turns.items())
+        step = tangent(call.step, frozenset(active | turns.keys()), kinds)
+        tangents = {f"d_{name}_angles": self.of(found.angles(values[name])) for name, found in turns.items()}
+        values |= tangents | {f"d_{name}": self.of(values[name]) for name in active}
         yield Apply(
             step,
             tuple(values[name] for name, _ in step.inputs),

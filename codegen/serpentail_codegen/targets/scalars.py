@@ -46,7 +46,7 @@ class Scalars:
 
     def __init__(self, nodes, results, names, dialect: Dialect, rows: dict[int, int] | None = None):
         self.nodes, self.names, self.dialect = nodes, names, dialect
-        self.live = scheduled(nodes, live_nodes(nodes, results), results)
+        self.live = live_nodes(nodes, results)
         self.uses = Counter(a for n in self.live for a in operands(nodes[n]))
         self.uses.update(results)
         self.text: dict[object, str] = {}
@@ -54,6 +54,7 @@ class Scalars:
         self.count = 0
         self.part, self.lanes = self._parts(rows or {})
         self.abroad = {a for n in self.live for a in operands(nodes[n]) if self.part[a] != self.part[n]}
+        self.results = results
 
     def _parts(self, rows: dict[int, int]) -> tuple[dict, dict]:
         inputs = defaultdict(int, rows)
@@ -69,9 +70,7 @@ class Scalars:
     def lines(self, part=EARLY) -> list[str]:
         """Return the definitions of a part in evaluation order; ``text`` then tells how to write any node."""
         out = []
-        for node in self.live:
-            if self.part[node] != part:
-                continue
+        for node in scheduled(self.nodes, [n for n in self.live if self.part[n] == part], self.results):
             op, *args = self.nodes[node]
             if op in ("sin", "cos") and self.dialect.sincos:
                 out += self._sincos(args[0])

@@ -1,0 +1,56 @@
+"""Arrays of sines and cosines: a program goes in; which arrays hold them, and of which angles, comes out."""
+
+from dataclasses import dataclass, replace
+
+from .compose import names, reads, writes
+from .program import Apply, Index, Program, Ref, statements
+from .turns import Turned, turned_by
+
+
+@dataclass(frozen=True)
+class TurnedArray:
+    """An array of sines and cosines, and where it is written from which angles."""
+
+    turned: Turned
+    target: Ref
+    source: Ref
+
+    def angles(self, ref: Ref) -> Ref:
+        """Return the angles of what a reference reads: the writer's, in the turn in which it was written."""
+        (variable, step), *_ = self.target.offset.terms or (("", 0),)
+        distance = ref.offset + self.target.offset.offset * -1
+        turn = Index(tuple((name, factor // step) for name, factor in distance.terms), distance.offset // step)
+        factor = dict(self.source.offset.terms)[variable]
+        return replace(self.source, offset=turn * factor + self.source.offset.offset)
+
+
+def turned_arrays(program: Program) -> dict[str, TurnedArray]:
+    """Return the arrays of sines and cosines that are written once and read by steps, vector by vector."""
+    out = {}
+    for statement, _ in statements(program.body):
+        turned = turned_by(statement.step) if isinstance(statement, Apply) else None
+        if turned and not any(statement.adds):
+            (source,), (target,) = statement.reads, statement.writes
+            out[target.array.name] = TurnedArray(turned, target, source)
+    return {name: found for name, found in out.items() if _plain(program, found)}
+
+
+def _plain(program: Program, found: TurnedArray) -> bool:
+    """Tell if an array is local, written by one step in one loop, and read as it was written."""
+    name, terms = found.target.array.name, found.target.offset.terms
+    writers = sum(name in names(writes(s)) for s, _ in statements(program.body))
+    if found.target.array.role != "local" or writers != 1 or len(terms) > 1 or len(found.source.offset.terms) > 1:
+        return False
+    step = dict(terms).get(terms[0][0] if terms else "", 0)
+    for statement, _ in statements(program.body):
+        for ref in reads(statement):
+            if ref.array.name == name and not (
+                isinstance(statement, Apply) and ref.size == found.target.size and _multiple(ref, found.target, step)
+            ):
+                return False
+    return bool(terms) and dict(found.source.offset.terms).keys() == dict(terms).keys()
+
+
+def _multiple(ref: Ref, target: Ref, step: int) -> bool:
+    distance = [factor for _, factor in ref.offset.terms] + [ref.offset.offset - target.offset.offset]
+    return step != 0 and ref.stride == target.stride and all(number % step == 0 for number in distance)
