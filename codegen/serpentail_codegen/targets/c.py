@@ -145,31 +145,35 @@ def c_context(scene: Scene, tail: Tail, emitted: list[Emitted], version: str) ->
     works = [{"name": f.name, "work": f.work} for f in views]
     if rollout:
         works.append({"name": "rollout", "work": rollout_work(emitted, tail)})
-    return {name: literal(value) for name, value in numbers.items()} | {
-        "title": f"{scene.kind} tail, {tail.segments} segments x {tail.links} {PIECES[scene.kind]}",
-        "pieces": PIECES[scene.kind],
-        "prefix": scene.name,
-        "upper": scene.name.upper(),
-        "real": scene.real,
-        "least": "FLT_MIN" if scene.real == "float" else "DBL_MIN",
-        "most": "FLT_MAX" if scene.real == "float" else "DBL_MAX",
-        "sqrt": dialect(scene.real).functions["sqrt"],
-        "version": version,
-        "coordinates": COORDINATES[scene.coordinates],
-        "polar": tail.polar,
-        "content_hash": "",
-        "abi_hash": abi_hash(scene, views),
-        "tail": tail,
-        "baked": scene.baked,
-        "parameters": parameter_views(scene),
-        "parameter_count": sum(p.size for p in inertial(scene.kind)),
-        "functions": views,
-        "most_arrays": max(len(f.inputs) + len(f.outputs) for f in views),
-        "works": works,
-        "steps": step_views(emitted, scene.real, scene.name),
-        "helpers": sorted(set().union(*(e.body.helpers for e in emitted)) | ({"copy"} if rollout else set())),
-        "rollout": rollout,
-    } | casadi_context(scene, tail, {f.name: f.work for f in views})
+    return (
+        {name: literal(value) for name, value in numbers.items()}
+        | {
+            "title": f"{scene.kind} tail, {tail.segments} segments x {tail.links} {PIECES[scene.kind]}",
+            "pieces": PIECES[scene.kind],
+            "prefix": scene.name,
+            "upper": scene.name.upper(),
+            "real": scene.real,
+            "least": "FLT_MIN" if scene.real == "float" else "DBL_MIN",
+            "most": "FLT_MAX" if scene.real == "float" else "DBL_MAX",
+            "sqrt": dialect(scene.real).functions["sqrt"],
+            "version": version,
+            "coordinates": COORDINATES[scene.coordinates],
+            "polar": tail.polar,
+            "content_hash": "",
+            "abi_hash": abi_hash(scene, views),
+            "tail": tail,
+            "baked": scene.baked,
+            "parameters": parameter_views(scene),
+            "parameter_count": sum(p.size for p in inertial(scene.kind)),
+            "functions": views,
+            "most_arrays": max(len(f.inputs) + len(f.outputs) for f in views),
+            "works": works,
+            "steps": step_views(emitted, scene.real, scene.name),
+            "helpers": sorted(set().union(*(e.body.helpers for e in emitted)) | ({"copy"} if rollout else set())),
+            "rollout": rollout,
+        }
+        | casadi_context(scene, tail, {f.name: f.work for f in views})
+    )
 
 
 def c_files(scene: Scene, context: dict) -> dict[str, str]:

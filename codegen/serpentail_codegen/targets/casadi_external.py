@@ -4,8 +4,9 @@ CasADi looks for ``jac_f``, ``adj1_f`` and ``jac_adj1_f`` beside ``f``.  It diff
 quaternion, the C functions by a turn of the torso: turn = T d(quaternion), T (3, 4) = 2 vec(conj(q) .) / |q|^2.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
+from functools import partial
 
 from ..catalogue import CATALOGUE
 from ..draft import Tail
@@ -18,7 +19,17 @@ MOVING = {"q": 3, "v": 3}
 Nonzero = Callable[[int, int], bool]
 
 
-def pattern(rows: int, columns: int, nonzero: Nonzero = lambda r, c: True) -> tuple[int, ...]:
+def everywhere(row: int, column: int) -> bool:
+    """Tell that a matrix is dense."""
+    return True
+
+
+def nowhere(row: int, column: int) -> bool:
+    """Tell that a matrix is zero."""
+    return False
+
+
+def pattern(rows: int, columns: int, nonzero: Nonzero = everywhere) -> tuple[int, ...]:
     """Return a sparsity pattern as CasADi reads it: the size, then 1 if dense, else column starts and rows."""
     found = [[r for r in range(rows) if nonzero(r, c)] for c in range(columns)]
     if sum(map(len, found)) == rows * columns:
@@ -75,6 +86,11 @@ class External:
         self.helpers.add(helper)
         self.lines.append(f"{self.prefix}_casadi_{helper}({', '.join(map(str, (*arguments, *made)))});")
 
+    def unknown(self, name: str) -> None:
+        """Make an array of one number that is none."""
+        self.arrays[name] = 1
+        self.lines.append(f"*{name} = (real)NAN;")
+
     def places(self) -> dict[str, int]:
         """Return where each array begins: whole cache lines apart."""
         found, first = {}, 0
@@ -97,9 +113,9 @@ def plain(start, name: str, sizes: dict[str, int]) -> External:
     function, e = CATALOGUE[name], start(name, "")
     names = [a.name for a in (*function.inputs, *function.outputs)]
     e.call(name, *names)
-    differentiable = f"{name}_parameter_derivatives" in e.works
+    fixed = any(f.name == name and f.has(e.works, "jac_") and not f.by_parameters(e.works) for f in DYNAMICS)
     e.inputs = [Port(a.name, pattern(a.length(e.tail), 1), a.name) for a in function.inputs]
-    e.inputs.append(Port("parameters", pattern(sizes["parameters"], 1), differentiable=differentiable))
+    e.inputs.append(Port("parameters", pattern(sizes["parameters"], 1), differentiable=not fixed))
     for a in function.outputs:
         columns = a.shape(e.tail)[-1] if len(a.shape(e.tail)) > 1 else 1
         e.outputs.append(Port(a.name, pattern(a.length(e.tail) // columns, columns), a.name, columns))
@@ -125,6 +141,15 @@ class Dynamics:
         """Inputs with derivatives."""
         return ("q", "v", self.last)
 
+    def has(self, works: Collection[str], kind: str) -> bool:
+        """Tell if the functions are there that a derivative is made of."""
+        parts = {"jac_": self.jacobian, "adj1_": self.adjoint, "jac_adj1_": self.adjoint + self.jacobian + self.hessian}
+        return {self.name, *parts[kind]} <= set(works)
+
+    def by_parameters(self, works: Collection[str]) -> bool:
+        """Tell if there are derivatives with respect to the parameters."""
+        return f"{self.name}_parameter_derivatives" in works
+
     def depends(self, on: str, row: int, column: int) -> bool:
         """Tell if output ``row`` depends on input ``column``."""
         if on == "v_dot":  # H: the mass in its first corner
@@ -133,9 +158,11 @@ class Dynamics:
             return row < 3 <= column
         return moves(on, column)
 
-    def curved(self, a: str, b: str) -> bool:
-        """Tell if some output has second derivatives with respect to two inputs."""
-        return {a, b} <= set(self.inputs) and (a == "q" or b == "q" or a == b == "v")
+    def curved(self, a: str, b: str, row: int, column: int) -> bool:
+        """Tell if the derivative of the weighted outputs by number ``row`` of a depends on number ``column`` of b."""
+        if b == f"adj_{self.gives}":
+            return self.depends(a, column, row)
+        return moves(a, row) and moves(b, column)
 
 
 DYNAMICS = (
@@ -172,17 +199,19 @@ def first_derivatives(e: External, f: Dynamics) -> dict[str, str]:
 
 def by_parameters(e: External, f: Dynamics) -> dict[str, str]:
     """Compute the Jacobian with respect to the parameters, where the model can."""
-    name = f"{f.name}_parameter_derivatives"
-    if name not in e.works:
+    if not f.by_parameters(e.works):
         return {}
-    e.call(name, "q", "v", f.last, "dparameters")
+    e.call(f"{f.name}_parameter_derivatives", "q", "v", f.last, "dparameters")
     return {"parameters": "dparameters"}
 
 
 def ports_in(f: Dynamics, sizes: dict[str, int], known: bool, order: int) -> list[Port]:
     """Return the inputs of f's Jacobian (order 1), of its adjoint (2), and of the adjoint's Jacobian (3)."""
     names = (*f.inputs, "parameters")
-    ports = [Port(n, pattern(sizes[n], 1), n if n in f.inputs else "", differentiable=n != "parameters" or known) for n in names]
+    ports = [
+        Port(n, pattern(sizes[n], 1), n if n in f.inputs else "", differentiable=n != "parameters" or known)
+        for n in names
+    ]
     ports.append(Port(f"out_{f.gives}", pattern(sizes[f.gives], 1)))
     if order > 1:
         ports.append(Port(f"adj_{f.gives}", pattern(sizes[f.gives], 1), f"adj_{f.gives}"))
@@ -196,8 +225,7 @@ def jacobian(e: External, f: Dynamics, sizes: dict[str, int]) -> None:
     arrays = first_derivatives(e, f) | by_parameters(e, f)
     e.inputs = ports_in(f, sizes, "parameters" in arrays, 1)
     for n in (*f.inputs, "parameters"):
-        nonzero = (lambda r, c, n=n: f.depends(n, r, c)) if n in arrays else (lambda r, c: False)
-        blocks = pattern(sizes[f.gives], sizes[n], nonzero)
+        blocks = pattern(sizes[f.gives], sizes[n], partial(f.depends, n) if n in arrays else nowhere)
         e.outputs.append(Port(f"jac_{f.gives}_{n}", blocks, arrays.get(n, ""), sizes[n]))
 
 
@@ -214,11 +242,13 @@ def adjoint(e: External, f: Dynamics, sizes: dict[str, int]) -> None:
         e.use("take", "NULL", count, parameters_gradient=count)
     e.inputs = ports_in(f, sizes, bool(found), 2)
     for n in (*f.inputs, "parameters"):
-        e.outputs.append(Port(f"adj_{n}", pattern(sizes[n], 1), f"{n}_gradient", differentiable=n in f.inputs))
+        e.outputs.append(
+            Port(f"adj_{n}", pattern(sizes[n], 1), f"{n}_gradient", differentiable=n in f.inputs or bool(found))
+        )
 
 
-def second_derivatives(e: External, f: Dynamics) -> None:
-    """Compute second derivatives of the weighted outputs in the tangent space: ``qq``, ``qv``, ``vv`` and ``by_last``."""
+def tangent_hessian(e: External, f: Dynamics) -> None:
+    """Second derivatives of the weighted outputs by velocities: ``qq``, ``qv``, ``vv``, ``aq`` or ``tq``."""
     weights, blocks = f"adj_{f.gives}", ("qq", "qv", "vv", "aq")
     if f.name == "inverse_dynamics":
         e.call("inverse_dynamics_hessian", "q", "v", "v_dot", weights, *blocks)
@@ -231,34 +261,41 @@ def second_derivatives(e: External, f: Dynamics) -> None:
         e.use("eliminate", "dq", "dv", "dtau", *blocks, tq=nt * nv)
 
 
-def hessian(e: External, f: Dynamics, sizes: dict[str, int]) -> None:
-    """Make ``jac_adj1_f``."""
+def second_derivatives(e: External, f: Dynamics) -> dict[tuple[str, str], tuple[str, int, int]]:
+    """Compute second derivatives; return the array of each block with its strides, by row and column."""
     nq, nv, weights = e.tail.nq, e.tail.nv, f"adj_{f.gives}"
+    last, rows = f.last, nv if f.last == "v_dot" else e.tail.nt
     first = first_derivatives(e, f)
-    second_derivatives(e, f)
+    tangent_hessian(e, f)
     e.use("quaternion_columns", "q", nv, "qq", half=nv * nq)
     e.use("quaternion_rows", "q", nq, "half", by_qq=nq * nq)
     e.use("weighted_rows", nq, "by_q", weights, q_gradient=nq)
     e.use("curvature", "q", "q_gradient", "by_qq")
     e.use("quaternion_rows", "q", nv, "qv", by_qv=nq * nv)
-    last = "aq" if f.last == "v_dot" else "tq"
-    e.use("quaternion_columns", "q", sizes[f.last], last, by_last=sizes[f.last] * nq)
-    second = {("q", "q"): ("by_qq", nq, 1), ("q", "v"): ("by_qv", nv, 1), ("v", "q"): ("by_qv", 1, nv)}
-    second |= {("v", "v"): ("vv", nv, 1), (f.last, "q"): ("by_last", nq, 1), ("q", f.last): ("by_last", 1, nq)}
-    first |= by_parameters(e, f)
-    known = "parameters" in first
+    e.use("quaternion_columns", "q", rows, "aq" if last == "v_dot" else "tq", by_last=rows * nq)
+    sources = {("q", "q"): ("by_qq", nq, 1), ("q", "v"): ("by_qv", nv, 1), ("v", "q"): ("by_qv", 1, nv)}
+    sources |= {("v", "v"): ("vv", nv, 1), (last, "q"): ("by_last", nq, 1), ("q", last): ("by_last", 1, nq)}
+    columns = {"q": nq, "v": nv, last: rows}
+    return sources | {(a, weights): (array, 1, columns[a]) for a, array in first.items()}
+
+
+def hessian(e: External, f: Dynamics, sizes: dict[str, int]) -> None:
+    """Make ``jac_adj1_f``; no C function gives second derivatives with respect to parameters: they are not a number."""
+    sources = second_derivatives(e, f)
+    known = f.by_parameters(e.works)
     e.inputs = ports_in(f, sizes, known, 3)
+    if known:
+        e.unknown("unknown")
     for a in (*f.inputs, "parameters"):
         for port in ports_in(f, sizes, known, 2):
-            b, name, shape = port.name, f"jac_adj_{a}_{port.name}", (sizes[a], port.pattern[0])
-            if b == weights and a in first:
-                nonzero: Nonzero = lambda r, c, a=a: f.depends(a, c, r)  # noqa: E731
-                e.outputs.append(Port(name, pattern(*shape, nonzero), first[a], 1, sizes[a]))
-            elif f.curved(a, b):
-                nonzero = lambda r, c, a=a, b=b: moves(a, r) and moves(b, c)  # noqa: E731
-                e.outputs.append(Port(name, pattern(*shape, nonzero), *second[a, b]))
+            b, shape = port.name, (sizes[a], port.pattern[0])
+            if (a, b) in sources:
+                blocks, source = pattern(*shape, partial(f.curved, a, b)), sources[a, b]
+            elif known and "parameters" in (a, b) and not b.startswith("out_"):
+                blocks, source = pattern(*shape), ("unknown", 0, 0)
             else:
-                e.outputs.append(Port(name, pattern(*shape, lambda r, c: False)))
+                blocks, source = pattern(*shape, nowhere), ()
+            e.outputs.append(Port(f"jac_adj_{a}_{b}", blocks, *source))
 
 
 # ---- a scene's functions --------------------------------------------------------------------------------------------
@@ -275,14 +312,10 @@ def externals(scene: Scene, tail: Tail, works: dict[str, int]) -> list[External]
 
     found = [plain(start, name, sizes) for name in works]
     for f in DYNAMICS:
-        wanted = (("jac_", jacobian, f.jacobian), ("adj1_", adjoint, f.adjoint), ("jac_adj1_", hessian, f.hessian))
-        needs: tuple[str, ...] = (f.name,)
-        for kind, make, parts in wanted:
-            needs += parts
-            if set(needs) <= works.keys():
-                made = start(f.name, kind)
-                make(made, f, sizes)
-                found.append(made)
+        for kind, make in (("jac_", jacobian), ("adj1_", adjoint), ("jac_adj1_", hessian)):
+            if f.has(works, kind):
+                found.append(start(f.name, kind))
+                make(found[-1], f, sizes)
     return found
 
 
