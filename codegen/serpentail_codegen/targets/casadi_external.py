@@ -308,7 +308,8 @@ def externals(scene: Scene, tail: Tail, works: dict[str, int]) -> list[External]
 
     def start(name: str, kind: str) -> External:
         symbol, doc = f"{kind}{scene.name}_casadi_{name}", f"{kind}{name}"
-        return External(symbol, doc, tail, scene.name, works)
+        hidden = () if not scene.baked else [n for n in works if n.endswith("_parameter_derivatives") and n != name]
+        return External(symbol, doc, tail, scene.name, {n: work for n, work in works.items() if n not in hidden})
 
     found = [plain(start, name, sizes) for name in works]
     for f in DYNAMICS:
