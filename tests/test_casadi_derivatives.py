@@ -2,6 +2,7 @@
 
 import re
 import subprocess
+import sys
 import tomllib
 import venv
 from pathlib import Path
@@ -311,3 +312,18 @@ def installed(python):
     return subprocess.run(
         [python, "-c", "import casadi; print(casadi.__version__)"], capture_output=True, text=True, check=True
     ).stdout.strip()
+
+
+# Documents.
+
+
+def test_example_of_the_document_runs(tmp_path):
+    text = (Path(__file__).parents[1] / "docs" / "casadi.md").read_text()
+    (example,) = re.findall(r"^```python\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+    (tmp_path / "generated").mkdir()
+    (tmp_path / "generated" / "planned").symlink_to(model_folder(1, 3, functions=PARTS, name="planned"))
+    done = subprocess.run([sys.executable, "-c", example], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout.split()[-1:]) == (0, ["Solve_Succeeded"]), done.stderr
+    for name, (first, second) in DERIVATIVES.items():
+        row = next(line for line in text.splitlines() if line.startswith(f"| `{name}` |"))
+        assert re.findall(r"`(\w+)`", row) == [name, *first, *second]
