@@ -280,6 +280,17 @@ def test_folded_function_takes_the_parameters_of_the_model(loaded):
     block = f.jacobian()(q=q, v=v, tau=tau)["jac_v_dot_tau"]
     np.testing.assert_allclose(block.full(), loaded.forward_dynamics_derivatives(q, v, tau)[2], rtol=1e-12)
     assert len(loaded.casadi.external("energy", folded=True)(q, v)) == 2
+    symbols = [casadi.MX.sym(key, f.size1_in(key), 3) for key in f.name_in()]
+    of_q = casadi.jacobian(f.map(3)(*symbols), symbols[0])
+    assert of_q.nnz() == 3 * f.jacobian().nnz_out("jac_v_dot_q")
+
+
+def test_second_derivatives_that_a_scene_lacks_are_refused(loaded):
+    f = loaded.casadi.external("forward_dynamics")
+    x = [casadi.MX.sym(key, f.size1_in(key)) for key in f.name_in()]
+    assert casadi.gradient(casadi.sum1(f(*x)), x[0]).size1() == 9
+    with pytest.raises(RuntimeError, match="Derivatives cannot be calculated"):
+        casadi.hessian(casadi.sum1(f(*x)), x[0])
 
 
 # Versions.

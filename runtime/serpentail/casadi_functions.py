@@ -71,7 +71,8 @@ class CasadiFunctions:
         inputs = [casadi.MX.sym(key, function.size1_in(key)) for key in function.name_in()[:-1]]
         outputs = function(*inputs, self.parameter_vector)
         outputs = outputs if isinstance(outputs, tuple) else (outputs,)
-        return casadi.Function(name, inputs, outputs, function.name_in()[:-1], function.name_out())
+        ports = (function.name_in()[:-1], function.name_out())
+        return casadi.Function(name, inputs, outputs, *ports, {"always_inline": True})  # graphs then see the blocks
 
     def _check(self, name: str, derivatives: int) -> None:
         """Raise ModelError where a scene lacks what derivatives of this order are made of."""
