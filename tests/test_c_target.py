@@ -166,7 +166,8 @@ def assert_own_symbols(model, objects, *merged):
     wanted = {symbol for path in objects for _, symbol in symbols(path, "-u")} - defined
     assert wanted <= {f"{name}{suffix}" for name in ("sin", "cos", "sqrt", *merged)} | {"memcpy", "memset"}
     assert own == set(re.findall(r"^(?:int|void) (\w+)\(", model.header.read_text(), re.M))
-    assert all(re.match(f"{model.name}_(batch_|casadi_|abi_hash$)", symbol) for symbol in host)
+    names = f"{model.name}_(batch_|abi_hash$)|(jac_|adj1_|jac_adj1_)?{model.name}_casadi_"
+    assert all(re.match(names, symbol) for symbol in host)
 
 
 @every_model
@@ -528,20 +529,22 @@ static int call(int (*batch)(@_call *), int inputs, int outputs, const int *leng
 
 CASADI_DRIVER = """
 typedef const long long *sizes(long long);
+typedef const char *names(long long);
 
 static int external(int (*f)(const real **, real **, long long *, real *, int),
-                    int (*work)(long long *, long long *, long long *, long long *), sizes *in, sizes *out)
+                    int (*work)(long long *, long long *, long long *, long long *), sizes *in, names *name,
+                    sizes *out)
 {
   long long n_in, n_out, n_iw, n_w;
   work(&n_in, &n_out, &n_iw, &n_w);
   real **arg = malloc((size_t)n_in * sizeof *arg), **res = malloc((size_t)n_out * sizeof *res);
   for (long long k = 0; k < n_in; ++k) {
     arg[k] = heap(in(k)[0] * in(k)[1], 1);
-  }
-  @_parameters parameters;
-  @_default_parameters(&parameters);
-  for (long long k = 0; k < in(n_in - 1)[0]; ++k) {
-    arg[n_in - 1][k] = ((const real *)(const void *)&parameters)[k];
+    if (!strcmp(name(k), "parameters")) {
+      @_parameters parameters;
+      @_default_parameters(&parameters);
+      memcpy(arg[k], &parameters, sizeof parameters);
+    }
   }
   for (long long k = 0; k < n_out; ++k) {
     res[k] = heap(out(k)[0] * out(k)[1], 1);
@@ -587,8 +590,8 @@ def driver(model):
         counts = f"{len(entry['inputs'])}, {len(entry['outputs'])}"
         calls += f"  bad += call(@_batch_{name}, {counts}, (const int[]){{ {', '.join(map(str, lengths))} }}, "
         calls += f"@@_WORK_{name.upper()}) != 0;\n"
-        c = f"@_casadi_{name}"
-        calls += f"  bad += external({c}, {c}_work, {c}_sparsity_in, {c}_sparsity_out) != 0;\n" if double else ""
+    for c in re.findall(r"^int (\w+)\(const real \*\*arg.*;$", model.host.read_text(), re.M):
+        calls += f"  bad += external({c}, {c}_work, {c}_sparsity_in, {c}_name_in, {c}_sparsity_out) != 0;\n"
     text = DRIVER + (CASADI_DRIVER if double else "")
     text += f"\nint main(void)\n{{\n  int bad = 0;\n{calls}{ROLLOUT if 'rollout' in model.scene.functions else ''}"
     text += '  printf("%d bad\\n", bad);\n  return bad;\n}\n'

@@ -7,6 +7,18 @@ import casadi
 from .errors import ModelError
 from .parameters import flat
 
+# compiled functions that first and second derivatives of an external one are made of
+DERIVATIVES = {
+    "inverse_dynamics": (
+        ("inverse_dynamics_derivatives", "mass_matrix"),
+        ("inverse_dynamics_vjp", "inverse_dynamics_hessian"),
+    ),
+    "forward_dynamics": (
+        ("forward_dynamics_derivatives",),
+        ("forward_dynamics_vjp", "inverse_dynamics_hessian", "mass_matrix"),
+    ),
+}
+
 
 class CasadiFunctions:
     """Attribute access builds a ``casadi.Function`` once; ``symbolic`` and ``external`` take parameters as an input."""
@@ -37,8 +49,14 @@ class CasadiFunctions:
         """Return a function of SX operations whose last input is the parameter vector."""
         return self._module.function(self._known(name))
 
-    def external(self, name: str) -> casadi.Function:
-        """Return the compiled C as a function whose last input is the parameter vector (double models only)."""
+    def external(self, name: str, derivatives: int = 0, folded: bool = False) -> casadi.Function:
+        """Return the compiled C as a function whose last input is the parameter vector (double models only).
+
+        derivatives: 1 or 2 raises ModelError here where the scene lacks what exact derivatives of that order are made
+        of; else CasADi raises when it differentiates.  Those with respect to parameters need
+        ``<name>_parameter_derivatives`` in the scene, and are first ones.
+        folded: take the model's parameters instead of an input.
+        """
         prefix = self._model.manifest["prefix"]
         if self._model.manifest["real"] != "double":
             raise ModelError(
@@ -46,7 +64,25 @@ class CasadiFunctions:
             )
         if self._model.library is None:
             raise ModelError(f"{prefix} was loaded with compiled=False: load it again to use its C")
-        return casadi.external(f"{prefix}_casadi_{self._known(name)}", self._model.library._name)
+        self._check(self._known(name), derivatives)
+        function = casadi.external(f"{prefix}_casadi_{name}", self._model.library._name)
+        if not folded:
+            return function
+        inputs = [casadi.MX.sym(key, function.size1_in(key)) for key in function.name_in()[:-1]]
+        outputs = function(*inputs, self.parameter_vector)
+        outputs = outputs if isinstance(outputs, tuple) else (outputs,)
+        ports = (function.name_in()[:-1], function.name_out())
+        return casadi.Function(name, inputs, outputs, *ports, {"always_inline": True})  # graphs then see the blocks
+
+    def _check(self, name: str, derivatives: int) -> None:
+        """Raise ModelError where a scene lacks what derivatives of this order are made of."""
+        if derivatives and name not in DERIVATIVES:
+            has = " and ".join(DERIVATIVES)
+            raise ModelError(f"{name}: only {has} have compiled derivatives for CasADi: use casadi.symbolic")
+        wanted = [part for order in DERIVATIVES.get(name, ())[:derivatives] for part in order]
+        lacking = [part for part in dict.fromkeys(wanted) if part not in self._model.manifest["functions"]]
+        if lacking:
+            raise self._model.without(*lacking)
 
     def _known(self, name: str) -> str:
         if name not in self._model.manifest["functions"]:

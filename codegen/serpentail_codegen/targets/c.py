@@ -10,6 +10,7 @@ from ..functions import program as assemble
 from ..scene import Scene
 from ..templating import render
 from .c_function import CFunction, Routine, dialect, in_loops, routine_arguments, routine_lines, straight_line
+from .casadi_external import casadi_context
 
 STRAIGHT_UP_TO = 5000  # operations: beyond, the text leaves the instruction cache and compile time grows
 COORDINATES = {
@@ -54,13 +55,10 @@ def values(scene: Scene, name: str) -> list[float]:
 class ArgumentView:
     """An argument as the templates see it."""
 
-    def __init__(self, argument: Argument, tail: Tail, first: int = 0):
-        shape = argument.shape(tail)
-        self.name, self.meaning, self.first = argument.name, argument.meaning, first
+    def __init__(self, argument: Argument, tail: Tail):
+        self.name, self.meaning = argument.name, argument.meaning
         self.length = argument.length(tail)
-        self.dims = "][".join(map(str, shape))
-        self.columns = shape[-1] if len(shape) > 1 else 1
-        self.rows = self.length // self.columns
+        self.dims = "][".join(map(str, argument.shape(tail)))
 
 
 class FunctionView:
@@ -69,12 +67,8 @@ class FunctionView:
     def __init__(self, emitted: Emitted, tail: Tail, prefix: str):
         function, self.lines, self.work = emitted.function, emitted.body.lines, emitted.body.work
         self.name, self.doc = function.name, function.doc
-        views, first = [], 0
-        for a in (*function.inputs, *function.outputs):
-            views.append(ArgumentView(a, tail, first))
-            first += views[-1].length
+        views = [ArgumentView(a, tail) for a in (*function.inputs, *function.outputs)]
         self.inputs, self.outputs = views[: len(function.inputs)], views[len(function.inputs) :]
-        self.scratch, self.casadi = first, f"{prefix}_casadi_{self.name}"
         real = f"{prefix}_real"
         arguments = [f"const {real} *{a.name}" for a in self.inputs] + [f"{real} *{a.name}" for a in self.outputs]
         head = f"const {prefix}_parameters *parameters"
@@ -146,36 +140,40 @@ def c_context(scene: Scene, tail: Tail, emitted: list[Emitted], version: str) ->
     """Return everything that the C templates lay out."""
     views = [FunctionView(e, tail, scene.name) for e in emitted]
     literal = dialect(scene.real).literal
-    numbers = {"zero": 0, "one": 1, "half": 0.5, "third": 1 / 3, "sixth": 1 / 6}
+    numbers = {"zero": 0, "one": 1, "two": 2, "half": 0.5, "third": 1 / 3, "sixth": 1 / 6}
     rollout = "rollout" in scene.functions
     works = [{"name": f.name, "work": f.work} for f in views]
     if rollout:
         works.append({"name": "rollout", "work": rollout_work(emitted, tail)})
-    return {name: literal(value) for name, value in numbers.items()} | {
-        "title": f"{scene.kind} tail, {tail.segments} segments x {tail.links} {PIECES[scene.kind]}",
-        "pieces": PIECES[scene.kind],
-        "prefix": scene.name,
-        "upper": scene.name.upper(),
-        "real": scene.real,
-        "least": "FLT_MIN" if scene.real == "float" else "DBL_MIN",
-        "most": "FLT_MAX" if scene.real == "float" else "DBL_MAX",
-        "sqrt": dialect(scene.real).functions["sqrt"],
-        "version": version,
-        "coordinates": COORDINATES[scene.coordinates],
-        "polar": tail.polar,
-        "content_hash": "",
-        "abi_hash": abi_hash(scene, views),
-        "tail": tail,
-        "baked": scene.baked,
-        "parameters": parameter_views(scene),
-        "parameter_count": sum(p.size for p in inertial(scene.kind)),
-        "functions": views,
-        "most_arrays": max(len(f.inputs) + len(f.outputs) for f in views),
-        "works": works,
-        "steps": step_views(emitted, scene.real, scene.name),
-        "helpers": sorted(set().union(*(e.body.helpers for e in emitted)) | ({"copy"} if rollout else set())),
-        "rollout": rollout,
-    }
+    return (
+        {name: literal(value) for name, value in numbers.items()}
+        | {
+            "title": f"{scene.kind} tail, {tail.segments} segments x {tail.links} {PIECES[scene.kind]}",
+            "pieces": PIECES[scene.kind],
+            "prefix": scene.name,
+            "upper": scene.name.upper(),
+            "real": scene.real,
+            "least": "FLT_MIN" if scene.real == "float" else "DBL_MIN",
+            "most": "FLT_MAX" if scene.real == "float" else "DBL_MAX",
+            "sqrt": dialect(scene.real).functions["sqrt"],
+            "version": version,
+            "coordinates": COORDINATES[scene.coordinates],
+            "polar": tail.polar,
+            "content_hash": "",
+            "abi_hash": abi_hash(scene, views),
+            "tail": tail,
+            "baked": scene.baked,
+            "parameters": parameter_views(scene),
+            "parameter_count": sum(p.size for p in inertial(scene.kind)),
+            "functions": views,
+            "most_arrays": max(len(f.inputs) + len(f.outputs) for f in views),
+            "works": works,
+            "steps": step_views(emitted, scene.real, scene.name),
+            "helpers": sorted(set().union(*(e.body.helpers for e in emitted)) | ({"copy"} if rollout else set())),
+            "rollout": rollout,
+        }
+        | casadi_context(scene, tail, {f.name: f.work for f in views})
+    )
 
 
 def c_files(scene: Scene, context: dict) -> dict[str, str]:
