@@ -20,7 +20,7 @@ from serpentail.compiler import compile_library
 SIZES = ((1, 3), (3, 4), (6, 6))
 ROUNDS, CALLS = 200, 64
 CASADI_FLAGS = ("-O2", "-march=native", "-fPIC", "-shared")
-PATIENCE = 60  # seconds for gcc on one of CasADi's files
+PATIENCE = 90  # seconds for gcc on one of CasADi's files
 OVER = f"over {PATIENCE} s"
 JACOBIANS, HESSIAN = "forward_dynamics_derivatives", "inverse_dynamics_hessian"
 IN_SX = ("mass_matrix", "bias_force", "inverse_dynamics")  # what CasADi differentiates
@@ -203,9 +203,10 @@ def jacobian_times(folder: Path) -> list[dict]:
 
     Ratios by minima (by medians in brackets).  Pinocchio, full chain of 2 m n revolutes: v_dot, computeRNEADerivatives
     there, G^T (...) G, Cholesky; as its documentation shows it, and with all that was found to speed it up
-    (pinocchio_derivatives.cpp).  CasADi: C of the SX graph of -H^-1 dID, cse, gcc -O2 -march=native, by its Jacobian
-    along all directions and with the columns of a turn written by hand.  Differences: of the documented path, which
-    loses two digits as B is a metre from the origin; the largest of the others.
+    (pinocchio_derivatives.cpp); own sums over the tied columns on its types.  CasADi: C of the SX graph of -H^-1 dID,
+    cse, gcc -O2 -march=native, by its Jacobian along all directions and with the columns of a turn written by hand.
+    Differences: of the documented path, which loses two digits as B is a metre from the origin; the largest of the
+    others.
     """
     return [jacobian_row(folder, size) for size in SIZES]
 
@@ -220,12 +221,13 @@ def jacobian_row(folder: Path, size: tuple[int, int]) -> dict:
     plain, tuned = (peers.PinocchioBench(*size, ours.parameters, library) for library in libraries)
     with plain, tuned:
         found = {"plain": plain.derivatives_closure, "revolutes": tuned.derivatives_closure}
+        found["own"] = tuned.own_derivatives_closure
         found |= {"casadi": by_itself and by_itself.closure, "hand": by_hand and by_hand.closure}
         row = {"model": f"({size[0]}, {size[1]})"} | compared(ours, found, states)
+        row["gcc_s"] = by_itself.seconds if by_itself else OVER
         row["plain_difference"] = pinocchio_difference(ours.model, plain, states)
-        errors = [pinocchio_difference(ours.model, tuned, states)]
+        errors = [pinocchio_difference(ours.model, tuned, states, path) for path in ("", "_own")]
     errors += [casadi_difference(ours.model, peer, states) for peer in (by_itself, by_hand) if peer]
-    row["gcc_s"] = by_itself.seconds if by_itself else OVER
     row["jacobian_difference"] = max(errors)
     return row
 
@@ -243,12 +245,12 @@ def compared(ours: Fixture, others: dict[str, peers.Closure | None], states: pee
     return row
 
 
-def pinocchio_difference(model: st.Model, peer: peers.PinocchioBench, states: peers.States) -> float:
+def pinocchio_difference(model: st.Model, peer: peers.PinocchioBench, states: peers.States, path: str = "") -> float:
     """Largest difference in the rows of omega and the tail, whose columns are the same relative to the torso."""
     errors = []
     for state in zip(*states, strict=True):
-        pairs = zip(model.forward_dynamics_derivatives(*state), peer.forward_dynamics_derivatives(*state), strict=True)
-        for (a, b), first in zip(pairs, (6, 3, 0), strict=True):
+        found = peer.forward_dynamics_derivatives(*state, path)
+        for a, b, first in zip(model.forward_dynamics_derivatives(*state), found, (6, 3, 0), strict=True):
             errors.append(difference(a[3:, first:], b[3:, first:]))
     return max(errors)
 

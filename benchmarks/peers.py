@@ -114,12 +114,17 @@ class PinocchioBench:
 
     @property
     def derivatives_closure(self) -> Closure:
-        """The path to the Jacobians of v_dot; of PLAIN and DERIVATIVES."""
+        """The path to the Jacobians of v_dot through computeRNEADerivatives; of PLAIN and DERIVATIVES."""
         return self._closure("pinocchio_forward_dynamics_derivatives")
 
-    def forward_dynamics_derivatives(self, q, v, tau) -> tuple[np.ndarray, ...]:
-        """Jacobians of v_dot, all relative to the torso: dq (nv, nv), dv (nv, nv), dtau (nv, nv - 6)."""
-        self._call("pinocchio_forward_dynamics_derivatives", (self.nv,), q, v, tau)
+    @property
+    def own_derivatives_closure(self) -> Closure:
+        """The path to the Jacobians of v_dot by own sums; of DERIVATIVES."""
+        return self._closure("pinocchio_forward_dynamics_derivatives_own")
+
+    def forward_dynamics_derivatives(self, q, v, tau, path: str = "") -> tuple[np.ndarray, ...]:
+        """Jacobians of v_dot, all relative to the torso: dq (nv, nv), dv (nv, nv), dtau (nv, nv - 6); path: "_own"."""
+        self._call(f"pinocchio_forward_dynamics_derivatives{path}", (self.nv,), q, v, tau)
         results = tuple(np.empty((self.nv, columns)) for columns in (self.nv, self.nv, self.nv - 6))
         self._library.pinocchio_derivatives_result(self._chain, *map(_pointer, results))
         return results
@@ -231,7 +236,7 @@ def _declared(path: Path) -> ctypes.CDLL:
     library.pinocchio_chain_free.restype = None
     pointers = {"chain_free": 1, "mass_matrix": 3, "bias_force": 4}
     pointers |= {"forward_dynamics": 5, "forward_dynamics_crba": 5, "forward_dynamics_derivatives": 5}
-    pointers |= {"derivatives_result": 4}
+    pointers |= {"forward_dynamics_derivatives_own": 5, "derivatives_result": 4}
     for name in (name for name in pointers if hasattr(library, f"pinocchio_{name}")):
         getattr(library, f"pinocchio_{name}").argtypes = [ctypes.c_void_p] * pointers[name]
     return library
