@@ -16,11 +16,12 @@ import pytest
 
 import serpentail as st
 from models import model_folder
-from serpentail_codegen.scene import FUNCTIONS
+from serpentail_codegen.scene import ALL
 
 SEGMENTS, LINKS = 2, 1
 NQ, NV, NT, POINTS = 7 + 2 * SEGMENTS, 6 + 2 * SEGMENTS, 2 * SEGMENTS, SEGMENTS * LINKS + 1
 SIZES = {"q": NQ, "v": NV, "v_dot": NV, "tau": NT, "f_ext": 6 + 3 * POINTS}
+SIZES |= {"dq": NV, "dv": NV, "dtau": NT, "multiplier": NV}
 # Every function: its arguments and the shapes of what it returns.
 CALLS = {
     "mass_matrix": (["q"], [(NV, NV)]),
@@ -34,11 +35,21 @@ CALLS = {
     "tail_point_jacobians": (["q"], [(POINTS, 3, NV)]),
     "mass_matrix_world": (["q"], [(NV, NV)]),
     "bias_force_world": (["q", "v"], [(NV,)]),
+    "forward_dynamics_derivatives": (["q", "v", "tau"], [(NV, NV), (NV, NV), (NV, NT)]),
+    "forward_dynamics_parameter_derivatives": (["q", "v", "tau"], [(NV, 13)]),
+    "forward_dynamics_jvp": (["q", "v", "tau", "dq", "dv", "dtau"], [(NV,)]),
+    "forward_dynamics_vjp": (["q", "v", "tau", "multiplier"], [(NV,), (NV,), (NT,)]),
+    "inverse_dynamics_derivatives": (["q", "v", "v_dot"], [(NV, NV), (NV, NV)]),
+    "inverse_dynamics_parameter_derivatives": (["q", "v", "v_dot"], [(NV, 13)]),
+    "inverse_dynamics_vjp": (["q", "v", "v_dot", "multiplier"], [(NV,), (NV,), (NV,)]),
+    "inverse_dynamics_hessian": (["q", "v", "v_dot", "multiplier"], [(NV, NV)] * 4),
+    "energy_derivatives": (["q", "v"], [(NV,), (NV,), (NV,)]),
+    "momentum_derivatives": (["q", "v"], [(3, NV)] * 4),
 }
 every_function = pytest.mark.parametrize("name", CALLS)
 
 
-folder = partial(model_folder, SEGMENTS, LINKS, name="tail")
+folder = partial(model_folder, SEGMENTS, LINKS, name="tail", functions="all")
 
 
 @pytest.fixture(scope="module")
@@ -86,7 +97,7 @@ def assert_same(found, expected):
 
 
 def test_every_function_is_called_here():
-    assert {*CALLS, "rollout"} == set(FUNCTIONS)
+    assert {*CALLS, "rollout"} == set(ALL)
 
 
 def test_sizes(model):

@@ -16,7 +16,8 @@ import serpentail as st
 from serpentail.laws import NEAR, Law
 from serpentail.measures import State, arguments, block_error, differences, matrix_error, outputs, states
 from serpentail.verify import Check, as_text, check, laws, summary
-from serpentail_codegen.functions import FUNCTIONS, program
+from serpentail_codegen.catalogue import CATALOGUE
+from serpentail_codegen.functions import program
 from serpentail_codegen.interpret import Numbers, Run
 from serpentail_codegen.pipeline import generate, tail_of
 from serpentail_codegen.scene import parse_scene
@@ -87,14 +88,14 @@ def judge(model: st.Model) -> list[Check]:
 def interpreter_laws(model: st.Model) -> Iterator[Law]:
     """Yield, for every function, that the C gives what its program means."""
     text = "The C gives what the interpreter of its program gives."
-    for name in FUNCTIONS:
+    for name in CATALOGUE:
         yield Law(f"interpreter: {name}", text, interpreted(model, name), (name,), NEAR)
 
 
 def interpreted(model: st.Model, name: str) -> Callable:
     """Return the law's error: the C against the program, run on Python's floats."""
     scene = parse_scene(model.manifest["scene"], model.name)
-    function = FUNCTIONS[name]
+    function = CATALOGUE[name]
     written = cache(lambda: program(function, tail_of(scene)))
 
     def error(model: st.Model, s: State) -> float:

@@ -76,6 +76,16 @@ VIRTUAL_POWER = Function(
 # ---- Jacobians ----------------------------------------------------------------------------------------------------
 
 
+def with_unit_quaternion(d: Draft, q: Array) -> Array:
+    """Return q with a unit quaternion, which turns are taken at: of any other, squares may overflow."""
+    unit = d.array("q_unit", d.tail.nq)
+    d.copy(unit.part(0, 3), q.part(0, 3))
+    d.step(kin.unit_quaternion, unit=unit.part(3, 4))
+    d.copy(unit.part(7, d.tail.nt), q.part(7, d.tail.nt))
+    d.known["quaternion"] = unit.part(3, 4)
+    return unit
+
+
 def assemble_inverse_dynamics_derivatives(d: Draft, arrays: dict[str, Array]) -> None:
     """Tangents of H v_dot + C along all directions at once."""
     directions = Directions(d.tail, ("turn", "omega"))
@@ -83,7 +93,7 @@ def assemble_inverse_dynamics_derivatives(d: Draft, arrays: dict[str, Array]) ->
         program(FUNCTIONS["inverse_dynamics"], d.tail), ("q", "v"), directions.count, directions.outward
     )
     rows = d.wide("rows", d.tail.nv, directions.count)
-    given = {name: arrays[name] for name in ("q", "v", "v_dot")}
+    given = {"q": with_unit_quaternion(d, arrays["q"]), "v": arrays["v"], "v_dot": arrays["v_dot"]}
     inline(d, inner, d_force=rows, **given, **directions.tangents(d))
     directions.spread(d, rows, arrays["dq"], arrays["dv"])
 
@@ -126,7 +136,7 @@ def torques(d: Draft, balance: Balance, dtau: Array) -> None:
     unit, x = d.wide("unit_torque", nt, nt), d.wide("x_torque", nv, nt)
     d.unit(unit.part(0, nt), 0)
     balance.solve(d, Loads(loads(d), tau=lambda k: unit.part(k, 1)), x)
-    with d.loop("r", nv) as r:
+    with d.loop("row", nv) as r:
         d.copy(dtau.part(nt * r, nt), x.lane(r, 0, nt))
 
 
@@ -152,7 +162,7 @@ def assemble_parameter_derivatives(d: Draft, arrays: dict[str, Array]) -> None:
         d.unit(d.known["gravity"], 0)  # gravity is the first parameter: p_b_ddot falls by as much
         balance.solve(d, Loads(at_torso, inertial=lambda k: rows.part(6 + k, 1)), x)
         rows = x
-    with d.loop("r", nv) as r:
+    with d.loop("row", nv) as r:
         d.copy(arrays["dparameters"].part(count * r, count), rows.lane(r, 0, count))
 
 
@@ -184,16 +194,16 @@ def assemble_inverse_dynamics_vjp(d: Draft, arrays: dict[str, Array]) -> None:
     """Gradient of lambda^T (H v_dot + C), by one way out along the tail and one back."""
     inner = adjoint_program(program(VIRTUAL_POWER, d.tail), ("q", "v", "v_dot"), ("power",))
     one, gradient = d.constant("one", [1]), d.array("gradient", d.tail.nq)
-    given = {name: arrays[name] for name in ("q", "v", "v_dot", "multiplier")}
+    q = with_unit_quaternion(d, arrays["q"])
+    given = {"q": q} | {name: arrays[name] for name in ("v", "v_dot", "multiplier")}
     inline(d, inner, b_power=one, b_q=gradient, b_v=arrays["dv"], b_v_dot=arrays["dv_dot"], **given)
-    in_tangent_space(d, arrays["q"], gradient, arrays["dq"])
+    in_tangent_space(d, gradient, arrays["dq"])
 
 
-def in_tangent_space(d: Draft, q: Array, gradient: Array, dq: Array) -> None:
+def in_tangent_space(d: Draft, gradient: Array, dq: Array) -> None:
     """Turn a gradient with respect to the numbers of q into one with respect to a velocity's directions."""
     d.copy(dq.part(0, 3), gradient.part(0, 3))
-    reads = {"quaternion": q.part(3, 4), "gradient": gradient.part(3, 4)}
-    d.step(kin.turn_gradient, reads, turn=dq.part(3, 3))
+    d.step(kin.turn_gradient, {"gradient": gradient.part(3, 4)}, turn=dq.part(3, 3))
     d.copy(dq.part(6, d.tail.nt), gradient.part(7, d.tail.nt))
 
 
@@ -208,9 +218,10 @@ def assemble_forward_dynamics_vjp(d: Draft, arrays: dict[str, Array]) -> None:
     balance.solve(d, Loads(at_torso, tau=lambda k: multiplier.part(6 + k, 1)), mu)
     inner = adjoint_program(program(VIRTUAL_POWER, tail), ("q", "v"), ("power",))
     minus, gradient = d.constant("minus", [-1]), d.array("gradient", tail.nq)
-    given = {"q": arrays["q"], "v": arrays["v"], "v_dot": v_dot, "multiplier": mu}
+    q = with_unit_quaternion(d, arrays["q"])
+    given = {"q": q, "v": arrays["v"], "v_dot": v_dot, "multiplier": mu}
     inline(d, inner, b_power=minus, b_q=gradient, b_v=arrays["dv"], **given)
-    in_tangent_space(d, arrays["q"], gradient, arrays["dq"])
+    in_tangent_space(d, gradient, arrays["dq"])
     d.copy(arrays["dtau"].part(0, tail.nt), mu.part(6, tail.nt))
 
 
@@ -219,14 +230,15 @@ def assemble_forward_dynamics_vjp(d: Draft, arrays: dict[str, Array]) -> None:
 
 def assemble_energy_derivatives(d: Draft, arrays: dict[str, Array]) -> None:
     """Gradients of kinetic and potential energy."""
+    q = with_unit_quaternion(d, arrays["q"])
     for name, wanted in (("kinetic", ("q", "v")), ("potential", ("q",))):
         inner = adjoint_program(program(FUNCTIONS["energy"], d.tail), wanted, (name,))
         inner = replace(inner, name=f"{inner.name}_{name}")
         gradient = d.array(f"{name}_gradient", d.tail.nq)
-        given = {"q": arrays["q"], "v": arrays["v"]} | ({"b_v": arrays["kinetic_dv"]} if "v" in wanted else {})
+        given = {"q": q, "v": arrays["v"]} | ({"b_v": arrays["kinetic_dv"]} if "v" in wanted else {})
         weight = {f"b_{name}": d.constant(f"one_{name}", [1]), "b_q": gradient}
         inline(d, inner, **given, **weight)
-        in_tangent_space(d, arrays["q"], gradient, arrays[f"{name}_dq"])
+        in_tangent_space(d, gradient, arrays[f"{name}_dq"])
 
 
 def assemble_momentum_derivatives(d: Draft, arrays: dict[str, Array]) -> None:
@@ -235,6 +247,7 @@ def assemble_momentum_derivatives(d: Draft, arrays: dict[str, Array]) -> None:
     inner = tangent_program(program(FUNCTIONS["momentum"], d.tail), ("q", "v"), directions.count)
     rows = {name: d.wide(f"{name}_rows", 3, directions.count) for name in ("linear", "angular")}
     outputs = {f"d_{name}": row for name, row in rows.items()}
-    inline(d, inner, q=arrays["q"], v=arrays["v"], **outputs, **directions.tangents(d))
+    q = with_unit_quaternion(d, arrays["q"])
+    inline(d, inner, q=q, v=arrays["v"], **outputs, **directions.tangents(d))
     for name, row in rows.items():
         directions.spread(d, row, arrays[f"{name}_dq"], arrays[f"{name}_dv"])

@@ -55,7 +55,7 @@ class Directions:
         return self.each * i + (self.base + 2)
 
     def tangents(self, d: Draft) -> dict[str, Array]:
-        """Declare ``d_q`` and ``d_v`` and store the directions in them as rows."""
+        """Declare ``d_q`` and ``d_v`` and store the directions in them as rows; the quaternion known is a unit one."""
         label = "_".join(self.torso)
         d_q = d.wide(f"d_q_{label}", d.tail.nq, self.count)
         d_v = d.wide(f"d_v_{label}", d.tail.nv, self.count) if self.rates else None
@@ -78,7 +78,7 @@ class Directions:
         nv = self.tail.nv
         for target in (of_q, of_v) if of_v else (of_q,):
             d.fill(target.part(0, target.length), 0)
-        with d.loop("r", source.length) as r:
+        with d.loop("row", source.length) as r:
             for lane, name in enumerate(self.torso):
                 column, is_q = TORSO[name]
                 d.copy((of_q if is_q else of_v).part(nv * r + column, 3), source.lane(r, 3 * lane, 3))

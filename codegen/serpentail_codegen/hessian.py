@@ -3,7 +3,7 @@
 from . import kinematics as kin
 from .adjoints import adjoint_program
 from .compose import inline
-from .derivatives import INERTIA_FORCE, VIRTUAL_POWER
+from .derivatives import INERTIA_FORCE, VIRTUAL_POWER, with_unit_quaternion
 from .directions import TORSO, Directions
 from .draft import Draft
 from .functions import program
@@ -21,13 +21,14 @@ def assemble_inverse_dynamics_hessian(d: Draft, arrays: dict[str, Array]) -> Non
     inner = adjoint_program(program(VIRTUAL_POWER, tail), ("q", "v"), ("power",))
     inner = tangent_program(inner, ("q", "v"), directions.count, directions.up_to)
     b_q, b_v = d.wide("d_b_q", tail.nq, directions.count), d.wide("d_b_v", nv, directions.count)
-    given = {name: arrays[name] for name in ("q", "v", "v_dot", "multiplier")}
+    q = with_unit_quaternion(d, arrays["q"])
+    given = {"q": q} | {name: arrays[name] for name in ("v", "v_dot", "multiplier")}
     d_q = directions.tangents(d)
     inline(d, inner, b_power=d.constant("one", [1]), d_b_q=b_q, d_b_v=b_v, **given, **d_q)
     turn = d.wide("d_b_turn", 3, directions.count)
     d.step(kin.turn_gradient, {"gradient": b_q.part(3, 4)}, turn=turn[0])
     mirror(d, directions, {"turn": turn[0], "omega": b_v.part(3, 3)}, (b_q, b_v), arrays)
-    mixed_block(d, arrays)
+    mixed_block(d, q, arrays)
 
 
 def mirror(d: Draft, directions: Directions, torso: dict[str, Ref], rows: tuple[Array, Array], out: dict) -> None:
@@ -64,7 +65,7 @@ def mirror(d: Draft, directions: Directions, torso: dict[str, Ref], rows: tuple[
         place_row(rows[1].part(2 * i + k + 6, 1), (2 * i + k + 6, False), i + 1)
 
 
-def mixed_block(d: Draft, arrays: dict[str, Array]) -> None:
+def mixed_block(d: Draft, q: Array, arrays: dict[str, Array]) -> None:
     """d(H lambda)/dq: tangents of the inverse dynamics of the acceleration lambda at rest, without gravity."""
     directions = Directions(d.tail, ("turn",), rates=False)
     inner = tangent_program(program(INERTIA_FORCE, d.tail), ("q",), directions.count, directions.outward)
@@ -72,5 +73,5 @@ def mixed_block(d: Draft, arrays: dict[str, Array]) -> None:
     still = d.array("at_rest", d.tail.nv)
     d.fill(still.part(0, d.tail.nv), 0)
     tangents = directions.tangents(d)
-    inline(d, inner, q=arrays["q"], v=still, v_dot=arrays["multiplier"], d_force=rows, **tangents)
+    inline(d, inner, q=q, v=still, v_dot=arrays["multiplier"], d_force=rows, **tangents)
     directions.spread(d, rows, arrays["aq"])

@@ -5,7 +5,7 @@ Every link recursion is written in link-local frames: a universal joint is a tur
 stay small.
 """
 
-from sympy import Matrix, cos, eye, sin
+from sympy import Matrix, cos, eye, sin, sqrt
 
 X, Y, Z = (Matrix(row) for row in eye(3).tolist())
 
@@ -41,8 +41,14 @@ def quaternion_rotation(let, quaternion) -> dict:
     return {"R": Matrix(rows)}
 
 
+def unit_quaternion(let, quaternion) -> dict:
+    """The quaternion over its norm."""
+    norm = let("norm", sqrt(let("square", quaternion.dot(quaternion))))
+    return {"unit": quaternion * let("inverse", 1 / norm)}
+
+
 def turned_quaternion(let, quaternion, turn) -> dict:
-    """Rate of the quaternion for a rate of turn in body axes: q (0, turn) / 2, times |q| as q is."""
+    """Rate of a unit quaternion for a rate of turn in body axes: q (0, turn) / 2."""
     w, x, y, z = quaternion
     half = [let("half", entry / 2) for entry in turn]
     rates = [
@@ -55,7 +61,7 @@ def turned_quaternion(let, quaternion, turn) -> dict:
 
 
 def turn_gradient(let, quaternion, gradient) -> dict:
-    """Gradient with respect to a turn in body axes, from that with respect to the quaternion's four numbers."""
+    """Gradient with respect to a turn in body axes, from that with respect to a unit quaternion's four numbers."""
     w, x, y, z = quaternion
     gw, gx, gy, gz = gradient
     twice = [

@@ -7,6 +7,7 @@ from itertools import starmap
 import numpy as np
 
 from .measures import (
+    DERIVATIVES,
     State,
     arguments,
     block_error,
@@ -33,7 +34,7 @@ NEAR = 450  # roundings: 1e-13 in double
 FEW = 8  # links in a segment
 FLIGHT, STEPS = 0.2, 2000  # s
 WORLD = ("mass_matrix_world", "bias_force_world")
-PLACED = ("energy", "momentum", "tail_points")  # what position and velocity of B enter
+PLACED = ("energy", "energy_derivatives", "momentum", "tail_points")  # what position and velocity of B enter
 
 
 @dataclass(frozen=True)
@@ -56,17 +57,24 @@ class Law:
         return self.floor + units * rounding(model)
 
 
+def registry(laws: list[Law]):
+    """Return a decorator that adds a function (model, state) -> error, or errors by place, to a list of laws.
+
+    Its name and docstring are the law's.
+    """
+
+    def law(*needs: str, **limits):
+        def register(error):
+            laws.append(Law(error.__name__.replace("_", " "), error.__doc__, error, needs, **limits))
+            return error
+
+        return register
+
+    return law
+
+
 LAWS: list[Law] = []
-
-
-def law(*needs: str, **limits):
-    """Register a function (model, state) -> error, or errors by place; its name and docstring are the law's."""
-
-    def register(error):
-        LAWS.append(Law(error.__name__.replace("_", " "), error.__doc__, error, needs, **limits))
-        return error
-
-    return register
+law = registry(LAWS)
 
 
 # Motions and derivatives
@@ -241,7 +249,8 @@ def pose_in_the_world_turns_all_alike(model: Model, s: State):
     X = changed_axes(Z, np.eye(3), model.nv)
     loads = s.f_ext.reshape(-1, 3) @ Z.T
     loads[1:2] = s.f_ext[3:6]
-    turned = replace(s, q=q, v=X @ s.v, v_dot=X @ s.v_dot, f_ext=loads.ravel())
+    turned = replace(s, q=q, f_ext=loads.ravel())
+    turned = replace(turned, **{name: X @ getattr(s, name) for name in ("v", "v_dot", "dq", "dv", "multiplier")})
     found = {}
     for name in model.kernels:
         axes = changed_axes(Z, Z if name in WORLD else np.eye(3), model.nv)
@@ -254,17 +263,21 @@ def turned_outputs(model: Model, found: dict, X: np.ndarray, shift: np.ndarray) 
     """Return what outputs become in a world turned by X's first block and shifted."""
     Z, weight = X[:3, :3], total_mass(model) * model.parameters["gravity"]
     turn = {
-        "H": lambda H: X @ H @ X.T,
-        "force": lambda f: X @ f,
-        "v_dot": lambda a: X @ a,
-        "kinetic": lambda T: T,
         "potential": lambda V: V + weight * shift[2],
-        "linear": lambda p: Z @ p,
-        "angular": lambda L: Z @ L,
         "points": lambda p: p @ Z.T + shift,
         "J": lambda J: Z @ J @ X.T,
+        "dparameters": lambda D: X @ D,
     }
-    return {key: turn[key](x) for key, x in found.items()}
+    return {key: turn[key](x) if key in turn else turned_array(x, X) for key, x in found.items()}
+
+
+def turned_array(x: np.ndarray, X: np.ndarray) -> np.ndarray:
+    """Turn the axes of a result that are as long as a velocity, or a vector."""
+    for axis, size in enumerate(np.shape(x)):
+        turn = {len(X): X, 3: X[:3, :3]}.get(size)
+        if turn is not None:
+            x = np.moveaxis(np.tensordot(turn, x, (1, axis)), 0, axis)
+    return x
 
 
 @law()
@@ -370,6 +383,7 @@ def casadi_functions_agree(model: Model, s: State):
     return {
         name: differences(model, name, s, casadi_outputs(model, name, getattr(model.casadi, name), s))
         for name in model.kernels
+        if name not in DERIVATIVES
     }
 
 

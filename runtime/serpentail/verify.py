@@ -5,10 +5,14 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
+from . import derivative_laws
 from .errors import SerpentailError
-from .laws import LAWS, Law
+from .laws import LAWS as VALUE_LAWS
+from .laws import Law
 from .measures import State, states
 from .model import Model
+
+LAWS = (*VALUE_LAWS, *derivative_laws.LAWS)
 
 
 @dataclass(frozen=True)
