@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 import continuum_forms
+import derivatives
 import peers
 import serpentail as st
 from fixtures import COLUMNS, Fixture, fixture
@@ -213,6 +214,9 @@ MEASURES = {
     "generation": generation,
     "speed": speed,
     "tails": tails,
+    "jacobian_times": derivatives.jacobian_times,
+    "hessian_times": derivatives.hessian_times,
+    "derivative_code": derivatives.derivative_code,
     "python_overhead": python_overhead,
     "drift": drift,
     "work_precision": work_precision,

@@ -1,6 +1,7 @@
 """Models to measure: a generated folder goes in, the model and a closure of its C forward dynamics come out."""
 
 import ctypes
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,15 +10,19 @@ import numpy as np
 import serpentail as st
 from peers import Closure
 from serpentail.compiler import compile_library
+from serpentail.library import aligned
 
 ADAPTER = """
 #include "{prefix}.h"
-struct context {{ {prefix}_parameters parameters; {prefix}_real work[{work}]; }};
-int measured(void *c, const {prefix}_real *q, const {prefix}_real *v, const {prefix}_real *tau, {prefix}_real *v_dot);
-int measured(void *c, const {prefix}_real *q, const {prefix}_real *v, const {prefix}_real *tau, {prefix}_real *v_dot)
+struct context {{ {prefix}_real work[{work}]; {prefix}_parameters parameters; {prefix}_real out[{out}]; }};
+int measured(void *c, const {prefix}_real *q, const {prefix}_real *v, const {prefix}_real *rest, {prefix}_real *seen);
+int measured(void *c, const {prefix}_real *q, const {prefix}_real *v, const {prefix}_real *rest, {prefix}_real *seen)
 {{
   struct context *context = c;
-  return {prefix}_forward_dynamics(&context->parameters, q, v, tau, v_dot, context->work);
+  {prefix}_real *out = {target};
+  int status = {prefix}_{function}(&context->parameters, {arguments}, context->work);
+  seen[0] = out[0];
+  return status;
 }}
 """
 COLUMNS = {
@@ -52,12 +57,28 @@ COLUMNS = {
     "form_ratio": "ratio (of medians)",
     "bend_operations": "operations, bend",
     "polar_operations": "operations, polar",
+    "revolutes_ns": "tuned, ns",
+    "revolutes_ratio": "times slower",
+    "casadi_ns": "CasADi's C, ns",
+    "casadi_ratio": "times slower",
+    "hand_ns": "the same, turn by hand, ns",
+    "hand_ratio": "times slower",
+    "gcc_s": "gcc on CasADi's C, s",
+    "plain_difference": "difference: Pinocchio",
+    "jacobian_difference": "others",
+    "hessian_difference": "difference",
+    "forward_dynamics_derivatives_operations": "operations: Jacobians of v_dot",
+    "inverse_dynamics_derivatives_operations": "of H v_dot + C",
+    "inverse_dynamics_hessian_operations": "its Hessian",
+    "derivative_bytes": "C text, bytes",
+    "generate_cpu": "generate, CPU s",
+    "compile_cpu": "compile, CPU s",
 }
 
 
 @dataclass(frozen=True)
 class Fixture:
-    """A loaded model and what calls its C forward dynamics for the timer."""
+    """A loaded model and what calls one of its C functions for the timer."""
 
     model: st.Model
     closure: Closure
@@ -69,13 +90,38 @@ class Fixture:
         return dict(self.model.parameters)
 
 
-def fixture(folder: Path, scratch: Path) -> Fixture:
-    """Load a generated folder and compile an adapter to the timer's call."""
+def fixture(folder: Path, scratch: Path, function: str = "forward_dynamics") -> Fixture:
+    """Load a generated folder and compile an adapter to the timer's call.
+
+    The third array of the timer holds all inputs after q and v, one after the other; more than one output stays in the
+    context, behind the workspace, which begins at a cache line.
+    """
     model = st.load(folder)
-    work = model.manifest["work"]["forward_dynamics"] + 1
-    adapter = scratch / f"{model.name}_adapter.c"
-    adapter.write_text(ADAPTER.format(prefix=model.name, work=work))
+    work = -(-(model.manifest["work"][function] + 1) // 8) * 8
+    inputs, outputs = (sizes(model.manifest["functions"][function][key]) for key in ("inputs", "outputs"))
+    single = len(outputs) == 1
+    arguments = ["q", "v", *offsets("rest", inputs[2:]), *offsets("out", outputs)]
+    adapter = scratch / f"{model.name}_{function}.c"
+    text = ADAPTER.format(
+        prefix=model.name,
+        function=function,
+        work=work,
+        out=1 if single else sum(outputs),
+        target="seen" if single else "context->out",
+        arguments=", ".join(arguments),
+    )
+    adapter.write_text(text)
     library = ctypes.CDLL(str(compile_library([adapter, folder / "src" / f"{model.name}.c"], folder / "include")))
-    context = np.concatenate([model.parameter_vector, np.zeros(work)])
-    address = ctypes.cast(library.measured, ctypes.c_void_p).value
-    return Fixture(model, Closure(address, context.ctypes.data), context)
+    context = aligned(work + len(model.parameter_vector) + sum(outputs), float)
+    context[work : work + len(model.parameter_vector)] = model.parameter_vector
+    return Fixture(model, Closure(ctypes.cast(library.measured, ctypes.c_void_p).value, context.ctypes.data), context)
+
+
+def sizes(arguments: list[dict]) -> list[int]:
+    """Return the lengths of a function's arrays."""
+    return [math.prod(argument["shape"]) for argument in arguments]
+
+
+def offsets(name: str, lengths: list[int]) -> list[str]:
+    """Return C expressions of arrays that lie one after the other."""
+    return [f"{name} + {sum(lengths[:k])}" for k in range(len(lengths))]

@@ -19,6 +19,7 @@ import numpy as np
 
 HERE = Path(__file__).resolve().parent
 TUNED, PLAIN, TIMER_SOURCE = HERE / "pinocchio_chain.cpp", HERE / "pinocchio_plain.cpp", HERE / "timer.c"
+DERIVATIVES = HERE / "pinocchio_derivatives.cpp"
 CACHE = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "serpentail" / "peers"
 
 SHARED_FLAGS = ("-fPIC", "-shared")
@@ -78,7 +79,8 @@ def build_library(source: Path, output_dir: Path) -> Path:
     """Compile a .c or .cpp file to a shared library, unless output_dir has it; PeerUnavailable says why not."""
     source, output_dir = Path(source), Path(output_dir)
     compiler, flags = _toolchain(source)
-    key = hashlib.sha256(repr((_identity(compiler, flags), source.read_text())).encode()).hexdigest()[:16]
+    texts = [path.read_text() for path in (source, *sorted(source.parent.glob("*.hpp")))]
+    key = hashlib.sha256(repr((_identity(compiler, flags), texts)).encode()).hexdigest()[:16]
     library = output_dir / f"{source.stem}-{key}.so"
     if not library.exists():
         output_dir.mkdir(parents=True, exist_ok=True)
@@ -109,6 +111,23 @@ class PinocchioBench:
     def crba_closure(self) -> Closure:
         """The path through Pinocchio's CRBA of the full chain."""
         return self._closure("pinocchio_forward_dynamics_crba")
+
+    @property
+    def derivatives_closure(self) -> Closure:
+        """The path to the Jacobians of v_dot through computeRNEADerivatives; of PLAIN and DERIVATIVES."""
+        return self._closure("pinocchio_forward_dynamics_derivatives")
+
+    @property
+    def own_derivatives_closure(self) -> Closure:
+        """The path to the Jacobians of v_dot by own sums; of DERIVATIVES."""
+        return self._closure("pinocchio_forward_dynamics_derivatives_own")
+
+    def forward_dynamics_derivatives(self, q, v, tau, path: str = "") -> tuple[np.ndarray, ...]:
+        """Jacobians of v_dot, all relative to the torso: dq (nv, nv), dv (nv, nv), dtau (nv, nv - 6); path: "_own"."""
+        self._call(f"pinocchio_forward_dynamics_derivatives{path}", (self.nv,), q, v, tau)
+        results = tuple(np.empty((self.nv, columns)) for columns in (self.nv, self.nv, self.nv - 6))
+        self._library.pinocchio_derivatives_result(self._chain, *map(_pointer, results))
+        return results
 
     def forward_dynamics(self, q, v, tau) -> np.ndarray:
         """v_dot (nv) by the fastest path."""
@@ -216,7 +235,8 @@ def _declared(path: Path) -> ctypes.CDLL:
     library.pinocchio_chain_new.argtypes = [ctypes.c_int, ctypes.c_int, ctypes.c_void_p]
     library.pinocchio_chain_free.restype = None
     pointers = {"chain_free": 1, "mass_matrix": 3, "bias_force": 4}
-    pointers |= {"forward_dynamics": 5, "forward_dynamics_crba": 5}
+    pointers |= {"forward_dynamics": 5, "forward_dynamics_crba": 5, "forward_dynamics_derivatives": 5}
+    pointers |= {"forward_dynamics_derivatives_own": 5, "derivatives_result": 4}
     for name in (name for name in pointers if hasattr(library, f"pinocchio_{name}")):
         getattr(library, f"pinocchio_{name}").argtypes = [ctypes.c_void_p] * pointers[name]
     return library
@@ -233,7 +253,7 @@ def _toolchain(source: Path) -> tuple[tuple[str, ...], tuple[str, ...]]:
         return _compiler("CC", ("cc", "gcc", "clang")), (*C_FLAGS, *SHARED_FLAGS)
     folders = dict.fromkeys(_header_folder(*header) for header in HEADERS)
     search = (flag for folder in folders for flag in ("-isystem", str(folder)))
-    flags = CXX_FLAGS + (TUNED_FLAGS if source == TUNED else ())
+    flags = CXX_FLAGS + (TUNED_FLAGS if source in (TUNED, DERIVATIVES) else ())
     return _compiler("CXX", ("g++", "c++", "clang++")), (*flags, *SHARED_FLAGS, *search)
 
 

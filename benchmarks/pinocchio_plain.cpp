@@ -1,6 +1,7 @@
 // From parameters of the articulated tail and states in this project's conventions to v_dot, through Pinocchio as
 // its documentation shows it: default joint types RX and RZ, crba and nonLinearEffects of the full chain, G^T H G
-// with the constant matrix G that repeats (alpha_i, beta_i), Eigen's LLT.  pinocchio_chain.cpp has tuned paths.
+// with the constant matrix G that repeats (alpha_i, beta_i), Eigen's LLT; and to the Jacobians of v_dot, by
+// computeRNEADerivatives of the full chain.  pinocchio_chain.cpp and pinocchio_derivatives.cpp have tuned paths.
 // what Pinocchio's own build sets: more than 20 joint types in one variant
 #define BOOST_MPL_CFG_NO_PREPROCESSED_HEADERS
 #define BOOST_MPL_LIMIT_LIST_SIZE 30
@@ -17,6 +18,7 @@
 #include "pinocchio/multibody/joint.hpp"
 
 #include "pinocchio/algorithm/crba.hpp"
+#include "pinocchio/algorithm/rnea-derivatives.hpp"
 #include "pinocchio/algorithm/rnea.hpp"
 
 #define PEER_API extern "C" __attribute__((visibility("default")))
@@ -59,8 +61,10 @@ pinocchio::Model chain_model(int count, const Parameters &p)
 struct Chain {
     Chain(int segments, int links, const Parameters &parameters)
         : m(segments), n(links), model(chain_model(m * n, parameters)), data(model), q(model.nq), v(model.nv),
-          G(MatrixXd::Zero(model.nv, 6 + 2 * m)), llt(6 + 2 * m)
+          G(MatrixXd::Zero(model.nv, 6 + 2 * m)), llt(6 + 2 * m), full_dq(MatrixXd::Zero(model.nv, model.nv)),
+          full_dv(full_dq), full_da(full_dq), unit(MatrixXd::Zero(6 + 2 * m, 2 * m))
     {
+        unit.bottomRows(2 * m).setIdentity();
         G.topLeftCorner(6, 6).setIdentity();
         for (int j = 0; j < m * n; ++j)
             for (int side = 0; side < 2; ++side)
@@ -73,6 +77,9 @@ struct Chain {
     VectorXd q, v;
     MatrixXd G;
     Eigen::LLT<MatrixXd> llt;
+    VectorXd a;                          // reduced; the first three rows R^T p_b_ddot - omega x R^T p_b_dot
+    MatrixXd full_dq, full_dv, full_da;  // of the inverse dynamics of the full chain
+    MatrixXd unit, dq, dv, dtau;         // unit torques; the result
 };
 
 } // namespace
@@ -107,8 +114,33 @@ PEER_API int pinocchio_forward_dynamics(void *context, const double *q, const do
     VectorXd load = -(chain.G.transpose() * chain.data.nle);
     load.tail(nt) += VectorXd::Map(tau, nt);
     chain.llt.compute(chain.G.transpose() * chain.data.M * chain.G);
-    const VectorXd a = chain.llt.solve(load);
-    Vector3d::Map(v_dot) = R * (a.head<3>() + omega.cross(velocity));
-    VectorXd::Map(v_dot + 3, 3 + nt) = a.tail(3 + nt);
+    chain.a = chain.llt.solve(load);
+    Vector3d::Map(v_dot) = R * (chain.a.head<3>() + omega.cross(velocity));
+    VectorXd::Map(v_dot + 3, 3 + nt) = chain.a.tail(3 + nt);
     return chain.llt.info() == Eigen::Success ? 0 : 1;
+}
+
+// dq and dv in Pinocchio's tangent space and velocity, both relative to the torso.
+PEER_API int pinocchio_forward_dynamics_derivatives(void *context, const double *q, const double *v,
+                                                    const double *tau, double *v_dot)
+{
+    Chain &chain = *static_cast<Chain *>(context);
+    const int status = pinocchio_forward_dynamics(context, q, v, tau, v_dot);
+    pinocchio::computeRNEADerivatives(chain.model, chain.data, chain.q, chain.v, chain.G * chain.a, chain.full_dq,
+                                      chain.full_dv, chain.full_da);
+    chain.dq = chain.llt.solve(-(chain.G.transpose() * chain.full_dq * chain.G));
+    chain.dv = chain.llt.solve(-(chain.G.transpose() * chain.full_dv * chain.G));
+    chain.dtau = chain.llt.solve(chain.unit);
+    return status;
+}
+
+// The latest result: dq, dv (nv x nv) and dtau (nv x 2m), row-major.
+PEER_API void pinocchio_derivatives_result(void *context, double *dq, double *dv, double *dtau)
+{
+    using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+    const Chain &chain = *static_cast<Chain *>(context);
+    const int nt = 2 * chain.m;
+    Eigen::Map<RowMajor>(dq, 6 + nt, 6 + nt) = chain.dq;
+    Eigen::Map<RowMajor>(dv, 6 + nt, 6 + nt) = chain.dv;
+    Eigen::Map<RowMajor>(dtau, 6 + nt, nt) = chain.dtau;
 }

@@ -54,7 +54,7 @@ int time_rounds(int competitors, const struct closure *closures, const struct st
                 int calls, double *min_ns, double *median_ns)
 {
     double *times = malloc((size_t)competitors * (size_t)rounds * sizeof *times);
-    double *v_dot = malloc(states->nv * sizeof *v_dot);
+    double *v_dot = calloc(states->nv, sizeof *v_dot);
     int failures = times && v_dot ? 0 : -1;
 
     for (int round = -1; failures == 0 && round < rounds; ++round)
