@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from derivatives import (
+from derivative_models import (
     FIRST,
     KINDS,
     complex_step,

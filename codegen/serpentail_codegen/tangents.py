@@ -7,7 +7,7 @@ direction; without, it holds the derivative in one direction.
 from collections.abc import Callable, Collection
 from dataclasses import replace
 
-from .compose import pruned, reached, reads, writes
+from .compose import pruned, reached, writes
 from .differentiate import tangent
 from .program import Apply, Array, Copy, Fill, Guard, Index, Loop, Program, Ref, statements
 from .turned_arrays import TurnedArray, turned_arrays
@@ -41,15 +41,12 @@ def _role(array: Array) -> str:
 
 
 def _partly_written(body: tuple) -> list[Ref]:
-    """Return the wide arrays that some statement writes in fewer lanes than another one reads."""
-    written, read = {}, {}
+    """Return the rows that some statement writes in part of their lanes: the others must be zero."""
+    found = {}
     for statement, _ in statements(body):
-        columns = getattr(statement, "columns", None)
-        for found, refs in ((written, writes(statement)), (read, reads(statement))):
-            for ref in refs:
-                if ref.array.lanes and ref.array.role == "local":
-                    found.setdefault(ref.array, set()).add(columns)
-    return [a.part(0, a.length) for a, columns in written.items() if len(columns | read.get(a, set())) > 1]
+        if getattr(statement, "columns", None):
+            found |= {ref.array.name: ref.array for ref in writes(statement) if ref.array.lanes}
+    return [a.part(0, a.length) for a in found.values()]
 
 
 class _Transform:
