@@ -31,7 +31,8 @@ def adjoint_program(program: Program, wanted: Collection[str], given: Collection
     arrays = tuple(replace(a, role="local") if a.role == "output" else a for a in program.arrays)
     arrays += (*companions.values(), *weights, *results, *way.kept)
     body = (*forward, *start, *backward, *end)
-    return pruned(replace(program, name=f"b_{program.name}", arrays=arrays, body=body))
+    name = "_".join(["b", *wanted, *given, program.name])
+    return pruned(replace(program, name=name, arrays=arrays, body=body))
 
 
 def _all(array: Array) -> Ref:

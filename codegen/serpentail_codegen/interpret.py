@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 
+from .compose import expanded
 from .program import Apply, Array, Copy, Factor, Fill, Guard, Loop, Program, Ref, Solve, Unit
 from .tape import Tape, replay
 
@@ -101,7 +102,7 @@ class Run:
     """One run of a program over an algebra: ``values`` are arrays by name, ``guards`` what must be positive."""
 
     def __init__(self, program: Program, algebra, arguments: dict[str, list]):
-        self.algebra, self.guards = algebra, []
+        program, self.algebra, self.guards = expanded(program), algebra, []
         self.values = {a.name: [None] * a.length for a in program.arrays}
         self.values |= {a.name: [algebra.const(v) for v in a.values] for a in program.of_role("constant")}
         self.values |= {name: list(scalars) for name, scalars in arguments.items()}

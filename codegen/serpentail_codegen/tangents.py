@@ -33,7 +33,8 @@ def tangent_program(program: Program, active: Collection[str], lanes: int = 0, b
     fills = tuple(Fill(ref, (0,) * ref.size) for ref in _partly_written(body))
     arrays = tuple(replace(a, role="local") if a.role == "output" else a for a in program.arrays)
     arrays += tuple(companions.values())
-    return pruned(replace(program, name=f"d_{program.name}", arrays=arrays, body=fills + body))
+    name = "_".join(["d", *active, program.name, *(["rows_of", str(lanes)] if lanes else [])])
+    return pruned(replace(program, name=name, arrays=arrays, body=fills + body))
 
 
 def _role(array: Array) -> str:
