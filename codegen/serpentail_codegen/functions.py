@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import partial
 from math import prod
 
 from . import dynamics as dyn
@@ -60,7 +60,6 @@ def inertial(kind: str) -> tuple[Parameter, ...]:
     return tuple(p for p in parameters_of(kind) if p.name != "link_radius")
 
 
-@cache
 def program(function: Function, tail: Tail) -> Program:
     """Assemble one function for given sizes."""
     draft = Draft(function.name, function.doc, tail=tail)

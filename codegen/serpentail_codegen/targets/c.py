@@ -11,11 +11,13 @@ from ..functions import Argument, Function, inertial
 from ..functions import program as assemble
 from ..program import Program
 from ..scene import Scene
+from ..tape import operation_count
 from ..templating import render
 from .c_function import CFunction, Routine, dialect, in_loops, routine_arguments, routine_lines, straight_line
 from .casadi_external import casadi_context
 
-STRAIGHT_UP_TO = 5000  # operations: beyond, the text leaves the instruction cache and compile time grows
+STRAIGHT_UP_TO = 2500  # lines: beyond, the text leaves the instruction cache and compile time grows
+LARGE = 100  # operations: a step that is written out wherever it is called; larger ones as the compiler sees fit
 COORDINATES = {
     "joint": "alpha_1, beta_1, ... of the joints",
     "bend": "a_1, b_1, ... of the segments' bend",
@@ -39,7 +41,7 @@ def emit(scene: Scene, tail: Tail, function: Function) -> Emitted:
     fixed = baked_values(scene)
     if scene.emission != "loops":
         body = straight_line(program, scene.real, scene.name, fixed)
-        if scene.emission == "straight" or body.operations <= STRAIGHT_UP_TO:
+        if scene.emission == "straight" or len(body.lines) <= STRAIGHT_UP_TO:
             return Emitted(function, body, "straight")
     return Emitted(function, in_loops(program, scene.real, scene.name, fixed), "loops")
 
@@ -118,6 +120,7 @@ def step_views(emitted: list[Emitted], real: str, prefix: str) -> list[dict]:
     return [
         {
             "name": routine.name,
+            "kind": "STEP" if operation_count(routine.step.nodes, routine.step.results) < LARGE else "static void",
             "doc": routine.step.doc,
             "lines": routine_lines(routine, real, prefix),
             "arguments": routine_arguments(routine),

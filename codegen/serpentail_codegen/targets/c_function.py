@@ -36,7 +36,7 @@ class Routine:
 class CFunction:
     """One C function body: its lines, the scalars of workspace, the routines and helpers it calls, what it costs.
 
-    ``callees`` are the programs that it calls, each with its C function.
+    ``operations`` are executed, each lane counted; ``callees`` are the programs that it calls, with their C functions.
     """
 
     lines: tuple[str, ...]
