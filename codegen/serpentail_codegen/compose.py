@@ -62,28 +62,29 @@ def rewritten(body: tuple, rewrite: Callable[[object], Iterator]) -> tuple:
     return tuple(out)
 
 
-def reached(body: tuple, start: Collection[str]) -> set[str]:
-    """Return the arrays that may depend on the arrays ``start``, by name."""
+def _grown(body: tuple, start: Collection[str], more: Callable[[object, set[str]], set[str]]) -> set[str]:
+    """Return names with what each statement adds to them, until none adds any."""
     found, before = set(start), -1
     while before < len(found):
         before = len(found)
         for statement, _ in statements(body):
-            if names(reads(statement)) & found:
-                found |= names(writes(statement))
+            found |= more(statement, found)
     return found
+
+
+def reached(body: tuple, start: Collection[str]) -> set[str]:
+    """Return the arrays that may depend on the arrays ``start``, by name."""
+    return _grown(body, start, lambda s, found: names(writes(s)) if names(reads(s)) & found else set())
 
 
 def influencing(body: tuple, end: Collection[str]) -> set[str]:
     """Return the arrays that the arrays ``end`` may depend on, by name."""
-    found, before = set(end), -1
-    while before < len(found):
-        before = len(found)
-        for statement, _ in statements(body):
-            if names(writes(statement)) & found:
-                found |= names(reads(_with_outputs(statement, found)))
-            elif isinstance(statement, Guard) and names(statement.protects) & found:
-                found |= names(reads(statement))
-    return found
+
+    def more(statement, found: set[str]) -> set[str]:
+        targets = statement.protects if isinstance(statement, Guard) else writes(statement)
+        return names(reads(_with_outputs(statement, found))) if names(targets) & found else set()
+
+    return _grown(body, end, more)
 
 
 def _with_outputs(statement, needed: Collection[str]):

@@ -3,6 +3,8 @@
 Nothing depends on the position of B or on its velocity.
 """
 
+from collections.abc import Callable
+
 from . import dynamics as dyn
 from . import kinematics as kin
 from . import sweeps
@@ -23,7 +25,7 @@ from .functions import (
     inertial,
     program,
 )
-from .program import Array, Ref
+from .program import Array, Index, Ref
 from .sweeps import mechanism
 from .tangents import tangent_program
 
@@ -108,6 +110,12 @@ def loads(d: Draft, **at_torso: Ref) -> dict[str, Ref]:
     return dict.fromkeys(("force", "moment", "load_force", "load_moment"), d.zero(3)) | at_torso
 
 
+def less(d: Draft, rows: Array, tau: Callable[[Index], Ref] | None = None) -> Loads:
+    """Loads of H x = tau - rows, rows being a change of H v_dot + C in torso axes."""
+    at_torso = loads(d, force=rows.part(0, 3), moment=rows.part(3, 3))
+    return Loads(at_torso, lambda k: rows.part(6 + k, 1), tau)
+
+
 def assemble_forward_dynamics_derivatives(d: Draft, arrays: dict[str, Array]) -> None:
     """-H^-1 times the tangents of H v_dot + C at fixed v_dot; with respect to tau, columns of H^-1."""
     tail, nv = d.tail, d.tail.nv
@@ -118,8 +126,7 @@ def assemble_forward_dynamics_derivatives(d: Draft, arrays: dict[str, Array]) ->
     rows, x = d.wide("rows", nv, directions.count), d.wide("x", nv, directions.count)
     given = {name: arrays[name] for name in ("q", "v")}
     d.call(inner, d_force=rows, v_dot=body, **given, **directions.tangents(d))
-    at_torso = loads(d, force=rows.part(0, 3), moment=rows.part(3, 3))
-    balance.solve(d, Loads(at_torso, inertial=lambda k: rows.part(6 + k, 1)), x)
+    balance.solve(d, less(d, rows), x)
     directions.spread(d, x, arrays["dq"], arrays["dv"])
     turned = {f"row_{r}": arrays["dq"].part(nv * r + 3, 3) for r in range(3)}
     d.step(dyn.turned_acceleration, {"a": body.part(0, 3)}, **turned)
@@ -136,30 +143,46 @@ def torques(d: Draft, balance: Balance, dtau: Array) -> None:
         d.copy(dtau.part(nt * r, nt), x.lane(r, 0, nt))
 
 
-def assemble_parameter_derivatives(d: Draft, arrays: dict[str, Array]) -> None:
-    """Tangents of H v_dot + C with respect to every parameter; -H^-1 times them where ``tau`` is given."""
-    nv, count = d.tail.nv, parameter_count(d.tail)
-    forward = "tau" in arrays
-    function = CORE if forward else FUNCTIONS["inverse_dynamics"]
-    tangents, lane = {}, 0
+def assemble_inverse_dynamics_parameter_derivatives(d: Draft, arrays: dict[str, Array]) -> None:
+    """Tangents of H v_dot + C with respect to every parameter."""
+    rows = parameter_tangents(d, FUNCTIONS["inverse_dynamics"], {n: arrays[n] for n in ("q", "v", "v_dot")})
+    spread_parameters(d, rows, arrays["dparameters"])
+
+
+def assemble_forward_dynamics_parameter_derivatives(d: Draft, arrays: dict[str, Array]) -> None:
+    """-H^-1 times the tangents of H v_dot + C with respect to every parameter, at fixed v_dot."""
+    count = parameter_count(d.tail)
+    balance, body = forward_dynamics_first(d, arrays)
+    rows, x = (
+        parameter_tangents(d, CORE, {"q": arrays["q"], "v": arrays["v"], "v_dot": body}),
+        d.wide("x", d.tail.nv, count),
+    )
+    d.known["gravity"] = d.wide("d_gravity_z", 1, count)[0]
+    d.unit(d.known["gravity"], 0)  # gravity is the first parameter: p_b_ddot falls by as much
+    balance.solve(d, less(d, rows), x)
+    spread_parameters(d, x, arrays["dparameters"])
+
+
+def parameter_tangents(d: Draft, function: Function, given: dict[str, Array]) -> Array:
+    """Return the tangents of a force with respect to every parameter, a lane for each number of the struct."""
+    count, lane, tangents = parameter_count(d.tail), 0, {}
+    names = [p.name for p in inertial(d.tail.kind)]
+    inner = tangent_program(program(function, d.tail), names, count)
     for p in inertial(d.tail.kind):
-        tangents[f"d_{p.name}"] = wide = d.wide(f"d_{p.name}", p.size, count)
-        d.unit(wide[0], lane)
+        if any(a.name == f"d_{p.name}" for a in inner.arrays):
+            tangents[f"d_{p.name}"] = d.wide(f"d_{p.name}", p.size, count)
+            d.unit(tangents[f"d_{p.name}"][0], lane)
         lane += p.size
-    balance, v_dot = forward_dynamics_first(d, arrays) if forward else (None, arrays["v_dot"])
-    inner = tangent_program(program(function, d.tail), [p.name for p in inertial(d.tail.kind)], count)
-    tangents = {name: array for name, array in tangents.items() if any(a.name == name for a in inner.arrays)}
-    rows = d.wide("rows", nv, count)
-    d.call(inner, d_force=rows, v_dot=v_dot, q=arrays["q"], v=arrays["v"], **tangents)
-    if forward:
-        x = d.wide("x", nv, count)
-        at_torso = loads(d, force=rows.part(0, 3), moment=rows.part(3, 3))
-        d.known["gravity"] = d.wide("d_gravity_z", 1, count)[0]
-        d.unit(d.known["gravity"], 0)  # gravity is the first parameter: p_b_ddot falls by as much
-        balance.solve(d, Loads(at_torso, inertial=lambda k: rows.part(6 + k, 1)), x)
-        rows = x
-    with d.loop("row", nv) as r:
-        d.copy(arrays["dparameters"].part(count * r, count), rows.lane(r, 0, count))
+    rows = d.wide("rows", d.tail.nv, count)
+    d.call(inner, d_force=rows, **given, **tangents)
+    return rows
+
+
+def spread_parameters(d: Draft, source: Array, dparameters: Array) -> None:
+    """Copy rows to a matrix with a column for each number of the parameter struct."""
+    count = parameter_count(d.tail)
+    with d.loop("row", d.tail.nv) as row:
+        d.copy(dparameters.part(count * row, count), source.lane(row, 0, count))
 
 
 def parameter_count(tail: Tail) -> int:
@@ -179,9 +202,7 @@ def assemble_forward_dynamics_jvp(d: Draft, arrays: dict[str, Array]) -> None:
     d.copy(d_q.part(7, d.tail.nt), arrays["dq"].part(6, d.tail.nt))
     inner = tangent_program(program(CORE, d.tail), ("q", "v"))
     d.call(inner, q=arrays["q"], v=arrays["v"], v_dot=body, d_q=d_q, d_v=arrays["dv"], d_force=rows)
-    at_torso = loads(d, force=rows.part(0, 3), moment=rows.part(3, 3))
-    dtau = arrays["dtau"]
-    balance.solve(d, Loads(at_torso, lambda k: rows.part(6 + k, 1), lambda k: dtau.part(k, 1)), x)
+    balance.solve(d, less(d, rows, lambda k: arrays["dtau"].part(k, 1)), x)
     reads = {"a": body.part(0, 3), "turn": arrays["dq"].part(3, 3), "p_ddot": x.part(0, 3)}
     d.step(dyn.turning_acceleration, reads, p_ddot=x.part(0, 3))
 
