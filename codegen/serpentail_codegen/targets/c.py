@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from ..draft import Tail
 from ..functions import Argument, Function, inertial
 from ..functions import program as assemble
+from ..interpret import applied
 from ..program import Program
 from ..scene import Scene
 from ..tape import operation_count
@@ -16,7 +17,7 @@ from ..templating import render
 from .c_function import CFunction, Routine, dialect, in_loops, routine_arguments, routine_lines, straight_line
 from .casadi_external import casadi_context
 
-STRAIGHT_UP_TO = 2500  # lines: beyond, the text leaves the instruction cache and compile time grows
+STRAIGHT_UP_TO = 7000  # nodes: beyond, the text leaves the instruction cache and compile time grows
 LARGE = 100  # operations: a step that is written out wherever it is called; larger ones as the compiler sees fit
 COORDINATES = {
     "joint": "alpha_1, beta_1, ... of the joints",
@@ -39,10 +40,9 @@ def emit(scene: Scene, tail: Tail, function: Function) -> Emitted:
     """Print one function in the form that the scene asks for; ``auto`` is straight while that is small."""
     program = assemble(function, tail)
     fixed = baked_values(scene)
-    if scene.emission != "loops":
-        body = straight_line(program, scene.real, scene.name, fixed)
-        if scene.emission == "straight" or len(body.lines) <= STRAIGHT_UP_TO:
-            return Emitted(function, body, "straight")
+    small = scene.emission == "auto" and applied(program) <= STRAIGHT_UP_TO
+    if small or scene.emission == "straight":
+        return Emitted(function, straight_line(program, scene.real, scene.name, fixed), "straight")
     return Emitted(function, in_loops(program, scene.real, scene.name, fixed), "loops")
 
 
