@@ -132,15 +132,16 @@ def casadi_outputs(model: Model, name: str, function, state: State, *more) -> li
 
 
 def differences(model: Model, name: str, state: State, references) -> float:
-    """Return the largest error of a function's outputs against references, in order."""
+    """Return the largest error of a function's outputs against references, in order; what is solved for, by cond(H)."""
     found = outputs(model, name, state).items()
     pairs = [(key, x, reference) for (key, x), reference in zip(found, references, strict=True)]
+    solved = name.startswith("forward_dynamics_") and name in DERIVATIVES
     return worst(
         relative(x, reference, max(size, np.max(np.abs(reference))))
         if (size := cancelled(model, key, state))
         else difference(model, state.q, key, x, reference)
         for key, x, reference in pairs
-    )
+    ) / (sensitivity(model, state.q) if solved else 1.0)
 
 
 def cancelled(model: Model, output: str, state: State) -> float:
