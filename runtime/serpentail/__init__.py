@@ -15,7 +15,15 @@ _HOME = {
     "filmstrip": "film",
     "time_plots": "plot",
     **dict.fromkeys(
-        ["SerpentailError", "CompilerNotFound", "CompileFailed", "ModelError", "StateError", "SimulationError", "PlanningError"],
+        [
+            "SerpentailError",
+            "CompilerNotFound",
+            "CompileFailed",
+            "ModelError",
+            "StateError",
+            "SimulationError",
+            "PlanningError",
+        ],
         "errors",
     ),
 }

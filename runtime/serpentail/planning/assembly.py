@@ -1,4 +1,4 @@
-"""Assembly: one function of a node and linear maps go in; a program's functions and exact sparse derivatives come out."""
+"""Assembly: a node's function and linear maps go in; a program's functions and exact derivatives come out."""
 
 from dataclasses import dataclass
 
@@ -72,7 +72,9 @@ class Assembly:
         inside = np.arange(length.sum()) - np.repeat(np.cumsum(length) - length, length)
         k = start[entry] + inside
         constant = self.linear.tocoo()
-        row, column = (np.concatenate(x) for x in ((self.weights.indices[k], constant.row), (place[entry], constant.col)))
+        row, column = (
+            np.concatenate(x) for x in ((self.weights.indices[k], constant.row), (place[entry], constant.col))
+        )
         key, position = np.unique(column.astype(np.int64) * self.linear.shape[0] + row, return_inverse=True)
         pattern = _sparsity(key, self.linear.shape)
         moving = position[: len(k)]

@@ -1,4 +1,4 @@
-"""Attitude coordinates: a name goes in; coordinates, their rate and their goal come out, for numbers and CasADi alike."""
+"""Attitude coordinates: a name goes in; conversions and rates come out, for numbers and for CasADi."""
 
 from dataclasses import dataclass
 

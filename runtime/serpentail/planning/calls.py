@@ -1,10 +1,11 @@
-"""Calls: functions of linear inputs inside a node's function go in; the node at all nodes, and its derivatives, come out.
+"""Calls: functions inside a node's function go in; values and exact derivatives at all nodes come out.
 
 A node's function is y(zeta, h, e), e being results of calls e = c(L zeta + l).  With E = c' L, its Jacobian is
 y_zeta + y_e E, and the Hessian of mu^T y is [I; E]^T (mu^T y)'' [I; E] + L^T (nu^T c)'' L with nu = y_e^T mu.
 """
 
 from dataclasses import dataclass
+from itertools import chain
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +74,7 @@ class MappedNode:
         blocks = self._blocks()
         direct, through = ca.jacobian(self.y, self.zeta), _jacobian_of_parts(self.y, self.results)
         total = direct + ca.mtimes(through, self._by_zeta(blocks))
-        return ca.Function("jacobian", [self.zeta, self.h, *self.results, *sum(blocks, [])], [total])
+        return ca.Function("jacobian", [self.zeta, self.h, *self.results, *chain.from_iterable(blocks)], [total])
 
     def _weights(self):
         """nu of every call."""
@@ -88,17 +89,17 @@ class MappedNode:
     def _hessian(self):
         import casadi as ca
 
-        mu, blocks, total = ca.SX.sym("mu", self.node.size), self._blocks(), 0
+        mu, blocks = ca.SX.sym("mu", self.node.size), self._blocks()
         everything = ca.vertcat(self.zeta, *self.results)
         inner = ca.hessian(ca.dot(mu, self.y), everything)[0]
-        chain = ca.vertcat(ca.SX.eye(self.zeta.size1()), self._by_zeta(blocks))
-        total = ca.mtimes([chain.T, inner, chain])
+        rows = ca.vertcat(ca.SX.eye(self.zeta.size1()), self._by_zeta(blocks))
+        total = ca.mtimes([rows.T, inner, rows])
         seconds = []
         for call, hessian in zip(self.calls, self.hessians_of_calls, strict=True):
             for i, j, place in _pairs(call):
                 seconds.append(ca.SX.sym("S", hessian.sparsity_out(place)))
                 total += ca.mtimes([call.inputs[i][0].T, seconds[-1], call.inputs[j][0]])
-        symbols = [self.zeta, self.h, *self.results, mu, *sum(blocks, []), *seconds]
+        symbols = [self.zeta, self.h, *self.results, mu, *chain.from_iterable(blocks), *seconds]
         return ca.Function("hessian", symbols, [total])
 
     def _inputs(self, call: Call, Z):
@@ -166,7 +167,6 @@ def _jacobian_of_parts(y, parts):
     import casadi as ca
 
     return ca.horzcat(*(ca.jacobian(y, part) for part in parts))
-
 
 
 def _entries(matrix):

@@ -32,7 +32,9 @@ class Curve:
     def inside(self, k: np.ndarray, s: np.ndarray) -> dict[str, np.ndarray]:
         """Blocks (n, size) in the intervals k (n,) at the fractions s (n,) of them."""
         grown, basis = self.rule.integrals(s), self.rule.basis(s)
-        states = {name: x[k] + np.einsum("nj,njx->nx", grown, self.increments[name][k]) for name, x in self.starts.items()}
+        states = {
+            name: x[k] + np.einsum("nj,njx->nx", grown, self.increments[name][k]) for name, x in self.starts.items()
+        }
         return states | {name: np.einsum("nj,njx->nx", basis, values[k]) for name, values in self.nodes.items()}
 
 

@@ -98,5 +98,3 @@ def _goal_values(goal, coordinates: Attitude, angles: np.ndarray) -> np.ndarray:
 
     target = pitch_roll_yaw(np.concatenate([np.zeros(3), goal.attitude]))
     return target + 2 * np.pi * np.round((angles - target) / (2 * np.pi))
-
-

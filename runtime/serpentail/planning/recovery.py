@@ -18,7 +18,7 @@ def full_state(model, start, coordinates: Attitude, times, blocks) -> tuple[np.n
     if "position" in blocks:
         position, velocity = blocks["position"], blocks["velocity"]
     else:
-        position, velocity = _falling(model, start, times, R, H, omega, tail_rate)
+        position, velocity = _falling(model, start, times, (R, H), np.column_stack([omega, tail_rate]))
     return np.column_stack([position, quaternion, tail]), np.column_stack([velocity, omega, tail_rate])
 
 
@@ -34,11 +34,12 @@ def _carrying(H: np.ndarray, h: np.ndarray, tail_rate: np.ndarray) -> np.ndarray
     return np.linalg.solve(H[:, :6, :6], momentum[..., None])[:, 3:, 0]
 
 
-def _falling(model, start, times, R, H, omega, tail_rate) -> tuple[np.ndarray, np.ndarray]:
-    """Position and velocity (K, 3) of B: the COM's, less those of the COM from B, which H has."""
-    mass, (q0, v0) = H[:, 0, 0][:, None], start
+def _falling(model, start, times, turned, rates) -> tuple[np.ndarray, np.ndarray]:
+    """Position and velocity (K, 3) of B: the COM's, less those of the COM from B; rates (omega, q_t_dot)."""
+    (R, H), (q0, v0) = turned, start
+    mass = H[:, 0, 0][:, None]
     offset = np.einsum("kij,kj->ki", R, _com(H))
-    drift = np.einsum("kij,kj->ki", R, -(H[:, :3, 3:6] @ omega[..., None] + H[:, :3, 6:] @ tail_rate[..., None])[..., 0])
+    drift = -np.einsum("kij,kjl,kl->ki", R, H[:, :3, 3:], rates)
     first = rotation_matrix(q0[3:7]) @ _com(model.mass_matrix(_at_identity(q0[None, 7:])))[0]
     v_com = model.momentum(q0, v0)[0] / mass[0]
     fall = np.array([0, 0, -model.parameters["gravity"]])

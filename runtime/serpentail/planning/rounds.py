@@ -127,7 +127,9 @@ class Run:
         if form != (self.problem.formulation, self.problem.attitude):
             return self._solved(program, of_trajectory(self.model, guess.trajectory, self.attitude), "close")
         motion, same = Motion(guess.duration, guess.curve.at), guess.solution.w.size == program.places.size
-        multipliers = guess.solution.multipliers if same and guess.solution.multipliers[1].size == program.rows else None
+        multipliers = (
+            guess.solution.multipliers if same and guess.solution.multipliers[1].size == program.rows else None
+        )
         return self._solved(program, motion, "close" if multipliers is None else "same", multipliers)
 
     def _pushed(self, k: int) -> Motion:

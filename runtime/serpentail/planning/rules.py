@@ -9,7 +9,7 @@ from numpy.polynomial import Legendre, Polynomial
 from ..errors import PlanningError
 
 FAMILIES = {"trapezoidal": 1, "hermite-simpson": 2, "lobatto": 3, "radau": 3}  # name -> default degree
-MOST_DEGREE = 9
+MOST_DEGREE = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +102,8 @@ def _lagrange(nodes: tuple[float, ...]) -> tuple[Polynomial, ...]:
     found = []
     for k, node in enumerate(nodes):
         others = [other for j, other in enumerate(nodes) if j != k]
-        found.append(Polynomial.fromroots(others) / np.prod([node - other for other in others]))
+        basis = Polynomial.fromroots(others) if others else Polynomial([1.0])
+        found.append(basis / np.prod([node - other for other in others]))
     return tuple(found)
 
 

@@ -79,18 +79,25 @@ def transcribe(model, problem: Problem, mesh: Mesh, rule: Rule, equations: Dynam
     form = layout(problem.formulation, coordinates, model.nv - 6, torque_unit(problem))
     one = node(model, problem, coordinates, form, equations)
     where = places(form, mesh, rule)
-    weights = _node_rows(one, mesh, rule, len(where.others))
     direct = _direct_rows(problem, form, where, mesh, rule, coordinates)
-    defects = _defect_rows(where, mesh, rule)
-    linear = _stack([(defects, weights.shape[0]), (direct, direct.shape[0])])
-    cost = _cost(one, mesh, rule, len(where.others))
-    time = np.zeros(where.size)
-    time[0] = problem.objective == "time"
-    padded = _pad(weights, linear.shape[0])
-    program = Assembly(one, where.nodes(), linear, padded, cost, time).functions()
+    program = collocate(one, where, (mesh, rule), direct, problem.objective == "time").functions()
     return Transcription(
-        problem, mesh, rule, coordinates, form, equations, one, where, program, linear.shape[0]
+        problem, mesh, rule, coordinates, form, equations, one, where, program, program["nlp"].size1_out("g")
     )
+
+
+def collocate(one: Node, where: Places, scheme: tuple[Mesh, Rule], direct, time: bool = False) -> Assembly:
+    """Return the defects of all intervals, residuals and path constraints of all nodes, then rows `direct` of w.
+
+    time: the duration is added to the objective.
+    """
+    mesh, rule = scheme
+    weights, defects = _node_rows(one, mesh, rule, len(where.others)), _defect_rows(where, mesh, rule)
+    linear = _stack([(defects, weights.shape[0]), (direct, direct.shape[0])])
+    slope = np.zeros(where.size)
+    slope[0] = time
+    weights = _pad(weights, linear.shape[0])
+    return Assembly(one, where.nodes(), linear, weights, _cost(one, mesh, rule, len(where.others)), slope)
 
 
 def torque_unit(problem: Problem) -> np.ndarray:

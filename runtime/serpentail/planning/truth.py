@@ -44,4 +44,3 @@ def local_errors(model, curve: Curve, damping: float, q, v) -> np.ndarray:
         rate = np.abs(found_v[3:] - v[k + 1, 3:]).max() * max(width, 0.02)
         errors[k] = max(turn, tail, rate)
     return errors
-
