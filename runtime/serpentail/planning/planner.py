@@ -6,6 +6,7 @@ from dataclasses import fields
 import numpy as np
 
 from ..errors import PlanningError
+from ..trajectory import Trajectory
 from .formulations import dynamics
 from .problem import SETTINGS, Bounds, Goal, Problem, checked_problem, choice, number
 from .rounds import Method, Run
@@ -55,6 +56,20 @@ def _checked(model, start, goal, duration, bounds, settings) -> tuple[Problem, M
             raise PlanningError(f"{name}: value {value!r}: needs a whole number from {least}")
     if method.tolerance is not None:
         number("tolerance", method.tolerance)
+    if not isinstance(method.options, dict):
+        raise PlanningError(f"options: value {method.options!r}: needs a dict, such as {{'ipopt.max_iter': 500}}")
+    _check_guess(model, method.guess)
     number("guess_damping", method.guess_damping, above=False)
     choice("dynamics", method.dynamics, ("auto", "compiled", "symbolic"))
     return problem, method
+
+
+def _check_guess(model, guess) -> None:
+    """PlanningError unless a guess is None, or a motion of such a model."""
+    if guess is None:
+        return
+    motion = getattr(guess, "trajectory", guess)
+    if not isinstance(motion, Trajectory):
+        raise PlanningError(f"guess: value {guess!r}: needs a Plan or a Trajectory")
+    if motion.q.shape[1] != model.nq or len(motion.t) < 2:
+        raise PlanningError(f"guess: q has shape {motion.q.shape}: needs at least two samples of {model.nq}")

@@ -69,6 +69,8 @@ def checked_problem(model, start, goal, duration, bounds, **settings) -> Problem
     _start_inside(q0[7:], bounds.angle, "angle", "rad")
     _start_inside(v0[6:], bounds.rate, "rate", "rad/s")
     wrong = {"objective": _objective, "damping": _damping, "path": _path}
+    for name, bound in (("tail", bounds.angle), ("tail_rate", bounds.rate)):
+        _goal_inside(name, getattr(goal, name), bound)
     settings = {name: wrong.get(name, lambda value: value)(value) for name, value in settings.items()}
     choice("formulation", settings.get("formulation", "airborne"), FORMULATIONS)
     choice("attitude", settings.get("attitude", "quaternion"), KINDS)
@@ -169,6 +171,15 @@ def _start_inside(values: np.ndarray, bound: np.ndarray | None, name: str, unit:
             f"bounds.{name}: the start's tail coordinate {k} has {values[k]:.6g} {unit}, beyond {bound[k]:.6g}: "
             "widen the bound, or start inside it"
         )
+
+
+def _goal_inside(name: str, values: np.ndarray | None, bound: np.ndarray | None) -> None:
+    if values is None or bound is None:
+        return
+    beyond = np.flatnonzero(np.abs(values) > bound)  # nan: free
+    if beyond.size:
+        k = beyond[0]
+        raise PlanningError(f"goal.{name}: entry {k} is {values[k]:.6g}, beyond its bound {bound[k]:.6g}: change one")
 
 
 def _duration(duration) -> tuple[float, float]:

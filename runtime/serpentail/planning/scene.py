@@ -32,7 +32,9 @@ def read_scene(path: str) -> tuple[dict, str]:
     try:
         scene = tomllib.loads(Path(path).read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
-        raise PlanningError(f"scene file: value {path!r}: cannot be read ({error}); give a scene file (.toml)") from error
+        raise PlanningError(
+            f"scene file: value {path!r}: cannot be read ({error}); give a scene file (.toml)"
+        ) from error
     table = scene.get("plan")
     if not isinstance(table, Mapping):
         raise PlanningError(f"plan: value {table!r}: {path} has no table [plan]; add one, with start and duration")
