@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from .model import Model
 
 KP, KD = 4e4, 400.0  # 1/s^2, 1/s: Table 1
+ROUNDING = 1e-9  # s
 
 
 class Pfl:
@@ -36,9 +37,9 @@ class Pfl:
 
     def reference(self, t: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return tail coordinates, rates and accelerations (2m,) wanted at t (s)."""
-        if t > self.span[1]:
+        if t > self.span[1] + ROUNDING:
             return self.last, np.zeros_like(self.last), np.zeros_like(self.last)
-        t = max(t, self.span[0])
+        t = min(max(t, self.span[0]), self.span[1])
         acceleration = self.spline(t, 2) if self.feedforward else np.zeros_like(self.last)
         return self.spline(t), self.spline(t, 1), acceleration
 

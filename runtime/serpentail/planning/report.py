@@ -14,14 +14,15 @@ TRACKED = 580  # samples of a tracked motion
 
 
 def report(run, best, trajectory: Trajectory) -> dict:
-    """Return the summary of a run's best round, whose planned trajectory is given."""
+    """Return the summary of a run's best round, whose planned trajectory is given; None for what is not finite."""
     problem, solution, mesh = run.problem, best.solution, best.program.mesh
     energy, power = work(trajectory)
     found = {"converged": solution.success, "status": solution.status, "formulation": problem.formulation}
     found |= {"attitude": problem.attitude, "rule": run.rule.name, "degree": run.rule.degree}
     found |= {"intervals": mesh.intervals, "nodes": len(best.program.places.others), "dynamics": run.equations.source}
     found |= {"duration_s": best.curve.duration, "objective": objective(best), "effort": effort(best.curve)}
-    return found | {"energy_J": energy, "peak_power_W": power} | truth(run, best, trajectory)
+    found |= {"energy_J": energy, "peak_power_W": power} | truth(run, best, trajectory)
+    return {name: None if isinstance(x, float) and not np.isfinite(x) else x for name, x in found.items()}
 
 
 def truth(run, best, planned: Trajectory) -> dict:

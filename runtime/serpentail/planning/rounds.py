@@ -56,8 +56,9 @@ class Round:
 
     @property
     def error(self) -> float:
-        """True error (deg) of the attitude at the end, against the plan or the goal, whichever is larger."""
-        return max(attitude_errors(self.program.problem, self.planned[0][-1, 3:7], self.true[0][-1, 3:7]))
+        """True error (deg) of the attitude at the end, against the plan or the goal, the larger one; inf if lost."""
+        error = max(attitude_errors(self.program.problem, self.planned[0][-1, 3:7], self.true[0][-1, 3:7]))
+        return error if np.isfinite(error) else np.inf
 
 
 class Run:

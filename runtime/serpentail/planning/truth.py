@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ..errors import SimulationError
 from ..simulation import TorqueTable, simulate
 from .attitude import angle_deg
 from .curve import Curve
@@ -10,7 +11,7 @@ STEP = 1e-4  # s, longest RK4 step
 
 
 def interval(model, curve: Curve, damping: float, k: int, q, v) -> tuple[np.ndarray, np.ndarray]:
-    """Return q, v at the end of interval k, its planned torques applied from the state q, v.
+    """Return q, v at the end of interval k, its planned torques applied from the state q, v; nan where they blow up.
 
     RK4 in C: the table has the torques at all times that RK4 asks for, so its straight lines add no error.
     """
@@ -19,7 +20,12 @@ def interval(model, curve: Curve, damping: float, k: int, q, v) -> tuple[np.ndar
     s = np.linspace(0.0, 1.0, 2 * steps + 1)
     torques = curve.rule.basis(s) @ curve.nodes["torque"][k]
     law = TorqueTable(s * width, torques, damping)
-    flight = simulate(model, q, v, controller=law, t_span=width, output_step=width, step=width / steps)
+    if not np.isfinite(q).all():
+        return q, v
+    try:
+        flight = simulate(model, q, v, controller=law, t_span=width, output_step=width, step=width / steps)
+    except SimulationError:  # bent or whirled beyond what the model describes
+        return np.full_like(q, np.nan), np.full_like(v, np.nan)
     return flight.q[-1], flight.v[-1]
 
 
@@ -42,5 +48,5 @@ def local_errors(model, curve: Curve, damping: float, q, v) -> np.ndarray:
         turn = np.radians(angle_deg(found_q[3:7], q[k + 1, 3:7]))
         tail = np.abs(found_q[7:] - q[k + 1, 7:]).max(initial=0)
         rate = np.abs(found_v[3:] - v[k + 1, 3:]).max() * max(width, 0.02)
-        errors[k] = max(turn, tail, rate)
+        errors[k] = max(turn, tail, rate) if np.isfinite(found_q).all() else np.pi
     return errors
