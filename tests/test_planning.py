@@ -1,5 +1,9 @@
 """Plans: formulations agree, laws hold, and the truth that a report tells is that of an independent integration."""
 
+import re
+from dataclasses import replace
+from pathlib import Path
+
 import casadi
 import numpy as np
 import pytest
@@ -7,7 +11,11 @@ from scipy.integrate import solve_ivp
 
 import serpentail as st
 from serpentail.planning.attitude import Attitude, angle_deg, from_angles
+from serpentail.planning.recovery import full_state
+from serpentail.planning.truth import local_errors, open_loop
 from serpentail.trajectory import rotation_matrix
+from serpentail_codegen.pipeline import generate
+from serpentail_codegen.scene import load_scene
 from tumbling import DURATION, planned, rat, start
 
 FORMS = [("airborne", "quaternion"), ("translation-free", "quaternion"), ("full", "quaternion"), ("full", "euler")]
@@ -75,8 +83,6 @@ def test_planned_positions_have_the_planned_velocities():
     flight = planned().trajectory
     dense = planned().curve
     times = np.linspace(0.01, DURATION - 0.01, 7)
-    from serpentail.planning.recovery import full_state
-
     problem, step = planned().problem, 1e-6
     ends = [
         full_state(rat(), (problem.q0, problem.v0), Attitude("quaternion"), t, dense.at(t))
@@ -197,7 +203,7 @@ def test_several_guesses_are_at_least_as_good_as_one():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("size", [(1, None), (2, 3), (3, 2)])
+@pytest.mark.parametrize("size", [(1, None), (2, 3)])
 def test_other_tails_reach_their_goal_in_truth(size):
     model = rat(*size)
     bounds = st.Bounds(angle=np.pi / 3, rate=30.0)
@@ -218,3 +224,22 @@ def test_attitude_coordinates_agree():
         turn = rotation_matrix(from_angles(angles)).T @ (R[1] - R[0]) / (2 * step)
         np.testing.assert_allclose([turn[2, 1], turn[0, 2], turn[1, 0]], omega, atol=1e-9)
         np.testing.assert_allclose(np.array(coordinates.quaternion(casadi.DM(c))).ravel(), from_angles(angles))
+
+
+def test_torques_that_no_model_survives_are_an_infinite_error():
+    """A motion that leaves what the model describes has no truth: nan from there on, never an exception."""
+    plan, model = planned(tolerance=None), rat()
+    wild = replace(plan.curve, nodes=plan.curve.nodes | {"torque": 1e9 + 0 * plan.curve.nodes["torque"]})
+    q, v = open_loop(model, wild, 0.0, (plan.problem.q0, plan.problem.v0))
+    assert np.isfinite(q[0]).all() and np.isnan(q[-1]).all()
+    assert np.isfinite(local_errors(model, wild, 0.0, np.repeat(q[:1], len(q), 0), np.repeat(v[:1], len(v), 0))).all()
+
+
+def test_example_of_the_document_runs(tmp_path, monkeypatch, capsys):
+    root = Path(__file__).parent.parent
+    generate(load_scene(root / "scenes" / "righting_m1_n3.toml"), tmp_path / "generated")
+    monkeypatch.chdir(tmp_path)
+    text = (root / "docs" / "planning.md").read_text()
+    exec(re.search(r"```python\n(.*?)```", text, re.DOTALL)[1], {})
+    good, error, _ = capsys.readouterr().out.split()
+    assert good == "True" and float(error) <= 0.01

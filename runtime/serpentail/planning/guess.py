@@ -2,11 +2,15 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
+from ..errors import SimulationError
 from ..trajectory import rotation_matrix
 from .transcription import Transcription
+
+STIFF_STEP = 1e-5  # s
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,7 +27,11 @@ def passive(model, problem, coordinates, damping: float, duration: float, push=N
 
     push = np.zeros((1, model.nv - 6)) if push is None else push
     law = TorqueTable(np.linspace(0, duration, len(push)), push, max(damping, problem.damping))
-    flight = simulate(model, problem.q0, problem.v0, controller=law, t_span=duration)
+    run = partial(simulate, model, problem.q0, problem.v0, controller=law, t_span=duration)
+    try:
+        flight = run()
+    except SimulationError:  # a damped continuum is stiff
+        flight = run(step=STIFF_STEP)
     return of_trajectory(model, flight, coordinates, problem.damping)
 
 

@@ -38,7 +38,7 @@ class Method:
     guess: object = None
     guess_damping: float = 1e-3
     multi_start: int = 1
-    retries: int = 2
+    retries: int = 4
     seed: int = 0
     dynamics: str = "auto"
     track: bool = True
@@ -96,7 +96,8 @@ class Run:
                 break
             program = self._transcribed(mesh)
             motion = Motion(last.curve.duration, last.curve.at)
-            rounds.append(self._round(program, self._solved(program, motion, "close")))
+            found = self._solved(program, motion, "close")
+            rounds.append(self._round(program, found if found.success else self._solved(program, motion)))
         return rounds
 
     def plan(self, rounds: list[Round], wall_s: float) -> Plan:
@@ -135,7 +136,8 @@ class Run:
 
     def _pushed(self, k: int) -> Motion:
         """Passive flight; the tail is pushed a little out of a plane of symmetry (k = 0), or about at random."""
-        method, duration = self.method, float(np.mean(self.problem.duration))
+        method, (least, most) = self.method, self.problem.duration
+        duration = least + (most - least) * (1.0, 0.5, 0.75, 0.25)[k % 4]
         size = float(torque_unit(self.problem).mean()) * (SLIGHT if k == 0 else 1.0)
         push = pushes(np.random.default_rng([method.seed, k]), size, self.model.nv - 6)
         return passive(self.model, self.problem, self.attitude, method.guess_damping, duration, push)
