@@ -20,7 +20,7 @@ from serpentail.compiler import compile_library
 SIZES = ((1, 3), (3, 4), (6, 6))
 ROUNDS, CALLS = 200, 64
 CASADI_FLAGS = ("-O2", "-march=native", "-fPIC", "-shared")
-PATIENCE = 90  # seconds for gcc on one of CasADi's files
+PATIENCE = 240  # seconds for gcc on one of CasADi's files
 OVER = f"over {PATIENCE} s"
 JACOBIANS, HESSIAN = "forward_dynamics_derivatives", "inverse_dynamics_hessian"
 IN_SX = ("mass_matrix", "bias_force", "inverse_dynamics")  # what CasADi differentiates

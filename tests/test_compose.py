@@ -6,7 +6,7 @@ import pytest
 
 from programs import EXACT, NEXT, PROGRAMS, RECTANGULAR, SQUARE, TURN, built, numbers, step_of
 from serpentail_codegen.adjoints import adjoint_program
-from serpentail_codegen.compose import influencing, inline, pruned, reached, reads, writes
+from serpentail_codegen.compose import expanded, influencing, pruned, reached, reads, writes
 from serpentail_codegen.interpret import Run
 from serpentail_codegen.program import Apply, Builder, Guard, Loop, statements
 from serpentail_codegen.tangents import tangent_program
@@ -139,12 +139,12 @@ def outer():
 
 
 @pytest.mark.parametrize("name", sorted(PROGRAMS.keys() - {"columns"}))
-def test_inlined_program_means_the_same(name):
+def test_called_program_means_the_same(name):
     inner = PROGRAMS[name]
     b, a, y, z = outer()
     s, w = b.array("s", 1), b.array("w", 1, role="output")
     b.fill(s[0], 7)
-    inline(b, inner, x=a, y=y, u=z, w=w)
+    b.call(inner, x=a, y=y, u=z, w=w)
     b.copy(w[0], s[0], adds=True)  # the inner program's own s is another
     given = numbers(inner)
     found = outputs(b.finish(), {"mass": given["mass"], "a": given["x"], "y": given["y"]})
@@ -152,19 +152,20 @@ def test_inlined_program_means_the_same(name):
     assert found == {"z": expected["u"], "w": [expected["w"][0] + 7]}
 
 
-def test_inlined_names_carry_the_programs_name():
+def test_called_names_carry_the_programs_name():
     b, a, y, z = outer()
-    inline(b, PROGRAMS["nested"], x=a, y=y, u=z, w=b.array("w", 1))
-    assert [array.name for array in b.arrays] == ["mass", "a", "y", "z", "w", "nest_s", "nest_t"]
-    assert all(ref.array in b.arrays for s, _ in statements(b.finish().body) for ref in (*reads(s), *writes(s)))
+    b.call(PROGRAMS["nested"], x=a, y=y, u=z, w=b.array("w", 1))
+    program = expanded(b.finish())
+    assert [array.name for array in program.arrays] == ["mass", "a", "y", "z", "w", "nest_s", "nest_t"]
+    assert all(ref.array in program.arrays for s, _ in statements(program.body) for ref in (*reads(s), *writes(s)))
 
 
-def test_inlined_in_a_loop_it_runs_in_every_turn():
+def test_called_in_a_loop_it_runs_in_every_turn():
     b, a, y, z = outer()
     w, total = b.array("w", 1), b.array("total", 1, role="output")
     b.fill(total[0], 0)
     with b.loop("l", 2):
-        inline(b, PROGRAMS["accumulators"], x=a, y=y, u=z, w=w)
+        b.call(PROGRAMS["accumulators"], x=a, y=y, u=z, w=w)
         b.copy(total[0], w[0], adds=True)
     given = numbers(PROGRAMS["accumulators"])
     found = outputs(b.finish(), {"mass": given["mass"], "a": given["x"], "y": given["y"]})
@@ -177,20 +178,26 @@ def test_arguments_that_are_not_bound_are_named(left_out, role):
     given = {"x": a, "y": y, "u": z, "w": b.array("w", 1)}
     given.pop(left_out)
     with pytest.raises(ValueError, match=f"^nest in outer: {role} {left_out} is not bound$"):
-        inline(b, PROGRAMS["nested"], **given)
+        b.call(PROGRAMS["nested"], **given)
 
 
-def test_names_taken_twice_are_refused():
+def test_what_is_called_twice_has_arrays_of_its_own_each_time():
     b, a, y, z = outer()
-    w = b.array("w", 1)
-    inline(b, PROGRAMS["nested"], x=a, y=y, u=z, w=w)
-    with pytest.raises(ValueError, match="array nest_s is declared twice in outer"):
-        inline(b, PROGRAMS["nested"], x=a, y=y, u=z, w=w)
+    w, total = b.array("w", 1), b.array("total", 1, role="output")
+    b.call(PROGRAMS["nested"], x=a, y=y, u=z, w=w)
+    b.copy(total[0], w[0])
+    b.call(PROGRAMS["nested"], x=a, y=y, u=z, w=w)
+    b.copy(total[0], w[0], adds=True)
+    names = [array.name for array in expanded(b.finish()).arrays]
+    assert len(set(names)) == len(names)
+    given = numbers(PROGRAMS["nested"])
+    found = outputs(b.finish(), {"mass": given["mass"], "a": given["x"], "y": given["y"]})
+    assert found["total"] == [2 * outputs(PROGRAMS["nested"], given)["w"][0]]
 
 
 def test_parameters_are_shared():
     b, a, y, z = outer()
-    inline(b, PROGRAMS["carry_up"], x=a, y=y, u=z, w=b.array("w", 1))
+    b.call(PROGRAMS["carry_up"], x=a, y=y, u=z, w=b.array("w", 1))
     program = b.finish()
     assert [array.name for array in program.of_role("parameters")] == ["mass"]
     run = Run(program, EXACT, {"mass": [Fraction(3)], "a": [Fraction(0)] * 3, "y": [Fraction(1)] * 3})

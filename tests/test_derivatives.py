@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from derivatives import (
+from derivative_models import (
     FIRST,
     KINDS,
     complex_step,
@@ -199,8 +199,9 @@ def test_hessians_are_linear_in_multipliers_and_affine_in_accelerations(model):
         other = {"multiplier": state["multiplier"][::-1].copy()}
         sum_ = {"multiplier": state["multiplier"] + other["multiplier"]}
         one, two, both = (called(model, "inverse_dynamics_hessian", state | change) for change in ({}, other, sum_))
-        for name, block in both.items():
-            assert jacobian_error(block, one[name] + two[name], model.nv) <= ROUNDING
+        for name, block in both.items():  # in "aq", the mass of the whole animal cancels in its turns
+            limit = 10 * ROUNDING if name == "aq" else ROUNDING
+            assert jacobian_error(block, one[name] + two[name], model.nv) <= limit
         at_rest = called(model, "inverse_dynamics_hessian", state | {"v_dot": 0 * state["v_dot"]})
         for name in ("qv", "vv", "aq"):  # C alone has velocities
             assert jacobian_error(at_rest[name], one[name], model.nv) <= ROUNDING

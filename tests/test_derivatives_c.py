@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from derivatives import derivative_model, jacobian_error, nest_of, parameters_of, states, tail_name
+from derivative_models import derivative_model, jacobian_error, nest_of, parameters_of, states, tail_name
 from models import model_folder
 from programs import Narrow
 from references.metrics import equilibrated_condition

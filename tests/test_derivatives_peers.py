@@ -7,7 +7,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from derivatives import KINDS, NEGLIGIBLE, derivative_model, jacobian_error, spans, states, tangent_of_q
+from derivative_models import KINDS, NEGLIGIBLE, derivative_model, jacobian_error, spans, states, tangent_of_q
 from references.metrics import equilibrated_condition
 from references.parameters import TABLE_1
 from references.pinocchio_chain import PinocchioChain

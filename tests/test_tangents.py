@@ -192,7 +192,6 @@ def read_in_later_turns():
     return b.finish()
 
 
-@pytest.mark.xfail(reason="lanes are filled with zeros where bounds differ in name; those of outputs are not")
 @pytest.mark.parametrize("build", [read_in_later_turns, lambda: PROGRAMS["temporaries"]])
 def test_lanes_left_out_are_zero_wherever_they_are_read(build):
     program = build()

@@ -5,7 +5,7 @@ import sys
 import time
 from pathlib import Path
 
-from .scene import FUNCTIONS, KINDS, SceneError, load_scene, parse_scene, scene_for, scene_to_dict
+from .scene import ALL, KINDS, SceneError, load_scene, parse_scene, scene_for, scene_to_dict
 
 
 def parser() -> argparse.ArgumentParser:
@@ -17,7 +17,7 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--tail", choices=KINDS, help="tail of a model without a scene file")
     p.add_argument("--segments", type=int, help="m")
     p.add_argument("--links", type=int, help="n, in each segment")
-    p.add_argument("--functions", help=f"comma-separated, of {', '.join(FUNCTIONS)} (default: all)")
+    p.add_argument("--functions", help=f"comma-separated, of {', '.join(ALL)}; all: all of them")
     p.add_argument("--real", help="double or float")
     p.add_argument("--emission", help="auto, straight or loops")
     p.add_argument("--baked", action="store_true", help="fold the parameters into the code")
@@ -29,7 +29,8 @@ def scene_of(arguments: argparse.Namespace):
     """Return the scene that the arguments describe."""
     chosen = {name: getattr(arguments, name) for name in ("real", "emission") if getattr(arguments, name)}
     if arguments.functions:
-        chosen["functions"] = arguments.functions.split(",")
+        names = arguments.functions
+        chosen["functions"] = names if names == "all" else names.split(",")
     if arguments.baked:
         chosen["baked"] = True
     if arguments.scene:

@@ -18,19 +18,21 @@ def adjoint_program(program: Program, wanted: Collection[str], given: Collection
     matters = reached(program.body, wanted) & influencing(program.body, given)
     turned = {name: found for name, found in turned_arrays(program).items() if name in matters}
     matters -= turned.keys()
+    ends = [a for a in program.arrays if a.name in (*wanted, *given)]
     companions = {a.name: Array(f"b_{a.name}", "local", a.size, a.count) for a in program.arrays if a.name in matters}
-    weights = [Array(f"b_{name}", "input", companions[name].size, companions[name].count) for name in given]
-    results = [Array(f"b_{name}", "output", companions[name].size, companions[name].count) for name in wanted]
-    companions |= {name: replace(companions[name], name=f"b_{name}_sum") for name in (*wanted, *given)}
+    companions |= {a.name: Array(f"b_{a.name}_sum", "local", a.size, a.count) for a in ends}
+    weights = [Array(f"b_{a.name}", "input", a.size, a.count) for a in ends if a.name in given]
+    results = [Array(f"b_{a.name}", "output", a.size, a.count) for a in ends if a.name in wanted]
     way = _WayBack(program, companions, turned)
     start = [Fill(b.part(0, b.length), (0,) * b.length) for b in companions.values()]
-    start += [Copy(_all(companions[name]), _all(w)) for name, w in zip(given, weights, strict=True)]
+    start += [Copy(_all(companions[w.name.removeprefix("b_")]), _all(w)) for w in weights]
     forward, backward = way.both(program.body, ())
-    end = tuple(Copy(_all(b), _all(companions[name])) for name, b in zip(wanted, results, strict=True))
+    end = tuple(Copy(_all(b), _all(companions[b.name.removeprefix("b_")])) for b in results)
     arrays = tuple(replace(a, role="local") if a.role == "output" else a for a in program.arrays)
     arrays += (*companions.values(), *weights, *results, *way.kept)
     body = (*forward, *start, *backward, *end)
-    return pruned(replace(program, name=f"b_{program.name}", arrays=arrays, body=body))
+    name = "_".join(["b", *wanted, *given, program.name])
+    return pruned(replace(program, name=name, arrays=arrays, body=body))
 
 
 def _all(array: Array) -> Ref:
@@ -45,6 +47,24 @@ def turns(loops: tuple[Loop, ...]) -> tuple[Index, int]:
             raise ValueError(f"loop {loop.var} is no rectangle from 0 on: its turns cannot be numbered")
         number, count = number + count * Index(((loop.var, 1),)), count * loop.stop.offset
     return number, count
+
+
+def _apart(ref: Ref, loops: tuple[Loop, ...]) -> bool:
+    """Tell if a reference means another place in every turn of the loops."""
+    strides, reach = {var: abs(factor) for var, factor in ref.offset.terms}, ref.size * ref.stride
+    for loop in sorted(loops, key=lambda loop: strides.get(loop.var, 0)):
+        if strides.get(loop.var, 0) < reach or loop.start.terms or loop.stop.terms:
+            return False
+        reach += strides[loop.var] * (loop.stop.offset - loop.start.offset - 1)
+    return True
+
+
+def _overlap(ref: Ref, other: Ref) -> bool:
+    """Tell if two references may share a scalar."""
+    if ref.array.name != other.array.name or ref.offset.terms != other.offset.terms:
+        return ref.array.name == other.array.name
+    ends = [(r.offset.offset, r.offset.offset + (r.size - 1) * r.stride) for r in (ref, other)]
+    return ends[0][0] <= ends[1][1] and ends[1][0] <= ends[0][1]
 
 
 @dataclass
@@ -66,8 +86,7 @@ class _WayBack:
             for ref in writes(statement):
                 name = ref.array.name
                 writers[name] = writers.get(name, 0) + 1
-                fixed = {loop.var for loop in loops} - {var for var, _ in ref.offset.terms}
-                if writers[name] > 1 or fixed:
+                if writers[name] > 1 or not _apart(ref, loops):
                     self.overwritten.add(name)
 
     def of(self, ref: Ref) -> Ref:
@@ -139,6 +158,9 @@ class _WayBack:
         places |= {f"b_{n}_angles": found.angles(read[n]) for n, found in turns.items()}
         targets = [places[name] for name, _ in step.outputs]
         in_place = [ref in stored for ref in targets]
+        for ref in stored:
+            if sum(_overlap(ref, other) for other in targets) > (ref in targets):
+                raise ValueError(f"{call.step.name} overwrites part of what it reads in {ref.array.name}")
         back = Apply(
             step,
             tuple(values[name] for name, _ in step.inputs),

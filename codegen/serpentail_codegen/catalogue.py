@@ -52,14 +52,14 @@ _TABLE = (
         "Jacobian of H v_dot + C with respect to the parameters",
         (Q, V, V_DOT),
         (DPARAMETERS,),
-        der.assemble_parameter_derivatives,
+        der.assemble_inverse_dynamics_parameter_derivatives,
     ),
     Function(
         "forward_dynamics_parameter_derivatives",
         "Jacobian of v_dot from Eq. 1 with respect to the parameters",
         (Q, V, TAU),
         (DPARAMETERS,),
-        der.assemble_parameter_derivatives,
+        der.assemble_forward_dynamics_parameter_derivatives,
     ),
     Function(
         "inverse_dynamics_vjp",

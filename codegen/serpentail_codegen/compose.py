@@ -1,4 +1,4 @@
-"""Programs as parts of others: rewriting a loop nest, dropping what nothing needs, writing one program into another."""
+"""Programs in parts: rewriting a loop nest, dropping what nothing needs, writing out what a program calls."""
 
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import replace
@@ -6,7 +6,7 @@ from dataclasses import replace
 from .program import (
     Apply,
     Array,
-    Builder,
+    Call,
     Copy,
     Factor,
     Fill,
@@ -62,28 +62,29 @@ def rewritten(body: tuple, rewrite: Callable[[object], Iterator]) -> tuple:
     return tuple(out)
 
 
-def reached(body: tuple, start: Collection[str]) -> set[str]:
-    """Return the arrays that may depend on the arrays ``start``, by name."""
+def _grown(body: tuple, start: Collection[str], more: Callable[[object, set[str]], set[str]]) -> set[str]:
+    """Return names with what each statement adds to them, until none adds any."""
     found, before = set(start), -1
     while before < len(found):
         before = len(found)
         for statement, _ in statements(body):
-            if names(reads(statement)) & found:
-                found |= names(writes(statement))
+            found |= more(statement, found)
     return found
+
+
+def reached(body: tuple, start: Collection[str]) -> set[str]:
+    """Return the arrays that may depend on the arrays ``start``, by name."""
+    return _grown(body, start, lambda s, found: names(writes(s)) if names(reads(s)) & found else set())
 
 
 def influencing(body: tuple, end: Collection[str]) -> set[str]:
     """Return the arrays that the arrays ``end`` may depend on, by name."""
-    found, before = set(end), -1
-    while before < len(found):
-        before = len(found)
-        for statement, _ in statements(body):
-            if names(writes(statement)) & found:
-                found |= names(reads(_with_outputs(statement, found)))
-            elif isinstance(statement, Guard) and names(statement.protects) & found:
-                found |= names(reads(statement))
-    return found
+
+    def more(statement, found: set[str]) -> set[str]:
+        targets = statement.protects if isinstance(statement, Guard) else writes(statement)
+        return names(reads(_with_outputs(statement, found))) if names(targets) & found else set()
+
+    return _grown(body, end, more)
 
 
 def _with_outputs(statement, needed: Collection[str]):
@@ -105,7 +106,8 @@ def _with_outputs(statement, needed: Collection[str]):
 
 
 def pruned(program: Program) -> Program:
-    """Return a program without the statements and arrays that no output needs."""
+    """Return a program without the statements and arrays that no output needs; arrays are what is declared by name."""
+    array = {a.name: a for a in program.arrays}
     needed = influencing(program.body, {a.name for a in program.of_role("output")})
 
     def rewrite(statement):
@@ -116,7 +118,7 @@ def pruned(program: Program) -> Program:
         elif names(writes(statement)) & needed:
             yield _with_outputs(statement, needed)
 
-    body = rewritten(program.body, rewrite)
+    body = rewritten(program.body, lambda s: (with_arrays(kept, array) for kept in rewrite(s)))
     kept = {a.name for a in program.arrays if a.role in ("input", "output", "parameters")} | needed
     return replace(program, arrays=tuple(a for a in program.arrays if a.name in kept), body=body)
 
@@ -139,18 +141,27 @@ def with_arrays(statement, array: Mapping[str, Array]):
     return replace(statement, **changes)
 
 
-def inline(builder: Builder, program: Program, **arguments: Array) -> None:
-    """Write a program into a builder: arguments are bound by name, parameters are shared, the rest is renamed."""
-    own = {a.name: a for a in builder.arrays}
-    array = {}
-    for a in program.arrays:
-        if a.name in arguments:
-            array[a.name] = arguments[a.name]
-        elif a.role == "parameters":
-            array[a.name] = own[a.name]
-        elif a.role in ("local", "constant"):
-            array[a.name] = builder.declare(replace(a, name=f"{program.name}_{a.name}"))
-        else:
-            raise ValueError(f"{program.name} in {builder.name}: {a.role} {a.name} is not bound")
-    for statement in rewritten(program.body, lambda s: (with_arrays(s, array),)):
-        builder.emit(statement)
+def expanded(program: Program) -> Program:
+    """Return a program with the programs that it calls written out; their own arrays are renamed."""
+    arrays = {a.name: a for a in program.arrays}
+
+    def rewrite(statement):
+        if not isinstance(statement, Call):
+            return (statement,)
+        inner, arguments = expanded(statement.program), dict(statement.arguments)
+        array = {a.name: arguments.get(a.name) or _own(a, inner.name, arrays) for a in inner.arrays}
+        return rewritten(inner.body, lambda s: (with_arrays(s, array),))
+
+    body = rewritten(program.body, rewrite)
+    return replace(program, arrays=tuple(arrays.values()), body=body)
+
+
+def _own(array: Array, owner: str, arrays: dict[str, Array]) -> Array:
+    """Return an array of a called program: the shared parameter, or a new one of a new name."""
+    if array.role == "parameters":
+        return arrays[array.name]
+    name = number = f"{owner}_{array.name}"
+    while name in arrays:
+        name = f"{number}_{len(arrays)}"
+    arrays[name] = replace(array, name=name)
+    return arrays[name]

@@ -3,13 +3,12 @@
 Nothing depends on the position of B or on its velocity.
 """
 
-from dataclasses import replace
+from collections.abc import Callable
 
 from . import dynamics as dyn
 from . import kinematics as kin
 from . import sweeps
 from .adjoints import adjoint_program
-from .compose import inline
 from .directions import Directions
 from .draft import Draft, Tail
 from .functions import (
@@ -23,11 +22,10 @@ from .functions import (
     Q,
     V,
     assemble_forward_dynamics,
-    assemble_inverse_dynamics,
     inertial,
     program,
 )
-from .program import Array, Ref
+from .program import Array, Index, Ref
 from .sweeps import mechanism
 from .tangents import tangent_program
 
@@ -60,14 +58,14 @@ def assemble_virtual_power(d: Draft, arrays: dict[str, Array]) -> None:
     sweeps.virtual_power(d, arrays["power"][0], multiplier, v_dot)
 
 
-def assemble_inertia_force(d: Draft, arrays: dict[str, Array]) -> None:
-    """H v_dot: the inverse dynamics of rest without gravity."""
-    d.known["gravity"] = d.zero(1)
-    assemble_inverse_dynamics(d, arrays)
+def assemble_inertia(d: Draft, arrays: dict[str, Array]) -> None:
+    """The core at rest: H v_dot in torso axes."""
+    d.at_rest, d.known["omega"] = True, d.zero(3)
+    assemble_core(d, arrays)
 
 
 CORE = Function("core", "H v_dot + C in torso axes", (Q, V, V_DOT), (FORCE,), assemble_core)
-INERTIA_FORCE = Function("inertia_force", "H v_dot", (Q, V, V_DOT), (FORCE,), assemble_inertia_force)
+INERTIA = Function("inertia", "H v_dot in torso axes", (Q, V_DOT), (FORCE,), assemble_inertia)
 VIRTUAL_POWER = Function(
     "virtual_power", "lambda^T (H v_dot + C)", (Q, V, V_DOT, MULTIPLIER), (POWER,), assemble_virtual_power
 )
@@ -94,7 +92,7 @@ def assemble_inverse_dynamics_derivatives(d: Draft, arrays: dict[str, Array]) ->
     )
     rows = d.wide("rows", d.tail.nv, directions.count)
     given = {"q": with_unit_quaternion(d, arrays["q"]), "v": arrays["v"], "v_dot": arrays["v_dot"]}
-    inline(d, inner, d_force=rows, **given, **directions.tangents(d))
+    d.call(inner, d_force=rows, **given, **directions.tangents(d))
     directions.spread(d, rows, arrays["dq"], arrays["dv"])
 
 
@@ -112,6 +110,12 @@ def loads(d: Draft, **at_torso: Ref) -> dict[str, Ref]:
     return dict.fromkeys(("force", "moment", "load_force", "load_moment"), d.zero(3)) | at_torso
 
 
+def less(d: Draft, rows: Array, tau: Callable[[Index], Ref] | None = None) -> Loads:
+    """Loads of H x = tau - rows, rows being a change of H v_dot + C in torso axes."""
+    at_torso = loads(d, force=rows.part(0, 3), moment=rows.part(3, 3))
+    return Loads(at_torso, lambda k: rows.part(6 + k, 1), tau)
+
+
 def assemble_forward_dynamics_derivatives(d: Draft, arrays: dict[str, Array]) -> None:
     """-H^-1 times the tangents of H v_dot + C at fixed v_dot; with respect to tau, columns of H^-1."""
     tail, nv = d.tail, d.tail.nv
@@ -121,9 +125,8 @@ def assemble_forward_dynamics_derivatives(d: Draft, arrays: dict[str, Array]) ->
     inner = tangent_program(program(CORE, tail), ("q", "v"), directions.count, directions.outward)
     rows, x = d.wide("rows", nv, directions.count), d.wide("x", nv, directions.count)
     given = {name: arrays[name] for name in ("q", "v")}
-    inline(d, inner, d_force=rows, v_dot=body, **given, **directions.tangents(d))
-    at_torso = loads(d, force=rows.part(0, 3), moment=rows.part(3, 3))
-    balance.solve(d, Loads(at_torso, inertial=lambda k: rows.part(6 + k, 1)), x)
+    d.call(inner, d_force=rows, v_dot=body, **given, **directions.tangents(d))
+    balance.solve(d, less(d, rows), x)
     directions.spread(d, x, arrays["dq"], arrays["dv"])
     turned = {f"row_{r}": arrays["dq"].part(nv * r + 3, 3) for r in range(3)}
     d.step(dyn.turned_acceleration, {"a": body.part(0, 3)}, **turned)
@@ -140,30 +143,46 @@ def torques(d: Draft, balance: Balance, dtau: Array) -> None:
         d.copy(dtau.part(nt * r, nt), x.lane(r, 0, nt))
 
 
-def assemble_parameter_derivatives(d: Draft, arrays: dict[str, Array]) -> None:
-    """Tangents of H v_dot + C with respect to every parameter; -H^-1 times them where ``tau`` is given."""
-    nv, count = d.tail.nv, parameter_count(d.tail)
-    forward = "tau" in arrays
-    function = CORE if forward else FUNCTIONS["inverse_dynamics"]
-    tangents, lane = {}, 0
+def assemble_inverse_dynamics_parameter_derivatives(d: Draft, arrays: dict[str, Array]) -> None:
+    """Tangents of H v_dot + C with respect to every parameter."""
+    rows = parameter_tangents(d, FUNCTIONS["inverse_dynamics"], {n: arrays[n] for n in ("q", "v", "v_dot")})
+    spread_parameters(d, rows, arrays["dparameters"])
+
+
+def assemble_forward_dynamics_parameter_derivatives(d: Draft, arrays: dict[str, Array]) -> None:
+    """-H^-1 times the tangents of H v_dot + C with respect to every parameter, at fixed v_dot."""
+    count = parameter_count(d.tail)
+    balance, body = forward_dynamics_first(d, arrays)
+    rows, x = (
+        parameter_tangents(d, CORE, {"q": arrays["q"], "v": arrays["v"], "v_dot": body}),
+        d.wide("x", d.tail.nv, count),
+    )
+    d.known["gravity"] = d.wide("d_gravity_z", 1, count)[0]
+    d.unit(d.known["gravity"], 0)  # gravity is the first parameter: p_b_ddot falls by as much
+    balance.solve(d, less(d, rows), x)
+    spread_parameters(d, x, arrays["dparameters"])
+
+
+def parameter_tangents(d: Draft, function: Function, given: dict[str, Array]) -> Array:
+    """Return the tangents of a force with respect to every parameter, a lane for each number of the struct."""
+    count, lane, tangents = parameter_count(d.tail), 0, {}
+    names = [p.name for p in inertial(d.tail.kind)]
+    inner = tangent_program(program(function, d.tail), names, count)
     for p in inertial(d.tail.kind):
-        tangents[f"d_{p.name}"] = wide = d.wide(f"d_{p.name}", p.size, count)
-        d.unit(wide[0], lane)
+        if any(a.name == f"d_{p.name}" for a in inner.arrays):
+            tangents[f"d_{p.name}"] = d.wide(f"d_{p.name}", p.size, count)
+            d.unit(tangents[f"d_{p.name}"][0], lane)
         lane += p.size
-    balance, v_dot = forward_dynamics_first(d, arrays) if forward else (None, arrays["v_dot"])
-    inner = tangent_program(program(function, d.tail), [p.name for p in inertial(d.tail.kind)], count)
-    tangents = {name: array for name, array in tangents.items() if any(a.name == name for a in inner.arrays)}
-    rows = d.wide("rows", nv, count)
-    inline(d, inner, d_force=rows, v_dot=v_dot, q=arrays["q"], v=arrays["v"], **tangents)
-    if forward:
-        x = d.wide("x", nv, count)
-        at_torso = loads(d, force=rows.part(0, 3), moment=rows.part(3, 3))
-        d.known["gravity"] = d.wide("d_gravity_z", 1, count)[0]
-        d.unit(d.known["gravity"], 0)  # gravity is the first parameter: p_b_ddot falls by as much
-        balance.solve(d, Loads(at_torso, inertial=lambda k: rows.part(6 + k, 1)), x)
-        rows = x
-    with d.loop("row", nv) as r:
-        d.copy(arrays["dparameters"].part(count * r, count), rows.lane(r, 0, count))
+    rows = d.wide("rows", d.tail.nv, count)
+    d.call(inner, d_force=rows, **given, **tangents)
+    return rows
+
+
+def spread_parameters(d: Draft, source: Array, dparameters: Array) -> None:
+    """Copy rows to a matrix with a column for each number of the parameter struct."""
+    count = parameter_count(d.tail)
+    with d.loop("row", d.tail.nv) as row:
+        d.copy(dparameters.part(count * row, count), source.lane(row, 0, count))
 
 
 def parameter_count(tail: Tail) -> int:
@@ -182,10 +201,8 @@ def assemble_forward_dynamics_jvp(d: Draft, arrays: dict[str, Array]) -> None:
     d_q, rows, x = d.array("d_q", d.tail.nq), d.array("rows", nv), arrays["dv_dot"]
     d.copy(d_q.part(7, d.tail.nt), arrays["dq"].part(6, d.tail.nt))
     inner = tangent_program(program(CORE, d.tail), ("q", "v"))
-    inline(d, inner, q=arrays["q"], v=arrays["v"], v_dot=body, d_q=d_q, d_v=arrays["dv"], d_force=rows)
-    at_torso = loads(d, force=rows.part(0, 3), moment=rows.part(3, 3))
-    dtau = arrays["dtau"]
-    balance.solve(d, Loads(at_torso, lambda k: rows.part(6 + k, 1), lambda k: dtau.part(k, 1)), x)
+    d.call(inner, q=arrays["q"], v=arrays["v"], v_dot=body, d_q=d_q, d_v=arrays["dv"], d_force=rows)
+    balance.solve(d, less(d, rows, lambda k: arrays["dtau"].part(k, 1)), x)
     reads = {"a": body.part(0, 3), "turn": arrays["dq"].part(3, 3), "p_ddot": x.part(0, 3)}
     d.step(dyn.turning_acceleration, reads, p_ddot=x.part(0, 3))
 
@@ -196,7 +213,7 @@ def assemble_inverse_dynamics_vjp(d: Draft, arrays: dict[str, Array]) -> None:
     one, gradient = d.constant("one", [1]), d.array("gradient", d.tail.nq)
     q = with_unit_quaternion(d, arrays["q"])
     given = {"q": q} | {name: arrays[name] for name in ("v", "v_dot", "multiplier")}
-    inline(d, inner, b_power=one, b_q=gradient, b_v=arrays["dv"], b_v_dot=arrays["dv_dot"], **given)
+    d.call(inner, b_power=one, b_q=gradient, b_v=arrays["dv"], b_v_dot=arrays["dv_dot"], **given)
     in_tangent_space(d, gradient, arrays["dq"])
 
 
@@ -220,7 +237,7 @@ def assemble_forward_dynamics_vjp(d: Draft, arrays: dict[str, Array]) -> None:
     minus, gradient = d.constant("minus", [-1]), d.array("gradient", tail.nq)
     q = with_unit_quaternion(d, arrays["q"])
     given = {"q": q, "v": arrays["v"], "v_dot": v_dot, "multiplier": mu}
-    inline(d, inner, b_power=minus, b_q=gradient, b_v=arrays["dv"], **given)
+    d.call(inner, b_power=minus, b_q=gradient, b_v=arrays["dv"], **given)
     in_tangent_space(d, gradient, arrays["dq"])
     d.copy(arrays["dtau"].part(0, tail.nt), mu.part(6, tail.nt))
 
@@ -233,11 +250,10 @@ def assemble_energy_derivatives(d: Draft, arrays: dict[str, Array]) -> None:
     q = with_unit_quaternion(d, arrays["q"])
     for name, wanted in (("kinetic", ("q", "v")), ("potential", ("q",))):
         inner = adjoint_program(program(FUNCTIONS["energy"], d.tail), wanted, (name,))
-        inner = replace(inner, name=f"{inner.name}_{name}")
         gradient = d.array(f"{name}_gradient", d.tail.nq)
         given = {"q": q, "v": arrays["v"]} | ({"b_v": arrays["kinetic_dv"]} if "v" in wanted else {})
         weight = {f"b_{name}": d.constant(f"one_{name}", [1]), "b_q": gradient}
-        inline(d, inner, **given, **weight)
+        d.call(inner, **given, **weight)
         in_tangent_space(d, gradient, arrays[f"{name}_dq"])
 
 
@@ -248,6 +264,6 @@ def assemble_momentum_derivatives(d: Draft, arrays: dict[str, Array]) -> None:
     rows = {name: d.wide(f"{name}_rows", 3, directions.count) for name in ("linear", "angular")}
     outputs = {f"d_{name}": row for name, row in rows.items()}
     q = with_unit_quaternion(d, arrays["q"])
-    inline(d, inner, q=q, v=arrays["v"], **outputs, **directions.tangents(d))
+    d.call(inner, q=q, v=arrays["v"], **outputs, **directions.tangents(d))
     for name, row in rows.items():
         directions.spread(d, row, arrays[f"{name}_dq"], arrays[f"{name}_dv"])

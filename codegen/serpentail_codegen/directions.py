@@ -56,7 +56,7 @@ class Directions:
 
     def tangents(self, d: Draft) -> dict[str, Array]:
         """Declare ``d_q`` and ``d_v`` and store the directions in them as rows; the quaternion known is a unit one."""
-        label = "_".join(self.torso)
+        label = "_".join(self.torso) or "tail"
         d_q = d.wide(f"d_q_{label}", d.tail.nq, self.count)
         d_v = d.wide(f"d_v_{label}", d.tail.nv, self.count) if self.rates else None
         for lane, name in enumerate(self.torso):

@@ -44,10 +44,11 @@ class Draft(Builder):
     """A function being assembled: the builder, the tail's sizes, and the vectors that steps find by name.
 
     ``pieces`` are arrays with one entry a segment that describe its rigid links or its arc, ``samples`` those that
-    describe what lies between two tail points.
+    describe what lies between two tail points.  ``at_rest``: nothing moves, there are accelerations only.
     """
 
     tail: Tail | None = None
+    at_rest: bool = False
     known: dict[str, Ref] = field(default_factory=dict)
     pieces: dict[str, Array] = field(default_factory=dict)
     samples: dict[str, Array] = field(default_factory=dict)
@@ -78,7 +79,7 @@ class Draft(Builder):
 
     def rates(self, i: Index) -> Ref:
         """Rates of the coordinates of segment i."""
-        return self.known["v"].array.part(6 + 2 * i, 2)
+        return self.zero(2) if self.at_rest else self.known["v"].array.part(6 + 2 * i, 2)
 
     def piece(self, i: Index) -> dict[str, Ref]:
         """What describes the links or the arc of segment i."""

@@ -84,7 +84,7 @@ def assemble_mass_matrix(d: Draft, arrays: dict[str, Array], world: bool = False
     def H_tail(k, other, size=1):
         return H.part((6 + k) * nv + 6 + other, size)
 
-    columns = sweeps.tail_inertia(d, H_tail, world)
+    columns = sweeps.tail_inertia(d, H_tail, d.array("columns", 12, tail.segments), world)
     if world:
         composite = {name: d.known[name] for name in ("h", "I")}
         d.step(dyn.world_composite, **composite)
@@ -114,21 +114,19 @@ def assemble_inverse_dynamics(d: Draft, arrays: dict[str, Array], world: bool = 
         d.step(dyn.world_vector, {"vector": force.part(3, 3)}, vector=force.part(3, 3))
 
 
-def assemble_forward_dynamics(d: Draft, arrays: dict[str, Array]) -> "Balance":
-    """v_dot from H v_dot + C = [0; tau] + J^T f: translation eliminated, then LDL^T for omega_dot and q_t_ddot."""
-    tail, v_dot = d.tail, arrays["v_dot"]
+def assemble_balance(d: Draft, arrays: dict[str, Array]) -> None:
+    """What H v_dot + C = loads is solved with: H without translation, factored, and C without gravity."""
+    tail, A, bias = d.tail, arrays["A"], arrays["bias"]
     size = 3 + tail.nt
-    A = d.array("A", size * size)
 
     def A_tail(k, other, entries=1):
         return A.part((3 + k) * size + 3 + other, entries)
 
-    d.store(kin.quaternion_rotation, R=9)
-    columns = sweeps.tail_inertia(d, A_tail)
-    inertial = sweeps.core_bias(d)
-    torques = applied_load(d, arrays)
-    d.vector("inverse_mass", 1)
-    d.vector("com", 3)
+    d.step(kin.quaternion_rotation, R=arrays["R"].part(0, 9))
+    columns = sweeps.tail_inertia(d, A_tail, arrays["columns"])
+    d.copy(arrays["first_moment"].part(0, 3), d.known["h"])
+    sweeps.core_bias(d, bias)
+    d.known |= {name: arrays[name].part(0, arrays[name].length) for name in ("inverse_mass", "com")}
     rows = {f"A_{r}": A.part(r * size, r + 1) for r in range(3)}
     d.step(dyn.without_translation, inverse_mass=d.known["inverse_mass"], com=d.known["com"], **rows)
     with d.loop("k", tail.nt) as k:
@@ -138,8 +136,24 @@ def assemble_forward_dynamics(d: Draft, arrays: dict[str, Array]) -> "Balance":
             reads = {"column": column, "other": column_of(columns, other)}
             d.step(dyn.pair_without_translation, reads, A_entry_=A_tail(k, other))
     d.factor(A, size)
-    balance = Balance(A, columns)
-    balance.solve(d, Loads({}, lambda k: inertial.part(k, 1), lambda k: torques.part(k, 1)), v_dot)
+
+
+def balanced(d: Draft, q: Array, v: Array) -> "Balance":
+    """Call the balance, and let steps find by their names what it gives."""
+    arrays = {a.name: d.array(a.name, a.length(d.tail)) for a in BALANCE.outputs}
+    d.call(program(BALANCE, d.tail), q=q, v=v, **arrays)
+    bias = arrays["bias"]
+    d.known |= {name: arrays[name].part(0, arrays[name].length) for name in ("R", "inverse_mass", "com")}
+    d.known |= {"h": arrays["first_moment"].part(0, 3), "force": bias.part(0, 3), "moment": bias.part(3, 3)}
+    return Balance(arrays["A"], arrays["columns"], bias)
+
+
+def assemble_forward_dynamics(d: Draft, arrays: dict[str, Array]) -> "Balance":
+    """v_dot from H v_dot + C = [0; tau] + J^T f: translation eliminated, then LDL^T for omega_dot and q_t_ddot."""
+    balance = balanced(d, arrays["q"], arrays["v"])
+    torques = applied_load(d, arrays)
+    loads = Loads({}, lambda k: balance.bias.part(6 + k, 1), lambda k: torques.part(k, 1))
+    balance.solve(d, loads, arrays["v_dot"])
     return balance
 
 
@@ -161,6 +175,7 @@ class Balance:
 
     A: Array
     columns: Array
+    bias: Array
 
     def solve(self, d: Draft, loads: Loads, x: Array) -> None:
         """Solve for p_b_ddot (world), omega_dot and q_t_ddot."""
@@ -253,6 +268,21 @@ def assemble_tail_point_jacobians(d: Draft, arrays: dict[str, Array]) -> None:
                 d.step(kin.point_jacobian_tail, {"S": S[segment], "arm": here["P"]}, **rows)
 
 
+BALANCE = Function(
+    "balance",
+    "H with translation eliminated, factored, and C without gravity",
+    (Q, V),
+    (
+        Argument("R", lambda t: (9,), "attitude"),
+        Argument("inverse_mass", lambda t: (1,), "1 / M"),
+        Argument("com", lambda t: (3,), "centre of mass from B, torso axes"),
+        Argument("first_moment", lambda t: (3,), "M times it"),
+        Argument("A", lambda t: (3 + t.nt, 3 + t.nt), "L D L^T"),
+        Argument("columns", lambda t: (t.nt, 6), "momentum of each tail coordinate at B"),
+        Argument("bias", lambda t: (t.nv,), "force, moment, and the tail's forces"),
+    ),
+    assemble_balance,
+)
 FORCE = Argument("force", lambda t: (t.nv,), GENERALISED)
 H = Argument("H", lambda t: (t.nv, t.nv), "inertia matrix, symmetric positive definite (kg, kg m, kg m^2)")
 POINTS = Argument("points", lambda t: (t.total + 1, 3), "joint positions, then the tip (m, world)")

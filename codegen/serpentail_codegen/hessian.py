@@ -1,9 +1,9 @@
 """Second derivatives: a tail's sizes go in, the loop nest of the Hessian of lambda^T (H v_dot + C) comes out."""
 
+from . import dynamics as dyn
 from . import kinematics as kin
 from .adjoints import adjoint_program
-from .compose import inline
-from .derivatives import INERTIA_FORCE, VIRTUAL_POWER, with_unit_quaternion
+from .derivatives import INERTIA, VIRTUAL_POWER, with_unit_quaternion
 from .directions import TORSO, Directions
 from .draft import Draft
 from .functions import program
@@ -18,17 +18,20 @@ def assemble_inverse_dynamics_hessian(d: Draft, arrays: dict[str, Array]) -> Non
     """
     tail, nv = d.tail, d.tail.nv
     directions = Directions(tail, ("turn", "omega"))
-    inner = adjoint_program(program(VIRTUAL_POWER, tail), ("q", "v"), ("power",))
+    inner = adjoint_program(program(VIRTUAL_POWER, tail), ("q", "v", "v_dot"), ("power",))
     inner = tangent_program(inner, ("q", "v"), directions.count, directions.up_to)
     b_q, b_v = d.wide("d_b_q", tail.nq, directions.count), d.wide("d_b_v", nv, directions.count)
+    b_v_dot = d.wide("d_b_v_dot", nv, directions.count)
     q = with_unit_quaternion(d, arrays["q"])
     given = {"q": q} | {name: arrays[name] for name in ("v", "v_dot", "multiplier")}
     d_q = directions.tangents(d)
-    inline(d, inner, b_power=d.constant("one", [1]), d_b_q=b_q, d_b_v=b_v, **given, **d_q)
+    d.call(inner, b_power=d.constant("one", [1]), d_b_q=b_q, d_b_v=b_v, d_b_v_dot=b_v_dot, **given, **d_q)
     turn = d.wide("d_b_turn", 3, directions.count)
     d.step(kin.turn_gradient, {"gradient": b_q.part(3, 4)}, turn=turn[0])
     mirror(d, directions, {"turn": turn[0], "omega": b_v.part(3, 3)}, (b_q, b_v), arrays)
-    mixed_block(d, q, arrays)
+    mixed_block(d, q, arrays["multiplier"], arrays["aq"])
+    with d.loop("row", nv) as row:
+        d.copy(arrays["aq"].part(nv * row + 3, 3), b_v_dot.lane(row, 0, 3))
 
 
 def mirror(d: Draft, directions: Directions, torso: dict[str, Ref], rows: tuple[Array, Array], out: dict) -> None:
@@ -65,13 +68,14 @@ def mirror(d: Draft, directions: Directions, torso: dict[str, Ref], rows: tuple[
         place_row(rows[1].part(2 * i + k + 6, 1), (2 * i + k + 6, False), i + 1)
 
 
-def mixed_block(d: Draft, q: Array, arrays: dict[str, Array]) -> None:
-    """d(H lambda)/dq: tangents of the inverse dynamics of the acceleration lambda at rest, without gravity."""
-    directions = Directions(d.tail, ("turn",), rates=False)
-    inner = tangent_program(program(INERTIA_FORCE, d.tail), ("q",), directions.count, directions.outward)
-    rows = d.wide("inertial_rows", d.tail.nv, directions.count)
-    still = d.array("at_rest", d.tail.nv)
-    d.fill(still.part(0, d.tail.nv), 0)
-    tangents = directions.tangents(d)
-    inline(d, inner, q=q, v=still, v_dot=arrays["multiplier"], d_force=rows, **tangents)
-    directions.spread(d, rows, arrays["aq"])
+def mixed_block(d: Draft, q: Array, multiplier: Array, aq: Array) -> None:
+    """d(H lambda)/d(q_t): tangents of the inertia's force for the acceleration lambda, then turned to world axes."""
+    nv, directions = d.tail.nv, Directions(d.tail, (), rates=False)
+    inner = tangent_program(program(INERTIA, d.tail), ("q",), directions.count, directions.outward)
+    rows, body = d.wide("inertial_rows", nv, directions.count), d.array("multiplier_in_torso_axes", nv)
+    d.store(kin.quaternion_rotation, R=9)
+    d.step(kin.torso_velocity, {"p_dot": multiplier.part(0, 3)}, u=body.part(0, 3))
+    d.copy(body.part(3, nv - 3), multiplier.part(3, nv - 3))
+    d.call(inner, q=q, v_dot=body, d_force=rows, **directions.tangents(d))
+    d.step(dyn.world_vector, {"vector": rows.part(0, 3)}, vector=rows.part(0, 3))
+    directions.spread(d, rows, aq)

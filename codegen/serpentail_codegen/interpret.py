@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 
+from .compose import expanded
 from .program import Apply, Array, Copy, Factor, Fill, Guard, Loop, Program, Ref, Solve, Unit
 from .tape import Tape, replay
 
@@ -68,6 +69,22 @@ def executed(program: Program) -> int:
     return counter.count
 
 
+def applied(program: Program) -> int:
+    """Return how many nodes of steps one run evaluates, each row once: what unrolling has to write out or fold."""
+    return _applied(expanded(program).body, {})
+
+
+def _applied(body: tuple, at: dict[str, int]) -> int:
+    count = 0
+    for statement in body:
+        if isinstance(statement, Loop):
+            span = range(statement.start.at(at), statement.stop.at(at))
+            count += sum(_applied(statement.body, at | {statement.var: value}) for value in span)
+        elif isinstance(statement, Apply):
+            count += len(statement.step.nodes)
+    return count
+
+
 def ldl_factor(algebra, A: list[list]) -> tuple[list[list], list]:
     """Factor A = L D L^T without pivoting, of its lower triangle; L below 1 / D on the diagonal, and the pivots D."""
     A, pivots = [list(row) for row in A], []
@@ -101,7 +118,7 @@ class Run:
     """One run of a program over an algebra: ``values`` are arrays by name, ``guards`` what must be positive."""
 
     def __init__(self, program: Program, algebra, arguments: dict[str, list]):
-        self.algebra, self.guards = algebra, []
+        program, self.algebra, self.guards = expanded(program), algebra, []
         self.values = {a.name: [None] * a.length for a in program.arrays}
         self.values |= {a.name: [algebra.const(v) for v in a.values] for a in program.of_role("constant")}
         self.values |= {name: list(scalars) for name, scalars in arguments.items()}

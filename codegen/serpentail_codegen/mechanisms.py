@@ -35,10 +35,14 @@ class Mechanism:
     power: Callable
 
 
-def still(function: Callable, moving: bool):
-    """Return a step, specialised to a tail that does not accelerate unless it does."""
+def still(d: Draft, function: Callable, moving: bool = True):
+    """Return a step, specialised to a tail that does not accelerate unless it does, and to rest where the draft is."""
     step = derive(function)
-    return step if moving else specialised(step, f"{step.name}_unforced", accelerations=(0, 0))
+    zeros = {"rest": {"rates": (0, 0), "w": (0, 0, 0)} if d.at_rest else {}, "unforced": {"accelerations": (0, 0)}}
+    zeros["unforced"] = {} if moving else zeros["unforced"]
+    for name, constants in zeros.items():
+        step = specialised(step, f"{step.name}_{name}", **constants) if constants else step
+    return step
 
 
 def motion(d: Draft, i: Index, v_dot: Array | None) -> dict[str, Ref]:
@@ -75,8 +79,8 @@ def move_link(d: Draft, i: Index, here: dict[str, Ref], v_dot: Array | None, wre
         if name not in d.known:
             d.vector(name, 3)
     reads = d.known | d.piece(i) | here | motion(d, i, v_dot)
-    d.apply(still(kin.link_motion, bool(v_dot)), reads, a_joint=d.known["a_joint"], swing=d.known["swing"], **here)
-    d.step(dyn.link_wrench, here, F=wrench)
+    d.apply(still(d, kin.link_motion, bool(v_dot)), reads, a_joint=d.known["a_joint"], swing=d.known["swing"], **here)
+    d.apply(still(d, dyn.link_wrench), d.known | here, F=wrench)
 
 
 def link_momentum(d: Draft, i: Index, writes: dict[str, Ref]) -> None:
@@ -159,8 +163,8 @@ def move_arc(d: Draft, i: Index, here: dict[str, Ref], v_dot: Array | None, wren
     if "torque_own" not in d.pieces:
         d.pieces["torque_own"] = d.array("torque_own", 2, d.tail.segments)
     reads = d.known | d.piece(i) | here | motion(d, i, v_dot)
-    d.apply(still(con.segment_wrench, bool(v_dot)), reads, F=wrench, torque_own=reads["torque_own"])
-    d.apply(still(con.segment_motion, bool(v_dot)), reads, **here)
+    d.apply(still(d, con.segment_wrench, bool(v_dot)), reads, F=wrench, torque_own=reads["torque_own"])
+    d.apply(still(d, con.segment_motion, bool(v_dot)), reads, **here)
 
 
 def arc_momentum(d: Draft, i: Index, writes: dict[str, Ref]) -> None:
@@ -242,9 +246,9 @@ def move_polar_arc(d: Draft, i: Index, here: dict[str, Ref], v_dot: Array | None
     if "torque_own" not in d.pieces:
         d.pieces["torque_own"] = d.array("torque_own", 2, d.tail.segments)
     reads = d.known | d.piece(i) | here | motion(d, i, v_dot)
-    d.apply(still(pol.segment_loading, bool(v_dot)), reads, loading=reads["loading"])
+    d.apply(still(d, pol.segment_loading, bool(v_dot)), reads, loading=reads["loading"])
     d.apply(derive(pol.segment_wrench), reads, F=wrench, torque_own=reads["torque_own"])
-    d.apply(still(pol.segment_motion, bool(v_dot)), reads, **here)
+    d.apply(still(d, pol.segment_motion, bool(v_dot)), reads, **here)
 
 
 POLAR = replace(CONTINUUM, prepare=prepare_polar_arcs, prepare_samples=prepare_polar_samples, move=move_polar_arc)

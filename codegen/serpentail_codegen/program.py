@@ -175,6 +175,14 @@ class Guard:
 
 
 @dataclass(frozen=True)
+class Call:
+    """Run another program: its inputs and outputs are arrays of this one, by name; parameters are shared."""
+
+    program: "Program"
+    arguments: tuple[tuple[str, Array], ...]
+
+
+@dataclass(frozen=True)
 class Program:
     """One function: its arrays and its loop nest."""
 
@@ -257,6 +265,13 @@ class Builder:
     def guard(self, scalar: Ref, status: str, *protects: Ref) -> None:
         """Give up with a status unless a scalar is positive."""
         self.emit(Guard(scalar, status, protects))
+
+    def call(self, program: "Program", **arguments: Array) -> None:
+        """Run another program on arrays of this one."""
+        for array in program.of_role("input") + program.of_role("output"):
+            if array.name not in arguments:
+                raise ValueError(f"{program.name} in {self.name}: {array.role} {array.name} is not bound")
+        self.emit(Call(program, tuple(arguments.items())))
 
     @contextmanager
     def loop(self, var: str, count: Index | int, downward: bool = False, start: Index | int = 0):

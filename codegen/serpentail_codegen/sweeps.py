@@ -108,11 +108,10 @@ def gather_moment(d: Draft) -> None:
     d.step(dyn.torso_moment, **carried)
 
 
-def gather_inertia(d: Draft, roots: dict[str, Array], H_tail: Callable[[Index, Index], Ref]) -> Array:
+def gather_inertia(d: Draft, roots: dict[str, Array], H_tail: Callable[[Index, Index], Ref], columns: Array) -> None:
     """Composite inertia in ``mass, h, I`` at B; each segment's momentum columns at B and its own block of H."""
     sizes = {"mass": 1, "h": 3, "I": 6, "pitch": 6, "yaw": 6}
     carried = {name: d.vector(name, size) for name, size in sizes.items()}
-    columns = d.array("columns", 12, d.tail.segments)
     for name in ("mass", "h", "I"):
         d.fill(carried[name], 0)
     with d.loop("i", d.tail.segments, downward=True) as i:
@@ -121,9 +120,8 @@ def gather_inertia(d: Draft, roots: dict[str, Array], H_tail: Callable[[Index, I
             d.fill(ref, 0)
         with d.loop("j", mechanism(d).pieces(d.tail), downward=True):
             d.step(mechanism(d).gather, d.piece(i), **carried, **own)
-        d.step(dyn.column_at_torso, {name: array[i] for name, array in roots.items()}, columns=columns[i])
+        d.step(dyn.column_at_torso, {name: array[i] for name, array in roots.items()}, columns=columns.part(12 * i, 12))
     d.step(dyn.torso_composite, **{name: carried[name] for name in ("mass", "h", "I")})
-    return columns
 
 
 def forward_roots(d: Draft, here: dict[str, Ref]) -> tuple[dict[str, Array], Array]:
@@ -143,17 +141,17 @@ def forward_roots(d: Draft, here: dict[str, Ref]) -> tuple[dict[str, Array], Arr
     return roots, S
 
 
-def tail_inertia(d: Draft, H_tail: Callable[[Index, Index], Ref], world: bool = False) -> Array:
+def tail_inertia(d: Draft, H_tail: Callable[[Index, Index], Ref], columns: Array, world: bool = False) -> Array:
     """All that H is made of (Eqs. 2, 16, 18): ``mass, h, I`` at B, momentum columns, H of the tail (lower triangle).
 
     In torso axes, or with ``world`` the columns in world axes.
     """
     mechanism(d).prepare(d, True)
     roots, S = forward_roots(d, torso_pose(d, world))
-    columns = gather_inertia(d, roots, H_tail)
+    gather_inertia(d, roots, H_tail, columns)
     with d.loop("i", d.tail.segments, start=1) as i, d.loop("l", i) as segment:
         block = {"H_pitch": H_tail(2 * i, 2 * segment, 2), "H_yaw": H_tail(2 * i + 1, 2 * segment, 2)}
-        d.step(dyn.segment_coupling, {"S": S[segment], "columns": columns[i]}, **block)
+        d.step(dyn.segment_coupling, {"S": S[segment], "columns": columns.part(12 * i, 12)}, **block)
     return columns
 
 
@@ -174,15 +172,13 @@ def column_of(columns: Array, k: Index) -> Ref:
     return columns.part(6 * k, 6)
 
 
-def core_bias(d: Draft) -> Array:
-    """C without gravity and translation: ``force, moment`` at B in torso axes; returns the joints' part."""
-    zero = d.constant("zero", [0, 0, 0])[0]
+def core_bias(d: Draft, bias: Array) -> None:
+    """C without gravity and translation: force and moment at B in torso axes, then the tail's forces."""
+    zero = d.zero(3)
     d.known |= {"w": d.known["omega"], "w_dot": zero, "a": zero}
-    torques = d.array("inertial", d.tail.nt)
     wrench = forward_wrenches(d, None)
-    gather_wrenches(d, wrench, lambda i: torques.part(2 * i, 2))
-    d.store(dyn.torso_wrench, force=3, moment=3)
-    return torques
+    gather_wrenches(d, wrench, lambda i: bias.part(6 + 2 * i, 2))
+    d.step(dyn.torso_wrench, force=bias.part(0, 3), moment=bias.part(3, 3))
 
 
 def sample_joints(d: Draft) -> tuple[Array, Array]:

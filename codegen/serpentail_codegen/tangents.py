@@ -7,7 +7,7 @@ direction; without, it holds the derivative in one direction.
 from collections.abc import Callable, Collection
 from dataclasses import replace
 
-from .compose import pruned, reached, reads, writes
+from .compose import pruned, reached, writes
 from .differentiate import tangent
 from .program import Apply, Array, Copy, Fill, Guard, Index, Loop, Program, Ref, statements
 from .turned_arrays import TurnedArray, turned_arrays
@@ -33,7 +33,8 @@ def tangent_program(program: Program, active: Collection[str], lanes: int = 0, b
     fills = tuple(Fill(ref, (0,) * ref.size) for ref in _partly_written(body))
     arrays = tuple(replace(a, role="local") if a.role == "output" else a for a in program.arrays)
     arrays += tuple(companions.values())
-    return pruned(replace(program, name=f"d_{program.name}", arrays=arrays, body=fills + body))
+    name = "_".join(["d", *active, program.name, *(["rows_of", str(lanes)] if lanes else [])])
+    return pruned(replace(program, name=name, arrays=arrays, body=fills + body))
 
 
 def _role(array: Array) -> str:
@@ -41,15 +42,12 @@ def _role(array: Array) -> str:
 
 
 def _partly_written(body: tuple) -> list[Ref]:
-    """Return the wide arrays that some statement writes in fewer lanes than another one reads."""
-    written, read = {}, {}
+    """Return the rows that some statement writes in part of their lanes: the others must be zero."""
+    found = {}
     for statement, _ in statements(body):
-        columns = getattr(statement, "columns", None)
-        for found, refs in ((written, writes(statement)), (read, reads(statement))):
-            for ref in refs:
-                if ref.array.lanes and ref.array.role == "local":
-                    found.setdefault(ref.array, set()).add(columns)
-    return [a.part(0, a.length) for a, columns in written.items() if len(columns | read.get(a, set())) > 1]
+        if getattr(statement, "columns", None):
+            found |= {ref.array.name: ref.array for ref in writes(statement) if ref.array.lanes}
+    return [a.part(0, a.length) for a in found.values()]
 
 
 class _Transform:

@@ -31,6 +31,7 @@ class Tape:
     def __init__(self):
         self.nodes: list[tuple] = []
         self.lanes: list[int] = []
+        self.has_rows = False
         self._known: dict[tuple, int] = {}
 
     def _node(self, *key) -> int:
@@ -38,7 +39,8 @@ class Tape:
         if found is None:
             found = self._known[key] = len(self.nodes)
             self.nodes.append(key)
-            self.lanes.append(lanes_of(key, self.lanes))
+            self.has_rows = self.has_rows or key[0] == "unit"
+            self.lanes.append(lanes_of(key, self.lanes) if self.has_rows else 0)
         return found
 
     def unit(self, lane: int, lanes: int) -> int:

@@ -33,12 +33,12 @@ class CasadiFunctions:
         values = {
             p["name"]: self._model.parameters[p["name"]] for p in self._model.manifest["parameters"] if p["in_struct"]
         }
-        function = self._module.function(self._known(name), values)
+        function = self._module.function(self._symbolic(name), values)
         setattr(self, name, function)
         return function
 
     def __dir__(self) -> list[str]:
-        return [*self._model.manifest["functions"], "symbolic", "external", "parameter_vector"]
+        return [*self._module.SIGNATURES, "symbolic", "external", "parameter_vector"]
 
     @property
     def parameter_vector(self) -> casadi.DM:
@@ -47,7 +47,7 @@ class CasadiFunctions:
 
     def symbolic(self, name: str) -> casadi.Function:
         """Return a function of SX operations whose last input is the parameter vector."""
-        return self._module.function(self._known(name))
+        return self._module.function(self._symbolic(name))
 
     def external(self, name: str, derivatives: int = 0, folded: bool = False) -> casadi.Function:
         """Return the compiled C as a function whose last input is the parameter vector (double models only).
@@ -73,6 +73,12 @@ class CasadiFunctions:
         outputs = outputs if isinstance(outputs, tuple) else (outputs,)
         ports = (function.name_in()[:-1], function.name_out())
         return casadi.Function(name, inputs, outputs, *ports, {"always_inline": True})  # graphs then see the blocks
+
+    def _symbolic(self, name: str) -> str:
+        if self._known(name) not in self._module.SIGNATURES:
+            remedy = f'differentiate the function by CasADi, or take the compiled one, external("{name}")'
+            raise ModelError(f"{self._model.name} has no SX operations of {name}: {remedy}")
+        return name
 
     def _check(self, name: str, derivatives: int) -> None:
         """Raise ModelError where a scene lacks what derivatives of this order are made of."""

@@ -2,17 +2,23 @@
 
 import hashlib
 import json
+import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from ..draft import Tail
 from ..functions import Argument, Function, inertial
 from ..functions import program as assemble
+from ..interpret import applied
+from ..program import Program
 from ..scene import Scene
+from ..tape import operation_count
 from ..templating import render
 from .c_function import CFunction, Routine, dialect, in_loops, routine_arguments, routine_lines, straight_line
 from .casadi_external import casadi_context
 
-STRAIGHT_UP_TO = 5000  # operations: beyond, the text leaves the instruction cache and compile time grows
+STRAIGHT_UP_TO = 7000  # nodes: beyond, the text leaves the instruction cache and compile time grows
+LARGE = 100  # operations: a step that is written out wherever it is called; larger ones as the compiler sees fit
 COORDINATES = {
     "joint": "alpha_1, beta_1, ... of the joints",
     "bend": "a_1, b_1, ... of the segments' bend",
@@ -34,10 +40,9 @@ def emit(scene: Scene, tail: Tail, function: Function) -> Emitted:
     """Print one function in the form that the scene asks for; ``auto`` is straight while that is small."""
     program = assemble(function, tail)
     fixed = baked_values(scene)
-    if scene.emission != "loops":
-        body = straight_line(program, scene.real, scene.name, fixed)
-        if scene.emission == "straight" or body.operations <= STRAIGHT_UP_TO:
-            return Emitted(function, body, "straight")
+    small = scene.emission == "auto" and applied(program) <= STRAIGHT_UP_TO
+    if small or scene.emission == "straight":
+        return Emitted(function, straight_line(program, scene.real, scene.name, fixed), "straight")
     return Emitted(function, in_loops(program, scene.real, scene.name, fixed), "loops")
 
 
@@ -74,8 +79,7 @@ class FunctionView:
         head = f"const {prefix}_parameters *parameters"
         self.prototype = wrapped(f"int {prefix}_{self.name}(", [head, *arguments, f"{real} *work"])
         self.names = ", ".join(a.name for a in views)
-        text = "\n".join(self.lines)
-        self.unused = [name for name, word in (("parameters", "parameters->"), ("work", "work")) if word not in text]
+        self.unused = unused(self.lines)
 
 
 def wrapped(head: str, arguments: list[str]) -> str:
@@ -109,18 +113,51 @@ def parameter_views(scene: Scene) -> list[dict]:
 def step_views(emitted: list[Emitted], real: str, prefix: str) -> list[dict]:
     """Return every step that some loop calls, once."""
     routines: dict[str, Routine] = {}
-    for routine in (r for e in emitted for r in e.body.routines):
+    bodies = [e.body for e in emitted] + [body for _, body in callees_of(emitted)]
+    for routine in (r for body in bodies for r in body.routines):
         if routines.setdefault(routine.name, routine) != routine:
             raise ValueError(f"two steps are called {routine.name}")
     return [
         {
             "name": routine.name,
+            "kind": "STEP" if operation_count(routine.step.nodes, routine.step.results) < LARGE else "static void",
             "doc": routine.step.doc,
             "lines": routine_lines(routine, real, prefix),
             "arguments": routine_arguments(routine),
         }
         for routine in routines.values()
     ]
+
+
+def callees_of(emitted: list[Emitted]) -> list[tuple[Program, CFunction]]:
+    """Return the programs that functions call, once, those first that others call."""
+    found: dict[str, tuple[Program, CFunction]] = {}
+    for program, body in (callee for e in emitted for callee in e.body.callees):
+        for inner in (*body.callees, (program, body)):
+            if found.setdefault(inner[0].name, inner) != inner:
+                raise ValueError(f"two programs are called {inner[0].name}")
+    return list(found.values())
+
+
+def callee_view(program: Program, body: CFunction, prefix: str) -> dict:
+    """Return a called program as a function of the C file."""
+    arguments = [f"const {prefix}_parameters *parameters"]
+    arguments += [f"const real *{a.name}" for a in program.of_role("input")]
+    arguments += [f"real *{a.name}" for a in program.of_role("output")]
+    head = f"static int {prefix}_{program.name}("
+    return {
+        "name": program.name,
+        "doc": program.doc,
+        "prototype": wrapped(head, [*arguments, "real *work"]),
+        "lines": body.lines,
+        "unused": unused(body.lines, [a.name for a in program.of_role("input")]),
+    }
+
+
+def unused(lines: Iterable[str], names: Iterable[str] = ()) -> list[str]:
+    """Return which of these arguments, parameters and work a body does not read."""
+    words = set(re.findall(r"\w+", " ".join(lines)))
+    return [name for name in ("parameters", "work", *names) if name not in words]
 
 
 def rollout_work(emitted: list[Emitted], tail: Tail) -> int:
@@ -169,6 +206,7 @@ def c_context(scene: Scene, tail: Tail, emitted: list[Emitted], version: str) ->
             "most_arrays": max(len(f.inputs) + len(f.outputs) for f in views),
             "works": works,
             "steps": step_views(emitted, scene.real, scene.name),
+            "callees": [callee_view(*callee, scene.name) for callee in callees_of(emitted)],
             "helpers": sorted(set().union(*(e.body.helpers for e in emitted)) | ({"copy"} if rollout else set())),
             "rollout": rollout,
         }

@@ -4,12 +4,13 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from ..interpret import executed, unroll
-from ..program import Apply, Array, Copy, Factor, Fill, Guard, Loop, Program, Ref, Solve, Unit, padded
+from ..program import Apply, Array, Call, Copy, Factor, Fill, Guard, Loop, Program, Ref, Solve, Unit, padded
 from ..tape import BINARY, Step
 from .scalars import EARLY, LATE, Dialect, Scalars, index_text
 
 FEW = 3  # scalars are written one by one, more by a helper
 ON_STACK = 12  # scalars: larger local arrays go to the caller's workspace
+CALLEES_WORK = "<work>"  # stands for where the workspace of what is called begins
 
 
 @dataclass(frozen=True)
@@ -33,13 +34,17 @@ class Routine:
 
 @dataclass(frozen=True)
 class CFunction:
-    """One C function body: its lines, the scalars of workspace, the routines and helpers it calls, what it costs."""
+    """One C function body: its lines, the scalars of workspace, the routines and helpers it calls, what it costs.
+
+    ``operations`` are executed, each lane counted; ``callees`` are the programs that it calls, with their C functions.
+    """
 
     lines: tuple[str, ...]
     work: int
     routines: tuple[Routine, ...]
     helpers: frozenset[str]
     operations: int
+    callees: "tuple[tuple[Program, CFunction], ...]" = ()
 
 
 def dialect(real: str, prefix: str = "") -> Dialect:
@@ -171,8 +176,9 @@ class LoopPrinter:
     """Prints a program as C loops that call its steps."""
 
     def __init__(self, program: Program, real: str, prefix: str, fixed=None):
-        self.program, self.prefix, self.fixed = program, prefix, fixed or {}
+        self.program, self.real, self.prefix, self.fixed = program, real, prefix, fixed or {}
         self.dialect = dialect(real)
+        self.callees: dict[str, tuple[Program, CFunction]] = {}
         self.routines: dict[str, Routine] = {}
         self.helpers: set[str] = set()
         self.used: dict[str, Array] = {}
@@ -181,8 +187,11 @@ class LoopPrinter:
         """Return the printed function."""
         body = self._body(self.program.body)
         declarations, work = self._declarations()
-        lines = (*declarations, *body, "return STATUS_OK;")
-        return CFunction(lines, work, tuple(self.routines.values()), frozenset(self.helpers), executed(self.program))
+        own = padded(work)  # what is called begins at a whole vector, too
+        lines = (*declarations, *(line.replace(CALLEES_WORK, str(own)) for line in body), "return STATUS_OK;")
+        work = max([work, *(own + function.work for _, function in self.callees.values() if function.work)])
+        routines, callees = tuple(self.routines.values()), tuple(self.callees.values())
+        return CFunction(lines, work, routines, frozenset(self.helpers), executed(self.program), callees)
 
     def _declarations(self) -> tuple[list[str], int]:
         lines, work = [], 0
@@ -260,6 +269,19 @@ class LoopPrinter:
         self.helpers.add("lanes")
         helper = self._helper("ldl_solve_rows")
         return [f"{helper}({x.size}, {x.lanes}, {x.array.row}, {pointer(matrix)}, {pointer(x)});"]
+
+    def _call(self, call: Call) -> list[str]:
+        inner = in_loops(call.program, self.real, self.prefix, self.fixed)
+        name = call.program.name
+        if self.callees.setdefault(name, (call.program, inner))[0] != call.program:
+            raise ValueError(f"two programs are called {name}")
+        self.callees |= {program.name: (program, function) for program, function in inner.callees}
+        self.helpers |= inner.helpers
+        arguments, given = ["parameters"], dict(call.arguments)
+        for array in (*call.program.of_role("input"), *call.program.of_role("output")):
+            arguments.append(pointer(self._ref(given[array.name].part(0, 1))))
+        text = f"{self.prefix}_{name}({', '.join(arguments)}, work + {CALLEES_WORK})"
+        return ["{", f"  const int status = {text};", "  if (status != STATUS_OK) {", "    return status;", "  }", "}"]
 
     def _apply(self, call: Apply) -> list[str]:
         outputs = list(zip(call.step.outputs, map(self._ref, call.writes), call.adds, strict=True))

@@ -2,6 +2,7 @@
 
 import re
 
+from ..compose import expanded
 from ..draft import Tail
 from ..functions import inertial
 from ..functions import program as assemble
@@ -38,7 +39,7 @@ class PythonPrinter:
     """Prints a program as Python loops over lists."""
 
     def __init__(self, program: Program):
-        self.program = program
+        self.program = expanded(program)
         self.steps: dict[str, Step] = {}
 
     def lines(self) -> list[str]:

@@ -57,6 +57,8 @@ class Scalars:
         self.results = results
 
     def _parts(self, rows: dict[int, int]) -> tuple[dict, dict]:
+        if not rows and not any(self.nodes[n][0] == "unit" for n in self.live):
+            return dict.fromkeys(self.live, EARLY), dict.fromkeys(self.live, 0)
         inputs = defaultdict(int, rows)
         lanes, part = {}, {}
         for n in sorted(self.live):

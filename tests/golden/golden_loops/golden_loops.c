@@ -336,6 +336,77 @@ STEP golden_loops_world_vector(const real *R, const real *vector, real *vector_o
   vector_out[2] = t5;
 }
 
+/* Right-hand side for omega_dot: applied minus inertial moment about the COM; and the net force. */
+STEP golden_loops_rotational_load(const real *com, const real *force, const real *moment, const real *load_force, const real *load_moment, real *net_out, real *rhs_out)
+{
+  const real t0 = load_force[0] - force[0];
+  const real t1 = load_force[1] - force[1];
+  const real t2 = load_force[2] - force[2];
+  const real t3 = load_moment[0] - moment[0];
+  const real t4 = load_moment[1] - moment[1];
+  const real t5 = load_moment[2] - moment[2];
+  const real t6 = t3 + com[2] * t1;
+  const real t7 = t4 + com[0] * t2;
+  const real t8 = t5 + com[1] * t0;
+  const real t9 = t6 - com[1] * t2;
+  const real t10 = t7 - com[2] * t0;
+  const real t11 = t8 - com[0] * t1;
+  net_out[0] = t0;
+  net_out[1] = t1;
+  net_out[2] = t2;
+  rhs_out[0] = t9;
+  rhs_out[1] = t10;
+  rhs_out[2] = t11;
+}
+
+/* Right-hand side for one tail coordinate, translation eliminated: tau - c_k - f_k . net / M. */
+STEP golden_loops_tail_load(const real *inverse_mass, const real *net, const real *column, const real *inertial, const real *tau, real *rhs_out)
+{
+  const real t0 = net[0] * column[0] + net[1] * column[1];
+  const real t1 = t0 + net[2] * column[2];
+  const real t2 = tau[0] - inertial[0];
+  const real t3 = t2 - inverse_mass[0] * t1;
+  rhs_out[0] = t3;
+}
+
+/* f_k q_ddot_k: the momentum rate that one tail coordinate gives at rest of B. */
+STEP golden_loops_column_acceleration_add_tail_force(const real *column, const real *acceleration, real *tail_force_out)
+{
+  const real r0 = column[0] * acceleration[0];
+  const real r1 = column[1] * acceleration[0];
+  const real r2 = column[2] * acceleration[0];
+  tail_force_out[0] += r0;
+  tail_force_out[1] += r1;
+  tail_force_out[2] += r2;
+}
+
+/* p_b_ddot = R_b (net - omega_dot x h - sum f_k q_ddot_k) / M - g z. */
+STEP golden_loops_base_acceleration(const real *R, const real *gravity, const real *inverse_mass, const real *h, const real *net, const real *w_dot, const real *tail_force, real *p_ddot_out)
+{
+  const real t0 = net[0] - tail_force[0];
+  const real t1 = t0 + h[1] * w_dot[2];
+  const real t2 = net[1] - tail_force[1];
+  const real t3 = t1 - h[2] * w_dot[1];
+  const real t4 = t2 + h[2] * w_dot[0];
+  const real t5 = net[2] - tail_force[2];
+  const real t6 = t4 - h[0] * w_dot[2];
+  const real t7 = t5 + h[0] * w_dot[1];
+  const real t8 = inverse_mass[0] * t3;
+  const real t9 = t7 - h[1] * w_dot[0];
+  const real t10 = inverse_mass[0] * t6;
+  const real t11 = inverse_mass[0] * t9;
+  const real t12 = R[6] * t8 - gravity[0];
+  const real t13 = R[0] * t8 + R[1] * t10;
+  const real t14 = R[3] * t8 + R[4] * t10;
+  const real t15 = t12 + R[7] * t10;
+  const real t16 = t13 + R[2] * t11;
+  const real t17 = t14 + R[5] * t11;
+  const real t18 = t15 + R[8] * t11;
+  p_ddot_out[0] = t16;
+  p_ddot_out[1] = t17;
+  p_ddot_out[2] = t18;
+}
+
 /* s^2, s c, 2 s c, c^2 - s^2 and c^2 of both joint angles: what turns a symmetric tensor in the plane. */
 STEP golden_loops_double_angles(const real *joint, real *twice_out)
 {
@@ -421,7 +492,7 @@ STEP golden_loops_link_pose(const real *joint, const real *link, const real *R, 
 }
 
 /* One link of the tip-to-base sweep of Eq. 16: composite inertia and the momentum columns of the segment. */
-STEP golden_loops_gather_links_add_H_pp_H_py_H_yy(const real *joint, const real *twice, const real *link, const real *mass, const real *h, const real *I, const real *pitch, const real *yaw, real *mass_out, real *h_out, real *I_out, real *pitch_out, real *yaw_out, real *H_pp_out, real *H_py_out, real *H_yy_out)
+static void golden_loops_gather_links_add_H_pp_H_py_H_yy(const real *joint, const real *twice, const real *link, const real *mass, const real *h, const real *I, const real *pitch, const real *yaw, real *mass_out, real *h_out, real *I_out, real *pitch_out, real *yaw_out, real *H_pp_out, real *H_py_out, real *H_yy_out)
 {
   const real t0 = h[1] - link[1] * mass[0];
   const real t1 = h[1] + t0;
@@ -702,77 +773,6 @@ STEP golden_loops_pair_without_translation_add_A_entry(const real *inverse_mass,
   A_entry_out[0] += r0;
 }
 
-/* Right-hand side for omega_dot: applied minus inertial moment about the COM; and the net force. */
-STEP golden_loops_rotational_load(const real *com, const real *force, const real *moment, const real *load_force, const real *load_moment, real *net_out, real *rhs_out)
-{
-  const real t0 = load_force[0] - force[0];
-  const real t1 = load_force[1] - force[1];
-  const real t2 = load_force[2] - force[2];
-  const real t3 = load_moment[0] - moment[0];
-  const real t4 = load_moment[1] - moment[1];
-  const real t5 = load_moment[2] - moment[2];
-  const real t6 = t3 + com[2] * t1;
-  const real t7 = t4 + com[0] * t2;
-  const real t8 = t5 + com[1] * t0;
-  const real t9 = t6 - com[1] * t2;
-  const real t10 = t7 - com[2] * t0;
-  const real t11 = t8 - com[0] * t1;
-  net_out[0] = t0;
-  net_out[1] = t1;
-  net_out[2] = t2;
-  rhs_out[0] = t9;
-  rhs_out[1] = t10;
-  rhs_out[2] = t11;
-}
-
-/* Right-hand side for one tail coordinate, translation eliminated: tau - c_k - f_k . net / M. */
-STEP golden_loops_tail_load(const real *inverse_mass, const real *net, const real *column, const real *inertial, const real *tau, real *rhs_out)
-{
-  const real t0 = net[0] * column[0] + net[1] * column[1];
-  const real t1 = t0 + net[2] * column[2];
-  const real t2 = tau[0] - inertial[0];
-  const real t3 = t2 - inverse_mass[0] * t1;
-  rhs_out[0] = t3;
-}
-
-/* f_k q_ddot_k: the momentum rate that one tail coordinate gives at rest of B. */
-STEP golden_loops_column_acceleration_add_tail_force(const real *column, const real *acceleration, real *tail_force_out)
-{
-  const real r0 = column[0] * acceleration[0];
-  const real r1 = column[1] * acceleration[0];
-  const real r2 = column[2] * acceleration[0];
-  tail_force_out[0] += r0;
-  tail_force_out[1] += r1;
-  tail_force_out[2] += r2;
-}
-
-/* p_b_ddot = R_b (net - omega_dot x h - sum f_k q_ddot_k) / M - g z. */
-STEP golden_loops_base_acceleration(const real *R, const real *gravity, const real *inverse_mass, const real *h, const real *net, const real *w_dot, const real *tail_force, real *p_ddot_out)
-{
-  const real t0 = net[0] - tail_force[0];
-  const real t1 = t0 + h[1] * w_dot[2];
-  const real t2 = net[1] - tail_force[1];
-  const real t3 = t1 - h[2] * w_dot[1];
-  const real t4 = t2 + h[2] * w_dot[0];
-  const real t5 = net[2] - tail_force[2];
-  const real t6 = t4 - h[0] * w_dot[2];
-  const real t7 = t5 + h[0] * w_dot[1];
-  const real t8 = inverse_mass[0] * t3;
-  const real t9 = t7 - h[1] * w_dot[0];
-  const real t10 = inverse_mass[0] * t6;
-  const real t11 = inverse_mass[0] * t9;
-  const real t12 = R[6] * t8 - gravity[0];
-  const real t13 = R[0] * t8 + R[1] * t10;
-  const real t14 = R[3] * t8 + R[4] * t10;
-  const real t15 = t12 + R[7] * t10;
-  const real t16 = t13 + R[2] * t11;
-  const real t17 = t14 + R[5] * t11;
-  const real t18 = t15 + R[8] * t11;
-  p_ddot_out[0] = t16;
-  p_ddot_out[1] = t17;
-  p_ddot_out[2] = t18;
-}
-
 /* Factor A = L D L^T in place without pivoting (lower triangle, row-major): L below 1 / D on the diagonal. */
 static int golden_loops_ldl_factor(int size, real *A)
 {
@@ -812,6 +812,126 @@ static void golden_loops_ldl_solve(int size, const real *A, real *x)
       x[i] -= A[k * size + i] * x[k];
     }
   }
+}
+
+/* H with translation eliminated, factored, and C without gravity */
+static int golden_loops_balance(const golden_loops_parameters *parameters, const real *q, const real *v, real *R,
+                                real *inverse_mass, real *com, real *first_moment, real *A, real *columns, real *bias,
+                                real *work)
+{
+  real link[6];
+  static const real share[1] = {0.25};
+  real joint[8];
+  real *const twice = work + 0;
+  real R_link[9];
+  real P_link[3];
+  real *const R_root = work + 20;
+  real P_root[6];
+  real S[12];
+  real mass[1];
+  real h[3];
+  real I[6];
+  real pitch[6];
+  real yaw[6];
+  real w_here[3];
+  real w_dot_here[3];
+  static const real zero_3[3] = {0.0, 0.0, 0.0};
+  real a_here[3];
+  real a_joint[3];
+  real swing[3];
+  real *const wrench = work + 38;
+  real F_next[6];
+  golden_loops_quaternion_rotation(q + 3, R);
+  golden_loops_link_properties(&parameters->tail_mass, &parameters->tail_length, parameters->link_inertia, share, link);
+  for (int i = 0; i < 2; ++i) {
+    golden_loops_joint_trigonometry(q + 2 * i + 7, joint + 4 * i);
+    golden_loops_double_angles(joint + 4 * i, twice + 10 * i);
+  }
+  R_link[0] = 1.0;
+  R_link[1] = 0.0;
+  R_link[2] = 0.0;
+  R_link[3] = 0.0;
+  R_link[4] = 1.0;
+  R_link[5] = 0.0;
+  R_link[6] = 0.0;
+  R_link[7] = 0.0;
+  R_link[8] = 1.0;
+  P_link[0] = parameters->tail_mount[0];
+  P_link[1] = parameters->tail_mount[1];
+  P_link[2] = parameters->tail_mount[2];
+  for (int i = 0; i < 1; ++i) {
+    golden_loops_copy(9, R_link, R_root + 9 * i);
+    P_root[3 * i] = P_link[0];
+    P_root[3 * i + 1] = P_link[1];
+    P_root[3 * i + 2] = P_link[2];
+    golden_loops_fill(12, 0.0, S + 12 * i);
+    for (int j = 0; j < 2; ++j) {
+      golden_loops_joint_twist_add_S(joint + 4 * i, R_link, P_link, S + 12 * i);
+      golden_loops_link_pose(joint + 4 * i, link, R_link, P_link, R_link, P_link);
+    }
+  }
+  golden_loops_copy(9, R_link, R_root + 9);
+  P_root[3] = P_link[0];
+  P_root[4] = P_link[1];
+  P_root[5] = P_link[2];
+  mass[0] = 0.0;
+  h[0] = 0.0;
+  h[1] = 0.0;
+  h[2] = 0.0;
+  golden_loops_fill(6, 0.0, I);
+  for (int i = 1; i >= 0; --i) {
+    golden_loops_fill(6, 0.0, pitch);
+    golden_loops_fill(6, 0.0, yaw);
+    A[16 * i + 24] = 0.0;
+    A[16 * i + 31] = 0.0;
+    A[16 * i + 32] = 0.0;
+    for (int j = 1; j >= 0; --j) {
+      golden_loops_gather_links_add_H_pp_H_py_H_yy(joint + 4 * i, twice + 10 * i, link, mass, h, I, pitch, yaw, mass, h, I, pitch, yaw, A + 16 * i + 24, A + 16 * i + 31, A + 16 * i + 32);
+    }
+    golden_loops_column_at_torso(R_root + 9 * i, P_root + 3 * i, pitch, yaw, columns + 12 * i);
+  }
+  golden_loops_torso_composite(parameters->tail_mount, &parameters->torso_mass, parameters->torso_inertia, mass, h, I, mass, h, I);
+  for (int i = 1; i < 2; ++i) {
+    for (int l = 0; l < i; ++l) {
+      golden_loops_segment_coupling(S + 12 * l, columns + 12 * i, A + 14 * i + 2 * l + 24, A + 14 * i + 2 * l + 31);
+    }
+  }
+  first_moment[0] = h[0];
+  first_moment[1] = h[1];
+  first_moment[2] = h[2];
+  w_here[0] = v[3];
+  w_here[1] = v[4];
+  w_here[2] = v[5];
+  w_dot_here[0] = zero_3[0];
+  w_dot_here[1] = zero_3[1];
+  w_dot_here[2] = zero_3[2];
+  golden_loops_mount_acceleration(v + 3, zero_3, zero_3, parameters->tail_mount, a_here);
+  for (int i = 0; i < 2; ++i) {
+    for (int j = 0; j < 2; ++j) {
+      golden_loops_link_motion_unforced(joint + 4 * i, v + 2 * i + 6, link, w_here, w_dot_here, a_here, w_here, w_dot_here, a_joint, swing, a_here);
+      golden_loops_link_wrench(link, w_here, w_dot_here, a_joint, swing, wrench + 12 * i + 6 * j);
+    }
+  }
+  golden_loops_fill(6, 0.0, F_next);
+  for (int i = 1; i >= 0; --i) {
+    bias[2 * i + 6] = 0.0;
+    bias[2 * i + 7] = 0.0;
+    for (int j = 1; j >= 0; --j) {
+      golden_loops_gather_wrench_add_torque(joint + 4 * i, link, wrench + 12 * i + 6 * j, F_next, F_next, bias + 2 * i + 6);
+    }
+  }
+  golden_loops_torso_wrench(parameters->tail_mount, &parameters->torso_mass, parameters->torso_inertia, v + 3, zero_3, zero_3, F_next, bias, bias + 3);
+  golden_loops_without_translation(mass, h, I, inverse_mass, com, A, A + 7, A + 14);
+  for (int k = 0; k < 4; ++k) {
+    golden_loops_column_without_translation(com, columns + 6 * k, A + 7 * k + 21);
+    for (int l = 0; l < k + 1; ++l) {
+      golden_loops_pair_without_translation_add_A_entry(inverse_mass, columns + 6 * k, columns + 6 * l, A + 7 * k + l + 24);
+    }
+  }
+  if (golden_loops_ldl_factor(7, A) != STATUS_OK) {
+    return STATUS_NOT_POSITIVE_DEFINITE;
+  }
+  return STATUS_OK;
 }
 
 /* C(q, v) of Eq. 3, gravity included */
@@ -869,128 +989,24 @@ int golden_loops_forward_dynamics(const golden_loops_parameters *parameters, con
                                   golden_loops_real *work)
 {
   real R[9];
-  real link[6];
-  static const real share[1] = {0.25};
-  real joint[8];
-  real *const twice = work + 0;
-  real R_link[9];
-  real P_link[3];
-  real *const R_root = work + 20;
-  real P_root[6];
-  real S[12];
-  real mass[1];
-  real h[3];
-  real I[6];
-  real pitch[6];
-  real yaw[6];
-  real *const A = work + 38;
-  real *const columns = work + 87;
-  real w_here[3];
-  real w_dot_here[3];
-  static const real zero[3] = {0.0, 0.0, 0.0};
-  real a_here[3];
-  real a_joint[3];
-  real swing[3];
-  real *const wrench = work + 111;
-  real F_next[6];
-  real inertial[4];
-  real force[3];
-  real moment[3];
   real inverse_mass[1];
   real com[3];
+  real first_moment[3];
+  real *const A = work + 0;
+  real *const columns = work + 49;
+  real bias[10];
   real net_v_dot[3];
   static const real unloaded[3] = {0.0, 0.0, 0.0};
   real tail_force_v_dot[3];
-  golden_loops_quaternion_rotation(q + 3, R);
-  golden_loops_link_properties(&parameters->tail_mass, &parameters->tail_length, parameters->link_inertia, share, link);
-  for (int i = 0; i < 2; ++i) {
-    golden_loops_joint_trigonometry(q + 2 * i + 7, joint + 4 * i);
-    golden_loops_double_angles(joint + 4 * i, twice + 10 * i);
-  }
-  R_link[0] = 1.0;
-  R_link[1] = 0.0;
-  R_link[2] = 0.0;
-  R_link[3] = 0.0;
-  R_link[4] = 1.0;
-  R_link[5] = 0.0;
-  R_link[6] = 0.0;
-  R_link[7] = 0.0;
-  R_link[8] = 1.0;
-  P_link[0] = parameters->tail_mount[0];
-  P_link[1] = parameters->tail_mount[1];
-  P_link[2] = parameters->tail_mount[2];
-  for (int i = 0; i < 1; ++i) {
-    golden_loops_copy(9, R_link, R_root + 9 * i);
-    P_root[3 * i] = P_link[0];
-    P_root[3 * i + 1] = P_link[1];
-    P_root[3 * i + 2] = P_link[2];
-    golden_loops_fill(12, 0.0, S + 12 * i);
-    for (int j = 0; j < 2; ++j) {
-      golden_loops_joint_twist_add_S(joint + 4 * i, R_link, P_link, S + 12 * i);
-      golden_loops_link_pose(joint + 4 * i, link, R_link, P_link, R_link, P_link);
+  {
+    const int status = golden_loops_balance(parameters, q, v, R, inverse_mass, com, first_moment, A, columns, bias, work + 80);
+    if (status != STATUS_OK) {
+      return status;
     }
   }
-  golden_loops_copy(9, R_link, R_root + 9);
-  P_root[3] = P_link[0];
-  P_root[4] = P_link[1];
-  P_root[5] = P_link[2];
-  mass[0] = 0.0;
-  h[0] = 0.0;
-  h[1] = 0.0;
-  h[2] = 0.0;
-  golden_loops_fill(6, 0.0, I);
-  for (int i = 1; i >= 0; --i) {
-    golden_loops_fill(6, 0.0, pitch);
-    golden_loops_fill(6, 0.0, yaw);
-    A[16 * i + 24] = 0.0;
-    A[16 * i + 31] = 0.0;
-    A[16 * i + 32] = 0.0;
-    for (int j = 1; j >= 0; --j) {
-      golden_loops_gather_links_add_H_pp_H_py_H_yy(joint + 4 * i, twice + 10 * i, link, mass, h, I, pitch, yaw, mass, h, I, pitch, yaw, A + 16 * i + 24, A + 16 * i + 31, A + 16 * i + 32);
-    }
-    golden_loops_column_at_torso(R_root + 9 * i, P_root + 3 * i, pitch, yaw, columns + 12 * i);
-  }
-  golden_loops_torso_composite(parameters->tail_mount, &parameters->torso_mass, parameters->torso_inertia, mass, h, I, mass, h, I);
-  for (int i = 1; i < 2; ++i) {
-    for (int l = 0; l < i; ++l) {
-      golden_loops_segment_coupling(S + 12 * l, columns + 12 * i, A + 14 * i + 2 * l + 24, A + 14 * i + 2 * l + 31);
-    }
-  }
-  w_here[0] = v[3];
-  w_here[1] = v[4];
-  w_here[2] = v[5];
-  w_dot_here[0] = zero[0];
-  w_dot_here[1] = zero[1];
-  w_dot_here[2] = zero[2];
-  golden_loops_mount_acceleration(v + 3, zero, zero, parameters->tail_mount, a_here);
-  for (int i = 0; i < 2; ++i) {
-    for (int j = 0; j < 2; ++j) {
-      golden_loops_link_motion_unforced(joint + 4 * i, v + 2 * i + 6, link, w_here, w_dot_here, a_here, w_here, w_dot_here, a_joint, swing, a_here);
-      golden_loops_link_wrench(link, w_here, w_dot_here, a_joint, swing, wrench + 12 * i + 6 * j);
-    }
-  }
-  golden_loops_fill(6, 0.0, F_next);
-  for (int i = 1; i >= 0; --i) {
-    inertial[2 * i] = 0.0;
-    inertial[2 * i + 1] = 0.0;
-    for (int j = 1; j >= 0; --j) {
-      golden_loops_gather_wrench_add_torque(joint + 4 * i, link, wrench + 12 * i + 6 * j, F_next, F_next, inertial + 2 * i);
-    }
-  }
-  golden_loops_torso_wrench(parameters->tail_mount, &parameters->torso_mass, parameters->torso_inertia, v + 3, zero, zero, F_next, force, moment);
-  golden_loops_without_translation(mass, h, I, inverse_mass, com, A, A + 7, A + 14);
+  golden_loops_rotational_load(com, bias, bias + 3, unloaded, unloaded, net_v_dot, v_dot + 3);
   for (int k = 0; k < 4; ++k) {
-    golden_loops_column_without_translation(com, columns + 6 * k, A + 7 * k + 21);
-    for (int l = 0; l < k + 1; ++l) {
-      golden_loops_pair_without_translation_add_A_entry(inverse_mass, columns + 6 * k, columns + 6 * l, A + 7 * k + l + 24);
-    }
-  }
-  if (golden_loops_ldl_factor(7, A) != STATUS_OK) {
-    return STATUS_NOT_POSITIVE_DEFINITE;
-  }
-  golden_loops_rotational_load(com, force, moment, unloaded, unloaded, net_v_dot, v_dot + 3);
-  for (int k = 0; k < 4; ++k) {
-    golden_loops_tail_load(inverse_mass, net_v_dot, columns + 6 * k, inertial + k, tau + k, v_dot + k + 6);
+    golden_loops_tail_load(inverse_mass, net_v_dot, columns + 6 * k, bias + k + 6, tau + k, v_dot + k + 6);
   }
   golden_loops_ldl_solve(7, A, v_dot + 3);
   tail_force_v_dot[0] = 0.0;
@@ -999,7 +1015,7 @@ int golden_loops_forward_dynamics(const golden_loops_parameters *parameters, con
   for (int k = 0; k < 4; ++k) {
     golden_loops_column_acceleration_add_tail_force(columns + 6 * k, v_dot + k + 6, tail_force_v_dot);
   }
-  golden_loops_base_acceleration(R, &parameters->gravity, inverse_mass, h, net_v_dot, v_dot + 3, tail_force_v_dot, v_dot);
+  golden_loops_base_acceleration(R, &parameters->gravity, inverse_mass, first_moment, net_v_dot, v_dot + 3, tail_force_v_dot, v_dot);
   return STATUS_OK;
 }
 

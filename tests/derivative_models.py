@@ -9,7 +9,8 @@ import serpentail as st
 from models import model_folder
 from references.metrics import BLOCKS
 from references.parameters import random_states
-from serpentail_codegen.derivatives import CATALOGUE
+from serpentail_codegen.catalogue import CATALOGUE
+from serpentail_codegen.compose import expanded
 from serpentail_codegen.functions import program
 from serpentail_codegen.interpret import Numbers, Run
 from serpentail_codegen.pipeline import tail_of
@@ -80,9 +81,9 @@ def tangent_of_q(q):
 
 @cache
 def nest_of(model, function):
-    """The loop nest of a model's function."""
+    """The loop nest of a model's function, what it calls written out."""
     scene = parse_scene(model.manifest["scene"], model.name)
-    return program(CATALOGUE[function], tail_of(scene))
+    return expanded(program(CATALOGUE[function], tail_of(scene)))
 
 
 def parameters_of(model):
