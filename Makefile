@@ -7,6 +7,7 @@ READY  := $(VENV)/.ready
 TAIL ?= articulated
 M    ?= 1
 N    ?= 3
+STARTS ?= 50
 # options of `make model`: REAL=float EMISSION=loops BAKED=1 FUNCTIONS=energy,momentum
 OPTIONS := $(if $(REAL),--real $(REAL)) $(if $(EMISSION),--emission $(EMISSION)) \
            $(if $(BAKED),--baked) $(if $(FUNCTIONS),--functions $(FUNCTIONS))
@@ -18,7 +19,7 @@ SOURCES := $(shell find codegen -name '*.py' -o -name '*.jinja')
 STAMP   := generated/$(MODEL)/.made
 WANTED  := $(if $(SCENE),$(SCENE),--tail $(TAIL) --segments $(M) $(if $(filter continuum,$(TAIL)),,--links $(N))) $(OPTIONS)
 
-.PHONY: help setup demo test test-all model verify bench study-models lint golden clean
+.PHONY: help setup demo test test-all model verify bench studies study-models study-righting lint golden clean
 .DELETE_ON_ERROR:
 
 help:
@@ -34,6 +35,8 @@ help:
 	@echo "  make verify TAIL=articulated M=3 N=4       verification report of that model"
 	@echo "  make bench                                 benchmark report"
 	@echo "  make study-models                          the paper's Fig. 8: both tails compared, and what each costs"
+	@echo "  make study-righting                        the paper's Figs. 9 to 13, Table 2: righting, planned and true"
+	@echo "  make studies                               both; STARTS=50 random starts in the second"
 	@echo "  make lint                                  style and import rules"
 	@echo "  make golden                                accept what the generator emits now as the golden models"
 	@echo "  make clean                                 remove generated/ and output/"
@@ -85,6 +88,11 @@ bench: $(READY)
 
 study-models: $(READY)
 	PYTHONPATH=benchmarks $(PY) examples/study_models.py
+
+study-righting: $(READY)
+	$(PY) examples/study_righting.py --starts $(STARTS)
+
+studies: study-models study-righting
 
 golden: $(READY)
 	$(PY) -m pytest tests/test_golden.py --update-golden

@@ -162,8 +162,15 @@ def test_the_paper_rats(segments, links):
 
 def test_the_full_scene_file_shows_every_key():
     text = (SCENES / "kangaroo_rat_m1_n3.toml").read_text()
-    words = [*(set(KEYS) - {"name", "parameters", *ONLY["continuum"].keys}), *(p.name for p in PARAMETERS)]
+    words = [*(set(KEYS) - {"name", "parameters", "plan", *ONLY["continuum"].keys}), *(p.name for p in PARAMETERS)]
     assert [word for word in words if f"{word} =" not in text] == []
+
+
+def test_the_table_plan_is_left_to_the_runtime(refuse):
+    with_plan = {"kind": "articulated", "segments": 1, "links": 3, "plan": {"anything": 1}}
+    assert parse_scene(with_plan, "rat") == parse_scene({k: with_plan[k] for k in list(with_plan)[:3]}, "rat")
+    assert "under a line [plan]" in str(refuse('kind = "articulated"\nsegments = 1\nlinks = 1\nplan = 3\n')["plan"])
+    assert (SCENES / "righting_m1_n3.toml").is_file() and load_scene(SCENES / "righting_m1_n3.toml").links == 3
 
 
 def test_all_problems_are_reported_at_once(refuse):

@@ -86,6 +86,9 @@ BEND = Rule(
 )
 
 
+TABLE = Rule("a table, under a line [plan]", lambda x: isinstance(x, Mapping))
+
+
 @dataclass(frozen=True)
 class Scene:
     """What to generate: a tail of `segments` x `links`, its parameters, the functions, and in which form."""
@@ -119,6 +122,7 @@ KEYS: dict[str, tuple[Any, Rule]] = {
     "baked": (Scene.baked, FLAG),
     "real": (Scene.real, _one_of(["double", "float"])),
     "emission": (Scene.emission, _one_of(["auto", "straight", "loops"])),
+    "plan": ({}, TABLE),  # a motion to plan: for the runtime, which checks it
 }
 NAMES = tuple(parameter.name for parameter in PARAMETERS)
 

@@ -8,10 +8,22 @@ _HOME = {
     **dict.fromkeys(["simulate", "Damping", "TorqueTable"], "simulation"),
     **dict.fromkeys(["Trajectory", "pitch_roll_yaw", "rotation_matrix"], "trajectory"),
     **dict.fromkeys(["polar_to_bend", "bend_to_polar"], "polar"),
+    "plan": "planning.planner",
+    **dict.fromkeys(["Goal", "Bounds"], "planning.problem"),
+    "Plan": "planning.solution",
+    "Pfl": "tracking",
     "filmstrip": "film",
     "time_plots": "plot",
     **dict.fromkeys(
-        ["SerpentailError", "CompilerNotFound", "CompileFailed", "ModelError", "StateError", "SimulationError"],
+        [
+            "SerpentailError",
+            "CompilerNotFound",
+            "CompileFailed",
+            "ModelError",
+            "StateError",
+            "SimulationError",
+            "PlanningError",
+        ],
         "errors",
     ),
 }

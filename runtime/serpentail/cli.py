@@ -1,4 +1,4 @@
-"""Command line of the runtime: a verb and a generated folder go in, a report comes out."""
+"""Command line of the runtime: a verb and a generated folder or a scene go in, a report comes out."""
 
 import argparse
 import json
@@ -48,6 +48,11 @@ def parser() -> argparse.ArgumentParser:
         prog="serpentail", description="Work with generated models of tailed animals and robots."
     )
     verbs = p.add_subparsers(dest="verb", required=True)
+    verb = verbs.add_parser("plan", help="plan the motion of a scene's table [plan]")
+    verb.add_argument("scene", help="a scene file, such as scenes/righting_m1_n3.toml")
+    verb.add_argument("--folder", help="its generated folder, by default generated/ and the scene's name")
+    verb.add_argument("--save", help="write the planned motion to this .npz file")
+    verb.add_argument("--json", choices=["-"], help="print one JSON object on stdout instead of text")
     for name, words in (("info", "what a generated model is"), ("verify", "check the laws that a model must obey")):
         verb = verbs.add_parser(name, help=words)
         verb.add_argument("folder", help="a generated folder, such as generated/articulated_m3_n4")
@@ -72,6 +77,14 @@ def run(arguments: argparse.Namespace) -> tuple[dict, str, bool]:
     if arguments.verb == "info":
         report = info(arguments.folder)
         return report, describe(report), True
+    if arguments.verb == "plan":
+        from .planning.scene import planned
+
+        plan = planned(arguments.scene, arguments.folder)
+        if arguments.save:
+            plan.trajectory.save(arguments.save)
+        text = "\n".join(f"{name:<30}{value}" for name, value in plan.report.items())
+        return plan.report, text, plan.success
     from .model import load
     from .verify import as_text, laws, summary
 

@@ -29,3 +29,7 @@ class StateError(SerpentailError, ValueError):
 
 class SimulationError(SerpentailError):
     """A simulation cannot go on."""
+
+
+class PlanningError(SerpentailError, ValueError):
+    """A planning problem that cannot be posed: a wrong field, its value, and what to give instead."""

@@ -1,0 +1,58 @@
+"""Curves: unknowns of a solved program go in; the motion that they mean, at any time, comes out."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .rules import Rule
+from .transcription import Transcription
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """Collocation polynomials of all intervals: ends (N + 1,) s; states at interval starts (N, nx), their increments by
+    rate (N, K, nx), torques and algebraic unknowns at nodes (N, K, ..), all in SI by block."""
+
+    ends: np.ndarray
+    rule: Rule
+    starts: dict[str, np.ndarray]
+    increments: dict[str, np.ndarray]
+    nodes: dict[str, np.ndarray]
+
+    @property
+    def duration(self) -> float:
+        """Duration in s."""
+        return float(self.ends[-1])
+
+    def at(self, times: np.ndarray) -> dict[str, np.ndarray]:
+        """Blocks (n, size) at times (n,) s from the start; between intervals those of the later one."""
+        k = np.clip(np.searchsorted(self.ends, times, side="right") - 1, 0, len(self.ends) - 2)
+        return self.inside(k, (times - self.ends[k]) / np.diff(self.ends)[k])
+
+    def inside(self, k: np.ndarray, s: np.ndarray) -> dict[str, np.ndarray]:
+        """Blocks (n, size) in the intervals k (n,) at the fractions s (n,) of them."""
+        grown, basis = self.rule.integrals(s), self.rule.basis(s)
+        states = {
+            name: x[k] + np.einsum("nj,njx->nx", grown, self.increments[name][k]) for name, x in self.starts.items()
+        }
+        return states | {name: np.einsum("nj,njx->nx", basis, values[k]) for name, values in self.nodes.items()}
+
+
+def curve(program: Transcription, w: np.ndarray, h: np.ndarray) -> Curve:
+    """Return the curve of the unknowns w."""
+    where, rule, form, mesh = program.places, program.rule, program.form, program.mesh
+    count, S, K = mesh.intervals, rule.steps, len(rule.nodes)
+    at_nodes = np.arange(count)[:, None] * S + np.arange(K)
+    rates = np.array(program.program["values"](w, h)).T[:, : program.node.rates] * form.scale(form.states)
+    increments = rates[at_nodes] * mesh.widths[:, None, None]
+    states = w[where.states[:-1:S]] * form.scale(form.states)
+    blocks = (*form.algebraic, ("torque", form.units["torque"].size))
+    others = (w[where.others] * form.scale(blocks))[at_nodes]
+    ends = mesh.ends * w[0]
+    return Curve(ends, rule, _split(states, form.states), _split(increments, form.states), _split(others, blocks))
+
+
+def _split(rows: np.ndarray, blocks) -> dict[str, np.ndarray]:
+    """Columns of the last axis by block."""
+    ends = np.cumsum([size for _, size in blocks])[:-1]
+    return dict(zip((name for name, _ in blocks), np.split(rows, ends, axis=-1), strict=True))

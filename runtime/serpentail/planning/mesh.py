@@ -1,0 +1,63 @@
+"""Meshes: how many intervals, or errors of a solution on them, go in; where the intervals end comes out."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .rules import Rule
+
+MOST_PIECES = 4  # an interval is split into at a time
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Ends of the intervals (N + 1,) as fractions of the duration, from 0 to 1."""
+
+    ends: np.ndarray
+
+    @property
+    def intervals(self) -> int:
+        """Number of intervals N."""
+        return len(self.ends) - 1
+
+    @property
+    def widths(self) -> np.ndarray:
+        """Widths (N,) of the intervals."""
+        return np.diff(self.ends)
+
+    def points(self, rule: Rule) -> np.ndarray:
+        """Points (N S + 1,) at which states are unknowns."""
+        inside = self.ends[:-1, None] + self.widths[:, None] * rule.supports[1:-1]
+        rows = np.column_stack([self.ends[:-1], inside])
+        return np.append(rows.ravel(), 1.0)
+
+    def split(self, pieces: np.ndarray) -> "Mesh":
+        """Return the mesh whose interval k is split into pieces[k] equal ones."""
+        rows = [
+            np.linspace(a, b, count, endpoint=False)
+            for a, b, count in zip(self.ends[:-1], self.ends[1:], pieces, strict=True)
+        ]
+        return Mesh(np.append(np.concatenate(rows), 1.0))
+
+
+def uniform(intervals: int) -> Mesh:
+    """Return a mesh of equal intervals."""
+    return Mesh(np.linspace(0.0, 1.0, intervals + 1))
+
+
+def refined(mesh: Mesh, errors: np.ndarray, factor: float, order: int, most: int) -> Mesh:
+    """Return a mesh on which errors (N,) of the intervals should sum to `factor` of what they do, at most `most` long.
+
+    Errors are spread evenly; one of an interval of width h falls like h^(order + 1).
+    """
+    order = min(order, 4)  # what an optimiser's controls leave of it
+    target = max(factor * errors.sum(), 1e-300) / mesh.intervals
+    wanted = np.ceil((errors / target) ** (1 / (order + 1)))
+    pieces = np.clip(np.nan_to_num(wanted, nan=2, posinf=MOST_PIECES), 1, MOST_PIECES).astype(int)
+    if pieces.sum() == mesh.intervals:
+        pieces[np.argsort(errors)[-max(1, mesh.intervals // 4) :]] = 2
+    for k in np.argsort(errors):  # the least important ones wait
+        if pieces.sum() <= most:
+            break
+        pieces[k] = 1
+    return mesh.split(pieces)

@@ -1,0 +1,116 @@
+"""Collocation rules: a name and a degree go in; nodes and weights of one interval come out."""
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.polynomial import Legendre, Polynomial
+
+from ..errors import PlanningError
+
+FAMILIES = {"trapezoidal": 1, "hermite-simpson": 2, "lobatto": 3, "radau": 3}  # name -> default degree
+MOST_DEGREE = 5
+
+
+@dataclass(frozen=True, eq=False)
+class Rule:
+    """One interval [0, 1] of a collocation Runge-Kutta method (Radau IIA, Lobatto IIIA).
+
+    nodes (K,): where the equations hold; supports (S + 1,): where the states are unknowns, 0 first.
+    The defects are states (S, S + 1) X - h slopes (S, K) F = 0, F being the rates at the nodes; the integral of a
+    function over the interval is h weights (K,) times its values at the nodes.
+    """
+
+    name: str
+    degree: int
+    nodes: np.ndarray
+    supports: np.ndarray
+    states: np.ndarray
+    slopes: np.ndarray
+    weights: np.ndarray
+
+    @property
+    def steps(self) -> int:
+        """Points that an interval adds to a mesh, S."""
+        return len(self.supports) - 1
+
+    @property
+    def order(self) -> int:
+        """Order of the state's error at the ends of intervals."""
+        return 2 * self.degree - 1 if self.name == "radau" else 2 * self.degree
+
+    def basis(self, s) -> np.ndarray:
+        """Lagrange polynomials of the nodes (..., K) at s (...) in [0, 1]."""
+        return _at(_lagrange(tuple(self.nodes)), s)
+
+    def integrals(self, s) -> np.ndarray:
+        """Integrals of these from 0 to s (..., K)."""
+        return _at([polynomial.integ() for polynomial in _lagrange(tuple(self.nodes))], s)
+
+
+def rule(name: str, degree: int | None = None) -> Rule:
+    """Return a rule; PlanningError where the name is unknown or the degree none that it has.
+
+    "trapezoidal" (the paper's, Eqs. 41, 42), "hermite-simpson" (Lobatto of degree 2), "lobatto" (degree + 1 nodes, both
+    ends among them), "radau" (degree nodes, the right end among them).
+    """
+    if name not in FAMILIES:
+        raise PlanningError(f"rule: value {name!r}: needs {' or '.join(map(repr, FAMILIES))}")
+    fixed = name in ("trapezoidal", "hermite-simpson")
+    degree = FAMILIES[name] if degree is None else degree
+    if isinstance(degree, bool) or not isinstance(degree, int) or not 1 <= degree <= MOST_DEGREE:
+        raise PlanningError(f"degree: value {degree!r}: needs a whole number from 1 to {MOST_DEGREE}")
+    if fixed and degree != FAMILIES[name]:
+        raise PlanningError(f"degree: value {degree!r}: {name} has {FAMILIES[name]}; leave it out, or use 'radau'")
+    return _rule(name, degree)
+
+
+@cache
+def _rule(name: str, degree: int) -> Rule:
+    return _radau(name, degree) if name == "radau" else _lobatto(name, degree)
+
+
+def _radau(name: str, degree: int) -> Rule:
+    """Radau IIA in derivative form: A^-1 (X - X_0) = h F, so that each rate is in one equation only."""
+    nodes = _roots(Legendre.basis(degree) - Legendre.basis(degree - 1))
+    A = _integrals(nodes, nodes)
+    inverse = np.linalg.inv(A)
+    states = np.column_stack([-inverse.sum(axis=1), inverse])
+    return Rule(name, degree, nodes, np.concatenate([[0.0], nodes]), states, np.eye(degree), A[-1])
+
+
+def _lobatto(name: str, degree: int) -> Rule:
+    """Lobatto IIIA in integral form: X - X_0 = h A F."""
+    inner = _roots(Legendre.basis(degree).deriv()) if degree > 1 else np.zeros(0)
+    nodes = np.concatenate([[0.0], inner, [1.0]])
+    A = _integrals(nodes, nodes)
+    states = np.column_stack([-np.ones(degree), np.eye(degree)])
+    return Rule(name, degree, nodes, nodes, states, A[1:], A[-1])
+
+
+def _roots(series: Legendre) -> np.ndarray:
+    """Roots of a series on [-1, 1], polished by Newton's method, moved to [0, 1]."""
+    x = np.sort(series.roots().real)
+    for _ in range(3):
+        x = x - series(x) / series.deriv()(x)
+    return (x + 1) / 2
+
+
+@cache
+def _lagrange(nodes: tuple[float, ...]) -> tuple[Polynomial, ...]:
+    """Lagrange polynomials of the nodes."""
+    found = []
+    for k, node in enumerate(nodes):
+        others = [other for j, other in enumerate(nodes) if j != k]
+        basis = Polynomial.fromroots(others) if others else Polynomial([1.0])
+        found.append(basis / np.prod([node - other for other in others]))
+    return tuple(found)
+
+
+def _integrals(nodes: np.ndarray, s: np.ndarray) -> np.ndarray:
+    return _at([polynomial.integ() for polynomial in _lagrange(tuple(nodes))], s)
+
+
+def _at(polynomials, s) -> np.ndarray:
+    """Values (..., K) of polynomials at s (...)."""
+    return np.stack([polynomial(np.asarray(s, float)) for polynomial in polynomials], axis=-1)

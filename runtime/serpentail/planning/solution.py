@@ -1,0 +1,63 @@
+"""Plans: a solved curve and what is true of it go in; what the user gets comes out."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..trajectory import Trajectory
+from .attitude import attitude
+from .curve import Curve
+from .problem import Problem
+from .recovery import full_state
+from .solver import Solution
+
+SAMPLES = 240  # of a trajectory, at least
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A planned motion and its truth.
+
+    success: the solver converged, and the torques, applied open loop, end within the tolerance.
+    trajectory: the planned motion, torques included (before damping), sampled at all ends of intervals and between.
+    report: JSON-ready summary; errors in degrees, times in s, energy in J, power in W.
+    problem, mesh, rule, solution: what was asked and solved; ``torque`` and ``curve`` give values at any time.
+    """
+
+    success: bool
+    trajectory: Trajectory
+    report: dict
+    problem: Problem
+    curve: Curve
+    mesh: object
+    rule: object
+    solution: Solution
+
+    @property
+    def duration(self) -> float:
+        """Duration in s."""
+        return self.curve.duration
+
+    def torque(self, times) -> np.ndarray:
+        """Planned torques (n, 2m), N m, at times (n,) s from the start."""
+        return self.curve.at(np.atleast_1d(np.asarray(times, float)))["torque"]
+
+    def controller(self, t: float, _q, v) -> np.ndarray:
+        """Open-loop torque law for ``st.simulate``: planned torques less the problem's damping."""
+        return self.torque(min(max(t, 0.0), self.duration))[0] - self.problem.damping * v[6:]
+
+
+def sample_times(ends: np.ndarray) -> np.ndarray:
+    """Return times that divide every interval evenly, at least SAMPLES in all."""
+    parts = np.ceil(np.diff(ends) / ends[-1] * SAMPLES).astype(int)
+    rows = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(ends[:-1], ends[1:], parts, strict=True)]
+    return np.append(np.concatenate(rows), ends[-1])
+
+
+def sampled(model, problem: Problem, curve: Curve) -> Trajectory:
+    """Return the planned motion as a trajectory."""
+    times = sample_times(curve.ends)
+    blocks = curve.at(times)
+    q, v = full_state(model, (problem.q0, problem.v0), attitude(problem.attitude), times, blocks)
+    info = {"model": model.name, "kind": "plan"}
+    return Trajectory(times, q, v, blocks["torque"], *model.energy(q, v), *model.momentum(q, v), info)

@@ -1,0 +1,72 @@
+"""Solvers: a program, limits and a guess go in; the unknowns that CasADi's nlpsol finds come out."""
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import PlanningError
+from .limits import Limits
+from .transcription import Transcription
+
+IPOPT = {"ipopt.print_level": 0, "ipopt.sb": "yes", "ipopt.max_iter": 300, "ipopt.nlp_scaling_method": "none"}
+IPOPT |= {"ipopt.mu_init": 1e-3}
+CLOSE = {"ipopt.mu_init": 1e-5, "ipopt.bound_push": 1e-6, "ipopt.bound_frac": 1e-6}  # to a solution
+SAME = CLOSE | {"ipopt.mu_init": 1e-8, "ipopt.warm_start_init_point": "yes"}  # with its multipliers
+SAME |= {f"ipopt.warm_start_{part}": 1e-8 for part in ("bound_push", "bound_frac", "mult_bound_push")}
+NEARNESS = {"far": {}, "close": CLOSE, "same": SAME}
+EXACT = ("grad_f", "jac_g", "hess_lag")
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """What a solver found: unknowns and multipliers, whether it says that they solve the problem, and its cost."""
+
+    w: np.ndarray
+    multipliers: tuple[np.ndarray, np.ndarray]
+    value: float
+    success: bool
+    status: str
+    iterations: int
+    cpu_s: float
+
+
+def solver(program: Transcription, name: str = "ipopt", options: dict | None = None, near: str = "far"):
+    """Return CasADi's solver of a program; PlanningError where there is none of that name, or an option is unknown."""
+    import casadi as ca
+
+    if not ca.has_nlpsol(name):
+        raise PlanningError(f"solver: value {name!r}: CasADi has no such solver here; 'ipopt' comes with it")
+    given = {"print_time": False, "error_on_fail": False}
+    if name == "ipopt":
+        given |= IPOPT | NEARNESS[near] | {key: program.program[key] for key in EXACT}
+    try:
+        return ca.nlpsol("plan", name, program.program["nlp"], given | (options or {}))
+    except RuntimeError as error:
+        raise PlanningError(f"options: value {options!r}: {name} refuses them: {_reason(error)}") from error
+
+
+def solve(engine, limits: Limits, w: np.ndarray, h: np.ndarray, multipliers=None) -> Solution:
+    """Run a solver from the unknowns w (and multipliers of a like problem); h: angular momentum."""
+    more = {} if multipliers is None else {"lam_x0": multipliers[0], "lam_g0": multipliers[1]}
+    begun = time.process_time()
+    found = engine(
+        x0=np.clip(w, limits.lower, limits.upper),
+        p=h,
+        lbx=limits.lower,
+        ubx=limits.upper,
+        lbg=limits.least,
+        ubg=limits.most,
+        **more,
+    )
+    spent, stats = time.process_time() - begun, engine.stats()
+    x, lam_x, lam_g = (np.array(found[key]).ravel() for key in ("x", "lam_x", "lam_g"))
+    finite = bool(np.isfinite(x).all())
+    status = str(stats.get("return_status", "unknown"))
+    good = bool(stats.get("success", False)) and finite
+    return Solution(x, (lam_x, lam_g), float(found["f"]), good, status, int(stats.get("iter_count", -1)), spent)
+
+
+def _reason(error: Exception) -> str:
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    return lines[-1] if lines else "no reason given"
