@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
 
 import serpentail as st
 from serpentail.plot import write
@@ -63,6 +64,7 @@ def draw_figure_11(rows: dict[str, list[dict]], path: Path) -> Path:
             panel.set(ylabel=name, xlabel="nodes a second [1/s]", yscale="log")
             panel.grid(color="#e6e6e6", linewidth=0.6)
         axes.flat[4].set(xlabel="solver time [s]", xscale="log")
+        axes.flat[4].xaxis.set_minor_formatter(NullFormatter())
         axes.flat[0].legend()
         return figure
 

@@ -26,13 +26,13 @@ class Pfl:
     def __init__(self, model: "Model", reference, kp: float = KP, kd: float = KD, feedforward: bool = True):
         from scipy.interpolate import CubicSpline
 
-        times, angles = _reference(reference, model.nv - 6)
+        times, angles, ends = _reference(reference, model.nv - 6)
         for name, value in (("kp", kp), ("kd", kd)):
             if not (isinstance(value, int | float) and np.isfinite(value) and value >= 0):
                 raise SimulationError(f"Pfl: {name} is {value!r}: give a finite number from 0")
         self.model, self.kp, self.kd = model, float(kp), float(kd)
         self.span, self.last = (times[0], times[-1]), angles[-1]
-        self.spline = CubicSpline(times, angles)
+        self.spline = CubicSpline(times, angles, bc_type=ends)
         self.feedforward = bool(feedforward)
 
     def reference(self, t: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -57,14 +57,14 @@ class Pfl:
         return force[6:] + H[6:, :6] @ base
 
 
-def _reference(reference, size: int) -> tuple[np.ndarray, np.ndarray]:
-    """Times (K,) and tail coordinates (K, 2m) of what the user gave."""
+def _reference(reference, size: int) -> tuple[np.ndarray, np.ndarray, object]:
+    """Times (K,), tail coordinates (K, 2m) of what the user gave, and how the spline ends: by the rates, if known."""
     motion = getattr(reference, "trajectory", reference)
     if hasattr(motion, "tail") and hasattr(motion, "t"):
-        times, angles = motion.t, motion.tail
+        times, angles, ends = motion.t, motion.tail, tuple((1, motion.v[k, 6:]) for k in (0, -1))
     else:
         try:
-            times, angles = (np.asarray(part, float) for part in reference)
+            times, angles, ends = *(np.asarray(part, float) for part in reference), "not-a-knot"
         except (TypeError, ValueError):
             what = "a Plan, a Trajectory, or (times, tail coordinates)"
             raise SimulationError(f"Pfl: reference is a {type(reference).__name__}: give {what}") from None
@@ -72,4 +72,4 @@ def _reference(reference, size: int) -> tuple[np.ndarray, np.ndarray]:
         raise SimulationError(f"Pfl: times {times.shape} and angles {angles.shape}, not (K,) and (K, {size}), K > 1")
     if not (np.isfinite(times).all() and np.isfinite(angles).all() and (np.diff(times) > 0).all()):
         raise SimulationError("Pfl: times must increase, and all entries be finite")
-    return times, angles
+    return times, angles, ends
