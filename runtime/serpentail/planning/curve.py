@@ -10,8 +10,11 @@ from .transcription import Transcription
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """Collocation polynomials of all intervals: ends (N + 1,) s; states at interval starts (N, nx), their increments by
-    rate (N, K, nx), torques and algebraic unknowns at nodes (N, K, ..), all in SI by block."""
+    """Collocation polynomials of all intervals, by block, SI.
+
+    ends (N + 1,): s.  starts (N, size): states where intervals start; increments (N, K, size): their rates at the nodes
+    times the interval's duration; nodes (N, K, size): torques and algebraic unknowns.
+    """
 
     ends: np.ndarray
     rule: Rule
