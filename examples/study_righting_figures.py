@@ -89,8 +89,9 @@ def draw_figure_13(plans: dict, path: Path) -> Path:
                     column[2].plot(flight.t, 1e3 * flight.tau[:, 2 * i + j], dash, color=COLOURS[i])
             column[0].set_title(f"$m = {m}$, $n = {n}$")
             column[2].set_xlabel("time [s]")
-            for panel in column[:2]:
-                panel.legend(fontsize=6, ncols=3, loc="lower center")
+            column[0].legend(fontsize=6, loc="upper left")
+            column[1].legend(fontsize=6, ncols=3, loc="lower center")
+            column[1].margins(y=0.4)
         for panel, name in zip(axes[:, 0], ("attitude [deg]", "tail [deg]", "torque [mN m]"), strict=True):
             panel.set_ylabel(name)
         return figure
