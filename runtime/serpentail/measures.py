@@ -196,9 +196,14 @@ def condition(H) -> float:
 
 
 def sensitivity(model: Model, q: np.ndarray) -> float:
-    """Return the condition number that an error of v_dot is divided by; of its tail's part where H is missing."""
+    """Return the condition number that an error of v_dot is divided by; of its tail's part where H is missing.
+
+    1 where neither H nor v_dot is there.
+    """
     if "mass_matrix" in model.kernels:
         return condition(model.mass_matrix(q))
+    if not model.kernels.keys() & {"forward_dynamics", "forward_dynamics_external"}:
+        return 1.0
     tau = np.eye(model.nv - 5, model.nv - 6, -1)
     load = None if "forward_dynamics" in model.kernels else model.external_force()
     v_dot = model.forward_dynamics(q, np.zeros(model.nv), tau, load)
