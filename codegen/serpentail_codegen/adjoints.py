@@ -7,7 +7,7 @@ overwritten before the way back needs it is kept, one copy for each turn of its 
 from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 
-from .compose import influencing, pruned, reached, writes
+from .compose import influencing, inner_arrays, pruned, reached, writes
 from .differentiate import adjoint
 from .program import Apply, Array, Copy, Fill, Guard, Index, Loop, Program, Ref, as_index, statements
 from .turned_arrays import TurnedArray, turned_arrays
@@ -28,8 +28,7 @@ def adjoint_program(program: Program, wanted: Collection[str], given: Collection
     start += [Copy(_all(companions[w.name.removeprefix("b_")]), _all(w)) for w in weights]
     forward, backward = way.both(program.body, ())
     end = tuple(Copy(_all(b), _all(companions[b.name.removeprefix("b_")])) for b in results)
-    arrays = tuple(replace(a, role="local") if a.role == "output" else a for a in program.arrays)
-    arrays += (*companions.values(), *weights, *results, *way.kept)
+    arrays = (*inner_arrays(program), *companions.values(), *weights, *results, *way.kept)
     body = (*forward, *start, *backward, *end)
     name = "_".join(["b", *wanted, *given, program.name])
     return pruned(replace(program, name=name, arrays=arrays, body=body))
@@ -138,8 +137,7 @@ class _WayBack:
 
     def apply(self, call: Apply, loops) -> tuple[list, list]:
         """Return a step, keeping what its reverse reads, and its reverse."""
-        read = {n: ref for (n, _), ref in zip(call.step.inputs, call.reads, strict=True)}
-        written = {n: ref for (n, _), ref in zip(call.step.outputs, call.writes, strict=True)}
+        read, written = call.inputs(), call.outputs()
         stored = [ref for ref, adds in zip(call.writes, call.adds, strict=True) if not adds]
         given = frozenset(n for n, ref in written.items() if self.matters(ref))
         turns = {n: self.turned[ref.array.name] for n, ref in read.items() if ref.array.name in self.turned}

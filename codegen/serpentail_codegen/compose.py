@@ -95,7 +95,7 @@ def _with_outputs(statement, needed: Collection[str]):
     if len(kept) == len(statement.writes):
         return statement
     step = narrowed(statement.step, {statement.step.outputs[k][0] for k in kept})
-    given = dict(zip((name for name, _ in statement.step.inputs), statement.reads, strict=True))
+    given = statement.inputs()
     return replace(
         statement,
         step=step,
@@ -121,6 +121,11 @@ def pruned(program: Program) -> Program:
     body = rewritten(program.body, lambda s: (with_arrays(kept, array) for kept in rewrite(s)))
     kept = {a.name for a in program.arrays if a.role in ("input", "output", "parameters")} | needed
     return replace(program, arrays=tuple(a for a in program.arrays if a.name in kept), body=body)
+
+
+def inner_arrays(program: Program) -> tuple[Array, ...]:
+    """Return a program's arrays as a part of another one: its outputs are local."""
+    return tuple(replace(a, role="local") if a.role == "output" else a for a in program.arrays)
 
 
 def with_arrays(statement, array: Mapping[str, Array]):

@@ -107,12 +107,13 @@ def forward_dynamics_first(d: Draft, arrays: dict[str, Array]) -> tuple[Balance,
 
 def loads(d: Draft, **at_torso: Ref) -> dict[str, Ref]:
     """Loads at the torso of a system H x = loads; what is not named is zero."""
-    return dict.fromkeys(("force", "moment", "load_force", "load_moment"), d.zero(3)) | at_torso
+    zeros = dict.fromkeys(("force", "moment", "load_force", "load_moment"), d.zero(3))
+    return zeros | {"gravity": d.zero(1)} | at_torso
 
 
-def less(d: Draft, rows: Array, tau: Callable[[Index], Ref] | None = None) -> Loads:
+def less(d: Draft, rows: Array, tau: Callable[[Index], Ref] | None = None, **at_torso: Ref) -> Loads:
     """Loads of H x = tau - rows, rows being a change of H v_dot + C in torso axes."""
-    at_torso = loads(d, force=rows.part(0, 3), moment=rows.part(3, 3))
+    at_torso = loads(d, force=rows.part(0, 3), moment=rows.part(3, 3), **at_torso)
     return Loads(at_torso, lambda k: rows.part(6 + k, 1), tau)
 
 
@@ -120,7 +121,6 @@ def assemble_forward_dynamics_derivatives(d: Draft, arrays: dict[str, Array]) ->
     """-H^-1 times the tangents of H v_dot + C at fixed v_dot; with respect to tau, columns of H^-1."""
     tail, nv = d.tail, d.tail.nv
     balance, body = forward_dynamics_first(d, arrays)
-    d.known["gravity"] = d.zero(1)
     directions = Directions(tail, ("omega",))
     inner = tangent_program(program(CORE, tail), ("q", "v"), directions.count, directions.outward)
     rows, x = d.wide("rows", nv, directions.count), d.wide("x", nv, directions.count)
@@ -157,9 +157,9 @@ def assemble_forward_dynamics_parameter_derivatives(d: Draft, arrays: dict[str, 
         parameter_tangents(d, CORE, {"q": arrays["q"], "v": arrays["v"], "v_dot": body}),
         d.wide("x", d.tail.nv, count),
     )
-    d.known["gravity"] = d.wide("d_gravity_z", 1, count)[0]
-    d.unit(d.known["gravity"], 0)  # gravity is the first parameter: p_b_ddot falls by as much
-    balance.solve(d, less(d, rows), x)
+    gravity = d.wide("d_gravity_z", 1, count)[0]
+    d.unit(gravity, 0)  # it is the first parameter: p_b_ddot falls by as much
+    balance.solve(d, less(d, rows, gravity=gravity), x)
     spread_parameters(d, x, arrays["dparameters"])
 
 
@@ -197,7 +197,6 @@ def assemble_forward_dynamics_jvp(d: Draft, arrays: dict[str, Array]) -> None:
     """Directional derivative of v_dot."""
     nv = d.tail.nv
     balance, body = forward_dynamics_first(d, arrays)
-    d.known["gravity"] = d.zero(1)
     d_q, rows, x = d.array("d_q", d.tail.nq), d.array("rows", nv), arrays["dv_dot"]
     d.copy(d_q.part(7, d.tail.nt), arrays["dq"].part(6, d.tail.nt))
     inner = tangent_program(program(CORE, d.tail), ("q", "v"))
@@ -229,7 +228,6 @@ def assemble_forward_dynamics_vjp(d: Draft, arrays: dict[str, Array]) -> None:
     tail, multiplier = d.tail, arrays["multiplier"]
     v_dot, mu = d.array("acceleration", tail.nv), d.array("mu", tail.nv)
     balance = assemble_forward_dynamics(d, arrays | {"v_dot": v_dot})
-    d.known["gravity"] = d.zero(1)
     d.step(kin.torso_velocity, {"p_dot": multiplier.part(0, 3)}, u=d.vector("pull", 3))
     at_torso = loads(d, load_force=d.known["pull"], load_moment=multiplier.part(3, 3))
     balance.solve(d, Loads(at_torso, tau=lambda k: multiplier.part(6 + k, 1)), mu)

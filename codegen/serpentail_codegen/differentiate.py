@@ -53,6 +53,11 @@ class Rules:
         return compacted(Step(name, doc, tuple(inputs), tuple(outputs), tuple(self.tape.nodes), tuple(results)))
 
 
+def some_of(vectors, chosen: frozenset[str], word: str = "") -> str:
+    """Return the chosen vectors as a part of a name, nothing where all are."""
+    return "" if len(chosen) == len(vectors) else "_".join([word, *(name for name, _ in vectors if name in chosen)])
+
+
 def spans(vectors) -> dict[str, range]:
     """Return the positions of named vectors that follow each other."""
     out, first = {}, 0
@@ -137,8 +142,9 @@ def tangent(step: Step, active: frozenset[str], turns: Turns = frozenset()) -> S
             changes.append(combinations.of(node, changes))
     outputs = (*step.outputs, *((f"d_{name}", size) for name, size in step.outputs))
     results = [rules.values[r] for r in step.results] + [combinations.summed(changes[r]) for r in step.results]
-    partly = "" if len(active) == len(step.inputs) else "_" + "_".join(n for n, _ in step.inputs if n in active)
-    return rules.finish(f"d{partly}", f"Tangents of {step.name}.", (*step.inputs, *moving), outputs, results)
+    return rules.finish(
+        f"d{some_of(step.inputs, active)}", f"Tangents of {step.name}.", (*step.inputs, *moving), outputs, results
+    )
 
 
 @cache
@@ -168,8 +174,7 @@ def adjoint(step: Step, wanted: frozenset[str], given: frozenset[str], turns: Tu
             own = by_angles(tape, span, turned[name], own) if name in turned else own
             outputs.append((f"b_{name}_angles" if name in turned else f"b_{name}", len(own)))
             results += own
-    partly = "" if len(wanted) == len(step.inputs) else "_" + "_".join(n for n, _ in step.inputs if n in wanted)
-    partly += "" if len(given) == len(step.outputs) else "_of_" + "_".join(n for n, _ in step.outputs if n in given)
+    partly = some_of(step.inputs, wanted) + some_of(step.outputs, given, "_of")
     return rules.finish(f"b{partly}", f"Adjoints of {step.name}.", (*step.inputs, *incoming), outputs, results)
 
 

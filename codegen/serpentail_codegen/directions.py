@@ -11,7 +11,7 @@ from .draft import Draft, Tail
 from .program import Array, Index, Loop
 
 # directions of the torso: first column in the tangent of q or v, and whether it is q
-TORSO = {"p": (0, True), "turn": (3, True), "p_dot": (0, False), "omega": (3, False)}
+TORSO = {"turn": (3, True), "p_dot": (0, False), "omega": (3, False)}
 
 
 @dataclass(frozen=True)
@@ -60,13 +60,12 @@ class Directions:
         d_q = d.wide(f"d_q_{label}", d.tail.nq, self.count)
         d_v = d.wide(f"d_v_{label}", d.tail.nv, self.count) if self.rates else None
         for lane, name in enumerate(self.torso):
-            column, is_q = TORSO[name]
             if name == "turn":
                 turn = d.wide(f"d_{label}", 3, self.count)
                 d.unit(turn[0], 3 * lane)
                 d.step(kin.turned_quaternion, {"turn": turn[0]}, rate=d_q.part(3, 4))
             else:
-                d.unit((d_q if is_q else d_v).part(column, 3), 3 * lane)
+                d.unit(d_v.part(TORSO[name][0], 3), 3 * lane)
         with d.loop("i", self.tail.segments) as i:
             d.unit(d_q.part(7 + 2 * i, 2), self.of_q(i))
             if self.rates:

@@ -161,6 +161,7 @@ def assemble_forward_dynamics(d: Draft, arrays: dict[str, Array]) -> "Balance":
 class Loads:
     """What accelerates the animal: ``load_force, load_moment`` less ``force, moment`` at B in torso axes, and torques.
 
+    ``at_torso`` names these and ``gravity``, which else are those that steps find by these names.
     ``inertial(k)`` is taken from the torque ``tau(k)``; None stands for zero.
     """
 
@@ -181,7 +182,7 @@ class Balance:
         """Solve for p_b_ddot (world), omega_dot and q_t_ddot."""
         size, lanes = 3 + d.tail.nt, x.lanes
         zero = d.zero(1)
-        net = d.declare(Array(f"net_{x.name}", "local", 3, lanes=lanes))[0]
+        net = d.wide(f"net_{x.name}", 3, lanes)[0]
         d.step(dyn.rotational_load, loads.at_torso, net=net, rhs=x.part(3, 3))
         with d.loop("k", d.tail.nt) as k:
             reads = {"column": column_of(self.columns, k), "net": net}
@@ -189,13 +190,13 @@ class Balance:
             reads["tau"] = loads.tau(k) if loads.tau else zero
             d.step(dyn.tail_load, reads, rhs=x.part(6 + k, 1))
         d.solve(self.A, x.part(3, size))
-        tail_force = d.declare(Array(f"tail_force_{x.name}", "local", 3, lanes=lanes))[0]
+        tail_force = d.wide(f"tail_force_{x.name}", 3, lanes)[0]
         d.fill(tail_force, 0)
         with d.loop("k", d.tail.nt) as k:
             reads = {"column": column_of(self.columns, k), "acceleration": x.part(6 + k, 1)}
             d.step(dyn.column_acceleration, reads, tail_force_=tail_force)
         reads = {"net": net, "tail_force": tail_force, "w_dot": x.part(3, 3)}
-        d.step(dyn.base_acceleration, reads, p_ddot=x.part(0, 3))
+        d.step(dyn.base_acceleration, loads.at_torso | reads, p_ddot=x.part(0, 3))
 
 
 def applied_load(d: Draft, arrays: dict[str, Array]) -> Array:

@@ -5,8 +5,6 @@ With numbers as the algebra this is the reference for every emitted text; with a
 
 import math
 
-import numpy as np
-
 from .compose import expanded
 from .program import Apply, Array, Copy, Factor, Fill, Guard, Loop, Program, Ref, Solve, Unit
 from .tape import Tape, replay
@@ -27,12 +25,14 @@ class Numbers:
 
     def unit(self, lane: int, lanes: int):
         """Return a unit row."""
+        import numpy as np  # the generator's own algebras have no use for it
+
         return np.array([self.const(int(k == lane)) for k in range(lanes)])
 
     @staticmethod
     def lane(row, lane: int):
         """Return one lane of a row; a number is the same in all."""
-        return row[lane] if isinstance(row, np.ndarray) else row
+        return row[lane] if getattr(row, "ndim", 0) else row
 
     add = staticmethod(lambda a, b: a + b)
     sub = staticmethod(lambda a, b: a - b)

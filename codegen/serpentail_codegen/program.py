@@ -112,6 +112,14 @@ class Apply:
     adds: tuple[bool, ...]
     columns: Index | None = None
 
+    def inputs(self) -> dict[str, Ref]:
+        """Return what is read, by the names of the step's inputs."""
+        return {name: ref for (name, _), ref in zip(self.step.inputs, self.reads, strict=True)}
+
+    def outputs(self) -> dict[str, Ref]:
+        """Return what is written, by the names of the step's outputs."""
+        return {name: ref for (name, _), ref in zip(self.step.outputs, self.writes, strict=True)}
+
 
 @dataclass(frozen=True)
 class Fill:
@@ -217,7 +225,7 @@ class Builder:
         return self.declare(Array(name, role, size, count))
 
     def wide(self, name: str, size: int, lanes: int) -> Array:
-        """Declare a local array of rows."""
+        """Declare a local array of rows of so many lanes, of scalars where they are 0."""
         return self.declare(Array(name, "local", size, lanes=lanes))
 
     def constant(self, name: str, values) -> Array:

@@ -7,7 +7,7 @@ direction; without, it holds the derivative in one direction.
 from collections.abc import Callable, Collection
 from dataclasses import replace
 
-from .compose import pruned, reached, writes
+from .compose import inner_arrays, pruned, reached, writes
 from .differentiate import tangent
 from .program import Apply, Array, Copy, Fill, Guard, Index, Loop, Program, Ref, statements
 from .turned_arrays import TurnedArray, turned_arrays
@@ -31,8 +31,7 @@ def tangent_program(program: Program, active: Collection[str], lanes: int = 0, b
     transform = _Transform(companions, turned, bound)
     body = transform.body(program.body, ())
     fills = tuple(Fill(ref, (0,) * ref.size) for ref in _partly_written(body))
-    arrays = tuple(replace(a, role="local") if a.role == "output" else a for a in program.arrays)
-    arrays += tuple(companions.values())
+    arrays = (*inner_arrays(program), *companions.values())
     name = "_".join(["d", *active, program.name, *(["rows_of", str(lanes)] if lanes else [])])
     return pruned(replace(program, name=name, arrays=arrays, body=fills + body))
 
@@ -95,7 +94,7 @@ class _Transform:
 
     def apply(self, call: Apply, columns: Index | None):
         """Yield a step with its tangents."""
-        values = {name: ref for (name, _), ref in zip(call.step.inputs, call.reads, strict=True)}
+        values = call.inputs()
         turns = {name: self.turned[ref.array.name] for name, ref in values.items() if ref.array.name in self.turned}
         active = {name for name, ref in values.items() if self.moves(ref)}
         if any(ref.array.name in self.turned for ref in call.writes) or not active | turns.keys():

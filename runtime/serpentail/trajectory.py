@@ -269,7 +269,7 @@ class _Rows:
 
 def _hermite_q(rows: _Rows, q: Array, v: Array) -> Array:
     """Configurations between the samples q with velocities v."""
-    attitude = _sign_continuous(q[:, 3:7])
+    attitude = sign_continuous(q[:, 3:7])
     positions = np.hstack([q[:, :3], attitude, q[:, 7:]])
     rates = np.hstack([v[:, :3], _quaternion_rate(attitude, v[:, 3:6]), v[:, 6:]])
     result = rows.hermite(positions, rates)
@@ -277,7 +277,7 @@ def _hermite_q(rows: _Rows, q: Array, v: Array) -> Array:
     return result
 
 
-def _sign_continuous(quaternion: Array) -> Array:
+def sign_continuous(quaternion: Array) -> Array:
     """The same rotations, each quaternion in the half-space of the one before it."""
     turned = np.sum(quaternion[1:] * quaternion[:-1], axis=1) < 0
     signs = np.cumprod(np.where(turned, -1.0, 1.0), dtype=np.float64)

@@ -302,13 +302,9 @@ class LoopPrinter:
 
     def _routine(self, call: Apply) -> tuple[Routine, int]:
         """Return what to call, and the lanes of its rows."""
-        vectors = list(zip((*call.step.inputs, *call.step.outputs), (*call.reads, *call.writes), strict=True))
-        wide = {name: ref for (name, _), ref in vectors if ref.lanes}
-        adds = {
-            name
-            for (name, _), ref, adds in zip(call.step.outputs, call.writes, call.adds, strict=True)
-            if adds and ref.stride == 1
-        }
+        wide = {n: ref for named in (call.inputs(), call.outputs()) for n, ref in named.items() if ref.lanes}
+        written = zip(call.outputs().items(), call.adds, strict=True)
+        adds = {name for (name, ref), adds in written if adds and ref.stride == 1}
         row = next((ref.array.row for ref in wide.values()), 1)
         routine = Routine(call.step, frozenset(wide), row, frozenset(adds))
         if self.routines.setdefault(routine.name, routine) != routine:

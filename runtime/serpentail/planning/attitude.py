@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import PlanningError
-from ..trajectory import pitch_roll_yaw
+from ..trajectory import pitch_roll_yaw, sign_continuous
 
 KINDS = {"quaternion": 4, "euler": 3}
 
@@ -52,7 +52,7 @@ class Attitude:
         """Return coordinates (K, size) of a motion's q (K, nq), continuous in time."""
         if self.kind == "euler":
             return pitch_roll_yaw(q, unwrap=True)
-        return continuous(q[:, 3:7])
+        return sign_continuous(q[:, 3:7])
 
     def as_quaternion(self, c: np.ndarray) -> np.ndarray:
         """Return unit quaternions (K, 4) of coordinates c (K, size)."""
@@ -85,13 +85,6 @@ def from_angles(angles: np.ndarray) -> np.ndarray:
     pitch, roll = [c[..., 0], s[..., 0], zero, zero], [c[..., 1], zero, s[..., 1], zero]
     yaw = [c[..., 2], zero, zero, s[..., 2]]
     return np.stack(product(product(yaw, pitch), roll), axis=-1)
-
-
-def continuous(quaternions: np.ndarray) -> np.ndarray:
-    """Return the same attitudes (K, 4), each quaternion in the half-space of the one before it."""
-    turned = np.sum(quaternions[1:] * quaternions[:-1], axis=1) < 0
-    signs = np.cumprod(np.where(turned, -1.0, 1.0))
-    return np.concatenate([quaternions[:1], signs[:, None] * quaternions[1:]])
 
 
 def angle_deg(a: np.ndarray, b: np.ndarray) -> np.ndarray:
