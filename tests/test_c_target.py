@@ -56,7 +56,9 @@ class Model(SimpleNamespace):
         self.manifest = json.loads((self.folder / "manifest.json").read_text())
         self.scene = parse_scene(self.manifest["scene"], name)
         self.include, self.header = self.folder / "include", self.folder / "include" / f"{name}.h"
-        self.source, self.host = (self.folder / "src" / f"{name}{part}.c" for part in ("", "_host"))
+        self.source, self.host, self.batch = (
+            self.folder / "src" / f"{name}{part}.c" for part in ("", "_host", "_batch")
+        )
         self.example = self.folder / "example" / "main.c"
 
     @property
@@ -103,13 +105,14 @@ def needs(program):
 @pytest.mark.parametrize("compiler", ["gcc", pytest.param("clang", marks=needs("clang"))])
 def test_compiles_without_a_warning(models, tmp_path, compiler, name):
     model = models(name)
-    for source in (model.source, model.host, model.example):
+    for source in (model.source, model.host, model.batch, model.example):
         compiled(tmp_path, source, *C99, "-fsyntax-only", compiler=compiler)
 
 
 @pytest.mark.parametrize("name", ["m2_n2_double_loops", "m2_n2_float_straight"])
 def test_optimiser_finds_nothing_to_warn_about(models, tmp_path, name):
-    compiled(tmp_path, models(name).source, *C99, "-O2")
+    for source in (models(name).source, models(name).batch):
+        compiled(tmp_path, source, *C99, "-O2")
 
 
 @pytest.mark.parametrize("function", NAMES)
@@ -117,8 +120,9 @@ def test_optimiser_finds_nothing_to_warn_about(models, tmp_path, name):
 @pytest.mark.parametrize("baked", [False, True], ids=["free", "baked"])
 def test_every_function_alone_compiles_without_a_warning(tmp_path, function, emission, baked):
     model = Model("alone", 2, 2, functions=[function], emission=emission, baked=baked)
-    for source in (model.source, model.host, model.example):
-        compiled(tmp_path, source, *C99, "-fsyntax-only")
+    for source in (model.source, model.host, model.batch, model.example):
+        if source.exists() or source != model.batch:
+            compiled(tmp_path, source, *C99, "-fsyntax-only")
 
 
 @some_models

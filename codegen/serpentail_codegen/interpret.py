@@ -183,7 +183,7 @@ class Run:
 
     def guard(self, guard: Guard, at: dict[str, int]) -> None:
         """Note what must be positive."""
-        self.guards.append((guard.status, self.read(guard.scalar, at)[0]))
+        self.guards += [(guard.status, value) for value in self.read(guard.scalar, at)]
 
     def rows(self, matrix: Array, size: int) -> list[list]:
         """Return the lower triangle of a matrix, row by row."""

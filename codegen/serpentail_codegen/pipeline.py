@@ -8,6 +8,7 @@ from .draft import Tail
 from .functions import FUNCTIONS
 from .scene import Scene
 from .targets.c import c_context, c_files, emit
+from .targets.c_batch import batch_entry, batch_file, batches
 from .targets.casadi import casadi_module
 from .targets.manifest import manifest
 from .write import digest, write_folder
@@ -20,12 +21,14 @@ def generate(scene: Scene, output: Path) -> list[str]:
     emitted = [emit(scene, tail, function) for function in wanted]
     context = c_context(scene, tail, emitted, __version__)
     context["content_hash"] = digest("".join(c_files(scene, context).values()))[:16]
-    files = c_files(scene, context)
+    side_by_side = batches(scene, tail, emitted)
+    files = c_files(scene, context) | batch_file(scene, tail, side_by_side, context)
     module = casadi_module(
         scene, tail, [f for f in wanted if f.name in FUNCTIONS], __version__, context["content_hash"]
     )
     files[f"{scene.name}_casadi.py"] = module
-    return write_folder(output / scene.name, files, manifest(scene, context, emitted))
+    described = manifest(scene, context, emitted) | {"batch": batch_entry(tail, side_by_side)}
+    return write_folder(output / scene.name, files, described)
 
 
 def tail_of(scene: Scene) -> Tail:

@@ -175,7 +175,7 @@ class Solve:
 
 @dataclass(frozen=True)
 class Guard:
-    """Give up with a status unless a scalar is positive; ``protects`` is what must not be used then."""
+    """Give up with a status unless all scalars of a vector are positive; ``protects`` must not be used then."""
 
     scalar: Ref
     status: str
@@ -271,7 +271,7 @@ class Builder:
         self.emit(Solve(matrix, x))
 
     def guard(self, scalar: Ref, status: str, *protects: Ref) -> None:
-        """Give up with a status unless a scalar is positive."""
+        """Give up with a status unless all scalars of a vector are positive."""
         self.emit(Guard(scalar, status, protects))
 
     def call(self, program: "Program", **arguments: Array) -> None:

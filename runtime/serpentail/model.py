@@ -11,6 +11,7 @@ from .errors import ModelError, StateError
 from .library import Kernel, open_library, real_array
 from .manifest import read_manifest
 from .parameters import flat, resolve
+from .side_by_side import SideBySide
 
 
 def load(
@@ -46,7 +47,7 @@ class Model:
     Threads may share a model; a pickled one is loaded anew from its folder.
     """
 
-    def __init__(self, folder: Path, manifest: dict, parameters: Mapping, library, profile: str = "fast"):
+    def __init__(self, folder: Path, manifest: dict, parameters: Mapping, library, profile: str = "fast", many=None):
         self.folder, self.manifest, self.parameters = folder, manifest, parameters
         self.library, self.profile = library, profile
         sizes = manifest["dimensions"]
@@ -59,7 +60,8 @@ class Model:
         dtype = np.float32 if manifest["real"] == "float" else np.float64
         self.parameter_vector = np.array(flat(manifest, parameters), dtype)
         made = manifest["functions"] if library else ()
-        self.kernels = {name: Kernel(library, manifest, name, self.parameter_vector) for name in made}
+        self.many = many or SideBySide(folder, manifest, profile)
+        self.kernels = {name: Kernel(library, self.many, manifest, name, self.parameter_vector) for name in made}
 
     def __repr__(self) -> str:
         pieces = f" x {self.links} links" if self.links else " continuum segments"
@@ -72,7 +74,8 @@ class Model:
             own.pop("link_radius", None)
         if "link_radius" in changes:
             own.pop("link_inertia", None)
-        return Model(self.folder, self.manifest, resolve(self.manifest, own | changes), self.library, self.profile)
+        values = resolve(self.manifest, own | changes)
+        return Model(self.folder, self.manifest, values, self.library, self.profile, self.many)
 
     def _given(self) -> dict:
         """Return the parameters that the others follow from; none where they are baked."""

@@ -110,7 +110,7 @@ def parameter_views(scene: Scene) -> list[dict]:
     ]
 
 
-def step_views(emitted: list[Emitted], real: str, prefix: str) -> list[dict]:
+def step_views(emitted, real: str, prefix: str) -> list[dict]:
     """Return every step that some loop calls, once."""
     routines: dict[str, Routine] = {}
     bodies = [e.body for e in emitted] + [body for _, body in callees_of(emitted)]
@@ -129,7 +129,7 @@ def step_views(emitted: list[Emitted], real: str, prefix: str) -> list[dict]:
     ]
 
 
-def callees_of(emitted: list[Emitted]) -> list[tuple[Program, CFunction]]:
+def callees_of(emitted) -> list[tuple[Program, CFunction]]:
     """Return the programs that functions call, once, those first that others call."""
     found: dict[str, tuple[Program, CFunction]] = {}
     for program, body in (callee for e in emitted for callee in e.body.callees):
