@@ -126,10 +126,11 @@ def test_any_number_of_states_gives_what_each_gives_alone(tail, emission, real, 
         assert (np.abs(out - expected[:count]) <= 3e3 * digits * scale).all()
 
 
-@pytest.mark.parametrize("kind", ["articulated", "continuum"])
+@pytest.mark.parametrize("tail", [("articulated", 2, 2), ("continuum", 2, None)])
+@pytest.mark.parametrize("emission", ["loops", pytest.param("straight", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", BATCHED)
-def test_the_reproducible_profile_gives_the_same_bits(kind, name):
-    found = model(kind, 2, 2 if kind == "articulated" else None, profile="reproducible", emission="loops")
+def test_the_reproducible_profile_gives_the_same_bits(tail, emission, name):
+    found = model(*tail, profile="reproducible", emission=emission)
     arguments = states(found, 11)
     assert np.array_equal(getattr(found, name)(*given(arguments, name)), alone(found, name, arguments))
 

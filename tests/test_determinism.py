@@ -16,9 +16,9 @@ from serpentail_codegen.write import digest, write_folder, write_if_changed
 
 OPTIONS = {"functions": ["forward_dynamics", "tail_points", "rollout"], "emission": "loops"}
 NAME = "articulated_m2_n2"
-HEADER, MODEL, HOST = f"include/{NAME}.h", f"src/{NAME}.c", f"src/{NAME}_host.c"
+HEADER, MODEL, HOST, BATCH = f"include/{NAME}.h", *(f"src/{NAME}{part}.c" for part in ("", "_host", "_batch"))
 EXAMPLE, CASADI, MANIFEST = "example/main.c", f"{NAME}_casadi.py", "manifest.json"
-FILES = {HEADER, MODEL, HOST, EXAMPLE, CASADI, MANIFEST}
+FILES = {HEADER, MODEL, HOST, BATCH, EXAMPLE, CASADI, MANIFEST}
 
 
 def scene(**options):
@@ -64,7 +64,7 @@ def test_same_bytes_under_any_hash_seed_and_from_any_folder(expected, tmp_path, 
     tail = ("--tail", "articulated", "--segments", "2", "--links", "2", "--emission", "loops")
     surroundings = {"PYTHONHASHSEED": seed, "LC_ALL": "C", "TZ": f"Etc/GMT+{seed}"}
     printed = call(*tail, "--functions", functions, "--output", "made/here", cwd=cwd, **surroundings)
-    assert f"made/here/{NAME}: 6 files written" in printed
+    assert f"made/here/{NAME}: {len(FILES)} files written" in printed
     assert texts(cwd / "made" / "here" / NAME) == expected
 
 
@@ -111,7 +111,8 @@ def test_a_parameter_changes_only_its_value_and_the_hash(expected, tmp_path):
 
 def test_a_baked_parameter_changes_only_the_code_and_the_hash(tmp_path):
     generate(scene(baked=True), tmp_path)
-    assert set(generate(scene(baked=True, parameters={"gravity": 1.62}), tmp_path)) == {HEADER, MODEL, CASADI, MANIFEST}
+    changed = generate(scene(baked=True, parameters={"gravity": 1.62}), tmp_path)
+    assert set(changed) == {HEADER, MODEL, BATCH, CASADI, MANIFEST}
 
 
 def test_manifest_describes_the_files(expected):

@@ -119,7 +119,7 @@ def test_outputs_are_plain_arrays(model, name):
 
 
 @every_function
-@pytest.mark.parametrize("count", [0, 1, 1000])
+@pytest.mark.parametrize("count", [0, 1, 500])
 def test_batch_is_its_states_one_by_one(model, name, count):
     batch = states(count)
     found = call(model, name, batch)
@@ -456,7 +456,8 @@ def restless():
 
 def test_eight_threads_on_one_model(model, restless):
     batch = states(1000)
-    expected = model.forward_dynamics(batch["q"], batch["v"], batch["tau"])
+    names = ("q", "v", "tau")
+    expected = np.array([model.forward_dynamics(*state) for state in zip(*map(batch.get, names), strict=True)])
     found, together = np.zeros((8, *expected.shape)), threading.Barrier(8)
 
     def work(thread):

@@ -44,6 +44,7 @@ class Model:
     v (nv = 6 + 2m): velocity of B in the world, angular velocity in the body frame, rates of the tail coordinates.
     Every method also takes arrays with a leading batch axis; a single state is repeated over a batch.  All raise
     StateError on a wrong shape or a value that is not finite, ModelError where the scene left the function out.
+    With the profile "fast" the last digits of a state may depend on the size of its batch.
     Threads may share a model; a pickled one is loaded anew from its folder.
     """
 
