@@ -30,7 +30,8 @@ SIZES = {
     **dict.fromkeys(["link", "I", "F", "F_next", "F_beyond", "pitch", "yaw", "column", "other", "f_torso"], 6),
     **{"section": 2, "H_own": 3, "torque_own": 2, "I_own": 6, "pitch_own": 6, "yaw_own": 6, "tip": 8, "shape": 16},
     **{"E": 9, "bend": 12, "trig": 4, "E_v": 15, "Q_v": 10, "loading": 27},
-    **{"twice": 10, "R": 9, "S": 12, "columns": 12},
+    **{"twice": 10, "R": 9, "S": 12, "columns": 12, "F_lanes": 6, "own": 2},
+    **dict.fromkeys(["at_bias", "at_pitch", "at_yaw", "H_pp", "H_py", "H_yp", "H_yy"], 1),
 }
 
 

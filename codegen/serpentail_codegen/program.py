@@ -159,7 +159,10 @@ class Loop:
 
 @dataclass(frozen=True)
 class Factor:
-    """Factor A = L D L^T in place; A symmetric positive definite, its lower triangle row-major."""
+    """Factor A = L^T D L in place; A symmetric positive definite, its lower triangle row-major.
+
+    The rows are ``padded(size)`` apart, so that whole vectors of a row can be computed.
+    """
 
     matrix: Array
     size: int
@@ -167,7 +170,7 @@ class Factor:
 
 @dataclass(frozen=True)
 class Solve:
-    """Solve L D L^T x = x in place with a factored matrix; a wide x is solved for all lanes."""
+    """Solve L^T D L x = x in place with a factored matrix; a wide x is solved for all lanes."""
 
     matrix: Array
     x: Ref

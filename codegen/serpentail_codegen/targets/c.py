@@ -7,10 +7,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from ..draft import Tail
+from ..eliminations import written_out
 from ..functions import Argument, Function, inertial
 from ..functions import program as assemble
 from ..interpret import applied
-from ..program import Program
+from ..program import VECTOR, Program
 from ..scene import Scene
 from ..tape import operation_count
 from ..templating import render
@@ -18,6 +19,8 @@ from .c_function import CFunction, Routine, dialect, in_loops, routine_arguments
 from .casadi_external import casadi_context
 
 STRAIGHT_UP_TO = 7000  # nodes: beyond, the text leaves the instruction cache and compile time grows
+STRAIGHT_BESIDE_LANES = 3500  # nodes: where there is a sweep in lanes, too, that is faster beyond
+ELIMINATED = 12  # rows: smaller matrices are factored without loops
 LARGE = 100  # operations: a step that is written out wherever it is called; larger ones as the compiler sees fit
 COORDINATES = {
     "joint": "alpha_1, beta_1, ... of the joints",
@@ -38,12 +41,21 @@ class Emitted:
 
 def emit(scene: Scene, tail: Tail, function: Function) -> Emitted:
     """Print one function in the form that the scene asks for; ``auto`` is straight while that is small."""
-    program = assemble(function, tail)
-    fixed = baked_values(scene)
-    small = scene.emission == "auto" and applied(program) <= STRAIGHT_UP_TO
-    if small or scene.emission == "straight":
-        return Emitted(function, straight_line(program, scene.real, scene.name, fixed), "straight")
-    return Emitted(function, in_loops(program, scene.real, scene.name, fixed), "loops")
+    program, fixed = assemble(function, tail), baked_values(scene)
+    form, program = fastest(function, tail, program) if scene.emission == "auto" else (scene.emission, program)
+    printer = straight_line if form == "straight" else in_loops
+    return Emitted(function, printer(program, scene.real, scene.name, fixed), form)
+
+
+def fastest(function: Function, tail: Tail, program: Program) -> tuple[str, Program]:
+    """Return the form that runs fastest on a processor with vectors, and the program in that form.
+
+    Straight lines are fastest until their text crowds the instruction cache; sweeps in lanes overtake them before that.
+    """
+    lanes = assemble(function, tail, tail.kind == "articulated")
+    if applied(program) <= (STRAIGHT_UP_TO if lanes == program else STRAIGHT_BESIDE_LANES):
+        return "straight", program
+    return "loops", written_out(lanes, ELIMINATED)
 
 
 def baked_values(scene: Scene) -> dict[str, list]:
@@ -188,6 +200,7 @@ def c_context(scene: Scene, tail: Tail, emitted: list[Emitted], version: str) ->
             "title": f"{scene.kind} tail, {tail.segments} segments x {tail.links} {PIECES[scene.kind]}",
             "pieces": PIECES[scene.kind],
             "prefix": scene.name,
+            "vector": VECTOR,
             "upper": scene.name.upper(),
             "real": scene.real,
             "least": "FLT_MIN" if scene.real == "float" else "DBL_MIN",

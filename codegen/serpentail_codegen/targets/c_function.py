@@ -286,6 +286,7 @@ class LoopPrinter:
             self.helpers |= {"all_positive"}
             call = f"{self._helper('ldl_factor_side_by_side')}({factor.size}, {matrix.array.row}, {pointer(matrix)})"
         else:
+            self.helpers |= {"lanes"}
             call = f"{self._helper('ldl_factor')}({factor.size}, {pointer(matrix)})"
         return [f"if ({call} != STATUS_OK) {{", "  return STATUS_NOT_POSITIVE_DEFINITE;", "}"]
 
