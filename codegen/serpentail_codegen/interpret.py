@@ -39,6 +39,7 @@ class Numbers:
     mul = staticmethod(lambda a, b: a * b)
     div = staticmethod(lambda a, b: a / b)
     neg = staticmethod(lambda a: -a)
+    select = staticmethod(lambda c, a, b: a if c > 0 else b)
 
 
 class Counter:
@@ -56,6 +57,7 @@ class Counter:
 
     add = sub = mul = div = _binary
     neg = sin = cos = sqrt = _same
+    select = staticmethod(max)
     const = staticmethod(lambda value: 0)
     lane = staticmethod(lambda row, lane: 0)
     unit = staticmethod(lambda lane, lanes: lanes)

@@ -77,6 +77,10 @@ class Recorder:
             return self._power(e.base, e.exp)
         if isinstance(e, sympy.sin | sympy.cos):
             return getattr(self.tape, type(e).__name__)(self.lower(e.args[0]))
+        if e.is_Piecewise:
+            return self._cases(list(e.args))
+        if isinstance(e, sympy.Max):
+            return self._chain(self.tape.max, sorted(e.args, key=sympy.default_sort_key))
         raise TypeError(f"no rule lowers {type(e).__name__}: {e}")
 
     def _chain(self, operation, terms) -> int:
@@ -99,6 +103,20 @@ class Recorder:
             raise TypeError(f"no rule lowers the exponent {exponent}")
         product = self._chain(self.tape.mul, [base] * abs(int(exponent)))
         return product if exponent > 0 else self.tape.div(self.tape.const(1), product)
+
+
+    def _cases(self, cases: list) -> int:
+        """The first expression whose condition holds; the last condition must be True."""
+        (e, condition), *others = cases
+        if condition == True:  # noqa: E712  SymPy's own truth
+            return self.lower(e)
+        if not others:
+            raise TypeError(f"no rule lowers a Piecewise without a last case (..., True): {condition}")
+        if isinstance(condition, sympy.StrictGreaterThan | sympy.StrictLessThan):
+            return self.tape.select(self.lower(condition.gts - condition.lts), self.lower(e), self._cases(others))
+        if isinstance(condition, sympy.GreaterThan | sympy.LessThan):
+            return self.tape.select(self.lower(condition.lts - condition.gts), self._cases(others), self.lower(e))
+        raise TypeError(f"no rule lowers the condition {condition}")
 
 
 def exact(number: sympy.Number):

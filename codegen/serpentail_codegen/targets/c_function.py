@@ -53,7 +53,7 @@ def dialect(real: str, prefix: str = "") -> Dialect:
     sincos = f"real {{sine}}, {{cosine}}; {prefix}_sincos({{argument}}, &{{sine}}, &{{cosine}});"
     functions = {"sqrt": "sqrt" + suffix}
     row, load = "const lanes {name} = {text};", "LOAD({address} + c)"
-    return Dialect("const real {name} = {text};", suffix, functions, sincos, row, load)
+    return Dialect("const real {name} = {text};", suffix, functions, sincos=sincos, row=row, load=load)
 
 
 def offset_text(ref: Ref) -> str:

@@ -12,7 +12,9 @@ from ..tape import Step
 from ..templating import render
 from .scalars import Dialect, Scalars, index_text
 
-PYTHON = Dialect("{name} = {text}", "", {"sin": "sin", "cos": "cos", "sqrt": "sqrt"})
+PYTHON = Dialect(
+    "{name} = {text}", "", {"sin": "sin", "cos": "cos", "sqrt": "sqrt"}, "if_else({c} > {zero}, {a}, {b})"
+)
 
 
 def slice_text(ref: Ref) -> str:
@@ -113,4 +115,5 @@ def casadi_module(scene: Scene, tail: Tail, functions, version: str, content_has
         steps |= printer.steps
     sizes = {p.name: p.size for p in inertial(scene.kind)}
     data = {"scene": scene, "version": version, "content_hash": content_hash, "functions": views, "sizes": sizes}
-    return render("casadi.py.jinja", data | {"steps": [step_view(s) for s in steps.values()]})
+    selects = any(op == "select" for s in steps.values() for op, *_ in s.nodes)
+    return render("casadi.py.jinja", data | {"steps": [step_view(s) for s in steps.values()], "selects": selects})
