@@ -168,6 +168,11 @@ class Tape:
             return self.neg(self.select(c, minus_a, minus_b))
         return self._node("select", c, a, b)
 
+    def decide(self, c: int) -> bool | None:
+        """Tell if c > 0, or None where that is not known."""
+        known = self.value(c)
+        return None if known is None else known > 0
+
     def max(self, a: int, b: int) -> int:
         """Return the larger of a and b."""
         return self.select(self.sub(a, b), a, b)
