@@ -1,7 +1,7 @@
 """The functions a scene can ask for: a tail's sizes go in, the loop nest of each function comes out."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from math import prod
 
@@ -12,7 +12,7 @@ from .draft import Draft, Tail
 from .lane_sweeps import balance_in_lanes
 from .parameters import Parameter
 from .program import Array, Index, Program, Ref, padded
-from .scene import parameters_of
+from .scene import Scene, parameters_of
 from .sweeps import column_of, mechanism
 
 
@@ -55,16 +55,21 @@ class Function:
     outputs: tuple[Argument, ...]
     assemble: Callable[[Draft, dict[str, Array]], None]
 
+    def of(self, tail: Tail) -> "Function":
+        """Return this function with the arguments that a tail has: those of a length."""
+        inputs, outputs = (tuple(a for a in some if a.length(tail)) for some in (self.inputs, self.outputs))
+        return replace(self, inputs=inputs, outputs=outputs)
 
-def inertial(kind: str) -> tuple[Parameter, ...]:
-    """Return the parameters that the equations of motion of a kind of tail read."""
-    return tuple(p for p in parameters_of(kind) if p.name != "link_radius")
+
+def struct_parameters(model: Tail | Scene) -> tuple[Parameter, ...]:
+    """Return the parameters that the functions of a model read: the fields of its struct."""
+    return tuple(p for p in parameters_of(model.kind, model.contacts) if p.name != "link_radius")
 
 
 def program(function: Function, tail: Tail, in_lanes: bool = False) -> Program:
     """Assemble one function for given sizes; ``in_lanes`` where vectors hold several numbers and the tail is long."""
     draft = Draft(function.name, function.doc, tail=tail, in_lanes=in_lanes)
-    for parameter in inertial(tail.kind):
+    for parameter in struct_parameters(tail):
         draft.known[parameter.name] = draft.array(parameter.name, parameter.size, role="parameters")[0]
     arrays = {a.name: draft.array(a.name, a.length(tail), role="input") for a in function.inputs}
     arrays |= {a.name: draft.array(a.name, a.length(tail), role="output") for a in function.outputs}
@@ -77,25 +82,27 @@ def program(function: Function, tail: Tail, in_lanes: bool = False) -> Program:
     return draft.finish()
 
 
-def assemble_mass_matrix(d: Draft, arrays: dict[str, Array], world: bool = False) -> None:
-    """H, both triangles."""
-    H, nv, tail = arrays["H"], d.tail.nv, d.tail
+def assemble_mass_matrix(
+    d: Draft, arrays: dict[str, Array], world: bool = False, apart: Callable[[int], int] = int
+) -> None:
+    """H, both triangles; its rows are ``apart(nv)`` apart."""
+    H, row, tail = arrays["H"], apart(d.tail.nv), d.tail
     d.store(kin.quaternion_rotation, R=9)
 
     def H_tail(k, other, size=1):
-        return H.part((6 + k) * nv + 6 + other, size)
+        return H.part((6 + k) * row + 6 + other, size)
 
     columns = sweeps.tail_inertia(d, H_tail, d.array("columns", 12, tail.segments), world)
     if world:
         composite = {name: d.known[name] for name in ("h", "I")}
         d.step(dyn.world_composite, **composite)
         d.known["R"] = d.constant("identity", sweeps.IDENTITY)[0]
-    d.step(dyn.mass_matrix_base, **{f"H_{r}": H.part(r * nv, 6) for r in range(6)})
+    d.step(dyn.mass_matrix_base, **{f"H_{r}": H.part(r * row, 6) for r in range(6)})
     with d.loop("k", tail.nt) as k:
-        row, column = H.part((6 + k) * nv, 6), H.part(6 + k, 6, stride=nv)
-        d.step(dyn.mass_matrix_column, {"column": column_of(columns, k)}, H_row=row, H_column=column)
+        lower, upper = H.part((6 + k) * row, 6), H.part(6 + k, 6, stride=row)
+        d.step(dyn.mass_matrix_column, {"column": column_of(columns, k)}, H_row=lower, H_column=upper)
         with d.loop("l", k) as other:
-            d.copy(H.part((6 + other) * nv + 6 + k, 1), H_tail(k, other))
+            d.copy(H.part((6 + other) * row + 6 + k, 1), H_tail(k, other))
 
 
 def assemble_inverse_dynamics(d: Draft, arrays: dict[str, Array], world: bool = False) -> None:

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 from ..draft import Tail
 from ..eliminations import written_out
-from ..functions import Argument, Function, inertial
+from ..functions import Argument, Function, struct_parameters
 from ..functions import program as assemble
-from ..interpret import applied
+from ..interpret import applied, branches
 from ..program import VECTOR, Program
 from ..scene import Scene
 from ..tape import operation_count
@@ -40,7 +40,7 @@ class Emitted:
 
 
 def emit(scene: Scene, tail: Tail, function: Function) -> Emitted:
-    """Print one function in the form that the scene asks for; ``auto`` is straight while that is small."""
+    """Print one function in the form that the scene asks for."""
     program, fixed = assemble(function, tail), baked_values(scene)
     form, program = fastest(function, tail, program) if scene.emission == "auto" else (scene.emission, program)
     printer = straight_line if form == "straight" else in_loops
@@ -50,17 +50,19 @@ def emit(scene: Scene, tail: Tail, function: Function) -> Emitted:
 def fastest(function: Function, tail: Tail, program: Program) -> tuple[str, Program]:
     """Return the form that runs fastest on a processor with vectors, and the program in that form.
 
-    Straight lines are fastest until their text crowds the instruction cache; sweeps in lanes overtake them before that.
+    Straight lines are fastest until their text crowds the instruction cache, if all of them are always run; sweeps in
+    lanes overtake them before that.
     """
     lanes = assemble(function, tail, tail.kind == "articulated")
-    if applied(program) <= (STRAIGHT_UP_TO if lanes == program else STRAIGHT_BESIDE_LANES):
+    limit = STRAIGHT_UP_TO if lanes == program else STRAIGHT_BESIDE_LANES
+    if applied(program) <= limit and not branches(program):
         return "straight", program
     return "loops", written_out(lanes, ELIMINATED)
 
 
 def baked_values(scene: Scene) -> dict[str, list]:
     """Return the parameters to fold into the code."""
-    return {p.name: values(scene, p.name) for p in inertial(scene.kind)} if scene.baked else {}
+    return {p.name: values(scene, p.name) for p in struct_parameters(scene)} if scene.baked else {}
 
 
 def values(scene: Scene, name: str) -> list[float]:
@@ -109,7 +111,7 @@ def wrapped(head: str, arguments: list[str]) -> str:
 def parameter_views(scene: Scene) -> list[dict]:
     """Return the fields of the parameter struct."""
     literal = dialect(scene.real).literal
-    fields = inertial(scene.kind)
+    fields = struct_parameters(scene)
     return [
         {
             "name": p.name,
@@ -180,7 +182,7 @@ def rollout_work(emitted: list[Emitted], tail: Tail) -> int:
 
 def abi_hash(scene: Scene, views: list[FunctionView]) -> str:
     """Digest of what a caller relies on: symbols, argument sizes, workspace, the parameter struct."""
-    interface = [scene.name, scene.real, [[p.name, p.size] for p in inertial(scene.kind)]]
+    interface = [scene.name, scene.real, [[p.name, p.size] for p in struct_parameters(scene)]]
     interface += [[f.name, [[a.name, a.length] for a in (*f.inputs, *f.outputs)], f.work] for f in views]
     return hashlib.sha256(json.dumps(interface).encode()).hexdigest()[:16]
 
@@ -212,9 +214,11 @@ def c_context(scene: Scene, tail: Tail, emitted: list[Emitted], version: str) ->
             "content_hash": "",
             "abi_hash": abi_hash(scene, views),
             "tail": tail,
+            "factors": next((a.length for f in views for a in f.outputs if a.name == "factors"), 0),
+            "groups": ", ".join(f"{count} of the {name}" for name, count in tail.groups.items()),
             "baked": scene.baked,
             "parameters": parameter_views(scene),
-            "parameter_count": sum(p.size for p in inertial(scene.kind)),
+            "parameter_count": sum(p.size for p in struct_parameters(scene)),
             "functions": views,
             "most_arrays": max(len(f.inputs) + len(f.outputs) for f in views),
             "works": works,
