@@ -10,6 +10,7 @@ from .scene import Scene
 from .targets.c import c_context, c_files, emit
 from .targets.casadi import casadi_module
 from .targets.manifest import manifest
+from .targets.package import package_files
 from .write import digest, write_folder
 
 
@@ -20,7 +21,7 @@ def generate(scene: Scene, output: Path) -> list[str]:
     emitted = [emit(scene, tail, function) for function in wanted]
     context = c_context(scene, tail, emitted, __version__)
     context["content_hash"] = digest("".join(c_files(scene, context).values()))[:16]
-    files = c_files(scene, context)
+    files = c_files(scene, context) | package_files(context)
     module = casadi_module(
         scene, tail, [f for f in wanted if f.name in FUNCTIONS], __version__, context["content_hash"]
     )

@@ -105,6 +105,7 @@ class Scene:
     baked: bool = False  # parameters folded into the code, behind the same ABI
     real: str = "double"
     emission: str = "auto"
+    profile: str = "fast"  # or the same bits on every machine
 
 
 # The keys of a scene file: default (None: required) and rule; ANY where a function of its own checks.
@@ -122,6 +123,7 @@ KEYS: dict[str, tuple[Any, Rule]] = {
     "baked": (Scene.baked, FLAG),
     "real": (Scene.real, _one_of(["double", "float"])),
     "emission": (Scene.emission, _one_of(["auto", "straight", "loops"])),
+    "profile": (Scene.profile, _one_of(["fast", "reproducible"])),
     "plan": ({}, TABLE),  # a motion to plan: for the runtime, which checks it
 }
 NAMES = tuple(parameter.name for parameter in PARAMETERS)
