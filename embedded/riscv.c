@@ -9,15 +9,14 @@ __attribute__((used)) static void prepare(void);
 
 static uint32_t counted_at_start;
 
-static void call_host(uintptr_t operation, const void *argument)
+/* The three instructions must not be compressed, nor lie across two pages. */
+__attribute__((naked, noinline, aligned(16))) static void call_host(uintptr_t operation, const void *argument)
 {
-  register uintptr_t a0 __asm__("a0") = operation;
-  register const void *a1 __asm__("a1") = argument;
-  __asm__ volatile(".option push\n\t.option norvc\n\t.balign 16\n\t"
-                   "slli zero, zero, 0x1f\n\tebreak\n\tsrai zero, zero, 7\n\t.option pop"
-                   : "+r"(a0)
-                   : "r"(a1)
-                   : "memory");
+  (void)operation; /* a0 */
+  (void)argument;  /* a1 */
+  __asm__ volatile(".option push\n\t.option norvc\n\t"
+                   "slli zero, zero, 0x1f\n\tebreak\n\tsrai zero, zero, 7\n\tret\n\t.option pop" ::
+                     : "a0", "memory");
 }
 
 void port_write(const char *text)

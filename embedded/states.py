@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-# Largest |entry| of each block of an input: the base's, then the tail's.
+# Largest |entry| of each entry of an input; the last one counts for all that follow.
 SCALES = {
     "v": (2, 2, 2, 20, 20, 20, 10),
     "v_dot": (20, 20, 20, 500, 500, 500, 500),
@@ -13,6 +13,9 @@ SCALES = {
     "f_ext": (0.1,),
     "bristles": (1e-3,),
 }
+# Least and most, where zero is not amid them.
+RANGES = {"damping": (0, 1e-3), "gains": (0, 400), "weight": (1e-4, 1e-3), "factors": (0.1, 1)}
+STANDING = np.radians([210, -40, 210, -40, 0, 0, 0, 0])  # gamma, delta of both legs and their rates
 
 
 def stored_states(manifest: dict, count: int = 3, seed: int = 8) -> dict[str, np.ndarray]:
@@ -30,6 +33,10 @@ def stored_states(manifest: dict, count: int = 3, seed: int = 8) -> dict[str, np
 def _drawn(rng: np.random.Generator, name: str, shape: tuple[int, int]) -> np.ndarray:
     if name == "q":
         return _configurations(rng, shape)
+    if name == "legs":
+        return STANDING + rng.uniform(-0.3, 0.3, shape)
+    if name in RANGES:
+        return rng.uniform(*RANGES[name], shape)
     scales = SCALES.get(name, (1,))
     return rng.uniform(-1, 1, shape) * np.array([scales[min(k, len(scales) - 1)] for k in range(shape[1])])
 
