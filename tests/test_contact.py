@@ -11,6 +11,7 @@ import serpentail as st
 from models import model_folder
 from references.contact import Contacts, attitude
 from references.parameters import random_states
+from serpentail.verify import laws
 from serpentail_codegen.contact import contact_force
 from serpentail_codegen.interpret import Numbers
 from serpentail_codegen.lower import derive
@@ -170,7 +171,7 @@ def test_what_sticks_does_not_drift():
     assert np.abs(rate).max() < 1e-16
 
 
-def slide(friction, angle, h=1e-4, seconds=1.5):
+def slide(friction, angle, h=2e-4, seconds=0.6):
     """Path of 0.1 kg at 1 m/s, pressed down by its weight at mu = 0.5: place, velocity and bristle at every step."""
     mass, mu, speed = 0.1, 0.5, 1.0
     depth = (mass * 9.8 / 1000) ** (2 / 3)
@@ -261,6 +262,12 @@ def test_a_flight_pays_nothing_for_contact(emission):
     assert texts[0] == texts[1]
 
 
+def test_verification_judges_what_else_a_model_with_contacts_has():
+    checks = laws(touching(2, 2))
+    assert [c for c in checks if not c.passed] == []
+    assert sum(not c.omitted for c in checks) == 10
+
+
 # Misuse.
 
 
@@ -298,7 +305,13 @@ def test_compiles_without_a_warning(tmp_path, size, options):
     functions = ["contact_points", "contact_dynamics", "pfl", "implicit"]
     folder = model_folder(*size, name="rat", contacts=list(ALL), functions=functions, **options)
     for source in ("src/rat.c", "src/rat_host.c", "example/main.c"):
-        compiled(tmp_path, folder / source, *C99, "-O2")
+        compiled(tmp_path, folder / source, *C99, "-fsyntax-only")
+
+
+def test_optimiser_finds_nothing_to_warn_about(tmp_path):
+    functions = ["contact_points", "contact_dynamics", "pfl", "implicit"]
+    folder = model_folder(2, 2, name="rat", contacts=list(ALL), functions=functions, emission="loops")
+    compiled(tmp_path, folder / "src" / "rat.c", *C99, "-O2")
 
 
 def test_single_precision_is_single_precision():
