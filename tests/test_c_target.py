@@ -36,7 +36,11 @@ MODELS = {
     "m1_n1_baked_straight": {"baked": True, "emission": "straight"},
     "m2_n2_baked_loops": {"baked": True, "emission": "loops"},
     "m2_n2_baked_float": {"baked": True, "emission": "loops", "real": "float"},
+    "m1_n1_double_reproducible": {"profile": "reproducible", "emission": "straight"},
+    "m2_n2_float_reproducible": {"profile": "reproducible", "emission": "loops", "real": "float"},
 }
+REPRODUCIBLE = [name for name in MODELS if name.endswith("_reproducible")]
+HARDEST = {"double": 6381956970095103.0 * 2.0**797, "float": 16367173.0 * 2.0**72}  # nearest to a multiple of pi/2
 del MODELS["arcs2_float_straight"]  # its text is long, and what it shows others show
 every_model = pytest.mark.parametrize("name", MODELS)
 some_models = pytest.mark.parametrize("name", ["m1_n1_double_straight", "m1_n1_float_loops", "m1_n1_baked_straight"])
@@ -385,18 +389,56 @@ def ulps(found, expected):
 
 
 @mpmath.workdps(60)
-@pytest.mark.parametrize("name", ["m1_n1_double_straight", "m1_n1_float_loops"])
+@pytest.mark.parametrize("name", ["m1_n1_double_straight", "m1_n1_float_loops", *REPRODUCIBLE])
 def test_sine_and_cosine_are_good_to_the_last_digit(models, name):
     library, rng = Library(models(name)), np.random.default_rng(1)
     angles = [*rng.uniform(-4, 4, 300), *rng.uniform(-1e5, 1e5, 300), *10.0 ** rng.uniform(-300, 8, 100)]
     angles += [k * np.pi / 4 for k in range(-40, 41)] + [k * np.pi / 2 for k in (1001, 44444, 63661, 63662, 63663)]
-    angles += [0.0, 1e5, -1e5, np.nextafter(1e5, 0), np.nextafter(1e5, 2e5)]
-    for x in np.array(angles).astype(library.number):
+    angles += [0.0, *(s * x for s in (1, -1) for end in (1e4, 1e5) for x in (end, np.nextafter(end, 0)))]
+    angles = np.array(angles).astype(library.number)
+    for x in angles if name not in REPRODUCIBLE else angles[abs(angles) < (1e4 if "float" in name else 1e5)]:
         exact = mpmath.cos_sin(mpmath.mpf(float(x)))[::-1]
         assert all(ulps(y, value) <= 1.5 for y, value in zip(library.sincos(x), exact, strict=True)), x
 
 
-@pytest.mark.parametrize("name", ["m1_n1_double_straight", "m1_n1_float_loops"])
+@mpmath.workdps(1000)
+@pytest.mark.parametrize("name", REPRODUCIBLE)
+def test_reproducible_sine_and_cosine_reduce_any_angle(models, name):
+    """Within 3 units of the last place as far as numbers go, without libm, and optimised or not to the same bits."""
+    model, rng = models(name), np.random.default_rng(3)
+    library, optimised, largest = Library(model), Library(model, "-O2"), np.finfo(float_of(model.scene.real)[0]).max
+    angles = 10.0 ** rng.uniform(3.9, np.log10(largest), 2000)
+    angles = np.array([*angles, largest, 1e4, 1e5, HARDEST[model.scene.real]]).astype(library.number)
+    angles = np.concatenate([angles, [k * np.pi / 2 for k in rng.integers(1e5, 1e9, 200)]]).astype(library.number)
+    for x in np.concatenate([angles, -angles[::9]]):
+        exact = mpmath.cos_sin(mpmath.mpf(float(x)))[::-1]
+        found = library.sincos(x)
+        assert all(ulps(y, value) <= 3 for y, value in zip(found, exact, strict=True)), x
+        assert found.tobytes() == optimised.sincos(x).tobytes()
+    assert not {"sin", "cos", "sinf", "cosf"} & {symbol for _, symbol in symbols(model.objects[0], "-u")}
+
+
+@pytest.mark.parametrize("name", REPRODUCIBLE)
+def test_reproducible_models_refuse_what_would_change_their_bits(models, tmp_path, name):
+    model = models(name)
+    command = ["gcc", "-I", model.include, "-c", model.source, "-o", tmp_path / "model.o"]
+    done = subprocess.run([*command, "-ffast-math"], capture_output=True, text=True, check=False)
+    assert done.returncode != 0 and f"{name} is reproducible: compile it without -ffast-math" in done.stderr
+
+
+@needs("objdump")
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="looks for x86's fused instructions")
+@pytest.mark.parametrize("name", REPRODUCIBLE)
+def test_reproducible_models_fuse_nothing_even_where_the_compiler_would(models, tmp_path, name):
+    """The control is a model of the fast profile, compiled alike."""
+    fused = []
+    for source in (models(name).source, models("m1_n1_double_straight").source):
+        target = compiled(tmp_path, source, "-std=gnu11", "-O2", "-mfma")
+        fused.append("vfmadd" in run("objdump", "-d", target))
+    assert fused == [False, True]
+
+
+@pytest.mark.parametrize("name", ["m1_n1_double_straight", "m1_n1_float_loops", *REPRODUCIBLE])
 def test_sine_and_cosine_at_the_edges(models, name):
     library = Library(models(name))
     assert library.sincos(0.0).tolist() == [0, 1]

@@ -18,7 +18,8 @@ OPTIONS = {"functions": ["forward_dynamics", "tail_points", "rollout"], "emissio
 NAME = "articulated_m2_n2"
 HEADER, MODEL, HOST, BATCH = f"include/{NAME}.h", *(f"src/{NAME}{part}.c" for part in ("", "_host", "_batch"))
 EXAMPLE, CASADI, MANIFEST = "example/main.c", f"{NAME}_casadi.py", "manifest.json"
-FILES = {HEADER, MODEL, HOST, BATCH, EXAMPLE, CASADI, MANIFEST}
+PACKAGE = {"Makefile", "CMakeLists.txt", "LICENSE", "README.md"}
+FILES = {HEADER, MODEL, HOST, BATCH, EXAMPLE, CASADI, MANIFEST, *PACKAGE}
 
 
 def scene(**options):

@@ -422,6 +422,12 @@ def test_float_model(model):
         single.bias_force(state()["q"], [1e39] + [0] * (NV - 1))
 
 
+def test_a_scene_s_profile_is_that_of_its_library():
+    folders = {name: model_folder(1, 1, functions=["mass_matrix"], profile=name) for name in ("fast", "reproducible")}
+    assert {name: st.load(path).profile for name, path in folders.items()} == {name: name for name in folders}
+    assert st.load(folders["reproducible"], profile="fast").profile == "fast"
+
+
 def test_profiles_agree_to_rounding(model):
     exact = st.load(folder(), profile="reproducible")
     assert exact.library._name != model.library._name

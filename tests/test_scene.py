@@ -75,6 +75,7 @@ def test_defaults_of_the_other_keys(read):
     scene = read(VALID)
     assert scene == Scene("rat", "articulated", 2, 3, FUNCTIONS, resolve_parameters({}, 6))
     assert (scene.coordinates, scene.baked, scene.real, scene.emission) == ("joint", False, "double", "auto")
+    assert scene.profile == "fast"
 
 
 def test_the_parameter_table_keeps_its_own_rules():
@@ -291,7 +292,7 @@ def test_duplicate_functions(refuse):
     assert str(problem) == "functions[2]: value 'energy': listed before; remove one of the two"
 
 
-@pytest.mark.parametrize("key", ["coordinates", "real", "emission"])
+@pytest.mark.parametrize("key", ["coordinates", "real", "emission", "profile"])
 @pytest.mark.parametrize("value", ['"Joint"', '""', "true", "1", "[]", '["joint"]', "{}"])
 def test_choices(refuse, key, value):
     assert f'"{getattr(Scene, key)}"' in refuse(f"{key} = {value}\n" + VALID)[key].remedy

@@ -10,6 +10,7 @@ from .targets.c import c_context, c_files, emit
 from .targets.c_batch import batch_entry, batch_file, batches
 from .targets.casadi import casadi_module
 from .targets.manifest import manifest
+from .targets.package import package_files
 from .write import digest, write_folder
 
 
@@ -21,7 +22,7 @@ def generate(scene: Scene, output: Path) -> list[str]:
     context = c_context(scene, tail, emitted, __version__)
     context["content_hash"] = digest("".join(c_files(scene, context).values()))[:16]
     side_by_side = batches(scene, tail, emitted)
-    files = c_files(scene, context) | batch_file(scene, tail, side_by_side, context)
+    files = c_files(scene, context) | batch_file(scene, tail, side_by_side, context) | package_files(context)
     module = casadi_module(scene, tail, [f for f in wanted if f.name in SYMBOLIC], __version__, context["content_hash"])
     files[f"{scene.name}_casadi.py"] = module
     described = manifest(scene, context, emitted) | {"batch": batch_entry(tail, side_by_side)}

@@ -17,13 +17,13 @@ from .side_by_side import SideBySide
 def load(
     folder: str | PathLike[str],
     parameters: Mapping[str, object] | None = None,
-    profile: str = "fast",
+    profile: str | None = None,
     compiled: bool = True,
 ) -> "Model":
     """Return the model of a generated folder, its C compiled (or taken from the cache) and loaded.
 
     parameters: name -> number or 3 numbers, SI; override the scene's, without recompiling.
-    profile: "fast" (this CPU, FMA) or "reproducible" (same bits everywhere).
+    profile: "fast" (this CPU, FMA) or "reproducible" (same bits everywhere); None: the scene's.
     compiled: False needs no C compiler; then only ``model.casadi`` evaluates.
     Raises ModelError (folder missing, stale or changed; parameter unknown or unphysical), CompilerNotFound,
     CompileFailed.
@@ -31,6 +31,7 @@ def load(
     folder = Path(folder)
     manifest = read_manifest(folder)
     values = resolve(manifest, parameters)
+    profile = profile or manifest["scene"]["profile"]
     library = open_library(folder, manifest, profile) if compiled else None
     return Model(folder, manifest, values, library, profile)
 

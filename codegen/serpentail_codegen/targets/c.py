@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import math
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -86,6 +87,7 @@ class FunctionView:
     def __init__(self, emitted: Emitted, tail: Tail, prefix: str):
         function, self.lines, self.work = emitted.function, emitted.body.lines, emitted.body.work
         self.name, self.doc = function.name, function.doc
+        self.emission, self.operations = emitted.emission, emitted.body.operations
         views = [ArgumentView(a, tail) for a in (*function.inputs, *function.outputs)]
         self.inputs, self.outputs = views[: len(function.inputs)], views[len(function.inputs) :]
         real = f"{prefix}_real"
@@ -192,6 +194,8 @@ def c_context(scene: Scene, tail: Tail, emitted: list[Emitted], version: str) ->
     views = [FunctionView(e, tail, scene.name) for e in emitted]
     literal = dialect(scene.real).literal
     numbers = {"zero": 0, "one": 1, "two": 2, "half": 0.5, "third": 1 / 3, "sixth": 1 / 6}
+    numbers |= {"stiffness": 400, "damping": 40}  # of the example's tail
+    numbers |= {"small": 2.0**-32, "quarter": math.pi / 2 * 2.0**-30}
     rollout = "rollout" in scene.functions
     works = [{"name": f.name, "work": f.work} for f in views]
     if rollout:
@@ -205,6 +209,7 @@ def c_context(scene: Scene, tail: Tail, emitted: list[Emitted], version: str) ->
             "vector": VECTOR,
             "upper": scene.name.upper(),
             "real": scene.real,
+            "reproducible": scene.profile == "reproducible",
             "least": "FLT_MIN" if scene.real == "float" else "DBL_MIN",
             "most": "FLT_MAX" if scene.real == "float" else "DBL_MAX",
             "sqrt": dialect(scene.real).functions["sqrt"],
@@ -220,6 +225,7 @@ def c_context(scene: Scene, tail: Tail, emitted: list[Emitted], version: str) ->
             "parameters": parameter_views(scene),
             "parameter_count": sum(p.size for p in struct_parameters(scene)),
             "functions": views,
+            "names": [f.name for f in views],
             "most_arrays": max(len(f.inputs) + len(f.outputs) for f in views),
             "works": works,
             "steps": step_views(emitted, scene.real, scene.name),
