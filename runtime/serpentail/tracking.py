@@ -5,12 +5,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .errors import SimulationError
+from .simulation.piecewise import spline
 
 if TYPE_CHECKING:
     from .model import Model
 
 KP, KD = 4e4, 400.0  # 1/s^2, 1/s: Table 1
-ROUNDING = 1e-9  # s
 
 
 class Pfl:
@@ -24,24 +24,18 @@ class Pfl:
     """
 
     def __init__(self, model: "Model", reference, kp: float = KP, kd: float = KD, feedforward: bool = True):
-        from scipy.interpolate import CubicSpline
-
         times, angles, ends = _reference(reference, model.nv - 6)
         for name, value in (("kp", kp), ("kd", kd)):
             if not (isinstance(value, int | float) and np.isfinite(value) and value >= 0):
                 raise SimulationError(f"Pfl: {name} is {value!r}: give a finite number from 0")
         self.model, self.kp, self.kd = model, float(kp), float(kd)
-        self.span, self.last = (times[0], times[-1]), angles[-1]
-        self.spline = CubicSpline(times, angles, bc_type=ends)
+        self.curve = spline(times, angles, ends)
         self.feedforward = bool(feedforward)
 
     def reference(self, t: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return tail coordinates, rates and accelerations (2m,) wanted at t (s)."""
-        if t > self.span[1] + ROUNDING:
-            return self.last, np.zeros_like(self.last), np.zeros_like(self.last)
-        t = min(max(t, self.span[0]), self.span[1])
-        acceleration = self.spline(t, 2) if self.feedforward else np.zeros_like(self.last)
-        return self.spline(t), self.spline(t, 1), acceleration
+        angles, rates, accelerations = self.curve.at(t)
+        return angles, rates, accelerations if self.feedforward else 0 * accelerations
 
     def __call__(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Return tau (2m,), N m.

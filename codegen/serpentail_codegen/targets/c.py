@@ -16,6 +16,7 @@ from ..tape import operation_count
 from ..templating import render
 from .c_function import CFunction, Routine, dialect, in_loops, routine_arguments, routine_lines, straight_line
 from .casadi_external import casadi_context
+from .simulation import Has, layouts, simulation_context
 
 STRAIGHT_UP_TO = 7000  # nodes: beyond, the text leaves the instruction cache and compile time grows
 LARGE = 100  # operations: a step that is written out wherever it is called; larger ones as the compiler sees fit
@@ -160,16 +161,17 @@ def unused(lines: Iterable[str], names: Iterable[str] = ()) -> list[str]:
     return [name for name in ("parameters", "work", *names) if name not in words]
 
 
-def rollout_work(emitted: list[Emitted], tail: Tail) -> int:
-    """Return the workspace of a rollout: its stages and what forward dynamics needs."""
-    inner = next(e.body.work for e in emitted if e.function.name == "forward_dynamics")
-    return 3 * (tail.nq + tail.nv) + tail.nt + inner
+def offered(scene: Scene, views: list["FunctionView"]) -> Has:
+    """Return what the simulation of a scene with these functions can do."""
+    return Has("pfl" in {f.name for f in views}, False, 0, (), False)
 
 
 def abi_hash(scene: Scene, views: list[FunctionView]) -> str:
     """Digest of what a caller relies on: symbols, argument sizes, workspace, the parameter struct."""
     interface = [scene.name, scene.real, [[p.name, p.size] for p in inertial(scene.kind)]]
     interface += [[f.name, [[a.name, a.length] for a in (*f.inputs, *f.outputs)], f.work] for f in views]
+    if "rollout" in scene.functions:
+        interface += layouts(offered(scene, views)).items()
     return hashlib.sha256(json.dumps(interface).encode()).hexdigest()[:16]
 
 
@@ -177,11 +179,11 @@ def c_context(scene: Scene, tail: Tail, emitted: list[Emitted], version: str) ->
     """Return everything that the C templates lay out."""
     views = [FunctionView(e, tail, scene.name) for e in emitted]
     literal = dialect(scene.real).literal
-    numbers = {"zero": 0, "one": 1, "two": 2, "half": 0.5, "third": 1 / 3, "sixth": 1 / 6}
-    rollout = "rollout" in scene.functions
-    works = [{"name": f.name, "work": f.work} for f in views]
-    if rollout:
-        works.append({"name": "rollout", "work": rollout_work(emitted, tail)})
+    numbers = {"zero": 0, "one": 1, "two": 2, "half": 0.5, "third": 1 / 3}
+    works = {f.name: f.work for f in views}
+    rollout = {}
+    if "rollout" in scene.functions:
+        rollout = simulation_context(scene, tail, offered(scene, views), works)
     return (
         {name: literal(value) for name, value in numbers.items()}
         | {
@@ -204,22 +206,24 @@ def c_context(scene: Scene, tail: Tail, emitted: list[Emitted], version: str) ->
             "parameter_count": sum(p.size for p in inertial(scene.kind)),
             "functions": views,
             "most_arrays": max(len(f.inputs) + len(f.outputs) for f in views),
-            "works": works,
+            "works": [{"name": name, "work": work} for name, work in works.items()],
             "steps": step_views(emitted, scene.real, scene.name),
             "callees": [callee_view(*callee, scene.name) for callee in callees_of(emitted)],
-            "helpers": sorted(set().union(*(e.body.helpers for e in emitted)) | ({"copy"} if rollout else set())),
-            "rollout": rollout,
+            "helpers": sorted(set().union(*(e.body.helpers for e in emitted))),
         }
-        | casadi_context(scene, tail, {f.name: f.work for f in views})
+        | rollout
+        | casadi_context(scene, tail, works)
     )
 
 
 def c_files(scene: Scene, context: dict) -> dict[str, str]:
     """Render the header, the model, its host entries and an example."""
     name = scene.name
+    places = {"simulation.h.jinja": f"include/{name}_simulation.h", "simulation.c.jinja": f"src/{name}_simulation.c"}
     return {
         f"include/{name}.h": render("header.h.jinja", context),
         f"src/{name}.c": render("model.c.jinja", context),
         f"src/{name}_host.c": render("host.c.jinja", context),
         "example/main.c": render("example.c.jinja", context),
+        **({path: render(template, context) for template, path in places.items()} if "has" in context else {}),
     }
