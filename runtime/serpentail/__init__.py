@@ -8,6 +8,8 @@ _HOME = {
     "simulate": "simulation.run",
     **dict.fromkeys(["Damping", "TorqueTable", "TorqueCurve", "NativeTorque", "Phases"], "simulation.controllers"),
     "Piecewise": "simulation.piecewise",
+    **dict.fromkeys(["Legs", "Reference"], "simulation.schedules"),
+    "Contact": "touch",
     **dict.fromkeys(["Trajectory", "pitch_roll_yaw", "rotation_matrix"], "trajectory"),
     **dict.fromkeys(["polar_to_bend", "bend_to_polar"], "polar"),
     "plan": "planning.planner",

@@ -11,6 +11,7 @@ from ..library import NOT_FINITE, NOT_POSITIVE_DEFINITE, OUT_OF_RANGE, aligned
 from ..trajectory import Trajectory
 from .controllers import Controller
 from .drive import Drive
+from .ground import MOST_EVENTS, Ground
 from .methods import SCIPY, Method, checked_method, chosen
 from .records import Records
 from .start import Start
@@ -28,46 +29,39 @@ WHY = {
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """What a method gives: samples of the motion up to where it came, and whether that is the end."""
+    """What a method gives: samples of the motion up to where it came, and what ended it before its end."""
 
     t: np.ndarray
     q: np.ndarray
     v: np.ndarray
     tau: np.ndarray
+    bristles: np.ndarray
     info: dict
-    failure: Exception | None = None
+    failure: BaseException | None = None
 
 
 class CompiledRun:
     """A run of the generated C: records filled in, ready to go on."""
 
-    def __init__(self, records: Records, drive: Drive, method: Method, start: Start):
+    def __init__(self, records: Records, drive: Drive, method: Method, start: Start, ground: Ground):
         model = records.model
-        self.records, self.drive, self.start, self.model = records, drive, start, model
-        self.times = records.array(start.times)
-        self.q, self.v = records.array(start.q0), records.array(start.v0)
-        samples, dtype = len(self.times), records.dtype
-        self.out = [np.zeros((samples, size), dtype) for size in (model.nq, model.nv, drive.nt)]
-        work = aligned(model.manifest["work"]["rollout"], dtype)
-        numbers = dict(method.settings) | {"step": method.settings.get("step", method.settings.get("first_step", 0))}
-        numbers = {name: number for name, number in numbers.items() if records.has("run", name)}
-        numbers["most_steps"] = int(min(numbers.get("most_steps", np.inf), 2**31 - 1))
-        outputs = dict(zip(("q_out", "v_out", "tau_out"), self.out, strict=True))
-        self.record = records.record(
-            "run",
-            parameters=model.parameter_vector,
-            drive=drive.record,
-            t=start.start,
-            q=self.q,
-            v=self.v,
-            method=model.manifest["simulation"]["methods"].get(method.name, 0),
-            pause=PAUSE,
-            samples=samples,
-            times=self.times,
-            work=work,
-            **numbers,
-            **outputs,
-        )
+        self.records, self.drive, self.start, self.ground, self.model = records, drive, start, ground, model
+        samples, dtype, points = start.intervals + 1, records.dtype, ground.points
+        sizes = {"q": model.nq, "v": model.nv, "tau": drive.nt} | ({"bristles": 2 * points} if points else {})
+        self.state = {"q": records.array(start.q0), "v": records.array(start.v0)}
+        members = dict(start_members(method), pause=PAUSE, samples=samples, times=records.array(start.times))
+        if points:
+            self.state["bristles"] = records.array(ground.bristles.ravel())
+            self.event_times = np.zeros(MOST_EVENTS, dtype)
+            self.event_kinds = np.zeros(MOST_EVENTS, np.intc)
+            members |= {"event_times": self.event_times, "event_kinds": self.event_kinds}
+            members |= {"most_events": MOST_EVENTS, "stop_at": ground.stop_at}
+        self.out = {name: np.zeros((samples, size), dtype) for name, size in sizes.items()}
+        members |= {f"{name}_out": array for name, array in self.out.items()} | self.state
+        members["work"] = aligned(model.manifest["work"]["rollout"], dtype)
+        members["method"] = model.manifest["simulation"]["methods"].get(method.name, 0)
+        parameters = model.parameter_vector
+        self.record = records.record("run", parameters=parameters, drive=drive.record, t=start.start, **members)
 
     def function(self, name: str, *arguments):
         """Return a function of the compiled model that takes a run."""
@@ -86,9 +80,38 @@ class CompiledRun:
         """Return the samples written, and what a status means."""
         record, done = self.record, self.record.done
         info = {name: getattr(record, name) for name in ("steps", "rejected", "evaluations", "factorisations")}
-        q, v, tau = (array[:done].astype(float) for array in self.out)
+        if self.ground.points:
+            count = min(record.events, MOST_EVENTS)
+            events = zip(self.event_times[:count].tolist(), self.event_kinds[:count].tolist(), strict=True)
+            info["events"] = [self.ground.event(t, number) for t, number in events]
+        rows = {name: array[:done].astype(float) for name, array in self.out.items()}
+        t = self.start.times[:done]
+        if status == STOPPED_AT_EVENT:
+            t, rows = self._with_the_end(t, rows)
+            status = 0
+        bristles = rows.get("bristles", np.zeros((len(t), 0))).reshape(len(t), self.ground.points, 2)
         failure = self.drive.error or (failed(status, record.t) if status else None)
-        return Samples(self.start.times[:done], q, v, tau, info, failure)
+        return Samples(t, rows["q"], rows["v"], rows["tau"], bristles, info, failure)
+
+    def _with_the_end(self, t: np.ndarray, rows: dict) -> tuple[np.ndarray, dict]:
+        """Add the state at which a run stopped as a last sample."""
+        if t[-1] >= self.record.t:
+            return t, rows
+        tau = np.zeros_like(self.out["tau"][0])
+        y, y_dot = (np.concatenate([*self.state.values()]) for _ in range(2))
+        pointer = ctypes.c_void_p
+        state_rate = self.function("state_rate", self.records.real, pointer, pointer, pointer)
+        state_rate(ctypes.addressof(self.record), self.record.t, *(a.ctypes.data for a in (y, y_dot, tau)))
+        last = self.state | {"tau": tau}
+        rows = {name: np.vstack([rows[name], last[name]]).astype(float) for name in rows}
+        return np.append(t, self.record.t), rows
+
+
+def start_members(method: Method) -> dict:
+    """Return a method's settings as members of the run's record."""
+    own = {name: x for name, x in method.settings.items() if name not in ("first_step", "most_steps")}
+    own["step"] = method.settings.get("step", method.settings.get("first_step", 0))
+    return own | {"most_steps": int(min(method.settings.get("most_steps", np.inf), 2**31 - 1))}
 
 
 def failed(status: int, t: float) -> SimulationError:
@@ -104,6 +127,8 @@ def simulate(
     q0 (nq,), v0 (nv,): start; its quaternion is normalised.
     controller: None (no torque), Damping, TorqueTable, TorqueCurve, Pfl, Phases of these, NativeTorque, or a function
     (t (s), q, v) -> tau (2m,) in N m.
+    legs, bristles0, stop_at (models with contacts): Legs, where there are feet; stretch (points, 2) of the friction
+    springs in m, zero by default; events to stop at, pairs such as ("take_off", "feet").
     t_span: (start, end) in s, or the end alone.
     method: "tsit5", "ros34pw2", "rodas4" (adaptive, in C), "rk4", "implicit_euler" (steps of a fixed length, in C),
     "dop853", "lsoda" (SciPy's, as a check), or "auto", whose choice and reason ``info`` tells.
@@ -117,14 +142,16 @@ def simulate(
     if missing:
         raise model.without(*missing)
     start = Start.checked(model, (q0, v0), t_span, settings.pop("output_step", None))
+    ground = Ground.checked(model, start, settings)
     records = Records(model)
-    drive = Drive(records, controller)
+    drive = Drive(records, controller, ground.legs.curve if ground.legs else None)
     choice = choose(model, drive, start, method, settings)
+    run = CompiledRun(records, drive, choice, start, ground)
     begun = time.perf_counter()
-    found = integrate(records, drive, choice, start)
+    found = integrate(run, choice)
     seconds = time.perf_counter() - begun
     info = found.info | choice.settings | {"method": choice.name, "reason": choice.reason, "seconds": seconds}
-    return judged(model, replace(found, info={k: x for k, x in info.items() if x != np.inf}))
+    return judged(model, replace(found, info={k: x for k, x in info.items() if x is not np.inf}), ground)
 
 
 def choose(model, drive: Drive, start: Start, name, settings: dict) -> Method:
@@ -153,9 +180,8 @@ def fastest_decay(model, drive: Drive, start: Start) -> float:
     return float(np.linalg.eigvalsh(columns).max())
 
 
-def integrate(records: Records, drive: Drive, method: Method, start: Start) -> Samples:
+def integrate(run: CompiledRun, method: Method) -> Samples:
     """Run a method."""
-    run = CompiledRun(records, drive, method, start)
     if method.name in SCIPY:
         from .scipy_methods import integrate_by_scipy
 
@@ -163,12 +189,12 @@ def integrate(records: Records, drive: Drive, method: Method, start: Start) -> S
     return run.samples(run.go())
 
 
-def judged(model, found: Samples) -> Trajectory:
+def judged(model, found: Samples, ground: Ground) -> Trajectory:
     """Return the trajectory of samples, or raise what ended the run, which keeps the trajectory up to there."""
     if not len(found.t):
         raise found.failure
     try:
-        trajectory = measured(model, found)
+        trajectory = measured(model, found, ground)
     except StateError as error:
         words = f"from t = {found.t[0]:.6g} s to {found.t[-1]:.6g} s, by sample: {error}"
         raise found.failure or SimulationError(words) from (None if found.failure else error)
@@ -179,9 +205,10 @@ def judged(model, found: Samples) -> Trajectory:
     raise found.failure
 
 
-def measured(model, found: Samples) -> Trajectory:
-    """Return samples with energies and momenta; StateError where these are beyond numbers."""
+def measured(model, found: Samples, ground: Ground) -> Trajectory:
+    """Return samples with energies, momenta and forces; StateError where these are beyond numbers."""
     info = found.info | {"model": model.name}
     info["parameters"] = {name: list(x) if isinstance(x, tuple) else x for name, x in model.parameters.items()}
     measures = *model.energy(found.q, found.v), *model.momentum(found.q, found.v)
-    return Trajectory(found.t, found.q, found.v, found.tau, *measures, info)
+    contact = ground.contact(model, found.t, (found.q, found.v, found.tau, found.bristles))
+    return Trajectory(found.t, found.q, found.v, found.tau, *measures, info, contact)

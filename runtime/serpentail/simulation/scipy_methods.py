@@ -15,7 +15,7 @@ class StateRate:
     def __init__(self, run: CompiledRun):
         self.run, pointer, dtype = run, ctypes.c_void_p, run.records.dtype
         self.function = run.function("state_rate", run.records.real, pointer, pointer, pointer)
-        size = run.model.nq + run.model.nv
+        size = sum(map(len, run.state.values()))
         self.y, self.y_dot, self.tau = np.zeros(size, dtype), np.zeros(size, dtype), np.zeros(run.drive.nt, dtype)
         self.addresses = [a.ctypes.data for a in (self.y, self.y_dot, self.tau)]
 
@@ -59,7 +59,7 @@ def integrate_by_scipy(run: CompiledRun, method: Method) -> Samples:
     rate = StateRate(run)
     tape, counts = Tape(rate, run.start.times), {"steps": 0, "evaluations": 0}
     ends = [*(t for t in run.drive.stops if run.start.start < t < run.start.end), run.start.end]
-    y, t, failure = np.concatenate([run.start.q0, run.start.v0]), run.start.start, None
+    y, t, failure = np.concatenate([*run.state.values()]).astype(float), run.start.start, None
     try:
         run.record.until = ends[0]
         tape.write(t, y)
@@ -70,9 +70,10 @@ def integrate_by_scipy(run: CompiledRun, method: Method) -> Samples:
         if not tape.states:
             raise
         failure = error
-    states, done = np.array(tape.states), len(tape.torques)
-    q, v = states[:done, : run.model.nq], states[:done, run.model.nq :]
-    return Samples(tape.times[:done], q, v, np.array(tape.torques), counts, failure)
+    done = len(tape.states)
+    q, v, bristles = np.split(np.array(tape.states), [run.model.nq, run.model.nq + run.model.nv], axis=1)
+    bristles = bristles.reshape(done, run.ground.points, 2)
+    return Samples(tape.times[:done], q, v, np.array(tape.torques), bristles, counts, failure)
 
 
 def _smooth_part(rate: StateRate, method: Method, part, tape: Tape, counts: dict) -> np.ndarray:
