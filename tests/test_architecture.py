@@ -17,7 +17,7 @@ CODEGEN, RUNTIME = (Path(package.__file__).parent for package in (serpentail_cod
 ROOT = Path(__file__).parents[1]
 SOURCES = sorted(path for package in (CODEGEN, RUNTIME) for path in package.rglob("*.py"))
 TEMPLATES = sorted((CODEGEN / "templates").glob("*.jinja"))
-DERIVATION = {"kinematics", "dynamics", "continuum", "polar_continuum", "lower"}
+DERIVATION = {"kinematics", "dynamics", "continuum", "polar_continuum", "legs", "contact", "stiffness", "lower"}
 WITHOUT_SYMPY = (
     "tape",
     "program",

@@ -13,11 +13,11 @@ import sympy
 
 from serpentail_codegen.differentiate import adjoint, tangent
 from serpentail_codegen.interpret import Numbers
-from serpentail_codegen.tape import BINARY, UNARY, Step, Tape, live_nodes, operation_count, replay
+from serpentail_codegen.tape import BINARY, TERNARY, UNARY, Step, Tape, live_nodes, operation_count, replay
 
 INPUTS = (("x", 2), ("y", 1), ("z", 2))
 OUTPUTS = (("u", 1), ("w", 2))
-SYMBOLS = {name: sympy.symbols(f"{name}:{size}", positive=True) for name, size in INPUTS}
+SYMBOLS = {name: sympy.symbols(f"{name}:{size}", real=True) for name, size in INPUTS}
 LEAVES = list(chain(*SYMBOLS.values()))
 CONSTANTS = (0, 1, -1, 2, Fraction(1, 3), Fraction(-5, 2))
 SEEDS = range(15)
@@ -25,7 +25,7 @@ DIGITS = 50
 MANY = Numbers(mpmath.mp, mpmath.mpf)
 FRACTIONS = Numbers(SimpleNamespace(sin=None, cos=None, sqrt=None), Fraction)
 RESIDUE = 1e-35  # of values that lose at most 15 digits
-ONLY_ARITHMETIC = ("neg", "add", "sub", "mul", "div")
+ONLY_ARITHMETIC = ("neg", "add", "sub", "mul", "div", "select")
 
 
 @pytest.fixture(autouse=True)
@@ -41,7 +41,7 @@ def subsets(vectors):
     return [frozenset(c) for size in range(1, len(names) + 1) for c in combinations(names, size)]
 
 
-def grow(rng, operations=(*UNARY, *BINARY, *BINARY), length=30):
+def grow(rng, operations=(*UNARY, *BINARY, *BINARY, *TERNARY), length=30):
     """A tape of random operations, and pairs of a node and its SymPy expression; operands may repeat."""
     tape = Tape()
     pool = [(tape.input(k), leaf) for k, leaf in enumerate(LEAVES)]
@@ -56,6 +56,9 @@ def grow(rng, operations=(*UNARY, *BINARY, *BINARY), length=30):
             b, y = tape.add(tape.mul(b, b), tape.const(2)), y * y + 2
         if op in UNARY:
             pool.append((getattr(tape, op)(a), -x if op == "neg" else getattr(sympy, op)(x)))
+        elif op in TERNARY:
+            c, z = operand(rng, tape, pool)
+            pool.append((tape.select(c, a, b), sympy.Piecewise((x, z > 0), (y, True))))
         else:
             e = {"add": x + y, "sub": x - y, "mul": x * y, "div": x / y}[op]
             pool.append((getattr(tape, op)(a, b), e))
@@ -228,6 +231,9 @@ RULES = {
     "mul": (lambda t, x, y: t.mul(x, y), X * Y),
     "div": (lambda t, x, y: t.div(x, y), X / Y),
     "itself": (lambda t, x: x, X),
+    "max": (lambda t, x, y: t.max(x, y), sympy.Piecewise((X, X > Y), (Y, True))),
+    "first": (lambda t, x, y: t.select(x, t.mul(x, y), y), X * Y),
+    "second": (lambda t, x, y: t.select(y, y, t.mul(x, y)), X * Y),  # y is negative where the rules are tried
     "constant": (lambda t, x: t.const(3), sympy.Integer(3)),
 }
 

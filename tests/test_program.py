@@ -11,7 +11,7 @@ import pytest
 from references.parameters import TABLE_1, random_states
 from serpentail_codegen.draft import Tail
 from serpentail_codegen.functions import FUNCTIONS, program
-from serpentail_codegen.interpret import Numbers, Run, ldl_factor, ldl_solve, unroll
+from serpentail_codegen.interpret import Numbers, Run, branches, ldl_factor, ldl_solve, unroll
 from serpentail_codegen.program import Apply, Array, Builder, Fill, Index, Loop, as_index, narrowed, statements
 from serpentail_codegen.tape import Step, Tape, live_nodes, replay
 
@@ -355,3 +355,72 @@ def test_solve_statement_solves_in_place():
     assert outputs(b, a=[2, 99, 1, 3]) == [1, 3]
     *_, guards = unroll(b.finish())
     assert [status for status, _ in guards] == ["NOT_POSITIVE_DEFINITE"] * 2
+
+
+# Conditions.
+
+COUNT = step_of("count", (("x", 1), ("y", 1)), (("z", 1),), lambda t, x, y: [t.add(t.mul(x, y), t.const(1))])
+
+
+def conditional():
+    """Conditions in a loop and in each other: what is written under one is read, summed up and overwritten after it."""
+    b = Builder("choosy", "Conditions.")
+    x, y, u = b.array("x", 1, 4, "input"), b.array("y", 1, 4, "input"), b.array("u", 1, 4, "output")
+    w, t = b.array("w", 1, role="output"), b.array("t", 1)
+    b.fill(w[0], 1)
+    with b.loop("i", 4) as i:
+        b.fill(u[i], 7)
+        with b.when(x[i]):
+            b.apply(COUNT, {"x": x[i], "y": y[i]}, z=t[0])
+            b.apply(COUNT, {"x": t[0], "y": w[0]}, z_=w[0])
+            with b.when(y[i]):
+                b.copy(u[i], t[0])
+                b.copy(w[0], y[i], adds=True)
+        with b.when(w[0]), b.loop("j", i + 1) as j:
+            b.copy(u[j], x[i], adds=True)
+    return b.finish()
+
+
+def plainly(x, y):
+    """The same in Python."""
+    u, w = [], 1
+    for i, (a, b) in enumerate(zip(x, y, strict=True)):
+        u.append(7)
+        if a > 0:
+            t = a * b + 1
+            w += t * w + 1
+            if b > 0:
+                u[i], w = t, w + b
+        if w > 0:
+            u = [value + a for value in u]
+    return u, w
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_conditions_run_what_they_ask_for_and_unroll_to_choices(seed):
+    rng, p = random.Random(seed), conditional()
+    given = {name: [Fraction(rng.randint(-3, 3), rng.randint(1, 2)) for _ in range(4)] for name in "xy"}
+    values = Run(p, EXACT, given).values
+    assert (values["u"], values["w"][0]) == plainly(given["x"], given["y"])
+    assert unrolled_values(p, given, EXACT) == {"u": values["u"], "w": values["w"]}
+    assert unrolled_values(p, given, EXACT, fixed=["x", "y"]) == {"u": values["u"], "w": values["w"]}
+
+
+def test_a_condition_survives_being_called():
+    b = Builder("outer", "Calls.")
+    arrays = {name: b.array(name, 1, 4, role) for name, role in (("x", "input"), ("y", "input"), ("u", "output"))}
+    b.call(conditional(), **arrays, w=b.array("w", 1, role="output"))
+    p, given = b.finish(), {"x": [1, -1, 2, 0], "y": [1, 2, -3, 4]}
+    assert branches(p) and not branches(program(FUNCTIONS["mass_matrix"], Tail(1, 1)))
+    values = Run(p, EXACT, given).values
+    assert (values["u"], values["w"][0]) == plainly(**given)
+
+
+def test_a_guard_under_a_condition_cannot_be_unrolled():
+    b = Builder("guarded", "A guard.")
+    x, u = b.array("x", 1, role="input"), b.array("u", 1, role="output")
+    with b.when(x[0]):
+        b.guard(x[0], "OUT_OF_RANGE", u[0])
+        b.copy(u[0], x[0])
+    with pytest.raises(ValueError, match="a guard under a condition"):
+        unroll(b.finish())

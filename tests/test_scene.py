@@ -13,9 +13,11 @@ import pytest
 from serpentail_codegen import scene as scene_module
 from serpentail_codegen.scene import (
     FUNCTIONS,
+    GROUPS,
     KEYS,
     ONLY,
     PARAMETERS,
+    TOUCHING,
     Problem,
     Scene,
     SceneError,
@@ -77,7 +79,7 @@ def test_defaults_of_the_other_keys(read):
 
 def test_the_parameter_table_keeps_its_own_rules():
     given = {p.name: p.default for p in PARAMETERS if p.default is not None}
-    assert resolve_parameters(given, 6) == resolve_parameters({}, 6)
+    assert resolve_parameters(given, 6, contacts=GROUPS) == resolve_parameters({}, 6, contacts=GROUPS)
     assert all(p.unit and p.meaning and p.size in (1, 3) for p in PARAMETERS)
 
 
@@ -97,7 +99,7 @@ def test_given_link_inertia_replaces_the_radius(read):
     parameters = read(VALID + "[parameters]\nlink_inertia = [1e-8, 0, 1e-8]\n").parameters
     assert parameters["link_inertia"] == (1e-8, 0.0, 1e-8)
     assert "link_radius" not in parameters
-    assert len(parameters) == len(PARAMETERS) - 1
+    assert set(parameters) == {p.name for p in PARAMETERS if not p.needs} - {"link_radius"}
 
 
 def test_zeros_are_allowed_and_lose_their_sign(read):
@@ -161,7 +163,7 @@ def test_the_paper_rats(segments, links):
 
 
 def test_the_full_scene_file_shows_every_key():
-    text = (SCENES / "kangaroo_rat_m1_n3.toml").read_text()
+    text = "".join((SCENES / f"{name}_m1_n3.toml").read_text() for name in ("kangaroo_rat", "contact"))
     words = [*(set(KEYS) - {"name", "parameters", "plan", *ONLY["continuum"].keys}), *(p.name for p in PARAMETERS)]
     assert [word for word in words if f"{word} =" not in text] == []
 
@@ -455,3 +457,52 @@ def test_a_model_hides_no_c_header(name):
 def test_single_precision_holds_its_parameters(mass):
     with pytest.raises(SceneError, match="beyond single precision"):
         scene_for("articulated", 1, 1, real="float", parameters={"torso_mass": mass})
+
+
+STANCE = VALID + 'contacts = ["torso", "feet"]\n'
+
+
+def test_contacts_bring_their_parameters_and_functions(read):
+    scene = read(STANCE)
+    assert scene.contacts == ("feet", "torso") and scene.friction == "cone"
+    assert scene.functions == (*FUNCTIONS, *TOUCHING)
+    assert dict(scene.parameters).keys() - dict(read(VALID).parameters) == {p.name for p in PARAMETERS if p.needs}
+    assert scene.parameters["L_a2m"] == 0.035 and scene.parameters["delta_m"] == pytest.approx(math.radians(30))
+    assert parse_scene(scene_to_dict(scene), "other") == scene
+    tail = read(VALID + 'contacts = ["tail"]\nfriction = "box"\n')
+    assert "mu" in tail.parameters and "hip" not in tail.parameters and tail.friction == "box"
+
+
+def test_a_flight_says_nothing_of_contacts(read):
+    scene = read(VALID)
+    assert scene.contacts == () and not {"contacts", "friction"} & set(scene_to_dict(scene))
+    assert not set(TOUCHING) & set(read(VALID + 'functions = "all"\n').functions)
+
+
+@pytest.mark.parametrize("value", ['["foot"]', '["feet", "feet"]', '"feet"', "true", "[3]", "[[]]"])
+def test_contacts_are_different_groups(refuse, value):
+    assert refuse(VALID + f"contacts = {value}\n")["contacts"].remedy.startswith("needs an array of different names")
+
+
+@pytest.mark.parametrize(
+    ("text", "field", "words"),
+    [
+        (VALID + 'friction = "box"\n', "friction", 'add contacts = ["feet"]'),
+        (VALID + 'functions = ["contact_points"]\n', "functions", 'add contacts = ["feet"]'),
+        (VALID + "[parameters]\nmu = 0.5\n", "parameters.mu", 'add "feet" to `contacts`'),
+        (VALID + 'contacts = ["tail"]\n[parameters]\nL_m2t = 0.5\n', "parameters.L_m2t", 'add "feet" to `contacts`'),
+        (STANCE + 'friction = "coulomb"\n', "friction", 'needs "cone" or "box" or "smooth" or "paper"'),
+        (
+            STANCE + "[parameters]\nmu = -0.1\n",
+            "parameters.mu",
+            "a finite number, 0 or above, in 1 (default: 1.0)",
+        ),
+        (STANCE + "[parameters]\nK_n = 0\n", "parameters.K_n", "above 0, in N/m^1.5"),
+        (STANCE + "[parameters]\nD_f = 0.0\n", "parameters.D_f", "above 0, in s"),
+        (STANCE + "[parameters]\nhip = [0, 1]\n", "parameters.hip", "an array of 3 finite numbers"),
+        (CONTINUUM + 'coordinates = "polar"\ncontacts = ["tail"]\n', "contacts", 'use "bend"'),
+    ],
+)
+def test_contact_keys_that_do_not_fit(refuse, text, field, words):
+    problems = refuse(text)
+    assert set(problems) == {field} and words in problems[field].remedy

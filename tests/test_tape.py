@@ -11,6 +11,7 @@ import pytest
 from serpentail_codegen.interpret import Numbers
 from serpentail_codegen.tape import (
     BINARY,
+    TERNARY,
     UNARY,
     Step,
     Tape,
@@ -46,8 +47,9 @@ def grow(rng, algebra, tape, leaves, length=80):
     """Record random operations; return pairs (node, the value computed directly)."""
     pool = [(tape.input(k), leaf) for k, leaf in enumerate(leaves)]
     while len(pool) < length:
-        op = rng.choice(BINARY * 2 + UNARY)
-        nodes, values = zip(*(_operand(rng, algebra, tape, pool) for _ in range(2 if op in BINARY else 1)), strict=True)
+        op = rng.choice(BINARY * 2 + UNARY + TERNARY)
+        count = next(k for k, ops in enumerate((UNARY, BINARY, TERNARY), 1) if op in ops)
+        nodes, values = zip(*(_operand(rng, algebra, tape, pool) for _ in range(count)), strict=True)
         if op == "div" and (values[1] == 0 or (algebra is FLOATS and None not in map(tape.value, nodes))):
             continue
         if op == "sqrt" and values[0] < 0:
@@ -101,7 +103,8 @@ def test_nodes_are_distinct_ordered_and_in_normal_form(seed):
             continue
         assert all(arg < position for arg in args)
         below = [tape.nodes[arg][0] for arg in args]
-        assert "neg" not in below or op == "sqrt"
+        assert "neg" not in below or op in ("sqrt", "select")
+        assert op != "select" or below[1:] != ["neg", "neg"]
         assert op not in ("add", "mul") or args == sorted(args)
         assert below != ["const", "const"]
         assert op != "neg" or below[0] not in ("sub",)
@@ -160,6 +163,20 @@ def test_negation_moves_outward(tape):
         assert op(minus_a, minus_b) == op(a, b)
     assert tape.sin(minus_a) == tape.neg(tape.sin(a))
     assert tape.cos(minus_a) == tape.cos(a)
+
+
+def test_selection_folds_where_the_choice_is_known_or_makes_no_difference(tape):
+    a, b, c = 0, 1, 2
+    assert [tape.select(tape.const(x), a, b) for x in (1, 0, -2, Fraction(1, 3))] == [a, b, b, a]
+    assert tape.select(c, a, a) == a
+    assert tape.select(c, tape.neg(a), tape.neg(b)) == tape.neg(tape.select(c, a, b))
+    assert tape.select(tape.neg(c), a, b) != tape.select(c, b, a)  # they differ at c = 0
+    assert tape.max(a, a) == a and tape.value(tape.max(tape.const(2), tape.const(3))) == 3
+
+
+def test_selection_takes_no_rows(tape):
+    with pytest.raises(ValueError, match="select takes no rows"):
+        tape.select(0, 1, tape.unit(0, 3))
 
 
 def test_operands_of_sums_and_products_are_ordered_by_node(tape):

@@ -2,8 +2,11 @@
 
 from . import derivatives as der
 from .derivatives import MULTIPLIER
+from .feedback import FEEDBACK
 from .functions import FUNCTIONS, TAU, V_DOT, Argument, Function, Q, V
 from .hessian import assemble_inverse_dynamics_hessian
+from .implicit import IMPLICIT
+from .touching import CONTACT
 
 
 def square(name: str, meaning: str) -> Argument:
@@ -122,4 +125,5 @@ _TABLE = (
         der.assemble_momentum_derivatives,
     ),
 )
-CATALOGUE = FUNCTIONS | {function.name: function for function in _TABLE}
+CATALOGUE = FUNCTIONS | {function.name: function for function in _TABLE} | CONTACT | FEEDBACK | IMPLICIT
+SYMBOLIC = FUNCTIONS | CONTACT | FEEDBACK  # those that the CasADi module builds of operations

@@ -16,6 +16,7 @@ from .program import (
     Ref,
     Solve,
     Unit,
+    When,
     narrowed,
     statements,
 )
@@ -57,6 +58,9 @@ def rewritten(body: tuple, rewrite: Callable[[object], Iterator]) -> tuple:
         if isinstance(statement, Loop):
             inner = rewritten(statement.body, rewrite)
             out += [replace(statement, body=inner)] if inner else []
+        elif isinstance(statement, When):
+            inner = rewritten(statement.body, rewrite)
+            out += [replace(head, body=inner) for head in rewrite(replace(statement, body=()))]
         else:
             out += rewrite(statement)
     return tuple(out)

@@ -22,8 +22,8 @@ from .functions import (
     Q,
     V,
     assemble_forward_dynamics,
-    inertial,
     program,
+    struct_parameters,
 )
 from .program import Array, Index, Ref
 from .sweeps import mechanism
@@ -166,9 +166,9 @@ def assemble_forward_dynamics_parameter_derivatives(d: Draft, arrays: dict[str, 
 def parameter_tangents(d: Draft, function: Function, given: dict[str, Array]) -> Array:
     """Return the tangents of a force with respect to every parameter, a lane for each number of the struct."""
     count, lane, tangents = parameter_count(d.tail), 0, {}
-    names = [p.name for p in inertial(d.tail.kind)]
+    names = [p.name for p in struct_parameters(d.tail)]
     inner = tangent_program(program(function, d.tail), names, count)
-    for p in inertial(d.tail.kind):
+    for p in struct_parameters(d.tail):
         if any(a.name == f"d_{p.name}" for a in inner.arrays):
             tangents[f"d_{p.name}"] = d.wide(f"d_{p.name}", p.size, count)
             d.unit(tangents[f"d_{p.name}"][0], lane)
@@ -187,7 +187,7 @@ def spread_parameters(d: Draft, source: Array, dparameters: Array) -> None:
 
 def parameter_count(tail: Tail) -> int:
     """Numbers in the parameter struct."""
-    return sum(p.size for p in inertial(tail.kind))
+    return sum(p.size for p in struct_parameters(tail))
 
 
 # ---- products with Jacobians --------------------------------------------------------------------------------------

@@ -16,6 +16,12 @@ def _quotient(tape: Tape, y: int, a: int, b: int) -> tuple[int, int]:
     return inverse, tape.neg(tape.mul(y, inverse))
 
 
+def _chosen(tape: Tape, c: int) -> tuple[int, int]:
+    """1 for the operand that counts, 0 for the other; what does not count must have a derivative all the same."""
+    one, zero = tape.const(1), tape.const(0)
+    return tape.select(c, one, zero), tape.select(c, zero, one)
+
+
 # partial derivatives of y = op(operands) with respect to each operand
 PARTIALS = {
     "add": lambda tape, y, a, b: (tape.const(1), tape.const(1)),
@@ -26,6 +32,7 @@ PARTIALS = {
     "sin": lambda tape, y, a: (tape.cos(a),),
     "cos": lambda tape, y, a: (tape.neg(tape.sin(a)),),
     "sqrt": lambda tape, y, a: (tape.div(tape.const(0.5), y),),
+    "select": lambda tape, y, c, a, b: (tape.const(0), *_chosen(tape, c)),
 }
 
 

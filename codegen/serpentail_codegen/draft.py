@@ -17,6 +17,8 @@ class Tail:
     kind: str = "articulated"
     bend_range: float = 2 * pi
     polar: bool = False  # a continuum in the paper's coordinates
+    contacts: tuple[str, ...] = ()  # groups of points that can touch the ground
+    friction: str = "cone"
 
     @property
     def total(self) -> int:
@@ -37,6 +39,17 @@ class Tail:
     def nv(self) -> int:
         """Scalars of a velocity."""
         return 6 + self.nt
+
+    @property
+    def groups(self) -> dict[str, int]:
+        """How many points each group has that can touch the ground: A, M and T of both feet, tail, torso."""
+        count = {"feet": 6, "tail": self.total, "torso": 1}
+        return {name: count[name] for name in self.contacts}
+
+    @property
+    def points(self) -> int:
+        """Points that can touch the ground."""
+        return sum(self.groups.values())
 
 
 @dataclass

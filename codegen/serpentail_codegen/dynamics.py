@@ -284,6 +284,16 @@ def base_acceleration(let, R, gravity, inverse_mass, h, net, w_dot, tail_force) 
     return {"p_ddot": square(R) * a - gravity[0] * Z}
 
 
+def free_acceleration(let, inverse_mass, com, net, w_dot) -> dict:
+    """Acceleration of B, gravity taken off, of what a net force moves: net / M - omega_dot x c, torso axes."""
+    return {"a": inverse_mass[0] * net - w_dot.cross(com)}
+
+
+def coupling_torque(let, column, a, w_dot) -> dict:
+    """What accelerations of the torso add to the torque of one tail coordinate."""
+    return {"torque": [column[0:3, :].dot(a) + column[3:6, :].dot(w_dot)]}
+
+
 def turned_acceleration(let, R, a) -> dict:
     """How p_b_ddot = R_b a - g z moves with a turn of the torso in body axes: columns R_b (e_k x a), row by row."""
     columns = [square(R) * axis.cross(a) for axis in (X, Y, Z)]

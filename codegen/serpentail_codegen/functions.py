@@ -1,7 +1,7 @@
 """The functions a scene can ask for: a tail's sizes go in, the loop nest of each function comes out."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from math import prod
 
@@ -11,7 +11,7 @@ from . import sweeps
 from .draft import Draft, Tail
 from .parameters import Parameter
 from .program import Array, Index, Program, Ref
-from .scene import parameters_of
+from .scene import Scene, parameters_of
 from .sweeps import column_of, mechanism
 
 
@@ -54,16 +54,21 @@ class Function:
     outputs: tuple[Argument, ...]
     assemble: Callable[[Draft, dict[str, Array]], None]
 
+    def of(self, tail: Tail) -> "Function":
+        """Return this function with the arguments that a tail has: those of a length."""
+        inputs, outputs = (tuple(a for a in some if a.length(tail)) for some in (self.inputs, self.outputs))
+        return replace(self, inputs=inputs, outputs=outputs)
 
-def inertial(kind: str) -> tuple[Parameter, ...]:
-    """Return the parameters that the equations of motion of a kind of tail read."""
-    return tuple(p for p in parameters_of(kind) if p.name != "link_radius")
+
+def struct_parameters(model: Tail | Scene) -> tuple[Parameter, ...]:
+    """Return the parameters that the functions of a model read: the fields of its struct."""
+    return tuple(p for p in parameters_of(model.kind, model.contacts) if p.name != "link_radius")
 
 
 def program(function: Function, tail: Tail) -> Program:
     """Assemble one function for given sizes."""
     draft = Draft(function.name, function.doc, tail=tail)
-    for parameter in inertial(tail.kind):
+    for parameter in struct_parameters(tail):
         draft.known[parameter.name] = draft.array(parameter.name, parameter.size, role="parameters")[0]
     arrays = {a.name: draft.array(a.name, a.length(tail), role="input") for a in function.inputs}
     arrays |= {a.name: draft.array(a.name, a.length(tail), role="output") for a in function.outputs}

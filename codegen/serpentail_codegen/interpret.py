@@ -6,7 +6,7 @@ With numbers as the algebra this is the reference for every emitted text; with a
 import math
 
 from .compose import expanded
-from .program import Apply, Array, Copy, Factor, Fill, Guard, Loop, Program, Ref, Solve, Unit
+from .program import Apply, Array, Copy, Factor, Fill, Guard, Loop, Program, Ref, Solve, Unit, When, statements
 from .tape import Tape, replay
 
 
@@ -39,6 +39,8 @@ class Numbers:
     mul = staticmethod(lambda a, b: a * b)
     div = staticmethod(lambda a, b: a / b)
     neg = staticmethod(lambda a: -a)
+    select = staticmethod(lambda c, a, b: a if c > 0 else b)
+    decide = staticmethod(lambda c: c > 0)
 
 
 class Counter:
@@ -56,6 +58,8 @@ class Counter:
 
     add = sub = mul = div = _binary
     neg = sin = cos = sqrt = _same
+    select = staticmethod(max)
+    decide = staticmethod(lambda c: True)  # the dearer case
     const = staticmethod(lambda value: 0)
     lane = staticmethod(lambda row, lane: 0)
     unit = staticmethod(lambda lane, lanes: lanes)
@@ -80,9 +84,16 @@ def _applied(body: tuple, at: dict[str, int]) -> int:
         if isinstance(statement, Loop):
             span = range(statement.start.at(at), statement.stop.at(at))
             count += sum(_applied(statement.body, at | {statement.var: value}) for value in span)
+        elif isinstance(statement, When):
+            count += _applied(statement.body, at)
         elif isinstance(statement, Apply):
             count += len(statement.step.nodes)
     return count
+
+
+def branches(program: Program) -> bool:
+    """Tell if some statements of a program are run only under a condition."""
+    return any(isinstance(outer, When) for _, around in statements(expanded(program).body) for outer in around)
 
 
 def ldl_factor(algebra, A: list[list]) -> tuple[list[list], list]:
@@ -153,6 +164,21 @@ class Run:
         span = range(loop.start.at(at), loop.stop.at(at))
         for value in reversed(span) if loop.downward else span:
             self.body(loop.body, at | {loop.var: value})
+
+    def when(self, when: When, at: dict[str, int]) -> None:
+        """Run what a condition asks for; where the algebra cannot tell, choose between new and old values."""
+        condition = self.read(when.scalar, at)[0]
+        known = self.algebra.decide(condition)
+        if known is not None:
+            self.body(when.body if known else (), at)
+            return
+        before, guards = {name: list(scalars) for name, scalars in self.values.items()}, len(self.guards)
+        self.body(when.body, at)
+        if len(self.guards) > guards:
+            raise ValueError("a guard under a condition cannot be unrolled")
+        for name, old in before.items():
+            pairs = zip(self.values[name], old, strict=True)
+            self.values[name] = [a if a == b or b is None else self.algebra.select(condition, a, b) for a, b in pairs]
 
     def apply(self, call: Apply, at: dict[str, int]) -> None:
         """Run a step: read everything, then write everything."""

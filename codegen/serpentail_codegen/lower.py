@@ -31,6 +31,11 @@ SIZES = {
     **{"section": 2, "H_own": 3, "torque_own": 2, "I_own": 6, "pitch_own": 6, "yaw_own": 6, "tip": 8, "shape": 16},
     **{"E": 9, "bend": 12, "trig": 4, "E_v": 15, "Q_v": 10, "loading": 27},
     **{"twice": 10, "R": 9, "S": 12, "columns": 12},
+    **dict.fromkeys(["K_n", "D_n", "K_f", "D_f", "mu", "drag", "mobility"], 1),
+    **dict.fromkeys(["L_h2d", "L_d2k", "L_k2a", "L_a2m", "L_m2t", "delta_m", "side"], 1),
+    **{"leg": 2, "leg_rates": 2, "bristle": 2, "load": 6, "spring": 14, "lag": 2, "gains": 2},
+    **dict.fromkeys(["weight", "damping", "damped", "gain", "gain_q", "gain_v", "relax", "entry", "coupling"], 1),
+    **dict.fromkeys(["change", "rate", "angle", "k_v"], 1),
 }
 
 
@@ -77,7 +82,7 @@ class Recorder:
             return self._power(e.base, e.exp)
         if isinstance(e, sympy.sin | sympy.cos):
             return getattr(self.tape, type(e).__name__)(self.lower(e.args[0]))
-        raise TypeError(f"no rule lowers {type(e).__name__}: {e}")
+        return self._choice(e)
 
     def _chain(self, operation, terms) -> int:
         total = self.lower(terms[0])
@@ -99,6 +104,26 @@ class Recorder:
             raise TypeError(f"no rule lowers the exponent {exponent}")
         product = self._chain(self.tape.mul, [base] * abs(int(exponent)))
         return product if exponent > 0 else self.tape.div(self.tape.const(1), product)
+
+    def _choice(self, e: sympy.Basic) -> int:
+        if e.is_Piecewise:
+            return self._cases(list(e.args))
+        if isinstance(e, sympy.Max):
+            return self._chain(self.tape.max, sorted(e.args, key=sympy.default_sort_key))
+        raise TypeError(f"no rule lowers {type(e).__name__}: {e}")
+
+    def _cases(self, cases: list) -> int:
+        """The first expression whose condition holds; the last condition must be True."""
+        (e, condition), *others = cases
+        if condition == True:  # noqa: E712  SymPy's own truth
+            return self.lower(e)
+        if not others:
+            raise TypeError(f"no rule lowers a Piecewise without a last case (..., True): {condition}")
+        if isinstance(condition, sympy.StrictGreaterThan | sympy.StrictLessThan):
+            return self.tape.select(self.lower(condition.gts - condition.lts), self.lower(e), self._cases(others))
+        if isinstance(condition, sympy.GreaterThan | sympy.LessThan):
+            return self.tape.select(self.lower(condition.lts - condition.gts), self._cases(others), self.lower(e))
+        raise TypeError(f"no rule lowers the condition {condition}")
 
 
 def exact(number: sympy.Number):

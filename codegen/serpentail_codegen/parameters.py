@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from math import pi
 from typing import Any
 
 SINGLE = (2.0**-126, (2 - 2.0**-23) * 2.0**127)  # least normal and largest number of a float
@@ -36,6 +37,7 @@ class Parameter:
     unit: str
     check: Rule
     meaning: str
+    needs: str = ""  # a group of contact points, or "contacts": any of them; empty: every scene has it
 
 
 # The defaults are the kangaroo rat of the paper's Table 1. B is the torso frame, at the torso COM.
@@ -51,6 +53,21 @@ PARAMETERS = (
     Parameter("link_radius", 1, 0.0029, "m", NOT_NEGATIVE, "radius of the ellipsoid that gives link_inertia"),
     Parameter("link_inertia", 3, None, "kg m^2", NOT_NEGATIVE,
               "principal moments of inertia of one link about its COM, y along the link"),
+    Parameter("K_n", 1, 1000.0, "N/m^1.5", POSITIVE, "stiffness of the ground", "contacts"),
+    Parameter("D_n", 1, 0.75, "s/m", NOT_NEGATIVE, "damping of the ground, over its stiffness", "contacts"),
+    Parameter("K_f", 1, 600.0, "N/m", POSITIVE, "stiffness of the friction spring", "contacts"),
+    Parameter("D_f", 1, 0.01, "s", POSITIVE, "damping of the friction spring, over its stiffness", "contacts"),
+    Parameter("mu", 1, 1.0, "1", NOT_NEGATIVE, "coefficient of friction", "contacts"),
+    Parameter("L_h2d", 1, 0.008, "m", NOT_NEGATIVE, "leg linkage from H to D", "feet"),
+    Parameter("L_d2k", 1, 0.024, "m", NOT_NEGATIVE, "leg linkage from D to the knee K", "feet"),
+    Parameter("L_k2a", 1, 0.032, "m", NOT_NEGATIVE, "leg linkage from the knee K to the ankle A", "feet"),
+    Parameter("L_a2m", 1, 0.035, "m", NOT_NEGATIVE, "leg linkage from the ankle A to the metatarsal M", "feet"),
+    Parameter("L_m2t", 1, 0.016, "m", NOT_NEGATIVE, "leg linkage from the metatarsal M to the toe T", "feet"),
+    Parameter("delta_m", 1, pi / 6, "rad", ANY, "angle of the sole against the thigh", "feet"),
+    Parameter("hip", 3, (0.0225, -0.018, 0.01125), "m", ANY, "p_b2h of the right leg, in B; the left one mirrors x",
+              "feet"),
+    Parameter("torso_semi_axes", 3, (0.0315, 0.0495, 0.027), "m", POSITIVE,
+              "semi-axes of the torso, an ellipsoid about B", "torso"),
 )
 # fmt: on
 

@@ -3,9 +3,8 @@
 from pathlib import Path
 
 from . import __version__
-from .catalogue import CATALOGUE
+from .catalogue import CATALOGUE, SYMBOLIC
 from .draft import Tail
-from .functions import FUNCTIONS
 from .scene import Scene
 from .targets.c import c_context, c_files, emit
 from .targets.casadi import casadi_module
@@ -16,14 +15,12 @@ from .write import digest, write_folder
 def generate(scene: Scene, output: Path) -> list[str]:
     """Derive, lower, emit and write what the scene asks for into ``output/<scene>``; return the changed files."""
     tail = tail_of(scene)
-    wanted = [CATALOGUE[name] for name in needed(scene.functions)]
+    wanted = [CATALOGUE[name].of(tail) for name in needed(scene.functions)]
     emitted = [emit(scene, tail, function) for function in wanted]
     context = c_context(scene, tail, emitted, __version__)
     context["content_hash"] = digest("".join(c_files(scene, context).values()))[:16]
     files = c_files(scene, context)
-    module = casadi_module(
-        scene, tail, [f for f in wanted if f.name in FUNCTIONS], __version__, context["content_hash"]
-    )
+    module = casadi_module(scene, tail, [f for f in wanted if f.name in SYMBOLIC], __version__, context["content_hash"])
     files[f"{scene.name}_casadi.py"] = module
     return write_folder(output / scene.name, files, manifest(scene, context, emitted))
 
@@ -31,10 +28,12 @@ def generate(scene: Scene, output: Path) -> list[str]:
 def tail_of(scene: Scene) -> Tail:
     """Return the sizes of a scene's tail."""
     pieces = scene.links if scene.kind == "articulated" else scene.samples
-    return Tail(scene.segments, pieces, scene.kind, scene.bend_range, scene.coordinates == "polar")
+    polar = scene.coordinates == "polar"
+    return Tail(scene.segments, pieces, scene.kind, scene.bend_range, polar, scene.contacts, scene.friction)
 
 
 def needed(names: tuple[str, ...]) -> list[str]:
-    """Return the functions to derive: those asked for, and forward dynamics where a rollout calls it."""
-    names = (*names, "forward_dynamics") if "rollout" in names else names
+    """Return the functions to derive: those asked for, those that a rollout calls, the parts of an implicit solve."""
+    parts = {"rollout": ("forward_dynamics",), "implicit": ("implicit_factor", "implicit_solve")}
+    names = {*names, *(part for name in names for part in parts.get(name, ()))}
     return [name for name in CATALOGUE if name in names]

@@ -158,6 +158,14 @@ class Loop:
 
 
 @dataclass(frozen=True)
+class When:
+    """Run the body where a scalar is positive."""
+
+    scalar: Ref
+    body: tuple
+
+
+@dataclass(frozen=True)
 class Factor:
     """Factor A = L D L^T in place; A symmetric positive definite, its lower triangle row-major."""
 
@@ -290,6 +298,13 @@ class Builder:
         if as_index(start) != as_index(count) and body:
             self.emit(Loop(var, as_index(start), as_index(count), downward, body))
 
+    @contextmanager
+    def when(self, scalar: Ref):
+        """Open what is run only where a scalar is positive; the body must not change that scalar."""
+        self._bodies.append([])
+        yield
+        self.emit(When(scalar, tuple(self._bodies.pop())))
+
     def finish(self) -> Program:
         """Return the recorded program."""
         return Program(self.name, self.doc, tuple(self.arrays), tuple(self._bodies[0]))
@@ -316,9 +331,9 @@ def narrowed(step: Step, wanted: set[str]) -> Step:
 
 
 def statements(body):
-    """Yield every statement of a loop nest with the loops around it, outermost first."""
+    """Yield every statement of a loop nest with the loops and conditions around it, outermost first."""
     for statement in body:
-        if isinstance(statement, Loop):
+        if isinstance(statement, Loop | When):
             for inner, loops in statements(statement.body):
                 yield inner, (statement, *loops)
         else:

@@ -4,13 +4,13 @@ import math
 import re
 import sys
 import tomllib
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, fields
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
 from .parameters import ANY, PARAMETERS, SINGLE, Parameter, Parameters, Rule, Value
+from .problems import Problem, SceneError, suggest
 
 # fmt: off
 KINDS = ("articulated", "continuum")
@@ -19,16 +19,17 @@ FUNCTIONS = (
     "energy", "momentum", "tail_points", "tail_point_jacobians",
     "mass_matrix_world", "bias_force_world", "rollout", "forward_dynamics_derivatives",
 )
-ON_DEMAND = (  # emitted where a scene names them
+EXACT = (
     "inverse_dynamics_derivatives", "inverse_dynamics_parameter_derivatives", "forward_dynamics_parameter_derivatives",
     "inverse_dynamics_vjp", "forward_dynamics_jvp", "forward_dynamics_vjp", "inverse_dynamics_hessian",
     "energy_derivatives", "momentum_derivatives",
 )
-ALL = (*FUNCTIONS, *ON_DEMAND)
-DERIVATIVES = (*ON_DEMAND, "forward_dynamics_derivatives")
-# Names used elsewhere for the same things: suggested, never accepted.
-ALIASES = {"crba": "mass_matrix", "nle": "bias_force", "rnea": "inverse_dynamics", "aba": "forward_dynamics",
-           "m": "segments", "n": "links", "tail": "kind"}
+DERIVATIVES = (*EXACT, "forward_dynamics_derivatives")
+ON_DEMAND = (*EXACT, "pfl", "implicit")  # emitted where a scene names them
+TOUCHING = ("contact_points", "contact_dynamics")  # of scenes with contacts
+ALL = (*FUNCTIONS, *ON_DEMAND, *TOUCHING)
+GROUPS = ("feet", "tail", "torso")  # of contact points, in their order
+FRICTION = ("cone", "box", "smooth", "paper")
 # fmt: on
 C_HEADERS = frozenset(
     [
@@ -86,6 +87,10 @@ BEND = Rule(
 )
 
 
+CONTACTS = Rule(
+    'an array of different names out of "feet", "tail" and "torso", such as ["feet"]',
+    lambda x: isinstance(x, list | tuple) and all(n in GROUPS and x.count(n) == 1 for n in x),
+)
 TABLE = Rule("a table, under a line [plan]", lambda x: isinstance(x, Mapping))
 
 
@@ -105,6 +110,8 @@ class Scene:
     baked: bool = False  # parameters folded into the code, behind the same ABI
     real: str = "double"
     emission: str = "auto"
+    contacts: tuple[str, ...] = ()  # groups of points that can touch the ground, in the order of GROUPS
+    friction: str = "cone"
 
 
 # The keys of a scene file: default (None: required) and rule; ANY where a function of its own checks.
@@ -122,6 +129,8 @@ KEYS: dict[str, tuple[Any, Rule]] = {
     "baked": (Scene.baked, FLAG),
     "real": (Scene.real, _one_of(["double", "float"])),
     "emission": (Scene.emission, _one_of(["auto", "straight", "loops"])),
+    "contacts": ((), CONTACTS),
+    "friction": (Scene.friction, _one_of(FRICTION)),
     "plan": ({}, TABLE),  # a motion to plan: for the runtime, which checks it
 }
 NAMES = tuple(parameter.name for parameter in PARAMETERS)
@@ -141,29 +150,6 @@ ONLY = {
     "articulated": Only(("links",), ("links",), ("link_radius", "link_inertia"), ("joint",)),
     "continuum": Only(("samples", "bend_range"), (), (), ("bend", "polar")),
 }
-
-
-@dataclass(frozen=True)
-class Problem:
-    """One thing that is wrong with a scene: where, the value found (None: nothing), and what to do."""
-
-    field: str
-    value: object
-    remedy: str
-
-    def __str__(self) -> str:
-        return f"{_one_line(self.field)}: {_show(self.value)}: {self.remedy}"
-
-
-class SceneError(ValueError):
-    """A scene that cannot be used; `problems` has all that is wrong with it, str() one line for each."""
-
-    def __init__(self, problems: Iterable[Problem]) -> None:
-        self.problems = tuple(problems)
-        super().__init__(self.problems)
-
-    def __str__(self) -> str:
-        return "\n".join(map(str, self.problems))
 
 
 def load_scene(path: str | Path) -> Scene:
@@ -195,15 +181,14 @@ def parse_scene(table: Mapping[str, Any], name: str) -> Scene:
     own = ONLY[kind]
     values = {key: default for key, (default, _) in KEYS.items()} | {"name": name, "coordinates": own.coordinates[0]}
     values |= dict.fromkeys(own.required) | dict(table)
-    if values["functions"] == "all":
-        values["functions"] = ALL
-    if values["coordinates"] == "polar" and "functions" not in table:
-        values["functions"] = tuple(name for name in FUNCTIONS if name not in DERIVATIVES)
+    contacts = tuple(values["contacts"]) if CONTACTS.holds(values["contacts"]) else ()
+    values["functions"] = _usual_functions(values, contacts, "functions" in table)
     problems = _unknown_keys(table, "", KEYS) + _key_problems(values) + _kind_problems(table, own)
-    problems += _function_problems(values["functions"])
+    problems += _function_problems(values["functions"]) + _contact_problems(table, values, contacts)
+    values["contacts"] = tuple(group for group in GROUPS if group in contacts)
     try:
         links = min(_tail_links(values), MOST_LINKS)
-        values["parameters"] = resolve_parameters(values["parameters"], links, kind)
+        values["parameters"] = resolve_parameters(values["parameters"], links, kind, contacts)
     except SceneError as error:
         problems += error.problems
     if not problems and values["real"] == "float":
@@ -214,18 +199,32 @@ def parse_scene(table: Mapping[str, Any], name: str) -> Scene:
     return Scene(**{field.name: values[field.name] for field in fields(Scene)})
 
 
-def parameters_of(kind: str) -> tuple[Parameter, ...]:
-    """Return the parameters that a kind of tail has."""
+def _usual_functions(values: Mapping[str, Any], contacts: Collection[str], chosen: bool) -> Any:
+    """Return the functions that a scene means by "all", or by not choosing any."""
+    touching = TOUCHING if contacts else ()
+    if values["functions"] == "all":
+        return tuple(name for name in ALL if name not in TOUCHING or contacts)
+    if chosen:
+        return values["functions"]
+    polar = values["coordinates"] == "polar"
+    return (*(name for name in FUNCTIONS if not (polar and name in DERIVATIVES)), *touching)
+
+
+def parameters_of(kind: str, contacts: Collection[str] = ()) -> tuple[Parameter, ...]:
+    """Return the parameters that a kind of tail has, with those of its contacts."""
     foreign = {name for other, only in ONLY.items() if other != kind for name in only.parameters}
-    return tuple(parameter for parameter in PARAMETERS if parameter.name not in foreign)
+    present = {"", *contacts, *(["contacts"] if contacts else [])}
+    return tuple(p for p in PARAMETERS if p.name not in foreign and p.needs in present)
 
 
-def resolve_parameters(given: Mapping[str, Any], tail_links: int, kind: str = "articulated") -> Parameters:
+def resolve_parameters(
+    given: Mapping[str, Any], tail_links: int, kind: str = "articulated", contacts: Collection[str] = ()
+) -> Parameters:
     """Check the given parameters and fill in the others, for N = m n links; raises SceneError."""
     if not isinstance(given, Mapping):
         raise SceneError([Problem("parameters", given, "needs to be a table, under a line [parameters]")])
     unused = "link_radius" if "link_inertia" in given else "link_inertia"
-    values = {p.name: p.default for p in parameters_of(kind) if p.name != unused} | dict(given)
+    values = {p.name: p.default for p in parameters_of(kind, contacts) if p.name != unused} | dict(given)
     problems = _unknown_keys(given, "parameters.", NAMES)
     if "link_inertia" in given and "link_radius" in given:
         remedy = "given together with link_radius, which it overrides; remove one of the two"
@@ -245,8 +244,9 @@ def scene_to_dict(scene: Scene) -> dict[str, Any]:
     computed = "link_inertia" if "link_radius" in scene.parameters else ""
     given = {name: value for name, value in scene.parameters.items() if name != computed}
     foreign = {key for kind, only in ONLY.items() if kind != scene.kind for key in only.keys}
+    foreign |= set() if scene.contacts else {"contacts", "friction"}
     table = {field.name: getattr(scene, field.name) for field in fields(Scene) if field.name not in foreign}
-    table["functions"] = list(scene.functions)
+    table |= {key: list(table[key]) for key in ("functions", "contacts") if key in table}
     table["parameters"] = {name: _plain(value) for name, value in given.items()}
     return table
 
@@ -321,6 +321,27 @@ def _kind_problems(table: Mapping[str, Any], own: Only) -> list[Problem]:
     return problems
 
 
+def _contact_problems(table: Mapping[str, Any], values: Mapping[str, Any], contacts: Collection[str]) -> list[Problem]:
+    """Return a problem for all that needs contacts which the scene does not have."""
+    problems, given = [], table.get("parameters", {})
+    needs = {p.name: p.needs for p in PARAMETERS if p.needs and p.needs not in contacts}
+    needs = {name: group for name, group in needs.items() if group != "contacts" or not contacts}
+    for name in [name for name in needs if isinstance(given, Mapping) and name in given]:
+        group = "feet" if needs[name] == "contacts" else needs[name]
+        remedy = f'nothing touches the ground by it; add "{group}" to `contacts`, or remove it'
+        problems.append(Problem(f"parameters.{name}", given[name], remedy))
+    if contacts and values["coordinates"] == "polar":
+        remedy = 'polar coordinates have no contacts: use "bend"'
+        problems.append(Problem("contacts", list(contacts), remedy))
+    if contacts:
+        return problems
+    remedy = 'needs points that touch the ground: add contacts = ["feet"]'
+    if "friction" in table:
+        problems.append(Problem("friction", table["friction"], remedy))
+    wanted = values["functions"] if isinstance(values["functions"], list | tuple) else ()
+    return problems + [Problem("functions", name, remedy) for name in wanted if name in TOUCHING]
+
+
 def _derivatives_in(wanted: Any) -> list[str]:
     """Return the derivatives among wanted functions."""
     names = ALL if wanted == "all" else wanted if isinstance(wanted, list | tuple) else ()
@@ -349,7 +370,7 @@ def _function_problems(wanted: Any) -> list[Problem]:
     problems = []
     for i, name in enumerate(wanted):
         if name not in ALL:
-            problems.append(Problem(f"functions[{i}]", name, f"unknown; {_suggest(name, ALL)}"))
+            problems.append(Problem(f"functions[{i}]", name, f"unknown; {suggest(name, ALL)}"))
         elif name in wanted[:i]:
             problems.append(Problem(f"functions[{i}]", name, "listed before; remove one of the two"))
     return problems
@@ -360,29 +381,6 @@ def _unknown_keys(table: Mapping[str, Any], prefix: str, known: Collection[str])
     elsewhere, place = (KEYS, "above") if prefix else (NAMES, "below")
     problems = []
     for key in [key for key in table if key not in known]:
-        hint = f"belongs {place} the line [parameters]" if key in elsewhere else _suggest(key, known)
+        hint = f"belongs {place} the line [parameters]" if key in elsewhere else suggest(key, known)
         problems.append(Problem(f"{prefix}{key}", table[key], f"unknown here; {hint}"))
     return problems
-
-
-def _suggest(word: object, known: Collection[str]) -> str:
-    """Return "did you mean ...?", or all that is known."""
-    text = word[:64].lower() if isinstance(word, str) else ""
-    near = [ALIASES[text]] if ALIASES.get(text) in known else get_close_matches(text, known, 1)
-    return f"did you mean '{near[0]}'?" if near else f"known: {', '.join(known)}"
-
-
-def _show(value: object) -> str:
-    """Return "value ..." as a reader of the file would write it."""
-    if value is None:
-        return "no value"
-    try:
-        return "value " + _one_line(repr(value).lower() if isinstance(value, bool) else repr(value))
-    except (ValueError, RecursionError):  # repr refuses integers of more than 4300 digits
-        return "value too long to show"
-
-
-def _one_line(text: str) -> str:
-    """Return the text on one line of at most 80 characters."""
-    line = text if text.isprintable() else repr(text)
-    return line if len(line) <= 80 else line[:77] + "..."

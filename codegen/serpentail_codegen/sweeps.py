@@ -13,6 +13,7 @@ from .draft import Draft
 from .mechanisms import Mechanism, mechanism_of, motion
 from .program import Array, Index, Ref
 
+Block = Callable[[Index, Index], Ref]  # an entry of H, by the numbers of two tail coordinates
 IDENTITY = (1, 0, 0, 0, 1, 0, 0, 0, 1)
 
 
@@ -108,14 +109,15 @@ def gather_moment(d: Draft) -> None:
     d.step(dyn.torso_moment, **carried)
 
 
-def gather_inertia(d: Draft, roots: dict[str, Array], H_tail: Callable[[Index, Index], Ref], columns: Array) -> None:
+def gather_inertia(d: Draft, roots: dict[str, Array], columns: Array, H_tail: Block | None = None) -> None:
     """Composite inertia in ``mass, h, I`` at B; each segment's momentum columns at B and its own block of H."""
     sizes = {"mass": 1, "h": 3, "I": 6, "pitch": 6, "yaw": 6}
     carried = {name: d.vector(name, size) for name, size in sizes.items()}
     for name in ("mass", "h", "I"):
         d.fill(carried[name], 0)
     with d.loop("i", d.tail.segments, downward=True) as i:
-        own = {"H_pp_": H_tail(2 * i, 2 * i), "H_py_": H_tail(2 * i + 1, 2 * i), "H_yy_": H_tail(2 * i + 1, 2 * i + 1)}
+        places = {"H_pp_": (2 * i, 2 * i), "H_py_": (2 * i + 1, 2 * i), "H_yy_": (2 * i + 1, 2 * i + 1)}
+        own = {name: H_tail(*place) for name, place in places.items()} if H_tail else {}
         for ref in (carried["pitch"], carried["yaw"], *own.values()):
             d.fill(ref, 0)
         with d.loop("j", mechanism(d).pieces(d.tail), downward=True):
@@ -124,31 +126,42 @@ def gather_inertia(d: Draft, roots: dict[str, Array], H_tail: Callable[[Index, I
     d.step(dyn.torso_composite, **{name: carried[name] for name in ("mass", "h", "I")})
 
 
-def forward_roots(d: Draft, here: dict[str, Ref]) -> tuple[dict[str, Array], Array]:
+def segment_columns(d: Draft) -> Array:
+    """Declare the spatial columns of all segments but the last."""
+    return d.array("S", 12, max(d.tail.segments - 1, 1))
+
+
+def forward_roots(d: Draft, here: dict[str, Ref], roots: dict[str, Array], S: Array | None = None) -> None:
     """Pose of every segment's root, and spatial columns of all segments but the last, from pose ``R, P`` on."""
     last = d.tail.segments - 1
-    roots = {"R": d.array("R_root", 9, last + 1), "P": d.array("P_root", 3, last + 1)}
-    S = d.array("S", 12, max(last, 1))
     with d.loop("i", last) as i:
         for name, ref in here.items():
             d.copy(roots[name][i], ref)
-        d.fill(S[i], 0)
+        if S:
+            d.fill(S[i], 0)
         with d.loop("j", mechanism(d).pieces(d.tail)):
-            d.step(mechanism(d).twist, here | d.piece(i), S_=S[i])
+            if S:
+                d.step(mechanism(d).twist, here | d.piece(i), S_=S[i])
             d.step(mechanism(d).pose, here | d.piece(i), **here)
     for name, ref in here.items():
         d.copy(roots[name][last], ref)
-    return roots, S
 
 
-def tail_inertia(d: Draft, H_tail: Callable[[Index, Index], Ref], columns: Array, world: bool = False) -> Array:
+def segment_roots(d: Draft) -> dict[str, Array]:
+    """Declare the pose of every segment's root."""
+    return {"R": d.array("R_root", 9, d.tail.segments), "P": d.array("P_root", 3, d.tail.segments)}
+
+
+def tail_inertia(d: Draft, H_tail: Block, columns: Array, world: bool = False) -> Array:
     """All that H is made of (Eqs. 2, 16, 18): ``mass, h, I`` at B, momentum columns, H of the tail (lower triangle).
 
     In torso axes, or with ``world`` the columns in world axes.
     """
     mechanism(d).prepare(d, True)
-    roots, S = forward_roots(d, torso_pose(d, world))
-    gather_inertia(d, roots, H_tail, columns)
+    here = torso_pose(d, world)
+    roots, S = segment_roots(d), segment_columns(d)
+    forward_roots(d, here, roots, S)
+    gather_inertia(d, roots, columns, H_tail)
     with d.loop("i", d.tail.segments, start=1) as i, d.loop("l", i) as segment:
         block = {"H_pitch": H_tail(2 * i, 2 * segment, 2), "H_yaw": H_tail(2 * i + 1, 2 * segment, 2)}
         d.step(dyn.segment_coupling, {"S": S[segment], "columns": columns.part(12 * i, 12)}, **block)

@@ -6,6 +6,7 @@ from fractions import Fraction
 Number = int | float | Fraction
 UNARY = ("neg", "sin", "cos", "sqrt")
 BINARY = ("add", "sub", "mul", "div")
+TERNARY = ("select",)
 LEAVES = ("input", "const", "unit")
 
 
@@ -20,7 +21,7 @@ def operands(node: tuple) -> tuple[int, ...]:
 class Tape:
     """An append-only list of operations; a node is its position in the list.
 
-    The methods are an algebra on nodes: whatever computes with ``add, sub, mul, div, neg, sin, cos, sqrt`` and
+    The methods are an algebra on nodes: whatever computes with ``add, sub, mul, div, neg, sin, cos, sqrt, select`` and
     ``const`` can be recorded here.  Rules: constants fold, 0 and 1 vanish, negation moves outward, operands of
     commutative operations are ordered by node.  Nothing is re-associated or distributed, so rounding is kept.
 
@@ -157,6 +158,25 @@ class Tape:
         """Return the square root of a."""
         return a if self.value(a) in (0, 1) else self._node("sqrt", a)
 
+    def select(self, c: int, a: int, b: int) -> int:
+        """Return a where c > 0, else b; a sign of both moves outward."""
+        known = self.value(c)
+        if known is not None or a == b:
+            return a if known is None or known > 0 else b
+        minus_a, minus_b = self._negated(a), self._negated(b)
+        if minus_a is not None and minus_b is not None:
+            return self.neg(self.select(c, minus_a, minus_b))
+        return self._node("select", c, a, b)
+
+    def decide(self, c: int) -> bool | None:
+        """Tell if c > 0, or None where that is not known."""
+        known = self.value(c)
+        return None if known is None else known > 0
+
+    def max(self, a: int, b: int) -> int:
+        """Return the larger of a and b."""
+        return self.select(self.sub(a, b), a, b)
+
 
 def lanes_of(node: tuple, lanes, inputs=()) -> int:
     """Return how many lanes a node has, 0 if it is narrow, from those of earlier nodes and of the inputs."""
@@ -166,6 +186,8 @@ def lanes_of(node: tuple, lanes, inputs=()) -> int:
     if op == "lane":
         return 0
     widths = {lanes[a] for a in args} - {0}
+    if widths and op in TERNARY:
+        raise ValueError(f"{op} takes no rows")
     if len(widths) > 1:
         raise ValueError(f"{op} joins rows of {sorted(widths)} lanes")
     return max(widths, default=0)

@@ -159,16 +159,21 @@ class Kernel:
                 where = f"[{', '.join(map(str, bad[0]))}]{state}"
                 value = array[index][tuple(bad[0])]
                 raise StateError(f"{self.name}: {name}{where} is {value}: give finite numbers")
-        q, limits = arrays[0][index].astype(float), np.finfo(self.dtype)
-        norm = math.hypot(*q[3:7])
-        if not limits.tiny <= norm * norm <= limits.max:
-            words = f"has norm {norm:.3g}" if norm else "is zero"
-            raise StateError(f"{self.name}: the quaternion q[3:7]{state} {words}: upright is (1, 0, 0, 0)")
+        q = arrays[0][index].astype(float)
+        if self.names[0] == "q":
+            self._check_attitude(q, state)
         if status == OUT_OF_RANGE:
             raise StateError(f"{self.name}: {self._out_of_range(q, state)}")
         indefinite = f"the inertia matrix{state} is not positive definite"
         what = indefinite if status == NOT_POSITIVE_DEFINITE else f"the result{state} is not finite"
         raise StateError(f"{self.name}: {what}: is a value too large, or a parameter unphysical?")
+
+    def _check_attitude(self, q, state: str) -> None:
+        """Refuse a quaternion that gives no attitude."""
+        limits, norm = np.finfo(self.dtype), math.hypot(*q[3:7])
+        if not limits.tiny <= norm * norm <= limits.max:
+            words = f"has norm {norm:.3g}" if norm else "is zero"
+            raise StateError(f"{self.name}: the quaternion q[3:7]{state} {words}: upright is (1, 0, 0, 0)")
 
     def _out_of_range(self, q, state: str) -> str:
         """Say which segment has a bend that the model does not cover, and what to do."""

@@ -56,6 +56,7 @@ class Model:
         pieces = sizes["links"]
         self.links, self.samples = (pieces, None) if self.kind == "articulated" else (None, pieces)
         self.nq, self.nv = sizes["nq"], sizes["nv"]
+        self.contacts = {entry["group"]: entry["count"] for entry in manifest["contacts"]}
         dtype = np.float32 if manifest["real"] == "float" else np.float64
         self.parameter_vector = np.array(flat(manifest, parameters), dtype)
         made = manifest["functions"] if library else ()
@@ -157,6 +158,35 @@ class Model:
     def bias_force_world(self, q, v):
         """C (nv,) for velocities (p_dot, omega in world axes, q_t_dot); the argument v has omega in the body frame."""
         return self.kernel("bias_force_world")(q, v)
+
+    def pfl(self, q, v, accelerations):
+        """tau (2m,) (N m) that gives the tail ``accelerations`` (2m,) (rad/s^2) in flight, Eq. 46."""
+        return self.kernel("pfl")(q, v, accelerations)
+
+    def contact_points(self, q, v, legs=None):
+        """(positions (K, 3) (m), velocities (K, 3) (m/s)), world, of what can touch the ground, Eqs. 5 to 15.
+
+        Their order is that of ``contacts``: A, M and T of the right foot, then of the left; the tail's joints but the
+        mount, and its tip, or samples of its arcs; the torso's lowest point.
+        legs (8,): gamma_1, delta_1 (right), gamma_2, delta_2 (rad), then their rates; only where there are feet.
+        """
+        return self.kernel("contact_points")(*self._with_legs((q, v), legs))
+
+    def contact_dynamics(self, q, v, tau, bristles, legs=None):
+        """(v_dot (nv,), bristle_rates (K, 2) (m/s), forces (K, 3) (N, world)) of Eq. 1 with contact, Eqs. 35 to 37.
+
+        bristles (K, 2): stretch of the points' friction springs (m, world x and y), a part of the state that starts at
+        zero.  legs as in ``contact_points``.
+        """
+        return self.kernel("contact_dynamics")(*self._with_legs((q, v, tau, bristles), legs))
+
+    def _with_legs(self, arrays: tuple, legs) -> tuple:
+        """Return the arguments with the legs' angles, where the model has legs."""
+        if ("feet" in self.contacts) == (legs is not None):
+            return arrays if legs is None else (*arrays, legs)
+        if legs is None:
+            raise StateError(f"{self.name} has feet: give legs, 4 angles (rad) and 4 rates (rad/s)")
+        raise StateError(f'{self.name} has no feet, but legs were given: leave them out, or add "feet" to `contacts`')
 
     def forward_dynamics_derivatives(self, q, v, tau):
         """(dq (nv, nv), dv (nv, nv), dtau (nv, 2m)): exact Jacobians of v_dot of Eq. 1, -H^-1 d(H v_dot + C).

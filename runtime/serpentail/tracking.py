@@ -20,8 +20,8 @@ class Pfl:
     reference: a Reference, a Plan, a Trajectory, or (times (K,) s, tail coordinates (K, 2m) rad); of the last three a
     cubic spline; after it the last value at rest.  kp (1/s^2), kd (1/s): gains, one number each.  feedforward: use
     q_t_ddot_r, which the paper leaves out.
-    Called with (t, q, v) it returns tau (2m,) in N m: a controller for ``st.simulate``.  Needs inverse_dynamics and
-    mass_matrix of the model.  Raises SimulationError where an argument is wrong.
+    Called with (t, q, v) it returns tau (2m,) in N m: a controller for ``st.simulate``.  Needs pfl of the model, or its
+    inverse_dynamics and mass_matrix.  Raises SimulationError where an argument is wrong.
     """
 
     def __init__(self, model: "Model", reference, kp: float = KP, kd: float = KD, feedforward: bool = True):
@@ -38,13 +38,13 @@ class Pfl:
         return angles, rates, accelerations if self.feedforward else 0 * accelerations
 
     def __call__(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Return tau (2m,), N m.
-
-        X^-1 (S H^-1 C + a), X = S H^-1 [0; I], without inverses: the base's accelerations at tail accelerations a solve
-        its rows of Eq. 1, and inverse dynamics has the torques.
-        """
+        """Return tau (2m,), N m: X^-1 (S H^-1 C + a), X = S H^-1 [0; I]."""
         angles, rates, accelerations = self.reference(t)
         wanted = accelerations + self.kd * (rates - v[6:]) + self.kp * (angles - q[7:])
+        return self.model.pfl(q, v, wanted) if "pfl" in self.model.kernels else self._eliminated(q, v, wanted)
+
+    def _eliminated(self, q: np.ndarray, v: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+        """The same of H and C: the base's accelerations solve its rows of Eq. 1, inverse dynamics has the torques."""
         v_dot = np.concatenate([np.zeros(6), wanted])
         H, force = self.model.mass_matrix(q), self.model.inverse_dynamics(q, v, v_dot)
         base = np.linalg.solve(H[:6, :6], -force[:6])

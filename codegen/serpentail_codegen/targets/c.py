@@ -7,9 +7,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from ..draft import Tail
-from ..functions import Argument, Function, inertial
+from ..functions import Argument, Function, struct_parameters
 from ..functions import program as assemble
-from ..interpret import applied
+from ..interpret import applied, branches
 from ..program import Program
 from ..scene import Scene
 from ..tape import operation_count
@@ -38,10 +38,10 @@ class Emitted:
 
 
 def emit(scene: Scene, tail: Tail, function: Function) -> Emitted:
-    """Print one function in the form that the scene asks for; ``auto`` is straight while that is small."""
+    """Print one function in the form that the scene asks for; ``auto`` is straight while that is small, unbranched."""
     program = assemble(function, tail)
     fixed = baked_values(scene)
-    small = scene.emission == "auto" and applied(program) <= STRAIGHT_UP_TO
+    small = scene.emission == "auto" and applied(program) <= STRAIGHT_UP_TO and not branches(program)
     if small or scene.emission == "straight":
         return Emitted(function, straight_line(program, scene.real, scene.name, fixed), "straight")
     return Emitted(function, in_loops(program, scene.real, scene.name, fixed), "loops")
@@ -49,7 +49,7 @@ def emit(scene: Scene, tail: Tail, function: Function) -> Emitted:
 
 def baked_values(scene: Scene) -> dict[str, list]:
     """Return the parameters to fold into the code."""
-    return {p.name: values(scene, p.name) for p in inertial(scene.kind)} if scene.baked else {}
+    return {p.name: values(scene, p.name) for p in struct_parameters(scene)} if scene.baked else {}
 
 
 def values(scene: Scene, name: str) -> list[float]:
@@ -98,7 +98,7 @@ def wrapped(head: str, arguments: list[str]) -> str:
 def parameter_views(scene: Scene) -> list[dict]:
     """Return the fields of the parameter struct."""
     literal = dialect(scene.real).literal
-    fields = inertial(scene.kind)
+    fields = struct_parameters(scene)
     return [
         {
             "name": p.name,
@@ -168,7 +168,7 @@ def offered(scene: Scene, views: list["FunctionView"]) -> Has:
 
 def abi_hash(scene: Scene, views: list[FunctionView]) -> str:
     """Digest of what a caller relies on: symbols, argument sizes, workspace, the parameter struct."""
-    interface = [scene.name, scene.real, [[p.name, p.size] for p in inertial(scene.kind)]]
+    interface = [scene.name, scene.real, [[p.name, p.size] for p in struct_parameters(scene)]]
     interface += [[f.name, [[a.name, a.length] for a in (*f.inputs, *f.outputs)], f.work] for f in views]
     if "rollout" in scene.functions:
         interface += layouts(offered(scene, views)).items()
@@ -201,9 +201,11 @@ def c_context(scene: Scene, tail: Tail, emitted: list[Emitted], version: str) ->
             "content_hash": "",
             "abi_hash": abi_hash(scene, views),
             "tail": tail,
+            "factors": next((a.length for f in views for a in f.outputs if a.name == "factors"), 0),
+            "groups": ", ".join(f"{count} of the {name}" for name, count in tail.groups.items()),
             "baked": scene.baked,
             "parameters": parameter_views(scene),
-            "parameter_count": sum(p.size for p in inertial(scene.kind)),
+            "parameter_count": sum(p.size for p in struct_parameters(scene)),
             "functions": views,
             "most_arrays": max(len(f.inputs) + len(f.outputs) for f in views),
             "works": [{"name": name, "work": work} for name, work in works.items()],

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from ..interpret import executed, unroll
-from ..program import Apply, Array, Call, Copy, Factor, Fill, Guard, Loop, Program, Ref, Solve, Unit, padded
+from ..program import Apply, Array, Call, Copy, Factor, Fill, Guard, Loop, Program, Ref, Solve, Unit, When, padded
 from ..tape import BINARY, Step
 from .scalars import EARLY, LATE, Dialect, Scalars, index_text
 
@@ -53,7 +53,7 @@ def dialect(real: str, prefix: str = "") -> Dialect:
     sincos = f"real {{sine}}, {{cosine}}; {prefix}_sincos({{argument}}, &{{sine}}, &{{cosine}});"
     functions = {"sqrt": "sqrt" + suffix}
     row, load = "const lanes {name} = {text};", "LOAD({address} + c)"
-    return Dialect("const real {name} = {text};", suffix, functions, sincos, row, load)
+    return Dialect("const real {name} = {text};", suffix, functions, sincos=sincos, row=row, load=load)
 
 
 def offset_text(ref: Ref) -> str:
@@ -224,6 +224,10 @@ class LoopPrinter:
             head = f"for (int {var} = {index_text(loop.stop + -1)}; {var} >= {start}; --{var}) {{"
         return [head, *("  " + line for line in self._body(loop.body)), "}"]
 
+    def _when(self, when: When) -> list[str]:
+        head = f"if ({scalar(self._ref(when.scalar), 0)} > {self.dialect.literal(0)}) {{"
+        return [head, *("  " + line for line in self._body(when.body)), "}"]
+
     def _fill(self, fill: Fill) -> list[str]:
         target = self._ref(fill.target)
         if target.lanes:
@@ -286,6 +290,9 @@ class LoopPrinter:
     def _apply(self, call: Apply) -> list[str]:
         outputs = list(zip(call.step.outputs, map(self._ref, call.writes), call.adds, strict=True))
         routine, lanes = self._routine(call)
+        apart = [name for name, ref in call.inputs().items() if ref.stride > 1]
+        if apart:
+            raise ValueError(f"{call.step.name} reads {apart[0]} from places apart, which a pointer cannot show")
         arguments = [pointer(self._ref(ref)) for ref in call.reads]
         before, after = [], []
         for (name, size), target, adds in outputs:

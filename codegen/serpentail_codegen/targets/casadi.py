@@ -4,15 +4,15 @@ import re
 
 from ..compose import expanded
 from ..draft import Tail
-from ..functions import inertial
 from ..functions import program as assemble
+from ..functions import struct_parameters
 from ..program import Apply, Copy, Factor, Fill, Guard, Loop, Program, Ref, Solve
 from ..scene import Scene
 from ..tape import Step
 from ..templating import render
 from .scalars import Dialect, Scalars, index_text
 
-PYTHON = Dialect("{name} = {text}", "", {"sin": "sin", "cos": "cos", "sqrt": "sqrt"})
+PYTHON = Dialect("{name} = {text}", "", {"sin": "sin", "cos": "cos", "sqrt": "sqrt"}, "if_else({c} > {zero}, {a}, {b})")
 
 
 def slice_text(ref: Ref) -> str:
@@ -111,6 +111,7 @@ def casadi_module(scene: Scene, tail: Tail, functions, version: str, content_has
             }
         )
         steps |= printer.steps
-    sizes = {p.name: p.size for p in inertial(scene.kind)}
+    sizes = {p.name: p.size for p in struct_parameters(scene)}
     data = {"scene": scene, "version": version, "content_hash": content_hash, "functions": views, "sizes": sizes}
-    return render("casadi.py.jinja", data | {"steps": [step_view(s) for s in steps.values()]})
+    selects = any(op == "select" for s in steps.values() for op, *_ in s.nodes)
+    return render("casadi.py.jinja", data | {"steps": [step_view(s) for s in steps.values()], "selects": selects})

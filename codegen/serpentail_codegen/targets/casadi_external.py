@@ -10,7 +10,7 @@ from functools import partial
 
 from ..catalogue import CATALOGUE
 from ..draft import Tail
-from ..functions import inertial
+from ..functions import struct_parameters
 from ..scene import Scene
 
 VECTOR = 8  # doubles in a cache line
@@ -73,7 +73,7 @@ class External:
 
     def call(self, name: str, *arguments: str) -> None:
         """Call a function of the model."""
-        function = CATALOGUE[name]
+        function = CATALOGUE[name].of(self.tail)
         for a, given in zip((*function.inputs, *function.outputs), arguments, strict=True):
             self.arrays.setdefault(given, a.length(self.tail))
         self.inner_work = max(self.inner_work, self.works[name])
@@ -110,7 +110,8 @@ class External:
 
 def plain(start, name: str, sizes: dict[str, int]) -> External:
     """Return a function of the model with dense ports."""
-    function, e = CATALOGUE[name], start(name, "")
+    e = start(name, "")
+    function = CATALOGUE[name].of(e.tail)
     names = [a.name for a in (*function.inputs, *function.outputs)]
     e.call(name, *names)
     fixed = any(f.name == name and f.has(e.works, "jac_") and not f.by_parameters(e.works) for f in DYNAMICS)
@@ -304,7 +305,7 @@ def hessian(e: External, f: Dynamics, sizes: dict[str, int]) -> None:
 def externals(scene: Scene, tail: Tail, works: dict[str, int]) -> list[External]:
     """Return every function that CasADi can call, derivatives after the function that they belong to."""
     sizes = {"q": tail.nq, "v": tail.nv, "v_dot": tail.nv, "force": tail.nv, "tau": tail.nt}
-    sizes["parameters"] = sum(p.size for p in inertial(scene.kind))
+    sizes["parameters"] = sum(p.size for p in struct_parameters(scene))
 
     def start(name: str, kind: str) -> External:
         symbol, doc = f"{kind}{scene.name}_casadi_{name}", f"{kind}{name}"

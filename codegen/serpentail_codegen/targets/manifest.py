@@ -26,7 +26,8 @@ def manifest(scene: Scene, context: dict, emitted: list) -> dict:
         "dimensions": {
             name: getattr(context["tail"], name) for name in ("segments", "links", "total", "nq", "nv", "nt")
         },
-        "parameters": [parameter_entry(scene, p) for p in parameters_of(scene.kind)],
+        "contacts": [{"group": name, "count": count} for name, count in context["tail"].groups.items()],
+        "parameters": [parameter_entry(scene, p) for p in parameters_of(scene.kind, scene.contacts)],
         "functions": {e.function.name: function_entry(e, context["tail"]) for e in emitted},
         "work": work,
         **simulation,

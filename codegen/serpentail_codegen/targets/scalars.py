@@ -24,6 +24,7 @@ class Dialect:
     definition: str
     suffix: str
     functions: dict[str, str]
+    select: str = "{c} > {zero} ? {a} : {b}"
     sincos: str = ""  # defines sine and cosine of one argument at once; empty: by two functions
     row: str = ""  # defines a row of lanes
     load: str = ""  # the lanes at an address that are in turn
@@ -111,6 +112,9 @@ class Scalars:
             return f"{self._operand(args[0], op)} {SYMBOL[op]} {self._operand(args[1], op)}"
         if op == "neg":
             return f"-{self._operand(args[0], op)}"
+        if op == "select":
+            c, a, b = (self.text[n] for n in args)
+            return self.dialect.select.format(c=c, a=a, b=b, zero=self.dialect.literal(0))
         if op == "lane":
             return f"work[{self.stored[args[0]] + args[1]}]"
         return self._leaf(op, args) if op in LEAVES else f"{self.dialect.functions[op]}({self.text[args[0]]})"

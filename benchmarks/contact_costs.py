@@ -1,0 +1,143 @@
+"""What contact costs: operation counts, bytes of C and nanoseconds of a flight, a stance and a tail contact.
+
+Times are processor time of single calls from C, the least of many rounds over the same states, functions in turn.
+"""
+
+import json
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from serpentail_codegen.pipeline import generate
+from serpentail_codegen.scene import scene_for
+
+SCENES = {"flight": (), "stance": ("feet",), "tail": ("feet", "tail")}
+SIZES = ((1, 3), (3, 4), (3, None))
+FLIGHT = ("forward_dynamics", "pfl", "implicit")
+TOUCHING = ("contact_points", "contact_dynamics")
+FLAGS = "-std=c99 -O2 -ffp-contract=fast -fno-tree-vectorize -fno-math-errno -fno-trapping-math -march=native".split()
+STATES, ROUNDS = 64, 300
+STANDING = [0, 0, 0.0225, 1, 0.1, 0, 0]  # as a rat stands: half of its foot points in the ground
+LEGS = [3.665, -0.2618, 3.665, -0.2618, 0, 0, 0, 0]
+DRIVER = """#include <stdio.h>
+#include <stdlib.h>
+#include <time.h>
+#include "{name}.h"
+static double read_reals(FILE *file, double *to, long count)
+{{
+  return fread(to, sizeof *to, (size_t)count, file) == (size_t)count ? 0.0 : 1.0;
+}}
+int main(int argc, char **argv)
+{{
+  {name}_parameters parameters;
+  {name}_default_parameters(&parameters);
+  double best[{functions}], *work = calloc({work}, sizeof *work);
+  FILE *file = fopen(argv[argc - 1], "rb");
+{declarations}
+  for (int f = 0; f < {functions}; ++f) best[f] = 1e9;
+  for (int round = 0; round < {rounds}; ++round) {{
+    clock_t start;
+{calls}
+  }}
+  for (int f = 0; f < {functions}; ++f) printf("%g\\n", best[f]);
+  return 0;
+}}
+"""
+
+
+def made(parent: Path, size: tuple, contacts: tuple[str, ...]) -> Path:
+    """Generate one scene of a tail."""
+    segments, links = size
+    functions = [*FLIGHT, *(TOUCHING if contacts else ())]
+    options = {"contacts": list(contacts)} if contacts else {}
+    scene = scene_for("articulated" if links else "continuum", segments, links, functions=functions, **options)
+    generate(scene, parent / "_".join(("scene", *contacts)))
+    return parent / "_".join(("scene", *contacts)) / scene.name
+
+
+def inputs(manifest: dict) -> dict[str, np.ndarray]:
+    """States near standing, rates small, and right-hand sides, by argument."""
+    rng, sizes = np.random.default_rng(1), manifest["dimensions"]
+    points = sum(entry["count"] for entry in manifest["contacts"])
+    shapes = {"v": sizes["nv"], "tau": sizes["nt"], "accelerations": sizes["nt"], "bristles": 2 * points}
+    shapes |= {"r_q": sizes["nv"], "r_v": sizes["nv"], "r_u": 2 * points}
+    given = {name: rng.normal(0, 1e-3, (STATES, size)) for name, size in shapes.items()}
+    tail = rng.normal(0, 0.2, (STATES, sizes["nt"]))
+    given |= {"q": np.hstack([np.tile(STANDING, (STATES, 1)), tail]), "legs": np.tile(LEGS, (STATES, 1))}
+    given |= {"damping": np.full((STATES, sizes["nt"]), 1e-3), "gains": np.zeros((STATES, 2))}
+    return given | {"weight": np.full((STATES, 1), 1e-4)}
+
+
+def driver(manifest: dict, given: dict[str, np.ndarray]) -> tuple[str, list[np.ndarray]]:
+    """C that times every function, and the arrays that it reads in order."""
+    lines, calls, data = [], [], []
+    for number, (name, entry) in enumerate(manifest["functions"].items()):
+        arguments = []
+        for a in (*entry["inputs"], *entry["outputs"]):
+            length = int(np.prod(a["shape"]))
+            variable = a["name"] if a["name"] == "factors" else f"{name}_{a['name']}"
+            if a["name"] == "factors" and a in entry["inputs"]:  # as factored before, of each state
+                arguments.append(f"factors + k * {length}")
+                continue
+            lines.append(f"  double *{variable} = calloc({STATES * length}, sizeof(double));")
+            arguments.append(f"{variable} + k * {length}")
+            if a in entry["inputs"]:
+                lines.append(f"  if (read_reals(file, {variable}, {STATES * length}) > 0.0) return 2;")
+                data.append(given[a["name"]])
+        call = f"{manifest['prefix']}_{name}(&parameters, {', '.join(arguments)}, work)"
+        calls += [
+            "    start = clock();",
+            f"    for (int repeat = 0; repeat < 8; ++repeat) for (long k = 0; k < {STATES}; ++k) if ({call}) return 1;",
+            f"    const double t{number} = (double)(clock() - start) / CLOCKS_PER_SEC / {8 * STATES};",
+            f"    if (t{number} < best[{number}]) best[{number}] = t{number};",
+        ]
+    text = DRIVER.format(
+        name=manifest["prefix"],
+        functions=len(manifest["functions"]),
+        work=max(manifest["work"].values()) + 1,
+        declarations="\n".join(lines),
+        rounds=ROUNDS,
+        calls="\n".join(calls),
+    )
+    return text, data
+
+
+def timed(folder: Path) -> dict[str, float]:
+    """Nanoseconds of one call of each function."""
+    manifest = json.loads((folder / "manifest.json").read_text())
+    text, data = driver(manifest, inputs(manifest))
+    (folder / "driver.c").write_text(text)
+    np.concatenate([array.ravel() for array in data]).tofile(folder / "states.bin")
+    sources = [folder / "driver.c", folder / "src" / f"{manifest['prefix']}.c"]
+    subprocess.run(["cc", *FLAGS, "-I", folder / "include", *sources, "-o", folder / "driver", "-lm"], check=True)
+    printed = subprocess.run([folder / "driver", folder / "states.bin"], check=True, capture_output=True, text=True)
+    return dict(zip(manifest["functions"], (1e9 * float(t) for t in printed.stdout.split()), strict=True))
+
+
+def measured(parent: Path, size: tuple, scene: str) -> dict:
+    """Operations and nanoseconds of each function of a scene, and the bytes of its C."""
+    folder = made(parent, size, SCENES[scene])
+    manifest = json.loads((folder / "manifest.json").read_text())
+    operations = {name: entry["operations"] for name, entry in manifest["functions"].items()}
+    size_c = (folder / "src" / f"{manifest['prefix']}.c").stat().st_size
+    return {"model": folder.name, "scene": scene, "bytes": size_c, "operations": operations, "ns": timed(folder)}
+
+
+def main() -> int:
+    """Print a table row for every function of every scene."""
+    print("| model | scene | C, kB | function | operations | ns |\n|---|---|---|---|---|---|")
+    with tempfile.TemporaryDirectory() as parent:
+        for size in SIZES:
+            for scene in SCENES:
+                found = measured(Path(parent), size, scene)
+                head = f"| {found['model']} | {scene} | {found['bytes'] / 1000:.0f} |"
+                for name, count in found["operations"].items():
+                    print(f"{head} {name} | {count} | {found['ns'][name]:.0f} |", flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,117 @@
+"""Contact with the ground: SymPy vectors of one point in, its motion, force and bristle rate out (Sect. 2.4).
+
+Points are given by ``arm``, from B in world axes, and ``velocity``, in the world.  The ground is z = 0.  A bristle is
+what the friction spring of a point is stretched by, in the world's x and y.
+"""
+
+from sympy import Matrix, Max, Piecewise, sqrt
+
+from .kinematics import square
+
+
+def point_on_torso(let, R, p_dot, omega, place, drift) -> dict:
+    """Arm and velocity of a point at ``place`` in the torso frame, which moves there at ``drift``."""
+    R = square(R)
+    return {"arm": R * place, "velocity": p_dot + R * let("relative", omega.cross(place) + drift)}
+
+
+def lowest_point(let, R, torso_semi_axes) -> dict:
+    """The lowest point of the torso, an ellipsoid about B: place = -D^2 n / |D n|, n = R_b^T z, D its semi-axes."""
+    scaled = let("D_n", torso_semi_axes.multiply_elementwise(square(R).row(2).T))
+    length = let("length", sqrt(let("square", scaled.dot(scaled))))
+    return {"place": -torso_semi_axes.multiply_elementwise(scaled) * let("inverse", 1 / length)}
+
+
+def torso_twist(let, R, p_dot, omega) -> dict:
+    """Angular velocity and velocity at B of the torso, world axes: where the tail's twists start."""
+    return {"turn": square(R) * omega, "slide": p_dot}
+
+
+def carried_twist(let, S, rates) -> dict:
+    """What one joint or bend adds to the twist about B of all beyond."""
+    total = rates[0] * S[0:6, :] + rates[1] * S[6:12, :]
+    return {"turn": total[0:3, :], "slide": total[3:6, :]}
+
+
+def point_on_tail(let, P, turn, slide) -> dict:
+    """Arm and velocity of a point at ``P`` from B of a body with a twist about B."""
+    return {"arm": P, "velocity": slide + turn.cross(P)}
+
+
+def position(let, p, arm) -> dict:
+    """A point in the world."""
+    return {"position": p + arm}
+
+
+def bristle_properties(let, K_f, D_f) -> dict:
+    """Damping D_f K_f of a bristle, and 1 over it."""
+    return {"drag": D_f * K_f[0], "mobility": [let("mobility", 1 / (D_f[0] * K_f[0]))]}
+
+
+def guarded(let, value, positive):
+    """Return a value where something is positive, else 1: what a root or quotient may be taken of."""
+    return let("safe", Piecewise((value, positive > 0), (1, True)))
+
+
+def normal_force(let, K_n, D_n, depth, rate):
+    """max(K_n z^(3/2) + D_n K_n z^(1/2) z_dot, 0) (Eq. 36); the text's z^3/2 is z^(3/2)."""
+    root = let("root", sqrt(guarded(let, depth, depth)))
+    push = let("push", K_n[0] * root * (depth + D_n[0] * rate))
+    return let("f_n", Piecewise((Max(push, 0), depth > 0), (0, True)))
+
+
+def cone(let, trial, limit) -> Matrix:
+    """The trial force, shortened to the limit whatever its direction: Coulomb's law."""
+    length = let("t_t", trial.dot(trial))
+    excess = let("excess", length - limit**2)
+    shorter = let("shorter", limit / let("length", sqrt(guarded(let, length, excess))))
+    return trial * let("scale", Piecewise((shorter, excess > 0), (1, True)))
+
+
+def box(let, trial, limit) -> Matrix:
+    """The trial force, each component clamped to the limit (Eq. 37)."""
+    return trial.applyfunc(lambda t: Piecewise((limit, t > limit), (-limit, t < -limit), (t, True)))
+
+
+def smooth(let, trial, limit) -> Matrix:
+    """A smooth cone, f = t / sqrt(1 + |t|^2 / limit^2): for derivatives."""
+    total = let("total", sqrt(guarded(let, let("sum", limit**2 + trial.dot(trial)), limit)))
+    return trial * let("scale", limit / total)
+
+
+FRICTION = {"cone": cone, "box": box, "smooth": smooth, "paper": box}
+
+
+def bristle_rate(let, K_f, mobility, bristle, sliding, friction: str, depth, force) -> Matrix:
+    """-(f + K_f u) / (D_f K_f): slip while the point sticks, what keeps f while it slides, relaxation in the air.
+
+    ``paper``: slip as long as the point is in the ground, the anchor of Eq. 37 staying where it was.
+    """
+    relaxing = -(force + K_f[0] * bristle) * mobility[0]
+    if friction != "paper":
+        return relaxing
+    return Matrix([Piecewise((sliding[k], depth > 0), (relaxing[k], True)) for k in (0, 1)])
+
+
+def contact_force(let, K_n, D_n, K_f, mu, drag, mobility, p, arm, velocity, bristle, friction: str = "cone") -> dict:
+    """Force of the ground on one point (Eqs. 35 to 37), world axes, and the rate of its bristle.
+
+    The friction spring restores toward the anchor and opposes slip: Eq. 37 lacks that sign.
+    """
+    depth, sliding = let("z", -(p[2] + arm[2])), velocity[0:2, :]
+    f_n = normal_force(let, K_n, D_n, depth, -velocity[2])
+    trial = let("trial", -(K_f[0] * bristle + drag[0] * sliding))
+    force = let("f_t", FRICTION[friction](let, trial, let("limit", mu[0] * f_n)))
+    rate = bristle_rate(let, K_f, mobility, bristle, sliding, friction, depth, force)
+    return {"force": Matrix([force, Matrix([f_n])]), "rate": rate}
+
+
+def load_about_torso(let, arm, force) -> dict:
+    """Force and moment at B of the force on a point, world axes (Eq. 10)."""
+    return {"load": Matrix([force, arm.cross(force)])}
+
+
+def load_in_torso(let, R, load) -> dict:
+    """Force and moment at B in torso axes."""
+    R = square(R).T
+    return {"load_force": R * load[0:3, :], "load_moment": R * load[3:6, :]}

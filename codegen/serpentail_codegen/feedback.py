@@ -1,0 +1,61 @@
+"""Partial feedback linearisation: a draft goes in, the torques that give wanted tail accelerations are added to it."""
+
+from . import dynamics as dyn
+from . import sweeps
+from .draft import Draft
+from .functions import Argument, Function, Q, V
+from .program import Array
+from .sweeps import column_of, mechanism
+
+ACCELERATIONS = Argument("accelerations", lambda t: (t.nt,), "wanted accelerations of the tail coordinates (rad/s^2)")
+TORQUES = Argument("tau", lambda t: (t.nt,), "torques (N m), conjugate to the tail coordinates")
+
+
+def assemble_pfl(d: Draft, arrays: dict[str, Array]) -> None:
+    """Torques of Eq. 46 without X: six rows of Eq. 1 give the torso's accelerations, the others then the torques.
+
+    In flight gravity moves torso and tail alike, and torques depend on neither place nor attitude.
+    """
+    tail, tau = d.tail, arrays["tau"]
+    mechanism(d).prepare(d, True)
+    columns, roots = d.array("columns", 12, tail.segments), sweeps.segment_roots(d)
+    sweeps.forward_roots(d, sweeps.torso_pose(d, world=False), roots)
+    sweeps.gather_inertia(d, roots, columns)
+    tail_alone(d, arrays["accelerations"], tau)
+    free_torso(d)
+    with d.loop("k", tail.nt) as k:
+        d.step(dyn.coupling_torque, {"column": column_of(columns, k)}, torque_=tau.part(k, 1))
+
+
+def tail_alone(d: Draft, accelerations: Array, tau: Array) -> None:
+    """``force, moment`` at B, and torques, of the moving tail while the torso does not accelerate."""
+    v_dot = d.array("v_dot", d.tail.nv)
+    with d.loop("k", d.tail.nt) as k:
+        d.copy(v_dot.part(6 + k, 1), accelerations.part(k, 1))
+    d.known |= {"w": d.known["omega"], "w_dot": d.zero(3), "a": d.zero(3)}
+    wrench = sweeps.forward_wrenches(d, v_dot)
+    sweeps.gather_wrenches(d, wrench, lambda i: tau.part(2 * i, 2))
+    d.store(dyn.torso_wrench, force=3, moment=3)
+
+
+def free_torso(d: Draft) -> None:
+    """``w_dot`` and ``a`` of the torso that balance ``force, moment``: translation eliminated, then LDL^T."""
+    A, w_dot = d.array("A", 9), d.vector("w_dot", 3)
+    d.known |= dict.fromkeys(["load_force", "load_moment"], d.zero(3))
+    rows = {f"A_{r}": A.part(3 * r, r + 1) for r in range(3)}
+    d.step(dyn.without_translation, inverse_mass=d.vector("inverse_mass", 1), com=d.vector("com", 3), **rows)
+    d.step(dyn.rotational_load, net=d.vector("net", 3), rhs=w_dot)
+    d.factor(A, 3)
+    d.solve(A, w_dot)
+    d.store(dyn.free_acceleration, a=3)
+
+
+FEEDBACK = {
+    "pfl": Function(
+        "pfl",
+        "torques in flight that give the tail wanted accelerations, Eq. 46",
+        (Q, V, ACCELERATIONS),
+        (TORQUES,),
+        assemble_pfl,
+    )
+}

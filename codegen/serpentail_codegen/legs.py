@@ -1,0 +1,28 @@
+"""The legs: SymPy vectors in, places and velocities of the foot's three points in torso axes out (Sect. 2.1).
+
+A leg moves in a plane parallel to the torso's y and z axes; two angles, gamma and delta, place all its points.
+"""
+
+from sympy import Matrix, cos, sin
+
+
+def direction(let, angle, rate) -> tuple[Matrix, Matrix]:
+    """u_h of Eq. 9 and its rate."""
+    c, s = let("c", cos(angle)), let("s", sin(angle))
+    return Matrix([0, c, s]), let("u_dot", Matrix([0, -s * rate, c * rate]))
+
+
+def foot_points(let, hip, side, L_h2d, L_d2k, L_k2a, L_a2m, L_m2t, delta_m, leg, leg_rates) -> dict:
+    """A, M and T from B, and their rates in B (Eqs. 5 to 9); ``side`` is 1 on the right, -1 on the left.
+
+    The sole keeps the angle delta_m to the thigh: Eq. 8's gamma - delta is gamma - delta_m.
+    """
+    upper, upper_rate = direction(let, leg[0], leg_rates[0])
+    lower, lower_rate = direction(let, leg[1], leg_rates[1])
+    sole, sole_rate = direction(let, let("sole", leg[0] - delta_m[0]), leg_rates[0])
+    thigh = let("thigh", L_h2d[0] + L_k2a[0])
+    ankle = let("A", Matrix([side[0] * hip[0], hip[1], hip[2]]) + thigh * upper + L_d2k[0] * lower)
+    ankle_rate = let("A_dot", thigh * upper_rate + L_d2k[0] * lower_rate)
+    middle, middle_rate = let("M", ankle + L_a2m[0] * lower), let("M_dot", ankle_rate + L_a2m[0] * lower_rate)
+    toe, toe_rate = middle - L_m2t[0] * sole, middle_rate - L_m2t[0] * sole_rate
+    return {"foot": Matrix([ankle, middle, toe]), "foot_rate": Matrix([ankle_rate, middle_rate, toe_rate])}

@@ -1,0 +1,62 @@
+"""What is wrong with a scene: fields, values and remedies go in; an error with one line for each comes out."""
+
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass
+from difflib import get_close_matches
+
+# Names used elsewhere for the same things: suggested, never accepted.
+ALIASES = {
+    "crba": "mass_matrix",
+    "nle": "bias_force",
+    "rnea": "inverse_dynamics",
+    "aba": "forward_dynamics",
+    "m": "segments",
+    "n": "links",
+    "tail": "kind",
+}
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One thing that is wrong with a scene: where, the value found (None: nothing), and what to do."""
+
+    field: str
+    value: object
+    remedy: str
+
+    def __str__(self) -> str:
+        return f"{one_line(self.field)}: {show(self.value)}: {self.remedy}"
+
+
+class SceneError(ValueError):
+    """A scene that cannot be used; `problems` has all that is wrong with it, str() one line for each."""
+
+    def __init__(self, problems: Iterable[Problem]) -> None:
+        self.problems = tuple(problems)
+        super().__init__(self.problems)
+
+    def __str__(self) -> str:
+        return "\n".join(map(str, self.problems))
+
+
+def suggest(word: object, known: Collection[str]) -> str:
+    """Return "did you mean ...?", or all that is known."""
+    text = word[:64].lower() if isinstance(word, str) else ""
+    near = [ALIASES[text]] if ALIASES.get(text) in known else get_close_matches(text, known, 1)
+    return f"did you mean '{near[0]}'?" if near else f"known: {', '.join(known)}"
+
+
+def show(value: object) -> str:
+    """Return "value ..." as a reader of the file would write it."""
+    if value is None:
+        return "no value"
+    try:
+        return "value " + one_line(repr(value).lower() if isinstance(value, bool) else repr(value))
+    except (ValueError, RecursionError):  # repr refuses integers of more than 4300 digits
+        return "value too long to show"
+
+
+def one_line(text: str) -> str:
+    """Return the text on one line of at most 80 characters."""
+    line = text if text.isprintable() else repr(text)
+    return line if len(line) <= 80 else line[:77] + "..."

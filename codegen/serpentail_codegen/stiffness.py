@@ -1,0 +1,200 @@
+"""Contact linearised for implicit integrators: SymPy vectors of one point in, its stiffness and responses out.
+
+A W-method solves with 1 - w J, J from contact, damping and gains alone.  Of one point that moves by dx and dv,
+friction changes by -P (K_f du + D_f K_f dv), the normal force by -k_n dx - d_n dv, and the bristle's rate by P dv -
+(1 - P) du / D_f (by dv with ``paper``): P, symmetric, is how friction follows the trial force.  With the bristle
+eliminated, ``spring`` holds all that factoring and solving need: w k_n and a = w (d_n + w k_n), then (xx, xy, yy) of B
+and C, w times the force for a velocity and for a bristle's right-hand side, and of M and N, the bristle for its
+right-hand side and for a velocity.
+"""
+
+from sympy import Matrix, Piecewise, eye, sqrt
+
+from .contact import guarded, normal_force
+from .kinematics import X, Y, Z, square
+
+
+def plane(entries) -> Matrix:
+    """The symmetric 2 x 2 matrix of (xx, xy, yy)."""
+    xx, xy, yy = entries
+    return Matrix([[xx, xy], [xy, yy]])
+
+
+def plane_entries(matrix) -> list:
+    """(xx, xy, yy) of a symmetric 2 x 2 matrix."""
+    return [matrix[0, 0], matrix[0, 1], matrix[1, 1]]
+
+
+def normal_slopes(let, K_n, D_n, depth, rate, f_n) -> tuple:
+    """d|f_n|/dz and d|f_n|/dz_dot of Eq. 36, 0 where nothing presses."""
+    root = let("root", sqrt(guarded(let, depth, depth)))
+    stiffness = let("k", K_n[0] * (root * 3 / 2 + D_n[0] * rate / (2 * root)))
+    damping = let("d", K_n[0] * D_n[0] * root)
+    return tuple(let("slope", Piecewise((value, f_n > 0), (0, True))) for value in (stiffness, damping))
+
+
+def cone_slope(let, trial, limit) -> Matrix:
+    """P of a cone: 1 while the point sticks, else across the force only."""
+    length = let("t_t", trial.dot(trial))
+    excess = let("excess", length - limit**2)
+    safe = guarded(let, length, excess)
+    along = let("along", trial * trial.T / safe)
+    sliding = let("sliding", let("ratio", limit / let("length", sqrt(safe))) * (eye(2) - along))
+    return sliding.applyfunc(lambda e: Piecewise((e, excess > 0), (0, True))) + eye(2) * Piecewise(
+        (0, excess > 0), (1, True)
+    )
+
+
+def box_slope(let, trial, limit) -> Matrix:
+    """P of a box: 1 along an axis that sticks, else 0."""
+    return Matrix.diag(*(Piecewise((1, let("room", limit**2 - t * t) > 0), (0, True)) for t in trial))
+
+
+def smooth_slope(let, trial, limit) -> Matrix:
+    """P of a smooth cone."""
+    total = guarded(let, let("sum", limit**2 + trial.dot(trial)), limit)
+    return let("ratio", limit / let("length", sqrt(total))) * (eye(2) - let("along", trial * trial.T / total))
+
+
+SLOPE = {"cone": cone_slope, "box": box_slope, "smooth": smooth_slope, "paper": box_slope}
+
+
+def linearised_contact(
+    let, K_n, D_n, K_f, D_f, mu, drag, weight, p, arm, velocity, bristle, friction: str = "cone"
+) -> dict:
+    """``spring`` of a point in the ground (Eqs. 35 to 37); how friction's bound moves with the load is left out."""
+    w, depth, rate = weight[0], let("z", -(p[2] + arm[2])), -velocity[2]
+    f_n = normal_force(let, K_n, D_n, depth, rate)
+    k_n, d_n = normal_slopes(let, K_n, D_n, depth, rate, f_n)
+    trial = let("trial", -(K_f[0] * bristle + drag[0] * velocity[0:2, :]))
+    P = SLOPE[friction](let, trial, let("limit", mu[0] * f_n))
+    P = plane([let("P", Piecewise((e, f_n > 0), (0, True))) for e in plane_entries(P)])
+    following = eye(2) if friction == "paper" else P
+    M = let("M", inverted(let, eye(2) + let("relax", w / D_f[0]) * (eye(2) - following)))
+    N = let("N", w * M * following)
+    B = w * P * let("K_N", K_f[0] * N + drag[0] * eye(2))
+    spring = [w * k_n, w * (d_n + w * k_n)]
+    for matrix in (B, let("w_K_f", w * K_f[0]) * P * M, M, N):
+        spring += plane_entries(matrix)
+    return {"spring": Matrix(spring)}
+
+
+def inverted(let, A) -> Matrix:
+    """The inverse of a symmetric positive definite 2 x 2 matrix."""
+    a, b, c = let("A", Matrix(plane_entries(A)))
+    inverse = let("inverse", 1 / let("det", a * c - b * b))
+    return Matrix([[c, -b], [-b, a]]) * inverse
+
+
+def depth_of_point(let, p, arm) -> dict:
+    """How deep a point is in the ground."""
+    return {"depth": [-(p[2] + arm[2])]}
+
+
+def stiffened(let, spring, velocity) -> Matrix:
+    """Force that a velocity calls for: B across the ground, a along its normal."""
+    across = plane(spring[2:5]) * velocity[0:2, :]
+    return Matrix([across[0], across[1], spring[1] * velocity[2]])
+
+
+def stiffened_torso(let, R, arm, spring) -> dict:
+    """J^T G J of one point for (p_dot, omega): lower triangle, row by row."""
+    R = square(R)
+    turning = [let("J", (R * axis).cross(arm)) for axis in (X, Y, Z)]
+    columns = [*(eye(3).col(k) for k in range(3)), *turning]
+    forces = [let("G_J", stiffened(let, spring, column)) for column in columns]
+    return {f"S_{r}": Matrix([columns[k].dot(forces[r]) for k in range(r + 1)]) for r in range(6)}
+
+
+def stiffened_column(let, R, arm, spring, J_k) -> dict:
+    """G J_k of one tail coordinate, and its coupling with (p_dot, omega)."""
+    force = let("G_J", stiffened(let, spring, J_k))
+    return {"force": force, "S_row": Matrix([force, square(R).T * let("moment", arm.cross(force))])}
+
+
+def coupled_columns(let, J_k, force) -> dict:
+    """J_l . G J_k."""
+    return {"S_entry": [J_k.dot(force)]}
+
+
+def torso_turn(let, R, rotation) -> dict:
+    """A turn or turning rate from torso axes to world axes."""
+    return {"turn": square(R) * rotation}
+
+
+def point_shift(let, shift, turn, arm) -> dict:
+    """What moves a point of the torso: J (shift, rotation)."""
+    return {"motion": shift + turn.cross(arm)}
+
+
+def tail_shift(let, J_k, coupling) -> dict:
+    """What one tail coordinate adds to it."""
+    return {"motion": J_k * coupling[0]}
+
+
+def contact_response(let, spring, motion_q, motion_v, lag) -> dict:
+    """Force on a point, w df, for right-hand sides of its place, velocity and bristle."""
+    across = plane(spring[2:5]) * motion_v[0:2, :] + plane(spring[5:8]) * lag
+    return {"force": Matrix([-across[0], -across[1], -(spring[0] * motion_q[2] + spring[1] * motion_v[2])])}
+
+
+def tail_response(let, J_k, force) -> dict:
+    """A force's share in one tail coordinate."""
+    return {"rhs": [J_k.dot(force)]}
+
+
+def torso_response(let, R, load) -> dict:
+    """A load about B as forces on (p_dot, omega)."""
+    return {"rhs": Matrix([load[0:3, :], square(R).T * load[3:6, :]])}
+
+
+def bristle_response(let, spring, motion, lag) -> dict:
+    """M r_u + N J k_v: a bristle in the ground."""
+    return {"k_u": plane(spring[8:11]) * lag + plane(spring[11:14]) * motion[0:2, :]}
+
+
+def relaxation(let, D_f, weight) -> dict:
+    """1 / (1 + w / D_f): a bristle in the air."""
+    return {"relax": [1 / (1 + let("lag", weight[0] / D_f[0]))]}
+
+
+def relaxed(let, relax, lag) -> dict:
+    """A bristle in the air."""
+    return {"k_u": lag * relax[0]}
+
+
+def gain_weights(let, weight, gains) -> dict:
+    """w K_p, and w (K_d + w K_p), which is 0 where there are no gains."""
+    w = weight[0]
+    proportional = let("w_K_p", w * gains[0])
+    return {"gain_q": [proportional], "gain_v": [w * gains[1] + w * proportional]}
+
+
+def damped(let, weight, damping) -> dict:
+    """w times the damping of one tail coordinate."""
+    return {"damped": [weight[0] * damping[0]]}
+
+
+def damped_response(let, damped, rate) -> dict:
+    """Its force for a right-hand side."""
+    return {"rhs": [-damped[0] * rate[0]]}
+
+
+def gained(let, gain, entry) -> dict:
+    """Gain times an entry of H_tt."""
+    return {"S_entry": [gain[0] * entry[0]]}
+
+
+def gain_response(let, gain_q, gain_v, entry, angle, rate) -> dict:
+    """The force of one coordinate's gains on another: -H_kl (w K_p r_q + w (K_d + w K_p) r_v)."""
+    return {"rhs": [-entry[0] * (gain_q[0] * angle[0] + gain_v[0] * rate[0])]}
+
+
+def total_rate(let, change, rate) -> dict:
+    """k_v = r_v + change."""
+    return {"k_v": change + rate}
+
+
+def total_place(let, weight, k_v, angle) -> dict:
+    """k_q = r_q + w k_v."""
+    return {"k_q": angle + weight[0] * k_v}

@@ -1,0 +1,189 @@
+"""Contact in plain NumPy: a state and parameters go in, points, velocities, Jacobians, forces and stiffness come out.
+
+Every formula also takes complex numbers: velocities and Jacobians are complex steps of the points' places.
+"""
+
+import numpy as np
+
+STEP = 1e-30
+SIDES = (1, -1)
+
+
+def hat(w):
+    """The matrix of a cross product."""
+    return np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
+
+
+def turn(w):
+    """Exp of a rotation vector (Rodrigues)."""
+    z = w @ w
+    if abs(z) < 1e-8:
+        c1, c2 = 1 - z / 6, 0.5 - z / 24
+    else:
+        c1, c2 = np.sin(np.sqrt(z)) / np.sqrt(z), (1 - np.cos(np.sqrt(z))) / z
+    return np.eye(3) + c1 * hat(w) + c2 * hat(w) @ hat(w)
+
+
+def attitude(quaternion):
+    """Rotation matrix of (w, x, y, z), not normalised."""
+    w, axis = quaternion[0], np.asarray(quaternion[1:])
+    norm = w * w + axis @ axis
+    return np.eye(3) + 2 / norm * (w * hat(axis) + hat(axis) @ hat(axis))
+
+
+def ray(angle):
+    """u_h of Eq. 9."""
+    return np.array([0 * angle, np.cos(angle), np.sin(angle)])
+
+
+def feet(parameters, legs):
+    """A, M, T of the right foot, then of the left, in the torso frame (Eqs. 5 to 8, corrected)."""
+    P, out = parameters, []
+    for side, (gamma, delta) in zip(SIDES, np.reshape(legs[:4], (2, 2)), strict=True):
+        hip = np.array(P["hip"]) * [side, 1, 1]
+        knee = hip + P["L_h2d"] * ray(gamma) + P["L_d2k"] * ray(delta)
+        ankle = knee + P["L_k2a"] * ray(gamma)
+        middle = ankle + P["L_a2m"] * ray(delta)
+        out += [ankle, middle, middle - P["L_m2t"] * ray(gamma - P["delta_m"])]
+    return out
+
+
+def articulated(parameters, q_t, links):
+    """Joints but the first, then the tip, in the torso frame."""
+    R, P, out = np.eye(3), np.array(parameters["tail_mount"]), []
+    length = parameters["tail_length"] / (links * len(q_t) // 2)
+    for alpha, beta in np.reshape(q_t, (-1, 2)):
+        for _ in range(links):
+            R = R @ turn(np.array([alpha, 0, 0])) @ turn(np.array([0, 0, beta]))
+            P = P - length * R[:, 1]
+            out.append(P)
+    return out
+
+
+def continuum(parameters, q_t, samples):
+    """Equally spaced points of every arc, in the torso frame: Gauss-Legendre quadrature of the tangent."""
+    R, P, out = np.eye(3), np.array(parameters["tail_mount"]), []
+    length = parameters["tail_length"] / (len(q_t) // 2)
+    nodes, weights = np.polynomial.legendre.leggauss(12)
+    for a, b in np.reshape(q_t, (-1, 2)):
+        bend = np.array([a, 0, b])
+        for k in range(samples):
+            xs, ws = (k + (nodes + 1) / 2) / samples, weights / (2 * samples)
+            P = P - length * R @ sum(w * turn(x * bend)[:, 1] for x, w in zip(xs, ws, strict=True))
+            out.append(P)
+        R = R @ turn(bend)
+    return out
+
+
+class Contacts:
+    """The points of a model; ``groups`` as in its manifest."""
+
+    def __init__(self, model):
+        self.parameters, self.kind = model.parameters, model.kind
+        self.pieces = model.links or model.samples
+        self.groups = [entry["group"] for entry in model.manifest["contacts"]]
+        self.friction, self.nv = model.manifest["scene"]["friction"], model.nv
+
+    def places(self, R, q_t, legs):
+        """All points in the torso frame; the torso's lowest is a point of it, so it has no derivative."""
+        P, out = self.parameters, []
+        if "feet" in self.groups:
+            out += feet(P, legs)
+        if "tail" in self.groups:
+            out += (articulated if self.kind == "articulated" else continuum)(P, q_t, self.pieces)
+        if "torso" in self.groups:
+            axes, down = np.array(P["torso_semi_axes"]), -R.real[2]
+            out.append(axes**2 * down / np.sqrt((axes * down) @ (axes * down)))
+        return np.array(out)
+
+    def positions(self, q, legs, step=None, leg_rates=0):
+        """Points in the world, (K, 3); with a step, q is moved along the velocity 1j step."""
+        step = np.zeros(self.nv) if step is None else np.asarray(step) * 1j * STEP
+        R = attitude(q[3:7])
+        moved = R @ (np.eye(3) + hat(step[3:6]))
+        angles = None if legs is None else np.asarray(legs[:4]) + 1j * STEP * leg_rates
+        return q[:3] + step[:3] + self.places(R, q[7:] + step[6:], angles) @ moved.T
+
+    def velocities(self, q, v, legs):
+        """Their velocities (K, 3), the legs' own motion included."""
+        return self.positions(q, legs, v, 0 if legs is None else np.asarray(legs[4:])).imag / STEP
+
+    def jacobians(self, q, legs):
+        """d(velocity)/dv, (K, 3, nv): the legs' rates have no share in it."""
+        return np.moveaxis([self.positions(q, legs, unit).imag / STEP for unit in np.eye(self.nv)], 0, 2)
+
+    def laws(self, q, v, bristles, legs):
+        """Forces (K, 3) and bristle rates (K, 2)."""
+        places, motion = self.positions(q, legs).real, self.velocities(q, v, legs)
+        found = [self.law(*one) for one in zip(places, motion, bristles, strict=True)]
+        return np.array([f for f, _ in found]), np.array([rate for _, rate in found])
+
+    def law(self, place, velocity, bristle):
+        """Force and bristle rate of one point."""
+        P, depth = self.parameters, -place[2]
+        normal = self.normal(depth, -velocity[2])
+        trial = -(P["K_f"] * bristle + P["D_f"] * P["K_f"] * velocity[:2])
+        f = self.limited(trial, P["mu"] * normal)
+        rate = -(f + P["K_f"] * bristle) / (P["D_f"] * P["K_f"])
+        if self.friction == "paper" and depth > 0:
+            rate = velocity[:2]
+        return np.array([*f, normal]), rate
+
+    def normal(self, depth, rate):
+        """Eq. 36."""
+        P = self.parameters
+        if depth.real <= 0:
+            return 0 * depth
+        push = P["K_n"] * depth**1.5 + P["D_n"] * P["K_n"] * depth**0.5 * rate
+        return push if push.real > 0 else 0 * push
+
+    def limited(self, trial, limit):
+        """The friction force that a trial force becomes."""
+        if limit == 0:
+            return np.zeros(2)
+        if self.friction == "smooth":
+            return trial / np.sqrt(1 + trial @ trial / limit**2)
+        if self.friction == "cone":
+            length = np.sqrt(trial @ trial)
+            return trial if length.real <= limit else trial * (limit / length)
+        return np.where(np.abs(trial.real) <= limit, trial, np.sign(trial.real) * limit)
+
+    def slopes(self, place, velocity, bristle):
+        """Derivatives of force (3) and bristle rate (2) by place, velocity (3 each) and bristle (2), by complex steps.
+
+        Two of them are left out, as a W-method may: how friction's bound and the bristle follow the normal force.
+        """
+        P, depth, rate = self.parameters, -place[2], -velocity[2]
+        slope = np.diag([0.0, 0.0, -self.normal(depth + 1j * STEP, rate).imag / STEP])
+        by_velocity = np.diag([0.0, 0.0, -self.normal(depth, rate + 1j * STEP).imag / STEP])
+        trial = -(P["K_f"] * bristle + P["D_f"] * P["K_f"] * velocity[:2])
+        limit = P["mu"] * self.normal(depth, rate)
+        follows = np.array([self.limited(trial + 1j * STEP * unit, limit).imag / STEP for unit in np.eye(2)]).T
+        by_velocity[:2, :2] = -P["D_f"] * P["K_f"] * follows
+        by_bristle = np.vstack([-P["K_f"] * follows, np.zeros(2)])
+        anchored = np.eye(2) if self.friction == "paper" and depth > 0 else follows
+        rates = np.hstack([anchored, np.zeros((2, 1))]), -(np.eye(2) - anchored) / P["D_f"]
+        return slope, by_velocity, by_bristle, *rates
+
+    def jacobian(self, state, H, damping, gains):
+        """J of the rates of (q in its tangent space, v, bristles), of contact, joint damping and tracking gains.
+
+        state: (q, v, bristles, legs).
+        """
+        q, v, bristles, legs = state
+        nv, count = self.nv, len(bristles)
+        by_q, by_v, by_u = np.zeros((nv, nv)), np.zeros((nv, nv)), np.zeros((nv, 2 * count))
+        u_v, u_u = np.zeros((2 * count, nv)), np.zeros((2 * count, 2 * count))
+        points = zip(self.positions(q, legs).real, self.velocities(q, v, legs), bristles, strict=True)
+        for k, (J, point) in enumerate(zip(self.jacobians(q, legs), points, strict=True)):
+            slope, by_velocity, by_bristle, rate_v, rate_u = self.slopes(*point)
+            own = slice(2 * k, 2 * k + 2)
+            by_q, by_v = by_q + J.T @ slope @ J, by_v + J.T @ by_velocity @ J
+            by_u[:, own], u_v[own], u_u[own, own] = J.T @ by_bristle, rate_v @ J, rate_u
+        by_v[6:, 6:] -= np.diag(damping) + gains[1] * H[6:, 6:]
+        by_q[6:, 6:] -= gains[0] * H[6:, 6:]
+        rows = (
+            [np.zeros((nv, nv)), np.eye(nv), np.zeros((nv, 2 * count))],
+            np.linalg.solve(H, np.hstack([by_q, by_v, by_u])),
+        )
+        return np.vstack([np.hstack(rows[0]), rows[1], np.hstack([np.zeros((2 * count, nv)), u_v, u_u])])
