@@ -574,7 +574,7 @@ static int external(int (*f)(const real **, real **, long long *, real *, int),
 }
 """
 
-ROLLOUT = """  for (int method = @@_RK4; method <= @@_RODAS4; ++method) {
+ROLLOUT = """  for (int method = @@_RK4; method <= @@_TSIT5; ++method) {
     enum { NQ = @@_NQ, NV = @@_NV, NT = @@_NT, SAMPLES = 3 };
     @_parameters parameters;
     @_default_parameters(&parameters);

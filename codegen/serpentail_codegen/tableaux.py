@@ -19,16 +19,15 @@ class Explicit:
 
 @dataclass(frozen=True)
 class Rosenbrock:
-    """A Rosenbrock method as it is computed, free of products with the Jacobian J.
+    """A Rosenbrock method as it is computed, free of products with J, any approximation of the rate's Jacobian.
 
-    (1 - h gamma J) u_s = h gamma f(t + nodes[s] h, y + sum rows[s] u) + gamma sum couplings[s] u (+ drifts[s] f_t).
+    (1 - h gamma J) u_s = h gamma f(t + nodes[s] h, y + sum rows[s] u) + gamma sum couplings[s] u.
     """
 
     gamma: float
     nodes: Row
     rows: tuple[Row, ...]
     couplings: tuple[Row, ...]
-    drifts: Row  # multiples of h; only where J is exact
     weights: Row
     error: Row
 
@@ -109,31 +108,6 @@ ROS34PW2 = Classical(
     embedded=(0.3781090314581937, -0.09604229221242318, 0.5, 0.2179332607542295),
 )
 
-# E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, Sect. IV.10: RODAS, order 4 with the exact J.
-RODAS4 = Rosenbrock(
-    gamma=0.25,
-    nodes=(0.0, 0.386, 0.21, 0.63, 1.0, 1.0),
-    rows=(
-        (),
-        (1.544,),
-        (0.9466785280815826, 0.2557011698983284),
-        (3.314825187068521, 2.896124015972201, 0.9986419139977817),
-        (1.221224509226641, 6.019134481288629, 12.53708332932087, -0.6878860361058950),
-        (1.221224509226641, 6.019134481288629, 12.53708332932087, -0.6878860361058950, 1.0),
-    ),
-    couplings=(
-        (),
-        (-5.6688,),
-        (-2.430093356833875, -0.2063599157091915),
-        (-0.1073529058151375, -9.594562251023355, -20.47028614809616),
-        (7.496443313967647, -10.24680431464352, -33.99990352819905, 11.70890893206160),
-        (8.083246795921522, -7.981132988064893, -31.52159432874371, 16.31930543123136, -6.058818238834054),
-    ),
-    drifts=(0.25, -0.1043, 0.1035, -0.0362000000000023, 0.0, 0.0),
-    weights=(1.221224509226641, 6.019134481288629, 12.53708332932087, -0.6878860361058950, 1.0, 1.0),
-    error=(0.0, 0.0, 0.0, 0.0, 0.0, 1.0),
-)
-
 
 def transformed(method: Classical) -> Rosenbrock:
     """Return a method in the unknowns u = Gamma k (Hairer and Wanner, Eq. IV.7.25), computed without rounding."""
@@ -151,7 +125,6 @@ def transformed(method: Classical) -> Rosenbrock:
         nodes=tuple(float(sum(map(Fraction, row))) for row in method.alpha),
         rows=tuple(map(times, method.alpha)),
         couplings=tuple(tuple(float(-inverse[i][j]) for j in range(i)) for i in range(size)),
-        drifts=tuple(float(sum(row)) for row in lower),
         weights=times(method.weights),
         error=times(
             tuple(float(Fraction(b) - Fraction(e)) for b, e in zip(method.weights, method.embedded, strict=True))

@@ -161,17 +161,19 @@ def unused(lines: Iterable[str], names: Iterable[str] = ()) -> list[str]:
     return [name for name in ("parameters", "work", *names) if name not in words]
 
 
-def offered(scene: Scene, views: list["FunctionView"]) -> Has:
+def offered(tail: Tail, views: list["FunctionView"]) -> Has:
     """Return what the simulation of a scene with these functions can do."""
-    return Has("pfl" in {f.name for f in views}, False, 0, (), False)
+    outputs = {f.name: f.outputs for f in views}
+    factors = outputs["implicit_factor"][0].length if "implicit_factor" in outputs else 0
+    return Has("pfl" in outputs, factors, tail.points, tuple(tail.groups.items()), "feet" in tail.contacts)
 
 
-def abi_hash(scene: Scene, views: list[FunctionView]) -> str:
+def abi_hash(scene: Scene, tail: Tail, views: list[FunctionView]) -> str:
     """Digest of what a caller relies on: symbols, argument sizes, workspace, the parameter struct."""
     interface = [scene.name, scene.real, [[p.name, p.size] for p in struct_parameters(scene)]]
     interface += [[f.name, [[a.name, a.length] for a in (*f.inputs, *f.outputs)], f.work] for f in views]
     if "rollout" in scene.functions:
-        interface += layouts(offered(scene, views)).items()
+        interface += layouts(offered(tail, views)).items()
     return hashlib.sha256(json.dumps(interface).encode()).hexdigest()[:16]
 
 
@@ -183,7 +185,7 @@ def c_context(scene: Scene, tail: Tail, emitted: list[Emitted], version: str) ->
     works = {f.name: f.work for f in views}
     rollout = {}
     if "rollout" in scene.functions:
-        rollout = simulation_context(scene, tail, offered(scene, views), works)
+        rollout = simulation_context(scene, tail, offered(tail, views), works)
     return (
         {name: literal(value) for name, value in numbers.items()}
         | {
@@ -199,7 +201,7 @@ def c_context(scene: Scene, tail: Tail, emitted: list[Emitted], version: str) ->
             "coordinates": COORDINATES[scene.coordinates],
             "polar": tail.polar,
             "content_hash": "",
-            "abi_hash": abi_hash(scene, views),
+            "abi_hash": abi_hash(scene, tail, views),
             "tail": tail,
             "factors": next((a.length for f in views for a in f.outputs if a.name == "factors"), 0),
             "groups": ", ".join(f"{count} of the {name}" for name, count in tail.groups.items()),

@@ -7,27 +7,18 @@ from itertools import accumulate
 
 from ..draft import Tail
 from ..scene import Scene
-from ..tableaux import RK4, RODAS4, ROS34PW2, TSIT5, Explicit, Rosenbrock, transformed
+from ..tableaux import RK4, ROS34PW2, TSIT5, Explicit, Rosenbrock, transformed
 from .c_function import dialect
 
 NAMES = r"\b(real|piecewise|controller|drive|parameters|torque)\b"
-SLOTS = 12  # states in the workspace: see states.c.jinja
-MACROS = ("NQ", "NV", "NT", "SIZE", "SLOT", "START", "END", "STAGES", "END_RATE", "TRIAL", "RIGHT", "DRIFT", "TAU")
-MACROS += ("TABLE", "FORCES", "DEPTHS", "GROUPS", "FACTORS", "INNER")
-NUMBERS = {
-    "three": 3,
-    "four": 4,
-    "five": 5,
-    "tenth": 0.1,
-    "fifth": 0.2,
-    "quarter": 0.25,
-    "hundred": 100,
-    "nearly": 0.99,
-}
-NUMBERS |= {"hundredth": 0.01, "milli": 1e-3, "millionth": 1e-6, "small": 1e-10, "nearly": 0.99, "tiny_error": 1e-6}
+SLOTS = 11  # states in the workspace: see states.c.jinja
+MACROS = ("NQ", "NV", "NT", "SIZE", "SLOT", "START", "END", "STAGES", "END_RATE", "TRIAL", "RIGHT", "TAU")
+MACROS += ("TABLE", "FORCES", "PRESSURES", "GROUPS", "FACTORS", "INNER")
+NUMBERS = {"three": 3, "four": 4, "five": 5, "hundred": 100, "fifth": 0.2, "nearly": 0.99, "hundredth": 0.01}
+NUMBERS |= {"milli": 1e-3, "millionth": 1e-6, "small": 1e-10, "tiny_error": 1e-6}
 NUMBERS |= {"safety": 0.9, "share": 0.85, "memory": 0.2}  # of the PI controller
 # The methods' numbers in C, in order; those with True need `implicit`.
-METHODS = {"rk4": False, "tsit5": False, "rodas4": False, "ros34pw2": True, "implicit_euler": True}
+METHODS = {"rk4": False, "tsit5": False, "ros34pw2": True, "implicit_euler": True}
 
 
 @dataclass(frozen=True)
@@ -49,11 +40,15 @@ class Has:
     """What a scene's simulation can do: feedback linearisation, W-methods, groups of contact points, legs."""
 
     pfl: bool
-    implicit: bool
+    factors: int  # reals of implicit_factor's, 0 without
     contacts: int
     groups: tuple[tuple[str, int], ...]
     legs: bool
-    factors: int = 0  # reals that implicit_factor fills in
+
+    @property
+    def implicit(self) -> bool:
+        """Whether it can take implicit steps."""
+        return self.factors > 0
 
     @property
     def methods(self) -> list[str]:
@@ -177,13 +172,13 @@ def simulation_context(scene: Scene, tail: Tail, has: Has, works: dict[str, int]
     literal = dialect(scene.real).literal
     size, table = tail.nq + tail.nv + 2 * has.contacts, max(4 * tail.nt, 2 * tail.nv)
     own = SLOTS * size + tail.nt + table + 3 * has.contacts + len(has.groups)
-    factors = max(size * size, has.factors)
     return {
         **{name: literal(value) for name, value in NUMBERS.items()},
         **{name: name + ("f" if scene.real == "float" else "") for name in ("pow", "fabs", "ceil")},
         "eps": "FLT_EPSILON" if scene.real == "float" else "DBL_EPSILON",
         "largest": "FLT_MAX" if scene.real == "float" else "DBL_MAX",
         "has": has,
+        "ground_damping": ground_damping(scene) if has.contacts else "",
         "group_starts": [0, *accumulate(count for _, count in has.groups)],
         "bristles": 2 * has.contacts,
         "bisections": 40,
@@ -191,15 +186,19 @@ def simulation_context(scene: Scene, tail: Tail, has: Has, works: dict[str, int]
         "macros": MACROS,
         "slots": SLOTS,
         "table": table,
-        "factors": factors,
-        "rollout_work": own + factors + max(works.values()),
+        "factors": has.factors,
+        "rollout_work": own + has.factors + max(works.values()),
         "descriptions": DESCRIPTIONS,
         "records": record_views(scene, has),
         "tsit5": explicit(TSIT5, scene.real),
         "rk4": explicit(RK4, scene.real),
-        "rodas4": rosenbrock(RODAS4, scene.real),
         "ros34pw2": rosenbrock(transformed(ROS34PW2), scene.real),
     }
+
+
+def ground_damping(scene: Scene) -> str:
+    """Return D_n of Eq. 36 as C text: a member of the parameters, or a number where these are folded in."""
+    return dialect(scene.real).literal(scene.parameters["D_n"]) if scene.baked else "run->parameters->D_n"
 
 
 def record_views(scene: Scene, has: Has) -> dict[str, list[dict]]:
@@ -235,7 +234,6 @@ def rosenbrock(method: Rosenbrock, real: str) -> dict:
         "nodes": literals(method.nodes, real),
         "rows": [literals(row, real) for row in method.rows[1:]],
         "couplings": [literals(row, real) for row in method.couplings[1:]],
-        "drifts": literals(method.drifts, real),
         "weights": literals(method.weights, real),
         "error": literals(method.error, real),
         "stages": len(method.nodes),

@@ -28,7 +28,7 @@ class Ground:
     def checked(cls, model, start: Start, settings: dict) -> "Ground":
         """Take legs, bristles0 and stop_at out of settings; SimulationError where they are wrong, or missing."""
         given = {name: settings.pop(name, None) for name in ("legs", "bristles0", "stop_at")}
-        groups = {entry["group"]: entry["count"] for entry in model.manifest.get("contacts", ())}
+        groups = model.contacts
         if not groups:
             for name in [name for name in given if given[name] is not None]:
                 remedy = "leave it out, or add `contacts` to the scene"

@@ -8,7 +8,7 @@ from ..errors import SimulationError
 from .start import positive
 
 FIXED = ("rk4", "implicit_euler")
-ADAPTIVE = ("tsit5", "ros34pw2", "rodas4")
+ADAPTIVE = ("tsit5", "ros34pw2")
 SCIPY = ("dop853", "lsoda")
 SETTINGS = {
     **dict.fromkeys(FIXED, ("step",)),
@@ -16,7 +16,7 @@ SETTINGS = {
     **dict.fromkeys(SCIPY, ("rtol", "atol")),
 }
 STIFF = 5e3  # 1/s: a fastest decay beyond this limits the steps of an explicit method, not their accuracy
-SINGLE = {"tsit5": 1e-4, "ros34pw2": 1e-3, "rodas4": 1e-3}  # tolerances in single precision
+SINGLE = {"tsit5": 1e-4, "ros34pw2": 1e-3}  # tolerances in single precision
 
 
 @dataclass(frozen=True)
@@ -51,10 +51,15 @@ def _defaults(name: str, single: bool, given: dict) -> dict:
     return {"rtol": rtol, "atol": given.get("atol", rtol), "most_step": np.inf, "most_steps": 10**7} | given
 
 
-def chosen(settings: dict, available, decay: float) -> tuple[str, str]:
-    """Return the method of "auto" and the reason; ``decay`` (1/s) is the fastest by joint damping at the start."""
+def chosen(settings: dict, available, decay: float | None) -> tuple[str, str]:
+    """Return the method of "auto" and why; ``decay`` (1/s) is the fastest by joint damping, None on the ground."""
     if "step" in settings:
-        return "rk4", "a step of a fixed length was asked for"
+        fixed = "rk4" if decay is not None or "implicit_euler" not in available else "implicit_euler"
+        return fixed, "a step of a fixed length was asked for"
+    if decay is None and "ros34pw2" in available:
+        return "ros34pw2", "contact with the ground: stiff"
+    if decay is None:
+        return "tsit5", "contact with the ground, but the scene has no `implicit` for a method that suits it"
     if decay > STIFF and "ros34pw2" in available:
         return "ros34pw2", f"joint damping decays at {decay:.2g} 1/s: stiff"
     return "tsit5", "flight" + (f", joint damping decays at {decay:.2g} 1/s" if decay else "")

@@ -130,7 +130,7 @@ def simulate(
     legs, bristles0, stop_at (models with contacts): Legs, where there are feet; stretch (points, 2) of the friction
     springs in m, zero by default; events to stop at, pairs such as ("take_off", "feet").
     t_span: (start, end) in s, or the end alone.
-    method: "tsit5", "ros34pw2", "rodas4" (adaptive, in C), "rk4", "implicit_euler" (steps of a fixed length, in C),
+    method: "tsit5", "ros34pw2" (adaptive, in C), "rk4", "implicit_euler" (steps of a fixed length, in C),
     "dop853", "lsoda" (SciPy's, as a check), or "auto", whose choice and reason ``info`` tells.
     settings: output_step (s, default 1/200 of the span, rounded to divide it); adaptive methods: rtol, atol (defaults
     1e-8, 1e-4 for ros34pw2), first_step, least_step, most_step (s), most_steps; fixed steps: step (s, default 1e-4,
@@ -159,7 +159,8 @@ def choose(model, drive: Drive, start: Start, name, settings: dict) -> Method:
     single = drive.records.real is ctypes.c_float
     available, reason = model.manifest["simulation"]["methods"], "asked for"
     if name == "auto":
-        name, reason = chosen(settings, available, fastest_decay(model, drive, start))
+        decay = None if model.contacts else fastest_decay(model, drive, start)
+        name, reason = chosen(settings, available, decay)
     method = checked_method(name, settings, available, single)
     if name == "rk4":  # steps divide the output's
         steps = max(1, int(np.ceil(start.interval / method.settings["step"] * (1 - 1e-12))))
