@@ -18,6 +18,13 @@ class Contact:
     bristles: np.ndarray
     groups: dict[str, int]
 
+    def __post_init__(self) -> None:
+        """Keep read-only copies."""
+        for name in ARRAYS:
+            array = np.array(getattr(self, name), float)
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+
     @property
     def depth(self) -> np.ndarray:
         """Depth (K, P) in m of the points below the ground; negative above it."""

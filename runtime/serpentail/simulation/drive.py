@@ -101,10 +101,8 @@ class Drive:
 
 def _native(law: NativeTorque) -> dict:
     """Return the members of a compiled function and its context."""
-    try:
-        function = law.function if isinstance(law.function, int) else ctypes.cast(law.function, ctypes.c_void_p).value
-    except (TypeError, ctypes.ArgumentError):
-        function = None
-    if not function or not isinstance(law.context, int | None):
+    native = isinstance(law.function, ctypes._CFuncPtr)
+    function = ctypes.cast(law.function, ctypes.c_void_p).value if native else law.function
+    if not isinstance(function, int) or function <= 0 or not isinstance(law.context, int | None):
         raise SimulationError(f"NativeTorque: {law!r}: give a ctypes function or an address, and an address or None")
     return {"function": function, "context": law.context}

@@ -92,7 +92,7 @@ def _bristles(groups, bristles) -> np.ndarray:
     found = np.zeros(shape) if bristles is None else real_array("bristles0", bristles, error=SimulationError)
     if found.shape != shape or not np.isfinite(found).all():
         raise SimulationError(f"bristles0 has shape {found.shape}: give {shape}, finite, in m")
-    return found
+    return found.copy()
 
 
 def _stops(groups, stop_at) -> int:

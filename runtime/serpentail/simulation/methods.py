@@ -48,7 +48,7 @@ def _defaults(name: str, single: bool, given: dict) -> dict:
     if name in SCIPY:
         return ({"rtol": 1e-6, "atol": 1e-6} if single else {"rtol": 1e-10, "atol": 1e-12}) | given
     rtol = given.get("rtol", SINGLE[name] if single else 1e-4 if name == "ros34pw2" else 1e-8)
-    return {"rtol": rtol, "atol": given.get("atol", rtol), "most_step": np.inf, "most_steps": 10**7} | given
+    return {"rtol": rtol, "atol": given.get("atol", rtol), "most_step": np.inf, "most_steps": 10**6} | given
 
 
 def chosen(settings: dict, available, decay: float | None) -> tuple[str, str]:

@@ -40,10 +40,11 @@ class Piecewise:
         jumps = np.zeros(len(self.times), bool)
         for order in range(orders):
             c = _derived(self.coefficients, order)
-            starts, ends = (_horner(c, x) for x in (0.0, np.diff(self.times)[:, None]))
+            widths = np.diff(self.times)[:, None]
+            starts, ends, sizes = _horner(c, 0.0), _horner(c, widths), _horner(np.abs(c), widths)
             held = [starts[:1], ends[-1:]] if order == 0 else np.zeros((2, 1, self.channels))
             left, right = np.vstack([held[0], ends]), np.vstack([starts, held[1]])
-            jumps |= (np.abs(left - right) > SAME * np.abs(c[..., 0]).max(initial=0)).any(axis=1)
+            jumps |= (np.abs(left - right) > SAME * sizes.max(initial=0)).any(axis=1)
         return self.times[jumps]
 
 
