@@ -60,10 +60,15 @@ class Model(SimpleNamespace):
         self.manifest = json.loads((self.folder / "manifest.json").read_text())
         self.scene = parse_scene(self.manifest["scene"], name)
         self.include, self.header = self.folder / "include", self.folder / "include" / f"{name}.h"
-        self.source, self.host, self.batch = (
-            self.folder / "src" / f"{name}{part}.c" for part in ("", "_host", "_batch")
+        self.source, self.host, self.batch, self.simulation = (
+            self.folder / "src" / f"{name}{part}.c" for part in ("", "_host", "_batch", "_simulation")
         )
         self.example = self.folder / "example" / "main.c"
+
+    @property
+    def sources(self):
+        """The model, its host entries and, where it has them, its batches and its simulation."""
+        return [path for path in (self.source, self.host, self.batch, self.simulation) if path.is_file()]
 
     @property
     def text(self):
@@ -74,7 +79,7 @@ class Model(SimpleNamespace):
     def objects(self):
         """Plain object files of the model and its host entries."""
         (self.folder / "objects").mkdir()
-        return [compiled(self.folder / "objects", source, *PLAIN) for source in (self.source, self.host)]
+        return [compiled(self.folder / "objects", source, *PLAIN) for source in self.sources]
 
 
 @pytest.fixture(scope="module")
@@ -109,13 +114,13 @@ def needs(program):
 @pytest.mark.parametrize("compiler", ["gcc", pytest.param("clang", marks=needs("clang"))])
 def test_compiles_without_a_warning(models, tmp_path, compiler, name):
     model = models(name)
-    for source in (model.source, model.host, model.batch, model.example):
+    for source in (*model.sources, model.example):
         compiled(tmp_path, source, *C99, "-fsyntax-only", compiler=compiler)
 
 
 @pytest.mark.parametrize("name", ["m2_n2_double_loops", "m2_n2_float_straight"])
 def test_optimiser_finds_nothing_to_warn_about(models, tmp_path, name):
-    for source in (models(name).source, models(name).batch):
+    for source in (models(name).source, models(name).batch, models(name).simulation):
         compiled(tmp_path, source, *C99, "-O2")
 
 
@@ -124,9 +129,8 @@ def test_optimiser_finds_nothing_to_warn_about(models, tmp_path, name):
 @pytest.mark.parametrize("baked", [False, True], ids=["free", "baked"])
 def test_every_function_alone_compiles_without_a_warning(tmp_path, function, emission, baked):
     model = Model("alone", 2, 2, functions=[function], emission=emission, baked=baked)
-    for source in (model.source, model.host, model.batch, model.example):
-        if source.exists() or source != model.batch:
-            compiled(tmp_path, source, *C99, "-fsyntax-only")
+    for source in (*model.sources, model.example):
+        compiled(tmp_path, source, *C99, "-fsyntax-only")
 
 
 @some_models
@@ -160,6 +164,9 @@ def test_header_is_cpp_and_links_from_it(models, tmp_path, name):
 # Symbols.
 
 
+MEMORY = {"memcpy", "memset"}  # what compilers make of loops
+
+
 def symbols(path, *options):
     """Pairs (kind, name) of an object file's symbols."""
     lines = [line.split() for line in run("nm", "-P", *options, path).splitlines()]
@@ -169,11 +176,13 @@ def symbols(path, *options):
 def assert_own_symbols(model, objects, *merged):
     """A model defines what its header declares, and wants no more than the mathematics and memory of libc."""
     suffix = "f" if model.manifest["real"] == "float" else ""
-    own, host = ({symbol for _, symbol in symbols(path, "-g", "--defined-only")} for path in objects)
-    defined = own | host
+    own, host, simulation = ({symbol for _, symbol in symbols(path, "-g", "--defined-only")} for path in objects)
+    defined = own | host | simulation
     wanted = {symbol for path in objects for _, symbol in symbols(path, "-u")} - defined
-    assert wanted <= {f"{name}{suffix}" for name in ("sin", "cos", "sqrt", *merged)} | {"memcpy", "memset"}
-    assert own == set(re.findall(r"^(?:int|void) (\w+)\(", model.header.read_text(), re.M))
+    assert wanted <= {f"{name}{suffix}" for name in ("sin", "cos", "sqrt", "pow", "ceil", *merged)} | MEMORY
+    header = model.include / f"{model.name}_simulation.h"
+    for found, path in ((own, model.header), (simulation, header)):
+        assert found == set(re.findall(r"^(?:int|void) (\w+)\(", path.read_text(), re.M))
     names = f"{model.name}_(batch_|abi_hash$)|(jac_|adj1_|jac_adj1_)?{model.name}_casadi_"
     assert all(re.match(names, symbol) for symbol in host)
 
@@ -186,7 +195,7 @@ def test_every_symbol_has_the_prefix_and_libc_gives_the_rest(models, name):
 @slow_but("m1_n1_double_straight", "m1_n1_float_loops")
 def test_optimiser_asks_for_no_more_than_sincos(models, tmp_path, name):
     model = models(name)
-    objects = [compiled(tmp_path, source, *PLAIN, "-O2") for source in (model.source, model.host)]
+    objects = [compiled(tmp_path, source, *PLAIN, "-O2") for source in model.sources]
     assert_own_symbols(model, objects, "sincos")
 
 
@@ -453,6 +462,7 @@ NUMBER = r"(?<![\w.])\d+(?:\.\d+(?:[eE][-+]?\d+)?|[eE][-+]?\d+)f?"
 def test_numbers_are_shortest_exact_decimals_of_the_right_type(models, name):
     model = models(name)
     code = re.sub(r"/\*.*?\*/|\"[^\"\n]*\"", "", model.text + model.host.read_text(), flags=re.S)
+    code += re.sub(r"/\*.*?\*/|\"[^\"\n]*\"", "", model.simulation.read_text(), flags=re.S)
     literals = set(re.findall(NUMBER, code))
     assert len(literals) > 10
     suffix = "f" if model.manifest["real"] == "float" else ""
@@ -518,7 +528,7 @@ def test_automatic_form_is_straight_until_the_code_grows_large():
 @pytest.mark.parametrize("name", ["m1_n1_float_straight", pytest.param("m2_n2_float_loops", marks=pytest.mark.slow)])
 def test_float_model_has_no_double_arithmetic(models, tmp_path, name):
     double = re.compile(r"\bv?(?:cvtss2sd|cvtsd2ss|(?:add|sub|mul|div|sqrt)[sp]d)\b")
-    for source in (models(name).source, models(name).host):
+    for source in models(name).sources:
         code = run("objdump", "-d", "--no-show-raw-insn", compiled(tmp_path, source, *PLAIN, "-O2"))
         assert double.findall(code) == []
     reference = compiled(tmp_path, models("m1_n1_double_straight").source, *PLAIN, "-O2")
@@ -528,7 +538,7 @@ def test_float_model_has_no_double_arithmetic(models, tmp_path, name):
 @every_model
 def test_wrapped_lines_and_no_trailing_blanks(models, name):
     model = models(name)
-    for path in (model.header, model.source, model.host, model.example):
+    for path in (model.header, *model.sources, model.include / f"{name}_simulation.h", model.example):
         text = path.read_text()
         assert text.isascii() and text.endswith("\n") and not text.endswith("\n\n")
         assert not re.search(r"[ \t]+$", text, re.M)
@@ -607,19 +617,40 @@ static int external(int (*f)(const real **, real **, long long *, real *, int),
 }
 """
 
-ROLLOUT = """  {
-    enum { NQ = @@_NQ, NV = @@_NV, NT = @@_NT };
+ROLLOUT = """  for (int method = @@_RK4; method <= @@_TSIT5; ++method) {
+    enum { NQ = @@_NQ, NV = @@_NV, NT = @@_NT, SAMPLES = 3 };
     @_parameters parameters;
     @_default_parameters(&parameters);
-    real *q = heap(NQ, 1), *v = heap(NV, 1), *q_out = heap(3 * NQ, 0), *v_out = heap(3 * NV, 0);
-    real *tau_out = heap(3 * NT, 0), *times = heap(2, 0), *torques = heap(2 * NT, 1), *damping = heap(NT, 0);
-    real *work = heap(@@_WORK_ROLLOUT, 1);
-    long done = -1;
-    times[1] = (real)0.001;
-    @_damped_table table = { damping, 2, times, torques };
-    bad += @_rollout(&parameters, @_torque_damped_table, &table, (real)0.0001, 4, 2, q, v, q_out, v_out, tau_out,
-                     &done, work) != 0 || done != 4;
-    real *all[] = { q, v, q_out, v_out, tau_out, times, torques, damping, work };
+    real *q = heap(NQ, 1), *v = heap(NV, 1), *q_out = heap(SAMPLES * NQ, 0), *v_out = heap(SAMPLES * NV, 0);
+    real *tau_out = heap(SAMPLES * NT, 0), *times = heap(SAMPLES, 0), *stop = heap(1, 0), *damping = heap(NT, 0);
+    real *table_times = heap(2, 0), *coefficients = heap(2 * NT, 1), *work = heap(@@_WORK_ROLLOUT, 1);
+    times[1] = (real)0.0003;
+    times[2] = (real)0.001;
+    stop[0] = table_times[1] = (real)0.0005;
+    @_piecewise table = { 1, NT, 1, table_times, coefficients };
+    @_controller controller = { 0 };
+    controller.damping = damping;
+    controller.torques = &table;
+    real *begins = heap(1, 0);
+    @_drive drive = { 1, begins, &controller, 1, stop };
+    @_run run = { 0 };
+    run.parameters = &parameters;
+    run.drive = &drive;
+    run.q = q;
+    run.v = v;
+    run.method = method;
+    run.rtol = run.atol = (real)0.001;
+    run.step = (real)0.0001;
+    run.most_step = 1;
+    run.most_steps = run.pause = 1000;
+    run.samples = SAMPLES;
+    run.times = times;
+    run.q_out = q_out;
+    run.v_out = v_out;
+    run.tau_out = tau_out;
+    run.work = work;
+    bad += @_rollout(&run) != 0 || run.done != SAMPLES || run.steps < 2;
+    real *all[] = { q, v, q_out, v_out, tau_out, times, stop, damping, table_times, coefficients, work, begins };
     for (size_t k = 0; k < sizeof all / sizeof *all; ++k) {
       free(all[k]);
     }
@@ -639,6 +670,8 @@ def driver(model):
     for c in re.findall(r"^int (\w+)\(const real \*\*arg.*;$", model.host.read_text(), re.M):
         calls += f"  bad += external({c}, {c}_work, {c}_sparsity_in, {c}_name_in, {c}_sparsity_out) != 0;\n"
     text = DRIVER + (CASADI_DRIVER if double else "")
+    if "rollout" in model.scene.functions:
+        text = '#include "@_simulation.h"\n' + text
     text += f"\nint main(void)\n{{\n  int bad = 0;\n{calls}{ROLLOUT if 'rollout' in model.scene.functions else ''}"
     text += '  printf("%d bad\\n", bad);\n  return bad;\n}\n'
     return text.replace("@@", model.name.upper()).replace("@", model.name)
@@ -649,7 +682,7 @@ def test_sanitizers_find_nothing(models, tmp_path, name):
     model, main = models(name), tmp_path / "main.c"
     main.write_text(driver(model))
     folders = ("-I", model.include, "-I", model.host.parent)
-    run("gcc", *SANITIZED, *folders, main, model.source, "-o", tmp_path / "main", "-lm")
+    run("gcc", *SANITIZED, *folders, main, model.source, model.simulation, "-o", tmp_path / "main", "-lm")
     assert run(tmp_path / "main", env={"ASAN_OPTIONS": "detect_leaks=1"}) == "0 bad\n"
 
 

@@ -466,7 +466,7 @@ STANCE = VALID + 'contacts = ["torso", "feet"]\n'
 def test_contacts_bring_their_parameters_and_functions(read):
     scene = read(STANCE)
     assert scene.contacts == ("feet", "torso") and scene.friction == "cone"
-    assert scene.functions == (*FUNCTIONS, *TOUCHING)
+    assert scene.functions == (*FUNCTIONS, "pfl", "implicit", *TOUCHING)
     assert dict(scene.parameters).keys() - dict(read(VALID).parameters) == {p.name for p in PARAMETERS if p.needs}
     assert scene.parameters["L_a2m"] == 0.035 and scene.parameters["delta_m"] == pytest.approx(math.radians(30))
     assert parse_scene(scene_to_dict(scene), "other") == scene

@@ -17,7 +17,7 @@ from .write import digest, write_folder
 def generate(scene: Scene, output: Path) -> list[str]:
     """Derive, lower, emit and write what the scene asks for into ``output/<scene>``; return the changed files."""
     tail = tail_of(scene)
-    wanted = [CATALOGUE[name].of(tail) for name in needed(scene.functions)]
+    wanted = [CATALOGUE[name].of(tail) for name in needed(scene.functions, bool(scene.contacts))]
     emitted = [emit(scene, tail, function) for function in wanted]
     context = c_context(scene, tail, emitted, __version__)
     context["content_hash"] = digest("".join(c_files(scene, context).values()))[:16]
@@ -36,8 +36,9 @@ def tail_of(scene: Scene) -> Tail:
     return Tail(scene.segments, pieces, scene.kind, scene.bend_range, polar, scene.contacts, scene.friction)
 
 
-def needed(names: tuple[str, ...]) -> list[str]:
+def needed(names: tuple[str, ...], contacts: bool = False) -> list[str]:
     """Return the functions to derive: those asked for, those that a rollout calls, the parts of an implicit solve."""
-    parts = {"rollout": ("forward_dynamics",), "implicit": ("implicit_factor", "implicit_solve")}
+    called = ("contact_points", "contact_dynamics") if contacts else ("forward_dynamics",)
+    parts = {"rollout": called, "implicit": ("implicit_factor", "implicit_solve")}
     names = {*names, *(part for name in names for part in parts.get(name, ()))}
     return [name for name in CATALOGUE if name in names]

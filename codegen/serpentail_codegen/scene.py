@@ -209,7 +209,8 @@ def _usual_functions(values: Mapping[str, Any], contacts: Collection[str], chose
     if chosen:
         return values["functions"]
     polar = values["coordinates"] == "polar"
-    return (*(name for name in FUNCTIONS if not (polar and name in DERIVATIVES)), *touching)
+    usual = (*touching, "pfl", "implicit") if contacts else ()  # what simulations on the ground call
+    return (*(name for name in FUNCTIONS if not (polar and name in DERIVATIVES)), *usual)
 
 
 def parameters_of(kind: str, contacts: Collection[str] = ()) -> tuple[Parameter, ...]:

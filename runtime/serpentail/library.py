@@ -20,7 +20,7 @@ NOT_POSITIVE_DEFINITE, NOT_FINITE, OUT_OF_RANGE = 1, 2, 3
 def open_library(folder: Path, manifest: dict, profile: str) -> ctypes.CDLL:
     """Compile (or find in the cache) and load a model's C; ModelError where it is not what the manifest says."""
     prefix = manifest["prefix"]
-    sources = [folder / "src" / f"{prefix}.c", folder / "src" / f"{prefix}_host.c"]
+    sources = [folder / name for name in manifest["files"] if name.startswith("src/")]
     path = compile_library(sources, folder / "include", profile)
     try:
         library = ctypes.CDLL(str(path))

@@ -18,6 +18,7 @@ from ..tape import operation_count
 from ..templating import render
 from .c_function import CFunction, Routine, dialect, in_loops, routine_arguments, routine_lines, straight_line
 from .casadi_external import casadi_context
+from .simulation import Has, layouts, simulation_context
 
 STRAIGHT_UP_TO = 7000  # nodes: beyond, the text leaves the instruction cache and compile time grows
 STRAIGHT_BESIDE_LANES = 3500  # nodes: where there is a sweep in lanes, too, that is faster beyond
@@ -176,16 +177,19 @@ def unused(lines: Iterable[str], names: Iterable[str] = ()) -> list[str]:
     return [name for name in ("parameters", "work", *names) if name not in words]
 
 
-def rollout_work(emitted: list[Emitted], tail: Tail) -> int:
-    """Return the workspace of a rollout: its stages and what forward dynamics needs."""
-    inner = next(e.body.work for e in emitted if e.function.name == "forward_dynamics")
-    return 3 * (tail.nq + tail.nv) + tail.nt + inner
+def offered(tail: Tail, views: list["FunctionView"]) -> Has:
+    """Return what the simulation of a scene with these functions can do."""
+    outputs = {f.name: f.outputs for f in views}
+    factors = outputs["implicit_factor"][0].length if "implicit_factor" in outputs else 0
+    return Has("pfl" in outputs, factors, tail.points, tuple(tail.groups.items()), "feet" in tail.contacts)
 
 
-def abi_hash(scene: Scene, views: list[FunctionView]) -> str:
+def abi_hash(scene: Scene, tail: Tail, views: list[FunctionView]) -> str:
     """Digest of what a caller relies on: symbols, argument sizes, workspace, the parameter struct."""
     interface = [scene.name, scene.real, [[p.name, p.size] for p in struct_parameters(scene)]]
     interface += [[f.name, [[a.name, a.length] for a in (*f.inputs, *f.outputs)], f.work] for f in views]
+    if "rollout" in scene.functions:
+        interface += layouts(offered(tail, views)).items()
     return hashlib.sha256(json.dumps(interface).encode()).hexdigest()[:16]
 
 
@@ -193,13 +197,13 @@ def c_context(scene: Scene, tail: Tail, emitted: list[Emitted], version: str) ->
     """Return everything that the C templates lay out."""
     views = [FunctionView(e, tail, scene.name) for e in emitted]
     literal = dialect(scene.real).literal
-    numbers = {"zero": 0, "one": 1, "two": 2, "half": 0.5, "third": 1 / 3, "sixth": 1 / 6}
+    numbers = {"zero": 0, "one": 1, "two": 2, "half": 0.5, "third": 1 / 3}
     numbers |= {"stiffness": 400, "damping": 40}  # of the example's tail
     numbers |= {"small": 2.0**-32, "quarter": math.pi / 2 * 2.0**-30}
-    rollout = "rollout" in scene.functions
-    works = [{"name": f.name, "work": f.work} for f in views]
-    if rollout:
-        works.append({"name": "rollout", "work": rollout_work(emitted, tail)})
+    works = {f.name: f.work for f in views}
+    rollout = {}
+    if "rollout" in scene.functions:
+        rollout = simulation_context(scene, tail, offered(tail, views), works)
     return (
         {name: literal(value) for name, value in numbers.items()}
         | {
@@ -217,7 +221,7 @@ def c_context(scene: Scene, tail: Tail, emitted: list[Emitted], version: str) ->
             "coordinates": COORDINATES[scene.coordinates],
             "polar": tail.polar,
             "content_hash": "",
-            "abi_hash": abi_hash(scene, views),
+            "abi_hash": abi_hash(scene, tail, views),
             "tail": tail,
             "factors": next((a.length for f in views for a in f.outputs if a.name == "factors"), 0),
             "groups": ", ".join(f"{count} of the {name}" for name, count in tail.groups.items()),
@@ -227,22 +231,24 @@ def c_context(scene: Scene, tail: Tail, emitted: list[Emitted], version: str) ->
             "functions": views,
             "names": [f.name for f in views],
             "most_arrays": max(len(f.inputs) + len(f.outputs) for f in views),
-            "works": works,
+            "works": [{"name": name, "work": work} for name, work in works.items()],
             "steps": step_views(emitted, scene.real, scene.name),
             "callees": [callee_view(*callee, scene.name) for callee in callees_of(emitted)],
-            "helpers": sorted(set().union(*(e.body.helpers for e in emitted)) | ({"copy"} if rollout else set())),
-            "rollout": rollout,
+            "helpers": sorted(set().union(*(e.body.helpers for e in emitted))),
         }
-        | casadi_context(scene, tail, {f.name: f.work for f in views})
+        | rollout
+        | casadi_context(scene, tail, works)
     )
 
 
 def c_files(scene: Scene, context: dict) -> dict[str, str]:
     """Render the header, the model, its host entries and an example."""
     name = scene.name
+    places = {"simulation.h.jinja": f"include/{name}_simulation.h", "simulation.c.jinja": f"src/{name}_simulation.c"}
     return {
         f"include/{name}.h": render("header.h.jinja", context),
         f"src/{name}.c": render("model.c.jinja", context),
         f"src/{name}_host.c": render("host.c.jinja", context),
         "example/main.c": render("example.c.jinja", context),
+        **({path: render(template, context) for template, path in places.items()} if "has" in context else {}),
     }

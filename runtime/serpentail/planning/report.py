@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..errors import SimulationError
-from ..simulation import simulate
+from ..simulation.run import simulate
 from ..tracking import Pfl
 from ..trajectory import Trajectory, pitch_roll_yaw
 from .attitude import angle_deg, tilt_deg
