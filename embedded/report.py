@@ -8,7 +8,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from boards import BOARDS
+from boards import BOARDS, ToolchainMissing
 from image import Image, build, command
 from misra import summary
 from results import blocks, run
@@ -161,9 +161,13 @@ def report(parent: Path) -> str:
 
 
 def main() -> int:
-    """Write the tables between the marks of docs/embedded.md."""
-    with TemporaryDirectory(prefix="serpentail_size_") as folder:
-        text = report(Path(folder))
+    """Write the tables between the marks of docs/embedded.md; return the exit status."""
+    try:
+        with TemporaryDirectory(prefix="serpentail_size_") as folder:
+            text = report(Path(folder))
+    except (ToolchainMissing, RuntimeError) as error:
+        print(error, file=sys.stderr)
+        return 2
     document = DOCUMENT.read_text(encoding="utf-8")
     marks = r"(<!-- size-report -->\n).*?(<!-- /size-report -->)"
     DOCUMENT.write_text(re.sub(marks, lambda m: f"{m[1]}{text}{m[2]}", document, flags=re.DOTALL), encoding="utf-8")

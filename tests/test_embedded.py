@@ -195,6 +195,14 @@ def test_missing_tools_are_named_with_their_packages(tmp_path, name):
     assert f"apt-get install --no-install-recommends {' '.join(boards.BOARDS[name].packages)}" in done.stderr
 
 
+def test_size_report_names_missing_tools(tmp_path):
+    before = (ROOT / "docs" / "embedded.md").read_bytes()
+    command = [sys.executable, str(ROOT / "embedded" / "report.py")]
+    done = subprocess.run(command, cwd=tmp_path, env={"PATH": ""}, capture_output=True, text=True, check=False)
+    assert done.returncode == 2 and "apt-get install" in done.stderr and "Traceback" not in done.stderr
+    assert (ROOT / "docs" / "embedded.md").read_bytes() == before
+
+
 def test_ci_installs_what_the_boards_need():
     script = (ROOT / ".ci" / "run").read_text()
     wanted = {package for name in CROSS for package in boards.BOARDS[name].packages} | {"cppcheck"}
