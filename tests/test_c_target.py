@@ -77,7 +77,7 @@ class Model(SimpleNamespace):
 
     @cached_property
     def objects(self):
-        """Plain object files of the model and its host entries."""
+        """Plain object files of the model, its host entries, its batches and its simulation."""
         (self.folder / "objects").mkdir()
         return [compiled(self.folder / "objects", source, *PLAIN) for source in self.sources]
 
@@ -176,8 +176,9 @@ def symbols(path, *options):
 def assert_own_symbols(model, objects, *merged):
     """A model defines what its header declares, and wants no more than the mathematics and memory of libc."""
     suffix = "f" if model.manifest["real"] == "float" else ""
-    own, host, simulation = ({symbol for _, symbol in symbols(path, "-g", "--defined-only")} for path in objects)
-    defined = own | host | simulation
+    parts = [{symbol for _, symbol in symbols(path, "-g", "--defined-only")} for path in objects]
+    own, host, batch, simulation = parts
+    defined = set().union(*parts)
     wanted = {symbol for path in objects for _, symbol in symbols(path, "-u")} - defined
     assert wanted <= {f"{name}{suffix}" for name in ("sin", "cos", "sqrt", "pow", "ceil", *merged)} | MEMORY
     header = model.include / f"{model.name}_simulation.h"
@@ -185,6 +186,7 @@ def assert_own_symbols(model, objects, *merged):
         assert found == set(re.findall(r"^(?:int|void) (\w+)\(", path.read_text(), re.M))
     names = f"{model.name}_(batch_|abi_hash$)|(jac_|adj1_|jac_adj1_)?{model.name}_casadi_"
     assert all(re.match(names, symbol) for symbol in host)
+    assert batch and all(symbol.startswith(f"{model.name}_side_by_side_") for symbol in batch)
 
 
 @every_model
