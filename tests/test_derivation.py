@@ -4,6 +4,7 @@ SymPy differentiates the joint turns; products carry derivatives by Leibniz' rul
 points of the circle, so nothing is rounded and equality is equality.
 """
 
+import math
 import random
 from collections import Counter
 from functools import cache
@@ -544,3 +545,33 @@ def test_steps_stay_within_their_budgets():
 def test_functions_stay_within_their_budgets():
     assert straight("forward_dynamics", 1, 3) <= 1040
     assert executed("forward_dynamics", 3, 4) <= 5340
+
+
+# Choices.
+
+
+@pytest.mark.parametrize("y", [-1.0, 0.0, 2.0])
+@pytest.mark.parametrize("x", [-1.0, 0.0, 2.0])
+def test_choices_are_lowered_as_sympy_means_them(x, y):
+    a, b = sympy.symbols("a b")
+    choices = [
+        sympy.Piecewise((a, a > b), (b + 1, True)),
+        sympy.Piecewise((a, a >= b), (b + 1, True)),
+        sympy.Piecewise((a, a < b), (b + 1, True)),
+        sympy.Piecewise((a, b <= a), (3, a < 0), (b + 1, True)),
+        sympy.Max(a, b),
+        sympy.Max(a, b, 1) - sympy.Max(a * b, -1),
+    ]
+    recorder = Recorder()
+    recorder.node_of |= {symbol: recorder.tape.input(k) for k, symbol in enumerate((a, b))}
+    nodes = [recorder.lower(e) for e in choices]
+    found = replay(recorder.tape.nodes, [x, y], Numbers(math, float))
+    assert [found[n] for n in nodes] == [float(e.subs({a: x, b: y})) for e in choices]
+
+
+@pytest.mark.parametrize("e", ["Piecewise((a, a > 0))", "Piecewise((a, Eq(a, b)), (b, True))", "Min(a, b)"])
+def test_choices_that_no_rule_lowers_are_refused(e):
+    recorder = Recorder()
+    symbols = {name: recorder.symbol(name, recorder.tape.input(k)) for k, name in enumerate("ab")}
+    with pytest.raises(TypeError, match="no rule lowers"):
+        recorder.lower(sympy.sympify(e, locals=symbols))

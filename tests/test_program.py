@@ -14,6 +14,7 @@ from serpentail_codegen.functions import FUNCTIONS, program
 from serpentail_codegen.interpret import Numbers, Run, branches, ldl_factor, ldl_solve, unroll
 from serpentail_codegen.program import Apply, Array, Builder, Fill, Index, Loop, as_index, narrowed, statements
 from serpentail_codegen.tape import Step, Tape, live_nodes, replay
+from serpentail_codegen.targets.c_function import in_loops
 
 TAILS = {"m1_n2": Tail(1, 2), "m2_n3": Tail(2, 3), "continuum_m2": Tail(2, 3, "continuum")}
 FLOATS = Numbers(math, float)
@@ -424,3 +425,11 @@ def test_a_guard_under_a_condition_cannot_be_unrolled():
         b.copy(u[0], x[0])
     with pytest.raises(ValueError, match="a guard under a condition"):
         unroll(b.finish())
+
+
+def test_c_steps_read_no_scalars_that_lie_apart():
+    b = Builder("apart", "A stride.")
+    x, u = b.array("x", 4, role="input"), b.array("u", 2, role="output")
+    b.apply(SWAP, {"x": x.part(0, 2, 2)}, x=u[0])
+    with pytest.raises(ValueError, match="swap reads x from places apart"):
+        in_loops(b.finish(), "double", "rat")

@@ -275,7 +275,7 @@ def part(name: str, meaning: str) -> Argument:
 
 def bristle_part(name: str, meaning: str) -> Argument:
     """Return an argument of the bristles."""
-    return Argument(name, lambda t: (t.points, 2), meaning)
+    return Argument(name, lambda t: (2 * t.points,), meaning)
 
 
 _TABLE = (

@@ -19,8 +19,8 @@ LEGS = Argument(
 )
 POSITIONS = Argument("positions", lambda t: (t.points, 3), "points that can touch the ground (m, world)")
 VELOCITIES = Argument("velocities", lambda t: (t.points, 3), "their velocities (m/s, world)")
-BRISTLES = Argument("bristles", lambda t: (t.points, 2), "stretch of the friction springs (m, world x and y)")
-BRISTLE_RATES = Argument("bristle_rates", lambda t: (t.points, 2), "their rates (m/s)")
+BRISTLES = Argument("bristles", lambda t: (2 * t.points,), "stretch of the friction springs (m, world x and y)")
+BRISTLE_RATES = Argument("bristle_rates", lambda t: (2 * t.points,), "their rates (m/s)")
 FORCES = Argument("forces", lambda t: (t.points, 3), "forces of the ground on the points (N, world)")
 
 

@@ -16,6 +16,7 @@ from .measures import (
     differences,
     differing,
     differing_outputs,
+    judged,
     matrix_error,
     named,
     outputs,
@@ -252,7 +253,7 @@ def pose_in_the_world_turns_all_alike(model: Model, s: State):
     turned = replace(s, q=q, f_ext=loads.ravel())
     turned = replace(turned, **{name: X @ getattr(s, name) for name in ("v", "v_dot", "dq", "dv", "multiplier")})
     found = {}
-    for name in model.kernels:
+    for name in judged(model):
         axes = changed_axes(Z, Z if name in WORLD else np.eye(3), model.nv)
         there = turned_outputs(model, outputs(model, name, s), axes, shift)
         found[name] = differences(model, name, turned, there.values())
@@ -284,7 +285,7 @@ def turned_array(x: np.ndarray, X: np.ndarray) -> np.ndarray:
 def position_and_speed_of_the_torso_do_not_matter(model: Model, s: State):
     """Another position and velocity of B leave H, C, v_dot and Jacobians as they are, bit for bit."""
     far = replace(s, q=s.q + 5.0 * (np.arange(model.nq) < 3), v=s.v - 3.0 * (np.arange(model.nv) < 3))
-    return same_bits(model, [name for name in model.kernels if name not in PLACED], s, far)
+    return same_bits(model, [name for name in judged(model) if name not in PLACED], s, far)
 
 
 @law()
@@ -292,7 +293,7 @@ def quaternion_has_no_norm_and_no_sign(model: Model, s: State):
     """The quaternion times -2 is the same attitude: the same results, bit for bit."""
     q = s.q.copy()
     q[3:7] *= -2
-    return same_bits(model, model.kernels, s, replace(s, q=q))
+    return same_bits(model, judged(model), s, replace(s, q=q))
 
 
 @law("tail_points", units=NEAR, only="articulated")
@@ -357,7 +358,7 @@ def bias_force_in_world_axes(model: Model, s: State):
 def calls_repeat(model: Model, s: State):
     """The same call gives the same bits, at once and after another call."""
     found = {}
-    for name in model.kernels:
+    for name in judged(model):
         first, second, _, last = (outputs(model, name, case) for case in (s, s, scaled(s, 0.5), s))
         found[name] = differing_outputs(first, second) + differing_outputs(first, last)
     return found
@@ -368,7 +369,7 @@ def batches_are_singles(model: Model, s: State):
     """A batch of nine states gives the bits of nine calls."""
     cases = [scaled(s, 1 - k / 16) for k in range(9)]
     found = {}
-    for name in model.kernels:
+    for name in judged(model):
         stacked = zip(*(arguments(model, name, case) for case in cases), strict=True)
         result = model.kernel(name)(*map(np.stack, stacked))
         whole = named(model, name, result)
@@ -382,7 +383,7 @@ def casadi_functions_agree(model: Model, s: State):
     """The CasADi functions of SX operations give what the C gives, v_dot relative to cond(H)."""
     return {
         name: differences(model, name, s, casadi_outputs(model, name, getattr(model.casadi, name), s))
-        for name in model.kernels
+        for name in judged(model)
         if name not in DERIVATIVES
     }
 
@@ -391,7 +392,7 @@ def casadi_functions_agree(model: Model, s: State):
 def casadi_externals_are_the_compiled_code(model: Model, s: State):
     """casadi.external on the compiled C gives the bits of the model's own call."""
     found = {}
-    for name in model.kernels:
+    for name in judged(model):
         results = casadi_outputs(model, name, model.casadi.external(name), s, model.casadi.parameter_vector)
         found[name] = sum(starmap(differing, zip(outputs(model, name, s).values(), results, strict=True)))
     return found

@@ -1,7 +1,7 @@
 """Measures: a model goes in; seeded states, its outputs there, and how far outputs differ, without units, come out."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -105,6 +105,12 @@ def scaled(s: State, factor: float) -> State:
 
 
 # Outputs
+
+
+def judged(model: Model) -> list[str]:
+    """Return the functions of a state alone; those of contact, tracking and integration take more."""
+    made, known = model.manifest["functions"], {field.name for field in fields(State)}
+    return [name for name in model.kernels if known.issuperset(a["name"] for a in made[name]["inputs"])]
 
 
 def outputs(model: Model, name: str, state: State) -> dict[str, np.ndarray]:

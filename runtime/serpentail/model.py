@@ -173,10 +173,10 @@ class Model:
         return self.kernel("contact_points")(*self._with_legs((q, v), legs))
 
     def contact_dynamics(self, q, v, tau, bristles, legs=None):
-        """(v_dot (nv,), bristle_rates (K, 2) (m/s), forces (K, 3) (N, world)) of Eq. 1 with contact, Eqs. 35 to 37.
+        """(v_dot (nv,), bristle_rates (2K,) (m/s), forces (K, 3) (N, world)) of Eq. 1 with contact, Eqs. 35 to 37.
 
-        bristles (K, 2): stretch of the points' friction springs (m, world x and y), a part of the state that starts at
-        zero.  legs as in ``contact_points``.
+        bristles (2K,): stretch of the points' friction springs (m), world x and y in turn, a part of the state that
+        starts at zero.  legs as in ``contact_points``.
         """
         return self.kernel("contact_dynamics")(*self._with_legs((q, v, tau, bristles), legs))
 

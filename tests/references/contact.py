@@ -113,10 +113,10 @@ class Contacts:
         return np.moveaxis([self.positions(q, legs, unit).imag / STEP for unit in np.eye(self.nv)], 0, 2)
 
     def laws(self, q, v, bristles, legs):
-        """Forces (K, 3) and bristle rates (K, 2)."""
+        """Forces (K, 3) and bristle rates (2K,)."""
         places, motion = self.positions(q, legs).real, self.velocities(q, v, legs)
-        found = [self.law(*one) for one in zip(places, motion, bristles, strict=True)]
-        return np.array([f for f, _ in found]), np.array([rate for _, rate in found])
+        found = [self.law(*one) for one in zip(places, motion, np.reshape(bristles, (-1, 2)), strict=True)]
+        return np.array([f for f, _ in found]), np.concatenate([rate for _, rate in found])
 
     def law(self, place, velocity, bristle):
         """Force and bristle rate of one point."""
@@ -170,7 +170,8 @@ class Contacts:
 
         state: (q, v, bristles, legs).
         """
-        q, v, bristles, legs = state
+        q, v, flat, legs = state
+        bristles = np.reshape(flat, (-1, 2))
         nv, count = self.nv, len(bristles)
         by_q, by_v, by_u = np.zeros((nv, nv)), np.zeros((nv, nv)), np.zeros((nv, 2 * count))
         u_v, u_u = np.zeros((2 * count, nv)), np.zeros((2 * count, 2 * count))
