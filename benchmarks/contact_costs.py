@@ -19,7 +19,6 @@ SIZES = ((1, 3), (3, 4), (3, None))
 FLIGHT = ("forward_dynamics", "pfl", "implicit")
 TOUCHING = ("contact_points", "contact_dynamics")
 FLAGS = ["-std=c99", "-O2", "-ffp-contract=fast", "-fno-tree-vectorize", "-fno-math-errno", "-fno-trapping-math"]
-FLAGS += ["-march=native"]
 STATES, ROUNDS = 64, 300
 STANDING = [0, 0, 0.0225, 1, 0.1, 0, 0]  # as a rat stands: half of its foot points in the ground
 LEGS = [3.665, -0.2618, 3.665, -0.2618, 0, 0, 0, 0]
