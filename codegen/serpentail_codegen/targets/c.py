@@ -199,14 +199,14 @@ def c_context(scene: Scene, tail: Tail, emitted: list[Emitted], version: str) ->
     literal = dialect(scene.real).literal
     numbers = {"zero": 0, "one": 1, "two": 2, "half": 0.5, "third": 1 / 3}
     numbers |= {"stiffness": 400, "damping": 40}  # of the example's tail
-    numbers |= {"small": 2.0**-32, "quarter": math.pi / 2 * 2.0**-30}
+    numbers |= {"word": 2.0**-32, "quarter": math.pi / 2 * 2.0**-30}
     works = {f.name: f.work for f in views}
     rollout = {}
     if "rollout" in scene.functions:
         rollout = simulation_context(scene, tail, offered(tail, views), works)
-    return (
-        {name: literal(value) for name, value in numbers.items()}
-        | {
+    return joined(
+        {name: literal(value) for name, value in numbers.items()},
+        {
             "title": f"{scene.kind} tail, {tail.segments} segments x {tail.links} {PIECES[scene.kind]}",
             "pieces": PIECES[scene.kind],
             "prefix": scene.name,
@@ -235,10 +235,19 @@ def c_context(scene: Scene, tail: Tail, emitted: list[Emitted], version: str) ->
             "steps": step_views(emitted, scene.real, scene.name),
             "callees": [callee_view(*callee, scene.name) for callee in callees_of(emitted)],
             "helpers": sorted(set().union(*(e.body.helpers for e in emitted))),
-        }
-        | rollout
-        | casadi_context(scene, tail, works)
+        },
+        rollout,
+        casadi_context(scene, tail, works),
     )
+
+
+def joined(*parts: dict) -> dict:
+    """Return the parts of a context as one; no name means two things."""
+    names = [name for part in parts for name in part]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise ValueError(f"the templates' names {', '.join(twice)} mean two things")
+    return {name: value for part in parts for name, value in part.items()}
 
 
 def c_files(scene: Scene, context: dict) -> dict[str, str]:

@@ -186,7 +186,6 @@ def simulation_context(scene: Scene, tail: Tail, has: Has, works: dict[str, int]
         "macros": MACROS,
         "slots": SLOTS,
         "table": table,
-        "factors": has.factors,
         "rollout_work": own + has.factors + max(works.values()),
         "descriptions": DESCRIPTIONS,
         "records": record_views(scene, has),
