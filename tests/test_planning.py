@@ -47,7 +47,7 @@ def integrated(model, plan):
 
 @every_form
 def test_plans_of_all_formulations_reach_the_goal_in_truth(formulation, attitude):
-    plan = planned(formulation=formulation, attitude=attitude)
+    plan = planned(formulation=formulation, attitude=attitude, guess=planned())  # one of several optima
     report = plan.report
     assert plan.success and report["converged"] and report["dynamics"] == "compiled"
     assert report["open_loop_attitude_error_deg"] <= 0.01
@@ -178,6 +178,15 @@ def test_goals_of_the_tail_and_of_a_whole_attitude():
     end = plan.trajectory
     assert angle_deg(end.attitude[-1], wanted) < 1e-5
     assert end.tail[-1, 0] == pytest.approx(0.1, abs=1e-7) and end.v[-1, 7] == pytest.approx(0, abs=1e-6)
+
+
+def test_effort_counts_rates_as_torques_of_a_damper():
+    for plan in (planned(tolerance=None), planned(tolerance=None, smoothing=0.0)):
+        flight, c = plan.trajectory, plan.problem.smoothing
+        integrand = np.sum(flight.tau**2 + (c * flight.v[:, 6:]) ** 2, axis=1)
+        assert plan.report["objective"] == pytest.approx(np.trapezoid(integrand, flight.t), rel=1e-2)
+    assert plan.report["objective"] == pytest.approx(plan.report["effort"], rel=1e-12)
+    assert plan.report["effort"] < planned(tolerance=None).report["effort"]
 
 
 def test_own_objective_and_path_constraint():
