@@ -80,7 +80,7 @@ class Run:
         program = self._transcribed(before.mesh if again else uniform(method.intervals))
         found: list[Solution] = []
         for k in range(method.multi_start + method.retries):
-            if asked() or (k >= method.multi_start and any(s.success for s in found)):
+            if found and (asked() or (k >= method.multi_start and any(s.success for s in found))):
                 break
             found.append(self._given(program) if k == 0 else self._solved(program, self._pushed(k)))
         return self._round(program, min(found, key=lambda s: (not s.success, s.value)))
