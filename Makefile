@@ -7,7 +7,7 @@ READY  := $(VENV)/.ready
 TAIL ?= articulated
 M    ?= 1
 N    ?= 3
-STARTS ?= 50
+STARTS ?= 200
 # options of `make model`: REAL=float EMISSION=loops BAKED=1 FUNCTIONS=energy,momentum
 OPTIONS := $(if $(REAL),--real $(REAL)) $(if $(EMISSION),--emission $(EMISSION)) \
            $(if $(BAKED),--baked) $(if $(FUNCTIONS),--functions $(FUNCTIONS))
@@ -36,7 +36,7 @@ help:
 	@echo "  make bench                                 benchmark report"
 	@echo "  make study-models                          the paper's Fig. 8: both tails compared, and what each costs"
 	@echo "  make study-righting                        the paper's Figs. 9 to 13, Table 2: righting, planned and true"
-	@echo "  make studies                               both; STARTS=50 random starts in the second"
+	@echo "  make studies                               both; STARTS=200 random starts in the second"
 	@echo "  make lint                                  style and import rules"
 	@echo "  make golden                                accept what the generator emits now as the golden models"
 	@echo "  make clean                                 remove generated/ and output/"

@@ -16,6 +16,7 @@ import numpy as np
 import continuum_forms
 import derivatives
 import peers
+import planning
 import serpentail as st
 from fixtures import COLUMNS, Fixture, fixture
 
@@ -222,6 +223,7 @@ MEASURES = {
     "work_precision": work_precision,
     "continuum_forms": continuum_forms.form_errors,
     "continuum_form_times": continuum_forms.form_times,
+    "planning": planning.planning,
 }
 
 

@@ -97,3 +97,26 @@ def draw_figure_13(plans: dict, path: Path) -> Path:
         return figure
 
     return write(path, draw)
+
+
+def draw_rates(rates: dict[str, list[dict]], path: Path) -> Path:
+    """Share of random starts that have a true plan within a CPU time, and the true errors of all of them."""
+
+    def draw() -> Figure:
+        figure = Figure(figsize=(7.2, 3.2), layout="constrained")
+        left, right = figure.subplots(1, 2)
+        for k, (kind, rows) in enumerate(rates.items()):
+            look = {"color": f"C{k}", "label": kind, "where": "post"}
+            share = np.arange(1, len(rows) + 1) / len(rows)
+            times = [r["cpu_s"] if r["success"] else np.inf for r in rows]
+            left.step(np.sort(times), 100 * share, **look)
+            right.step(np.sort([r["open_loop_attitude_error_deg"] for r in rows]), 100 * share, **look)
+        left.set(xlabel="CPU time [s]", ylabel="starts with a true plan [%]", xscale="log", ylim=(0, 101))
+        right.set(xlabel="true error at the end [deg]", ylabel="starts [%]", xscale="log", ylim=(0, 101))
+        right.axvline(0.01, color="0.5", linestyle=":")
+        for panel in (left, right):
+            panel.grid(color="#e6e6e6", linewidth=0.6)
+        left.legend(fontsize=6)
+        return figure
+
+    return write(path, draw)

@@ -69,6 +69,14 @@ def simulate(
     return Trajectory(t, q, v, tau, *measured, info)
 
 
+def end_state(model: Model, q0, v0, *, controller: Controller, duration: float, step: float):
+    """Return q (nq,), v (nv,) where simulate's "rk4" ends after a duration (s), and measure nothing on the way."""
+    run = Run.checked(model, q0, v0, duration, duration)
+    t, q, v, tau, _ = _rk4(model, Law(model, controller, run.start), run, {"step": step})
+    _check_finite(t, q, v, tau)
+    return q[-1], v[-1]
+
+
 @dataclass(frozen=True)
 class Run:
     """A checked start and output grid."""

@@ -1,11 +1,14 @@
 """Truth: a planned curve goes in; what its torques really do, interval by interval and from end to end, comes out."""
 
+from functools import lru_cache
+
 import numpy as np
 
 from ..errors import SimulationError
-from ..simulation import TorqueTable, simulate
+from ..simulation import TorqueTable, end_state
 from .attitude import angle_deg
 from .curve import Curve
+from .rules import Rule
 
 STEP = 1e-4  # s, longest RK4 step
 
@@ -17,16 +20,21 @@ def interval(model, curve: Curve, damping: float, k: int, q, v) -> tuple[np.ndar
     """
     width = float(curve.ends[k + 1] - curve.ends[k])
     steps = max(4, int(np.ceil(width / STEP)))
-    s = np.linspace(0.0, 1.0, 2 * steps + 1)
-    torques = curve.rule.basis(s) @ curve.nodes["torque"][k]
-    law = TorqueTable(s * width, torques, damping)
+    s, basis = _halves(curve.rule, steps)
+    law = TorqueTable(s * width, basis @ curve.nodes["torque"][k], damping)
     if not np.isfinite(q).all():
         return q, v
     try:
-        flight = simulate(model, q, v, controller=law, t_span=width, output_step=width, step=width / steps)
+        return end_state(model, q, v, controller=law, duration=width, step=width / steps)
     except SimulationError:  # bent or whirled beyond what the model describes
         return np.full_like(q, np.nan), np.full_like(v, np.nan)
-    return flight.q[-1], flight.v[-1]
+
+
+@lru_cache(maxsize=64)
+def _halves(rule: Rule, steps: int) -> tuple[np.ndarray, np.ndarray]:
+    """Fractions (2 steps + 1,) of an interval at which RK4 asks for torques, and the nodes' polynomials there."""
+    s = np.linspace(0.0, 1.0, 2 * steps + 1)
+    return s, rule.basis(s)
 
 
 def open_loop(model, curve: Curve, damping: float, start) -> tuple[np.ndarray, np.ndarray]:
