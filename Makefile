@@ -7,7 +7,7 @@ READY  := $(VENV)/.ready
 TAIL ?= articulated
 M    ?= 1
 N    ?= 3
-STARTS ?= 50
+STARTS ?= 200
 CPU    ?= m4
 ifneq ($(filter embedded,$(MAKECMDGOALS)),)
 REAL   ?= $(if $(filter m4,$(CPU)),float,double)
@@ -43,7 +43,7 @@ help:
 	@echo "  make size-report                           flash, RAM, stack and instructions -> docs/embedded.md"
 	@echo "  make study-models                          the paper's Fig. 8: both tails compared, and what each costs"
 	@echo "  make study-righting                        the paper's Figs. 9 to 13, Table 2: righting, planned and true"
-	@echo "  make studies                               both; STARTS=50 random starts in the second"
+	@echo "  make studies                               both; STARTS=200 random starts in the second"
 	@echo "  make lint                                  style and import rules"
 	@echo "  make golden                                accept what the generator emits now as the golden models"
 	@echo "  make clean                                 remove generated/ and output/"

@@ -17,6 +17,7 @@ import batches
 import continuum_forms
 import derivatives
 import peers
+import planning
 import serpentail as st
 from fixtures import COLUMNS, Fixture, fixture, generated, label
 
@@ -211,6 +212,7 @@ MEASURES = {
     "work_precision": work_precision,
     "continuum_forms": continuum_forms.form_errors,
     "continuum_form_times": continuum_forms.form_times,
+    "planning": planning.planning,
 }
 
 

@@ -5,7 +5,7 @@ import numpy as np
 from ..errors import SimulationError
 from ..simulation.controllers import TorqueCurve
 from ..simulation.piecewise import Piecewise
-from ..simulation.run import simulate
+from ..simulation.run import end_state
 from .attitude import angle_deg
 from .curve import Curve
 
@@ -23,12 +23,9 @@ def interval(model, curve: Curve, damping: float, k: int, q, v) -> tuple[np.ndar
     if not np.isfinite(q).all():
         return q, v
     try:
-        flight = simulate(
-            model, q, v, controller=law, t_span=width, output_step=width, method="rk4", step=width / steps
-        )
+        return end_state(model, q, v, controller=law, duration=width, step=width / steps)
     except SimulationError:  # bent or whirled beyond what the model describes
         return np.full_like(q, np.nan), np.full_like(v, np.nan)
-    return flight.q[-1], flight.v[-1]
 
 
 def planned_torques(curve: Curve, k: int) -> Piecewise:

@@ -142,16 +142,30 @@ def simulate(
     if missing:
         raise model.without(*missing)
     start = Start.checked(model, (q0, v0), t_span, settings.pop("output_step", None))
-    ground = Ground.checked(model, start, settings)
-    records = Records(model)
-    drive = Drive(records, controller, ground.legs.curve if ground.legs else None)
-    choice = choose(model, drive, start, method, settings)
-    run = CompiledRun(records, drive, choice, start, ground)
+    run, choice = prepared(model, start, controller, method, settings)
     begun = time.perf_counter()
     found = integrate(run, choice)
     seconds = time.perf_counter() - begun
     info = found.info | choice.settings | {"method": choice.name, "reason": choice.reason, "seconds": seconds}
-    return judged(model, replace(found, info={k: x for k, x in info.items() if x is not np.inf}), ground)
+    return judged(model, replace(found, info={k: x for k, x in info.items() if x is not np.inf}), run.ground)
+
+
+def end_state(model, q0, v0, *, controller: Controller, duration: float, step: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return q (nq,), v (nv,) where simulate's "rk4" ends after a duration (s), and measure nothing on the way."""
+    start = Start.checked(model, (q0, v0), duration, duration)
+    found = integrate(*prepared(model, start, controller, "rk4", {"step": step}))
+    if found.failure is not None:
+        raise found.failure
+    return found.q[-1], found.v[-1]
+
+
+def prepared(model, start: Start, controller: Controller, method, settings: dict) -> tuple[CompiledRun, Method]:
+    """Return a run that is ready to go, and its method; SimulationError where a setting is wrong."""
+    ground = Ground.checked(model, start, settings)
+    records = Records(model)
+    drive = Drive(records, controller, ground.legs.curve if ground.legs else None)
+    choice = choose(model, drive, start, method, settings)
+    return CompiledRun(records, drive, choice, start, ground), choice
 
 
 def choose(model, drive: Drive, start: Start, name, settings: dict) -> Method:
