@@ -18,7 +18,8 @@ OPTIONS = {"functions": ["forward_dynamics", "tail_points", "rollout"], "emissio
 NAME = "articulated_m2_n2"
 HEADER, MODEL, HOST = f"include/{NAME}.h", f"src/{NAME}.c", f"src/{NAME}_host.c"
 EXAMPLE, CASADI, MANIFEST = "example/main.c", f"{NAME}_casadi.py", "manifest.json"
-FILES = {HEADER, MODEL, HOST, EXAMPLE, CASADI, MANIFEST}
+SIMULATION = {f"include/{NAME}_simulation.h", f"src/{NAME}_simulation.c"}
+FILES = {HEADER, MODEL, HOST, EXAMPLE, CASADI, MANIFEST, *SIMULATION}
 
 
 def scene(**options):
@@ -64,7 +65,7 @@ def test_same_bytes_under_any_hash_seed_and_from_any_folder(expected, tmp_path, 
     tail = ("--tail", "articulated", "--segments", "2", "--links", "2", "--emission", "loops")
     surroundings = {"PYTHONHASHSEED": seed, "LC_ALL": "C", "TZ": f"Etc/GMT+{seed}"}
     printed = call(*tail, "--functions", functions, "--output", "made/here", cwd=cwd, **surroundings)
-    assert f"made/here/{NAME}: 6 files written" in printed
+    assert f"made/here/{NAME}: 8 files written" in printed
     assert texts(cwd / "made" / "here" / NAME) == expected
 
 
