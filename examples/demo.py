@@ -69,7 +69,7 @@ def report(model: st.Model, flight: st.Trajectory, check: st.Trajectory) -> str:
     turned = np.ptp(st.pitch_roll_yaw(flight.q, unwrap=True)[:, 0])
     rows = {
         "pitch": f"{turned:.2f} rad in {FLIGHT} s of flight",
-        "speed": f"{flight.info['steps']} Tsit5 steps, {FLIGHT / flight.info['seconds']:.0f} times faster than real time",
+        "speed": f"{flight.info['steps']} steps of Tsit5, {FLIGHT / flight.info['seconds']:.0f} times real time",
         "momentum": f"constant to {drift(level):.0e}, gravity's impulse taken off",
         "angular momentum": f"constant to {drift(flight.angular_momentum):.0e}, about the centre of mass",
         "energy": f"{1e3 * lost:.4f} mJ less; the tail's damping took {1e3 * damped:.4f} mJ",
