@@ -179,10 +179,11 @@ def internal_energy(flight, model) -> np.ndarray:
 
 
 def work_precision(folder: Path) -> list[dict]:
-    """Run time against error of 0.58 s of damped flight: RK4 in C at several steps, DOP853 at several tolerances."""
+    """Run time against error of 0.58 s of damped flight: RK4, Tsit5 and DOP853 at several steps or tolerances."""
     model = st.load(generated(folder / "speed", 1, 3))
     start = thrown(model)
     settings = [("rk4", {"step": h}) for h in (4e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4)]
+    settings += [("tsit5", {"rtol": r, "atol": r}) for r in (1e-4, 1e-6, 1e-8, 1e-10)]
     settings += [("dop853", {"rtol": r, "atol": r * 1e-2}) for r in (1e-4, 1e-6, 1e-8, 1e-10)]
 
     def fly(method, options):

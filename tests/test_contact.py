@@ -265,7 +265,7 @@ def test_a_flight_pays_nothing_for_contact(emission):
 def test_verification_judges_what_else_a_model_with_contacts_has():
     checks = laws(touching(2, 2))
     assert [c for c in checks if not c.passed] == []
-    assert sum(not c.omitted for c in checks) == 10
+    assert sum(not c.omitted for c in checks) == 14
 
 
 # Misuse.

@@ -25,6 +25,7 @@ from .measures import (
     same_bits,
     scaled,
     total_mass,
+    turned_array,
     worst,
 )
 from .model import Model
@@ -35,7 +36,8 @@ NEAR = 450  # roundings: 1e-13 in double
 FEW = 8  # links in a segment
 FLIGHT, STEPS = 0.2, 2000  # s
 WORLD = ("mass_matrix_world", "bias_force_world")
-PLACED = ("energy", "energy_derivatives", "momentum", "tail_points")  # what position and velocity of B enter
+# what position and velocity of B enter
+PLACED = ("energy", "energy_derivatives", "momentum", "tail_points", "contact_points")
 
 
 @dataclass(frozen=True)
@@ -265,20 +267,12 @@ def turned_outputs(model: Model, found: dict, X: np.ndarray, shift: np.ndarray) 
     Z, weight = X[:3, :3], total_mass(model) * model.parameters["gravity"]
     turn = {
         "potential": lambda V: V + weight * shift[2],
-        "points": lambda p: p @ Z.T + shift,
+        **dict.fromkeys(("points", "positions"), lambda p: p @ Z.T + shift),
+        "velocities": lambda u: u @ Z.T,
         "J": lambda J: Z @ J @ X.T,
         "dparameters": lambda D: X @ D,
     }
     return {key: turn[key](x) if key in turn else turned_array(x, X) for key, x in found.items()}
-
-
-def turned_array(x: np.ndarray, X: np.ndarray) -> np.ndarray:
-    """Turn the axes of a result that are as long as a velocity, or a vector."""
-    for axis, size in enumerate(np.shape(x)):
-        turn = {len(X): X, 3: X[:3, :3]}.get(size)
-        if turn is not None:
-            x = np.moveaxis(np.tensordot(turn, x, (1, axis)), 0, axis)
-    return x
 
 
 @law()

@@ -41,6 +41,11 @@ class State:
     dtau: np.ndarray
     multiplier: np.ndarray
 
+    @property
+    def accelerations(self) -> np.ndarray:
+        """Wanted accelerations of the tail coordinates."""
+        return self.v_dot[6:]
+
 
 def rounding(model: Model) -> float:
     """Return eps of the model's real type."""
@@ -108,8 +113,8 @@ def scaled(s: State, factor: float) -> State:
 
 
 def judged(model: Model) -> list[str]:
-    """Return the functions of a state alone; those of contact, tracking and integration take more."""
-    made, known = model.manifest["functions"], {field.name for field in fields(State)}
+    """Return the functions of a state alone; those of contact and implicit steps take more."""
+    made, known = model.manifest["functions"], {"accelerations", *(field.name for field in fields(State))}
     return [name for name in model.kernels if known.issuperset(a["name"] for a in made[name]["inputs"])]
 
 
@@ -169,6 +174,15 @@ def differing_outputs(found: dict, others: dict) -> float:
 
 
 # Errors without units
+
+
+def turned_array(x: np.ndarray, X: np.ndarray) -> np.ndarray:
+    """Turn the axes of a result that are as long as a velocity, or a vector."""
+    for axis, size in enumerate(np.shape(x)):
+        turn = {len(X): X, 3: X[:3, :3]}.get(size)
+        if turn is not None:
+            x = np.moveaxis(np.tensordot(turn, x, (1, axis)), 0, axis)
+    return x
 
 
 def worst(errors) -> float:

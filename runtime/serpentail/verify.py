@@ -5,14 +5,14 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from . import derivative_laws
+from . import contact_laws, derivative_laws
 from .errors import SerpentailError
 from .laws import LAWS as VALUE_LAWS
 from .laws import Law
 from .measures import State, states
 from .model import Model
 
-LAWS = (*VALUE_LAWS, *derivative_laws.LAWS)
+LAWS = (*VALUE_LAWS, *derivative_laws.LAWS, *contact_laws.LAWS)
 
 
 @dataclass(frozen=True)
@@ -59,10 +59,10 @@ def unchecked(entry: Law, model: Model) -> str:
     """Return why a law cannot be checked, or nothing."""
     made = {*model.manifest["functions"], *model.manifest["work"]}
     absent = ", ".join(name for name in entry.needs if name not in made)
-    if absent:
-        return f"not generated: {absent}"
-    kinds = ("", model.manifest["real"], model.manifest["scene"]["kind"])
-    return "" if entry.only in kinds else f"only for {entry.only} models"
+    kinds = ("", model.manifest["real"], model.manifest["scene"]["kind"], *(["contact"] if model.contacts else []))
+    if entry.only not in kinds:
+        return f"only for {entry.only} models"
+    return f"not generated: {absent}" if absent else ""
 
 
 def errors_at(entry: Law, model: Model, state: State) -> Iterator[tuple[str, float]]:
