@@ -71,7 +71,7 @@ class Ground:
         q, v, tau, bristles = state
         legs = self.legs_at(t)
         positions, _ = model.contact_points(q, v, *legs)
-        _, _, forces = model.contact_dynamics(q, v, tau, bristles.reshape(len(t), -1), *legs)
+        _, _, forces = model.contact_dynamics(q, v, tau, bristles.reshape(len(bristles), -1), *legs)
         return Contact(positions, forces, bristles, self.groups)
 
     def event(self, t: float, number: int) -> dict:
