@@ -1,7 +1,5 @@
 """`make bench`: measures generation, speed, drift and precision in one run; writes a report to output/bench."""
 
-import inspect
-import json
 import os
 import platform
 import subprocess
@@ -16,10 +14,13 @@ import numpy as np
 import batches
 import continuum_forms
 import derivatives
+import more_peers
 import peers
 import planning
+import scaling
 import serpentail as st
-from fixtures import COLUMNS, Fixture, fixture, generated, label
+from fixtures import Fixture, fixture, generated, label
+from report import written
 
 ROOT = Path(__file__).resolve().parent.parent
 OUTPUT = ROOT / "output" / "bench"
@@ -34,13 +35,11 @@ def main() -> int:
             print(f"measuring {name} ...", file=sys.stderr, flush=True)
             report[name] = measure(Path(folder))
     OUTPUT.mkdir(parents=True, exist_ok=True)
-    (OUTPUT / "report.json").write_text(json.dumps(report, indent=1))
-    picture = OUTPUT / "continuum_forms.png"
-    continuum_forms.draw(report["continuum_forms"], report["continuum_form_times"], picture)
-    text = markdown(report)
-    (OUTPUT / "report.md").write_text(text)
-    print(text)
-    print(f"written: {OUTPUT / 'report.md'}, report.json and {picture.name}", file=sys.stderr)
+    pictures = [OUTPUT / "continuum_forms.png", OUTPUT / "scaling.png"]
+    continuum_forms.draw(report["continuum_forms"], report["continuum_form_times"], pictures[0])
+    scaling.draw(report["scaling"], pictures[1])
+    print(written(OUTPUT, report, MEASURES, pictures))
+    print(f"written: {OUTPUT}: report.md, report.html, report.json and pictures", file=sys.stderr)
     return 0
 
 
@@ -203,6 +202,8 @@ def work_precision(folder: Path) -> list[dict]:
 MEASURES = {
     "generation": generation,
     "speed": speed,
+    "other_peers": more_peers.other_peers,
+    "scaling": scaling.scaling,
     "batch_times": batches.batch_times,
     "tails": tails,
     "jacobian_times": derivatives.jacobian_times,
@@ -215,26 +216,6 @@ MEASURES = {
     "continuum_form_times": continuum_forms.form_times,
     "planning": planning.planning,
 }
-
-
-def markdown(report: dict) -> str:
-    """Return the report as text: a heading and a table for each measure."""
-    lines = ["# Benchmark", "", ", ".join(str(value) for value in report["machine"].values()), ""]
-    for name, measure in MEASURES.items():
-        lines += [f"## {name.replace('_', ' ')}", "", inspect.cleandoc(measure.__doc__), "", *table(report[name]), ""]
-    return "\n".join(lines)
-
-
-def table(rows: list[dict]) -> list[str]:
-    """Return rows as a Markdown table."""
-    head = [COLUMNS.get(key, key) for key in rows[0]]
-    body = [[cell(value) for value in row.values()] for row in rows]
-    return ["| " + " | ".join(line) + " |" for line in (head, ["---"] * len(head), *body)]
-
-
-def cell(value) -> str:
-    """Return a table cell; numbers to three digits."""
-    return f"{value:.3g}" if isinstance(value, float) else str(value)
 
 
 if __name__ == "__main__":

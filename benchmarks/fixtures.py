@@ -61,6 +61,8 @@ COLUMNS = {
     "polar_operations": "operations, polar",
     "revolutes_ns": "tuned, ns",
     "revolutes_ratio": "times slower",
+    "mujoco_ns": "MuJoCo, ns",
+    "mujoco_ratio": "times slower",
     "casadi_ns": "CasADi's C, ns",
     "casadi_ratio": "times slower",
     "hand_ns": "the same, turn by hand, ns",
@@ -78,9 +80,10 @@ COLUMNS = {
 }
 
 
-def generated(parent: Path, segments: int, links: int | None = None) -> Path:
+def generated(parent: Path, segments: int, links: int | None = None, functions: str = "") -> Path:
     """Run the generator as `make model` does, for a continuum if there are no links; return the generated folder."""
     tail = ["--tail", "articulated", "--links", str(links)] if links else ["--tail", "continuum"]
+    tail += ["--functions", functions] if functions else []
     command = [sys.executable, "-m", "serpentail_codegen", *tail, "--segments", str(segments), "--output", str(parent)]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
     return parent / (f"articulated_m{segments}_n{links}" if links else f"continuum_m{segments}")

@@ -85,7 +85,7 @@ def build_library(source: Path, output_dir: Path) -> Path:
     if not library.exists():
         output_dir.mkdir(parents=True, exist_ok=True)
         partial = library.with_suffix(f".{os.getpid()}.tmp")
-        _run([*compiler, *flags, str(source), "-o", str(partial)])
+        run([*compiler, *flags, str(source), "-o", str(partial)])
         partial.replace(library)
     return library
 
@@ -282,13 +282,13 @@ def _header_folder(header: str, distribution: str, folder: str) -> Path:
 def _identity(compiler: Sequence[str], flags: Sequence[str]) -> tuple:
     """What a library depends on besides its source: compiler, flags, processor, headers."""
     native = [flag for flag in flags if flag.startswith("-march")]
-    version = _run([*compiler, "--version"])
-    target = _run([*compiler, *native, "-E", "-v", "-x", "c", os.devnull]) if native else ""
+    version = run([*compiler, "--version"])
+    target = run([*compiler, *native, "-E", "-v", "-x", "c", os.devnull]) if native else ""
     headers = [metadata.version(name) for _, name, _ in HEADERS] if native else []
     return tuple(compiler), tuple(flags), version, target, headers
 
 
-def _run(command: Sequence[str]) -> str:
+def run(command: Sequence[str]) -> str:
     """Output of a command; PeerUnavailable with the end of its complaints where it fails."""
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:

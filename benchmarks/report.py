@@ -1,0 +1,106 @@
+"""Reports: tables of figures go in, Markdown and HTML come out, with what changed since the last run."""
+
+import html
+import inspect
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+from fixtures import COLUMNS
+
+Report = dict[str, list[dict]]
+NOTABLE = 1.15  # ratio to the last run from which a figure is listed
+
+
+def written(folder: Path, report: dict, measures: dict[str, Callable], pictures: list[Path]) -> str:
+    """Write report.json, report.md and report.html, the last run compared; return the Markdown."""
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / "report.json"
+    last = json.loads(path.read_text()) if path.is_file() else None
+    sections = [(name, inspect.cleandoc(measures[name].__doc__), report[name]) for name in measures]
+    sections.append(("since the last run", *changes(report, last)))
+    head = ", ".join(str(value) for value in report["machine"].values())
+    text = "\n".join(["# Benchmark", "", head, "", *(line for s in sections for line in markdown(*s))])
+    (folder / "report.md").write_text(text)
+    (folder / "report.html").write_text(page(head, sections, pictures))
+    path.write_text(json.dumps(report, indent=1))
+    return text
+
+
+def changes(report: dict, last: dict | None) -> tuple[str, list[dict]]:
+    """Return what to say of the last run, and the times that differ from its by more than noise explains."""
+    if last is None:
+        return "This is the first run.", []
+    if last["machine"] != report["machine"]:
+        return "The last run was on another machine.", []
+    rows = []
+    for name, table in report.items():
+        pairs = zip(table, last.get(name, []), strict=False) if isinstance(table, list) else ()
+        for row, before in pairs:
+            rows += [r for key in row if (r := change(name, row, before, key))]
+    about = f"Times that differ from the last run's by more than {NOTABLE - 1:.0%}; both may have been disturbed."
+    return about if rows else f"No time differs from the last run's by more than {NOTABLE - 1:.0%}.", rows
+
+
+def change(name: str, row: dict, before: dict, key: str) -> dict | None:
+    """Return one time that changed."""
+    old, new = before.get(key), row[key]
+    time = "ns" in key.split("_") or key.endswith((" ns", "_s", "_ms", "_us"))
+    if not time or next(iter(row.values())) != next(iter(before.values())):
+        return None
+    if not all(isinstance(x, float) and x > 0 for x in (old, new)) or 1 / NOTABLE < new / old < NOTABLE:
+        return None
+    which = str(next(iter(row.values())))
+    return {
+        "measure": name,
+        "of": which,
+        "figure": COLUMNS.get(key, key),
+        "before": old,
+        "now": new,
+        "ratio": new / old,
+    }
+
+
+def markdown(name: str, about: str, rows: list[dict]) -> list[str]:
+    """Return a section as Markdown."""
+    return [f"## {name.replace('_', ' ')}", "", about, "", *table(rows), ""]
+
+
+def table(rows: list[dict]) -> list[str]:
+    """Return rows as a Markdown table."""
+    if not rows:
+        return []
+    body = [[cell(value) for value in row.values()] for row in rows]
+    return ["| " + " | ".join(line) + " |" for line in (heads(rows), ["---"] * len(rows[0]), *body)]
+
+
+def heads(rows: list[dict]) -> list[str]:
+    """Return the columns' names."""
+    return [COLUMNS.get(key, key) for key in rows[0]]
+
+
+def cell(value) -> str:
+    """Return a table cell; numbers to three digits."""
+    return f"{value:.3g}" if isinstance(value, float) else str(value)
+
+
+def page(head: str, sections: list[tuple], pictures: list[Path]) -> str:
+    """Return the report as one HTML page beside its pictures."""
+    style = "body{font:15px sans-serif;max-width:70em;margin:2em auto}td,th{padding:.2em .8em;text-align:right}"
+    style += "th{border-bottom:1px solid}td:first-child,th:first-child{text-align:left}img{max-width:100%}"
+    body = "".join(section(*s) for s in sections)
+    body += "".join(f'<p><img src="{p.name}" alt="{p.stem}"></p>' for p in pictures)
+    title = "<!doctype html><html lang=en><meta charset=utf-8><title>Benchmark</title>"
+    return f"{title}<style>{style}</style><h1>Benchmark</h1><p>{html.escape(head)}</p>{body}</html>\n"
+
+
+def section(name: str, about: str, rows: list[dict]) -> str:
+    """Return a section as HTML."""
+    lines = [cells("th", heads(rows)), *(cells("td", map(cell, row.values())) for row in rows)] if rows else []
+    title = html.escape(name.replace("_", " "))
+    return f"<h2>{title}</h2><p>{html.escape(about)}</p><table>{''.join(lines)}</table>"
+
+
+def cells(kind: str, texts) -> str:
+    """Return a row of an HTML table."""
+    return "<tr>" + "".join(f"<{kind}>{html.escape(text)}</{kind}>" for text in texts) + "</tr>"

@@ -1,0 +1,62 @@
+"""Scaling: sizes go in; nanoseconds of forward dynamics, and its share of the core's peak, come out."""
+
+import ctypes
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+
+import peers
+from fixtures import fixture, generated, label
+
+SWEEPS = {
+    "links of one segment": [(1, n) for n in (1, 2, 4, 8, 16, 32, 64)],
+    "segments of four links": [(m, 4) for m in (1, 2, 3, 4, 6, 8, 12)],
+    "segments of a continuum": [(m, None) for m in (1, 2, 3, 4, 6, 8)],
+}
+ROUNDS, CALLS = 100, 64
+
+
+def scaling(folder: Path) -> list[dict]:
+    """Nanoseconds of forward dynamics against the size of the tail, and its share of the peak of multiply-adds.
+
+    Operations are additions, multiplications and divisions; lanes of rows are counted, so a sweep in lanes does more of
+    them, and faster.  The peak is measured in this run, of scalars (of vectors in brackets).
+    """
+    scalar, vector = peak(folder)
+    rows = []
+    for sweep, sizes in SWEEPS.items():
+        for size in sizes:
+            ours = fixture(generated(folder / "scaling", *size, functions="forward_dynamics"), folder / "scaling")
+            least, _ = peers.time_rounds([ours.closure], peers.random_states(size[0]), ROUNDS, CALLS)[0]
+            entry = ours.model.manifest["functions"]["forward_dynamics"]
+            share = f"{entry['operations'] / least / scalar:.0%} ({entry['operations'] / least / vector:.0%})"
+            row = {"sweep": sweep, "model": label(*size), "ns": least, "operations": entry["operations"]}
+            rows.append(row | {"emission": entry["emission"], "of the peak": share})
+    return rows
+
+
+def peak(folder: Path) -> tuple[float, float]:
+    """Flops per nanosecond of this core: scalars, vectors."""
+    flags = ("-std=gnu11", "-O2", "-march=native", "-ffp-contract=fast", "-fPIC", "-shared")
+    target = folder / "peak.so"
+    peers.run(["gcc", *flags, str(Path(__file__).parent / "peak.c"), "-o", str(target)])
+    found = (ctypes.c_double * 2)()
+    ctypes.CDLL(str(target)).measure_peak(ctypes.byref(found, 0), ctypes.byref(found, 8))
+    return found[0], found[1]
+
+
+def draw(rows: list[dict], path: Path) -> None:
+    """Draw nanoseconds against the number of links or segments."""
+    figure, axes = plt.subplots(figsize=(6.4, 4.2), layout="constrained")
+    for (sweep, sizes), marker in zip(SWEEPS.items(), "os^", strict=True):
+        times = [row["ns"] for row in rows if row["sweep"] == sweep]
+        counts = [n if sweep.startswith("links") else m for m, n in sizes]
+        axes.loglog(counts, times, marker=marker, label=sweep)
+    axes.set(xlabel="number", ylabel="forward dynamics, ns", title="Run time against size")
+    axes.grid(True, which="both", alpha=0.3)
+    axes.legend()
+    figure.savefig(path, dpi=150)
+    plt.close(figure)
