@@ -7,10 +7,14 @@ READY  := $(VENV)/.ready
 TAIL ?= articulated
 M    ?= 1
 N    ?= 3
-STARTS ?= 50
-# options of `make model`: REAL=float EMISSION=loops BAKED=1 FUNCTIONS=energy,momentum
+STARTS ?= 200
+CPU    ?= m4
+ifneq ($(filter embedded,$(MAKECMDGOALS)),)
+REAL   ?= $(if $(filter m4,$(CPU)),float,double)
+endif
+# options of `make model`: REAL=float EMISSION=loops PROFILE=reproducible BAKED=1 FUNCTIONS=energy,momentum
 OPTIONS := $(if $(REAL),--real $(REAL)) $(if $(EMISSION),--emission $(EMISSION)) \
-           $(if $(BAKED),--baked) $(if $(FUNCTIONS),--functions $(FUNCTIONS))
+           $(if $(PROFILE),--profile $(PROFILE)) $(if $(BAKED),--baked) $(if $(FUNCTIONS),--functions $(FUNCTIONS))
 NAME    := $(TAIL)_m$(M)$(if $(filter continuum,$(TAIL)),,_n$(N))
 SCENE   ?= $(wildcard scenes/$(NAME).toml)
 OWN     := $(if $(SCENE),$(shell sed -n 's/^name *= *"\([^"]*\)".*/\1/p' $(SCENE) 2>/dev/null))
@@ -19,7 +23,7 @@ SOURCES := $(shell find codegen -name '*.py' -o -name '*.jinja')
 STAMP   := generated/$(MODEL)/.made
 WANTED  := $(if $(SCENE),$(SCENE),--tail $(TAIL) --segments $(M) $(if $(filter continuum,$(TAIL)),,--links $(N))) $(OPTIONS)
 
-.PHONY: help setup demo test test-all model verify bench studies study-models study-righting lint golden clean
+.PHONY: help setup demo test test-all model verify bench embedded size-report studies study-models study-righting lint golden clean
 .DELETE_ON_ERROR:
 
 help:
@@ -31,12 +35,15 @@ help:
 	@echo "  make model  TAIL=articulated M=3 N=4       -> generated/articulated_m3_n4"
 	@echo "  make model  TAIL=continuum M=3             -> generated/continuum_m3"
 	@echo "  make model  SCENE=scenes/kangaroo_rat_m3_n4.toml"
-	@echo "              options: REAL=float EMISSION=loops BAKED=1 FUNCTIONS=energy,momentum"
+	@echo "              options: REAL=float EMISSION=loops PROFILE=reproducible BAKED=1"
+	@echo "                       FUNCTIONS=energy,momentum"
 	@echo "  make verify TAIL=articulated M=3 N=4       verification report of that model"
 	@echo "  make bench                                 benchmark report"
+	@echo "  make embedded TAIL=articulated M=1 N=3     run it on a Cortex-M4F in QEMU against the host; CPU=m7: in double"
+	@echo "  make size-report                           flash, RAM, stack and instructions -> docs/embedded.md"
 	@echo "  make study-models                          the paper's Fig. 8: both tails compared, and what each costs"
 	@echo "  make study-righting                        the paper's Figs. 9 to 13, Table 2: righting, planned and true"
-	@echo "  make studies                               both; STARTS=50 random starts in the second"
+	@echo "  make studies                               both; STARTS=200 random starts in the second"
 	@echo "  make lint                                  style and import rules"
 	@echo "  make golden                                accept what the generator emits now as the golden models"
 	@echo "  make clean                                 remove generated/ and output/"
@@ -85,6 +92,12 @@ verify: model
 
 bench: $(READY)
 	$(PY) benchmarks/bench.py
+
+embedded: model
+	$(PY) embedded/check.py generated/$(MODEL) --board $(CPU)
+
+size-report: $(READY)
+	$(PY) embedded/report.py
 
 study-models: $(READY)
 	PYTHONPATH=benchmarks $(PY) examples/study_models.py

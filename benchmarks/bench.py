@@ -13,11 +13,13 @@ from pathlib import Path
 
 import numpy as np
 
+import batches
 import continuum_forms
 import derivatives
 import peers
+import planning
 import serpentail as st
-from fixtures import COLUMNS, Fixture, fixture
+from fixtures import COLUMNS, Fixture, fixture, generated, label
 
 ROOT = Path(__file__).resolve().parent.parent
 OUTPUT = ROOT / "output" / "bench"
@@ -71,19 +73,6 @@ def generation(folder: Path) -> list[dict]:
         rows.append({"model": label(*size), "generate_s": made - begun, "compile_s": done - made} | {"c_bytes": text})
         rows[-1] |= {"total_s": done - begun, "emission": emission}
     return rows
-
-
-def generated(parent: Path, segments: int, links: int | None = None) -> Path:
-    """Run the generator as `make model` does, for a continuum if there are no links; return the generated folder."""
-    tail = ["--tail", "articulated", "--links", str(links)] if links else ["--tail", "continuum"]
-    command = [sys.executable, "-m", "serpentail_codegen", *tail, "--segments", str(segments), "--output", str(parent)]
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-    return parent / (f"articulated_m{segments}_n{links}" if links else f"continuum_m{segments}")
-
-
-def label(segments: int, links: int | None) -> str:
-    """Return (m, n) as text; a continuum has no links."""
-    return f"({segments}, {links})" if links else f"continuum, m = {segments}"
 
 
 def speed(folder: Path) -> list[dict]:
@@ -213,6 +202,7 @@ def work_precision(folder: Path) -> list[dict]:
 MEASURES = {
     "generation": generation,
     "speed": speed,
+    "batch_times": batches.batch_times,
     "tails": tails,
     "jacobian_times": derivatives.jacobian_times,
     "hessian_times": derivatives.hessian_times,
@@ -222,6 +212,7 @@ MEASURES = {
     "work_precision": work_precision,
     "continuum_forms": continuum_forms.form_errors,
     "continuum_form_times": continuum_forms.form_times,
+    "planning": planning.planning,
 }
 
 

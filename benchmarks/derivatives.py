@@ -142,11 +142,11 @@ def jacobians(model: st.Model, turn_by_hand: bool) -> ca.Function:
     g = Graph(model)
     tau, v_dot = ca.SX.sym("tau", g.nt), ca.SX.sym("v_dot", g.nv)
     q = ca.vertsplit(g.q)
-    factor = g.module.ldl_factor(g.module.mass_matrix(g.fields, q=q)["H"], g.nv)
+    factor = g.module.ldl_factor(g.module.mass_matrix(g.fields, q=q)["H"], g.nv, g.nv)
     bias = ca.vertcat(*g.module.bias_force(g.fields, q=q, v=ca.vertsplit(g.v))["force"])
 
     def solve(column):
-        return ca.vertcat(*g.module.ldl_solve(factor, ca.vertsplit(column)))
+        return ca.vertcat(*g.module.ldl_solve(factor, ca.vertsplit(column), g.nv))
 
     solved = solve(ca.vertcat(ca.SX(6, 1), tau) - bias)
     directions = [g.q[7:], g.v[3:]] + ([] if turn_by_hand else [g.turn])

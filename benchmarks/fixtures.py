@@ -2,6 +2,8 @@
 
 import ctypes
 import math
+import subprocess
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -74,6 +76,19 @@ COLUMNS = {
     "generate_cpu": "generate, CPU s",
     "compile_cpu": "compile, CPU s",
 }
+
+
+def generated(parent: Path, segments: int, links: int | None = None) -> Path:
+    """Run the generator as `make model` does, for a continuum if there are no links; return the generated folder."""
+    tail = ["--tail", "articulated", "--links", str(links)] if links else ["--tail", "continuum"]
+    command = [sys.executable, "-m", "serpentail_codegen", *tail, "--segments", str(segments), "--output", str(parent)]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    return parent / (f"articulated_m{segments}_n{links}" if links else f"continuum_m{segments}")
+
+
+def label(segments: int, links: int | None) -> str:
+    """Return (m, n) as text; a continuum has no links."""
+    return f"({segments}, {links})" if links else f"continuum, m = {segments}"
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ FUNCTIONS = (
     "inverse_dynamics_hessian"
 )
 PAPER = {"formulation": "full", "attitude": "euler", "rule": "trapezoidal", "tolerance": None, "retries": 0}
+PAPER |= {"smoothing": 0.0}
 
 
 def model(folder: Path, segments: int, links: int | None) -> st.Model:

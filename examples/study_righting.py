@@ -1,24 +1,26 @@
 """Airborne righting (Sects. 4.2, 4.3): paper's problem and tails go in; Figs. 9 to 13, Table 2 and rates come out.
 
-Usage: python examples/study_righting.py [FOLDER] [--starts 50], by default output/studies/righting
+Usage: python examples/study_righting.py [FOLDER] [--starts 200], by default output/studies/righting
 """
 
 import argparse
 import json
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
 
 import righting
 import serpentail as st
-from study_righting_figures import draw_figure_10, draw_figure_11, draw_figure_13
+from study_righting_figures import draw_figure_10, draw_figure_11, draw_figure_13, draw_rates
 
 FREQUENCIES = (20, 40, 60, 80, 100, 150, 200)  # Hz, nodes a second
 EXAMPLE = 4  # the random start of Fig. 11: both ways of planning converge on it
 TAILS = ((1, 6), (2, 3), (3, 2))
-MORE = ((1, None),)
-TRUE = {"tolerance": 0.01, "rounds": 4}
+MORE = ((4, 2), (5, 2), (6, 2), (1, None), (2, None), (3, None))
+SEVERAL = ((2, 3), (3, 2), (6, 2), (1, None), (3, None))  # tails righted from random starts, besides (1, 3)
+FEWER = 4  # times fewer starts for these
 
 
 def say(words: str) -> None:
@@ -58,10 +60,9 @@ def segments(folder: Path, models: dict) -> dict:
     """Sect. 4.3: tails of six links, from the kick's state, as the paper plans (100 Hz) and true."""
     rows, plans = [], {}
     for (m, n), rat in models.items():
-        say(f"({m}, {n or 'continuum'})")
+        say(name(m, n))
         common = {"start": righting.kicked(rat), "bounds": righting.bounds(rat, 2 * np.pi)}
-        own = common | {"bounds": righting.bounds(rat, 2 * np.pi, 60.0), "duration": (0.3, righting.FLIGHT)}
-        true = st.plan(rat, **own, **TRUE, damping=1e-5, most_intervals=120)
+        true = st.plan(rat, **common, duration=(0.3, righting.FLIGHT), retries=8)
         rows.append({"segments": m, "links": n, "ours": righting.row(true)})
         if (m, n) in TAILS:
             paper = st.plan(rat, **common, duration=righting.FLIGHT, **righting.PAPER, intervals=58)
@@ -74,24 +75,43 @@ def segments(folder: Path, models: dict) -> dict:
     return {"rows": rows}
 
 
-def rates(rat: st.Model, count: int) -> dict:
-    """Success over random tumbling starts: first mesh alone, and refined until true."""
-    kinds = {
-        "upright and at rest": ({}, {"tolerance": 0.01}),
-        "upright": ({"torso_rate": None}, {"tolerance": 0.01}),
-        "upright, not refined": ({"torso_rate": None}, {"tolerance": None}),
-    }
-    return {name: rate(rat, count, st.Goal(**goal), settings) for name, (goal, settings) in kinds.items()}
+def rates(models: dict, count: int) -> dict[str, list[dict]]:
+    """What plans from random tumbling starts come to, upright and at rest unless told otherwise."""
+    free, kinds = st.Goal(torso_rate=None), {"(1, 3)": ((1, 3), count, {})}
+    kinds["(1, 3), any rate"] = (1, 3), count, {"goal": free}
+    kinds["(1, 3), no smoothing"] = (1, 3), count // FEWER, {"smoothing": 0.0}
+    kinds |= {name(*size): (size, count // FEWER, {}) for size in SEVERAL}
+    return {kind: rate(kind, models[size], starts, own) for kind, (size, starts, own) in kinds.items()}
 
 
-def rate(rat: st.Model, count: int, goal: st.Goal, settings: dict) -> dict:
-    """Success, and medians over the successes, of plans from `count` random starts."""
-    settings = settings | {"duration": (0.3, righting.FLIGHT), "bounds": righting.bounds(rat), "goal": goal}
-    plans = [st.plan(rat, start=righting.tumbling(rat, k), track=False, **settings) for k in range(1, count + 1)]
-    good = [plan.report for plan in plans if plan.success]
-    names = ("iterations", "solve_cpu_s", "wall_s", "intervals", "open_loop_attitude_error_deg", "objective")
-    medians = {name: float(np.median([report[name] for report in good])) for name in names} if good else {}
-    return {"successes": len(good), "starts": count} | medians
+def name(segments: int, links: int | None) -> str:
+    """Return a tail's name."""
+    return f"({segments}, {links})" if links else f"continuum {segments}"
+
+
+def rate(kind: str, rat: st.Model, count: int, settings: dict) -> list[dict]:
+    """Return a row for every start; the whole tail bends by 180 degrees as in Sect. 4.2, or by 360 as in 4.3."""
+    say(f"{kind}: {count} random starts")
+    turn = np.pi if (rat.segments, rat.links) == (1, 3) else 2 * np.pi
+    settings = settings | {"duration": (0.3, righting.FLIGHT), "bounds": righting.bounds(rat, turn), "track": False}
+    rows = []
+    for k in range(1, count + 1):
+        begun = time.process_time()
+        plan = st.plan(rat, start=righting.tumbling(rat, k), **settings)
+        rows.append(righting.row(plan) | {"start": k, "cpu_s": time.process_time() - begun})
+    return rows
+
+
+def rate_lines(rates: dict[str, list[dict]]) -> list[str]:
+    """Return the rates as text: successes, medians and tails of CPU time, error and objective."""
+    lines = ["random starts          true      of  cpu: median    95 %   most [s]  err [deg]  objective"]
+    for kind, rows in rates.items():
+        good = [r for r in rows if r["success"]]
+        cpu = np.percentile([r["cpu_s"] for r in rows], [50, 95, 100])
+        medians = [np.median([r[key] for r in good]) for key in ("open_loop_attitude_error_deg", "objective")]
+        numbers = "{:>12.2f}{:>8.2f}{:>11.2f}{:>11.4f}{:>11.2e}".format(*cpu, *medians)
+        lines.append(f"{kind:<22}{len(good):>5}{len(rows):>8}{numbers}")
+    return lines
 
 
 def table(study: dict) -> str:
@@ -103,11 +123,11 @@ def table(study: dict) -> str:
     head = "plan                   conv.    it  T [s]  objective  cpu [s]  err [deg]    E [J]   P [W]"
     lines = [head, line.format("(1, 3), Sect. 4.2", study["righting"])]
     for r in study["segments"]["rows"]:
-        name = f"({r['segments']}, {r['links'] or 'continuum'})"
-        lines += [line.format(f"{name} {kind}", r[kind]) for kind in ("paper", "ours") if kind in r]
+        tail = name(r["segments"], r["links"])
+        lines += [line.format(f"{tail} {kind}", r[kind]) for kind in ("paper", "ours") if kind in r]
     for kind, rows in study["frequencies"].items():
         lines += [line.format(f"{r['frequency']} Hz, {kind}", r) for r in rows]
-    lines += ["", *(f"{name}: {r}" for name, r in study["rates"].items())]
+    lines += ["", *rate_lines(study["rates"])]
     return "\n".join(lines)
 
 
@@ -124,17 +144,17 @@ def main(folder: Path, starts: int) -> None:
     draw_figure_11(study["frequencies"], folder / "fig11.png")
     say("Sect. 4.3")
     study["segments"] = segments(folder, models)
-    say(f"{starts} random starts")
-    study["rates"] = rates(rat, starts)
+    study["rates"] = rates(models | {(1, 3): rat}, starts)
+    draw_rates(study["rates"], folder / "rates.png")
     (folder / "summary.json").write_text(json.dumps(study, indent=1) + "\n")
     print(table(study))
-    print(f"\nwritten: fig9 to fig13 and summary.json in {folder}")
+    print(f"\nwritten: fig9 to fig13, rates.png and summary.json in {folder}")
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", nargs="?", type=Path, default=righting.ROOT / "output" / "studies" / "righting")
-    parser.add_argument("--starts", type=int, default=50)
+    parser.add_argument("--starts", type=int, default=200)
     given = parser.parse_args()
     try:
         main(given.folder.absolute(), given.starts)

@@ -24,7 +24,7 @@ def draw_figure_10(flights: dict[str, st.Trajectory], path: Path) -> Path:
         names += (r"$\alpha_1$ [deg]", r"$\beta_1$ [deg]", r"$\tau_\alpha$ [mN m]", r"$\tau_\beta$ [mN m]")
         for name, flight in flights.items():
             colour, dash = LOOKS[name]
-            for k, curve in enumerate(_curves(flight)):
+            for k, curve in enumerate(_curves(flight, flight if name == "passive" else flights["tracked"])):
                 axes.flat[k].plot(flight.t, curve, dash, color=colour, label=name)
         for panel, name in zip(axes.flat, names, strict=True):
             panel.set_ylabel(name)
@@ -37,10 +37,23 @@ def draw_figure_10(flights: dict[str, st.Trajectory], path: Path) -> Path:
     return write(path, draw)
 
 
-def _curves(flight: st.Trajectory) -> list[np.ndarray]:
-    angles = np.degrees(st.pitch_roll_yaw(flight.q, unwrap=True))
+def _curves(flight: st.Trajectory, like: st.Trajectory) -> list[np.ndarray]:
+    angles = np.degrees(_angles_near(flight, like))
     tail, tau = np.degrees(flight.tail), 1e3 * flight.tau
     return [flight.q[:, 1], flight.q[:, 2], angles[:, 0], angles[:, 1], tail[:, 0], tail[:, 1], tau[:, 0], tau[:, 1]]
+
+
+def _angles_near(flight: st.Trajectory, like: st.Trajectory) -> np.ndarray:
+    """Pitch, roll, yaw (K, 3): of the two triples of each attitude, and turns of them, those nearest to another flight.
+
+    (pi - phi_x, phi_y + pi, phi_z + pi) is the same attitude: near pitches of 90 degrees, either may come out.
+    """
+    angles, wanted = (st.pitch_roll_yaw(motion.q, unwrap=True) for motion in (flight, like))
+    wanted = np.column_stack([np.interp(flight.t, like.t, column) for column in wanted.T])
+    both = np.stack([angles, angles * (-1, 1, 1) + np.pi])
+    both += 2 * np.pi * np.round((wanted - both) / (2 * np.pi))
+    nearest = np.abs(both - wanted).sum(axis=2).argmin(axis=0)
+    return both[nearest, np.arange(len(angles))]
 
 
 def draw_figure_11(rows: dict[str, list[dict]], path: Path) -> Path:
@@ -94,6 +107,29 @@ def draw_figure_13(plans: dict, path: Path) -> Path:
             column[1].margins(y=0.4)
         for panel, name in zip(axes[:, 0], ("attitude [deg]", "tail [deg]", "torque [mN m]"), strict=True):
             panel.set_ylabel(name)
+        return figure
+
+    return write(path, draw)
+
+
+def draw_rates(rates: dict[str, list[dict]], path: Path) -> Path:
+    """Share of random starts that have a true plan within a CPU time, and the true errors of all of them."""
+
+    def draw() -> Figure:
+        figure = Figure(figsize=(7.2, 3.2), layout="constrained")
+        left, right = figure.subplots(1, 2)
+        for k, (kind, rows) in enumerate(rates.items()):
+            look = {"color": f"C{k}", "label": kind, "where": "post"}
+            share = np.arange(1, len(rows) + 1) / len(rows)
+            times = [r["cpu_s"] if r["success"] else np.inf for r in rows]
+            left.step(np.sort(times), 100 * share, **look)
+            right.step(np.sort([r["open_loop_attitude_error_deg"] for r in rows]), 100 * share, **look)
+        left.set(xlabel="CPU time [s]", ylabel="starts with a true plan [%]", xscale="log", ylim=(0, 101))
+        right.set(xlabel="true error at the end [deg]", ylabel="starts [%]", xscale="log", ylim=(0, 101))
+        right.axvline(0.01, color="0.5", linestyle=":")
+        for panel in (left, right):
+            panel.grid(color="#e6e6e6", linewidth=0.6)
+        left.legend(fontsize=6)
         return figure
 
     return write(path, draw)

@@ -17,7 +17,8 @@ CODEGEN, RUNTIME = (Path(package.__file__).parent for package in (serpentail_cod
 ROOT = Path(__file__).parents[1]
 SOURCES = sorted(path for package in (CODEGEN, RUNTIME) for path in package.rglob("*.py"))
 TEMPLATES = sorted((CODEGEN / "templates").glob("*.jinja"))
-DERIVATION = {"kinematics", "dynamics", "continuum", "polar_continuum", "legs", "contact", "stiffness", "lower"}
+DERIVATION = {"kinematics", "dynamics", "lane_dynamics", "continuum", "polar_continuum", "legs", "contact", "stiffness"}
+DERIVATION |= {"lower"}
 WITHOUT_SYMPY = (
     "tape",
     "program",

@@ -36,7 +36,11 @@ MODELS = {
     "m1_n1_baked_straight": {"baked": True, "emission": "straight"},
     "m2_n2_baked_loops": {"baked": True, "emission": "loops"},
     "m2_n2_baked_float": {"baked": True, "emission": "loops", "real": "float"},
+    "m1_n1_double_reproducible": {"profile": "reproducible", "emission": "straight"},
+    "m2_n2_float_reproducible": {"profile": "reproducible", "emission": "loops", "real": "float"},
 }
+REPRODUCIBLE = [name for name in MODELS if name.endswith("_reproducible")]
+HARDEST = {"double": 6381956970095103.0 * 2.0**797, "float": 16367173.0 * 2.0**72}  # nearest to a multiple of pi/2
 del MODELS["arcs2_float_straight"]  # its text is long, and what it shows others show
 every_model = pytest.mark.parametrize("name", MODELS)
 some_models = pytest.mark.parametrize("name", ["m1_n1_double_straight", "m1_n1_float_loops", "m1_n1_baked_straight"])
@@ -56,8 +60,15 @@ class Model(SimpleNamespace):
         self.manifest = json.loads((self.folder / "manifest.json").read_text())
         self.scene = parse_scene(self.manifest["scene"], name)
         self.include, self.header = self.folder / "include", self.folder / "include" / f"{name}.h"
-        self.source, self.host = (self.folder / "src" / f"{name}{part}.c" for part in ("", "_host"))
+        self.source, self.host, self.batch, self.simulation = (
+            self.folder / "src" / f"{name}{part}.c" for part in ("", "_host", "_batch", "_simulation")
+        )
         self.example = self.folder / "example" / "main.c"
+
+    @property
+    def sources(self):
+        """The model, its host entries and, where it has them, its batches and its simulation."""
+        return [path for path in (self.source, self.host, self.batch, self.simulation) if path.is_file()]
 
     @property
     def text(self):
@@ -66,9 +77,9 @@ class Model(SimpleNamespace):
 
     @cached_property
     def objects(self):
-        """Plain object files of the model and its host entries."""
+        """Plain object files of the model, its host entries, its batches and its simulation."""
         (self.folder / "objects").mkdir()
-        return [compiled(self.folder / "objects", source, *PLAIN) for source in (self.source, self.host)]
+        return [compiled(self.folder / "objects", source, *PLAIN) for source in self.sources]
 
 
 @pytest.fixture(scope="module")
@@ -103,13 +114,14 @@ def needs(program):
 @pytest.mark.parametrize("compiler", ["gcc", pytest.param("clang", marks=needs("clang"))])
 def test_compiles_without_a_warning(models, tmp_path, compiler, name):
     model = models(name)
-    for source in (model.source, model.host, model.example):
+    for source in (*model.sources, model.example):
         compiled(tmp_path, source, *C99, "-fsyntax-only", compiler=compiler)
 
 
 @pytest.mark.parametrize("name", ["m2_n2_double_loops", "m2_n2_float_straight"])
 def test_optimiser_finds_nothing_to_warn_about(models, tmp_path, name):
-    compiled(tmp_path, models(name).source, *C99, "-O2")
+    for source in (models(name).source, models(name).batch, models(name).simulation):
+        compiled(tmp_path, source, *C99, "-O2")
 
 
 @pytest.mark.parametrize("function", NAMES)
@@ -117,7 +129,7 @@ def test_optimiser_finds_nothing_to_warn_about(models, tmp_path, name):
 @pytest.mark.parametrize("baked", [False, True], ids=["free", "baked"])
 def test_every_function_alone_compiles_without_a_warning(tmp_path, function, emission, baked):
     model = Model("alone", 2, 2, functions=[function], emission=emission, baked=baked)
-    for source in (model.source, model.host, model.example):
+    for source in (*model.sources, model.example):
         compiled(tmp_path, source, *C99, "-fsyntax-only")
 
 
@@ -152,6 +164,9 @@ def test_header_is_cpp_and_links_from_it(models, tmp_path, name):
 # Symbols.
 
 
+MEMORY = {"memcpy", "memset"}  # what compilers make of loops
+
+
 def symbols(path, *options):
     """Pairs (kind, name) of an object file's symbols."""
     lines = [line.split() for line in run("nm", "-P", *options, path).splitlines()]
@@ -161,13 +176,17 @@ def symbols(path, *options):
 def assert_own_symbols(model, objects, *merged):
     """A model defines what its header declares, and wants no more than the mathematics and memory of libc."""
     suffix = "f" if model.manifest["real"] == "float" else ""
-    own, host = ({symbol for _, symbol in symbols(path, "-g", "--defined-only")} for path in objects)
-    defined = own | host
+    parts = [{symbol for _, symbol in symbols(path, "-g", "--defined-only")} for path in objects]
+    own, host, batch, simulation = parts
+    defined = set().union(*parts)
     wanted = {symbol for path in objects for _, symbol in symbols(path, "-u")} - defined
-    assert wanted <= {f"{name}{suffix}" for name in ("sin", "cos", "sqrt", *merged)} | {"memcpy", "memset"}
-    assert own == set(re.findall(r"^(?:int|void) (\w+)\(", model.header.read_text(), re.M))
+    assert wanted <= {f"{name}{suffix}" for name in ("sin", "cos", "sqrt", "pow", "ceil", *merged)} | MEMORY
+    header = model.include / f"{model.name}_simulation.h"
+    for found, path in ((own, model.header), (simulation, header)):
+        assert found == set(re.findall(r"^(?:int|void) (\w+)\(", path.read_text(), re.M))
     names = f"{model.name}_(batch_|abi_hash$)|(jac_|adj1_|jac_adj1_)?{model.name}_casadi_"
     assert all(re.match(names, symbol) for symbol in host)
+    assert batch and all(symbol.startswith(f"{model.name}_side_by_side_") for symbol in batch)
 
 
 @every_model
@@ -178,7 +197,7 @@ def test_every_symbol_has_the_prefix_and_libc_gives_the_rest(models, name):
 @slow_but("m1_n1_double_straight", "m1_n1_float_loops")
 def test_optimiser_asks_for_no_more_than_sincos(models, tmp_path, name):
     model = models(name)
-    objects = [compiled(tmp_path, source, *PLAIN, "-O2") for source in (model.source, model.host)]
+    objects = [compiled(tmp_path, source, *PLAIN, "-O2") for source in model.sources]
     assert_own_symbols(model, objects, "sincos")
 
 
@@ -381,18 +400,56 @@ def ulps(found, expected):
 
 
 @mpmath.workdps(60)
-@pytest.mark.parametrize("name", ["m1_n1_double_straight", "m1_n1_float_loops"])
+@pytest.mark.parametrize("name", ["m1_n1_double_straight", "m1_n1_float_loops", *REPRODUCIBLE])
 def test_sine_and_cosine_are_good_to_the_last_digit(models, name):
     library, rng = Library(models(name)), np.random.default_rng(1)
     angles = [*rng.uniform(-4, 4, 300), *rng.uniform(-1e5, 1e5, 300), *10.0 ** rng.uniform(-300, 8, 100)]
     angles += [k * np.pi / 4 for k in range(-40, 41)] + [k * np.pi / 2 for k in (1001, 44444, 63661, 63662, 63663)]
-    angles += [0.0, 1e5, -1e5, np.nextafter(1e5, 0), np.nextafter(1e5, 2e5)]
-    for x in np.array(angles).astype(library.number):
+    angles += [0.0, *(s * x for s in (1, -1) for end in (1e4, 1e5) for x in (end, np.nextafter(end, 0)))]
+    angles = np.array(angles).astype(library.number)
+    for x in angles if name not in REPRODUCIBLE else angles[abs(angles) < (1e4 if "float" in name else 1e5)]:
         exact = mpmath.cos_sin(mpmath.mpf(float(x)))[::-1]
         assert all(ulps(y, value) <= 1.5 for y, value in zip(library.sincos(x), exact, strict=True)), x
 
 
-@pytest.mark.parametrize("name", ["m1_n1_double_straight", "m1_n1_float_loops"])
+@mpmath.workdps(1000)
+@pytest.mark.parametrize("name", REPRODUCIBLE)
+def test_reproducible_sine_and_cosine_reduce_any_angle(models, name):
+    """Within 3 units of the last place as far as numbers go, without libm, and optimised or not to the same bits."""
+    model, rng = models(name), np.random.default_rng(3)
+    library, optimised, largest = Library(model), Library(model, "-O2"), np.finfo(float_of(model.scene.real)[0]).max
+    angles = 10.0 ** rng.uniform(3.9, np.log10(largest), 2000)
+    angles = np.array([*angles, largest, 1e4, 1e5, HARDEST[model.scene.real]]).astype(library.number)
+    angles = np.concatenate([angles, [k * np.pi / 2 for k in rng.integers(1e5, 1e9, 200)]]).astype(library.number)
+    for x in np.concatenate([angles, -angles[::9]]):
+        exact = mpmath.cos_sin(mpmath.mpf(float(x)))[::-1]
+        found = library.sincos(x)
+        assert all(ulps(y, value) <= 3 for y, value in zip(found, exact, strict=True)), x
+        assert found.tobytes() == optimised.sincos(x).tobytes()
+    assert not {"sin", "cos", "sinf", "cosf"} & {symbol for _, symbol in symbols(model.objects[0], "-u")}
+
+
+@pytest.mark.parametrize("name", REPRODUCIBLE)
+def test_reproducible_models_refuse_what_would_change_their_bits(models, tmp_path, name):
+    model = models(name)
+    command = ["gcc", "-I", model.include, "-c", model.source, "-o", tmp_path / "model.o"]
+    done = subprocess.run([*command, "-ffast-math"], capture_output=True, text=True, check=False)
+    assert done.returncode != 0 and f"{name} is reproducible: compile it without -ffast-math" in done.stderr
+
+
+@needs("objdump")
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="looks for x86's fused instructions")
+@pytest.mark.parametrize("name", REPRODUCIBLE)
+def test_reproducible_models_fuse_nothing_even_where_the_compiler_would(models, tmp_path, name):
+    """The control is a model of the fast profile, compiled alike."""
+    fused = []
+    for source in (models(name).source, models("m1_n1_double_straight").source):
+        target = compiled(tmp_path, source, "-std=gnu11", "-O2", "-mfma")
+        fused.append("vfmadd" in run("objdump", "-d", target))
+    assert fused == [False, True]
+
+
+@pytest.mark.parametrize("name", ["m1_n1_double_straight", "m1_n1_float_loops", *REPRODUCIBLE])
 def test_sine_and_cosine_at_the_edges(models, name):
     library = Library(models(name))
     assert library.sincos(0.0).tolist() == [0, 1]
@@ -407,6 +464,7 @@ NUMBER = r"(?<![\w.])\d+(?:\.\d+(?:[eE][-+]?\d+)?|[eE][-+]?\d+)f?"
 def test_numbers_are_shortest_exact_decimals_of_the_right_type(models, name):
     model = models(name)
     code = re.sub(r"/\*.*?\*/|\"[^\"\n]*\"", "", model.text + model.host.read_text(), flags=re.S)
+    code += re.sub(r"/\*.*?\*/|\"[^\"\n]*\"", "", model.simulation.read_text(), flags=re.S)
     literals = set(re.findall(NUMBER, code))
     assert len(literals) > 10
     suffix = "f" if model.manifest["real"] == "float" else ""
@@ -472,7 +530,7 @@ def test_automatic_form_is_straight_until_the_code_grows_large():
 @pytest.mark.parametrize("name", ["m1_n1_float_straight", pytest.param("m2_n2_float_loops", marks=pytest.mark.slow)])
 def test_float_model_has_no_double_arithmetic(models, tmp_path, name):
     double = re.compile(r"\bv?(?:cvtss2sd|cvtsd2ss|(?:add|sub|mul|div|sqrt)[sp]d)\b")
-    for source in (models(name).source, models(name).host):
+    for source in models(name).sources:
         code = run("objdump", "-d", "--no-show-raw-insn", compiled(tmp_path, source, *PLAIN, "-O2"))
         assert double.findall(code) == []
     reference = compiled(tmp_path, models("m1_n1_double_straight").source, *PLAIN, "-O2")
@@ -482,7 +540,7 @@ def test_float_model_has_no_double_arithmetic(models, tmp_path, name):
 @every_model
 def test_wrapped_lines_and_no_trailing_blanks(models, name):
     model = models(name)
-    for path in (model.header, model.source, model.host, model.example):
+    for path in (model.header, *model.sources, model.include / f"{name}_simulation.h", model.example):
         text = path.read_text()
         assert text.isascii() and text.endswith("\n") and not text.endswith("\n\n")
         assert not re.search(r"[ \t]+$", text, re.M)
@@ -561,19 +619,40 @@ static int external(int (*f)(const real **, real **, long long *, real *, int),
 }
 """
 
-ROLLOUT = """  {
-    enum { NQ = @@_NQ, NV = @@_NV, NT = @@_NT };
+ROLLOUT = """  for (int method = @@_RK4; method <= @@_TSIT5; ++method) {
+    enum { NQ = @@_NQ, NV = @@_NV, NT = @@_NT, SAMPLES = 3 };
     @_parameters parameters;
     @_default_parameters(&parameters);
-    real *q = heap(NQ, 1), *v = heap(NV, 1), *q_out = heap(3 * NQ, 0), *v_out = heap(3 * NV, 0);
-    real *tau_out = heap(3 * NT, 0), *times = heap(2, 0), *torques = heap(2 * NT, 1), *damping = heap(NT, 0);
-    real *work = heap(@@_WORK_ROLLOUT, 1);
-    long done = -1;
-    times[1] = (real)0.001;
-    @_damped_table table = { damping, 2, times, torques };
-    bad += @_rollout(&parameters, @_torque_damped_table, &table, (real)0.0001, 4, 2, q, v, q_out, v_out, tau_out,
-                     &done, work) != 0 || done != 4;
-    real *all[] = { q, v, q_out, v_out, tau_out, times, torques, damping, work };
+    real *q = heap(NQ, 1), *v = heap(NV, 1), *q_out = heap(SAMPLES * NQ, 0), *v_out = heap(SAMPLES * NV, 0);
+    real *tau_out = heap(SAMPLES * NT, 0), *times = heap(SAMPLES, 0), *stop = heap(1, 0), *damping = heap(NT, 0);
+    real *table_times = heap(2, 0), *coefficients = heap(2 * NT, 1), *work = heap(@@_WORK_ROLLOUT, 1);
+    times[1] = (real)0.0003;
+    times[2] = (real)0.001;
+    stop[0] = table_times[1] = (real)0.0005;
+    @_piecewise table = { 1, NT, 1, table_times, coefficients };
+    @_controller controller = { 0 };
+    controller.damping = damping;
+    controller.torques = &table;
+    real *begins = heap(1, 0);
+    @_drive drive = { 1, begins, &controller, 1, stop };
+    @_run run = { 0 };
+    run.parameters = &parameters;
+    run.drive = &drive;
+    run.q = q;
+    run.v = v;
+    run.method = method;
+    run.rtol = run.atol = (real)0.001;
+    run.step = (real)0.0001;
+    run.most_step = 1;
+    run.most_steps = run.pause = 1000;
+    run.samples = SAMPLES;
+    run.times = times;
+    run.q_out = q_out;
+    run.v_out = v_out;
+    run.tau_out = tau_out;
+    run.work = work;
+    bad += @_rollout(&run) != 0 || run.done != SAMPLES || run.steps < 2;
+    real *all[] = { q, v, q_out, v_out, tau_out, times, stop, damping, table_times, coefficients, work, begins };
     for (size_t k = 0; k < sizeof all / sizeof *all; ++k) {
       free(all[k]);
     }
@@ -593,6 +672,8 @@ def driver(model):
     for c in re.findall(r"^int (\w+)\(const real \*\*arg.*;$", model.host.read_text(), re.M):
         calls += f"  bad += external({c}, {c}_work, {c}_sparsity_in, {c}_name_in, {c}_sparsity_out) != 0;\n"
     text = DRIVER + (CASADI_DRIVER if double else "")
+    if "rollout" in model.scene.functions:
+        text = '#include "@_simulation.h"\n' + text
     text += f"\nint main(void)\n{{\n  int bad = 0;\n{calls}{ROLLOUT if 'rollout' in model.scene.functions else ''}"
     text += '  printf("%d bad\\n", bad);\n  return bad;\n}\n'
     return text.replace("@@", model.name.upper()).replace("@", model.name)
@@ -603,7 +684,7 @@ def test_sanitizers_find_nothing(models, tmp_path, name):
     model, main = models(name), tmp_path / "main.c"
     main.write_text(driver(model))
     folders = ("-I", model.include, "-I", model.host.parent)
-    run("gcc", *SANITIZED, *folders, main, model.source, "-o", tmp_path / "main", "-lm")
+    run("gcc", *SANITIZED, *folders, main, model.source, model.simulation, "-o", tmp_path / "main", "-lm")
     assert run(tmp_path / "main", env={"ASAN_OPTIONS": "detect_leaks=1"}) == "0 bad\n"
 
 
@@ -611,7 +692,8 @@ def test_sanitizers_would_find_a_short_workspace(tmp_path):
     model = Model("short", 1, 1, functions=["forward_dynamics"], emission="loops")
     main = tmp_path / "main.c"
     needed = f"{model.name.upper()}_WORK_FORWARD_DYNAMICS"
-    main.write_text(driver(model).replace(f"{needed})", f"{needed} - 1)"))
+    # less a vector: that much of the last row of a matrix to factor is room
+    main.write_text(driver(model).replace(f"{needed})", f"{needed} - 8)"))
     folders = ("-I", model.include, "-I", model.host.parent)
     run("gcc", *SANITIZED, *folders, main, model.source, "-o", tmp_path / "main", "-lm")
     done = subprocess.run([tmp_path / "main"], capture_output=True, text=True, check=False)

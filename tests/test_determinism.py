@@ -16,9 +16,11 @@ from serpentail_codegen.write import digest, write_folder, write_if_changed
 
 OPTIONS = {"functions": ["forward_dynamics", "tail_points", "rollout"], "emission": "loops"}
 NAME = "articulated_m2_n2"
-HEADER, MODEL, HOST = f"include/{NAME}.h", f"src/{NAME}.c", f"src/{NAME}_host.c"
+HEADER, MODEL, HOST, BATCH = f"include/{NAME}.h", *(f"src/{NAME}{part}.c" for part in ("", "_host", "_batch"))
 EXAMPLE, CASADI, MANIFEST = "example/main.c", f"{NAME}_casadi.py", "manifest.json"
-FILES = {HEADER, MODEL, HOST, EXAMPLE, CASADI, MANIFEST}
+PACKAGE = {"Makefile", "CMakeLists.txt", "LICENSE", "README.md"}
+HEADERS = {HEADER, f"include/{NAME}_simulation.h"}
+FILES = {*HEADERS, MODEL, HOST, BATCH, f"src/{NAME}_simulation.c", EXAMPLE, CASADI, MANIFEST, *PACKAGE}
 
 
 def scene(**options):
@@ -64,7 +66,7 @@ def test_same_bytes_under_any_hash_seed_and_from_any_folder(expected, tmp_path, 
     tail = ("--tail", "articulated", "--segments", "2", "--links", "2", "--emission", "loops")
     surroundings = {"PYTHONHASHSEED": seed, "LC_ALL": "C", "TZ": f"Etc/GMT+{seed}"}
     printed = call(*tail, "--functions", functions, "--output", "made/here", cwd=cwd, **surroundings)
-    assert f"made/here/{NAME}: 6 files written" in printed
+    assert f"made/here/{NAME}: {len(FILES)} files written" in printed
     assert texts(cwd / "made" / "here" / NAME) == expected
 
 
@@ -98,26 +100,27 @@ def differing_lines(some, other):
 
 def test_a_parameter_changes_only_its_value_and_the_hash(expected, tmp_path):
     changed = generate(scene(parameters={"gravity": 1.62}), tmp_path / "expected")
-    assert set(changed) == {HEADER, MODEL, CASADI, MANIFEST}
+    assert set(changed) == {*HEADERS, MODEL, CASADI, MANIFEST}
     now = texts(tmp_path / "expected" / NAME)
     assert differing_lines(expected[MODEL], now[MODEL]) == [
         ("  parameters->gravity = 9.8;", "  parameters->gravity = 1.62;")
     ]
     before, after = (json.loads(some[MANIFEST])["content_hash"] for some in (expected, now))
-    for name in (HEADER, CASADI):
+    for name in (*HEADERS, CASADI):
         pairs = differing_lines(expected[name], now[name])
         assert pairs and all(old.replace(before, after) == new for old, new in pairs)
 
 
 def test_a_baked_parameter_changes_only_the_code_and_the_hash(tmp_path):
     generate(scene(baked=True), tmp_path)
-    assert set(generate(scene(baked=True, parameters={"gravity": 1.62}), tmp_path)) == {HEADER, MODEL, CASADI, MANIFEST}
+    changed = generate(scene(baked=True, parameters={"gravity": 1.62}), tmp_path)
+    assert set(changed) == {*HEADERS, MODEL, BATCH, CASADI, MANIFEST}
 
 
 def test_manifest_describes_the_files(expected):
     manifest = json.loads(expected[MANIFEST])
     assert manifest["files"] == {name: digest(expected[name].decode()) for name in sorted(FILES - {MANIFEST})}
-    for name in (HEADER, CASADI):
+    for name in (*HEADERS, CASADI):
         assert manifest["content_hash"] in expected[name].decode()
     assert f'return "{manifest["abi_hash"]}";' in expected[HOST].decode()
 

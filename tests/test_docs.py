@@ -190,7 +190,7 @@ def test_benchmark_block_can_be_filled():
 
 
 def test_quoted_errors_are_the_ones_raised():
-    sources = "".join(path.read_text(encoding="utf-8") for home in (CODEGEN, RUNTIME) for path in home.glob("*.py"))
+    sources = "".join(path.read_text(encoding="utf-8") for home in (CODEGEN, RUNTIME) for path in home.rglob("*.py"))
     rows = re.findall(r"^\| `(.*?)` \|", README.split("## Errors you may meet")[1], re.MULTILINE)
     assert rows
     for message in rows:

@@ -1,6 +1,8 @@
 """Plans: formulations agree, laws hold, and the truth that a report tells is that of an independent integration."""
 
 import re
+import signal
+import threading
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,13 +12,15 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import serpentail as st
+from models import model_folder
+from serpentail.planning import interrupt, solver, transcription
 from serpentail.planning.attitude import Attitude, angle_deg, from_angles
 from serpentail.planning.recovery import full_state
 from serpentail.planning.truth import local_errors, open_loop
 from serpentail.trajectory import rotation_matrix
 from serpentail_codegen.pipeline import generate
 from serpentail_codegen.scene import load_scene
-from tumbling import DURATION, planned, rat, start
+from tumbling import DURATION, FUNCTIONS, planned, rat, start
 
 FORMS = [("airborne", "quaternion"), ("translation-free", "quaternion"), ("full", "quaternion"), ("full", "euler")]
 every_form = pytest.mark.parametrize(("formulation", "attitude"), FORMS)
@@ -47,7 +51,7 @@ def integrated(model, plan):
 
 @every_form
 def test_plans_of_all_formulations_reach_the_goal_in_truth(formulation, attitude):
-    plan = planned(formulation=formulation, attitude=attitude)
+    plan = planned(formulation=formulation, attitude=attitude, guess=planned())  # one of several optima
     report = plan.report
     assert plan.success and report["converged"] and report["dynamics"] == "compiled"
     assert report["open_loop_attitude_error_deg"] <= 0.01
@@ -180,6 +184,15 @@ def test_goals_of_the_tail_and_of_a_whole_attitude():
     assert end.tail[-1, 0] == pytest.approx(0.1, abs=1e-7) and end.v[-1, 7] == pytest.approx(0, abs=1e-6)
 
 
+def test_effort_counts_rates_as_torques_of_a_damper():
+    for plan in (planned(tolerance=None), planned(tolerance=None, smoothing=0.0)):
+        flight, c = plan.trajectory, plan.problem.smoothing
+        integrand = np.sum(flight.tau**2 + (c * flight.v[:, 6:]) ** 2, axis=1)
+        assert plan.report["objective"] == pytest.approx(np.trapezoid(integrand, flight.t), rel=1e-2)
+    assert plan.report["objective"] == pytest.approx(plan.report["effort"], rel=1e-12)
+    assert plan.report["effort"] < planned(tolerance=None).report["effort"]
+
+
 def test_own_objective_and_path_constraint():
     settings = {"tolerance": None, "intervals": 8}
     plan = planned(objective=_bend, path=((_first_rate, -4.0, 9.0),), **settings)
@@ -243,3 +256,55 @@ def test_example_of_the_document_runs(tmp_path, monkeypatch, capsys):
     exec(re.search(r"```python\n(.*?)```", text, re.DOTALL)[1], {})
     good, error, _ = capsys.readouterr().out.split()
     assert good == "True" and float(error) <= 0.01
+
+
+# Planning again, and being told to stop.
+
+AGAIN = {"duration": DURATION, "bounds": st.Bounds(angle=np.pi / 3), "tolerance": None, "track": False}
+
+
+def test_planning_again_from_neighbouring_states_derives_nothing(monkeypatch):
+    model, (q, v) = rat(), start(rat())
+    plan = st.plan(model, start=(q, v), **AGAIN)
+    once = st.plan(model, start=(q, 1.005 * v), guess=plan, **AGAIN)
+    for module, name in ((transcription, "transcribe"), (solver, "_engine")):
+        monkeypatch.setattr(module, name, lambda *_: pytest.fail("derived again"))
+    again = st.plan(model, start=(q, 1.01 * v), guess=once, **AGAIN)
+    assert again.report["converged"] and again.report["iterations"] <= 8
+    np.testing.assert_allclose(again.trajectory.v[0, 3:], 1.01 * v[3:], atol=1e-9)
+
+
+def test_other_problems_and_models_share_no_program():
+    """A kept program answers for its own problem only: damping, goal and model all matter."""
+    model, coarse = rat(), {"intervals": 4}
+    tilted = st.Goal(attitude=from_angles(np.array([0.1, 0, 0])))
+    found = [st.plan(model, start=start(model), **AGAIN, **coarse, **own) for own in ({}, {"damping": 1e-3})]
+    found += [st.plan(model, start=start(model), goal=tilted, **AGAIN, **coarse)]
+    heavy = st.load(model_folder(1, 3, functions=list(dict.fromkeys(FUNCTIONS))), parameters={"tail_mass": 0.005})
+    found += [st.plan(heavy, start=start(model), **AGAIN, **coarse)]
+    assert len({plan.report["objective"] for plan in found}) == 4
+    again = st.plan(model, start=start(model), **AGAIN, **coarse)
+    np.testing.assert_array_equal(again.solution.w, found[0].solution.w)
+
+
+def test_interrupt_returns_the_best_so_far():
+    """Ctrl-C in the first solve gives its iterate, flagged; in a later round, the round before; never an exception."""
+    model, settings = rat(), AGAIN | {"tolerance": 1e-9, "rounds": 30}
+    before = signal.getsignal(signal.SIGINT)
+    for delay in (0.05, 1.0):
+        timer = threading.Timer(delay, signal.raise_signal, (signal.SIGINT,))
+        timer.start()
+        plan = st.plan(model, start=start(model), intervals=30, **settings)
+        timer.cancel()
+        assert not plan.success and np.isfinite(plan.solution.w).all()
+        assert plan.report["converged"] or plan.report["status"] == "User_Requested_Stop"
+        assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_second_interrupt_is_the_usual_one():
+    with pytest.raises(KeyboardInterrupt), interrupt.heeded():
+        signal.raise_signal(signal.SIGINT)
+        assert interrupt.asked()
+        signal.raise_signal(signal.SIGINT)
+    with interrupt.heeded():
+        assert not interrupt.asked()

@@ -50,6 +50,7 @@ def refused(**changes) -> str:
         ({"formulation": "euler"}, "formulation: value 'euler'"),
         ({"attitude": "matrix"}, "attitude: value 'matrix': needs 'quaternion' or 'euler'"),
         ({"damping": -1e-3}, "damping: value -0.001"),
+        ({"smoothing": "none"}, "smoothing: value 'none': needs a number from 0"),
         ({"path": [(3, 0, 1)]}, "path[0]"),
         ({"path": [(len, 1, 0)]}, "path[0]: bounds (1.0, 0.0)"),
         ({"rule": "radaw"}, "rule: value 'radaw'"),

@@ -75,6 +75,7 @@ def test_defaults_of_the_other_keys(read):
     scene = read(VALID)
     assert scene == Scene("rat", "articulated", 2, 3, FUNCTIONS, resolve_parameters({}, 6))
     assert (scene.coordinates, scene.baked, scene.real, scene.emission) == ("joint", False, "double", "auto")
+    assert scene.profile == "fast"
 
 
 def test_the_parameter_table_keeps_its_own_rules():
@@ -291,7 +292,7 @@ def test_duplicate_functions(refuse):
     assert str(problem) == "functions[2]: value 'energy': listed before; remove one of the two"
 
 
-@pytest.mark.parametrize("key", ["coordinates", "real", "emission"])
+@pytest.mark.parametrize("key", ["coordinates", "real", "emission", "profile"])
 @pytest.mark.parametrize("value", ['"Joint"', '""', "true", "1", "[]", '["joint"]', "{}"])
 def test_choices(refuse, key, value):
     assert f'"{getattr(Scene, key)}"' in refuse(f"{key} = {value}\n" + VALID)[key].remedy
@@ -465,7 +466,7 @@ STANCE = VALID + 'contacts = ["torso", "feet"]\n'
 def test_contacts_bring_their_parameters_and_functions(read):
     scene = read(STANCE)
     assert scene.contacts == ("feet", "torso") and scene.friction == "cone"
-    assert scene.functions == (*FUNCTIONS, *TOUCHING)
+    assert scene.functions == (*FUNCTIONS, "pfl", "implicit", *TOUCHING)
     assert dict(scene.parameters).keys() - dict(read(VALID).parameters) == {p.name for p in PARAMETERS if p.needs}
     assert scene.parameters["L_a2m"] == 0.035 and scene.parameters["delta_m"] == pytest.approx(math.radians(30))
     assert parse_scene(scene_to_dict(scene), "other") == scene

@@ -45,7 +45,8 @@ def motion(t, segments=2):
 
 def fields(trajectory):
     """The nine arrays and the info of a trajectory by name."""
-    return {entry.name: getattr(trajectory, entry.name) for entry in dataclasses.fields(trajectory)}
+    found = {entry.name: getattr(trajectory, entry.name) for entry in dataclasses.fields(trajectory)}
+    return {name: value for name, value in found.items() if value is not None}
 
 
 def assert_same(first, second):

@@ -20,6 +20,7 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--functions", help=f"comma-separated, of {', '.join(ALL)}; all: all of them")
     p.add_argument("--real", help="double or float")
     p.add_argument("--emission", help="auto, straight or loops")
+    p.add_argument("--profile", help="fast, or reproducible: the same bits on every machine")
     p.add_argument("--baked", action="store_true", help="fold the parameters into the code")
     p.add_argument("--output", type=Path, default=Path("generated"), help="parent of the generated folder")
     return p
@@ -27,7 +28,7 @@ def parser() -> argparse.ArgumentParser:
 
 def scene_of(arguments: argparse.Namespace):
     """Return the scene that the arguments describe."""
-    chosen = {name: getattr(arguments, name) for name in ("real", "emission") if getattr(arguments, name)}
+    chosen = {name: getattr(arguments, name) for name in ("real", "emission", "profile") if getattr(arguments, name)}
     if arguments.functions:
         names = arguments.functions
         chosen["functions"] = names if names == "all" else names.split(",")

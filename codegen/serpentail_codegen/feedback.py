@@ -4,7 +4,7 @@ from . import dynamics as dyn
 from . import sweeps
 from .draft import Draft
 from .functions import Argument, Function, Q, V
-from .program import Array
+from .program import Array, padded
 from .sweeps import column_of, mechanism
 
 ACCELERATIONS = Argument("accelerations", lambda t: (t.nt,), "wanted accelerations of the tail coordinates (rad/s^2)")
@@ -40,9 +40,9 @@ def tail_alone(d: Draft, accelerations: Array, tau: Array) -> None:
 
 def free_torso(d: Draft) -> None:
     """``w_dot`` and ``a`` of the torso that balance ``force, moment``: translation eliminated, then LDL^T."""
-    A, w_dot = d.array("A", 9), d.vector("w_dot", 3)
+    A, w_dot = d.array("A", padded(3), 3), d.vector("w_dot", 3)
     d.known |= dict.fromkeys(["load_force", "load_moment"], d.zero(3))
-    rows = {f"A_{r}": A.part(3 * r, r + 1) for r in range(3)}
+    rows = {f"A_{r}": A.part(padded(3) * r, r + 1) for r in range(3)}
     d.step(dyn.without_translation, inverse_mass=d.vector("inverse_mass", 1), com=d.vector("com", 3), **rows)
     d.step(dyn.rotational_load, net=d.vector("net", 3), rhs=w_dot)
     d.factor(A, 3)

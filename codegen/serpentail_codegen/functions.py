@@ -9,8 +9,9 @@ from . import dynamics as dyn
 from . import kinematics as kin
 from . import sweeps
 from .draft import Draft, Tail
+from .lane_sweeps import balance_in_lanes
 from .parameters import Parameter
-from .program import Array, Index, Program, Ref
+from .program import Array, Index, Program, Ref, padded
 from .scene import Scene, parameters_of
 from .sweeps import column_of, mechanism
 
@@ -65,9 +66,9 @@ def struct_parameters(model: Tail | Scene) -> tuple[Parameter, ...]:
     return tuple(p for p in parameters_of(model.kind, model.contacts) if p.name != "link_radius")
 
 
-def program(function: Function, tail: Tail) -> Program:
-    """Assemble one function for given sizes."""
-    draft = Draft(function.name, function.doc, tail=tail)
+def program(function: Function, tail: Tail, in_lanes: bool = False) -> Program:
+    """Assemble one function for given sizes; ``in_lanes`` where vectors hold several numbers and the tail is long."""
+    draft = Draft(function.name, function.doc, tail=tail, in_lanes=in_lanes)
     for parameter in struct_parameters(tail):
         draft.known[parameter.name] = draft.array(parameter.name, parameter.size, role="parameters")[0]
     arrays = {a.name: draft.array(a.name, a.length(tail), role="input") for a in function.inputs}
@@ -81,25 +82,27 @@ def program(function: Function, tail: Tail) -> Program:
     return draft.finish()
 
 
-def assemble_mass_matrix(d: Draft, arrays: dict[str, Array], world: bool = False) -> None:
-    """H, both triangles."""
-    H, nv, tail = arrays["H"], d.tail.nv, d.tail
+def assemble_mass_matrix(
+    d: Draft, arrays: dict[str, Array], world: bool = False, apart: Callable[[int], int] = int
+) -> None:
+    """H, both triangles; its rows are ``apart(nv)`` apart."""
+    H, row, tail = arrays["H"], apart(d.tail.nv), d.tail
     d.store(kin.quaternion_rotation, R=9)
 
     def H_tail(k, other, size=1):
-        return H.part((6 + k) * nv + 6 + other, size)
+        return H.part((6 + k) * row + 6 + other, size)
 
     columns = sweeps.tail_inertia(d, H_tail, d.array("columns", 12, tail.segments), world)
     if world:
         composite = {name: d.known[name] for name in ("h", "I")}
         d.step(dyn.world_composite, **composite)
         d.known["R"] = d.constant("identity", sweeps.IDENTITY)[0]
-    d.step(dyn.mass_matrix_base, **{f"H_{r}": H.part(r * nv, 6) for r in range(6)})
+    d.step(dyn.mass_matrix_base, **{f"H_{r}": H.part(r * row, 6) for r in range(6)})
     with d.loop("k", tail.nt) as k:
-        row, column = H.part((6 + k) * nv, 6), H.part(6 + k, 6, stride=nv)
-        d.step(dyn.mass_matrix_column, {"column": column_of(columns, k)}, H_row=row, H_column=column)
+        lower, upper = H.part((6 + k) * row, 6), H.part(6 + k, 6, stride=row)
+        d.step(dyn.mass_matrix_column, {"column": column_of(columns, k)}, H_row=lower, H_column=upper)
         with d.loop("l", k) as other:
-            d.copy(H.part((6 + other) * nv + 6 + k, 1), H_tail(k, other))
+            d.copy(H.part((6 + other) * row + 6 + k, 1), H_tail(k, other))
 
 
 def assemble_inverse_dynamics(d: Draft, arrays: dict[str, Array], world: bool = False) -> None:
@@ -123,20 +126,25 @@ def assemble_balance(d: Draft, arrays: dict[str, Array]) -> None:
     """What H v_dot + C = loads is solved with: H without translation, factored, and C without gravity."""
     tail, A, bias = d.tail, arrays["A"], arrays["bias"]
     size = 3 + tail.nt
+    row = padded(size)
 
     def A_tail(k, other, entries=1):
-        return A.part((3 + k) * size + 3 + other, entries)
+        return A.part((3 + k) * row + 3 + other, entries)
 
     d.step(kin.quaternion_rotation, R=arrays["R"].part(0, 9))
+    if d.in_lanes:
+        balance_in_lanes(d, arrays, lambda k, other, entries=1: A.part(k * row + other, entries))
+        d.factor(A, size)
+        return
     columns = sweeps.tail_inertia(d, A_tail, arrays["columns"])
     d.copy(arrays["first_moment"].part(0, 3), d.known["h"])
     sweeps.core_bias(d, bias)
     d.known |= {name: arrays[name].part(0, arrays[name].length) for name in ("inverse_mass", "com")}
-    rows = {f"A_{r}": A.part(r * size, r + 1) for r in range(3)}
+    rows = {f"A_{r}": A.part(r * row, r + 1) for r in range(3)}
     d.step(dyn.without_translation, inverse_mass=d.known["inverse_mass"], com=d.known["com"], **rows)
     with d.loop("k", tail.nt) as k:
         column = column_of(columns, k)
-        d.step(dyn.column_without_translation, {"column": column}, A_row=A.part((3 + k) * size, 3))
+        d.step(dyn.column_without_translation, {"column": column}, A_row=A.part((3 + k) * row, 3))
         with d.loop("l", k + 1) as other:
             reads = {"column": column, "other": column_of(columns, other)}
             d.step(dyn.pair_without_translation, reads, A_entry_=A_tail(k, other))
@@ -146,7 +154,7 @@ def assemble_balance(d: Draft, arrays: dict[str, Array]) -> None:
 def balanced(d: Draft, q: Array, v: Array) -> "Balance":
     """Call the balance, and let steps find by their names what it gives."""
     arrays = {a.name: d.array(a.name, a.length(d.tail)) for a in BALANCE.outputs}
-    d.call(program(BALANCE, d.tail), q=q, v=v, **arrays)
+    d.call(program(BALANCE, d.tail, d.in_lanes), q=q, v=v, **arrays)
     bias = arrays["bias"]
     d.known |= {name: arrays[name].part(0, arrays[name].length) for name in ("R", "inverse_mass", "com")}
     d.known |= {"h": arrays["first_moment"].part(0, 3), "force": bias.part(0, 3), "moment": bias.part(3, 3)}
@@ -283,7 +291,7 @@ BALANCE = Function(
         Argument("inverse_mass", lambda t: (1,), "1 / M"),
         Argument("com", lambda t: (3,), "centre of mass from B, torso axes"),
         Argument("first_moment", lambda t: (3,), "M times it"),
-        Argument("A", lambda t: (3 + t.nt, 3 + t.nt), "L D L^T"),
+        Argument("A", lambda t: (3 + t.nt, padded(3 + t.nt)), "L^T D L"),
         Argument("columns", lambda t: (t.nt, 6), "momentum of each tail coordinate at B"),
         Argument("bias", lambda t: (t.nv,), "force, moment, and the tail's forces"),
     ),

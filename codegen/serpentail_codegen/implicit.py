@@ -13,7 +13,7 @@ from . import stiffness as stiff
 from .draft import Draft, Tail
 from .functions import Argument, Function, Q, V, assemble_mass_matrix
 from .lower import derive
-from .program import Array, Index, Ref
+from .program import Array, Index, Ref, padded
 from .touching import BRISTLES, LEGS, Points, gather_points
 
 SPRING = 14  # numbers of a point's linearised contact
@@ -21,7 +21,7 @@ SPRING = 14  # numbers of a point's linearised contact
 
 def blocks(tail: Tail) -> dict[str, tuple[int, int]]:
     """Size and count of what factoring hands to solving, S first."""
-    found = {"S": (tail.nv, tail.nv), "H_tail": (tail.nt, tail.nt), "damped": (1, tail.nt)}
+    found = {"S": (padded(tail.nv), tail.nv), "H_tail": (tail.nt, tail.nt), "damped": (1, tail.nt)}
     found |= dict.fromkeys(["gain_q", "gain_v", "weight"], (1, 1))
     if tail.contacts:
         found |= {"R": (9, 1), "relax": (1, 1), "depth": (1, tail.points), "arm": (3, tail.points)}
@@ -70,7 +70,10 @@ class Factors:
 def assemble_factor(d: Draft, arrays: dict[str, Array]) -> None:
     """S = H + tail damping and gains + J^T G J of the points in the ground, and its LDL^T."""
     f = Factors(arrays["factors"], d.tail)
-    assemble_mass_matrix(d, {"H": f.array})
+    assemble_mass_matrix(d, {"H": f.array}, apart=padded)
+    room = padded(d.tail.nv) - d.tail.nv
+    with d.loop("k", d.tail.nv if room else 0) as k:
+        d.fill(f.entry("S", k, d.tail.nv, room), 0)
     d.copy(f("weight"), d.known["weight"])
     add_gains(d, f)
     with d.loop("k", d.tail.nt) as k:

@@ -6,7 +6,22 @@ With numbers as the algebra this is the reference for every emitted text; with a
 import math
 
 from .compose import expanded
-from .program import Apply, Array, Copy, Factor, Fill, Guard, Loop, Program, Ref, Solve, Unit, When, statements
+from .program import (
+    Apply,
+    Array,
+    Copy,
+    Factor,
+    Fill,
+    Guard,
+    Loop,
+    Program,
+    Ref,
+    Solve,
+    Unit,
+    When,
+    padded,
+    statements,
+)
 from .tape import Tape, replay
 
 
@@ -97,31 +112,32 @@ def branches(program: Program) -> bool:
 
 
 def ldl_factor(algebra, A: list[list]) -> tuple[list[list], list]:
-    """Factor A = L D L^T without pivoting, of its lower triangle; L below 1 / D on the diagonal, and the pivots D."""
+    """Factor A = L^T D L without pivoting, of its lower triangle; L below 1 / D on the diagonal, and the pivots D.
+
+    From the last row up, because then all that a row takes from another one lies side by side.
+    """
     A, pivots = [list(row) for row in A], []
-    for k in range(len(A)):
-        pivots.append(A[k][k])
-        A[k][k] = algebra.div(algebra.const(1), A[k][k])
-        for i in range(k + 1, len(A)):
-            column = A[i][k]
-            factor = algebra.mul(column, A[k][k])
-            for j in range(k + 1, i):
-                A[i][j] = algebra.sub(A[i][j], algebra.mul(A[j][k], column))
-            A[i][i] = algebra.sub(A[i][i], algebra.mul(factor, column))
-            A[i][k] = factor
+    for k in reversed(range(len(A))):
+        last = A[k]
+        pivots.append(last[k])
+        inverse = algebra.div(algebra.const(1), last[k])
+        for i in reversed(range(k)):
+            factor = algebra.mul(last[i], inverse)
+            A[i] = [algebra.sub(entry, algebra.mul(factor, other)) for entry, other in zip(A[i], last, strict=False)]
+        A[k] = [algebra.mul(entry, inverse) for entry in last[:k]] + [inverse]
     return A, pivots
 
 
 def ldl_solve(algebra, A: list[list], b: list) -> list:
-    """Solve L D L^T x = b with what ``ldl_factor`` returns."""
+    """Solve L^T D L x = b with what ``ldl_factor`` returns."""
     size, b = len(b), list(b)
-    for k in range(size):
-        for i in range(k + 1, size):
-            b[i] = algebra.sub(b[i], algebra.mul(A[i][k], b[k]))
-    b = [algebra.mul(value, A[k][k]) for k, value in enumerate(b)]
-    for k in range(size - 1, -1, -1):
+    for k in reversed(range(size)):
         for i in range(k):
             b[i] = algebra.sub(b[i], algebra.mul(A[k][i], b[k]))
+    b = [algebra.mul(value, A[k][k]) for k, value in enumerate(b)]
+    for k in range(size):
+        for i in range(k):
+            b[k] = algebra.sub(b[k], algebra.mul(A[k][i], b[i]))
     return b
 
 
@@ -209,19 +225,20 @@ class Run:
 
     def guard(self, guard: Guard, at: dict[str, int]) -> None:
         """Note what must be positive."""
-        self.guards.append((guard.status, self.read(guard.scalar, at)[0]))
+        self.guards += [(guard.status, value) for value in self.read(guard.scalar, at)]
 
     def rows(self, matrix: Array, size: int) -> list[list]:
         """Return the lower triangle of a matrix, row by row."""
-        flat = self.values[matrix.name]
-        return [flat[k * size : k * size + k + 1] for k in range(size)]
+        flat, row = self.values[matrix.name], padded(size)
+        return [flat[k * row : k * row + k + 1] for k in range(size)]
 
     def factor(self, factor: Factor, at: dict[str, int]) -> None:
         """Factor a symmetric matrix."""
         rows, pivots = ldl_factor(self.algebra, self.rows(factor.matrix, factor.size))
         self.guards += [("NOT_POSITIVE_DEFINITE", pivot) for pivot in pivots]
         for k, row in enumerate(rows):
-            self.values[factor.matrix.name][k * factor.size : k * factor.size + k + 1] = row
+            first = k * padded(factor.size)
+            self.values[factor.matrix.name][first : first + k + 1] = row
 
     def solve(self, solve: Solve, at: dict[str, int]) -> None:
         """Solve with a factored matrix."""

@@ -7,22 +7,26 @@ from .catalogue import CATALOGUE, SYMBOLIC
 from .draft import Tail
 from .scene import Scene
 from .targets.c import c_context, c_files, emit
+from .targets.c_batch import batch_entry, batch_file, batches
 from .targets.casadi import casadi_module
 from .targets.manifest import manifest
+from .targets.package import package_files
 from .write import digest, write_folder
 
 
 def generate(scene: Scene, output: Path) -> list[str]:
     """Derive, lower, emit and write what the scene asks for into ``output/<scene>``; return the changed files."""
     tail = tail_of(scene)
-    wanted = [CATALOGUE[name].of(tail) for name in needed(scene.functions)]
+    wanted = [CATALOGUE[name].of(tail) for name in needed(scene.functions, bool(scene.contacts))]
     emitted = [emit(scene, tail, function) for function in wanted]
     context = c_context(scene, tail, emitted, __version__)
     context["content_hash"] = digest("".join(c_files(scene, context).values()))[:16]
-    files = c_files(scene, context)
+    side_by_side = batches(scene, tail, emitted)
+    files = c_files(scene, context) | batch_file(scene, tail, side_by_side, context) | package_files(context)
     module = casadi_module(scene, tail, [f for f in wanted if f.name in SYMBOLIC], __version__, context["content_hash"])
     files[f"{scene.name}_casadi.py"] = module
-    return write_folder(output / scene.name, files, manifest(scene, context, emitted))
+    described = manifest(scene, context, emitted) | {"batch": batch_entry(tail, side_by_side)}
+    return write_folder(output / scene.name, files, described)
 
 
 def tail_of(scene: Scene) -> Tail:
@@ -32,8 +36,9 @@ def tail_of(scene: Scene) -> Tail:
     return Tail(scene.segments, pieces, scene.kind, scene.bend_range, polar, scene.contacts, scene.friction)
 
 
-def needed(names: tuple[str, ...]) -> list[str]:
+def needed(names: tuple[str, ...], contacts: bool = False) -> list[str]:
     """Return the functions to derive: those asked for, those that a rollout calls, the parts of an implicit solve."""
-    parts = {"rollout": ("forward_dynamics",), "implicit": ("implicit_factor", "implicit_solve")}
+    called = ("contact_points", "contact_dynamics") if contacts else ("forward_dynamics",)
+    parts = {"rollout": called, "implicit": ("implicit_factor", "implicit_solve")}
     names = {*names, *(part for name in names for part in parts.get(name, ()))}
     return [name for name in CATALOGUE if name in names]

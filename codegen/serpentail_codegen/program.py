@@ -167,7 +167,10 @@ class When:
 
 @dataclass(frozen=True)
 class Factor:
-    """Factor A = L D L^T in place; A symmetric positive definite, its lower triangle row-major."""
+    """Factor A = L^T D L in place; A symmetric positive definite, its lower triangle row-major.
+
+    The rows are ``padded(size)`` apart, so that whole vectors of a row can be computed.
+    """
 
     matrix: Array
     size: int
@@ -175,7 +178,7 @@ class Factor:
 
 @dataclass(frozen=True)
 class Solve:
-    """Solve L D L^T x = x in place with a factored matrix; a wide x is solved for all lanes."""
+    """Solve L^T D L x = x in place with a factored matrix; a wide x is solved for all lanes."""
 
     matrix: Array
     x: Ref
@@ -183,7 +186,7 @@ class Solve:
 
 @dataclass(frozen=True)
 class Guard:
-    """Give up with a status unless a scalar is positive; ``protects`` is what must not be used then."""
+    """Give up with a status unless all scalars of a vector are positive; ``protects`` must not be used then."""
 
     scalar: Ref
     status: str
@@ -279,7 +282,7 @@ class Builder:
         self.emit(Solve(matrix, x))
 
     def guard(self, scalar: Ref, status: str, *protects: Ref) -> None:
-        """Give up with a status unless a scalar is positive."""
+        """Give up with a status unless all scalars of a vector are positive."""
         self.emit(Guard(scalar, status, protects))
 
     def call(self, program: "Program", **arguments: Array) -> None:

@@ -110,6 +110,7 @@ class Scene:
     baked: bool = False  # parameters folded into the code, behind the same ABI
     real: str = "double"
     emission: str = "auto"
+    profile: str = "fast"  # or the same bits on every machine
     contacts: tuple[str, ...] = ()  # groups of points that can touch the ground, in the order of GROUPS
     friction: str = "cone"
 
@@ -129,6 +130,7 @@ KEYS: dict[str, tuple[Any, Rule]] = {
     "baked": (Scene.baked, FLAG),
     "real": (Scene.real, _one_of(["double", "float"])),
     "emission": (Scene.emission, _one_of(["auto", "straight", "loops"])),
+    "profile": (Scene.profile, _one_of(["fast", "reproducible"])),
     "contacts": ((), CONTACTS),
     "friction": (Scene.friction, _one_of(FRICTION)),
     "plan": ({}, TABLE),  # a motion to plan: for the runtime, which checks it
@@ -207,7 +209,8 @@ def _usual_functions(values: Mapping[str, Any], contacts: Collection[str], chose
     if chosen:
         return values["functions"]
     polar = values["coordinates"] == "polar"
-    return (*(name for name in FUNCTIONS if not (polar and name in DERIVATIVES)), *touching)
+    usual = (*touching, "pfl", "implicit") if contacts else ()  # what simulations on the ground call
+    return (*(name for name in FUNCTIONS if not (polar and name in DERIVATIVES)), *usual)
 
 
 def parameters_of(kind: str, contacts: Collection[str] = ()) -> tuple[Parameter, ...]:

@@ -5,7 +5,11 @@ from importlib import import_module
 __version__ = "0.1.0"
 _HOME = {
     **dict.fromkeys(["load", "Model"], "model"),
-    **dict.fromkeys(["simulate", "Damping", "TorqueTable"], "simulation"),
+    "simulate": "simulation.run",
+    **dict.fromkeys(["Damping", "TorqueTable", "TorqueCurve", "NativeTorque", "Phases"], "simulation.controllers"),
+    "Piecewise": "simulation.piecewise",
+    **dict.fromkeys(["Legs", "Reference"], "simulation.schedules"),
+    "Contact": "touch",
     **dict.fromkeys(["Trajectory", "pitch_roll_yaw", "rotation_matrix"], "trajectory"),
     **dict.fromkeys(["polar_to_bend", "bend_to_polar"], "polar"),
     "plan": "planning.planner",

@@ -28,7 +28,9 @@ class StateError(SerpentailError, ValueError):
 
 
 class SimulationError(SerpentailError):
-    """A simulation cannot go on."""
+    """A simulation cannot go on; `trajectory` is the motion up to where it failed, None if it never began."""
+
+    trajectory = None
 
 
 class PlanningError(SerpentailError, ValueError):

@@ -29,7 +29,7 @@ from .measures import (
     worst,
 )
 from .model import Model
-from .simulation import simulate
+from .simulation.run import simulate
 from .trajectory import rotation_matrix
 
 NEAR = 450  # roundings: 1e-13 in double

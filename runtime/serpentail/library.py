@@ -3,6 +3,7 @@
 import ctypes
 import math
 import threading
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy import ndarray
 from .compiler import compile_library
 from .errors import ModelError, SerpentailError, StateError
 from .manifest import remedy
+from .side_by_side import SideBySide, shared
 
 NOT_POSITIVE_DEFINITE, NOT_FINITE, OUT_OF_RANGE = 1, 2, 3
 
@@ -18,7 +20,7 @@ NOT_POSITIVE_DEFINITE, NOT_FINITE, OUT_OF_RANGE = 1, 2, 3
 def open_library(folder: Path, manifest: dict, profile: str) -> ctypes.CDLL:
     """Compile (or find in the cache) and load a model's C; ModelError where it is not what the manifest says."""
     prefix = manifest["prefix"]
-    sources = [folder / "src" / f"{prefix}.c", folder / "src" / f"{prefix}_host.c"]
+    sources = [folder / name for name in manifest["files"] if name.startswith("src/")]
     path = compile_library(sources, folder / "include", profile)
     try:
         library = ctypes.CDLL(str(path))
@@ -96,7 +98,7 @@ class Buffers(threading.local):
 class Kernel:
     """One compiled function of a model: single states, or arrays with a leading batch axis."""
 
-    def __init__(self, library: ctypes.CDLL, manifest: dict, name: str, parameters: np.ndarray):
+    def __init__(self, library: ctypes.CDLL, many: SideBySide, manifest: dict, name: str, parameters: np.ndarray):
         entry = manifest["functions"][name]
         self.name, self.dtype = name, parameters.dtype
         self.names = [a["name"] for a in entry["inputs"]]
@@ -104,10 +106,10 @@ class Kernel:
         self.out_shapes = [() if a["shape"] == [1] else tuple(a["shape"]) for a in entry["outputs"]]
         self.function = getattr(library, f"{manifest['prefix']}_batch_{name}")
         self.function.argtypes = [ctypes.c_void_p]
-        self.parameters = parameters
+        self.parameters, self.many, self.work = parameters, many, manifest["work"][name]
         self.bend_range = manifest["scene"].get("bend_range")
         self.polar = manifest["scene"]["coordinates"] == "polar"
-        self.buffers = Buffers(self.dtype, self.shapes, self.out_shapes, manifest["work"][name], parameters)
+        self.buffers = Buffers(self.dtype, self.shapes, self.out_shapes, self.work, parameters)
 
     def __call__(self, *arrays):
         """Evaluate; StateError names the argument that has a wrong shape or a value that is not finite."""
@@ -145,11 +147,29 @@ class Kernel:
             for a, shape in zip(arrays, self.shapes, strict=True)
         ]
         outputs = [np.empty((count, *shape), self.dtype) for shape in self.out_shapes]
-        call = call_record(self.parameters, count, self.buffers.work, (*whole, *outputs))
-        status = self.function(ctypes.addressof(call))
-        if status:
-            self._fail(status, call.failed, whole)
+        many = self.many.entry(self.name, count)
+        run = self._each if many is None else partial(self._side_by_side, many)
+        shared(count, lambda first, last: run(whole, outputs, first, last))
         return outputs[0] if len(outputs) == 1 else tuple(outputs)
+
+    def _each(self, inputs, outputs, first: int, last: int) -> None:
+        """Evaluate states [first, last) one by one."""
+        work = aligned(self.work, self.dtype)
+        call = call_record(self.parameters, last - first, work, [a[first:last] for a in (*inputs, *outputs)])
+        if status := self.function(ctypes.addressof(call)):
+            self._fail(status, first + call.failed, inputs)
+
+    def _side_by_side(self, function, inputs, outputs, first: int, last: int) -> None:
+        """Evaluate states [first, last) side by side; those among which one fails are taken again, one by one."""
+        work = aligned(self.many.work[self.name], self.dtype)
+        while first < last:
+            call = call_record(self.parameters, last - first, work, [a[first:last] for a in (*inputs, *outputs)])
+            if not function(ctypes.addressof(call)):
+                return
+            first += call.failed
+            after = min(first + self.many.states, last)
+            self._each(inputs, outputs, first, after)
+            first = after
 
     def _fail(self, status: int, index: int, arrays):
         state = f" of state {index}" if len(arrays[0]) > 1 else ""

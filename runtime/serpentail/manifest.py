@@ -8,7 +8,7 @@ from . import __version__
 from .errors import ModelError
 
 FORMAT = 1
-KEYS = ("abi_hash", "prefix", "real", "scene", "dimensions", "parameters", "functions", "work", "files")
+KEYS = ("abi_hash", "prefix", "real", "scene", "dimensions", "parameters", "functions", "work", "batch", "files")
 
 
 def read_manifest(folder: Path) -> dict:

@@ -11,18 +11,19 @@ from .errors import ModelError, StateError
 from .library import Kernel, open_library, real_array
 from .manifest import read_manifest
 from .parameters import flat, resolve
+from .side_by_side import SideBySide
 
 
 def load(
     folder: str | PathLike[str],
     parameters: Mapping[str, object] | None = None,
-    profile: str = "fast",
+    profile: str | None = None,
     compiled: bool = True,
 ) -> "Model":
     """Return the model of a generated folder, its C compiled (or taken from the cache) and loaded.
 
     parameters: name -> number or 3 numbers, SI; override the scene's, without recompiling.
-    profile: "fast" (this CPU, FMA) or "reproducible" (same bits everywhere).
+    profile: "fast" (this CPU, FMA) or "reproducible" (same bits everywhere); None: the scene's.
     compiled: False needs no C compiler; then only ``model.casadi`` evaluates.
     Raises ModelError (folder missing, stale or changed; parameter unknown or unphysical), CompilerNotFound,
     CompileFailed.
@@ -30,6 +31,7 @@ def load(
     folder = Path(folder)
     manifest = read_manifest(folder)
     values = resolve(manifest, parameters)
+    profile = profile or manifest["scene"]["profile"]
     library = open_library(folder, manifest, profile) if compiled else None
     return Model(folder, manifest, values, library, profile)
 
@@ -43,10 +45,11 @@ class Model:
     v (nv = 6 + 2m): velocity of B in the world, angular velocity in the body frame, rates of the tail coordinates.
     Every method also takes arrays with a leading batch axis; a single state is repeated over a batch.  All raise
     StateError on a wrong shape or a value that is not finite, ModelError where the scene left the function out.
+    With the profile "fast" the last digits of a state may depend on the size of its batch.
     Threads may share a model; a pickled one is loaded anew from its folder.
     """
 
-    def __init__(self, folder: Path, manifest: dict, parameters: Mapping, library, profile: str = "fast"):
+    def __init__(self, folder: Path, manifest: dict, parameters: Mapping, library, profile: str = "fast", many=None):
         self.folder, self.manifest, self.parameters = folder, manifest, parameters
         self.library, self.profile = library, profile
         sizes = manifest["dimensions"]
@@ -60,7 +63,8 @@ class Model:
         dtype = np.float32 if manifest["real"] == "float" else np.float64
         self.parameter_vector = np.array(flat(manifest, parameters), dtype)
         made = manifest["functions"] if library else ()
-        self.kernels = {name: Kernel(library, manifest, name, self.parameter_vector) for name in made}
+        self.many = many or SideBySide(folder, manifest, profile)
+        self.kernels = {name: Kernel(library, self.many, manifest, name, self.parameter_vector) for name in made}
 
     def __repr__(self) -> str:
         pieces = f" x {self.links} links" if self.links else " continuum segments"
@@ -73,7 +77,8 @@ class Model:
             own.pop("link_radius", None)
         if "link_radius" in changes:
             own.pop("link_inertia", None)
-        return Model(self.folder, self.manifest, resolve(self.manifest, own | changes), self.library, self.profile)
+        values = resolve(self.manifest, own | changes)
+        return Model(self.folder, self.manifest, values, self.library, self.profile, self.many)
 
     def _given(self) -> dict:
         """Return the parameters that the others follow from; none where they are baked."""

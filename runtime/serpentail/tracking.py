@@ -5,43 +5,37 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .errors import SimulationError
+from .simulation.piecewise import Piecewise, spline
+from .simulation.schedules import Reference
 
 if TYPE_CHECKING:
     from .model import Model
 
 KP, KD = 4e4, 400.0  # 1/s^2, 1/s: Table 1
-ROUNDING = 1e-9  # s
 
 
 class Pfl:
     """Partial feedback linearisation, Eq. 46: tail accelerations become q_t_ddot_r + Kd e_dot + Kp e, e = q_t_r - q_t.
 
-    reference: a Plan, a Trajectory, or (times (K,) s, tail coordinates (K, 2m) rad); between its samples a cubic
-    spline, after them the last value at rest.  kp (1/s^2), kd (1/s): gains, one number each.  feedforward: use
+    reference: a Reference, a Plan, a Trajectory, or (times (K,) s, tail coordinates (K, 2m) rad); of the last three a
+    cubic spline; after it the last value at rest.  kp (1/s^2), kd (1/s): gains, one number each.  feedforward: use
     q_t_ddot_r, which the paper leaves out.
     Called with (t, q, v) it returns tau (2m,) in N m: a controller for ``st.simulate``.  Needs pfl of the model, or its
     inverse_dynamics and mass_matrix.  Raises SimulationError where an argument is wrong.
     """
 
     def __init__(self, model: "Model", reference, kp: float = KP, kd: float = KD, feedforward: bool = True):
-        from scipy.interpolate import CubicSpline
-
-        times, angles, ends = _reference(reference, model.nv - 6)
         for name, value in (("kp", kp), ("kd", kd)):
             if not (isinstance(value, int | float) and np.isfinite(value) and value >= 0):
                 raise SimulationError(f"Pfl: {name} is {value!r}: give a finite number from 0")
         self.model, self.kp, self.kd = model, float(kp), float(kd)
-        self.span, self.last = (times[0], times[-1]), angles[-1]
-        self.spline = CubicSpline(times, angles, bc_type=ends)
+        self.curve = _curve(reference, model.nv - 6)
         self.feedforward = bool(feedforward)
 
     def reference(self, t: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return tail coordinates, rates and accelerations (2m,) wanted at t (s)."""
-        if t > self.span[1] + ROUNDING:
-            return self.last, np.zeros_like(self.last), np.zeros_like(self.last)
-        t = min(max(t, self.span[0]), self.span[1])
-        acceleration = self.spline(t, 2) if self.feedforward else np.zeros_like(self.last)
-        return self.spline(t), self.spline(t, 1), acceleration
+        angles, rates, accelerations = self.curve.at(t)
+        return angles, rates, accelerations if self.feedforward else 0 * accelerations
 
     def __call__(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Return tau (2m,), N m: X^-1 (S H^-1 C + a), X = S H^-1 [0; I]."""
@@ -57,8 +51,12 @@ class Pfl:
         return force[6:] + H[6:, :6] @ base
 
 
-def _reference(reference, size: int) -> tuple[np.ndarray, np.ndarray, object]:
-    """Times (K,), tail coordinates (K, 2m) of what the user gave, and how the spline ends: by the rates, if known."""
+def _curve(reference, size: int) -> Piecewise:
+    """Return what the user gave as a function of time; splines end by the rates of a motion, where these are known."""
+    if isinstance(reference, Reference):
+        if reference.curve.channels != size:
+            raise SimulationError(f"Pfl: the reference has {reference.curve.channels} angles, the tail {size}")
+        return reference.curve
     motion = getattr(reference, "trajectory", reference)
     if hasattr(motion, "tail") and hasattr(motion, "t"):
         times, angles, ends = motion.t, motion.tail, tuple((1, motion.v[k, 6:]) for k in (0, -1))
@@ -66,10 +64,10 @@ def _reference(reference, size: int) -> tuple[np.ndarray, np.ndarray, object]:
         try:
             times, angles, ends = *(np.asarray(part, float) for part in reference), "not-a-knot"
         except (TypeError, ValueError):
-            what = "a Plan, a Trajectory, or (times, tail coordinates)"
+            what = "a Plan, a Trajectory, a Reference, or (times, tail coordinates)"
             raise SimulationError(f"Pfl: reference is a {type(reference).__name__}: give {what}") from None
     if times.ndim != 1 or len(times) < 2 or angles.shape != (len(times), size):
         raise SimulationError(f"Pfl: times {times.shape} and angles {angles.shape}, not (K,) and (K, {size}), K > 1")
     if not (np.isfinite(times).all() and np.isfinite(angles).all() and (np.diff(times) > 0).all()):
         raise SimulationError("Pfl: times must increase, and all entries be finite")
-    return times, angles, ends
+    return spline(times, angles, ends)

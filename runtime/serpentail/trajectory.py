@@ -15,6 +15,9 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .touch import ARRAYS as TOUCHING
+from .touch import Contact
+
 Array = NDArray[np.float64]
 SUFFIX = ".npz"
 UNIT_TOLERANCE = 1e-3  # how far a stored quaternion's norm may drift from 1
@@ -25,7 +28,8 @@ class Trajectory:
     """K samples of a motion with m tail segments, SI; the arrays are read-only copies, ValueError if unsound.
 
     t (K,) s, increasing; q (K, 7+2m), v (K, 6+2m); tau (K, 2m) N m; kinetic, potential (K,) J; in the world
-    linear_momentum (K, 3) kg m/s and, about the COM, angular_momentum (K, 3) kg m2/s; info: JSON-ready dict.
+    linear_momentum (K, 3) kg m/s and, about the COM, angular_momentum (K, 3) kg m2/s; info: JSON-ready dict;
+    contact: points, forces and bristles of a motion on the ground, None in flight.
     """
 
     t: Array
@@ -37,6 +41,7 @@ class Trajectory:
     linear_momentum: Array
     angular_momentum: Array
     info: dict[str, Any] = field(default_factory=dict)
+    contact: Contact | None = None
 
     def __post_init__(self) -> None:
         """Freeze private copies of the fields once each has been found sound."""
@@ -56,6 +61,11 @@ class Trajectory:
         return self.kinetic + self.potential
 
     @property
+    def events(self) -> list[dict[str, Any]]:
+        """Touch-downs and take-offs in order: time (s), group, kind ("touch_down" or "take_off")."""
+        return self.info.get("events", [])
+
+    @property
     def segments(self) -> int:
         """Number of tail segments m."""
         return int(self.q.shape[1] - 7) // 2
@@ -73,10 +83,17 @@ class Trajectory:
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write one npz file (suffix added if absent), whole or not at all, and return its path."""
         target = _npz(path)
-        arrays = {name: getattr(self, name) for name in ARRAYS}
+        arrays = {name: getattr(self, name) for name in ARRAYS} | self._touching()
         with replacing(target) as part, part.open("wb") as stream:
             np.savez(stream, info=np.array(_json(self.info)), **arrays)
         return target
+
+    def _touching(self) -> dict[str, Any]:
+        """The contact as arrays of a file."""
+        if self.contact is None:
+            return {}
+        arrays = {CONTACT + name: getattr(self.contact, name) for name in TOUCHING}
+        return arrays | {CONTACT + "groups": np.array(_json(self.contact.groups))}
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
@@ -86,7 +103,7 @@ class Trajectory:
             raise FileNotFoundError(f"no trajectory file {str(source)!r}: check the name, or save one first")
         fields = _read(source)
         try:
-            return cls(**fields | {"info": json.loads(str(fields["info"]))})
+            return cls(**_parsed(fields))
         except ValueError as error:
             raise ValueError(f"{str(source)!r} holds no sound trajectory: {error}") from error
 
@@ -95,16 +112,18 @@ class Trajectory:
 
         p and q_t: cubic Hermite through positions and velocities. Attitude: the same on the quaternion with
         q_dot = q (0, omega) / 2, normalised (samples less than half a turn apart). v, energies and momenta:
-        monotone cubic, so no overshoot at impacts. tau: linear, since torques may jump.
+        monotone cubic, so no overshoot at impacts. tau and contact: linear, since they may jump.
         """
         times = _inside(_real("t", t), self.t)
         rows = _Rows.at(times, self.t)
         smooth: dict[str, Any] = {name: _monotone(self.t, getattr(self, name), times) for name in SMOOTH}
         q = _hermite_q(rows, self.q, self.v)
-        return dataclasses.replace(self, t=times, q=q, tau=rows.linear(self.tau), **smooth)
+        contact = self.contact.mapped(rows.linear) if self.contact else None
+        return dataclasses.replace(self, t=times, q=q, tau=rows.linear(self.tau), contact=contact, **smooth)
 
 
-ARRAYS = tuple(entry.name for entry in dataclasses.fields(Trajectory) if entry.name != "info")
+ARRAYS = tuple(entry.name for entry in dataclasses.fields(Trajectory) if entry.name not in ("info", "contact"))
+CONTACT = "contact_"  # before the names of a contact's arrays in a file
 SMOOTH = ("v", "kinetic", "potential", "linear_momentum", "angular_momentum")
 
 
@@ -220,11 +239,21 @@ def _read(source: Path) -> dict[str, Any]:
         if damaged:
             raise ValueError(f"the checksum of {damaged} is wrong")
         with np.load(source, allow_pickle=False) as stored:
-            return {name: stored[name] for name in (*ARRAYS, "info")}
+            touching = [name for name in stored.files if name.startswith(CONTACT)]
+            return {name: stored[name] for name in (*ARRAYS, "info", *touching)}
     except KeyError as error:
         raise ValueError(f"{str(source)!r} is not a trajectory: {error.args[0]}") from error
     except (ValueError, EOFError, NotImplementedError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
         raise ValueError(f"{str(source)!r} is damaged or not a trajectory ({error}): save it again") from error
+
+
+def _parsed(fields: dict[str, Any]) -> dict[str, Any]:
+    """The arguments of a trajectory from the fields of a file."""
+    own = {name: value for name, value in fields.items() if not name.startswith(CONTACT)}
+    touching = {name.removeprefix(CONTACT): value for name, value in fields.items() if name not in own}
+    if touching:
+        own["contact"] = Contact(**touching | {"groups": json.loads(str(touching["groups"]))})
+    return own | {"info": json.loads(str(fields["info"]))}
 
 
 def _inside(times: Array, span: Array) -> Array:

@@ -2,22 +2,27 @@
 
 import hashlib
 import json
+import math
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
 from ..draft import Tail
+from ..eliminations import written_out
 from ..functions import Argument, Function, struct_parameters
 from ..functions import program as assemble
 from ..interpret import applied, branches
-from ..program import Program
+from ..program import VECTOR, Program
 from ..scene import Scene
 from ..tape import operation_count
 from ..templating import render
 from .c_function import CFunction, Routine, dialect, in_loops, routine_arguments, routine_lines, straight_line
 from .casadi_external import casadi_context
+from .simulation import Has, layouts, simulation_context
 
 STRAIGHT_UP_TO = 7000  # nodes: beyond, the text leaves the instruction cache and compile time grows
+STRAIGHT_BESIDE_LANES = 3500  # nodes: where there is a sweep in lanes, too, that is faster beyond
+ELIMINATED = 12  # rows: smaller matrices are factored without loops
 LARGE = 100  # operations: a step that is written out wherever it is called; larger ones as the compiler sees fit
 COORDINATES = {
     "joint": "alpha_1, beta_1, ... of the joints",
@@ -37,13 +42,24 @@ class Emitted:
 
 
 def emit(scene: Scene, tail: Tail, function: Function) -> Emitted:
-    """Print one function in the form that the scene asks for; ``auto`` is straight while that is small, unbranched."""
-    program = assemble(function, tail)
-    fixed = baked_values(scene)
-    small = scene.emission == "auto" and applied(program) <= STRAIGHT_UP_TO and not branches(program)
-    if small or scene.emission == "straight":
-        return Emitted(function, straight_line(program, scene.real, scene.name, fixed), "straight")
-    return Emitted(function, in_loops(program, scene.real, scene.name, fixed), "loops")
+    """Print one function in the form that the scene asks for."""
+    program, fixed = assemble(function, tail), baked_values(scene)
+    form, program = fastest(function, tail, program) if scene.emission == "auto" else (scene.emission, program)
+    printer = straight_line if form == "straight" else in_loops
+    return Emitted(function, printer(program, scene.real, scene.name, fixed), form)
+
+
+def fastest(function: Function, tail: Tail, program: Program) -> tuple[str, Program]:
+    """Return the form that runs fastest on a processor with vectors, and the program in that form.
+
+    Straight lines are fastest until their text crowds the instruction cache, if all of them are always run; sweeps in
+    lanes overtake them before that.
+    """
+    lanes = assemble(function, tail, tail.kind == "articulated")
+    limit = STRAIGHT_UP_TO if lanes == program else STRAIGHT_BESIDE_LANES
+    if applied(program) <= limit and not branches(program):
+        return "straight", program
+    return "loops", written_out(lanes, ELIMINATED)
 
 
 def baked_values(scene: Scene) -> dict[str, list]:
@@ -72,6 +88,7 @@ class FunctionView:
     def __init__(self, emitted: Emitted, tail: Tail, prefix: str):
         function, self.lines, self.work = emitted.function, emitted.body.lines, emitted.body.work
         self.name, self.doc = function.name, function.doc
+        self.emission, self.operations = emitted.emission, emitted.body.operations
         views = [ArgumentView(a, tail) for a in (*function.inputs, *function.outputs)]
         self.inputs, self.outputs = views[: len(function.inputs)], views[len(function.inputs) :]
         real = f"{prefix}_real"
@@ -110,7 +127,7 @@ def parameter_views(scene: Scene) -> list[dict]:
     ]
 
 
-def step_views(emitted: list[Emitted], real: str, prefix: str) -> list[dict]:
+def step_views(emitted, real: str, prefix: str) -> list[dict]:
     """Return every step that some loop calls, once."""
     routines: dict[str, Routine] = {}
     bodies = [e.body for e in emitted] + [body for _, body in callees_of(emitted)]
@@ -129,7 +146,7 @@ def step_views(emitted: list[Emitted], real: str, prefix: str) -> list[dict]:
     ]
 
 
-def callees_of(emitted: list[Emitted]) -> list[tuple[Program, CFunction]]:
+def callees_of(emitted) -> list[tuple[Program, CFunction]]:
     """Return the programs that functions call, once, those first that others call."""
     found: dict[str, tuple[Program, CFunction]] = {}
     for program, body in (callee for e in emitted for callee in e.body.callees):
@@ -160,16 +177,19 @@ def unused(lines: Iterable[str], names: Iterable[str] = ()) -> list[str]:
     return [name for name in ("parameters", "work", *names) if name not in words]
 
 
-def rollout_work(emitted: list[Emitted], tail: Tail) -> int:
-    """Return the workspace of a rollout: its stages and what forward dynamics needs."""
-    inner = next(e.body.work for e in emitted if e.function.name == "forward_dynamics")
-    return 3 * (tail.nq + tail.nv) + tail.nt + inner
+def offered(tail: Tail, views: list["FunctionView"]) -> Has:
+    """Return what the simulation of a scene with these functions can do."""
+    outputs = {f.name: f.outputs for f in views}
+    factors = outputs["implicit_factor"][0].length if "implicit_factor" in outputs else 0
+    return Has("pfl" in outputs, factors, tail.points, tuple(tail.groups.items()), "feet" in tail.contacts)
 
 
-def abi_hash(scene: Scene, views: list[FunctionView]) -> str:
+def abi_hash(scene: Scene, tail: Tail, views: list[FunctionView]) -> str:
     """Digest of what a caller relies on: symbols, argument sizes, workspace, the parameter struct."""
     interface = [scene.name, scene.real, [[p.name, p.size] for p in struct_parameters(scene)]]
     interface += [[f.name, [[a.name, a.length] for a in (*f.inputs, *f.outputs)], f.work] for f in views]
+    if "rollout" in scene.functions:
+        interface += layouts(offered(tail, views)).items()
     return hashlib.sha256(json.dumps(interface).encode()).hexdigest()[:16]
 
 
@@ -177,19 +197,23 @@ def c_context(scene: Scene, tail: Tail, emitted: list[Emitted], version: str) ->
     """Return everything that the C templates lay out."""
     views = [FunctionView(e, tail, scene.name) for e in emitted]
     literal = dialect(scene.real).literal
-    numbers = {"zero": 0, "one": 1, "two": 2, "half": 0.5, "third": 1 / 3, "sixth": 1 / 6}
-    rollout = "rollout" in scene.functions
-    works = [{"name": f.name, "work": f.work} for f in views]
-    if rollout:
-        works.append({"name": "rollout", "work": rollout_work(emitted, tail)})
-    return (
-        {name: literal(value) for name, value in numbers.items()}
-        | {
+    numbers = {"zero": 0, "one": 1, "two": 2, "half": 0.5, "third": 1 / 3}
+    numbers |= {"stiffness": 400, "damping": 40}  # of the example's tail
+    numbers |= {"word": 2.0**-32, "quarter": math.pi / 2 * 2.0**-30}
+    works = {f.name: f.work for f in views}
+    rollout = {}
+    if "rollout" in scene.functions:
+        rollout = simulation_context(scene, tail, offered(tail, views), works)
+    return joined(
+        {name: literal(value) for name, value in numbers.items()},
+        {
             "title": f"{scene.kind} tail, {tail.segments} segments x {tail.links} {PIECES[scene.kind]}",
             "pieces": PIECES[scene.kind],
             "prefix": scene.name,
+            "vector": VECTOR,
             "upper": scene.name.upper(),
             "real": scene.real,
+            "reproducible": scene.profile == "reproducible",
             "least": "FLT_MIN" if scene.real == "float" else "DBL_MIN",
             "most": "FLT_MAX" if scene.real == "float" else "DBL_MAX",
             "sqrt": dialect(scene.real).functions["sqrt"],
@@ -197,7 +221,7 @@ def c_context(scene: Scene, tail: Tail, emitted: list[Emitted], version: str) ->
             "coordinates": COORDINATES[scene.coordinates],
             "polar": tail.polar,
             "content_hash": "",
-            "abi_hash": abi_hash(scene, views),
+            "abi_hash": abi_hash(scene, tail, views),
             "tail": tail,
             "factors": next((a.length for f in views for a in f.outputs if a.name == "factors"), 0),
             "groups": ", ".join(f"{count} of the {name}" for name, count in tail.groups.items()),
@@ -205,23 +229,35 @@ def c_context(scene: Scene, tail: Tail, emitted: list[Emitted], version: str) ->
             "parameters": parameter_views(scene),
             "parameter_count": sum(p.size for p in struct_parameters(scene)),
             "functions": views,
+            "names": [f.name for f in views],
             "most_arrays": max(len(f.inputs) + len(f.outputs) for f in views),
-            "works": works,
+            "works": [{"name": name, "work": work} for name, work in works.items()],
             "steps": step_views(emitted, scene.real, scene.name),
             "callees": [callee_view(*callee, scene.name) for callee in callees_of(emitted)],
-            "helpers": sorted(set().union(*(e.body.helpers for e in emitted)) | ({"copy"} if rollout else set())),
-            "rollout": rollout,
-        }
-        | casadi_context(scene, tail, {f.name: f.work for f in views})
+            "helpers": sorted(set().union(*(e.body.helpers for e in emitted))),
+        },
+        rollout,
+        casadi_context(scene, tail, works),
     )
+
+
+def joined(*parts: dict) -> dict:
+    """Return the parts of a context as one; no name means two things."""
+    names = [name for part in parts for name in part]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise ValueError(f"the templates' names {', '.join(twice)} mean two things")
+    return {name: value for part in parts for name, value in part.items()}
 
 
 def c_files(scene: Scene, context: dict) -> dict[str, str]:
     """Render the header, the model, its host entries and an example."""
     name = scene.name
+    places = {"simulation.h.jinja": f"include/{name}_simulation.h", "simulation.c.jinja": f"src/{name}_simulation.c"}
     return {
         f"include/{name}.h": render("header.h.jinja", context),
         f"src/{name}.c": render("model.c.jinja", context),
         f"src/{name}_host.c": render("host.c.jinja", context),
         "example/main.c": render("example.c.jinja", context),
+        **({path: render(template, context) for template, path in places.items()} if "has" in context else {}),
     }

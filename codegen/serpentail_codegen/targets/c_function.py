@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from ..interpret import executed, unroll
 from ..program import Apply, Array, Call, Copy, Factor, Fill, Guard, Loop, Program, Ref, Solve, Unit, When, padded
-from ..tape import BINARY, Step
+from ..tape import BINARY, Step, lanes_of
 from .scalars import EARLY, LATE, Dialect, Scalars, index_text
 
 FEW = 3  # scalars are written one by one, more by a helper
@@ -25,7 +25,8 @@ class Routine:
     @property
     def name(self) -> str:
         """Name that tells routines of one step apart."""
-        usual = {n for n, _ in (*self.step.inputs, *self.step.outputs) if n.startswith("d_")}
+        names = {n for n, _ in (*self.step.inputs, *self.step.outputs)}
+        usual = {n for n in names if n.startswith("d_")} or names
         odd = sorted(self.rows ^ usual) if self.rows else []
         lanes = [f"rows_of_{self.row}", *odd] if self.rows else []
         adds = ["add", *sorted(self.adds)] if self.adds else []
@@ -52,8 +53,11 @@ def dialect(real: str, prefix: str = "") -> Dialect:
     suffix = "f" if real == "float" else ""
     sincos = f"real {{sine}}, {{cosine}}; {prefix}_sincos({{argument}}, &{{sine}}, &{{cosine}});"
     functions = {"sqrt": "sqrt" + suffix}
+    sincos_row = f"lanes {{sine}}, {{cosine}}; {prefix}_sincos_row({{argument}}, &{{sine}}, &{{cosine}});"
     row, load = "const lanes {name} = {text};", "LOAD({address} + c)"
-    return Dialect("const real {name} = {text};", suffix, functions, sincos=sincos, row=row, load=load)
+    return Dialect(
+        "const real {name} = {text};", suffix, functions, sincos=sincos, sincos_row=sincos_row, row=row, load=load
+    )
 
 
 def offset_text(ref: Ref) -> str:
@@ -95,7 +99,7 @@ def routine_arguments(routine: Routine) -> str:
     """Print the arguments of a step."""
     inputs = [f"const real *{name}" for name, _ in routine.step.inputs]
     outputs = [f"real *{name}_out" for name, _ in routine.step.outputs]
-    return ", ".join([*inputs, *outputs, *(["int columns"] if routine.rows else [])])
+    return ", ".join([*inputs, *outputs, *(["int count"] if routine.rows else [])])
 
 
 def routine_lines(routine: Routine, real: str, prefix: str) -> list[str]:
@@ -124,7 +128,7 @@ def routine_lines(routine: Routine, real: str, prefix: str) -> list[str]:
     # every input is read before an output is written: outputs may overwrite inputs
     late = {text: f"r{k}" for k, (_, _, text) in enumerate(narrow) if "[" in text}
     lines += [f"const real {name} = {text};" for text, name in late.items()]
-    lines += each_lane("columns", wide + stores) if stores else []
+    lines += each_lane("count", wide + stores) if stores else []
     for name, k, text in narrow:
         lines.append(f"{name}_out[{k}] {'+=' if name in routine.adds else '='} {late.get(text, text)};")
     return lines
@@ -201,7 +205,7 @@ class LoopPrinter:
                 text = ", ".join(self.dialect.literal(v) for v in values)
                 lines.append(f"static const real {array.name}[{array.length}] = {{{text}}};")
             elif array.role == "local" and array.length * array.row <= ON_STACK:
-                lines.append(f"real {array.name}[{array.length}];")
+                lines.append(f"real {array.name}[{array.length * array.row}];")
             elif array.role == "local":
                 lines.append(f"real *const {array.name} = work + {work};")
                 work += array.length * array.row
@@ -231,11 +235,18 @@ class LoopPrinter:
     def _fill(self, fill: Fill) -> list[str]:
         target = self._ref(fill.target)
         if target.lanes:
-            return [f"{self._helper('clear_rows')}({target.size * target.array.row}, {pointer(target)});"]
+            return self._fill_rows(target, fill.values)
         if target.size > FEW and len(set(fill.values)) == 1:
             value = self.dialect.literal(fill.values[0])
             return [f"{self._helper('fill')}({target.size}, {value}, {pointer(target)});"]
         return [f"{scalar(target, k)} = {self.dialect.literal(v)};" for k, v in enumerate(fill.values)]
+
+    def _fill_rows(self, target: Ref, values) -> list[str]:
+        if not any(values):
+            return [f"{self._helper('clear_rows')}({target.size * target.array.row}, {pointer(target)});"]
+        fill, row = self._helper("fill_rows"), target.array.row
+        texts = [self.dialect.literal(v) for v in values]
+        return [f"{fill}({row}, {text}, {pointer(one)});" for text, one in zip(texts, singles(target), strict=True)]
 
     def _unit(self, unit: Unit) -> list[str]:
         target, row = self._ref(unit.target), unit.target.array.row
@@ -246,24 +257,43 @@ class LoopPrinter:
     def _copy(self, copy: Copy) -> list[str]:
         target, source = self._ref(copy.target), self._ref(copy.source)
         if target.lanes:
-            helper = self._helper("add_rows" if copy.adds else "copy_rows")
-            return [f"{helper}({target.size * target.array.row}, {pointer(source)}, {pointer(target)});"]
+            return self._copy_rows(target, source, "add_rows" if copy.adds else "copy_rows")
         if target.size > FEW and target.stride == source.stride == 1:
             helper = self._helper("add" if copy.adds else "copy")
             return [f"{helper}({target.size}, {pointer(source)}, {pointer(target)});"]
         sign = "+=" if copy.adds else "="
         return [f"{scalar(target, k)} {sign} {scalar(source, k)};" for k in range(target.size)]
 
+    def _copy_rows(self, target: Ref, source: Ref, how: str) -> list[str]:
+        row = target.array.row
+        if not source.lanes:
+            fill, pairs = self._helper("fill_rows"), enumerate(singles(target))
+            return [f"{fill}({row}, {scalar(source, k)}, {pointer(one)});" for k, one in pairs]
+        copy = self._helper(how)
+        if target.stride == source.stride == 1:
+            return [f"{copy}({target.size * row}, {pointer(source)}, {pointer(target)});"]
+        pairs = zip(singles(source), singles(target), strict=True)
+        return [f"{copy}({row}, {pointer(one)}, {pointer(other)});" for one, other in pairs]
+
     def _helper(self, name: str) -> str:
         self.helpers.add(name)
         return f"{self.prefix}_{name}"
 
     def _guard(self, guard: Guard) -> list[str]:
-        test = f"!({scalar(self._ref(guard.scalar), 0)} > {self.dialect.literal(0)})"
+        given = self._ref(guard.scalar)
+        test = f"!({' && '.join(f'{scalar(given, k)} > {self.dialect.literal(0)}' for k in range(given.size))})"
+        if given.lanes:
+            test = f"!{self._helper('all_positive')}({given.size * given.array.row}, {pointer(given)})"
         return [f"if ({test}) {{", f"  return STATUS_{guard.status};", "}"]
 
     def _factor(self, factor: Factor) -> list[str]:
-        call = f"{self._helper('ldl_factor')}({factor.size}, {pointer(self._ref(factor.matrix[0]))})"
+        matrix = self._ref(factor.matrix[0])
+        if matrix.lanes:
+            self.helpers |= {"all_positive"}
+            call = f"{self._helper('ldl_factor_side_by_side')}({factor.size}, {matrix.array.row}, {pointer(matrix)})"
+        else:
+            self.helpers |= {"lanes"}
+            call = f"{self._helper('ldl_factor')}({factor.size}, {pointer(matrix)})"
         return [f"if ({call} != STATUS_OK) {{", "  return STATUS_NOT_POSITIVE_DEFINITE;", "}"]
 
     def _solve(self, solve: Solve) -> list[str]:
@@ -271,6 +301,9 @@ class LoopPrinter:
         if not x.lanes:
             return [f"{self._helper('ldl_solve')}({x.size}, {pointer(matrix)}, {pointer(x)});"]
         self.helpers.add("lanes")
+        if matrix.lanes:
+            helper = self._helper("ldl_solve_side_by_side")
+            return [f"{helper}({x.size}, {x.array.row}, {pointer(matrix)}, {pointer(x)});"]
         helper = self._helper("ldl_solve_rows")
         return [f"{helper}({x.size}, {x.lanes}, {x.array.row}, {pointer(matrix)}, {pointer(x)});"]
 
@@ -299,13 +332,19 @@ class LoopPrinter:
             if target.stride == 1:
                 arguments.append(pointer(target))
                 continue
-            before.append(f"real {name}_new[{size}];")
-            after += [f"{scalar(target, k)} {'+=' if adds else '='} {name}_new[{k}];" for k in range(size)]
+            before.append(f"real {name}_new[{size * target.array.row}];")
+            after += self._scattered(name, target, adds)
             arguments.append(f"{name}_new")
         if lanes:
             arguments.append(index_text(call.columns) if call.columns else str(lanes))
         line = f"{self.prefix}_{routine.name}({', '.join(arguments)});"
         return [line] if not before else ["{", *("  " + x for x in (*before, line, *after)), "}"]
+
+    def _scattered(self, name: str, target: Ref, adds: bool) -> list[str]:
+        if target.lanes:
+            source = Array(f"{name}_new", "local", target.size, lanes=target.lanes)[0]
+            return self._copy_rows(target, source, "add_rows" if adds else "copy_rows")
+        return [f"{scalar(target, k)} {'+=' if adds else '='} {name}_new[{k}];" for k in range(target.size)]
 
     def _routine(self, call: Apply) -> tuple[Routine, int]:
         """Return what to call, and the lanes of its rows."""
@@ -316,13 +355,26 @@ class LoopPrinter:
         routine = Routine(call.step, frozenset(wide), row, frozenset(adds))
         if self.routines.setdefault(routine.name, routine) != routine:
             raise ValueError(f"two steps are called {routine.name}")
-        self.helpers |= called(call.step.nodes) | ({"lanes"} if wide else set())
+        given = [
+            padded(wide[name].lanes) if name in wide else 0 for name, size in call.step.inputs for _ in range(size)
+        ]
+        self.helpers |= called(call.step.nodes, given) | ({"lanes"} if wide else set())
         return routine, next((ref.lanes for ref in wide.values()), 0)
 
 
-def called(nodes) -> set[str]:
-    """Return the helpers that nodes call."""
-    return {"sincos"} if any(op in ("sin", "cos") for op, *_ in nodes) else set()
+def singles(ref: Ref) -> list[Ref]:
+    """Return a reference to each scalar of a reference."""
+    return [Ref(ref.array, ref.offset + k * ref.stride, 1) for k in range(ref.size)]
+
+
+def called(nodes, inputs=()) -> set[str]:
+    """Return the helpers that nodes call, from the lanes of their inputs."""
+    lanes, helpers = [], set()
+    for op, *args in nodes:
+        lanes.append(lanes_of((op, *args), lanes, inputs))
+        if op in ("sin", "cos"):
+            helpers |= {"sincos", "sincos_row"} if lanes[args[0]] else {"sincos"}
+    return helpers
 
 
 def in_loops(program: Program, real: str, prefix: str, fixed=None) -> CFunction:

@@ -6,7 +6,7 @@ from ..compose import expanded
 from ..draft import Tail
 from ..functions import program as assemble
 from ..functions import struct_parameters
-from ..program import Apply, Copy, Factor, Fill, Guard, Loop, Program, Ref, Solve
+from ..program import Apply, Copy, Factor, Fill, Guard, Loop, Program, Ref, Solve, padded
 from ..scene import Scene
 from ..tape import Step
 from ..templating import render
@@ -74,10 +74,12 @@ class PythonPrinter:
         return [f"{slice_text(ref)} = where({slice_text(guard.scalar)}, {slice_text(ref)})" for ref in guard.protects]
 
     def _factor(self, factor: Factor) -> list[str]:
-        return [f"{factor.matrix.name} = ldl_factor({factor.matrix.name}, {factor.size})"]
+        return [f"{factor.matrix.name} = ldl_factor({factor.matrix.name}, {factor.size}, {padded(factor.size)})"]
 
     def _solve(self, solve: Solve) -> list[str]:
-        return [f"{slice_text(solve.x)} = ldl_solve({solve.matrix.name}, {slice_text(solve.x)})"]
+        return [
+            f"{slice_text(solve.x)} = ldl_solve({solve.matrix.name}, {slice_text(solve.x)}, {padded(solve.x.size)})"
+        ]
 
     def _apply(self, call: Apply) -> list[str]:
         self.steps.setdefault(call.step.name, call.step)

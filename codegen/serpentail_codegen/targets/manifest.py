@@ -2,6 +2,7 @@
 
 from ..parameters import ANY, BODY_INERTIA, NOT_NEGATIVE, POSITIVE
 from ..scene import Scene, parameters_of, scene_to_dict
+from .simulation import layouts
 
 FORMAT = 1
 CHECKS = {ANY: "finite", POSITIVE: "positive", NOT_NEGATIVE: "not_negative", BODY_INERTIA: "body_inertia"}
@@ -9,6 +10,11 @@ CHECKS = {ANY: "finite", POSITIVE: "positive", NOT_NEGATIVE: "not_negative", BOD
 
 def manifest(scene: Scene, context: dict, emitted: list) -> dict:
     """Return the manifest of a generated folder, without its files."""
+    work = {f["name"]: f["work"] for f in context["works"]}
+    simulation = {}
+    if "has" in context:
+        work |= {"rollout": context["rollout_work"]}
+        simulation = {"simulation": simulation_entry(context)}
     return {
         "format": FORMAT,
         "generator": context["version"],
@@ -23,8 +29,16 @@ def manifest(scene: Scene, context: dict, emitted: list) -> dict:
         "contacts": [{"group": name, "count": count} for name, count in context["tail"].groups.items()],
         "parameters": [parameter_entry(scene, p) for p in parameters_of(scene.kind, scene.contacts)],
         "functions": {e.function.name: function_entry(e, context["tail"]) for e in emitted},
-        "work": {f["name"]: f["work"] for f in context["works"]},
+        "work": work,
+        **simulation,
     }
+
+
+def simulation_entry(context: dict) -> dict:
+    """Return what a caller must know of simulations: methods by their numbers, the members of records."""
+    has = context["has"]
+    methods = {name: number for number, name in enumerate(context["methods"]) if name in has.methods}
+    return {"methods": methods, "records": layouts(has)}
 
 
 def parameter_entry(scene: Scene, parameter) -> dict:

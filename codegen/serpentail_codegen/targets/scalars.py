@@ -26,6 +26,7 @@ class Dialect:
     functions: dict[str, str]
     select: str = "{c} > {zero} ? {a} : {b}"
     sincos: str = ""  # defines sine and cosine of one argument at once; empty: by two functions
+    sincos_row: str = ""  # the same of a row
     row: str = ""  # defines a row of lanes
     load: str = ""  # the lanes at an address that are in turn
 
@@ -105,7 +106,8 @@ class Scalars:
         name = self._name()
         names = {"sine": name, "cosine": f"{name}c"}
         self.text["sin", argument], self.text["cos", argument] = names.values()
-        return [self.dialect.sincos.format(argument=self.text[argument], **names)]
+        form = self.dialect.sincos_row if self.lanes[argument] else self.dialect.sincos
+        return [form.format(argument=self.text[argument], **names)]
 
     def _expression(self, op: str, args) -> str:
         if op in BINARY:

@@ -182,7 +182,7 @@ def cost(problem, point, unit: np.ndarray):
     if callable(problem.objective):
         return problem.objective(point)
     if problem.objective == "effort":
-        return ca.sumsqr(point.torque / unit)
+        return (ca.sumsqr(point.torque) + problem.smoothing**2 * ca.sumsqr(point.tail_rate)) / unit.mean() ** 2
     if problem.objective == "energy":
         return ca.sum1(ca.sqrt((point.torque * point.tail_rate) ** 2 + SMOOTH**2) - SMOOTH) / (unit.mean() * 10)
     return ca.SX(0)

@@ -2,15 +2,11 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
-from ..errors import SimulationError
 from ..trajectory import rotation_matrix
 from .transcription import Transcription
-
-STIFF_STEP = 1e-5  # s
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,15 +19,12 @@ class Motion:
 
 def passive(model, problem, coordinates, damping: float, duration: float, push=None) -> Motion:
     """Return the motion whose tail only damps (Eq. 47), the paper's guess (Sect. 3.2), pushed by torques (n, 2m)."""
-    from ..simulation import TorqueTable, simulate
+    from ..simulation.controllers import TorqueTable
+    from ..simulation.run import simulate
 
     push = np.zeros((1, model.nv - 6)) if push is None else push
     law = TorqueTable(np.linspace(0, duration, len(push)), push, max(damping, problem.damping))
-    run = partial(simulate, model, problem.q0, problem.v0, controller=law, t_span=duration)
-    try:
-        flight = run()
-    except SimulationError:  # a damped continuum is stiff
-        flight = run(step=STIFF_STEP)
+    flight = simulate(model, problem.q0, problem.v0, controller=law, t_span=duration)
     return of_trajectory(model, flight, coordinates, problem.damping)
 
 

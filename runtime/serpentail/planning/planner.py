@@ -8,6 +8,7 @@ import numpy as np
 from ..errors import PlanningError
 from ..trajectory import Trajectory
 from .formulations import dynamics
+from .interrupt import heeded
 from .problem import SETTINGS, Bounds, Goal, Problem, checked_problem, choice, number
 from .rounds import Method, Run
 from .rules import rule
@@ -18,15 +19,18 @@ def plan(model, *, start, goal=None, duration, bounds=None, **settings):
 
     start: (q0 (nq,), v0 (nv,)).  goal: Goal (default: upright, torso at rest).  duration: s, or (least, most) where it
     is free.  bounds: Bounds (default: |tau| <= 0.02 N m).
-    The problem: objective "effort" (integral of tau^2), "energy" (of sum |tau q_t_dot|), "time", or a function of a
-    point; damping (N m s, Eq. 47, in addition to the planned torques); path, rows (function of a point, least, most); a
-    point has the CasADi blocks tail, tail_rate, torso_rate, torque, attitude, quaternion in SI; formulation "airborne"
-    (angular momentum conserved by construction), "translation-free", "full"; attitude "quaternion", "euler".
+    The problem: objective "effort" (integral of tau^2 + (smoothing q_t_dot)^2), "energy" (of sum |tau q_t_dot|),
+    "time", or a function of a point; smoothing (N m s), without which plans whirl a light tail; damping (N m s, Eq. 47,
+    in addition to the planned torques); path, rows (function of a point, least, most); a point has the CasADi blocks
+    tail, tail_rate, torso_rate, torque, attitude, quaternion in SI; formulation "airborne" (angular momentum conserved
+    by construction), "translation-free", "full"; attitude "quaternion", "euler".
     The method: rule "radau" (default), "lobatto", "hermite-simpson", "trapezoidal"; degree; intervals; tolerance (deg)
     of the true attitude at the end, None for no demand; rounds of refinement; most_intervals; solver, options of
     ``casadi.nlpsol``; guess: a Plan or a Trajectory (default: passive flight); guess_damping (N m s); multi_start:
     guesses solved, the best is kept; retries: more guesses after failures; seed; dynamics "auto", "compiled",
     "symbolic"; track: simulate with PFL, too.
+    Programs and solvers are kept: planning again on a plan's mesh, from another start, derives nothing.  Ctrl-C ends
+    the search, and the best so far is returned; a second one raises KeyboardInterrupt.
     Returns a Plan; look at its ``success`` and ``report``.  Raises PlanningError (a field, its value, the remedy),
     ModelError (the scene lacks functions).
     """
@@ -38,7 +42,8 @@ def plan(model, *, start, goal=None, duration, bounds=None, **settings):
     scheme = rule(method.rule, method.degree)
     equations = dynamics(model, method.dynamics)
     run = Run(model, problem, method, equations, scheme)
-    rounds = run.refined(run.first())
+    with heeded():
+        rounds = run.refined(run.first())
     return run.plan(rounds, time.perf_counter() - begun)
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from difflib import get_close_matches
+from functools import partial
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from .attitude import KINDS
 from .formulations import FORMULATIONS
 
 OBJECTIVES = ("effort", "energy", "time")
+SMOOTHING = 3e-4  # N m s: the effort counts a tail's rates as torques, or a plan whirls a light tail at no cost
 SLACK = 1e-6  # rad, rad/s: how far a start may be beyond its bounds
 
 
@@ -53,13 +55,14 @@ class Problem:
     duration: tuple[float, float]
     bounds: Bounds
     objective: str | Callable = "effort"
+    smoothing: float = SMOOTHING
     damping: float = 0.0
     path: tuple[tuple[Callable, float, float], ...] = ()
     formulation: str = "airborne"
     attitude: str = "quaternion"
 
 
-SETTINGS = ("objective", "damping", "path", "formulation", "attitude")
+SETTINGS = ("objective", "smoothing", "damping", "path", "formulation", "attitude")
 
 
 def checked_problem(model, start, goal, duration, bounds, **settings) -> Problem:
@@ -68,7 +71,8 @@ def checked_problem(model, start, goal, duration, bounds, **settings) -> Problem
     goal, bounds = _goal(goal, q0.size - 7), _bounds(bounds, q0.size - 7)
     _start_inside(q0[7:], bounds.angle, "angle", "rad")
     _start_inside(v0[6:], bounds.rate, "rate", "rad/s")
-    wrong = {"objective": _objective, "damping": _damping, "path": _path}
+    wrong = {"objective": _objective, "path": _path}
+    wrong |= {name: partial(number, name, above=False) for name in ("smoothing", "damping")}
     for name, bound in (("tail", bounds.angle), ("tail_rate", bounds.rate)):
         _goal_inside(name, getattr(goal, name), bound)
     settings = {name: wrong.get(name, lambda value: value)(value) for name, value in settings.items()}
@@ -196,10 +200,6 @@ def _objective(objective):
     if not callable(objective):
         choice("objective", objective, OBJECTIVES)
     return objective
-
-
-def _damping(damping) -> float:
-    return number("damping", damping, above=False)
 
 
 def _path(path) -> tuple:

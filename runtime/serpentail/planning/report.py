@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..errors import SimulationError
-from ..simulation import simulate
+from ..simulation.run import simulate
 from ..tracking import Pfl
 from ..trajectory import Trajectory, pitch_roll_yaw
 from .attitude import angle_deg, tilt_deg
@@ -49,10 +49,9 @@ def truth(run, best, planned: Trajectory) -> dict:
 def objective(best) -> float:
     """The objective's value in SI units."""
     problem, value = best.program.problem, best.solution.value
-    unit = best.program.form.units["torque"]
-    if problem.objective == "effort":
-        return effort(best.curve)
-    return value * unit.mean() * 10 if problem.objective == "energy" else value
+    unit = best.program.form.units["torque"].mean()
+    scales = {"effort": unit**2, "energy": 10 * unit}
+    return value if callable(problem.objective) else value * scales.get(problem.objective, 1.0)
 
 
 def effort(curve: Curve) -> float:

@@ -9,6 +9,7 @@ from .attitude import attitude
 from .curve import Curve, curve
 from .formulations import Dynamics
 from .guess import Motion, of_trajectory, passive, pushes, unknowns
+from .interrupt import asked
 from .limits import limits
 from .mesh import Mesh, refined, uniform
 from .problem import Problem
@@ -17,7 +18,7 @@ from .report import attitude_errors, report
 from .rules import Rule
 from .solution import Plan, sampled
 from .solver import Solution, solve, solver
-from .transcription import Transcription, torque_unit, transcribe
+from .transcription import Transcription, program_of, torque_unit
 from .truth import local_errors, open_loop
 
 SLIGHT = 0.05  # of the torques' unit: what pushes the first guess out of a plane of symmetry
@@ -79,7 +80,7 @@ class Run:
         program = self._transcribed(before.mesh if again else uniform(method.intervals))
         found: list[Solution] = []
         for k in range(method.multi_start + method.retries):
-            if k >= method.multi_start and any(s.success for s in found):
+            if found and (asked() or (k >= method.multi_start and any(s.success for s in found))):
                 break
             found.append(self._given(program) if k == 0 else self._solved(program, self._pushed(k)))
         return self._round(program, min(found, key=lambda s: (not s.success, s.value)))
@@ -89,7 +90,7 @@ class Run:
         rounds, method = [first], self.method
         for _ in range(method.rounds if method.tolerance is not None else 0):
             last = rounds[-1]
-            if not last.solution.success or last.error <= method.tolerance:
+            if asked() or not last.solution.success or last.error <= method.tolerance:
                 break
             mesh = self._split(last)
             if mesh.intervals == last.program.mesh.intervals:
@@ -97,7 +98,8 @@ class Run:
             program = self._transcribed(mesh)
             motion = Motion(last.curve.duration, last.curve.at)
             found = self._solved(program, motion, "close")
-            rounds.append(self._round(program, found if found.success else self._solved(program, motion)))
+            again = not (found.success or asked())
+            rounds.append(self._round(program, self._solved(program, motion) if again else found))
         return rounds
 
     def plan(self, rounds: list[Round], wall_s: float) -> Plan:
@@ -114,7 +116,7 @@ class Run:
 
     def _transcribed(self, mesh: Mesh) -> Transcription:
         begun = time.perf_counter()
-        program = transcribe(self.model, self.problem, mesh, self.rule, self.equations)
+        program = program_of(self.model, self.problem, mesh, self.rule, self.equations)
         self.spent["derive_s"] += time.perf_counter() - begun
         return program
 

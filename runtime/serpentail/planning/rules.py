@@ -43,6 +43,10 @@ class Rule:
         """Lagrange polynomials of the nodes (..., K) at s (...) in [0, 1]."""
         return _at(_lagrange(tuple(self.nodes)), s)
 
+    def powers(self) -> np.ndarray:
+        """Coefficients of these, (K, degree + 1), of the powers of s, constants first."""
+        return np.array([polynomial.coef for polynomial in _lagrange(tuple(self.nodes))])
+
     def integrals(self, s) -> np.ndarray:
         """Integrals of these from 0 to s (..., K)."""
         return _at([polynomial.integ() for polynomial in _lagrange(tuple(self.nodes))], s)

@@ -2,16 +2,22 @@
 
 import time
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from ..errors import PlanningError
+from .interrupt import asked
+from .kept import kept
 from .limits import Limits
 from .transcription import Transcription
 
 IPOPT = {"ipopt.print_level": 0, "ipopt.sb": "yes", "ipopt.max_iter": 300, "ipopt.nlp_scaling_method": "none"}
-IPOPT |= {"ipopt.mu_init": 1e-3}
-CLOSE = {"ipopt.mu_init": 1e-5, "ipopt.bound_push": 1e-6, "ipopt.bound_frac": 1e-6}  # to a solution
+IPOPT |= {"ipopt.mu_strategy": "adaptive"}  # half the iterations
+IPOPT |= {"ipopt.watchdog_shortened_iter_trigger": 0}  # else multipliers may grow without bound, and steps shrink
+IPOPT |= {"ipopt.mumps_pivtol": 1e-8, "ipopt.mumps_pivtolmax": 1e-6}  # else pivots are delayed: up to 20 times slower
+CLOSE = {"ipopt.mu_strategy": "monotone", "ipopt.mu_init": 1e-5}  # to a solution
+CLOSE |= {"ipopt.bound_push": 1e-6, "ipopt.bound_frac": 1e-6}
 SAME = CLOSE | {"ipopt.mu_init": 1e-8, "ipopt.warm_start_init_point": "yes"}  # with its multipliers
 SAME |= {f"ipopt.warm_start_{part}": 1e-8 for part in ("bound_push", "bound_frac", "mult_bound_push")}
 NEARNESS = {"far": {}, "close": CLOSE, "same": SAME}
@@ -39,11 +45,46 @@ def solver(program: Transcription, name: str = "ipopt", options: dict | None = N
         raise PlanningError(f"solver: value {name!r}: CasADi has no such solver here; 'ipopt' comes with it")
     given = {"print_time": False, "error_on_fail": False}
     if name == "ipopt":
-        given |= IPOPT | NEARNESS[near] | {key: program.program[key] for key in EXACT}
+        given |= IPOPT | NEARNESS[near]
+    given |= options or {}
     try:
-        return ca.nlpsol("plan", name, program.program["nlp"], given | (options or {}))
+        return kept((program.node, name, repr(sorted(given.items()))), partial(_engine, program, name, given))
     except RuntimeError as error:
         raise PlanningError(f"options: value {options!r}: {name} refuses them: {_reason(error)}") from error
+
+
+def _engine(program: Transcription, name: str, options: dict):
+    import casadi as ca
+
+    if name != "ipopt":
+        return ca.nlpsol("plan", name, program.program["nlp"], options)
+    exact, watch = {key: program.program[key] for key in EXACT}, _watch(program.places.size, program.rows)
+    engine = ca.nlpsol("plan", name, program.program["nlp"], exact | {"iteration_callback": watch} | options)
+    engine.watch = watch  # CasADi keeps no callback alive
+    return engine
+
+
+def _watch(unknowns: int, rows: int):
+    """A callback of every iteration, through which Ctrl-C ends the search."""
+    import casadi as ca
+
+    class Watch(ca.Callback):
+        def get_n_in(self):
+            return ca.nlpsol_n_out()
+
+        def get_name_in(self, k):
+            return ca.nlpsol_out(k)
+
+        def get_sparsity_in(self, k):
+            sizes = {"f": 1, "x": unknowns, "lam_x": unknowns, "g": rows, "lam_g": rows, "lam_p": 3}
+            return ca.Sparsity.dense(sizes[ca.nlpsol_out(k)], 1)
+
+        def eval(self, _found):
+            return [int(asked())]
+
+    watch = Watch()
+    watch.construct("watch", {})
+    return watch
 
 
 def solve(engine, limits: Limits, w: np.ndarray, h: np.ndarray, multipliers=None) -> Solution:

@@ -4,13 +4,15 @@ Objective and constraints are linear in the unknowns w and in the values Y of on
 f = cost Y + direct w, g = linear w + weights Y.  All derivatives follow from those of that one function.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from .assembly import Assembly
 from .attitude import Attitude, attitude
 from .formulations import Dynamics, Layout, Node, layout, node
+from .kept import kept
 from .mesh import Mesh
 from .problem import Problem
 from .rules import Rule
@@ -71,6 +73,15 @@ class Transcription:
     def fractions(self) -> np.ndarray:
         """Points (P,) as fractions of the duration."""
         return self.mesh.points(self.rule)
+
+
+def program_of(model, problem: Problem, mesh: Mesh, rule: Rule, equations: Dynamics) -> Transcription:
+    """Return the program of a problem on a mesh; one that differs in start, duration or limits alone shares it."""
+    goal, bounds = problem.goal.attitude, problem.bounds
+    of = [None if x is None else tuple(x) for x in (goal, bounds.torque, bounds.torque_rate)]
+    of += [problem.objective, problem.smoothing, problem.damping, problem.path, problem.formulation, problem.attitude]
+    make = partial(transcribe, model, problem, mesh, rule, equations)
+    return replace(kept((model, *of, tuple(mesh.ends), rule, equations.source), make), problem=problem)
 
 
 def transcribe(model, problem: Problem, mesh: Mesh, rule: Rule, equations: Dynamics) -> Transcription:

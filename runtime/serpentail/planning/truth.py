@@ -3,7 +3,9 @@
 import numpy as np
 
 from ..errors import SimulationError
-from ..simulation import TorqueTable, simulate
+from ..simulation.controllers import TorqueCurve
+from ..simulation.piecewise import Piecewise
+from ..simulation.run import end_state
 from .attitude import angle_deg
 from .curve import Curve
 
@@ -13,20 +15,24 @@ STEP = 1e-4  # s, longest RK4 step
 def interval(model, curve: Curve, damping: float, k: int, q, v) -> tuple[np.ndarray, np.ndarray]:
     """Return q, v at the end of interval k, its planned torques applied from the state q, v; nan where they blow up.
 
-    RK4 in C: the table has the torques at all times that RK4 asks for, so its straight lines add no error.
+    RK4 in C, its torques being the plan's own polynomial.
     """
     width = float(curve.ends[k + 1] - curve.ends[k])
     steps = max(4, int(np.ceil(width / STEP)))
-    s = np.linspace(0.0, 1.0, 2 * steps + 1)
-    torques = curve.rule.basis(s) @ curve.nodes["torque"][k]
-    law = TorqueTable(s * width, torques, damping)
+    law = TorqueCurve(planned_torques(curve, k), damping)
     if not np.isfinite(q).all():
         return q, v
     try:
-        flight = simulate(model, q, v, controller=law, t_span=width, output_step=width, step=width / steps)
+        return end_state(model, q, v, controller=law, duration=width, step=width / steps)
     except SimulationError:  # bent or whirled beyond what the model describes
         return np.full_like(q, np.nan), np.full_like(v, np.nan)
-    return flight.q[-1], flight.v[-1]
+
+
+def planned_torques(curve: Curve, k: int) -> Piecewise:
+    """Return the torques of interval k, its start being time 0."""
+    width = float(curve.ends[k + 1] - curve.ends[k])
+    coefficients = curve.nodes["torque"][k].T @ curve.rule.powers()
+    return Piecewise(np.array([0.0, width]), (coefficients / width ** np.arange(coefficients.shape[1]))[None])
 
 
 def open_loop(model, curve: Curve, damping: float, start) -> tuple[np.ndarray, np.ndarray]:

@@ -77,6 +77,27 @@ STEP golden_loops_copy(int size, const real *source, real *target)
   }
 }
 
+/* Rows: one number for each direction of differentiation, LANES of them in turn. */
+#if defined(__GNUC__) && defined(__AVX512F__)
+#define LANES 8
+#elif defined(__GNUC__) && defined(__AVX__)
+#define LANES 4
+#elif defined(__GNUC__) && (defined(__SSE2__) || defined(__aarch64__))
+#define LANES 2
+#else
+#define LANES 1
+#endif
+#if LANES > 1
+typedef real golden_loops_lanes __attribute__((vector_size(LANES * sizeof(real)), aligned(sizeof(real)), may_alias));
+#define WIDE(x) ((golden_loops_lanes){ 0.0 } + (x))
+#else
+typedef real golden_loops_lanes;
+#define WIDE(x) (x)
+#endif
+#define lanes golden_loops_lanes
+#define LOAD(p) (*(const lanes *)(p))
+#define STORE(p, x) (*(lanes *)(p) = (x))
+
 /* R_b from (w, x, y, z); only the direction of the quaternion counts, so it need not be normalised. */
 STEP golden_loops_quaternion_rotation(const real *quaternion, real *R_out)
 {
@@ -773,46 +794,62 @@ STEP golden_loops_pair_without_translation_add_A_entry(const real *inverse_mass,
   A_entry_out[0] += r0;
 }
 
-/* Factor A = L D L^T in place without pivoting (lower triangle, row-major): L below 1 / D on the diagonal. */
+/* Rows of a matrix to factor are so far apart: whole vectors. */
+#define ROW(size) (((size) + 7) / 8 * 8)
+
+/* Factor A = L^T D L in place without pivoting (lower triangle, row-major): L below 1 / D on the diagonal.  From the last
+ * row up, because then all that a row takes from another one lies side by side.
+ */
 static int golden_loops_ldl_factor(int size, real *A)
 {
-  for (int k = 0; k < size; ++k) {
-    const real pivot = A[k * size + k];
+  const int row = ROW(size);
+  for (int k = size - 1; k >= 0; --k) {
+    real *const last = A + k * row;
+    const real pivot = last[k];
     if (!(pivot > 0.0)) {
       return STATUS_NOT_POSITIVE_DEFINITE;
     }
     const real inverse = 1.0 / pivot;
-    for (int i = k + 1; i < size; ++i) {
-      const real column = A[i * size + k];
-      const real factor = column * inverse;
-      for (int j = k + 1; j < i; ++j) {
-        A[i * size + j] -= A[j * size + k] * column;
+    for (int i = k - 1; i >= 0; --i) {
+      const real factor = last[i] * inverse;
+      for (int c = 0; c <= i; c += LANES) {
+        STORE(A + i * row + c, LOAD(A + i * row + c) - factor * LOAD(last + c));
       }
-      A[i * size + i] -= factor * column;
-      A[i * size + k] = factor;
     }
-    A[k * size + k] = inverse;
+    for (int c = 0; c < k; c += LANES) {
+      STORE(last + c, LOAD(last + c) * inverse);
+    }
+    last[k] = inverse;
   }
   return STATUS_OK;
 }
 
-/* Solve L D L^T x = x in place. */
+/* Solve L^T D L x = x in place. */
 static void golden_loops_ldl_solve(int size, const real *A, real *x)
 {
-  for (int k = 0; k < size; ++k) {
-    for (int i = k + 1; i < size; ++i) {
-      x[i] -= A[i * size + k] * x[k];
-    }
-  }
-  for (int k = 0; k < size; ++k) {
-    x[k] *= A[k * size + k];
-  }
+  const int row = ROW(size);
   for (int k = size - 1; k > 0; --k) {
-    for (int i = 0; i < k; ++i) {
-      x[i] -= A[k * size + i] * x[k];
+    const real known = x[k];
+    int c = 0;
+    for (; c + LANES <= k; c += LANES) {
+      STORE(x + c, LOAD(x + c) - LOAD(A + k * row + c) * known);
     }
+    for (; c < k; ++c) {
+      x[c] -= A[k * row + c] * known;
+    }
+  }
+  for (int k = 0; k < size; ++k) {
+    x[k] *= A[k * row + k];
+  }
+  for (int k = 1; k < size; ++k) {
+    real sum = x[k];
+    for (int i = 0; i < k; ++i) {
+      sum -= A[k * row + i] * x[i];
+    }
+    x[k] = sum;
   }
 }
+#undef ROW
 
 /* H with translation eliminated, factored, and C without gravity */
 static int golden_loops_balance(const golden_loops_parameters *parameters, const real *q, const real *v, real *R,
@@ -882,18 +919,18 @@ static int golden_loops_balance(const golden_loops_parameters *parameters, const
   for (int i = 1; i >= 0; --i) {
     golden_loops_fill(6, 0.0, pitch);
     golden_loops_fill(6, 0.0, yaw);
-    A[16 * i + 24] = 0.0;
-    A[16 * i + 31] = 0.0;
-    A[16 * i + 32] = 0.0;
+    A[18 * i + 27] = 0.0;
+    A[18 * i + 35] = 0.0;
+    A[18 * i + 36] = 0.0;
     for (int j = 1; j >= 0; --j) {
-      golden_loops_gather_links_add_H_pp_H_py_H_yy(joint + 4 * i, twice + 10 * i, link, mass, h, I, pitch, yaw, mass, h, I, pitch, yaw, A + 16 * i + 24, A + 16 * i + 31, A + 16 * i + 32);
+      golden_loops_gather_links_add_H_pp_H_py_H_yy(joint + 4 * i, twice + 10 * i, link, mass, h, I, pitch, yaw, mass, h, I, pitch, yaw, A + 18 * i + 27, A + 18 * i + 35, A + 18 * i + 36);
     }
     golden_loops_column_at_torso(R_root + 9 * i, P_root + 3 * i, pitch, yaw, columns + 12 * i);
   }
   golden_loops_torso_composite(parameters->tail_mount, &parameters->torso_mass, parameters->torso_inertia, mass, h, I, mass, h, I);
   for (int i = 1; i < 2; ++i) {
     for (int l = 0; l < i; ++l) {
-      golden_loops_segment_coupling(S + 12 * l, columns + 12 * i, A + 14 * i + 2 * l + 24, A + 14 * i + 2 * l + 31);
+      golden_loops_segment_coupling(S + 12 * l, columns + 12 * i, A + 16 * i + 2 * l + 27, A + 16 * i + 2 * l + 35);
     }
   }
   first_moment[0] = h[0];
@@ -921,11 +958,11 @@ static int golden_loops_balance(const golden_loops_parameters *parameters, const
     }
   }
   golden_loops_torso_wrench(parameters->tail_mount, &parameters->torso_mass, parameters->torso_inertia, v + 3, zero_3, zero_3, F_next, bias, bias + 3);
-  golden_loops_without_translation(mass, h, I, inverse_mass, com, A, A + 7, A + 14);
+  golden_loops_without_translation(mass, h, I, inverse_mass, com, A, A + 8, A + 16);
   for (int k = 0; k < 4; ++k) {
-    golden_loops_column_without_translation(com, columns + 6 * k, A + 7 * k + 21);
+    golden_loops_column_without_translation(com, columns + 6 * k, A + 8 * k + 24);
     for (int l = 0; l < k + 1; ++l) {
-      golden_loops_pair_without_translation_add_A_entry(inverse_mass, columns + 6 * k, columns + 6 * l, A + 7 * k + l + 24);
+      golden_loops_pair_without_translation_add_A_entry(inverse_mass, columns + 6 * k, columns + 6 * l, A + 8 * k + l + 27);
     }
   }
   if (golden_loops_ldl_factor(7, A) != STATUS_OK) {
@@ -993,7 +1030,7 @@ int golden_loops_forward_dynamics(const golden_loops_parameters *parameters, con
   real com[3];
   real first_moment[3];
   real *const A = work + 0;
-  real *const columns = work + 49;
+  real *const columns = work + 56;
   real bias[10];
   real net_v_dot[3];
   static const real unloaded[3] = {0.0, 0.0, 0.0};
@@ -1019,6 +1056,11 @@ int golden_loops_forward_dynamics(const golden_loops_parameters *parameters, con
   return STATUS_OK;
 }
 
+#undef WIDE
+#undef STORE
+#undef LOAD
+#undef lanes
+#undef LANES
 #undef STEP
 #undef STATUS_OUT_OF_RANGE
 #undef STATUS_NOT_POSITIVE_DEFINITE

@@ -1,0 +1,143 @@
+"""Integration methods: literature's coefficients go in, as exact literals; what the C templates print comes out."""
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+Row = tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Explicit:
+    """A Runge-Kutta method: stage s at t + nodes[s] h from rows[s]; weights of the result and of its error."""
+
+    nodes: Row
+    rows: tuple[Row, ...]
+    weights: Row
+    error: Row = ()
+    dense: tuple[Row, ...] = ()  # of stage i: weight at the part x of a step, x dense[i][0] + x^2 dense[i][1] + ...
+
+
+@dataclass(frozen=True)
+class Rosenbrock:
+    """A Rosenbrock method as it is computed, free of products with J, any approximation of the rate's Jacobian.
+
+    (1 - h gamma J) u_s = h gamma f(t + nodes[s] h, y + sum rows[s] u) + gamma sum couplings[s] u.
+    """
+
+    gamma: float
+    nodes: Row
+    rows: tuple[Row, ...]
+    couplings: tuple[Row, ...]
+    weights: Row
+    error: Row
+
+
+RK4 = Explicit((0.0, 0.5, 0.5, 1.0), ((), (0.5,), (0.0, 0.5), (0.0, 0.0, 1.0)), (1 / 6, 1 / 3, 1 / 3, 1 / 6))
+
+# Ch. Tsitouras, Runge-Kutta pairs of order 5(4) satisfying only the first column simplifying assumption, Comput.
+# Math. Appl. 62 (2011) 770-775; the last stage is the first of the next step, the interpolant has order 4.
+TSIT5 = Explicit(
+    nodes=(0.0, 0.161, 0.327, 0.9, 0.9800255409045097, 1.0, 1.0),
+    rows=(
+        (),
+        (0.161,),
+        (-0.008480655492356989, 0.335480655492357),
+        (2.8971530571054935, -6.359448489975075, 4.3622954328695815),
+        (5.325864828439257, -11.748883564062828, 7.4955393428898365, -0.09249506636175525),
+        (5.86145544294642, -12.92096931784711, 8.159367898576159, -0.071584973281401, -0.028269050394068383),
+        (0.09646076681806523, 0.01, 0.4798896504144996, 1.379008574103742, -3.290069515436081, 2.324710524099774),
+    ),
+    weights=(
+        0.09646076681806523,
+        0.01,
+        0.4798896504144996,
+        1.379008574103742,
+        -3.290069515436081,
+        2.324710524099774,
+        0.0,
+    ),
+    error=(
+        -0.00178001105222577714,
+        -0.0008164344596567469,
+        0.007880878010261995,
+        -0.1447110071732629,
+        0.5823571654525552,
+        -0.45808210592918697,
+        0.015151515151515152,
+    ),
+    dense=(
+        (1.0, -2.763706197274826, 2.9132554618219126, -1.0530884977290216),
+        (0.0, 0.13169999999999998, -0.2234, 0.1017),
+        (0.0, 3.9302962368947516, -5.941033872131505, 2.490627285651253),
+        (0.0, -12.411077166933676, 30.33818863028232, -16.548102889244902),
+        (0.0, 37.50931341651104, -88.1789048947664, 47.37952196281928),
+        (0.0, -27.896526289197286, 65.09189467479366, -34.87065786149661),
+        (0.0, 1.5, -4.0, 2.5),
+    ),
+)
+
+
+@dataclass(frozen=True)
+class Classical:
+    """A Rosenbrock method as papers state it: alpha and gamma below their diagonals, the diagonal of gamma."""
+
+    gamma: float
+    alpha: tuple[Row, ...]
+    below: tuple[Row, ...]
+    weights: Row
+    embedded: Row
+
+
+# J. Rang, L. Angermann, New Rosenbrock W-methods of order 3 for PDAEs of index 1, BIT 45 (2005) 761-787: order 3 with
+# any J, order 2 embedded, L-stable and stiffly accurate with the exact J.
+ROS34PW2 = Classical(
+    gamma=0.435866521508459,
+    alpha=(
+        (),
+        (0.8717330430169180,),
+        (0.8445706001536942, -0.11299064236484185),
+        (0.0, 0.0, 1.0),
+    ),
+    below=(
+        (),
+        (-0.8717330430169180,),
+        (-0.9033805701304408, 0.05418067238809533),
+        (0.24212380706095346, -1.2232505839045147, 0.5452602553351021),
+    ),
+    weights=(0.24212380706095346, -1.2232505839045147, 1.5452602553351021, 0.435866521508459),
+    embedded=(0.3781090314581937, -0.09604229221242318, 0.5, 0.2179332607542295),
+)
+
+
+def transformed(method: Classical) -> Rosenbrock:
+    """Return a method in the unknowns u = Gamma k (Hairer and Wanner, Eq. IV.7.25), computed without rounding."""
+    size, gamma = len(method.weights), Fraction(method.gamma)
+    lower = [[*map(Fraction, row), gamma] for row in method.below]
+    inverse = _inverse(lower)
+
+    def times(row: Row) -> Row:
+        return tuple(
+            float(sum(Fraction(x) * inverse[i][j] for i, x in enumerate(row) if i >= j)) for j in range(len(row))
+        )
+
+    return Rosenbrock(
+        gamma=method.gamma,
+        nodes=tuple(float(sum(map(Fraction, row))) for row in method.alpha),
+        rows=tuple(map(times, method.alpha)),
+        couplings=tuple(tuple(float(-inverse[i][j]) for j in range(i)) for i in range(size)),
+        weights=times(method.weights),
+        error=times(
+            tuple(float(Fraction(b) - Fraction(e)) for b, e in zip(method.weights, method.embedded, strict=True))
+        ),
+    )
+
+
+def _inverse(lower: list[list[Fraction]]) -> list[list[Fraction]]:
+    """Return the inverse of a lower triangular matrix, row by row."""
+    size = len(lower)
+    inverse = [[Fraction(0)] * size for _ in range(size)]
+    for j in range(size):
+        inverse[j][j] = 1 / lower[j][j]
+        for i in range(j + 1, size):
+            inverse[i][j] = -sum(lower[i][k] * inverse[k][j] for k in range(j, i)) / lower[i][i]
+    return inverse

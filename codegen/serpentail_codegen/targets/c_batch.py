@@ -1,0 +1,66 @@
+"""The C of batches: emitted functions of a scene go in, the text of the file that evaluates many states comes out."""
+
+from dataclasses import dataclass
+
+from ..batches import flattened, side_by_side
+from ..draft import Tail
+from ..functions import Function
+from ..functions import program as assemble
+from ..program import Program
+from ..scene import Scene
+from ..templating import render
+from .c import ArgumentView, Emitted, baked_values, callee_view, step_views
+from .c_function import CFunction, in_loops
+
+STATES = 8  # side by side: lanes of the widest vector
+BATCHED = ("mass_matrix", "bias_force", "inverse_dynamics", "forward_dynamics")
+
+
+@dataclass(frozen=True)
+class Batch:
+    """One function over rows of states: its program, and the C of that."""
+
+    function: Function
+    program: Program
+    body: CFunction
+
+
+def batches(scene: Scene, tail: Tail, emitted: list[Emitted]) -> list[Batch]:
+    """Return the functions that a host evaluates for many states; straight or in loops as they are for one."""
+    return [_batch(scene, tail, e) for e in emitted if e.function.name in BATCHED]
+
+
+def _batch(scene: Scene, tail: Tail, emitted: Emitted) -> Batch:
+    fixed, single = baked_values(scene), assemble(emitted.function, tail)
+    single = flattened(single, fixed) if emitted.emission == "straight" else single
+    rows = side_by_side(single, STATES)
+    return Batch(emitted.function, rows, in_loops(rows, scene.real, scene.name, fixed))
+
+
+class BatchView:
+    """A batch as the template sees it: its arguments, the function of their rows, the workspace of both."""
+
+    def __init__(self, batch: Batch, tail: Tail, prefix: str):
+        function = batch.function
+        self.name, self.rows = function.name, callee_view(batch.program, batch.body, prefix)
+        self.inputs = [ArgumentView(a, tail) for a in function.inputs]
+        self.outputs = [ArgumentView(a, tail) for a in function.outputs]
+        self.names = ", ".join(a.name for a in self.inputs + self.outputs)
+        self.own = STATES * sum(a.length for a in self.inputs + self.outputs)
+        self.work = self.own + batch.body.work
+
+
+def batch_file(scene: Scene, tail: Tail, found: list[Batch], context: dict) -> dict[str, str]:
+    """Render the file of batches, if there are any."""
+    own = {
+        "states": STATES,
+        "functions": [BatchView(b, tail, scene.name) for b in found],
+        "steps": step_views(found, scene.real, scene.name),
+        "helpers": sorted(set().union(*(b.body.helpers for b in found)) | {"lanes"}),
+    }
+    return {f"src/{scene.name}_batch.c": render("batch.c.jinja", context | own)} if found else {}
+
+
+def batch_entry(tail: Tail, found: list[Batch]) -> dict:
+    """Return what a loader must know of the batches: how many states side by side, and each one's workspace."""
+    return {"states": STATES, "work": {b.function.name: BatchView(b, tail, "").work for b in found}}

@@ -1,0 +1,16 @@
+"""The package around a model's C: the templates' data go in, the files that build, explain and license it come out."""
+
+from ..templating import render
+
+TEMPLATES = {
+    "Makefile": "makefile.jinja",
+    "CMakeLists.txt": "cmake.txt.jinja",
+    "LICENSE": "license.txt.jinja",
+    "README.md": "readme.md.jinja",
+}
+
+
+def package_files(context: dict) -> dict[str, str]:
+    """Render what a user of the C alone needs beside it."""
+    context = context | {"size": {"float": 4, "double": 8}[context["real"]]}
+    return {name: render(template, context) for name, template in TEMPLATES.items()}

@@ -1,0 +1,37 @@
+"""cppcheck: a generated folder goes in; its faults come out, and how often each rule of MISRA C:2012 is hit."""
+
+import re
+import shutil
+import subprocess
+from collections import Counter
+from pathlib import Path
+
+from boards import ToolchainMissing
+
+CPPCHECK = ("cppcheck", "--std=c99", "--quiet")
+
+
+def need() -> None:
+    """Raise ToolchainMissing unless cppcheck is installed."""
+    if shutil.which("cppcheck") is None:
+        raise ToolchainMissing(
+            "cppcheck is not on PATH; Debian, Ubuntu: apt-get install --no-install-recommends cppcheck"
+        )
+
+
+def summary(folder: Path) -> list[tuple[str, int]]:
+    """Return (rule, hits) of a model's source, the most frequent first: information, no verdict."""
+    need()
+    source = folder / "src" / f"{folder.name}.c"
+    words = [*CPPCHECK, "--addon=misra", "-I", str(folder / "include"), str(source)]
+    done = subprocess.run(words, capture_output=True, text=True, check=True)
+    hits = Counter(re.findall(r"\[misra-c2012-([\d.]+)\]", done.stderr))
+    return sorted(hits.items(), key=lambda item: (-item[1], item[0]))
+
+
+def faults(folder: Path) -> str:
+    """Return what cppcheck's own checks find in a model's source: nothing, where it is clean."""
+    need()
+    source = folder / "src" / f"{folder.name}.c"
+    words = [*CPPCHECK, "--enable=warning,performance,portability", "-I", str(folder / "include"), str(source)]
+    return subprocess.run(words, capture_output=True, text=True, check=True).stderr

@@ -1,0 +1,60 @@
+"""Batches: a generated folder goes in; C that evaluates several states side by side, on all cores, comes out."""
+
+import ctypes
+import os
+import threading
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+from itertools import pairwise
+from pathlib import Path
+
+from .compiler import compile_library
+
+MANY = 1000  # states: from here on a batch pays for compiling the C of batches, which takes a second or two
+SHARE = 256  # states: the least that is worth a thread
+
+
+class SideBySide:
+    """The C of batches of one model, compiled when the first large batch comes."""
+
+    def __init__(self, folder: Path, manifest: dict, profile: str):
+        self.folder, self.prefix, self.profile = folder, manifest["prefix"], profile
+        self.states, self.work = manifest["batch"]["states"], manifest["batch"]["work"]
+        self.library, self.lock = None, threading.Lock()
+
+    def entry(self, name: str, count: int):
+        """Return the C function for a batch of so many states, or None where one state at a time is better."""
+        if name not in self.work or count < (MANY if self.library is None else self.states):
+            return None
+        with self.lock:
+            if self.library is None:
+                source = self.folder / "src" / f"{self.prefix}_batch.c"
+                self.library = ctypes.CDLL(str(compile_library([source], self.folder / "include", self.profile)))
+        function = getattr(self.library, f"{self.prefix}_side_by_side_{name}")
+        function.argtypes = [ctypes.c_void_p]
+        return function
+
+
+@cache
+def cores() -> int:
+    """Return how many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@cache
+def pool() -> ThreadPoolExecutor:
+    """Return the threads that share batches; C runs in them without Python's lock."""
+    return ThreadPoolExecutor(cores(), thread_name_prefix="serpentail")
+
+
+def shared(count: int, run: Callable[[int, int], None]) -> None:
+    """Call ``run(first, last)`` for shares of a batch, on all cores where it is large; the first error is raised."""
+    shares = max(1, min(cores(), count // SHARE))
+    ends = [count * k // shares for k in range(shares + 1)]
+    if shares == 1:
+        run(0, count)
+        return
+    waiting = [pool().submit(run, first, last) for first, last in pairwise(ends)]
+    for future in waiting:
+        future.result()

@@ -1,0 +1,135 @@
+"""Controllers: numbers, tables and functions go in; checked torque laws of the tail come out."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import SimulationError
+from ..library import real_array
+from ..tracking import Pfl
+from .piecewise import Piecewise, checked_nodes, linear
+
+CHOICES = "None, Damping, TorqueTable, TorqueCurve, Pfl, Phases, NativeTorque or a function (t, q, v)"
+
+
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """What one controller adds up: damping (2m,), torques, a tracked reference, a function of C or of Python."""
+
+    damping: np.ndarray | None = None
+    torques: Piecewise | None = None
+    pfl: Pfl | None = None
+    native: object | None = None
+    user: Callable | None = None
+
+    def kinks(self) -> list[float]:
+        """Times at which these torques jump or have a kink."""
+        found = [] if self.torques is None else self.torques.kinks(2).tolist()
+        return found + ([] if self.pfl is None else self.pfl.curve.kinks(3).tolist())
+
+
+@dataclass(frozen=True)
+class Damping:
+    """tau = -damping q_t_dot (Eq. 47); damping in N m s, one number or one a tail coordinate."""
+
+    damping: float | tuple[float, ...] = 1e-3
+
+    def parts(self, nt: int) -> Parts:
+        """Return what it adds up for 2m tail coordinates."""
+        return Parts(_damping(self.damping, nt))
+
+
+@dataclass(frozen=True)
+class TorqueTable:
+    """Torques (K, 2m) in N m at increasing times (K,) in s: linear in between, held outside; less damping q_t_dot."""
+
+    times: object
+    torques: object
+    damping: float | tuple[float, ...] = 0.0
+
+    def parts(self, nt: int) -> Parts:
+        """Return what it adds up for 2m tail coordinates."""
+        nodes = checked_nodes("TorqueTable", "torques", (self.times, self.torques), nt)
+        return Parts(_damping(self.damping, nt), linear(*nodes))
+
+
+@dataclass(frozen=True, eq=False)
+class TorqueCurve:
+    """Torques in N m as polynomials piece by piece, of 2m channels; less damping q_t_dot."""
+
+    torques: Piecewise
+    damping: float | tuple[float, ...] = 0.0
+
+    def parts(self, nt: int) -> Parts:
+        """Return what it adds up for 2m tail coordinates."""
+        if not isinstance(self.torques, Piecewise) or self.torques.channels != nt:
+            raise SimulationError(f"TorqueCurve: torques {self.torques!r}: give a Piecewise of {nt} channels")
+        return Parts(_damping(self.damping, nt), self.torques)
+
+
+@dataclass(frozen=True)
+class NativeTorque:
+    """A compiled function, ``int f(void *context, real t, const real *q, const real *v, real *tau)``, 0 for success.
+
+    function: a ctypes function, or an address; context: an address, or None.  The caller keeps both alive.
+    """
+
+    function: object
+    context: int | None = None
+
+    def parts(self, nt: int) -> Parts:
+        """Return what it adds up, whatever the number of tail coordinates."""
+        return Parts(native=self)
+
+
+@dataclass(frozen=True, eq=False)
+class Phases:
+    """Controllers one after another: pairs of a time (s), increasing, and the controller that acts from then on."""
+
+    phases: tuple
+
+    def __post_init__(self) -> None:
+        """Refuse what is no list of pairs in the order of time."""
+        try:
+            pairs = tuple((begin, controller) for begin, controller in self.phases)
+        except (TypeError, ValueError):
+            raise SimulationError(f"Phases: {self.phases!r}: give pairs (time, controller)") from None
+        begins = (
+            real_array("Phases: times", [begin for begin, _ in pairs], error=SimulationError) if pairs else np.ones(0)
+        )
+        if begins.ndim != 1 or not len(begins) or not np.isfinite(begins).all() or (np.diff(begins) <= 0).any():
+            raise SimulationError(f"Phases: times {begins.tolist()}: give one or more, finite and increasing, in s")
+        if any(isinstance(controller, Phases) for _, controller in pairs):
+            raise SimulationError("Phases: one of the controllers is Phases itself: put all pairs in one list")
+        object.__setattr__(self, "phases", pairs)
+
+
+Controller = Damping | TorqueTable | TorqueCurve | Pfl | Phases | NativeTorque | Callable | None
+
+
+def phases_of(controller: Controller) -> tuple[tuple[float, object], ...]:
+    """Return pairs of time and controller."""
+    return controller.phases if isinstance(controller, Phases) else ((0.0, controller),)
+
+
+def parts_of(controller: Controller, nt: int) -> Parts:
+    """Return the parts of one controller for 2m tail coordinates; SimulationError where it cannot be one."""
+    if controller is None:
+        return Parts()
+    if isinstance(controller, Pfl):
+        return Parts(pfl=controller)
+    if isinstance(controller, Damping | TorqueTable | TorqueCurve | NativeTorque):
+        return controller.parts(nt)
+    if callable(controller):
+        return Parts(user=controller)
+    raise SimulationError(f"controller {controller!r}: give {CHOICES}")
+
+
+def _damping(damping, nt: int) -> np.ndarray:
+    values = real_array("damping", damping, error=SimulationError)
+    if values.shape not in ((), (nt,)):
+        raise SimulationError(f"damping {damping!r}: give one number or {nt}, in N m s")
+    if not (np.isfinite(values).all() and (values >= 0).all()):
+        raise SimulationError(f"damping {damping!r}: give finite numbers, 0 or above, in N m s")
+    return np.broadcast_to(values, (nt,))

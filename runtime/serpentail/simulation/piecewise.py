@@ -1,0 +1,106 @@
+"""Functions of time: nodes go in; polynomials piece by piece, which the generated C evaluates, come out."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import SimulationError
+from ..library import real_array
+
+SAME = 1e-9  # a jump that is smaller, over the largest value, is rounding
+
+
+@dataclass(frozen=True, eq=False)
+class Piecewise:
+    """Polynomials of t - times[k]: coefficients (pieces, channels, degree + 1), constants first; times (pieces + 1,) s.
+
+    Before the first time and after the last the values there are held.
+    """
+
+    times: np.ndarray
+    coefficients: np.ndarray
+
+    @property
+    def channels(self) -> int:
+        """Number of functions."""
+        return self.coefficients.shape[1]
+
+    def at(self, t) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Values, rates and accelerations, (channels,) or (K, channels), at t or t (K,), s; of two pieces the later."""
+        t = np.asarray(t, float)
+        inside = np.clip(t, self.times[0], self.times[-1])
+        piece = np.clip(np.searchsorted(self.times, t, "right") - 1, 0, len(self.times) - 2)
+        held = ((t < self.times[0]) | (t >= self.times[-1]))[..., None]
+        x, c = (inside - self.times[piece])[..., None], self.coefficients[piece]
+        value, rate, acceleration = (_horner(_derived(c, order), x) for order in range(3))
+        return value, np.where(held, 0.0, rate), np.where(held, 0.0, acceleration)
+
+    def kinks(self, orders: int) -> np.ndarray:
+        """Times at which a derivative below this order jumps, beginning and end of what is held among them."""
+        jumps = np.zeros(len(self.times), bool)
+        for order in range(orders):
+            c = _derived(self.coefficients, order)
+            widths = np.diff(self.times)[:, None]
+            starts, ends, sizes = _horner(c, 0.0), _horner(c, widths), _horner(np.abs(c), widths)
+            held = [starts[:1], ends[-1:]] if order == 0 else np.zeros((2, 1, self.channels))
+            left, right = np.vstack([held[0], ends]), np.vstack([starts, held[1]])
+            jumps |= (np.abs(left - right) > SAME * sizes.max(initial=0)).any(axis=1)
+        return self.times[jumps]
+
+
+def _derived(coefficients: np.ndarray, order: int) -> np.ndarray:
+    """Coefficients of a derivative."""
+    for _ in range(order):
+        powers = np.arange(1, coefficients.shape[-1])
+        coefficients = coefficients[..., 1:] * powers if len(powers) else 0 * coefficients
+    return coefficients
+
+
+def _horner(coefficients: np.ndarray, x) -> np.ndarray:
+    value = np.zeros(coefficients.shape[:-1])
+    for k in reversed(range(coefficients.shape[-1])):
+        value = value * x + coefficients[..., k]
+    return value
+
+
+def checked_nodes(what: str, name: str, nodes: tuple, width: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return increasing times (K,) and values (K, width), all finite; SimulationError names what is wrong."""
+    times = real_array(f"{what}: times", nodes[0], error=SimulationError)
+    values = real_array(f"{what}: {name}", nodes[1], error=SimulationError)
+    if times.ndim != 1 or len(times) == 0 or values.shape != (len(times), width):
+        shapes = f"times {times.shape} and {name} {values.shape}, not (K,) and (K, {width})"
+        raise SimulationError(f"{what}: {shapes}")
+    if not (np.isfinite(times).all() and np.isfinite(values).all() and (np.diff(times) > 0).all()):
+        raise SimulationError(f"{what}: times must increase, and all entries be finite")
+    return times, values
+
+
+def linear(times: np.ndarray, values: np.ndarray) -> Piecewise:
+    """Straight lines between nodes; one node is a constant."""
+    if len(times) == 1:
+        return constant(times[0], values[0])
+    slopes = np.diff(values, axis=0) / np.diff(times)[:, None]
+    return Piecewise(times, np.stack([values[:-1], slopes], axis=-1))
+
+
+def constant(time: float, values: np.ndarray) -> Piecewise:
+    """Values (channels,) that never change."""
+    return Piecewise(np.array([time, time + 1.0]), np.asarray(values, float)[None, :, None])
+
+
+def spline(times: np.ndarray, values: np.ndarray, ends: object = "not-a-knot") -> Piecewise:
+    """Cubic spline through nodes; ``ends`` as SciPy's CubicSpline has it."""
+    from scipy.interpolate import CubicSpline
+
+    found = CubicSpline(times, values, bc_type=ends)
+    return Piecewise(times, np.moveaxis(found.c[::-1], 0, -1))
+
+
+def blends(times: np.ndarray, values: np.ndarray) -> Piecewise:
+    """From rest to rest: quintics 10 s^3 - 15 s^4 + 6 s^5 between nodes, at which rate and acceleration are zero."""
+    if len(times) == 1:
+        return constant(times[0], values[0])
+    rise, width = np.diff(values, axis=0), np.diff(times)[:, None]
+    zero = np.zeros_like(rise)
+    rows = [values[:-1], zero, zero, 10 * rise / width**3, -15 * rise / width**4, 6 * rise / width**5]
+    return Piecewise(times, np.stack(rows, axis=-1))

@@ -1,0 +1,99 @@
+"""SciPy's methods on the compiled model: an independent check of the generated ones."""
+
+import ctypes
+
+import numpy as np
+
+from ..errors import SimulationError
+from .methods import Method
+from .run import CompiledRun, Samples, failed
+
+
+class StateRate:
+    """y = (q, v) -> y_dot by the compiled model."""
+
+    def __init__(self, run: CompiledRun):
+        self.run, pointer, dtype = run, ctypes.c_void_p, run.records.dtype
+        self.function = run.function("state_rate", run.records.real, pointer, pointer, pointer)
+        size = sum(map(len, run.state.values()))
+        self.y, self.y_dot, self.tau = np.zeros(size, dtype), np.zeros(size, dtype), np.zeros(run.drive.nt, dtype)
+        self.addresses = [a.ctypes.data for a in (self.y, self.y_dot, self.tau)]
+
+    def __call__(self, t: float, y: np.ndarray) -> np.ndarray:
+        """Return y_dot."""
+        self.y[...] = y
+        status = self.function(ctypes.addressof(self.run.record), t, *self.addresses)
+        if self.run.drive.error is not None:
+            raise self.run.drive.error
+        if status:
+            raise failed(status, t if np.isfinite(t) else self.run.record.t)
+        return self.y_dot.astype(float)
+
+    def torque(self, t: float, y: np.ndarray) -> np.ndarray:
+        """Return the torques at a state."""
+        self(t, y)
+        return self.tau.astype(float)
+
+
+class Tape:
+    """Samples written one after another as steps pass their times."""
+
+    def __init__(self, rate: StateRate, times: np.ndarray):
+        self.rate, self.times, self.states, self.torques = rate, times, [], []
+
+    def write(self, t: float, y: np.ndarray) -> None:
+        """Write one sample, its quaternion normalised."""
+        y = y.copy()
+        y[3:7] /= np.linalg.norm(y[3:7])
+        self.torques.append(self.rate.torque(t, y))
+        self.states.append(y)
+
+    def due(self, t: float) -> np.ndarray:
+        """Times of the samples not later than t."""
+        return self.times[len(self.states) : np.searchsorted(self.times, t, "right")]
+
+
+@np.errstate(all="ignore")  # a trial step may overflow, and is then taken again, shorter
+def integrate_by_scipy(run: CompiledRun, method: Method) -> Samples:
+    """Integrate from stop to stop; what ends the run before its end goes with the samples up to there."""
+    rate = StateRate(run)
+    tape, counts = Tape(rate, run.start.times), {"steps": 0, "evaluations": 0}
+    ends = [*(t for t in run.drive.stops if run.start.start < t < run.start.end), run.start.end]
+    y, t, failure = np.concatenate([*run.state.values()]).astype(float), run.start.start, None
+    try:
+        run.record.until = ends[0]
+        tape.write(t, y)
+        for end in ends:
+            run.record.t, run.record.until = t, end
+            y, t = _smooth_part(rate, method, (t, y, end), tape, counts), end
+    except BaseException as error:
+        if not tape.states:
+            raise
+        failure = error
+    done = len(tape.states)
+    q, v, bristles = np.split(np.array(tape.states), [run.model.nq, run.model.nq + run.model.nv], axis=1)
+    bristles = bristles.reshape(done, run.ground.points, 2)
+    return Samples(tape.times[:done], q, v, np.array(tape.torques), bristles, counts, failure)
+
+
+def _smooth_part(rate: StateRate, method: Method, part, tape: Tape, counts: dict) -> np.ndarray:
+    """Integrate over times without a break, (start, state, end), and return the last state."""
+    from scipy.integrate import DOP853, LSODA
+
+    t, y, end = part
+    solver = {"dop853": DOP853, "lsoda": LSODA}[method.name](rate, t, y, end, **method.settings)
+    while solver.status == "running":
+        message = solver.step()
+        if solver.status == "failed":
+            reason = (message or "the step failed").rstrip(".").lower()
+            raise SimulationError(f"at t = {solver.t:.6g} s {reason}: is the motion stiff, or rtol too small?")
+        counts["steps"] += 1
+        interpolant = solver.dense_output()
+        for at in tape.due(solver.t):
+            tape.write(at, interpolant(at) if at < solver.t else solver.y)
+        if method.name == "dop853":
+            norm = np.linalg.norm(solver.y[3:7])
+            solver.y[3:7] /= norm
+            solver.f[3:7] /= norm
+    counts["evaluations"] += solver.nfev
+    return solver.y

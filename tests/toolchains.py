@@ -1,0 +1,28 @@
+"""Cross compilers, emulators and analysers for tests: without them a test is skipped, in CI it fails."""
+
+import os
+from collections.abc import Callable
+
+import pytest
+
+import misra
+from boards import BOARDS, ToolchainMissing
+
+
+def _required(need: Callable[[], None]) -> None:
+    """Skip a test whose tools are missing, saying how to get them; in CI it fails."""
+    try:
+        need()
+    except ToolchainMissing as error:
+        (pytest.fail if os.environ.get("CI") else pytest.skip)(str(error))
+
+
+def board(name: str):
+    """Return a board whose tools are there."""
+    _required(BOARDS[name].need)
+    return BOARDS[name]
+
+
+def cppcheck() -> None:
+    """Ask for cppcheck."""
+    _required(misra.need)
