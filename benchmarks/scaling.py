@@ -39,13 +39,14 @@ def scaling(folder: Path) -> list[dict]:
 
 
 def peak(folder: Path) -> tuple[float, float]:
-    """Flops per nanosecond of this core: scalars, vectors."""
+    """Flops per nanosecond of this core: scalars, vectors, which take the same time."""
     flags = ("-std=gnu11", "-O2", "-march=native", "-ffp-contract=fast", "-fPIC", "-shared")
-    target = folder / "peak.so"
+    target, width = folder / "peak.so", ctypes.c_int()
     peers.run(["gcc", *flags, str(Path(__file__).parent / "peak.c"), "-o", str(target)])
-    found = (ctypes.c_double * 2)()
-    ctypes.CDLL(str(target)).measure_peak(ctypes.byref(found, 0), ctypes.byref(found, 8))
-    return found[0], found[1]
+    measure = ctypes.CDLL(str(target)).measure_peak
+    measure.restype = ctypes.c_double
+    vector = measure(ctypes.byref(width))
+    return vector / width.value, vector
 
 
 def draw(rows: list[dict], path: Path) -> None:
