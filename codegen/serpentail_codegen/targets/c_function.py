@@ -4,7 +4,24 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from ..interpret import executed, unroll
-from ..program import Apply, Array, Call, Copy, Factor, Fill, Guard, Loop, Program, Ref, Solve, Unit, When, padded
+from ..program import (
+    Apply,
+    Array,
+    Call,
+    Copy,
+    Factor,
+    FactorPair,
+    Fill,
+    Guard,
+    Loop,
+    Program,
+    Ref,
+    Solve,
+    SolvePair,
+    Unit,
+    When,
+    padded,
+)
 from ..tape import BINARY, Step, lanes_of
 from .scalars import EARLY, LATE, Dialect, Scalars, index_text
 
@@ -306,6 +323,16 @@ class LoopPrinter:
             return [f"{helper}({x.size}, {x.array.row}, {pointer(matrix)}, {pointer(x)});"]
         helper = self._helper("ldl_solve_rows")
         return [f"{helper}({x.size}, {x.lanes}, {x.array.row}, {pointer(matrix)}, {pointer(x)});"]
+
+    def _factorpair(self, factor: FactorPair) -> list[str]:
+        self.helpers |= {"lanes"}
+        matrix = pointer(self._ref(factor.matrix[0]))
+        call = f"{self._helper('pair_factor')}({factor.size}, {matrix})"
+        return [f"if ({call} != STATUS_OK) {{", "  return STATUS_NOT_POSITIVE_DEFINITE;", "}"]
+
+    def _solvepair(self, solve: SolvePair) -> list[str]:
+        matrix, x = pointer(self._ref(solve.matrix[0])), pointer(self._ref(solve.x))
+        return [f"{self._helper('pair_solve')}({solve.x.size}, {matrix}, {x});"]
 
     def _call(self, call: Call) -> list[str]:
         inner = in_loops(call.program, self.real, self.prefix, self.fixed)
