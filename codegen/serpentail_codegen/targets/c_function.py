@@ -22,8 +22,8 @@ from ..program import (
     When,
     padded,
 )
-from ..tape import BINARY, Step, lanes_of
-from .scalars import EARLY, LATE, Dialect, Scalars, index_text
+from ..tape import BINARY, Step
+from .scalars import EARLY, LATE, Dialect, Scalars, called, index_text
 
 FEW = 3  # scalars are written one by one, more by a helper
 ON_STACK = 12  # scalars: larger local arrays go to the caller's workspace
@@ -392,16 +392,6 @@ class LoopPrinter:
 def singles(ref: Ref) -> list[Ref]:
     """Return a reference to each scalar of a reference."""
     return [Ref(ref.array, ref.offset + k * ref.stride, 1) for k in range(ref.size)]
-
-
-def called(nodes, inputs=()) -> set[str]:
-    """Return the helpers that nodes call, from the lanes of their inputs."""
-    lanes, helpers = [], set()
-    for op, *args in nodes:
-        lanes.append(lanes_of((op, *args), lanes, inputs))
-        if op in ("sin", "cos"):
-            helpers |= {"sincos", "sincos_row"} if lanes[args[0]] else {"sincos"}
-    return helpers
 
 
 def in_loops(program: Program, real: str, prefix: str, fixed=None) -> CFunction:
