@@ -11,7 +11,7 @@ import pytest
 from references.parameters import TABLE_1, random_states
 from serpentail_codegen.draft import Tail
 from serpentail_codegen.functions import FUNCTIONS, program
-from serpentail_codegen.interpret import Numbers, Run, branches, ldl_factor, ldl_solve, unroll
+from serpentail_codegen.interpret import Numbers, Run, branches, ldl_factor, ldl_solve, pair_factor, pair_solve, unroll
 from serpentail_codegen.program import Apply, Array, Builder, Fill, Index, Loop, as_index, narrowed, statements
 from serpentail_codegen.tape import Step, Tape, live_nodes, replay
 from serpentail_codegen.targets.c_function import in_loops
@@ -343,6 +343,35 @@ def test_solver_agrees_with_numpy(size):
 def test_pivots_show_what_is_not_positive_definite():
     _, pivots = ldl_factor(EXACT, [[Fraction(1)], [Fraction(2), Fraction(3)]])
     assert pivots == [1, -1]
+
+
+@pytest.mark.parametrize("size", [1, 3, 8])
+def test_pair_solver_is_exact_in_rational_arithmetic(size):
+    rng = random.Random(size)
+    A, b = positive_definite(rng, size), [rng.randint(-9, 9) for _ in range(size)]
+    A = [[x + rng.choice((-1, 1)) * (k != j) for j, x in enumerate(row)] for k, row in enumerate(A)]
+    turned = [list(column) for column in zip(*A, strict=True)]
+    triangles = [[[Fraction(x) for x in row[: k + 1]] for k, row in enumerate(rows)] for rows in (A, turned)]
+    *factors, pivots = pair_factor(EXACT, *triangles)
+    x = pair_solve(EXACT, *factors, [Fraction(value) for value in b])
+    assert [sum(a * value for a, value in zip(row, x, strict=True)) for row in A] == b
+    minors = [Fraction(round(np.linalg.det(np.array(A)[k:, k:]))) for k in reversed(range(size))]
+    assert [math.prod(pivots[: k + 1]) for k in range(size)] == minors
+
+
+def test_pair_statement_solves_in_place():
+    """[[2, 7], [1, 4]] x = [11, 6]: triangles of it and of its transpose, rows 8 apart."""
+    b = Builder("solve", "A x = x.")
+    a, x = b.array("a", 32, role="input"), b.array("x", 2, role="output")
+    A = b.array("A", 32)
+    b.copy(A[0], a[0])
+    b.fill(x[0], 11, 6)
+    b.factor_pair(A, 2)
+    b.solve_pair(A, x[0])
+    rows = [[2, 99], [1, 4], [2, 99], [7, 4]]
+    assert outputs(b, a=[y for row in rows for y in [*row, *[0] * 6]]) == [2, 1]
+    *_, guards = unroll(b.finish())
+    assert [status for status, _ in guards] == ["NOT_POSITIVE_DEFINITE"] * 2
 
 
 def test_solve_statement_solves_in_place():

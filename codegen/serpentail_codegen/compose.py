@@ -9,12 +9,14 @@ from .program import (
     Call,
     Copy,
     Factor,
+    FactorPair,
     Fill,
     Guard,
     Loop,
     Program,
     Ref,
     Solve,
+    SolvePair,
     Unit,
     When,
     narrowed,
@@ -28,9 +30,9 @@ def reads(statement) -> tuple[Ref, ...]:
         return statement.reads + tuple(w for w, adds in zip(statement.writes, statement.adds, strict=True) if adds)
     if isinstance(statement, Copy):
         return (statement.source, statement.target) if statement.adds else (statement.source,)
-    if isinstance(statement, Factor):
+    if isinstance(statement, Factor | FactorPair):
         return (statement.matrix[0],)
-    if isinstance(statement, Solve):
+    if isinstance(statement, Solve | SolvePair):
         return (statement.matrix[0], statement.x)
     return (statement.scalar,) if isinstance(statement, Guard) else ()
 
@@ -41,9 +43,9 @@ def writes(statement) -> tuple[Ref, ...]:
         return statement.writes
     if isinstance(statement, Copy | Fill | Unit):
         return (statement.target,)
-    if isinstance(statement, Factor):
+    if isinstance(statement, Factor | FactorPair):
         return (statement.matrix[0],)
-    return (statement.x,) if isinstance(statement, Solve) else ()
+    return (statement.x,) if isinstance(statement, Solve | SolvePair) else ()
 
 
 def names(refs) -> set[str]:

@@ -1,11 +1,14 @@
-"""Eliminations: a program goes in, the same one with small matrices factored and solved by steps comes out."""
+"""Eliminations: a program goes in, the same one with small matrices factored and solved by steps comes out.
+
+Pairs of triangles are factored in loops whatever their size: twice the entries spill, and whole vectors are faster.
+"""
 
 from dataclasses import replace
 from functools import cache
 
 from .compose import rewritten
-from .interpret import ldl_factor, ldl_solve
-from .program import Apply, Array, Call, Factor, Guard, Program, Ref, Solve, padded
+from .interpret import ldl_factor, ldl_solve, pair_solve
+from .program import Apply, Array, Call, Factor, Guard, Program, Ref, Solve, SolvePair, padded
 from .tape import Step, Tape
 
 
@@ -17,12 +20,14 @@ def written_out(program: Program, largest: int) -> Program:
         if isinstance(statement, Factor) and statement.size <= largest:
             own = Array(f"pivots_{statement.matrix.name}", "local", statement.size)
             pivots[own.name] = own
-            rows = _rows(statement.matrix, statement.size)
+            rows = _rows(statement.matrix, statement.size, statement.size)
             yield Apply(_factor_step(statement.size), rows, (*rows, own[0]), (False,) * (len(rows) + 1))
             yield Guard(own[0], "NOT_POSITIVE_DEFINITE", rows)
-        elif isinstance(statement, Solve) and statement.x.size <= largest:
-            rows = _rows(statement.matrix, statement.x.size)
-            yield Apply(_solve_step(statement.x.size), (*rows, statement.x), (statement.x,), (False,))
+        elif isinstance(statement, Solve | SolvePair) and statement.x.size <= largest:
+            count = 2 if isinstance(statement, SolvePair) else 1
+            rows = _rows(statement.matrix, count * statement.x.size, statement.x.size)
+            step = _solve_step(statement.x.size, count)
+            yield Apply(step, (*rows, statement.x), (statement.x,), (False,))
         elif isinstance(statement, Call):
             yield replace(statement, program=written_out(statement.program, largest))
         else:
@@ -32,21 +37,22 @@ def written_out(program: Program, largest: int) -> Program:
     return replace(program, arrays=(*program.arrays, *pivots.values()), body=body)
 
 
-def _rows(matrix: Array, size: int) -> tuple[Ref, ...]:
-    """Return the rows of the lower triangle."""
-    return tuple(matrix.part(k * padded(size), k + 1) for k in range(size))
+def _rows(matrix: Array, count: int, size: int) -> tuple[Ref, ...]:
+    """Return so many rows of lower triangles, one below the other."""
+    return tuple(matrix.part(k * padded(size), k % size + 1) for k in range(count))
 
 
-def _triangle(size: int) -> tuple[Tape, list[list[int]], tuple[tuple[str, int], ...]]:
-    """Return a tape whose inputs are a lower triangle, its entries row by row, and the rows' names and lengths."""
+def _triangles(size: int, count: int) -> tuple[Tape, list[list[list[int]]], tuple[tuple[str, int], ...]]:
+    """Return a tape whose inputs are lower triangles, their entries row by row, and the rows' names and lengths."""
     tape = Tape()
-    rows = [[tape.input(k * (k + 1) // 2 + j) for j in range(k + 1)] for k in range(size)]
-    return tape, rows, tuple((f"row_{k}", k + 1) for k in range(size))
+    entries = (tape.input(k) for k in range(count * size * (size + 1) // 2))
+    found = [[[next(entries) for _ in range(k + 1)] for k in range(size)] for _ in range(count)]
+    return tape, found, tuple((f"row_{k}", k % size + 1) for k in range(count * size))
 
 
 @cache
 def _factor_step(size: int) -> Step:
-    tape, rows, names = _triangle(size)
+    tape, (rows,), names = _triangles(size, 1)
     factored, pivots = ldl_factor(tape, rows)
     results = (*(entry for row in factored for entry in row), *pivots)
     doc = f"A = L^T D L of {size} rows; L below 1 / D on the diagonal, and the pivots D."
@@ -54,9 +60,10 @@ def _factor_step(size: int) -> Step:
 
 
 @cache
-def _solve_step(size: int) -> Step:
-    tape, rows, names = _triangle(size)
-    first = size * (size + 1) // 2
-    x = ldl_solve(tape, rows, [tape.input(first + k) for k in range(size)])
-    doc = f"Solve L^T D L x = x of {size} rows."
-    return Step(f"solve_{size}", doc, (*names, ("x", size)), (("x", size),), tuple(tape.nodes), tuple(x))
+def _solve_step(size: int, count: int) -> Step:
+    tape, triangles, names = _triangles(size, count)
+    first = count * size * (size + 1) // 2
+    solve, name, product = (ldl_solve, "solve", "L^T D L") if count == 1 else (pair_solve, "solve_pair", "U D L")
+    x = solve(tape, *triangles, [tape.input(first + k) for k in range(size)])
+    doc = f"Solve {product} x = x of {size} rows."
+    return Step(f"{name}_{size}", doc, (*names, ("x", size)), (("x", size),), tuple(tape.nodes), tuple(x))

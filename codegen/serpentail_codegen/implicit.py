@@ -2,7 +2,8 @@
 
 J is the Jacobian of the rates of (q in its tangent space, v, bristles), of contact, joint damping and tracking gains
 alone.  With k_q = r_q + w k_v and the bristles eliminated, S (k_v - r_v) = forces is left, S = H + stiffness, symmetric
-and positive definite.  Eliminating translation is what the first three pivots of S do.
+and positive definite but for points that slide: there friction follows the load, and S takes two triangles.
+Eliminating translation is what the first three pivots of S do.
 """
 
 from dataclasses import dataclass
@@ -16,12 +17,15 @@ from .lower import derive
 from .program import Array, Index, Ref, padded
 from .touching import BRISTLES, LEGS, Points, gather_points
 
-SPRING = 14  # numbers of a point's linearised contact
+SPRING = 18  # numbers of a point's linearised contact
 
 
 def blocks(tail: Tail) -> dict[str, tuple[int, int]]:
     """Size and count of what factoring hands to solving, S first."""
-    found = {"S": (padded(tail.nv), tail.nv), "H_tail": (tail.nt, tail.nt), "damped": (1, tail.nt)}
+    found = {"S": (padded(tail.nv), tail.nv)}
+    if tail.contacts:
+        found |= {"S_turned": (padded(tail.nv), tail.nv)}
+    found |= {"H_tail": (tail.nt, tail.nt), "damped": (1, tail.nt)}
     found |= dict.fromkeys(["gain_q", "gain_v", "weight"], (1, 1))
     if tail.contacts:
         found |= {"R": (9, 1), "relax": (1, 1), "depth": (1, tail.points), "arm": (3, tail.points)}
@@ -70,6 +74,7 @@ class Factors:
 def assemble_factor(d: Draft, arrays: dict[str, Array]) -> None:
     """S = H + tail damping and gains + J^T G J of the points in the ground, and its LDL^T."""
     f = Factors(arrays["factors"], d.tail)
+    d.known["weight"] = arrays["weight"].part(0, 1)
     assemble_mass_matrix(d, {"H": f.array}, apart=padded)
     room = padded(d.tail.nv) - d.tail.nv
     with d.loop("k", d.tail.nv if room else 0) as k:
@@ -81,7 +86,10 @@ def assemble_factor(d: Draft, arrays: dict[str, Array]) -> None:
         d.copy(f.entry("S", 6 + k, 6 + k), f("damped", k), adds=True)
     if d.tail.contacts:
         add_contacts(d, f, arrays)
-    d.factor(f.array, d.tail.nv)
+        add_sliding(d, f)
+        d.factor_pair(f.array, d.tail.nv)
+    else:
+        d.factor(f.array, d.tail.nv)
 
 
 def add_gains(d: Draft, f: Factors) -> None:
@@ -98,6 +106,7 @@ def add_gains(d: Draft, f: Factors) -> None:
 def add_contacts(d: Draft, f: Factors, arrays: dict[str, Array]) -> None:
     """The points in the ground, linearised; the others cost a comparison."""
     d.copy(f("R"), d.known["R"])
+    d.known["bound_share"] = arrays["weight"].part(1, 1)
     d.step(stiff.relaxation, relax=f("relax"))
     d.step(con.bristle_properties, drag=d.vector("drag", 1))
     points = gather_points(d, arrays)
@@ -152,6 +161,43 @@ def add_tail_contacts(d: Draft, f: Factors, points: Points, bristles: Array) -> 
                         d.step(stiff.coupled_columns, reads, S_entry_=f.entry("S", 6 + k, 6 + other))
 
 
+def add_sliding(d: Draft, f: Factors) -> None:
+    """The transpose of S, and what makes them differ: the points that slide, whose friction follows the load."""
+    nv, row = d.tail.nv, padded(d.tail.nv)
+    d.copy(f.array.part(f.first("S_turned"), nv * row), f.array.part(f.first("S"), nv * row))
+    slip, push, lift = d.array("slip", 1)[0], d.array("push", nv), d.array("lift", nv)
+
+    def shear(number: Index, segment: Index | None) -> None:
+        spring = {"spring": f("spring", number)}
+        with d.when(f("depth", number)):
+            d.step(stiff.sliding, spring, slip=slip)
+            with d.when(slip):
+                reads = spring | {"arm": f("arm", number)}
+                d.step(stiff.sheared_torso, reads, push=push.part(0, 6), lift=lift.part(0, 6))
+                if segment is not None:
+                    shear_tail(d, f, number, segment, (push, lift))
+                shear_triangles(d, f, 6 if segment is None else 2 * segment + 8, (push, lift))
+
+    each_contact(d, f, shear)
+
+
+def shear_tail(d: Draft, f: Factors, number: Index, segment: Index, columns: tuple[Array, Array]) -> None:
+    """The tail's part of both columns of a tail point."""
+    push, lift = columns
+    with d.loop("k", 2 * segment + 2) as k:
+        reads = {"J_k": f.column(number + -first_tail_point(d.tail), k), "spring": f("spring", number)}
+        d.step(stiff.sheared_column, reads, push=push.part(6 + k, 1), lift=lift.part(6 + k, 1))
+
+
+def shear_triangles(d: Draft, f: Factors, count: Index | int, columns: tuple[Array, Array]) -> None:
+    """Add the product of two columns to S, and to its transpose."""
+    push, lift = columns
+    with d.loop("k", count) as k, d.loop("l", k + 1) as other:
+        reads = {"push_k": push.part(k, 1), "push_l": push.part(other, 1)}
+        reads |= {"lift_k": lift.part(k, 1), "lift_l": lift.part(other, 1)}
+        d.step(stiff.sheared_entries, reads, entry_=f.entry("S", k, other), turned_=f.entry("S_turned", k, other))
+
+
 # ---- solving --------------------------------------------------------------------------------------------------------
 
 
@@ -163,14 +209,16 @@ def assemble_solve(d: Draft, arrays: dict[str, Array]) -> None:
     tail_response(d, f, arrays)
     if d.tail.contacts:
         d.known |= {"R": f("R"), "relax": f("relax")}
-        contact_response(d, f, arrays)
-    d.solve(f.array, k_v[0])
+        pressed = contact_response(d, f, arrays)
+        d.solve_pair(f.array, k_v[0])
+    else:
+        d.solve(f.array, k_v[0])
     with d.loop("k", d.tail.nv) as k:
         d.step(stiff.total_rate, {"change": k_v.part(k, 1), "rate": r_v.part(k, 1)}, k_v=k_v.part(k, 1))
         reads = {"k_v": k_v.part(k, 1), "angle": r_q.part(k, 1)}
         d.step(stiff.total_place, reads, k_q=arrays["k_q"].part(k, 1))
     if d.tail.contacts:
-        solve_bristles(d, f, arrays)
+        solve_bristles(d, f, arrays, pressed)
 
 
 def tail_response(d: Draft, f: Factors, arrays: dict[str, Array]) -> None:
@@ -228,11 +276,12 @@ def each_contact(d: Draft, f: Factors, respond) -> None:
         first += count
 
 
-def contact_response(d: Draft, f: Factors, arrays: dict[str, Array]) -> None:
-    """Forces of the points in the ground for the right-hand sides."""
+def contact_response(d: Draft, f: Factors, arrays: dict[str, Array]) -> Array:
+    """Forces of the points in the ground for the right-hand sides; returns the loads for r_q alone."""
     x, at_q, at_v = arrays["k_v"], shift(d, arrays["r_q"]), shift(d, arrays["r_v"])
     reads = {name: d.array(name, 3)[0] for name in ("motion_q", "motion_v")}
     force, load = d.array("force_response", 3)[0], d.array("load_response", 6)[0]
+    pressed = d.array("pressed", 1, d.tail.points)
     d.fill(load, 0)
 
     def respond(number: Index, segment: Index | None) -> None:
@@ -240,7 +289,7 @@ def contact_response(d: Draft, f: Factors, arrays: dict[str, Array]) -> None:
             at_q.at(d, f, number, segment, reads["motion_q"])
             at_v.at(d, f, number, segment, reads["motion_v"])
             point = {"spring": f("spring", number), "lag": arrays["r_u"].part(2 * number, 2), "arm": f("arm", number)}
-            d.step(stiff.contact_response, reads | point, force=force)
+            d.step(stiff.contact_response, reads | point, force=force, pressed=pressed[number])
             d.step(con.load_about_torso, point | {"force": force}, load_=load)
             if segment is not None:
                 with d.loop("k", 2 * segment + 2) as k:
@@ -249,9 +298,10 @@ def contact_response(d: Draft, f: Factors, arrays: dict[str, Array]) -> None:
 
     each_contact(d, f, respond)
     d.step(stiff.torso_response, {"load": load}, rhs=x.part(0, 6))
+    return pressed
 
 
-def solve_bristles(d: Draft, f: Factors, arrays: dict[str, Array]) -> None:
+def solve_bristles(d: Draft, f: Factors, arrays: dict[str, Array], pressed: Array) -> None:
     """k_u of all points."""
     at, motion = shift(d, arrays["k_v"]), d.array("motion_k", 3)[0]
 
@@ -260,14 +310,19 @@ def solve_bristles(d: Draft, f: Factors, arrays: dict[str, Array]) -> None:
         d.step(stiff.relaxed, {"lag": lag}, k_u=k_u)
         with d.when(f("depth", number)):
             at.at(d, f, number, segment, motion)
-            d.step(stiff.bristle_response, {"spring": f("spring", number), "motion": motion, "lag": lag}, k_u=k_u)
+            reads = {"spring": f("spring", number), "motion": motion, "lag": lag, "pressed": pressed[number]}
+            d.step(stiff.bristle_response, reads, k_u=k_u)
 
     each_contact(d, f, respond)
 
 
 DAMPING = Argument("damping", lambda t: (t.nt,), "of the tail's joints (N m s): tau = -damping q_t_dot")
 GAINS = Argument("gains", lambda t: (2,), "K_p (1/s^2), K_d (1/s) of tracking, through H_tt; zeros without")
-WEIGHT = Argument("weight", lambda t: (1,), "w, weight of J: a method's coefficient times its step (s)")
+WEIGHT = Argument(
+    "weight",
+    lambda t: (1 + (t.points > 0),),
+    "w, weight of J: a method's coefficient times its step (s); with contacts then 1, or 0: friction's bound stays",
+)
 FACTORS = Argument("factors", lambda t: (factors_size(t),), "what implicit_solve needs")
 
 

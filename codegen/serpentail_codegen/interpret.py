@@ -11,12 +11,14 @@ from .program import (
     Array,
     Copy,
     Factor,
+    FactorPair,
     Fill,
     Guard,
     Loop,
     Program,
     Ref,
     Solve,
+    SolvePair,
     Unit,
     When,
     padded,
@@ -130,10 +132,32 @@ def ldl_factor(algebra, A: list[list]) -> tuple[list[list], list]:
 
 def ldl_solve(algebra, A: list[list], b: list) -> list:
     """Solve L^T D L x = b with what ``ldl_factor`` returns."""
+    return pair_solve(algebra, A, A, b)
+
+
+def pair_factor(algebra, A: list[list], B: list[list]) -> tuple[list[list], list[list], list]:
+    """Factor A = U D L without pivoting, of the lower triangles A of it and B of its transpose.
+
+    From the last row up, as ``ldl_factor``.  Return L below 1 / D, the transpose of U below it, and the pivots D.
+    """
+    A, B, pivots = [list(row) for row in A], [list(row) for row in B], []
+    for k in reversed(range(len(A))):
+        pivots.append(A[k][k])
+        inverse = algebra.div(algebra.const(1), A[k][k])
+        for one, other in ((A, B), (B, A)):
+            for i in range(k):
+                factor = algebra.mul(other[k][i], inverse)
+                one[i] = [algebra.sub(e, algebra.mul(factor, r)) for e, r in zip(one[i], one[k], strict=False)]
+        A[k], B[k] = ([algebra.mul(entry, inverse) for entry in row[k][:k]] + [inverse] for row in (A, B))
+    return A, B, pivots
+
+
+def pair_solve(algebra, A: list[list], B: list[list], b: list) -> list:
+    """Solve U D L x = b with what ``pair_factor`` returns."""
     size, b = len(b), list(b)
     for k in reversed(range(size)):
         for i in range(k):
-            b[i] = algebra.sub(b[i], algebra.mul(A[k][i], b[k]))
+            b[i] = algebra.sub(b[i], algebra.mul(B[k][i], b[k]))
     b = [algebra.mul(value, A[k][k]) for k, value in enumerate(b)]
     for k in range(size):
         for i in range(k):
@@ -227,18 +251,35 @@ class Run:
         """Note what must be positive."""
         self.guards += [(guard.status, value) for value in self.read(guard.scalar, at)]
 
-    def rows(self, matrix: Array, size: int) -> list[list]:
-        """Return the lower triangle of a matrix, row by row."""
+    def rows(self, matrix: Array, size: int, first: int = 0) -> list[list]:
+        """Return the lower triangle of a matrix that begins at row ``first``, row by row."""
         flat, row = self.values[matrix.name], padded(size)
-        return [flat[k * row : k * row + k + 1] for k in range(size)]
+        return [flat[(first + k) * row : (first + k) * row + k + 1] for k in range(size)]
+
+    def write_rows(self, matrix: Array, rows: list[list], first: int = 0) -> None:
+        """Store a lower triangle."""
+        for k, row in enumerate(rows):
+            start = (first + k) * padded(len(rows))
+            self.values[matrix.name][start : start + k + 1] = row
 
     def factor(self, factor: Factor, at: dict[str, int]) -> None:
         """Factor a symmetric matrix."""
         rows, pivots = ldl_factor(self.algebra, self.rows(factor.matrix, factor.size))
         self.guards += [("NOT_POSITIVE_DEFINITE", pivot) for pivot in pivots]
-        for k, row in enumerate(rows):
-            first = k * padded(factor.size)
-            self.values[factor.matrix.name][first : first + k + 1] = row
+        self.write_rows(factor.matrix, rows)
+
+    def factorpair(self, factor: FactorPair, at: dict[str, int]) -> None:
+        """Factor a pair of triangles."""
+        size = factor.size
+        *pair, pivots = pair_factor(self.algebra, *(self.rows(factor.matrix, size, first) for first in (0, size)))
+        self.guards += [("NOT_POSITIVE_DEFINITE", pivot) for pivot in pivots]
+        for first, rows in zip((0, size), pair, strict=True):
+            self.write_rows(factor.matrix, rows, first)
+
+    def solvepair(self, solve: SolvePair, at: dict[str, int]) -> None:
+        """Solve with a factored pair."""
+        pair = (self.rows(solve.matrix, solve.x.size, first) for first in (0, solve.x.size))
+        self.write(solve.x, at, pair_solve(self.algebra, *pair, self.read(solve.x, at)))
 
     def solve(self, solve: Solve, at: dict[str, int]) -> None:
         """Solve with a factored matrix."""

@@ -34,9 +34,10 @@ SIZES = {
     **dict.fromkeys(["at_bias", "at_pitch", "at_yaw", "H_pp", "H_py", "H_yp", "H_yy"], 1),
     **dict.fromkeys(["K_n", "D_n", "K_f", "D_f", "mu", "drag", "mobility"], 1),
     **dict.fromkeys(["L_h2d", "L_d2k", "L_k2a", "L_a2m", "L_m2t", "delta_m", "side"], 1),
-    **{"leg": 2, "leg_rates": 2, "bristle": 2, "load": 6, "spring": 14, "lag": 2, "gains": 2},
+    **{"leg": 2, "leg_rates": 2, "bristle": 2, "load": 6, "spring": 18, "lag": 2, "gains": 2},
     **dict.fromkeys(["weight", "damping", "damped", "gain", "gain_q", "gain_v", "relax", "entry", "coupling"], 1),
-    **dict.fromkeys(["change", "rate", "angle", "k_v"], 1),
+    **dict.fromkeys(["change", "rate", "angle", "k_v", "bound_share", "pressed"], 1),
+    **dict.fromkeys(["push_k", "push_l", "lift_k", "lift_l"], 1),
 }
 
 

@@ -185,6 +185,25 @@ class Solve:
 
 
 @dataclass(frozen=True)
+class FactorPair:
+    """Factor A = U D L in place, A not symmetric but with positive pivots: as ``Factor``, for a pair of triangles.
+
+    The matrix holds the lower triangle of A, then that of its transpose, each as ``Factor`` takes it.
+    """
+
+    matrix: Array
+    size: int
+
+
+@dataclass(frozen=True)
+class SolvePair:
+    """Solve U D L x = x in place with a factored pair of triangles."""
+
+    matrix: Array
+    x: Ref
+
+
+@dataclass(frozen=True)
 class Guard:
     """Give up with a status unless all scalars of a vector are positive; ``protects`` must not be used then."""
 
@@ -280,6 +299,14 @@ class Builder:
     def solve(self, matrix: Array, x: Ref) -> None:
         """Solve in place with a factored matrix."""
         self.emit(Solve(matrix, x))
+
+    def factor_pair(self, matrix: Array, size: int) -> None:
+        """Factor a pair of triangles in place."""
+        self.emit(FactorPair(matrix, size))
+
+    def solve_pair(self, matrix: Array, x: Ref) -> None:
+        """Solve in place with a factored pair of triangles."""
+        self.emit(SolvePair(matrix, x))
 
     def guard(self, scalar: Ref, status: str, *protects: Ref) -> None:
         """Give up with a status unless all scalars of a vector are positive."""

@@ -1,11 +1,12 @@
 """Contact linearised for implicit integrators: SymPy vectors of one point in, its stiffness and responses out.
 
-A W-method solves with 1 - w J, J from contact, damping and gains alone.  Of one point that moves by dx and dv,
-friction changes by -P (K_f du + D_f K_f dv), the normal force by -k_n dx - d_n dv, and the bristle's rate by P dv -
-(1 - P) du / D_f (by dv with ``paper``): P, symmetric, is how friction follows the trial force.  With the bristle
-eliminated, ``spring`` holds all that factoring and solving need: w k_n and a = w (d_n + w k_n), then (xx, xy, yy) of B
-and C, w times the force for a velocity and for a bristle's right-hand side, and of M and N, the bristle for its
-right-hand side and for a velocity.
+A W-method solves with 1 - w J, J from contact, damping and gains alone.  Of one point that moves by dx and dv, the
+normal force changes by df_n = -k_n dx - d_n dv, friction by g df_n - P (K_f du + D_f K_f dv), and the bristle's rate by
+P dv - ((1 - P) K_f du + g df_n) / (D_f K_f) (by dv with ``paper``): P, symmetric, is how friction follows the trial
+force, g how it follows the load, which bounds it while the point slides.  With the bristle eliminated, ``spring`` holds
+all that factoring and solving need: w k_n and a = w (d_n + w k_n), then (xx, xy, yy) of B and C, w times the force for
+a velocity and for a bristle's right-hand side, and of M and N, the bristle for its right-hand side and for a velocity;
+then h and e, friction and bristle for w df_n.
 """
 
 from sympy import Matrix, Piecewise, eye, sqrt
@@ -59,15 +60,45 @@ def smooth_slope(let, trial, limit) -> Matrix:
 SLOPE = {"cone": cone_slope, "box": box_slope, "smooth": smooth_slope, "paper": box_slope}
 
 
+def cone_bound(let, trial, limit) -> Matrix:
+    """df/d(bound) of a cone: along the force while the point slides."""
+    length = let("t_t", trial.dot(trial))
+    excess = let("excess", length - limit**2)
+    along = trial / let("length", sqrt(guarded(let, length, excess)))
+    return along.applyfunc(lambda e: Piecewise((e, excess > 0), (0, True)))
+
+
+def box_bound(let, trial, limit) -> Matrix:
+    """df/d(bound) of a box: 1 or -1 along an axis that slides."""
+    return trial.applyfunc(lambda t: Piecewise((1, t > limit), (-1, t < -limit), (0, True)))
+
+
+def smooth_bound(let, trial, limit) -> Matrix:
+    """df/d(bound) of a smooth cone: t |t|^2 / (bound^2 + |t|^2)^(3/2)."""
+    square_of_trial = let("t_t", trial.dot(trial))
+    total = guarded(let, let("sum", limit**2 + square_of_trial), limit)
+    return trial * let("share", square_of_trial / (total * let("length", sqrt(total))))
+
+
+BOUND = {"cone": cone_bound, "box": box_bound, "smooth": smooth_bound, "paper": box_bound}
+
+
+def following_load(let, bound, pressing, mu, share) -> Matrix:
+    """g = mu df/d(bound), 0 where nothing presses; ``share`` 0 leaves it out, so that S is symmetric."""
+    return let("g", (bound * mu * share).applyfunc(lambda e: Piecewise((e, pressing > 0), (0, True))))
+
+
 def linearised_contact(
-    let, K_n, D_n, K_f, D_f, mu, drag, weight, p, arm, velocity, bristle, friction: str = "cone"
+    let, K_n, D_n, K_f, D_f, mu, drag, weight, bound_share, p, arm, velocity, bristle, friction: str = "cone"
 ) -> dict:
-    """``spring`` of a point in the ground (Eqs. 35 to 37); how friction's bound moves with the load is left out."""
+    """``spring`` of a point in the ground (Eqs. 35 to 37)."""
     w, depth, rate = weight[0], let("z", -(p[2] + arm[2])), -velocity[2]
     f_n = normal_force(let, K_n, D_n, depth, rate)
     k_n, d_n = normal_slopes(let, K_n, D_n, depth, rate, f_n)
     trial = let("trial", -(K_f[0] * bristle + drag[0] * velocity[0:2, :]))
-    P = SLOPE[friction](let, trial, let("limit", mu[0] * f_n))
+    limit = let("limit", mu[0] * f_n)
+    P, g = SLOPE[friction](let, trial, limit), BOUND[friction](let, trial, limit)
+    g = following_load(let, g, f_n, mu[0], bound_share[0])
     P = plane([let("P", Piecewise((e, f_n > 0), (0, True))) for e in plane_entries(P)])
     following = eye(2) if friction == "paper" else P
     M = let("M", inverted(let, eye(2) + let("relax", w / D_f[0]) * (eye(2) - following)))
@@ -76,7 +107,8 @@ def linearised_contact(
     spring = [w * k_n, w * (d_n + w * k_n)]
     for matrix in (B, let("w_K_f", w * K_f[0]) * P * M, M, N):
         spring += plane_entries(matrix)
-    return {"spring": Matrix(spring)}
+    e = Matrix([0, 0]) if friction == "paper" else let("e", -M * g / drag[0])
+    return {"spring": Matrix([*spring, *(g - w * K_f[0] * P * e), *e])}
 
 
 def inverted(let, A) -> Matrix:
@@ -117,6 +149,28 @@ def coupled_columns(let, J_k, force) -> dict:
     return {"S_entry": [J_k.dot(force)]}
 
 
+def sliding(let, spring) -> dict:
+    """|h|^2: positive where friction follows the load."""
+    return {"slip": [spring[14] ** 2 + spring[15] ** 2]}
+
+
+def sheared_torso(let, R, arm, spring) -> dict:
+    """J^T h and a J_z of one point for (p_dot, omega): S has their product, too, so it is not symmetric."""
+    R, h, lift = square(R).T, Matrix([spring[14], spring[15], 0]), Matrix([0, 0, spring[1]])
+    push = Matrix([h, R * let("moment", arm.cross(h))])
+    return {"push": push, "lift": Matrix([lift, R * let("turning", arm.cross(lift))])}
+
+
+def sheared_column(let, spring, J_k) -> dict:
+    """The same for one tail coordinate."""
+    return {"push": [spring[14] * J_k[0] + spring[15] * J_k[1]], "lift": [spring[1] * J_k[2]]}
+
+
+def sheared_entries(let, push_k, push_l, lift_k, lift_l) -> dict:
+    """push_k lift_l, and what is opposite it."""
+    return {"entry": [push_k[0] * lift_l[0]], "turned": [lift_k[0] * push_l[0]]}
+
+
 def torso_turn(let, R, rotation) -> dict:
     """A turn or turning rate from torso axes to world axes."""
     return {"turn": square(R) * rotation}
@@ -133,9 +187,11 @@ def tail_shift(let, J_k, coupling) -> dict:
 
 
 def contact_response(let, spring, motion_q, motion_v, lag) -> dict:
-    """Force on a point, w df, for right-hand sides of its place, velocity and bristle."""
+    """Force on a point, w df, for right-hand sides of its place, velocity and bristle; ``pressed``: its place's."""
     across = plane(spring[2:5]) * motion_v[0:2, :] + plane(spring[5:8]) * lag
-    return {"force": Matrix([-across[0], -across[1], -(spring[0] * motion_q[2] + spring[1] * motion_v[2])])}
+    pressed = let("pressed", -spring[0] * motion_q[2])
+    load = let("load", pressed - spring[1] * motion_v[2])
+    return {"force": Matrix([load * spring[14] - across[0], load * spring[15] - across[1], load]), "pressed": [pressed]}
 
 
 def tail_response(let, J_k, force) -> dict:
@@ -148,9 +204,10 @@ def torso_response(let, R, load) -> dict:
     return {"rhs": Matrix([load[0:3, :], square(R).T * load[3:6, :]])}
 
 
-def bristle_response(let, spring, motion, lag) -> dict:
-    """M r_u + N J k_v: a bristle in the ground."""
-    return {"k_u": plane(spring[8:11]) * lag + plane(spring[11:14]) * motion[0:2, :]}
+def bristle_response(let, spring, motion, lag, pressed) -> dict:
+    """M r_u + N J k_v + e w df_n: a bristle in the ground."""
+    load = let("load", pressed[0] - spring[1] * motion[2])
+    return {"k_u": plane(spring[8:11]) * lag + plane(spring[11:14]) * motion[0:2, :] + load * spring[16:18, :]}
 
 
 def relaxation(let, D_f, weight) -> dict:

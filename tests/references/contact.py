@@ -118,14 +118,14 @@ class Contacts:
         found = [self.law(*one) for one in zip(places, motion, np.reshape(bristles, (-1, 2)), strict=True)]
         return np.array([f for f, _ in found]), np.concatenate([rate for _, rate in found])
 
-    def law(self, place, velocity, bristle):
-        """Force and bristle rate of one point."""
+    def law(self, place, velocity, bristle, bounding=lambda normal: normal):
+        """Force and bristle rate of one point; ``bounding`` is the load that bounds friction."""
         P, depth = self.parameters, -place[2]
         normal = self.normal(depth, -velocity[2])
         trial = -(P["K_f"] * bristle + P["D_f"] * P["K_f"] * velocity[:2])
-        f = self.limited(trial, P["mu"] * normal)
+        f = self.limited(trial, P["mu"] * bounding(normal))
         rate = -(f + P["K_f"] * bristle) / (P["D_f"] * P["K_f"])
-        if self.friction == "paper" and depth > 0:
+        if self.friction == "paper" and depth.real > 0:
             rate = velocity[:2]
         return np.array([*f, normal]), rate
 
@@ -139,33 +139,32 @@ class Contacts:
 
     def limited(self, trial, limit):
         """The friction force that a trial force becomes."""
-        if limit == 0:
-            return np.zeros(2)
+        if limit.real == 0:
+            return 0 * trial
         if self.friction == "smooth":
             return trial / np.sqrt(1 + trial @ trial / limit**2)
         if self.friction == "cone":
             length = np.sqrt(trial @ trial)
-            return trial if length.real <= limit else trial * (limit / length)
-        return np.where(np.abs(trial.real) <= limit, trial, np.sign(trial.real) * limit)
+            return trial if length.real <= limit.real else trial * (limit / length)
+        return np.where(np.abs(trial.real) <= limit.real, trial, np.sign(trial.real) * limit)
 
-    def slopes(self, place, velocity, bristle):
+    def slopes(self, place, velocity, bristle, share):
         """Derivatives of force (3) and bristle rate (2) by place, velocity (3 each) and bristle (2), by complex steps.
 
-        Two of them are left out, as a W-method may: how friction's bound and the bristle follow the normal force.
+        share: of how friction's bound moves with the load, which a W-method may leave out.
         """
-        P, depth, rate = self.parameters, -place[2], -velocity[2]
-        slope = np.diag([0.0, 0.0, -self.normal(depth + 1j * STEP, rate).imag / STEP])
-        by_velocity = np.diag([0.0, 0.0, -self.normal(depth, rate + 1j * STEP).imag / STEP])
-        trial = -(P["K_f"] * bristle + P["D_f"] * P["K_f"] * velocity[:2])
-        limit = P["mu"] * self.normal(depth, rate)
-        follows = np.array([self.limited(trial + 1j * STEP * unit, limit).imag / STEP for unit in np.eye(2)]).T
-        by_velocity[:2, :2] = -P["D_f"] * P["K_f"] * follows
-        by_bristle = np.vstack([-P["K_f"] * follows, np.zeros(2)])
-        anchored = np.eye(2) if self.friction == "paper" and depth > 0 else follows
-        rates = np.hstack([anchored, np.zeros((2, 1))]), -(np.eye(2) - anchored) / P["D_f"]
-        return slope, by_velocity, by_bristle, *rates
 
-    def jacobian(self, state, H, damping, gains):
+        def found(k):
+            x = np.concatenate([place, velocity, bristle]).astype(complex)
+            x[k] += 1j * STEP
+            bound = self.normal(-place[2], -velocity[2])
+            force, rate = self.law(x[:3], x[3:6], x[6:], lambda normal: bound + share * (normal - bound))
+            return np.concatenate([force, rate]).imag / STEP
+
+        J = np.array([found(k) for k in range(8)]).T
+        return J[:, :3], J[:, 3:6], J[:, 6:]
+
+    def jacobian(self, state, H, damping, gains, share=1.0):
         """J of the rates of (q in its tangent space, v, bristles), of contact, joint damping and tracking gains.
 
         state: (q, v, bristles, legs).
@@ -174,17 +173,18 @@ class Contacts:
         bristles = np.reshape(flat, (-1, 2))
         nv, count = self.nv, len(bristles)
         by_q, by_v, by_u = np.zeros((nv, nv)), np.zeros((nv, nv)), np.zeros((nv, 2 * count))
-        u_v, u_u = np.zeros((2 * count, nv)), np.zeros((2 * count, 2 * count))
+        u_q, u_v, u_u = (np.zeros((2 * count, size)) for size in (nv, nv, 2 * count))
         points = zip(self.positions(q, legs).real, self.velocities(q, v, legs), bristles, strict=True)
         for k, (J, point) in enumerate(zip(self.jacobians(q, legs), points, strict=True)):
-            slope, by_velocity, by_bristle, rate_v, rate_u = self.slopes(*point)
+            by_place, by_velocity, by_bristle = self.slopes(*point, share)
             own = slice(2 * k, 2 * k + 2)
-            by_q, by_v = by_q + J.T @ slope @ J, by_v + J.T @ by_velocity @ J
-            by_u[:, own], u_v[own], u_u[own, own] = J.T @ by_bristle, rate_v @ J, rate_u
+            by_q, by_v = by_q + J.T @ by_place[:3] @ J, by_v + J.T @ by_velocity[:3] @ J
+            u_q[own], u_v[own] = by_place[3:] @ J, by_velocity[3:] @ J
+            by_u[:, own], u_u[own, own] = J.T @ by_bristle[:3], by_bristle[3:]
         by_v[6:, 6:] -= np.diag(damping) + gains[1] * H[6:, 6:]
         by_q[6:, 6:] -= gains[0] * H[6:, 6:]
         rows = (
             [np.zeros((nv, nv)), np.eye(nv), np.zeros((nv, 2 * count))],
             np.linalg.solve(H, np.hstack([by_q, by_v, by_u])),
         )
-        return np.vstack([np.hstack(rows[0]), rows[1], np.hstack([np.zeros((2 * count, nv)), u_v, u_u])])
+        return np.vstack([np.hstack(rows[0]), rows[1], np.hstack([u_q, u_v, u_u])])

@@ -4,9 +4,26 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from ..interpret import executed, unroll
-from ..program import Apply, Array, Call, Copy, Factor, Fill, Guard, Loop, Program, Ref, Solve, Unit, When, padded
-from ..tape import BINARY, Step, lanes_of
-from .scalars import EARLY, LATE, Dialect, Scalars, index_text
+from ..program import (
+    Apply,
+    Array,
+    Call,
+    Copy,
+    Factor,
+    FactorPair,
+    Fill,
+    Guard,
+    Loop,
+    Program,
+    Ref,
+    Solve,
+    SolvePair,
+    Unit,
+    When,
+    padded,
+)
+from ..tape import BINARY, Step
+from .scalars import EARLY, LATE, Dialect, Scalars, called, index_text
 
 FEW = 3  # scalars are written one by one, more by a helper
 ON_STACK = 12  # scalars: larger local arrays go to the caller's workspace
@@ -307,6 +324,16 @@ class LoopPrinter:
         helper = self._helper("ldl_solve_rows")
         return [f"{helper}({x.size}, {x.lanes}, {x.array.row}, {pointer(matrix)}, {pointer(x)});"]
 
+    def _factorpair(self, factor: FactorPair) -> list[str]:
+        self.helpers |= {"lanes"}
+        matrix = pointer(self._ref(factor.matrix[0]))
+        call = f"{self._helper('pair_factor')}({factor.size}, {matrix})"
+        return [f"if ({call} != STATUS_OK) {{", "  return STATUS_NOT_POSITIVE_DEFINITE;", "}"]
+
+    def _solvepair(self, solve: SolvePair) -> list[str]:
+        matrix, x = pointer(self._ref(solve.matrix[0])), pointer(self._ref(solve.x))
+        return [f"{self._helper('pair_solve')}({solve.x.size}, {matrix}, {x});"]
+
     def _call(self, call: Call) -> list[str]:
         inner = in_loops(call.program, self.real, self.prefix, self.fixed)
         name = call.program.name
@@ -365,16 +392,6 @@ class LoopPrinter:
 def singles(ref: Ref) -> list[Ref]:
     """Return a reference to each scalar of a reference."""
     return [Ref(ref.array, ref.offset + k * ref.stride, 1) for k in range(ref.size)]
-
-
-def called(nodes, inputs=()) -> set[str]:
-    """Return the helpers that nodes call, from the lanes of their inputs."""
-    lanes, helpers = [], set()
-    for op, *args in nodes:
-        lanes.append(lanes_of((op, *args), lanes, inputs))
-        if op in ("sin", "cos"):
-            helpers |= {"sincos", "sincos_row"} if lanes[args[0]] else {"sincos"}
-    return helpers
 
 
 def in_loops(program: Program, real: str, prefix: str, fixed=None) -> CFunction:

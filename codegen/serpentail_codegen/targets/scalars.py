@@ -131,3 +131,13 @@ class Scalars:
         text, product = self.text[node], self.nodes[node][0] == "mul"
         plain = not text.startswith("-") and (" " not in text or self.nodes[node][0] == "input")
         return text if plain or (product and op in ("add", "sub")) else f"({text})"
+
+
+def called(nodes, inputs=()) -> set[str]:
+    """Return the helpers that nodes call, from the lanes of their inputs."""
+    lanes, helpers = [], set()
+    for op, *args in nodes:
+        lanes.append(lanes_of((op, *args), lanes, inputs))
+        if op in ("sin", "cos"):
+            helpers |= {"sincos", "sincos_row"} if lanes[args[0]] else {"sincos"}
+    return helpers
