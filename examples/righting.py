@@ -29,6 +29,11 @@ def model(folder: Path, segments: int, links: int | None) -> st.Model:
     tail = ["--tail", "articulated", "--links", str(links)] if links else ["--tail", "continuum"]
     options = ["--segments", str(segments), "--functions", FUNCTIONS, "--output", str(folder)]
     subprocess.run([sys.executable, "-m", "serpentail_codegen", *tail, *options], check=True, stdout=subprocess.DEVNULL)
+    return loaded(folder, segments, links)
+
+
+def loaded(folder: Path, segments: int, links: int | None) -> st.Model:
+    """Load a tail that was generated."""
     return st.load(folder / (f"articulated_m{segments}_n{links}" if links else f"continuum_m{segments}"))
 
 
@@ -67,9 +72,10 @@ def passive(rat: st.Model, start, duration: float) -> st.Trajectory:
 
 
 def tracked(rat: st.Model, plan: st.Plan) -> st.Trajectory:
-    """Return the flight whose tail tracks a plan by PFL (Eq. 46)."""
+    """Return the flight whose tail tracks a plan by PFL (Eq. 46), just before the end, where PFL wants it at rest."""
     start, law = (plan.problem.q0, plan.problem.v0), st.Pfl(rat, plan)
-    return st.simulate(rat, *start, controller=law, t_span=plan.duration, method="dop853", rtol=1e-8)
+    end = np.nextafter(plan.duration, 0)
+    return st.simulate(rat, *start, controller=law, t_span=end, method="dop853", rtol=1e-8)
 
 
 def centre_of_mass(rat: st.Model, flight: st.Trajectory) -> np.ndarray:

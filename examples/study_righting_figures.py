@@ -84,14 +84,13 @@ def draw_figure_11(rows: dict[str, list[dict]], path: Path) -> Path:
     return write(path, draw)
 
 
-def draw_figure_13(plans: dict, path: Path) -> Path:
+def draw_figure_13(flights: dict, path: Path) -> Path:
     """Attitude, tail and torques of plans for tails of one, two and three segments."""
 
     def draw() -> Figure:
         figure = Figure(figsize=(7.2, 5.4), layout="constrained")
-        axes = figure.subplots(3, len(plans), squeeze=False, sharey="row")
-        for column, ((m, n), plan) in zip(axes.T, plans.items(), strict=True):
-            flight = plan.trajectory
+        axes = figure.subplots(3, len(flights), squeeze=False, sharey="row")
+        for column, ((m, n), flight) in zip(axes.T, flights.items(), strict=True):
             angles = np.degrees(st.pitch_roll_yaw(flight.q, unwrap=True))
             for k, name in enumerate((r"$\phi_x$", r"$\phi_y$", r"$\phi_z$")):
                 column[0].plot(flight.t, angles[:, k], color=COLOURS[k], label=name)

@@ -66,3 +66,13 @@ def test_misuse(reference, gains, words):
     with pytest.raises(st.SimulationError) as caught:
         st.Pfl(rat(), reference, **gains)
     assert words in str(caught.value)
+
+
+def test_tracking_a_plan_takes_the_planned_torques():
+    """On the planned motion Eq. 46 is Eq. 1 solved for tau; up to the end, where the spline has the plan's q_t_ddot."""
+    model, plan = rat(), planned(intervals=40, tolerance=None)
+    flight, law = plan.trajectory, st.Pfl(model, plan)
+    times = np.append(flight.t[:-1], np.nextafter(plan.duration, 0))
+    torques = np.array([law(*state) for state in zip(times, flight.q, flight.v, strict=True)])
+    error = np.abs(torques - plan.torque(times)).max(axis=1) / np.abs(flight.tau).max()
+    assert error[[0, -1]].max() < 6e-4 and error.max() < 0.01

@@ -52,7 +52,7 @@ class Pfl:
 
 
 def _curve(reference, size: int) -> Piecewise:
-    """Return what the user gave as a function of time; splines end by the rates of a motion, where these are known."""
+    """Return what the user gave as a function of time; splines end by a plan's accelerations or a motion's rates."""
     if isinstance(reference, Reference):
         if reference.curve.channels != size:
             raise SimulationError(f"Pfl: the reference has {reference.curve.channels} angles, the tail {size}")
@@ -60,6 +60,8 @@ def _curve(reference, size: int) -> Piecewise:
     motion = getattr(reference, "trajectory", reference)
     if hasattr(motion, "tail") and hasattr(motion, "t"):
         times, angles, ends = motion.t, motion.tail, tuple((1, motion.v[k, 6:]) for k in (0, -1))
+        if motion is not reference:  # a plan: else its second derivative, fed forward, is least exact at the ends
+            ends = tuple((2, row) for row in reference.curve.slopes(times[[0, -1]])["tail_rate"])
     else:
         try:
             times, angles, ends = *(np.asarray(part, float) for part in reference), "not-a-knot"

@@ -29,8 +29,18 @@ class Curve:
 
     def at(self, times: np.ndarray) -> dict[str, np.ndarray]:
         """Blocks (n, size) at times (n,) s from the start; between intervals those of the later one."""
+        return self.inside(*self._places(times))
+
+    def slopes(self, times: np.ndarray) -> dict[str, np.ndarray]:
+        """Rates (n, size) of the states' blocks, per s, at times (n,) s; between intervals those of the later one."""
+        k, s = self._places(times)
+        basis, width = self.rule.basis(s), np.diff(self.ends)[k, None]
+        return {name: np.einsum("nj,njx->nx", basis, rates[k]) / width for name, rates in self.increments.items()}
+
+    def _places(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Intervals (n,) and fractions (n,) of them at times (n,)."""
         k = np.clip(np.searchsorted(self.ends, times, side="right") - 1, 0, len(self.ends) - 2)
-        return self.inside(k, (times - self.ends[k]) / np.diff(self.ends)[k])
+        return k, (times - self.ends[k]) / np.diff(self.ends)[k]
 
     def inside(self, k: np.ndarray, s: np.ndarray) -> dict[str, np.ndarray]:
         """Blocks (n, size) in the intervals k (n,) at the fractions s (n,) of them."""

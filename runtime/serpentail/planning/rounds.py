@@ -30,10 +30,10 @@ class Method:
 
     rule: str = "radau"
     degree: int | None = None
-    intervals: int = 20
+    intervals: int = 12
     tolerance: float | None = 0.01
     rounds: int = 6
-    most_intervals: int = 200
+    most_intervals: int = 120
     solver: str = "ipopt"
     options: dict = field(default_factory=dict)
     guess: object = None
