@@ -8,7 +8,7 @@ import pytest
 import serpentail as st
 from references.contact import Contacts
 from references.parameters import random_states
-from test_contact import CASES, FRICTION, each, touching
+from test_contact import CASES, FRICTION, each, near_ground, touching
 
 NAMES = ("mass_matrix", "implicit")
 GAINS = {"passive": (0.0, 0.0), "tracked": (4e4, 400.0), "damped": (0.0, 30.0)}
@@ -91,3 +91,32 @@ def test_in_the_air_bristles_relax_and_nothing_else_happens():
     w = 0.01
     expected = np.concatenate([r[0] + w * r[1], r[1], r[2] / (1 + w / model.parameters["D_f"])])
     np.testing.assert_allclose(solved(model, state, np.zeros(2), (0, 0), (w, 1.0), r), expected, rtol=1e-14)
+
+
+def refused(model, seed, w):
+    """States 20 mm deep in the ground whose systems have a pivot that is not positive, as what jams gives."""
+    factor, still = model.kernel("implicit_factor"), np.r_[np.ones(4), np.zeros(4)]
+    for q, v, _, bristles, legs in zip(*near_ground(model, seed, 400), strict=True):
+        q[2] -= model.contact_points(q, v, legs)[0][:, 2].min() + 0.02
+        try:
+            factor(q, v, np.zeros(model.nv - 6), np.zeros(2), [w, 1.0], bristles, legs * still)
+        except st.StateError:
+            yield q, v, bristles, legs * still
+
+
+def test_a_step_of_what_jams_is_taken_as_if_friction_did_not_follow_the_load():
+    """Linearly implicit Euler: (1 - w J) k = w times the rates, J without that slope."""
+    model = touching(2, 2, functions=(*NAMES, "energy", "momentum", "rollout", "tail_points"))
+    reference, w, none, count = Contacts(model), 0.01, np.zeros(4), 0
+    for q, v, bristles, legs in refused(model, 5, w):
+        H = model.mass_matrix(q)
+        J = reference.jacobian((q, v, bristles, legs), H, none, (0.0, 0.0), 0.0)
+        v_dot, rate, _ = model.contact_dynamics(q, v, none, bristles, legs)
+        k = np.linalg.solve(np.eye(len(J)) - w * J, w * np.concatenate([v, v_dot, rate]))
+        held = st.Legs([0, 1], [legs[[0, 2]]] * 2, [legs[[1, 3]]] * 2)
+        start = {"legs": held, "bristles0": bristles.reshape(-1, 2), "t_span": w}
+        flight = st.simulate(model, q, v, method="implicit_euler", step=w, output_step=w, **start)
+        expected = v + k[model.nv : 2 * model.nv]
+        np.testing.assert_allclose(flight.v[-1], expected, rtol=1e-8, atol=1e-9 * np.abs(expected).max())
+        count += 1
+    assert count
