@@ -18,7 +18,7 @@ HEIGHT, VELOCITY, PITCH, SPIN, BEND, BEND_RATE = 0.34, (0.0, -0.302, 2.385), 3.8
 FUNCTIONS = (
     "mass_matrix,bias_force,inverse_dynamics,forward_dynamics,energy,momentum,tail_points,rollout,"
     "forward_dynamics_derivatives,inverse_dynamics_derivatives,inverse_dynamics_vjp,forward_dynamics_vjp,"
-    "inverse_dynamics_hessian"
+    "inverse_dynamics_hessian,pfl"
 )
 PAPER = {"formulation": "full", "attitude": "euler", "rule": "trapezoidal", "tolerance": None, "retries": 0}
 PAPER |= {"smoothing": 0.0}

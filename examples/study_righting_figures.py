@@ -58,7 +58,7 @@ def _angles_near(flight: st.Trajectory, like: st.Trajectory) -> np.ndarray:
 
 def draw_figure_11(rows: dict[str, list[dict]], path: Path) -> Path:
     """Iterations, objective, time and true error against the nodes a second, and time against error."""
-    panels = {"iterations": "iterations", "objective": "effort [N$^2$ m$^2$ s]", "solve_cpu_s": "solver time [s]"}
+    panels = {"iterations": "iterations", "objective": "objective [N$^2$ m$^2$ s]", "solve_cpu_s": "solver time [s]"}
     panels["open_loop_attitude_error_deg"] = "true error [deg]"
 
     def draw() -> Figure:
@@ -78,7 +78,9 @@ def draw_figure_11(rows: dict[str, list[dict]], path: Path) -> Path:
             panel.grid(color="#e6e6e6", linewidth=0.6)
         axes.flat[4].set(xlabel="solver time [s]", xscale="log")
         axes.flat[4].xaxis.set_minor_formatter(NullFormatter())
-        axes.flat[0].legend()
+        axes.flat[0].set(yscale="linear", ylim=(0, None))
+        axes.flat[1].yaxis.set_minor_formatter("{x:.0e}")
+        figure.legend(*axes.flat[0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
         return figure
 
     return write(path, draw)

@@ -9,7 +9,7 @@ from models import model_folder
 from serpentail.casadi_functions import DERIVATIVES
 
 EXACT = sorted({part for name, orders in DERIVATIVES.items() for part in (name, *orders[0], *orders[1])})
-FUNCTIONS = [*EXACT, "bias_force", "energy", "momentum", "rollout", "tail_points"]
+FUNCTIONS = [*EXACT, "bias_force", "pfl", "energy", "momentum", "rollout", "tail_points"]
 DURATION = 0.4  # s
 
 
