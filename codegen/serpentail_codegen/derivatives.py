@@ -226,7 +226,7 @@ def in_tangent_space(d: Draft, gradient: Array, dq: Array) -> None:
 def assemble_forward_dynamics_vjp(d: Draft, arrays: dict[str, Array]) -> None:
     """lambda^T times the Jacobian of v_dot: mu = H^-1 lambda, then minus the gradient of mu^T (H v_dot + C)."""
     tail, multiplier = d.tail, arrays["multiplier"]
-    v_dot, mu = d.array("acceleration", tail.nv), d.array("mu", tail.nv)
+    v_dot, mu = d.array("acceleration", tail.nv), d.array("response", tail.nv)  # "mu" is a parameter of contact
     balance = assemble_forward_dynamics(d, arrays | {"v_dot": v_dot})
     d.step(kin.torso_velocity, {"p_dot": multiplier.part(0, 3)}, u=d.vector("pull", 3))
     at_torso = loads(d, load_force=d.known["pull"], load_moment=multiplier.part(3, 3))
