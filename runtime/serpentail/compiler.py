@@ -81,7 +81,7 @@ def describe_compiler(profile: str = "fast") -> dict[str, object]:
 
 def _check_profile(profile: str) -> None:
     """Raise SerpentailError unless `profile` is known."""
-    if profile not in PROFILES:
+    if not isinstance(profile, str) or profile not in PROFILES:
         raise SerpentailError(f"unknown build profile {profile!r}; choose one of {', '.join(PROFILES)}")
 
 

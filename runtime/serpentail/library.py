@@ -35,6 +35,14 @@ def open_library(folder: Path, manifest: dict, profile: str) -> ctypes.CDLL:
     return library
 
 
+def finite_array(what: str, value) -> np.ndarray:
+    """Return a value as a contiguous array; StateError where it is none of finite real numbers."""
+    array = real_array(what, value)
+    if not np.isfinite(array).all():
+        raise StateError(f"{what} is not finite: give finite numbers")
+    return array
+
+
 MOST_ARRAYS = 8
 
 

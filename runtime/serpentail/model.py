@@ -28,10 +28,15 @@ def load(
     Raises ModelError (folder missing, stale or changed; parameter unknown or unphysical), CompilerNotFound,
     CompileFailed.
     """
-    folder = Path(folder)
+    try:
+        folder = Path(folder)
+    except TypeError:
+        raise ModelError(f"folder: value {folder!r:.60}: needs the path of a generated folder") from None
     manifest = read_manifest(folder)
     values = resolve(manifest, parameters)
-    profile = profile or manifest["scene"]["profile"]
+    profile = manifest["scene"]["profile"] if profile is None else profile
+    if not isinstance(compiled, bool | np.bool_):
+        raise ModelError(f"compiled: value {compiled!r:.60}: needs True or False")
     library = open_library(folder, manifest, profile) if compiled else None
     return Model(folder, manifest, values, library, profile)
 

@@ -23,6 +23,8 @@ CHECKS = {
 
 def resolve(manifest: dict, changes: Mapping[str, object] | None) -> MappingProxyType:
     """Return name -> float or tuple (SI) of all parameters; ModelError lists everything that is wrong."""
+    if not isinstance(changes, Mapping | None):
+        raise ModelError(f"parameters: value {changes!r:.60}: needs a mapping, such as {{'gravity': 9.8}}")
     fields = {p["name"]: p for p in manifest["parameters"]}
     values = {name: p["default"] for name, p in fields.items() if p["default"] is not None}
     problems, given = [], {}

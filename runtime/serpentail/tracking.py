@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from .model import Model
 
 KP, KD = 4e4, 400.0  # 1/s^2, 1/s: Table 1
+LARGEST = np.finfo(float).max
 
 
 class Pfl:
@@ -26,7 +27,7 @@ class Pfl:
 
     def __init__(self, model: "Model", reference, kp: float = KP, kd: float = KD, feedforward: bool = True):
         for name, value in (("kp", kp), ("kd", kd)):
-            if not (isinstance(value, int | float) and np.isfinite(value) and value >= 0):
+            if not (isinstance(value, int | float) and 0 <= value <= LARGEST):
                 raise SimulationError(f"Pfl: {name} is {value!r}: give a finite number from 0")
         self.model, self.kp, self.kd = model, float(kp), float(kd)
         self.curve = _curve(reference, model.nv - 6)

@@ -15,6 +15,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .errors import StateError
+from .library import finite_array
 from .touch import ARRAYS as TOUCHING
 from .touch import Contact
 
@@ -129,7 +131,13 @@ SMOOTH = ("v", "kinetic", "potential", "linear_momentum", "angular_momentum")
 
 def rotation_matrix(quaternion: ArrayLike) -> Array:
     """R, torso to world, (..., 3, 3), of quaternions (w, x, y, z), (..., 4), of any norm but zero."""
-    quaternion = np.asarray(quaternion, dtype=float)
+    quaternion = finite_array("quaternion", quaternion)
+    if quaternion.shape[-1:] != (4,):
+        raise StateError(f"quaternion has shape {quaternion.shape}, not (4,) or (..., 4)")
+    size = np.max(np.abs(quaternion), axis=-1, keepdims=True)
+    if not (size >= np.finfo(float).tiny).all():
+        raise StateError("a quaternion is zero: upright is (1, 0, 0, 0)")
+    quaternion = quaternion / size  # whose squares are numbers
     w, x, y, z = np.moveaxis(quaternion / np.linalg.norm(quaternion, axis=-1, keepdims=True), -1, 0)
     first = np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)], axis=-1)
     second = np.stack([2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)], axis=-1)
@@ -143,7 +151,10 @@ def pitch_roll_yaw(q: ArrayLike, unwrap: bool = False) -> Array:
     |phi_x| <= pi/2; at pi/2 itself one of the valid answers. unwrap, for q (K, 7+2m): continued along time
     over whole turns and through phi_x = +-pi/2.
     """
-    rotation = rotation_matrix(np.asarray(q, dtype=float)[..., 3:7])
+    q = finite_array("q", q)
+    if q.ndim == 0 or q.shape[-1] < 7:
+        raise StateError(f"q has shape {q.shape}, not (7 + 2m,) or (..., 7 + 2m)")
+    rotation = rotation_matrix(q[..., 3:7])
     first, second, third = (rotation[..., row, :] for row in range(3))
     yaw = np.arctan2(-first[..., 1], second[..., 1])
     c, s = np.cos(yaw)[..., None], np.sin(yaw)[..., None]

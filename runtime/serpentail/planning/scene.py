@@ -30,8 +30,8 @@ def planned(path: str, folder: str | None = None) -> Plan:
 def read_scene(path: str) -> tuple[dict, str]:
     """Return the table [plan] of a scene file, and the scene's name."""
     try:
-        scene = tomllib.loads(Path(path).read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+        scene = tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
+    except (OSError, ValueError, RecursionError) as error:
         raise PlanningError(
             f"scene file: value {path!r}: cannot be read ({error}); give a scene file (.toml)"
         ) from error

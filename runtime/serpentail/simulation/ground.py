@@ -99,7 +99,7 @@ def _stops(groups, stop_at) -> int:
     """Return the bits of the events to stop at: pairs (kind, group)."""
     known = {(kind, group): 2 * g + k for g, group in enumerate(groups) for k, kind in enumerate(KINDS)}
     try:
-        pairs = [tuple(pair) for pair in stop_at or ()]
+        pairs = [] if stop_at is None else [tuple(pair) for pair in stop_at]
         return sum(1 << known[pair] for pair in set(pairs))
     except (TypeError, KeyError):
         choices = ", ".join(map(repr, known))

@@ -28,10 +28,10 @@ class Method:
     settings: dict
 
 
-def checked_method(name, settings: dict, available, single: bool) -> Method:
+def checked_method(name: str, settings: dict, available, single: bool) -> Method:
     """Return a method by its name with settings checked and filled in; SimulationError names what is wrong."""
     known = [each for each in SETTINGS if each in available or each in SCIPY]
-    if name not in known:
+    if not isinstance(name, str) or name not in known:
         raise SimulationError(f"method {name!r}: choose one of auto, {', '.join(known)}")
     unknown = [key for key in settings if key not in SETTINGS[name]]
     if unknown:

@@ -102,5 +102,8 @@ def blends(times: np.ndarray, values: np.ndarray) -> Piecewise:
         return constant(times[0], values[0])
     rise, width = np.diff(values, axis=0), np.diff(times)[:, None]
     zero = np.zeros_like(rise)
-    rows = [values[:-1], zero, zero, 10 * rise / width**3, -15 * rise / width**4, 6 * rise / width**5]
+    with np.errstate(all="ignore"):
+        rows = [values[:-1], zero, zero, 10 * rise / width**3, -15 * rise / width**4, 6 * rise / width**5]
+    if not np.isfinite(rows).all():
+        raise SimulationError(f"times {times.tolist()!s:.60}: too close to each other for a blend")
     return Piecewise(times, np.stack(rows, axis=-1))

@@ -17,6 +17,7 @@ from .records import Records
 from .start import Start
 
 PAUSED, STEP_TOO_SMALL, TOO_MANY_STEPS, STOPPED_AT_EVENT, TORQUE_FAILED = range(32, 37)
+MOST_STEPS = 2**31 - 1  # that the C interface counts
 PAUSE = 2000  # steps between looks at signals, such as Ctrl-C
 WHY = {
     NOT_FINITE: "the state is not finite any more: is the step too long, or a velocity or torque too large?",
@@ -111,7 +112,7 @@ def start_members(method: Method) -> dict:
     """Return a method's settings as members of the run's record."""
     own = {name: x for name, x in method.settings.items() if name not in ("first_step", "most_steps")}
     own["step"] = method.settings.get("step", method.settings.get("first_step", 0))
-    return own | {"most_steps": int(min(method.settings.get("most_steps", np.inf), 2**31 - 1))}
+    return own | {"most_steps": int(min(method.settings.get("most_steps", np.inf), MOST_STEPS))}
 
 
 def failed(status: int, t: float) -> SimulationError:
@@ -172,14 +173,24 @@ def choose(model, drive: Drive, start: Start, name, settings: dict) -> Method:
     """Return the method that was asked for, or a choice and its reason."""
     single = drive.records.real is ctypes.c_float
     available, reason = model.manifest["simulation"]["methods"], "asked for"
-    if name == "auto":
+    if isinstance(name, str) and name == "auto":
         decay = None if model.contacts else fastest_decay(model, drive, start)
         name, reason = chosen(settings, available, decay)
     method = checked_method(name, settings, available, single)
+    if "step" in method.settings:
+        refuse_too_many(start, method.settings["step"])
     if name == "rk4":  # steps divide the output's
         steps = max(1, int(np.ceil(start.interval / method.settings["step"] * (1 - 1e-12))))
         return replace(method, reason=reason, settings={"step": start.interval / steps})
     return replace(method, reason=reason)
+
+
+def refuse_too_many(start: Start, step: float) -> None:
+    """SimulationError where steps of a fixed length (s) are more than a run can count."""
+    span = start.end - start.start
+    if span > MOST_STEPS * step:
+        least = span / MOST_STEPS
+        raise SimulationError(f"step {step:.3g}: more than {MOST_STEPS} steps to the end: give {least:.2g} s or more")
 
 
 def fastest_decay(model, drive: Drive, start: Start) -> float:

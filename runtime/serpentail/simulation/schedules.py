@@ -28,7 +28,7 @@ class Reference:
 
     def __post_init__(self) -> None:
         """Refuse nodes that are no motion."""
-        if self.blend not in BLENDS:
+        if not isinstance(self.blend, str) or self.blend not in BLENDS:
             raise SimulationError(f"Reference: blend {self.blend!r}: give one of {', '.join(BLENDS)}")
         width = np.shape(self.angles)[1] if np.ndim(self.angles) == 2 else 0
         nodes = checked_nodes("Reference", "angles", (self.times, self.angles), width)
@@ -64,9 +64,12 @@ class Legs:
     @classmethod
     def ramp(cls, gamma: float, delta: tuple[float, float], at: float, rate: float) -> Self:
         """Legs whose delta goes from one angle to another at a rate (rad/s, of any sign) from a time (s) on: a kick."""
+        delta = real_array("Legs.ramp: delta", delta, error=SimulationError)
+        if delta.shape != (2,):
+            raise SimulationError(f"Legs.ramp: delta has shape {delta.shape}: give two angles, from and to")
         numbers = real_array("Legs.ramp: gamma, delta, at, rate", [gamma, *delta, at, rate], error=SimulationError)
         if not np.isfinite(numbers).all() or rate == 0 or delta[0] == delta[1]:
-            given = f"Legs.ramp: delta {delta!r}, at {at!r}, rate {rate!r}"
+            given = f"Legs.ramp: delta {tuple(delta.tolist())}, at {at!r}, rate {rate!r}"
             raise SimulationError(f"{given}: give finite numbers, two angles that differ, and a rate that is not 0")
         return cls([at, at + math.fabs((delta[1] - delta[0]) / rate)], gamma, delta)
 

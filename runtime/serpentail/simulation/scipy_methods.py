@@ -10,9 +10,10 @@ from .run import CompiledRun, Samples, failed
 
 
 class StateRate:
-    """y = (q, v) -> y_dot by the compiled model."""
+    """y = (q, v) -> y_dot by the compiled model; with ``trials``, a state that has none gives NaN, not an error."""
 
-    def __init__(self, run: CompiledRun):
+    def __init__(self, run: CompiledRun, trials: bool):
+        self.trials, self.refused = trials, None
         self.run, pointer, dtype = run, ctypes.c_void_p, run.records.dtype
         self.function = run.function("state_rate", run.records.real, pointer, pointer, pointer)
         size = sum(map(len, run.state.values()))
@@ -26,7 +27,10 @@ class StateRate:
         if self.run.drive.error is not None:
             raise self.run.drive.error
         if status:
-            raise failed(status, t if np.isfinite(t) else self.run.record.t)
+            self.refused = failed(status, t if np.isfinite(t) else self.run.record.t)
+            if self.trials:
+                return np.full(len(y), np.nan)
+            raise self.refused
         return self.y_dot.astype(float)
 
     def torque(self, t: float, y: np.ndarray) -> np.ndarray:
@@ -56,7 +60,7 @@ class Tape:
 @np.errstate(all="ignore")  # a trial step may overflow, and is then taken again, shorter
 def integrate_by_scipy(run: CompiledRun, method: Method) -> Samples:
     """Integrate from stop to stop; what ends the run before its end goes with the samples up to there."""
-    rate = StateRate(run)
+    rate = StateRate(run, method.name == "dop853")  # which takes a step with NaN again, shorter
     tape, counts = Tape(rate, run.start.times), {"steps": 0, "evaluations": 0}
     ends = [*(t for t in run.drive.stops if run.start.start < t < run.start.end), run.start.end]
     y, t, failure = np.concatenate([*run.state.values()]).astype(float), run.start.start, None
@@ -84,10 +88,13 @@ def _smooth_part(rate: StateRate, method: Method, part, tape: Tape, counts: dict
     solver = {"dop853": DOP853, "lsoda": LSODA}[method.name](rate, t, y, end, **method.settings)
     while solver.status == "running":
         message = solver.step()
+        if solver.status == "failed" and rate.refused is not None:
+            raise rate.refused
         if solver.status == "failed":
             reason = (message or "the step failed").rstrip(".").lower()
             raise SimulationError(f"at t = {solver.t:.6g} s {reason}: is the motion stiff, or rtol too small?")
         counts["steps"] += 1
+        rate.refused = None
         interpolant = solver.dense_output()
         for at in tape.due(solver.t):
             tape.write(at, interpolant(at) if at < solver.t else solver.y)

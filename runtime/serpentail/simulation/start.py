@@ -8,6 +8,8 @@ import numpy as np
 from ..errors import SimulationError, StateError
 from ..library import real_array
 
+MOST_SAMPLES = 10_000_000  # of one run: more are a slip, and fill the memory
+
 
 @dataclass(frozen=True)
 class Start:
@@ -34,8 +36,10 @@ class Start:
         if not (np.isfinite([start, end]).all() and end > start):
             raise SimulationError(f"t_span {t_span!r}: the end must be finite and after the start")
         step = positive("output_step", (end - start) / 200 if output_step is None else output_step)
-        intervals = max(1, round((end - start) / step))
-        return cls(q0, v0, start, end, intervals)
+        if end - start > MOST_SAMPLES * step:
+            remedy = f"give {(end - start) / MOST_SAMPLES:.2g} s or more"
+            raise SimulationError(f"output_step {step:.3g}: more than {MOST_SAMPLES} samples: {remedy}")
+        return cls(q0, v0, start, end, max(1, round((end - start) / step)))
 
     @property
     def interval(self) -> float:
