@@ -8,6 +8,7 @@ TAIL ?= articulated
 M    ?= 1
 N    ?= 3
 STARTS ?= 200
+CALLS ?= 2000
 CPU    ?= m4
 ifneq ($(filter embedded,$(MAKECMDGOALS)),)
 REAL   ?= $(if $(filter m4,$(CPU)),float,double)
@@ -23,7 +24,7 @@ SOURCES := $(shell find codegen -name '*.py' -o -name '*.jinja')
 STAMP   := generated/$(MODEL)/.made
 WANTED  := $(if $(SCENE),$(SCENE),--tail $(TAIL) --segments $(M) $(if $(filter continuum,$(TAIL)),,--links $(N))) $(OPTIONS)
 
-.PHONY: help setup demo test test-all model verify bench embedded size-report studies study-models study-righting lint golden clean
+.PHONY: help setup demo test test-all model verify bench stress embedded size-report studies study-models study-righting lint golden clean
 .DELETE_ON_ERROR:
 
 help:
@@ -39,6 +40,7 @@ help:
 	@echo "                       FUNCTIONS=energy,momentum"
 	@echo "  make verify TAIL=articulated M=3 N=4       verification report of that model"
 	@echo "  make bench                                 benchmark report"
+	@echo "  make stress                                errors, drifts, drops, fuzz at the limits; CALLS=2000 random calls"
 	@echo "  make embedded TAIL=articulated M=1 N=3     run it on a Cortex-M4F in QEMU against the host; CPU=m7: in double"
 	@echo "  make size-report                           flash, RAM, stack and instructions -> docs/embedded.md"
 	@echo "  make study-models                          the paper's Fig. 8: both tails compared, and what each costs"
@@ -92,6 +94,9 @@ verify: model
 
 bench: $(READY)
 	$(PY) benchmarks/bench.py
+
+stress: $(READY)
+	PYTHONPATH=tests $(PY) stress/stress.py --calls $(CALLS)
 
 embedded: model
 	$(PY) embedded/check.py generated/$(MODEL) --board $(CPU)

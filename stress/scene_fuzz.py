@@ -1,0 +1,57 @@
+"""Mutated scene files: good files and dice go in; what was neither read nor refused comes out."""
+
+import contextlib
+import io
+import random
+from pathlib import Path
+
+from serpentail import cli
+from serpentail_codegen.__main__ import parser, scene_of
+from serpentail_codegen.scene import SceneError
+
+BYTES = (b"", b"\0", b"\xff", b"\xef\xbb\xbf", b"=", b"[", b"]", b"[[", b'"', b"'''", b"\\", b"#", b"\n", b"\r")
+# fmt: off
+PIECES = (
+    *BYTES, b"nan", b"-inf", b"1e999", b"1e308", b"-0.0", b"1e-320", b"9" * 30, b"0x7fffffffffffffff", b"true", b"{}",
+    b"[]", b"[nan]", b"1979-05-27", b'"all"', b'"continuum"', b'"polar"', b'"float"', b"[" * 3000, b"links", b"name",
+    b"[plan]", b"[parameters]", b"segments = 10000\n", b"contacts = [1]\n", b"functions = [[]]\n", b"\xc3\xa9",
+)
+# fmt: on
+
+
+def mutated(text: bytes, dice: random.Random) -> bytes:
+    """Return bytes with one to three pieces replaced, removed or put in."""
+    for _ in range(dice.randint(1, 3)):
+        first = dice.randrange(len(text) + 1)
+        last = min(len(text), first + dice.choice([0, 1, 3, 12, 60]))
+        piece = dice.choice([dice.choice(PIECES), text[dice.randrange(len(text) + 1) :][:30]])
+        text = text[:first] + piece + text[last:]
+    return text
+
+
+def faults(files: list[Path], count: int, dice: random.Random, folder: Path) -> list[str]:
+    """Return what so many mutated files raised besides refusals, by the generator and by ``serpentail plan``."""
+    found, sources = [], [path.read_bytes() for path in files]
+    path = folder / "mutated.toml"
+    for _ in range(count):
+        path.write_bytes(mutated(dice.choice(sources), dice))
+        for read in (generated, planned):
+            try:
+                read(path)
+            except Exception as error:
+                found.append(f"{read.__name__}: {error!r} of {path.read_bytes()!r:.2000}")
+    return found
+
+
+def generated(path: Path) -> None:
+    """Read a scene as the generator does, up to the derivation."""
+    with contextlib.suppress(SceneError):
+        scene_of(parser().parse_args([str(path)]))
+
+
+def planned(path: Path) -> None:
+    """Plan a scene whose model was never made: the file is read, the folder refused."""
+    with contextlib.redirect_stderr(io.StringIO()) as words:
+        status = cli.main(["plan", str(path), "--folder", str(path.parent / "absent")])
+    if status != 2 or not words.getvalue().strip():
+        raise AssertionError(f"status {status}, {words.getvalue()!r}")
