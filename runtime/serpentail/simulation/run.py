@@ -178,19 +178,18 @@ def choose(model, drive: Drive, start: Start, name, settings: dict) -> Method:
         name, reason = chosen(settings, available, decay)
     method = checked_method(name, settings, available, single)
     if "step" in method.settings:
-        refuse_too_many(start, method.settings["step"])
+        refuse_vanishing(start, method.settings["step"])
     if name == "rk4":  # steps divide the output's
         steps = max(1, int(np.ceil(start.interval / method.settings["step"] * (1 - 1e-12))))
         return replace(method, reason=reason, settings={"step": start.interval / steps})
     return replace(method, reason=reason)
 
 
-def refuse_too_many(start: Start, step: float) -> None:
-    """SimulationError where steps of a fixed length (s) are more than a run can count."""
-    span = start.end - start.start
-    if span > MOST_STEPS * step:
-        least = span / MOST_STEPS
-        raise SimulationError(f"step {step:.3g}: more than {MOST_STEPS} steps to the end: give {least:.2g} s or more")
+def refuse_vanishing(start: Start, step: float) -> None:
+    """SimulationError where steps of a fixed length (s) are too short to be seen in the time."""
+    least = np.finfo(float).eps * max(abs(start.start), abs(start.end))
+    if step < least:
+        raise SimulationError(f"step {step:.3g}: too short to move the time: give {least:.2g} s or more")
 
 
 def fastest_decay(model, drive: Drive, start: Start) -> float:
