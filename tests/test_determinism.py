@@ -19,8 +19,8 @@ NAME = "articulated_m2_n2"
 HEADER, MODEL, HOST, BATCH = f"include/{NAME}.h", *(f"src/{NAME}{part}.c" for part in ("", "_host", "_batch"))
 EXAMPLE, CASADI, MANIFEST = "example/main.c", f"{NAME}_casadi.py", "manifest.json"
 PACKAGE = {"Makefile", "CMakeLists.txt", "LICENSE", "README.md"}
-HEADERS = {HEADER, f"include/{NAME}_simulation.h"}
-FILES = {*HEADERS, MODEL, HOST, BATCH, f"src/{NAME}_simulation.c", EXAMPLE, CASADI, MANIFEST, *PACKAGE}
+SIMULATION = {f"include/{NAME}_simulation.h", f"src/{NAME}_simulation.c"}
+FILES = {HEADER, MODEL, HOST, BATCH, EXAMPLE, CASADI, MANIFEST, *PACKAGE, *SIMULATION}
 
 
 def scene(**options):
@@ -100,13 +100,13 @@ def differing_lines(some, other):
 
 def test_a_parameter_changes_only_its_value_and_the_hash(expected, tmp_path):
     changed = generate(scene(parameters={"gravity": 1.62}), tmp_path / "expected")
-    assert set(changed) == {*HEADERS, MODEL, CASADI, MANIFEST}
+    assert set(changed) == {HEADER, MODEL, CASADI, MANIFEST}
     now = texts(tmp_path / "expected" / NAME)
     assert differing_lines(expected[MODEL], now[MODEL]) == [
         ("  parameters->gravity = 9.8;", "  parameters->gravity = 1.62;")
     ]
     before, after = (json.loads(some[MANIFEST])["content_hash"] for some in (expected, now))
-    for name in (*HEADERS, CASADI):
+    for name in (HEADER, CASADI):
         pairs = differing_lines(expected[name], now[name])
         assert pairs and all(old.replace(before, after) == new for old, new in pairs)
 
@@ -114,13 +114,13 @@ def test_a_parameter_changes_only_its_value_and_the_hash(expected, tmp_path):
 def test_a_baked_parameter_changes_only_the_code_and_the_hash(tmp_path):
     generate(scene(baked=True), tmp_path)
     changed = generate(scene(baked=True, parameters={"gravity": 1.62}), tmp_path)
-    assert set(changed) == {*HEADERS, MODEL, BATCH, CASADI, MANIFEST}
+    assert set(changed) == {HEADER, MODEL, BATCH, CASADI, MANIFEST}
 
 
 def test_manifest_describes_the_files(expected):
     manifest = json.loads(expected[MANIFEST])
     assert manifest["files"] == {name: digest(expected[name].decode()) for name in sorted(FILES - {MANIFEST})}
-    for name in (*HEADERS, CASADI):
+    for name in (HEADER, CASADI):
         assert manifest["content_hash"] in expected[name].decode()
     assert f'return "{manifest["abi_hash"]}";' in expected[HOST].decode()
 
