@@ -24,7 +24,7 @@ SOURCES := $(shell find codegen -name '*.py' -o -name '*.jinja')
 STAMP   := generated/$(MODEL)/.made
 WANTED  := $(if $(SCENE),$(SCENE),--tail $(TAIL) --segments $(M) $(if $(filter continuum,$(TAIL)),,--links $(N))) $(OPTIONS)
 
-.PHONY: help setup demo test test-all model verify bench stress embedded size-report studies study-models study-righting lint golden clean
+.PHONY: help setup demo test test-all model verify bench stress embedded size-report studies study-models study-righting study-contact lint golden clean
 .DELETE_ON_ERROR:
 
 help:
@@ -45,7 +45,8 @@ help:
 	@echo "  make size-report                           flash, RAM, stack and instructions -> docs/embedded.md"
 	@echo "  make study-models                          the paper's Fig. 8: both tails compared, and what each costs"
 	@echo "  make study-righting                        the paper's Figs. 9 to 13, Table 2: righting, planned and true"
-	@echo "  make studies                               both; STARTS=200 random starts in the second"
+	@echo "  make study-contact                         kick, jump from the tail, self-recovery: films, plots, a table"
+	@echo "  make studies                               all; STARTS=200 random starts in the second"
 	@echo "  make lint                                  style and import rules"
 	@echo "  make golden                                accept what the generator emits now as the golden models"
 	@echo "  make clean                                 remove generated/ and output/"
@@ -110,7 +111,10 @@ study-models: $(READY)
 study-righting: $(READY)
 	$(PY) examples/study_righting.py --starts $(STARTS)
 
-studies: study-models study-righting
+study-contact: $(READY)
+	$(PY) examples/study_contact.py
+
+studies: study-models study-righting study-contact
 
 golden: $(READY)
 	$(PY) -m pytest tests/test_golden.py --update-golden

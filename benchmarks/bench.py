@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 import batches
+import contact_costs
 import continuum_forms
 import derivatives
 import more_peers
@@ -19,6 +20,7 @@ import peers
 import planning
 import scaling
 import serpentail as st
+import simulations
 from fixtures import Fixture, fixture, generated, label
 from report import written
 
@@ -35,9 +37,10 @@ def main() -> int:
             print(f"measuring {name} ...", file=sys.stderr, flush=True)
             report[name] = measure(Path(folder))
     OUTPUT.mkdir(parents=True, exist_ok=True)
-    pictures = [OUTPUT / "continuum_forms.png", OUTPUT / "scaling.png"]
+    pictures = [OUTPUT / "continuum_forms.png", OUTPUT / "scaling.png", OUTPUT / "simulations.png"]
     continuum_forms.draw(report["continuum_forms"], report["continuum_form_times"], pictures[0])
     scaling.draw(report["scaling"], pictures[1])
+    simulations.draw(report["simulation_times"], pictures[2])
     print(written(OUTPUT, report, MEASURES, pictures))
     print(f"written: {OUTPUT}: report.md, report.html, report.json and pictures", file=sys.stderr)
     return 0
@@ -212,6 +215,10 @@ MEASURES = {
     "python_overhead": python_overhead,
     "drift": drift,
     "work_precision": work_precision,
+    "simulation_summary": simulations.simulation_summary,
+    "simulation_times": simulations.simulation_times,
+    "mujoco_times": simulations.mujoco_times,
+    "contact_costs": contact_costs.contact_costs,
     "continuum_forms": continuum_forms.form_errors,
     "continuum_form_times": continuum_forms.form_times,
     "planning": planning.planning,

@@ -5,8 +5,6 @@ Times are processor time of single calls from C, the least of many rounds over t
 
 import json
 import subprocess
-import sys
-import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +17,7 @@ SIZES = ((1, 3), (3, 4), (3, None))
 FLIGHT = ("forward_dynamics", "pfl", "implicit")
 TOUCHING = ("contact_points", "contact_dynamics")
 FLAGS = ["-std=c99", "-O2", "-ffp-contract=fast", "-fno-tree-vectorize", "-fno-math-errno", "-fno-trapping-math"]
+FLAGS += ["-march=native"]
 STATES, ROUNDS = 64, 300
 STANDING = [0, 0, 0.0225, 1, 0.1, 0, 0]  # as a rat stands: half of its foot points in the ground
 LEGS = [3.665, -0.2618, 3.665, -0.2618, 0, 0, 0, 0]
@@ -68,7 +67,7 @@ def inputs(manifest: dict) -> dict[str, np.ndarray]:
     tail = rng.normal(0, 0.2, (STATES, sizes["nt"]))
     given |= {"q": np.hstack([np.tile(STANDING, (STATES, 1)), tail]), "legs": np.tile(LEGS, (STATES, 1))}
     given |= {"damping": np.full((STATES, sizes["nt"]), 1e-3), "gains": np.zeros((STATES, 2))}
-    return given | {"weight": np.full((STATES, 1), 1e-4)}
+    return given | {"weight": np.tile([1e-4, 1.0] if points else [1e-4], (STATES, 1))}
 
 
 def driver(manifest: dict, given: dict[str, np.ndarray]) -> tuple[str, list[np.ndarray]]:
@@ -112,34 +111,26 @@ def timed(folder: Path) -> dict[str, float]:
     (folder / "driver.c").write_text(text)
     np.concatenate([array.ravel() for array in data]).tofile(folder / "states.bin")
     sources = [folder / "driver.c", folder / "src" / f"{manifest['prefix']}.c"]
-    subprocess.run(
-        ["cc", *FLAGS, "-march=native", "-I", folder / "include", *sources, "-o", folder / "driver", "-lm"], check=True
-    )
+    subprocess.run(["cc", *FLAGS, "-I", folder / "include", *sources, "-o", folder / "driver", "-lm"], check=True)
     printed = subprocess.run([folder / "driver", folder / "states.bin"], check=True, capture_output=True, text=True)
     return dict(zip(manifest["functions"], (1e9 * float(t) for t in printed.stdout.split()), strict=True))
 
 
-def measured(parent: Path, size: tuple, scene: str) -> dict:
-    """Operations and nanoseconds of each function of a scene, and the bytes of its C."""
-    folder = made(parent, size, SCENES[scene])
-    manifest = json.loads((folder / "manifest.json").read_text())
-    operations = {name: entry["operations"] for name, entry in manifest["functions"].items()}
-    size_c = (folder / "src" / f"{manifest['prefix']}.c").stat().st_size
-    return {"model": folder.name, "scene": scene, "bytes": size_c, "operations": operations, "ns": timed(folder)}
+def contact_costs(folder: Path) -> list[dict]:
+    """What a flight, a stance (feet) and a tail contact (feet, tail) of one model cost: C of its file, calls.
 
-
-def main() -> int:
-    """Print a table row for every function of every scene."""
-    print("| model | scene | C, kB | function | operations | ns |\n|---|---|---|---|---|---|")
-    with tempfile.TemporaryDirectory() as parent:
-        for size in SIZES:
-            for scene in SCENES:
-                found = measured(Path(parent), size, scene)
-                head = f"| {found['model']} | {scene} | {found['bytes'] / 1000:.0f} |"
-                for name, count in found["operations"].items():
-                    print(f"{head} {name} | {count} | {found['ns'][name]:.0f} |", flush=True)
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+    Operations of one evaluation; processor time of single calls from C, half of the foot points in the ground.
+    """
+    rows = []
+    for size in SIZES:
+        for scene, contacts in SCENES.items():
+            made_at = made(folder / "costs", size, contacts)
+            manifest = json.loads((made_at / "manifest.json").read_text())
+            dynamics, ns = "contact_dynamics" if contacts else "forward_dynamics", timed(made_at)
+            operations = {name: entry["operations"] for name, entry in manifest["functions"].items()}
+            row = {"model": made_at.name, "scene": scene, "points": sum(e["count"] for e in manifest["contacts"])}
+            row |= {"c_bytes": (made_at / "src" / f"{manifest['prefix']}.c").stat().st_size}
+            row |= {"dynamics_operations": operations[dynamics], "dynamics_ns": ns[dynamics]}
+            row |= {"implicit_operations": operations["implicit_factor"], "implicit_ns": ns["implicit_factor"]}
+            rows.append(row)
+    return rows

@@ -77,6 +77,16 @@ COLUMNS = {
     "derivative_bytes": "C text, bytes",
     "generate_cpu": "generate, CPU s",
     "compile_cpu": "compile, CPU s",
+    "real_time_factor": "times real time",
+    "lsoda_ms": "SciPy's LSODA, ms",
+    "lsoda_error": "its error",
+    "lsoda_ratio": "times slower",
+    "mujoco_step_s": "MuJoCo's step, s",
+    "points": "contact points",
+    "dynamics_operations": "operations of v_dot",
+    "implicit_operations": "of an implicit step's matrix",
+    "dynamics_ns": "v_dot, ns",
+    "implicit_ns": "implicit step's matrix, ns",
 }
 
 

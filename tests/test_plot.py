@@ -13,7 +13,8 @@ from scipy.spatial.transform import Rotation
 
 import serpentail.film
 import serpentail.plot
-from serpentail.film import SIDE, TOP, filmstrip, silhouette
+from serpentail.animal import SIDE, TOP, silhouette
+from serpentail.film import filmstrip
 from serpentail.plot import time_plots
 from serpentail.trajectory import Trajectory, rotation_matrix
 

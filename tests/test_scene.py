@@ -165,14 +165,19 @@ def test_the_paper_rats(segments, links):
 
 def test_the_full_scene_file_shows_every_key():
     text = "".join((SCENES / f"{name}_m1_n3.toml").read_text() for name in ("kangaroo_rat", "contact"))
-    words = [*(set(KEYS) - {"name", "parameters", "plan", *ONLY["continuum"].keys}), *(p.name for p in PARAMETERS)]
+    words = [
+        *(set(KEYS) - {"name", "parameters", "plan", "simulate", *ONLY["continuum"].keys}),
+        *(p.name for p in PARAMETERS),
+    ]
     assert [word for word in words if f"{word} =" not in text] == []
 
 
-def test_the_table_plan_is_left_to_the_runtime(refuse):
-    with_plan = {"kind": "articulated", "segments": 1, "links": 3, "plan": {"anything": 1}}
-    assert parse_scene(with_plan, "rat") == parse_scene({k: with_plan[k] for k in list(with_plan)[:3]}, "rat")
-    assert "under a line [plan]" in str(refuse('kind = "articulated"\nsegments = 1\nlinks = 1\nplan = 3\n')["plan"])
+@pytest.mark.parametrize("name", ["plan", "simulate"])
+def test_tables_of_motions_are_left_to_the_runtime(refuse, name):
+    alone = {"kind": "articulated", "segments": 1, "links": 3}
+    assert parse_scene(alone | {name: {"anything": 1}}, "rat") == parse_scene(alone, "rat")
+    wrong = refuse(f'kind = "articulated"\nsegments = 1\nlinks = 1\n{name} = 3\n')
+    assert f"under a line [{name}]" in str(wrong[name])
     assert (SCENES / "righting_m1_n3.toml").is_file() and load_scene(SCENES / "righting_m1_n3.toml").links == 3
 
 

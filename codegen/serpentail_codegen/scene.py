@@ -91,7 +91,11 @@ CONTACTS = Rule(
     'an array of different names out of "feet", "tail" and "torso", such as ["feet"]',
     lambda x: isinstance(x, list | tuple) and all(n in GROUPS and x.count(n) == 1 for n in x),
 )
-TABLE = Rule("a table, under a line [plan]", lambda x: isinstance(x, Mapping))
+
+
+def _table(name: str) -> Rule:
+    """Return the rule that a value is a table."""
+    return Rule(f"a table, under a line [{name}]", lambda x: isinstance(x, Mapping))
 
 
 @dataclass(frozen=True)
@@ -133,7 +137,8 @@ KEYS: dict[str, tuple[Any, Rule]] = {
     "profile": (Scene.profile, _one_of(["fast", "reproducible"])),
     "contacts": ((), CONTACTS),
     "friction": (Scene.friction, _one_of(FRICTION)),
-    "plan": ({}, TABLE),  # a motion to plan: for the runtime, which checks it
+    "plan": ({}, _table("plan")),  # a motion to plan, and one to simulate: for the runtime, which checks them
+    "simulate": ({}, _table("simulate")),
 }
 NAMES = tuple(parameter.name for parameter in PARAMETERS)
 

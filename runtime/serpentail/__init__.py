@@ -6,6 +6,8 @@ __version__ = "0.1.0"
 _HOME = {
     **dict.fromkeys(["load", "Model"], "model"),
     "simulate": "simulation.run",
+    "settle": "simulation.settling",
+    **dict.fromkeys(["scenario", "Scenario"], "simulation.scenarios"),
     **dict.fromkeys(["Damping", "TorqueTable", "TorqueCurve", "NativeTorque", "Phases"], "simulation.controllers"),
     "Piecewise": "simulation.piecewise",
     **dict.fromkeys(["Legs", "Reference"], "simulation.schedules"),
@@ -17,6 +19,7 @@ _HOME = {
     "Plan": "planning.solution",
     "Pfl": "tracking",
     "filmstrip": "film",
+    "leg_joints": "limbs",
     "time_plots": "plot",
     **dict.fromkeys(
         [

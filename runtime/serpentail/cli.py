@@ -53,6 +53,20 @@ def parser() -> argparse.ArgumentParser:
     verb.add_argument("--folder", help="its generated folder, by default generated/ and the scene's name")
     verb.add_argument("--save", help="write the planned motion to this .npz file")
     verb.add_argument("--json", choices=["-"], help="print one JSON object on stdout instead of text")
+    verb = verbs.add_parser("simulate", help="simulate the motion of a scene's table [simulate]")
+    verb.add_argument("scene", help="a scene file, such as scenes/kick.toml")
+    verb.add_argument("--folder", help="its generated folder, by default generated/ and the scene's name")
+    verb.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        dest="changes",
+        help="another value of a parameter (mu=0.5) or of a key below [simulate] (duration=2, start.height=0.1)",
+    )
+    verb.add_argument("--save", help="write the motion to this .npz file")
+    verb.add_argument("--film", help="draw it as a filmstrip, to this .png, .svg or .pdf file")
+    verb.add_argument("--json", choices=["-"], help="print one JSON object on stdout instead of text")
     for name, words in (("info", "what a generated model is"), ("verify", "check the laws that a model must obey")):
         verb = verbs.add_parser(name, help=words)
         verb.add_argument("folder", help="a generated folder, such as generated/articulated_m3_n4")
@@ -85,12 +99,29 @@ def run(arguments: argparse.Namespace) -> tuple[dict, str, bool]:
             plan.trajectory.save(arguments.save)
         text = "\n".join(f"{name:<30}{value}" for name, value in plan.report.items())
         return plan.report, text, plan.success
+    if arguments.verb == "simulate":
+        return simulated(arguments)
     from .model import load
     from .verify import as_text, laws, summary
 
     model = load(arguments.folder)
     checks = laws(model)
     return summary(model, checks), as_text(model, checks), all(c.passed for c in checks)
+
+
+def simulated(arguments: argparse.Namespace) -> tuple[dict, str, bool]:
+    """Return the report of a scene's motion."""
+    from .simulation.changes import parsed
+    from .simulation.scenarios import scenario
+
+    scene = scenario(arguments.scene, arguments.folder, parsed(arguments.changes))
+    motion = scene.simulate()
+    if arguments.save:
+        motion.save(arguments.save)
+    if arguments.film:
+        scene.film(motion, arguments.film)
+    report = scene.summary(motion)
+    return report, "\n".join(f"{name:<30}{value}" for name, value in report.items()), True
 
 
 if __name__ == "__main__":

@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from .plot import HEAD, INK, QUIET, TAIL, TORSO, Array, writable, write
+from .animal import FORCE, LEG, LONGEST, SIDE, TOP, Body, Frame, Pen, View, arrows, draw_animal, draw_marks, tick
+from .plot import HEAD, INK, QUIET, TAIL, Array, writable, write
 from .trajectory import Trajectory, rotation_matrix
 
 if TYPE_CHECKING:
@@ -32,67 +33,6 @@ LEAST, TALLEST = (
     3.2,
 )  # the page's least width (for the key) and the tallest path panel below a film, inches
 PER_LINE = 6  # most frames on a line
-MOST_DOTS = 20  # more tail points than this are drawn without dots
-
-
-@dataclass(frozen=True)
-class Body:
-    """The drawn torso: its ellipsoid's semi-axes and the tail's root, both in the torso frame, m."""
-
-    semi_axes: tuple[float, float, float] = (0.0315, 0.0495, 0.027)
-    tail_mount: tuple[float, float, float] = (0.0, -0.0405, 0.0045)
-
-    def __post_init__(self) -> None:
-        """Semi-axes and root are three finite numbers each, the first ones positive."""
-        for name, value in vars(self).items():
-            if np.shape(value) != (3,) or not np.isfinite(value).all():
-                raise ValueError(f"{name} is {value!r}: give three finite lengths in m")
-        if min(self.semi_axes) <= 0:
-            raise ValueError(f"semi_axes is {self.semi_axes!r}: give positive lengths in m")
-
-
-@dataclass(frozen=True, eq=False)
-class View:
-    """An orthographic view; the rows of its matrix are the world directions right, up, towards the viewer."""
-
-    name: str
-    right: str
-    up: str
-    matrix: Array
-
-    def of(self, world: Array) -> Array:
-        """World vectors (n, 3) as (right, up, towards the viewer)."""
-        return world @ self.matrix.T
-
-
-SIDE = View("side", "y", "z", np.array([[0.0, 1, 0], [0, 0, 1], [1, 0, 0]]))
-TOP = View("top", "y", "\u2212x", np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]]))
-
-
-@dataclass(frozen=True, eq=False)
-class Frame:
-    """One moment of a film: time, torso position and rotation, root and tail (P + 1, 3), COM; world, SI."""
-
-    time: float
-    torso: Array
-    rotation: Array
-    tail: Array
-    com: Array
-    body: Body
-
-    def world(self, local: ArrayLike) -> Array:
-        """Torso points (n, 3) in the world."""
-        return self.torso + np.asarray(local, dtype=float) @ self.rotation.T
-
-    def outline(self, view: View) -> Array:
-        """The torso's silhouette (n, 2) in a view."""
-        return view.of(self.torso)[:2] + silhouette(self.rotation, self.body.semi_axes, view)
-
-    def in_front(self, world: Array, view: View) -> NDArray[np.bool_]:
-        """Which world points x (n, 3) it cannot hide: |u| >= 1, near side, u = diag(a)^-1 R^T (x - p)."""
-        u = (world - self.torso) @ self.rotation / self.body.semi_axes
-        towards = view.matrix[2] @ self.rotation / self.body.semi_axes
-        return np.asarray((np.linalg.norm(u, axis=1) > 1 - 1e-9) & (u @ towards > -1e-6))
 
 
 @dataclass(frozen=True)
@@ -150,27 +90,38 @@ def filmstrip(
     trajectory: Trajectory,
     points: ArrayLike,
     path: str | os.PathLike[str],
-    frames: int = 8,
+    frames: int | Sequence[float] = 8,
     com: ArrayLike | None = None,
-    **body: Any,
+    **look: Any,
 ) -> Path:
-    """Draw moments of flight, side (y, z) over top (y, -x) view at one scale, and the COM path; return path.
+    """Draw moments of a motion, side (y, z) over top (y, -x) view at one scale, and the COM path; return path.
 
-    points (K, P, 3): the tail in the world at every sample, m; com (K, 3), m, by default the torso's; body:
-    semi_axes and tail_mount, m (see Body). No path panel when the COM stays within half a torso's length.
+    points (K, P, 3): the tail in the world at every sample, m; frames: how many, or their times (s); com (K, 3), m, by
+    default the torso's.  look: legs (K, L, J, 3), their joints in the world, m (see ``leg_joints``); semi_axes and
+    tail_mount, m (see Body).  On the ground, arrows are its forces.  No path panel when the COM stays within half a
+    torso's length.
     """
-    path, body_drawn = writable(path), Body(**body)
-    points = _checked("points", points, (len(trajectory.t), -1, 3))
-    com = trajectory.q[:, :3] if com is None else _checked("com", com, (len(trajectory.t), 3))
-    film = [_frame(trajectory, points, com, body_drawn, k) for k in _moments(trajectory.t, frames)]
-    return write(path, lambda: _draw_film(film, com))
+    path, legs = writable(path), look.pop("legs", None)
+    body = Body(**look)
+    count = len(trajectory.t)
+    points = _checked("points", points, (count, -1, 3))
+    com = trajectory.q[:, :3] if com is None else _checked("com", com, (count, 3))
+    legs = np.zeros((count, 0, 2, 3)) if legs is None else _checked("legs", legs, (count, -1, -1, 3))
+    moments = _moments(trajectory.t, frames)
+    film = [_frame(trajectory, points, com, body, k) for k in moments]
+    film = [dataclasses.replace(frame, legs=legs[k]) for frame, k in zip(film, moments, strict=True)]
+    film, largest = _with_forces(film, trajectory, moments)
+    return write(path, lambda: _draw_film(film, com, largest))
 
 
-def silhouette(rotation: Array, semi_axes: ArrayLike, view: View = SIDE, count: int = 121) -> Array:
-    """Outline (count, 2), m, about the centre, of an ellipsoid turned by R: ellipse P R diag(a^2) R^T P^T."""
-    spread = view.matrix[:2] @ rotation * np.asarray(semi_axes, dtype=float)
-    angle = np.linspace(0, 2 * np.pi, count)
-    return np.stack([np.cos(angle), np.sin(angle)], axis=1) @ np.linalg.cholesky(spread @ spread.T).T
+def _with_forces(film: list[Frame], trajectory: Trajectory, moments: list[int]) -> tuple[list[Frame], float]:
+    """Frames with arrows of the ground's forces, and the largest of these, N; 0 in flight."""
+    if trajectory.contact is None:
+        return film, 0.0
+    points, forces = trajectory.contact.points[moments], trajectory.contact.forces[moments]
+    largest = float(np.linalg.norm(forces, axis=-1).max())
+    shown = [arrows(x, f, largest) for x, f in zip(points, forces, strict=True)]
+    return [dataclasses.replace(f, arrows=a, grounded=True) for f, a in zip(film, shown, strict=True)], largest
 
 
 def _checked(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Array:
@@ -185,12 +136,15 @@ def _checked(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Array:
     return array
 
 
-def _moments(t: Array, count: int) -> list[int]:
-    """The samples nearest to `count` evenly spaced times."""
-    if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1:
-        raise ValueError(f"frames is {count!r}: give a whole number of at least 1")
-    wanted = np.linspace(t[0], t[-1], count)
-    return sorted({int(np.abs(t - time).argmin()) for time in wanted})
+def _moments(t: Array, wanted: int | Sequence[float]) -> list[int]:
+    """The samples nearest to the wanted times, or to so many evenly spaced ones."""
+    if np.ndim(wanted) == 1 and len(wanted) and np.isfinite(wanted).all():
+        times = np.asarray(wanted, float)
+    elif isinstance(wanted, bool) or not isinstance(wanted, int | np.integer) or wanted < 1:
+        raise ValueError(f"frames is {wanted!r}: give a whole number of at least 1, or times in s")
+    else:
+        times = np.linspace(t[0], t[-1], wanted)
+    return sorted({int(np.abs(t - time).argmin()) for time in times})
 
 
 def _frame(trajectory: Trajectory, points: Array, com: Array, body: Body, k: int) -> Frame:
@@ -200,7 +154,7 @@ def _frame(trajectory: Trajectory, points: Array, com: Array, body: Body, k: int
     return Frame(float(trajectory.t[k]), torso, rotation, np.vstack([root, points[k]]), com[k], body)
 
 
-def _draw_film(film: list[Frame], com: Array) -> "Figure":
+def _draw_film(film: list[Frame], com: Array, largest: float = 0.0) -> "Figure":
     """The film's page."""
     from matplotlib.figure import Figure
 
@@ -209,7 +163,7 @@ def _draw_film(film: list[Frame], com: Array) -> "Figure":
     figure = Figure(figsize=page.size)
     for row in range(2):
         _draw_row(figure, page, row, film, windows[row], com)
-    _draw_key(figure, page, windows[0])
+    _draw_key(figure, page, windows[0], _key(film, largest))
     if page.path is not None:
         _draw_path(page.add(figure, page.path_panel()), film, com)
     return figure
@@ -217,7 +171,7 @@ def _draw_film(film: list[Frame], com: Array) -> "Figure":
 
 def _drawn(frame: Frame, view: View) -> Array:
     """Everything a frame shows, as points (n, 2) in a view."""
-    lines = np.vstack([frame.tail, frame.world(_tick(frame.body))])
+    lines = np.vstack([frame.tail, frame.world(tick(frame.body)), *frame.legs])
     return np.vstack([frame.outline(view), view.of(lines)[:, :2]])
 
 
@@ -225,12 +179,6 @@ def _window(shapes: list[Array], margin: float = 0.012) -> Array:
     """Lower and upper corner (2, 2) of a box around all shapes."""
     every = np.vstack(shapes)
     return np.array([every.min(axis=0) - margin, every.max(axis=0) + margin])
-
-
-def _tick(body: Body) -> Array:
-    """The mark on the back, (2, 3), in the torso frame."""
-    height = body.semi_axes[2]
-    return np.array([[0, 0, height], [0, 0, 1.5 * height]])
 
 
 def _page(film: list[Frame], windows: list[Array], com: Array) -> Page:
@@ -262,8 +210,9 @@ def _draw_row(figure: "Figure", page: Page, row: int, film: list[Frame], window:
         axes.spines[:].set_visible(True)
         pen = Pen(axes, frame, view, frame.com)
         pen.plot(com, ":", 0, color=QUIET, linewidth=1.0)
-        _draw_animal(pen)
-        _draw_marks(pen)
+        pen.ground()
+        draw_animal(pen)
+        draw_marks(pen)
         if row == 0:
             axes.set_title(_label(k, film), pad=3)
         if x == LEFT:
@@ -275,62 +224,6 @@ def _label(k: int, film: list[Frame]) -> str:
     step = min(np.diff([frame.time for frame in film]), default=1.0)
     decimals = max(0, math.ceil(-math.log10(1e3 * step)))
     return rf"$\mathbf{{{k + 1}}}$   {1e3 * film[k].time:.{decimals}f} ms"
-
-
-@dataclass(frozen=True, eq=False)
-class Pen:
-    """Draws one frame on axes in a view, world point `origin` at zero, above all lower levels."""
-
-    axes: "Axes"
-    frame: Frame
-    view: View
-    origin: Array
-    level: float = 0.0
-
-    def plot(self, world: Array, mark: str, zorder: float, **look: Any) -> None:
-        """World points (n, 3) as matplotlib's mark says."""
-        self.axes.plot(*self.view.of(world - self.origin).T[:2], mark, zorder=self.level + zorder, **look)
-
-    def torso(self) -> None:
-        """The filled silhouette."""
-        outline = self.frame.outline(self.view) - self.view.of(self.origin)[:2]
-        self.axes.fill(*outline.T, facecolor=TORSO, edgecolor=INK, linewidth=0.7, zorder=self.level + 0.4)
-
-    def line(self, corners: Array, **look: Any) -> None:
-        """A line, all of it under the torso, and again over it where the torso cannot hide it."""
-        fine = np.linspace(0, len(corners) - 1, 16 * (len(corners) - 1) + 1)
-        world = np.stack([np.interp(fine, np.arange(len(corners)), c) for c in corners.T], axis=1)
-        self.plot(world, "-", 0.2, **look)
-        self.plot(self.visible(world), "-", 0.6, **look)
-
-    def dots(self, world: Array, **look: Any) -> None:
-        """Dots, under and over the torso likewise."""
-        self.plot(world, "o", 0.3, **look)
-        self.plot(self.visible(world), "o", 0.7, **look)
-
-    def visible(self, world: Array) -> Array:
-        """World points, nan where the torso may hide them."""
-        return np.where(self.frame.in_front(world, self.view)[:, None], world, np.nan)
-
-
-def _draw_animal(pen: Pen) -> None:
-    """Torso, tail, and a dot at every tail point if they are few enough to be told apart."""
-    pen.torso()
-    pen.line(pen.frame.tail, color=TAIL, linewidth=1.4)
-    if len(pen.frame.tail) <= MOST_DOTS + 1:
-        pen.dots(pen.frame.tail[1:], color=INK, markersize=2.4, markeredgewidth=0)
-
-
-def _draw_marks(pen: Pen) -> None:
-    """The back's midline and tick, and the head end: a full dot on the near side, a ring on the far side."""
-    _, length, height = pen.frame.body.semi_axes
-    angle = np.linspace(0, np.pi, 61)
-    back = pen.frame.world(np.stack([0 * angle, length * np.cos(angle), height * np.sin(angle)], axis=1))
-    pen.plot(pen.visible(back), "-", 0.5, color=INK, linewidth=0.7)
-    pen.line(pen.frame.world(_tick(pen.frame.body)), color=INK, linewidth=1.4)
-    head = pen.frame.world([[0, length, 0]])
-    fill = HEAD if pen.frame.in_front(head, pen.view)[0] else "white"
-    pen.plot(head, "o", 0.8, color=HEAD, markersize=4, markerfacecolor=fill)
 
 
 def _draw_directions(axes: "Axes", view: View) -> None:
@@ -345,7 +238,14 @@ def _draw_directions(axes: "Axes", view: View) -> None:
         axes.text(*where, name, ha="center", va="center", style="italic")
 
 
-def _draw_key(figure: "Figure", page: Page, window: Array) -> None:
+def _key(film: list[Frame], largest: float) -> dict[str, dict[str, Any]]:
+    """What the marks of a film mean: on the ground also legs and forces."""
+    legs = {"leg": {"color": LEG, "linewidth": 1.4}} if len(film[0].legs) else {}
+    words = f"ground's force, {1e3 * LONGEST:.0f} mm: {largest:.3g} N"
+    return KEY | legs | ({words: {"color": FORCE, "linewidth": 1.0}} if largest else {})
+
+
+def _draw_key(figure: "Figure", page: Page, window: Array, key: dict[str, dict[str, Any]]) -> None:
     """The scale bar and what the marks mean, under the film."""
     from matplotlib.lines import Line2D
 
@@ -355,9 +255,11 @@ def _draw_key(figure: "Figure", page: Page, window: Array) -> None:
     axes.set_axis_off()
     axes.plot([0, length], [0.5, 0.5], color=INK, linewidth=2, solid_capstyle="butt", clip_on=False)
     axes.text(length + 0.06, 0.5, "50 mm", va="center_baseline")
-    handles = [Line2D([], [], label=name, **look) for name, look in KEY.items()]
+    handles = [Line2D([], [], label=name, **look) for name, look in key.items()]
     corner = ((LEFT + length + 0.6) / page.size[0], (page.base - 0.17) / page.size[1])
-    figure.legend(handles=handles, loc="center left", bbox_to_anchor=corner, ncols=5, columnspacing=1.4)
+    figure.legend(
+        handles=handles, loc="center left", bbox_to_anchor=corner, ncols=5 if len(key) < 6 else 4, columnspacing=1.4
+    )
 
 
 def _draw_path(axes: "Axes", film: list[Frame], com: Array) -> None:
@@ -365,8 +267,9 @@ def _draw_path(axes: "Axes", film: list[Frame], com: Array) -> None:
     low, high = _path_window(film, com)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel="$y$ [m]", ylabel="$z$ [m]")
     pens = [Pen(axes, frame, SIDE, np.zeros(3), k) for k, frame in enumerate(film)]
+    pens[0].ground()
     for pen in pens:
-        _draw_animal(pen)
+        draw_animal(pen)
     pens[-1].plot(com, ":", 1, color=INK, linewidth=1.0)
     for k, frame in enumerate(film):
         disc = {"color": "white", "markersize": 8, "markeredgecolor": INK, "markeredgewidth": 0.5}

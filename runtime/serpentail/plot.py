@@ -43,6 +43,7 @@ class Panel:
     names: Sequence[str]
     styles: Sequence[tuple[Any, str]]
     span: float
+    roots: bool = False  # a scale on which blows and weights are both seen
 
 
 def time_plots(trajectory: Trajectory, path: str | os.PathLike[str]) -> Path:
@@ -93,6 +94,9 @@ def _draw_panel(axes: "Axes", t: Array, panel: Panel) -> None:
     low, high = float(panel.curves.min()), float(panel.curves.max())
     margin = 0.06 * (high - low) + max(0.0, panel.span - (high - low)) / 2
     axes.set(ylabel=panel.label, ylim=(low - margin, high + margin))
+    if panel.roots:
+        axes.set_yscale("function", functions=(lambda x: np.sign(x) * np.sqrt(np.abs(x)), lambda x: np.sign(x) * x**2))
+        axes.set_ylim(0, max(panel.span, high) * 1.1)
     axes.grid(color="#e6e6e6", linewidth=0.6)
     axes.set_axisbelow(True)
     if "[deg]" in panel.label:
@@ -111,10 +115,24 @@ def _panels(trajectory: Trajectory) -> list[Panel]:
     return [
         Panel("attitude [deg]", angles, attitude, TRIPLE, 1.0),
         *_tail_panels(trajectory),
+        *_ground_panels(trajectory),
         Panel("torso rate\n[rad/s]", trajectory.v[:, 3:6], rates, TRIPLE, 0.1),
         Panel("energy [mJ]", energies, ("kinetic", "potential", "total"), (*TRIPLE[:2], (INK, "-")), 1.0),
         Panel("momentum\n[mN s]", 1e3 * trajectory.linear_momentum, world, TRIPLE, 1.0),
         Panel("angular mom.\n[mN m s]", 1e3 * trajectory.angular_momentum, world, TRIPLE, 0.01),
+    ]
+
+
+def _ground_panels(trajectory: Trajectory) -> list[Panel]:
+    """Height of the torso and the ground's normal forces by groups; none in flight."""
+    contact = trajectory.contact
+    if contact is None:
+        return []
+    forces = np.stack([contact.of(group).forces[..., 2].sum(axis=1) for group in contact.groups], axis=1)
+    height = 1e3 * trajectory.q[:, 2:3]
+    return [
+        Panel("height [mm]", height, ("of B",), ((INK, "-"),), 1.0),
+        Panel("normal force\n[N]", forces, tuple(contact.groups), TRIPLE[: forces.shape[1]], 1.0, roots=True),
     ]
 
 

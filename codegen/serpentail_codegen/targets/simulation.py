@@ -13,7 +13,7 @@ from .c_function import dialect
 NAMES = r"\b(real|piecewise|controller|drive|parameters|torque)\b"
 SLOTS = 11  # states in the workspace: see states.c.jinja
 MACROS = ("NQ", "NV", "NT", "SIZE", "SLOT", "START", "END", "STAGES", "END_RATE", "TRIAL", "RIGHT", "TAU")
-MACROS += ("TABLE", "FORCES", "PRESSURES", "GROUPS", "FACTORS", "INNER")
+MACROS += ("TABLE", "FORCES", "PRESSURES", "REACHED", "POINTS", "GROUPS", "FACTORS", "INNER")
 NUMBERS = {"three": 3, "four": 4, "five": 5, "hundred": 100, "fifth": 0.2, "nearly": 0.99, "hundredth": 0.01}
 NUMBERS |= {"milli": 1e-3, "millionth": 1e-6, "small": 1e-10, "tiny_error": 1e-6}
 NUMBERS |= {"safety": 0.9, "share": 0.85, "memory": 0.2}  # of the PI controller
@@ -171,7 +171,7 @@ def simulation_context(scene: Scene, tail: Tail, has: Has, works: dict[str, int]
     """Return what the simulation's templates lay out; ``works`` is the workspace of every function."""
     literal = dialect(scene.real).literal
     size, table = tail.nq + tail.nv + 2 * has.contacts, max(4 * tail.nt, 2 * tail.nv)
-    own = SLOTS * size + tail.nt + table + 3 * has.contacts + len(has.groups)
+    own = SLOTS * size + tail.nt + table + 5 * has.contacts
     return {
         **{name: literal(value) for name, value in NUMBERS.items()},
         **{name: name + ("f" if scene.real == "float" else "") for name in ("pow", "fabs", "ceil")},

@@ -2,11 +2,11 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
-from difflib import get_close_matches
 from functools import partial
 
 import numpy as np
 
+from .. import names
 from ..errors import PlanningError
 from .attitude import KINDS
 from .formulations import FORMULATIONS
@@ -83,10 +83,7 @@ def checked_problem(model, start, goal, duration, bounds, **settings) -> Problem
 
 def choice(field: str, value, known) -> None:
     """PlanningError unless the value is a known name."""
-    if not isinstance(value, str) or value not in known:
-        near = get_close_matches(value, known, 1) if isinstance(value, str) else []
-        hint = f"did you mean {near[0]!r}?" if near else f"needs {' or '.join(map(repr, known))}"
-        raise PlanningError(f"{field}: value {value!r}: {hint}")
+    names.known(field, value, known, PlanningError)
 
 
 def number(field: str, value, least: float = 0.0, above: bool = True) -> float:

@@ -1,12 +1,10 @@
 """Scenes: a scene file with a table [plan] goes in; the plan of its motion comes out."""
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import fields
-from pathlib import Path
 
 from ..errors import PlanningError
-from ..model import load
+from ..scene_file import model_of, read_scene, subtable
 from .planner import plan
 from .problem import SETTINGS, Bounds, Goal, choice
 from .rounds import Method
@@ -20,26 +18,11 @@ KEYS = ("start", "goal", "duration", "bounds", *SETTINGS, *(entry.name for entry
 def planned(path: str, folder: str | None = None) -> Plan:
     """Return the plan that a scene file asks for; its model is in `folder`, by default generated/<scene>.
 
-    Raises PlanningError with field, value and remedy, ModelError where the model was not generated.
+    Raises PlanningError with field, value and remedy, ModelError where the folder is of another scene.
     """
-    table, name = read_scene(path)
-    arguments = plan_arguments(table)
-    return plan(load(folder or Path("generated") / name), **arguments)
-
-
-def read_scene(path: str) -> tuple[dict, str]:
-    """Return the table [plan] of a scene file, and the scene's name."""
-    try:
-        scene = tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
-    except (OSError, ValueError, RecursionError) as error:
-        raise PlanningError(
-            f"scene file: value {path!r}: cannot be read ({error}); give a scene file (.toml)"
-        ) from error
-    table = scene.get("plan")
-    if not isinstance(table, Mapping):
-        raise PlanningError(f"plan: value {table!r}: {path} has no table [plan]; add one, with start and duration")
-    name = scene.get("name", Path(path).stem)
-    return dict(table), str(name)
+    scene = read_scene(path, PlanningError)
+    arguments = plan_arguments(subtable(scene, "plan", path, PlanningError))
+    return plan(model_of(scene, path, folder, {}), **arguments)
 
 
 def plan_arguments(table: Mapping) -> dict:

@@ -1,6 +1,7 @@
 """Schedules: nodes of leg angles and of tail angles go in; checked functions of time come out."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Self
 
@@ -8,7 +9,9 @@ import numpy as np
 
 from ..errors import SimulationError
 from ..library import real_array
+from ..names import known
 from .piecewise import Piecewise, blends, checked_nodes, linear, spline
+from .start import finite, positive
 
 BLENDS = {"linear": linear, "quintic": blends, "spline": spline}
 
@@ -35,6 +38,24 @@ class Reference:
         if len(nodes[0]) < 2:
             raise SimulationError("Reference: one node only: give two or more")
         object.__setattr__(self, "curve", BLENDS[self.blend](*nodes))
+
+    @classmethod
+    def of_bends(cls, model, times, bends, blend: str = "quintic") -> Self:
+        """Return the reference of either tail whose segments bend by (K, m, 2) rad, pitch and yaw; (K, m): pitch alone.
+
+        A segment's bend is what its links turn in all: each of n takes 1/n of it, a continuum all of it.
+        """
+        return cls(times, shared_among_links(model, real_array("bends", bends, error=SimulationError)), blend)
+
+
+def shared_among_links(model, bends: np.ndarray) -> np.ndarray:
+    """Return tail coordinates (K, 2m) of bends of the segments, (K, m, 2) or (K, m), rad."""
+    m = model.segments
+    if bends.shape[1:] not in ((m,), (m, 2)):
+        shape = f"(times, {m}) or (times, {m}, 2)"
+        raise SimulationError(f"bends has shape {bends.shape}: give {shape}: pitch, or pitch and yaw, of each segment")
+    both = bends if bends.ndim == 3 else np.stack([bends, 0 * bends], axis=-1)
+    return both.reshape(len(bends), 2 * m) / (model.links or 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +92,20 @@ class Legs:
         if not np.isfinite(numbers).all() or rate == 0 or delta[0] == delta[1]:
             given = f"Legs.ramp: delta {tuple(delta.tolist())}, at {at!r}, rate {rate!r}"
             raise SimulationError(f"{given}: give finite numbers, two angles that differ, and a rate that is not 0")
-        return cls([at, at + math.fabs((delta[1] - delta[0]) / rate)], gamma, delta)
+        return cls.moves(gamma, delta[0], [{"at": at, "delta": delta[1], "rate": math.fabs(rate)}])
+
+    @classmethod
+    def moves(cls, gamma: float, delta: float, moves) -> Self:
+        """Legs at gamma, delta (rad) that move from time to time, both legs alike, and are held in between.
+
+        Each move is a mapping: at (s), its end's gamma, delta or both (rad), and duration (s) or rate (rad/s, of the
+        angle that goes farther).  Moves follow each other in time.
+        """
+        nodes = [(-math.inf, (gamma, delta))]
+        for number, move in enumerate(moves):
+            nodes += _move(f"legs.moves[{number}]", move, nodes[-1])
+        times, angles = zip(*(nodes[1:] or [(0.0, nodes[0][1])]), strict=True)
+        return cls(times, *np.array(angles, float).T)
 
 
 def _both_legs(name: str, value, times: np.ndarray) -> np.ndarray:
@@ -81,3 +115,26 @@ def _both_legs(name: str, value, times: np.ndarray) -> np.ndarray:
         shapes = f"not a number, ({len(times)},) or ({len(times)}, 2)"
         raise SimulationError(f"Legs: {name} has shape {angles.shape}, {shapes}")
     return np.broadcast_to(angles[:, None] if angles.ndim == 1 else angles, (len(times), 2))
+
+
+MOVE = ("at", "gamma", "delta", "duration", "rate")
+
+
+def _move(field: str, move, last) -> list:
+    """Return the nodes (time, (gamma, delta)) that a move adds after the last one; SimulationError where it cannot."""
+    if not isinstance(move, Mapping):
+        raise SimulationError(f"{field}: value {move!r}: needs a table of {', '.join(MOVE)}")
+    for name, value in move.items():
+        known(f"{field}: key", name, MOVE, SimulationError)
+        finite(f"{field}.{name}", value)
+    (end, angles), at = last, move.get("at")
+    if at is None or not {"gamma", "delta"} & set(move) or ("rate" in move) == ("duration" in move):
+        raise SimulationError(f"{field}: value {dict(move)!r}: needs at, gamma or delta, and one of rate, duration")
+    goal = move.get("gamma", angles[0]), move.get("delta", angles[1])
+    way = max(abs(x - y) for x, y in zip(goal, angles, strict=True))
+    duration = move["duration"] if "duration" in move else way / positive(f"{field}.rate", move["rate"])
+    if not duration > 0:
+        raise SimulationError(f"{field}: takes {duration!r} s: needs a duration above 0, and another angle than before")
+    if at < end:
+        raise SimulationError(f"{field}.at: value {at!r}: the move before it ends at {end:.6g} s: move it after that")
+    return [(at + duration, goal)] if at == end else [(at, angles), (at + duration, goal)]

@@ -68,3 +68,11 @@ def positive(name: str, value) -> float:
     if number.shape != () or not 0 < number < np.inf:
         raise SimulationError(f"{name} {value!r}: give a number above 0")
     return float(number)
+
+
+def finite(name: str, value) -> float:
+    """Return a finite number; SimulationError where it is none."""
+    number = real_array(name, value, error=SimulationError)
+    if number.shape != () or not np.isfinite(number):
+        raise SimulationError(f"{name} {value!r}: give a finite number")
+    return float(number)

@@ -1,0 +1,30 @@
+"""Settling: a model and a state go in; the state of rest that it comes to on the ground comes out."""
+
+import numpy as np
+
+from ..errors import SimulationError
+from .controllers import Controller
+from .run import simulate
+from .start import positive
+
+
+def settle(
+    model, q0, *, rounds: int = 1, duration: float = 1.5, controller: Controller = None, at: float = 0.0, **settings
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return q (nq,), v (nv,) = 0 and the friction springs' stretch (points, 2) in m after coming to rest from q0.
+
+    rounds: runs of ``duration`` s, after each of which all velocities are set to zero; many short ones quench.
+    Controller and legs act as they do before the time ``at`` (s), where schedules hold their first values.
+    settings: those of ``simulate``, such as legs.  Raises what it raises.
+    """
+    positive("duration", duration)
+    if isinstance(rounds, bool) or not isinstance(rounds, int) or rounds < 1:
+        raise SimulationError(f"rounds {rounds!r}: give a whole number from 1")
+    if not model.contacts:
+        raise SimulationError(f"{model.name} touches nothing, so it cannot settle: add `contacts` to its scene")
+    still, v = {}, np.zeros(model.nv)
+    settings = {"output_step": duration, "controller": controller, "t_span": (at - duration, at)} | settings
+    for _ in range(rounds):
+        end = simulate(model, q0, v, **settings | still)
+        q0, still = end.q[-1], {"bristles0": end.contact.bristles[-1]}
+    return q0, v, still["bristles0"]
