@@ -9,7 +9,7 @@ from functools import cache
 from .compose import rewritten
 from .interpret import ldl_factor, ldl_solve, pair_solve
 from .program import Apply, Array, Call, Factor, Guard, Program, Ref, Solve, SolvePair, padded
-from .tape import Step, Tape
+from .tape import Step, Tape, compacted
 
 
 def written_out(program: Program, largest: int) -> Program:
@@ -27,7 +27,8 @@ def written_out(program: Program, largest: int) -> Program:
             count = 2 if isinstance(statement, SolvePair) else 1
             rows = _rows(statement.matrix, count * statement.x.size, statement.x.size)
             step = _solve_step(statement.x.size, count)
-            yield Apply(step, (*rows, statement.x), (statement.x,), (False,))
+            given = {f"row_{k}": row for k, row in enumerate(rows)} | {"x": statement.x}
+            yield Apply(step, tuple(given[name] for name, _ in step.inputs), (statement.x,), (False,))
         elif isinstance(statement, Call):
             yield replace(statement, program=written_out(statement.program, largest))
         else:
@@ -66,4 +67,5 @@ def _solve_step(size: int, count: int) -> Step:
     solve, name, product = (ldl_solve, "solve", "L^T D L") if count == 1 else (pair_solve, "solve_pair", "U D L")
     x = solve(tape, *triangles, [tape.input(first + k) for k in range(size)])
     doc = f"Solve {product} x = x of {size} rows."
-    return Step(f"{name}_{size}", doc, (*names, ("x", size)), (("x", size),), tuple(tape.nodes), tuple(x))
+    step = Step(f"{name}_{size}", doc, (*names, ("x", size)), (("x", size),), tuple(tape.nodes), tuple(x))
+    return compacted(step)  # one of the pair's diagonals is not read
