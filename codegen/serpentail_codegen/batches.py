@@ -8,8 +8,8 @@ from dataclasses import replace
 
 from .compose import expanded, reached, rewritten, with_arrays
 from .interpret import unroll
-from .program import Apply, Array, Guard, Program, narrowed
-from .tape import Step
+from .program import Apply, Array, Guard, Program
+from .tape import Step, compacted
 
 
 def side_by_side(program: Program, states: int) -> Program:
@@ -39,7 +39,7 @@ def flattened(program: Program, fixed: dict[str, list] | None = None) -> Program
         tuple(tape.nodes),
         tuple(results),
     )
-    step = narrowed(step, {a.name for a in targets})
+    step = compacted(step)
     given = {a.name: a.part(0, a.length) for a in inputs}
     call = Apply(
         step,

@@ -24,6 +24,17 @@ class Batch:
     program: Program
     body: CFunction
 
+    @property
+    def own(self) -> int:
+        """Reals of workspace for the rows of its arguments."""
+        arguments = (*self.program.of_role("input"), *self.program.of_role("output"))
+        return STATES * sum(a.length for a in arguments)
+
+    @property
+    def work(self) -> int:
+        """Reals of workspace in all."""
+        return self.own + self.body.work
+
 
 def batches(scene: Scene, tail: Tail, emitted: list[Emitted]) -> list[Batch]:
     """Return the functions that a host evaluates for many states; straight or in loops as they are for one."""
@@ -38,7 +49,7 @@ def _batch(scene: Scene, tail: Tail, emitted: Emitted) -> Batch:
 
 
 class BatchView:
-    """A batch as the template sees it: its arguments, the function of their rows, the workspace of both."""
+    """A batch as the template sees it: its arguments, the function of their rows, their workspace."""
 
     def __init__(self, batch: Batch, tail: Tail, prefix: str):
         function = batch.function
@@ -46,8 +57,7 @@ class BatchView:
         self.inputs = [ArgumentView(a, tail) for a in function.inputs]
         self.outputs = [ArgumentView(a, tail) for a in function.outputs]
         self.names = ", ".join(a.name for a in self.inputs + self.outputs)
-        self.own = STATES * sum(a.length for a in self.inputs + self.outputs)
-        self.work = self.own + batch.body.work
+        self.own = batch.own
 
 
 def batch_file(scene: Scene, tail: Tail, found: list[Batch], context: dict) -> dict[str, str]:
@@ -61,6 +71,6 @@ def batch_file(scene: Scene, tail: Tail, found: list[Batch], context: dict) -> d
     return {f"src/{scene.name}_batch.c": render("batch.c.jinja", context | own)} if found else {}
 
 
-def batch_entry(tail: Tail, found: list[Batch]) -> dict:
+def batch_entry(found: list[Batch]) -> dict:
     """Return what a loader must know of the batches: how many states side by side, and each one's workspace."""
-    return {"states": STATES, "work": {b.function.name: BatchView(b, tail, "").work for b in found}}
+    return {"states": STATES, "work": {b.function.name: b.work for b in found}}
