@@ -66,8 +66,8 @@ demo: $(READY)
 test: $(READY)
 	$(PY) -m pytest -m "not slow" -n auto --dist loadfile
 
-test-all: $(READY)
-	$(PY) -m pytest -n auto --dist loadfile
+test-all: test
+	$(PY) -m pytest -m slow -n auto --dist loadfile
 
 lint: $(READY)
 	$(VENV)/bin/ruff check .

@@ -5,6 +5,7 @@ import ctypes
 import numpy as np
 
 from ..errors import SimulationError
+from ..library import NOT_FINITE
 from .methods import Method
 from .run import CompiledRun, Samples, failed
 
@@ -23,9 +24,12 @@ class StateRate:
     def __call__(self, t: float, y: np.ndarray) -> np.ndarray:
         """Return y_dot."""
         self.y[...] = y
+        self.refused = None
         status = self.function(ctypes.addressof(self.run.record), t, *self.addresses)
         if self.run.drive.error is not None:
             raise self.run.drive.error
+        if not status and not np.isfinite(self.y_dot).all():
+            status = NOT_FINITE
         if status:
             self.refused = failed(status, t if np.isfinite(t) else self.run.record.t)
             if self.trials:
@@ -34,8 +38,10 @@ class StateRate:
         return self.y_dot.astype(float)
 
     def torque(self, t: float, y: np.ndarray) -> np.ndarray:
-        """Return the torques at a state."""
+        """Return the torques at a state that must have a rate."""
         self(t, y)
+        if self.refused is not None:
+            raise self.refused
         return self.tau.astype(float)
 
 
@@ -85,6 +91,7 @@ def _smooth_part(rate: StateRate, method: Method, part, tape: Tape, counts: dict
     from scipy.integrate import DOP853, LSODA
 
     t, y, end = part
+    rate.torque(t, y)  # where the rate is NaN, DOP853's first step would be, and never end
     solver = {"dop853": DOP853, "lsoda": LSODA}[method.name](rate, t, y, end, **method.settings)
     while solver.status == "running":
         message = solver.step()
@@ -94,7 +101,6 @@ def _smooth_part(rate: StateRate, method: Method, part, tape: Tape, counts: dict
             reason = (message or "the step failed").rstrip(".").lower()
             raise SimulationError(f"at t = {solver.t:.6g} s {reason}: is the motion stiff, or rtol too small?")
         counts["steps"] += 1
-        rate.refused = None
         interpolant = solver.dense_output()
         for at in tape.due(solver.t):
             tape.write(at, interpolant(at) if at < solver.t else solver.y)
