@@ -80,12 +80,33 @@ def test_vjp_of_a_model_with_contacts_is_that_of_flight(standing):
         ({"stop_at": np.zeros((2, 2))}, "stop_at"),
         ({"method": "rk4", "step": 1e-320}, "step 1e-320: too short"),
         ({"output_step": 1e-320}, "output_step 1e-320: more than"),
+        ({"method": "lsoda", "t_span": 1e-320}, "output_step .*: too short to move the time: give 1e-100"),
+        ({"t_span": (1e10, 1e10 + 4e-6)}, "output_step .*: too short to move the time: give 2.2e-06 s"),
+        ({"method": "ros34pw2", "rtol": 1e-320}, "rtol 1e-320: too near to rounding: give 2.2e-14"),
+        ({"method": "dop853", "rtol": 1e-15}, "rtol 1e-15: too near to rounding"),
+        ({"method": "ros34pw2", "most_step": 1e-200}, "most_step 1e-200: too short to move the time"),
     ],
 )
 def test_simulations_that_cannot_be_are_refused(standing, settings, words):
     q = np.array([0, 0, 0.3, 1, 0, 0, 0, 0, 0.0])
     with pytest.raises(st.SimulationError, match=words):
-        st.simulate(standing, q, np.zeros(8), legs=st.Legs.fixed(3.6, -0.3), t_span=0.01, **settings)
+        st.simulate(standing, q, np.zeros(8), legs=st.Legs.fixed(3.6, -0.3), **({"t_span": 0.01} | settings))
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda model: st.Legs.ramp(3.6, (-0.3, -1.0), 0.4, 1e-320), "takes inf s"),
+        (lambda model: st.Reference([0.0, 1.0], [1, [2, 3]]), "Reference: angles is not made of real numbers"),
+        (lambda model: st.Pfl(model, ([0.0, 1.0], np.zeros((2, 2))), 10**60), "Pfl: kp is not made of real numbers"),
+        (lambda model: st.Pfl(model, np.zeros((2, 3), complex)), "Pfl: times is not made of real numbers"),
+        (lambda model: st.Pfl(model, ([0.0], np.zeros((1, 2)))), "Pfl: one node only"),
+        (lambda model: model.external_force(moment=(0, np.nan, 0)), "external_force: moment is not finite"),
+    ],
+)
+def test_arguments_that_the_fuzz_once_broke_are_refused(standing, call, words):
+    with pytest.raises(st.SerpentailError, match=words):
+        call(standing)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from .errors import ModelError, StateError
-from .library import Kernel, open_library, real_array
+from .library import Kernel, finite_array, open_library
 from .manifest import read_manifest
 from .parameters import flat, resolve
 from .side_by_side import SideBySide
@@ -139,7 +139,7 @@ class Model:
         points = self.manifest["dimensions"]["total"] + 1
         shapes = {"force": (3,), "moment": (3,), "tail": (points, 3)}
         given = {"force": force, "moment": moment, "tail": np.zeros((points, 3)) if tail is None else tail}
-        arrays = {name: real_array(name, value) for name, value in given.items()}
+        arrays = {name: finite_array(f"external_force: {name}", value) for name, value in given.items()}
         for name, shape in shapes.items():
             if arrays[name].shape != shape:
                 raise StateError(f"external_force: {name} has shape {arrays[name].shape}, not {shape}")
