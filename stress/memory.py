@@ -13,6 +13,7 @@ import serpentail as st
 from boards import ToolchainMissing
 from extremes import cases
 from poses import FAST, SMALL, folds
+from serpentail.parameters import flat, resolve
 from subjects import Subject
 
 DRIVER = Path(__file__).parent / "driver.c"
@@ -145,7 +146,7 @@ def states(model: st.Model, names: list[str], lengths: list[int], rng) -> Iterat
         yield good(model, names, lengths, rng, rng.uniform(-1, 1, nt), factor * FAST[0]), vector, False
     size = model.segments, model.links
     for change in cases(size).values():
-        other = model.with_parameters(**change).parameter_vector
+        other = np.array(flat(model.manifest, resolve(model.manifest, change)))
         yield good(model, names, lengths, rng, rng.uniform(-1, 1, nt)), other, False
     for where in range(len(lengths)):
         for number in NUMBERS:
