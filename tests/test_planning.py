@@ -3,6 +3,7 @@
 import re
 import signal
 import threading
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -293,6 +294,7 @@ def test_other_problems_and_models_share_no_program():
 def test_interrupt_returns_the_best_so_far():
     """Ctrl-C in the first solve gives its iterate, flagged; in a later round, the round before; never an exception."""
     model, settings = rat(), AGAIN | {"tolerance": 1e-9, "rounds": 30}
+    st.plan(model, start=start(model), intervals=30, **settings, time_limit=0.01)  # derives before signals are heeded
     before = signal.getsignal(signal.SIGINT)
     for delay in (0.05, 1.0):
         timer = threading.Timer(delay, signal.raise_signal, (signal.SIGINT,))
@@ -301,7 +303,48 @@ def test_interrupt_returns_the_best_so_far():
         timer.cancel()
         assert not plan.success and np.isfinite(plan.solution.w).all()
         assert plan.report["converged"] or plan.report["status"] == "User_Requested_Stop"
+        assert plan.report["stopped"] == "interrupt"
         assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_time_limit_ends_a_solve_inside_and_returns_its_iterate():
+    """Within an iteration's time after the limit; a limit that is not reached changes nothing."""
+    model, endless = rat(), {"ipopt.tol": 1e-300, "ipopt.acceptable_iter": 0, "ipopt.max_iter": 10**6}
+    common = AGAIN | {"start": start(model), "intervals": 40, "options": endless}
+    st.plan(model, **common, time_limit=0.01)  # derives
+    begun = time.perf_counter()
+    cut = st.plan(model, **common, time_limit=0.2)
+    assert 0.2 <= time.perf_counter() - begun < 2.0
+    assert (cut.success, cut.report["stopped"], cut.report["guesses"]) == (False, "time limit", 1)
+    assert cut.report["status"] == "User_Requested_Stop" and cut.report["iterations"] > 1
+    free, limited = (
+        st.plan(model, start=start(model), intervals=6, **AGAIN, **own) for own in ({}, {"time_limit": 60})
+    )
+    assert limited.report["stopped"] is None and limited.success
+    np.testing.assert_array_equal(free.solution.w, limited.solution.w)
+
+
+def test_time_limit_ends_refinement_with_the_best_round():
+    """Between rounds: what was solved before is kept, and may be good for all but the tolerance."""
+    model = rat()
+    cut = st.plan(
+        model, start=start(model), intervals=6, **AGAIN | {"tolerance": 1e-12, "rounds": 10**6}, time_limit=1.0
+    )
+    assert not cut.success and cut.report["converged"] and cut.report["stopped"] == "time limit"
+
+
+def test_time_limits_are_of_one_thread():
+    found = {}
+
+    def other():
+        with interrupt.heeded(3600.0):
+            found["other"] = interrupt.asked()
+
+    with interrupt.heeded(1e-9):
+        thread = threading.Thread(target=other)
+        thread.start()
+        thread.join()
+        assert (interrupt.asked(), found["other"]) == ("time limit", None)
 
 
 def test_second_interrupt_is_the_usual_one():

@@ -42,6 +42,7 @@ class Method:
     retries: int = 4
     seed: int = 0
     dynamics: str = "auto"
+    time_limit: float | None = None  # s
     track: bool = True
 
 
@@ -72,6 +73,7 @@ class Run:
         self.attitude = attitude(problem.attitude)
         self.spent = dict.fromkeys(("derive_s", "solve_cpu_s", "truth_s"), 0.0)
         self.iterations = self.attempts = 0
+        self.stopped: str | None = None
 
     def first(self) -> Round:
         """Return the best solution on the first mesh, of as many guesses as asked for, and more if all fail."""
@@ -80,7 +82,7 @@ class Run:
         program = self._transcribed(before.mesh if again else uniform(method.intervals))
         found: list[Solution] = []
         for k in range(method.multi_start + method.retries):
-            if found and (asked() or (k >= method.multi_start and any(s.success for s in found))):
+            if found and ((k >= method.multi_start and any(s.success for s in found)) or self._stopped()):
                 break
             found.append(self._given(program) if k == 0 else self._solved(program, self._pushed(k)))
         return self._round(program, min(found, key=lambda s: (not s.success, s.value)))
@@ -90,7 +92,7 @@ class Run:
         rounds, method = [first], self.method
         for _ in range(method.rounds if method.tolerance is not None else 0):
             last = rounds[-1]
-            if asked() or not last.solution.success or last.error <= method.tolerance:
+            if not last.solution.success or last.error <= method.tolerance or self._stopped():
                 break
             mesh = self._split(last)
             if mesh.intervals == last.program.mesh.intervals:
@@ -98,7 +100,7 @@ class Run:
             program = self._transcribed(mesh)
             motion = Motion(last.curve.duration, last.curve.at)
             found = self._solved(program, motion, "close")
-            again = not (found.success or asked())
+            again = not (found.success or self.stopped)
             rounds.append(self._round(program, self._solved(program, motion) if again else found))
         return rounds
 
@@ -109,10 +111,16 @@ class Run:
         good = bool(best.solution.success and (tolerance is None or best.error <= tolerance))
         trajectory = sampled(self.model, self.problem, best.curve)
         own = {"rounds": len(rounds), "iterations": self.iterations, "guesses": self.attempts}
+        own |= {"stopped": self.stopped}
         own |= self.spent | {"wall_s": wall_s}
         summary = {"success": good} | report(self, best, trajectory) | own
         program = best.program
         return Plan(good, trajectory, summary, self.problem, best.curve, program.mesh, self.rule, best.solution)
+
+    def _stopped(self) -> bool:
+        """Tell, and note why, whether the search should end that is not done."""
+        self.stopped = asked()
+        return self.stopped is not None
 
     def _transcribed(self, mesh: Mesh) -> Transcription:
         begun = time.perf_counter()
@@ -155,6 +163,8 @@ class Run:
         self.spent["solve_cpu_s"] += found.cpu_s
         self.iterations += found.iterations
         self.attempts += 1
+        if not found.success:
+            self._stopped()
         return found
 
     def _start_blocks(self) -> dict[str, np.ndarray]:

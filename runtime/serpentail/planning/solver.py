@@ -65,7 +65,7 @@ def _engine(program: Transcription, name: str, options: dict):
 
 
 def _watch(unknowns: int, rows: int):
-    """A callback of every iteration, through which Ctrl-C ends the search."""
+    """A callback of every iteration, through which Ctrl-C or a time limit ends the search."""
     import casadi as ca
 
     class Watch(ca.Callback):
@@ -80,7 +80,7 @@ def _watch(unknowns: int, rows: int):
             return ca.Sparsity.dense(sizes[ca.nlpsol_out(k)], 1)
 
         def eval(self, _found):
-            return [int(asked())]
+            return [int(asked() is not None)]
 
     watch = Watch()
     watch.construct("watch", {})
