@@ -12,6 +12,7 @@ from .guess import Motion, of_trajectory, passive, pushes, unknowns
 from .interrupt import asked
 from .limits import limits
 from .mesh import Mesh, refined, uniform
+from .multipliers import carried
 from .problem import Problem
 from .recovery import full_state
 from .report import attitude_errors, report
@@ -48,7 +49,7 @@ class Method:
 
 @dataclass(frozen=True, eq=False)
 class Round:
-    """One solution on one mesh, and what its torques really do at the ends of intervals."""
+    """One solution on one mesh: q, v planned at the ends of intervals, and true at the end of all."""
 
     program: Transcription
     solution: Solution
@@ -59,7 +60,7 @@ class Round:
     @property
     def error(self) -> float:
         """True error (deg) of the attitude at the end, against the plan or the goal, the larger one; inf if lost."""
-        error = max(attitude_errors(self.program.problem, self.planned[0][-1, 3:7], self.true[0][-1, 3:7]))
+        error = max(attitude_errors(self.program.problem, self.planned[0][-1, 3:7], self.true[0][3:7]))
         return error if np.isfinite(error) else np.inf
 
 
@@ -99,7 +100,7 @@ class Run:
                 break
             program = self._transcribed(mesh)
             motion = Motion(last.curve.duration, last.curve.at)
-            found = self._solved(program, motion, "close")
+            found = self._near(program, motion, carried(last.solution.multipliers, last.program, program))
             again = not (found.success or self.stopped)
             rounds.append(self._round(program, self._solved(program, motion) if again else found))
         return rounds
@@ -138,10 +139,12 @@ class Run:
         form = (guess.problem.formulation, guess.problem.attitude)
         if form != (self.problem.formulation, self.problem.attitude):
             return self._solved(program, of_trajectory(self.model, guess.trajectory, self.attitude), "close")
-        motion, same = Motion(guess.duration, guess.curve.at), guess.solution.w.size == program.places.size
-        multipliers = (
-            guess.solution.multipliers if same and guess.solution.multipliers[1].size == program.rows else None
-        )
+        multipliers, sizes = guess.solution.multipliers, (program.places.size, program.rows)
+        same = tuple(part.size for part in multipliers) == sizes
+        return self._near(program, Motion(guess.duration, guess.curve.at), multipliers if same else None)
+
+    def _near(self, program: Transcription, motion: Motion, multipliers) -> Solution:
+        """Solve from a motion that is close to a solution, and from its multipliers where there are any."""
         return self._solved(program, motion, "close" if multipliers is None else "same", multipliers)
 
     def _pushed(self, k: int) -> Motion:
