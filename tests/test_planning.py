@@ -347,13 +347,13 @@ def test_interrupt_returns_the_best_so_far():
 
 
 def test_time_limit_ends_a_solve_inside_and_returns_its_iterate():
-    """Within an iteration's time after the limit; a limit that is not reached changes nothing."""
+    """A solve that would take a million iterations; a limit that is not reached changes nothing."""
     model, endless = rat(), {"ipopt.tol": 1e-300, "ipopt.acceptable_iter": 0, "ipopt.max_iter": 10**6}
     common = AGAIN | {"start": start(model), "intervals": 40, "options": endless}
     st.plan(model, **common, time_limit=0.01)  # derives
     begun = time.perf_counter()
-    cut = st.plan(model, **common, time_limit=0.2)
-    assert 0.2 <= time.perf_counter() - begun < 2.0
+    cut = st.plan(model, **common, time_limit=0.5)
+    assert 0.5 <= time.perf_counter() - begun < 30.0
     assert (cut.success, cut.report["stopped"], cut.report["guesses"]) == (False, "time limit", 1)
     assert cut.report["status"] == "User_Requested_Stop" and cut.report["iterations"] > 1
     free, limited = (
@@ -363,13 +363,13 @@ def test_time_limit_ends_a_solve_inside_and_returns_its_iterate():
     np.testing.assert_array_equal(free.solution.w, limited.solution.w)
 
 
-def test_time_limit_ends_refinement_with_the_best_round():
-    """Between rounds: what was solved before is kept, and may be good for all but the tolerance."""
-    model = rat()
-    cut = st.plan(
-        model, start=start(model), intervals=6, **AGAIN | {"tolerance": 1e-12, "rounds": 10**6}, time_limit=1.0
-    )
-    assert not cut.success and cut.report["converged"] and cut.report["stopped"] == "time limit"
+def test_time_limit_ends_refinement_with_the_best_round(monkeypatch):
+    """Between rounds: what was solved before is kept, and is good for all but the tolerance."""
+    model, settings = rat(), AGAIN | {"intervals": 6, "tolerance": 1e-12}
+    monkeypatch.setattr(rounds, "asked", lambda: "time limit")
+    cut = st.plan(model, start=start(model), **settings)
+    assert not cut.success and cut.report["converged"]
+    assert (cut.report["stopped"], cut.report["rounds"]) == ("time limit", 1)
 
 
 def test_time_limits_are_of_one_thread():
