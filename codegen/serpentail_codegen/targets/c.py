@@ -230,6 +230,7 @@ def c_context(scene: Scene, tail: Tail, emitted: list[Emitted], version: str) ->
             "pieces": PIECES[scene.kind],
             "prefix": scene.name,
             "vector": VECTOR,
+            "widest": VECTOR,
             "upper": scene.name.upper(),
             "real": scene.real,
             "reproducible": scene.profile == "reproducible",
