@@ -25,7 +25,7 @@ def generate(scene: Scene, output: Path) -> list[str]:
     files = c_files(scene, context) | batch_file(scene, tail, side_by_side, context) | package_files(context)
     module = casadi_module(scene, tail, [f for f in wanted if f.name in SYMBOLIC], __version__, context["content_hash"])
     files[f"{scene.name}_casadi.py"] = module
-    described = manifest(scene, context, emitted) | {"batch": batch_entry(side_by_side)}
+    described = manifest(scene, context, emitted) | {"batch": batch_entry(scene, side_by_side)}
     return write_folder(output / scene.name, files, described)
 
 
