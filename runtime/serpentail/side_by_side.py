@@ -3,8 +3,9 @@
 import ctypes
 import os
 import threading
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from collections import deque
+from collections.abc import Callable, Iterator
+from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
@@ -12,6 +13,7 @@ from pathlib import Path
 from .compiler import compile_library
 
 MANY = 1000  # states: from here on a batch pays for compiling the C of batches, which takes a second or two
+LOOK = 0.1  # s between looks at signals, such as Ctrl-C
 SHARE = 256  # states: the least that is worth a thread
 
 
@@ -58,3 +60,33 @@ def shared(count: int, run: Callable[[int, int], None]) -> None:
     waiting = [pool().submit(run, first, last) for first, last in pairwise(ends)]
     for future in waiting:
         future.result()
+
+
+def in_turn(count: int, threads: int, work: Callable[[Iterator[int], threading.Event], None]) -> None:
+    """Call ``work(numbers, ended)`` in so many threads, which take the numbers below ``count`` in turn.
+
+    The first error, Ctrl-C among them, sets ``ended`` and is raised when all threads have returned.
+    """
+    left, ended = deque(range(count)), threading.Event()
+    if threads == 1:
+        work(_taken(left), ended)
+        return
+    with ThreadPoolExecutor(threads, thread_name_prefix="serpentail") as crew:
+        try:
+            waiting = {crew.submit(work, _taken(left), ended) for _ in range(threads)}
+            while waiting:  # looks at signals now and then
+                done, waiting = wait(waiting, LOOK, FIRST_EXCEPTION)
+                for future in done:
+                    future.result()
+        finally:
+            left.clear()
+            ended.set()
+
+
+def _taken(left: deque) -> Iterator[int]:
+    """Numbers that no other thread has taken."""
+    while True:
+        try:
+            yield left.popleft()
+        except IndexError:
+            return
