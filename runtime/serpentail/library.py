@@ -12,7 +12,7 @@ from numpy import ndarray
 from .compiler import compile_library
 from .errors import ModelError, SerpentailError, StateError
 from .manifest import remedy
-from .side_by_side import SideBySide, shared
+from .side_by_side import LATE, SideBySide, shared
 
 NOT_POSITIVE_DEFINITE, NOT_FINITE, OUT_OF_RANGE = 1, 2, 3
 
@@ -20,7 +20,8 @@ NOT_POSITIVE_DEFINITE, NOT_FINITE, OUT_OF_RANGE = 1, 2, 3
 def open_library(folder: Path, manifest: dict, profile: str) -> ctypes.CDLL:
     """Compile (or find in the cache) and load a model's C; ModelError where it is not what the manifest says."""
     prefix = manifest["prefix"]
-    sources = [folder / name for name in manifest["files"] if name.startswith("src/")]
+    late = {f"src/{prefix}_{part}.c" for part in LATE}
+    sources = [folder / name for name in manifest["files"] if name.startswith("src/") and name not in late]
     path = compile_library(sources, folder / "include", profile)
     try:
         library = ctypes.CDLL(str(path))

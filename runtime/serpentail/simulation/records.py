@@ -18,11 +18,7 @@ class Records:
     @cached_property
     def types(self) -> dict[str, type]:
         """Structure types by name."""
-        kinds = {"pointer": ctypes.c_void_p, "int": ctypes.c_int, "long": ctypes.c_long, "real": self.real}
-        return {
-            name: type(name, (ctypes.Structure,), {"_fields_": [(member, kinds[kind]) for member, kind in members]})
-            for name, members in self.members.items()
-        }
+        return {name: structure(name, members, self.real) for name, members in self.members.items()}
 
     def has(self, record: str, member: str) -> bool:
         """Tell if a record has a member."""
@@ -53,3 +49,10 @@ class Records:
         if isinstance(value, ctypes.Structure | ctypes.Array):
             return ctypes.addressof(value)
         return ctypes.cast(value, ctypes.c_void_p) if isinstance(value, ctypes._CFuncPtr) else value
+
+
+def structure(name: str, members: list, real: type) -> type[ctypes.Structure]:
+    """Return the structure type of members, pairs of name and kind."""
+    kinds = {"pointer": ctypes.c_void_p, "int": ctypes.c_int, "long": ctypes.c_long, "size_t": ctypes.c_size_t}
+    kinds["real"] = real
+    return type(name, (ctypes.Structure,), {"_fields_": [(member, kinds[kind]) for member, kind in members]})

@@ -11,6 +11,7 @@ from ..library import Rows
 from ..parameters import RunParameters
 from ..side_by_side import cores, in_turn
 from ..trajectory import Trajectory
+from .abreast import Abreast, pays
 from .compiled import COUNTS, PAUSED, CompiledRun, Memory, Outcome, Samples, sampled
 from .drive import Drive
 from .ground import Ground
@@ -81,9 +82,13 @@ class Rollouts:
 class Flights:
     """Runs on their way: threads take them up in turn, and write samples, measures and outcomes."""
 
-    def __init__(self, memory: Memory, drive: Drive, method: Method, threads: int):
+    def __init__(self, memory: Memory, drive: Drive, method: Method):
         runs, samples = memory.start.runs, memory.start.intervals + 1
-        self.memory, self.drive, self.method, self.threads = memory, drive, method, threads
+        self.memory, self.drive, self.method = memory, drive, method
+        self.abreast = Abreast(memory, drive, method) if pays(memory, drive, method) else None
+        self.tasks = self.abreast.groups if self.abreast else runs
+        of_python = method.name in SCIPY or any(parts.user is not None for parts in drive.parts)
+        self.threads = 1 if of_python else min(cores(), self.tasks)
         self.model = memory.records.model
         self.outcomes: list[Outcome] = [None] * runs
         self.source = Source(self.model, memory.parameters, memory.ground, self.outcomes, method.told)
@@ -102,14 +107,32 @@ class Flights:
             outcome = self._by_scipy(run) if self.method.name in SCIPY else in_c(run, ended)
             if outcome is None:
                 return
-            if not isinstance(outcome.failure, SimulationError | None):
-                raise outcome.failure
-            self.outcomes[k] = outcome
-            try:
-                for measure in measures if outcome.failure is None else ():
-                    measure(k, outcome.done)
-            except StateError:
-                self.unmeasured.append(k)
+            self._keep(k, outcome, measures)
+
+    def fly_abreast(self, groups: Iterator[int], ended: Event) -> None:
+        """Take up groups of runs; those among which one cannot go on are made again, one by one."""
+        abreast, start, measures = self.abreast, self.memory.start, [self._rows(name) for name in MEASURES]
+        steps = len(abreast.steps.lengths)
+        info = dict.fromkeys(COUNTS, 0) | {"steps": steps, "evaluations": 4 * steps}
+        for group in groups:
+            flown = abreast.go(group, ended)
+            if flown is None:
+                return
+            if not flown:
+                self.fly(iter(abreast.runs(group)), ended)
+            for k in abreast.runs(group) if flown else ():
+                self._keep(k, Outcome(start.intervals + 1, start.end, dict(info)), measures)
+
+    def _keep(self, k: int, outcome: Outcome, measures: list[Rows]) -> None:
+        """Keep and measure what run k came to; an error that is not its own ends all runs."""
+        if not isinstance(outcome.failure, SimulationError | None):
+            raise outcome.failure
+        self.outcomes[k] = outcome
+        try:
+            for measure in measures if outcome.failure is None else ():
+                measure(k, outcome.done)
+        except StateError:
+            self.unmeasured.append(k)
 
     def _by_scipy(self, run: CompiledRun) -> Outcome:
         """Return what a run came to by one of SciPy's methods, its samples kept."""
@@ -140,7 +163,8 @@ class Flights:
         for array in arrays.values():
             array.setflags(write=False)
         counts = {name: sum(each.info.get(name, 0) for each in self.outcomes) for name in COUNTS}
-        info = counts | self.method.told | {"model": self.model.name, "threads": self.threads} | info
+        shared = {"threads": self.threads, "abreast": self.abreast.states if self.abreast else 1}
+        info = counts | self.method.told | {"model": self.model.name} | shared | info
         return Rollouts(**arrays, errors=errors, info=info, source=self.source)
 
     def _judge(self, k: int) -> SimulationError | None:
@@ -168,7 +192,6 @@ def in_c(run: CompiledRun, ended: Event) -> Outcome | None:
 
 def flown(memory: Memory, drive: Drive, method: Method) -> Flights:
     """Make all runs, on all cores unless Python acts in them."""
-    of_python = method.name in SCIPY or any(parts.user is not None for parts in drive.parts)
-    flights = Flights(memory, drive, method, 1 if of_python else min(cores(), memory.start.runs))
-    in_turn(memory.start.runs, flights.threads, flights.fly)
+    flights = Flights(memory, drive, method)
+    in_turn(flights.tasks, flights.threads, flights.fly_abreast if flights.abreast else flights.fly)
     return flights
