@@ -1,6 +1,7 @@
 """Batches: states side by side give what each of them gives alone, in any number, from any thread, errors included."""
 
 import ctypes
+import json
 import threading
 from functools import cache
 
@@ -110,6 +111,14 @@ def test_what_depends_on_parameters_alone_stays_narrow():
     assert arrays["link"] == arrays["tail_mass"] == 0
 
 
+@pytest.mark.parametrize(("segments", "links", "straight"), [(3, 4, True), (8, 16, False)])
+def test_batches_stay_straight_for_longer_tails_than_single_states(segments, links, straight):
+    folder = model_folder(segments, links, functions=["forward_dynamics"])
+    manifest = json.loads((folder / "manifest.json").read_text())
+    assert manifest["functions"]["forward_dynamics"]["emission"] == "loops"
+    assert ("written_out" in (folder / "src" / f"{folder.name}_batch.c").read_text()) == straight
+
+
 # The compiled batches.
 
 
@@ -117,10 +126,10 @@ def test_what_depends_on_parameters_alone_stays_narrow():
 @pytest.mark.parametrize("name", BATCHED)
 def test_any_number_of_states_gives_what_each_gives_alone(tail, emission, real, name):
     found = model(*tail, emission=emission, real=real)
-    arguments = states(found, 21)
+    arguments = states(found, 37)
     expected = alone(found, name, arguments)
     scale, digits = np.abs(expected).max(axis=0), np.finfo(expected.dtype).eps
-    for count in (1, 7, STATES, STATES + 1, 21):
+    for count in (1, 7, *range(STATES[real], len(expected), STATES[real] - 3), len(expected)):
         out = getattr(found, name)(*(a[:count] for a in given(arguments, name)))
         assert out.dtype == expected.dtype
         assert (np.abs(out - expected[:count]) <= 3e3 * digits * scale).all()
@@ -156,8 +165,10 @@ void row(const real *x, real *sine, real *cosine) {{
     file.write_text(source)
     library = ctypes.CDLL(str(compile_library([file], found.folder / "include")))
     width, rng = library.row_lanes(), np.random.default_rng(3)
-    angles = [*rng.uniform(-4, 4, 320), *rng.uniform(-1e5, 1e5, 320), *10.0 ** rng.uniform(-300, 8, 96)]
-    angles += [k * np.pi / 4 for k in range(-40, 40)] + [0.0, 1e5, -1e5, np.nextafter(1e5, 2e5), np.inf, -np.inf]
+    far, least = (number(1e4), -40) if real == "float" else (number(1e5), -300)
+    angles = [*rng.uniform(-4, 4, 320), *rng.uniform(-far, far, 320), *10.0 ** rng.uniform(least, 8, 96)]
+    angles += [k * np.pi / 4 for k in range(-40, 40)] + [k * np.pi / 2 for k in rng.integers(0, int(far / 2), 160)]
+    angles += [0.0, far, -far, np.nextafter(far, 2 * far), -np.nextafter(far, 2 * far), np.inf, -np.inf]
     angles = np.array(angles + [np.nan] * (-len(angles) % width)).astype(number).reshape(-1, width)
     pointer = [np.zeros(width, number) for _ in range(3)]
     for row in angles:

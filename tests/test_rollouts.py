@@ -345,13 +345,18 @@ def test_ctrl_c_ends_all_threads_within_a_second(monkeypatch, many):
     monkeypatch.setattr(abreast, "MANY", many)
     monkeypatch.setattr(abreast, "LONG", 10**12)
     q, v = starts(tail(), 50)
-    before = threading.active_count()
-    timer = threading.Timer(0.5, signal.raise_signal, (signal.SIGINT,))
+    tail().many.flights.function("tail_side_by_side_flights")  # compiled before the clock runs
+    before, asked = threading.active_count(), []
+
+    def ask():
+        asked.append(time.monotonic())
+        signal.raise_signal(signal.SIGINT)
+
+    timer = threading.Timer(1.5, ask)
     timer.start()
-    begun = time.monotonic()
     with pytest.raises(KeyboardInterrupt):
         st.simulate(tail(), q, v, t_span=20, step=1e-5, method="rk4", output_step=20)
-    assert 0.5 <= time.monotonic() - begun < 1.5
+    assert time.monotonic() - asked[0] < 1
     timer.join()
     assert threading.active_count() == before
 
@@ -412,7 +417,7 @@ def test_every_form_of_a_model_flies_abreast(sizes, options, digits):
     q, v = starts(model, 9)
     settings = FLIGHT | {"controller": LAWS["table"]}
     found = st.simulate(model, q, v, **settings)
-    assert found.info["abreast"] == 8
+    assert found.info["abreast"] == (16 if options.get("real") == "float" else 8)
     near(found, alone(model, q, v, **settings), digits)
 
 
@@ -524,6 +529,12 @@ WRONG_PARAMETERS = {
 def test_wrong_parameters_are_named(own, words):
     with pytest.raises(st.ModelError, match=words):
         st.simulate(tail(), Q, V, parameters=own)
+
+
+def test_bodies_of_unlike_size_in_one_run_are_warned_of_where_it_is_called():
+    with pytest.warns(st.UnlikeBodies, match=r"unlike by 3\.9e\+06") as caught:
+        st.simulate(tail(), Q, V, parameters={"tail_length": [0.2, 200.0, 0.2, 0.2]}, t_span=1e-3, step=1e-3)
+    assert caught[0].filename == __file__
 
 
 def test_parameters_of_a_single_run_are_a_models():

@@ -28,7 +28,9 @@ def generate(scene: Scene, output: Path) -> list[str]:
     files |= flights_file(scene, together, context)
     module = casadi_module(scene, tail, [f for f in wanted if f.name in SYMBOLIC], __version__, context["content_hash"])
     files[f"{scene.name}_casadi.py"] = module
-    described = manifest(scene, context, emitted) | {"batch": batch_entry(side_by_side)} | flights_entry(together)
+    described = (
+        manifest(scene, context, emitted) | {"batch": batch_entry(scene, side_by_side)} | flights_entry(together)
+    )
     return write_folder(output / scene.name, files, described)
 
 
@@ -41,7 +43,8 @@ def tail_of(scene: Scene) -> Tail:
 
 def needed(names: tuple[str, ...], contacts: bool = False) -> list[str]:
     """Return the functions to derive: those asked for, those that a rollout calls, the parts of an implicit solve."""
-    called = ("contact_points", "contact_dynamics") if contacts else ("forward_dynamics",)
+    flight = ("forward_dynamics", "tracked_dynamics") if "pfl" in names else ("forward_dynamics",)
+    called = ("contact_points", "contact_dynamics") if contacts else flight
     parts = {"rollout": called, "implicit": ("implicit_factor", "implicit_solve")}
     names = {*names, *(part for name in names for part in parts.get(name, ()))}
     return [name for name in CATALOGUE if name in names]

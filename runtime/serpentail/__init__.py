@@ -31,6 +31,7 @@ _HOME = {
             "StateError",
             "SimulationError",
             "PlanningError",
+            "UnlikeBodies",
         ],
         "errors",
     ),

@@ -1,5 +1,6 @@
 """Parameters: a manifest's parameters and a caller's changes go in, checked values come out."""
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -7,7 +8,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from .errors import ModelError
+from .errors import ModelError, UnlikeBodies
 
 Value = float | tuple[float, ...]
 CHECKS = {  # of rows (K, size), for each one
@@ -19,6 +20,8 @@ CHECKS = {  # of rows (K, size), for each one
         "above 0, none above the sum of the other two",
     ),
 }
+
+UNLIKE = 1e4  # from here on H may be off by 1e-12 of its diagonal: docs/stability.md
 
 
 def resolve(manifest: dict, changes: Mapping[str, object] | None) -> MappingProxyType:
@@ -106,6 +109,27 @@ def ellipsoid(values: Mapping[str, Value], links: int) -> tuple[float, float, fl
     if not sound:
         raise ModelError("parameters: tail_mass, tail_length and link_radius give no finite link_inertia: use kg and m")
     return across, along, across
+
+
+def disparity(values: Mapping[str, Value]) -> float:
+    """Return how unlike torso and tail are: moments of inertia that cancel in H over what is left, or their lengths.
+
+    That is the larger of m (|b2t| + L)^2 / min I_b and |b2t| / L, m and L being the tail's mass and length; of many
+    runs the largest.
+    """
+    with np.errstate(all="ignore"):
+        mount, length = np.linalg.norm(values["tail_mount"], axis=-1), np.asarray(values["tail_length"])
+        moments = np.asarray(values["tail_mass"]) * (mount + length) ** 2 / np.min(values["torso_inertia"], axis=-1)
+        return float(np.max(np.maximum(moments, mount / length)))
+
+
+def warn_of_unlike(values: Mapping[str, Value], calls: int = 2) -> None:
+    """Warn who called so many calls above where H loses digits by bodies of unlike size."""
+    found = disparity(values)
+    if found > UNLIKE:
+        sizes = "tail_mass, tail_length, tail_mount, torso_inertia"
+        words = f"torso and tail are unlike by {found:.1e} ({sizes}): H may be off by as many roundings"
+        warnings.warn(f"{words}; are the units kg and m?", UnlikeBodies, stacklevel=calls + 1)
 
 
 def flat(manifest: dict, values: Mapping[str, Value]) -> list[float]:

@@ -9,7 +9,7 @@ from ..program import Program, padded
 from ..scene import Scene
 from ..templating import render
 from .c import Emitted, baked_values, callee_view, step_views
-from .c_batch import STATES
+from .c_batch import STATES, straight
 from .c_function import CFunction, dialect, in_loops
 from .simulation import fields, typed
 
@@ -37,6 +37,7 @@ RECORD = fields(
 class Flights:
     """Forward dynamics over rows of states and of their parameters: its program, and the C of that."""
 
+    states: int
     program: Program
     body: CFunction
     parameters: int
@@ -46,12 +47,12 @@ class Flights:
     @property
     def state(self) -> int:
         """Where the states lie in the workspace: behind the parameters."""
-        return STATES * self.parameters
+        return self.states * self.parameters
 
     @property
     def inner(self) -> int:
         """Where the workspace of forward dynamics begins."""
-        return padded(self.state + STATES * (4 * self.size + self.nt))
+        return padded(self.state + self.states * (4 * self.size + self.nt))
 
     @property
     def work(self) -> int:
@@ -64,13 +65,12 @@ def flights(scene: Scene, tail: Tail, emitted: list[Emitted]) -> Flights | None:
     if "rollout" not in scene.functions or scene.contacts:
         return None
     (single,) = (e for e in emitted if e.function.name == "forward_dynamics")
-    fixed, straight = baked_values(scene), single.emission == "straight"
-    single = assemble(single.function, tail)
-    single = flattened(single, fixed) if straight else single
+    fixed, states, single = baked_values(scene), STATES[scene.real], assemble(single.function, tail)
+    single = flattened(single, fixed) if straight(scene, single) else single
     own = single if scene.baked else with_own_parameters(single, "forward_dynamics_of_flights")
-    rows = side_by_side(own, STATES)
+    rows = side_by_side(own, states)
     count = 0 if scene.baked else sum(a.length for a in single.of_role("parameters"))
-    return Flights(rows, in_loops(rows, scene.real, scene.name, fixed), count, tail.nq + tail.nv, tail.nt)
+    return Flights(states, rows, in_loops(rows, scene.real, scene.name, fixed), count, tail.nq + tail.nv, tail.nt)
 
 
 def flights_file(scene: Scene, found: Flights | None, context: dict) -> dict[str, str]:
@@ -87,7 +87,8 @@ def _own(scene: Scene, found: Flights) -> dict:
         names.append(rows.get(a.name, f"own + STATES * {place}"))
         place += 0 if a.name in rows else a.length
     return {
-        "states": STATES,
+        "states": found.states,
+        "widest": found.states,
         "rows": callee_view(found.program, found.body, scene.name),
         "arguments": ", ".join(names),
         "record": [{"type": typed(f.type, scene.name), "name": f.name, "meaning": f.meaning} for f in RECORD],
@@ -96,11 +97,11 @@ def _own(scene: Scene, found: Flights) -> dict:
         "inner": found.inner,
         "sixth": dialect(scene.real).literal(1 / 6),
         "steps": step_views([found], scene.real, scene.name),
-        "helpers": sorted(found.body.helpers | {"lanes"}),
+        "helpers": sorted(found.body.helpers | {"lanes", "everywhere"}),
     }
 
 
 def flights_entry(found: Flights | None) -> dict:
     """Return what a loader must know of flights: how many side by side, their workspace, the members of the record."""
     members = [[f.name, f.kind] for f in RECORD]
-    return {"flights": {"states": STATES, "work": found.work, "record": members}} if found else {}
+    return {"flights": {"states": found.states, "work": found.work, "record": members}} if found else {}

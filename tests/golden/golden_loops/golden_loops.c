@@ -97,6 +97,7 @@ typedef real golden_loops_lanes;
 #define lanes golden_loops_lanes
 #define LOAD(p) (*(const lanes *)(p))
 #define STORE(p, x) (*(lanes *)(p) = (x))
+#define ROW(size) (((size) + 7) / 8 * 8) /* numbers from one row of a matrix to the next */
 
 /* R_b from (w, x, y, z); only the direction of the quaternion counts, so it need not be normalised. */
 STEP golden_loops_quaternion_rotation(const real *quaternion, real *R_out)
@@ -794,9 +795,6 @@ STEP golden_loops_pair_without_translation_add_A_entry(const real *inverse_mass,
   A_entry_out[0] += r0;
 }
 
-/* Rows of a matrix to factor are so far apart: whole vectors. */
-#define ROW(size) (((size) + 7) / 8 * 8)
-
 /* Factor A = L^T D L in place without pivoting (lower triangle, row-major): L below 1 / D on the diagonal.  From the last
  * row up, because then all that a row takes from another one lies side by side.
  */
@@ -849,7 +847,6 @@ static void golden_loops_ldl_solve(int size, const real *A, real *x)
     x[k] = sum;
   }
 }
-#undef ROW
 
 /* H with translation eliminated, factored, and C without gravity */
 static int golden_loops_balance(const golden_loops_parameters *parameters, const real *q, const real *v, real *R,
@@ -1057,6 +1054,7 @@ int golden_loops_forward_dynamics(const golden_loops_parameters *parameters, con
 }
 
 #undef WIDE
+#undef ROW
 #undef STORE
 #undef LOAD
 #undef lanes
