@@ -208,6 +208,7 @@ MEASURES = {
     "other_peers": more_peers.other_peers,
     "scaling": scaling.scaling,
     "batch_times": batches.batch_times,
+    "rollout_rates": batches.rollout_rates,
     "tails": tails,
     "jacobian_times": derivatives.jacobian_times,
     "hessian_times": derivatives.hessian_times,
