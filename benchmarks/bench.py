@@ -14,6 +14,7 @@ import numpy as np
 import batches
 import contact_costs
 import continuum_forms
+import continuum_peer
 import derivatives
 import more_peers
 import peers
@@ -209,6 +210,7 @@ MEASURES = {
     "scaling": scaling.scaling,
     "batch_times": batches.batch_times,
     "tails": tails,
+    "continuum_peer": continuum_peer.continuum_peer,
     "jacobian_times": derivatives.jacobian_times,
     "hessian_times": derivatives.hessian_times,
     "derivative_code": derivatives.derivative_code,
