@@ -81,6 +81,7 @@ COLUMNS = {
     "lsoda_ms": "SciPy's LSODA, ms",
     "lsoda_error": "its error",
     "lsoda_ratio": "times slower",
+    "lsoda_ratio_at_our_error": "at our error",
     "mujoco_step_s": "MuJoCo's step, s",
     "points": "contact points",
     "dynamics_operations": "operations of v_dot",

@@ -17,7 +17,7 @@ import serpentail as st
 from serpentail.planning import rounds
 from serpentail.planning.formulations import dynamics
 
-CAP = 60.0  # s of CPU for what does not end
+SLOWER, CAP = 500, 300.0  # times slower than the best, or s of CPU: what does not end is cut at the lesser
 EXAMPLE = 4  # the random start
 REPEATS = 5
 NODES = {"rule": "hermite-simpson", "intervals": 29, "tolerance": None, "retries": 0, "track": False}
@@ -27,13 +27,14 @@ STARTS = {(1, 3): (200, 0.5, 95), (2, 3): (50, 10.0, 80), (3, 2): (50, 10.0, 80)
 
 
 class Cut(Exception):
-    """The cap is reached."""
+    """What does not end has taken long enough."""
 
 
 def planning(folder: Path) -> list[dict]:
     """Ways to solve one problem of 59 nodes; how often, and how fast, plans become true (<= 0.01 deg); planning again.
 
-    Paper's method: SciPy's SLSQP with finite differences of the trapezoidal program in Euler angles, at most 60 s here.
+    Paper's method: SciPy's SLSQP with finite differences of the trapezoidal program in Euler angles; cut, unsolved,
+    at 500 times the best way's time, 5 minutes at most.
     """
     models = {size: righting.model(folder / "planning", *size) for size in STARTS}
     rat, free = models[1, 3], st.Goal(torso_rate=None)
@@ -60,10 +61,9 @@ def one_problem(rat: st.Model) -> list[dict]:
         least, target = min(r["solve_cpu_s"] for r in found), "<= 0.15 s" if way == "exact Hessian" else ""
         about = f"{found[0]['iterations']} iterations, {least / best:.1f}x, {found[0]['status']}"
         rows.append(figure(f"(1, 3), 59 nodes, {way}", f"{least:.3f} s", target, about))
-    spent, about = finite_differences(rat)
-    rows.append(
-        figure("(1, 3), 59 nodes, paper's method", f"{spent:.1f} s", ">= 500x", f"{spent / best:.0f}x, {about}")
-    )
+    spent, about = finite_differences(rat, min(SLOWER * best, CAP))
+    about = f"{spent / best:.0f}x, {about}"
+    rows.append(figure("(1, 3), 59 nodes, paper's method", f"{spent:.1f} s", ">= 500x", about))
     if importlib.util.find_spec("opty") is None:
         rows.append(figure("(1, 3), opty", "not measured", "", "not installed"))
     return rows
@@ -74,14 +74,14 @@ def figure(name: str, value: str, target: str, about: str = "") -> dict:
     return {"figure": name, "value": value, "target": target, "about": about}
 
 
-def finite_differences(rat: st.Model) -> tuple[float, str]:
-    """CPU seconds of SLSQP without derivatives on the paper's program, and how it ended."""
+def finite_differences(rat: st.Model, cap: float) -> tuple[float, str]:
+    """CPU seconds of SLSQP without derivatives on the paper's program, at most `cap`, and how it ended."""
     program, limits, w, h = captured(rat)
     nlp, fixed = program.program["nlp"], limits.least == limits.most
     begun = time.process_time()
 
     def both(x):
-        if time.process_time() - begun > CAP:
+        if time.process_time() - begun > cap:
             raise Cut
         return nlp(x, h)
 
@@ -95,7 +95,7 @@ def finite_differences(rat: st.Model) -> tuple[float, str]:
         )
         status = f"{found.nit} iterations, success {found.success}"
     except Cut:
-        status = f"unsolved: cut at {CAP:.0f} s"
+        status = f"unsolved: cut at {cap:.0f} s"
     return time.process_time() - begun, status
 
 

@@ -137,13 +137,18 @@ def least(rows: list[dict], methods: tuple[str, ...], error: float) -> dict:
 
 
 def simulation_summary(folder: Path) -> list[dict]:
-    """The fastest run of a generated method in each scene whose error is at most 1e-4, beside that of SciPy's LSODA."""
+    """The fastest run of a generated method in each scene whose error is at most 1e-4, beside SciPy's LSODA's.
+
+    At the same bound of the error, and at the error that ours has: where stability, not accuracy, bounds our steps,
+    that is far below.
+    """
     found = []
     for name in SCENES:
         rows = [row for row in simulation_times(folder) if row["scene"] == name]
         own, lsoda = least(rows, GENERATED, ERROR), least(rows, ("lsoda",), ERROR)
+        equal = least(rows, ("lsoda",), own["error"])
         found.append(own | {"lsoda_ms": lsoda["ms"], "lsoda_error": lsoda["error"]})
-        found[-1] |= {"lsoda_ratio": lsoda["ms"] / own["ms"]}
+        found[-1] |= {"lsoda_ratio": lsoda["ms"] / own["ms"], "lsoda_ratio_at_our_error": equal["ms"] / own["ms"]}
     return found
 
 

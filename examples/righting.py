@@ -94,7 +94,18 @@ def _middle(points: np.ndarray) -> np.ndarray:
 
 def row(plan: st.Plan) -> dict:
     """What the studies tell of a plan."""
-    names = ("converged", "success", "iterations", "rounds", "guesses", "intervals", "duration_s", "objective")
+    names = (
+        "converged",
+        "success",
+        "iterations",
+        "rounds",
+        "guesses",
+        "intervals",
+        "duration_s",
+        "objective",
+        "effort",
+    )
     names += ("solve_cpu_s", "open_loop_attitude_error_deg", "tracked_attitude_error_deg", "tracked_tail_error_rad")
     names += ("dyn_err", "energy_J", "peak_power_W")
-    return {name: np.nan if plan.report[name] is None else plan.report[name] for name in names}
+    found = {name: np.nan if plan.report[name] is None else plan.report[name] for name in names}
+    return found | {"stopped": plan.report["stopped"]}

@@ -3,7 +3,8 @@
 import numpy as np
 
 from figures import Figure
-from subjects import Subject, changed, errors, judged, state, subject
+from serpentail.parameters import disparity
+from subjects import changed, errors, judged, state, subject
 
 MICROGRAM = 1e-9  # kg
 CASES = {
@@ -18,7 +19,6 @@ CASES = {
     "no gravity": lambda links: {"gravity": 0.0},
     "mount 1 km away": lambda links: {"tail_mount": (1e3, -1e3, 1e3)},
 }
-ORDINARY = ("links of 1 ug", "torso of 1 kg", "torso of 1 kg, links of 1 ug", "no gravity")
 LINKS = {
     "zero link inertia": {"link_inertia": (0.0, 0.0, 0.0)},
     "zero link radius": {"link_radius": 0.0},
@@ -40,14 +40,6 @@ def measured() -> list[Figure]:
         for name, change in cases(size).items():
             other = changed(of, **change)
             bends = [rng.uniform(-1, 1, of.model.nv - 6), np.zeros(of.model.nv - 6)]
-            ratio = 1.0 if name in (*ORDINARY, *LINKS) else disparity(other)
-            found += judged(of, name, [errors(other, *state(other, rng, bend)) for bend in bends], ratio)
+            unlike = max(1.0, disparity(other.model.parameters))
+            found += judged(of, name, [errors(other, *state(other, rng, bend)) for bend in bends], unlike)
     return found
-
-
-def disparity(of: Subject) -> float:
-    """Return the largest moment of inertia that a sum for H has in it, over the least that is left of it."""
-    p = of.model.parameters
-    mass, length = p["tail_mass"], p["tail_length"]
-    least = min(*p["torso_inertia"], mass * (length / of.links) ** 2 / of.links)
-    return max(1.0, mass * (np.linalg.norm(p["tail_mount"]) + length) ** 2 / least)

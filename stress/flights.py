@@ -10,6 +10,10 @@ from subjects import subject
 
 DURATION = 1000.0  # s
 TOLERANCE = 1e-8
+DRIFT = 1e-5  # of energy and of angular momentum, without damping
+FLOWN = [
+    (size, damping) for size, damped in (((1, 3), 1e-6), ((3, 4), 1e-6), ((2, None), 1e-7)) for damping in (0, damped)
+]
 
 
 def starting(model: st.Model) -> tuple[np.ndarray, np.ndarray]:
@@ -36,7 +40,7 @@ def flown(size: tuple, damping: float, duration: float = DURATION) -> st.Traject
 def measured(duration: float = DURATION) -> list[Figure]:
     """Return drifts, each over the whole flight."""
     found = []
-    for size, damping in (((1, 3), 0.0), ((1, 3), 1e-6), ((1, None), 1e-7)):
+    for size, damping in FLOWN:
         motion = flown(size, damping, duration)
         name = f"{subject(*size).name}, damping {damping:g}, {motion.t[-1]:g} s"
         found += [*drifts(name, motion, damping), Figure(f"{name}: time not flown, s", duration - motion.t[-1], 0)]
@@ -44,14 +48,14 @@ def measured(duration: float = DURATION) -> list[Figure]:
 
 
 def drifts(name: str, motion: st.Trajectory, damping: float) -> list[Figure]:
-    """Return the drift of energy (damped: its gain between samples), of angular momentum and of the quaternion."""
+    """Return drifts of energy (damped: its gain between samples), of angular momentum and of the quaternion."""
     energy = motion.kinetic / motion.kinetic[0]
     off = np.max(np.diff(energy)) if damping else np.max(np.abs(energy - 1))
     turning = np.linalg.norm(motion.angular_momentum - motion.angular_momentum[0], axis=1).max()
     turning /= np.linalg.norm(motion.angular_momentum[0])
     note = motion.info.get("refused", f"{motion.info['steps']} steps")
     return [
-        Figure(f"{name}: energy gained" if damping else f"{name}: energy", off, 1e-6 if damping else 1e-4, note),
-        Figure(f"{name}: angular momentum", turning, 1e-4),
+        Figure(f"{name}: energy gained" if damping else f"{name}: energy", off, 0.0 if damping else DRIFT, note),
+        Figure(f"{name}: angular momentum", turning, DRIFT),
         Figure(f"{name}: |quaternion| - 1", np.abs(np.linalg.norm(motion.q[:, 3:7], axis=1) - 1).max(), 1e-15),
     ]

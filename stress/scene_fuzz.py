@@ -3,9 +3,13 @@
 import contextlib
 import io
 import random
+from functools import partial
 from pathlib import Path
 
+import serpentail as st
 from serpentail import cli
+from serpentail.scene_file import read_scene, subtable
+from serpentail.simulation.scenarios import scenario_of
 from serpentail_codegen.__main__ import parser, scene_of
 from serpentail_codegen.scene import SceneError
 
@@ -14,7 +18,8 @@ BYTES = (b"", b"\0", b"\xff", b"\xef\xbb\xbf", b"=", b"[", b"]", b"[[", b'"', b"
 PIECES = (
     *BYTES, b"nan", b"-inf", b"1e999", b"1e308", b"-0.0", b"1e-320", b"9" * 30, b"0x7fffffffffffffff", b"true", b"{}",
     b"[]", b"[nan]", b"1979-05-27", b'"all"', b'"continuum"', b'"polar"', b'"float"', b"[" * 3000, b"links", b"name",
-    b"[plan]", b"[parameters]", b"segments = 10000\n", b"contacts = [1]\n", b"functions = [[]]\n", b"\xc3\xa9",
+    b"[plan]", b"[simulate]", b"[parameters]", b"segments = 10000\n", b"contacts = [1]\n", b"functions = [[]]\n",
+    b"\xc3\xa9",
 )
 # fmt: on
 
@@ -29,17 +34,20 @@ def mutated(text: bytes, dice: random.Random) -> bytes:
     return text
 
 
-def faults(files: list[Path], count: int, dice: random.Random, folder: Path) -> list[str]:
-    """Return what so many mutated files raised besides refusals, by the generator and by ``serpentail plan``."""
+def faults(files: list[Path], count: int, dice: random.Random, folder: Path, model: st.Model) -> list[str]:
+    """Return what so many mutated files raised besides refusals, read by the generator and by each verb of the runtime.
+
+    model: one that motions of files with a table [simulate] are made ready for, whatever model they name.
+    """
     found, sources = [], [path.read_bytes() for path in files]
     path = folder / "mutated.toml"
     for _ in range(count):
         path.write_bytes(mutated(dice.choice(sources), dice))
-        for read in (generated, planned):
+        for read in (generated, partial(refused, "plan"), partial(refused, "simulate"), partial(made_ready, model)):
             try:
                 read(path)
             except Exception as error:
-                found.append(f"{read.__name__}: {error!r} of {path.read_bytes()!r:.2000}")
+                found.append(f"{read}: {error!r} of {path.read_bytes()!r:.2000}")
     return found
 
 
@@ -49,9 +57,20 @@ def generated(path: Path) -> None:
         scene_of(parser().parse_args([str(path)]))
 
 
-def planned(path: Path) -> None:
-    """Plan a scene whose model was never made: the file is read, the folder refused."""
+def refused(verb: str, path: Path) -> None:
+    """Plan or simulate a scene whose folder holds no model: the file is read, the folder refused."""
+    empty = path.parent / "empty"
+    empty.mkdir(exist_ok=True)
     with contextlib.redirect_stderr(io.StringIO()) as words:
-        status = cli.main(["plan", str(path), "--folder", str(path.parent / "absent")])
+        status = cli.main([verb, str(path), "--folder", str(empty)])
     if status != 2 or not words.getvalue().strip():
         raise AssertionError(f"status {status}, {words.getvalue()!r}")
+
+
+def made_ready(model: st.Model, path: Path) -> None:
+    """Make a scene's motion ready, from where it starts: to settle takes as long as it takes."""
+    with contextlib.suppress(st.SerpentailError):
+        table = subtable(read_scene(path, st.SimulationError), "simulate", path, st.SimulationError)
+        if isinstance(table.get("start"), dict):
+            table["start"].pop("settle", None)
+        scenario_of(model, table, path.parent)

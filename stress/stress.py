@@ -47,7 +47,8 @@ def fuzzed(count: int) -> list[Figure]:
             found.append(
                 Figure(f"{model.name}: {count} calls: faults", len(faults), 0, "; ".join(map(str, faults[:3])))
             )
-        scenes = scene_fuzz.faults(sorted((ROOT / "scenes").glob("*.toml")), count, random.Random(13), folder)
+        files, model = sorted((ROOT / "scenes").glob("*.toml")), drops.falling(3, 4)
+        scenes = scene_fuzz.faults(files, count, random.Random(13), folder, model)
         found.append(Figure(f"{count} scene files: faults", len(scenes), 0, "; ".join(scenes[:3])))
     return found
 

@@ -3,11 +3,14 @@
 from pathlib import Path
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.figure import Figure as Page
 
 from figures import Figure
 from poses import Point
 from subjects import PER_CONDITION
+
+LEAST = 1e-5  # share of a limit that is told from less
 
 
 def draw(found: dict[str, list[Figure]], swept: list[Point], folder: Path) -> None:
@@ -19,45 +22,51 @@ def draw(found: dict[str, list[Figure]], swept: list[Point], folder: Path) -> No
 
 
 def bends(swept: list[Point]) -> Page:
-    """Errors of H, C and v_dot along the bend, one row of axes for each tail."""
-    page = Page(figsize=(8, 3.4), layout="constrained")
+    """Errors of H, C and v_dot, one place for each bend, one axes for each tail."""
+    page = Page(figsize=(8, 6), layout="constrained")
     tails = list(dict.fromkeys(p.tail for p in swept))
-    for axes, tail in zip(page.subplots(1, len(tails), sharey=True), tails, strict=True):
-        points = [p for p in swept if p.tail == tail and p.bend > 0]
+    places = sorted({p.bend for p in swept})
+    for axes, tail in zip(page.subplots(len(tails), 1, sharex=True, sharey=True), tails, strict=True):
+        points = [p for p in swept if p.tail == tail]
         for name, marker in (("H", "o"), ("C", "s"), ("per_condition", "^")):
-            axes.plot(
-                [p.bend for p in points], [max(getattr(p.errors, name), 1e-18) for p in points], marker, label=name
-            )
-        axes.set(xscale="log", yscale="log", title=tail, xlabel="bend of each segment, rad")
-        axes.legend(["H", "C", "v_dot / cond(H)"])
-    page.axes[0].set_ylabel("error against 30 digits")
+            found = [max(getattr(p.errors, name), 1e-18) for p in points]
+            words = "v_dot / cond(H)" if name == "per_condition" else name
+            axes.plot([places.index(p.bend) for p in points], found, marker, label=words, markersize=5)
+        axes.set(yscale="log", title=tail, ylabel="error against 30 digits")
+        axes.grid(axis="x", color="0.9")
+    axes.set_xticks(range(len(places)), [f"{bend:.3g}" for bend in places], rotation=60)
+    axes.set_xlabel("bend of each segment, rad")
+    page.legend(*axes.get_legend_handles_labels(), loc="outside right upper")
     return page
 
 
 def conditions(found: dict[str, list[Figure]]) -> Page:
     """Errors of v_dot against the condition number of H, and their bound."""
-    page = Page(figsize=(6, 4), layout="constrained")
+    page = Page(figsize=(8, 4), layout="constrained")
     axes = page.subplots()
     for part, figures in found.items():
         solved = [f for f in figures if f.note.startswith("cond(H)")]
         numbers = [float(f.note.split()[1]) for f in solved]
         if solved:
             axes.plot(numbers, [max(c * f.found, 1e-18) for c, f in zip(numbers, solved, strict=True)], ".", label=part)
-    high = axes.get_xlim()[1]
-    axes.plot([1, max(high, 10)], [PER_CONDITION, PER_CONDITION * max(high, 10)], "k--", label="5e-15 cond(H)")
+    ends = np.array([1, max(10, axes.get_xlim()[1])])
+    axes.plot(ends, PER_CONDITION * ends, "k--", label="5e-15 cond(H)")
     axes.set(xscale="log", yscale="log", xlabel="cond(H), unit diagonal", ylabel="error of v_dot")
-    axes.legend()
+    axes.set_title("above the line: torso and tail of unlike size", fontsize=9)
+    page.legend(loc="outside right upper")
     return page
 
 
 def margins(found: dict[str, list[Figure]]) -> Page:
     """How much of its limit each figure takes, by part."""
-    page = Page(figsize=(7, 4), layout="constrained")
+    page = Page(figsize=(8, 4), layout="constrained")
     axes = page.subplots()
     names = [name for name in found if any(f.limit > 0 for f in found[name])]
     for row, name in enumerate(names):
-        shares = [max(f.found / f.limit, 1e-6) for f in found[name] if f.limit > 0]
+        shares = [max(f.found / f.limit, LEAST) for f in found[name] if f.limit > 0]
         axes.plot(shares, [row] * len(shares), "|", markersize=10)
     axes.axvline(1, color="k", linestyle="--")
-    axes.set(xscale="log", xlabel="found / limit", yticks=range(len(names)), yticklabels=names)
+    axes.set(xscale="log", xlabel=f"found / limit (left edge: {LEAST:g} or less)", yticks=range(len(names)))
+    axes.set(xlim=(LEAST / 2, 3), yticklabels=names)
+    axes.invert_yaxis()
     return page

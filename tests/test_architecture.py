@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[1]
 SOURCES = sorted(path for package in (CODEGEN, RUNTIME) for path in package.rglob("*.py"))
 TEMPLATES = sorted((CODEGEN / "templates").glob("*.jinja"))
 DERIVATION = {"kinematics", "dynamics", "lane_dynamics", "continuum", "polar_continuum", "legs", "contact", "stiffness"}
-DERIVATION |= {"lower"}
+DERIVATION |= {"lower", "articulated_bodies"}
 WITHOUT_SYMPY = (
     "tape",
     "program",

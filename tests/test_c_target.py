@@ -17,12 +17,12 @@ import pytest
 from models import model_folder
 from references.parameters import random_states
 from serpentail_codegen.catalogue import CATALOGUE
-from serpentail_codegen.functions import program
 from serpentail_codegen.interpret import Numbers, Run
 from serpentail_codegen.pipeline import tail_of
 from serpentail_codegen.scene import DERIVATIVES, parse_scene
 from serpentail_codegen.scene import FUNCTIONS as NAMES
 from serpentail_codegen.tape import Step
+from serpentail_codegen.targets.c import in_form
 from serpentail_codegen.targets.c_function import Routine, routine_lines
 
 STRICT = ("-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Wdouble-promotion", "-Wshadow", "-Werror")
@@ -36,6 +36,8 @@ MODELS = {
     "m1_n1_baked_straight": {"baked": True, "emission": "straight"},
     "m2_n2_baked_loops": {"baked": True, "emission": "loops"},
     "m2_n2_baked_float": {"baked": True, "emission": "loops", "real": "float"},
+    "m2_n2_double_segments": {"emission": "segments"},
+    "m2_n2_float_segments": {"real": "float", "emission": "segments"},
     "m1_n1_double_reproducible": {"profile": "reproducible", "emission": "straight"},
     "m2_n2_float_reproducible": {"profile": "reproducible", "emission": "loops", "real": "float"},
 }
@@ -252,8 +254,13 @@ class Arithmetic(Numbers):
     """The arithmetic of a model's C: its rounding, its constants, its own sine and cosine."""
 
     def __init__(self, library):
-        functions = SimpleNamespace(sin=lambda x: library.sincos(x)[0], cos=lambda x: library.sincos(x)[1], sqrt=None)
+        functions = SimpleNamespace(sin=lambda x: self.each(x, 0), cos=lambda x: self.each(x, 1), sqrt=None)
         super().__init__(functions, library.number)
+        self.library = library
+
+    def each(self, x, k):
+        """Sine or cosine of a number, or of each lane of a row."""
+        return np.array([self.library.sincos(lane)[k] for lane in x]) if np.ndim(x) else self.library.sincos(x)[k]
 
     def const(self, value):
         """The nearest number of the C type, zero where that type has no normal number so small."""
@@ -268,7 +275,7 @@ def parameter_values(model):
 
 def interpreted(model, name, arguments, arithmetic):
     """Run a function's program; return its outputs."""
-    p = program(CATALOGUE[name], tail_of(model.scene))
+    _, p = in_form(model.manifest["functions"][name]["emission"], CATALOGUE[name], tail_of(model.scene))
     known = parameter_values(model) | arguments
     arrays = (*p.of_role("parameters"), *p.of_role("input"))
     values = Run(p, arithmetic, {a.name: [arithmetic.convert(x) for x in known[a.name]] for a in arrays}).values
@@ -521,7 +528,7 @@ def test_automatic_form_is_straight_until_the_code_grows_large():
         model = Model("one", *size, functions=["forward_dynamics"], **options)
         return model.manifest["functions"]["forward_dynamics"]["emission"]
 
-    assert (emission((1, 1)), emission((8, 16))) == ("straight", "loops")
+    assert (emission((1, 1)), emission((8, 16))) == ("straight", "segments")
     assert emission((1, 1), emission="loops") == "loops"
 
 

@@ -32,7 +32,7 @@ def outputs(program, given):
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("name", ["forward_dynamics", "forward_dynamics_external"])
 def test_sweeps_in_lanes_give_the_same_acceleration(size, name):
-    plain, lanes = (program(FUNCTIONS[name], Tail(*size), in_lanes) for in_lanes in (False, True))
+    plain, lanes = (program(FUNCTIONS[name], Tail(*size), dynamics) for dynamics in ("composite", "lanes"))
     assert plain != lanes
     given = arguments(plain)
     expected, found = outputs(plain, given)["v_dot"], outputs(lanes, given)["v_dot"]
@@ -97,7 +97,7 @@ def _spread(rows, wide):
 
 
 def test_matrices_beyond_the_limit_keep_their_loops():
-    long = program(FUNCTIONS["forward_dynamics"], Tail(7, 1), True)
+    long = program(FUNCTIONS["forward_dynamics"], Tail(7, 1), "lanes")
     assert written_out(long, 12) == long
 
 
@@ -113,7 +113,7 @@ def test_factor_and_solve_invert():
 @pytest.mark.parametrize("size", [(2, 4), (3, 4), pytest.param((7, 3), marks=pytest.mark.slow)])
 def test_long_tails_run_in_lanes_and_agree_with_loops(size):
     names = ["forward_dynamics", "mass_matrix", "bias_force"]
-    fast, plain = (st.load(model_folder(*size, functions=names, emission=e)) for e in ("auto", "loops"))
+    fast, plain = (st.load(model_folder(*size, functions=names, emission=e)) for e in ("lanes", "loops"))
     text = (fast.folder / "src" / f"{fast.name}.c").read_text()
     assert "gather_lanes" in text and "gather_lanes" not in (plain.folder / "src" / f"{plain.name}.c").read_text()
     for q, v, *_ in zip(*random_states(size[0], 1, 5, "random"), strict=True):
@@ -130,7 +130,7 @@ def test_long_tails_run_in_lanes_and_agree_with_loops(size):
 def test_the_fast_form_serves_derivatives_too():
     tail = Tail(3, 4)
     name = "forward_dynamics_derivatives"
-    plain, lanes = (program(CATALOGUE[name], tail, in_lanes) for in_lanes in (False, True))
+    plain, lanes = (program(CATALOGUE[name], tail, dynamics) for dynamics in ("composite", "lanes"))
     given = arguments(plain)
     expected, found = outputs(plain, given), outputs(lanes, given)
     for key, value in expected.items():

@@ -12,6 +12,7 @@ import pytest
 import serpentail as st
 from models import model_folder
 from serpentail import compiler
+from serpentail_codegen.write import signed
 
 UPRIGHT = [0, 0, 0, 1, 0, 0, 0, 0, 0]
 AGAIN = "generate it again (`make model`, or python -m serpentail_codegen SCENE.toml)"
@@ -45,11 +46,11 @@ def script(tmp_path, monkeypatch):
     return install
 
 
-def edit(folder, **changes):
-    """Change entries of the manifest; None removes one."""
+def edit(folder, change=lambda manifest: manifest, **changes):
+    """Change entries of the manifest, then the whole; None removes an entry."""
     path = folder / "manifest.json"
     manifest = {k: v for k, v in (json.loads(path.read_text()) | changes).items() if v is not None}
-    path.write_text(json.dumps(manifest))
+    path.write_text(json.dumps(change(manifest)))
 
 
 def refusal(folder):
@@ -88,7 +89,19 @@ def test_half_a_manifest(folder):
 
 @pytest.mark.parametrize(
     "key",
-    ["format", "generator", "abi_hash", "prefix", "real", "dimensions", "parameters", "functions", "work", "files"],
+    [
+        "format",
+        "generator",
+        "abi_hash",
+        "prefix",
+        "real",
+        "dimensions",
+        "parameters",
+        "functions",
+        "work",
+        "files",
+        "manifest_hash",
+    ],
 )
 def test_manifest_without_an_entry(folder, key):
     edit(folder, **{key: None})
@@ -116,8 +129,33 @@ def test_missing_file_is_named(folder, name):
     assert refusal(folder) == expected
 
 
+def larger(manifest):
+    """The tail of a segment more: what C then reads lies beyond the arrays it is given."""
+    sizes = manifest["dimensions"]
+    return manifest | {"dimensions": sizes | {"segments": 2, "nq": sizes["nq"] + 2, "nv": sizes["nv"] + 2}}
+
+
+def heavier(manifest):
+    """Another default of a parameter."""
+    manifest["parameters"][1]["default"] *= 2
+    return manifest
+
+
+@pytest.mark.parametrize("change", [larger, heavier, lambda manifest: manifest | {"work": {"mass_matrix": 0, "x": 1}}])
+def test_manifest_changed_by_hand_is_named(folder, change):
+    edit(folder, change)
+    message = refusal(folder)
+    assert message.startswith(f"{folder / 'manifest.json'} was changed after it was generated: delete {folder}")
+    assert "st.load(folder, parameters=...)" in message
+
+
+def test_manifest_laid_out_anew_is_the_same(folder):
+    edit(folder, lambda manifest: dict(sorted(manifest.items())))
+    assert st.load(folder).name == "tail"
+
+
 def test_manifest_of_other_code(folder):
-    edit(folder, abi_hash="0123456789abcdef")
+    edit(folder, signed, abi_hash="0123456789abcdef")
     message = refusal(folder)
     assert "the manifest 0123456789abcdef" in message and message.endswith(f"delete {folder} and {AGAIN}")
 

@@ -72,3 +72,14 @@ def test_under_a_torso_that_stays_a_link_needs_its_own_inertia():
     m, length, inertia = (model.parameters[name] for name in ("tail_mass", "tail_length", "link_inertia"))
     tau = model.pfl([0, 0, 0, 1, 0, 0, 0, 0, 0], np.zeros(8), [3.0, 5.0])
     np.testing.assert_allclose(tau, np.array([3, 5]) * (np.array(inertia)[[0, 2]] + m * length**2 / 4), rtol=1e-9)
+
+
+@pytest.mark.parametrize(("segments", "links", "options"), CASES)
+def test_its_accelerations_are_those_of_forward_dynamics(segments, links, options):
+    model = model_of(segments, links, ["pfl", "rollout", "energy", "momentum"], **options)
+    q, v, v_dot, _ = random_states(segments, 3, 20, "random")
+    tau, found = model.kernel("tracked_dynamics")(q, v, v_dot[:, 6:])
+    np.testing.assert_array_equal(found[:, 6:], v_dot[:, 6:])
+    np.testing.assert_allclose(tau, model.pfl(q, v, v_dot[:, 6:]), rtol=1e-12, atol=1e-14)
+    expected = model.forward_dynamics(q, v, tau)
+    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-10 * np.abs(expected).max())

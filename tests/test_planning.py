@@ -3,6 +3,7 @@
 import re
 import signal
 import threading
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,9 +14,13 @@ from scipy.integrate import solve_ivp
 
 import serpentail as st
 from models import model_folder
-from serpentail.planning import interrupt, solver, transcription
+from serpentail.planning import interrupt, rounds, solver, transcription
 from serpentail.planning.attitude import Attitude, angle_deg, from_angles
+from serpentail.planning.formulations import dynamics
+from serpentail.planning.multipliers import carried
 from serpentail.planning.recovery import full_state
+from serpentail.planning.threads import _blas, one_thread
+from serpentail.planning.transcription import program_of
 from serpentail.planning.truth import local_errors, open_loop
 from serpentail.trajectory import rotation_matrix
 from serpentail_codegen.pipeline import generate
@@ -119,6 +124,32 @@ def test_refinement_reduces_the_true_error():
     assert fine["open_loop_attitude_error_deg"] <= 1e-3 < coarse["open_loop_attitude_error_deg"]
 
 
+def test_multipliers_are_carried_to_another_mesh():
+    """The solver finds about the same ones there, from nothing; on the mesh itself they stay, to rounding."""
+    settings = AGAIN | {"start": start(rat()), "bounds": st.Bounds(angle=0.45)}
+    programs, solutions = [], []
+    for intervals in (24, 36):
+        plan = st.plan(rat(), intervals=intervals, **settings)
+        programs.append(program_of(rat(), plan.problem, plan.mesh, plan.rule, dynamics(rat())))
+        solutions.append(plan.solution.multipliers)
+    assert np.abs(solutions[0][0]).max() > 1e-3  # a bound is active
+    for kept, given in zip(carried(solutions[0], programs[0], programs[0]), solutions[0], strict=True):
+        np.testing.assert_allclose(kept, given, atol=1e-12)
+    for found, wanted in zip(carried(solutions[0], *programs), solutions[1], strict=True):
+        assert np.linalg.norm(found - wanted) < 0.1 * np.linalg.norm(wanted)
+
+
+def test_refinement_goes_on_from_the_multipliers(monkeypatch):
+    model, settings = rat(), AGAIN | {"intervals": 8, "tolerance": 1e-4}
+    iterations = []
+    for carry in (carried, lambda *_: None):
+        monkeypatch.setattr(rounds, "carried", carry)
+        plan = st.plan(model, start=start(model), **settings)
+        assert plan.success and plan.report["rounds"] > 1
+        iterations.append(plan.report["iterations"])
+    assert iterations[0] < iterations[1]
+
+
 def test_what_cannot_be_refined_is_flagged():
     plan = planned(rule="trapezoidal", intervals=10, tolerance=1e-6, rounds=1)
     assert not plan.success and plan.report["converged"] and not plan.report["success"]
@@ -213,6 +244,14 @@ def _first_rate(point):
     return point.tail_rate[0]
 
 
+def test_solver_uses_one_thread_and_gives_back_the_others():
+    blas = _blas()
+    before = blas.openblas_get_num_threads()
+    with one_thread():
+        assert blas.openblas_get_num_threads() == 1
+    assert blas.openblas_get_num_threads() == before
+
+
 def test_several_guesses_are_at_least_as_good_as_one():
     one, many = planned(tolerance=None, intervals=8), planned(tolerance=None, intervals=8, multi_start=3)
     assert many.report["guesses"] >= 3 and many.report["objective"] <= one.report["objective"] * (1 + 1e-6)
@@ -246,9 +285,10 @@ def test_torques_that_no_model_survives_are_an_infinite_error():
     """A motion that leaves what the model describes has no truth: nan from there on, never an exception."""
     plan, model = planned(tolerance=None), rat()
     wild = replace(plan.curve, nodes=plan.curve.nodes | {"torque": 1e9 + 0 * plan.curve.nodes["torque"]})
-    q, v = open_loop(model, wild, 0.0, (plan.problem.q0, plan.problem.v0))
-    assert np.isfinite(q[0]).all() and np.isnan(q[-1]).all()
-    assert np.isfinite(local_errors(model, wild, 0.0, np.repeat(q[:1], len(q), 0), np.repeat(v[:1], len(v), 0))).all()
+    start = (plan.problem.q0, plan.problem.v0)
+    assert np.isnan(np.concatenate(open_loop(model, wild, 0.0, start))).all()
+    errors = local_errors(model, wild, 0.0, *(np.tile(x, (len(wild.ends), 1)) for x in start))
+    assert np.isfinite(errors).all()
 
 
 def test_example_of_the_document_runs(tmp_path, monkeypatch, capsys):
@@ -293,6 +333,7 @@ def test_other_problems_and_models_share_no_program():
 def test_interrupt_returns_the_best_so_far():
     """Ctrl-C in the first solve gives its iterate, flagged; in a later round, the round before; never an exception."""
     model, settings = rat(), AGAIN | {"tolerance": 1e-9, "rounds": 30}
+    st.plan(model, start=start(model), intervals=30, **settings, time_limit=0.01)  # derives before signals are heeded
     before = signal.getsignal(signal.SIGINT)
     for delay in (0.05, 1.0):
         timer = threading.Timer(delay, signal.raise_signal, (signal.SIGINT,))
@@ -301,7 +342,48 @@ def test_interrupt_returns_the_best_so_far():
         timer.cancel()
         assert not plan.success and np.isfinite(plan.solution.w).all()
         assert plan.report["converged"] or plan.report["status"] == "User_Requested_Stop"
+        assert plan.report["stopped"] == "interrupt"
         assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_time_limit_ends_a_solve_inside_and_returns_its_iterate():
+    """A solve that would take a million iterations; a limit that is not reached changes nothing."""
+    model, endless = rat(), {"ipopt.tol": 1e-300, "ipopt.acceptable_iter": 0, "ipopt.max_iter": 10**6}
+    common = AGAIN | {"start": start(model), "intervals": 40, "options": endless}
+    st.plan(model, **common, time_limit=0.01)  # derives
+    begun = time.perf_counter()
+    cut = st.plan(model, **common, time_limit=0.5)
+    assert 0.5 <= time.perf_counter() - begun < 30.0
+    assert (cut.success, cut.report["stopped"], cut.report["guesses"]) == (False, "time limit", 1)
+    assert cut.report["status"] == "User_Requested_Stop" and cut.report["iterations"] > 1
+    free, limited = (
+        st.plan(model, start=start(model), intervals=6, **AGAIN, **own) for own in ({}, {"time_limit": 60})
+    )
+    assert limited.report["stopped"] is None and limited.success
+    np.testing.assert_array_equal(free.solution.w, limited.solution.w)
+
+
+def test_time_limit_ends_refinement_with_the_best_round(monkeypatch):
+    """Between rounds: what was solved before is kept, and is good for all but the tolerance."""
+    model, settings = rat(), AGAIN | {"intervals": 6, "tolerance": 1e-12}
+    monkeypatch.setattr(rounds, "asked", lambda: "time limit")
+    cut = st.plan(model, start=start(model), **settings)
+    assert not cut.success and cut.report["converged"]
+    assert (cut.report["stopped"], cut.report["rounds"]) == ("time limit", 1)
+
+
+def test_time_limits_are_of_one_thread():
+    found = {}
+
+    def other():
+        with interrupt.heeded(3600.0):
+            found["other"] = interrupt.asked()
+
+    with interrupt.heeded(1e-9):
+        thread = threading.Thread(target=other)
+        thread.start()
+        thread.join()
+        assert (interrupt.asked(), found["other"]) == ("time limit", None)
 
 
 def test_second_interrupt_is_the_usual_one():

@@ -57,6 +57,8 @@ def refused(**changes) -> str:
         ({"degree": 12}, "degree: value 12"),
         ({"intervals": 0}, "intervals: value 0: needs a whole number from 1"),
         ({"tolerance": 0.0}, "tolerance: value 0.0"),
+        ({"time_limit": 0}, "time_limit: value 0: needs a number above 0"),
+        ({"time_limit": float("nan")}, "time_limit: value nan"),
         ({"interval": 20}, "setting: value 'interval': did you mean 'intervals'?"),
         ({"guess": 3}, "guess: value 3: needs a Plan or a Trajectory"),
         ({"solver": "no_such"}, "solver: value 'no_such'"),

@@ -14,7 +14,7 @@ from serpentail_codegen.functions import FUNCTIONS, program
 from serpentail_codegen.interpret import Numbers, Run, branches, ldl_factor, ldl_solve, pair_factor, pair_solve, unroll
 from serpentail_codegen.program import Apply, Array, Builder, Fill, Index, Loop, as_index, narrowed, statements
 from serpentail_codegen.tape import Step, Tape, live_nodes, replay
-from serpentail_codegen.targets.c_function import in_loops
+from serpentail_codegen.targets.c_function import in_loops, routine_lines
 
 TAILS = {"m1_n2": Tail(1, 2), "m2_n3": Tail(2, 3), "continuum_m2": Tail(2, 3, "continuum")}
 FLOATS = Numbers(math, float)
@@ -457,9 +457,32 @@ def test_a_guard_under_a_condition_cannot_be_unrolled():
         unroll(b.finish())
 
 
-def test_c_steps_read_no_scalars_that_lie_apart():
+def test_a_lane_of_several_rows_is_read_and_written():
+    b = Builder("down", "Columns of lanes.")
+    x, u, rows = b.array("x", 2, 3, role="input"), b.array("u", 2, 3, role="output"), b.wide("rows", 4, 3)
+    b.fill(rows.part(0, 4), 7)
+    with b.loop("i", 3) as i:
+        b.copy(rows.down(2, i, 2), x[i])
+        b.apply(SWAP, {"x": rows.down(2, i, 2)}, x=rows.down(2, i, 2))
+        b.copy(u[i], rows.down(1, i, 2))
+    values = Run(b.finish(), EXACT, {"x": [Fraction(k) for k in range(6)]}).values
+    assert values["u"] == [7, 1, 7, 3, 7, 5]
+    assert [list(row) for row in values["rows"][2:]] == [[1, 3, 5], [0, 2, 4]]
+    assert "rat_swap_x_apart_8(rows + i + 16, x_new);" in "".join(in_loops(b.finish(), "double", "rat").lines)
+
+
+def test_c_steps_read_scalars_that_lie_apart():
     b = Builder("apart", "A stride.")
     x, u = b.array("x", 4, role="input"), b.array("u", 2, role="output")
     b.apply(SWAP, {"x": x.part(0, 2, 2)}, x=u[0])
-    with pytest.raises(ValueError, match="swap reads x from places apart"):
+    (routine,) = in_loops(b.finish(), "double", "rat").routines
+    assert routine_lines(routine, "double", "rat")[-2:] == ["x_out[0] = r0;", "x_out[1] = r1;"]
+    assert "const real r0 = x[2];" in routine_lines(routine, "double", "rat")
+
+
+def test_c_steps_read_no_rows_that_lie_apart():
+    b = Builder("apart", "A stride.")
+    x, u = b.wide("x", 4, 3), b.wide("u", 2, 3)
+    b.apply(SWAP, {"x": x.part(0, 2, 2)}, x=u[0])
+    with pytest.raises(ValueError, match="swap reads rows from places apart"):
         in_loops(b.finish(), "double", "rat")

@@ -12,6 +12,10 @@ import scene_fuzz
 import serpentail as st
 from call_fuzz import Fault, Target
 from models import model_folder
+from references.metrics import mass_matrix_error
+from serpentail.parameters import UNLIKE as UNLIKE_FROM
+from serpentail.parameters import disparity
+from subjects import Subject, changed, exact_of, state
 
 SCENES = sorted((Path(__file__).parent.parent / "scenes").glob("*.toml"))
 slow_count = pytest.param(10_000, marks=pytest.mark.slow)
@@ -48,8 +52,10 @@ def test_the_fuzz_sees_bare_errors():
 
 @pytest.mark.parametrize("count", [300, slow_count])
 def test_mutated_scene_files_are_read_or_refused(count, tmp_path, monkeypatch):
+    functions = ["forward_dynamics", "rollout", "energy", "momentum", "pfl"]
+    model = st.load(model_folder(3, 4, contacts=["feet", "tail", "torso"], functions=functions))
     monkeypatch.chdir(tmp_path)
-    assert scene_fuzz.faults(SCENES, count, random.Random(count), tmp_path) == []
+    assert scene_fuzz.faults(SCENES, count, random.Random(count), tmp_path, model) == []
 
 
 @pytest.mark.parametrize("method", ["ros34pw2", "tsit5", "dop853"])
@@ -61,6 +67,53 @@ def test_a_drop_gains_no_energy(method):
         legs = st.Legs.fixed(rng.uniform(2, 4.5), rng.uniform(-1.5, 1))
     settings = {"controller": st.Damping(1e-4), "legs": legs, "t_span": drops.DURATION, "output_step": 0.01}
     assert drops.gain(st.simulate(model, q, v, method=method, **settings)) <= drops.GAIN
+
+
+UNLIKE = {
+    "a tail of 1 km": {"tail_length": 1e3},
+    "a tail of 1 um": {"tail_length": 1e-6},
+    "a torso of 1 mg": {"torso_mass": 1e-6, "torso_inertia": (1e-12, 1e-12, 1e-12)},
+    "a mount 1 km away": {"tail_mount": (1e3, -1e3, 1e3)},
+}
+
+
+@pytest.mark.parametrize("change", UNLIKE.values(), ids=UNLIKE)
+def test_bodies_of_unlike_size_are_told(lying, change):
+    with pytest.warns(st.UnlikeBodies, match=r"unlike by .*: H may be off by as many roundings; are the"):
+        other = lying.with_parameters(**change)
+    with pytest.warns(st.UnlikeBodies):
+        st.load(lying.folder, parameters=change)
+    assert other.parameters["tail_mass"] == lying.parameters["tail_mass"]
+
+
+def test_the_warning_is_true(lying):
+    """It comes where H is off by more than 1e-12, and an error is never more than it says."""
+    off = {}
+    for name, change in UNLIKE.items():
+        of = changed(Subject("", lying, None), **change)
+        straight = [errors_of_mass_matrix(of, state(of, np.random.default_rng(k), np.zeros(4))[0]) for k in range(5)]
+        off[name] = max(straight) / disparity(of.model.parameters)
+    assert max(off.values()) < np.finfo(float).eps
+    worst = max(off, key=lambda name: off[name] * disparity(lying.parameters | UNLIKE[name]))
+    assert off[worst] * disparity(lying.parameters | UNLIKE[worst]) > 1e-12
+
+
+@pytest.mark.parametrize("name", ["standing", "lying"])
+def test_bodies_without_the_warning_keep_their_digits(request, name):
+    """Random bodies as unlike as may be without it."""
+    of, rng, quiet = Subject("", request.getfixturevalue(name), None), np.random.default_rng(4), 0
+    while quiet < 12:
+        heavy, long, wide = 10 ** rng.uniform(-4, 4), 10 ** rng.uniform(-3, 3), 10 ** rng.uniform(-3, 3)
+        change = {"tail_mass": 3.5e-3 * heavy, "tail_length": 0.2 * long, "tail_mount": (0, -0.04 * wide, 4e-3 * wide)}
+        if 1e2 < disparity(of.model.parameters | change) < UNLIKE_FROM:
+            other, quiet = Subject("", of.model.with_parameters(**change), None), quiet + 1
+            for bends in (np.zeros(of.model.nv - 6), rng.uniform(-1, 1, of.model.nv - 6)):
+                assert errors_of_mass_matrix(other, state(other, rng, bends)[0]) < 1e-12
+
+
+def errors_of_mass_matrix(of, q):
+    """Error of H against 30 digits, in units of its diagonal."""
+    return mass_matrix_error(of.model.mass_matrix(q), exact_of(of.model).mass_matrix(q))
 
 
 def test_vjp_of_a_model_with_contacts_is_that_of_flight(standing):
@@ -80,12 +133,33 @@ def test_vjp_of_a_model_with_contacts_is_that_of_flight(standing):
         ({"stop_at": np.zeros((2, 2))}, "stop_at"),
         ({"method": "rk4", "step": 1e-320}, "step 1e-320: too short"),
         ({"output_step": 1e-320}, "output_step 1e-320: more than"),
+        ({"method": "lsoda", "t_span": 1e-320}, "output_step .*: too short to move the time: give 1e-100"),
+        ({"t_span": (1e10, 1e10 + 4e-6)}, "output_step .*: too short to move the time: give 2.2e-06 s"),
+        ({"method": "ros34pw2", "rtol": 1e-320}, "rtol 1e-320: too near to rounding: give 2.2e-14"),
+        ({"method": "dop853", "rtol": 1e-15}, "rtol 1e-15: too near to rounding"),
+        ({"method": "ros34pw2", "most_step": 1e-200}, "most_step 1e-200: too short to move the time"),
     ],
 )
 def test_simulations_that_cannot_be_are_refused(standing, settings, words):
     q = np.array([0, 0, 0.3, 1, 0, 0, 0, 0, 0.0])
     with pytest.raises(st.SimulationError, match=words):
-        st.simulate(standing, q, np.zeros(8), legs=st.Legs.fixed(3.6, -0.3), t_span=0.01, **settings)
+        st.simulate(standing, q, np.zeros(8), legs=st.Legs.fixed(3.6, -0.3), **({"t_span": 0.01} | settings))
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda model: st.Legs.ramp(3.6, (-0.3, -1.0), 0.4, 1e-320), "takes inf s"),
+        (lambda model: st.Reference([0.0, 1.0], [1, [2, 3]]), "Reference: angles is not made of real numbers"),
+        (lambda model: st.Pfl(model, ([0.0, 1.0], np.zeros((2, 2))), 10**60), "Pfl: kp is not made of real numbers"),
+        (lambda model: st.Pfl(model, np.zeros((2, 3), complex)), "Pfl: times is not made of real numbers"),
+        (lambda model: st.Pfl(model, ([0.0], np.zeros((1, 2)))), "Pfl: one node only"),
+        (lambda model: model.external_force(moment=(0, np.nan, 0)), "external_force: moment is not finite"),
+    ],
+)
+def test_arguments_that_the_fuzz_once_broke_are_refused(standing, call, words):
+    with pytest.raises(st.SerpentailError, match=words):
+        call(standing)
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ from collections.abc import Callable
 
 import pytest
 
+import memory
 import misra
 from boards import BOARDS, ToolchainMissing
 
@@ -26,3 +27,8 @@ def board(name: str):
 def cppcheck() -> None:
     """Ask for cppcheck."""
     _required(misra.need)
+
+
+def valgrind() -> None:
+    """Ask for valgrind."""
+    _required(memory.need)

@@ -19,7 +19,7 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--links", type=int, help="n, in each segment")
     p.add_argument("--functions", help=f"comma-separated, of {', '.join(ALL)}; all: all of them")
     p.add_argument("--real", help="double or float")
-    p.add_argument("--emission", help="auto, straight or loops")
+    p.add_argument("--emission", help="auto, straight, loops, lanes or segments")
     p.add_argument("--profile", help="fast, or reproducible: the same bits on every machine")
     p.add_argument("--baked", action="store_true", help="fold the parameters into the code")
     p.add_argument("--output", type=Path, default=Path("generated"), help="parent of the generated folder")

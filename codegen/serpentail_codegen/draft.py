@@ -58,12 +58,13 @@ class Draft(Builder):
 
     ``pieces`` are arrays with one entry a segment that describe its rigid links or its arc, ``samples`` those that
     describe what lies between two tail points.  ``at_rest``: nothing moves, there are accelerations only.
-    ``in_lanes``: sweeps may carry several vectors as lanes of one.
+    ``dynamics`` of an articulated tail: "composite", H column by column; "lanes", its columns are lanes; "segments",
+    v_dot comes about without H where nothing else is asked for.
     """
 
     tail: Tail | None = None
     at_rest: bool = False
-    in_lanes: bool = False
+    dynamics: str = "composite"
     known: dict[str, Ref] = field(default_factory=dict)
     pieces: dict[str, Array] = field(default_factory=dict)
     samples: dict[str, Array] = field(default_factory=dict)

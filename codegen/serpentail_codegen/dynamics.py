@@ -289,6 +289,11 @@ def free_acceleration(let, inverse_mass, com, net, w_dot) -> dict:
     return {"a": inverse_mass[0] * net - w_dot.cross(com)}
 
 
+def world_acceleration(let, R, gravity, a) -> dict:
+    """p_b_ddot = R_b a - g z."""
+    return {"p_ddot": square(R) * a - gravity[0] * Z}
+
+
 def coupling_torque(let, column, a, w_dot) -> dict:
     """What accelerations of the torso add to the torque of one tail coordinate."""
     return {"torque": [column[0:3, :].dot(a) + column[3:6, :].dot(w_dot)]}

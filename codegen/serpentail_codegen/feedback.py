@@ -1,9 +1,10 @@
 """Partial feedback linearisation: a draft goes in, the torques that give wanted tail accelerations are added to it."""
 
 from . import dynamics as dyn
+from . import kinematics as kin
 from . import sweeps
 from .draft import Draft
-from .functions import Argument, Function, Q, V
+from .functions import V_DOT, Argument, Function, Q, V
 from .program import Array, padded
 from .sweeps import column_of, mechanism
 
@@ -14,24 +15,29 @@ TORQUES = Argument("tau", lambda t: (t.nt,), "torques (N m), conjugate to the ta
 def assemble_pfl(d: Draft, arrays: dict[str, Array]) -> None:
     """Torques of Eq. 46 without X: six rows of Eq. 1 give the torso's accelerations, the others then the torques.
 
-    In flight gravity moves torso and tail alike, and torques depend on neither place nor attitude.
+    In flight gravity moves torso and tail alike, and torques depend on neither place nor attitude.  With ``v_dot``
+    among the arguments it is all accelerations, which need no forward dynamics then.
     """
     tail, tau = d.tail, arrays["tau"]
+    v_dot = arrays.get("v_dot") or d.array("v_dot", tail.nv)
     mechanism(d).prepare(d, True)
     columns, roots = d.array("columns", 12, tail.segments), sweeps.segment_roots(d)
     sweeps.forward_roots(d, sweeps.torso_pose(d, world=False), roots)
     sweeps.gather_inertia(d, roots, columns)
-    tail_alone(d, arrays["accelerations"], tau)
+    with d.loop("k", tail.nt) as k:
+        d.copy(v_dot.part(6 + k, 1), arrays["accelerations"].part(k, 1))
+    tail_alone(d, v_dot, tau)
     free_torso(d)
     with d.loop("k", tail.nt) as k:
         d.step(dyn.coupling_torque, {"column": column_of(columns, k)}, torque_=tau.part(k, 1))
+    if "v_dot" in arrays:
+        d.store(kin.quaternion_rotation, R=9)
+        d.step(dyn.world_acceleration, p_ddot=v_dot.part(0, 3))
+        d.copy(v_dot.part(3, 3), d.known["w_dot"])
 
 
-def tail_alone(d: Draft, accelerations: Array, tau: Array) -> None:
-    """``force, moment`` at B, and torques, of the moving tail while the torso does not accelerate."""
-    v_dot = d.array("v_dot", d.tail.nv)
-    with d.loop("k", d.tail.nt) as k:
-        d.copy(v_dot.part(6 + k, 1), accelerations.part(k, 1))
+def tail_alone(d: Draft, v_dot: Array, tau: Array) -> None:
+    """``force, moment`` at B, and torques, of the tail that ``v_dot`` moves while the torso does not accelerate."""
     d.known |= {"w": d.known["omega"], "w_dot": d.zero(3), "a": d.zero(3)}
     wrench = sweeps.forward_wrenches(d, v_dot)
     sweeps.gather_wrenches(d, wrench, lambda i: tau.part(2 * i, 2))
@@ -50,12 +56,16 @@ def free_torso(d: Draft) -> None:
     d.store(dyn.free_acceleration, a=3)
 
 
+WANTED = (Q, V, ACCELERATIONS)
 FEEDBACK = {
     "pfl": Function(
-        "pfl",
-        "torques in flight that give the tail wanted accelerations, Eq. 46",
-        (Q, V, ACCELERATIONS),
-        (TORQUES,),
+        "pfl", "torques in flight that give the tail wanted accelerations, Eq. 46", WANTED, (TORQUES,), assemble_pfl
+    ),
+    "tracked_dynamics": Function(
+        "tracked_dynamics",
+        "torques in flight that give the tail wanted accelerations, Eq. 46, and v_dot under them",
+        WANTED,
+        (TORQUES, V_DOT),
         assemble_pfl,
-    )
+    ),
 }

@@ -13,6 +13,7 @@ from .lane_sweeps import balance_in_lanes
 from .parameters import Parameter
 from .program import Array, Index, Program, Ref, padded
 from .scene import Scene, parameters_of
+from .segment_sweeps import accelerate
 from .sweeps import column_of, mechanism
 
 
@@ -66,9 +67,13 @@ def struct_parameters(model: Tail | Scene) -> tuple[Parameter, ...]:
     return tuple(p for p in parameters_of(model.kind, model.contacts) if p.name != "link_radius")
 
 
-def program(function: Function, tail: Tail, in_lanes: bool = False) -> Program:
-    """Assemble one function for given sizes; ``in_lanes`` where vectors hold several numbers and the tail is long."""
-    draft = Draft(function.name, function.doc, tail=tail, in_lanes=in_lanes)
+def program(function: Function, tail: Tail, dynamics: str = "composite") -> Program:
+    """Assemble one function for given sizes; other ``dynamics`` where vectors hold several numbers and tails are long.
+
+    What they do not apply to is the same in all.
+    """
+    dynamics = dynamics if tail.kind == "articulated" else "composite"
+    draft = Draft(function.name, function.doc, tail=tail, dynamics=dynamics)
     for parameter in struct_parameters(tail):
         draft.known[parameter.name] = draft.array(parameter.name, parameter.size, role="parameters")[0]
     arrays = {a.name: draft.array(a.name, a.length(tail), role="input") for a in function.inputs}
@@ -132,7 +137,7 @@ def assemble_balance(d: Draft, arrays: dict[str, Array]) -> None:
         return A.part((3 + k) * row + 3 + other, entries)
 
     d.step(kin.quaternion_rotation, R=arrays["R"].part(0, 9))
-    if d.in_lanes:
+    if d.dynamics != "composite":
         balance_in_lanes(d, arrays, lambda k, other, entries=1: A.part(k * row + other, entries))
         d.factor(A, size)
         return
@@ -154,7 +159,7 @@ def assemble_balance(d: Draft, arrays: dict[str, Array]) -> None:
 def balanced(d: Draft, q: Array, v: Array) -> "Balance":
     """Call the balance, and let steps find by their names what it gives."""
     arrays = {a.name: d.array(a.name, a.length(d.tail)) for a in BALANCE.outputs}
-    d.call(program(BALANCE, d.tail, d.in_lanes), q=q, v=v, **arrays)
+    d.call(program(BALANCE, d.tail, d.dynamics), q=q, v=v, **arrays)
     bias = arrays["bias"]
     d.known |= {name: arrays[name].part(0, arrays[name].length) for name in ("R", "inverse_mass", "com")}
     d.known |= {"h": arrays["first_moment"].part(0, 3), "force": bias.part(0, 3), "moment": bias.part(3, 3)}
@@ -168,6 +173,29 @@ def assemble_forward_dynamics(d: Draft, arrays: dict[str, Array]) -> "Balance":
     loads = Loads({}, lambda k: balance.bias.part(6 + k, 1), lambda k: torques.part(k, 1))
     balance.solve(d, loads, arrays["v_dot"])
     return balance
+
+
+def assemble_acceleration(d: Draft, arrays: dict[str, Array]) -> None:
+    """v_dot alone: H is not formed where the draft goes by segments."""
+    if d.dynamics != "segments":
+        assemble_forward_dynamics(d, arrays)
+        return
+    d.store(kin.quaternion_rotation, R=9)
+    accelerate_by_segments(d, arrays, applied_load(d, arrays))
+
+
+def accelerate_by_segments(d: Draft, arrays: dict[str, Array], torques: Array) -> None:
+    """v_dot from ``load_force, load_moment`` at B in torso axes and torques."""
+    load = d.array("load_at_torso", 6)
+    for k, name in enumerate(("load_force", "load_moment")):
+        d.copy(load.part(3 * k, 3), d.known[name])
+    arguments = {name: arrays[name] for name in ("q", "v", "v_dot")}
+    d.call(program(SEGMENT_DYNAMICS, d.tail), at_torso=load, torques=torques, **arguments)
+
+
+def assemble_segment_dynamics(d: Draft, arrays: dict[str, Array]) -> None:
+    """v_dot from loads at B and torques, by segments."""
+    accelerate(d, arrays["at_torso"], arrays["torques"], arrays["v_dot"])
 
 
 @dataclass(frozen=True)
@@ -297,6 +325,13 @@ BALANCE = Function(
     ),
     assemble_balance,
 )
+SEGMENT_DYNAMICS = Function(
+    "segment_dynamics",
+    "v_dot from loads, segment by segment as articulated bodies",
+    (Q, V, Argument("at_torso", lambda t: (6,), "force and moment at B, torso axes"), replace(TAU, name="torques")),
+    (V_DOT,),
+    assemble_segment_dynamics,
+)
 FORCE = Argument("force", lambda t: (t.nv,), GENERALISED)
 H = Argument("H", lambda t: (t.nv, t.nv), "inertia matrix, symmetric positive definite (kg, kg m, kg m^2)")
 POINTS = Argument("points", lambda t: (t.total + 1, 3), "joint positions, then the tip (m, world)")
@@ -310,13 +345,13 @@ _TABLE = (
     Function("mass_matrix", "H(q) of Eq. 2", (Q,), (H,), assemble_mass_matrix),
     Function("bias_force", "C(q, v) of Eq. 3, gravity included", (Q, V), (FORCE,), assemble_inverse_dynamics),
     Function("inverse_dynamics", "H v_dot + C", (Q, V, V_DOT), (FORCE,), assemble_inverse_dynamics),
-    Function("forward_dynamics", "v_dot from Eq. 1", (Q, V, TAU), (V_DOT,), assemble_forward_dynamics),
+    Function("forward_dynamics", "v_dot from Eq. 1", (Q, V, TAU), (V_DOT,), assemble_acceleration),
     Function(
         "forward_dynamics_external",
         "v_dot from Eq. 1, loads applied",
         (Q, V, TAU, F_EXT),
         (V_DOT,),
-        assemble_forward_dynamics,
+        assemble_acceleration,
     ),
     Function("energy", "kinetic and potential energy", (Q, V), (KINETIC, POTENTIAL), assemble_energy),
     Function("momentum", "linear and angular momentum", (Q, V), (LINEAR, ANGULAR), assemble_momentum),

@@ -51,6 +51,14 @@ class Numbers:
         """Return one lane of a row; a number is the same in all."""
         return row[lane] if getattr(row, "ndim", 0) else row
 
+    def placed(self, row, lane: int, lanes: int, value):
+        """Return a row with one lane replaced; a number is the same in all."""
+        import numpy as np  # as in ``unit``
+
+        row = np.array(row) if getattr(row, "ndim", 0) else np.array([row] * lanes)
+        row[lane] = value
+        return row
+
     add = staticmethod(lambda a, b: a + b)
     sub = staticmethod(lambda a, b: a - b)
     mul = staticmethod(lambda a, b: a * b)
@@ -80,6 +88,7 @@ class Counter:
     const = staticmethod(lambda value: 0)
     lane = staticmethod(lambda row, lane: 0)
     unit = staticmethod(lambda lane, lanes: lanes)
+    placed = staticmethod(lambda row, lane, lanes, value: lanes)
 
 
 def executed(program: Program) -> int:
@@ -184,13 +193,21 @@ class Run:
         """Return the scalars of a reference."""
         array = self.values[ref.array.name]
         if ref.lane:
-            row, first = array[ref.offset.at(at)], ref.lane.at(at)
-            return [self.algebra.lane(row, first + k) for k in range(ref.size)]
+            return [self.algebra.lane(array[k], lane) for k, lane in self.places(ref, at)]
         return [array[k] for k in self.slots(ref, at)]
+
+    def places(self, ref: Ref, at: dict[str, int]) -> list[tuple[int, int]]:
+        """Return the scalars and lanes that a reference to lanes means."""
+        first, lane = ref.offset.at(at), ref.lane.at(at)
+        return [(first + k, lane) if ref.stride > 1 else (first, lane + k) for k in range(ref.size)]
 
     def write(self, ref: Ref, at: dict[str, int], scalars) -> None:
         """Store scalars."""
         array = self.values[ref.array.name]
+        if ref.lane:
+            for (k, lane), value in zip(self.places(ref, at), scalars, strict=True):
+                array[k] = self.algebra.placed(array[k], lane, ref.array.lanes, value)
+            return
         for k, value in zip(self.slots(ref, at), scalars, strict=True):
             array[k] = value
 

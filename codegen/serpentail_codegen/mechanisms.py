@@ -53,10 +53,15 @@ def motion(d: Draft, i: Index, v_dot: Array | None) -> dict[str, Ref]:
 # ---- articulated: link by link in link-local frames ---------------------------------------------------------------
 
 
-def prepare_links(d: Draft, doubled: bool = False) -> None:
-    """Link properties, and the trigonometry of every segment's joint."""
+def prepare_link(d: Draft) -> None:
+    """Properties of a link."""
     d.known["share"] = d.constant("share", [Fraction(1, d.tail.total)])[0]
     d.store(dyn.link_properties, link=6)
+
+
+def prepare_links(d: Draft, doubled: bool = False) -> None:
+    """Link properties, and the trigonometry of every segment's joint."""
+    prepare_link(d)
     d.pieces["joint"] = joint = d.array("joint", 4, d.tail.segments)
     twice = d.array("twice", 10, d.tail.segments) if doubled else None
     with d.loop("i", d.tail.segments) as i:

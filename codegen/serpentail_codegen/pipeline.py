@@ -38,7 +38,8 @@ def tail_of(scene: Scene) -> Tail:
 
 def needed(names: tuple[str, ...], contacts: bool = False) -> list[str]:
     """Return the functions to derive: those asked for, those that a rollout calls, the parts of an implicit solve."""
-    called = ("contact_points", "contact_dynamics") if contacts else ("forward_dynamics",)
+    flight = ("forward_dynamics", "tracked_dynamics") if "pfl" in names else ("forward_dynamics",)
+    called = ("contact_points", "contact_dynamics") if contacts else flight
     parts = {"rollout": called, "implicit": ("implicit_factor", "implicit_solve")}
     names = {*names, *(part for name in names for part in parts.get(name, ()))}
     return [name for name in CATALOGUE if name in names]

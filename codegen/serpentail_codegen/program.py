@@ -72,6 +72,10 @@ class Array:
         """Return ``size`` lanes of one wide scalar, from lane ``first`` on."""
         return Ref(self, as_index(scalar), size, 1, as_index(first))
 
+    def down(self, scalar: Index | int, lane: Index | int, size: int) -> "Ref":
+        """Return one lane of ``size`` wide scalars."""
+        return Ref(self, as_index(scalar), size, self.row, as_index(lane))
+
     @property
     def length(self) -> int:
         """Number of scalars."""
@@ -85,7 +89,10 @@ class Array:
 
 @dataclass(frozen=True)
 class Ref:
-    """``size`` scalars of an array from an offset on, ``stride`` apart; with ``lane``, lanes of the first."""
+    """``size`` scalars of an array from an offset on, ``stride`` apart; with ``lane``, lanes of the first.
+
+    With ``lane`` and a stride of the array's row it is one lane of ``size`` scalars.
+    """
 
     array: Array
     offset: Index

@@ -133,7 +133,7 @@ KEYS: dict[str, tuple[Any, Rule]] = {
     "coordinates": (Scene.coordinates, ANY),
     "baked": (Scene.baked, FLAG),
     "real": (Scene.real, _one_of(["double", "float"])),
-    "emission": (Scene.emission, _one_of(["auto", "straight", "loops"])),
+    "emission": (Scene.emission, _one_of(["auto", "straight", "loops", "lanes", "segments"])),
     "profile": (Scene.profile, _one_of(["fast", "reproducible"])),
     "contacts": ((), CONTACTS),
     "friction": (Scene.friction, _one_of(FRICTION)),

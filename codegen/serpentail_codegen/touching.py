@@ -7,7 +7,7 @@ from . import dynamics as dyn
 from . import kinematics as kin
 from . import legs, sweeps
 from .draft import Draft, Tail
-from .functions import TAU, V_DOT, Argument, Function, Loads, Q, V, balanced
+from .functions import TAU, V_DOT, Argument, Function, Loads, Q, V, accelerate_by_segments, balanced
 from .lower import derive
 from .program import Array, Index, Ref
 from .sweeps import mechanism
@@ -127,15 +127,25 @@ def gather_contact_loads(d: Draft, points: Points, forces: Array, torques: Array
     d.store(con.load_in_torso, load_force=3, load_moment=3)
 
 
-def assemble_contact_dynamics(d: Draft, arrays: dict[str, Array]) -> None:
-    """v_dot from H v_dot + C = [0; tau] + J^T f with the ground's forces."""
-    balance = balanced(d, arrays["q"], arrays["v"])
+def contact_torques(d: Draft, arrays: dict[str, Array]) -> Array:
+    """Forces of all points, their load at B; returns the torques of actuators and forces together."""
     points = gather_points(d, arrays)
     press(d, points, arrays)
     torques = d.array("applied", d.tail.nt)
     with d.loop("k", d.tail.nt) as k:
         d.copy(torques.part(k, 1), arrays["tau"].part(k, 1))
     gather_contact_loads(d, points, arrays["forces"], torques)
+    return torques
+
+
+def assemble_contact_dynamics(d: Draft, arrays: dict[str, Array]) -> None:
+    """v_dot from H v_dot + C = [0; tau] + J^T f with the ground's forces."""
+    if d.dynamics == "segments":
+        d.store(kin.quaternion_rotation, R=9)
+        accelerate_by_segments(d, arrays, contact_torques(d, arrays))
+        return
+    balance = balanced(d, arrays["q"], arrays["v"])
+    torques = contact_torques(d, arrays)
     loads = Loads({}, lambda k: balance.bias.part(6 + k, 1), lambda k: torques.part(k, 1))
     balance.solve(d, loads, arrays["v_dot"])
 

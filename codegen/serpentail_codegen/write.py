@@ -11,6 +11,12 @@ def digest(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
+def signed(manifest: dict) -> dict:
+    """Return a manifest with the SHA-256 of all its other entries, so that a loader sees a change by hand."""
+    entries = {key: value for key, value in manifest.items() if key != "manifest_hash"}
+    return entries | {"manifest_hash": digest(json.dumps(entries, sort_keys=True))}
+
+
 def write_if_changed(path: Path, text: str) -> bool:
     """Write a file atomically unless it holds the text already; return whether it was written."""
     if path.is_file() and path.read_bytes() == text.encode():
@@ -24,7 +30,7 @@ def write_if_changed(path: Path, text: str) -> bool:
 
 def write_folder(folder: Path, files: dict[str, str], manifest: dict) -> list[str]:
     """Write all files, the manifest last, and drop what an earlier generation left; return the changed names."""
-    manifest = manifest | {"files": {name: digest(text) for name, text in sorted(files.items())}}
+    manifest = signed(manifest | {"files": {name: digest(text) for name, text in sorted(files.items())}})
     changed = [name for name, text in files.items() if write_if_changed(folder / name, text)]
     _remove_stale(folder, set(files))
     text = json.dumps(manifest, indent=1, ensure_ascii=False) + "\n"

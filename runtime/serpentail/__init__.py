@@ -30,6 +30,7 @@ _HOME = {
             "StateError",
             "SimulationError",
             "PlanningError",
+            "UnlikeBodies",
         ],
         "errors",
     ),

@@ -35,3 +35,7 @@ class SimulationError(SerpentailError):
 
 class PlanningError(SerpentailError, ValueError):
     """A planning problem that cannot be posed: a wrong field, its value, and what to give instead."""
+
+
+class UnlikeBodies(UserWarning):
+    """Torso and tail so unlike in size that H loses digits: what is left of moments that cancel has their rounding."""

@@ -8,7 +8,19 @@ from . import __version__
 from .errors import ModelError
 
 FORMAT = 1
-KEYS = ("abi_hash", "prefix", "real", "scene", "dimensions", "parameters", "functions", "work", "batch", "files")
+KEYS = [
+    "abi_hash",
+    "prefix",
+    "real",
+    "scene",
+    "dimensions",
+    "parameters",
+    "functions",
+    "work",
+    "batch",
+    "files",
+    "manifest_hash",
+]
 
 
 def read_manifest(folder: Path) -> dict:
@@ -39,10 +51,20 @@ def _check(folder: Path, manifest: dict) -> None:
     absent = [key for key in KEYS if key not in manifest]
     if absent:
         raise ValueError(f"it lacks {', '.join(absent)}")
+    entries = {key: value for key, value in manifest.items() if key != "manifest_hash"}
+    if _sha256(json.dumps(entries, sort_keys=True).encode()) != manifest["manifest_hash"]:
+        raise ModelError(
+            f"{folder / 'manifest.json'} was changed after it was generated: {remedy(folder)}; parameters are changed "
+            "by st.load(folder, parameters=...), sizes by another scene"
+        )
     for name, digest in manifest["files"].items():
         try:
-            found = hashlib.sha256((folder / name).read_bytes()).hexdigest()
+            found = _sha256((folder / name).read_bytes())
         except OSError as error:
             raise ModelError(f"{folder / name} cannot be read ({error.strerror}): {remedy(folder)}") from error
         if found != digest:
             raise ModelError(f"{folder / name} was changed after it was generated: {remedy(folder)}")
+
+
+def _sha256(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()

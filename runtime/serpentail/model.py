@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from .errors import ModelError, StateError
-from .library import Kernel, open_library, real_array
+from .library import Kernel, finite_array, open_library
 from .manifest import read_manifest
-from .parameters import flat, resolve
+from .parameters import flat, resolve, warn_of_unlike
 from .side_by_side import SideBySide
 
 
@@ -26,7 +26,7 @@ def load(
     profile: "fast" (this CPU, FMA) or "reproducible" (same bits everywhere); None: the scene's.
     compiled: False needs no C compiler; then only ``model.casadi`` evaluates.
     Raises ModelError (folder missing, stale or changed; parameter unknown or unphysical), CompilerNotFound,
-    CompileFailed.
+    CompileFailed.  Warns UnlikeBodies where torso and tail are so unlike in size that H loses digits.
     """
     try:
         folder = Path(folder)
@@ -34,6 +34,7 @@ def load(
         raise ModelError(f"folder: value {folder!r:.60}: needs the path of a generated folder") from None
     manifest = read_manifest(folder)
     values = resolve(manifest, parameters)
+    warn_of_unlike(values)
     profile = manifest["scene"]["profile"] if profile is None else profile
     if not isinstance(compiled, bool | np.bool_):
         raise ModelError(f"compiled: value {compiled!r:.60}: needs True or False")
@@ -76,13 +77,14 @@ class Model:
         return f"<serpentail.Model {self.name}: {self.segments}{pieces}, nv = {self.nv}>"
 
     def with_parameters(self, **changes) -> "Model":
-        """Return this model with other parameters; nothing is compiled."""
+        """Return this model with other parameters; nothing is compiled.  Warns as ``load`` does."""
         own = self._given()
         if "link_inertia" in changes:
             own.pop("link_radius", None)
         if "link_radius" in changes:
             own.pop("link_inertia", None)
         values = resolve(self.manifest, own | changes)
+        warn_of_unlike(values)
         return Model(self.folder, self.manifest, values, self.library, self.profile, self.many)
 
     def _given(self) -> dict:
@@ -139,7 +141,7 @@ class Model:
         points = self.manifest["dimensions"]["total"] + 1
         shapes = {"force": (3,), "moment": (3,), "tail": (points, 3)}
         given = {"force": force, "moment": moment, "tail": np.zeros((points, 3)) if tail is None else tail}
-        arrays = {name: real_array(name, value) for name, value in given.items()}
+        arrays = {name: finite_array(f"external_force: {name}", value) for name, value in given.items()}
         for name, shape in shapes.items():
             if arrays[name].shape != shape:
                 raise StateError(f"external_force: {name} has shape {arrays[name].shape}, not {shape}")

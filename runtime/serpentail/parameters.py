@@ -1,13 +1,14 @@
 """Parameters: a manifest's parameters and a caller's changes go in, checked values come out."""
 
 import math
+import warnings
 from collections.abc import Mapping
 from difflib import get_close_matches
 from types import MappingProxyType
 
 import numpy as np
 
-from .errors import ModelError
+from .errors import ModelError, UnlikeBodies
 
 Value = float | tuple[float, ...]
 CHECKS = {
@@ -19,6 +20,8 @@ CHECKS = {
         "above 0, none above the sum of the other two",
     ),
 }
+
+UNLIKE = 1e4  # from here on H may be off by 1e-12 of its diagonal: docs/stability.md
 
 
 def resolve(manifest: dict, changes: Mapping[str, object] | None) -> MappingProxyType:
@@ -59,6 +62,25 @@ def ellipsoid(values: Mapping[str, Value], links: int) -> tuple[float, float, fl
     if not math.isfinite(across + along):
         raise ModelError("parameters: tail_mass, tail_length and link_radius give no finite link_inertia: use kg and m")
     return across, along, across
+
+
+def disparity(values: Mapping[str, Value]) -> float:
+    """Return how unlike torso and tail are: moments of inertia that cancel in H over what is left, or their lengths.
+
+    That is the larger of m (|b2t| + L)^2 / min I_b and |b2t| / L, m and L being the tail's mass and length.
+    """
+    mount, length = math.hypot(*values["tail_mount"]), values["tail_length"]
+    reach = mount + length
+    return max(values["tail_mass"] * reach * reach / min(values["torso_inertia"]), mount / length)
+
+
+def warn_of_unlike(values: Mapping[str, Value]) -> None:
+    """Warn the caller's caller where H loses digits by bodies of unlike size."""
+    found = disparity(values)
+    if found > UNLIKE:
+        sizes = "tail_mass, tail_length, tail_mount, torso_inertia"
+        words = f"torso and tail are unlike by {found:.1e} ({sizes}): H may be off by as many roundings"
+        warnings.warn(f"{words}; are the units kg and m?", UnlikeBodies, stacklevel=3)
 
 
 def flat(manifest: dict, values: Mapping[str, Value]) -> list[float]:

@@ -5,14 +5,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .errors import SimulationError
-from .simulation.piecewise import Piecewise, spline
+from .library import real_array
+from .simulation.piecewise import Piecewise, checked_nodes, spline
 from .simulation.schedules import Reference
 
 if TYPE_CHECKING:
     from .model import Model
 
 KP, KD = 4e4, 400.0  # 1/s^2, 1/s: Table 1
-LARGEST = np.finfo(float).max
 
 
 class Pfl:
@@ -26,10 +26,7 @@ class Pfl:
     """
 
     def __init__(self, model: "Model", reference, kp: float = KP, kd: float = KD, feedforward: bool = True):
-        for name, value in (("kp", kp), ("kd", kd)):
-            if not (isinstance(value, int | float) and 0 <= value <= LARGEST):
-                raise SimulationError(f"Pfl: {name} is {value!r}: give a finite number from 0")
-        self.model, self.kp, self.kd = model, float(kp), float(kd)
+        self.model, self.kp, self.kd = model, _gain("kp", kp), _gain("kd", kd)
         self.curve = _curve(reference, model.nv - 6)
         self.feedforward = bool(feedforward)
 
@@ -52,6 +49,14 @@ class Pfl:
         return force[6:] + H[6:, :6] @ base
 
 
+def _gain(name: str, value) -> float:
+    """Return a gain; SimulationError where it is none."""
+    gain = real_array(f"Pfl: {name}", value, error=SimulationError)
+    if gain.shape != () or not 0 <= gain < np.inf:
+        raise SimulationError(f"Pfl: {name} is {value!r}: give a finite number from 0")
+    return float(gain)
+
+
 def _curve(reference, size: int) -> Piecewise:
     """Return what the user gave as a function of time; splines end by a plan's accelerations or a motion's rates."""
     if isinstance(reference, Reference):
@@ -65,12 +70,11 @@ def _curve(reference, size: int) -> Piecewise:
             ends = tuple((2, row) for row in reference.curve.slopes(times[[0, -1]])["tail_rate"])
     else:
         try:
-            times, angles, ends = *(np.asarray(part, float) for part in reference), "not-a-knot"
+            (times, angles), ends = reference, "not-a-knot"
         except (TypeError, ValueError):
             what = "a Plan, a Trajectory, a Reference, or (times, tail coordinates)"
             raise SimulationError(f"Pfl: reference is a {type(reference).__name__}: give {what}") from None
-    if times.ndim != 1 or len(times) < 2 or angles.shape != (len(times), size):
-        raise SimulationError(f"Pfl: times {times.shape} and angles {angles.shape}, not (K,) and (K, {size}), K > 1")
-    if not (np.isfinite(times).all() and np.isfinite(angles).all() and (np.diff(times) > 0).all()):
-        raise SimulationError("Pfl: times must increase, and all entries be finite")
+    times, angles = checked_nodes("Pfl", "angles", (times, angles), size)
+    if len(times) < 2:
+        raise SimulationError("Pfl: one node only: give two or more")
     return spline(times, angles, ends)

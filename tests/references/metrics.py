@@ -19,6 +19,16 @@ def block_error(x, x_ref):
     return float(max(_scaled_error(x[block], x_ref[block], floor) for block in BLOCKS))
 
 
+def force_error(force, force_ref, mass_ref):
+    """Largest |dC_i| / sqrt(H_ii) over the largest |C_i| / sqrt(H_ii).
+
+    C_i sums products of a Jacobian's column with accelerations, both weighted by masses: by Cauchy and Schwarz no sum
+    of its terms is above sqrt(H_ii) times the norm of the latter, however much they cancel.
+    """
+    scale = np.sqrt(np.diag(mass_ref))
+    return float(np.max(np.abs(force - force_ref) / scale) / (np.max(np.abs(force_ref) / scale) or 1.0))
+
+
 def equilibrated_condition(mass):
     """2-norm condition number of H after the symmetric scaling to a unit diagonal."""
     scale = np.sqrt(np.diag(mass))

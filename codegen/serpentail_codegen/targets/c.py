@@ -22,6 +22,7 @@ from .simulation import Has, layouts, simulation_context
 
 STRAIGHT_UP_TO = 7000  # nodes: beyond, the text leaves the instruction cache and compile time grows
 STRAIGHT_BESIDE_LANES = 3500  # nodes: where there is a sweep in lanes, too, that is faster beyond
+SEGMENTS_FROM = 128  # columns of H times links: the work of sweeps that go by segments grows with neither
 ELIMINATED = 12  # rows: smaller matrices are factored without loops
 LARGE = 100  # operations: a step that is written out wherever it is called; larger ones as the compiler sees fit
 COORDINATES = {
@@ -43,23 +44,41 @@ class Emitted:
 
 def emit(scene: Scene, tail: Tail, function: Function) -> Emitted:
     """Print one function in the form that the scene asks for."""
-    program, fixed = assemble(function, tail), baked_values(scene)
-    form, program = fastest(function, tail, program) if scene.emission == "auto" else (scene.emission, program)
+    fixed = baked_values(scene)
+    form, program = fastest(function, tail) if scene.emission == "auto" else in_form(scene.emission, function, tail)
     printer = straight_line if form == "straight" else in_loops
     return Emitted(function, printer(program, scene.real, scene.name, fixed), form)
 
 
-def fastest(function: Function, tail: Tail, program: Program) -> tuple[str, Program]:
+def fastest(function: Function, tail: Tail) -> tuple[str, Program]:
     """Return the form that runs fastest on a processor with vectors, and the program in that form.
 
     Straight lines are fastest until their text crowds the instruction cache, if all of them are always run; sweeps in
-    lanes overtake them before that.
+    lanes overtake them before that, and sweeps by segments overtake both.
     """
-    lanes = assemble(function, tail, tail.kind == "articulated")
-    limit = STRAIGHT_UP_TO if lanes == program else STRAIGHT_BESIDE_LANES
-    if applied(program) <= limit and not branches(program):
+    if tail.nt * tail.total >= SEGMENTS_FROM:
+        form, program = in_form("segments", function, tail)
+        if form == "segments":
+            return form, program
+    form, lanes = in_form("lanes", function, tail)
+    program = assemble(function, tail)
+    if applied(program) <= (STRAIGHT_BESIDE_LANES if form == "lanes" else STRAIGHT_UP_TO) and not branches(program):
         return "straight", program
-    return "loops", written_out(lanes, ELIMINATED)
+    return form, lanes
+
+
+def in_form(form: str, function: Function, tail: Tail) -> tuple[str, Program]:
+    """Return the form that a function gets where this one is asked for, and its program.
+
+    What nothing goes by segments in gets lanes, what has no use for lanes gets loops.
+    """
+    program = assemble(function, tail)
+    if form in ("straight", "loops"):
+        return form, program
+    lanes, segments = (assemble(function, tail, dynamics) for dynamics in ("lanes", "segments"))
+    if form == "segments" and segments != lanes:
+        return "segments", written_out(segments, ELIMINATED)
+    return "loops" if lanes == program else "lanes", written_out(lanes, ELIMINATED)
 
 
 def baked_values(scene: Scene) -> dict[str, list]:

@@ -13,6 +13,7 @@ from ..program import (
     FactorPair,
     Fill,
     Guard,
+    Index,
     Loop,
     Program,
     Ref,
@@ -32,12 +33,13 @@ CALLEES_WORK = "<work>"  # stands for where the workspace of what is called begi
 
 @dataclass(frozen=True)
 class Routine:
-    """A step as one C function: which of its vectors are rows, how far apart, and which outputs are added."""
+    """A step as one C function: its rows and how far apart, the outputs that are added, inputs that lie apart."""
 
     step: Step
     rows: frozenset[str] = frozenset()
     row: int = 1
     adds: frozenset[str] = frozenset()
+    apart: tuple[tuple[str, int], ...] = ()
 
     @property
     def name(self) -> str:
@@ -47,7 +49,8 @@ class Routine:
         odd = sorted(self.rows ^ usual) if self.rows else []
         lanes = [f"rows_of_{self.row}", *odd] if self.rows else []
         adds = ["add", *sorted(self.adds)] if self.adds else []
-        return "_".join([self.step.name, *lanes, *adds])
+        apart = [f"{name}_apart_{stride}" for name, stride in self.apart]
+        return "_".join([self.step.name, *lanes, *adds, *apart])
 
 
 @dataclass(frozen=True)
@@ -77,10 +80,9 @@ def dialect(real: str, prefix: str = "") -> Dialect:
     )
 
 
-def offset_text(ref: Ref) -> str:
-    """Print where a reference begins, in numbers."""
-    start = ref.offset * ref.array.row + (ref.lane or 0)
-    return index_text(start)
+def begin(ref: Ref) -> Index:
+    """Return where a reference begins, in numbers."""
+    return ref.offset * ref.array.row + (ref.lane or 0)
 
 
 def pointer(ref: Ref) -> str:
@@ -88,7 +90,7 @@ def pointer(ref: Ref) -> str:
     name = argument_name(ref.array)
     if ref.array.role == "parameters":
         return name if ref.array.length > 1 else f"&{name}"
-    offset = offset_text(ref)
+    offset = index_text(begin(ref))
     return name if offset == "0" else f"{name} + {offset}"
 
 
@@ -97,9 +99,7 @@ def scalar(ref: Ref, k: int) -> str:
     name = argument_name(ref.array)
     if ref.array.role == "parameters" and ref.array.length == 1:
         return name
-    if ref.lane:
-        return f"{name}[{index_text(ref.offset * ref.array.row + ref.lane + k)}]"
-    return f"{name}[{index_text(ref.offset + k * ref.stride)}]"
+    return f"{name}[{index_text(begin(ref) + k * ref.stride)}]"
 
 
 def argument_name(array: Array) -> str:
@@ -128,7 +128,7 @@ def routine_lines(routine: Routine, real: str, prefix: str) -> list[str]:
             rows |= {len(names) + k: row for k in range(size)}
             names += [f"&{name}[{k * row}]" for k in range(size)]
         else:
-            names += [f"{name}[{k}]" for k in range(size)]
+            names += [f"{name}[{k * dict(routine.apart).get(name, 1)}]" for k in range(size)]
     scalars = Scalars(step.nodes, step.results, names, dialect(real, prefix), rows)
     lines = scalars.lines()
     wide, narrow, results = scalars.lines(row) if routine.rows else [], [], iter(step.results)
@@ -350,9 +350,6 @@ class LoopPrinter:
     def _apply(self, call: Apply) -> list[str]:
         outputs = list(zip(call.step.outputs, map(self._ref, call.writes), call.adds, strict=True))
         routine, lanes = self._routine(call)
-        apart = [name for name, ref in call.inputs().items() if ref.stride > 1]
-        if apart:
-            raise ValueError(f"{call.step.name} reads {apart[0]} from places apart, which a pointer cannot show")
         arguments = [pointer(self._ref(ref)) for ref in call.reads]
         before, after = [], []
         for (name, size), target, adds in outputs:
@@ -379,7 +376,10 @@ class LoopPrinter:
         written = zip(call.outputs().items(), call.adds, strict=True)
         adds = {name for (name, ref), adds in written if adds and ref.stride == 1}
         row = next((ref.array.row for ref in wide.values()), 1)
-        routine = Routine(call.step, frozenset(wide), row, frozenset(adds))
+        apart = tuple((name, ref.stride) for name, ref in call.inputs().items() if ref.stride > 1)
+        if any(name in wide for name, _ in apart):
+            raise ValueError(f"{call.step.name} reads rows from places apart, which a pointer cannot show")
+        routine = Routine(call.step, frozenset(wide), row, frozenset(adds), apart)
         if self.routines.setdefault(routine.name, routine) != routine:
             raise ValueError(f"two steps are called {routine.name}")
         given = [

@@ -51,6 +51,11 @@ class Has:
         return self.factors > 0
 
     @property
+    def tracked(self) -> bool:
+        """Whether feedback linearisation gives v_dot, too: where the ground adds nothing to it."""
+        return self.pfl and not self.contacts
+
+    @property
     def methods(self) -> list[str]:
         """The methods it has."""
         return [name for name, implicit in METHODS.items() if self.implicit or not implicit]

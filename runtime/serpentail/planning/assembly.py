@@ -25,15 +25,16 @@ class Assembly:
 
         w, h = ca.MX.sym("x", len(self.direct)), ca.MX.sym("p", 3)
         lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", self.linear.shape[0])
-        mapped = MappedNode(self.node, self.places.shape[1])
+        one = self.node.derivatives
+        mapped = MappedNode(one, self.places.shape[1])
         Z = ca.reshape(w[self.places.T.ravel().tolist()], self.places.shape)
         mu = lam_f * ca.DM(self.cost) + ca.mtimes(_dm(self.weights.T.tocsc()), lam_g)
         Y, J = ca.vec(mapped.values(Z, h)), mapped.jacobians(Z, h)
         S = mapped.hessians(Z, h, ca.reshape(mu, self.node.size, self.places.shape[1]))
         f, g = self._objective(mapped, Z, h, w), ca.mtimes(_dm(self.linear), w) + ca.mtimes(_dm(self.weights), Y)
-        rows, columns = _pattern(mapped.jacobian.sparsity_out(0))
+        rows, columns = _pattern(one.jacobian.sparsity_out(0))
         pattern, matrix, constant = self._jacobian(rows, columns)
-        triangle, gather = self._hessian(*_pattern(mapped.hessian.sparsity_out(0)))
+        triangle, gather = self._hessian(*_pattern(one.hessian.sparsity_out(0)))
         jac = ca.MX(pattern, ca.mtimes(matrix, J) + constant)
         hess, grad = ca.MX(triangle, ca.mtimes(gather, S)), self._gradient(mapped, Z, h)
         return {
@@ -56,7 +57,7 @@ class Assembly:
         """The objective's gradient: the dynamics has no part in it."""
         import casadi as ca
 
-        _, columns = _pattern(mapped.slope.sparsity_out(0))
+        _, columns = _pattern(self.node.derivatives.slope.sparsity_out(0))
         place, cost = self.places[columns].T.ravel(), self.cost.reshape(-1, self.node.size)[:, -1]
         weights = np.repeat(cost, len(columns))
         gather = _sparse(weights, place, np.arange(place.size), (len(self.direct), place.size))

@@ -34,13 +34,13 @@ def linear_call(function, zeta, arguments) -> Call:
     return Call(function, tuple(inputs))
 
 
-class MappedNode:
-    """A node's function at all of `count` nodes: unknowns Z (n, count) and h (3) go in, rows of values come out."""
+class NodeDerivatives:
+    """A node's function and its exact derivatives as CasADi functions of zeta, h and what its calls give."""
 
-    def __init__(self, node, count: int):
+    def __init__(self, node):
         import casadi as ca
 
-        self.count, self.calls, self.node = count, node.calls, node
+        self.node, self.calls, self.function = node, node.calls, node.function
         self.zeta, self.h, *self.results = node.function.sx_in()
         self.y = node.function.call([self.zeta, self.h, *self.results])[0]
         self.jacobians_of_calls = [call.function.jacobian() for call in node.calls]
@@ -102,6 +102,13 @@ class MappedNode:
         symbols = [self.zeta, self.h, *self.results, mu, *chain.from_iterable(blocks), *seconds]
         return ca.Function("hessian", symbols, [total])
 
+
+class MappedNode:
+    """A node's function at all of `count` nodes: unknowns Z (n, count) and h (3) go in, rows of values come out."""
+
+    def __init__(self, one: NodeDerivatives, count: int):
+        self.one, self.count = one, count
+
     def _inputs(self, call: Call, Z):
         import casadi as ca
 
@@ -110,7 +117,7 @@ class MappedNode:
     def _first(self, Z):
         """Results of all calls, and their Jacobians by the moving inputs."""
         results, blocks = [], []
-        for call, jacobian in zip(self.calls, self.jacobians_of_calls, strict=True):
+        for call, jacobian in zip(self.one.calls, self.one.jacobians_of_calls, strict=True):
             inputs = self._inputs(call, Z)
             results.append(call.function.map(self.count)(*inputs))
             found = jacobian.map(self.count).call([*inputs, results[-1]])
@@ -124,34 +131,34 @@ class MappedNode:
 
     def values(self, Z, h):
         """Y (size, count)."""
-        results = [call.function.map(self.count)(*self._inputs(call, Z)) for call in self.calls]
-        return self.node.function.map(self.count)(Z, self._repeated(h), *results)
+        results = [call.function.map(self.count)(*self._inputs(call, Z)) for call in self.one.calls]
+        return self.one.function.map(self.count)(Z, self._repeated(h), *results)
 
     def costs(self, Z, h):
         """The last row of Y."""
-        return self.cost.map(self.count)(Z, self._repeated(h))
+        return self.one.cost.map(self.count)(Z, self._repeated(h))
 
     def slopes(self, Z, h):
         """Entries of the costs' gradients, node after node."""
-        return _entries(self.slope.map(self.count)(Z, self._repeated(h)))
+        return _entries(self.one.slope.map(self.count)(Z, self._repeated(h)))
 
     def jacobians(self, Z, h):
         """Entries of the Jacobians, node after node."""
         results, blocks = self._first(Z)
-        return _entries(self.jacobian.map(self.count)(Z, self._repeated(h), *results, *blocks))
+        return _entries(self.one.jacobian.map(self.count)(Z, self._repeated(h), *results, *blocks))
 
     def hessians(self, Z, h, mu):
         """Entries of the Hessians of mu^T y, node after node; mu (size, count)."""
         import casadi as ca
 
         results, blocks = self._first(Z)
-        nus = self.weights.map(self.count).call([Z, self._repeated(h), *results, mu])
+        nus = self.one.weights.map(self.count).call([Z, self._repeated(h), *results, mu])
         seconds = []
-        for call, hessian, result, nu in zip(self.calls, self.hessians_of_calls, results, nus, strict=True):
+        for call, hessian, result, nu in zip(self.one.calls, self.one.hessians_of_calls, results, nus, strict=True):
             unused = [ca.MX(hessian.size1_in(k), self.count) for k in range(len(call.inputs) + 2, hessian.n_in())]
             found = hessian.map(self.count).call([*self._inputs(call, Z), result, nu, *unused])
             seconds += [found[place] for _, _, place in _pairs(call)]
-        return _entries(self.hessian.map(self.count)(Z, self._repeated(h), *results, mu, *blocks, *seconds))
+        return _entries(self.one.hessian.map(self.count)(Z, self._repeated(h), *results, mu, *blocks, *seconds))
 
 
 def _pairs(call: Call) -> list[tuple[int, int, int]]:

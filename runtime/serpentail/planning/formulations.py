@@ -1,13 +1,14 @@
 """Formulations: a model's dynamics and a problem go in; a CasADi function of one node comes out."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from types import SimpleNamespace
 
 import numpy as np
 
 from ..errors import ModelError
 from .attitude import Attitude
-from .calls import Call, linear_call
+from .calls import Call, NodeDerivatives, linear_call
 
 # name -> blocks of the state, which has a rate, and of the algebraic unknowns, which a node's equations determine
 FORMULATIONS = {
@@ -83,6 +84,11 @@ class Node:
     rates: int
     residuals: int
     path: int
+
+    @cached_property
+    def derivatives(self) -> NodeDerivatives:
+        """Exact derivatives, which programs on all meshes share."""
+        return NodeDerivatives(self)
 
     @property
     def size(self) -> int:

@@ -28,9 +28,9 @@ def plan(model, *, start, goal=None, duration, bounds=None, **settings):
     of the true attitude at the end, None for no demand; rounds of refinement; most_intervals; solver, options of
     ``casadi.nlpsol``; guess: a Plan or a Trajectory (default: passive flight); guess_damping (N m s); multi_start:
     guesses solved, the best is kept; retries: more guesses after failures; seed; dynamics "auto", "compiled",
-    "symbolic"; track: simulate with PFL, too.
+    "symbolic"; time_limit (s) of the search; track: simulate with PFL, too.
     Programs and solvers are kept: planning again on a plan's mesh, from another start, derives nothing.  Ctrl-C ends
-    the search, and the best so far is returned; a second one raises KeyboardInterrupt.
+    the search, as the time limit does, and the best so far is returned; a second one raises KeyboardInterrupt.
     Returns a Plan; look at its ``success`` and ``report``.  Raises PlanningError (a field, its value, the remedy),
     ModelError (the scene lacks functions).
     """
@@ -42,7 +42,7 @@ def plan(model, *, start, goal=None, duration, bounds=None, **settings):
     scheme = rule(method.rule, method.degree)
     equations = dynamics(model, method.dynamics)
     run = Run(model, problem, method, equations, scheme)
-    with heeded():
+    with heeded(method.time_limit):
         rounds = run.refined(run.first())
     return run.plan(rounds, time.perf_counter() - begun)
 
@@ -59,8 +59,9 @@ def _checked(model, start, goal, duration, bounds, settings) -> tuple[Problem, M
         value = getattr(method, name)
         if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
             raise PlanningError(f"{name}: value {value!r}: needs a whole number from {least}")
-    if method.tolerance is not None:
-        number("tolerance", method.tolerance)
+    for name in ("tolerance", "time_limit"):
+        if getattr(method, name) is not None:
+            number(name, getattr(method, name))
     if not isinstance(method.options, dict):
         raise PlanningError(f"options: value {method.options!r}: needs a dict, such as {{'ipopt.max_iter': 500}}")
     _check_guess(model, method.guess)

@@ -27,8 +27,8 @@ def report(run, best, trajectory: Trajectory) -> dict:
 
 def truth(run, best, planned: Trajectory) -> dict:
     """Return the errors of the plan at its end: torques applied open loop, and the tail tracked by PFL."""
-    apart, from_goal = attitude_errors(run.problem, best.planned[0][-1, 3:7], best.true[0][-1, 3:7])
-    rates = np.abs(best.true[1][-1, 3:] - best.planned[1][-1, 3:]).max()
+    apart, from_goal = attitude_errors(run.problem, best.planned[0][-1, 3:7], best.true[0][3:7])
+    rates = np.abs(best.true[1][3:] - best.planned[1][-1, 3:]).max()
     found = {"open_loop_attitude_error_deg": apart, "open_loop_goal_error_deg": from_goal}
     found |= {"open_loop_rate_error": float(rates)}
     found |= {"tracked_attitude_error_deg": None, "tracked_tail_error_rad": None, "dyn_err": None}

@@ -12,6 +12,7 @@ from .guess import Motion, of_trajectory, passive, pushes, unknowns
 from .interrupt import asked
 from .limits import limits
 from .mesh import Mesh, refined, uniform
+from .multipliers import carried
 from .problem import Problem
 from .recovery import full_state
 from .report import attitude_errors, report
@@ -42,12 +43,13 @@ class Method:
     retries: int = 4
     seed: int = 0
     dynamics: str = "auto"
+    time_limit: float | None = None  # s
     track: bool = True
 
 
 @dataclass(frozen=True, eq=False)
 class Round:
-    """One solution on one mesh, and what its torques really do at the ends of intervals."""
+    """One solution on one mesh: q, v planned at the ends of intervals, and true at the end of all."""
 
     program: Transcription
     solution: Solution
@@ -58,7 +60,7 @@ class Round:
     @property
     def error(self) -> float:
         """True error (deg) of the attitude at the end, against the plan or the goal, the larger one; inf if lost."""
-        error = max(attitude_errors(self.program.problem, self.planned[0][-1, 3:7], self.true[0][-1, 3:7]))
+        error = max(attitude_errors(self.program.problem, self.planned[0][-1, 3:7], self.true[0][3:7]))
         return error if np.isfinite(error) else np.inf
 
 
@@ -72,6 +74,7 @@ class Run:
         self.attitude = attitude(problem.attitude)
         self.spent = dict.fromkeys(("derive_s", "solve_cpu_s", "truth_s"), 0.0)
         self.iterations = self.attempts = 0
+        self.stopped: str | None = None
 
     def first(self) -> Round:
         """Return the best solution on the first mesh, of as many guesses as asked for, and more if all fail."""
@@ -80,7 +83,7 @@ class Run:
         program = self._transcribed(before.mesh if again else uniform(method.intervals))
         found: list[Solution] = []
         for k in range(method.multi_start + method.retries):
-            if found and (asked() or (k >= method.multi_start and any(s.success for s in found))):
+            if found and ((k >= method.multi_start and any(s.success for s in found)) or self._stopped()):
                 break
             found.append(self._given(program) if k == 0 else self._solved(program, self._pushed(k)))
         return self._round(program, min(found, key=lambda s: (not s.success, s.value)))
@@ -90,15 +93,15 @@ class Run:
         rounds, method = [first], self.method
         for _ in range(method.rounds if method.tolerance is not None else 0):
             last = rounds[-1]
-            if asked() or not last.solution.success or last.error <= method.tolerance:
+            if not last.solution.success or last.error <= method.tolerance or self._stopped():
                 break
             mesh = self._split(last)
             if mesh.intervals == last.program.mesh.intervals:
                 break
             program = self._transcribed(mesh)
             motion = Motion(last.curve.duration, last.curve.at)
-            found = self._solved(program, motion, "close")
-            again = not (found.success or asked())
+            found = self._near(program, motion, carried(last.solution.multipliers, last.program, program))
+            again = not (found.success or self.stopped)
             rounds.append(self._round(program, self._solved(program, motion) if again else found))
         return rounds
 
@@ -109,10 +112,16 @@ class Run:
         good = bool(best.solution.success and (tolerance is None or best.error <= tolerance))
         trajectory = sampled(self.model, self.problem, best.curve)
         own = {"rounds": len(rounds), "iterations": self.iterations, "guesses": self.attempts}
+        own |= {"stopped": self.stopped}
         own |= self.spent | {"wall_s": wall_s}
         summary = {"success": good} | report(self, best, trajectory) | own
         program = best.program
         return Plan(good, trajectory, summary, self.problem, best.curve, program.mesh, self.rule, best.solution)
+
+    def _stopped(self) -> bool:
+        """Tell, and note why, whether the search should end that is not done."""
+        self.stopped = asked()
+        return self.stopped is not None
 
     def _transcribed(self, mesh: Mesh) -> Transcription:
         begun = time.perf_counter()
@@ -130,10 +139,12 @@ class Run:
         form = (guess.problem.formulation, guess.problem.attitude)
         if form != (self.problem.formulation, self.problem.attitude):
             return self._solved(program, of_trajectory(self.model, guess.trajectory, self.attitude), "close")
-        motion, same = Motion(guess.duration, guess.curve.at), guess.solution.w.size == program.places.size
-        multipliers = (
-            guess.solution.multipliers if same and guess.solution.multipliers[1].size == program.rows else None
-        )
+        multipliers, sizes = guess.solution.multipliers, (program.places.size, program.rows)
+        same = tuple(part.size for part in multipliers) == sizes
+        return self._near(program, Motion(guess.duration, guess.curve.at), multipliers if same else None)
+
+    def _near(self, program: Transcription, motion: Motion, multipliers) -> Solution:
+        """Solve from a motion that is close to a solution, and from its multipliers where there are any."""
         return self._solved(program, motion, "close" if multipliers is None else "same", multipliers)
 
     def _pushed(self, k: int) -> Motion:
@@ -155,6 +166,8 @@ class Run:
         self.spent["solve_cpu_s"] += found.cpu_s
         self.iterations += found.iterations
         self.attempts += 1
+        if not found.success:
+            self._stopped()
         return found
 
     def _start_blocks(self) -> dict[str, np.ndarray]:

@@ -80,15 +80,17 @@ def program_of(model, problem: Problem, mesh: Mesh, rule: Rule, equations: Dynam
     goal, bounds = problem.goal.attitude, problem.bounds
     of = [None if x is None else tuple(x) for x in (goal, bounds.torque, bounds.torque_rate)]
     of += [problem.objective, problem.smoothing, problem.damping, problem.path, problem.formulation, problem.attitude]
-    make = partial(transcribe, model, problem, mesh, rule, equations)
-    return replace(kept((model, *of, tuple(mesh.ends), rule, equations.source), make), problem=problem)
-
-
-def transcribe(model, problem: Problem, mesh: Mesh, rule: Rule, equations: Dynamics) -> Transcription:
-    """Return the program of a problem on a mesh."""
+    of += [model, equations.source]
     coordinates = attitude(problem.attitude)
     form = layout(problem.formulation, coordinates, model.nv - 6, torque_unit(problem))
-    one = node(model, problem, coordinates, form, equations)
+    one = kept(("node", *of), partial(node, model, problem, coordinates, form, equations))
+    make = partial(transcribe, problem, mesh, rule, equations, form, one)
+    return replace(kept((*of, tuple(mesh.ends), rule), make), problem=problem)
+
+
+def transcribe(problem: Problem, mesh: Mesh, rule: Rule, equations: Dynamics, form: Layout, one: Node) -> Transcription:
+    """Return the program of a problem on a mesh, of the function of one node."""
+    coordinates = attitude(problem.attitude)
     where = places(form, mesh, rule)
     direct = _direct_rows(problem, form, where, mesh, rule, coordinates)
     program = collocate(one, where, (mesh, rule), direct, problem.objective == "time").functions()

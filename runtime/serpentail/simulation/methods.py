@@ -16,6 +16,7 @@ SETTINGS = {
     **dict.fromkeys(SCIPY, ("rtol", "atol")),
 }
 STIFF = 5e3  # 1/s: a fastest decay beyond this limits the steps of an explicit method, not their accuracy
+LEAST = 100  # roundings that a relative tolerance must allow, as SciPy's methods ask
 SINGLE = {"tsit5": 1e-4, "ros34pw2": 1e-3}  # tolerances in single precision
 
 
@@ -38,6 +39,9 @@ def checked_method(name: str, settings: dict, available, single: bool) -> Method
         has = ", ".join((*SETTINGS[name], "output_step"))
         raise SimulationError(f"{name} has no setting {', '.join(map(repr, unknown))}; it has {has}")
     checked = {key: positive(key, value) for key, value in settings.items()}
+    least = LEAST * np.finfo(np.float32 if single and name not in SCIPY else float).eps
+    if checked.get("rtol", 1.0) < least:
+        raise SimulationError(f"rtol {checked['rtol']:.3g}: too near to rounding: give {least:.2g} or more")
     return Method(name, "", _defaults(name, single, checked))
 
 

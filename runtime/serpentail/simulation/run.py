@@ -177,19 +177,19 @@ def choose(model, drive: Drive, start: Start, name, settings: dict) -> Method:
         decay = None if model.contacts else fastest_decay(model, drive, start)
         name, reason = chosen(settings, available, decay)
     method = checked_method(name, settings, available, single)
-    if "step" in method.settings:
-        refuse_vanishing(start, method.settings["step"])
+    for each in ("step", "most_step"):
+        refuse_vanishing(start, each, method.settings.get(each, np.inf))
     if name == "rk4":  # steps divide the output's
         steps = max(1, int(np.ceil(start.interval / method.settings["step"] * (1 - 1e-12))))
         return replace(method, reason=reason, settings={"step": start.interval / steps})
     return replace(method, reason=reason)
 
 
-def refuse_vanishing(start: Start, step: float) -> None:
-    """SimulationError where steps of a fixed length (s) are too short to be seen in the time."""
+def refuse_vanishing(start: Start, name: str, step: float) -> None:
+    """SimulationError where steps of at most this length (s) are too short to be seen in the time."""
     least = np.finfo(float).eps * max(abs(start.start), abs(start.end))
     if step < least:
-        raise SimulationError(f"step {step:.3g}: too short to move the time: give {least:.2g} s or more")
+        raise SimulationError(f"{name} {step:.3g}: too short to move the time: give {least:.2g} s or more")
 
 
 def fastest_decay(model, drive: Drive, start: Start) -> float:

@@ -33,8 +33,8 @@ class Reference:
         """Refuse nodes that are no motion."""
         if not isinstance(self.blend, str) or self.blend not in BLENDS:
             raise SimulationError(f"Reference: blend {self.blend!r}: give one of {', '.join(BLENDS)}")
-        width = np.shape(self.angles)[1] if np.ndim(self.angles) == 2 else 0
-        nodes = checked_nodes("Reference", "angles", (self.times, self.angles), width)
+        angles = real_array("Reference: angles", self.angles, error=SimulationError)
+        nodes = checked_nodes("Reference", "angles", (self.times, angles), angles.shape[1] if angles.ndim == 2 else 0)
         if len(nodes[0]) < 2:
             raise SimulationError("Reference: one node only: give two or more")
         object.__setattr__(self, "curve", BLENDS[self.blend](*nodes))
@@ -131,9 +131,9 @@ def _move(field: str, move, last) -> list:
     if at is None or not {"gamma", "delta"} & set(move) or ("rate" in move) == ("duration" in move):
         raise SimulationError(f"{field}: value {dict(move)!r}: needs at, gamma or delta, and one of rate, duration")
     goal = move.get("gamma", angles[0]), move.get("delta", angles[1])
-    way = max(abs(x - y) for x, y in zip(goal, angles, strict=True))
+    way = max(abs(float(x) - float(y)) for x, y in zip(goal, angles, strict=True))
     duration = move["duration"] if "duration" in move else way / positive(f"{field}.rate", move["rate"])
-    if not duration > 0:
+    if not 0 < duration < math.inf:
         raise SimulationError(f"{field}: takes {duration!r} s: needs a duration above 0, and another angle than before")
     if at < end:
         raise SimulationError(f"{field}.at: value {at!r}: the move before it ends at {end:.6g} s: move it after that")

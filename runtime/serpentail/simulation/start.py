@@ -9,6 +9,8 @@ from ..errors import SimulationError, StateError
 from ..library import real_array
 
 MOST_SAMPLES = 10_000_000  # of one run: more are a slip, and fill the memory
+SHORTEST = 1e-100  # s: between samples; methods multiply times
+EPS = float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,11 @@ class Start:
         if end - start > MOST_SAMPLES * step:
             remedy = f"give {(end - start) / MOST_SAMPLES:.2g} s or more"
             raise SimulationError(f"output_step {step:.3g}: more than {MOST_SAMPLES} samples: {remedy}")
-        return cls(q0, v0, start, end, max(1, round((end - start) / step)))
+        checked = cls(q0, v0, start, end, max(1, round((end - start) / step)))
+        least = max(SHORTEST, EPS * max(abs(start), abs(end)))
+        if checked.interval < least:
+            raise SimulationError(f"output_step {step:.3g}: too short to move the time: give {least:.2g} s or more")
+        return checked
 
     @property
     def interval(self) -> float:

@@ -1,0 +1,123 @@
+"""Segments as articulated bodies: SymPy vectors in, the inertia and the loads that pass from segment to segment out.
+
+The links of a segment move with its base and with its two coordinates.  A motion is (acceleration of the origin,
+angular acceleration), a wrench (force, moment), in the axes of the base they are about; the tip of a segment is the
+base of the next one.  With x = (motion of the base, second derivatives of the coordinates), K x + b is the wrench that
+moves a segment and all beyond, and the torques on its coordinates: K is 8 x 8.  Once the coordinates are eliminated it
+is A a + b of the base's motion a alone.  Lanes of K, A, b and T are the entries of x.
+"""
+
+from sympy import Matrix, diag, zeros
+
+from .dynamics import symmetric
+from .kinematics import X, Y, Z, square
+
+
+def swept_by(arm) -> Matrix:
+    """Velocity of a point at ``arm`` for a turn about each axis: columns e_k x arm."""
+    return Matrix.hstack(*(axis.cross(arm) for axis in (X, Y, Z)))
+
+
+def tip_motion(let, R, P, S) -> dict:
+    """What the tip's motion is made of: R^T, R^T (e_k x P), and in its axes the columns S at the tip (A5 to A8)."""
+    turn, parts = square(R).T, []
+    for axis, velocity in ((S[0:3, :], S[3:6, :]), (S[6:9, :], S[9:12, :])):
+        parts += [turn * let("at_tip", velocity + axis.cross(P)), turn * axis]
+    return {"tip_map": Matrix([*turn, *(turn * swept_by(P)), *(entry for part in parts for entry in part)])}
+
+
+def tip_matrix(tip_map) -> Matrix:
+    """T, 6 x 8: motion of the tip in its own axes = T x, but for what velocities add."""
+    turn, swept = square(tip_map[0:9, :]), square(tip_map[9:18, :])
+    pitch, turn_pitch, yaw, turn_yaw = (tip_map[18 + 3 * k : 21 + 3 * k, :] for k in range(4))
+    return Matrix.vstack(Matrix.hstack(turn, swept, pitch, yaw), Matrix.hstack(zeros(3, 3), turn, turn_pitch, turn_yaw))
+
+
+def tip_rows(let, tip_map) -> dict:
+    """The rows of T."""
+    return {f"T_{r}": tip_matrix(tip_map).row(r).T for r in range(6)}
+
+
+def tip_angular_velocity(let, tip_map, rates, w) -> dict:
+    """omega of the tip (A1), in its axes."""
+    return {"w": tip_matrix(tip_map)[3:6, 3:8] * Matrix([w, rates])}
+
+
+def own_inertia(let, mass, h, I, pitch, yaw, H_pp, H_py, H_yy) -> dict:
+    """Rows of K of a segment's own links: their composite inertia and momentum columns (Eq. 16)."""
+    body = Matrix([[diag(*[mass[0]] * 3), swept_by(h)], [swept_by(h).T, symmetric(I)]])
+    columns, block = Matrix.hstack(pitch, yaw), Matrix([[H_pp[0], H_py[0]], [H_py[0], H_yy[0]]])
+    K = Matrix([[body, columns], [columns.T, block]])
+    return {f"K_{r}": K.row(r).T for r in range(8)}
+
+
+def load_at_tip(let, A, b, coasting) -> dict:
+    """Wrench that moves all beyond a tip whose motion is ``coasting``, what velocities alone give it: A a + b."""
+    total = b[0]
+    for k in range(6):
+        total += let("moved", coasting[k] * A[k])
+    return {"load": [total]}
+
+
+def pass_on(let, T, tip_map, A_0, A_1, A_2, A_3, A_4, A_5, load) -> dict:
+    """What all beyond the tip adds to a segment: K by T^T A T, b by T^T load; ``A_0`` to ``A_5`` are the rows of A."""
+    entries, A = tip_matrix(tip_map), (A_0, A_1, A_2, A_3, A_4, A_5)
+    moved = [let("moved", sum((A[c][r] * T[c] for c in range(6)), 0)) for r in range(6)]
+    K = [sum((entries[r, k] * moved[r] for r in range(6)), 0) for k in range(8)]
+    return {"K": K, "b": [sum((load[r] * T[r] for r in range(6)), 0)]}
+
+
+def free_coordinates(let, K, b, pitch_row, yaw_row, joint_load, torques) -> dict:
+    """Eliminate the coordinates, yaw first; the rows are the last of K, ``joint_load`` the last two entries of b.
+
+    ``shares`` tell each coordinate's second derivative: minus the sum of (the entries of x before it, 1) times them.
+    """
+    over_yaw = let("over_yaw", 1 / yaw_row[7])
+    yaw_share = let("yaw_share", yaw_row[0:7, :] * over_yaw)
+    left = let("left", pitch_row[0:7, :] - yaw_row[6] * yaw_share)
+    over_pitch = let("over_pitch", 1 / left[6])
+    pitch_share = let("pitch_share", left[0:6, :] * over_pitch)
+    yaw_load = let("yaw_load", joint_load[1] - torques[1])
+    pitch_load = let("pitch_load", (joint_load[0] - torques[0] - yaw_share[6] * yaw_load) * over_pitch)
+    yaw_load = let("yaw_load", yaw_load * over_yaw)
+    pitch_lanes = let("pitch_lanes", K[6] - yaw_share[6] * K[7])
+    return {
+        "A": [let("A", K[r] - yaw_share[r] * K[7]) - pitch_share[r] * pitch_lanes for r in range(6)],
+        "b_base": [let("b", b[0] - yaw_load * K[7]) - pitch_load * pitch_lanes],
+        "shares": Matrix([*pitch_share, pitch_load, *yaw_share, yaw_load]),
+        "pivots": Matrix([left[6], yaw_row[7]]),
+    }
+
+
+def outward(let, tip_map, shares, coasting, base) -> dict:
+    """Second derivatives of a segment's coordinates, and the motion of its tip, from that of its base."""
+    pitch = let("pitch", -(shares[0:6, :].dot(base) + shares[6]))
+    yaw = let("yaw", -(shares[7:13, :].dot(base) + shares[13] * pitch + shares[14]))
+    free = Matrix([pitch, yaw])
+    return {"accelerations": free, "base": coasting + tip_matrix(tip_map) * Matrix([base, free])}
+
+
+def freed_inertia(let, torso_mass, torso_inertia, tail_mount, A_0, A_1, A_2, A_3, A_4, A_5) -> dict:
+    """Inertia of torso and tail at B with free coordinates: lower triangle for (omega_dot, a), torso axes."""
+    A, swept = Matrix.hstack(A_0, A_1, A_2, A_3, A_4, A_5).T, swept_by(tail_mount)
+    force, moment = A[0:3, 0:3], A[3:6, 0:3]
+    coupling = let("coupling", moment + swept.T * force)
+    turning = A[3:6, 3:6] + moment * swept + swept.T * coupling.T
+    H = Matrix([[turning + diag(*torso_inertia), zeros(3, 3)], [coupling.T, force + diag(*[torso_mass[0]] * 3)]])
+    return {f"H_{r}": H[r, 0 : r + 1].T for r in range(6)}
+
+
+def freed_wrench(let, tail_mount, a_mount, A_0, A_1, A_2, b_mount) -> dict:
+    """Wrench at B that moves a tail with free coordinates whose mount accelerates by ``a_mount`` and does not turn."""
+    F = let("F", b_mount + a_mount[0] * A_0 + a_mount[1] * A_1 + a_mount[2] * A_2)
+    return {"F": Matrix([F[0:3, :], F[3:6, :] + tail_mount.cross(F[0:3, :])])}
+
+
+def net_load(let, at_torso, force, moment) -> dict:
+    """Applied less inertial loads at B, for (omega_dot, a)."""
+    return {"rhs": Matrix([at_torso[3:6, :] - moment, at_torso[0:3, :] - force])}
+
+
+def world_acceleration(let, R, a, gravity) -> dict:
+    """p_b_ddot = R_b a - g z."""
+    return {"p_ddot": square(R) * a - gravity[0] * Z}
