@@ -14,6 +14,7 @@ import numpy as np
 import batches
 import contact_costs
 import continuum_forms
+import continuum_peer
 import derivatives
 import more_peers
 import peers
@@ -210,6 +211,7 @@ MEASURES = {
     "batch_times": batches.batch_times,
     "rollout_rates": batches.rollout_rates,
     "tails": tails,
+    "continuum_peer": continuum_peer.continuum_peer,
     "jacobian_times": derivatives.jacobian_times,
     "hessian_times": derivatives.hessian_times,
     "derivative_code": derivatives.derivative_code,

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from fixtures import COLUMNS
+from targets import judged
 
 Report = dict[str, list[dict]]
 NOTABLE = 1.15  # ratio to the last run from which a figure is listed
@@ -18,6 +19,8 @@ def written(folder: Path, report: dict, measures: dict[str, Callable], pictures:
     path = folder / "report.json"
     last = json.loads(path.read_text()) if path.is_file() else None
     sections = [(name, inspect.cleandoc(measures[name].__doc__), report[name]) for name in measures]
+    about = "Times slower than serpentail: what is asked, what was found in this run, by minima."
+    sections.insert(0, ("targets", about, judged(report)))
     sections.append(("since the last run", *changes(report, last)))
     head = ", ".join(str(value) for value in report["machine"].values())
     text = "\n".join(["# Benchmark", "", head, "", *(line for s in sections for line in markdown(*s))])
