@@ -1,8 +1,9 @@
-"""Batches: generated folders go in, nanoseconds a state of batched calls beside single ones come out."""
+"""Batches: generated folders go in, times of batched calls and rollouts beside those of single ones come out."""
 
 import ctypes
 import time
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 
@@ -10,8 +11,10 @@ import serpentail as st
 from fixtures import generated, label
 from serpentail.library import aligned, call_record
 from serpentail.side_by_side import MANY
+from serpentail.simulation import abreast
 
 STATES, ROUNDS = 512, 300  # a batch that stays in the cache
+FLIGHTS = 64
 SIZES = ((1, 3), (2, 3), (3, 4), (6, 6), (3, None))
 
 
@@ -30,6 +33,38 @@ def batch_times(folder: Path) -> list[dict]:
         row = {"model": label(*size), "one by one, ns": alone, "side by side, ns": together}
         rows.append(row | {"ratio": alone / together, "from Python, all cores, ns": whole})
     return rows
+
+
+def rollout_rates(folder: Path) -> list[dict]:
+    """Damped flights of 200 steps of RK4, 11 samples, a second: one call each, all in one call, and abreast in it.
+
+    All but the first on all cores, each flight with its own parameters. Last: what a flight of one step takes, which is
+    what a run costs besides its steps. Target: abreast 3x faster, 50 us.
+    """
+    rows = []
+    for size in SIZES:
+        model = st.load(generated(folder / "speed", *size))
+        q, v, _ = random_states(model, FLIGHTS)
+        q[:, 3] += 2
+        times = np.min([flight_times(model, q, v) for _ in range(9)], axis=0) / FLIGHTS
+        rates = dict(zip(("one by one, 1/s", "at once, 1/s", "abreast, 1/s"), 1e9 / times, strict=False))
+        rows.append({"model": label(*size)} | rates | {"ratio": times[1] / times[2], "a run, us": times[3] / 1e3})
+    return rows
+
+
+def flight_times(model, q: np.ndarray, v: np.ndarray) -> list[float]:
+    """Return nanoseconds of all flights by each way, and of flights of one step."""
+    settings = {"controller": st.Damping(1e-6), "t_span": 0.2, "step": 1e-3, "output_step": 0.02, "method": "rk4"}
+    own = {"tail_mass": np.linspace(0.003, 0.004, len(q))}
+    models = [model.with_parameters(tail_mass=mass) for mass in own["tail_mass"]]
+    ways = [lambda: [st.simulate(*one, **settings) for one in zip(models, q, v, strict=True)]]
+    ways.append(lambda: st.simulate(model, q, v, parameters=own, **settings))
+    found = []
+    for way, many in zip((*ways, ways[1]), (np.inf, np.inf, 1), strict=True):
+        with mock.patch.object(abreast, "MANY", many):
+            found.append(best(way, 1))
+    step = settings | {"t_span": 1e-3, "output_step": 1e-3}
+    return [*found, best(lambda: st.simulate(model, q, v, parameters=own, **step), 1)]
 
 
 def random_states(model, count: int) -> tuple[np.ndarray, ...]:

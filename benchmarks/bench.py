@@ -209,6 +209,7 @@ MEASURES = {
     "other_peers": more_peers.other_peers,
     "scaling": scaling.scaling,
     "batch_times": batches.batch_times,
+    "rollout_rates": batches.rollout_rates,
     "tails": tails,
     "continuum_peer": continuum_peer.continuum_peer,
     "jacobian_times": derivatives.jacobian_times,

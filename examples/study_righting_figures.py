@@ -57,8 +57,8 @@ def _angles_near(flight: st.Trajectory, like: st.Trajectory) -> np.ndarray:
 
 
 def draw_figure_11(rows: dict[str, list[dict]], path: Path) -> Path:
-    """Iterations, objective, time and true error against the nodes a second, and time against error."""
-    panels = {"iterations": "iterations", "objective": "objective [N$^2$ m$^2$ s]", "solve_cpu_s": "solver time [s]"}
+    """Iterations, effort, time and true error against the nodes a second, and time against error."""
+    panels = {"iterations": "iterations", "effort": "effort [N$^2$ m$^2$ s]", "solve_cpu_s": "solver time [s]"}
     panels["open_loop_attitude_error_deg"] = "true error [deg]"
 
     def draw() -> Figure:
@@ -75,6 +75,7 @@ def draw_figure_11(rows: dict[str, list[dict]], path: Path) -> Path:
             axes.flat[5].plot([r["frequency"] for r in good], [r["dyn_err"] for r in good], mark, **look)
         for panel, name in zip(axes.flat, (*panels.values(), "true error [deg]", "Dyn.Err (Eq. 50)"), strict=True):
             panel.set(ylabel=name, xlabel="nodes a second [1/s]", yscale="log")
+            panel.yaxis.set_minor_formatter(NullFormatter())
             panel.grid(color="#e6e6e6", linewidth=0.6)
         axes.flat[4].set(xlabel="solver time [s]", xscale="log")
         axes.flat[4].xaxis.set_minor_formatter(NullFormatter())

@@ -1,6 +1,5 @@
 """Memory: a model and states far from ordinary go in; what sanitizers and valgrind say of its C at them comes out."""
 
-import shutil
 import subprocess
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -10,7 +9,6 @@ import numpy as np
 
 import drops
 import serpentail as st
-from boards import ToolchainMissing
 from extremes import cases
 from poses import FAST, SMALL, folds
 from serpentail.parameters import flat, resolve
@@ -20,18 +18,9 @@ DRIVER = Path(__file__).parent / "driver.c"
 SANITIZED = ("-O0", "-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all")
 WATCHED = ("valgrind", "--quiet", "--error-exitcode=9", "--leak-check=full", "--errors-for-leak-kinds=definite")
 BARE, BATCH, ROWS = 0, 1, 2  # a function, its batch, its batch side by side
-SEVERAL = 11  # states of a batch: more than are taken side by side at once, and no multiple of that
 NUMBERS = (np.nan, np.inf, -np.inf, 1e308, -1e300, 1e155, 1e80, 1e20, 3e9, 1e5, 1e-200, 5e-324, -0.0, 0.0)
 STATUSES = {0, 1, 2, 3}
 ENDS = STATUSES | {33, 34}  # of runs: steps too small, too many
-
-
-def need() -> None:
-    """Raise ToolchainMissing unless valgrind is installed."""
-    if shutil.which(WATCHED[0]) is None:
-        raise ToolchainMissing(
-            "valgrind is not on PATH; Debian, Ubuntu: apt-get install --no-install-recommends valgrind"
-        )
 
 
 @dataclass(frozen=True)
@@ -117,11 +106,12 @@ def every(model: st.Model, seed: int) -> list[Case]:
     """Return all cases: every function in every form at every state, then runs by every method."""
     rng, vector = np.random.default_rng(seed), model.parameter_vector
     many, found = model.manifest["batch"]["work"], []
+    several = model.manifest["batch"]["states"] + 3  # more than are taken side by side at once, no multiple of that
     for number, (name, lengths, inputs) in enumerate(shapes(model)):
         names = [a["name"] for a in model.manifest["functions"][name]["inputs"]]
         for given, parameters, refused in states(model, names, lengths[:inputs], rng):
             for form in (BARE, BATCH, *([ROWS] if name in many else [])):
-                count = SEVERAL if form == ROWS else 1
+                count = several if form == ROWS else 1
                 arrays = [np.broadcast_to(x, (count, len(x))) for x in given]
                 found.append(Case(name, packed(model, 3 * number + form, count, 0, parameters, arrays), form, refused))
     return [*found, *runs(model, rng, 3 * (number + 1), vector)]

@@ -62,15 +62,16 @@ class Model(SimpleNamespace):
         self.manifest = json.loads((self.folder / "manifest.json").read_text())
         self.scene = parse_scene(self.manifest["scene"], name)
         self.include, self.header = self.folder / "include", self.folder / "include" / f"{name}.h"
-        self.source, self.host, self.batch, self.simulation = (
-            self.folder / "src" / f"{name}{part}.c" for part in ("", "_host", "_batch", "_simulation")
+        self.source, self.host, self.batch, self.simulation, self.flights = (
+            self.folder / "src" / f"{name}{part}.c" for part in ("", "_host", "_batch", "_simulation", "_flights")
         )
         self.example = self.folder / "example" / "main.c"
 
     @property
     def sources(self):
-        """The model, its host entries and, where it has them, its batches and its simulation."""
-        return [path for path in (self.source, self.host, self.batch, self.simulation) if path.is_file()]
+        """The model, its host entries and, where it has them, its batches, its simulation and its flights."""
+        parts = (self.source, self.host, self.batch, self.simulation, self.flights)
+        return [path for path in parts if path.is_file()]
 
     @property
     def text(self):
@@ -122,7 +123,7 @@ def test_compiles_without_a_warning(models, tmp_path, compiler, name):
 
 @pytest.mark.parametrize("name", ["m2_n2_double_loops", "m2_n2_float_straight"])
 def test_optimiser_finds_nothing_to_warn_about(models, tmp_path, name):
-    for source in (models(name).source, models(name).batch, models(name).simulation):
+    for source in (models(name).source, models(name).batch, models(name).simulation, models(name).flights):
         compiled(tmp_path, source, *C99, "-O2")
 
 
@@ -179,7 +180,7 @@ def assert_own_symbols(model, objects, *merged):
     """A model defines what its header declares, and wants no more than the mathematics and memory of libc."""
     suffix = "f" if model.manifest["real"] == "float" else ""
     parts = [{symbol for _, symbol in symbols(path, "-g", "--defined-only")} for path in objects]
-    own, host, batch, simulation = parts
+    own, host, batch, simulation, *flights = parts
     defined = set().union(*parts)
     wanted = {symbol for path in objects for _, symbol in symbols(path, "-u")} - defined
     assert wanted <= {f"{name}{suffix}" for name in ("sin", "cos", "sqrt", "pow", "ceil", *merged)} | MEMORY
@@ -189,6 +190,7 @@ def assert_own_symbols(model, objects, *merged):
     names = f"{model.name}_(batch_|abi_hash$)|(jac_|adj1_|jac_adj1_)?{model.name}_casadi_"
     assert all(re.match(names, symbol) for symbol in host)
     assert batch and all(symbol.startswith(f"{model.name}_side_by_side_") for symbol in batch)
+    assert all(found == {f"{model.name}_side_by_side_flights"} for found in flights)
 
 
 @every_model

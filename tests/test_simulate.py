@@ -268,7 +268,7 @@ LAST = [*Q0[:-1], np.nan]
     [
         ((Q0[:-1], V0), rf"q0 has shape \({NQ - 1},\), not \({NQ},\)"),
         ((Q0, [*V0, 0]), rf"v0 has shape \({NV + 1},\), not \({NV},\)"),
-        (([Q0], V0), r"q0 has shape \(1, \d+\).*one start state"),
+        (([[Q0]], V0), r"q0 has shape \(1, 1, \d+\).*one start state"),
         ((0.0, V0), r"q0 has shape \(\)"),
         ((None, V0), "q0 is not made of real numbers"),
         (([[1], [1, 2]], V0), "q0 is not made of real numbers"),

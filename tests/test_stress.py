@@ -10,12 +10,15 @@ import call_fuzz
 import drops
 import scene_fuzz
 import serpentail as st
+import stress_plots
 from call_fuzz import Fault, Target
+from figures import Figure, table
 from models import model_folder
+from poses import Point
 from references.metrics import mass_matrix_error
 from serpentail.parameters import UNLIKE as UNLIKE_FROM
 from serpentail.parameters import disparity
-from subjects import Subject, changed, exact_of, state
+from subjects import Errors, Subject, changed, exact_of, state
 
 SCENES = sorted((Path(__file__).parent.parent / "scenes").glob("*.toml"))
 slow_count = pytest.param(10_000, marks=pytest.mark.slow)
@@ -36,6 +39,20 @@ def test_random_calls_are_answered_or_refused(standing, lying, count, tmp_path, 
     monkeypatch.chdir(tmp_path)
     for seed, model in enumerate((standing, lying)):
         assert call_fuzz.fuzz(call_fuzz.targets(model, tmp_path), count, seed) == []
+
+
+@pytest.mark.parametrize(("found", "passed"), [(1.0, True), (1.1, False), (np.nan, False), (np.inf, False)])
+def test_a_figure_beyond_its_limit_fails(found, passed):
+    figure = Figure("it", found, 1.0)
+    assert (figure.passed, figure.row()["passed"], "**FAILED**" in table([figure])) == (passed, passed, not passed)
+
+
+def test_plots_are_drawn(tmp_path):
+    errors = [Errors(1e-16, 0.0, 1e-15, condition) for condition in (3.0, 1e4)]
+    swept = [Point(tail, bend, e) for tail in ("one", "two") for bend, e in zip((0.0, 1.0), errors, strict=True)]
+    figures = [Figure("v_dot", 1e-16, 5e-15, "cond(H) 1e4"), Figure("faults", 0, 0), Figure("drift", 0.0, 1e-6)]
+    stress_plots.draw({"Part": figures}, swept, tmp_path)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["bends.png", "condition.png", "margins.png"]
 
 
 @pytest.mark.parametrize("result", [np.array([1.0, np.nan]), (1.0, (np.inf,))])

@@ -22,6 +22,14 @@ def side_by_side(program: Program, states: int) -> Program:
     return replace(program, name=f"{program.name}_rows", arrays=tuple(array.values()), body=body)
 
 
+def with_own_parameters(program: Program, name: str) -> Program:
+    """Return a program by another name that takes its parameters as inputs, so that each state may have its own."""
+    program = expanded(program)
+    array = {a.name: replace(a, role="input") if a.role == "parameters" else a for a in program.arrays}
+    body = rewritten(program.body, lambda statement: (with_arrays(statement, array),))
+    return replace(program, name=name, arrays=tuple(array.values()), body=body)
+
+
 def flattened(program: Program, fixed: dict[str, list] | None = None) -> Program:
     """Return a program that is one step, its loops written out, and guards; ``fixed`` arrays are constants."""
     tape, outputs, guards = unroll(program, fixed)

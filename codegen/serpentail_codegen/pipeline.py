@@ -8,6 +8,7 @@ from .draft import Tail
 from .scene import Scene
 from .targets.c import c_context, c_files, emit
 from .targets.c_batch import batch_entry, batch_file, batches
+from .targets.c_flights import flights, flights_entry, flights_file
 from .targets.casadi import casadi_module
 from .targets.manifest import manifest
 from .targets.package import package_files
@@ -22,10 +23,14 @@ def generate(scene: Scene, output: Path) -> list[str]:
     context = c_context(scene, tail, emitted, __version__)
     context["content_hash"] = digest("".join(c_files(scene, context).values()))[:16]
     side_by_side = batches(scene, tail, emitted)
+    together = flights(scene, tail, emitted)
     files = c_files(scene, context) | batch_file(scene, tail, side_by_side, context) | package_files(context)
+    files |= flights_file(scene, together, context)
     module = casadi_module(scene, tail, [f for f in wanted if f.name in SYMBOLIC], __version__, context["content_hash"])
     files[f"{scene.name}_casadi.py"] = module
-    described = manifest(scene, context, emitted) | {"batch": batch_entry(scene, side_by_side)}
+    described = (
+        manifest(scene, context, emitted) | {"batch": batch_entry(scene, side_by_side)} | flights_entry(together)
+    )
     return write_folder(output / scene.name, files, described)
 
 

@@ -34,13 +34,13 @@ class Sweeps:
 def accelerate(d: Draft, load: Array, torques: Array, v_dot: Array) -> None:
     """Fill ``v_dot`` from a load (force, moment) at B in torso axes and torques."""
     m = d.tail.segments
-    known = Sweeps(in_lanes(d, "tip_map", 30).array, d.array("coasting", 6, m), d.array("shares", 15, m))
-    prepare(d)
-    shape(d, known.tip)
-    turn(d, known)
-    move(d)
-    A, b = inward(d, known, torques)
-    at_torso(d, A, b, load, v_dot)
+    known = Sweeps(_in_lanes(d, "tip_map", 30).array, d.array("coasting", 6, m), d.array("shares", 15, m))
+    _prepare(d)
+    _shape(d, known.tip)
+    _turn(d, known)
+    _move(d)
+    A, b = _inward(d, known, torques)
+    _at_torso(d, A, b, load, v_dot)
     base = d.array("base", 6)
     d.copy(base.part(0, 3), d.known["a_mount"])
     d.copy(base.part(3, 3), v_dot.part(3, 3))
@@ -49,7 +49,7 @@ def accelerate(d: Draft, load: Array, torques: Array, v_dot: Array) -> None:
         d.step(art.outward, reads, accelerations=v_dot.part(6 + 2 * i, 2), base=base[0])
 
 
-def in_lanes(d: Draft, name: str, size: int, *values) -> Ref:
+def _in_lanes(d: Draft, name: str, size: int, *values) -> Ref:
     """Declare a vector with one lane for each segment, found by its name; ``values`` are those it begins with."""
     d.known[name] = d.wide(f"{name}_lanes", size, d.tail.segments)[0]
     if values:
@@ -57,55 +57,55 @@ def in_lanes(d: Draft, name: str, size: int, *values) -> Ref:
     return d.known[name]
 
 
-def prepare(d: Draft) -> None:
+def _prepare(d: Draft) -> None:
     """Link properties, trigonometry of all joints."""
     prepare_link(d)
-    angles, rates = in_lanes(d, "angles", 2, 0), in_lanes(d, "rates", 2, 0)
+    angles, rates = _in_lanes(d, "angles", 2, 0), _in_lanes(d, "rates", 2, 0)
     with d.loop("i", d.tail.segments) as i:
         d.copy(angles.array.down(0, i, 2), d.angles(i))
         d.copy(rates.array.down(0, i, 2), d.rates(i))
-    d.step(kin.joint_trigonometry, joint=in_lanes(d, "joint", 4))
-    d.step(kin.double_angles, twice=in_lanes(d, "twice", 10))
+    d.step(kin.joint_trigonometry, joint=_in_lanes(d, "joint", 4))
+    d.step(kin.double_angles, twice=_in_lanes(d, "twice", 10))
 
 
-def shape(d: Draft, tip: Array) -> None:
+def _shape(d: Draft, tip: Array) -> None:
     """How each tip moves, and the composite inertia of each segment's own links."""
-    here = {"R": in_lanes(d, "R", 9, *IDENTITY), "P": in_lanes(d, "P", 3, 0)}
-    S = in_lanes(d, "S", 12, 0)
+    here = {"R": _in_lanes(d, "R", 9, *IDENTITY), "P": _in_lanes(d, "P", 3, 0)}
+    S = _in_lanes(d, "S", 12, 0)
     with d.loop("j", d.tail.links):
         d.step(kin.joint_twist, S_=S)
         d.step(kin.link_pose, **here)
     d.step(art.tip_motion, tip_map=tip[0])
-    carried = {name: in_lanes(d, name, size, 0) for name, size in (("h", 3), ("I", 6), ("pitch", 6), ("yaw", 6))}
-    own = {f"{name}_": in_lanes(d, name, 1, 0) for name in ("H_pp", "H_py", "H_yy")}
+    carried = {name: _in_lanes(d, name, size, 0) for name, size in (("h", 3), ("I", 6), ("pitch", 6), ("yaw", 6))}
+    own = {f"{name}_": _in_lanes(d, name, 1, 0) for name in ("H_pp", "H_py", "H_yy")}
     d.fill(d.vector("mass", 1), 0)
     with d.loop("j", d.tail.links, downward=True):
         d.step(dyn.gather_links, mass=d.known["mass"], **carried, **own)
 
 
-def turn(d: Draft, known: Sweeps) -> None:
+def _turn(d: Draft, known: Sweeps) -> None:
     """Angular velocity of each segment's base."""
-    w, here = in_lanes(d, "w", 3, 0), d.array("w_base", 3)[0]
+    w, here = _in_lanes(d, "w", 3, 0), d.array("w_base", 3)[0]
     d.copy(here, d.known["omega"])
     with d.loop("i", d.tail.segments) as i:
         d.copy(w.array.down(0, i, 3), here)
         d.step(art.tip_angular_velocity, {"tip_map": known.tip_of(i), "rates": d.rates(i), "w": here}, w=here)
 
 
-def move(d: Draft) -> None:
+def _move(d: Draft) -> None:
     """Loads that velocities alone ask for in each segment, and what they alone accelerate its tip by."""
-    here = {"w": d.known["w"], "w_dot": in_lanes(d, "w_dot", 3, 0), "a": in_lanes(d, "a", 3, 0)}
-    motion = here | {name: in_lanes(d, name, 3) for name in ("a_joint", "swing")}
+    here = {"w": d.known["w"], "w_dot": _in_lanes(d, "w_dot", 3, 0), "a": _in_lanes(d, "a", 3, 0)}
+    motion = here | {name: _in_lanes(d, name, 3) for name in ("a_joint", "swing")}
     wrench = d.wide("wrench", 6 * d.tail.links, d.tail.segments)
     with d.loop("j", d.tail.links) as j:
         d.apply(still(d, kin.link_motion, moving=False), d.known, **motion)
         d.step(dyn.link_wrench, F=wrench.part(6 * j, 6))
-    total, torque = in_lanes(d, "F_next", 6, 0), in_lanes(d, "torque", 2, 0)
+    total, torque = _in_lanes(d, "F_next", 6, 0), _in_lanes(d, "torque", 2, 0)
     with d.loop("j", d.tail.links, downward=True) as j:
         d.step(dyn.gather_wrench, {"F": wrench.part(6 * j, 6)}, F_next=total, torque_=torque)
 
 
-def inward(d: Draft, known: Sweeps, torques: Array) -> tuple[Array, Array]:
+def _inward(d: Draft, known: Sweeps, torques: Array) -> tuple[Array, Array]:
     """From the tip to the mount, coordinates eliminated; return A and b of all that hangs on the mount."""
     K, T = d.wide("K", UNKNOWNS, UNKNOWNS), d.wide("T", 6, UNKNOWNS)
     b, load, pivots = d.wide("b", 1, UNKNOWNS), d.wide("load", 1, UNKNOWNS), d.array("pivots", 2)[0]
@@ -134,25 +134,25 @@ def inward(d: Draft, known: Sweeps, torques: Array) -> tuple[Array, Array]:
         begin(i)
         d.step(art.tip_rows, {"tip_map": known.tip_of(i)}, **{f"T_{r}": T.lane(r, 0, UNKNOWNS) for r in range(6)})
         d.step(art.load_at_tip, {"A": A[0], "b": b_base[0], "coasting": known.coasting[i]}, load=load[0])
-        reads = {"T": T[0], "tip_map": known.tip_of(i), "load": load.lane(0, 0, 6)} | rows(A, 6)
+        reads = {"T": T[0], "tip_map": known.tip_of(i), "load": load.lane(0, 0, 6)} | _rows(A, 6)
         d.step(art.pass_on, reads, K_=K[0], b_=b[0])
         end(i)
     return A, b_base
 
 
-def rows(A: Array, count: int) -> dict[str, Ref]:
+def _rows(A: Array, count: int) -> dict[str, Ref]:
     """The first rows of A, number by number."""
     return {f"A_{r}": A.lane(r, 0, 6) for r in range(count)}
 
 
-def at_torso(d: Draft, A: Array, b: Array, load: Array, v_dot: Array) -> None:
+def _at_torso(d: Draft, A: Array, b: Array, load: Array, v_dot: Array) -> None:
     """Accelerations of the torso; leaves that of the mount in ``a_mount``."""
     H, rhs, zero, omega = d.array("H", UNKNOWNS, 6), d.array("rhs", 6), d.zero(3), d.known["omega"]
     F, a_mount = d.array("F_tail", 6)[0], d.vector("a_mount", 3)
-    d.step(art.freed_inertia, rows(A, 6), **{f"H_{r}": H.part(UNKNOWNS * r, r + 1) for r in range(6)})
+    d.step(art.freed_inertia, _rows(A, 6), **{f"H_{r}": H.part(UNKNOWNS * r, r + 1) for r in range(6)})
     d.factor(H, 6)
     d.step(kin.mount_acceleration, {"w": omega, "w_dot": zero, "a": zero}, a_mount=a_mount)
-    d.step(art.freed_wrench, rows(A, 3) | {"b_mount": b.lane(0, 0, 6)}, F=F)
+    d.step(art.freed_wrench, _rows(A, 3) | {"b_mount": b.lane(0, 0, 6)}, F=F)
     inertial = {name: d.array(f"{name}_torso", 3)[0] for name in ("force", "moment")}
     d.step(torso_bias, {"w": omega, "a": zero, "F": F}, **inertial)
     d.step(art.net_load, inertial | {"at_torso": load[0]}, rhs=rhs[0])

@@ -6,6 +6,7 @@ __version__ = "0.1.0"
 _HOME = {
     **dict.fromkeys(["load", "Model"], "model"),
     "simulate": "simulation.run",
+    "Rollouts": "simulation.rollouts",
     "settle": "simulation.settling",
     **dict.fromkeys(["scenario", "Scenario"], "simulation.scenarios"),
     **dict.fromkeys(["Damping", "TorqueTable", "TorqueCurve", "NativeTorque", "Phases"], "simulation.controllers"),

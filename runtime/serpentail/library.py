@@ -12,7 +12,7 @@ from numpy import ndarray
 from .compiler import compile_library
 from .errors import ModelError, SerpentailError, StateError
 from .manifest import remedy
-from .side_by_side import SideBySide, shared
+from .side_by_side import LATE, SideBySide, shared
 
 NOT_POSITIVE_DEFINITE, NOT_FINITE, OUT_OF_RANGE = 1, 2, 3
 
@@ -20,7 +20,8 @@ NOT_POSITIVE_DEFINITE, NOT_FINITE, OUT_OF_RANGE = 1, 2, 3
 def open_library(folder: Path, manifest: dict, profile: str) -> ctypes.CDLL:
     """Compile (or find in the cache) and load a model's C; ModelError where it is not what the manifest says."""
     prefix = manifest["prefix"]
-    sources = [folder / name for name in manifest["files"] if name.startswith("src/")]
+    late = {f"src/{prefix}_{part}.c" for part in LATE}
+    sources = [folder / name for name in manifest["files"] if name.startswith("src/") and name not in late]
     path = compile_library(sources, folder / "include", profile)
     try:
         library = ctypes.CDLL(str(path))
@@ -103,6 +104,31 @@ class Buffers(threading.local):
         return tuple(o[()] if o.ndim == 0 else o.copy() for o in self.outputs)
 
 
+class Rows:
+    """A compiled function on rows of many runs, each with its own parameters; where they lie is looked up once.
+
+    parameters (runs, scalars); inputs and outputs (runs, rows, ...), of the model's reals.  For one thread.
+    """
+
+    def __init__(self, kernel: "Kernel", parameters: np.ndarray, inputs, outputs):
+        self.kernel, self.inputs = kernel, inputs
+        self.places = [(a.ctypes.data, a.strides[0]) for a in (*inputs, *outputs)]
+        self.parameters = parameters.ctypes.data, parameters.strides[0]
+        self.work = aligned(kernel.work, kernel.dtype)
+        self.call = call_record(parameters, 0, self.work, (*inputs, *outputs))
+        self.address = ctypes.addressof(self.call)
+
+    def __call__(self, run: int, rows: int) -> None:
+        """Evaluate the first rows of a run; StateError, which counts all rows from the first run's on."""
+        call = self.call
+        call.parameters, call.count = self.parameters[0] + run * self.parameters[1], rows
+        for k, (first, apart) in enumerate(self.places):
+            call.arrays[k] = first + run * apart
+        if status := self.kernel.function(self.address):
+            whole = [a.reshape(-1, *a.shape[2:]) for a in self.inputs]
+            self.kernel.fail(status, run * self.inputs[0].shape[1] + call.failed, whole)
+
+
 class Kernel:
     """One compiled function of a model: single states, or arrays with a leading batch axis."""
 
@@ -129,7 +155,7 @@ class Kernel:
                 return self._any(arrays)
             buffer[:] = array
         if status := self.function(buffers.address):
-            self._fail(status, 0, [b[None] for b in buffers.inputs])
+            self.fail(status, 0, [b[None] for b in buffers.inputs])
         return buffers.only.copy() if buffers.only is not None else buffers.results()
 
     def _any(self, arrays):
@@ -165,7 +191,7 @@ class Kernel:
         work = aligned(self.work, self.dtype)
         call = call_record(self.parameters, last - first, work, [a[first:last] for a in (*inputs, *outputs)])
         if status := self.function(ctypes.addressof(call)):
-            self._fail(status, first + call.failed, inputs)
+            self.fail(status, first + call.failed, inputs)
 
     def _side_by_side(self, function, inputs, outputs, first: int, last: int) -> None:
         """Evaluate states [first, last) side by side; those among which one fails are taken again, one by one."""
@@ -179,7 +205,8 @@ class Kernel:
             self._each(inputs, outputs, first, after)
             first = after
 
-    def _fail(self, status: int, index: int, arrays):
+    def fail(self, status: int, index: int, arrays):
+        """Raise what a status means of one state among arrays."""
         state = f" of state {index}" if len(arrays[0]) > 1 else ""
         for name, array in zip(self.names, arrays, strict=True):
             bad = np.argwhere(~np.isfinite(array[index]))

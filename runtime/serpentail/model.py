@@ -10,7 +10,7 @@ import numpy as np
 from .errors import ModelError, StateError
 from .library import Kernel, finite_array, open_library
 from .manifest import read_manifest
-from .parameters import flat, resolve, warn_of_unlike
+from .parameters import RunParameters, flat, resolve, warn_of_unlike, without_replaced
 from .side_by_side import SideBySide
 
 
@@ -78,14 +78,17 @@ class Model:
 
     def with_parameters(self, **changes) -> "Model":
         """Return this model with other parameters; nothing is compiled.  Warns as ``load`` does."""
-        own = self._given()
-        if "link_inertia" in changes:
-            own.pop("link_radius", None)
-        if "link_radius" in changes:
-            own.pop("link_inertia", None)
-        values = resolve(self.manifest, own | changes)
+        values = resolve(self.manifest, without_replaced(self._given(), changes) | changes)
         warn_of_unlike(values)
         return Model(self.folder, self.manifest, values, self.library, self.profile, self.many)
+
+    def parameters_of_runs(self, changes: Mapping[str, object] | None, runs: int) -> RunParameters:
+        """Return the parameters of many runs; changes: name -> (runs,) or (runs, 3), SI, or None."""
+        own = self._given() if changes else self.parameters
+        found = RunParameters.checked(self.manifest, own, changes, runs)
+        if found.changes:
+            warn_of_unlike(found.values, 4)  # who calls st.simulate
+        return found
 
     def _given(self) -> dict:
         """Return the parameters that the others follow from; none where they are baked."""

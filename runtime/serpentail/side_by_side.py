@@ -3,8 +3,9 @@
 import ctypes
 import os
 import threading
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from collections import deque
+from collections.abc import Callable, Iterator
+from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
@@ -12,28 +13,41 @@ from pathlib import Path
 from .compiler import compile_library
 
 MANY = 1000  # states: from here on a batch pays for compiling the C of batches, which takes a second or two
+LOOK = 0.1  # s between looks at signals, such as Ctrl-C
+LATE = ("batch", "flights")  # sources of a model that are compiled when they are needed
 SHARE = 256  # states: the least that is worth a thread
 
 
+class Late:
+    """A source of one model that is compiled when it is first needed, not with the model."""
+
+    def __init__(self, folder: Path, manifest: dict, profile: str, part: str):
+        self.folder, self.source, self.profile = folder, f"{manifest['prefix']}_{part}.c", profile
+        self.library, self.lock = None, threading.Lock()
+
+    def function(self, name: str):
+        """Return a function that takes a record."""
+        with self.lock:
+            if self.library is None:
+                source = self.folder / "src" / self.source
+                self.library = ctypes.CDLL(str(compile_library([source], self.folder / "include", self.profile)))
+        function = getattr(self.library, name)
+        function.argtypes = [ctypes.c_void_p]
+        return function
+
+
 class SideBySide:
-    """The C of batches of one model, compiled when the first large batch comes."""
+    """The C of one model that evaluates batches, or simulates flights, several states side by side."""
 
     def __init__(self, folder: Path, manifest: dict, profile: str):
-        self.folder, self.prefix, self.profile = folder, manifest["prefix"], profile
-        self.states, self.work = manifest["batch"]["states"], manifest["batch"]["work"]
-        self.library, self.lock = None, threading.Lock()
+        self.prefix, self.states, self.work = manifest["prefix"], manifest["batch"]["states"], manifest["batch"]["work"]
+        self.batch, self.flights = (Late(folder, manifest, profile, part) for part in LATE)
 
     def entry(self, name: str, count: int):
         """Return the C function for a batch of so many states, or None where one state at a time is better."""
-        if name not in self.work or count < (MANY if self.library is None else self.states):
+        if name not in self.work or count < (MANY if self.batch.library is None else self.states):
             return None
-        with self.lock:
-            if self.library is None:
-                source = self.folder / "src" / f"{self.prefix}_batch.c"
-                self.library = ctypes.CDLL(str(compile_library([source], self.folder / "include", self.profile)))
-        function = getattr(self.library, f"{self.prefix}_side_by_side_{name}")
-        function.argtypes = [ctypes.c_void_p]
-        return function
+        return self.batch.function(f"{self.prefix}_side_by_side_{name}")
 
 
 @cache
@@ -58,3 +72,33 @@ def shared(count: int, run: Callable[[int, int], None]) -> None:
     waiting = [pool().submit(run, first, last) for first, last in pairwise(ends)]
     for future in waiting:
         future.result()
+
+
+def in_turn(count: int, threads: int, work: Callable[[Iterator[int], threading.Event], None]) -> None:
+    """Call ``work(numbers, ended)`` in so many threads, which take the numbers below ``count`` in turn.
+
+    The first error, Ctrl-C among them, sets ``ended`` and is raised when all threads have returned.
+    """
+    left, ended = deque(range(count)), threading.Event()
+    if threads == 1:
+        work(_taken(left), ended)
+        return
+    with ThreadPoolExecutor(threads, thread_name_prefix="serpentail") as crew:
+        try:
+            waiting = {crew.submit(work, _taken(left), ended) for _ in range(threads)}
+            while waiting:  # looks at signals now and then
+                done, waiting = wait(waiting, LOOK, FIRST_EXCEPTION)
+                for future in done:
+                    future.result()
+        finally:
+            left.clear()
+            ended.set()
+
+
+def _taken(left: deque) -> Iterator[int]:
+    """Numbers that no other thread has taken."""
+    while True:
+        try:
+            yield left.popleft()
+        except IndexError:
+            return

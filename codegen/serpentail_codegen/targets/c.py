@@ -22,7 +22,7 @@ from .simulation import Has, layouts, simulation_context
 
 STRAIGHT_UP_TO = 7000  # nodes: beyond, the text leaves the instruction cache and compile time grows
 STRAIGHT_BESIDE_LANES = 3500  # nodes: where there is a sweep in lanes, too, that is faster beyond
-SEGMENTS_FROM = 128  # columns of H times links: the work of sweeps that go by segments grows with neither
+SEGMENTS_FROM = 128  # columns of H times links, the work of a sweep in lanes: from here on segments are no slower
 ELIMINATED = 12  # rows: smaller matrices are factored without loops
 LARGE = 100  # operations: a step that is written out wherever it is called; larger ones as the compiler sees fit
 COORDINATES = {

@@ -46,12 +46,12 @@ def batches(scene: Scene, tail: Tail, emitted: list[Emitted]) -> list[Batch]:
 
 def _batch(scene: Scene, tail: Tail, function: Function) -> Batch:
     fixed, single, states = baked_values(scene), assemble(function, tail), STATES[scene.real]
-    single = flattened(single, fixed) if _straight(scene, single) else single
+    single = flattened(single, fixed) if straight(scene, single) else single
     rows = side_by_side(single, states)
     return Batch(function, states, rows, in_loops(rows, scene.real, scene.name, fixed))
 
 
-def _straight(scene: Scene, program: Program) -> bool:
+def straight(scene: Scene, program: Program) -> bool:
     """Return whether a batch has no loops; there are no sweeps in lanes here that would overtake straight lines."""
     if scene.emission == "auto":
         return applied(program) <= STRAIGHT_UP_TO and not branches(program)

@@ -100,9 +100,8 @@ class Run:
                 break
             program = self._transcribed(mesh)
             motion = Motion(last.curve.duration, last.curve.at)
-            found = self._near(program, motion, carried(last.solution.multipliers, last.program, program))
-            again = not (found.success or self.stopped)
-            rounds.append(self._round(program, self._solved(program, motion) if again else found))
+            multipliers = carried(last.solution.multipliers, last.program, program)
+            rounds.append(self._round(program, self._near(program, motion, multipliers)))
         return rounds
 
     def plan(self, rounds: list[Round], wall_s: float) -> Plan:
@@ -144,8 +143,9 @@ class Run:
         return self._near(program, Motion(guess.duration, guess.curve.at), multipliers if same else None)
 
     def _near(self, program: Transcription, motion: Motion, multipliers) -> Solution:
-        """Solve from a motion that is close to a solution, and from its multipliers where there are any."""
-        return self._solved(program, motion, "close" if multipliers is None else "same", multipliers)
+        """Solve from a motion that is close to a solution, with multipliers or without; as from afar if that fails."""
+        found = self._solved(program, motion, "close" if multipliers is None else "same", multipliers)
+        return found if found.success or self.stopped else self._solved(program, motion)
 
     def _pushed(self, k: int) -> Motion:
         """Passive flight; the tail is pushed a little out of a plane of symmetry (k = 0), or about at random."""

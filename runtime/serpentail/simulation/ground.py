@@ -5,7 +5,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..errors import SimulationError
-from ..library import real_array
+from ..library import Rows, real_array
+from ..parameters import RunParameters
 from ..touch import Contact
 from .schedules import Legs
 from .start import Start
@@ -17,7 +18,7 @@ MOST_EVENTS = 10_000  # that are kept
 
 @dataclass(frozen=True, eq=False)
 class Ground:
-    """The checked settings of a run on the ground; without contacts there is nothing to set."""
+    """The checked settings of runs on the ground, bristles (k, points, 2); without contacts there is nothing to set."""
 
     groups: dict[str, int] = field(default_factory=dict)
     legs: Legs | None = None
@@ -25,7 +26,7 @@ class Ground:
     stop_at: int = 0
 
     @classmethod
-    def checked(cls, model, start: Start, settings: dict) -> "Ground":
+    def checked(cls, model, start: Start, parameters: RunParameters, settings: dict) -> "Ground":
         """Take legs, bristles0 and stop_at out of settings; SimulationError where they are wrong, or missing."""
         given = {name: settings.pop(name, None) for name in ("legs", "bristles0", "stop_at")}
         groups = model.contacts
@@ -34,9 +35,9 @@ class Ground:
                 remedy = "leave it out, or add `contacts` to the scene"
                 raise SimulationError(f"{name} {given[name]!r}: {model.name} touches nothing: {remedy}")
             return cls()
-        legs, bristles = _legs(groups, given["legs"]), _bristles(groups, given["bristles0"])
+        legs, bristles = _legs(groups, given["legs"]), _bristles(groups, start, given["bristles0"])
         ground = cls(groups, legs, bristles, _stops(groups, given["stop_at"]))
-        ground.refuse_deep(model, start)
+        ground.refuse_deep(model, start, parameters)
         return ground
 
     @property
@@ -48,17 +49,28 @@ class Ground:
         """Return the argument ``legs`` (8,) or (K, 8) at t (s), angles and rates, where there are feet."""
         return () if self.legs is None else (np.concatenate(self.legs.curve.at(t)[:2], axis=-1),)
 
-    def refuse_deep(self, model, start: Start) -> None:
+    def refuse_deep(self, model, start: Start, parameters: RunParameters) -> None:
         """SimulationError where a point begins so deep that only a blow could have brought it there."""
-        positions, _ = model.contact_points(start.q0, start.v0, *self.legs_at(start.start))
-        p = model.parameters
+        heights, p = self._heights(model, start, parameters), parameters.values
         weight = (p["torso_mass"] + p["tail_mass"]) * p["gravity"]
-        limit = (DEEP * weight / p["K_n"]) ** (2 / 3)
-        deepest = float(-positions[:, 2].min())
-        if deepest > limit:
-            k = int(positions[:, 2].argmin())
+        limits = np.broadcast_to((DEEP * weight / p["K_n"]) ** (2 / 3), start.runs)
+        wrong = np.flatnonzero(-heights.min(axis=1) > limits)
+        if len(wrong):
+            heights, limit, k = heights[wrong[0]], limits[wrong[0]], int(heights[wrong[0]].argmin())
+            deepest, whose = -float(heights[k]), f" of run {wrong[0]}" if start.many else ""
             where = f"point {k} ({self._group_of(k)}) is {1e3 * deepest:.3g} mm deep at the start"
-            raise SimulationError(f"q0: {where}, more than {1e3 * limit:.3g} mm: raise q0[2] by {deepest:.4g} m")
+            raise SimulationError(f"q0{whose}: {where}, more than {1e3 * limit:.3g} mm: raise q0[2] by {deepest:.4g} m")
+
+    def _heights(self, model, start: Start, parameters: RunParameters) -> np.ndarray:
+        """Heights (k, points) in m of the points at the starts."""
+        kernel, one = model.kernel("contact_points"), (start.runs, 1)
+        legs = (np.broadcast_to(each, (*one, 8)) for each in self.legs_at(start.start))
+        inputs = [np.array(a, kernel.dtype, order="C") for a in (start.q0[:, None], start.v0[:, None], *legs)]
+        outputs = [np.zeros((*one, self.points, 3), kernel.dtype) for _ in range(2)]
+        evaluate = Rows(kernel, parameters.vectors, inputs, outputs)
+        for k in range(start.runs):
+            evaluate(k, 1)
+        return outputs[0][:, 0, :, 2]
 
     def _group_of(self, k: int) -> str:
         ends = np.cumsum(list(self.groups.values()))
@@ -87,12 +99,13 @@ def _legs(groups, legs) -> Legs | None:
     return legs
 
 
-def _bristles(groups, bristles) -> np.ndarray:
+def _bristles(groups, start: Start, bristles) -> np.ndarray:
+    """Return the stretch of every run, (k, points, 2); one is repeated."""
     shape = (sum(groups.values()), 2)
     found = np.zeros(shape) if bristles is None else real_array("bristles0", bristles, error=SimulationError)
-    if found.shape != shape or not np.isfinite(found).all():
+    if found.shape not in ({shape, (start.runs, *shape)} if start.many else {shape}) or not np.isfinite(found).all():
         raise SimulationError(f"bristles0 has shape {found.shape}: give {shape}, finite, in m")
-    return found.copy()
+    return np.array(np.broadcast_to(found, (start.runs, *shape)), order="C")
 
 
 def _stops(groups, stop_at) -> int:

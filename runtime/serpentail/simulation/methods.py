@@ -28,6 +28,12 @@ class Method:
     reason: str
     settings: dict
 
+    @property
+    def told(self) -> dict:
+        """What a trajectory's info says of it."""
+        finite = {name: x for name, x in self.settings.items() if x is not np.inf}
+        return finite | {"method": self.name, "reason": self.reason}
+
 
 def checked_method(name: str, settings: dict, available, single: bool) -> Method:
     """Return a method by its name with settings checked and filled in; SimulationError names what is wrong."""

@@ -1,131 +1,32 @@
-"""Runs: a model, a state and what acts on it go in, a trajectory comes out."""
+"""Simulations: a model, states and what acts on them go in; a trajectory, or rollouts of many states, come out."""
 
 import ctypes
 import time
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from ..errors import SimulationError, StateError
-from ..library import NOT_FINITE, NOT_POSITIVE_DEFINITE, OUT_OF_RANGE, aligned
+from ..errors import ModelError, SimulationError, StateError
+from ..library import Rows
+from ..parameters import RunParameters
 from ..trajectory import Trajectory
+from .compiled import CompiledRun, Memory, Samples
 from .controllers import Controller
 from .drive import Drive
-from .ground import MOST_EVENTS, Ground
+from .ground import Ground
+from .measuring import judged
 from .methods import SCIPY, Method, checked_method, chosen
 from .records import Records
+from .rollouts import Rollouts, flown
 from .start import Start
-
-PAUSED, STEP_TOO_SMALL, TOO_MANY_STEPS, STOPPED_AT_EVENT, TORQUE_FAILED = range(32, 37)
-MOST_STEPS = 2**31 - 1  # that the C interface counts
-PAUSE = 2000  # steps between looks at signals, such as Ctrl-C
-WHY = {
-    NOT_FINITE: "the state is not finite any more: is the step too long, or a velocity or torque too large?",
-    NOT_POSITIVE_DEFINITE: "the inertia matrix is not positive definite: is the step too long, or a torque too large?",
-    OUT_OF_RANGE: "a segment is bent beyond the scene's bend_range: is the torque too large, or the range too small?",
-    STEP_TOO_SMALL: "the tolerance would need steps that are too short: is the motion stiff, or rtol too small?",
-    TOO_MANY_STEPS: "most_steps were not enough: is the motion stiff, or rtol too small?",
-}
-
-
-@dataclass(frozen=True, eq=False)
-class Samples:
-    """What a method gives: samples of the motion up to where it came, and what ended it before its end."""
-
-    t: np.ndarray
-    q: np.ndarray
-    v: np.ndarray
-    tau: np.ndarray
-    bristles: np.ndarray
-    info: dict
-    failure: BaseException | None = None
-
-
-class CompiledRun:
-    """A run of the generated C: records filled in, ready to go on."""
-
-    def __init__(self, records: Records, drive: Drive, method: Method, start: Start, ground: Ground):
-        model = records.model
-        self.records, self.drive, self.start, self.ground, self.model = records, drive, start, ground, model
-        samples, dtype, points = start.intervals + 1, records.dtype, ground.points
-        sizes = {"q": model.nq, "v": model.nv, "tau": drive.nt} | ({"bristles": 2 * points} if points else {})
-        self.state = {"q": records.array(start.q0), "v": records.array(start.v0)}
-        members = dict(start_members(method), pause=PAUSE, samples=samples, times=records.array(start.times))
-        if points:
-            self.state["bristles"] = records.array(ground.bristles.ravel())
-            self.event_times = np.zeros(MOST_EVENTS, dtype)
-            self.event_kinds = np.zeros(MOST_EVENTS, np.intc)
-            members |= {"event_times": self.event_times, "event_kinds": self.event_kinds}
-            members |= {"most_events": MOST_EVENTS, "stop_at": ground.stop_at}
-        self.out = {name: np.zeros((samples, size), dtype) for name, size in sizes.items()}
-        members |= {f"{name}_out": array for name, array in self.out.items()} | self.state
-        members["work"] = aligned(model.manifest["work"]["rollout"], dtype)
-        members["method"] = model.manifest["simulation"]["methods"].get(method.name, 0)
-        parameters = model.parameter_vector
-        self.record = records.record("run", parameters=parameters, drive=drive.record, t=start.start, **members)
-
-    def function(self, name: str, *arguments):
-        """Return a function of the compiled model that takes a run."""
-        found = getattr(self.model.library, f"{self.model.name}_{name}")
-        found.argtypes = (ctypes.c_void_p, *arguments)
-        return found
-
-    def go(self) -> int:
-        """Advance to the end, or to what ends the run before; return its status."""
-        rollout, address, status = self.function("rollout"), ctypes.addressof(self.record), PAUSED
-        while status == PAUSED:
-            status = rollout(address)
-        return status
-
-    def samples(self, status: int) -> Samples:
-        """Return the samples written, and what a status means."""
-        record, done = self.record, self.record.done
-        info = {name: getattr(record, name) for name in ("steps", "rejected", "evaluations", "factorisations")}
-        if self.ground.points:
-            count = min(record.events, MOST_EVENTS)
-            events = zip(self.event_times[:count].tolist(), self.event_kinds[:count].tolist(), strict=True)
-            info["events"] = [self.ground.event(t, number) for t, number in events]
-        rows = {name: array[:done].astype(float) for name, array in self.out.items()}
-        t = self.start.times[:done]
-        if status == STOPPED_AT_EVENT:
-            t, rows = self._with_the_end(t, rows)
-            status = 0
-        bristles = rows.get("bristles", np.zeros((len(t), 0))).reshape(len(t), self.ground.points, 2)
-        failure = self.drive.error or (failed(status, record.t) if status else None)
-        return Samples(t, rows["q"], rows["v"], rows["tau"], bristles, info, failure)
-
-    def _with_the_end(self, t: np.ndarray, rows: dict) -> tuple[np.ndarray, dict]:
-        """Add the state at which a run stopped as a last sample."""
-        if t[-1] >= self.record.t:
-            return t, rows
-        tau = np.zeros_like(self.out["tau"][0])
-        y, y_dot = (np.concatenate([*self.state.values()]) for _ in range(2))
-        pointer = ctypes.c_void_p
-        state_rate = self.function("state_rate", self.records.real, pointer, pointer, pointer)
-        state_rate(ctypes.addressof(self.record), self.record.t, *(a.ctypes.data for a in (y, y_dot, tau)))
-        last = self.state | {"tau": tau}
-        rows = {name: np.vstack([rows[name], last[name]]).astype(float) for name in rows}
-        return np.append(t, self.record.t), rows
-
-
-def start_members(method: Method) -> dict:
-    """Return a method's settings as members of the run's record."""
-    own = {name: x for name, x in method.settings.items() if name not in ("first_step", "most_steps")}
-    own["step"] = method.settings.get("step", method.settings.get("first_step", 0))
-    return own | {"most_steps": int(min(method.settings.get("most_steps", np.inf), MOST_STEPS))}
-
-
-def failed(status: int, t: float) -> SimulationError:
-    """Return the error that a status of the C interface means."""
-    return SimulationError(f"at t = {t:.6g} s {WHY[status]}")
 
 
 def simulate(
     model, q0, v0, *, controller: Controller = None, t_span=(0.0, 1.0), method: str = "auto", **settings
-) -> Trajectory:
+) -> Trajectory | Rollouts:
     """Simulate a motion: H v_dot + C = [0; tau], the quaternion kept on the unit sphere.
 
-    q0 (nq,), v0 (nv,): start; its quaternion is normalised.
+    q0 (nq,), v0 (nv,): start; its quaternion is normalised; (k, nq), (k, nv), or one of both: k starts, see below.
     controller: None (no torque), Damping, TorqueTable, TorqueCurve, Pfl, Phases of these, NativeTorque, or a function
     (t (s), q, v) -> tau (2m,) in N m.
     legs, bristles0, stop_at (models with contacts): Legs, where there are feet; stretch (points, 2) of the friction
@@ -138,17 +39,26 @@ def simulate(
     shortened to divide output_step); SciPy's: rtol, atol (defaults 1e-10, 1e-12; 1e-6 both for a float model).
     Raises StateError (shapes, values), SimulationError (settings; the state left what numbers can hold; its
     ``trajectory`` is the motion up to there), ModelError (the scene left out rollout, energy or momentum).
+
+    Many starts give Rollouts, which keep the SimulationErrors of single runs: the other runs go on.  One method is
+    chosen for all.  parameters: name -> (k,) or (k, 3), SI, what the runs have of their own; bristles0 may be
+    (k, points, 2).  Runs are shared among all cores, so a NativeTorque must bear calls from several threads at once.
+    Flights by "rk4" whose torques are None, Damping, a TorqueTable or a TorqueCurve fly as lanes of vectors where they
+    take 1e6 steps or more in all: several times as fast, other last digits.  With a function of Python, or SciPy's
+    methods, runs are made one after another in the calling thread, and what the function raises, unless it is a
+    SimulationError, ends all.
     """
     missing = [name for name in ("rollout", "energy", "momentum") if name not in model.manifest["work"]]
     if missing:
         raise model.without(*missing)
     start = Start.checked(model, (q0, v0), t_span, settings.pop("output_step", None))
-    run, choice = prepared(model, start, controller, method, settings)
+    memory, drive, choice = prepared(model, start, controller, method, settings)
     begun = time.perf_counter(), time.process_time()
-    found = integrate(run, choice)
+    found = (flown if start.many else integrate)(memory, drive, choice)
     spent = {"seconds": time.perf_counter() - begun[0], "cpu_seconds": time.process_time() - begun[1]}
-    info = found.info | choice.settings | {"method": choice.name, "reason": choice.reason} | spent
-    return judged(model, replace(found, info={k: x for k, x in info.items() if x is not np.inf}), run.ground)
+    if start.many:
+        return found.rollouts(spent)
+    return judged(model, replace(found, info=found.info | choice.told | spent), memory.ground)
 
 
 def end_state(model, q0, v0, *, controller: Controller, duration: float, step: float) -> tuple[np.ndarray, np.ndarray]:
@@ -160,21 +70,24 @@ def end_state(model, q0, v0, *, controller: Controller, duration: float, step: f
     return found.q[-1], found.v[-1]
 
 
-def prepared(model, start: Start, controller: Controller, method, settings: dict) -> tuple[CompiledRun, Method]:
-    """Return a run that is ready to go, and its method; SimulationError where a setting is wrong."""
-    ground = Ground.checked(model, start, settings)
-    records = Records(model)
-    drive = Drive(records, controller, ground.legs.curve if ground.legs else None)
-    choice = choose(model, drive, start, method, settings)
-    return CompiledRun(records, drive, choice, start, ground), choice
+def prepared(model, start: Start, controller: Controller, method, settings: dict) -> tuple[Memory, Drive, Method]:
+    """Return what runs need to go; SimulationError or ModelError where a setting is wrong."""
+    changes = settings.pop("parameters", None)
+    if changes is not None and not start.many:
+        raise ModelError("parameters: one start only: give q0 or v0 a row a run, or use model.with_parameters")
+    parameters = model.parameters_of_runs(changes, start.runs)
+    ground = Ground.checked(model, start, parameters, settings)
+    drive = Drive(Records(model), controller, ground.legs.curve if ground.legs else None)
+    choice = choose(drive, start, parameters, method, settings)
+    return Memory(drive.records, start, ground, parameters), drive, choice
 
 
-def choose(model, drive: Drive, start: Start, name, settings: dict) -> Method:
+def choose(drive: Drive, start: Start, parameters: RunParameters, name, settings: dict) -> Method:
     """Return the method that was asked for, or a choice and its reason."""
-    single = drive.records.real is ctypes.c_float
+    model, single = drive.model, drive.records.real is ctypes.c_float
     available, reason = model.manifest["simulation"]["methods"], "asked for"
     if isinstance(name, str) and name == "auto":
-        decay = None if model.contacts else fastest_decay(model, drive, start)
+        decay = None if model.contacts else fastest_decay(drive, start, parameters)
         name, reason = chosen(settings, available, decay)
     method = checked_method(name, settings, available, single)
     for each in ("step", "most_step"):
@@ -192,48 +105,35 @@ def refuse_vanishing(start: Start, name: str, step: float) -> None:
         raise SimulationError(f"{name} {step:.3g}: too short to move the time: give {least:.2g} s or more")
 
 
-def fastest_decay(model, drive: Drive, start: Start) -> float:
-    """Largest eigenvalue (1/s) of K (H^-1)_tt at the start, K being joint damping; unit torques give H^-1."""
+def fastest_decay(drive: Drive, start: Start, parameters: RunParameters) -> float:
+    """Largest eigenvalue (1/s) of K (H^-1)_tt at the starts, K being joint damping; unit torques give H^-1."""
     damping = np.max([p.damping if p.damping is not None else np.zeros(drive.nt) for p in drive.parts], axis=0)
     if not damping.any():
         return 0.0
+    kernel, shape = drive.model.kernel("forward_dynamics"), (start.runs, drive.nt + 1)
+    q = np.repeat(start.q0[:, None], shape[1], axis=1).astype(kernel.dtype)
+    tau = np.tile(np.eye(drive.nt + 1, drive.nt, -1, kernel.dtype), (start.runs, 1, 1))
+    v, v_dot = (np.zeros((*shape, drive.model.nv), kernel.dtype) for _ in range(2))
+    evaluate = Rows(kernel, parameters.vectors, (q, v, tau), (v_dot,))
+    sound = [k for k in range(start.runs) if evaluated(evaluate, k, shape[1])]
+    columns = (v_dot[sound, 1:, 6:] - v_dot[sound, :1, 6:]) * np.sqrt(np.outer(damping, damping))
+    return float(np.linalg.eigvalsh(columns).max(initial=0.0))
+
+
+def evaluated(rows: Rows, k: int, count: int) -> bool:
+    """Evaluate rows of run k; tell whether it could be done."""
     try:
-        v_dot = model.forward_dynamics(start.q0, 0 * start.v0, np.vstack([0 * damping, np.eye(drive.nt)]))
+        rows(k, count)
     except StateError:
-        return 0.0
-    columns = (v_dot[1:, 6:] - v_dot[:1, 6:]) * np.sqrt(np.outer(damping, damping))
-    return float(np.linalg.eigvalsh(columns).max())
+        return False
+    return True
 
 
-def integrate(run: CompiledRun, method: Method) -> Samples:
-    """Run a method."""
+def integrate(memory: Memory, drive: Drive, method: Method) -> Samples:
+    """Return the samples of a single run."""
+    run = CompiledRun(memory, drive, method)
     if method.name in SCIPY:
         from .scipy_methods import integrate_by_scipy
 
         return integrate_by_scipy(run, method)
     return run.samples(run.go())
-
-
-def judged(model, found: Samples, ground: Ground) -> Trajectory:
-    """Return the trajectory of samples, or raise what ended the run, which keeps the trajectory up to there."""
-    if not len(found.t):
-        raise found.failure
-    try:
-        trajectory = measured(model, found, ground)
-    except StateError as error:
-        words = f"from t = {found.t[0]:.6g} s to {found.t[-1]:.6g} s, by sample: {error}"
-        raise found.failure or SimulationError(words) from (None if found.failure else error)
-    if found.failure is None:
-        return trajectory
-    if isinstance(found.failure, SimulationError):
-        found.failure.trajectory = trajectory
-    raise found.failure
-
-
-def measured(model, found: Samples, ground: Ground) -> Trajectory:
-    """Return samples with energies, momenta and forces; StateError where these are beyond numbers."""
-    info = found.info | {"model": model.name}
-    info["parameters"] = {name: list(x) if isinstance(x, tuple) else x for name, x in model.parameters.items()}
-    measures = *model.energy(found.q, found.v), *model.momentum(found.q, found.v)
-    contact = ground.contact(model, found.t, (found.q, found.v, found.tau, found.bristles))
-    return Trajectory(found.t, found.q, found.v, found.tau, *measures, info, contact)

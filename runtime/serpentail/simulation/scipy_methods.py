@@ -6,8 +6,8 @@ import numpy as np
 
 from ..errors import SimulationError
 from ..library import NOT_FINITE
+from .compiled import CompiledRun, Samples, failed
 from .methods import Method
-from .run import CompiledRun, Samples, failed
 
 
 class StateRate:

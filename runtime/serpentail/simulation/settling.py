@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..errors import SimulationError
+from ..errors import SimulationError, StateError
 from .controllers import Controller
 from .run import simulate
 from .start import positive
@@ -17,6 +17,8 @@ def settle(
     Controller and legs act as they do before the time ``at`` (s), where schedules hold their first values.
     settings: those of ``simulate``, such as legs.  Raises what it raises.
     """
+    if np.ndim(q0) != 1:
+        raise StateError(f"q0 has shape {np.shape(q0)}, not ({model.nq},): settle one start state after another")
     positive("duration", duration)
     if isinstance(rounds, bool) or not isinstance(rounds, int) or rounds < 1:
         raise SimulationError(f"rounds {rounds!r}: give a whole number from 1")

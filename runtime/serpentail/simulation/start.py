@@ -1,71 +1,99 @@
-"""Starts: a user's state, span and step go in; a checked start and output times come out."""
+"""Starts: a user's states, span and step go in; checked starts and output times come out."""
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from ..errors import SimulationError, StateError
 from ..library import real_array
 
-MOST_SAMPLES = 10_000_000  # of one run: more are a slip, and fill the memory
+MOST_SAMPLES = 10_000_000  # of all runs: more are a slip, and fill the memory
 SHORTEST = 1e-100  # s: between samples; methods multiply times
 EPS = float(np.finfo(float).eps)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Start:
-    """A checked start and output grid."""
+    """Checked starts q0 (k, nq), v0 (k, nv) and their output grid; ``many`` tells k runs from a single one."""
 
     q0: np.ndarray
     v0: np.ndarray
     start: float
     end: float
     intervals: int
+    many: bool
 
     @classmethod
     def checked(cls, model, state, t_span, output_step) -> "Start":
-        """Return a start; StateError or SimulationError where an argument is wrong."""
-        q0, v0 = checked_state("q0", state[0], model.nq), checked_state("v0", state[1], model.nv)
-        norm = math.hypot(*q0[3:7])
-        if norm == 0:
-            raise StateError("q0[3:7] is the zero quaternion: upright is (1, 0, 0, 0)")
-        q0[3:7] /= norm
-        span = real_array("t_span", t_span, error=SimulationError)
-        if span.shape not in ((), (2,)):
-            raise SimulationError(f"t_span {t_span!r}: give (start, end) in s, or the end")
-        start, end = span.tolist() if span.ndim else (0.0, float(span))
-        if not (np.isfinite([start, end]).all() and end > start):
-            raise SimulationError(f"t_span {t_span!r}: the end must be finite and after the start")
+        """Return starts; StateError or SimulationError where an argument is wrong."""
+        given = [checked_states(*item) for item in zip(("q0", "v0"), state, (model.nq, model.nv), strict=True)]
+        many = any(array.ndim == 2 for array in given)
+        q0, v0 = _paired(*given)
+        norms = np.array([math.hypot(*quaternion) for quaternion in q0[:, 3:7].tolist()])
+        if not norms.all():
+            where = f" of run {int(norms.argmin())}" if many else ""
+            raise StateError(f"q0[3:7]{where} is the zero quaternion: upright is (1, 0, 0, 0)")
+        q0[:, 3:7] /= norms[:, None]
+        start, end = checked_span(t_span)
         step = positive("output_step", (end - start) / 200 if output_step is None else output_step)
-        if end - start > MOST_SAMPLES * step:
-            remedy = f"give {(end - start) / MOST_SAMPLES:.2g} s or more"
-            raise SimulationError(f"output_step {step:.3g}: more than {MOST_SAMPLES} samples: {remedy}")
-        checked = cls(q0, v0, start, end, max(1, round((end - start) / step)))
+        if len(q0) * (end - start) > MOST_SAMPLES * step:
+            remedy = f"give {len(q0) * (end - start) / MOST_SAMPLES:.2g} s or more"
+            whose = f" of {len(q0)} runs" if many else ""
+            raise SimulationError(f"output_step {step:.3g}: more than {MOST_SAMPLES} samples{whose}: {remedy}")
+        checked = cls(q0, v0, start, end, max(1, round((end - start) / step)), many)
         least = max(SHORTEST, EPS * max(abs(start), abs(end)))
         if checked.interval < least:
             raise SimulationError(f"output_step {step:.3g}: too short to move the time: give {least:.2g} s or more")
         return checked
 
     @property
+    def runs(self) -> int:
+        """Number of runs."""
+        return len(self.q0)
+
+    @property
     def interval(self) -> float:
         """Time between outputs."""
         return (self.end - self.start) / self.intervals
 
-    @property
+    @cached_property
     def times(self) -> np.ndarray:
         """Output times (intervals + 1,)."""
         return np.linspace(self.start, self.end, self.intervals + 1)
 
 
-def checked_state(name: str, value, size: int) -> np.ndarray:
-    """Return a copy of a finite vector; StateError names what is wrong."""
-    array = real_array(name, value).copy()
-    if array.shape != (size,):
-        raise StateError(f"{name} has shape {array.shape}, not ({size},): one start state")
-    if not np.isfinite(array).all():
-        raise StateError(f"{name}[{np.flatnonzero(~np.isfinite(array))[0]}] is not finite")
+def checked_span(t_span) -> tuple[float, float]:
+    """Return start and end (s); SimulationError where they are none."""
+    span = real_array("t_span", t_span, error=SimulationError)
+    if span.shape not in ((), (2,)):
+        raise SimulationError(f"t_span {t_span!r}: give (start, end) in s, or the end")
+    start, end = span.tolist() if span.ndim else (0.0, float(span))
+    if not (np.isfinite([start, end]).all() and end > start):
+        raise SimulationError(f"t_span {t_span!r}: the end must be finite and after the start")
+    return start, end
+
+
+def checked_states(name: str, value, size: int) -> np.ndarray:
+    """Return finite vectors (size,) or (k, size); StateError names what is wrong."""
+    array = real_array(name, value)
+    if array.shape[-1:] != (size,) or array.ndim > 2 or not array.size:
+        raise StateError(f"{name} has shape {array.shape}, not ({size},) of one start state, or (k, {size}) of k runs")
+    wrong = np.argwhere(~np.isfinite(array))
+    if len(wrong):
+        where = f" of run {wrong[0][0]}" if array.ndim == 2 else ""
+        raise StateError(f"{name}[{wrong[0][-1]}]{where} is not finite")
     return array
+
+
+def _paired(q0: np.ndarray, v0: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return copies (k, size), a single one being repeated; StateError where the numbers of runs differ."""
+    counts = {len(array) for array in (q0, v0) if array.ndim == 2}
+    if len(counts) > 1:
+        raise StateError(f"q0 has {len(q0)} runs, v0 {len(v0)}: give as many of both, or one of either")
+    runs = counts.pop() if counts else 1
+    return tuple(np.array(np.broadcast_to(array, (runs, array.shape[-1])), order="C") for array in (q0, v0))
 
 
 def positive(name: str, value) -> float:

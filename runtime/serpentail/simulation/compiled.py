@@ -1,0 +1,172 @@
+"""Runs of the generated C: starts, a drive and a method go in; samples, and what ended each run, come out."""
+
+import ctypes
+from dataclasses import dataclass
+from threading import Event
+
+import numpy as np
+
+from ..errors import SimulationError
+from ..library import NOT_FINITE, NOT_POSITIVE_DEFINITE, OUT_OF_RANGE, aligned
+from ..parameters import RunParameters
+from .drive import Drive
+from .ground import MOST_EVENTS, Ground
+from .methods import Method
+from .records import Records
+from .start import Start
+
+PAUSED, STEP_TOO_SMALL, TOO_MANY_STEPS, STOPPED_AT_EVENT, TORQUE_FAILED = range(32, 37)
+MOST_STEPS = 2**31 - 1  # that the C interface counts
+PAUSE = 2000  # steps between looks at signals, such as Ctrl-C
+COUNTS = ("steps", "rejected", "evaluations", "factorisations")
+WHY = {
+    NOT_FINITE: "the state is not finite any more: is the step too long, or a velocity or torque too large?",
+    NOT_POSITIVE_DEFINITE: "the inertia matrix is not positive definite: is the step too long, or a torque too large?",
+    OUT_OF_RANGE: "a segment is bent beyond the scene's bend_range: is the torque too large, or the range too small?",
+    STEP_TOO_SMALL: "the tolerance would need steps that are too short: is the motion stiff, or rtol too small?",
+    TOO_MANY_STEPS: "most_steps were not enough: is the motion stiff, or rtol too small?",
+    TORQUE_FAILED: "the compiled torque function did not return 0: what has it refused?",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """What a method gives: samples of the motion up to where it came, and what ended it before its end."""
+
+    t: np.ndarray
+    q: np.ndarray
+    v: np.ndarray
+    tau: np.ndarray
+    bristles: np.ndarray
+    info: dict
+    failure: BaseException | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What a run came to: samples written, its end (s), counts and events, what failed, a stop between samples."""
+
+    done: int
+    end: float
+    info: dict
+    failure: BaseException | None = None
+    stop: dict | None = None  # t (s) and a row of every array
+
+
+class Memory:
+    """Arrays of k runs: parameters; states (k, size), from start to end; samples (k, intervals + 1, size)."""
+
+    def __init__(self, records: Records, start: Start, ground: Ground, parameters: RunParameters):
+        model, dtype = records.model, records.dtype
+        self.records, self.start, self.ground, self.parameters = records, start, ground, parameters
+        self.state = {"q": np.array(start.q0, dtype, order="C"), "v": np.array(start.v0, dtype, order="C")}
+        sizes = {"q": model.nq, "v": model.nv, "tau": model.nv - 6, "bristles": 2 * ground.points}
+        if ground.points:
+            self.state["bristles"] = np.array(ground.bristles.reshape(start.runs, -1), dtype)
+        self.out = {name: np.zeros((start.runs, start.intervals + 1, size), dtype) for name, size in sizes.items()}
+        arrays = {"parameters": parameters.vectors} | self.state | {f"{name}_out": a for name, a in self.out.items()}
+        places = [(member, a.ctypes.data, a.strides[0]) for member, a in arrays.items()]
+        self.places = [place for place in places if records.has("run", place[0])]
+
+    def samples(self, k: int, outcome: Outcome) -> Samples:
+        """Return what run k wrote."""
+        return sampled(self.start.times, {name: a[k] for name, a in self.out.items()}, outcome)
+
+
+class CompiledRun:
+    """A record of the generated C that takes up one run of a memory after another; each thread needs its own."""
+
+    def __init__(self, memory: Memory, drive: Drive, method: Method):
+        records, start, ground = memory.records, memory.start, memory.ground
+        self.memory, self.records, self.drive, self.start, self.ground = memory, records, drive, start, ground
+        self.model = records.model
+        members = dict(start_members(method), pause=PAUSE, samples=start.intervals + 1)
+        members["times"] = records.array(start.times)
+        if ground.points:
+            self.event_times = np.zeros(MOST_EVENTS, records.dtype)
+            self.event_kinds = np.zeros(MOST_EVENTS, np.intc)
+            members |= {"event_times": self.event_times, "event_kinds": self.event_kinds}
+            members |= {"most_events": MOST_EVENTS, "stop_at": ground.stop_at}
+        members["work"] = aligned(self.model.manifest["work"]["rollout"], records.dtype)
+        members["method"] = self.model.manifest["simulation"]["methods"].get(method.name, 0)
+        self.record = records.record("run", drive=drive.record, t=start.start, **members)
+        self.blank = bytes(self.record)
+        self.address, self.rollout = ctypes.addressof(self.record), self.function("rollout")
+        self.begin(0)
+
+    def begin(self, k: int) -> None:
+        """Take up run k, at its start."""
+        ctypes.memmove(self.address, self.blank, len(self.blank))
+        for member, first, apart in self.memory.places:
+            setattr(self.record, member, first + k * apart)
+        self.k, self.drive.error = k, None
+
+    @property
+    def state(self) -> dict[str, np.ndarray]:
+        """Where the run is: q, v and, with contacts, bristles."""
+        return {name: array[self.k] for name, array in self.memory.state.items()}
+
+    def function(self, name: str, *arguments):
+        """Return a function of the compiled model that takes a run."""
+        found = getattr(self.model.library, f"{self.model.name}_{name}")
+        found.argtypes = (ctypes.c_void_p, *arguments)
+        return found
+
+    def go(self, ended: Event | None = None) -> int:
+        """Advance to the end, to what ends the run before, or till ``ended`` is set; return the status."""
+        status = PAUSED
+        while status == PAUSED and not (ended and ended.is_set()):
+            status = self.rollout(self.address)
+        return status
+
+    def outcome(self, status: int) -> Outcome:
+        """Return what the run came to, and what a status means."""
+        record = self.record
+        info = {name: getattr(record, name) for name in COUNTS}
+        if self.ground.points:
+            count = min(record.events, MOST_EVENTS)
+            events = zip(self.event_times[:count].tolist(), self.event_kinds[:count].tolist(), strict=True)
+            info["events"] = [self.ground.event(t, number) for t, number in events]
+        failure = self.drive.error
+        if failure is None and status not in (0, STOPPED_AT_EVENT):
+            failure = failed(status, record.t)
+        return Outcome(record.done, record.t, info, failure, self._stop() if status == STOPPED_AT_EVENT else None)
+
+    def samples(self, status: int) -> Samples:
+        """Return the samples written, and what a status means."""
+        return self.memory.samples(self.k, self.outcome(status))
+
+    def _stop(self) -> dict | None:
+        """The state at which the run stopped, where it is no sample."""
+        if self.start.times[self.record.done - 1] >= self.record.t:
+            return None
+        state = self.state
+        tau = np.zeros_like(self.memory.out["tau"][0, 0])
+        y, y_dot = (np.concatenate([*state.values()]) for _ in range(2))
+        pointer = ctypes.c_void_p
+        state_rate = self.function("state_rate", self.records.real, pointer, pointer, pointer)
+        state_rate(self.address, self.record.t, *(a.ctypes.data for a in (y, y_dot, tau)))
+        return {name: array.copy() for name, array in state.items()} | {"t": self.record.t, "tau": tau}
+
+
+def sampled(times: np.ndarray, arrays: dict[str, np.ndarray], outcome: Outcome) -> Samples:
+    """Return what a run wrote to q, v, tau, bristles, and where it stopped as a last sample."""
+    t, done, stop = times[: outcome.done], outcome.done, outcome.stop
+    rows = {name: a[:done].astype(float).reshape(done, a[0].size) for name, a in arrays.items()}
+    if stop is not None:
+        t = np.append(t, stop["t"])
+        rows = {name: np.vstack([a, stop[name]]).astype(float) for name, a in rows.items()}
+    bristles = rows["bristles"].reshape(len(t), rows["bristles"].shape[1] // 2, 2)
+    return Samples(t, rows["q"], rows["v"], rows["tau"], bristles, outcome.info, outcome.failure)
+
+
+def start_members(method: Method) -> dict:
+    """Return a method's settings as members of the run's record."""
+    own = {name: x for name, x in method.settings.items() if name not in ("first_step", "most_steps")}
+    own["step"] = method.settings.get("step", method.settings.get("first_step", 0))
+    return own | {"most_steps": int(min(method.settings.get("most_steps", np.inf), MOST_STEPS))}
+
+
+def failed(status: int, t: float) -> SimulationError:
+    """Return the error that a status of the C interface means."""
+    return SimulationError(f"at t = {t:.6g} s {WHY[status]}")
