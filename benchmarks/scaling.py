@@ -56,8 +56,8 @@ def draw(rows: list[dict], path: Path) -> None:
         times = [row["ns"] for row in rows if row["sweep"] == sweep]
         counts = [n if sweep.startswith("links") else m for m, n in sizes]
         axes.loglog(counts, times, marker=marker, label=sweep)
-    axes.set(xlabel="number", ylabel="forward dynamics, ns", title="Run time against size")
+    axes.set(xlabel="number of links or segments", ylabel="forward dynamics, ns", title="Run time against size")
     axes.grid(True, which="both", alpha=0.3)
-    axes.legend()
+    axes.legend(loc="upper left")
     figure.savefig(path, dpi=150)
     plt.close(figure)
