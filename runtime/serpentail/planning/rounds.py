@@ -34,7 +34,7 @@ class Method:
     intervals: int = 12
     tolerance: float | None = 0.01
     rounds: int = 6
-    most_intervals: int = 120
+    most_intervals: int = 200
     solver: str = "ipopt"
     options: dict = field(default_factory=dict)
     guess: object = None
