@@ -126,4 +126,4 @@ _TABLE = (
     ),
 )
 CATALOGUE = FUNCTIONS | {function.name: function for function in _TABLE} | CONTACT | FEEDBACK | IMPLICIT
-SYMBOLIC = {*FUNCTIONS, *CONTACT, "pfl"}  # those that the CasADi module builds of operations
+SYMBOLIC = FUNCTIONS | CONTACT | FEEDBACK  # those that the CasADi module builds of operations

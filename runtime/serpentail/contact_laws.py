@@ -39,6 +39,18 @@ def tail_gets_the_accelerations_that_torques_are_for(model: Model, s: State):
     return relative(v_dot[6:], s.accelerations, v_dot) / sensitivity(model, s.q)
 
 
+@law("tracked_dynamics", "pfl", "forward_dynamics", units=NEAR)
+def tracking_moves_as_its_torques_do(model: Model, s: State):
+    """What gives the torques of partial feedback linearisation gives v_dot under them, relative to cond(H)."""
+    tau, v_dot = model.kernel("tracked_dynamics")(s.q, s.v, s.accelerations)
+    expected = model.forward_dynamics(s.q, s.v, tau)
+    torques = model.pfl(s.q, s.v, s.accelerations)
+    return {
+        "tau": relative(tau, torques, torques),
+        "v_dot": relative(v_dot, expected, expected) / sensitivity(model, s.q),
+    }
+
+
 @law("implicit_factor", "implicit_solve", "mass_matrix", units=NEAR)
 def implicit_steps_solve_their_system(model: Model, s: State):
     """High up, (1 - w J) k = r with J of damping and gains alone, relative to cond(H)."""

@@ -44,7 +44,7 @@ class RunParameters:
 
     @classmethod
     def checked(cls, manifest: dict, own: Mapping[str, Value], changes, runs: int) -> "RunParameters":
-        """Return a model's own parameters, others where they change: name -> (runs,) or (runs, 3), SI, or None.
+        """Return a model's own parameters, others where they change: name -> (runs,) or (runs, 3), SI.
 
         Structs of runs that do not differ are one, repeated without a copy.
         ModelError lists everything that is wrong, and the run.
