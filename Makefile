@@ -103,7 +103,7 @@ embedded: model
 	$(PY) embedded/check.py generated/$(MODEL) --board $(CPU)
 
 size-report: $(READY)
-	$(PY) embedded/report.py
+	$(PY) embedded/size_report.py
 
 study-models: $(READY)
 	PYTHONPATH=benchmarks $(PY) examples/study_models.py

@@ -190,3 +190,9 @@ def test_public_names_have_docstrings(path):
     tree = ast.parse(path.read_text())
     assert one_line(ast.get_docstring(tree))
     assert [node.name for node in public(tree) if not one_line(ast.get_docstring(node))] == []
+
+
+def test_scripts_that_tests_import_have_different_names():
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["pytest"]["ini_options"]
+    names = [path.name for folder in settings["pythonpath"] for path in (ROOT / folder).glob("*.py")]
+    assert sorted(set(names)) == sorted(names)

@@ -89,10 +89,10 @@ def test_forward_dynamics_keeps_its_budget(tmp_path, name, tail, emission, instr
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "tail"), [("m4", (1, 3)), ("m4", (3, 4)), ("m7", (1, 3))])
 def test_forward_dynamics_in_loops_is_small(tmp_path, name, tail):
-    import report
+    import size_report
 
     model = folder(name, "fast", *tail, functions=["forward_dynamics"], contacts=[], emission="loops")
-    assert report.flash(image.build(model, board(name), tmp_path), "forward_dynamics") <= 6 * 1024
+    assert size_report.flash(image.build(model, board(name), tmp_path), "forward_dynamics") <= 6 * 1024
 
 
 # The instruments.
@@ -197,7 +197,7 @@ def test_missing_tools_are_named_with_their_packages(tmp_path, name):
 
 def test_size_report_names_missing_tools(tmp_path):
     before = (ROOT / "docs" / "embedded.md").read_bytes()
-    command = [sys.executable, str(ROOT / "embedded" / "report.py")]
+    command = [sys.executable, str(ROOT / "embedded" / "size_report.py")]
     done = subprocess.run(command, cwd=tmp_path, env={"PATH": ""}, capture_output=True, text=True, check=False)
     assert done.returncode == 2 and "apt-get install" in done.stderr and "Traceback" not in done.stderr
     assert (ROOT / "docs" / "embedded.md").read_bytes() == before
