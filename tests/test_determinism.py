@@ -16,11 +16,12 @@ from serpentail_codegen.write import digest, write_folder, write_if_changed
 
 OPTIONS = {"functions": ["forward_dynamics", "tail_points", "rollout"], "emission": "loops"}
 NAME = "articulated_m2_n2"
-HEADER, MODEL, HOST, BATCH = f"include/{NAME}.h", *(f"src/{NAME}{part}.c" for part in ("", "_host", "_batch"))
+HEADER, MODEL, HOST = f"include/{NAME}.h", f"src/{NAME}.c", f"src/{NAME}_host.c"
+BATCH, FLIGHTS = f"src/{NAME}_batch.c", f"src/{NAME}_flights.c"
 EXAMPLE, CASADI, MANIFEST = "example/main.c", f"{NAME}_casadi.py", "manifest.json"
 PACKAGE = {"Makefile", "CMakeLists.txt", "LICENSE", "README.md"}
 SIMULATION = {f"include/{NAME}_simulation.h", f"src/{NAME}_simulation.c"}
-FILES = {HEADER, MODEL, HOST, BATCH, *SIMULATION, EXAMPLE, CASADI, MANIFEST, *PACKAGE}
+FILES = {HEADER, MODEL, HOST, BATCH, FLIGHTS, *SIMULATION, EXAMPLE, CASADI, MANIFEST, *PACKAGE}
 
 
 def scene(**options):
@@ -114,7 +115,7 @@ def test_a_parameter_changes_only_its_value_and_the_hash(expected, tmp_path):
 def test_a_baked_parameter_changes_only_the_code_and_the_hash(tmp_path):
     generate(scene(baked=True), tmp_path)
     changed = generate(scene(baked=True, parameters={"gravity": 1.62}), tmp_path)
-    assert set(changed) == {HEADER, MODEL, BATCH, CASADI, MANIFEST}
+    assert set(changed) == {HEADER, MODEL, BATCH, FLIGHTS, CASADI, MANIFEST}
 
 
 def test_manifest_describes_the_files(expected):

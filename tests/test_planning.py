@@ -330,26 +330,40 @@ def test_other_problems_and_models_share_no_program():
     np.testing.assert_array_equal(again.solution.w, found[0].solution.w)
 
 
-def test_interrupt_returns_the_best_so_far():
-    """Ctrl-C in the first solve gives its iterate, flagged; in a later round, the round before; never an exception."""
-    model, settings = rat(), AGAIN | {"tolerance": 1e-9, "rounds": 30}
-    st.plan(model, start=start(model), intervals=30, **settings, time_limit=0.01)  # derives before signals are heeded
+ENDLESS = {"ipopt.tol": 1e-300, "ipopt.acceptable_iter": 0, "ipopt.max_iter": 10**6}
+
+
+def test_interrupt_in_the_first_solve_returns_its_iterate():
+    """Ctrl-C in a solve that would take a million iterations."""
+    model, common = rat(), AGAIN | {"start": start(rat()), "intervals": 40, "options": ENDLESS}
+    st.plan(model, **common, time_limit=0.01)  # derives before signals are heeded
     before = signal.getsignal(signal.SIGINT)
-    for delay in (0.05, 1.0):
-        timer = threading.Timer(delay, signal.raise_signal, (signal.SIGINT,))
-        timer.start()
-        plan = st.plan(model, start=start(model), intervals=30, **settings)
-        timer.cancel()
-        assert not plan.success and np.isfinite(plan.solution.w).all()
-        assert plan.report["converged"] or plan.report["status"] == "User_Requested_Stop"
-        assert plan.report["stopped"] == "interrupt"
-        assert signal.getsignal(signal.SIGINT) is before
+    timer = threading.Timer(0.3, signal.raise_signal, (signal.SIGINT,))
+    timer.start()
+    plan = st.plan(model, **common)
+    timer.join()
+    assert not plan.success and np.isfinite(plan.solution.w).all()
+    assert (plan.report["stopped"], plan.report["status"]) == ("interrupt", "User_Requested_Stop")
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_interrupt_in_a_later_round_returns_the_round_before(monkeypatch):
+    split = rounds.Run._split
+
+    def interrupted(run, last):
+        signal.raise_signal(signal.SIGINT)
+        return split(run, last)
+
+    monkeypatch.setattr(rounds.Run, "_split", interrupted)
+    plan = st.plan(rat(), start=start(rat()), intervals=6, **AGAIN | {"tolerance": 1e-9, "rounds": 30})
+    assert not plan.success and plan.report["converged"]
+    assert (plan.report["stopped"], plan.report["intervals"]) == ("interrupt", 6)
 
 
 def test_time_limit_ends_a_solve_inside_and_returns_its_iterate():
     """A solve that would take a million iterations; a limit that is not reached changes nothing."""
-    model, endless = rat(), {"ipopt.tol": 1e-300, "ipopt.acceptable_iter": 0, "ipopt.max_iter": 10**6}
-    common = AGAIN | {"start": start(model), "intervals": 40, "options": endless}
+    model = rat()
+    common = AGAIN | {"start": start(model), "intervals": 40, "options": ENDLESS}
     st.plan(model, **common, time_limit=0.01)  # derives
     begun = time.perf_counter()
     cut = st.plan(model, **common, time_limit=0.5)

@@ -116,8 +116,3 @@ def freed_wrench(let, tail_mount, a_mount, A_0, A_1, A_2, b_mount) -> dict:
 def net_load(let, at_torso, force, moment) -> dict:
     """Applied less inertial loads at B, for (omega_dot, a)."""
     return {"rhs": Matrix([at_torso[3:6, :] - moment, at_torso[0:3, :] - force])}
-
-
-def world_acceleration(let, R, a, gravity) -> dict:
-    """p_b_ddot = R_b a - g z."""
-    return {"p_ddot": square(R) * a - gravity[0] * Z}

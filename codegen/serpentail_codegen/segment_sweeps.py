@@ -160,5 +160,5 @@ def _at_torso(d: Draft, A: Array, b: Array, load: Array, v_dot: Array) -> None:
     w_dot, a = rhs.part(0, 3), rhs.part(3, 3)
     d.copy(v_dot.part(3, 3), w_dot)
     d.store(kin.quaternion_rotation, R=9)
-    d.step(art.world_acceleration, {"a": a}, p_ddot=v_dot.part(0, 3))
+    d.step(dyn.world_acceleration, {"a": a}, p_ddot=v_dot.part(0, 3))
     d.step(kin.mount_acceleration, {"w": omega, "w_dot": w_dot, "a": a}, a_mount=a_mount)
