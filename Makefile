@@ -94,7 +94,7 @@ verify: model
 	$(PY) tests/verify_model.py generated/$(MODEL)
 
 bench: $(READY)
-	$(PY) benchmarks/bench.py
+	PYTHONPATH=tests $(PY) benchmarks/bench.py
 
 stress: $(READY)
 	PYTHONPATH=tests $(PY) stress/stress.py --calls $(CALLS)

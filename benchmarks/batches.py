@@ -26,8 +26,7 @@ def batch_times(folder: Path) -> list[dict]:
     rows = []
     for size in SIZES:
         model = st.load(generated(folder / "speed", *size))
-        states = random_states(model, STATES)
-        alone, together = c_times(model, states)
+        alone, together = c_times(model)
         many = random_states(model, 100 * STATES)
         whole = best(lambda model=model, many=many: model.forward_dynamics(*many), 7) / len(many[0])
         row = {"model": label(*size), "one by one, ns": alone, "side by side, ns": together}
@@ -73,12 +72,13 @@ def random_states(model, count: int) -> tuple[np.ndarray, ...]:
     return tuple(0.5 * rng.normal(size=(count, size)) for size in (model.nq, model.nv, model.nv - 6))
 
 
-def c_times(model, states) -> tuple[float, float]:
-    """Return nanoseconds a state of both C functions, rounds interleaved."""
-    kernel = model.kernels["forward_dynamics"]
-    out, keep, calls = np.empty((STATES, model.nv)), [], []
+def c_times(model) -> tuple[float, float]:
+    """Return nanoseconds a state of both C functions of forward dynamics, rounds interleaved."""
+    kernel, keep, calls = model.kernels["forward_dynamics"], [], []
+    states = [x.astype(kernel.dtype) for x in random_states(model, STATES)]
+    out = np.empty((STATES, model.nv), kernel.dtype)
     for function, size in ((kernel.function, kernel.work), (kernel.many.entry(kernel.name, MANY), None)):
-        keep.append(aligned(size or kernel.many.work[kernel.name], float))
+        keep.append(aligned(size or kernel.many.work[kernel.name], kernel.dtype))
         record = call_record(kernel.parameters, STATES, keep[-1], (*states, out))
         calls.append(lambda function=function, record=record: function(ctypes.addressof(record)))
     times = [[best(call, 1) for call in calls] for _ in range(ROUNDS)]

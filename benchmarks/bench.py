@@ -19,6 +19,7 @@ import derivatives
 import more_peers
 import peers
 import planning
+import precisions
 import scaling
 import serpentail as st
 import simulations
@@ -210,6 +211,7 @@ MEASURES = {
     "scaling": scaling.scaling,
     "batch_times": batches.batch_times,
     "rollout_rates": batches.rollout_rates,
+    "precision_times": precisions.precision_times,
     "tails": tails,
     "continuum_peer": continuum_peer.continuum_peer,
     "jacobian_times": derivatives.jacobian_times,

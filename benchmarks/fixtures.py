@@ -91,10 +91,10 @@ COLUMNS = {
 }
 
 
-def generated(parent: Path, segments: int, links: int | None = None, functions: str = "") -> Path:
+def generated(parent: Path, segments: int, links: int | None = None, functions: str = "", real: str = "double") -> Path:
     """Run the generator as `make model` does, for a continuum if there are no links; return the generated folder."""
     tail = ["--tail", "articulated", "--links", str(links)] if links else ["--tail", "continuum"]
-    tail += ["--functions", functions] if functions else []
+    tail += (["--functions", functions] if functions else []) + ["--real", real]
     command = [sys.executable, "-m", "serpentail_codegen", *tail, "--segments", str(segments), "--output", str(parent)]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
     return parent / (f"articulated_m{segments}_n{links}" if links else f"continuum_m{segments}")
