@@ -14,6 +14,7 @@ from serpentail_codegen.catalogue import CATALOGUE
 from serpentail_codegen.draft import Tail
 from serpentail_codegen.functions import FUNCTIONS, program
 from serpentail_codegen.interpret import Numbers, Run
+from serpentail_codegen.targets.c import fastest
 from test_lanes import arguments, outputs
 
 SIZES = [(1, 1), (1, 3), (2, 1), (2, 3), (4, 2), (9, 1)]
@@ -34,6 +35,11 @@ def test_segments_give_the_same_acceleration(size, name):
 def test_what_needs_the_matrix_goes_in_lanes():
     for name in ("forward_dynamics_derivatives", "mass_matrix", "pfl"):
         assert program(CATALOGUE[name], Tail(3, 2), "segments") == program(CATALOGUE[name], Tail(3, 2), "lanes")
+
+
+@pytest.mark.parametrize(("size", "form"), [((1, 64), "lanes"), ((3, 4), "lanes"), ((4, 4), "segments")])
+def test_long_tails_of_several_segments_go_by_segments(size, form):
+    assert fastest(FUNCTIONS[FUNCTION], Tail(*size))[0] == form
 
 
 @pytest.mark.parametrize("name", ["forward_dynamics", "mass_matrix"])

@@ -56,7 +56,7 @@ def fastest(function: Function, tail: Tail) -> tuple[str, Program]:
     Straight lines are fastest until their text crowds the instruction cache, if all of them are always run; sweeps in
     lanes overtake them before that, and sweeps by segments overtake both.
     """
-    if tail.nt * tail.total >= SEGMENTS_FROM:
+    if tail.segments > 1 and tail.nt * tail.total >= SEGMENTS_FROM:
         form, program = in_form("segments", function, tail)
         if form == "segments":
             return form, program
