@@ -15,7 +15,7 @@ from serpentail_codegen.draft import Tail
 from serpentail_codegen.functions import FUNCTIONS, program
 from serpentail_codegen.interpret import Numbers, Run
 from serpentail_codegen.targets.c import fastest
-from test_lanes import arguments, outputs
+from test_lanes import arguments, assert_same_acceleration
 
 SIZES = [(1, 1), (1, 3), (2, 1), (2, 3), (4, 2), (9, 1)]
 COILS = ((0.7, 0.4), (1.5, -0.2))  # rad at every joint: turns that lie on one another
@@ -25,11 +25,7 @@ FUNCTION = "forward_dynamics"
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("name", ["forward_dynamics", "forward_dynamics_external"])
 def test_segments_give_the_same_acceleration(size, name):
-    plain, segments = (program(FUNCTIONS[name], Tail(*size), dynamics) for dynamics in ("composite", "segments"))
-    assert plain != segments
-    given = arguments(plain)
-    expected, found = outputs(plain, given)["v_dot"], outputs(segments, given)["v_dot"]
-    assert np.abs(found - expected).max() <= 1e-12 * np.abs(expected).max()
+    assert_same_acceleration(size, name, "segments")
 
 
 def test_what_needs_the_matrix_goes_in_lanes():

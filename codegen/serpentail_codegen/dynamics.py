@@ -281,7 +281,7 @@ def column_acceleration(let, column, acceleration) -> dict:
 def base_acceleration(let, R, gravity, inverse_mass, h, net, w_dot, tail_force) -> dict:
     """p_b_ddot = R_b (net - omega_dot x h - sum f_k q_ddot_k) / M - g z."""
     a = let("a", inverse_mass[0] * (net - w_dot.cross(h) - tail_force))
-    return {"p_ddot": square(R) * a - gravity[0] * Z}
+    return world_acceleration(let, R, gravity, a)
 
 
 def free_acceleration(let, inverse_mass, com, net, w_dot) -> dict:

@@ -84,13 +84,11 @@ class Model:
 
     def parameters_of_runs(self, changes: Mapping[str, object] | None, runs: int) -> RunParameters:
         """Return the parameters of many runs; changes: name -> (runs,) or (runs, 3), SI, or None."""
-        if changes is None:
+        if changes is None or (isinstance(changes, Mapping) and not changes):
             vectors = np.broadcast_to(self.parameter_vector, (runs, len(self.parameter_vector)))
             return RunParameters({}, self.parameters, vectors)
-        own = self._given() if changes else self.parameters
-        found = RunParameters.checked(self.manifest, own, changes, runs)
-        if found.changes:
-            warn_of_unlike(found.values, 4)  # who calls st.simulate
+        found = RunParameters.checked(self.manifest, self._given(), changes, runs)
+        warn_of_unlike(found.values, 4)  # who calls st.simulate
         return found
 
     def _given(self) -> dict:

@@ -46,16 +46,14 @@ class RunParameters:
     def checked(cls, manifest: dict, own: Mapping[str, Value], changes, runs: int) -> "RunParameters":
         """Return a model's own parameters, others where they change: name -> (runs,) or (runs, 3), SI.
 
-        Structs of runs that do not differ are one, repeated without a copy.
         ModelError lists everything that is wrong, and the run.
         """
         given = _given(manifest, changes, runs)
-        values = completed(manifest, without_replaced(own, given) | given) if given else dict(own)
+        values = completed(manifest, without_replaced(own, given) | given)
         fields = [(p["name"], p["size"]) for p in manifest["parameters"] if p["in_struct"]]
-        columns = [np.zeros((1, 0)), *(np.asarray(values[name], float).reshape(-1, size) for name, size in fields)]
-        vectors = np.hstack([np.broadcast_to(a, (runs if given else 1, a.shape[1])) for a in columns])
-        vectors = vectors.astype(np.float32 if manifest["real"] == "float" else np.float64, order="C")
-        return cls(given, values, np.broadcast_to(vectors, (runs, vectors.shape[1])))
+        columns = (np.asarray(values[name], float).reshape(-1, size) for name, size in fields)
+        vectors = np.hstack([np.broadcast_to(a, (runs, a.shape[1])) for a in columns])
+        return cls(given, values, vectors.astype(np.float32 if manifest["real"] == "float" else np.float64, order="C"))
 
     def of(self, k: int) -> dict[str, np.ndarray]:
         """Return the changes of run k."""

@@ -56,15 +56,14 @@ def fastest(function: Function, tail: Tail) -> tuple[str, Program]:
     Straight lines are fastest until their text crowds the instruction cache, if all of them are always run; sweeps in
     lanes overtake them before that, and sweeps by segments overtake both.
     """
-    if tail.segments > 1 and tail.nt * tail.total >= SEGMENTS_FROM:
-        form, program = in_form("segments", function, tail)
-        if form == "segments":
-            return form, program
-    form, lanes = in_form("lanes", function, tail)
+    long = tail.segments > 1 and tail.nt * tail.total >= SEGMENTS_FROM
+    form, swept = in_form("segments" if long else "lanes", function, tail)
+    if form == "segments":
+        return form, swept
     program = assemble(function, tail)
     if applied(program) <= (STRAIGHT_BESIDE_LANES if form == "lanes" else STRAIGHT_UP_TO) and not branches(program):
         return "straight", program
-    return form, lanes
+    return form, swept
 
 
 def in_form(form: str, function: Function, tail: Tail) -> tuple[str, Program]:
@@ -75,8 +74,9 @@ def in_form(form: str, function: Function, tail: Tail) -> tuple[str, Program]:
     program = assemble(function, tail)
     if form in ("straight", "loops"):
         return form, program
-    lanes, segments = (assemble(function, tail, dynamics) for dynamics in ("lanes", "segments"))
-    if form == "segments" and segments != lanes:
+    lanes = assemble(function, tail, "lanes")
+    segments = assemble(function, tail, "segments") if form == "segments" else lanes
+    if segments != lanes:
         return "segments", written_out(segments, ELIMINATED)
     return "loops" if lanes == program else "lanes", written_out(lanes, ELIMINATED)
 
