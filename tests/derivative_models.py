@@ -10,9 +10,9 @@ from models import model_folder
 from references.metrics import BLOCKS
 from references.parameters import random_states
 from serpentail_codegen.catalogue import CATALOGUE
-from serpentail_codegen.compose import expanded
 from serpentail_codegen.functions import program
-from serpentail_codegen.interpret import Numbers, Run
+from serpentail_codegen.ir.dataflow import expanded
+from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.pipeline import tail_of
 from serpentail_codegen.scene import DERIVATIVES, parse_scene
 

@@ -6,9 +6,10 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from serpentail_codegen.interpret import Numbers, Run
-from serpentail_codegen.program import Builder
-from serpentail_codegen.tape import Step, Tape
+from serpentail_codegen.ir.builder import Builder
+from serpentail_codegen.ir.interpret import Numbers, Run
+from serpentail_codegen.ir.step import Step
+from serpentail_codegen.ir.tape import Tape
 
 EXACT = Numbers(SimpleNamespace(sin=None, cos=None, sqrt=None), Fraction)
 

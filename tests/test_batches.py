@@ -17,7 +17,7 @@ from serpentail_codegen.batches import flattened
 from serpentail_codegen.batches import side_by_side as widened
 from serpentail_codegen.draft import Tail
 from serpentail_codegen.functions import FUNCTIONS, program
-from serpentail_codegen.interpret import Numbers, Run
+from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.targets.c_batch import BATCHED, STATES
 
 TAILS = {"articulated": Tail(2, 2), "continuum": Tail(2, 4, "continuum")}

@@ -17,11 +17,11 @@ import pytest
 from models import model_folder
 from references.parameters import random_states
 from serpentail_codegen.catalogue import CATALOGUE
-from serpentail_codegen.interpret import Numbers, Run
+from serpentail_codegen.ir.interpret import Numbers, Run
+from serpentail_codegen.ir.step import Step
 from serpentail_codegen.pipeline import tail_of
 from serpentail_codegen.scene import DERIVATIVES, parse_scene
 from serpentail_codegen.scene import FUNCTIONS as NAMES
-from serpentail_codegen.tape import Step
 from serpentail_codegen.targets.c import in_form
 from serpentail_codegen.targets.c_function import Routine, routine_lines
 

@@ -6,9 +6,10 @@ import pytest
 
 from programs import EXACT, NEXT, PROGRAMS, RECTANGULAR, SQUARE, TURN, built, numbers, step_of
 from serpentail_codegen.adjoints import adjoint_program
-from serpentail_codegen.compose import expanded, influencing, pruned, reached, reads, writes
-from serpentail_codegen.interpret import Run
-from serpentail_codegen.program import Apply, Builder, Guard, Loop, statements
+from serpentail_codegen.ir.builder import Builder
+from serpentail_codegen.ir.dataflow import expanded, influencing, pruned, reached, reads, writes
+from serpentail_codegen.ir.interpret import Run
+from serpentail_codegen.ir.program import Apply, Guard, Loop, statements
 from serpentail_codegen.tangents import tangent_program
 from test_tangents import arguments_of
 

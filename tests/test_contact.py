@@ -13,9 +13,9 @@ from references.contact import Contacts, attitude
 from references.parameters import random_states
 from serpentail.verify import laws
 from serpentail_codegen.contact import contact_force
-from serpentail_codegen.interpret import Numbers
+from serpentail_codegen.ir.interpret import Numbers
+from serpentail_codegen.ir.tape import replay
 from serpentail_codegen.lower import derive
-from serpentail_codegen.tape import replay
 from test_c_target import C99, compiled
 
 FLOATS = Numbers(math, float)

@@ -20,10 +20,10 @@ from serpentail_codegen import dynamics as dyn
 from serpentail_codegen import kinematics as kin
 from serpentail_codegen.draft import Tail
 from serpentail_codegen.functions import FUNCTIONS, program
-from serpentail_codegen.interpret import Numbers, Run, unroll
+from serpentail_codegen.ir.interpret import Numbers, Run, unroll
+from serpentail_codegen.ir.program import Apply, statements
+from serpentail_codegen.ir.tape import operation_count, replay
 from serpentail_codegen.lower import Recorder, derive
-from serpentail_codegen.program import Apply, statements
-from serpentail_codegen.tape import operation_count, replay
 
 X, Y, Z = (eye(3).col(k) for k in range(3))
 # an angle is given by the tangent of its half

@@ -15,8 +15,8 @@ from programs import Narrow
 from references.metrics import equilibrated_condition
 from serpentail.compiler import _candidates
 from serpentail.model import Model
-from serpentail_codegen.interpret import Numbers, Run
-from serpentail_codegen.program import Apply, statements
+from serpentail_codegen.ir.interpret import Numbers, Run
+from serpentail_codegen.ir.program import Apply, statements
 from serpentail_codegen.scene import DERIVATIVES
 
 FLOATS = Numbers(np, float)

@@ -12,8 +12,9 @@ import pytest
 import sympy
 
 from serpentail_codegen.differentiate import adjoint, tangent
-from serpentail_codegen.interpret import Numbers
-from serpentail_codegen.tape import BINARY, TERNARY, UNARY, Step, Tape, live_nodes, operation_count, replay
+from serpentail_codegen.ir.interpret import Numbers
+from serpentail_codegen.ir.step import Step
+from serpentail_codegen.ir.tape import BINARY, TERNARY, UNARY, Tape, live_nodes, operation_count, replay
 
 INPUTS = (("x", 2), ("y", 1), ("z", 2))
 OUTPUTS = (("u", 1), ("w", 2))

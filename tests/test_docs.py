@@ -14,7 +14,8 @@ from scipy.integrate import simpson
 
 import serpentail as st
 from serpentail.cli import parser
-from serpentail_codegen.scene import ALL, PARAMETERS, parse_scene
+from serpentail_codegen.parameters import PARAMETERS
+from serpentail_codegen.scene import ALL, parse_scene
 
 ROOT = Path(__file__).parent.parent
 DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *sorted(ROOT.glob("docs/*.md"))]

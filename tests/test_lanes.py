@@ -10,8 +10,10 @@ from serpentail_codegen.catalogue import CATALOGUE
 from serpentail_codegen.draft import Tail
 from serpentail_codegen.eliminations import written_out
 from serpentail_codegen.functions import FUNCTIONS, program
-from serpentail_codegen.interpret import Numbers, Run, ldl_factor, ldl_solve
-from serpentail_codegen.program import Builder, Factor, Solve, padded, statements
+from serpentail_codegen.ir.builder import Builder
+from serpentail_codegen.ir.interpret import Numbers, Run
+from serpentail_codegen.ir.ldl import ldl_factor, ldl_solve
+from serpentail_codegen.ir.program import Factor, Solve, padded, statements
 
 SIZES = [(1, 1), (1, 3), (2, 1), (2, 3), (4, 2), (7, 1)]
 
@@ -87,7 +89,8 @@ def test_an_elimination_written_out_solves(rows, wide):
 
 def _spread(rows, wide):
     """The step that puts columns into lanes."""
-    from serpentail_codegen.tape import Step, Tape
+    from serpentail_codegen.ir.step import Step
+    from serpentail_codegen.ir.tape import Tape
 
     tape, results = Tape(), []
     columns = [[tape.input(c * rows + k) for k in range(rows)] for c in range(wide)]

@@ -11,9 +11,12 @@ import pytest
 from references.parameters import TABLE_1, random_states
 from serpentail_codegen.draft import Tail
 from serpentail_codegen.functions import FUNCTIONS, program
-from serpentail_codegen.interpret import Numbers, Run, branches, ldl_factor, ldl_solve, pair_factor, pair_solve, unroll
-from serpentail_codegen.program import Apply, Array, Builder, Fill, Index, Loop, as_index, narrowed, statements
-from serpentail_codegen.tape import Step, Tape, live_nodes, replay
+from serpentail_codegen.ir.builder import Builder, narrowed
+from serpentail_codegen.ir.interpret import Numbers, Run, branches, unroll
+from serpentail_codegen.ir.ldl import ldl_factor, ldl_solve, pair_factor, pair_solve
+from serpentail_codegen.ir.program import Apply, Array, Fill, Index, Loop, as_index, statements
+from serpentail_codegen.ir.step import Step
+from serpentail_codegen.ir.tape import Tape, live_nodes, replay
 from serpentail_codegen.targets.c_function import in_loops, routine_lines
 
 TAILS = {"m1_n2": Tail(1, 2), "m2_n3": Tail(2, 3), "continuum_m2": Tail(2, 3, "continuum")}

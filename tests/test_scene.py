@@ -11,16 +11,15 @@ from pathlib import Path
 import pytest
 
 from serpentail_codegen import scene as scene_module
+from serpentail_codegen.parameters import PARAMETERS
+from serpentail_codegen.problems import Problem, SceneError
 from serpentail_codegen.scene import (
     FUNCTIONS,
     GROUPS,
     KEYS,
     ONLY,
-    PARAMETERS,
     TOUCHING,
-    Problem,
     Scene,
-    SceneError,
     load_scene,
     parse_scene,
     resolve_parameters,

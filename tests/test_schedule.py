@@ -7,8 +7,8 @@ import pytest
 from serpentail_codegen import schedule
 from serpentail_codegen.draft import Tail
 from serpentail_codegen.functions import FUNCTIONS, program
-from serpentail_codegen.interpret import unroll
-from serpentail_codegen.tape import Tape, live_nodes
+from serpentail_codegen.ir.interpret import unroll
+from serpentail_codegen.ir.tape import Tape, live_nodes
 
 
 def straight(segments, links):

@@ -13,7 +13,7 @@ from references.parameters import TABLE_1, random_states
 from serpentail_codegen.catalogue import CATALOGUE
 from serpentail_codegen.draft import Tail
 from serpentail_codegen.functions import FUNCTIONS, program
-from serpentail_codegen.interpret import Numbers, Run
+from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.targets.c import fastest
 from test_lanes import arguments, assert_same_acceleration
 

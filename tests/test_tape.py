@@ -8,20 +8,9 @@ from types import SimpleNamespace
 import mpmath
 import pytest
 
-from serpentail_codegen.interpret import Numbers
-from serpentail_codegen.tape import (
-    BINARY,
-    TERNARY,
-    UNARY,
-    Step,
-    Tape,
-    compacted,
-    exact_quotient,
-    live_nodes,
-    operation_count,
-    replay,
-    specialised,
-)
+from serpentail_codegen.ir.interpret import Numbers
+from serpentail_codegen.ir.step import Step, compacted, specialised
+from serpentail_codegen.ir.tape import BINARY, TERNARY, UNARY, Tape, exact_quotient, live_nodes, operation_count, replay
 
 INPUTS = 4
 SEEDS = range(40)

@@ -19,7 +19,7 @@ from serpentail.verify import Check, as_text, check, laws, summary
 from serpentail_codegen.catalogue import CATALOGUE
 from serpentail_codegen.functions import program
 from serpentail_codegen.implicit import IMPLICIT
-from serpentail_codegen.interpret import Numbers, Run
+from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.pipeline import generate, tail_of
 from serpentail_codegen.scene import parse_scene
 from serpentail_codegen.touching import CONTACT

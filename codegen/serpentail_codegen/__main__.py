@@ -5,7 +5,8 @@ import sys
 import time
 from pathlib import Path
 
-from .scene import ALL, KINDS, SceneError, load_scene, parse_scene, scene_for, scene_to_dict
+from .problems import SceneError
+from .scene import ALL, KINDS, load_scene, parse_scene, scene_for, scene_to_dict
 
 
 def parser() -> argparse.ArgumentParser:

@@ -7,9 +7,9 @@ overwritten before the way back needs it is kept, one copy for each turn of its 
 from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 
-from .compose import influencing, inner_arrays, pruned, reached, writes
 from .differentiate import adjoint
-from .program import Apply, Array, Copy, Fill, Guard, Index, Loop, Program, Ref, as_index, statements
+from .ir.dataflow import influencing, inner_arrays, pruned, reached, writes
+from .ir.program import Apply, Array, Copy, Fill, Guard, Index, Loop, Program, Ref, as_index, statements
 from .turned_arrays import TurnedArray, turned_arrays
 
 

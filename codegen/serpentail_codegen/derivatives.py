@@ -25,7 +25,7 @@ from .functions import (
     program,
     struct_parameters,
 )
-from .program import Array, Index, Ref
+from .ir.program import Array, Index, Ref
 from .sweeps import mechanism
 from .tangents import tangent_program
 

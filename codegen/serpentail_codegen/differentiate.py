@@ -7,7 +7,8 @@ Both walk the tape once and differentiate each operation by its rule.  Tangents 
 from collections import Counter
 from functools import cache
 
-from .tape import LEAVES, Step, Tape, compacted, live_nodes, operands, replay
+from .ir.step import Step, compacted
+from .ir.tape import LEAVES, Tape, live_nodes, operands, replay
 from .turns import Turned
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from . import kinematics as kin
 from .draft import Draft, Tail
-from .program import Array, Index, Loop
+from .ir.program import Array, Index, Loop
 
 # directions of the torso: first column in the tangent of q or v, and whether it is q
 TORSO = {"turn": (3, True), "p_dot": (0, False), "omega": (3, False)}

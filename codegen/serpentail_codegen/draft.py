@@ -4,8 +4,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import pi
 
+from .ir.builder import Builder
+from .ir.program import Array, Index, Ref
 from .lower import derive
-from .program import Array, Builder, Index, Ref
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,11 @@ Pairs of triangles are factored in loops whatever their size: twice the entries 
 from dataclasses import replace
 from functools import cache
 
-from .compose import rewritten
-from .interpret import ldl_factor, ldl_solve, pair_solve
-from .program import Apply, Array, Call, Factor, Guard, Program, Ref, Solve, SolvePair, padded
-from .tape import Step, Tape, compacted
+from .ir.dataflow import rewritten
+from .ir.ldl import ldl_factor, ldl_solve, pair_solve
+from .ir.program import Apply, Array, Call, Factor, Guard, Program, Ref, Solve, SolvePair, padded
+from .ir.step import Step, compacted
+from .ir.tape import Tape
 
 
 def written_out(program: Program, largest: int) -> Program:

@@ -5,7 +5,7 @@ from . import kinematics as kin
 from . import sweeps
 from .draft import Draft
 from .functions import V_DOT, Argument, Function, Q, V
-from .program import Array, padded
+from .ir.program import Array, padded
 from .sweeps import column_of, mechanism
 
 ACCELERATIONS = Argument("accelerations", lambda t: (t.nt,), "wanted accelerations of the tail coordinates (rad/s^2)")

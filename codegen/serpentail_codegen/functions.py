@@ -9,9 +9,9 @@ from . import dynamics as dyn
 from . import kinematics as kin
 from . import sweeps
 from .draft import Draft, Tail
+from .ir.program import Array, Index, Program, Ref, padded
 from .lane_sweeps import balance_in_lanes
 from .parameters import Parameter
-from .program import Array, Index, Program, Ref, padded
 from .scene import Scene, parameters_of
 from .segment_sweeps import accelerate
 from .sweeps import column_of, mechanism

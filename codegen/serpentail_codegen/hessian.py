@@ -7,7 +7,7 @@ from .derivatives import INERTIA, VIRTUAL_POWER, with_unit_quaternion
 from .directions import TORSO, Directions
 from .draft import Draft
 from .functions import program
-from .program import Array, Index, Ref, as_index
+from .ir.program import Array, Index, Ref, as_index
 from .tangents import tangent_program
 
 

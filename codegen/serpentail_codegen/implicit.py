@@ -13,8 +13,8 @@ from . import kinematics as kin
 from . import stiffness as stiff
 from .draft import Draft, Tail
 from .functions import Argument, Function, Q, V, assemble_mass_matrix
+from .ir.program import Array, Index, Ref, padded
 from .lower import derive
-from .program import Array, Index, Ref, padded
 from .touching import BRISTLES, LEGS, Points, gather_points
 
 SPRING = 18  # numbers of a point's linearised contact

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from . import dynamics as dyn
 from . import lane_dynamics as lan
 from .draft import Draft
-from .program import Array, Ref
+from .ir.program import Array, Ref
 from .sweeps import each_piece, forward_wrenches, mechanism
 
 

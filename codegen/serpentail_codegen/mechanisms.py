@@ -13,9 +13,9 @@ from . import dynamics as dyn
 from . import kinematics as kin
 from . import polar_continuum as pol
 from .draft import Draft, Tail
+from .ir.program import Array, Index, Ref
+from .ir.step import Step, specialised
 from .lower import derive
-from .program import Array, Index, Ref
-from .tape import Step, specialised
 
 
 @dataclass(frozen=True)

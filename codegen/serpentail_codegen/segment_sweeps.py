@@ -10,9 +10,9 @@ from . import articulated_bodies as art
 from . import dynamics as dyn
 from . import kinematics as kin
 from .draft import Draft
+from .ir.program import Array, Index, Ref, as_index
 from .lane_dynamics import torso_bias
 from .mechanisms import prepare_link, still
-from .program import Array, Index, Ref, as_index
 from .sweeps import IDENTITY
 
 UNKNOWNS = 8  # motion of a segment's base, and two coordinates

@@ -10,8 +10,8 @@ from contextlib import contextmanager
 from . import dynamics as dyn
 from . import kinematics as kin
 from .draft import Draft
+from .ir.program import Array, Index, Ref
 from .mechanisms import Mechanism, mechanism_of, motion
-from .program import Array, Index, Ref
 
 Block = Callable[[Index, Index], Ref]  # an entry of H, by the numbers of two tail coordinates
 IDENTITY = (1, 0, 0, 0, 1, 0, 0, 0, 1)

@@ -7,9 +7,9 @@ direction; without, it holds the derivative in one direction.
 from collections.abc import Callable, Collection
 from dataclasses import replace
 
-from .compose import inner_arrays, pruned, reached, writes
 from .differentiate import tangent
-from .program import Apply, Array, Copy, Fill, Guard, Index, Loop, Program, Ref, statements
+from .ir.dataflow import inner_arrays, pruned, reached, writes
+from .ir.program import Apply, Array, Copy, Fill, Guard, Index, Loop, Program, Ref, statements
 from .turned_arrays import TurnedArray, turned_arrays
 
 Bound = Callable[[tuple[Loop, ...]], Index | None]

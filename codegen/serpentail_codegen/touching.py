@@ -8,8 +8,8 @@ from . import kinematics as kin
 from . import legs, sweeps
 from .draft import Draft, Tail
 from .functions import TAU, V_DOT, Argument, Function, Loads, Q, V, accelerate_by_segments, balanced
+from .ir.program import Array, Index, Ref
 from .lower import derive
-from .program import Array, Index, Ref
 from .sweeps import mechanism
 
 LEGS = Argument(

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass, replace
 
-from .compose import names, reads, writes
-from .program import Apply, Index, Program, Ref, statements
+from .ir.dataflow import names, reads, writes
+from .ir.program import Apply, Index, Program, Ref, statements
 from .turns import Turned, turned_by
 
 

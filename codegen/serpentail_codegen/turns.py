@@ -6,7 +6,7 @@ differentiated with respect to the angles: half the rows, and d(R x) = R dx + da
 
 from dataclasses import dataclass
 
-from .tape import Step
+from .ir.step import Step
 
 
 @dataclass(frozen=True)

@@ -11,10 +11,10 @@ from ..draft import Tail
 from ..eliminations import written_out
 from ..functions import Argument, Function, struct_parameters
 from ..functions import program as assemble
-from ..interpret import applied, branches
-from ..program import VECTOR, Program
+from ..ir.interpret import applied, branches
+from ..ir.program import VECTOR, Program
+from ..ir.tape import operation_count
 from ..scene import Scene
-from ..tape import operation_count
 from ..templating import render
 from .c_function import CFunction, Routine, dialect, in_loops, routine_arguments, routine_lines, straight_line
 from .casadi_external import casadi_context

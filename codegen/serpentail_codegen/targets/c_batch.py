@@ -6,8 +6,8 @@ from ..batches import flattened, side_by_side
 from ..draft import Tail
 from ..functions import Function
 from ..functions import program as assemble
-from ..interpret import applied, branches
-from ..program import Program
+from ..ir.interpret import applied, branches
+from ..ir.program import Program
 from ..scene import Scene
 from ..templating import render
 from .c import ArgumentView, Emitted, baked_values, callee_view, step_views

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from ..batches import flattened, side_by_side, with_own_parameters
 from ..draft import Tail
 from ..functions import program as assemble
-from ..program import Program, padded
+from ..ir.program import Program, padded
 from ..scene import Scene
 from ..templating import render
 from .c import Emitted, baked_values, callee_view, step_views

@@ -3,8 +3,8 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from ..interpret import executed, unroll
-from ..program import (
+from ..ir.interpret import executed, unroll
+from ..ir.program import (
     Apply,
     Array,
     Call,
@@ -23,7 +23,8 @@ from ..program import (
     When,
     padded,
 )
-from ..tape import BINARY, Step
+from ..ir.step import Step
+from ..ir.tape import BINARY
 from .scalars import EARLY, LATE, Dialect, Scalars, called, index_text
 
 FEW = 3  # scalars are written one by one, more by a helper

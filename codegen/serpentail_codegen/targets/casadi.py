@@ -2,13 +2,13 @@
 
 import re
 
-from ..compose import expanded
 from ..draft import Tail
 from ..functions import program as assemble
 from ..functions import struct_parameters
-from ..program import Apply, Copy, Factor, Fill, Guard, Loop, Program, Ref, Solve, padded
+from ..ir.dataflow import expanded
+from ..ir.program import Apply, Copy, Factor, Fill, Guard, Loop, Program, Ref, Solve, padded
+from ..ir.step import Step
 from ..scene import Scene
-from ..tape import Step
 from ..templating import render
 from .scalars import Dialect, Scalars, index_text
 

@@ -3,9 +3,9 @@
 from collections import Counter, defaultdict
 from dataclasses import dataclass
 
-from ..program import Index
+from ..ir.program import Index
+from ..ir.tape import BINARY, LEAVES, lanes_of, live_nodes, operands
 from ..schedule import scheduled
-from ..tape import BINARY, LEAVES, lanes_of, live_nodes, operands
 
 LEAST_SINGLE = 2.0**-126
 SYMBOL = {"add": "+", "sub": "-", "mul": "*", "div": "/"}

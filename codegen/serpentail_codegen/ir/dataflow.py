@@ -3,6 +3,7 @@
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import replace
 
+from .builder import narrowed
 from .program import (
     Apply,
     Array,
@@ -19,7 +20,6 @@ from .program import (
     SolvePair,
     Unit,
     When,
-    narrowed,
     statements,
 )
 

@@ -1,10 +1,9 @@
 """Loop nests over steps: the order in which steps are applied to flat arrays, for one emitted function."""
 
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
-from functools import cache
+from dataclasses import dataclass
 
-from .tape import Number, Step, compacted
+from .step import Step
+from .tape import Number
 
 VECTOR = 8  # lanes of the widest vector
 
@@ -239,132 +238,6 @@ class Program:
     def of_role(self, role: str) -> tuple[Array, ...]:
         """Return the arrays of a role, in the order in which they were declared."""
         return tuple(a for a in self.arrays if a.role == role)
-
-
-@dataclass
-class Builder:
-    """Records a program: declare arrays, open loops, apply steps."""
-
-    name: str
-    doc: str
-    arrays: list[Array] = field(default_factory=list)
-    _bodies: list[list] = field(default_factory=lambda: [[]])
-
-    def declare(self, array: Array) -> Array:
-        """Declare an array; local names are unique within a program."""
-        if any(a.name == array.name for a in self.arrays):
-            raise ValueError(f"array {array.name} is declared twice in {self.name}")
-        self.arrays.append(array)
-        return array
-
-    def array(self, name: str, size: int, count: int = 1, role: str = "local") -> Array:
-        """Declare an array of scalars."""
-        return self.declare(Array(name, role, size, count))
-
-    def wide(self, name: str, size: int, lanes: int) -> Array:
-        """Declare a local array of rows of so many lanes, of scalars where they are 0."""
-        return self.declare(Array(name, "local", size, lanes=lanes))
-
-    def constant(self, name: str, values) -> Array:
-        """Declare an array whose values are known at generation."""
-        return self.declare(Array(name, "constant", len(values), values=tuple(values)))
-
-    def emit(self, statement) -> None:
-        """Append a statement to the innermost open loop."""
-        self._bodies[-1].append(statement)
-
-    def apply(self, step: Step, reads: dict[str, Ref], **writes: Ref) -> None:
-        """Apply a step to named vectors; outputs not named are dropped, a trailing ``_`` adds instead of storing."""
-        step = narrowed(step, {name.rstrip("_") for name in writes})
-        inputs = tuple(reads[name] for name, _ in step.inputs)
-        targets = tuple(writes.get(name, writes.get(name + "_")) for name, _ in step.outputs)
-        for (name, size), ref in zip(step.inputs + step.outputs, inputs + targets, strict=True):
-            if ref.size != size:
-                raise ValueError(f"{step.name} in {self.name}: {name} has {size} scalars, not {ref.size}")
-        self.emit(Apply(step, inputs, targets, tuple(name + "_" in writes for name, _ in step.outputs)))
-
-    def fill(self, target: Ref, *values: Number) -> None:
-        """Store constants; one value is repeated."""
-        self.emit(Fill(target, values * target.size if len(values) == 1 else values))
-
-    def copy(self, target: Ref, source: Ref, adds: bool = False) -> None:
-        """Copy scalars, or add them."""
-        if target.size != source.size:
-            raise ValueError(
-                f"{self.name}: {source.size} scalars of {source.array.name} do not fit {target.array.name}"
-            )
-        self.emit(Copy(target, source, adds))
-
-    def unit(self, target: Ref, first: Index | int) -> None:
-        """Store unit rows."""
-        self.emit(Unit(target, as_index(first)))
-
-    def factor(self, matrix: Array, size: int) -> None:
-        """Factor a matrix in place."""
-        self.emit(Factor(matrix, size))
-
-    def solve(self, matrix: Array, x: Ref) -> None:
-        """Solve in place with a factored matrix."""
-        self.emit(Solve(matrix, x))
-
-    def factor_pair(self, matrix: Array, size: int) -> None:
-        """Factor a pair of triangles in place."""
-        self.emit(FactorPair(matrix, size))
-
-    def solve_pair(self, matrix: Array, x: Ref) -> None:
-        """Solve in place with a factored pair of triangles."""
-        self.emit(SolvePair(matrix, x))
-
-    def guard(self, scalar: Ref, status: str, *protects: Ref) -> None:
-        """Give up with a status unless all scalars of a vector are positive."""
-        self.emit(Guard(scalar, status, protects))
-
-    def call(self, program: "Program", **arguments: Array) -> None:
-        """Run another program on arrays of this one."""
-        for array in program.of_role("input") + program.of_role("output"):
-            if array.name not in arguments:
-                raise ValueError(f"{program.name} in {self.name}: {array.role} {array.name} is not bound")
-        self.emit(Call(program, tuple(arguments.items())))
-
-    @contextmanager
-    def loop(self, var: str, count: Index | int, downward: bool = False, start: Index | int = 0):
-        """Open a loop; yields its variable as an index."""
-        self._bodies.append([])
-        yield Index(((var, 1),))
-        body = tuple(self._bodies.pop())
-        if as_index(start) != as_index(count) and body:
-            self.emit(Loop(var, as_index(start), as_index(count), downward, body))
-
-    @contextmanager
-    def when(self, scalar: Ref):
-        """Open what is run only where a scalar is positive; the body must not change that scalar."""
-        self._bodies.append([])
-        yield
-        self.emit(When(scalar, tuple(self._bodies.pop())))
-
-    def finish(self) -> Program:
-        """Return the recorded program."""
-        return Program(self.name, self.doc, tuple(self.arrays), tuple(self._bodies[0]))
-
-
-@cache
-def _narrowed(step: Step, wanted: frozenset[str]) -> Step:
-    outputs, results, first = [], [], 0
-    for name, size in step.outputs:
-        if name in wanted:
-            outputs.append((name, size))
-            results += step.results[first : first + size]
-        first += size
-    name = step.name if len(outputs) == len(step.outputs) else "_".join([step.name, *(n for n, _ in outputs)])
-    return compacted(replace(step, name=name, outputs=tuple(outputs), results=tuple(results)))
-
-
-def narrowed(step: Step, wanted: set[str]) -> Step:
-    """Return the step with only the wanted outputs and what they need."""
-    unknown = wanted - {name for name, _ in step.outputs}
-    if unknown:
-        raise ValueError(f"{step.name} has no output {sorted(unknown)}")
-    return _narrowed(step, frozenset(wanted))
 
 
 def statements(body):

@@ -1,0 +1,1 @@
+"""The intermediate representation: straight-line steps, and programs that loop over them."""
