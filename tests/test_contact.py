@@ -12,10 +12,10 @@ from models import model_folder
 from references.contact import Contacts, attitude
 from references.parameters import random_states
 from serpentail.verify import laws
-from serpentail_codegen.contact import contact_force
 from serpentail_codegen.ir.interpret import Numbers
 from serpentail_codegen.ir.tape import replay
-from serpentail_codegen.lower import derive
+from serpentail_codegen.mechanics.contact import contact_force
+from serpentail_codegen.mechanics.lower import derive
 from test_c_target import C99, compiled
 
 FLOATS = Numbers(math, float)

@@ -16,14 +16,13 @@ import sympy
 from sympy import Matrix, Rational, diag, eye, zeros
 from sympy.algebras.quaternion import Quaternion
 
-from serpentail_codegen import dynamics as dyn
-from serpentail_codegen import kinematics as kin
 from serpentail_codegen.draft import Tail
 from serpentail_codegen.functions import FUNCTIONS, program
 from serpentail_codegen.ir.interpret import Numbers, Run, unroll
 from serpentail_codegen.ir.program import Apply, statements
 from serpentail_codegen.ir.tape import operation_count, replay
-from serpentail_codegen.lower import Recorder, derive
+from serpentail_codegen.mechanics import link, rotations
+from serpentail_codegen.mechanics.lower import Recorder, derive
 
 X, Y, Z = (eye(3).col(k) for k in range(3))
 # an angle is given by the tangent of its half
@@ -224,15 +223,15 @@ def links(state):
 
 
 def test_rotation_of_a_quaternion_that_need_not_be_normalised(state):
-    R = call(kin.quaternion_rotation, quaternion=state.quaternion)["R"]
-    assert call(kin.quaternion_rotation, quaternion=-3 * state.quaternion)["R"] == R
+    R = call(rotations.quaternion_rotation, quaternion=state.quaternion)["R"]
+    assert call(rotations.quaternion_rotation, quaternion=-3 * state.quaternion)["R"] == R
     assert Matrix(3, 3, list(R)) == Quaternion(*state.quaternion).to_rotation_matrix()
 
 
 def test_trigonometry_of_a_joint(state):
-    joint = call(kin.joint_trigonometry, angles=state.halves[:2])["joint"]
+    joint = call(link.joint_trigonometry, angles=state.halves[:2])["joint"]
     assert joint == state.joint(0)
-    twice = call(kin.double_angles, joint=joint)["twice"]
+    twice = call(link.double_angles, joint=joint)["twice"]
     angle = sympy.Symbol("angle", real=True)
     for k, (c, s) in enumerate((joint[:2], joint[2:])):
         sine, cosine, double = sympy.sin(angle), sympy.cos(angle), 2 * angle
@@ -244,7 +243,7 @@ def test_trigonometry_of_a_joint(state):
 def test_angular_velocity_is_that_of_the_rotation(state, links):
     for parent, body, i in links:
         rates = state.tail_vector(state.v, i)
-        assert call(kin.link_angular_velocity, joint=state.joint(i), rates=rates, w=parent.omega)["w"] == body.omega
+        assert call(link.link_angular_velocity, joint=state.joint(i), rates=rates, w=parent.omega)["w"] == body.omega
 
 
 def test_link_motion_is_the_second_derivative_of_the_pose(state, links):
@@ -252,7 +251,7 @@ def test_link_motion_is_the_second_derivative_of_the_pose(state, links):
         rates, accelerations = (state.tail_vector(v, i) for v in (state.v, state.v_dot))
         here = {"w": parent.omega, "w_dot": parent.omega_dot, "a": parent.R[0].T * parent.end[2]}
         known = {"joint": state.joint(i), "rates": rates, "accelerations": accelerations, "link": state.link()}
-        motion = call(kin.link_motion, **known, **here)
+        motion = call(link.link_motion, **known, **here)
         assert (motion["w"], motion["w_dot"]) == (body.omega, body.omega_dot)
         assert motion["a_joint"] == body.R[0].T * body.joint[2]
         assert motion["a"] == body.R[0].T * body.end[2]
@@ -262,19 +261,19 @@ def test_link_motion_is_the_second_derivative_of_the_pose(state, links):
 def test_link_velocity_is_the_derivative_of_the_pose(state, links):
     for parent, body, i in links:
         u = parent.R[0].T * parent.end[1]
-        found = call(kin.link_linear_velocity, joint=state.joint(i), link=state.link(), w=body.omega, u=u)
+        found = call(link.link_linear_velocity, joint=state.joint(i), link=state.link(), w=body.omega, u=u)
         assert (found["u_joint"], found["u"]) == (body.R[0].T * body.joint[1], body.R[0].T * body.end[1])
 
 
 def test_mount_moves_with_the_torso(state, links):
     torso, r = links[0][0], state.parameters["tail_mount"]
     R, mount = torso.R[0], torso.end
-    u = call(kin.torso_velocity, R=R, p_dot=state.v[:3])["u"]
-    assert call(kin.mount_velocity, u=u, w=torso.omega, tail_mount=r)["u"] == R.T * mount[1]
-    a = call(kin.torso_acceleration, R=R, p_ddot=state.v_dot[:3], gravity=[0])["a"]
-    at_mount = call(kin.mount_acceleration, w=torso.omega, w_dot=torso.omega_dot, a=a, tail_mount=r)["a_mount"]
+    u = call(torso.torso_velocity, R=R, p_dot=state.v[:3])["u"]
+    assert call(torso.mount_velocity, u=u, w=torso.omega, tail_mount=r)["u"] == R.T * mount[1]
+    a = call(torso.torso_acceleration, R=R, p_ddot=state.v_dot[:3], gravity=[0])["a"]
+    at_mount = call(torso.mount_acceleration, w=torso.omega, w_dot=torso.omega_dot, a=a, tail_mount=r)["a_mount"]
     assert at_mount == R.T * mount[2]
-    assert call(kin.mount_position, R=R, p=state.p, tail_mount=r)["P"] == mount[0]
+    assert call(torso.mount_position, R=R, p=state.p, tail_mount=r)["P"] == mount[0]
 
 
 # Dynamics, step by step.
@@ -283,7 +282,7 @@ def test_mount_moves_with_the_torso(state, links):
 def test_link_properties_are_those_of_one_of_equal_links(state):
     names = ("tail_mass", "tail_length", "link_inertia")
     known = {name: state.parameters[name] for name in names}
-    assert call(dyn.link_properties, share=[Rational(1, state.tail.total)], **known)["link"] == state.link()
+    assert call(link.link_properties, share=[Rational(1, state.tail.total)], **known)["link"] == state.link()
 
 
 def wrench_about(point, body):
@@ -303,7 +302,7 @@ def test_link_wrench_is_newton_and_euler_about_the_joint(state, links):
         a_joint, a_com = R.T * body.joint[2], R.T * body.com[2]
         swing = (a_joint - a_com) * 2 / state.length
         found = call(
-            dyn.link_wrench, link=state.link(), w=body.omega, w_dot=body.omega_dot, a_joint=a_joint, swing=swing
+            link.link_wrench, link=state.link(), w=body.omega, w_dot=body.omega_dot, a_joint=a_joint, swing=swing
         )
         assert found["F"] == in_frame(R, wrench_about(body.joint[0], body))
 
@@ -313,7 +312,7 @@ def test_gathered_wrench_is_the_sum_over_all_links_beyond(state, links):
     for k in reversed(range(len(links))):
         parent, body, i = links[k]
         own = in_frame(body.R[0], wrench_about(body.joint[0], body))
-        found = call(dyn.gather_wrench, joint=state.joint(i), link=state.link(), F=own, F_next=beyond)
+        found = call(link.gather_wrench, joint=state.joint(i), link=state.link(), F=own, F_next=beyond)
         total = sum((wrench_about(body.joint[0], other) for _, other, _ in links[k:]), zeros(6, 1))
         beyond = found["F_next"]
         assert beyond == in_frame(parent.R[0], total)
@@ -323,7 +322,7 @@ def test_gathered_wrench_is_the_sum_over_all_links_beyond(state, links):
 def test_link_momentum_and_kinetic_energy_are_their_definitions(state, links):
     for _, body, _ in links:
         R, momentum = body.R[0], body.mass * body.com[1]
-        found = call(dyn.link_momentum, link=state.link(), w=body.omega, u_joint=R.T * body.joint[1])
+        found = call(link.link_momentum, link=state.link(), w=body.omega, u_joint=R.T * body.joint[1])
         about_joint = body.spin + (body.com[0] - body.joint[0]).cross(momentum)
         assert found["F"] == in_frame(R, Matrix.vstack(momentum, about_joint))
         assert found["kinetic"][0] == kinetic_form([body], [body]) / 2
@@ -332,12 +331,12 @@ def test_link_momentum_and_kinetic_energy_are_their_definitions(state, links):
 @pytest.mark.parametrize(("axes", "axis", "part"), [((0, 1, 2), Z, 1), ((1, 2, 0), X, 0)])
 def test_double_angles_turn_an_inertia(state, axes, axis, part):
     joint, inertia = state.joint(0), Matrix([3, 5, 7, Rational(1, 2), -2, Rational(4, 3)])
-    twice = call(kin.double_angles, joint=joint)["twice"]
+    twice = call(link.double_angles, joint=joint)["twice"]
     angle = sympy.Symbol("angle")
     c, s = joint[2 * part : 2 * part + 2]
     turn = rotation(axis, angle).xreplace({sympy.cos(angle): c, sympy.sin(angle): s})
-    found = dyn.turned_inertia(lambda _, value: value, axes, turn, twice[5 * part : 5 * part + 5], inertia)
-    assert dyn.symmetric(found) == turn * dyn.symmetric(inertia) * turn.T
+    found = link.turned_inertia(lambda _, value: value, axes, turn, twice[5 * part : 5 * part + 5], inertia)
+    assert rotations.symmetric(found) == turn * rotations.symmetric(inertia) * turn.T
 
 
 def composite(bodies, R, origin):
@@ -346,7 +345,7 @@ def composite(bodies, R, origin):
     h = sum((body.mass * r for body, r in zip(bodies, arms, strict=True)), zeros(3, 1))
     spread = [body.mass * (r.dot(r) * eye(3) - r * r.T) for body, r in zip(bodies, arms, strict=True)]
     inertia = sum((b.R[0] * b.inertia * b.R[0].T + x for b, x in zip(bodies, spread, strict=True)), zeros(3, 3))
-    return Matrix([sum(body.mass for body in bodies)]), R.T * h, dyn.entries(R.T * inertia * R)
+    return Matrix([sum(body.mass for body in bodies)]), R.T * h, rotations.entries(R.T * inertia * R)
 
 
 def momentum_about(origin, bodies, R):
@@ -359,11 +358,11 @@ def momentum_about(origin, bodies, R):
 
 def gathered_segment(state, i, beyond):
     """Apply gather_links over a segment; return what it carries and the sums of H_pp, H_py and H_yy."""
-    twice = call(kin.double_angles, joint=state.joint(i))["twice"]
+    twice = call(link.double_angles, joint=state.joint(i))["twice"]
     carried = {**beyond, "pitch": zeros(6, 1), "yaw": zeros(6, 1)}
     own = Counter()
     for _ in range(state.tail.links):
-        found = call(dyn.gather_links, joint=state.joint(i), twice=twice, link=state.link(), **carried)
+        found = call(link.gather_links, joint=state.joint(i), twice=twice, link=state.link(), **carried)
         carried = {name: found[name] for name in carried}
         own.update({name: found[name][0] for name in ("H_pp", "H_py", "H_yy")})
     return carried, own
@@ -383,7 +382,7 @@ def test_gathered_links_are_sums_over_the_links_from_definition():
         assert carried["pitch"] == momentum_about(root, columns[pitch][first:], R)
         assert carried["yaw"] == momentum_about(root, columns[yaw][first:], R)
         assert own == {"H_pp": H[pitch, pitch], "H_py": H[pitch, yaw], "H_yy": H[yaw, yaw]}
-        found = call(dyn.gather_moment, joint=state.joint(i), link=state.link(), mass=[0], h=zeros(3, 1))
+        found = call(link.gather_moment, joint=state.joint(i), link=state.link(), mass=[0], h=zeros(3, 1))
         last = columns[pitch][first + state.tail.links - 1]
         before = columns[pitch][first + state.tail.links - 2]
         assert (found["mass"], found["h"]) == composite([last], before.R[0], last.joint[0])[:2]
@@ -494,11 +493,11 @@ def test_a_name_means_one_step():
 
 
 def test_derived_steps_are_named_after_their_function():
-    step = derive(dyn.link_wrench)
+    step = derive(link.link_wrench)
     assert (step.name, step.outputs) == ("link_wrench", (("F", 6),))
     assert step.inputs == (("link", 6), ("w", 3), ("w_dot", 3), ("a_joint", 3), ("swing", 3))
     assert step.doc == "Inertial wrench of one link at its joint (Eq. 17), Newton and Euler in the link frame."
-    assert derive(dyn.link_wrench) is step
+    assert derive(link.link_wrench) is step
 
 
 # Costs: additions, subtractions, multiplications and divisions.
@@ -537,9 +536,9 @@ def step_cost(*functions):
 
 
 def test_steps_stay_within_their_budgets():
-    assert step_cost(dyn.gather_links) <= 140
-    assert step_cost(kin.link_motion, dyn.link_wrench) <= 95
-    assert step_cost(dyn.gather_wrench) <= 36
+    assert step_cost(link.gather_links) <= 140
+    assert step_cost(link.link_motion, link.link_wrench) <= 95
+    assert step_cost(link.gather_wrench) <= 36
 
 
 def test_functions_stay_within_their_budgets():

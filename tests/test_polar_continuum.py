@@ -14,7 +14,7 @@ from references.exact_polar import ExactPolar
 from references.metrics import block_error, equilibrated_condition, mass_matrix_error
 from references.parameters import TABLE_1
 from serpentail.verify import laws
-from serpentail_codegen import polar_continuum
+from serpentail_codegen.mechanics import polar_arc as polar_continuum
 from serpentail_codegen.problems import SceneError
 from serpentail_codegen.scene import DERIVATIVES, FUNCTIONS, parse_scene, scene_for, scene_to_dict
 

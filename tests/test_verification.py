@@ -6,6 +6,7 @@ import re
 
 import numpy as np
 import pytest
+from sympy import Matrix
 
 import serpentail as st
 import verify_model
@@ -14,11 +15,10 @@ from references import metrics
 from references.exact_chain import ExactChain
 from references.exact_continuum import ExactContinuum
 from serpentail import laws, measures, verify
-from serpentail_codegen import dynamics as dyn
-from serpentail_codegen import kinematics as kin
 from serpentail_codegen.catalogue import CATALOGUE
 from serpentail_codegen.feedback import FEEDBACK
 from serpentail_codegen.implicit import IMPLICIT
+from serpentail_codegen.mechanics import link, loads, torso
 from serpentail_codegen.pipeline import generate
 from serpentail_codegen.scene import ON_DEMAND, scene_for
 from serpentail_codegen.touching import CONTACT
@@ -346,7 +346,7 @@ def without_joint_acceleration(let, link, w, w_dot, a_joint, swing):
 
 def with_flat_load(let, R, f_torso, F_beyond):
     """Loads at B taken as if B were upright."""
-    return LOAD_AT_TORSO(let, 0 * R + kin.Matrix([1, 0, 0, 0, 1, 0, 0, 0, 1]), f_torso, F_beyond)
+    return LOAD_AT_TORSO(let, 0 * R + Matrix([1, 0, 0, 0, 1, 0, 0, 0, 1]), f_torso, F_beyond)
 
 
 def with_weak_gravity(let, R, p_ddot, gravity):
@@ -359,14 +359,14 @@ def with_load_at_the_wrong_place(let, R, P, f_point, F_beyond):
     return LOAD_AT_POINT(let, R, P * 101 / 100, f_point, F_beyond)
 
 
-LINK_WRENCH, LOAD_AT_TORSO, LOAD_AT_POINT = dyn.link_wrench, dyn.load_at_torso, dyn.load_at_point
-TORSO_ACCELERATION = kin.torso_acceleration
+LINK_WRENCH, LOAD_AT_TORSO, LOAD_AT_POINT = link.link_wrench, loads.load_at_torso, loads.load_at_point
+TORSO_ACCELERATION = torso.torso_acceleration
 DERIVATION_FAULTS = {
-    "gyroscopic": (dyn, "link_wrench", without_gyroscopic_torque, "momentum is constant in flight"),
-    "acceleration": (dyn, "link_wrench", without_joint_acceleration, "energy changes by the power of the torques"),
-    "flat load": (dyn, "load_at_torso", with_flat_load, "pose in the world turns all alike"),
-    "gravity": (kin, "torso_acceleration", with_weak_gravity, "forward dynamics needs the torques it was given"),
-    "load": (dyn, "load_at_point", with_load_at_the_wrong_place, "loads accelerate by their generalised force"),
+    "gyroscopic": (link, "link_wrench", without_gyroscopic_torque, "momentum is constant in flight"),
+    "acceleration": (link, "link_wrench", without_joint_acceleration, "energy changes by the power of the torques"),
+    "flat load": (loads, "load_at_torso", with_flat_load, "pose in the world turns all alike"),
+    "gravity": (torso, "torso_acceleration", with_weak_gravity, "forward dynamics needs the torques it was given"),
+    "load": (loads, "load_at_point", with_load_at_the_wrong_place, "loads accelerate by their generalised force"),
 }
 
 

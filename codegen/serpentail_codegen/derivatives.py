@@ -5,8 +5,6 @@ Nothing depends on the position of B or on its velocity.
 
 from collections.abc import Callable
 
-from . import dynamics as dyn
-from . import kinematics as kin
 from . import sweeps
 from .adjoints import adjoint_program
 from .directions import Directions
@@ -26,6 +24,7 @@ from .functions import (
     struct_parameters,
 )
 from .ir.program import Array, Index, Ref
+from .mechanics import rotations, torso, translation
 from .sweeps import mechanism
 from .tangents import tangent_program
 
@@ -43,18 +42,18 @@ def assemble_core(d: Draft, arrays: dict[str, Array]) -> None:
     d.known |= {"w": d.known["omega"], "w_dot": v_dot.part(3, 3), "a": v_dot.part(0, 3)}
     wrench = sweeps.forward_wrenches(d, v_dot)
     sweeps.gather_wrenches(d, wrench, lambda i: force.part(6 + 2 * i, 2))
-    d.step(dyn.torso_wrench, force=force.part(0, 3), moment=force.part(3, 3))
+    d.step(torso.torso_wrench, force=force.part(0, 3), moment=force.part(3, 3))
 
 
 def assemble_virtual_power(d: Draft, arrays: dict[str, Array]) -> None:
     """lambda^T (H v_dot + C) as one sum over the links, from the torso to the tip."""
     v_dot, multiplier = arrays["v_dot"], arrays["multiplier"]
-    d.store(kin.quaternion_rotation, R=9)
+    d.store(rotations.quaternion_rotation, R=9)
     mechanism(d).prepare(d)
     d.known |= {"w": d.known["omega"], "w_dot": v_dot.part(3, 3), "w_virtual": multiplier.part(3, 3)}
     d.known["p_ddot"] = v_dot.part(0, 3)
-    d.store(kin.torso_acceleration, a=3)
-    d.step(kin.torso_velocity, {"p_dot": multiplier.part(0, 3)}, u=d.vector("u_virtual", 3))
+    d.store(torso.torso_acceleration, a=3)
+    d.step(torso.torso_velocity, {"p_dot": multiplier.part(0, 3)}, u=d.vector("u_virtual", 3))
     sweeps.virtual_power(d, arrays["power"][0], multiplier, v_dot)
 
 
@@ -78,7 +77,7 @@ def with_unit_quaternion(d: Draft, q: Array) -> Array:
     """Return q with a unit quaternion, which turns are taken at: of any other, squares may overflow."""
     unit = d.array("q_unit", d.tail.nq)
     d.copy(unit.part(0, 3), q.part(0, 3))
-    d.step(kin.unit_quaternion, unit=unit.part(3, 4))
+    d.step(rotations.unit_quaternion, unit=unit.part(3, 4))
     d.copy(unit.part(7, d.tail.nt), q.part(7, d.tail.nt))
     d.known["quaternion"] = unit.part(3, 4)
     return unit
@@ -100,7 +99,7 @@ def forward_dynamics_first(d: Draft, arrays: dict[str, Array]) -> tuple[Balance,
     """Forward dynamics, then its acceleration with R^T (p_b_ddot + g z) in place of p_b_ddot."""
     v_dot, body = d.array("acceleration", d.tail.nv), d.array("body_acceleration", d.tail.nv)
     balance = assemble_forward_dynamics(d, arrays | {"v_dot": v_dot})
-    d.step(kin.torso_acceleration, {"p_ddot": v_dot.part(0, 3)}, a=body.part(0, 3))
+    d.step(torso.torso_acceleration, {"p_ddot": v_dot.part(0, 3)}, a=body.part(0, 3))
     d.copy(body.part(3, d.tail.nv - 3), v_dot.part(3, d.tail.nv - 3))
     return balance, body
 
@@ -129,7 +128,7 @@ def assemble_forward_dynamics_derivatives(d: Draft, arrays: dict[str, Array]) ->
     balance.solve(d, less(d, rows), x)
     directions.spread(d, x, arrays["dq"], arrays["dv"])
     turned = {f"row_{r}": arrays["dq"].part(nv * r + 3, 3) for r in range(3)}
-    d.step(dyn.turned_acceleration, {"a": body.part(0, 3)}, **turned)
+    d.step(translation.turned_acceleration, {"a": body.part(0, 3)}, **turned)
     torques(d, balance, arrays["dtau"])
 
 
@@ -203,7 +202,7 @@ def assemble_forward_dynamics_jvp(d: Draft, arrays: dict[str, Array]) -> None:
     d.call(inner, q=arrays["q"], v=arrays["v"], v_dot=body, d_q=d_q, d_v=arrays["dv"], d_force=rows)
     balance.solve(d, less(d, rows, lambda k: arrays["dtau"].part(k, 1)), x)
     reads = {"a": body.part(0, 3), "turn": arrays["dq"].part(3, 3), "p_ddot": x.part(0, 3)}
-    d.step(dyn.turning_acceleration, reads, p_ddot=x.part(0, 3))
+    d.step(translation.turning_acceleration, reads, p_ddot=x.part(0, 3))
 
 
 def assemble_inverse_dynamics_vjp(d: Draft, arrays: dict[str, Array]) -> None:
@@ -219,7 +218,7 @@ def assemble_inverse_dynamics_vjp(d: Draft, arrays: dict[str, Array]) -> None:
 def in_tangent_space(d: Draft, gradient: Array, dq: Array) -> None:
     """Turn a gradient with respect to the numbers of q into one with respect to a velocity's directions."""
     d.copy(dq.part(0, 3), gradient.part(0, 3))
-    d.step(kin.turn_gradient, {"gradient": gradient.part(3, 4)}, turn=dq.part(3, 3))
+    d.step(rotations.turn_gradient, {"gradient": gradient.part(3, 4)}, turn=dq.part(3, 3))
     d.copy(dq.part(6, d.tail.nt), gradient.part(7, d.tail.nt))
 
 
@@ -228,7 +227,7 @@ def assemble_forward_dynamics_vjp(d: Draft, arrays: dict[str, Array]) -> None:
     tail, multiplier = d.tail, arrays["multiplier"]
     v_dot, mu = d.array("acceleration", tail.nv), d.array("response", tail.nv)  # "mu" is a parameter of contact
     balance = assemble_forward_dynamics(d, arrays | {"v_dot": v_dot})
-    d.step(kin.torso_velocity, {"p_dot": multiplier.part(0, 3)}, u=d.vector("pull", 3))
+    d.step(torso.torso_velocity, {"p_dot": multiplier.part(0, 3)}, u=d.vector("pull", 3))
     at_torso = loads(d, load_force=d.known["pull"], load_moment=multiplier.part(3, 3))
     balance.solve(d, Loads(at_torso, tau=lambda k: multiplier.part(6 + k, 1)), mu)
     inner = adjoint_program(program(VIRTUAL_POWER, tail), ("q", "v"), ("power",))

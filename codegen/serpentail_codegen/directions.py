@@ -6,9 +6,9 @@ coordinates; the columns of such a matrix are those of a velocity v.
 
 from dataclasses import dataclass
 
-from . import kinematics as kin
 from .draft import Draft, Tail
 from .ir.program import Array, Index, Loop
+from .mechanics import rotations
 
 # directions of the torso: first column in the tangent of q or v, and whether it is q
 TORSO = {"turn": (3, True), "p_dot": (0, False), "omega": (3, False)}
@@ -63,7 +63,7 @@ class Directions:
             if name == "turn":
                 turn = d.wide(f"d_{label}", 3, self.count)
                 d.unit(turn[0], 3 * lane)
-                d.step(kin.turned_quaternion, {"turn": turn[0]}, rate=d_q.part(3, 4))
+                d.step(rotations.turned_quaternion, {"turn": turn[0]}, rate=d_q.part(3, 4))
             else:
                 d.unit(d_v.part(TORSO[name][0], 3), 3 * lane)
         with d.loop("i", self.tail.segments) as i:

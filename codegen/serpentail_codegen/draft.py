@@ -6,7 +6,7 @@ from math import pi
 
 from .ir.builder import Builder
 from .ir.program import Array, Index, Ref
-from .lower import derive
+from .mechanics.lower import derive
 
 
 @dataclass(frozen=True)

@@ -1,11 +1,10 @@
 """Partial feedback linearisation: a draft goes in, the torques that give wanted tail accelerations are added to it."""
 
-from . import dynamics as dyn
-from . import kinematics as kin
 from . import sweeps
 from .draft import Draft
 from .functions import V_DOT, Argument, Function, Q, V
 from .ir.program import Array, padded
+from .mechanics import rotations, torso, translation
 from .sweeps import column_of, mechanism
 
 ACCELERATIONS = Argument("accelerations", lambda t: (t.nt,), "wanted accelerations of the tail coordinates (rad/s^2)")
@@ -29,10 +28,10 @@ def assemble_pfl(d: Draft, arrays: dict[str, Array]) -> None:
     tail_alone(d, v_dot, tau)
     free_torso(d)
     with d.loop("k", tail.nt) as k:
-        d.step(dyn.coupling_torque, {"column": column_of(columns, k)}, torque_=tau.part(k, 1))
+        d.step(translation.coupling_torque, {"column": column_of(columns, k)}, torque_=tau.part(k, 1))
     if "v_dot" in arrays:
-        d.store(kin.quaternion_rotation, R=9)
-        d.step(dyn.world_acceleration, p_ddot=v_dot.part(0, 3))
+        d.store(rotations.quaternion_rotation, R=9)
+        d.step(rotations.world_acceleration, p_ddot=v_dot.part(0, 3))
         d.copy(v_dot.part(3, 3), d.known["w_dot"])
 
 
@@ -41,7 +40,7 @@ def tail_alone(d: Draft, v_dot: Array, tau: Array) -> None:
     d.known |= {"w": d.known["omega"], "w_dot": d.zero(3), "a": d.zero(3)}
     wrench = sweeps.forward_wrenches(d, v_dot)
     sweeps.gather_wrenches(d, wrench, lambda i: tau.part(2 * i, 2))
-    d.store(dyn.torso_wrench, force=3, moment=3)
+    d.store(torso.torso_wrench, force=3, moment=3)
 
 
 def free_torso(d: Draft) -> None:
@@ -49,11 +48,11 @@ def free_torso(d: Draft) -> None:
     A, w_dot = d.array("A", padded(3), 3), d.vector("w_dot", 3)
     d.known |= dict.fromkeys(["load_force", "load_moment"], d.zero(3))
     rows = {f"A_{r}": A.part(padded(3) * r, r + 1) for r in range(3)}
-    d.step(dyn.without_translation, inverse_mass=d.vector("inverse_mass", 1), com=d.vector("com", 3), **rows)
-    d.step(dyn.rotational_load, net=d.vector("net", 3), rhs=w_dot)
+    d.step(translation.without_translation, inverse_mass=d.vector("inverse_mass", 1), com=d.vector("com", 3), **rows)
+    d.step(translation.rotational_load, net=d.vector("net", 3), rhs=w_dot)
     d.factor(A, 3)
     d.solve(A, w_dot)
-    d.store(dyn.free_acceleration, a=3)
+    d.store(translation.free_acceleration, a=3)
 
 
 WANTED = (Q, V, ACCELERATIONS)

@@ -5,12 +5,11 @@ from dataclasses import dataclass, replace
 from functools import partial
 from math import prod
 
-from . import dynamics as dyn
-from . import kinematics as kin
 from . import sweeps
 from .draft import Draft, Tail
 from .ir.program import Array, Index, Program, Ref, padded
 from .lane_sweeps import balance_in_lanes
+from .mechanics import loads, rotations, torso, translation
 from .parameters import Parameter
 from .scene import Scene, parameters_of
 from .segment_sweeps import accelerate
@@ -92,7 +91,7 @@ def assemble_mass_matrix(
 ) -> None:
     """H, both triangles; its rows are ``apart(nv)`` apart."""
     H, row, tail = arrays["H"], apart(d.tail.nv), d.tail
-    d.store(kin.quaternion_rotation, R=9)
+    d.store(rotations.quaternion_rotation, R=9)
 
     def H_tail(k, other, size=1):
         return H.part((6 + k) * row + 6 + other, size)
@@ -100,12 +99,12 @@ def assemble_mass_matrix(
     columns = sweeps.tail_inertia(d, H_tail, d.array("columns", 12, tail.segments), world)
     if world:
         composite = {name: d.known[name] for name in ("h", "I")}
-        d.step(dyn.world_composite, **composite)
+        d.step(rotations.world_composite, **composite)
         d.known["R"] = d.constant("identity", sweeps.IDENTITY)[0]
-    d.step(dyn.mass_matrix_base, **{f"H_{r}": H.part(r * row, 6) for r in range(6)})
+    d.step(torso.mass_matrix_base, **{f"H_{r}": H.part(r * row, 6) for r in range(6)})
     with d.loop("k", tail.nt) as k:
         lower, upper = H.part((6 + k) * row, 6), H.part(6 + k, 6, stride=row)
-        d.step(dyn.mass_matrix_column, {"column": column_of(columns, k)}, H_row=lower, H_column=upper)
+        d.step(torso.mass_matrix_column, {"column": column_of(columns, k)}, H_row=lower, H_column=upper)
         with d.loop("l", k) as other:
             d.copy(H.part((6 + other) * row + 6 + k, 1), H_tail(k, other))
 
@@ -114,17 +113,17 @@ def assemble_inverse_dynamics(d: Draft, arrays: dict[str, Array], world: bool = 
     """H v_dot + C by Newton and Euler; without ``v_dot`` among the arguments it is C."""
     force, v_dot = arrays["force"], arrays.get("v_dot")
     still = d.constant("still", [0, 0, 0])[0]
-    d.store(kin.quaternion_rotation, R=9)
+    d.store(rotations.quaternion_rotation, R=9)
     mechanism(d).prepare(d)
     d.known |= {"w": d.known["omega"], "w_dot": v_dot.part(3, 3) if v_dot else still}
     d.known["p_ddot"] = v_dot.part(0, 3) if v_dot else still
-    d.store(kin.torso_acceleration, a=3)
+    d.store(torso.torso_acceleration, a=3)
     wrench = sweeps.forward_wrenches(d, v_dot)
     sweeps.gather_wrenches(d, wrench, lambda i: force.part(6 + 2 * i, 2))
-    d.step(dyn.torso_wrench, force=force.part(0, 3), moment=force.part(3, 3))
-    d.step(dyn.world_vector, {"vector": force.part(0, 3)}, vector=force.part(0, 3))
+    d.step(torso.torso_wrench, force=force.part(0, 3), moment=force.part(3, 3))
+    d.step(rotations.world_vector, {"vector": force.part(0, 3)}, vector=force.part(0, 3))
     if world:
-        d.step(dyn.world_vector, {"vector": force.part(3, 3)}, vector=force.part(3, 3))
+        d.step(rotations.world_vector, {"vector": force.part(3, 3)}, vector=force.part(3, 3))
 
 
 def assemble_balance(d: Draft, arrays: dict[str, Array]) -> None:
@@ -136,7 +135,7 @@ def assemble_balance(d: Draft, arrays: dict[str, Array]) -> None:
     def A_tail(k, other, entries=1):
         return A.part((3 + k) * row + 3 + other, entries)
 
-    d.step(kin.quaternion_rotation, R=arrays["R"].part(0, 9))
+    d.step(rotations.quaternion_rotation, R=arrays["R"].part(0, 9))
     if d.dynamics != "composite":
         balance_in_lanes(d, arrays, lambda k, other, entries=1: A.part(k * row + other, entries))
         d.factor(A, size)
@@ -146,13 +145,13 @@ def assemble_balance(d: Draft, arrays: dict[str, Array]) -> None:
     sweeps.core_bias(d, bias)
     d.known |= {name: arrays[name].part(0, arrays[name].length) for name in ("inverse_mass", "com")}
     rows = {f"A_{r}": A.part(r * row, r + 1) for r in range(3)}
-    d.step(dyn.without_translation, inverse_mass=d.known["inverse_mass"], com=d.known["com"], **rows)
+    d.step(translation.without_translation, inverse_mass=d.known["inverse_mass"], com=d.known["com"], **rows)
     with d.loop("k", tail.nt) as k:
         column = column_of(columns, k)
-        d.step(dyn.column_without_translation, {"column": column}, A_row=A.part((3 + k) * row, 3))
+        d.step(translation.column_without_translation, {"column": column}, A_row=A.part((3 + k) * row, 3))
         with d.loop("l", k + 1) as other:
             reads = {"column": column, "other": column_of(columns, other)}
-            d.step(dyn.pair_without_translation, reads, A_entry_=A_tail(k, other))
+            d.step(translation.pair_without_translation, reads, A_entry_=A_tail(k, other))
     d.factor(A, size)
 
 
@@ -180,7 +179,7 @@ def assemble_acceleration(d: Draft, arrays: dict[str, Array]) -> None:
     if d.dynamics != "segments":
         assemble_forward_dynamics(d, arrays)
         return
-    d.store(kin.quaternion_rotation, R=9)
+    d.store(rotations.quaternion_rotation, R=9)
     accelerate_by_segments(d, arrays, applied_load(d, arrays))
 
 
@@ -224,20 +223,20 @@ class Balance:
         size, lanes = 3 + d.tail.nt, x.lanes
         zero = d.zero(1)
         net = d.wide(f"net_{x.name}", 3, lanes)[0]
-        d.step(dyn.rotational_load, loads.at_torso, net=net, rhs=x.part(3, 3))
+        d.step(translation.rotational_load, loads.at_torso, net=net, rhs=x.part(3, 3))
         with d.loop("k", d.tail.nt) as k:
             reads = {"column": column_of(self.columns, k), "net": net}
             reads["inertial"] = loads.inertial(k) if loads.inertial else zero
             reads["tau"] = loads.tau(k) if loads.tau else zero
-            d.step(dyn.tail_load, reads, rhs=x.part(6 + k, 1))
+            d.step(translation.tail_load, reads, rhs=x.part(6 + k, 1))
         d.solve(self.A, x.part(3, size))
         tail_force = d.wide(f"tail_force_{x.name}", 3, lanes)[0]
         d.fill(tail_force, 0)
         with d.loop("k", d.tail.nt) as k:
             reads = {"column": column_of(self.columns, k), "acceleration": x.part(6 + k, 1)}
-            d.step(dyn.column_acceleration, reads, tail_force_=tail_force)
+            d.step(translation.column_acceleration, reads, tail_force_=tail_force)
         reads = {"net": net, "tail_force": tail_force, "w_dot": x.part(3, 3)}
-        d.step(dyn.base_acceleration, loads.at_torso | reads, p_ddot=x.part(0, 3))
+        d.step(translation.base_acceleration, loads.at_torso | reads, p_ddot=x.part(0, 3))
 
 
 def applied_load(d: Draft, arrays: dict[str, Array]) -> Array:
@@ -255,22 +254,22 @@ def applied_load(d: Draft, arrays: dict[str, Array]) -> Array:
 def assemble_momentum(d: Draft, arrays: dict[str, Array]) -> None:
     """Momentum, and angular momentum about the COM; the sweep sees the motion relative to B."""
     still = d.constant("still", [0, 0, 0])[0]
-    d.store(kin.quaternion_rotation, R=9)
+    d.store(rotations.quaternion_rotation, R=9)
     sweeps.gather_momentum(d, still)
-    d.step(dyn.momentum_at_com, linear=arrays["linear"][0], angular=arrays["angular"][0])
+    d.step(torso.momentum_at_com, linear=arrays["linear"][0], angular=arrays["angular"][0])
 
 
 def assemble_energy(d: Draft, arrays: dict[str, Array]) -> None:
     """Kinetic energy link by link, potential energy of the COM's height."""
-    d.store(kin.quaternion_rotation, R=9)
+    d.store(rotations.quaternion_rotation, R=9)
     sweeps.gather_momentum(d, d.known["p_dot"], kinetic=arrays["kinetic"][0])
-    d.step(dyn.potential_energy, potential=arrays["potential"][0])
+    d.step(torso.potential_energy, potential=arrays["potential"][0])
 
 
 def assemble_tail_points(d: Draft, arrays: dict[str, Array]) -> None:
     """The joints and the tip, or equally spaced samples of every segment."""
     points, tail = arrays["points"], d.tail
-    d.store(kin.quaternion_rotation, R=9)
+    d.store(rotations.quaternion_rotation, R=9)
     mechanism(d).prepare_samples(d)
     here = sweeps.torso_pose(d, True, d.known["p"])
     d.copy(points.part(0, 3), here["P"])
@@ -282,7 +281,7 @@ def assemble_tail_points(d: Draft, arrays: dict[str, Array]) -> None:
 def assemble_tail_point_jacobians(d: Draft, arrays: dict[str, Array]) -> None:
     """d(point)/dt = J v for every tail point; arms start at B, so distance from the origin costs no accuracy."""
     J, tail = arrays["J"], d.tail
-    d.store(kin.quaternion_rotation, R=9)
+    d.store(rotations.quaternion_rotation, R=9)
     mechanism(d).prepare_samples(d)
     S = d.array("S", 12, tail.segments)
     here = sweeps.torso_pose(d, True)
@@ -295,7 +294,7 @@ def assemble_tail_point_jacobians(d: Draft, arrays: dict[str, Array]) -> None:
         for axis in range(3):
             d.fill(row(point, axis, axis, 1), 1)
         rows = {f"J_{name}": row(point, axis, 3, 3) for axis, name in enumerate("xyz")}
-        d.step(kin.point_jacobian_base, {"arm": here["P"]}, **rows)
+        d.step(loads.point_jacobian_base, {"arm": here["P"]}, **rows)
 
     base_rows(Index())
     with d.loop("i", tail.segments) as i:
@@ -307,7 +306,7 @@ def assemble_tail_point_jacobians(d: Draft, arrays: dict[str, Array]) -> None:
             base_rows(point)
             with d.loop("l", i + 1) as segment:
                 rows = {f"J_{name}": row(point, axis, 6 + 2 * segment, 2) for axis, name in enumerate("xyz")}
-                d.step(kin.point_jacobian_tail, {"S": S[segment], "arm": here["P"]}, **rows)
+                d.step(loads.point_jacobian_tail, {"S": S[segment], "arm": here["P"]}, **rows)
 
 
 BALANCE = Function(

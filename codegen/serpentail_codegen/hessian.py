@@ -1,13 +1,12 @@
 """Second derivatives: a tail's sizes go in, the loop nest of the Hessian of lambda^T (H v_dot + C) comes out."""
 
-from . import dynamics as dyn
-from . import kinematics as kin
 from .adjoints import adjoint_program
 from .derivatives import INERTIA, VIRTUAL_POWER, with_unit_quaternion
 from .directions import TORSO, Directions
 from .draft import Draft
 from .functions import program
 from .ir.program import Array, Index, Ref, as_index
+from .mechanics import rotations, torso
 from .tangents import tangent_program
 
 
@@ -27,7 +26,7 @@ def assemble_inverse_dynamics_hessian(d: Draft, arrays: dict[str, Array]) -> Non
     d_q = directions.tangents(d)
     d.call(inner, b_power=d.constant("one", [1]), d_b_q=b_q, d_b_v=b_v, d_b_v_dot=b_v_dot, **given, **d_q)
     turn = d.wide("d_b_turn", 3, directions.count)
-    d.step(kin.turn_gradient, {"gradient": b_q.part(3, 4)}, turn=turn[0])
+    d.step(rotations.turn_gradient, {"gradient": b_q.part(3, 4)}, turn=turn[0])
     mirror(d, directions, {"turn": turn[0], "omega": b_v.part(3, 3)}, (b_q, b_v), arrays)
     mixed_block(d, q, arrays["multiplier"], arrays["aq"])
     with d.loop("row", nv) as row:
@@ -73,9 +72,9 @@ def mixed_block(d: Draft, q: Array, multiplier: Array, aq: Array) -> None:
     nv, directions = d.tail.nv, Directions(d.tail, (), rates=False)
     inner = tangent_program(program(INERTIA, d.tail), ("q",), directions.count, directions.outward)
     rows, body = d.wide("inertial_rows", nv, directions.count), d.array("multiplier_in_torso_axes", nv)
-    d.store(kin.quaternion_rotation, R=9)
-    d.step(kin.torso_velocity, {"p_dot": multiplier.part(0, 3)}, u=body.part(0, 3))
+    d.store(rotations.quaternion_rotation, R=9)
+    d.step(torso.torso_velocity, {"p_dot": multiplier.part(0, 3)}, u=body.part(0, 3))
     d.copy(body.part(3, nv - 3), multiplier.part(3, nv - 3))
     d.call(inner, q=q, v_dot=body, d_force=rows, **directions.tangents(d))
-    d.step(dyn.world_vector, {"vector": rows.part(0, 3)}, vector=rows.part(0, 3))
+    d.step(rotations.world_vector, {"vector": rows.part(0, 3)}, vector=rows.part(0, 3))
     directions.spread(d, rows, aq)

@@ -8,13 +8,13 @@ Eliminating translation is what the first three pivots of S do.
 
 from dataclasses import dataclass
 
-from . import contact as con
-from . import kinematics as kin
-from . import stiffness as stiff
 from .draft import Draft, Tail
 from .functions import Argument, Function, Q, V, assemble_mass_matrix
 from .ir.program import Array, Index, Ref, padded
-from .lower import derive
+from .mechanics import contact as con
+from .mechanics import contact_stiffness as stiff
+from .mechanics import loads
+from .mechanics.lower import derive
 from .touching import BRISTLES, LEGS, Points, gather_points
 
 SPRING = 18  # numbers of a point's linearised contact
@@ -152,7 +152,7 @@ def add_tail_contacts(d: Draft, f: Factors, points: Points, bristles: Array) -> 
                 stiffen(d, f, points, number, bristles)
                 with d.loop("l", i + 1) as segment:
                     rows = {f"J_{axis}": f.row(g, k, segment) for k, axis in enumerate("xyz")}
-                    d.step(kin.point_jacobian_tail, {"S": S[segment], "arm": f("arm", number)}, **rows)
+                    d.step(loads.point_jacobian_tail, {"S": S[segment], "arm": f("arm", number)}, **rows)
                 with d.loop("k", 2 * i + 2) as k:
                     reads = {"arm": f("arm", number), "spring": f("spring", number), "J_k": f.column(g, k)}
                     d.step(stiff.stiffened_column, reads, force=force, S_row_=f.entry("S", 6 + k, 0, 6))

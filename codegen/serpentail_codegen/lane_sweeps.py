@@ -6,10 +6,10 @@ links need no pose and no column has to meet another one.  It pays where vectors
 
 from collections.abc import Callable
 
-from . import dynamics as dyn
-from . import lane_dynamics as lan
 from .draft import Draft
 from .ir.program import Array, Ref
+from .mechanics import link_columns as lan
+from .mechanics import torso, translation
 from .sweeps import each_piece, forward_wrenches, mechanism
 
 
@@ -22,7 +22,7 @@ def balance_in_lanes(d: Draft, arrays: dict[str, Array], entry: Callable[..., Re
     wrench = forward_wrenches(d, None)
     F_lanes, rows = d.wide("F_lanes", 6, nt + 1)[0], d.wide("H_rows", nt, nt + 1)
     own = _gather(d, wrench, F_lanes, rows)
-    d.step(dyn.torso_composite, **{name: d.known[name] for name in ("mass", "h", "I")})
+    d.step(torso.torso_composite, **{name: d.known[name] for name in ("mass", "h", "I")})
     d.copy(arrays["first_moment"].part(0, 3), d.known["h"])
     d.step(lan.lanes_at_torso, {"F_lanes": F_lanes}, F_lanes=F_lanes)
     total = d.array("F_tail", 6)[0]
@@ -35,7 +35,7 @@ def balance_in_lanes(d: Draft, arrays: dict[str, Array], entry: Callable[..., Re
             d.copy(columns.part(6 * k + r, 1), F_lanes.array.lane(r, k))
     d.known |= {name: arrays[name].part(0, arrays[name].length) for name in ("inverse_mass", "com")}
     base = {f"A_{r}": entry(r, 0, r + 1) for r in range(3)}
-    d.step(dyn.without_translation, inverse_mass=d.known["inverse_mass"], com=d.known["com"], **base)
+    d.step(translation.without_translation, inverse_mass=d.known["inverse_mass"], com=d.known["com"], **base)
     _without_translation(d, F_lanes, rows, columns, entry)
     _own_blocks(d, own, rows, columns, entry)
 

@@ -8,14 +8,12 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import ceil, log2
 
-from . import continuum as con
-from . import dynamics as dyn
-from . import kinematics as kin
-from . import polar_continuum as pol
 from .draft import Draft, Tail
 from .ir.program import Array, Index, Ref
 from .ir.step import Step, specialised
-from .lower import derive
+from .mechanics import arc, arc_shape, link
+from .mechanics import polar_arc as pol
+from .mechanics.lower import derive
 
 
 @dataclass(frozen=True)
@@ -56,7 +54,7 @@ def motion(d: Draft, i: Index, v_dot: Array | None) -> dict[str, Ref]:
 def prepare_link(d: Draft) -> None:
     """Properties of a link."""
     d.known["share"] = d.constant("share", [Fraction(1, d.tail.total)])[0]
-    d.store(dyn.link_properties, link=6)
+    d.store(link.link_properties, link=6)
 
 
 def prepare_links(d: Draft, doubled: bool = False) -> None:
@@ -65,10 +63,10 @@ def prepare_links(d: Draft, doubled: bool = False) -> None:
     d.pieces["joint"] = joint = d.array("joint", 4, d.tail.segments)
     twice = d.array("twice", 10, d.tail.segments) if doubled else None
     with d.loop("i", d.tail.segments) as i:
-        d.step(kin.joint_trigonometry, {"angles": d.angles(i)}, joint=joint[i])
+        d.step(link.joint_trigonometry, {"angles": d.angles(i)}, joint=joint[i])
         if doubled:
             d.pieces["twice"] = twice
-            d.step(kin.double_angles, {"joint": joint[i]}, twice=twice[i])
+            d.step(link.double_angles, {"joint": joint[i]}, twice=twice[i])
     d.samples |= d.pieces
 
 
@@ -84,8 +82,8 @@ def move_link(d: Draft, i: Index, here: dict[str, Ref], v_dot: Array | None, wre
         if name not in d.known:
             d.vector(name, 3)
     reads = d.known | d.piece(i) | here | motion(d, i, v_dot)
-    d.apply(still(d, kin.link_motion, bool(v_dot)), reads, a_joint=d.known["a_joint"], swing=d.known["swing"], **here)
-    d.apply(still(d, dyn.link_wrench), d.known | here, F=wrench)
+    d.apply(still(d, link.link_motion, bool(v_dot)), reads, a_joint=d.known["a_joint"], swing=d.known["swing"], **here)
+    d.apply(still(d, link.link_wrench), d.known | here, F=wrench)
 
 
 def link_momentum(d: Draft, i: Index, writes: dict[str, Ref]) -> None:
@@ -93,23 +91,23 @@ def link_momentum(d: Draft, i: Index, writes: dict[str, Ref]) -> None:
     if "u_joint" not in d.known:
         d.vector("u_joint", 3)
     reads = d.piece(i) | {"rates": d.rates(i)}
-    d.step(kin.link_angular_velocity, reads, w=d.known["w"])
-    d.step(kin.link_linear_velocity, reads, u_joint=d.known["u_joint"], u=d.known["u"])
-    d.step(dyn.link_momentum, **writes)
+    d.step(link.link_angular_velocity, reads, w=d.known["w"])
+    d.step(link.link_linear_velocity, reads, u_joint=d.known["u_joint"], u=d.known["u"])
+    d.step(link.link_momentum, **writes)
 
 
 ARTICULATED = Mechanism(
     pieces=lambda tail: tail.links,
     prepare=prepare_links,
     prepare_samples=prepare_link_samples,
-    pose=kin.link_pose,
-    twist=kin.joint_twist,
-    gather=dyn.gather_links,
-    gather_wrench=dyn.gather_wrench,
-    gather_moment=dyn.gather_moment,
+    pose=link.link_pose,
+    twist=link.joint_twist,
+    gather=link.gather_links,
+    gather_wrench=link.gather_wrench,
+    gather_moment=link.gather_moment,
     move=move_link,
     momentum=link_momentum,
-    power=dyn.link_power,
+    power=link.link_power,
 )
 
 
@@ -121,25 +119,25 @@ OWN = {"h_own": 3, "I_own": 6, "pitch_own": 6, "yaw_own": 6, "H_own": 3}
 
 def shape_step(bend_range: float) -> Step:
     """Return the step of a segment's shape with as many quadruplings as the range needs."""
-    levels = max(0, ceil(log2(bend_range / con.SERIES_REACH)))
-    return derive(con.segment_shape, levels=levels)
+    levels = max(0, ceil(log2(bend_range / arc_shape.SERIES_REACH)))
+    return derive(arc_shape.segment_shape, levels=levels)
 
 
 def prepare_arcs(d: Draft, doubled: bool = False) -> None:
     """Shape, tip and own inertia of every segment."""
     del doubled
     d.known["share"] = d.constant("share", [Fraction(1, d.tail.segments)])[0]
-    d.store(con.section_properties, section=2)
+    d.store(arc.section_properties, section=2)
     d.pieces |= {name: d.array(name, size, d.tail.segments) for name, size in (ARC | OWN).items()}
     d.known["bend_range"] = d.constant("bend_range", [d.tail.bend_range])[0]
     margin = d.array("margin", 1)[0]
     with d.loop("i", d.tail.segments) as i:
         piece = d.piece(i)
         d.apply(shape_step(d.tail.bend_range), piece, tip=piece["tip"], shape=piece["shape"])
-        d.step(con.bend_margin, piece, margin=margin)
+        d.step(arc_shape.bend_margin, piece, margin=margin)
         d.guard(margin, "OUT_OF_RANGE", piece["tip"], piece["shape"])
-        d.step(con.segment_tip, piece, E=piece["E"], r=piece["r"], bend=piece["bend"])
-        d.step(con.segment_inertia, piece, **{name: piece[name] for name in OWN})
+        d.step(arc.segment_tip, piece, E=piece["E"], r=piece["r"], bend=piece["bend"])
+        d.step(arc.segment_inertia, piece, **{name: piece[name] for name in OWN})
 
 
 def prepare_arc_samples(d: Draft) -> None:
@@ -147,7 +145,7 @@ def prepare_arc_samples(d: Draft) -> None:
     fraction = Fraction(1, d.tail.links)
     d.known["fraction"] = d.constant("fraction", [fraction])[0]
     d.known["share"] = d.constant("share_sample", [fraction / d.tail.segments])[0]
-    d.step(con.section_properties, section=d.array("section_sample", 2)[0])
+    d.step(arc.section_properties, section=d.array("section_sample", 2)[0])
     section = {"section": next(a for a in d.arrays if a.name == "section_sample")[0]}
     d.samples |= {name: d.array(f"{name}_sample", ARC[name], d.tail.segments) for name in ("E", "r", "bend")}
     part, tip, margin = d.array("part", 2)[0], d.array("tip_sample", 8)[0], d.array("margin_sample", 1)[0]
@@ -155,12 +153,12 @@ def prepare_arc_samples(d: Draft) -> None:
         d.known["bend_range"] = d.constant("bend_range", [d.tail.bend_range])[0]
     with d.loop("i", d.tail.segments) as i:
         sample = d.sample(i)
-        d.step(con.part_of_bend, {"angles": d.angles(i)}, part=part)
+        d.step(arc.part_of_bend, {"angles": d.angles(i)}, part=part)
         d.apply(shape_step(d.tail.bend_range / d.tail.links), {"angles": part}, tip=tip)
-        d.step(con.bend_margin, {"angles": d.angles(i)}, margin=margin)
+        d.step(arc_shape.bend_margin, {"angles": d.angles(i)}, margin=margin)
         d.guard(margin, "OUT_OF_RANGE", tip)
-        d.step(con.segment_tip, {"angles": part, "tip": tip} | section, **sample)
-        d.step(con.columns_of_bend, sample, bend=sample["bend"])
+        d.step(arc.segment_tip, {"angles": part, "tip": tip} | section, **sample)
+        d.step(arc.columns_of_bend, sample, bend=sample["bend"])
 
 
 def move_arc(d: Draft, i: Index, here: dict[str, Ref], v_dot: Array | None, wrench: Ref) -> None:
@@ -168,29 +166,29 @@ def move_arc(d: Draft, i: Index, here: dict[str, Ref], v_dot: Array | None, wren
     if "torque_own" not in d.pieces:
         d.pieces["torque_own"] = d.array("torque_own", 2, d.tail.segments)
     reads = d.known | d.piece(i) | here | motion(d, i, v_dot)
-    d.apply(still(d, con.segment_wrench, bool(v_dot)), reads, F=wrench, torque_own=reads["torque_own"])
-    d.apply(still(d, con.segment_motion, bool(v_dot)), reads, **here)
+    d.apply(still(d, arc.segment_wrench, bool(v_dot)), reads, F=wrench, torque_own=reads["torque_own"])
+    d.apply(still(d, arc.segment_motion, bool(v_dot)), reads, **here)
 
 
 def arc_momentum(d: Draft, i: Index, writes: dict[str, Ref]) -> None:
     """Give the momentum or kinetic energy of one arc, then carry ``w, u`` to its tip."""
     reads = d.piece(i) | {"rates": d.rates(i)}
-    d.step(con.segment_momentum, reads, **writes)
-    d.step(con.segment_velocity, reads, w=d.known["w"], u=d.known["u"])
+    d.step(arc.segment_momentum, reads, **writes)
+    d.step(arc.segment_velocity, reads, w=d.known["w"], u=d.known["u"])
 
 
 CONTINUUM = Mechanism(
     pieces=lambda tail: 1,
     prepare=prepare_arcs,
     prepare_samples=prepare_arc_samples,
-    pose=con.segment_pose,
-    twist=con.segment_twist,
-    gather=con.gather_segment,
-    gather_wrench=con.gather_segment_wrench,
-    gather_moment=con.gather_segment_moment,
+    pose=arc.segment_pose,
+    twist=arc.segment_twist,
+    gather=arc.gather_segment,
+    gather_wrench=arc.gather_segment_wrench,
+    gather_moment=arc.gather_segment_moment,
     move=move_arc,
     momentum=arc_momentum,
-    power=con.segment_power,
+    power=arc.segment_power,
 )
 
 
@@ -213,7 +211,7 @@ def prepare_polar_arcs(d: Draft, doubled: bool = False) -> None:
     """Integrals over the slices, tip and own inertia of every segment."""
     del doubled
     d.known["share"] = d.constant("share", [Fraction(1, d.tail.segments)])[0]
-    d.store(con.section_properties, section=2)
+    d.store(arc.section_properties, section=2)
     sizes = {name: size for name, size in ARC.items() if name not in ("tip", "shape")} | OWN | POLAR_OWN
     d.pieces |= {name: d.array(name, size, d.tail.segments) for name, size in sizes.items()}
     d.known["bend_range"] = d.constant("bend_range", [d.tail.bend_range])[0]
@@ -232,7 +230,7 @@ def prepare_polar_samples(d: Draft) -> None:
     d.known["fraction"] = d.constant("fraction", [fraction])[0]
     d.known["share"] = d.constant("share_sample", [fraction / d.tail.segments])[0]
     section = d.array("section_sample", 2)[0]
-    d.step(con.section_properties, section=section)
+    d.step(arc.section_properties, section=section)
     d.samples |= {name: d.array(f"{name}_sample", ARC[name], d.tail.segments) for name in ("E", "r", "bend")}
     part, trig = d.array("part", 2)[0], d.array("trig_sample", 4)[0]
     if "bend_range" not in d.known:

@@ -6,12 +6,11 @@ mount, each as an articulated body whose coordinates are free, and one takes acc
 
 from dataclasses import dataclass
 
-from . import articulated_bodies as art
-from . import dynamics as dyn
-from . import kinematics as kin
 from .draft import Draft
 from .ir.program import Array, Index, Ref, as_index
-from .lane_dynamics import torso_bias
+from .mechanics import free_segment as art
+from .mechanics import link, rotations, torso
+from .mechanics.link_columns import torso_bias
 from .mechanisms import prepare_link, still
 from .sweeps import IDENTITY
 
@@ -64,8 +63,8 @@ def _prepare(d: Draft) -> None:
     with d.loop("i", d.tail.segments) as i:
         d.copy(angles.array.down(0, i, 2), d.angles(i))
         d.copy(rates.array.down(0, i, 2), d.rates(i))
-    d.step(kin.joint_trigonometry, joint=_in_lanes(d, "joint", 4))
-    d.step(kin.double_angles, twice=_in_lanes(d, "twice", 10))
+    d.step(link.joint_trigonometry, joint=_in_lanes(d, "joint", 4))
+    d.step(link.double_angles, twice=_in_lanes(d, "twice", 10))
 
 
 def _shape(d: Draft, tip: Array) -> None:
@@ -73,14 +72,14 @@ def _shape(d: Draft, tip: Array) -> None:
     here = {"R": _in_lanes(d, "R", 9, *IDENTITY), "P": _in_lanes(d, "P", 3, 0)}
     S = _in_lanes(d, "S", 12, 0)
     with d.loop("j", d.tail.links):
-        d.step(kin.joint_twist, S_=S)
-        d.step(kin.link_pose, **here)
+        d.step(link.joint_twist, S_=S)
+        d.step(link.link_pose, **here)
     d.step(art.tip_motion, tip_map=tip[0])
     carried = {name: _in_lanes(d, name, size, 0) for name, size in (("h", 3), ("I", 6), ("pitch", 6), ("yaw", 6))}
     own = {f"{name}_": _in_lanes(d, name, 1, 0) for name in ("H_pp", "H_py", "H_yy")}
     d.fill(d.vector("mass", 1), 0)
     with d.loop("j", d.tail.links, downward=True):
-        d.step(dyn.gather_links, mass=d.known["mass"], **carried, **own)
+        d.step(link.gather_links, mass=d.known["mass"], **carried, **own)
 
 
 def _turn(d: Draft, known: Sweeps) -> None:
@@ -98,11 +97,11 @@ def _move(d: Draft) -> None:
     motion = here | {name: _in_lanes(d, name, 3) for name in ("a_joint", "swing")}
     wrench = d.wide("wrench", 6 * d.tail.links, d.tail.segments)
     with d.loop("j", d.tail.links) as j:
-        d.apply(still(d, kin.link_motion, moving=False), d.known, **motion)
-        d.step(dyn.link_wrench, F=wrench.part(6 * j, 6))
+        d.apply(still(d, link.link_motion, moving=False), d.known, **motion)
+        d.step(link.link_wrench, F=wrench.part(6 * j, 6))
     total, torque = _in_lanes(d, "F_next", 6, 0), _in_lanes(d, "torque", 2, 0)
     with d.loop("j", d.tail.links, downward=True) as j:
-        d.step(dyn.gather_wrench, {"F": wrench.part(6 * j, 6)}, F_next=total, torque_=torque)
+        d.step(link.gather_wrench, {"F": wrench.part(6 * j, 6)}, F_next=total, torque_=torque)
 
 
 def _inward(d: Draft, known: Sweeps, torques: Array) -> tuple[Array, Array]:
@@ -151,7 +150,7 @@ def _at_torso(d: Draft, A: Array, b: Array, load: Array, v_dot: Array) -> None:
     F, a_mount = d.array("F_tail", 6)[0], d.vector("a_mount", 3)
     d.step(art.freed_inertia, _rows(A, 6), **{f"H_{r}": H.part(UNKNOWNS * r, r + 1) for r in range(6)})
     d.factor(H, 6)
-    d.step(kin.mount_acceleration, {"w": omega, "w_dot": zero, "a": zero}, a_mount=a_mount)
+    d.step(torso.mount_acceleration, {"w": omega, "w_dot": zero, "a": zero}, a_mount=a_mount)
     d.step(art.freed_wrench, _rows(A, 3) | {"b_mount": b.lane(0, 0, 6)}, F=F)
     inertial = {name: d.array(f"{name}_torso", 3)[0] for name in ("force", "moment")}
     d.step(torso_bias, {"w": omega, "a": zero, "F": F}, **inertial)
@@ -159,6 +158,6 @@ def _at_torso(d: Draft, A: Array, b: Array, load: Array, v_dot: Array) -> None:
     d.solve(H, rhs[0])
     w_dot, a = rhs.part(0, 3), rhs.part(3, 3)
     d.copy(v_dot.part(3, 3), w_dot)
-    d.store(kin.quaternion_rotation, R=9)
-    d.step(dyn.world_acceleration, {"a": a}, p_ddot=v_dot.part(0, 3))
-    d.step(kin.mount_acceleration, {"w": omega, "w_dot": w_dot, "a": a}, a_mount=a_mount)
+    d.store(rotations.quaternion_rotation, R=9)
+    d.step(rotations.world_acceleration, {"a": a}, p_ddot=v_dot.part(0, 3))
+    d.step(torso.mount_acceleration, {"w": omega, "w_dot": w_dot, "a": a}, a_mount=a_mount)

@@ -7,10 +7,9 @@ pieces or tail points.  What a sweep carries from piece to piece is updated in p
 from collections.abc import Callable
 from contextlib import contextmanager
 
-from . import dynamics as dyn
-from . import kinematics as kin
 from .draft import Draft
 from .ir.program import Array, Index, Ref
+from .mechanics import loads, torso
 from .mechanisms import Mechanism, mechanism_of, motion
 
 Block = Callable[[Index, Index], Ref]  # an entry of H, by the numbers of two tail coordinates
@@ -39,7 +38,7 @@ def forward_wrenches(d: Draft, v_dot: Array | None) -> Array:
     here = {name: d.array(f"{name}_here", 3)[0] for name in ("w", "w_dot", "a")}
     d.copy(here["w"], d.known["w"])
     d.copy(here["w_dot"], d.known["w_dot"])
-    d.step(kin.mount_acceleration, a_mount=here["a"])
+    d.step(torso.mount_acceleration, a_mount=here["a"])
     with each_piece(d) as (i, g):
         mechanism(d).move(d, i, here, v_dot, wrench[g])
     return wrench
@@ -64,9 +63,9 @@ def virtual_power(d: Draft, power: Ref, multiplier: Array, v_dot: Array) -> None
     Starts from ``w``, ``w_dot``, ``a`` of the torso and ``w_virtual``, ``u_virtual``, its virtual velocities.
     """
     carried = {name: d.array(f"{name}_here", 3)[0] for name in ("w", "w_dot", "a", "w_virtual", "u_virtual")}
-    d.step(dyn.torso_power, power=power)
-    d.step(kin.mount_acceleration, a_mount=carried["a"])
-    d.step(kin.mount_velocity, {"w": d.known["w_virtual"], "u": d.known["u_virtual"]}, u=carried["u_virtual"])
+    d.step(torso.torso_power, power=power)
+    d.step(torso.mount_acceleration, a_mount=carried["a"])
+    d.step(torso.mount_velocity, {"w": d.known["w_virtual"], "u": d.known["u_virtual"]}, u=carried["u_virtual"])
     for name in ("w", "w_dot", "w_virtual"):
         d.copy(carried[name], d.known[name])
     with each_piece(d) as (i, _):
@@ -82,10 +81,10 @@ def gather_momentum(d: Draft, p_dot: Ref, kinetic: Ref | None = None) -> None:
     mechanism(d).prepare(d)
     gather_moment(d)
     w, u = d.vector("w", 3), d.vector("u", 3)
-    d.step(kin.torso_velocity, {"p_dot": p_dot}, u=u)
+    d.step(torso.torso_velocity, {"p_dot": p_dot}, u=u)
     d.copy(d.vector("u_torso", 3), u)
     d.copy(w, d.known["omega"])
-    d.step(kin.mount_velocity, u=u)
+    d.step(torso.mount_velocity, u=u)
     momentum = None if kinetic else d.array("momenta", 6, d.tail.segments * mechanism(d).pieces(d.tail))
     if kinetic:
         d.fill(kinetic, 0)
@@ -93,10 +92,10 @@ def gather_momentum(d: Draft, p_dot: Ref, kinetic: Ref | None = None) -> None:
         mechanism(d).momentum(d, i, {"kinetic_": kinetic} if kinetic else {"F": momentum[g]})
     d.known["w"] = d.known["omega"]
     if kinetic:
-        d.step(dyn.torso_momentum, kinetic_=kinetic)
+        d.step(torso.torso_momentum, kinetic_=kinetic)
         return
     gather_wrenches(d, momentum, None)
-    d.store(dyn.torso_momentum, force=3, moment=3)
+    d.store(torso.torso_momentum, force=3, moment=3)
 
 
 def gather_moment(d: Draft) -> None:
@@ -106,7 +105,7 @@ def gather_moment(d: Draft) -> None:
         d.fill(ref, 0)
     with each_piece(d, downward=True) as (i, _):
         d.step(mechanism(d).gather_moment, d.piece(i), **carried)
-    d.step(dyn.torso_moment, **carried)
+    d.step(torso.torso_moment, **carried)
 
 
 def gather_inertia(d: Draft, roots: dict[str, Array], columns: Array, H_tail: Block | None = None) -> None:
@@ -122,8 +121,10 @@ def gather_inertia(d: Draft, roots: dict[str, Array], columns: Array, H_tail: Bl
             d.fill(ref, 0)
         with d.loop("j", mechanism(d).pieces(d.tail), downward=True):
             d.step(mechanism(d).gather, d.piece(i), **carried, **own)
-        d.step(dyn.column_at_torso, {name: array[i] for name, array in roots.items()}, columns=columns.part(12 * i, 12))
-    d.step(dyn.torso_composite, **{name: carried[name] for name in ("mass", "h", "I")})
+        d.step(
+            torso.column_at_torso, {name: array[i] for name, array in roots.items()}, columns=columns.part(12 * i, 12)
+        )
+    d.step(torso.torso_composite, **{name: carried[name] for name in ("mass", "h", "I")})
 
 
 def segment_columns(d: Draft) -> Array:
@@ -164,7 +165,7 @@ def tail_inertia(d: Draft, H_tail: Block, columns: Array, world: bool = False) -
     gather_inertia(d, roots, columns, H_tail)
     with d.loop("i", d.tail.segments, start=1) as i, d.loop("l", i) as segment:
         block = {"H_pitch": H_tail(2 * i, 2 * segment, 2), "H_yaw": H_tail(2 * i + 1, 2 * segment, 2)}
-        d.step(dyn.segment_coupling, {"S": S[segment], "columns": columns.part(12 * i, 12)}, **block)
+        d.step(torso.segment_coupling, {"S": S[segment], "columns": columns.part(12 * i, 12)}, **block)
     return columns
 
 
@@ -173,7 +174,7 @@ def torso_pose(d: Draft, world: bool, origin: Ref | None = None, name: str = "li
     here = {"R": d.array(f"R_{name}", 9)[0], "P": d.array(f"P_{name}", 3)[0]}
     if world:
         d.copy(here["R"], d.known["R"])
-        d.step(kin.mount_position, {"p": origin or d.constant("origin", [0, 0, 0])[0]}, P=here["P"])
+        d.step(torso.mount_position, {"p": origin or d.constant("origin", [0, 0, 0])[0]}, P=here["P"])
     else:
         d.fill(here["R"], *IDENTITY)
         d.copy(here["P"], d.known["tail_mount"])
@@ -191,7 +192,7 @@ def core_bias(d: Draft, bias: Array) -> None:
     d.known |= {"w": d.known["omega"], "w_dot": zero, "a": zero}
     wrench = forward_wrenches(d, None)
     gather_wrenches(d, wrench, lambda i: bias.part(6 + 2 * i, 2))
-    d.step(dyn.torso_wrench, force=bias.part(0, 3), moment=bias.part(3, 3))
+    d.step(torso.torso_wrench, force=bias.part(0, 3), moment=bias.part(3, 3))
 
 
 def sample_joints(d: Draft) -> tuple[Array, Array]:
@@ -217,12 +218,12 @@ def gather_loads(d: Draft, f_ext: Array, torques: Array) -> None:
 
     def add_load(point):
         reads = {"P": points[point], "f_point": f_ext.part(6 + 3 * point, 3)}
-        d.step(dyn.load_at_point, reads, F_beyond=beyond)
+        d.step(loads.load_at_point, reads, F_beyond=beyond)
 
     with d.loop("i", d.tail.segments, downward=True) as i, d.loop("j", d.tail.links, downward=True) as j:
         g = d.tail.links * i + j
         add_load(g + 1)
-        d.step(dyn.joint_load, {"S": S[g]}, torque_=torques.part(2 * i, 2))
+        d.step(loads.joint_load, {"S": S[g]}, torque_=torques.part(2 * i, 2))
     add_load(Index())
     d.known["f_torso"] = f_ext.part(0, 6)
-    d.store(dyn.load_at_torso, load_force=3, load_moment=3)
+    d.store(loads.load_at_torso, load_force=3, load_moment=3)

@@ -2,14 +2,14 @@
 
 from dataclasses import dataclass
 
-from . import contact as con
-from . import dynamics as dyn
-from . import kinematics as kin
-from . import legs, sweeps
+from . import sweeps
 from .draft import Draft, Tail
 from .functions import TAU, V_DOT, Argument, Function, Loads, Q, V, accelerate_by_segments, balanced
 from .ir.program import Array, Index, Ref
-from .lower import derive
+from .mechanics import contact as con
+from .mechanics import leg as legs
+from .mechanics import loads, rotations
+from .mechanics.lower import derive
 from .sweeps import mechanism
 
 LEGS = Argument(
@@ -90,7 +90,7 @@ def place_tail(d: Draft, points: Points) -> None:
 
 def assemble_contact_points(d: Draft, arrays: dict[str, Array]) -> None:
     """Places and velocities of all points."""
-    d.store(kin.quaternion_rotation, R=9)
+    d.store(rotations.quaternion_rotation, R=9)
     points = gather_points(d, arrays)
     with d.loop("k", d.tail.points) as k:
         d.step(con.position, points.motion(k), position=arrays["positions"].part(3 * k, 3))
@@ -120,7 +120,7 @@ def gather_contact_loads(d: Draft, points: Points, forces: Array, torques: Array
         with d.loop("i", d.tail.segments, downward=True) as i, d.loop("j", d.tail.links, downward=True) as j:
             g = d.tail.links * i + j
             add(g + points.first["tail"])
-            d.step(dyn.joint_load, {"S": points.S[g], "F_beyond": load}, torque_=torques.part(2 * i, 2))
+            d.step(loads.joint_load, {"S": points.S[g], "F_beyond": load}, torque_=torques.part(2 * i, 2))
     for group in [name for name in d.tail.contacts if name != "tail"]:
         with d.loop("k", d.tail.groups[group]) as k:
             add(k + points.first[group])
@@ -141,7 +141,7 @@ def contact_torques(d: Draft, arrays: dict[str, Array]) -> Array:
 def assemble_contact_dynamics(d: Draft, arrays: dict[str, Array]) -> None:
     """v_dot from H v_dot + C = [0; tau] + J^T f with the ground's forces."""
     if d.dynamics == "segments":
-        d.store(kin.quaternion_rotation, R=9)
+        d.store(rotations.quaternion_rotation, R=9)
         accelerate_by_segments(d, arrays, contact_torques(d, arrays))
         return
     balance = balanced(d, arrays["q"], arrays["v"])

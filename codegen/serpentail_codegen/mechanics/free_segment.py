@@ -9,8 +9,7 @@ is A a + b of the base's motion a alone.  Lanes of K, A, b and T are the entries
 
 from sympy import Matrix, diag, zeros
 
-from .dynamics import symmetric
-from .kinematics import X, Y, Z, square
+from .rotations import X, Y, Z, square, symmetric
 
 
 def swept_by(arm) -> Matrix:

@@ -12,7 +12,7 @@ then h and e, friction and bristle for w df_n.
 from sympy import Matrix, Piecewise, eye, sqrt
 
 from .contact import guarded, normal_force
-from .kinematics import X, Y, Z, square
+from .rotations import X, Y, Z, square
 
 
 def plane(entries) -> Matrix:

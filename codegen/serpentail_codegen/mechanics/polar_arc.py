@@ -9,8 +9,7 @@ at theta = 0.  `continuum.py` is the same tail without these faults.
 
 from sympy import Matrix, Rational, cos, eye, sin, zeros
 
-from .dynamics import entries
-from .kinematics import X, Y, Z
+from .rotations import X, Y, Z, entries
 
 UPPER = tuple((k, j) for k in range(5) for j in range(k, 5))  # entries of E that Appendix B lists
 

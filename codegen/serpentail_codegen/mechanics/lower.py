@@ -6,8 +6,8 @@ from functools import cache
 
 import sympy
 
-from .ir.step import Step, compacted
-from .ir.tape import Tape
+from ..ir.step import Step, compacted
+from ..ir.tape import Tape
 
 # scalars of every named quantity that is no 3-vector
 SIZES = {

@@ -6,7 +6,7 @@ what the friction spring of a point is stretched by, in the world's x and y.
 
 from sympy import Matrix, Max, Piecewise, sqrt
 
-from .kinematics import square
+from .rotations import square
 
 
 def point_on_torso(let, R, p_dot, omega, place, drift) -> dict:

@@ -7,8 +7,8 @@ tail coordinate k, the last lane their inertial wrench.  A lane is addressed by 
 
 from sympy import Matrix
 
-from .dynamics import along_link, symmetric, turned, turned_inertia, with_link
-from .kinematics import X, Z, joint_turns
+from .link import along_link, joint_turns, turned_inertia, with_link
+from .rotations import X, Z, symmetric, turned
 
 
 def gather_composite(let, joint, twice, link, mass, h, I) -> dict:

@@ -1,0 +1,1 @@
+"""The equations of motion, one small step each, in SymPy."""

@@ -1,0 +1,119 @@
+"""Dynamics of torso and links: SymPy vectors in, inertias, momenta and wrenches out (Sect. 2, Eqs. 2, 3, 16, 17).
+
+A link is given by ``link`` = (m, L, m L / 2, I_x, I_y, I_z), the moments of inertia taken about its joint.  A body set
+is given by its mass, first moment ``h`` = sum m r, and ``I`` = (xx, yy, zz, xy, xz, yz) about the frame's origin.  A
+wrench or momentum ``F`` = (force or momentum, its moment about the origin).
+"""
+
+from sympy import Matrix, eye
+
+from .rotations import Z, entries, square, symmetric
+
+
+def torso_power(let, torso_mass, torso_inertia, w, w_dot, a, w_virtual, u_virtual) -> dict:
+    """Power of the torso's inertial wrench at B (Eq. 3) under a virtual motion, torso axes."""
+    euler = torso_inertia.multiply_elementwise(w_dot) + w.cross(let("I_w", torso_inertia.multiply_elementwise(w)))
+    return {"power": [torso_mass[0] * let("a_u", a.dot(u_virtual)) + w_virtual.dot(let("euler", euler))]}
+
+
+def column_at_torso(let, R, P, pitch, yaw) -> dict:
+    """Momentum columns of a segment, from its root frame at ``P`` to the torso frame at B."""
+    R = square(R)
+    out = []
+    for column in (pitch, yaw):
+        force = let("force", R * column[0:3, :])
+        out += [force, R * column[3:6, :] + P.cross(force)]
+    return {"columns": Matrix(out)}
+
+
+def segment_coupling(let, S, columns) -> dict:
+    """Block of H between a segment and one beyond it: spatial columns at B times momentum columns at B (Eq. 16)."""
+    block = [
+        S[a : a + 3, :].dot(columns[b + 3 : b + 6, :]) + S[a + 3 : a + 6, :].dot(columns[b : b + 3, :])
+        for b in (0, 6)
+        for a in (0, 6)
+    ]
+    return {"H_pitch": Matrix(block[0:2]), "H_yaw": Matrix(block[2:4])}
+
+
+def torso_composite(let, tail_mount, torso_mass, torso_inertia, mass, h, I) -> dict:
+    """Mass, first moment and inertia of the whole animal at B, from the tail's at its mount (Eq. 2)."""
+    r = tail_mount
+    h_B = let("h_B", h + mass[0] * r)
+    total = symmetric(I) + let("spread", (h + h_B).dot(r)) * eye(3) - (h * r.T + r * h_B.T)
+    diagonal = Matrix([*torso_inertia, 0, 0, 0])
+    return {"mass": mass + torso_mass, "h": h_B, "I": entries(total) + diagonal}
+
+
+def torso_moment(let, tail_mount, torso_mass, mass, h) -> dict:
+    """Mass and first moment of the whole animal at B, from the tail's at its mount."""
+    return {"mass": mass + torso_mass, "h": h + mass[0] * tail_mount}
+
+
+def torso_wrench(let, tail_mount, torso_mass, torso_inertia, w, w_dot, a, F_next) -> dict:
+    """Inertial wrench of torso and tail at B (Eq. 3), ``F_next`` being the tail's at its mount."""
+    force, moment = F_next[0:3, :], F_next[3:6, :]
+    I_w = let("I_w", torso_inertia.multiply_elementwise(w))
+    euler = torso_inertia.multiply_elementwise(w_dot) + w.cross(I_w)
+    return {"force": force + torso_mass[0] * a, "moment": moment + tail_mount.cross(force) + euler}
+
+
+def torso_momentum(let, tail_mount, torso_mass, torso_inertia, w, u_torso, F_next) -> dict:
+    """Momentum and angular momentum of torso and tail at B, torso axes; kinetic energy of the torso alone."""
+    force, moment = F_next[0:3, :], F_next[3:6, :]
+    p = let("p", torso_mass[0] * u_torso)
+    L = let("L", torso_inertia.multiply_elementwise(w))
+    return {
+        "force": force + p,
+        "moment": moment + tail_mount.cross(force) + L,
+        "kinetic": [let("twice", u_torso.dot(p) + w.dot(L)) / 2],
+    }
+
+
+def potential_energy(let, gravity, R, p, mass, h) -> dict:
+    """g (M z_b + z . R_b h)."""
+    return {"potential": [gravity[0] * (mass[0] * p[2] + square(R).row(2).dot(h))]}
+
+
+def momentum_at_com(let, R, p_dot, mass, h, force, moment) -> dict:
+    """Momentum, and angular momentum about the COM, world axes; ``force, moment`` taken at rest of B."""
+    R = square(R)
+    return {"linear": mass[0] * p_dot + R * force, "angular": R * (moment - h.cross(force) / mass[0])}
+
+
+def mass_matrix_base(let, R, mass, h, I) -> dict:
+    """The 6 x 6 block of H for (p_dot world, omega body): M 1, -R skew(h), I."""
+    skewed = square(R) * Matrix([[0, h[2], -h[1]], [-h[2], 0, h[0]], [h[1], -h[0], 0]])
+    upper, lower = Matrix.hstack(mass[0] * eye(3), skewed), Matrix.hstack(skewed.T, symmetric(I))
+    return {f"H_{k}": Matrix.vstack(upper, lower).row(k).T for k in range(6)}
+
+
+def mass_matrix_column(let, R, column) -> dict:
+    """Coupling of one tail coordinate with (p_dot world, omega body)."""
+    values = Matrix([square(R) * column[0:3, :], column[3:6, :]])
+    return {"H_column": values, "H_row": values}
+
+
+def mount_position(let, R, p, tail_mount) -> dict:
+    """p_1,jnt = p_b + R_b p_b2t (Eq. 14)."""
+    return {"P": p + square(R) * tail_mount}
+
+
+def torso_velocity(let, R, p_dot) -> dict:
+    """v_b in the torso frame."""
+    return {"u": square(R).T * p_dot}
+
+
+def mount_velocity(let, u, w, tail_mount) -> dict:
+    """v_1,jnt = v_b + omega_b x p_b2t (Eq. A3) in the torso frame."""
+    return {"u": u + w.cross(tail_mount)}
+
+
+def mount_acceleration(let, w, w_dot, a, tail_mount) -> dict:
+    """v_dot_1,jnt of A11 in the torso frame; ``a`` is R_b^T (p_b_ddot + g), gravity being an acceleration of B."""
+    return {"a_mount": a + w_dot.cross(tail_mount) + w.cross(let("r", w.cross(tail_mount)))}
+
+
+def torso_acceleration(let, R, p_ddot, gravity) -> dict:
+    """a = R_b^T (p_b_ddot + g z): all that gravity and translation do in flight (Eqs. 3, 17)."""
+    return {"a": square(R).T * (p_ddot + gravity[0] * Z)}
