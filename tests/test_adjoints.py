@@ -3,11 +3,11 @@
 import pytest
 
 from programs import EXACT, NEXT, PROGRAMS, RECTANGULAR, SQUARE, TURN, built, jacobian, numbers
-from serpentail_codegen.adjoints import adjoint_program, turns
+from serpentail_codegen.autodiff.forward import tangent_program
+from serpentail_codegen.autodiff.reverse import adjoint_program, turns
 from serpentail_codegen.ir.builder import Builder
 from serpentail_codegen.ir.interpret import Run
 from serpentail_codegen.ir.program import Factor, Index, Loop, as_index, statements
-from serpentail_codegen.tangents import tangent_program
 from test_tangents import arguments_of, subsets
 
 every_program = pytest.mark.parametrize("name", RECTANGULAR)

@@ -5,12 +5,12 @@ from fractions import Fraction
 import pytest
 
 from programs import EXACT, NEXT, PROGRAMS, RECTANGULAR, SQUARE, TURN, built, numbers, step_of
-from serpentail_codegen.adjoints import adjoint_program
+from serpentail_codegen.autodiff.forward import tangent_program
+from serpentail_codegen.autodiff.reverse import adjoint_program
 from serpentail_codegen.ir.builder import Builder
 from serpentail_codegen.ir.dataflow import expanded, influencing, pruned, reached, reads, writes
 from serpentail_codegen.ir.interpret import Run
 from serpentail_codegen.ir.program import Apply, Guard, Loop, statements
-from serpentail_codegen.tangents import tangent_program
 from test_tangents import arguments_of
 
 SPLIT = step_of("split", (("x", 1), ("y", 1)), (("s", 1), ("z", 1)), lambda t, x, y: [t.mul(x, x), t.mul(y, y)])

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import sympy
 
-from serpentail_codegen.differentiate import adjoint, tangent
+from serpentail_codegen.autodiff.step import adjoint, tangent
 from serpentail_codegen.ir.interpret import Numbers
 from serpentail_codegen.ir.step import Step
 from serpentail_codegen.ir.tape import BINARY, TERNARY, UNARY, Tape, live_nodes, operation_count, replay

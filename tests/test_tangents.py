@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from programs import EXACT, NEXT, PROGRAMS, SQUARE, Narrow, built, jacobian, numbers
+from serpentail_codegen.autodiff.forward import tangent_program
 from serpentail_codegen.ir.builder import Builder
 from serpentail_codegen.ir.interpret import Run
 from serpentail_codegen.ir.program import Factor, Fill, Index, statements
-from serpentail_codegen.tangents import tangent_program
 
 every_program = pytest.mark.parametrize("name", PROGRAMS)
 

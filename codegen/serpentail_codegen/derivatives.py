@@ -6,7 +6,8 @@ Nothing depends on the position of B or on its velocity.
 from collections.abc import Callable
 
 from . import sweeps
-from .adjoints import adjoint_program
+from .autodiff.forward import tangent_program
+from .autodiff.reverse import adjoint_program
 from .directions import Directions
 from .draft import Draft, Tail
 from .functions import (
@@ -26,7 +27,6 @@ from .functions import (
 from .ir.program import Array, Index, Ref
 from .mechanics import rotations, torso, translation
 from .sweeps import mechanism
-from .tangents import tangent_program
 
 MULTIPLIER = Argument("multiplier", lambda t: (t.nv,), "weights lambda of the rows")
 POWER = Argument("power", lambda t: (1,), "lambda^T (H v_dot + C)")

@@ -7,10 +7,10 @@ overwritten before the way back needs it is kept, one copy for each turn of its 
 from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 
-from .differentiate import adjoint
-from .ir.dataflow import influencing, inner_arrays, pruned, reached, writes
-from .ir.program import Apply, Array, Copy, Fill, Guard, Index, Loop, Program, Ref, as_index, statements
-from .turned_arrays import TurnedArray, turned_arrays
+from ..ir.dataflow import influencing, inner_arrays, pruned, reached, writes
+from ..ir.program import Apply, Array, Copy, Fill, Guard, Index, Loop, Program, Ref, as_index, statements
+from .angles import TurnedArray, turned_arrays
+from .step import adjoint
 
 
 def adjoint_program(program: Program, wanted: Collection[str], given: Collection[str]) -> Program:

@@ -7,9 +7,9 @@ Both walk the tape once and differentiate each operation by its rule.  Tangents 
 from collections import Counter
 from functools import cache
 
-from .ir.step import Step, compacted
-from .ir.tape import LEAVES, Tape, live_nodes, operands, replay
-from .turns import Turned
+from ..ir.step import Step, compacted
+from ..ir.tape import LEAVES, Tape, live_nodes, operands, replay
+from .angles import Turned
 
 
 def _quotient(tape: Tape, y: int, a: int, b: int) -> tuple[int, int]:

@@ -7,10 +7,10 @@ direction; without, it holds the derivative in one direction.
 from collections.abc import Callable, Collection
 from dataclasses import replace
 
-from .differentiate import tangent
-from .ir.dataflow import inner_arrays, pruned, reached, writes
-from .ir.program import Apply, Array, Copy, Fill, Guard, Index, Loop, Program, Ref, statements
-from .turned_arrays import TurnedArray, turned_arrays
+from ..ir.dataflow import inner_arrays, pruned, reached, writes
+from ..ir.program import Apply, Array, Copy, Fill, Guard, Index, Loop, Program, Ref, statements
+from .angles import TurnedArray, turned_arrays
+from .step import tangent
 
 Bound = Callable[[tuple[Loop, ...]], Index | None]
 
