@@ -13,11 +13,11 @@ import serpentail as st
 from models import model_folder
 from serpentail import side_by_side
 from serpentail.compiler import compile_library
-from serpentail_codegen.batches import flattened
-from serpentail_codegen.batches import side_by_side as widened
 from serpentail_codegen.draft import Tail
 from serpentail_codegen.functions import FUNCTIONS, program
 from serpentail_codegen.ir.interpret import Numbers, Run
+from serpentail_codegen.passes.batch import flattened
+from serpentail_codegen.passes.batch import side_by_side as widened
 from serpentail_codegen.targets.c_batch import BATCHED, STATES
 
 TAILS = {"articulated": Tail(2, 2), "continuum": Tail(2, 4, "continuum")}

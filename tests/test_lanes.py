@@ -8,12 +8,12 @@ from models import model_folder
 from references.parameters import random_states
 from serpentail_codegen.catalogue import CATALOGUE
 from serpentail_codegen.draft import Tail
-from serpentail_codegen.eliminations import written_out
 from serpentail_codegen.functions import FUNCTIONS, program
 from serpentail_codegen.ir.builder import Builder
 from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.ir.ldl import ldl_factor, ldl_solve
 from serpentail_codegen.ir.program import Factor, Solve, padded, statements
+from serpentail_codegen.passes.unrolled_ldl import written_out
 
 SIZES = [(1, 1), (1, 3), (2, 1), (2, 3), (4, 2), (7, 1)]
 

@@ -4,11 +4,11 @@ import random
 
 import pytest
 
-from serpentail_codegen import schedule
 from serpentail_codegen.draft import Tail
 from serpentail_codegen.functions import FUNCTIONS, program
 from serpentail_codegen.ir.interpret import unroll
 from serpentail_codegen.ir.tape import Tape, live_nodes
+from serpentail_codegen.passes import schedule
 
 
 def straight(segments, links):

@@ -8,12 +8,12 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from ..draft import Tail
-from ..eliminations import written_out
 from ..functions import Argument, Function, struct_parameters
 from ..functions import program as assemble
 from ..ir.interpret import applied, branches
 from ..ir.program import VECTOR, Program
 from ..ir.tape import operation_count
+from ..passes.unrolled_ldl import written_out
 from ..scene import Scene
 from ..templating import render
 from .c_function import CFunction, Routine, dialect, in_loops, routine_arguments, routine_lines, straight_line

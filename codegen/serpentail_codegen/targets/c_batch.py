@@ -2,12 +2,12 @@
 
 from dataclasses import dataclass
 
-from ..batches import flattened, side_by_side
 from ..draft import Tail
 from ..functions import Function
 from ..functions import program as assemble
 from ..ir.interpret import applied, branches
 from ..ir.program import Program
+from ..passes.batch import flattened, side_by_side
 from ..scene import Scene
 from ..templating import render
 from .c import ArgumentView, Emitted, baked_values, callee_view, step_views

@@ -2,10 +2,10 @@
 
 from dataclasses import dataclass
 
-from ..batches import flattened, side_by_side, with_own_parameters
 from ..draft import Tail
 from ..functions import program as assemble
 from ..ir.program import Program, padded
+from ..passes.batch import flattened, side_by_side, with_own_parameters
 from ..scene import Scene
 from ..templating import render
 from .c import Emitted, baked_values, callee_view, step_views

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from ..ir.program import Index
 from ..ir.tape import BINARY, LEAVES, lanes_of, live_nodes, operands
-from ..schedule import scheduled
+from ..passes.schedule import scheduled
 
 LEAST_SINGLE = 2.0**-126
 SYMBOL = {"add": "+", "sub": "-", "mul": "*", "div": "/"}

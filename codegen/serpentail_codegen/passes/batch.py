@@ -6,10 +6,10 @@ narrow, and is computed once for all.
 
 from dataclasses import replace
 
-from .ir.dataflow import expanded, reached, rewritten, with_arrays
-from .ir.interpret import unroll
-from .ir.program import Apply, Array, Guard, Program
-from .ir.step import Step, compacted
+from ..ir.dataflow import expanded, reached, rewritten, with_arrays
+from ..ir.interpret import unroll
+from ..ir.program import Apply, Array, Guard, Program
+from ..ir.step import Step, compacted
 
 
 def side_by_side(program: Program, states: int) -> Program:

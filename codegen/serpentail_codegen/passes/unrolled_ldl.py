@@ -6,11 +6,11 @@ Pairs of triangles are factored in loops whatever their size: twice the entries 
 from dataclasses import replace
 from functools import cache
 
-from .ir.dataflow import rewritten
-from .ir.ldl import ldl_factor, ldl_solve, pair_solve
-from .ir.program import Apply, Array, Call, Factor, Guard, Program, Ref, Solve, SolvePair, padded
-from .ir.step import Step, compacted
-from .ir.tape import Tape
+from ..ir.dataflow import rewritten
+from ..ir.ldl import ldl_factor, ldl_solve, pair_solve
+from ..ir.program import Apply, Array, Call, Factor, Guard, Program, Ref, Solve, SolvePair, padded
+from ..ir.step import Step, compacted
+from ..ir.tape import Tape
 
 
 def written_out(program: Program, largest: int) -> Program:

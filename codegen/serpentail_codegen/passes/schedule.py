@@ -7,7 +7,7 @@ what frees registers goes first.
 
 from collections import Counter
 
-from .ir.tape import BINARY, LEAVES, operands
+from ..ir.tape import BINARY, LEAVES, operands
 
 REGISTERS = 24  # of 32 vector registers; on 16 it still pays
 MOST_OPERATIONS = 2800  # beyond, spilled values cost more than latency
