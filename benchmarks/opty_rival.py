@@ -11,8 +11,8 @@ import numpy as np
 import sympy
 
 import serpentail as st
-from serpentail_codegen.catalogue import CATALOGUE
-from serpentail_codegen.functions import program
+from serpentail_codegen.functions.catalogue import CATALOGUE
+from serpentail_codegen.functions.function import program
 from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.pipeline import tail_of
 from serpentail_codegen.scene import Scene

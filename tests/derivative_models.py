@@ -9,8 +9,8 @@ import serpentail as st
 from models import model_folder
 from references.metrics import BLOCKS
 from references.parameters import random_states
-from serpentail_codegen.catalogue import CATALOGUE
-from serpentail_codegen.functions import program
+from serpentail_codegen.functions.catalogue import CATALOGUE
+from serpentail_codegen.functions.function import program
 from serpentail_codegen.ir.dataflow import expanded
 from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.pipeline import tail_of

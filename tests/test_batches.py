@@ -13,8 +13,9 @@ import serpentail as st
 from models import model_folder
 from serpentail import side_by_side
 from serpentail.compiler import compile_library
-from serpentail_codegen.draft import Tail
-from serpentail_codegen.functions import FUNCTIONS, program
+from serpentail_codegen.functions.function import program
+from serpentail_codegen.functions.plain import FUNCTIONS
+from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.passes.batch import flattened
 from serpentail_codegen.passes.batch import side_by_side as widened

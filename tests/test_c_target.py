@@ -16,7 +16,7 @@ import pytest
 
 from models import model_folder
 from references.parameters import random_states
-from serpentail_codegen.catalogue import CATALOGUE
+from serpentail_codegen.functions.catalogue import CATALOGUE
 from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.ir.step import Step
 from serpentail_codegen.pipeline import tail_of

@@ -13,7 +13,8 @@ import pytest
 
 from models import model_folder
 from references.parameters import random_states
-from serpentail_codegen.functions import FUNCTIONS, program
+from serpentail_codegen.functions.function import program
+from serpentail_codegen.functions.plain import FUNCTIONS
 from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.pipeline import tail_of
 from serpentail_codegen.scene import DERIVATIVES, parse_scene

@@ -16,8 +16,9 @@ import sympy
 from sympy import Matrix, Rational, diag, eye, zeros
 from sympy.algebras.quaternion import Quaternion
 
-from serpentail_codegen.draft import Tail
-from serpentail_codegen.functions import FUNCTIONS, program
+from serpentail_codegen.functions.function import program
+from serpentail_codegen.functions.plain import FUNCTIONS
+from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.ir.interpret import Numbers, Run, unroll
 from serpentail_codegen.ir.program import Apply, statements
 from serpentail_codegen.ir.tape import operation_count, replay

@@ -6,9 +6,10 @@ import pytest
 import serpentail as st
 from models import model_folder
 from references.parameters import random_states
-from serpentail_codegen.catalogue import CATALOGUE
-from serpentail_codegen.draft import Tail
-from serpentail_codegen.functions import FUNCTIONS, program
+from serpentail_codegen.functions.catalogue import CATALOGUE
+from serpentail_codegen.functions.function import program
+from serpentail_codegen.functions.plain import FUNCTIONS
+from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.ir.builder import Builder
 from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.ir.ldl import ldl_factor, ldl_solve

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from references.parameters import TABLE_1, random_states
-from serpentail_codegen.draft import Tail
-from serpentail_codegen.functions import FUNCTIONS, program
+from serpentail_codegen.functions.function import program
+from serpentail_codegen.functions.plain import FUNCTIONS
+from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.ir.builder import Builder, narrowed
 from serpentail_codegen.ir.interpret import Numbers, Run, branches, unroll
 from serpentail_codegen.ir.ldl import ldl_factor, ldl_solve, pair_factor, pair_solve

@@ -4,8 +4,9 @@ import random
 
 import pytest
 
-from serpentail_codegen.draft import Tail
-from serpentail_codegen.functions import FUNCTIONS, program
+from serpentail_codegen.functions.function import program
+from serpentail_codegen.functions.plain import FUNCTIONS
+from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.ir.interpret import unroll
 from serpentail_codegen.ir.tape import Tape, live_nodes
 from serpentail_codegen.passes import schedule

@@ -10,9 +10,10 @@ from models import model_folder
 from references.exact_chain import ExactChain
 from references.metrics import block_error, equilibrated_condition
 from references.parameters import TABLE_1, random_states
-from serpentail_codegen.catalogue import CATALOGUE
-from serpentail_codegen.draft import Tail
-from serpentail_codegen.functions import FUNCTIONS, program
+from serpentail_codegen.functions.catalogue import CATALOGUE
+from serpentail_codegen.functions.function import program
+from serpentail_codegen.functions.plain import FUNCTIONS
+from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.targets.c import fastest
 from test_lanes import arguments, assert_same_acceleration

@@ -15,13 +15,13 @@ from references import metrics
 from references.exact_chain import ExactChain
 from references.exact_continuum import ExactContinuum
 from serpentail import laws, measures, verify
-from serpentail_codegen.catalogue import CATALOGUE
-from serpentail_codegen.feedback import FEEDBACK
-from serpentail_codegen.implicit import IMPLICIT
+from serpentail_codegen.functions.catalogue import CATALOGUE
+from serpentail_codegen.functions.contact import CONTACT
+from serpentail_codegen.functions.implicit.functions import IMPLICIT
+from serpentail_codegen.functions.pfl import FEEDBACK
 from serpentail_codegen.mechanics import link, loads, torso
 from serpentail_codegen.pipeline import generate
 from serpentail_codegen.scene import ON_DEMAND, scene_for
-from serpentail_codegen.touching import CONTACT
 
 SOUND = {
     "m1_n1": (1, 1, {}),

@@ -16,13 +16,13 @@ import serpentail as st
 from serpentail.laws import NEAR, Law
 from serpentail.measures import State, arguments, block_error, differences, matrix_error, outputs, states
 from serpentail.verify import Check, as_text, check, laws, summary
-from serpentail_codegen.catalogue import CATALOGUE
-from serpentail_codegen.functions import program
-from serpentail_codegen.implicit import IMPLICIT
+from serpentail_codegen.functions.catalogue import CATALOGUE
+from serpentail_codegen.functions.contact import CONTACT
+from serpentail_codegen.functions.function import program
+from serpentail_codegen.functions.implicit.functions import IMPLICIT
 from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.pipeline import generate, tail_of
 from serpentail_codegen.scene import parse_scene
-from serpentail_codegen.touching import CONTACT
 
 STRICT = 22.5  # roundings: 5e-15 in double
 FOLDED = 4 * STRICT  # what H sums cancels in a folded tail: libraries are off by 1e-14 to 2e-14 there

@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from . import __version__
-from .catalogue import CATALOGUE, SYMBOLIC
-from .draft import Tail
+from .functions.catalogue import CATALOGUE, SYMBOLIC
+from .functions.tail import Tail
 from .scene import Scene
 from .targets.c import c_context, c_files, emit
 from .targets.c_batch import batch_entry, batch_file, batches

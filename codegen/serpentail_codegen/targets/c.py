@@ -7,9 +7,9 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from ..draft import Tail
-from ..functions import Argument, Function, struct_parameters
-from ..functions import program as assemble
+from ..functions.function import Argument, Function, struct_parameters
+from ..functions.function import program as assemble
+from ..functions.tail import Tail
 from ..ir.interpret import applied, branches
 from ..ir.program import VECTOR, Program
 from ..ir.tape import operation_count

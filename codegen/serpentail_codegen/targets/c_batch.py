@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
-from ..draft import Tail
-from ..functions import Function
-from ..functions import program as assemble
+from ..functions.function import Function
+from ..functions.function import program as assemble
+from ..functions.tail import Tail
 from ..ir.interpret import applied, branches
 from ..ir.program import Program
 from ..passes.batch import flattened, side_by_side

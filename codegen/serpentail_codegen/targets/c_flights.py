@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from ..draft import Tail
-from ..functions import program as assemble
+from ..functions.function import program as assemble
+from ..functions.tail import Tail
 from ..ir.program import Program, padded
 from ..passes.batch import flattened, side_by_side, with_own_parameters
 from ..scene import Scene

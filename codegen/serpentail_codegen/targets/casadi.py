@@ -2,9 +2,9 @@
 
 import re
 
-from ..draft import Tail
-from ..functions import program as assemble
-from ..functions import struct_parameters
+from ..functions.function import program as assemble
+from ..functions.function import struct_parameters
+from ..functions.tail import Tail
 from ..ir.dataflow import expanded
 from ..ir.program import Apply, Copy, Factor, Fill, Guard, Loop, Program, Ref, Solve, padded
 from ..ir.step import Step

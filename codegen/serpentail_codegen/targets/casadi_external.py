@@ -8,9 +8,9 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 from functools import partial
 
-from ..catalogue import CATALOGUE
-from ..draft import Tail
-from ..functions import struct_parameters
+from ..functions.catalogue import CATALOGUE
+from ..functions.function import struct_parameters
+from ..functions.tail import Tail
 from ..scene import Scene
 
 VECTOR = 8  # doubles in a cache line

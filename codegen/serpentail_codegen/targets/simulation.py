@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import accumulate
 
-from ..draft import Tail
+from ..functions.tail import Tail
 from ..scene import Scene
 from ..tableaux import RK4, ROS34PW2, TSIT5, Explicit, Rosenbrock, transformed
 from .c_function import dialect

@@ -2,15 +2,18 @@
 
 from dataclasses import dataclass
 
-from . import sweeps
-from .draft import Draft, Tail
-from .functions import TAU, V_DOT, Argument, Function, Loads, Q, V, accelerate_by_segments, balanced
-from .ir.program import Array, Index, Ref
-from .mechanics import contact as con
-from .mechanics import leg as legs
-from .mechanics import loads, rotations
-from .mechanics.lower import derive
-from .sweeps import mechanism
+from ..ir.program import Array, Index, Ref
+from ..mechanics import contact as con
+from ..mechanics import leg as legs
+from ..mechanics import loads, rotations
+from ..mechanics.lower import derive
+from .arguments import TAU, V_DOT, Q, V
+from .draft import Draft
+from .dynamics import Loads, accelerate_by_segments, balanced
+from .function import Argument, Function
+from .sweeps import sweeps
+from .sweeps.sweeps import mechanism
+from .tail import Tail
 
 LEGS = Argument(
     "legs",

@@ -5,28 +5,19 @@ Nothing depends on the position of B or on its velocity.
 
 from collections.abc import Callable
 
-from . import sweeps
-from .autodiff.forward import tangent_program
-from .autodiff.reverse import adjoint_program
+from ...autodiff.forward import tangent_program
+from ...autodiff.reverse import adjoint_program
+from ...ir.program import Array, Index, Ref
+from ...mechanics import rotations, torso, translation
+from ..arguments import FORCE, V_DOT, Q, V
+from ..draft import Draft
+from ..dynamics import Balance, Loads, assemble_forward_dynamics
+from ..function import Argument, Function, program, struct_parameters
+from ..plain import FUNCTIONS
+from ..sweeps import sweeps
+from ..sweeps.sweeps import mechanism
+from ..tail import Tail
 from .directions import Directions
-from .draft import Draft, Tail
-from .functions import (
-    FORCE,
-    FUNCTIONS,
-    V_DOT,
-    Argument,
-    Balance,
-    Function,
-    Loads,
-    Q,
-    V,
-    assemble_forward_dynamics,
-    program,
-    struct_parameters,
-)
-from .ir.program import Array, Index, Ref
-from .mechanics import rotations, torso, translation
-from .sweeps import mechanism
 
 MULTIPLIER = Argument("multiplier", lambda t: (t.nv,), "weights lambda of the rows")
 POWER = Argument("power", lambda t: (1,), "lambda^T (H v_dot + C)")

@@ -7,10 +7,11 @@ pieces or tail points.  What a sweep carries from piece to piece is updated in p
 from collections.abc import Callable
 from contextlib import contextmanager
 
-from .draft import Draft
-from .ir.program import Array, Index, Ref
-from .mechanics import loads, torso
-from .mechanisms import Mechanism, mechanism_of, motion
+from ...ir.program import Array, Index, Ref
+from ...mechanics import loads, torso
+from ..draft import Draft
+from ..tails.mechanism import Mechanism, motion
+from ..tails.of_scene import mechanism_of
 
 Block = Callable[[Index, Index], Ref]  # an entry of H, by the numbers of two tail coordinates
 IDENTITY = (1, 0, 0, 0, 1, 0, 0, 0, 1)

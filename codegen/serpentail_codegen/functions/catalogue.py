@@ -1,12 +1,14 @@
 """All functions that a scene can ask for: names go in, what to assemble comes out."""
 
-from . import derivatives as der
-from .derivatives import MULTIPLIER
-from .feedback import FEEDBACK
-from .functions import FUNCTIONS, TAU, V_DOT, Argument, Function, Q, V
-from .hessian import assemble_inverse_dynamics_hessian
-from .implicit import IMPLICIT
-from .touching import CONTACT
+from .arguments import TAU, V_DOT, Q, V
+from .contact import CONTACT
+from .derivatives import jacobians
+from .derivatives.hessian import assemble_inverse_dynamics_hessian
+from .derivatives.jacobians import MULTIPLIER
+from .function import Argument, Function
+from .implicit.functions import IMPLICIT
+from .pfl import FEEDBACK
+from .plain import FUNCTIONS
 
 
 def square(name: str, meaning: str) -> Argument:
@@ -28,7 +30,7 @@ DTAU_IN = Argument("dtau", lambda t: (t.nt,), "direction of tau")
 DTAU_OUT = Argument("dtau", lambda t: (t.nt,), "lambda^T d(v_dot)/d(tau)")
 DPARAMETERS = Argument(
     "dparameters",
-    lambda t: (t.nv, der.parameter_count(t)),
+    lambda t: (t.nv, jacobians.parameter_count(t)),
     "derivative with respect to the parameter struct's numbers",
 )
 _TABLE = (
@@ -37,7 +39,7 @@ _TABLE = (
         "Jacobians of H v_dot + C; that with respect to v_dot is H",
         (Q, V, V_DOT),
         (square("dq", "d(force)/d(q), q in its tangent space"), square("dv", "d(force)/d(v)")),
-        der.assemble_inverse_dynamics_derivatives,
+        jacobians.assemble_inverse_dynamics_derivatives,
     ),
     Function(
         "forward_dynamics_derivatives",
@@ -48,21 +50,21 @@ _TABLE = (
             square("dv", "d(v_dot)/d(v)"),
             Argument("dtau", lambda t: (t.nv, t.nt), "d(v_dot)/d(tau)"),
         ),
-        der.assemble_forward_dynamics_derivatives,
+        jacobians.assemble_forward_dynamics_derivatives,
     ),
     Function(
         "inverse_dynamics_parameter_derivatives",
         "Jacobian of H v_dot + C with respect to the parameters",
         (Q, V, V_DOT),
         (DPARAMETERS,),
-        der.assemble_inverse_dynamics_parameter_derivatives,
+        jacobians.assemble_inverse_dynamics_parameter_derivatives,
     ),
     Function(
         "forward_dynamics_parameter_derivatives",
         "Jacobian of v_dot from Eq. 1 with respect to the parameters",
         (Q, V, TAU),
         (DPARAMETERS,),
-        der.assemble_forward_dynamics_parameter_derivatives,
+        jacobians.assemble_forward_dynamics_parameter_derivatives,
     ),
     Function(
         "inverse_dynamics_vjp",
@@ -73,21 +75,21 @@ _TABLE = (
             row("dv", "with respect to v"),
             row("dv_dot", "with respect to v_dot: H lambda"),
         ),
-        der.assemble_inverse_dynamics_vjp,
+        jacobians.assemble_inverse_dynamics_vjp,
     ),
     Function(
         "forward_dynamics_jvp",
         "directional derivative of v_dot from Eq. 1",
         (Q, V, TAU, row("dq", "direction of q, in its tangent space"), row("dv", "direction of v"), DTAU_IN),
         (row("dv_dot", "derivative of v_dot"),),
-        der.assemble_forward_dynamics_jvp,
+        jacobians.assemble_forward_dynamics_jvp,
     ),
     Function(
         "forward_dynamics_vjp",
         "lambda^T times the Jacobians of v_dot from Eq. 1",
         (Q, V, TAU, MULTIPLIER),
         (row("dq", "lambda^T d(v_dot)/d(q), in the tangent space"), row("dv", "lambda^T d(v_dot)/d(v)"), DTAU_OUT),
-        der.assemble_forward_dynamics_vjp,
+        jacobians.assemble_forward_dynamics_vjp,
     ),
     Function(
         "inverse_dynamics_hessian",
@@ -110,7 +112,7 @@ _TABLE = (
             row("kinetic_dv", "of the kinetic energy with respect to v: H v"),
             row("potential_dq", "of the potential energy with respect to q, in its tangent space"),
         ),
-        der.assemble_energy_derivatives,
+        jacobians.assemble_energy_derivatives,
     ),
     Function(
         "momentum_derivatives",
@@ -122,7 +124,7 @@ _TABLE = (
             three("angular_dq", "of the angular momentum with respect to q, in its tangent space"),
             three("angular_dv", "of the angular momentum with respect to v"),
         ),
-        der.assemble_momentum_derivatives,
+        jacobians.assemble_momentum_derivatives,
     ),
 )
 CATALOGUE = FUNCTIONS | {function.name: function for function in _TABLE} | CONTACT | FEEDBACK | IMPLICIT

@@ -6,9 +6,10 @@ coordinates; the columns of such a matrix are those of a velocity v.
 
 from dataclasses import dataclass
 
-from .draft import Draft, Tail
-from .ir.program import Array, Index, Loop
-from .mechanics import rotations
+from ...ir.program import Array, Index, Loop
+from ...mechanics import rotations
+from ..draft import Draft
+from ..tail import Tail
 
 # directions of the torso: first column in the tangent of q or v, and whether it is q
 TORSO = {"turn": (3, True), "p_dot": (0, False), "omega": (3, False)}

@@ -1,13 +1,13 @@
 """Second derivatives: a tail's sizes go in, the loop nest of the Hessian of lambda^T (H v_dot + C) comes out."""
 
-from .autodiff.forward import tangent_program
-from .autodiff.reverse import adjoint_program
-from .derivatives import INERTIA, VIRTUAL_POWER, with_unit_quaternion
+from ...autodiff.forward import tangent_program
+from ...autodiff.reverse import adjoint_program
+from ...ir.program import Array, Index, Ref, as_index
+from ...mechanics import rotations, torso
+from ..draft import Draft
+from ..function import program
 from .directions import TORSO, Directions
-from .draft import Draft
-from .functions import program
-from .ir.program import Array, Index, Ref, as_index
-from .mechanics import rotations, torso
+from .jacobians import INERTIA, VIRTUAL_POWER, with_unit_quaternion
 
 
 def assemble_inverse_dynamics_hessian(d: Draft, arrays: dict[str, Array]) -> None:

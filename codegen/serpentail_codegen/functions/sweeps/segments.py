@@ -6,12 +6,13 @@ mount, each as an articulated body whose coordinates are free, and one takes acc
 
 from dataclasses import dataclass
 
-from .draft import Draft
-from .ir.program import Array, Index, Ref, as_index
-from .mechanics import free_segment as art
-from .mechanics import link, rotations, torso
-from .mechanics.link_columns import torso_bias
-from .mechanisms import prepare_link, still
+from ...ir.program import Array, Index, Ref, as_index
+from ...mechanics import free_segment as art
+from ...mechanics import link, rotations, torso
+from ...mechanics.link_columns import torso_bias
+from ..draft import Draft
+from ..tails.articulated import prepare_link
+from ..tails.mechanism import still
 from .sweeps import IDENTITY
 
 UNKNOWNS = 8  # motion of a segment's base, and two coordinates

@@ -1,11 +1,12 @@
 """Partial feedback linearisation: a draft goes in, the torques that give wanted tail accelerations are added to it."""
 
-from . import sweeps
+from ..ir.program import Array, padded
+from ..mechanics import rotations, torso, translation
+from .arguments import V_DOT, Q, V
 from .draft import Draft
-from .functions import V_DOT, Argument, Function, Q, V
-from .ir.program import Array, padded
-from .mechanics import rotations, torso, translation
-from .sweeps import column_of, mechanism
+from .function import Argument, Function
+from .sweeps import sweeps
+from .sweeps.sweeps import column_of, mechanism
 
 ACCELERATIONS = Argument("accelerations", lambda t: (t.nt,), "wanted accelerations of the tail coordinates (rad/s^2)")
 TORQUES = Argument("tau", lambda t: (t.nt,), "torques (N m), conjugate to the tail coordinates")

@@ -2,88 +2,16 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
-from math import prod
 
-from . import sweeps
-from .draft import Draft, Tail
-from .ir.program import Array, Index, Program, Ref, padded
-from .lane_sweeps import balance_in_lanes
-from .mechanics import loads, rotations, torso, translation
-from .parameters import Parameter
-from .scene import Scene, parameters_of
-from .segment_sweeps import accelerate
-from .sweeps import column_of, mechanism
-
-
-@dataclass(frozen=True)
-class Argument:
-    """One array argument of a function: its shape from the tail's sizes, and what it means."""
-
-    name: str
-    shape: Callable[[Tail], tuple[int, ...]]
-    meaning: str
-
-    def length(self, tail: Tail) -> int:
-        """Number of scalars."""
-        return prod(self.shape(tail))
-
-
-Q = Argument(
-    "q", lambda t: (t.nq,), "configuration: position of B (m, world), quaternion w x y z, tail coordinates (rad)"
-)
-V = Argument(
-    "v", lambda t: (t.nv,), "velocity: of B (m/s, world), omega (rad/s, body), rates of the tail coordinates (rad/s)"
-)
-V_DOT = Argument("v_dot", lambda t: (t.nv,), "time derivative of v")
-TAU = Argument("tau", lambda t: (t.nt,), "torques (N m), conjugate to the tail coordinates")
-F_EXT = Argument(
-    "f_ext",
-    lambda t: (6 + 3 * (t.total + 1),),
-    "force at B (N, world), moment (N m, body), then a force (N, world) at each of the N + 1 tail points",
-)
-GENERALISED = "generalised force: on p_dot (N, world), on omega (N m, body), on the rates of the tail coordinates (N m)"
-
-
-@dataclass(frozen=True)
-class Function:
-    """A function that a scene can ask for: name, arguments, and how to assemble it."""
-
-    name: str
-    doc: str
-    inputs: tuple[Argument, ...]
-    outputs: tuple[Argument, ...]
-    assemble: Callable[[Draft, dict[str, Array]], None]
-
-    def of(self, tail: Tail) -> "Function":
-        """Return this function with the arguments that a tail has: those of a length."""
-        inputs, outputs = (tuple(a for a in some if a.length(tail)) for some in (self.inputs, self.outputs))
-        return replace(self, inputs=inputs, outputs=outputs)
-
-
-def struct_parameters(model: Tail | Scene) -> tuple[Parameter, ...]:
-    """Return the parameters that the functions of a model read: the fields of its struct."""
-    return tuple(p for p in parameters_of(model.kind, model.contacts) if p.name != "link_radius")
-
-
-def program(function: Function, tail: Tail, dynamics: str = "composite") -> Program:
-    """Assemble one function for given sizes; other ``dynamics`` where vectors hold several numbers and tails are long.
-
-    What they do not apply to is the same in all.
-    """
-    dynamics = dynamics if tail.kind == "articulated" else "composite"
-    draft = Draft(function.name, function.doc, tail=tail, dynamics=dynamics)
-    for parameter in struct_parameters(tail):
-        draft.known[parameter.name] = draft.array(parameter.name, parameter.size, role="parameters")[0]
-    arrays = {a.name: draft.array(a.name, a.length(tail), role="input") for a in function.inputs}
-    arrays |= {a.name: draft.array(a.name, a.length(tail), role="output") for a in function.outputs}
-    draft.known |= {a.name: arrays[a.name][0] for a in function.inputs}
-    if "q" in arrays:
-        draft.known |= {"p": arrays["q"].part(0, 3), "quaternion": arrays["q"].part(3, 4)}
-    if "v" in arrays:
-        draft.known |= {"p_dot": arrays["v"].part(0, 3), "omega": arrays["v"].part(3, 3)}
-    function.assemble(draft, arrays)
-    return draft.finish()
+from ..ir.program import Array, Index, Ref, padded
+from ..mechanics import rotations, torso, translation
+from .arguments import TAU, V_DOT, Q, V
+from .draft import Draft
+from .function import Argument, Function, program
+from .sweeps import sweeps
+from .sweeps.columns import balance_in_lanes
+from .sweeps.segments import accelerate
+from .sweeps.sweeps import column_of, mechanism
 
 
 def assemble_mass_matrix(
@@ -266,49 +194,6 @@ def assemble_energy(d: Draft, arrays: dict[str, Array]) -> None:
     d.step(torso.potential_energy, potential=arrays["potential"][0])
 
 
-def assemble_tail_points(d: Draft, arrays: dict[str, Array]) -> None:
-    """The joints and the tip, or equally spaced samples of every segment."""
-    points, tail = arrays["points"], d.tail
-    d.store(rotations.quaternion_rotation, R=9)
-    mechanism(d).prepare_samples(d)
-    here = sweeps.torso_pose(d, True, d.known["p"])
-    d.copy(points.part(0, 3), here["P"])
-    with d.loop("i", tail.segments) as i, d.loop("j", tail.links) as j:
-        d.step(mechanism(d).pose, here | d.sample(i), **here)
-        d.copy(points.part(3 * (tail.links * i + j + 1), 3), here["P"])
-
-
-def assemble_tail_point_jacobians(d: Draft, arrays: dict[str, Array]) -> None:
-    """d(point)/dt = J v for every tail point; arms start at B, so distance from the origin costs no accuracy."""
-    J, tail = arrays["J"], d.tail
-    d.store(rotations.quaternion_rotation, R=9)
-    mechanism(d).prepare_samples(d)
-    S = d.array("S", 12, tail.segments)
-    here = sweeps.torso_pose(d, True)
-
-    def row(point: Index, axis: int, first: Index | int, size: int):
-        return J.part((3 * tail.nv) * point + axis * tail.nv + first, size)
-
-    def base_rows(point: Index):
-        d.fill(J.part((3 * tail.nv) * point, 3 * tail.nv), 0)
-        for axis in range(3):
-            d.fill(row(point, axis, axis, 1), 1)
-        rows = {f"J_{name}": row(point, axis, 3, 3) for axis, name in enumerate("xyz")}
-        d.step(loads.point_jacobian_base, {"arm": here["P"]}, **rows)
-
-    base_rows(Index())
-    with d.loop("i", tail.segments) as i:
-        d.fill(S[i], 0)
-        with d.loop("j", tail.links) as j:
-            d.step(mechanism(d).twist, here | d.sample(i), S_=S[i])
-            d.step(mechanism(d).pose, here | d.sample(i), **here)
-            point = tail.links * i + j + 1
-            base_rows(point)
-            with d.loop("l", i + 1) as segment:
-                rows = {f"J_{name}": row(point, axis, 6 + 2 * segment, 2) for axis, name in enumerate("xyz")}
-                d.step(loads.point_jacobian_tail, {"S": S[segment], "arm": here["P"]}, **rows)
-
-
 BALANCE = Function(
     "balance",
     "H with translation eliminated, factored, and C without gravity",
@@ -331,44 +216,3 @@ SEGMENT_DYNAMICS = Function(
     (V_DOT,),
     assemble_segment_dynamics,
 )
-FORCE = Argument("force", lambda t: (t.nv,), GENERALISED)
-H = Argument("H", lambda t: (t.nv, t.nv), "inertia matrix, symmetric positive definite (kg, kg m, kg m^2)")
-POINTS = Argument("points", lambda t: (t.total + 1, 3), "joint positions, then the tip (m, world)")
-JACOBIANS = Argument("J", lambda t: (t.total + 1, 3, t.nv), "d(point)/dt = J v")
-KINETIC = Argument("kinetic", lambda t: (1,), "kinetic energy (J)")
-POTENTIAL = Argument("potential", lambda t: (1,), "potential energy, zero at the height of the world's origin (J)")
-LINEAR = Argument("linear", lambda t: (3,), "momentum (kg m/s, world)")
-ANGULAR = Argument("angular", lambda t: (3,), "angular momentum about the centre of mass (kg m^2/s, world)")
-
-_TABLE = (
-    Function("mass_matrix", "H(q) of Eq. 2", (Q,), (H,), assemble_mass_matrix),
-    Function("bias_force", "C(q, v) of Eq. 3, gravity included", (Q, V), (FORCE,), assemble_inverse_dynamics),
-    Function("inverse_dynamics", "H v_dot + C", (Q, V, V_DOT), (FORCE,), assemble_inverse_dynamics),
-    Function("forward_dynamics", "v_dot from Eq. 1", (Q, V, TAU), (V_DOT,), assemble_acceleration),
-    Function(
-        "forward_dynamics_external",
-        "v_dot from Eq. 1, loads applied",
-        (Q, V, TAU, F_EXT),
-        (V_DOT,),
-        assemble_acceleration,
-    ),
-    Function("energy", "kinetic and potential energy", (Q, V), (KINETIC, POTENTIAL), assemble_energy),
-    Function("momentum", "linear and angular momentum", (Q, V), (LINEAR, ANGULAR), assemble_momentum),
-    Function("tail_points", "Eqs. 13 to 15", (Q,), (POINTS,), assemble_tail_points),
-    Function("tail_point_jacobians", "Eqs. A5 to A8", (Q,), (JACOBIANS,), assemble_tail_point_jacobians),
-    Function(
-        "mass_matrix_world",
-        "H for (p_dot, omega in world axes, q_t_dot)",
-        (Q,),
-        (H,),
-        partial(assemble_mass_matrix, world=True),
-    ),
-    Function(
-        "bias_force_world",
-        "C for (p_dot, omega in world axes, q_t_dot)",
-        (Q, V),
-        (FORCE,),
-        partial(assemble_inverse_dynamics, world=True),
-    ),
-)
-FUNCTIONS = {function.name: function for function in _TABLE}

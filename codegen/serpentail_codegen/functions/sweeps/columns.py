@@ -6,10 +6,10 @@ links need no pose and no column has to meet another one.  It pays where vectors
 
 from collections.abc import Callable
 
-from .draft import Draft
-from .ir.program import Array, Ref
-from .mechanics import link_columns as lan
-from .mechanics import torso, translation
+from ...ir.program import Array, Ref
+from ...mechanics import link_columns as lan
+from ...mechanics import torso, translation
+from ..draft import Draft
 from .sweeps import each_piece, forward_wrenches, mechanism
 
 

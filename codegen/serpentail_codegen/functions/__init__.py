@@ -1,0 +1,1 @@
+"""The functions that a scene can ask for, assembled from steps."""

@@ -1,0 +1,1 @@
+"""The tails: for each, the steps that describe one piece of a segment."""
