@@ -16,7 +16,7 @@ import serpentail_codegen
 CODEGEN, RUNTIME = (Path(package.__file__).parent for package in (serpentail_codegen, serpentail))
 ROOT = Path(__file__).parents[1]
 SOURCES = sorted(path for package in (CODEGEN, RUNTIME) for path in package.rglob("*.py"))
-TEMPLATES = sorted((CODEGEN / "templates").glob("*.jinja"))
+TEMPLATES = sorted(CODEGEN.rglob("*.jinja"))
 DERIVATION = {"kinematics", "dynamics", "lane_dynamics", "continuum", "polar_continuum", "legs", "contact", "stiffness"}
 DERIVATION |= {"lower", "articulated_bodies"}
 WITHOUT_SYMPY = (

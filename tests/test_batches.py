@@ -19,7 +19,7 @@ from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.passes.batch import flattened
 from serpentail_codegen.passes.batch import side_by_side as widened
-from serpentail_codegen.targets.c_batch import BATCHED, STATES
+from serpentail_codegen.targets.c.batch import BATCHED, STATES
 
 TAILS = {"articulated": Tail(2, 2), "continuum": Tail(2, 4, "continuum")}
 FORMS = [

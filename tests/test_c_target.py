@@ -22,8 +22,8 @@ from serpentail_codegen.ir.step import Step
 from serpentail_codegen.pipeline import tail_of
 from serpentail_codegen.scene import DERIVATIVES, parse_scene
 from serpentail_codegen.scene import FUNCTIONS as NAMES
-from serpentail_codegen.targets.c import in_form
-from serpentail_codegen.targets.c_function import Routine, routine_lines
+from serpentail_codegen.targets.c.form import in_form
+from serpentail_codegen.targets.c.routine import Routine, routine_lines
 
 STRICT = ("-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Wdouble-promotion", "-Wshadow", "-Werror")
 C99 = ("-std=c99", *STRICT)

@@ -16,7 +16,7 @@ import serpentail as st
 from models import model_folder
 from references.parameters import random_states
 from serpentail.casadi_functions import DERIVATIVES
-from serpentail_codegen.targets.casadi_external import DYNAMICS
+from serpentail_codegen.targets.c.casadi_external import DYNAMICS
 from test_casadi_target import Model
 
 PARTS = sorted({part for name, orders in DERIVATIVES.items() for part in (name, *orders[0], *orders[1])})

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from serpentail_codegen import write
 from serpentail_codegen.pipeline import generate
 from serpentail_codegen.scene import scene_for
-from serpentail_codegen.write import digest, write_folder, write_if_changed
+from serpentail_codegen.targets import write
+from serpentail_codegen.targets.write import digest, write_folder, write_if_changed
 
 OPTIONS = {"functions": ["forward_dynamics", "tail_points", "rollout"], "emission": "loops"}
 NAME = "articulated_m2_n2"

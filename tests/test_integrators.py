@@ -13,7 +13,7 @@ import pytest
 
 import serpentail as st
 from models import model_folder
-from serpentail_codegen.tableaux import RK4, ROS34PW2, TSIT5, transformed
+from serpentail_codegen.targets.c.tableaux import RK4, ROS34PW2, TSIT5, transformed
 
 WANTED = ["forward_dynamics", "energy", "momentum", "rollout", "implicit", "pfl"]
 ROUNDING = 3e-14  # coefficients of up to 88, printed with 16 digits

@@ -138,7 +138,7 @@ def test_changed_generator_looks_again_and_writes_only_what_differs(tree, make):
     stamp = tree / "generated" / NAME / ".made"
     after = built(tree)
     assert {path for path in after if after[path] != before[path]} == {stamp}
-    template = tree / "codegen" / "serpentail_codegen" / "templates" / "model.c.jinja"
+    template = tree / "codegen" / "serpentail_codegen" / "targets" / "c" / "templates" / "model" / "model.c.jinja"
     template.write_text("/* another start */\n" + template.read_text())
     assert "files written" in make("model", *ORDER).stdout
     source = tree / "generated" / NAME / "src" / f"{NAME}.c"

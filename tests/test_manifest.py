@@ -12,7 +12,7 @@ import pytest
 import serpentail as st
 from models import model_folder
 from serpentail import compiler
-from serpentail_codegen.write import signed
+from serpentail_codegen.targets.write import signed
 
 UPRIGHT = [0, 0, 0, 1, 0, 0, 0, 0, 0]
 AGAIN = "generate it again (`make model`, or python -m serpentail_codegen SCENE.toml)"

@@ -18,7 +18,8 @@ from serpentail_codegen.ir.ldl import ldl_factor, ldl_solve, pair_factor, pair_s
 from serpentail_codegen.ir.program import Apply, Array, Fill, Index, Loop, as_index, statements
 from serpentail_codegen.ir.step import Step
 from serpentail_codegen.ir.tape import Tape, live_nodes, replay
-from serpentail_codegen.targets.c_function import in_loops, routine_lines
+from serpentail_codegen.targets.c.loops import in_loops
+from serpentail_codegen.targets.c.routine import routine_lines
 
 TAILS = {"m1_n2": Tail(1, 2), "m2_n3": Tail(2, 3), "continuum_m2": Tail(2, 3, "continuum")}
 FLOATS = Numbers(math, float)

@@ -15,7 +15,7 @@ from serpentail_codegen.functions.function import program
 from serpentail_codegen.functions.plain import FUNCTIONS
 from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.ir.interpret import Numbers, Run
-from serpentail_codegen.targets.c import fastest
+from serpentail_codegen.targets.c.form import fastest
 from test_lanes import arguments, assert_same_acceleration
 
 SIZES = [(1, 1), (1, 3), (2, 1), (2, 3), (4, 2), (9, 1)]

@@ -6,13 +6,14 @@ from . import __version__
 from .functions.catalogue import CATALOGUE, SYMBOLIC
 from .functions.tail import Tail
 from .scene import Scene
-from .targets.c import c_context, c_files, emit
-from .targets.c_batch import batch_entry, batch_file, batches
-from .targets.c_flights import flights, flights_entry, flights_file
-from .targets.casadi import casadi_module
+from .targets.c.batch import batch_entry, batch_file, batches
+from .targets.c.batch_rollout import flights, flights_entry, flights_file
+from .targets.c.form import emit
+from .targets.c.model import c_context, c_files
+from .targets.c.package import package_files
+from .targets.casadi.module import casadi_module
 from .targets.manifest import manifest
-from .targets.package import package_files
-from .write import digest, write_folder
+from .targets.write import digest, write_folder
 
 
 def generate(scene: Scene, output: Path) -> list[str]:

@@ -2,7 +2,7 @@
 
 from ..parameters import ANY, BODY_INERTIA, NOT_NEGATIVE, POSITIVE
 from ..scene import Scene, parameters_of, scene_to_dict
-from .simulation import layouts
+from .c.simulation import layouts
 
 FORMAT = 1
 CHECKS = {ANY: "finite", POSITIVE: "positive", NOT_NEGATIVE: "not_negative", BODY_INERTIA: "body_inertia"}

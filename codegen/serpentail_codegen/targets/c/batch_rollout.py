@@ -2,16 +2,18 @@
 
 from dataclasses import dataclass
 
-from ..functions.function import program as assemble
-from ..functions.tail import Tail
-from ..ir.program import Program, padded
-from ..passes.batch import flattened, side_by_side, with_own_parameters
-from ..scene import Scene
+from ...functions.function import program as assemble
+from ...functions.tail import Tail
+from ...ir.program import Program, padded
+from ...passes.batch import flattened, side_by_side, with_own_parameters
+from ...scene import Scene
 from ..templating import render
-from .c import Emitted, baked_values, callee_view, step_views
-from .c_batch import STATES, straight
-from .c_function import CFunction, dialect, in_loops
+from .batch import STATES, straight
+from .form import Emitted, baked_values
+from .loops import in_loops
+from .routine import CFunction, dialect
 from .simulation import fields, typed
+from .views import callee_view, step_views
 
 RECORD = fields(
     ("parameters", "const real *", "[count][PARAMETERS]"),
@@ -76,7 +78,7 @@ def flights(scene: Scene, tail: Tail, emitted: list[Emitted]) -> Flights | None:
 def flights_file(scene: Scene, found: Flights | None, context: dict) -> dict[str, str]:
     """Render the file of flights, if there are any."""
     own = {} if found is None else context | _own(scene, found)
-    return {f"src/{scene.name}_flights.c": render("flights.c.jinja", own)} if own else {}
+    return {f"src/{scene.name}_flights.c": render("c", "batch/rollout.c.jinja", own)} if own else {}
 
 
 def _own(scene: Scene, found: Flights) -> dict:

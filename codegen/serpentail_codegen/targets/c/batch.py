@@ -2,16 +2,18 @@
 
 from dataclasses import dataclass
 
-from ..functions.function import Function
-from ..functions.function import program as assemble
-from ..functions.tail import Tail
-from ..ir.interpret import applied, branches
-from ..ir.program import Program
-from ..passes.batch import flattened, side_by_side
-from ..scene import Scene
+from ...functions.function import Function
+from ...functions.function import program as assemble
+from ...functions.tail import Tail
+from ...ir.interpret import applied, branches
+from ...ir.program import Program
+from ...passes.batch import flattened, side_by_side
+from ...scene import Scene
 from ..templating import render
-from .c import ArgumentView, Emitted, baked_values, callee_view, step_views
-from .c_function import CFunction, in_loops
+from .form import Emitted, baked_values
+from .loops import in_loops
+from .routine import CFunction
+from .views import ArgumentView, callee_view, step_views
 
 STATES = {"double": 8, "float": 16}  # side by side: lanes of the widest vector
 STRAIGHT_UP_TO = 10000  # nodes: beyond, loops are hardly slower, and compile in a quarter of the time
@@ -79,7 +81,7 @@ def batch_file(scene: Scene, tail: Tail, found: list[Batch], context: dict) -> d
         "steps": step_views(found, scene.real, scene.name),
         "helpers": sorted(set().union(*(b.body.helpers for b in found)) | {"lanes", "everywhere"}),
     }
-    return {f"src/{scene.name}_batch.c": render("batch.c.jinja", context | own)} if found else {}
+    return {f"src/{scene.name}_batch.c": render("c", "batch/batch.c.jinja", context | own)} if found else {}
 
 
 def batch_entry(scene: Scene, found: list[Batch]) -> dict:

@@ -33,7 +33,6 @@ class Rosenbrock:
 
 
 RK4 = Explicit((0.0, 0.5, 0.5, 1.0), ((), (0.5,), (0.0, 0.5), (0.0, 0.0, 1.0)), (1 / 6, 1 / 3, 1 / 3, 1 / 6))
-
 # Ch. Tsitouras, Runge-Kutta pairs of order 5(4) satisfying only the first column simplifying assumption, Comput.
 # Math. Appl. 62 (2011) 770-775; the last stage is the first of the next step, the interpolant has order 4.
 TSIT5 = Explicit(

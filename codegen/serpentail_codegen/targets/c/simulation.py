@@ -5,13 +5,13 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import accumulate
 
-from ..functions.tail import Tail
-from ..scene import Scene
-from ..tableaux import RK4, ROS34PW2, TSIT5, Explicit, Rosenbrock, transformed
-from .c_function import dialect
+from ...functions.tail import Tail
+from ...scene import Scene
+from .routine import dialect
+from .tableaux import RK4, ROS34PW2, TSIT5, Explicit, Rosenbrock, transformed
 
 NAMES = r"\b(real|piecewise|controller|drive|parameters|torque)\b"
-SLOTS = 11  # states in the workspace: see states.c.jinja
+SLOTS = 11  # states in the workspace: see simulation/workspace.c.jinja
 MACROS = ("NQ", "NV", "NT", "SIZE", "SLOT", "START", "END", "STAGES", "END_RATE", "TRIAL", "RIGHT", "TAU")
 MACROS += ("TABLE", "FORCES", "PRESSURES", "REACHED", "POINTS", "GROUPS", "FACTORS", "INNER")
 NUMBERS = {"three": 3, "four": 4, "five": 5, "hundred": 100, "fifth": 0.2, "nearly": 0.99, "hundredth": 0.01}

@@ -2,15 +2,15 @@
 
 import re
 
-from ..functions.function import program as assemble
-from ..functions.function import struct_parameters
-from ..functions.tail import Tail
-from ..ir.dataflow import expanded
-from ..ir.program import Apply, Copy, Factor, Fill, Guard, Loop, Program, Ref, Solve, padded
-from ..ir.step import Step
-from ..scene import Scene
+from ...functions.function import program as assemble
+from ...functions.function import struct_parameters
+from ...functions.tail import Tail
+from ...ir.dataflow import expanded
+from ...ir.program import Apply, Copy, Factor, Fill, Guard, Loop, Program, Ref, Solve, padded
+from ...ir.step import Step
+from ...scene import Scene
+from ..expressions import Dialect, Scalars, index_text
 from ..templating import render
-from .scalars import Dialect, Scalars, index_text
 
 PYTHON = Dialect("{name} = {text}", "", {"sin": "sin", "cos": "cos", "sqrt": "sqrt"}, "if_else({c} > {zero}, {a}, {b})")
 
@@ -116,4 +116,6 @@ def casadi_module(scene: Scene, tail: Tail, functions, version: str, content_has
     sizes = {p.name: p.size for p in struct_parameters(scene)}
     data = {"scene": scene, "version": version, "content_hash": content_hash, "functions": views, "sizes": sizes}
     selects = any(op == "select" for s in steps.values() for op, *_ in s.nodes)
-    return render("casadi.py.jinja", data | {"steps": [step_view(s) for s in steps.values()], "selects": selects})
+    return render(
+        "casadi", "module.py.jinja", data | {"steps": [step_view(s) for s in steps.values()], "selects": selects}
+    )

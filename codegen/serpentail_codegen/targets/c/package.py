@@ -3,14 +3,14 @@
 from ..templating import render
 
 TEMPLATES = {
-    "Makefile": "makefile.jinja",
-    "CMakeLists.txt": "cmake.txt.jinja",
-    "LICENSE": "license.txt.jinja",
-    "README.md": "readme.md.jinja",
+    "Makefile": "package/makefile.jinja",
+    "CMakeLists.txt": "package/cmake.txt.jinja",
+    "LICENSE": "package/license.txt.jinja",
+    "README.md": "package/readme.md.jinja",
 }
 
 
 def package_files(context: dict) -> dict[str, str]:
     """Render what a user of the C alone needs beside it."""
     context = context | {"size": {"float": 4, "double": 8}[context["real"]]}
-    return {name: render(template, context) for name, template in TEMPLATES.items()}
+    return {name: render("c", template, context) for name, template in TEMPLATES.items()}

@@ -8,10 +8,10 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 from functools import partial
 
-from ..functions.catalogue import CATALOGUE
-from ..functions.function import struct_parameters
-from ..functions.tail import Tail
-from ..scene import Scene
+from ...functions.catalogue import CATALOGUE
+from ...functions.function import struct_parameters
+from ...functions.tail import Tail
+from ...scene import Scene
 
 VECTOR = 8  # doubles in a cache line
 # where the numbers begin that anything depends on: neither the position of B nor its velocity matters

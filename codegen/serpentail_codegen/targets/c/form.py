@@ -1,0 +1,78 @@
+"""The C target: a scene's programs go in, the text of every C file comes out."""
+
+from dataclasses import dataclass
+
+from ...functions.function import Function, struct_parameters
+from ...functions.function import program as assemble
+from ...functions.tail import Tail
+from ...ir.interpret import applied, branches
+from ...ir.program import Program
+from ...passes.unrolled_ldl import written_out
+from ...scene import Scene
+from .loops import in_loops
+from .routine import CFunction
+from .straight import straight_line
+
+STRAIGHT_UP_TO = 7000  # nodes: beyond, the text leaves the instruction cache and compile time grows
+STRAIGHT_BESIDE_LANES = 3500  # nodes: where there is a sweep in lanes, too, that is faster beyond
+SEGMENTS_FROM = 128  # columns of H times links, the work of a sweep in lanes: from here on segments are no slower
+ELIMINATED = 12  # rows: smaller matrices are factored without loops
+
+
+@dataclass(frozen=True)
+class Emitted:
+    """One emitted function: what it computes, its C body, and how it was emitted."""
+
+    function: Function
+    body: CFunction
+    emission: str
+
+
+def emit(scene: Scene, tail: Tail, function: Function) -> Emitted:
+    """Print one function in the form that the scene asks for."""
+    fixed = baked_values(scene)
+    form, program = fastest(function, tail) if scene.emission == "auto" else in_form(scene.emission, function, tail)
+    printer = straight_line if form == "straight" else in_loops
+    return Emitted(function, printer(program, scene.real, scene.name, fixed), form)
+
+
+def fastest(function: Function, tail: Tail) -> tuple[str, Program]:
+    """Return the form that runs fastest on a processor with vectors, and the program in that form.
+
+    Straight lines are fastest until their text crowds the instruction cache, if all of them are always run; sweeps in
+    lanes overtake them before that, and sweeps by segments overtake both.
+    """
+    long = tail.segments > 1 and tail.nt * tail.total >= SEGMENTS_FROM
+    form, swept = in_form("segments" if long else "lanes", function, tail)
+    if form == "segments":
+        return form, swept
+    program = assemble(function, tail)
+    if applied(program) <= (STRAIGHT_BESIDE_LANES if form == "lanes" else STRAIGHT_UP_TO) and not branches(program):
+        return "straight", program
+    return form, swept
+
+
+def in_form(form: str, function: Function, tail: Tail) -> tuple[str, Program]:
+    """Return the form that a function gets where this one is asked for, and its program.
+
+    What nothing goes by segments in gets lanes, what has no use for lanes gets loops.
+    """
+    program = assemble(function, tail)
+    if form in ("straight", "loops"):
+        return form, program
+    lanes = assemble(function, tail, "lanes")
+    segments = assemble(function, tail, "segments") if form == "segments" else lanes
+    if segments != lanes:
+        return "segments", written_out(segments, ELIMINATED)
+    return "loops" if lanes == program else "lanes", written_out(lanes, ELIMINATED)
+
+
+def baked_values(scene: Scene) -> dict[str, list]:
+    """Return the parameters to fold into the code."""
+    return {p.name: values(scene, p.name) for p in struct_parameters(scene)} if scene.baked else {}
+
+
+def values(scene: Scene, name: str) -> list[float]:
+    """Return a parameter as a list of scalars."""
+    value = scene.parameters[name]
+    return list(value) if isinstance(value, tuple) else [value]
