@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from serpentail_codegen.pipeline import generate
-from serpentail_codegen.scene import scene_for
+from serpentail_codegen.scene.parse import scene_for
 
 SCENES = {"flight": (), "stance": ("feet",), "tail": ("feet", "tail")}
 SIZES = ((1, 3), (3, 4), (3, None))

@@ -16,7 +16,7 @@ import peers
 import serpentail as st
 from fixtures import Fixture, fixture
 from serpentail.compiler import compile_library
-from serpentail_codegen.scene import DERIVATIVES
+from serpentail_codegen.scene.scene import DERIVATIVES
 
 SIZES = ((1, 3), (3, 4), (6, 6))
 ROUNDS, CALLS = 200, 64

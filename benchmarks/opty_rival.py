@@ -15,7 +15,7 @@ from serpentail_codegen.functions.catalogue import CATALOGUE
 from serpentail_codegen.functions.function import program
 from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.pipeline import tail_of
-from serpentail_codegen.scene import Scene
+from serpentail_codegen.scene.scene import Scene
 
 MOST = 3000  # iterations
 UNIT = 1e-3  # N m, of torques in the objective

@@ -17,7 +17,7 @@ import serpentail as st
 from serpentail.planning import rounds
 from serpentail.planning.formulations import dynamics
 from serpentail.planning.problem import SMOOTHING
-from serpentail_codegen.scene import scene_for
+from serpentail_codegen.scene.parse import scene_for
 
 SLOWER, CAP = 500, 300.0  # times slower than the best, or s of CPU: what does not end is cut at the lesser
 EXAMPLE = 4  # the random start

@@ -13,7 +13,7 @@ from image import Image, build, command
 from misra import summary
 from results import blocks, run
 from serpentail_codegen.pipeline import generate
-from serpentail_codegen.scene import scene_for
+from serpentail_codegen.scene.parse import scene_for
 from stack import deepest
 
 DOCUMENT = Path(__file__).parent.parent / "docs" / "embedded.md"

@@ -11,7 +11,7 @@ from serpentail import cli
 from serpentail.scene_file import read_scene, subtable
 from serpentail.simulation.scenarios import scenario_of
 from serpentail_codegen.__main__ import parser, scene_of
-from serpentail_codegen.problems import SceneError
+from serpentail_codegen.scene.problems import SceneError
 
 BYTES = (b"", b"\0", b"\xff", b"\xef\xbb\xbf", b"=", b"[", b"]", b"[[", b'"', b"'''", b"\\", b"#", b"\n", b"\r")
 # fmt: off

@@ -14,7 +14,8 @@ from serpentail_codegen.functions.function import program
 from serpentail_codegen.ir.dataflow import expanded
 from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.pipeline import tail_of
-from serpentail_codegen.scene import DERIVATIVES, parse_scene
+from serpentail_codegen.scene.parse import parse_scene
+from serpentail_codegen.scene.scene import DERIVATIVES
 
 COMPLEX = Numbers(np, complex)
 STEP = 1e-30  # of the imaginary part: nothing is subtracted, so derivatives are as exact as values

@@ -7,7 +7,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from serpentail_codegen.pipeline import generate
-from serpentail_codegen.scene import scene_for
+from serpentail_codegen.scene.parse import scene_for
 
 
 @cache

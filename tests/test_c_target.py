@@ -20,8 +20,9 @@ from serpentail_codegen.functions.catalogue import CATALOGUE
 from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.ir.step import Step
 from serpentail_codegen.pipeline import tail_of
-from serpentail_codegen.scene import DERIVATIVES, parse_scene
-from serpentail_codegen.scene import FUNCTIONS as NAMES
+from serpentail_codegen.scene.parse import parse_scene
+from serpentail_codegen.scene.scene import DERIVATIVES
+from serpentail_codegen.scene.scene import FUNCTIONS as NAMES
 from serpentail_codegen.targets.c.form import in_form
 from serpentail_codegen.targets.c.routine import Routine, routine_lines
 

@@ -17,7 +17,8 @@ from serpentail_codegen.functions.function import program
 from serpentail_codegen.functions.plain import FUNCTIONS
 from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.pipeline import tail_of
-from serpentail_codegen.scene import DERIVATIVES, parse_scene
+from serpentail_codegen.scene.parse import parse_scene
+from serpentail_codegen.scene.scene import DERIVATIVES
 
 TAILS = {"m1_n1": (1, 1), "m2_n2": (2, 2), "arcs2": (2, None)}
 SHAPES = {

@@ -18,7 +18,7 @@ from derivative_models import (
     tangent_of_q,
 )
 from references.metrics import block_error, equilibrated_condition
-from serpentail_codegen.scene import DERIVATIVES
+from serpentail_codegen.scene.scene import DERIVATIVES
 
 QUICK = [(1, 3, "straight"), (2, 2, "loops"), (3, 4, "loops"), (1, None, "loops")]
 SLOW = [(1, 3, "loops"), (2, 2, "straight"), (3, 4, "straight"), (6, 6, "loops"), (8, 16, "loops")]

@@ -17,7 +17,7 @@ from serpentail.compiler import _candidates
 from serpentail.model import Model
 from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.ir.program import Apply, statements
-from serpentail_codegen.scene import DERIVATIVES
+from serpentail_codegen.scene.scene import DERIVATIVES
 
 FLOATS = Numbers(np, float)
 SIZES = [(2, 2, "loops"), (1, 3, "straight")]

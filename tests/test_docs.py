@@ -14,8 +14,9 @@ from scipy.integrate import simpson
 
 import serpentail as st
 from serpentail.cli import parser
-from serpentail_codegen.parameters import PARAMETERS
-from serpentail_codegen.scene import ALL, parse_scene
+from serpentail_codegen.scene.parameters import PARAMETERS
+from serpentail_codegen.scene.parse import parse_scene
+from serpentail_codegen.scene.scene import ALL
 
 ROOT = Path(__file__).parent.parent
 DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *sorted(ROOT.glob("docs/*.md"))]

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from serpentail_codegen.pipeline import generate
-from serpentail_codegen.scene import scene_for
+from serpentail_codegen.scene.parse import scene_for
 
 GOLDEN = Path(__file__).parent / "golden"
 MODELS = {

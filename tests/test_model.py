@@ -16,7 +16,7 @@ import pytest
 
 import serpentail as st
 from models import model_folder
-from serpentail_codegen.scene import ALL, TOUCHING
+from serpentail_codegen.scene.scene import ALL, TOUCHING
 
 SEGMENTS, LINKS = 2, 1
 NQ, NV, NT, POINTS = 7 + 2 * SEGMENTS, 6 + 2 * SEGMENTS, 2 * SEGMENTS, SEGMENTS * LINKS + 1

@@ -8,8 +8,8 @@ import pytest
 import serpentail as st
 from models import model_folder
 from serpentail.parameters import ellipsoid, flat, resolve
-from serpentail_codegen.parameters import PARAMETERS
-from serpentail_codegen.scene import resolve_parameters
+from serpentail_codegen.scene.parameters import PARAMETERS
+from serpentail_codegen.scene.resolve import resolve_parameters
 
 SEGMENTS, LINKS = 2, 3
 INERTIA = (2.5e-07, 3.9e-09, 2.6e-07)

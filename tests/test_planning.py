@@ -24,7 +24,7 @@ from serpentail.planning.transcription import program_of
 from serpentail.planning.truth import local_errors, open_loop
 from serpentail.trajectory import rotation_matrix
 from serpentail_codegen.pipeline import generate
-from serpentail_codegen.scene import load_scene
+from serpentail_codegen.scene.parse import load_scene
 from tumbling import DURATION, FUNCTIONS, planned, rat, start
 
 FORMS = [("airborne", "quaternion"), ("translation-free", "quaternion"), ("full", "quaternion"), ("full", "euler")]

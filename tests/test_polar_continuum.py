@@ -15,8 +15,9 @@ from references.metrics import block_error, equilibrated_condition, mass_matrix_
 from references.parameters import TABLE_1
 from serpentail.verify import laws
 from serpentail_codegen.mechanics import polar_arc as polar_continuum
-from serpentail_codegen.problems import SceneError
-from serpentail_codegen.scene import DERIVATIVES, FUNCTIONS, parse_scene, scene_for, scene_to_dict
+from serpentail_codegen.scene.parse import parse_scene, scene_for, scene_to_dict
+from serpentail_codegen.scene.problems import SceneError
+from serpentail_codegen.scene.scene import DERIVATIVES, FUNCTIONS
 
 MODERATE = (0.5, 1.0, 2.0, np.pi)
 VANISHING = 10.0 ** np.arange(-1, -3.1, -0.5)

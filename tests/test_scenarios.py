@@ -13,7 +13,7 @@ from models import parent
 from serpentail import cli
 from serpentail.limbs import leg_joints
 from serpentail_codegen.pipeline import generate
-from serpentail_codegen.scene import load_scene
+from serpentail_codegen.scene.parse import load_scene
 
 SCENES = Path(__file__).parents[1] / "scenes"
 SIMPLE = """kind = "articulated"

@@ -21,7 +21,8 @@ from serpentail_codegen.functions.implicit.functions import IMPLICIT
 from serpentail_codegen.functions.pfl import FEEDBACK
 from serpentail_codegen.mechanics import link, loads, torso
 from serpentail_codegen.pipeline import generate
-from serpentail_codegen.scene import ON_DEMAND, scene_for
+from serpentail_codegen.scene.parse import scene_for
+from serpentail_codegen.scene.scene import ON_DEMAND
 
 SOUND = {
     "m1_n1": (1, 1, {}),

@@ -22,7 +22,7 @@ from serpentail_codegen.functions.function import program
 from serpentail_codegen.functions.implicit.functions import IMPLICIT
 from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.pipeline import generate, tail_of
-from serpentail_codegen.scene import parse_scene
+from serpentail_codegen.scene.parse import parse_scene
 
 STRICT = 22.5  # roundings: 5e-15 in double
 FOLDED = 4 * STRICT  # what H sums cancels in a folded tail: libraries are off by 1e-14 to 2e-14 there

@@ -5,8 +5,9 @@ import sys
 import time
 from pathlib import Path
 
-from .problems import SceneError
-from .scene import ALL, KINDS, load_scene, parse_scene, scene_for, scene_to_dict
+from .scene.parse import load_scene, parse_scene, scene_for, scene_to_dict
+from .scene.problems import SceneError
+from .scene.scene import ALL, KINDS
 
 
 def parser() -> argparse.ArgumentParser:

@@ -5,7 +5,7 @@ from pathlib import Path
 from . import __version__
 from .functions.catalogue import CATALOGUE, SYMBOLIC
 from .functions.tail import Tail
-from .scene import Scene
+from .scene.scene import Scene
 from .targets.c.batch import batch_entry, batch_file, batches
 from .targets.c.batch_rollout import flights, flights_entry, flights_file
 from .targets.c.form import emit

@@ -5,8 +5,9 @@ from dataclasses import dataclass, replace
 from math import prod
 
 from ..ir.program import Array, Program
-from ..parameters import Parameter
-from ..scene import Scene, parameters_of
+from ..scene.parameters import Parameter
+from ..scene.resolve import parameters_of
+from ..scene.scene import Scene
 from .draft import Draft
 from .tail import Tail
 

@@ -1,7 +1,9 @@
 """The manifest: what was emitted goes in, what a loader needs to know comes out as plain data."""
 
-from ..parameters import ANY, BODY_INERTIA, NOT_NEGATIVE, POSITIVE
-from ..scene import Scene, parameters_of, scene_to_dict
+from ..scene.parameters import ANY, BODY_INERTIA, NOT_NEGATIVE, POSITIVE
+from ..scene.parse import scene_to_dict
+from ..scene.resolve import parameters_of
+from ..scene.scene import Scene
 from .c.simulation import layouts
 
 FORMAT = 1

@@ -8,7 +8,7 @@ from ...functions.tail import Tail
 from ...ir.interpret import applied, branches
 from ...ir.program import Program
 from ...passes.batch import flattened, side_by_side
-from ...scene import Scene
+from ...scene.scene import Scene
 from ..templating import render
 from .form import Emitted, baked_values
 from .loops import in_loops

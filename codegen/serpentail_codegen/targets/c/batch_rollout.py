@@ -6,7 +6,7 @@ from ...functions.function import program as assemble
 from ...functions.tail import Tail
 from ...ir.program import Program, padded
 from ...passes.batch import flattened, side_by_side, with_own_parameters
-from ...scene import Scene
+from ...scene.scene import Scene
 from ..templating import render
 from .batch import STATES, straight
 from .form import Emitted, baked_values

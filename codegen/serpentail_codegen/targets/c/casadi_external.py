@@ -11,7 +11,7 @@ from functools import partial
 from ...functions.catalogue import CATALOGUE
 from ...functions.function import struct_parameters
 from ...functions.tail import Tail
-from ...scene import Scene
+from ...scene.scene import Scene
 
 VECTOR = 8  # doubles in a cache line
 # where the numbers begin that anything depends on: neither the position of B nor its velocity matters

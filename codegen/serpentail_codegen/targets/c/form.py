@@ -8,7 +8,7 @@ from ...functions.tail import Tail
 from ...ir.interpret import applied, branches
 from ...ir.program import Program
 from ...passes.unrolled_ldl import written_out
-from ...scene import Scene
+from ...scene.scene import Scene
 from .loops import in_loops
 from .routine import CFunction
 from .straight import straight_line

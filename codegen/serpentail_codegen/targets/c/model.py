@@ -7,7 +7,7 @@ import math
 from ...functions.function import struct_parameters
 from ...functions.tail import Tail
 from ...ir.program import VECTOR
-from ...scene import Scene
+from ...scene.scene import Scene
 from ..templating import render
 from .casadi_external import casadi_context
 from .form import Emitted

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from itertools import accumulate
 
 from ...functions.tail import Tail
-from ...scene import Scene
+from ...scene.scene import Scene
 from .routine import dialect
 from .tableaux import RK4, ROS34PW2, TSIT5, Explicit, Rosenbrock, transformed
 

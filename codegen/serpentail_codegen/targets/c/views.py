@@ -7,7 +7,7 @@ from ...functions.function import Argument, struct_parameters
 from ...functions.tail import Tail
 from ...ir.program import Program
 from ...ir.tape import operation_count
-from ...scene import Scene
+from ...scene.scene import Scene
 from .form import Emitted, values
 from .routine import CFunction, Routine, dialect, routine_arguments, routine_lines
 

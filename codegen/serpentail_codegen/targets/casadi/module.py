@@ -8,7 +8,7 @@ from ...functions.tail import Tail
 from ...ir.dataflow import expanded
 from ...ir.program import Apply, Copy, Factor, Fill, Guard, Loop, Program, Ref, Solve, padded
 from ...ir.step import Step
-from ...scene import Scene
+from ...scene.scene import Scene
 from ..expressions import Dialect, Scalars, index_text
 from ..templating import render
 

@@ -69,6 +69,8 @@ PARAMETERS = (
     Parameter("torso_semi_axes", 3, (0.0315, 0.0495, 0.027), "m", POSITIVE,
               "semi-axes of the torso, an ellipsoid about B", "torso"),
 )
+
+
 # fmt: on
 
 

@@ -1,0 +1,1 @@
+"""What to model: scene files, their rules and parameters."""

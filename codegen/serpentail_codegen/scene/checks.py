@@ -1,0 +1,128 @@
+"""What a scene may say: every rule that a file or table must keep, with its remedy."""
+
+import sys
+from collections.abc import Collection, Mapping
+from typing import Any
+
+from .parameters import PARAMETERS, SINGLE, Parameter, Value
+from .problems import Problem, suggest
+from .scene import ALL, COUNT, DERIVATIVES, KEYS, MOST_LINKS, NAMES, ONLY, TOUCHING, Only, _is_whole
+
+
+def plain(value: Value) -> float | list[float]:
+    """Return a value as TOML and JSON have it."""
+    return list(value) if isinstance(value, tuple) else value
+
+
+def fits(parameter: Parameter, value: Any) -> bool:
+    """Tell if a value has the parameter's size, is made of finite numbers, and keeps the parameter's rule."""
+    if (parameter.size > 1) != isinstance(value, list | tuple):
+        return False
+    numbers = value if parameter.size > 1 else [value]
+    return len(numbers) == parameter.size and all(map(_is_finite, numbers)) and parameter.check.holds(numbers)
+
+
+def _is_finite(x: Any) -> bool:
+    """Tell if x is a number that a float can hold."""
+    return (_is_whole(x) or isinstance(x, float)) and abs(x) <= sys.float_info.max
+
+
+def number_problem(parameter: Parameter, value: object) -> Problem:
+    """Say what the parameter needs: size, rule, unit and default."""
+    shape = "a finite number" if parameter.size == 1 else f"an array of {parameter.size} finite numbers"
+    default = "computed" if parameter.default is None else plain(parameter.default)
+    remedy = f"needs {shape}{parameter.check.text}, in {parameter.unit} (default: {default})"
+    return Problem(f"parameters.{parameter.name}", value, remedy)
+
+
+def key_problems(values: Mapping[str, Any]) -> list[Problem]:
+    """Return a problem for each key whose rule is broken, and for a tail of too many links."""
+    broken = [(key, rule) for key, (_, rule) in KEYS.items() if not rule.holds(values[key])]
+    problems = [Problem(key, values[key], f"needs {rule.text}") for key, rule in broken]
+    if tail_links(values) > MOST_LINKS:
+        remedy = f"more than {MOST_LINKS} links in all; choose fewer segments or links"
+        problems.append(Problem("segments * links", tail_links(values), remedy))
+    return problems
+
+
+def kind_problems(table: Mapping[str, Any], own: Only) -> list[Problem]:
+    """Return a problem for all that the tail's kind does not have."""
+    problems, given = [], table.get("parameters", {})
+    for only in (only for only in ONLY.values() if only is not own):
+        remedy = "this kind of tail has none; remove it, or choose another kind"
+        problems += [Problem(key, table[key], remedy) for key in only.keys if key in table]
+        wrong = [key for key in only.parameters if isinstance(given, Mapping) and key in given]
+        problems += [Problem(f"parameters.{key}", given[key], remedy) for key in wrong]
+    if table.get("coordinates", own.coordinates[0]) not in own.coordinates:
+        choices = " or ".join(f'"{name}"' for name in own.coordinates)
+        remedy = f"needs {choices}; polar angles are singular at theta = 0, convert states"
+        problems.append(Problem("coordinates", table["coordinates"], remedy))
+    elif table.get("coordinates") == "polar" and (wanted := _derivatives_in(table.get("functions"))):
+        remedy = f'has no derivatives, such as {wanted[0]}: use "bend", which has'
+        problems.append(Problem("coordinates", "polar", remedy))
+    return problems
+
+
+def contact_problems(table: Mapping[str, Any], values: Mapping[str, Any], contacts: Collection[str]) -> list[Problem]:
+    """Return a problem for all that needs contacts which the scene does not have."""
+    problems, given = [], table.get("parameters", {})
+    needs = {p.name: p.needs for p in PARAMETERS if p.needs and p.needs not in contacts}
+    needs = {name: group for name, group in needs.items() if group != "contacts" or not contacts}
+    for name in [name for name in needs if isinstance(given, Mapping) and name in given]:
+        group = "feet" if needs[name] == "contacts" else needs[name]
+        remedy = f'nothing touches the ground by it; add "{group}" to `contacts`, or remove it'
+        problems.append(Problem(f"parameters.{name}", given[name], remedy))
+    if contacts and values["coordinates"] == "polar":
+        remedy = 'polar coordinates have no contacts: use "bend"'
+        problems.append(Problem("contacts", list(contacts), remedy))
+    if contacts:
+        return problems
+    remedy = 'needs points that touch the ground: add contacts = ["feet"]'
+    if "friction" in table:
+        problems.append(Problem("friction", table["friction"], remedy))
+    wanted = values["functions"] if isinstance(values["functions"], list | tuple) else ()
+    return problems + [Problem("functions", name, remedy) for name in wanted if name in TOUCHING]
+
+
+def _derivatives_in(wanted: Any) -> list[str]:
+    """Return the derivatives among wanted functions."""
+    names = ALL if wanted == "all" else wanted if isinstance(wanted, list | tuple) else ()
+    return [name for name in names if name in DERIVATIVES]
+
+
+def single_problems(parameters: Mapping[str, Value]) -> list[Problem]:
+    """Return a problem for each parameter that single precision cannot hold."""
+    flat = {name: value if isinstance(value, tuple) else (value,) for name, value in parameters.items()}
+    wrong = [n for n, xs in flat.items() if any(x and not SINGLE[0] <= abs(x) <= SINGLE[1] for x in xs)]
+    remedy = 'beyond single precision, 1.2e-38 to 3.4e38; set real = "double"'
+    return [Problem(f"parameters.{name}", plain(parameters[name]), remedy) for name in wrong]
+
+
+def tail_links(values: Mapping[str, Any]) -> int:
+    """N = m n, or 1 where m or n is wrong."""
+    m, n = values["segments"], values["links"]
+    return m * n if COUNT.holds(m) and COUNT.holds(n) else 1
+
+
+def function_problems(wanted: Any) -> list[Problem]:
+    """Return a problem for each entry that is unknown or listed before, or one for what is no array."""
+    if not isinstance(wanted, list | tuple) or not wanted:
+        remedy = 'needs an array of names, such as ["mass_matrix"]; leave it out for the usual ones, or "all"'
+        return [Problem("functions", wanted, remedy)]
+    problems = []
+    for i, name in enumerate(wanted):
+        if name not in ALL:
+            problems.append(Problem(f"functions[{i}]", name, f"unknown; {suggest(name, ALL)}"))
+        elif name in wanted[:i]:
+            problems.append(Problem(f"functions[{i}]", name, "listed before; remove one of the two"))
+    return problems
+
+
+def unknown_keys(table: Mapping[str, Any], prefix: str, known: Collection[str]) -> list[Problem]:
+    """Return a problem for each key that is not known, with its likely place or spelling."""
+    elsewhere, place = (KEYS, "above") if prefix else (NAMES, "below")
+    problems = []
+    for key in [key for key in table if key not in known]:
+        hint = f"belongs {place} the line [parameters]" if key in elsewhere else suggest(key, known)
+        problems.append(Problem(f"{prefix}{key}", table[key], f"unknown here; {hint}"))
+    return problems
