@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 
 import serpentail as st
-from serpentail.trajectory import ARRAYS, replacing
+from serpentail.files import replacing
+from serpentail.trajectory import ARRAYS
 
 
 def say(words: str) -> None:

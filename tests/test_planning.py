@@ -14,15 +14,15 @@ from scipy.integrate import solve_ivp
 
 import serpentail as st
 from models import model_folder
+from serpentail.attitude import angle_deg, from_angles, rotation_matrix
 from serpentail.planning import interrupt, rounds, solver, transcription
-from serpentail.planning.attitude import Attitude, angle_deg, from_angles
+from serpentail.planning.attitude import Attitude
 from serpentail.planning.formulations import dynamics
 from serpentail.planning.multipliers import carried
 from serpentail.planning.recovery import full_state
 from serpentail.planning.threads import _blas, one_thread
 from serpentail.planning.transcription import program_of
 from serpentail.planning.truth import local_errors, open_loop
-from serpentail.trajectory import rotation_matrix
 from serpentail_codegen.pipeline import generate
 from serpentail_codegen.scene.parse import load_scene
 from tumbling import DURATION, FUNCTIONS, planned, rat, start

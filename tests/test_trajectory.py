@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from serpentail.trajectory import Trajectory, pitch_roll_yaw, rotation_matrix
+from serpentail.attitude import pitch_roll_yaw, rotation_matrix
+from serpentail.trajectory import Trajectory
 
 PRECESSION, TILT, SPIN = 7.0, 0.6, 11.0  # rad/s, rad, rad/s of a torque-free symmetric top
 

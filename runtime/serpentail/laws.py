@@ -6,6 +6,7 @@ from itertools import starmap
 
 import numpy as np
 
+from .attitude import rotation_matrix
 from .measures import (
     DERIVATIVES,
     State,
@@ -30,7 +31,6 @@ from .measures import (
 )
 from .model import Model
 from .simulation.run import simulate
-from .trajectory import rotation_matrix
 
 NEAR = 450  # roundings: 1e-13 in double
 FEW = 8  # links in a segment

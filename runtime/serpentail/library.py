@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy import ndarray
 
+from .checks import real_array
 from .compiler import compile_library
 from .errors import ModelError, SerpentailError, StateError
 from .manifest import remedy
@@ -36,27 +37,7 @@ def open_library(folder: Path, manifest: dict, profile: str) -> ctypes.CDLL:
     return library
 
 
-def finite_array(what: str, value) -> np.ndarray:
-    """Return a value as a contiguous array; StateError where it is none of finite real numbers."""
-    array = real_array(what, value)
-    if not np.isfinite(array).all():
-        raise StateError(f"{what} is not finite: give finite numbers")
-    return array
-
-
 MOST_ARRAYS = 8
-
-
-def real_array(what: str, value, dtype=np.float64, error=StateError) -> np.ndarray:
-    """Return a value as a contiguous array; raise ``error`` where it is none of real numbers."""
-    try:
-        array = np.asarray(value)
-    except Exception as reason:  # whatever the __array__ of a foreign type raises
-        raise error(f"{what} is not made of real numbers: {reason}") from reason
-    if array.dtype.kind not in "fiu":
-        raise error(f"{what} is not made of real numbers: its type is {array.dtype}")
-    with np.errstate(over="ignore"):  # what float cannot hold becomes inf, which is refused later
-        return np.asarray(array, dtype, order="C")
 
 
 class Call(ctypes.Structure):

@@ -3,7 +3,8 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .trajectory import Trajectory, rotation_matrix
+from .attitude import rotation_matrix
+from .trajectory import Trajectory
 
 SIDES = (1.0, -1.0)  # the left hip mirrors the right one in x
 

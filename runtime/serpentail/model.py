@@ -7,8 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
+from .checks import finite_array
 from .errors import ModelError, StateError
-from .library import Kernel, finite_array, open_library
+from .library import Kernel, open_library
 from .manifest import read_manifest
 from .parameters import RunParameters, flat, resolve, warn_of_unlike, without_replaced
 from .side_by_side import SideBySide

@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .trajectory import Trajectory, pitch_roll_yaw, replacing
+from .attitude import pitch_roll_yaw
+from .files import replacing
+from .trajectory import Trajectory
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from .checks import finite_array
 from .errors import StateError
-from .library import finite_array
 
 
 def polar_to_bend(phi, theta, phi_dot=0.0, theta_dot=0.0):

@@ -4,8 +4,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .checks import real_array
 from .errors import SimulationError
-from .library import real_array
 from .simulation.piecewise import Piecewise, checked_nodes, spline
 from .simulation.schedules import Reference
 

@@ -1,13 +1,10 @@
 """Sampled motions: states, torques, energies and momenta at given times in, files and new samplings out."""
 
-import contextlib
 import dataclasses
 import json
 import os
-import secrets
 import zipfile
 import zlib
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self
@@ -15,12 +12,11 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .errors import StateError
-from .library import finite_array
+from .attitude import Array, quaternion_rate, sign_continuous
+from .files import replacing
 from .touch import ARRAYS as TOUCHING
 from .touch import Contact
 
-Array = NDArray[np.float64]
 SUFFIX = ".npz"
 UNIT_TOLERANCE = 1e-3  # how far a stored quaternion's norm may drift from 1
 
@@ -127,54 +123,6 @@ class Trajectory:
 ARRAYS = tuple(entry.name for entry in dataclasses.fields(Trajectory) if entry.name not in ("info", "contact"))
 CONTACT = "contact_"  # before the names of a contact's arrays in a file
 SMOOTH = ("v", "kinetic", "potential", "linear_momentum", "angular_momentum")
-
-
-def rotation_matrix(quaternion: ArrayLike) -> Array:
-    """R, torso to world, (..., 3, 3), of quaternions (w, x, y, z), (..., 4), of any norm but zero."""
-    quaternion = finite_array("quaternion", quaternion)
-    if quaternion.shape[-1:] != (4,):
-        raise StateError(f"quaternion has shape {quaternion.shape}, not (4,) or (..., 4)")
-    size = np.max(np.abs(quaternion), axis=-1, keepdims=True)
-    if not (size >= np.finfo(float).tiny).all():
-        raise StateError("a quaternion is zero: upright is (1, 0, 0, 0)")
-    quaternion = quaternion / size  # whose squares are numbers
-    w, x, y, z = np.moveaxis(quaternion / np.linalg.norm(quaternion, axis=-1, keepdims=True), -1, 0)
-    first = np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)], axis=-1)
-    second = np.stack([2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)], axis=-1)
-    third = np.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)], axis=-1)
-    return np.stack([first, second, third], axis=-2)
-
-
-def pitch_roll_yaw(q: ArrayLike, unwrap: bool = False) -> Array:
-    """Angles (phi_x, phi_y, phi_z), (..., 3), rad, R = Rz(phi_z) Rx(phi_x) Ry(phi_y), of q (..., 7+2m).
-
-    |phi_x| <= pi/2; at pi/2 itself one of the valid answers. unwrap, for q (K, 7+2m): continued along time
-    over whole turns and through phi_x = +-pi/2.
-    """
-    q = finite_array("q", q)
-    if q.ndim == 0 or q.shape[-1] < 7:
-        raise StateError(f"q has shape {q.shape}, not (7 + 2m,) or (..., 7 + 2m)")
-    rotation = rotation_matrix(q[..., 3:7])
-    first, second, third = (rotation[..., row, :] for row in range(3))
-    yaw = np.arctan2(-first[..., 1], second[..., 1])
-    c, s = np.cos(yaw)[..., None], np.sin(yaw)[..., None]
-    first, second = c * first + s * second, c * second - s * first  # Rz(-phi_z) R = Rx(phi_x) Ry(phi_y)
-    pitch = np.arctan2(third[..., 1], second[..., 1])
-    angles = np.stack([pitch, np.arctan2(first[..., 2], first[..., 0]), yaw], axis=-1)
-    return _continued(angles) if unwrap else angles
-
-
-@contextlib.contextmanager
-def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """A file to write beside path, made to replace it on success and removed on failure; makes the folder."""
-    target = Path(path)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    part = target.with_name(f".{target.name}.{secrets.token_hex(4)}.part")
-    try:
-        yield part
-        part.replace(target)
-    finally:
-        part.unlink(missing_ok=True)
 
 
 def _real(name: str, value: ArrayLike) -> Array:
@@ -311,23 +259,10 @@ def _hermite_q(rows: _Rows, q: Array, v: Array) -> Array:
     """Configurations between the samples q with velocities v."""
     attitude = sign_continuous(q[:, 3:7])
     positions = np.hstack([q[:, :3], attitude, q[:, 7:]])
-    rates = np.hstack([v[:, :3], _quaternion_rate(attitude, v[:, 3:6]), v[:, 6:]])
+    rates = np.hstack([v[:, :3], quaternion_rate(attitude, v[:, 3:6]), v[:, 6:]])
     result = rows.hermite(positions, rates)
     result[:, 3:7] /= np.linalg.norm(result[:, 3:7], axis=1, keepdims=True)
     return result
-
-
-def sign_continuous(quaternion: Array) -> Array:
-    """The same rotations, each quaternion in the half-space of the one before it."""
-    turned = np.sum(quaternion[1:] * quaternion[:-1], axis=1) < 0
-    signs = np.cumprod(np.where(turned, -1.0, 1.0), dtype=np.float64)
-    return np.vstack([quaternion[:1], signs[:, None] * quaternion[1:]])
-
-
-def _quaternion_rate(quaternion: Array, omega: Array) -> Array:
-    """q_dot = q (0, omega) / 2 with omega in the body frame."""
-    w, u = quaternion[:, :1], quaternion[:, 1:]
-    return np.hstack([-np.sum(u * omega, axis=1, keepdims=True), w * omega + np.cross(u, omega)]) / 2
 
 
 def _monotone(t: Array, values: Array, times: Array) -> Array:
@@ -337,33 +272,3 @@ def _monotone(t: Array, values: Array, times: Array) -> Array:
     if len(t) == 1:
         return np.repeat(values, len(times), axis=0)
     return np.asarray(PchipInterpolator(t, values, axis=0)(times))
-
-
-def _continued(angles: Array) -> Array:
-    """Angles (K, 3) followed along time over whole turns and both Euler branches."""
-    if angles.ndim != 2:
-        raise ValueError(f"q of {angles.ndim} dimensions cannot be unwrapped: give (K, 7 + 2m), time first")
-    followed = angles.copy()
-    followed[:1] = [_upright(first) for first in angles[:1]]
-    for k in range(1, len(angles)):
-        followed[k] = _nearest(angles[k], followed[k - 1])
-    return followed
-
-
-def _branches(angles: Array) -> Array:
-    """Both Euler branches of one attitude: (x, y, z) and (pi - x, y + pi, z + pi), (2, 3)."""
-    return np.stack([angles, angles * (-1, 1, 1) + np.pi])
-
-
-def _upright(angles: Array) -> Array:
-    """The angles of one attitude with the least roll and yaw, which are within half a turn: a somersault is pitch."""
-    branches = _branches(angles)
-    branches[:, 1:] -= 2 * np.pi * np.round(branches[:, 1:] / (2 * np.pi))
-    return np.asarray(branches[np.argmin(np.abs(branches[:, 1:]).sum(axis=1))])
-
-
-def _nearest(angles: Array, reference: Array) -> Array:
-    """The angles of one attitude, (x, y, z) or (pi - x, y + pi, z + pi) plus turns, closest to reference."""
-    branches = _branches(angles)
-    branches += 2 * np.pi * np.round((reference - branches) / (2 * np.pi))
-    return np.asarray(branches[np.argmin(np.abs(branches - reference).sum(axis=1))])

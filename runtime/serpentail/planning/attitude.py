@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..attitude import from_angles, pitch_roll_yaw, product, sign_continuous
 from ..errors import PlanningError
-from ..trajectory import pitch_roll_yaw, sign_continuous
 
 KINDS = {"quaternion": 4, "euler": 3}
 
@@ -66,37 +66,3 @@ def attitude(kind: str) -> Attitude:
     if kind not in KINDS:
         raise PlanningError(f"attitude: value {kind!r}: needs {' or '.join(map(repr, KINDS))}")
     return Attitude(kind)
-
-
-def product(a, b) -> list:
-    """Return the entries of the quaternion product a b."""
-    return [
-        a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
-        a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
-        a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
-        a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0],
-    ]
-
-
-def from_angles(angles: np.ndarray) -> np.ndarray:
-    """Return quaternions (..., 4) of pitch, roll and yaw (..., 3), rad, R = Rz(phi_z) Rx(phi_x) Ry(phi_y)."""
-    c, s = np.cos(angles / 2), np.sin(angles / 2)
-    zero = np.zeros_like(c[..., 0])
-    pitch, roll = [c[..., 0], s[..., 0], zero, zero], [c[..., 1], zero, s[..., 1], zero]
-    yaw = [c[..., 2], zero, zero, s[..., 2]]
-    return np.stack(product(product(yaw, pitch), roll), axis=-1)
-
-
-def angle_deg(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return the angle (...) in degrees between attitudes given as unit quaternions (..., 4)."""
-    conjugate = np.asarray(a) * (1, -1, -1, -1)
-    entries = product(list(np.moveaxis(conjugate, -1, 0)), list(np.moveaxis(np.asarray(b), -1, 0)))
-    vector = np.sqrt(entries[1] ** 2 + entries[2] ** 2 + entries[3] ** 2)
-    return np.degrees(2 * np.arctan2(vector, np.abs(entries[0])))
-
-
-def tilt_deg(quaternion: np.ndarray) -> np.ndarray:
-    """Return the angle (...) in degrees between the torso's z axis and the world's, of unit quaternions (..., 4)."""
-    q = np.asarray(quaternion)
-    level = np.hypot(q[..., 1], q[..., 2])
-    return np.degrees(2 * np.arctan2(level, np.hypot(q[..., 0], q[..., 3])))

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..trajectory import rotation_matrix
+from ..attitude import rotation_matrix
 from .transcription import Transcription
 
 

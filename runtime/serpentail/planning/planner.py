@@ -5,11 +5,12 @@ from dataclasses import fields
 
 import numpy as np
 
+from ..checks import choice, number
 from ..errors import PlanningError
 from ..trajectory import Trajectory
 from .formulations import dynamics
 from .interrupt import heeded
-from .problem import SETTINGS, Bounds, Goal, Problem, checked_problem, choice, number
+from .problem import SETTINGS, Bounds, Goal, Problem, checked_problem
 from .rounds import Method, Run
 from .rules import rule
 

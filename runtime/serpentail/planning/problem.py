@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from .. import names
+from ..checks import choice, number, numbers
 from ..errors import PlanningError
 from .attitude import KINDS
 from .formulations import FORMULATIONS
@@ -79,30 +79,6 @@ def checked_problem(model, start, goal, duration, bounds, **settings) -> Problem
     choice("formulation", settings.get("formulation", "airborne"), FORMULATIONS)
     choice("attitude", settings.get("attitude", "quaternion"), KINDS)
     return Problem(q0, v0, goal, _duration(duration), bounds, **settings)
-
-
-def choice(field: str, value, known) -> None:
-    """PlanningError unless the value is a known name."""
-    names.known(field, value, known, PlanningError)
-
-
-def number(field: str, value, least: float = 0.0, above: bool = True) -> float:
-    """Return a finite number above (or from) the least one; PlanningError else."""
-    good = isinstance(value, int | float | np.number) and not isinstance(value, bool) and np.isfinite(value)
-    if not good or value < least or (above and value == least):
-        raise PlanningError(f"{field}: value {value!r}: needs a number {'above' if above else 'from'} {least:g}")
-    return float(value)
-
-
-def numbers(field: str, value, size: int) -> np.ndarray:
-    """Return finite numbers (size,), one given number repeated; PlanningError else."""
-    try:
-        array = np.asarray(value, float)
-    except (TypeError, ValueError):
-        raise PlanningError(f"{field}: value {value!r}: needs {size} numbers") from None
-    if array.shape not in ((), (size,)) or not np.isfinite(array).all():
-        raise PlanningError(f"{field}: value {value!r}: needs {size} finite numbers")
-    return np.broadcast_to(array, (size,)).copy()
 
 
 def _vector(field: str, value, size: int) -> np.ndarray:

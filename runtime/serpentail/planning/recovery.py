@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..trajectory import rotation_matrix
+from ..attitude import rotation_matrix
 from .attitude import Attitude
 
 

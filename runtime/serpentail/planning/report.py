@@ -2,11 +2,11 @@
 
 import numpy as np
 
+from ..attitude import angle_deg, pitch_roll_yaw, tilt_deg
 from ..errors import SimulationError
 from ..simulation.run import simulate
 from ..tracking import Pfl
-from ..trajectory import Trajectory, pitch_roll_yaw
-from .attitude import angle_deg, tilt_deg
+from ..trajectory import Trajectory
 from .curve import Curve
 from .problem import Problem
 

@@ -3,10 +3,11 @@
 from collections.abc import Mapping
 from dataclasses import fields
 
+from ..checks import choice
 from ..errors import PlanningError
 from ..scene_file import model_of, read_scene, subtable
 from .planner import plan
-from .problem import SETTINGS, Bounds, Goal, choice
+from .problem import SETTINGS, Bounds, Goal
 from .rounds import Method
 from .solution import Plan
 

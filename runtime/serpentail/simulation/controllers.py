@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..checks import real_array
 from ..errors import SimulationError
-from ..library import real_array
 from ..tracking import Pfl
 from .piecewise import Piecewise, checked_nodes, linear
 

@@ -4,8 +4,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..checks import real_array
 from ..errors import SimulationError
-from ..library import Rows, real_array
+from ..library import Rows
 from ..parameters import RunParameters
 from ..touch import Contact
 from .schedules import Legs

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..checks import positive
 from ..errors import SimulationError
-from .start import positive
 
 FIXED = ("rk4", "implicit_euler")
 ADAPTIVE = ("tsit5", "ros34pw2")

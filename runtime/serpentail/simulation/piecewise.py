@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..checks import real_array
 from ..errors import SimulationError
-from ..library import real_array
 
 SAME = 1e-9  # a jump that is smaller, over the largest value, is rounding
 

@@ -6,12 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
+from ..checks import finite, known, positive, real_array
 from ..errors import SimulationError
 from ..film import filmstrip
-from ..library import real_array
 from ..limbs import centre_of_mass, leg_joints
 from ..model import Model
-from ..names import known
 from ..scene_file import model_of, read_scene, subtable
 from ..tracking import KD, KP, Pfl
 from ..trajectory import Trajectory
@@ -21,7 +20,6 @@ from .methods import SETTINGS
 from .run import simulate
 from .schedules import Legs, Reference, shared_among_links
 from .settling import settle
-from .start import finite, positive
 from .summary import summary
 
 NUMBERS = (*dict.fromkeys(name for own in SETTINGS.values() for name in own), "output_step")

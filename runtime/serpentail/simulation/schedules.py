@@ -7,11 +7,9 @@ from typing import Self
 
 import numpy as np
 
+from ..checks import finite, known, positive, real_array
 from ..errors import SimulationError
-from ..library import real_array
-from ..names import known
 from .piecewise import Piecewise, blends, checked_nodes, linear, spline
-from .start import finite, positive
 
 BLENDS = {"linear": linear, "quintic": blends, "spline": spline}
 

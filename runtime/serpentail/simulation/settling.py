@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from ..checks import positive
 from ..errors import SimulationError, StateError
 from .controllers import Controller
 from .run import simulate
-from .start import positive
 
 
 def settle(

@@ -6,8 +6,8 @@ from functools import cached_property
 
 import numpy as np
 
+from ..checks import positive, real_array
 from ..errors import SimulationError, StateError
-from ..library import real_array
 
 MOST_SAMPLES = 10_000_000  # of all runs: more are a slip, and fill the memory
 SHORTEST = 1e-100  # s: between samples; methods multiply times
@@ -94,19 +94,3 @@ def _paired(q0: np.ndarray, v0: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         raise StateError(f"q0 has {len(q0)} runs, v0 {len(v0)}: give as many of both, or one of either")
     runs = counts.pop() if counts else 1
     return tuple(np.array(np.broadcast_to(array, (runs, array.shape[-1])), order="C") for array in (q0, v0))
-
-
-def positive(name: str, value) -> float:
-    """Return a number above 0; SimulationError where it is none."""
-    number = real_array(name, value, error=SimulationError)
-    if number.shape != () or not 0 < number < np.inf:
-        raise SimulationError(f"{name} {value!r}: give a number above 0")
-    return float(number)
-
-
-def finite(name: str, value) -> float:
-    """Return a finite number; SimulationError where it is none."""
-    number = real_array(name, value, error=SimulationError)
-    if number.shape != () or not np.isfinite(number):
-        raise SimulationError(f"{name} {value!r}: give a finite number")
-    return float(number)
