@@ -9,8 +9,8 @@ import numpy as np
 
 import serpentail as st
 from fixtures import generated, label
-from serpentail.library import aligned, call_record
-from serpentail.side_by_side import MANY
+from serpentail.model.batch import MANY
+from serpentail.model.kernel import aligned, call_record
 from serpentail.simulation import abreast
 
 STATES, ROUNDS = 512, 300  # a batch that stays in the cache

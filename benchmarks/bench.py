@@ -50,7 +50,7 @@ def main() -> int:
 
 def machine() -> dict:
     """Return the processor and compiler."""
-    from serpentail.compiler import describe_compiler
+    from serpentail.model.compiler import describe_compiler
 
     lines = Path("/proc/cpuinfo").read_text().splitlines() if Path("/proc/cpuinfo").exists() else []
     processor = next(

@@ -15,7 +15,7 @@ import numpy as np
 import peers
 import serpentail as st
 from fixtures import Fixture, fixture
-from serpentail.compiler import compile_library
+from serpentail.model.compiler import compile_library
 from serpentail_codegen.scene.scene import DERIVATIVES
 
 SIZES = ((1, 3), (3, 4), (6, 6))

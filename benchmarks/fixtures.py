@@ -11,8 +11,8 @@ import numpy as np
 
 import serpentail as st
 from peers import Closure
-from serpentail.compiler import compile_library
-from serpentail.library import aligned
+from serpentail.model.compiler import compile_library
+from serpentail.model.kernel import aligned
 
 ADAPTER = """
 #include "{prefix}.h"

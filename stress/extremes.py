@@ -3,7 +3,7 @@
 import numpy as np
 
 from figures import Figure
-from serpentail.parameters import disparity
+from serpentail.model.parameters import disparity
 from subjects import changed, errors, judged, state, subject
 
 MICROGRAM = 1e-9  # kg

@@ -11,7 +11,7 @@ import drops
 import serpentail as st
 from extremes import cases
 from poses import FAST, SMALL, folds
-from serpentail.parameters import flat, resolve
+from serpentail.model.parameters import flat, resolve
 from subjects import Subject
 
 DRIVER = Path(__file__).parent / "driver.c"

@@ -11,8 +11,7 @@ import pytest
 
 import serpentail as st
 from models import model_folder
-from serpentail import side_by_side
-from serpentail.compiler import compile_library
+from serpentail.model.compiler import compile_library
 from serpentail_codegen.functions.function import program
 from serpentail_codegen.functions.plain import FUNCTIONS
 from serpentail_codegen.functions.tail import Tail
@@ -46,7 +45,7 @@ def model(kind="articulated", segments=2, links=2, profile="fast", **options):
 
 @pytest.fixture(autouse=True)
 def any_batch_is_large(monkeypatch):
-    monkeypatch.setattr(side_by_side, "MANY", 1)
+    monkeypatch.setattr("serpentail.model.batch.MANY", 1)
 
 
 def states(model, count, seed=0):
@@ -188,9 +187,9 @@ void row(const real *x, real *sine, real *cosine) {{
 
 
 def test_a_few_states_compile_nothing_and_many_do_once(monkeypatch):
-    monkeypatch.setattr(side_by_side, "MANY", 1000)
+    monkeypatch.setattr("serpentail.model.batch.MANY", 1000)
     built = []
-    monkeypatch.setattr(side_by_side, "compile_library", lambda *a: built.append(a) or compile_library(*a))
+    monkeypatch.setattr("serpentail.model.batch.compile_library", lambda *a: built.append(a) or compile_library(*a))
     found = st.load(model().folder)
     found.mass_matrix(states(found, 999)["q"])
     assert not built

@@ -15,7 +15,7 @@ import collocation
 import serpentail as st
 from models import model_folder
 from references.parameters import random_states
-from serpentail.casadi_functions import DERIVATIVES
+from serpentail.model.casadi import DERIVATIVES
 from serpentail_codegen.targets.c.casadi_external import DYNAMICS
 from test_casadi_target import Model
 

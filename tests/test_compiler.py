@@ -14,8 +14,9 @@ from pathlib import Path
 
 import pytest
 
-from serpentail import compiler
 from serpentail.errors import CompileFailed, CompilerNotFound, ModelError, SerpentailError, StateError
+from serpentail.model import compiler, toolchain
+from serpentail.model.cache import cache_folder
 
 TWICE = '#include "scale.h"\ndouble twice(double x) { return SCALE * x; }\n'
 
@@ -131,7 +132,7 @@ def test_another_processor_gets_another_library(model, monkeypatch, script):
     built = []
     for processor in ("zen", "lake"):
         monkeypatch.setenv("PROCESSOR", processor)
-        monkeypatch.setattr(compiler, "_processor", lambda processor=processor: processor)
+        monkeypatch.setattr("serpentail.model.toolchain._processor", lambda processor=processor: processor)
         built.append(compiler.compile_library(*model))
     assert built[0].parent != built[1].parent
     forbid_processes(monkeypatch)
@@ -228,7 +229,7 @@ def test_ziglang_wheel_comes_last(monkeypatch, tmp_path):
     (package / "__init__.py").touch()
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setenv("PATH", str(package))
-    assert list(compiler._candidates()) == [(sys.executable, "-m", "ziglang", "cc")]
+    assert list(toolchain.candidates()) == [(sys.executable, "-m", "ziglang", "cc")]
 
 
 def test_failing_source_shows_the_compilers_words(model, cache):
@@ -274,12 +275,12 @@ def test_damaged_note_is_ignored(model, cache, text):
 def test_eight_processes_at_once(model, cache):
     (source,), include = model
     program = (
-        "import ctypes, pathlib, sys; from serpentail import compiler; path = pathlib.Path\n"
+        "import ctypes, pathlib, sys; from serpentail.model import compiler; path = pathlib.Path\n"
         "library = ctypes.CDLL(str(compiler.compile_library([path(sys.argv[1])], path(sys.argv[2]))))\n"
         "library.twice.restype = ctypes.c_double; print(library.twice(ctypes.c_double(21.0)))"
     )
     command = [sys.executable, "-c", program, str(source), str(include)]
-    surroundings = {**os.environ, "PYTHONPATH": str(Path(compiler.__file__).parents[1])}
+    surroundings = {**os.environ, "PYTHONPATH": str(Path(compiler.__file__).parents[2])}
     crowd = [
         subprocess.Popen(command, env=surroundings, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         for _ in range(8)
@@ -292,10 +293,10 @@ def test_killed_compile_leaves_no_library(model, script, cache, monkeypatch):
     (source,), include = model
     script('for word; do case $word in *.part) echo half > $word; touch "$0.busy"; sleep 60;; esac; done')
     program = (
-        "import pathlib, sys; from serpentail import compiler; path = pathlib.Path\n"
+        "import pathlib, sys; from serpentail.model import compiler; path = pathlib.Path\n"
         "compiler.compile_library([path(sys.argv[1])], path(sys.argv[2]))"
     )
-    surroundings = {**os.environ, "PYTHONPATH": str(Path(compiler.__file__).parents[1])}
+    surroundings = {**os.environ, "PYTHONPATH": str(Path(compiler.__file__).parents[2])}
     command = [sys.executable, "-c", program, str(source), str(include)]
     with subprocess.Popen(command, env=surroundings, start_new_session=True) as process:
         busy = Path(os.environ["CC"] + ".busy")
@@ -328,12 +329,12 @@ def test_unwritable_cache_names_the_variable(model, monkeypatch, tmp_path):
 def test_cache_folder_by_precedence(monkeypatch, tmp_path):
     monkeypatch.setenv("HOME", str(tmp_path))
     monkeypatch.setenv("XDG_CACHE_HOME", "/xdg")
-    assert compiler._cache_folder(tmp_path / "argument") == tmp_path / "argument"
-    assert compiler._cache_folder(None) == tmp_path / "cache"
+    assert cache_folder(tmp_path / "argument") == tmp_path / "argument"
+    assert cache_folder(None) == tmp_path / "cache"
     monkeypatch.delenv("SERPENTAIL_CACHE")
-    assert compiler._cache_folder(None) == Path("/xdg/serpentail")
+    assert cache_folder(None) == Path("/xdg/serpentail")
     monkeypatch.setenv("XDG_CACHE_HOME", "relative")
-    assert compiler._cache_folder(None) == tmp_path / ".cache" / "serpentail"
+    assert cache_folder(None) == tmp_path / ".cache" / "serpentail"
 
 
 def test_missing_files_are_a_model_error(model, tmp_path):

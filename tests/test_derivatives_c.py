@@ -13,8 +13,8 @@ from derivative_models import derivative_model, jacobian_error, nest_of, paramet
 from models import model_folder
 from programs import Narrow
 from references.metrics import equilibrated_condition
-from serpentail.compiler import _candidates
-from serpentail.model import Model
+from serpentail.model.model import Model
+from serpentail.model.toolchain import candidates as _candidates
 from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.ir.program import Apply, statements
 from serpentail_codegen.scene.scene import DERIVATIVES

@@ -11,7 +11,6 @@ import pytest
 
 import serpentail as st
 from models import model_folder
-from serpentail import compiler
 from serpentail_codegen.targets.write import signed
 
 UPRIGHT = [0, 0, 0, 1, 0, 0, 0, 0, 0]
@@ -188,7 +187,7 @@ def test_compilers_message_is_shown(folder, cache, script):
 def test_library_that_cannot_be_loaded(folder, cache, monkeypatch):
     foreign = folder / "foreign.so"
     foreign.write_text("of another machine")
-    monkeypatch.setattr("serpentail.library.compile_library", lambda *_: foreign)
+    monkeypatch.setattr("serpentail.model.library.compile_library", lambda *_: foreign)
     with pytest.raises(st.SerpentailError, match=r"cannot be loaded \(.*foreign\.so.*set SERPENTAIL_CACHE"):
         st.load(folder)
 
@@ -217,6 +216,6 @@ def test_four_processes_load_one_model(folder, cache, script, tmp_path):
 
 def test_second_load_compiles_nothing(folder, cache, monkeypatch):
     first = st.load(folder)
-    monkeypatch.setattr(compiler, "_compile", None)
+    monkeypatch.setattr("serpentail.model.compiler._compile", None)
     second = st.load(folder)
     np.testing.assert_array_equal(second.mass_matrix(UPRIGHT), first.mass_matrix(UPRIGHT))

@@ -7,7 +7,7 @@ import pytest
 
 import serpentail as st
 from models import model_folder
-from serpentail.parameters import ellipsoid, flat, resolve
+from serpentail.model.parameters import ellipsoid, flat, resolve
 from serpentail_codegen.scene.parameters import PARAMETERS
 from serpentail_codegen.scene.resolve import resolve_parameters
 

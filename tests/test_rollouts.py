@@ -12,7 +12,7 @@ import pytest
 
 import serpentail as st
 from models import model_folder
-from serpentail import side_by_side
+from serpentail.model.compiler import compile_library
 from serpentail.simulation import abreast, rollouts
 
 SEGMENTS, LINKS = 2, 2
@@ -459,8 +459,8 @@ def test_a_flight_that_fails_abreast_loses_no_other():
 
 def test_few_steps_compile_nothing_and_other_laws_fly_alone(monkeypatch):
     built = []
-    compiled = side_by_side.compile_library
-    monkeypatch.setattr(side_by_side, "compile_library", lambda *a: built.append(a) or compiled(*a))
+    compiled = compile_library
+    monkeypatch.setattr("serpentail.model.batch.compile_library", lambda *a: built.append(a) or compiled(*a))
     model = st.load(tail().folder)
     q, v = starts(model, 9)
     assert st.simulate(model, q, v, **FLIGHT).info["abreast"] == 1 and not built

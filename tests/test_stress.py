@@ -16,8 +16,8 @@ from figures import Figure, table
 from models import model_folder
 from poses import Point
 from references.metrics import mass_matrix_error
-from serpentail.parameters import UNLIKE as UNLIKE_FROM
-from serpentail.parameters import disparity
+from serpentail.model.parameters import UNLIKE as UNLIKE_FROM
+from serpentail.model.parameters import disparity
 from subjects import Errors, Subject, changed, exact_of, state
 
 SCENES = sorted((Path(__file__).parent.parent / "scenes").glob("*.toml"))

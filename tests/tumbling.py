@@ -6,7 +6,7 @@ import numpy as np
 
 import serpentail as st
 from models import model_folder
-from serpentail.casadi_functions import DERIVATIVES
+from serpentail.model.casadi import DERIVATIVES
 
 EXACT = sorted({part for name, orders in DERIVATIVES.items() for part in (name, *orders[0], *orders[1])})
 FUNCTIONS = [*EXACT, "bias_force", "pfl", "energy", "momentum", "rollout", "tail_points"]

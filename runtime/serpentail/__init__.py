@@ -4,7 +4,7 @@ from importlib import import_module
 
 __version__ = "0.1.0"
 _HOME = {
-    **dict.fromkeys(["load", "Model"], "model"),
+    **dict.fromkeys(["load", "Model"], "model.model"),
     "simulate": "simulation.run",
     "Rollouts": "simulation.rollouts",
     "settle": "simulation.settling",
@@ -15,7 +15,7 @@ _HOME = {
     "Contact": "touch",
     "Trajectory": "trajectory",
     **dict.fromkeys(["pitch_roll_yaw", "rotation_matrix"], "attitude"),
-    **dict.fromkeys(["polar_to_bend", "bend_to_polar"], "polar"),
+    **dict.fromkeys(["polar_to_bend", "bend_to_polar"], "model.polar"),
     "plan": "planning.planner",
     **dict.fromkeys(["Goal", "Bounds"], "planning.problem"),
     "Plan": "planning.solution",

@@ -9,7 +9,7 @@ from .errors import SerpentailError
 
 def info(folder: str) -> dict:
     """Return what a model is: sizes, functions, how each was emitted, what it costs."""
-    from .model import load
+    from .model.model import load
 
     model = load(folder)
     functions = {
@@ -101,7 +101,7 @@ def run(arguments: argparse.Namespace) -> tuple[dict, str, bool]:
         return plan.report, text, plan.success
     if arguments.verb == "simulate":
         return simulated(arguments)
-    from .model import load
+    from .model.model import load
     from .verify import as_text, laws, summary
 
     model = load(arguments.folder)

@@ -6,7 +6,7 @@ import numpy as np
 
 from .laws import NEAR, Law, fastest, moved, registry, slope
 from .measures import State, relative, sensitivity, worst
-from .model import Model
+from .model.model import Model
 
 FAR = 10 * NEAR  # a slope divides rounding by its step
 SUNK = 3e-3  # m, how deep the lowest point is

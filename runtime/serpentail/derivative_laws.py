@@ -7,7 +7,7 @@ import numpy as np
 
 from .laws import NEAR, Law, fastest, moved, registry, slope
 from .measures import State, block_error, relative, worst
-from .model import Model
+from .model.model import Model
 
 FAR = 10 * NEAR  # a slope divides rounding by its step
 LAWS: list[Law] = []

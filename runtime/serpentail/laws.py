@@ -29,7 +29,7 @@ from .measures import (
     turned_array,
     worst,
 )
-from .model import Model
+from .model.model import Model
 from .simulation.run import simulate
 
 NEAR = 450  # roundings: 1e-13 in double

@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from .errors import ModelError
-from .model import Model
+from .model.model import Model
 
 KINDS = ("random", "straight", "folded")
 BLOCKS = (slice(0, 3), slice(3, 6), slice(6, None))  # of forces and accelerations: B's translation, rotation, tail

@@ -8,8 +8,8 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from .errors import ModelError
-from .manifest import read_manifest
-from .model import Model, load
+from .model.manifest import read_manifest
+from .model.model import Model, load
 
 MADE_OF = ("kind", "segments", "links", "samples", "contacts", "friction", "bend_range", "coordinates")
 

@@ -10,7 +10,7 @@ from .simulation.piecewise import Piecewise, checked_nodes, spline
 from .simulation.schedules import Reference
 
 if TYPE_CHECKING:
-    from .model import Model
+    from .model.model import Model
 
 KP, KD = 4e4, 400.0  # 1/s^2, 1/s: Table 1
 

@@ -10,7 +10,7 @@ from .errors import SerpentailError
 from .laws import LAWS as VALUE_LAWS
 from .laws import Law
 from .measures import State, states
-from .model import Model
+from .model.model import Model
 
 LAWS = (*VALUE_LAWS, *derivative_laws.LAWS, *contact_laws.LAWS)
 

@@ -6,7 +6,7 @@ from threading import Event
 
 import numpy as np
 
-from ..library import aligned
+from ..model.kernel import aligned
 from .compiled import PAUSE, Memory
 from .drive import Drive
 from .methods import Method

@@ -7,8 +7,9 @@ from threading import Event
 import numpy as np
 
 from ..errors import SimulationError
-from ..library import NOT_FINITE, NOT_POSITIVE_DEFINITE, OUT_OF_RANGE, aligned
-from ..parameters import RunParameters
+from ..model.kernel import aligned
+from ..model.library import NOT_FINITE, NOT_POSITIVE_DEFINITE, OUT_OF_RANGE
+from ..model.parameters import RunParameters
 from .drive import Drive
 from .ground import MOST_EVENTS, Ground
 from .methods import Method

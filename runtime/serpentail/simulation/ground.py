@@ -6,8 +6,8 @@ import numpy as np
 
 from ..checks import real_array
 from ..errors import SimulationError
-from ..library import Rows
-from ..parameters import RunParameters
+from ..model.kernel import Rows
+from ..model.parameters import RunParameters
 from ..touch import Contact
 from .schedules import Legs
 from .start import Start

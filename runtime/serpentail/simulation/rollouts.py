@@ -7,9 +7,9 @@ from threading import Event
 import numpy as np
 
 from ..errors import SimulationError, StateError
-from ..library import Rows
-from ..parameters import RunParameters
-from ..side_by_side import cores, in_turn
+from ..model.kernel import Rows
+from ..model.parameters import RunParameters
+from ..model.workers import cores, in_turn
 from ..trajectory import Trajectory
 from .abreast import Abreast, pays
 from .compiled import COUNTS, PAUSED, CompiledRun, Memory, Outcome, Samples, sampled

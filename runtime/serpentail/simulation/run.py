@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import ModelError, SimulationError, StateError
-from ..library import Rows
-from ..parameters import RunParameters
+from ..model.kernel import Rows
+from ..model.parameters import RunParameters
 from ..trajectory import Trajectory
 from .compiled import CompiledRun, Memory, Samples
 from .controllers import Controller

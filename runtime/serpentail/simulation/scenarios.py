@@ -10,7 +10,7 @@ from ..checks import finite, known, positive, real_array
 from ..errors import SimulationError
 from ..film import filmstrip
 from ..limbs import centre_of_mass, leg_joints
-from ..model import Model
+from ..model.model import Model
 from ..scene_file import model_of, read_scene, subtable
 from ..tracking import KD, KP, Pfl
 from ..trajectory import Trajectory

@@ -5,7 +5,7 @@ import ctypes
 import numpy as np
 
 from ..errors import SimulationError
-from ..library import NOT_FINITE
+from ..model.library import NOT_FINITE
 from .compiled import CompiledRun, Samples, failed
 from .methods import Method
 

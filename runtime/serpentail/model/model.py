@@ -7,12 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from .checks import finite_array
-from .errors import ModelError, StateError
-from .library import Kernel, open_library
+from ..checks import finite_array
+from ..errors import ModelError, StateError
+from .batch import SideBySide
+from .kernel import Kernel
+from .library import open_library
 from .manifest import read_manifest
 from .parameters import RunParameters, flat, resolve, warn_of_unlike, without_replaced
-from .side_by_side import SideBySide
 
 
 def load(
@@ -261,6 +262,6 @@ class Model:
     @cached_property
     def casadi(self):
         """``casadi.Function``s by name, the parameters folded in: ``model.casadi.forward_dynamics(q, v, tau)``."""
-        from .casadi_functions import CasadiFunctions
+        from .casadi import CasadiFunctions
 
         return CasadiFunctions(self)

@@ -8,7 +8,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from .errors import ModelError, UnlikeBodies
+from ..errors import ModelError, UnlikeBodies
 
 Value = float | tuple[float, ...]
 CHECKS = {  # of rows (K, size), for each one
@@ -20,7 +20,6 @@ CHECKS = {  # of rows (K, size), for each one
         "above 0, none above the sum of the other two",
     ),
 }
-
 UNLIKE = 1e4  # from here on H may be off by 1e-12 of its diagonal: docs/stability.md
 
 

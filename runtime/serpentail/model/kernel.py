@@ -1,41 +1,18 @@
-"""Compiled models: a manifest and a parameter vector go in, callables on NumPy arrays come out."""
+"""Compiled functions that are called with NumPy arrays."""
 
 import ctypes
 import math
 import threading
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 from numpy import ndarray
 
-from .checks import real_array
-from .compiler import compile_library
-from .errors import ModelError, SerpentailError, StateError
-from .manifest import remedy
-from .side_by_side import LATE, SideBySide, shared
-
-NOT_POSITIVE_DEFINITE, NOT_FINITE, OUT_OF_RANGE = 1, 2, 3
-
-
-def open_library(folder: Path, manifest: dict, profile: str) -> ctypes.CDLL:
-    """Compile (or find in the cache) and load a model's C; ModelError where it is not what the manifest says."""
-    prefix = manifest["prefix"]
-    late = {f"src/{prefix}_{part}.c" for part in LATE}
-    sources = [folder / name for name in manifest["files"] if name.startswith("src/") and name not in late]
-    path = compile_library(sources, folder / "include", profile)
-    try:
-        library = ctypes.CDLL(str(path))
-    except OSError as error:
-        raise SerpentailError(f"the compiled model cannot be loaded ({error}): set SERPENTAIL_CACHE") from error
-    abi_hash = getattr(library, f"{prefix}_abi_hash")
-    abi_hash.restype = ctypes.c_char_p
-    if abi_hash().decode() != manifest["abi_hash"]:
-        raise ModelError(
-            f"{path} has interface {abi_hash().decode()}, the manifest {manifest['abi_hash']}: {remedy(folder)}"
-        )
-    return library
-
+from ..checks import real_array
+from ..errors import StateError
+from .batch import SideBySide
+from .library import NOT_POSITIVE_DEFINITE, OUT_OF_RANGE
+from .workers import shared
 
 MOST_ARRAYS = 8
 

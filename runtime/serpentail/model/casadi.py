@@ -4,7 +4,7 @@ import importlib.util
 
 import casadi
 
-from .errors import ModelError
+from ..errors import ModelError
 from .parameters import flat
 
 # compiled functions that first and second derivatives of an external one are made of

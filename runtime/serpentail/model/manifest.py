@@ -4,8 +4,8 @@ import hashlib
 import json
 from pathlib import Path
 
-from . import __version__
-from .errors import ModelError
+from .. import __version__
+from ..errors import ModelError
 
 FORMAT = 1
 KEYS = [

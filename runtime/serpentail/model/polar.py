@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from .checks import finite_array
-from .errors import StateError
+from ..checks import finite_array
+from ..errors import StateError
 
 
 def polar_to_bend(phi, theta, phi_dot=0.0, theta_dot=0.0):

@@ -1,0 +1,201 @@
+"""The C compiler: which one works here, and what its flags stand for on this machine."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.util
+import json
+import os
+import shlex
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from ..errors import CompilerNotFound, SerpentailError
+from .cache import digest, temporary_file
+
+# -std=c99 alone turns contraction off, so the fast profile asks for it by name.
+PROFILES = {
+    "fast": ("-std=c99", "-O2", "-ffp-contract=fast", "-fno-tree-vectorize", "-fno-math-errno", "-fno-trapping-math"),
+    "reproducible": ("-std=c99", "-O2", "-ffp-contract=off"),
+}
+# The first of these that the compiler takes joins the profile. Only zig takes `baseline`: unasked, it builds
+# for the processor at hand, where gcc and clang build for any processor of its family.
+CPU_FLAGS = {"fast": ("-march=native", "-mcpu=native"), "reproducible": ("-mcpu=baseline",)}
+PROGRAMS = ("cc", "gcc", "clang")
+REMEDY_NOT_FOUND = (
+    "Install one (Debian, Ubuntu: `apt install gcc`; macOS: `xcode-select --install`; anywhere: "
+    "`pip install ziglang`) or set CC to the command of a C compiler. "
+    "Without a compiler the CasADi functions of a model still evaluate."
+)
+
+
+@dataclass(frozen=True)
+class Toolchain:
+    """A compiler as examined for one profile: how to call it and what its output depends on."""
+
+    command: tuple[str, ...]
+    flags: tuple[str, ...]
+    version: str
+    target: str  # digest of the processor and instruction set that the flags stand for on this machine
+
+
+def check_profile(profile: str) -> None:
+    """Raise SerpentailError unless `profile` is known."""
+    if not isinstance(profile, str) or profile not in PROFILES:
+        raise SerpentailError(f"unknown build profile {profile!r}; choose one of {', '.join(PROFILES)}")
+
+
+# The compiler: which one, and what it resolves its flags to.
+
+
+def candidates() -> Iterator[tuple[str, ...]]:
+    """Yield the commands to try: $CC alone if it is set, else what is on PATH, then the ziglang wheel."""
+    chosen = os.environ.get("CC", "").strip()
+    if chosen:
+        yield _split(chosen)
+        return
+    yield from ((path,) for path in map(shutil.which, PROGRAMS) if path)
+    if importlib.util.find_spec("ziglang"):
+        yield (sys.executable, "-m", "ziglang", "cc")
+
+
+def _split(chosen: str) -> tuple[str, ...]:
+    """Return the words of $CC, the first one as a path where it can be found."""
+    try:
+        program, *arguments = shlex.split(chosen)
+    except ValueError as error:
+        raise CompilerNotFound(f"CC={chosen!r} is not a command: {error}. {REMEDY_NOT_FOUND}") from error
+    return (shutil.which(program) or program, *arguments)
+
+
+def examine(profile: str, folder: Path) -> Toolchain:
+    """Return the first candidate that answers, asking it afresh, and leave notes on all that were asked."""
+    refusals = []
+    for command in candidates():
+        try:
+            toolchain = _ask(command, profile)
+        except CompilerNotFound as error:
+            refusals.append(str(error))
+            _write_note(folder, command, profile, None)
+        else:
+            _write_note(folder, command, profile, toolchain)
+            return toolchain
+    raise CompilerNotFound(_not_found(refusals))
+
+
+def _not_found(refusals: list[str]) -> str:
+    """Return the message that names what was tried and how to mend it."""
+    chosen = os.environ.get("CC", "").strip()
+    if chosen:
+        return f"CC={chosen!r} does not work as a C compiler: {refusals[0]}. {REMEDY_NOT_FOUND}"
+    absent = [f"{program} (not on PATH)" for program in PROGRAMS if not shutil.which(program)]
+    zig = [] if importlib.util.find_spec("ziglang") else ["the ziglang wheel (not installed)"]
+    return f"no C compiler works here; tried {', '.join([*absent, *refusals, *zig])}. {REMEDY_NOT_FOUND}"
+
+
+def _ask(command: tuple[str, ...], profile: str) -> Toolchain:
+    """Return what `command` says about itself, or raise CompilerNotFound with its reason."""
+    answer = run_command((*command, "--version"))
+    if answer.returncode or not answer.stdout.strip():
+        reason = (answer.stderr.strip() or "no answer to --version")[:300]
+        raise CompilerNotFound(f"`{shlex.join(command)}` ({reason})")
+    flags = PROFILES[profile] + _cpu_flag(command, profile)
+    return Toolchain(command, flags, answer.stdout.strip(), _target(command, flags))
+
+
+def _cpu_flag(command: tuple[str, ...], profile: str) -> tuple[str, ...]:
+    """Return the first of the profile's processor flags that the compiler takes in silence, or none."""
+    nothing = ("-E", "-x", "c", os.devnull)
+    usual = run_command((*command, *nothing)).stderr
+    for flag in CPU_FLAGS[profile]:
+        answer = run_command((*command, flag, *nothing))
+        if answer.returncode == 0 and answer.stderr == usual:
+            return (flag,)
+    return ()
+
+
+def _target(command: tuple[str, ...], flags: tuple[str, ...]) -> str:
+    """Return a digest of what `flags` resolve to: gcc's list of them, else the macros they define."""
+    questions = (("-Q", "--help=target"), ("-dM", "-E", "-x", "c", os.devnull))
+    answers = (run_command((*command, *flags, *question)) for question in questions)
+    listings = (answer.stdout for answer in answers if answer.returncode == 0 and answer.stdout)
+    return digest(next(listings, None) or _processor())
+
+
+def run_command(command: Sequence[str]) -> subprocess.CompletedProcess[str]:
+    """Return the finished `command`, run in the C locale; one that cannot start counts as exit code 127."""
+    surroundings = {**os.environ, "LC_ALL": "C"}
+    try:
+        return subprocess.run(
+            command,
+            env=surroundings,
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            encoding="utf-8",
+            errors="replace",
+            check=False,
+        )
+    except OSError as error:
+        return subprocess.CompletedProcess(command, 127, "", error.strerror or str(error))
+
+
+# Notes: what a compiler said, kept so that a warm call starts no process.
+
+
+def recall(profile: str, folder: Path) -> Toolchain | None:
+    """Return the first working candidate as noted earlier on such a processor, or None to ask afresh."""
+    for command in candidates():
+        note = _read_note(_note_path(folder, command, profile))
+        if note is None:
+            return None
+        if note["works"]:
+            return Toolchain(command, tuple(note["flags"]), note["version"], note["target"])
+    return None
+
+
+def _note_path(folder: Path, command: tuple[str, ...], profile: str) -> Path:
+    """Return the note's place, named by the programs' files, the flags to choose from and the processor."""
+    programs = [_file_identity(path) for path in map(shutil.which, command) if path]
+    choices = (PROFILES[profile], CPU_FLAGS[profile])
+    return folder / "compilers" / f"{digest([command, programs, choices, _processor()])}.json"
+
+
+def _file_identity(path: str) -> tuple[str, int, int]:
+    """Return what changes when the program at `path` is replaced."""
+    status = os.stat(path)
+    return os.path.realpath(path), status.st_mtime_ns, status.st_size
+
+
+def _read_note(path: Path) -> dict[str, Any] | None:
+    """Return a whole note, or None."""
+    try:
+        note = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return note if isinstance(note, dict) and {"works", "flags", "version", "target"} <= note.keys() else None
+
+
+def _write_note(folder: Path, command: tuple[str, ...], profile: str, toolchain: Toolchain | None) -> None:
+    """Keep what was learnt; a cache that cannot be written still serves, until a build needs it."""
+    blank = Toolchain(command, (), "", "")
+    note = {"works": toolchain is not None, **asdict(toolchain or blank)}
+    path = _note_path(folder, command, profile)
+    with contextlib.suppress(OSError), temporary_file(path.parent) as part:
+        part.write_text(json.dumps(note), encoding="utf-8")
+        part.replace(path)
+
+
+def _processor() -> str:
+    """Return the processor's model and features, read without a new process, else the machine's name."""
+    with contextlib.suppress(OSError):
+        return Path("/sys/devices/system/cpu/modalias").read_text()
+    with contextlib.suppress(OSError):
+        names = ("model name", "flags", "Features", "CPU implementer", "CPU part", "cpu\t", "isa", "uarch")
+        lines = Path("/proc/cpuinfo").read_text(errors="replace").splitlines()
+        return "\n".join(sorted({line for line in lines if line.startswith(names)}))
+    return " ".join(os.uname())
