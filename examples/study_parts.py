@@ -10,7 +10,7 @@ import numpy as np
 
 import serpentail as st
 from serpentail.files import replacing
-from serpentail.trajectory import ARRAYS
+from serpentail.motion.trajectory import ARRAYS
 
 
 def say(words: str) -> None:

@@ -16,8 +16,8 @@ import serpentail.plot
 from serpentail.animal import SIDE, TOP, silhouette
 from serpentail.attitude import rotation_matrix
 from serpentail.film import filmstrip
+from serpentail.motion.trajectory import Trajectory
 from serpentail.plot import time_plots
-from serpentail.trajectory import Trajectory
 
 SEMI_AXES = np.array([0.0315, 0.0495, 0.027])
 MOUNT = np.array([0, -0.0405, 0.0045])

@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from serpentail.attitude import pitch_roll_yaw, rotation_matrix
-from serpentail.trajectory import Trajectory
+from serpentail.motion.trajectory import Trajectory
 
 PRECESSION, TILT, SPIN = 7.0, 0.6, 11.0  # rad/s, rad, rad/s of a torque-free symmetric top
 

@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike
 
 from .animal import FORCE, LEG, LONGEST, SIDE, TOP, Body, Frame, Pen, View, arrows, draw_animal, draw_marks, tick
 from .attitude import rotation_matrix
+from .motion.trajectory import Trajectory
 from .plot import HEAD, INK, QUIET, TAIL, Array, writable, write
-from .trajectory import Trajectory
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .attitude import rotation_matrix
-from .trajectory import Trajectory
+from .motion.trajectory import Trajectory
 
 SIDES = (1.0, -1.0)  # the left hip mirrors the right one in x
 

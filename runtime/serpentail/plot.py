@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from .attitude import pitch_roll_yaw
 from .files import replacing
-from .trajectory import Trajectory
+from .motion.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..checks import choice, number
 from ..errors import PlanningError
-from ..trajectory import Trajectory
+from ..motion.trajectory import Trajectory
 from .formulations import dynamics
 from .interrupt import heeded
 from .problem import SETTINGS, Bounds, Goal, Problem, checked_problem

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..trajectory import Trajectory
+from ..motion.trajectory import Trajectory
 from .attitude import attitude
 from .curve import Curve
 from .problem import Problem

@@ -8,7 +8,7 @@ from ..checks import real_array
 from ..errors import SimulationError
 from ..model.kernel import Rows
 from ..model.parameters import RunParameters
-from ..touch import Contact
+from ..motion.contact import Contact
 from .schedules import Legs
 from .start import Start
 

@@ -1,7 +1,7 @@
 """Measures: samples of a run go in; its trajectory, or the error that ended it, comes out."""
 
 from ..errors import SimulationError, StateError
-from ..trajectory import Trajectory
+from ..motion.trajectory import Trajectory
 from .compiled import Samples
 from .ground import Ground
 

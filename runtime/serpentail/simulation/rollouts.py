@@ -10,7 +10,7 @@ from ..errors import SimulationError, StateError
 from ..model.kernel import Rows
 from ..model.parameters import RunParameters
 from ..model.workers import cores, in_turn
-from ..trajectory import Trajectory
+from ..motion.trajectory import Trajectory
 from .abreast import Abreast, pays
 from .compiled import COUNTS, PAUSED, CompiledRun, Memory, Outcome, Samples, sampled
 from .drive import Drive

@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import ModelError, SimulationError, StateError
 from ..model.kernel import Rows
 from ..model.parameters import RunParameters
-from ..trajectory import Trajectory
+from ..motion.trajectory import Trajectory
 from .compiled import CompiledRun, Memory, Samples
 from .controllers import Controller
 from .drive import Drive

@@ -11,16 +11,16 @@ from ..errors import SimulationError
 from ..film import filmstrip
 from ..limbs import centre_of_mass, leg_joints
 from ..model.model import Model
+from ..motion.summary import summary
+from ..motion.trajectory import Trajectory
 from ..scene_file import model_of, read_scene, subtable
 from ..tracking import KD, KP, Pfl
-from ..trajectory import Trajectory
 from .changes import changed
 from .controllers import Controller, Damping, Phases, TorqueTable
 from .methods import SETTINGS
 from .run import simulate
 from .schedules import Legs, Reference, shared_among_links
 from .settling import settle
-from .summary import summary
 
 NUMBERS = (*dict.fromkeys(name for own in SETTINGS.values() for name in own), "output_step")
 KEYS = ("duration", "method", *NUMBERS, "start", "legs", "reference", "controller")

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..attitude import pitch_roll_yaw, rotation_matrix
-from ..trajectory import Trajectory
+from .trajectory import Trajectory
 
 UPRIGHT, SLOW, CARRIED = 0.9, 0.05, 0.5  # of standing: z of the torso's z axis, m/s of B, share of the weight on feet
 

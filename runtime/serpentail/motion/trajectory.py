@@ -10,12 +10,13 @@ from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from .attitude import Array, quaternion_rate, sign_continuous
-from .files import replacing
-from .touch import ARRAYS as TOUCHING
-from .touch import Contact
+from ..attitude import Array
+from ..files import replacing
+from .contact import ARRAYS as TOUCHING
+from .contact import Contact
+from .resample import Rows, hermite_q, inside, monotone
 
 SUFFIX = ".npz"
 UNIT_TOLERANCE = 1e-3  # how far a stored quaternion's norm may drift from 1
@@ -112,10 +113,10 @@ class Trajectory:
         q_dot = q (0, omega) / 2, normalised (samples less than half a turn apart). v, energies and momenta:
         monotone cubic, so no overshoot at impacts. tau and contact: linear, since they may jump.
         """
-        times = _inside(_real("t", t), self.t)
-        rows = _Rows.at(times, self.t)
-        smooth: dict[str, Any] = {name: _monotone(self.t, getattr(self, name), times) for name in SMOOTH}
-        q = _hermite_q(rows, self.q, self.v)
+        times = inside(_real("t", t), self.t)
+        rows = Rows.at(times, self.t)
+        smooth: dict[str, Any] = {name: monotone(self.t, getattr(self, name), times) for name in SMOOTH}
+        q = hermite_q(rows, self.q, self.v)
         contact = self.contact.mapped(rows.linear) if self.contact else None
         return dataclasses.replace(self, t=times, q=q, tau=rows.linear(self.tau), contact=contact, **smooth)
 
@@ -213,62 +214,3 @@ def _parsed(fields: dict[str, Any]) -> dict[str, Any]:
     if touching:
         own["contact"] = Contact(**touching | {"groups": json.loads(str(touching["groups"]))})
     return own | {"info": json.loads(str(fields["info"]))}
-
-
-def _inside(times: Array, span: Array) -> Array:
-    """The times, one-dimensional and inside the span up to rounding."""
-    if times.ndim != 1:
-        raise ValueError(f"t has shape {times.shape}: give one row of times")
-    slack = 4 * np.finfo(float).eps * max(abs(span[0]), abs(span[-1]))
-    outside = times[(times < span[0] - slack) | (times > span[-1] + slack)]
-    if outside.size:
-        raise ValueError(f"t = {outside[0]} s is outside the trajectory: give times from {span[0]} to {span[-1]} s")
-    return np.clip(times, span[0], span[-1])
-
-
-@dataclass(frozen=True)
-class _Rows:
-    """Where n times lie among samples: the rows before and after, the fraction between, the step (n, 1)."""
-
-    before: NDArray[np.intp]
-    after: NDArray[np.intp]
-    fraction: Array
-    step: Array
-
-    @classmethod
-    def at(cls, times: Array, samples: Array) -> "_Rows":
-        """Locate times inside the span of the samples."""
-        before = np.clip(np.searchsorted(samples, times, side="right") - 1, 0, max(len(samples) - 2, 0))
-        after = np.minimum(before + 1, len(samples) - 1)
-        step = samples[after] - samples[before]
-        fraction = (times - samples[before]) / np.where(step > 0, step, 1)
-        return cls(before, after, fraction[:, None], step[:, None])
-
-    def linear(self, values: Array) -> Array:
-        """Straight lines between the rows of values."""
-        return (1 - self.fraction) * values[self.before] + self.fraction * values[self.after]
-
-    def hermite(self, values: Array, rates: Array) -> Array:
-        """Cubics that match the rows of values and their rates at both ends."""
-        s, h = self.fraction, self.step
-        start = (1 - s) ** 2 * ((1 + 2 * s) * values[self.before] + s * h * rates[self.before])
-        return start + s**2 * ((3 - 2 * s) * values[self.after] + (s - 1) * h * rates[self.after])
-
-
-def _hermite_q(rows: _Rows, q: Array, v: Array) -> Array:
-    """Configurations between the samples q with velocities v."""
-    attitude = sign_continuous(q[:, 3:7])
-    positions = np.hstack([q[:, :3], attitude, q[:, 7:]])
-    rates = np.hstack([v[:, :3], quaternion_rate(attitude, v[:, 3:6]), v[:, 6:]])
-    result = rows.hermite(positions, rates)
-    result[:, 3:7] /= np.linalg.norm(result[:, 3:7], axis=1, keepdims=True)
-    return result
-
-
-def _monotone(t: Array, values: Array, times: Array) -> Array:
-    """Shape-preserving cubics (PCHIP) through the rows of values."""
-    from scipy.interpolate import PchipInterpolator
-
-    if len(t) == 1:
-        return np.repeat(values, len(times), axis=0)
-    return np.asarray(PchipInterpolator(t, values, axis=0)(times))

@@ -1,0 +1,1 @@
+"""Recorded motions: trajectories, contacts, and what they amount to."""
