@@ -11,7 +11,7 @@ import serpentail as st
 from fixtures import generated, label
 from serpentail.model.batch import MANY
 from serpentail.model.kernel import aligned, call_record
-from serpentail.simulation import abreast
+from serpentail.simulation import batched_runs as abreast
 
 STATES, ROUNDS = 512, 300  # a batch that stays in the cache
 FLIGHTS = 64

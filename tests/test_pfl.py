@@ -6,7 +6,7 @@ import pytest
 import serpentail as st
 from models import model_folder
 from references.parameters import random_states
-from serpentail.tracking import Pfl
+from serpentail.simulation.pfl import Pfl
 
 CASES = [
     (1, 3, {"emission": "straight"}),

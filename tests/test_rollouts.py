@@ -13,7 +13,8 @@ import pytest
 import serpentail as st
 from models import model_folder
 from serpentail.model.compiler import compile_library
-from serpentail.simulation import abreast, rollouts
+from serpentail.simulation import batched_runs as abreast
+from serpentail.simulation import rollouts
 
 SEGMENTS, LINKS = 2, 2
 NQ, NV, NT = 7 + 2 * SEGMENTS, 6 + 2 * SEGMENTS, 2 * SEGMENTS

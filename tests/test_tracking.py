@@ -5,7 +5,7 @@ import pytest
 
 import serpentail as st
 from references.parameters import random_states
-from serpentail.tracking import KD, KP
+from serpentail.simulation.pfl import KD, KP
 from tumbling import planned, rat, start
 
 

@@ -5,9 +5,9 @@ from importlib import import_module
 __version__ = "0.1.0"
 _HOME = {
     **dict.fromkeys(["load", "Model"], "model.model"),
-    "simulate": "simulation.run",
+    "simulate": "simulation.simulate",
     "Rollouts": "simulation.rollouts",
-    "settle": "simulation.settling",
+    "settle": "simulation.settle",
     **dict.fromkeys(["scenario", "Scenario"], "simulation.scenarios"),
     **dict.fromkeys(["Damping", "TorqueTable", "TorqueCurve", "NativeTorque", "Phases"], "simulation.controllers"),
     "Piecewise": "simulation.piecewise",
@@ -19,7 +19,7 @@ _HOME = {
     "plan": "planning.planner",
     **dict.fromkeys(["Goal", "Bounds"], "planning.problem"),
     "Plan": "planning.solution",
-    "Pfl": "tracking",
+    "Pfl": "simulation.pfl",
     "filmstrip": "film",
     "leg_joints": "limbs",
     "time_plots": "plot",

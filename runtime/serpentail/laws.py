@@ -30,7 +30,7 @@ from .measures import (
     worst,
 )
 from .model.model import Model
-from .simulation.run import simulate
+from .simulation.simulate import simulate
 
 NEAR = 450  # roundings: 1e-13 in double
 FEW = 8  # links in a segment

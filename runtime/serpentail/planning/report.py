@@ -5,8 +5,8 @@ import numpy as np
 from ..attitude import angle_deg, pitch_roll_yaw, tilt_deg
 from ..errors import SimulationError
 from ..motion.trajectory import Trajectory
-from ..simulation.run import simulate
-from ..tracking import Pfl
+from ..simulation.pfl import Pfl
+from ..simulation.simulate import simulate
 from .curve import Curve
 from .problem import Problem
 

@@ -6,7 +6,7 @@ from ..attitude import angle_deg
 from ..errors import SimulationError
 from ..simulation.controllers import TorqueCurve
 from ..simulation.piecewise import Piecewise
-from ..simulation.run import end_state
+from ..simulation.simulate import end_state
 from .curve import Curve
 
 STEP = 1e-4  # s, longest RK4 step

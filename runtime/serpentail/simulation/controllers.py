@@ -7,7 +7,7 @@ import numpy as np
 
 from ..checks import real_array
 from ..errors import SimulationError
-from ..tracking import Pfl
+from .pfl import Pfl
 from .piecewise import Piecewise, checked_nodes, linear
 
 CHOICES = "None, Damping, TorqueTable, TorqueCurve, Pfl, Phases, NativeTorque or a function (t, q, v)"

@@ -11,11 +11,11 @@ from ..model.kernel import Rows
 from ..model.parameters import RunParameters
 from ..model.workers import cores, in_turn
 from ..motion.trajectory import Trajectory
-from .abreast import Abreast, pays
-from .compiled import COUNTS, PAUSED, CompiledRun, Memory, Outcome, Samples, sampled
-from .drive import Drive
+from .actuation import Drive
+from .batched_runs import Abreast, pays
+from .compiled_run import COUNTS, PAUSED, CompiledRun, Memory, Outcome, Samples, sampled
 from .ground import Ground
-from .measuring import judged
+from .measured import judged
 from .methods import SCIPY, Method
 
 MEASURES = {"energy": ("kinetic", "potential"), "momentum": ("linear_momentum", "angular_momentum")}

@@ -14,13 +14,13 @@ from ..model.model import Model
 from ..motion.summary import summary
 from ..motion.trajectory import Trajectory
 from ..scene_file import model_of, read_scene, subtable
-from ..tracking import KD, KP, Pfl
 from .changes import changed
 from .controllers import Controller, Damping, Phases, TorqueTable
 from .methods import SETTINGS
-from .run import simulate
+from .pfl import KD, KP, Pfl
 from .schedules import Legs, Reference, shared_among_links
-from .settling import settle
+from .settle import settle
+from .simulate import simulate
 
 NUMBERS = (*dict.fromkeys(name for own in SETTINGS.values() for name in own), "output_step")
 KEYS = ("duration", "method", *NUMBERS, "start", "legs", "reference", "controller")

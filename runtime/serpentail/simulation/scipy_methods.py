@@ -6,7 +6,7 @@ import numpy as np
 
 from ..errors import SimulationError
 from ..model.library import NOT_FINITE
-from .compiled import CompiledRun, Samples, failed
+from .compiled_run import CompiledRun, Samples, failed
 from .methods import Method
 
 

@@ -10,7 +10,7 @@ from ..errors import SimulationError
 from ..model.kernel import aligned
 from ..model.library import NOT_FINITE, NOT_POSITIVE_DEFINITE, OUT_OF_RANGE
 from ..model.parameters import RunParameters
-from .drive import Drive
+from .actuation import Drive
 from .ground import MOST_EVENTS, Ground
 from .methods import Method
 from .records import Records

@@ -7,8 +7,8 @@ from threading import Event
 import numpy as np
 
 from ..model.kernel import aligned
-from .compiled import PAUSE, Memory
-from .drive import Drive
+from .actuation import Drive
+from .compiled_run import PAUSE, Memory
 from .methods import Method
 from .piecewise import Piecewise
 from .records import structure

@@ -4,14 +4,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .checks import real_array
-from .errors import SimulationError
-from .simulation.piecewise import Piecewise, checked_nodes, spline
-from .simulation.schedules import Reference
+from ..checks import real_array
+from ..errors import SimulationError
+from .piecewise import Piecewise, checked_nodes, spline
+from .schedules import Reference
 
 if TYPE_CHECKING:
-    from .model.model import Model
-
+    from ..model.model import Model
 KP, KD = 4e4, 400.0  # 1/s^2, 1/s: Table 1
 
 

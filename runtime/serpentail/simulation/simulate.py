@@ -10,11 +10,11 @@ from ..errors import ModelError, SimulationError, StateError
 from ..model.kernel import Rows
 from ..model.parameters import RunParameters
 from ..motion.trajectory import Trajectory
-from .compiled import CompiledRun, Memory, Samples
+from .actuation import Drive
+from .compiled_run import CompiledRun, Memory, Samples
 from .controllers import Controller
-from .drive import Drive
 from .ground import Ground
-from .measuring import judged
+from .measured import judged
 from .methods import SCIPY, Method, checked_method, chosen
 from .records import Records
 from .rollouts import Rollouts, flown

@@ -5,7 +5,7 @@ import numpy as np
 from ..checks import positive
 from ..errors import SimulationError, StateError
 from .controllers import Controller
-from .run import simulate
+from .simulate import simulate
 
 
 def settle(

@@ -2,7 +2,7 @@
 
 from ..errors import SimulationError, StateError
 from ..motion.trajectory import Trajectory
-from .compiled import Samples
+from .compiled_run import Samples
 from .ground import Ground
 
 
