@@ -15,7 +15,7 @@ sys.path.append(str(Path(__file__).resolve().parent.parent / "examples"))
 import righting
 import serpentail as st
 from serpentail.planning import rounds
-from serpentail.planning.formulations import dynamics
+from serpentail.planning.nlp.node import dynamics
 from serpentail.planning.problem import SMOOTHING
 from serpentail_codegen.scene.parse import scene_for
 

@@ -15,14 +15,15 @@ from scipy.integrate import solve_ivp
 import serpentail as st
 from models import model_folder
 from serpentail.attitude import angle_deg, from_angles, rotation_matrix
-from serpentail.planning import interrupt, rounds, solver, transcription
-from serpentail.planning.attitude import Attitude
-from serpentail.planning.formulations import dynamics
-from serpentail.planning.multipliers import carried
-from serpentail.planning.recovery import full_state
-from serpentail.planning.threads import _blas, one_thread
-from serpentail.planning.transcription import program_of
-from serpentail.planning.truth import local_errors, open_loop
+from serpentail.planning import rounds
+from serpentail.planning.nlp import interrupt, solver, transcription
+from serpentail.planning.nlp.blas_threads import _blas, one_thread
+from serpentail.planning.nlp.coordinates import Attitude
+from serpentail.planning.nlp.multipliers import carried
+from serpentail.planning.nlp.node import dynamics
+from serpentail.planning.nlp.transcription import program_of
+from serpentail.planning.result.full_state import full_state
+from serpentail.planning.result.truth import local_errors, open_loop
 from serpentail_codegen.pipeline import generate
 from serpentail_codegen.scene.parse import load_scene
 from tumbling import DURATION, FUNCTIONS, planned, rat, start

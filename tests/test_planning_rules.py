@@ -7,10 +7,10 @@ from scipy.linalg import expm
 from scipy.sparse import coo_matrix
 
 import serpentail as st
-from serpentail.planning.formulations import Layout, Node
-from serpentail.planning.mesh import Mesh, refined, uniform
-from serpentail.planning.rules import MOST_DEGREE, rule
-from serpentail.planning.transcription import collocate, places
+from serpentail.planning.nlp.mesh import Mesh, refined, uniform
+from serpentail.planning.nlp.node import Layout, Node
+from serpentail.planning.nlp.rules import MOST_DEGREE, rule
+from serpentail.planning.nlp.transcription import collocate, places
 
 SCHEMES = [("trapezoidal", None), ("hermite-simpson", None), *(("lobatto", d) for d in range(1, MOST_DEGREE + 1))]
 SCHEMES += [("radau", d) for d in range(1, MOST_DEGREE + 1)]
@@ -67,7 +67,7 @@ def least_effort() -> float:
 
 def oscillator() -> tuple[Layout, Node]:
     """The oscillator as a node: zeta = (T, x, x_dot, u); its rate is a call, as dynamics is."""
-    from serpentail.planning.calls import linear_call
+    from serpentail.planning.nlp.node_calls import linear_call
 
     zeta, h = casadi.SX.sym("zeta", 4), casadi.SX.sym("h", 3)
     state, u = casadi.SX.sym("state", 2), casadi.SX.sym("u")

@@ -18,7 +18,7 @@ _HOME = {
     **dict.fromkeys(["polar_to_bend", "bend_to_polar"], "model.polar"),
     "plan": "planning.planner",
     **dict.fromkeys(["Goal", "Bounds"], "planning.problem"),
-    "Plan": "planning.solution",
+    "Plan": "planning.result.plan",
     "Pfl": "simulation.pfl",
     "filmstrip": "film",
     "leg_joints": "limbs",

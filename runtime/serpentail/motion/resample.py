@@ -29,7 +29,7 @@ class Rows:
     step: Array
 
     @classmethod
-    def at(cls, times: Array, samples: Array) -> "_Rows":
+    def at(cls, times: Array, samples: Array) -> "Rows":
         """Locate times inside the span of the samples."""
         before = np.clip(np.searchsorted(samples, times, side="right") - 1, 0, max(len(samples) - 2, 0))
         after = np.minimum(before + 1, len(samples) - 1)

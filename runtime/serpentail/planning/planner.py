@@ -8,11 +8,12 @@ import numpy as np
 from ..checks import choice, number
 from ..errors import PlanningError
 from ..motion.trajectory import Trajectory
-from .formulations import dynamics
-from .interrupt import heeded
+from .method import Method
+from .nlp.interrupt import heeded
+from .nlp.node import dynamics
+from .nlp.rules import rule
 from .problem import SETTINGS, Bounds, Goal, Problem, checked_problem
-from .rounds import Method, Run
-from .rules import rule
+from .rounds import Run
 
 
 def plan(model, *, start, goal=None, duration, bounds=None, **settings):

@@ -8,8 +8,8 @@ import numpy as np
 
 from ..checks import choice, number, numbers
 from ..errors import PlanningError
-from .attitude import KINDS
-from .formulations import FORMULATIONS
+from .nlp.coordinates import KINDS
+from .nlp.node import FORMULATIONS
 
 OBJECTIVES = ("effort", "energy", "time")
 SMOOTHING = 3e-4  # N m s: the effort counts a tail's rates as torques, or a plan whirls a light tail at no cost

@@ -1,50 +1,29 @@
 """Rounds: a problem and a method go in; solutions on finer and finer meshes, and the best one's plan, come out."""
 
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
-from .attitude import attitude
-from .curve import Curve, curve
-from .formulations import Dynamics
-from .guess import Motion, of_trajectory, passive, pushes, unknowns
-from .interrupt import asked
-from .limits import limits
-from .mesh import Mesh, refined, uniform
-from .multipliers import carried
+from .method import Method
+from .nlp.bounds import limits
+from .nlp.coordinates import attitude
+from .nlp.guess import Motion, of_trajectory, passive, pushes, unknowns
+from .nlp.interrupt import asked
+from .nlp.mesh import Mesh, refined, uniform
+from .nlp.multipliers import carried
+from .nlp.node import Dynamics
+from .nlp.rules import Rule
+from .nlp.solver import Solution, solve, solver
+from .nlp.transcription import Transcription, program_of, torque_unit
 from .problem import Problem
-from .recovery import full_state
-from .report import attitude_errors, report
-from .rules import Rule
-from .solution import Plan, sampled
-from .solver import Solution, solve, solver
-from .transcription import Transcription, program_of, torque_unit
-from .truth import local_errors, open_loop
+from .result.curve import Curve, curve
+from .result.full_state import full_state
+from .result.plan import Plan, sampled
+from .result.report import attitude_errors, report
+from .result.truth import local_errors, open_loop
 
 SLIGHT = 0.05  # of the torques' unit: what pushes the first guess out of a plane of symmetry
-
-
-@dataclass(frozen=True)
-class Method:
-    """How to solve: rule and degree, mesh, tolerance (deg, None: no demand) of the truth, solver, guesses."""
-
-    rule: str = "radau"
-    degree: int | None = None
-    intervals: int = 12
-    tolerance: float | None = 0.01
-    rounds: int = 6
-    most_intervals: int = 200
-    solver: str = "ipopt"
-    options: dict = field(default_factory=dict)
-    guess: object = None
-    guess_damping: float = 1e-3
-    multi_start: int = 1
-    retries: int = 4
-    seed: int = 0
-    dynamics: str = "auto"
-    time_limit: float | None = None  # s
-    track: bool = True
 
 
 @dataclass(frozen=True, eq=False)

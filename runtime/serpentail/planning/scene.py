@@ -6,10 +6,10 @@ from dataclasses import fields
 from ..checks import choice
 from ..errors import PlanningError
 from ..scene_file import model_of, read_scene, subtable
+from .method import Method
 from .planner import plan
 from .problem import SETTINGS, Bounds, Goal
-from .rounds import Method
-from .solution import Plan
+from .result.plan import Plan
 
 FREE = "free"  # TOML has no None
 CODE = ("guess", "path")  # what no file can hold

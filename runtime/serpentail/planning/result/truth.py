@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from ..attitude import angle_deg
-from ..errors import SimulationError
-from ..simulation.controllers import TorqueCurve
-from ..simulation.piecewise import Piecewise
-from ..simulation.simulate import end_state
+from ...attitude import angle_deg
+from ...errors import SimulationError
+from ...simulation.controllers import TorqueCurve
+from ...simulation.piecewise import Piecewise
+from ...simulation.simulate import end_state
 from .curve import Curve
 
 STEP = 1e-4  # s, longest RK4 step

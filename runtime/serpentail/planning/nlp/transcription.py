@@ -9,12 +9,12 @@ from functools import partial
 
 import numpy as np
 
-from .assembly import Assembly
-from .attitude import Attitude, attitude
-from .formulations import Dynamics, Layout, Node, layout, node
-from .kept import kept
+from ..problem import Problem
+from .cache import kept
+from .coordinates import Attitude, attitude
+from .derivatives import Assembly
 from .mesh import Mesh
-from .problem import Problem
+from .node import Dynamics, Layout, Node, layout, node
 from .rules import Rule
 
 

@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..motion.trajectory import Trajectory
-from .attitude import attitude
+from ...motion.trajectory import Trajectory
+from ..nlp.coordinates import attitude
+from ..nlp.solver import Solution
+from ..problem import Problem
 from .curve import Curve
-from .problem import Problem
-from .recovery import full_state
-from .solver import Solution
+from .full_state import full_state
 
 SAMPLES = 240  # of a trajectory, at least
 

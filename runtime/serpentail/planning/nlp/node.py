@@ -6,9 +6,9 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from ..errors import ModelError
-from .attitude import Attitude
-from .calls import Call, NodeDerivatives, linear_call
+from ...errors import ModelError
+from .coordinates import Attitude
+from .node_calls import Call, NodeDerivatives, linear_call
 
 # name -> blocks of the state, which has a rate, and of the algebraic unknowns, which a node's equations determine
 FORMULATIONS = {

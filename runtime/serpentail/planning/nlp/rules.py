@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 from numpy.polynomial import Legendre, Polynomial
 
-from ..errors import PlanningError
+from ...errors import PlanningError
 
 FAMILIES = {"trapezoidal": 1, "hermite-simpson": 2, "lobatto": 3, "radau": 3}  # name -> default degree
 MOST_DEGREE = 5

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..attitude import from_angles, pitch_roll_yaw, product, sign_continuous
-from ..errors import PlanningError
+from ...attitude import from_angles, pitch_roll_yaw, product, sign_continuous
+from ...errors import PlanningError
 
 KINDS = {"quaternion": 4, "euler": 3}
 

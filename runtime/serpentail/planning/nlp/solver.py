@@ -6,11 +6,11 @@ from functools import partial
 
 import numpy as np
 
-from ..errors import PlanningError
+from ...errors import PlanningError
+from .blas_threads import one_thread
+from .bounds import Limits
+from .cache import kept
 from .interrupt import asked
-from .kept import kept
-from .limits import Limits
-from .threads import one_thread
 from .transcription import Transcription
 
 IPOPT = {"ipopt.print_level": 0, "ipopt.sb": "yes", "ipopt.max_iter": 300, "ipopt.nlp_scaling_method": "none"}

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .calls import MappedNode
-from .formulations import Node
+from .node import Node
+from .node_calls import MappedNode
 
 
 @dataclass(frozen=True, eq=False)

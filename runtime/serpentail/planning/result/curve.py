@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .rules import Rule
-from .transcription import Transcription
+from ..nlp.rules import Rule
+from ..nlp.transcription import Transcription
 
 
 @dataclass(frozen=True, eq=False)

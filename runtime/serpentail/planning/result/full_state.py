@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from ..attitude import rotation_matrix
-from .attitude import Attitude
+from ...attitude import rotation_matrix
+from ..nlp.coordinates import Attitude
 
 
 def full_state(model, start, coordinates: Attitude, times, blocks) -> tuple[np.ndarray, np.ndarray]:

@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from ..attitude import angle_deg, pitch_roll_yaw, tilt_deg
-from ..errors import SimulationError
-from ..motion.trajectory import Trajectory
-from ..simulation.pfl import Pfl
-from ..simulation.simulate import simulate
+from ...attitude import angle_deg, pitch_roll_yaw, tilt_deg
+from ...errors import SimulationError
+from ...motion.trajectory import Trajectory
+from ...simulation.pfl import Pfl
+from ...simulation.simulate import simulate
+from ..problem import Problem
 from .curve import Curve
-from .problem import Problem
 
 TRACKED = 580  # samples of a tracked motion
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..attitude import rotation_matrix
+from ...attitude import rotation_matrix
 from .transcription import Transcription
 
 
@@ -19,8 +19,8 @@ class Motion:
 
 def passive(model, problem, coordinates, damping: float, duration: float, push=None) -> Motion:
     """Return the motion whose tail only damps (Eq. 47), the paper's guess (Sect. 3.2), pushed by torques (n, 2m)."""
-    from ..simulation.controllers import TorqueTable
-    from ..simulation.simulate import simulate
+    from ...simulation.controllers import TorqueTable
+    from ...simulation.simulate import simulate
 
     push = np.zeros((1, model.nv - 6)) if push is None else push
     law = TorqueTable(np.linspace(0, duration, len(push)), push, max(damping, problem.damping))

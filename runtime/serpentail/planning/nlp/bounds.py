@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .attitude import Attitude
+from .coordinates import Attitude
 from .transcription import Transcription, goal_matrix
 
 
@@ -94,7 +94,7 @@ def _goal_values(goal, coordinates: Attitude, angles: np.ndarray) -> np.ndarray:
     if isinstance(goal.attitude, str):
         turns = np.round(angles[:2] / (2 * np.pi)) if goal.turns is None else goal.turns
         return 2 * np.pi * turns
-    from ..attitude import pitch_roll_yaw
+    from ...attitude import pitch_roll_yaw
 
     target = pitch_roll_yaw(np.concatenate([np.zeros(3), goal.attitude]))
     return target + 2 * np.pi * np.round((angles - target) / (2 * np.pi))

@@ -1,0 +1,1 @@
+"""The nonlinear program: mesh, nodes, constraints, derivatives, solver."""

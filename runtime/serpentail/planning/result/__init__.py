@@ -1,0 +1,1 @@
+"""What a solved program means: curve, true flight, report."""
