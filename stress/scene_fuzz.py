@@ -8,8 +8,8 @@ from pathlib import Path
 
 import serpentail as st
 from serpentail import cli
-from serpentail.scene_file import read_scene, subtable
-from serpentail.simulation.scenarios import scenario_of
+from serpentail.scenes.file import read_scene, subtable
+from serpentail.scenes.simulate import scenario_of
 from serpentail_codegen.__main__ import parser, scene_of
 from serpentail_codegen.scene.problems import SceneError
 

@@ -10,7 +10,7 @@ import pytest
 import serpentail as st
 from models import model_folder
 from serpentail import cli
-from serpentail.planning.scene import plan_arguments, planned
+from serpentail.scenes.plan import plan_arguments, planned
 from tumbling import DURATION, FUNCTIONS, rat, start
 
 SCENE = Path(__file__).parent.parent / "scenes" / "righting_m1_n3.toml"

@@ -8,7 +8,7 @@ _HOME = {
     "simulate": "simulation.simulate",
     "Rollouts": "simulation.rollouts",
     "settle": "simulation.settle",
-    **dict.fromkeys(["scenario", "Scenario"], "simulation.scenarios"),
+    **dict.fromkeys(["scenario", "Scenario"], "scenes.simulate"),
     **dict.fromkeys(["Damping", "TorqueTable", "TorqueCurve", "NativeTorque", "Phases"], "simulation.controllers"),
     "Piecewise": "simulation.piecewise",
     **dict.fromkeys(["Legs", "Reference"], "simulation.schedules"),

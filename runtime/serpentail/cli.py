@@ -92,7 +92,7 @@ def run(arguments: argparse.Namespace) -> tuple[dict, str, bool]:
         report = info(arguments.folder)
         return report, describe(report), True
     if arguments.verb == "plan":
-        from .planning.scene import planned
+        from .scenes.plan import planned
 
         plan = planned(arguments.scene, arguments.folder)
         if arguments.save:
@@ -111,8 +111,8 @@ def run(arguments: argparse.Namespace) -> tuple[dict, str, bool]:
 
 def simulated(arguments: argparse.Namespace) -> tuple[dict, str, bool]:
     """Return the report of a scene's motion."""
-    from .simulation.changes import parsed
-    from .simulation.scenarios import scenario
+    from .scenes.overrides import parsed
+    from .scenes.simulate import scenario
 
     scene = scenario(arguments.scene, arguments.folder, parsed(arguments.changes))
     motion = scene.simulate()

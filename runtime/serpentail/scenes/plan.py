@@ -5,11 +5,11 @@ from dataclasses import fields
 
 from ..checks import choice
 from ..errors import PlanningError
-from ..scene_file import model_of, read_scene, subtable
-from .method import Method
-from .planner import plan
-from .problem import SETTINGS, Bounds, Goal
-from .result.plan import Plan
+from ..planning.method import Method
+from ..planning.planner import plan
+from ..planning.problem import SETTINGS, Bounds, Goal
+from ..planning.result.plan import Plan
+from .file import model_of, read_scene, subtable
 
 FREE = "free"  # TOML has no None
 CODE = ("guess", "path")  # what no file can hold

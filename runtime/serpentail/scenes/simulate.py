@@ -13,14 +13,14 @@ from ..limbs import centre_of_mass, leg_joints
 from ..model.model import Model
 from ..motion.summary import summary
 from ..motion.trajectory import Trajectory
-from ..scene_file import model_of, read_scene, subtable
-from .changes import changed
-from .controllers import Controller, Damping, Phases, TorqueTable
-from .methods import SETTINGS
-from .pfl import KD, KP, Pfl
-from .schedules import Legs, Reference, shared_among_links
-from .settle import settle
-from .simulate import simulate
+from ..simulation.controllers import Controller, Damping, Phases, TorqueTable
+from ..simulation.methods import SETTINGS
+from ..simulation.pfl import KD, KP, Pfl
+from ..simulation.schedules import Legs, Reference, shared_among_links
+from ..simulation.settle import settle
+from ..simulation.simulate import simulate
+from .file import model_of, read_scene, subtable
+from .overrides import changed
 
 NUMBERS = (*dict.fromkeys(name for own in SETTINGS.values() for name in own), "output_step")
 KEYS = ("duration", "method", *NUMBERS, "start", "legs", "reference", "controller")

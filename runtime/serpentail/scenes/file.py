@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from importlib.util import find_spec
 from pathlib import Path
 
-from .errors import ModelError
-from .model.manifest import read_manifest
-from .model.model import Model, load
+from ..errors import ModelError
+from ..model.manifest import read_manifest
+from ..model.model import Model, load
 
 MADE_OF = ("kind", "segments", "links", "samples", "contacts", "friction", "bend_range", "coordinates")
 

@@ -1,0 +1,1 @@
+"""Scene files: the model, simulation and plan that they describe."""
