@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from models import model_folder
-from serpentail import cli, verify
+from serpentail import cli
+from serpentail.verification import report as verify
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ import serpentail as st
 from models import model_folder
 from references.contact import Contacts, attitude
 from references.parameters import random_states
-from serpentail.verify import laws
+from serpentail.verification.report import laws
 from serpentail_codegen.ir.interpret import Numbers
 from serpentail_codegen.ir.tape import replay
 from serpentail_codegen.mechanics.contact import contact_force

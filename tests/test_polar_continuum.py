@@ -13,7 +13,7 @@ from models import model_folder
 from references.exact_polar import ExactPolar
 from references.metrics import block_error, equilibrated_condition, mass_matrix_error
 from references.parameters import TABLE_1
-from serpentail.verify import laws
+from serpentail.verification.report import laws
 from serpentail_codegen.mechanics import polar_arc as polar_continuum
 from serpentail_codegen.scene.parse import parse_scene, scene_for, scene_to_dict
 from serpentail_codegen.scene.problems import SceneError

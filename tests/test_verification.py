@@ -14,7 +14,8 @@ from models import model_folder
 from references import metrics
 from references.exact_chain import ExactChain
 from references.exact_continuum import ExactContinuum
-from serpentail import laws, measures, verify
+from serpentail.verification import errors, law, states
+from serpentail.verification import report as verify
 from serpentail_codegen.functions.catalogue import CATALOGUE
 from serpentail_codegen.functions.contact import CONTACT
 from serpentail_codegen.functions.implicit.functions import IMPLICIT
@@ -71,7 +72,7 @@ def failed(checks):
 
 def laws_broken(model, count=2):
     """Names of the laws that a model breaks, CasADi's left out: they compare with the C, which is at fault here."""
-    cases = list(measures.states(model, count))
+    cases = list(states.states(model, count))
     entries = [entry for entry in verify.LAWS if "casadi" not in entry.name]
     return failed(verify.check(entry, model, cases) for entry in entries)
 
@@ -147,7 +148,7 @@ def test_every_function_that_loses_a_number_breaks_a_law(having, name):
 @pytest.mark.parametrize("name", [name for name in CATALOGUE if name not in TAKING_MORE])
 def test_every_function_that_is_slightly_wrong_is_not_what_its_program_means(model, name):
     faulty = broken(model, name, times(1 + SLIGHT))
-    cases = list(measures.states(faulty, 1))
+    cases = list(states.states(faulty, 1))
     assert failed(verify.check(e, faulty, cases) for e in verify_model.interpreter_laws(faulty)) == {
         f"interpreter: {name}"
     }
@@ -157,7 +158,7 @@ def test_every_function_that_is_slightly_wrong_is_not_what_its_program_means(mod
 def test_every_quantity_that_is_slightly_wrong_disagrees_with_references(model, reference):
     for name in reference.names:
         faulty = broken(model, name, times(1 + SLIGHT))
-        found = failed(verify_model.reference_checks(reference, faulty, list(measures.states(faulty, 1))))
+        found = failed(verify_model.reference_checks(reference, faulty, list(states.states(faulty, 1))))
         assert f"{reference.title}: {name}" in found
 
 
@@ -297,7 +298,7 @@ def test_faults_break_the_law_that_is_there_for_them(model, fault):
 def test_faults_of_flight_break_the_laws_of_flight(model, monkeypatch, law, changes):
     def flight(model, s):
         flown = model.with_parameters(gravity=changes.get("gravity", 9.8))
-        v, controller = 10 / laws.fastest(model, s.v) * s.v, changes.get("controller")
+        v, controller = 10 / law.fastest(model, s.v) * s.v, changes.get("controller")
         return st.simulate(flown, s.q, v, controller=controller, t_span=0.2)
 
     monkeypatch.setattr(laws, "flight", flight)
@@ -319,7 +320,7 @@ def test_another_animal_obeys_the_laws_and_only_references_notice(model):
     other.parameters = model.parameters
     assert laws_broken(other) == set()
     for reference in verify_model.REFERENCES[:3]:
-        found = failed(verify_model.reference_checks(reference, other, list(measures.states(other, 1))))
+        found = failed(verify_model.reference_checks(reference, other, list(states.states(other, 1))))
         assert f"{reference.title}: mass_matrix" in found
         assert f"{reference.title}: forward_dynamics" in found
 
@@ -327,9 +328,9 @@ def test_another_animal_obeys_the_laws_and_only_references_notice(model):
 def test_halves_of_segments_that_differ_from_wholes_fail(tmp_path):
     whole = st.load(model_folder(1, 2))
     other = whole.with_parameters(tail_mass=whole.parameters["tail_mass"] * (1 + SLIGHT))
-    check = verify_model.split_check(other, list(measures.states(other, 1)), tmp_path)
+    check = verify_model.split_check(other, list(states.states(other, 1)), tmp_path)
     assert check.status == "failed"
-    assert verify_model.split_check(whole, list(measures.states(whole, 1)), tmp_path).status == "passed"
+    assert verify_model.split_check(whole, list(states.states(whole, 1)), tmp_path).status == "passed"
 
 
 def without_gyroscopic_torque(let, link, w, w_dot, a_joint, swing):
@@ -409,7 +410,7 @@ def test_a_model_of_one_function_is_checked(name):
     if name in TAKING_MORE:
         return
     expected = {"calls repeat", "batches are singles", "casadi externals are the compiled code"}
-    expected |= {"casadi functions agree"} if name not in measures.DERIVATIVES else set()
+    expected |= {"casadi functions agree"} if name not in errors.DERIVATIVES else set()
     assert expected <= {c.name for c in checks if c.status == "passed"}
 
 
@@ -459,29 +460,29 @@ def test_errors_are_measured_as_the_references_measure():
     root = rng.normal(size=(8, 8))
     H = root @ root.T
     other = H + 1e-9 * rng.normal(size=(8, 8))
-    assert measures.matrix_error(other, H) == pytest.approx(metrics.mass_matrix_error(other, H), rel=1e-12)
-    assert measures.block_error(other[0], H[0]) == pytest.approx(metrics.block_error(other[0], H[0]), rel=1e-12)
-    assert measures.condition(H) == pytest.approx(metrics.equilibrated_condition(H), rel=1e-12)
+    assert errors.matrix_error(other, H) == pytest.approx(metrics.mass_matrix_error(other, H), rel=1e-12)
+    assert errors.block_error(other[0], H[0]) == pytest.approx(metrics.block_error(other[0], H[0]), rel=1e-12)
+    assert errors.condition(H) == pytest.approx(metrics.equilibrated_condition(H), rel=1e-12)
 
 
 def test_condition_without_a_mass_matrix_is_of_the_same_size(model):
     partial = copy.copy(model)
     partial.kernels = {"forward_dynamics": model.kernel("forward_dynamics")}
-    for s in measures.states(model):
-        ratio = measures.sensitivity(partial, s.q) / measures.sensitivity(model, s.q)
+    for s in states.states(model):
+        ratio = errors.sensitivity(partial, s.q) / errors.sensitivity(model, s.q)
         assert 0.01 < ratio < 1.001
 
 
 def test_slope_is_the_derivative():
-    slope, largest = laws.slope(lambda t: np.array([np.sin(3 * t + 1), np.cos(3 * t)]), 3.0)
+    slope, largest = law.slope(lambda t: np.array([np.sin(3 * t + 1), np.cos(3 * t)]), 3.0)
     np.testing.assert_allclose(slope, [3 * np.cos(1), 0], rtol=0, atol=3e-14)
     assert (largest <= 1).all() and largest[1] > 0.99
 
 
 def test_moved_follows_the_velocity(model):
-    s = next(measures.states(model))
-    there = laws.moved(s.q, s.v, 1e-6)
-    rate = (there - laws.moved(s.q, s.v, -1e-6)) / 2e-6
+    s = next(states.states(model))
+    there = law.moved(s.q, s.v, 1e-6)
+    rate = (there - law.moved(s.q, s.v, -1e-6)) / 2e-6
     w, x, y, z = s.q[3:7]
     Q = np.array([[-x, -y, -z], [w, -z, y], [z, w, -x], [-y, x, w]])
     np.testing.assert_allclose(rate, np.concatenate([s.v[:3], Q @ s.v[3:6] / 2, s.v[6:]]), rtol=1e-8, atol=1e-8)
@@ -491,8 +492,8 @@ def test_moved_follows_the_velocity(model):
 def test_states_are_of_all_kinds_seeded_and_exact_in_the_real_type():
     for options in ({}, {"real": "float"}):
         model = st.load(model_folder(1, 2, **options))
-        first, again = list(measures.states(model)), list(measures.states(model))
-        assert [s.kind for s in first] == [kind for kind in measures.KINDS for _ in range(4)]
+        first, again = list(states.states(model)), list(states.states(model))
+        assert [s.kind for s in first] == [kind for kind in states.KINDS for _ in range(4)]
         for one, other in zip(first, again, strict=True):
             for name in ("q", "v", "v_dot", "tau", "f_ext"):
                 x = getattr(one, name)
@@ -540,20 +541,20 @@ def lean(segments, links):
 @pytest.mark.parametrize("segments", range(1, 7))
 def test_accuracy(segments, links):
     model = lean(segments, links)
-    assert_accurate(model, ExactChain(model.parameters, segments, links), measures.states(model, 2))
+    assert_accurate(model, ExactChain(model.parameters, segments, links), states.states(model, 2))
 
 
 @pytest.mark.slow
 def test_accuracy_of_128_links():
     model = lean(8, 16)
-    assert_accurate(model, ExactChain(model.parameters, 8, 16), measures.states(model, 2))
+    assert_accurate(model, ExactChain(model.parameters, 8, 16), states.states(model, 2))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("segments", [1, 2, 3, 6])
 def test_accuracy_of_the_continuum(segments):
     model = lean(segments, None)
-    assert_accurate(model, ExactContinuum(model.parameters, segments), measures.states(model, 1))
+    assert_accurate(model, ExactContinuum(model.parameters, segments), states.states(model, 1))
 
 
 @pytest.mark.slow
@@ -561,7 +562,7 @@ def test_accuracy_of_the_continuum(segments):
 def test_accuracy_where_the_last_link_lies_along_its_own_pitch_axis(segments):
     model = lean(segments, 1)
     chain = ExactChain(model.parameters, segments, 1)
-    for s in measures.states(model, 1):
+    for s in states.states(model, 1):
         for short_of in (0.0, 1e-3, 1e-2, 0.1):
             s.q[-1] = np.pi / 2 - short_of
             assert_accurate(model, chain, [s])

@@ -13,9 +13,10 @@ from pathlib import Path
 import numpy as np
 
 import serpentail as st
-from serpentail.laws import NEAR, Law
-from serpentail.measures import State, arguments, block_error, differences, matrix_error, outputs, states
-from serpentail.verify import Check, as_text, check, laws, summary
+from serpentail.verification.errors import block_error, differences, matrix_error
+from serpentail.verification.law import NEAR, Law
+from serpentail.verification.report import Check, as_text, check, laws, summary
+from serpentail.verification.states import State, arguments, outputs, states
 from serpentail_codegen.functions.catalogue import CATALOGUE
 from serpentail_codegen.functions.contact import CONTACT
 from serpentail_codegen.functions.function import program

@@ -102,7 +102,7 @@ def run(arguments: argparse.Namespace) -> tuple[dict, str, bool]:
     if arguments.verb == "simulate":
         return simulated(arguments)
     from .model.model import load
-    from .verify import as_text, laws, summary
+    from .verification.report import as_text, laws, summary
 
     model = load(arguments.folder)
     checks = laws(model)

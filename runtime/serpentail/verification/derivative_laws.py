@@ -5,9 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from .laws import NEAR, Law, fastest, moved, registry, slope
-from .measures import State, block_error, relative, worst
-from .model.model import Model
+from ..model.model import Model
+from .errors import block_error, relative, worst
+from .law import NEAR, Law, fastest, moved, registry, slope
+from .states import State
 
 FAR = 10 * NEAR  # a slope divides rounding by its step
 LAWS: list[Law] = []

@@ -4,9 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from .laws import NEAR, Law, fastest, moved, registry, slope
-from .measures import State, relative, sensitivity, worst
-from .model.model import Model
+from ..model.model import Model
+from .errors import relative, sensitivity, worst
+from .law import NEAR, Law, fastest, moved, registry, slope
+from .states import State
 
 FAR = 10 * NEAR  # a slope divides rounding by its step
 SUNK = 3e-3  # m, how deep the lowest point is

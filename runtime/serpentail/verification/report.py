@@ -5,12 +5,12 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
+from ..errors import SerpentailError
+from ..model.model import Model
 from . import contact_laws, derivative_laws
-from .errors import SerpentailError
-from .laws import LAWS as VALUE_LAWS
-from .laws import Law
-from .measures import State, states
-from .model.model import Model
+from .law import Law
+from .states import State, states
+from .value_laws import LAWS as VALUE_LAWS
 
 LAWS = (*VALUE_LAWS, *derivative_laws.LAWS, *contact_laws.LAWS)
 
