@@ -10,7 +10,7 @@ import numpy as np
 
 import mujoco_scene
 import serpentail as st
-from serpentail.limbs import leg_joints
+from serpentail.pictures.skeleton import leg_joints
 
 GAMMA, CROUCH, STAND, STRETCH = np.radians([210.0, -15.0, -40.0, -75.0])
 DAMPING = 1e-3  # N m s

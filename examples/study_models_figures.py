@@ -4,7 +4,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from serpentail.plot import HEAD, INK, QUIET, TAIL, write
+from serpentail.pictures.style import HEAD, INK, QUIET, TAIL, write
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

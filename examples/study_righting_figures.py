@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
 import serpentail as st
-from serpentail.plot import write
+from serpentail.pictures.style import write
 
 LOOKS = {"planned": ("#009e73", "-"), "tracked": ("#0072b2", "-."), "passive": ("#d55e00", "--")}
 WAYS = {"paper": ("#d55e00", "o--"), "ours": ("#0072b2", "s-")}

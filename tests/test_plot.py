@@ -9,15 +9,15 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 import pytest
+import serpentail.plot
 from scipy.spatial.transform import Rotation
 
-import serpentail.film
-import serpentail.plot
-from serpentail.animal import SIDE, TOP, silhouette
+import serpentail.pictures.filmstrip
 from serpentail.attitude import rotation_matrix
-from serpentail.film import filmstrip
 from serpentail.motion.trajectory import Trajectory
-from serpentail.plot import time_plots
+from serpentail.pictures.animal import SIDE, TOP, silhouette
+from serpentail.pictures.filmstrip import filmstrip
+from serpentail.pictures.time_plots import time_plots
 
 SEMI_AXES = np.array([0.0315, 0.0495, 0.027])
 MOUNT = np.array([0, -0.0405, 0.0045])

@@ -11,7 +11,7 @@ import pytest
 import serpentail as st
 from models import parent
 from serpentail import cli
-from serpentail.limbs import leg_joints
+from serpentail.pictures.skeleton import leg_joints
 from serpentail_codegen.pipeline import generate
 from serpentail_codegen.scene.parse import load_scene
 

@@ -20,9 +20,9 @@ _HOME = {
     **dict.fromkeys(["Goal", "Bounds"], "planning.problem"),
     "Plan": "planning.result.plan",
     "Pfl": "simulation.pfl",
-    "filmstrip": "film",
-    "leg_joints": "limbs",
-    "time_plots": "plot",
+    "filmstrip": "pictures.filmstrip",
+    "leg_joints": "pictures.skeleton",
+    "time_plots": "pictures.time_plots",
     **dict.fromkeys(
         [
             "SerpentailError",

@@ -8,11 +8,11 @@ import numpy as np
 
 from ..checks import finite, known, positive, real_array
 from ..errors import SimulationError
-from ..film import filmstrip
-from ..limbs import centre_of_mass, leg_joints
 from ..model.model import Model
 from ..motion.summary import summary
 from ..motion.trajectory import Trajectory
+from ..pictures.filmstrip import filmstrip
+from ..pictures.skeleton import centre_of_mass, leg_joints
 from ..simulation.controllers import Controller, Damping, Phases, TorqueTable
 from ..simulation.methods import SETTINGS
 from ..simulation.pfl import KD, KP, Pfl

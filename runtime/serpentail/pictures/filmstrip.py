@@ -11,15 +11,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..attitude import rotation_matrix
+from ..motion.trajectory import Trajectory
 from .animal import FORCE, LEG, LONGEST, SIDE, TOP, Body, Frame, Pen, View, arrows, draw_animal, draw_marks, tick
-from .attitude import rotation_matrix
-from .motion.trajectory import Trajectory
-from .plot import HEAD, INK, QUIET, TAIL, Array, writable, write
+from .style import HEAD, INK, QUIET, TAIL, Array, writable, write
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
 DOT: dict[str, Any] = {"color": HEAD, "linestyle": "", "marker": "o", "markersize": 4}
 KEY: dict[str, dict[str, Any]] = {
     "head": DOT,

@@ -6,11 +6,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .plot import HEAD, INK, TAIL, TORSO, Array
+from .style import HEAD, INK, TAIL, TORSO, Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
 MOST_DOTS = 20  # more tail points than this are drawn without dots
 LEG, FORCE = "#009e73", "#cc79a7"  # Okabe and Ito
 LONGEST = 0.06  # m, the arrow of the largest force of a film

@@ -1,39 +1,21 @@
 """Figures over time: a trajectory in, SVG, PDF or PNG files out; and how every figure is written."""
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .attitude import pitch_roll_yaw
-from .files import replacing
-from .motion.trajectory import Trajectory
+from ..attitude import pitch_roll_yaw
+from ..motion.trajectory import Trajectory
+from .style import INK, TAIL, Array, writable, write
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-Array = NDArray[np.float64]
-METADATA: dict[str, dict[str, Any]] = {".pdf": {"CreationDate": None}, ".png": {}, ".svg": {"Date": None}}
-DPI = 200
-INK, QUIET, TORSO, TAIL, HEAD = "#222222", "#8c8c8c", "#c6e0f0", "#d55e00", "#0072b2"
 TRIPLE = (("#0072b2", "-"), ("#d55e00", "--"), ("#009e73", "-."))  # Okabe and Ito, dashed for grey prints
-STYLE: dict[str, Any] = {
-    "svg.hashsalt": "serpentail",
-    "font.size": 8,
-    "axes.linewidth": 0.6,
-    "axes.edgecolor": QUIET,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "lines.linewidth": 1.3,
-    "lines.solid_capstyle": "round",
-    "legend.frameon": False,
-    "legend.handlelength": 2.2,
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,24 +35,6 @@ def time_plots(trajectory: Trajectory, path: str | os.PathLike[str]) -> Path:
     if len(trajectory.t) < 2:
         raise ValueError("the trajectory has one sample: give at least two to draw over time")
     return write(writable(path), lambda: _draw_times(trajectory))
-
-
-def writable(path: str | os.PathLike[str]) -> Path:
-    """The path, if its suffix names a known format."""
-    path = Path(path)
-    if path.suffix.lower() not in METADATA:
-        raise ValueError(f"figure {str(path)!r} has suffix {path.suffix!r}: use one of {', '.join(METADATA)}")
-    return path
-
-
-def write(path: Path, draw: Callable[[], "Figure"]) -> Path:
-    """Draw and write a figure whole or not at all; the same bytes every time."""
-    from matplotlib import style
-
-    kind = path.suffix.lower()
-    with style.context(STYLE, after_reset=True), replacing(path) as part:
-        draw().savefig(part, format=kind[1:], metadata=METADATA[kind], dpi=DPI)
-    return path
 
 
 def _draw_times(trajectory: Trajectory) -> "Figure":

@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .attitude import rotation_matrix
-from .motion.trajectory import Trajectory
+from ..attitude import rotation_matrix
+from ..motion.trajectory import Trajectory
 
 SIDES = (1.0, -1.0)  # the left hip mirrors the right one in x
 

@@ -1,0 +1,46 @@
+"""The look that all drawings share, and how they are written."""
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..files import replacing
+
+Array = NDArray[np.float64]
+METADATA: dict[str, dict[str, Any]] = {".pdf": {"CreationDate": None}, ".png": {}, ".svg": {"Date": None}}
+DPI = 200
+INK, QUIET, TORSO, TAIL, HEAD = "#222222", "#8c8c8c", "#c6e0f0", "#d55e00", "#0072b2"
+STYLE: dict[str, Any] = {
+    "svg.hashsalt": "serpentail",
+    "font.size": 8,
+    "axes.linewidth": 0.6,
+    "axes.edgecolor": QUIET,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "lines.linewidth": 1.3,
+    "lines.solid_capstyle": "round",
+    "legend.frameon": False,
+    "legend.handlelength": 2.2,
+}
+
+
+def writable(path: str | os.PathLike[str]) -> Path:
+    """The path, if its suffix names a known format."""
+    path = Path(path)
+    if path.suffix.lower() not in METADATA:
+        raise ValueError(f"figure {str(path)!r} has suffix {path.suffix!r}: use one of {', '.join(METADATA)}")
+    return path
+
+
+def write(path: Path, draw: Callable[[], "Figure"]) -> Path:
+    """Draw and write a figure whole or not at all; the same bytes every time."""
+    from matplotlib import style
+
+    kind = path.suffix.lower()
+    with style.context(STYLE, after_reset=True), replacing(path) as part:
+        draw().savefig(part, format=kind[1:], metadata=METADATA[kind], dpi=DPI)
+    return path
