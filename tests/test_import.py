@@ -54,7 +54,7 @@ def test_names_are_the_contract():
 def test_no_module_hides_a_public_name():
     """Importing a submodule makes it an attribute of the package, in place of what is there."""
     modules = {module.name for module in pkgutil.iter_modules(st.__path__)}
-    assert "trajectory" in modules and not modules & set(st.__all__)
+    assert "motion" in modules and not modules & set(st.__all__)
     assert fresh("import serpentail as st; st.Damping; print(st.simulate.__name__)") == "simulate\n"
 
 

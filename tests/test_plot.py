@@ -9,14 +9,15 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 import pytest
-import serpentail.plot
 from scipy.spatial.transform import Rotation
 
-import serpentail.pictures.filmstrip
 from serpentail.attitude import rotation_matrix
 from serpentail.motion.trajectory import Trajectory
-from serpentail.pictures.animal import SIDE, TOP, silhouette
+from serpentail.pictures import filmstrip as film
+from serpentail.pictures import time_plots as plots
+from serpentail.pictures.animal import SIDE, TOP, Body, silhouette
 from serpentail.pictures.filmstrip import filmstrip
+from serpentail.pictures.style import STYLE
 from serpentail.pictures.time_plots import time_plots
 
 SEMI_AXES = np.array([0.0315, 0.0495, 0.027])
@@ -74,16 +75,16 @@ def film_frame(seed):
     q[:, 3:7] = Rotation.random(rng=seed).as_quat()
     trajectory = dataclasses.replace(trajectory, q=q)
     points = tail_points(trajectory)
-    return serpentail.film._frame(trajectory, points, q[:, :3], serpentail.film.Body(), 0)
+    return film._frame(trajectory, points, q[:, :3], Body(), 0)
 
 
 def drawn_film(trajectory, frames=8, com=None):
     """The film's figure and frames, unwritten."""
     com = trajectory.q[:, :3] if com is None else com
-    points, moments = tail_points(trajectory), serpentail.film._moments(trajectory.t, frames)
-    body = serpentail.film.Body()
-    film = [serpentail.film._frame(trajectory, points, com, body, k) for k in moments]
-    return serpentail.film._draw_film(film, com), film
+    points, moments = tail_points(trajectory), film._moments(trajectory.t, frames)
+    body = Body()
+    frames = [film._frame(trajectory, points, com, body, k) for k in moments]
+    return film._draw_film(frames, com), frames
 
 
 @pytest.mark.parametrize("view", [SIDE, TOP], ids=lambda view: view.name)
@@ -152,14 +153,14 @@ def test_the_same_bytes_twice_whatever_the_user_has_set(tmp_path, suffix):
 
 def test_drawing_leaves_pyplot_alone_and_importing_leaves_matplotlib_alone(tmp_path):
     code = (
-        "import sys, serpentail.film, serpentail.plot, serpentail.trajectory\n"
+        "import sys, serpentail.pictures.filmstrip, serpentail.pictures.time_plots, serpentail.motion.trajectory\n"
         "assert 'matplotlib' not in sys.modules and 'scipy' not in sys.modules\n"
         "from test_plot import flight, tail_points\n"
-        "serpentail.film.filmstrip(flight(), tail_points(flight()), 'film.svg')\n"
-        "serpentail.plot.time_plots(flight(), 'times.svg')\n"
+        "serpentail.pictures.filmstrip.filmstrip(flight(), tail_points(flight()), 'film.svg')\n"
+        "serpentail.pictures.time_plots.time_plots(flight(), 'times.svg')\n"
         "assert 'matplotlib.pyplot' not in sys.modules\n"
     )
-    packages = [str(Path(serpentail.plot.__file__).parents[1]), str(Path(__file__).parent)]
+    packages = [str(Path(plots.__file__).parents[2]), str(Path(__file__).parent)]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(packages), "PYTHONDONTWRITEBYTECODE": "1"}
     subprocess.run([sys.executable, "-c", code], cwd=tmp_path, env=environment, check=True)
 
@@ -225,10 +226,10 @@ def test_one_sample_cannot_be_drawn_over_time(tmp_path):
 @pytest.mark.parametrize("frames", [1, 2, 7, 8, 40])
 def test_frames_are_the_samples_nearest_to_even_times(frames):
     t = np.sort(np.random.default_rng(5).uniform(0, 1, 400))
-    moments = serpentail.film._moments(t, frames)
+    moments = film._moments(t, frames)
     assert len(moments) == frames
     assert np.abs(t[moments] - np.linspace(t[0], t[-1], frames)).max() <= np.diff(t).max() / 2
-    assert serpentail.film._moments(t[:3], 8) == [0, 1, 2]
+    assert film._moments(t[:3], 8) == [0, 1, 2]
 
 
 @pytest.mark.parametrize("speed", SPEEDS)
@@ -256,7 +257,7 @@ def test_panels_have_one_scale_and_show_everything(speed, frames):
 @pytest.mark.parametrize("frames", [1, 4, 8])
 @pytest.mark.parametrize("speed", SPEEDS)
 def test_panels_key_and_labels_do_not_overlap(speed, frames):
-    with matplotlib.rc_context(serpentail.plot.STYLE):
+    with matplotlib.rc_context(STYLE):
         figure, _ = drawn_film(flight(SPEEDS[speed]), frames)
         figure.draw_without_rendering()
         boxes = [axes.get_tightbbox() for axes in figure.axes if axes.axison]
@@ -278,8 +279,8 @@ def test_centre_of_mass_given_moves_the_windows():
 
 @pytest.mark.parametrize("segments", [0, 1, 3, 8])
 def test_time_plots_label_everything_and_legends_cover_nothing(segments):
-    with matplotlib.rc_context(serpentail.plot.STYLE):
-        figure = serpentail.plot._draw_times(flight(segments=segments))
+    with matplotlib.rc_context(STYLE):
+        figure = plots._draw_times(flight(segments=segments))
         figure.draw_without_rendering()
         curves = 15 + 4 * segments
         assert sum(len(axes.lines) for axes in figure.axes) == curves
@@ -296,5 +297,5 @@ def test_time_plots_label_everything_and_legends_cover_nothing(segments):
 
 def test_a_conserved_momentum_is_drawn_flat():
     trajectory = dataclasses.replace(flight(), angular_momentum=np.full((59, 3), 1e-3) * (1 + 1e-13 * np.eye(59, 3)))
-    figure = serpentail.plot._draw_times(trajectory)
+    figure = plots._draw_times(trajectory)
     assert np.ptp(figure.axes[-1].get_ylim()) >= 0.01
