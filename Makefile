@@ -91,33 +91,33 @@ generated/.options/$(MODEL): .FORCE
 .FORCE:
 
 verify: model
-	$(PY) tests/verify_model.py generated/$(MODEL)
+	$(PY) -m tests.verification.verify_model generated/$(MODEL)
 
 bench: $(READY)
-	PYTHONPATH=tests $(PY) benchmarks/bench.py
+	$(PY) -m benchmarks.bench
 
 stress: $(READY)
-	PYTHONPATH=tests $(PY) stress/stress.py --calls $(CALLS)
+	$(PY) -m stress.stress --calls $(CALLS)
 
 embedded: model
-	$(PY) embedded/check.py generated/$(MODEL) --board $(CPU)
+	$(PY) -m embedded.check generated/$(MODEL) --board $(CPU)
 
 size-report: $(READY)
-	$(PY) embedded/size_report.py
+	$(PY) -m embedded.size_report
 
 study-models: $(READY)
-	PYTHONPATH=benchmarks $(PY) examples/study_models.py
+	$(PY) -m examples.studies.models
 
 study-righting: $(READY)
-	$(PY) examples/study_righting.py --starts $(STARTS)
+	$(PY) -m examples.studies.righting --starts $(STARTS)
 
 study-contact: $(READY)
-	$(PY) examples/study_contact.py
+	$(PY) -m examples.studies.contact
 
 studies: study-models study-righting study-contact
 
 golden: $(READY)
-	$(PY) -m pytest tests/test_golden.py --update-golden
+	$(PY) -m pytest tests/house/test_golden.py --update-golden
 
 clean:
 	rm -rf generated output

@@ -8,7 +8,7 @@ from unittest import mock
 import numpy as np
 
 import serpentail as st
-from fixtures import generated, label
+from benchmarks.fixtures import generated, label
 from serpentail.model.batch import MANY
 from serpentail.model.kernel import aligned, call_record
 from serpentail.simulation import batched_runs as abreast

@@ -11,20 +11,13 @@ from pathlib import Path
 
 import numpy as np
 
-import batches
-import contact_costs
-import continuum_forms
-import continuum_peer
-import derivatives
-import more_peers
-import peers
-import planning
-import precisions
-import scaling
 import serpentail as st
-import simulations
-from fixtures import Fixture, fixture, generated, label
-from report import written
+from benchmarks import batches, contact_costs, continuum_forms, derivatives, planning, precisions, scaling, simulations
+from benchmarks.fixtures import Fixture, fixture, generated, label
+from benchmarks.peers import mujoco_casadi as more_peers
+from benchmarks.peers import pinocchio as peers
+from benchmarks.peers import soromox as continuum_peer
+from benchmarks.report import written
 
 ROOT = Path(__file__).resolve().parent.parent
 OUTPUT = ROOT / "output" / "bench"

@@ -6,11 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-import peers
 import serpentail as st
-from fixtures import fixture
+from benchmarks.fixtures import fixture
+from benchmarks.peers import pinocchio as peers
 
-TESTS = Path(__file__).resolve().parent.parent / "tests"
 THETAS = (*(10.0 ** (np.arange(-24, 2) / 3)), np.pi, 2 * np.pi)
 STATES = 6  # at each theta; the worst error counts
 ROUNDS, CALLS = 200, 256
@@ -36,8 +35,7 @@ def form_errors(folder: Path) -> list[dict]:
     Rates of all coordinates are some 10 rad/s. Accelerations are compared in bend components. "refused": some H was
     not positive definite, so that there is no v_dot.
     """
-    sys.path.append(str(TESTS))  # the reference is the tests'
-    from references.exact_polar import ExactPolar
+    from tests.references.exact_polar import ExactPolar
 
     models = {name: st.load(form(folder, name, 1)) for name in COLOURS}
     exact = ExactPolar(models["polar"].parameters, 1)
@@ -65,7 +63,7 @@ def state(theta: float, seed: int) -> tuple[np.ndarray, ...]:
 
 def state_errors(models: dict, exact, q, v, tau) -> dict:
     """Return the errors of both forms at one state, each at its own float64 numbers."""
-    from references.metrics import mass_matrix_error
+    from tests.references.metrics import mass_matrix_error
 
     in_bend = [np.array(x, float) for x in (*exact.state(q, v), exact.force(q, tau))]
     expected = exact.bend.mass_matrix(in_bend[0])
@@ -78,7 +76,7 @@ def state_errors(models: dict, exact, q, v, tau) -> dict:
 
 def v_dot_error(model: st.Model, exact, arguments, to_bend) -> float | None:
     """Return the error of forward dynamics in bend components; None where the model refuses."""
-    from references.metrics import block_error
+    from tests.references.metrics import block_error
 
     q, v, tau = arguments
     try:

@@ -12,9 +12,9 @@ from types import ModuleType
 import casadi as ca
 import numpy as np
 
-import peers
 import serpentail as st
-from fixtures import Fixture, fixture
+from benchmarks.fixtures import Fixture, fixture
+from benchmarks.peers import pinocchio as peers
 from serpentail.model.compiler import compile_library
 from serpentail_codegen.scene.scene import DERIVATIVES
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 import serpentail as st
-from peers import Closure
+from benchmarks.peers.pinocchio import Closure
 from serpentail.model.compiler import compile_library
 from serpentail.model.kernel import aligned
 

@@ -5,15 +5,13 @@ All times are CPU seconds of this process.  The problem of one plan is that of S
 """
 
 import importlib.util
-import sys
 import time
 from pathlib import Path
 
 import numpy as np
 
-sys.path.append(str(Path(__file__).resolve().parent.parent / "examples"))
-import righting
 import serpentail as st
+from examples import righting
 from serpentail.planning import rounds
 from serpentail.planning.nlp.node import dynamics
 from serpentail.planning.problem import SMOOTHING
@@ -79,7 +77,7 @@ def opty(rat: st.Model, best: float) -> dict:
     name = "(1, 3), 59 nodes, opty"
     if any(importlib.util.find_spec(needed) is None for needed in ("opty", "cyipopt")):
         return figure(name, "not measured", "", "opty or cyipopt is not installed")
-    from opty_rival import solved
+    from benchmarks.peers.opty_righting import solved
 
     flight = righting.passive(rat, righting.tumbling(rat, EXAMPLE), righting.FLIGHT)
     guess = flight.resample(np.linspace(0, righting.FLIGHT, 59))

@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 
 import serpentail as st
-from batches import c_times, random_states
-from fixtures import generated, label
-from references.exact_chain import ExactChain
-from references.exact_continuum import ExactContinuum
+from benchmarks.batches import c_times, random_states
+from benchmarks.fixtures import generated, label
+from tests.references.exact_chain import ExactChain
+from tests.references.exact_continuum import ExactContinuum
 
 EXACT = 10  # states that are compared with 40 digits
 

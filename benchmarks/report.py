@@ -6,8 +6,8 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 
-from fixtures import COLUMNS
-from targets import judged
+from benchmarks.fixtures import COLUMNS
+from benchmarks.targets import judged
 
 Report = dict[str, list[dict]]
 NOTABLE = 1.15  # ratio to the last run from which a figure is listed

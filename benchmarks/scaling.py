@@ -8,8 +8,8 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
-import peers
-from fixtures import fixture, generated, label
+from benchmarks.fixtures import fixture, generated, label
+from benchmarks.peers import pinocchio as peers
 
 SWEEPS = {
     "links of one segment": [(1, n) for n in (1, 2, 4, 8, 16, 32, 64)],
@@ -42,7 +42,7 @@ def peak(folder: Path) -> tuple[float, float]:
     """Flops per nanosecond of this core: scalars, vectors, which take the same time."""
     flags = ("-std=gnu11", "-O2", "-march=native", "-ffp-contract=fast", "-fPIC", "-shared")
     target, width = folder / "peak.so", ctypes.c_int()
-    peers.run(["gcc", *flags, str(Path(__file__).parent / "peak.c"), "-o", str(target)])
+    peers.run(["gcc", *flags, str(Path(__file__).parent / "native" / "peak.c"), "-o", str(target)])
     measure = ctypes.CDLL(str(target)).measure_peak
     measure.restype = ctypes.c_double
     vector = measure(ctypes.byref(width))

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-import mujoco_scene
 import serpentail as st
+from benchmarks.peers import mujoco_scene
 from serpentail.pictures.skeleton import leg_joints
 
 GAMMA, CROUCH, STAND, STRETCH = np.radians([210.0, -15.0, -40.0, -75.0])

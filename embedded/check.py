@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from boards import BOARDS, PROFILES, ToolchainMissing
-from image import Image, build, manifest_of
-from results import Result, blocks, run
-from stack import deepest
+from embedded.boards import BOARDS, PROFILES, ToolchainMissing
+from embedded.image import Image, build, manifest_of
+from embedded.results import Result, blocks, run
+from embedded.stack import deepest
 
 BOUND = 1e4  # units of the last place of an output's largest entry: what the fast profile may differ by
 

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from boards import HERE, PROFILES, WARNINGS, Board
-from states import stored_states
+from embedded.boards import HERE, PROFILES, WARNINGS, Board
+from embedded.states import stored_states
 
 LONGEST_REPORT = 3000  # characters of what a compiler says
 C_LINES = ("-std=gnu11", "-I", str(HERE))  # the harness alone: attributes, assembly

@@ -6,7 +6,7 @@ import subprocess
 from collections import Counter
 from pathlib import Path
 
-from boards import ToolchainMissing
+from embedded.boards import ToolchainMissing
 
 CPPCHECK = ("cppcheck", "--std=c99", "--quiet")
 

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from image import Image, sizes
+from embedded.image import Image, sizes
 
 PATIENCE = 120  # s
 

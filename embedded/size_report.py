@@ -8,13 +8,13 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from boards import BOARDS, ToolchainMissing
-from image import Image, build, command
-from misra import summary
-from results import blocks, run
+from embedded.boards import BOARDS, ToolchainMissing
+from embedded.image import Image, build, command
+from embedded.misra import summary
+from embedded.results import blocks, run
+from embedded.stack import deepest
 from serpentail_codegen.pipeline import generate
 from serpentail_codegen.scene.parse import scene_for
-from stack import deepest
 
 DOCUMENT = Path(__file__).parent.parent / "docs" / "embedded.md"
 TAILS = ((1, 3), (3, 4), (6, 4), (1, None), (3, None))  # segments, links; None: continuum

@@ -6,8 +6,8 @@ from functools import cache
 import numpy as np
 
 import serpentail as st
-from figures import Figure
-from models import model_folder
+from stress.figures import Figure
+from tests.support.models import model_folder
 
 METHODS = {"ros34pw2": 60, "tsit5": 60, "rk4": 40, "implicit_euler": 60, "lsoda": 8, "dop853": 8}  # drops each
 DURATION = 0.5  # s

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from figures import Figure
 from serpentail.model.parameters import disparity
-from subjects import changed, errors, judged, state, subject
+from stress.figures import Figure
+from stress.subjects import changed, errors, judged, state, subject
 
 MICROGRAM = 1e-9  # kg
 CASES = {

@@ -5,8 +5,8 @@ from functools import cache
 import numpy as np
 
 import serpentail as st
-from figures import Figure
-from subjects import subject
+from stress.figures import Figure
+from stress.subjects import subject
 
 DURATION = 1000.0  # s
 TOLERANCE = 1e-8

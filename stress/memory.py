@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-import drops
 import serpentail as st
-from extremes import cases
-from poses import FAST, SMALL, folds
 from serpentail.model.parameters import flat, resolve
-from subjects import Subject
+from stress import drops
+from stress.extremes import cases
+from stress.poses import FAST, SMALL, folds
+from stress.subjects import Subject
 
 DRIVER = Path(__file__).parent / "driver.c"
 SANITIZED = ("-O0", "-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all")

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from figures import Figure
-from subjects import Errors, Subject, errors, judged, state, subject
+from stress.figures import Figure
+from stress.subjects import Errors, Subject, errors, judged, state, subject
 
 SMALL = (0.0, 5e-324, 1e-300, 1e-200, 1e-154, 1e-100, 1e-30, 1e-16, 1e-12, 1e-8, 1e-6, 1e-4, 1e-3, 1e-2, 0.1)
 LARGE = (0.3, 1.0, 2.0, np.pi, 4.0, 5.0, 6.0, 2 * np.pi * (1 - 1e-12))

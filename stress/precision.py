@@ -3,9 +3,9 @@
 import numpy as np
 
 import serpentail as st
-from figures import Figure
-from references.metrics import block_error, equilibrated_condition, mass_matrix_error
-from subjects import label, state, subject
+from stress.figures import Figure
+from stress.subjects import label, state, subject
+from tests.references.metrics import block_error, equilibrated_condition, mass_matrix_error
 
 EPS32 = float(np.finfo(np.float32).eps)
 ROUNDINGS = 64  # of one quantity, in units of eps

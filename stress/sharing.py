@@ -4,9 +4,9 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-import drops
 import serpentail as st
-from figures import Figure
+from stress import drops
+from stress.figures import Figure
 
 THREADS, JOBS = 8, 64
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from figures import Figure
-from subjects import errors, judged, state, subject
+from stress.figures import Figure
+from stress.subjects import errors, judged, state, subject
 
 SIZES = ((1, 1), (8, 4), (20, 1), (20, 4), (1, 512), (6, None))
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from figures import Figure
-from poses import FAST, folds
-from references.metrics import block_error
-from subjects import Subject, state, subject
+from stress.figures import Figure
+from stress.poses import FAST, folds
+from stress.subjects import Subject, state, subject
+from tests.references.metrics import block_error
 
 STEP = 2.0**-7
 STENCIL = {1: 4 / 5, 2: -1 / 5, 3: 4 / 105, 4: -1 / 280}  # central differences of order 8

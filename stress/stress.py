@@ -9,19 +9,21 @@ import time
 import warnings
 from pathlib import Path
 
-import call_fuzz
-import drops
-import extremes
-import flights
-import poses
-import precision
-import scene_fuzz
-import sharing
-import sizes
-import slopes
-import stress_plots
-from figures import Figure, table
-from poses import Point
+from stress import (
+    call_fuzz,
+    drops,
+    extremes,
+    flights,
+    poses,
+    precision,
+    scene_fuzz,
+    sharing,
+    sizes,
+    slopes,
+    stress_plots,
+)
+from stress.figures import Figure, table
+from stress.poses import Point
 
 ROOT = Path(__file__).resolve().parent.parent
 OUTPUT = ROOT / "output" / "stress"

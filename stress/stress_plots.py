@@ -6,9 +6,9 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure as Page
 
-from figures import Figure
-from poses import Point
-from subjects import PER_CONDITION
+from stress.figures import Figure
+from stress.poses import Point
+from stress.subjects import PER_CONDITION
 
 LEAST = 1e-5  # share of a limit that is told from less
 

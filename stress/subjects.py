@@ -7,11 +7,11 @@ from functools import cache
 import numpy as np
 
 import serpentail as st
-from figures import Figure
-from models import model_folder
-from references.exact_chain import ExactChain
-from references.exact_continuum import ExactContinuum
-from references.metrics import block_error, equilibrated_condition, force_error, mass_matrix_error
+from stress.figures import Figure
+from tests.references.exact_chain import ExactChain
+from tests.references.exact_continuum import ExactContinuum
+from tests.references.metrics import block_error, equilibrated_condition, force_error, mass_matrix_error
+from tests.support.models import model_folder
 
 FUNCTIONS = [
     "mass_matrix",

@@ -5,7 +5,7 @@ from functools import lru_cache
 import mpmath
 import numpy as np
 
-from references.metrics import BLOCKS
+from tests.references.metrics import BLOCKS
 
 TORSO_ROTATION = range(3, 6)
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from references.exact_continuum import ExactContinuum
+from tests.references.exact_continuum import ExactContinuum
 
 
 class ExactPolar:

@@ -1,0 +1,1 @@
+"""`make bench`: run time, accuracy and size, beside peers."""

@@ -1,0 +1,109 @@
+"""MuJoCo and CasADi beside the generated forward dynamics: models go in, nanoseconds and ratios come out."""
+
+import ctypes
+import importlib.util
+import subprocess
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+
+from benchmarks import derivatives
+from benchmarks.fixtures import fixture, generated, label
+from benchmarks.peers import pinocchio as peers
+
+SIZES = ((1, 3), (3, 4), (6, 6))
+IN_CASADI = ((1, 3), (3, 4))  # gcc takes minutes for longer tails
+ROUNDS, CALLS = 200, 128
+
+
+def other_peers(folder: Path) -> list[dict]:
+    """Nanoseconds of forward dynamics beside MuJoCo's and CasADi's, rounds interleaved; ratios by minima (by medians).
+
+    MuJoCo: the full chain of 2 m n hinges, its inertia and bias by its own functions, reduced and solved as
+    Pinocchio's is (mujoco_chain.c).  CasADi: C of the generated SX function, gcc -O2 -march=native, CasADi's default.
+    Targets: MuJoCo 11x; CasADi 1.25x (m = 1), 1.7x (3, 4).
+    """
+    library = mujoco_library(folder)
+    return [row(folder, size, library) for size in SIZES]
+
+
+def row(folder: Path, size: tuple[int, int], library: ctypes.CDLL) -> dict:
+    """Return the figures of one tail."""
+    ours = fixture(generated(folder / "speed", *size), folder / "speed")
+    states = peers.random_states(size[0])
+    chain = library.mujoco_chain_new(str(chain_xml(folder, ours.model)).encode(), *size)
+    if not chain:
+        raise peers.PeerUnavailable("MuJoCo could not read the chain")
+    pointer = ctypes.cast(library.mujoco_forward_dynamics, ctypes.c_void_p).value
+    others = {"mujoco": peers.Closure(pointer, chain)}
+    if size in IN_CASADI:
+        others["casadi"] = derivatives.in_casadi("fd", acceleration(ours.model), ours.model, folder).closure
+    found = derivatives.compared(ours, others, states)
+    found |= {name: "" for name in ("casadi_ns", "casadi_ratio") if name not in found}
+    found["v_dot_difference"] = difference(library, chain, ours.model, states)
+    library.mujoco_chain_free(chain)
+    return {"model": label(*size)} | found
+
+
+def acceleration(model) -> ca.Function:
+    """Return v_dot of (q, v, tau, parameters), and nothing second, as the timer's adapter wants two outputs."""
+    graph = derivatives.Graph(model)
+    tau = ca.SX.sym("tau", graph.nt)
+    arguments = {name: ca.vertsplit(x) for name, x in (("q", graph.q), ("v", graph.v), ("tau", tau))}
+    v_dot = ca.vertcat(*graph.module.forward_dynamics(graph.fields, **arguments)["v_dot"])
+    return graph.finished(tau, [v_dot, ca.SX.zeros(1)])
+
+
+def mujoco_library(folder: Path) -> ctypes.CDLL:
+    """Compile mujoco_chain.c against the installed MuJoCo; PeerUnavailable where that is not there."""
+    found = importlib.util.find_spec("mujoco")
+    if found is None:
+        raise peers.PeerUnavailable("MuJoCo is not installed: pip install mujoco")
+    home = Path(found.origin).parent
+    shared = next(home.glob("libmujoco.so.*"))
+    target = folder / "mujoco_chain.so"
+    source = Path(__file__).parent / "mujoco_chain.c"
+    flags = ["-O2", "-march=native", "-fPIC", "-shared", "-I", str(home / "include"), f"-Wl,-rpath,{home}"]
+    subprocess.run(["gcc", *flags, str(source), str(shared), "-o", str(target)], check=True)
+    library = ctypes.CDLL(str(target))
+    library.mujoco_chain_new.restype = ctypes.c_void_p
+    library.mujoco_chain_free.argtypes = [ctypes.c_void_p]
+    library.mujoco_forward_dynamics.argtypes = [ctypes.c_void_p] * 5
+    return library
+
+
+def chain_xml(folder: Path, model) -> Path:
+    """Write the chain of a model as MJCF; return the file."""
+    p, count = model.parameters, model.segments * model.links
+    length, inertia = p["tail_length"] / count, words(p["link_inertia"])
+    body = ""
+    for k in reversed(range(count)):
+        place = words(p["tail_mount"]) if k == 0 else f"0 {-length!r} 0"
+        body = (
+            f'<body pos="{place}"><joint axis="1 0 0"/><joint axis="0 0 1"/><inertial pos="0 {-length / 2!r} 0" '
+            f'mass="{p["tail_mass"] / count!r}" diaginertia="{inertia}"/>{body}</body>'
+        )
+    torso = f'<inertial pos="0 0 0" mass="{p["torso_mass"]!r}" diaginertia="{words(p["torso_inertia"])}"/>'
+    path = folder / f"{model.name}.xml"
+    path.write_text(
+        f'<mujoco><compiler angle="radian" balanceinertia="false"/><option gravity="0 0 {-p["gravity"]!r}"/>'
+        f"<worldbody><body><freejoint/>{torso}{body}</body></worldbody></mujoco>"
+    )
+    return path
+
+
+def words(numbers) -> str:
+    """Return numbers as MJCF has them."""
+    return " ".join(map(repr, numbers))
+
+
+def difference(library: ctypes.CDLL, chain: int, model, states: peers.States) -> float:
+    """Largest relative difference of MuJoCo's v_dot from the model's."""
+    errors, v_dot = [], np.zeros(model.nv)
+    for q, v, tau in zip(*states, strict=True):
+        arrays = [np.ascontiguousarray(x) for x in (q, v, tau)]
+        library.mujoco_forward_dynamics(chain, *(a.ctypes.data for a in (*arrays, v_dot)))
+        expected = model.forward_dynamics(q, v, tau)
+        errors.append(np.abs(v_dot - expected).max() / np.abs(expected).max())
+    return max(errors)

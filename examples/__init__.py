@@ -1,0 +1,1 @@
+"""Examples: a demonstration, and the studies."""

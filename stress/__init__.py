@@ -1,0 +1,1 @@
+"""`make stress`: models and runtime at their limits."""

@@ -1,0 +1,212 @@
+"""The front door: make builds what is asked for, once, and says in one line what it cannot do."""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+VARIABLES = {"TAIL", "M", "N", "SCENE", "REAL", "EMISSION", "BAKED", "FUNCTIONS", "CC"}
+ORDER = ("TAIL=articulated", "M=1", "N=1", "FUNCTIONS=mass_matrix")
+NAME = "articulated_m1_n1"
+UP_TO_DATE = f"generated/{NAME} is up to date\n"
+# Programs of .venv: this interpreter, and no installation, which would reach the real environment.
+PROGRAM = '#!/bin/sh\ncase "$*" in *"pip install"*) echo "no pip in here" >&2; exit 9;; esac\nexec {} "$@"\n'
+
+
+@pytest.fixture
+def tree(tmp_path):
+    """A copy of what make builds from, with a stand-in for .venv that is ready."""
+    for name in ("Makefile", "pyproject.toml"):
+        shutil.copy2(ROOT / name, tmp_path)
+    for name in ("codegen", "scenes"):
+        shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
+    programs = tmp_path / ".venv" / "bin"
+    programs.mkdir(parents=True)
+    for name, command in (("python", sys.executable), ("serpentail", f"{sys.executable} -m serpentail.cli")):
+        (programs / name).write_text(PROGRAM.format(command))
+        (programs / name).chmod(0o755)
+    (tmp_path / ".venv" / ".ready").touch()
+    return tmp_path
+
+
+@pytest.fixture
+def make(tree):
+    """Return a function that runs make there, away from a make that runs these tests."""
+
+    def run(*arguments, **more):
+        own = {k: v for k, v in os.environ.items() if k not in VARIABLES and not re.match("MAKE|MFLAGS", k)}
+        own |= {"PYTHONPATH": str(tree / "codegen"), "LC_ALL": "C", **more}
+        return subprocess.run(["make", *arguments], cwd=tree, env=own, capture_output=True, text=True, check=False)
+
+    return run
+
+
+def lines(done):
+    """The lines that make printed, with single spaces."""
+    return [" ".join(line.split()) for line in done.stdout.splitlines()]
+
+
+def built(tree):
+    """Time of every file that a build wrote."""
+    return {path: path.stat().st_mtime_ns for path in (tree / "generated").rglob("*") if path.is_file()}
+
+
+def manifest(tree, name=NAME):
+    return json.loads((tree / "generated" / name / "manifest.json").read_text())
+
+
+def age(tree):
+    """Make everything an hour older, so that what is written from now on is newer."""
+    for path in tree.rglob("*"):
+        status = path.stat()
+        os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns - 3_600_000_000_000))
+
+
+def test_make_alone_is_help(tree, make):
+    done = make()
+    assert (done.returncode, done.stderr) == (0, "")
+    phony = re.search(r"^\.PHONY: (help .*)", (ROOT / "Makefile").read_text(), re.MULTILINE)
+    for target in phony[1].split():
+        assert target == "help" or re.search(rf"make {target}\b", done.stdout), target
+    assert make("help").stdout == done.stdout
+    assert not (tree / "generated").exists()
+
+
+def test_plan_of_a_model(tree, make):
+    done = make("-n", "model", "TAIL=articulated", "M=2", "N=2")
+    assert (done.returncode, done.stderr) == (0, "")
+    generate, tell = (line for line in lines(done) if line.startswith(".venv/bin/"))
+    assert generate == ".venv/bin/python -m serpentail_codegen --tail articulated --segments 2 --links 2"
+    assert tell == ".venv/bin/serpentail info generated/articulated_m2_n2"
+    assert not (tree / "generated").exists()
+
+
+@pytest.mark.parametrize("size", [("M=1", "N=3"), ()])
+def test_plan_of_options(make, size):
+    options = ("REAL=float", "EMISSION=loops", "BAKED=1", "FUNCTIONS=energy,momentum")
+    done = make("-n", "model", *size, *options)
+    wanted = (
+        "--tail articulated --segments 1 --links 3 --real float --emission loops --baked --functions energy,momentum"
+    )
+    assert f".venv/bin/python -m serpentail_codegen {wanted}" in lines(done)
+
+
+def test_plan_of_a_scene(make):
+    done = make("-n", "model", "SCENE=scenes/kangaroo_rat_m1_n3.toml", "REAL=float")
+    assert ".venv/bin/python -m serpentail_codegen scenes/kangaroo_rat_m1_n3.toml --real float" in lines(done)
+    assert ".venv/bin/serpentail info generated/kangaroo_rat_m1_n3" in lines(done)
+
+
+def test_second_make_rebuilds_nothing(tree, make):
+    first = make("model", "TAIL=articulated", "M=1", "N=1")
+    assert (first.returncode, first.stderr) == (0, "")
+    assert re.search(rf"generated/{NAME}: \d+ files written", first.stdout)
+    assert f"{NAME}: 1 segments x 1 links, nq 9, nv 8, double" in first.stdout
+    age(tree)
+    before = built(tree)
+    second = make("model", "TAIL=articulated", "M=1", "N=1")
+    assert (second.returncode, second.stderr) == (0, "")
+    assert "serpentail" not in second.stdout
+    assert built(tree) == before
+
+
+def test_changed_options_rebuild(tree, make):
+    assert make("model", *ORDER).returncode == 0
+    for options, key, value in [
+        (("REAL=float",), "real", "float"),
+        ((), "real", "double"),
+    ]:
+        done = make("model", *ORDER, *options)
+        assert (done.returncode, done.stderr) == (0, "") and "files written" in done.stdout
+        assert manifest(tree)["scene"][key] == value
+        assert make("model", *ORDER, *options).stdout == UP_TO_DATE
+
+
+def test_changed_generator_looks_again_and_writes_only_what_differs(tree, make):
+    assert make("model", *ORDER).returncode == 0
+    age(tree)
+    before = built(tree)
+    (tree / "codegen" / "serpentail_codegen" / "kinematics.py").touch()
+    done = make("model", *ORDER)
+    assert done.returncode == 0 and f"generated/{NAME}: up to date" in done.stdout
+    stamp = tree / "generated" / NAME / ".made"
+    after = built(tree)
+    assert {path for path in after if after[path] != before[path]} == {stamp}
+    template = tree / "codegen" / "serpentail_codegen" / "targets" / "c" / "templates" / "model" / "model.c.jinja"
+    template.write_text("/* another start */\n" + template.read_text())
+    assert "files written" in make("model", *ORDER).stdout
+    source = tree / "generated" / NAME / "src" / f"{NAME}.c"
+    assert source.read_text().startswith("/* another start */\n")
+
+
+def test_changed_scene_rebuilds(tree, make):
+    scene = tree / "scenes" / "own.toml"
+    scene.write_text('kind = "articulated"\nsegments = 1\nlinks = 1\nfunctions = ["mass_matrix"]\n')
+    assert make("model", "SCENE=scenes/own.toml").returncode == 0
+    age(tree)
+    scene.write_text(scene.read_text().replace("links = 1", "links = 2"))
+    done = make("model", "SCENE=scenes/own.toml")
+    assert done.returncode == 0 and "own: 1 segments x 2 links" in done.stdout
+    assert manifest(tree, "own")["dimensions"]["links"] == 2
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["M=0"], "segments: value 0: needs a whole number, 1 or above"),
+        (["M=-1"], "segments: value -1: needs a whole number, 1 or above"),
+        (["N=0"], "links: value 0: needs a whole number, 1 or above"),
+        (["M=abc"], "argument --segments: invalid int value: 'abc'"),
+        (["M=1.5"], "argument --segments: invalid int value: '1.5'"),
+        (["N="], "argument --links: expected one argument"),
+        (["TAIL=snake"], "argument --tail: invalid choice: 'snake' (choose from 'articulated'"),
+        (["M=1000", "N=1000"], "more than 100000 links in all; choose fewer segments or links"),
+        (["REAL=half"], 'real: value \'half\': needs "double" or "float"'),
+        (["EMISSION=fast"], "emission: value 'fast': needs "),
+        (["FUNCTIONS=energi"], "functions[0]: value 'energi': unknown; did you mean 'energy'?"),
+        (["SCENE=missing.toml"], "missing.toml"),
+        (["SCENE=Makefile"], "scene file: value 'Makefile': cannot be read as TOML"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)
+def test_wrong_order_is_one_readable_line(tree, make, options, words):
+    done = make("model", *options)
+    assert done.returncode == 2
+    (line,) = (line for line in done.stderr.splitlines() if words in line)
+    assert "Traceback" not in done.stderr and len(line) < 130
+    assert not list((tree / "generated").glob("[a-z]*"))
+
+
+def test_unknown_target(make):
+    done = make("modle")
+    assert done.returncode == 2 and "No rule to make target 'modle'" in done.stderr
+
+
+def test_failed_build_is_tried_again(tree, make):
+    failed = make("model", *ORDER, CC="no-such-cc", SERPENTAIL_CACHE=str(tree / "cache"))
+    assert failed.returncode == 2 and "CC='no-such-cc' does not work as a C compiler" in failed.stderr
+    again = make("model", *ORDER)
+    assert again.returncode == 0 and "mass_matrix" in again.stdout
+
+
+def test_clean_removes_what_was_made(tree, make):
+    for name in ("generated/x", "output"):
+        (tree / name).mkdir(parents=True)
+    sources = sorted((tree / "codegen").rglob("*.py"))
+    assert make("clean").returncode == 0
+    assert not (tree / "generated").exists() and not (tree / "output").exists()
+    assert sorted((tree / "codegen").rglob("*.py")) == sources != []
+
+
+def test_old_environment_is_installed_again(tree, make):
+    """A newer pyproject.toml leads to pip, which this stand-in refuses."""
+    os.utime(tree / ".venv" / ".ready", (0, 0))
+    done = make("model", *ORDER)
+    assert done.returncode == 2 and "no pip in here" in done.stderr
+    assert not (tree / "generated" / NAME).exists()

@@ -1,0 +1,205 @@
+"""Programs as parts of others: what depends on what, what nothing needs, and one program within another."""
+
+from fractions import Fraction
+
+import pytest
+
+from serpentail_codegen.autodiff.forward import tangent_program
+from serpentail_codegen.autodiff.reverse import adjoint_program
+from serpentail_codegen.ir.builder import Builder
+from serpentail_codegen.ir.dataflow import expanded, influencing, pruned, reached, reads, writes
+from serpentail_codegen.ir.interpret import Run
+from serpentail_codegen.ir.program import Apply, Guard, Loop, statements
+from tests.autodiff.test_forward import arguments_of
+from tests.support.programs import EXACT, NEXT, PROGRAMS, RECTANGULAR, SQUARE, TURN, built, numbers, step_of
+
+SPLIT = step_of("split", (("x", 1), ("y", 1)), (("s", 1), ("z", 1)), lambda t, x, y: [t.mul(x, x), t.mul(y, y)])
+
+
+def outputs(program, arguments):
+    """The outputs of a run by name."""
+    values = Run(program, EXACT, {name: arguments[name] for name in arguments_of(program)}).values
+    return {a.name: values[a.name] for a in program.of_role("output")}
+
+
+def made():
+    """Programs as they come from builders, tangents and adjoints."""
+    for name, program in PROGRAMS.items():
+        yield name, pruned(program)
+        yield f"tangents of {name}", tangent_program(program, arguments_of(program))
+    for name, program in RECTANGULAR.items():
+        yield (
+            f"adjoints of {name}",
+            adjoint_program(program, ({"guarded": "mass", "columns": "m"}.get(name, "x"),), ("u",)),
+        )
+
+
+# What depends on what
+
+
+def diamond():
+    """w from a and b, both from x; u from y alone."""
+    b, mass, x, y, u, w = built()
+    p, q = b.array("p", 1), b.array("q", 1)
+    b.apply(SPLIT, {"x": x[0], "y": y[0]}, s=p[0], z=u[0])
+    b.copy(u.part(1, 2), y.part(1, 2))
+    b.guard(mass[0], "TOO_SMALL", w[0])
+    b.apply(SQUARE, {"x": x[1]}, s=q[0])
+    b.apply(NEXT, {"s": p[0], "x": q[0], "y": q[0]}, s=w[0])
+    return b.finish()
+
+
+def test_dependence_goes_both_ways():
+    body = diamond().body
+    assert reached(body, {"x"}) == {"x", "p", "q", "w", "u"}  # a step is one: it may take x to u
+    assert reached(body, {"q"}) == {"q", "w"}
+    assert reached(body, {"mass"}) == {"mass"}
+    assert influencing(body, {"w"}) == {"w", "p", "q", "x", "mass"}  # an output that is not wanted needs nothing
+    assert influencing(body, {"u"}) == {"u", "y"}
+
+
+def test_dependence_goes_around_loops():
+    b, _mass, x, _y, u, _w = built()
+    s, t = b.array("s", 1), b.array("t", 1)
+    b.fill(s[0], 0)
+    with b.loop("i", 3) as i:
+        b.copy(t[0], s[0])
+        b.copy(s[0], x[i])
+        b.copy(u[i], t[0])
+    assert "u" in reached(b.finish().body, {"x"})
+    assert "x" in influencing(b.finish().body, {"u"})
+
+
+def test_sums_read_what_they_add_to():
+    b, _mass, x, y, u, w = built()
+    b.copy(w[0], x[0], adds=True)
+    b.apply(SQUARE, {"x": y[0]}, s_=u[0])
+    b.apply(SQUARE, {"x": y[0]}, s=u[0])
+    added, squared, stored = b.finish().body
+    assert reads(added) == (x[0], w[0]) and writes(added) == (w[0],)
+    assert reads(squared) == (y[0], u[0]) and reads(stored) == (y[0],)
+    assert reads(Guard(w[0], "TOO_SMALL", ())) == (w[0],) and writes(Guard(w[0], "TOO_SMALL", ())) == ()
+
+
+# What nothing needs
+
+
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_pruning_keeps_the_outputs(name):
+    program = PROGRAMS[name]
+    assert outputs(pruned(program), numbers(program)) == outputs(program, numbers(program))
+
+
+def test_nothing_unneeded_is_left():
+    """Every array matters to an output; every loop has a body; no output of a step is dropped by nobody."""
+    for name, program in made():
+        needed = influencing(program.body, {a.name for a in program.of_role("output")})
+        known = {a.name for a in program.arrays if a.role in ("input", "output", "parameters")}
+        assert {a.name for a in program.arrays} == needed | known, name
+        for statement, loops in statements(program.body):
+            assert all(loop.body for loop in loops)
+            targets = statement.protects if isinstance(statement, Guard) else writes(statement)
+            assert targets and {ref.array.name for ref in targets} <= needed, name
+        assert pruned(program) == program, name
+
+
+def test_outputs_of_a_step_go_one_by_one():
+    b, _mass, x, y, u, w = built()
+    dead = b.array("dead", 1)
+    b.fill(u.part(0, 3), 0)
+    b.apply(SPLIT, {"x": x[0], "y": y[0]}, s=w[0], z=dead[0])
+    with b.loop("i", 3) as i:
+        b.apply(TURN, {"x": x.part(0, 2), "y": y[i]}, s=b.array("t", 2)[0])
+    program = pruned(b.finish())
+    (call,) = [s for s in program.body if isinstance(s, Apply)]
+    assert (call.step.name, call.reads, call.writes, call.adds) == ("split_s", (x[0],), (w[0],), (False,))
+    assert not any(isinstance(s, Loop) for s in program.body)
+    assert [a.name for a in program.arrays] == ["mass", "x", "y", "u", "w"]
+
+
+def test_guards_stay_where_they_protect_an_output():
+    b, _mass, x, _y, u, w = built()
+    dead = b.array("dead", 1)
+    b.fill(u.part(0, 3), 0)
+    b.fill(dead[0], 0)
+    b.guard(x[0], "TOO_SMALL", w[0], dead[0])
+    b.guard(x[1], "TOO_SMALL", dead[0])
+    b.apply(SQUARE, {"x": x[0]}, s=w[0])
+    guards = [s for s in pruned(b.finish()).body if isinstance(s, Guard)]
+    assert [(g.scalar, g.protects) for g in guards] == [(x[0], (w[0],))]
+
+
+# One program within another
+
+
+def outer():
+    """A builder with the arguments that the inner programs have."""
+    b = Builder("outer", "A program with another one inside.")
+    b.array("mass", 1, role="parameters")
+    return b, b.array("a", 1, 3, "input"), b.array("y", 1, 3, "input"), b.array("z", 1, 3, "output")
+
+
+@pytest.mark.parametrize("name", sorted(PROGRAMS.keys() - {"columns"}))
+def test_called_program_means_the_same(name):
+    inner = PROGRAMS[name]
+    b, a, y, z = outer()
+    s, w = b.array("s", 1), b.array("w", 1, role="output")
+    b.fill(s[0], 7)
+    b.call(inner, x=a, y=y, u=z, w=w)
+    b.copy(w[0], s[0], adds=True)  # the inner program's own s is another
+    given = numbers(inner)
+    found = outputs(b.finish(), {"mass": given["mass"], "a": given["x"], "y": given["y"]})
+    expected = outputs(inner, given)
+    assert found == {"z": expected["u"], "w": [expected["w"][0] + 7]}
+
+
+def test_called_names_carry_the_programs_name():
+    b, a, y, z = outer()
+    b.call(PROGRAMS["nested"], x=a, y=y, u=z, w=b.array("w", 1))
+    program = expanded(b.finish())
+    assert [array.name for array in program.arrays] == ["mass", "a", "y", "z", "w", "nest_s", "nest_t"]
+    assert all(ref.array in program.arrays for s, _ in statements(program.body) for ref in (*reads(s), *writes(s)))
+
+
+def test_called_in_a_loop_it_runs_in_every_turn():
+    b, a, y, z = outer()
+    w, total = b.array("w", 1), b.array("total", 1, role="output")
+    b.fill(total[0], 0)
+    with b.loop("l", 2):
+        b.call(PROGRAMS["accumulators"], x=a, y=y, u=z, w=w)
+        b.copy(total[0], w[0], adds=True)
+    given = numbers(PROGRAMS["accumulators"])
+    found = outputs(b.finish(), {"mass": given["mass"], "a": given["x"], "y": given["y"]})
+    assert found["total"] == [2 * outputs(PROGRAMS["accumulators"], given)["w"][0]]
+
+
+@pytest.mark.parametrize(("left_out", "role"), [("x", "input"), ("y", "input"), ("u", "output"), ("w", "output")])
+def test_arguments_that_are_not_bound_are_named(left_out, role):
+    b, a, y, z = outer()
+    given = {"x": a, "y": y, "u": z, "w": b.array("w", 1)}
+    given.pop(left_out)
+    with pytest.raises(ValueError, match=f"^nest in outer: {role} {left_out} is not bound$"):
+        b.call(PROGRAMS["nested"], **given)
+
+
+def test_what_is_called_twice_has_arrays_of_its_own_each_time():
+    b, a, y, z = outer()
+    w, total = b.array("w", 1), b.array("total", 1, role="output")
+    b.call(PROGRAMS["nested"], x=a, y=y, u=z, w=w)
+    b.copy(total[0], w[0])
+    b.call(PROGRAMS["nested"], x=a, y=y, u=z, w=w)
+    b.copy(total[0], w[0], adds=True)
+    names = [array.name for array in expanded(b.finish()).arrays]
+    assert len(set(names)) == len(names)
+    given = numbers(PROGRAMS["nested"])
+    found = outputs(b.finish(), {"mass": given["mass"], "a": given["x"], "y": given["y"]})
+    assert found["total"] == [2 * outputs(PROGRAMS["nested"], given)["w"][0]]
+
+
+def test_parameters_are_shared():
+    b, a, y, z = outer()
+    b.call(PROGRAMS["carry_up"], x=a, y=y, u=z, w=b.array("w", 1))
+    program = b.finish()
+    assert [array.name for array in program.of_role("parameters")] == ["mass"]
+    run = Run(program, EXACT, {"mass": [Fraction(3)], "a": [Fraction(0)] * 3, "y": [Fraction(1)] * 3})
+    assert run.values["z"] == [1, 1, 1]

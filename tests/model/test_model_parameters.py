@@ -1,0 +1,133 @@
+"""Parameters: what a caller gives reaches the model as it would from a scene, or is refused with what to do."""
+
+import json
+
+import numpy as np
+import pytest
+
+import serpentail as st
+from serpentail.model.parameters import ellipsoid, flat, resolve
+from serpentail_codegen.scene.parameters import PARAMETERS
+from serpentail_codegen.scene.resolve import resolve_parameters
+from tests.support.models import model_folder
+
+SEGMENTS, LINKS = 2, 3
+INERTIA = (2.5e-07, 3.9e-09, 2.6e-07)
+
+
+def made(**options):
+    """The manifest of a small model."""
+    folder = model_folder(SEGMENTS, LINKS, functions=["mass_matrix"], **options)
+    return json.loads((folder / "manifest.json").read_text())
+
+
+@pytest.fixture(scope="module")
+def manifest():
+    return made()
+
+
+@pytest.fixture(scope="module")
+def thick():
+    """The manifest of a scene that gives link_inertia."""
+    return made(parameters={"link_inertia": list(INERTIA), "gravity": 0})
+
+
+def refusal(manifest, changes):
+    """The message that refuses changes."""
+    with pytest.raises(st.ModelError) as caught:
+        resolve(manifest, changes)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("changes", [None, {}])
+def test_defaults_are_the_scenes(manifest, changes):
+    assert dict(resolve(manifest, changes)) == dict(resolve_parameters({}, SEGMENTS * LINKS))
+
+
+def test_scene_and_caller_agree_bit_for_bit(manifest):
+    names = ("tail_mass", "tail_length", "link_radius")
+    for row in np.random.default_rng(5).uniform(0.001, 2, (200, 3)).tolist():
+        given = dict(zip(names, row, strict=True))
+        assert dict(resolve(manifest, given)) == dict(resolve_parameters(given, SEGMENTS * LINKS))
+
+
+@pytest.mark.parametrize("name", ["tail_mass", "tail_length", "link_radius"])
+def test_link_inertia_follows_what_it_is_computed_from(manifest, name):
+    before, after = resolve(manifest, None), resolve(manifest, {name: 0.1})
+    assert after["link_inertia"] == ellipsoid(after, SEGMENTS * LINKS) != before["link_inertia"]
+
+
+def test_given_link_inertia_replaces_link_radius(manifest):
+    values = resolve(manifest, {"link_inertia": INERTIA, "tail_mass": 0.1})
+    assert values["link_inertia"] == INERTIA and "link_radius" not in values
+
+
+def test_link_radius_replaces_a_scenes_link_inertia(thick):
+    assert resolve(thick, {"tail_mass": 0.1})["link_inertia"] == INERTIA
+    values = resolve(thick, {"link_radius": 0.01})
+    assert values["link_inertia"] == ellipsoid(values, SEGMENTS * LINKS)
+
+
+def test_flat_is_the_struct(manifest):
+    values = resolve(manifest, {"tail_mount": (1, 2, 3)})
+    own = [p.name for p in PARAMETERS if p.name != "link_radius" and not p.needs]
+    assert flat(manifest, values) == np.hstack([values[name] for name in own]).tolist()
+    assert flat(manifest, values)[5:8] == [1.0, 2.0, 3.0]
+
+
+@pytest.mark.parametrize("three", [[1, 2, 2.5], (1, 2, 2.5), np.array([1, 2, 2.5]), np.float32([1, 2, 2.5])])
+def test_three_numbers_in_any_row(manifest, three):
+    assert resolve(manifest, {"torso_inertia": three})["torso_inertia"] == (1.0, 2.0, 2.5)
+
+
+@pytest.mark.parametrize("one", [2, 2.0, np.float32(2), np.int8(2), np.array(2.0)])
+def test_one_number_of_any_type(manifest, one):
+    value = resolve(manifest, {"tail_mass": one})["tail_mass"]
+    assert value == 2.0 and type(value) is float
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        *[("tail_mass", bad) for bad in (0, -1, np.nan, np.inf, "3", True, None, 1j, [1.0], np.array([1.0]), 10**400)],
+        *[("torso_inertia", bad) for bad in ("123", {1, 2, 3}, [1, 2], [1, 1, "1"], [[1, 1, 1]], 1.0, [1, 2, 3.1])],
+        ("tail_mount", [0, 0, np.nan]),
+        ("tail_mount", [[1], [1, 2]]),
+        ("gravity", -9.8),
+        ("link_inertia", [1, -1, 1]),
+    ],
+)
+def test_wrong_value_is_named_with_its_unit(manifest, name, value):
+    message = refusal(manifest, {name: value})
+    unit = next(p.unit for p in PARAMETERS if p.name == name)
+    assert message.startswith(f"parameters: {name}: value ") and f"({unit})" in message
+
+
+def test_unknown_name_is_answered_with_the_likely_one(manifest):
+    assert "tail_mas: no such parameter; did you mean 'tail_mass'?" in refusal(manifest, {"tail_mas": 1})
+    for strange in ("colour", 3):
+        message = refusal(manifest, {strange: 1})
+        assert f"{strange}: no such parameter; there are " in message and "torso_mass" in message
+
+
+def test_all_problems_come_at_once(manifest):
+    wrong = {"tail_mas": 1, "torso_mass": -1, "link_radius": 0.1, "link_inertia": INERTIA, "gravity": "9.8"}
+    lines = refusal(manifest, wrong).splitlines()
+    assert len(lines) == 4
+    for line, name in zip(lines, ("tail_mas", "torso_mass", "gravity", "link_radius and link_inertia"), strict=True):
+        assert f"{name}: " in line
+
+
+def test_inertia_beyond_numbers_is_refused(manifest):
+    assert "no finite link_inertia" in refusal(manifest, {"tail_length": 1e200})
+
+
+def test_baked_parameters_are_refused_with_the_remedy():
+    baked = made(baked=True)
+    assert "`baked = false`" in refusal(baked, {"tail_mass": 0.1})
+    assert dict(resolve(baked, {})) == dict(resolve_parameters({}, SEGMENTS * LINKS))
+
+
+def test_values_cannot_be_changed_in_place(manifest):
+    with pytest.raises(TypeError):
+        resolve(manifest, None)["tail_mass"] = 1.0

@@ -1,0 +1,143 @@
+"""Derivatives by other means: states to try, a complex step through the loops of a function, and a fair measure."""
+
+from functools import cache
+from math import pi
+
+import numpy as np
+
+import serpentail as st
+from serpentail_codegen.functions.catalogue import CATALOGUE
+from serpentail_codegen.functions.function import program
+from serpentail_codegen.ir.dataflow import expanded
+from serpentail_codegen.ir.interpret import Numbers, Run
+from serpentail_codegen.pipeline import tail_of
+from serpentail_codegen.scene.parse import parse_scene
+from serpentail_codegen.scene.scene import DERIVATIVES
+from tests.references.metrics import BLOCKS
+from tests.references.parameters import random_states
+from tests.support.models import model_folder
+
+COMPLEX = Numbers(np, complex)
+STEP = 1e-30  # of the imaginary part: nothing is subtracted, so derivatives are as exact as values
+NEGLIGIBLE = 1e-6  # of the largest derivative in the same rows: smaller blocks of columns are compared with that
+KINDS = ("random", "straight", "folded", "still", "scaled")
+# what is differentiated: of every derivative function the function, and of its outputs (output, argument)
+FIRST = {
+    "inverse_dynamics_derivatives": ("inverse_dynamics", {"dq": ("force", "q"), "dv": ("force", "v")}),
+    "forward_dynamics_derivatives": (
+        "forward_dynamics",
+        {"dq": ("v_dot", "q"), "dv": ("v_dot", "v"), "dtau": ("v_dot", "tau")},
+    ),
+    "inverse_dynamics_parameter_derivatives": ("inverse_dynamics", {"dparameters": ("force", "parameters")}),
+    "forward_dynamics_parameter_derivatives": ("forward_dynamics", {"dparameters": ("v_dot", "parameters")}),
+    "energy_derivatives": (
+        "energy",
+        {"kinetic_dq": ("kinetic", "q"), "kinetic_dv": ("kinetic", "v"), "potential_dq": ("potential", "q")},
+    ),
+    "momentum_derivatives": (
+        "momentum",
+        {
+            "linear_dq": ("linear", "q"),
+            "linear_dv": ("linear", "v"),
+            "angular_dq": ("angular", "q"),
+            "angular_dv": ("angular", "v"),
+        },
+    ),
+}
+
+
+@cache
+def derivative_model(segments, links, emission, **options):
+    """A compiled model with all derivatives and what they are compared with."""
+    wanted = [*DERIVATIVES, "mass_matrix", "inverse_dynamics", "forward_dynamics", "energy", "momentum"]
+    options = {"emission": emission, "name": "tail", "functions": [*options.pop("functions", wanted)]} | options
+    return st.load(model_folder(segments, links, **options))
+
+
+def states(model, kind, count=2):
+    """States of a kind: tuples of q, v, v_dot, tau, multiplier."""
+    m, tails = model.segments, kind if kind in ("random", "straight", "folded") else "random"
+    q, v, v_dot, tau = random_states(m, 23, count, tails)
+    if model.kind == "continuum" and kind == "folded":  # q_t of every segment: a bend of pi
+        bends = q[:, 7:].reshape(count, m, 2)
+        q[:, 7:] = (pi * bends / np.linalg.norm(bends, axis=2, keepdims=True)).reshape(count, 2 * m)
+    q[:, 3:7] *= 3.7 if kind == "scaled" else 1
+    v *= 0 if kind == "still" else 1
+    multiplier = random_states(m, 29, count, "random")[1] / np.repeat([2, 20, 10], [3, 3, 2 * m])
+    return [
+        dict(zip(("q", "v", "v_dot", "tau", "multiplier"), x, strict=True))
+        for x in zip(q, v, v_dot, tau, multiplier, strict=True)
+    ]
+
+
+def tangent_of_q(q):
+    """Rates of q (nq, nv) when it moves with the unit velocities: of the quaternion, q * (0, omega) / 2."""
+    w, x, y, z = q[3:7] / 2
+    T = np.zeros((len(q), len(q) - 1))
+    T[:3, :3] = np.eye(3)
+    T[3:7, 3:6] = [[-x, -y, -z], [w, -z, y], [z, w, -x], [-y, x, w]]
+    T[7:, 6:] = np.eye(len(q) - 7)
+    return T
+
+
+@cache
+def nest_of(model, function):
+    """The loop nest of a model's function, what it calls written out."""
+    scene = parse_scene(model.manifest["scene"], model.name)
+    return expanded(program(CATALOGUE[function], tail_of(scene)))
+
+
+def parameters_of(model):
+    """The parameters of a model's functions by name."""
+    sizes = {a.name: a.length for a in nest_of(model, "mass_matrix").of_role("parameters")}
+    return dict(zip(sizes, np.split(model.parameter_vector, np.cumsum([*sizes.values()])[:-1]), strict=True))
+
+
+def complex_step(model, function, state, argument):
+    """Derivatives of the outputs of a function with respect to one argument: name -> (length, directions)."""
+    nest, parameters = nest_of(model, function), parameters_of(model)
+    vectors = parameters | {a.name: state[a.name] for a in nest.of_role("input")}
+    if argument == "parameters":
+        unit = iter(np.eye(len(model.parameter_vector)))
+        directions = {name: np.array([next(unit) for _ in x]) for name, x in parameters.items()}
+    else:
+        x = state[argument]
+        directions = {argument: tangent_of_q(x) if argument == "q" else np.eye(len(x))}
+    count = next(iter(directions.values())).shape[1]
+    steps = {name: directions.get(name, np.zeros((len(x), count))) for name, x in vectors.items()}
+    scalars = {name: list(np.asarray(x)[:, None] + 1j * STEP * steps[name]) for name, x in vectors.items()}
+    run = Run(nest, COMPLEX, scalars)
+    return {
+        a.name: np.array([np.broadcast_to(x, count).imag for x in run.values[a.name]]) / STEP
+        for a in nest.of_role("output")
+    }
+
+
+def tail_name(size):
+    """A name for a size and an emission."""
+    m, n, emission = size
+    return f"m{m}_n{n}_{emission}" if n else f"arcs{m}_{emission}"
+
+
+def spans(size, nv):
+    """Blocks of rows or columns with the same unit."""
+    return BLOCKS if size == nv else (slice(None),)
+
+
+def jacobian_error(found, expected, nv, negligible=NEGLIGIBLE):
+    """Largest over blocks of max|d| / max|ref|; a block that is negligible in its rows is scaled by them."""
+    found, expected = np.atleast_2d(found), np.atleast_2d(expected)
+    assert found.shape == expected.shape
+    worst = 0.0
+    for rows in spans(len(expected), nv):
+        floor = negligible * np.max(np.abs(expected[rows]), initial=0) or 1.0
+        for columns in spans(expected.shape[1], nv):
+            one, other = found[rows, columns], expected[rows, columns]
+            scale = max(np.max(np.abs(other), initial=0), floor)
+            worst = max(worst, np.max(np.abs(one - other), initial=0) / scale)
+    return worst
+
+
+def parameter_scales(model):
+    """The magnitude of each parameter, so that its derivatives are forces; a zero has that of its vector."""
+    return np.concatenate([np.full(len(part), np.abs(part).max()) for part in parameters_of(model).values()])

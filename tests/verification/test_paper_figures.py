@@ -1,0 +1,88 @@
+"""The paper's figures: numbers that independent computations of its studies gave must come out of the models."""
+
+import json
+import os
+import subprocess
+import sys
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import serpentail as st
+from examples.studies import models as study_models
+from tests.support.models import model_folder
+
+ROOT = Path(__file__).parents[2]
+DIFFERENCE = {2: -0.148, 4: -0.400, 8: -0.333, 16: -0.211, 32: -0.120}  # deg, articulated less continuum, Fig. 8b
+THIN = {"link_inertia": study_models.THIN}
+
+
+@cache
+def motion(links, thin=False):
+    """Yaw (deg) of the torso in Sect. 4.1's motion, of the continuum for no links."""
+    model = st.load(model_folder(1, links, functions=["mass_matrix"]), THIN if thin else None)
+    return study_models.yaw_motion(model)
+
+
+def difference(links, thin=False):
+    """Final yaw (deg), articulated less continuum."""
+    return motion(links, thin)[-1] - motion(None)[-1]
+
+
+def test_the_continuum_turns_the_torso_as_in_fig_8a():
+    assert motion(None)[0] == 0.0
+    assert motion(None)[-1] == pytest.approx(-21.450, abs=1e-3)
+    assert np.all(np.diff(motion(None)) < 0)
+
+
+@pytest.mark.parametrize("links", DIFFERENCE)
+def test_the_articulated_tail_differs_as_in_fig_8b(links):
+    assert difference(links) == pytest.approx(DIFFERENCE[links], abs=1e-3)
+
+
+def test_four_links_differ_most_and_by_less_than_half_a_degree():
+    sizes = {links: abs(difference(links)) for links in range(2, 9)}
+    assert max(sizes, key=sizes.get) == study_models.SHOWN
+    assert sizes[study_models.SHOWN] < 0.5
+
+
+def test_thin_links_tend_to_the_continuum_and_thick_ones_keep_their_thickness():
+    coarse, fine = (difference(links, thin=True) for links in (128, 256))
+    assert coarse / fine == pytest.approx(2, abs=0.05)
+    assert difference(256) - fine == pytest.approx(-0.0030, abs=1e-4)
+
+
+def test_directions_of_the_com_are_those_of_its_position():
+    bend, links, samples = 2.0, 5, 20_000
+    joints = bend * np.arange(1, links + 1) / links
+    ends = np.cumsum(np.stack([np.sin(joints), np.cos(joints)]), axis=1)
+    x, y = (ends - np.stack([np.sin(joints), np.cos(joints)]) / 2).mean(axis=1)
+    assert study_models.chain_direction(np.array(bend), links) == pytest.approx(np.arctan2(x, y), rel=1e-14)
+    assert study_models.chain_direction(np.array(bend), samples) == pytest.approx(
+        study_models.arc_direction(bend), abs=2 / samples
+    )
+
+
+def test_bends_have_the_wanted_directions():
+    targets = study_models.com_directions()
+    bends = study_models.bend_towards(study_models.arc_direction, targets)
+    assert (bends[0], bends[-1]) == (pytest.approx(0, abs=1e-12), pytest.approx(np.pi, rel=1e-12))
+    np.testing.assert_allclose(study_models.arc_direction(bends[1:]), targets[1:], rtol=0, atol=1e-11)
+
+
+@pytest.mark.slow
+def test_the_study_runs_anywhere_and_writes_its_files(tmp_path):
+    command = [sys.executable, "-m", "examples.studies.models", "study"]
+    path = {"PYTHONPATH": str(ROOT)}
+    done = subprocess.run(command, cwd=tmp_path, env=os.environ | path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "continuum: final yaw -21.450 deg" in done.stdout
+    study = json.loads((tmp_path / "study" / "summary.json").read_text())
+    rows = {row["links"]: row for row in study["articulated"]}
+    for links, expected in DIFFERENCE.items():
+        assert rows[links]["difference"] == pytest.approx(expected, abs=1e-3)
+    assert rows[256]["ns"] > 10 * study["continuum"]["ns"] > 0
+    for picture in ("fig8", "cost_against_difference"):
+        assert (tmp_path / "study" / f"{picture}.png").read_bytes()[:4] == b"\x89PNG"

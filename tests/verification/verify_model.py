@@ -1,0 +1,269 @@
+"""Verification report: a generated folder goes in; laws, interpreter, peers and exact arithmetic judge its model."""
+
+import argparse
+import json
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+
+import numpy as np
+
+import serpentail as st
+from serpentail.verification.errors import block_error, differences, matrix_error
+from serpentail.verification.law import NEAR, Law
+from serpentail.verification.report import Check, as_text, check, laws, summary
+from serpentail.verification.states import State, arguments, outputs, states
+from serpentail_codegen.functions.catalogue import CATALOGUE
+from serpentail_codegen.functions.contact import CONTACT
+from serpentail_codegen.functions.function import program
+from serpentail_codegen.functions.implicit.functions import IMPLICIT
+from serpentail_codegen.ir.interpret import Numbers, Run
+from serpentail_codegen.pipeline import generate, tail_of
+from serpentail_codegen.scene.parse import parse_scene
+
+STRICT = 22.5  # roundings: 5e-15 in double
+FOLDED = 4 * STRICT  # what H sums cancels in a folded tail: libraries are off by 1e-14 to 2e-14 there
+COMPARED = ("mass_matrix", "bias_force", "inverse_dynamics", "forward_dynamics", "energy", "momentum")
+POINTS = ("tail_points", "tail_point_jacobians")
+
+
+@dataclass(frozen=True)
+class Reference:
+    """Another derivation of one kind of tail: its class, what it computes, and whether it does so in many digits."""
+
+    title: str
+    module: str
+    chain: str
+    kind: str
+    names: tuple[str, ...] = COMPARED
+    exact: bool = False
+
+    def opened(self, model: st.Model):
+        """Return the reference for a model's tail; ImportError, or ValueError where it refuses the parameters."""
+        sizes = (model.segments, model.links) if self.kind == "articulated" else (model.segments,)
+        return getattr(import_module(f"tests.references.{self.module}"), self.chain)(parameters(model), *sizes)
+
+    def rows(self, model: st.Model, cases: list[State]) -> Iterator[tuple[str, str, list[State], float]]:
+        """Yield title, function, states and limit (in roundings) of every comparison."""
+        long = (
+            2 * model.segments * (model.links or 1)
+        )  # libraries are off by 6e-13 for 48 links, folded, by 9e-12 for 128
+        for name in self.names:
+            if not (self.exact and name == "forward_dynamics"):
+                yield name, name, cases, NEAR if self.exact else NEAR * max(10, long)
+                continue
+            yield name, name, [s for s in cases if s.kind != "folded"], STRICT
+            yield f"{name}, folded", name, [s for s in cases if s.kind == "folded"], FOLDED
+
+
+REFERENCES = (
+    Reference("Pinocchio", "pinocchio_chain", "PinocchioChain", "articulated", (*COMPARED, *POINTS)),
+    Reference("MuJoCo", "mujoco_chain", "MujocoChain", "articulated", (*COMPARED, *POINTS)),
+    Reference("40 digits", "exact_chain", "ExactChain", "articulated", exact=True),
+    Reference("40 digits", "exact_continuum", "ExactContinuum", "continuum", exact=True),
+)
+
+
+def verify(folder: str | Path) -> list[Check]:
+    """Return every check of a generated folder's model."""
+    return judge(st.load(folder))
+
+
+def judge(model: st.Model) -> list[Check]:
+    """Return every check of a model."""
+    cases = list(states(model))
+    one_of_each = list({s.kind: s for s in reversed(cases)}.values())
+    checks = laws(model)
+    checks += [check(entry, model, one_of_each) for entry in interpreter_laws(model)]
+    for reference in REFERENCES:
+        checks += reference_checks(reference, model, cases)
+    with tempfile.TemporaryDirectory() as parent:
+        return [*checks, split_check(model, cases, Path(parent))]
+
+
+# The interpreter: what the program means, by the numbers of Python
+
+
+def interpreter_laws(model: st.Model) -> Iterator[Law]:
+    """Yield, for every function, that the C gives what its program means."""
+    text = "The C gives what the interpreter of its program gives."
+    for name in [name for name in CATALOGUE if name not in CONTACT | IMPLICIT]:  # these take more than a state
+        yield Law(f"interpreter: {name}", text, interpreted(model, name), (name,), NEAR)
+
+
+def interpreted(model: st.Model, name: str) -> Callable:
+    """Return the law's error: the C against the program, run on Python's floats."""
+    scene = parse_scene(model.manifest["scene"], model.name)
+    function = CATALOGUE[name]
+    written = cache(lambda: program(function, tail_of(scene)))
+
+    def error(model: st.Model, s: State) -> float:
+        given = {a.name: getattr(s, a.name).tolist() for a in function.inputs}
+        given |= {key: np.ravel(value).tolist() for key, value in parameters(model).items()}
+        values = Run(written(), Numbers(), given).values
+        results = outputs(model, name, s)
+        return differences(model, name, s, [np.reshape(values[key], x.shape) for key, x in results.items()])
+
+    return error
+
+
+def parameters(model: st.Model) -> dict:
+    """Return the parameters as the model's real type holds them."""
+    real = model.parameter_vector.dtype
+    return {name: np.asarray(value, real).astype(float).tolist() for name, value in model.parameters.items()}
+
+
+# References: other derivations of the same tail
+
+
+def reference_checks(reference: Reference, model: st.Model, cases: list[State]) -> list[Check]:
+    """Return, for every quantity that a reference computes, whether the model agrees; none for another kind of tail."""
+    title, checks = reference.title, []
+    text = f"The model agrees with {title}, v_dot relative to cond(H)."
+    if reference.kind != model.manifest["scene"]["kind"]:
+        return []
+    try:
+        chain = reference.opened(model)
+    except (ImportError, ValueError) as error:
+        return [Check(f"{title}: chain", text, 0.0, 0.0, omitted=str(error))]
+    for row, name, chosen, units in reference.rows(model, cases):
+        entry = Law(f"{title}: {row}", text, agreement(chain, name), (name,), units)
+        checks.append(check(entry, model, chosen))
+    return checks
+
+
+def agreement(chain, name: str) -> Callable:
+    """Return the law's error: a function of the model against the same of a chain."""
+
+    def error(model: st.Model, s: State) -> float:
+        results = getattr(chain, name)(*arguments(model, name, s))
+        return differences(model, name, s, results if isinstance(results, tuple) else (results,))
+
+    return error
+
+
+# Equal segments: 2 m segments of n links that bend alike are m segments of 2 n
+
+
+def split_check(model: st.Model, cases: list[State], parent: Path) -> Check:
+    """Return whether H and C depend on how equal joints are counted: against a model generated for this."""
+    name = "halves of segments"
+    text = (
+        "With equal halves, 2 m segments of n links are m segments of 2 n: H = G^T H G, C = G^T C, G repeating angles."
+    )
+    functions, sizes = ["mass_matrix", "bias_force"], partner_sizes(model)
+    if sizes is None:
+        return Check(name, text, 0.0, 0.0, omitted="no even m or n of links")
+    if not set(functions) <= set(model.kernels):
+        return Check(name, text, 0.0, 0.0, omitted=f"not generated: {' or '.join(functions)}")
+    change = {"segments": sizes[0], "links": sizes[1], "functions": functions, "name": "partner"}
+    generate(parse_scene(model.manifest["scene"] | change, "partner"), parent)
+    partner = st.load(parent / "partner")
+    whole, halves = (model, partner) if partner.segments > model.segments else (partner, model)
+
+    def error(_model: st.Model, s: State) -> dict[str, float]:
+        return split_errors(whole, halves, s)
+
+    return check(Law(name, text, error, units=NEAR), model, cases)
+
+
+def partner_sizes(model: st.Model) -> tuple[int, int] | None:
+    """Return the sizes of the same articulated tail in half or twice as many segments."""
+    segments, links = model.segments, model.links
+    if model.manifest["scene"]["kind"] != "articulated" or segments % 2 == links % 2 == 1:
+        return None
+    return (segments // 2, 2 * links) if segments % 2 == 0 else (2 * segments, links // 2)
+
+
+def split_errors(whole: st.Model, halves: st.Model, s: State) -> dict[str, float]:
+    """Return the errors of H and C at the state of the whole that a state of either model starts with."""
+    q, v = s.q[: whole.nq], s.v[: whole.nv]
+    G = np.kron(np.eye(whole.segments), np.vstack([np.eye(2), np.eye(2)]))
+    q_halves, v_halves = np.concatenate([q[:7], G @ q[7:]]), np.concatenate([v[:6], G @ v[6:]])
+    T = np.zeros((halves.nv, whole.nv))
+    T[:6, :6], T[6:, 6:] = np.eye(6), G
+    return {
+        "H": matrix_error(T.T @ halves.mass_matrix(q_halves) @ T, whole.mass_matrix(q)),
+        "C": block_error(T.T @ halves.bias_force(q_halves, v_halves), whole.bias_force(q, v)),
+    }
+
+
+# The report
+
+
+def markdown(model: st.Model, checks: list[Check]) -> str:
+    """Return the report."""
+    counts = summary(model, checks)["counts"]
+    lines = [
+        f"# Verification of {model.name}",
+        "",
+        f"{model.segments} segments{f' of {model.links} links' if model.links else ''}, {model.manifest['real']}; "
+        + ", ".join(f"{count} {status}" for status, count in counts.items())
+        + ".",
+        "",
+        "| check | error | limit | status | largest at |",
+        "|---|---|---|---|---|",
+    ]
+    for c in checks:
+        error, limit = ("", "") if c.omitted else (f"{c.error:.2g}", f"{c.limit:.2g}")
+        lines.append(f"| {c.name} | {error} | {limit} | {c.status} | {c.omitted or c.where} |")
+    lines += ["", "## What is checked", ""]
+    return "\n".join([*lines, *statements(checks)]) + "\n"
+
+
+def statements(checks: list[Check]) -> list[str]:
+    """Return each law once, with the names of its checks."""
+    texts: dict[str, list[str]] = {}
+    for c in checks:
+        texts.setdefault(c.law, []).append(c.name)
+    return [f"- {', '.join(names)}: {text}" for text, names in texts.items()]
+
+
+def short_table(model: st.Model, checks: list[Check]) -> str:
+    """Return one line for each group of checks, then all that failed."""
+    groups: dict[str, list[Check]] = {}
+    for c in checks:
+        groups.setdefault(c.name.partition(": ")[0] if ": " in c.name else "laws", []).append(c)
+    lines = [f"{model.name}", f"  {'':<12}{'passed':>8}{'failed':>8}{'not checked':>13}   largest error / limit"]
+    for name, rows in groups.items():
+        counts = summary(model, rows)["counts"]
+        lines.append(
+            f"  {name:<12}" + "{passed:>8}{failed:>8}{not checked:>13}".format(**counts) + f"   {largest(rows)}"
+        )
+    failed = [c for c in checks if not c.passed]
+    return "\n".join(lines + ([as_text(model, failed)] if failed else []))
+
+
+def largest(rows: list[Check]) -> str:
+    """Return the check that came nearest to its limit, or passed it."""
+    rated = [(np.nan_to_num(c.error / c.limit, nan=np.inf), c) for c in rows if c.limit and not c.omitted]
+    ratio, worst = max(rated, key=lambda pair: pair[0], default=(0, None))
+    return f"{ratio:.2g}  {worst.name.rpartition(': ')[2]}" if worst else ""
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Verify a folder, write the reports, print a short table; 1 if a check failed."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path, help="a generated folder")
+    parser.add_argument("--output", type=Path, default=Path("output/verify"), help="folder of the reports")
+    chosen = parser.parse_args(argv)
+    try:
+        checks, model = verify(chosen.folder), st.load(chosen.folder)
+    except st.SerpentailError as error:
+        print(error, file=sys.stderr)
+        return 2
+    chosen.output.mkdir(parents=True, exist_ok=True)
+    report = chosen.output / f"{model.name}.md"
+    report.write_text(markdown(model, checks))
+    report.with_suffix(".json").write_text(json.dumps(summary(model, checks), indent=1) + "\n")
+    print(short_table(model, checks))
+    print(f"  report: {report}")
+    return 0 if all(c.passed for c in checks) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
