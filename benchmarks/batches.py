@@ -1,4 +1,6 @@
-"""Batches: generated folders go in, times of batched calls and rollouts beside those of single ones come out."""
+"""Batches: generated folders go in, times of batched calls and rollouts beside those of single ones
+come out.
+"""
 
 import ctypes
 import time
@@ -19,7 +21,8 @@ SIZES = ((1, 3), (2, 3), (3, 4), (6, 6), (3, None))
 
 
 def batch_times(folder: Path) -> list[dict]:
-    """Nanoseconds a state of one core: forward dynamics one by one, and side by side; and from Python, all cores.
+    """Nanoseconds a state of one core: forward dynamics one by one, and side by side; and from
+    Python, all cores.
 
     Both check that arguments and results are finite. Target: side by side 6x faster (AVX-512).
     """
@@ -35,9 +38,11 @@ def batch_times(folder: Path) -> list[dict]:
 
 
 def rollout_rates(folder: Path) -> list[dict]:
-    """Damped flights of 200 steps of RK4, 11 samples, a second: one call each, all in one call, and abreast in it.
+    """Damped flights of 200 steps of RK4, 11 samples, a second: one call each, all in one call, and
+    abreast in it.
 
-    All but the first on all cores, each flight with its own parameters. Last: what a flight of one step takes, which is
+    All but the first on all cores, each flight with its own parameters. Last: what a flight of one
+    step takes, which is
     what a run costs besides its steps. Target: abreast 3x faster, 50 us.
     """
     rows = []
@@ -46,14 +51,26 @@ def rollout_rates(folder: Path) -> list[dict]:
         q, v, _ = random_states(model, FLIGHTS)
         q[:, 3] += 2
         times = np.min([flight_times(model, q, v) for _ in range(9)], axis=0) / FLIGHTS
-        rates = dict(zip(("one by one, 1/s", "at once, 1/s", "abreast, 1/s"), 1e9 / times, strict=False))
-        rows.append({"model": label(*size)} | rates | {"ratio": times[1] / times[2], "a run, us": times[3] / 1e3})
+        rates = dict(
+            zip(("one by one, 1/s", "at once, 1/s", "abreast, 1/s"), 1e9 / times, strict=False)
+        )
+        rows.append(
+            {"model": label(*size)}
+            | rates
+            | {"ratio": times[1] / times[2], "a run, us": times[3] / 1e3}
+        )
     return rows
 
 
 def flight_times(model, q: np.ndarray, v: np.ndarray) -> list[float]:
     """Return nanoseconds of all flights by each way, and of flights of one step."""
-    settings = {"controller": st.Damping(1e-6), "t_span": 0.2, "step": 1e-3, "output_step": 0.02, "method": "rk4"}
+    settings = {
+        "controller": st.Damping(1e-6),
+        "t_span": 0.2,
+        "step": 1e-3,
+        "output_step": 0.02,
+        "method": "rk4",
+    }
     own = {"tail_mass": np.linspace(0.003, 0.004, len(q))}
     models = [model.with_parameters(tail_mass=mass) for mass in own["tail_mass"]]
     ways = [lambda: [st.simulate(*one, **settings) for one in zip(models, q, v, strict=True)]]
@@ -69,7 +86,9 @@ def flight_times(model, q: np.ndarray, v: np.ndarray) -> list[float]:
 def random_states(model, count: int) -> tuple[np.ndarray, ...]:
     """Return q, v and tau."""
     rng = np.random.default_rng(1)
-    return tuple(0.5 * rng.normal(size=(count, size)) for size in (model.nq, model.nv, model.nv - 6))
+    return tuple(
+        0.5 * rng.normal(size=(count, size)) for size in (model.nq, model.nv, model.nv - 6)
+    )
 
 
 def c_times(model) -> tuple[float, float]:
@@ -77,7 +96,10 @@ def c_times(model) -> tuple[float, float]:
     kernel, keep, calls = model.kernels["forward_dynamics"], [], []
     states = [x.astype(kernel.dtype) for x in random_states(model, STATES)]
     out = np.empty((STATES, model.nv), kernel.dtype)
-    for function, size in ((kernel.function, kernel.work), (kernel.many.entry(kernel.name, MANY), None)):
+    for function, size in (
+        (kernel.function, kernel.work),
+        (kernel.many.entry(kernel.name, MANY), None),
+    ):
         keep.append(aligned(size or kernel.many.work[kernel.name], kernel.dtype))
         record = call_record(kernel.parameters, STATES, keep[-1], (*states, out))
         calls.append(lambda function=function, record=record: function(ctypes.addressof(record)))

@@ -1,4 +1,6 @@
-"""`make bench`: measures generation, speed, drift and precision in one run; writes a report to output/bench."""
+"""`make bench`: measures generation, speed, drift and precision in one run; writes a report to
+output/bench.
+"""
 
 import os
 import platform
@@ -12,7 +14,16 @@ from pathlib import Path
 import numpy as np
 
 import serpentail as st
-from benchmarks import batches, contact_costs, continuum_forms, derivatives, planning, precisions, scaling, simulations
+from benchmarks import (
+    batches,
+    contact_costs,
+    continuum_forms,
+    derivatives,
+    planning,
+    precisions,
+    scaling,
+    simulations,
+)
 from benchmarks.fixtures import Fixture, fixture, generated, label
 from benchmarks.peers import mujoco_casadi as more_peers
 from benchmarks.peers import pinocchio as peers
@@ -47,9 +58,14 @@ def machine() -> dict:
 
     lines = Path("/proc/cpuinfo").read_text().splitlines() if Path("/proc/cpuinfo").exists() else []
     processor = next(
-        (line.split(":")[1].strip() for line in lines if line.startswith("model name")), platform.machine()
+        (line.split(":")[1].strip() for line in lines if line.startswith("model name")),
+        platform.machine(),
     )
-    return {"processor": processor, "cores": os.cpu_count(), "compiler": describe_compiler()["version"].splitlines()[0]}
+    return {
+        "processor": processor,
+        "cores": os.cpu_count(),
+        "compiler": describe_compiler()["version"].splitlines()[0],
+    }
 
 
 def generation(folder: Path) -> list[dict]:
@@ -67,16 +83,21 @@ def generation(folder: Path) -> list[dict]:
         done = time.perf_counter()
         text = (path / "src" / f"{path.name}.c").stat().st_size
         emission = st.load(path).manifest["functions"]["forward_dynamics"]["emission"]
-        rows.append({"model": label(*size), "generate_s": made - begun, "compile_s": done - made} | {"c_bytes": text})
+        rows.append(
+            {"model": label(*size), "generate_s": made - begun, "compile_s": done - made}
+            | {"c_bytes": text}
+        )
         rows[-1] |= {"total_s": done - begun, "emission": emission}
     return rows
 
 
 def speed(folder: Path) -> list[dict]:
-    """Nanoseconds of one forward dynamics call from C, beside Pinocchio's coupled path, rounds interleaved.
+    """Nanoseconds of one forward dynamics call from C, beside Pinocchio's coupled path, rounds
+    interleaved.
 
-    Ratios by minima (by medians in brackets).  Pinocchio: as its documentation shows it; its CRBA with all that was
-    found to speed it up; the tied columns summed by own code on its types (pinocchio_chain.cpp).
+    Ratios by minima (by medians in brackets).  Pinocchio: as its documentation shows it; its CRBA
+    with all that was found to speed it up; the tied columns summed by own code on its types
+    (pinocchio_chain.cpp).
     """
     rows = []
     for size in ((1, 3), (3, 4), (6, 6), (8, 16)):
@@ -90,9 +111,17 @@ def speed(folder: Path) -> list[dict]:
             error = max(difference(ours, tuned, states), difference(ours, plain, states))
             closures = [ours.closure, plain.closure, tuned.crba_closure, tuned.closure]
             times = peers.time_rounds(closures, states, ROUNDS, CALLS)
-        row = {"model": label(*size), "ns": times[0][0], "median_ns": times[0][1], "v_dot_difference": error}
+        row = {
+            "model": label(*size),
+            "ns": times[0][0],
+            "median_ns": times[0][1],
+            "v_dot_difference": error,
+        }
         for name, (least, median) in zip(("plain", "tuned", "own"), times[1:], strict=True):
-            row |= {f"{name}_ns": least, f"{name}_ratio": f"{least / times[0][0]:.1f}x ({median / times[0][1]:.1f}x)"}
+            row |= {
+                f"{name}_ns": least,
+                f"{name}_ratio": f"{least / times[0][0]:.1f}x ({median / times[0][1]:.1f}x)",
+            }
         rows.append(row)
     return rows
 
@@ -107,13 +136,21 @@ def difference(ours: Fixture, pinocchio, states) -> float:
 
 
 def tails(folder: Path) -> list[dict]:
-    """Nanoseconds of forward dynamics of a continuum beside an articulated tail of three links a segment."""
+    """Nanoseconds of forward dynamics of a continuum beside an articulated tail of three links a
+    segment.
+    """
     rows = []
     for m in (1, 3, 6):
-        pair = [fixture(generated(folder / "speed", m, links), folder / "speed") for links in (None, 3)]
+        pair = [
+            fixture(generated(folder / "speed", m, links), folder / "speed") for links in (None, 3)
+        ]
         states = peers.random_states(m)
-        (arcs, _), (links, _) = peers.time_rounds([entry.closure for entry in pair], states, ROUNDS, CALLS)
-        rows.append({"segments": m, "continuum_ns": arcs, "articulated_ns": links, "ratio": arcs / links})
+        (arcs, _), (links, _) = peers.time_rounds(
+            [entry.closure for entry in pair], states, ROUNDS, CALLS
+        )
+        rows.append(
+            {"segments": m, "continuum_ns": arcs, "articulated_ns": links, "ratio": arcs / links}
+        )
     return rows
 
 
@@ -123,7 +160,10 @@ def python_overhead(folder: Path) -> list[dict]:
     for size in ((1, 3), (3, 4)):
         ours = fixture(generated(folder / "speed", *size), folder / "speed")
         q, v, tau = (x[0] for x in peers.random_states(size[0]))
-        inside = peers.time_rounds([ours.closure], peers.random_states(size[0]), ROUNDS, CALLS)[0][0] / 1e3
+        inside = (
+            peers.time_rounds([ours.closure], peers.random_states(size[0]), ROUNDS, CALLS)[0][0]
+            / 1e3
+        )
         for name, arguments in (("forward_dynamics", (q, v, tau)), ("mass_matrix", (q,))):
             total = best_us(getattr(ours.model, name), arguments)
             rows.append({"model": label(*size), "call": name, "us": total})
@@ -143,7 +183,9 @@ def best_us(call: Callable, arguments: tuple, count: int = 5000, repeats: int = 
 
 
 def drift(folder: Path) -> list[dict]:
-    """Relative drift of energy and angular momentum in 10 s of undamped flight, RK4 at 0.1 ms, and its run time."""
+    """Relative drift of energy and angular momentum in 10 s of undamped flight, RK4 at 0.1 ms, and
+    its run time.
+    """
     rows = []
     for size in ((1, 3), (3, 4)):
         model = st.load(generated(folder / "speed", *size))
@@ -153,7 +195,9 @@ def drift(folder: Path) -> list[dict]:
             {
                 "model": label(*size),
                 "energy_drift": float(np.abs(energy - energy[0]).max() / energy[0]),
-                "momentum_drift": float(np.abs(momentum - momentum[0]).max() / np.linalg.norm(momentum[0])),
+                "momentum_drift": float(
+                    np.abs(momentum - momentum[0]).max() / np.linalg.norm(momentum[0])
+                ),
                 "quaternion": float(np.abs(np.linalg.norm(flight.attitude, axis=1) - 1).max()),
                 "seconds": flight.info["seconds"],
             }
@@ -176,7 +220,9 @@ def internal_energy(flight, model) -> np.ndarray:
 
 
 def work_precision(folder: Path) -> list[dict]:
-    """Run time against error of 0.58 s of damped flight: RK4, Tsit5 and DOP853 at several steps or tolerances."""
+    """Run time against error of 0.58 s of damped flight: RK4, Tsit5 and DOP853 at several steps or
+    tolerances.
+    """
     model = st.load(generated(folder / "speed", 1, 3))
     start = thrown(model)
     settings = [("rk4", {"step": h}) for h in (4e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4)]
@@ -184,7 +230,9 @@ def work_precision(folder: Path) -> list[dict]:
     settings += [("dop853", {"rtol": r, "atol": r * 1e-2}) for r in (1e-4, 1e-6, 1e-8, 1e-10)]
 
     def fly(method, options):
-        return st.simulate(model, *start, controller=st.Damping(1e-4), t_span=0.58, method=method, **options)
+        return st.simulate(
+            model, *start, controller=st.Damping(1e-4), t_span=0.58, method=method, **options
+        )
 
     exact = fly("dop853", {"rtol": 1e-13, "atol": 1e-15})
     rows = []
@@ -193,7 +241,14 @@ def work_precision(folder: Path) -> list[dict]:
         error = np.abs(flights[0].q[-1] - exact.q[-1]).max()
         name, value = next(iter(options.items()))
         milliseconds = 1e3 * min(f.info["seconds"] for f in flights)
-        rows.append({"method": method, "setting": f"{name} {value:g}", "ms": milliseconds, "error": float(error)})
+        rows.append(
+            {
+                "method": method,
+                "setting": f"{name} {value:g}",
+                "ms": milliseconds,
+                "error": float(error),
+            }
+        )
     return rows
 
 

@@ -1,6 +1,8 @@
-"""What contact costs: operation counts, bytes of C and nanoseconds of a flight, a stance and a tail contact.
+"""What contact costs: operation counts, bytes of C and nanoseconds of a flight, a stance and a tail
+contact.
 
-Times are processor time of single calls from C, the least of many rounds over the same states, functions in turn.
+Times are processor time of single calls from C, the least of many rounds over the same states,
+functions in turn.
 """
 
 import json
@@ -16,7 +18,14 @@ SCENES = {"flight": (), "stance": ("feet",), "tail": ("feet", "tail")}
 SIZES = ((1, 3), (3, 4), (3, None))
 FLIGHT = ("forward_dynamics", "pfl", "implicit")
 TOUCHING = ("contact_points", "contact_dynamics")
-FLAGS = ["-std=c99", "-O2", "-ffp-contract=fast", "-fno-tree-vectorize", "-fno-math-errno", "-fno-trapping-math"]
+FLAGS = [
+    "-std=c99",
+    "-O2",
+    "-ffp-contract=fast",
+    "-fno-tree-vectorize",
+    "-fno-math-errno",
+    "-fno-trapping-math",
+]
 FLAGS += ["-march=native"]
 STATES, ROUNDS = 64, 300
 STANDING = [0, 0, 0.0225, 1, 0.1, 0, 0]  # as a rat stands: half of its foot points in the ground
@@ -52,7 +61,9 @@ def made(parent: Path, size: tuple, contacts: tuple[str, ...]) -> Path:
     segments, links = size
     functions = [*FLIGHT, *(TOUCHING if contacts else ())]
     options = {"contacts": list(contacts)} if contacts else {}
-    scene = scene_for("articulated" if links else "continuum", segments, links, functions=functions, **options)
+    scene = scene_for(
+        "articulated" if links else "continuum", segments, links, functions=functions, **options
+    )
     generate(scene, parent / "_".join(("scene", *contacts)))
     return parent / "_".join(("scene", *contacts)) / scene.name
 
@@ -61,11 +72,19 @@ def inputs(manifest: dict) -> dict[str, np.ndarray]:
     """States near standing, rates small, and right-hand sides, by argument."""
     rng, sizes = np.random.default_rng(1), manifest["dimensions"]
     points = sum(entry["count"] for entry in manifest["contacts"])
-    shapes = {"v": sizes["nv"], "tau": sizes["nt"], "accelerations": sizes["nt"], "bristles": 2 * points}
+    shapes = {
+        "v": sizes["nv"],
+        "tau": sizes["nt"],
+        "accelerations": sizes["nt"],
+        "bristles": 2 * points,
+    }
     shapes |= {"r_q": sizes["nv"], "r_v": sizes["nv"], "r_u": 2 * points}
     given = {name: rng.normal(0, 1e-3, (STATES, size)) for name, size in shapes.items()}
     tail = rng.normal(0, 0.2, (STATES, sizes["nt"]))
-    given |= {"q": np.hstack([np.tile(STANDING, (STATES, 1)), tail]), "legs": np.tile(LEGS, (STATES, 1))}
+    given |= {
+        "q": np.hstack([np.tile(STANDING, (STATES, 1)), tail]),
+        "legs": np.tile(LEGS, (STATES, 1)),
+    }
     given |= {"damping": np.full((STATES, sizes["nt"]), 1e-3), "gains": np.zeros((STATES, 2))}
     return given | {"weight": np.tile([1e-4, 1.0] if points else [1e-4], (STATES, 1))}
 
@@ -84,13 +103,17 @@ def driver(manifest: dict, given: dict[str, np.ndarray]) -> tuple[str, list[np.n
             lines.append(f"  double *{variable} = calloc({STATES * length}, sizeof(double));")
             arguments.append(f"{variable} + k * {length}")
             if a in entry["inputs"]:
-                lines.append(f"  if (read_reals(file, {variable}, {STATES * length}) > 0.0) return 2;")
+                lines.append(
+                    f"  if (read_reals(file, {variable}, {STATES * length}) > 0.0) return 2;"
+                )
                 data.append(given[a["name"]])
         call = f"{manifest['prefix']}_{name}(&parameters, {', '.join(arguments)}, work)"
         calls += [
             "    start = clock();",
-            f"    for (int repeat = 0; repeat < 8; ++repeat) for (long k = 0; k < {STATES}; ++k) if ({call}) return 1;",
-            f"    const double t{number} = (double)(clock() - start) / CLOCKS_PER_SEC / {8 * STATES};",
+            f"    for (int repeat = 0; repeat < 8; ++repeat) for (long k = 0; k < {STATES}; ++k) "
+            f"if ({call}) return 1;",
+            f"    const double t{number} = (double)(clock() - start) / CLOCKS_PER_SEC / "
+            f"{8 * STATES};",
             f"    if (t{number} < best[{number}]) best[{number}] = t{number};",
         ]
     text = DRIVER.format(
@@ -111,15 +134,24 @@ def timed(folder: Path) -> dict[str, float]:
     (folder / "driver.c").write_text(text)
     np.concatenate([array.ravel() for array in data]).tofile(folder / "states.bin")
     sources = [folder / "driver.c", folder / "src" / f"{manifest['prefix']}.c"]
-    subprocess.run(["cc", *FLAGS, "-I", folder / "include", *sources, "-o", folder / "driver", "-lm"], check=True)
-    printed = subprocess.run([folder / "driver", folder / "states.bin"], check=True, capture_output=True, text=True)
-    return dict(zip(manifest["functions"], (1e9 * float(t) for t in printed.stdout.split()), strict=True))
+    subprocess.run(
+        ["cc", *FLAGS, "-I", folder / "include", *sources, "-o", folder / "driver", "-lm"],
+        check=True,
+    )
+    printed = subprocess.run(
+        [folder / "driver", folder / "states.bin"], check=True, capture_output=True, text=True
+    )
+    return dict(
+        zip(manifest["functions"], (1e9 * float(t) for t in printed.stdout.split()), strict=True)
+    )
 
 
 def contact_costs(folder: Path) -> list[dict]:
-    """What a flight, a stance (feet) and a tail contact (feet, tail) of one model cost: C of its file, calls.
+    """What a flight, a stance (feet) and a tail contact (feet, tail) of one model cost: C of its
+    file, calls.
 
-    Operations of one evaluation; processor time of single calls from C, half of the foot points in the ground.
+    Operations of one evaluation; processor time of single calls from C, half of the foot points in
+    the ground.
     """
     rows = []
     for size in SIZES:
@@ -127,10 +159,19 @@ def contact_costs(folder: Path) -> list[dict]:
             made_at = made(folder / "costs", size, contacts)
             manifest = json.loads((made_at / "manifest.json").read_text())
             dynamics, ns = "contact_dynamics" if contacts else "forward_dynamics", timed(made_at)
-            operations = {name: entry["operations"] for name, entry in manifest["functions"].items()}
-            row = {"model": made_at.name, "scene": scene, "points": sum(e["count"] for e in manifest["contacts"])}
+            operations = {
+                name: entry["operations"] for name, entry in manifest["functions"].items()
+            }
+            row = {
+                "model": made_at.name,
+                "scene": scene,
+                "points": sum(e["count"] for e in manifest["contacts"]),
+            }
             row |= {"c_bytes": (made_at / "src" / f"{manifest['prefix']}.c").stat().st_size}
             row |= {"dynamics_operations": operations[dynamics], "dynamics_ns": ns[dynamics]}
-            row |= {"implicit_operations": operations["implicit_factor"], "implicit_ns": ns["implicit_factor"]}
+            row |= {
+                "implicit_operations": operations["implicit_factor"],
+                "implicit_ns": ns["implicit_factor"],
+            }
             rows.append(row)
     return rows

@@ -1,4 +1,6 @@
-"""The continuum tail in two forms, bend components and the paper's polar closed forms: errors, run times, a picture."""
+"""The continuum tail in two forms, bend components and the paper's polar closed forms: errors, run
+times, a picture.
+"""
 
 import subprocess
 import sys
@@ -30,10 +32,11 @@ def form(folder: Path, coordinates: str, segments: int) -> Path:
 
 
 def form_errors(folder: Path) -> list[dict]:
-    """Largest errors of H and v_dot of one segment at bend theta over six random states, against 50 digits.
+    """Largest errors of H and v_dot of one segment at bend theta over six random states, against 50
+    digits.
 
-    Rates of all coordinates are some 10 rad/s. Accelerations are compared in bend components. "refused": some H was
-    not positive definite, so that there is no v_dot.
+    Rates of all coordinates are some 10 rad/s. Accelerations are compared in bend components.
+    "refused": some H was not positive definite, so that there is no v_dot.
     """
     from tests.references.exact_polar import ExactPolar
 
@@ -42,7 +45,9 @@ def form_errors(folder: Path) -> list[dict]:
     rows = []
     for theta in THETAS:
         errors = [state_errors(models, exact, *state(theta, seed)) for seed in range(STATES)]
-        row = {"theta": f"{theta:.3g}"} | {key: REFUSED if None in x else max(x) for key, x in columns(errors).items()}
+        row = {"theta": f"{theta:.3g}"} | {
+            key: REFUSED if None in x else max(x) for key, x in columns(errors).items()
+        }
         rows.append(row)
     return rows
 
@@ -53,7 +58,9 @@ def columns(rows: list[dict]) -> dict[str, list]:
 
 
 def state(theta: float, seed: int) -> tuple[np.ndarray, ...]:
-    """Return q, v, tau in polar angles, bent by theta; the torque on phi vanishes with theta, as it does by nature."""
+    """Return q, v, tau in polar angles, bent by theta; the torque on phi vanishes with theta, as it
+    does by nature.
+    """
     rng = np.random.default_rng(seed)
     q, v, tau = rng.normal(size=9), 10 * rng.normal(size=8), 1e-3 * rng.normal(size=2)
     q[3:7] /= np.linalg.norm(q[3:7])
@@ -70,7 +77,9 @@ def state_errors(models: dict, exact, q, v, tau) -> dict:
     row = {"bend_H": mass_matrix_error(models["bend"].mass_matrix(in_bend[0]), expected)}
     row["polar_H"] = mass_matrix_error(models["polar"].mass_matrix(q), exact.mass_matrix(q))
     row["bend_v_dot"] = v_dot_error(models["bend"], exact, in_bend, lambda v_dot: v_dot)
-    row["polar_v_dot"] = v_dot_error(models["polar"], exact, (q, v, tau), lambda x: exact.acceleration(q, v, x))
+    row["polar_v_dot"] = v_dot_error(
+        models["polar"], exact, (q, v, tau), lambda x: exact.acceleration(q, v, x)
+    )
     return row
 
 
@@ -89,17 +98,27 @@ def v_dot_error(model: st.Model, exact, arguments, to_bend) -> float | None:
 
 
 def form_times(folder: Path) -> list[dict]:
-    """Nanoseconds of one forward dynamics call from C of both forms, rounds interleaved, and operations of each."""
+    """Nanoseconds of one forward dynamics call from C of both forms, rounds interleaved, and
+    operations of each.
+    """
     rows = []
     for m in (1, 3):
         pair = {name: fixture(form(folder, name, m), folder) for name in COLOURS}
         q, v, tau = peers.random_states(m)
-        q[:, 8::2] = np.abs(q[:, 8::2]) + 0.5  # polar: theta; bend: b, to which its run time is indifferent
-        times = peers.time_rounds([entry.closure for entry in pair.values()], (q, v, tau), ROUNDS, CALLS)
-        row = {"segments": m} | {f"{name}_ns": least for name, (least, _) in zip(pair, times, strict=True)}
+        q[:, 8::2] = (
+            np.abs(q[:, 8::2]) + 0.5
+        )  # polar: theta; bend: b, to which its run time is indifferent
+        times = peers.time_rounds(
+            [entry.closure for entry in pair.values()], (q, v, tau), ROUNDS, CALLS
+        )
+        row = {"segments": m} | {
+            f"{name}_ns": least for name, (least, _) in zip(pair, times, strict=True)
+        }
         row["form_ratio"] = f"{times[1][0] / times[0][0]:.2f} ({times[1][1] / times[0][1]:.2f})"
         for name, entry in pair.items():
-            row[f"{name}_operations"] = entry.model.manifest["functions"]["forward_dynamics"]["operations"]
+            row[f"{name}_operations"] = entry.model.manifest["functions"]["forward_dynamics"][
+                "operations"
+            ]
         rows.append(row)
     return rows
 
@@ -112,13 +131,17 @@ def draw(errors: list[dict], times: list[dict], path: Path) -> None:
     import matplotlib.pyplot as plt
 
     widths = {"width_ratios": (3, 3, 1.6)}
-    figure, (left, right, side) = plt.subplots(1, 3, figsize=(10, 4.2), layout="constrained", gridspec_kw=widths)
+    figure, (left, right, side) = plt.subplots(
+        1, 3, figsize=(10, 4.2), layout="constrained", gridspec_kw=widths
+    )
     for axes, quantity, title in ((left, "H", "H"), (right, "v_dot", "v_dot")):
         draw_errors(axes, errors, quantity)
         axes.set_title(f"error of {title}, m = 1")
     right.tick_params(labelleft=False)
     left.set_ylabel("largest relative error of six states")
-    figure.legend(*right.get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False)
+    figure.legend(
+        *right.get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False
+    )
     draw_times(side, times)
     figure.savefig(path, dpi=100)
     plt.close(figure)
@@ -133,7 +156,13 @@ def draw_errors(axes, errors: list[dict], quantity: str) -> None:
         numbers = [value for value in values if value != REFUSED]
         axes.loglog(theta[given], numbers, "o-", color=colour, markersize=3.5, label=LABELS[name])
         if not given.all():
-            axes.plot(theta[~given], np.full((~given).sum(), 10.0), "x", color=colour, label="H not positive definite")
+            axes.plot(
+                theta[~given],
+                np.full((~given).sum(), 10.0),
+                "x",
+                color=colour,
+                label="H not positive definite",
+            )
     axes.plot(theta, 2e-15 * theta**-4.0, ":", color="0.4", label=r"$2\cdot10^{-15}/\theta^4$")
     axes.axvline(PAPER_SWITCH, color="0.6", linewidth=1, linestyle="--")
     axes.text(

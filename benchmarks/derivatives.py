@@ -1,4 +1,6 @@
-"""Derivatives in C beside Pinocchio's and CasADi's: models go in, run times, sizes, build times come out."""
+"""Derivatives in C beside Pinocchio's and CasADi's: models go in, run times, sizes, build times
+come out.
+"""
 
 import ctypes
 import importlib.util
@@ -40,14 +42,19 @@ int measured(void *c, const double *q, const double *v, const double *rest, doub
 """
 
 
-# ---- models and closures ------------------------------------------------------------------------------------------
+# ---- models and closures -------------------------------------------------------------------------
 
 
 def generated(parent: Path, size: tuple[int, int], functions, emission: str = "auto") -> Path:
     """Generate an articulated tail with some functions; return the generated folder."""
     name = f"{functions[-1]}_m{size[0]}_n{size[1]}"
     scene = parent / f"{name}.toml"
-    lines = ['kind = "articulated"', f"segments = {size[0]}", f"links = {size[1]}", f"functions = {list(functions)}"]
+    lines = [
+        'kind = "articulated"',
+        f"segments = {size[0]}",
+        f"links = {size[1]}",
+        f"functions = {list(functions)}",
+    ]
     scene.write_text("\n".join([*lines, f'emission = "{emission}"', ""]))
     command = [sys.executable, "-m", "serpentail_codegen", str(scene), "--output", str(parent)]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
@@ -72,7 +79,9 @@ class InCasadi:
         subprocess.run(command, check=True, timeout=PATIENCE)
         self.seconds = time.perf_counter() - begun
         self.function = ctypes.CDLL(str(source.with_suffix(".so"))).measured
-        self.context = np.zeros(sum(sizes[name] for name in ("parameters", "out", "work", "integers")) + 2)
+        self.context = np.zeros(
+            sum(sizes[name] for name in ("parameters", "out", "work", "integers")) + 2
+        )
         self.context[: sizes["parameters"]] = model.parameter_vector
         self.out = self.context[sizes["parameters"] :][: first + second]
         self.shapes = [function.size_out(k) for k in range(2)]
@@ -80,7 +89,9 @@ class InCasadi:
     @property
     def closure(self) -> peers.Closure:
         """What the timer calls."""
-        return peers.Closure(ctypes.cast(self.function, ctypes.c_void_p).value, self.context.ctypes.data)
+        return peers.Closure(
+            ctypes.cast(self.function, ctypes.c_void_p).value, self.context.ctypes.data
+        )
 
     def __call__(self, *arrays) -> list[np.ndarray]:
         """Both matrices."""
@@ -90,7 +101,10 @@ class InCasadi:
             raise FloatingPointError("CasADi's C reports a failure")
         first = int(np.prod(self.shapes[0]))
         parts = (self.out[:first], self.out[first:])
-        return [part.reshape(shape, order="F").copy() for part, shape in zip(parts, self.shapes, strict=True)]
+        return [
+            part.reshape(shape, order="F").copy()
+            for part, shape in zip(parts, self.shapes, strict=True)
+        ]
 
 
 class Graph:
@@ -107,7 +121,9 @@ class Graph:
             first += size
 
     def turned(self) -> list:
-        """The numbers of q, the torso turned by ``turn``; to second order the exponential map, as q is normalised."""
+        """The numbers of q, the torso turned by ``turn``; to second order the exponential map, as q
+        is normalised.
+        """
         w, x, y, z = ca.vertsplit(self.q[3:7])
         a, b, c = ca.vertsplit(self.turn / 2)
         turned = [w - x * a - y * b - z * c, x + w * a + y * c - z * b]
@@ -116,13 +132,21 @@ class Graph:
 
     def force(self, q, v_dot):
         """H v_dot + C."""
-        result = self.module.inverse_dynamics(self.fields, q=q, v=ca.vertsplit(self.v), v_dot=ca.vertsplit(v_dot))
+        result = self.module.inverse_dynamics(
+            self.fields, q=q, v=ca.vertsplit(self.v), v_dot=ca.vertsplit(v_dot)
+        )
         return ca.vertcat(*result["force"])
 
     def finished(self, rest, results) -> ca.Function:
-        """Return the function of (q, v, rest, parameters), without a turn, equal subexpressions computed once."""
+        """Return the function of (q, v, rest, parameters), without a turn, equal subexpressions
+        computed once.
+        """
         results = ca.cse(ca.substitute(results, [self.turn], [ca.SX.zeros(3)]))
-        return ca.Function("differentiated", [self.q, self.v, rest, self.parameters], [ca.densify(r) for r in results])
+        return ca.Function(
+            "differentiated",
+            [self.q, self.v, rest, self.parameters],
+            [ca.densify(r) for r in results],
+        )
 
 
 def casadi_module(model: st.Model) -> ModuleType:
@@ -135,7 +159,8 @@ def casadi_module(model: st.Model) -> ModuleType:
 
 
 def jacobians(model: st.Model, turn_by_hand: bool) -> ca.Function:
-    """-H^-1 dID in SX: columns of tail coordinates, omega and rates, torques; then those of a turn of the torso.
+    """-H^-1 dID in SX: columns of tail coordinates, omega and rates, torques; then those of a turn
+    of the torso.
 
     A turn of the torso moves p_b_ddot + g z along and leaves all else; by hand, it is written so.
     """
@@ -153,7 +178,10 @@ def jacobians(model: st.Model, turn_by_hand: bool) -> ca.Function:
     J = ca.jacobian(g.force(q if turn_by_hand else g.turned(), v_dot), ca.vertcat(*directions))
     J = ca.horzsplit(ca.substitute(J, v_dot, solved))
     columns = [solve(-ca.densify(column)) for column in J]
-    torques = [solve(column) for column in ca.horzsplit(ca.densify(ca.vertcat(ca.SX(6, g.nt), ca.SX.eye(g.nt))))]
+    torques = [
+        solve(column)
+        for column in ca.horzsplit(ca.densify(ca.vertcat(ca.SX(6, g.nt), ca.SX.eye(g.nt))))
+    ]
     rest = ca.horzcat(*columns[: 2 * g.nt + 3], *torques)
     if turn_by_hand:
         R = ca.reshape(ca.vertcat(*g.module.quaternion_rotation(q[3:7])[0]), 3, 3).T
@@ -164,7 +192,9 @@ def jacobians(model: st.Model, turn_by_hand: bool) -> ca.Function:
 
 
 def hessian(model: st.Model) -> ca.Function:
-    """Second derivatives of lambda^T ID in SX: lower triangle for turn, tail, omega, rates; rows of v_dot for q."""
+    """Second derivatives of lambda^T ID in SX: lower triangle for turn, tail, omega, rates; rows of
+    v_dot for q.
+    """
     g = Graph(model)
     both = ca.SX.sym("v_dot_and_multiplier", 2 * g.nv)
     v_dot, multiplier = ca.vertsplit(both, g.nv)
@@ -184,17 +214,23 @@ def in_casadi(name: str, function: ca.Function, model: st.Model, folder: Path) -
         return None
 
 
-# ---- measures -----------------------------------------------------------------------------------------------------
+# ---- measures ------------------------------------------------------------------------------------
 
 
 def jacobian_times(folder: Path) -> list[dict]:
-    """Nanoseconds of the Jacobians of v_dot from (q, v, tau), forward dynamics included, rounds interleaved.
+    """Nanoseconds of the Jacobians of v_dot from (q, v, tau), forward dynamics included, rounds
+    interleaved.
 
-    Ratios by minima (by medians in brackets).  Pinocchio, full chain of 2 m n revolutes: v_dot, computeRNEADerivatives
-    there, G^T (...) G, Cholesky; as its documentation shows it, and with all that was found to speed it up
-    (pinocchio_derivatives.cpp); own sums over the tied columns on its types.  CasADi: C of the SX graph of -H^-1 dID,
-    cse, gcc -O2 -march=native, by its Jacobian along all directions and with the columns of a turn written by hand.
-    Differences: of the documented path, which loses two digits as B is a metre from the origin; the largest of the
+    Ratios by minima (by medians in brackets).  Pinocchio, full chain of 2 m n revolutes: v_dot,
+    computeRNEADerivatives
+    there, G^T (...) G, Cholesky; as its documentation shows it, and with all that was found to
+    speed it up
+    (pinocchio_derivatives.cpp); own sums over the tied columns on its types.  CasADi: C of the SX
+    graph of -H^-1 dID,
+    cse, gcc -O2 -march=native, by its Jacobian along all directions and with the columns of a turn
+    written by hand.
+    Differences: of the documented path, which loses two digits as B is a metre from the origin; the
+    largest of the
     others.
     """
     return [jacobian_row(folder, size) for size in SIZES]
@@ -204,9 +240,13 @@ def jacobian_row(folder: Path, size: tuple[int, int]) -> dict:
     """Measure one size."""
     ours = fixture(generated(folder, size, (*IN_SX, JACOBIANS)), folder, JACOBIANS)
     by_hand = in_casadi("by_hand", jacobians(ours.model, True), ours.model, folder)
-    by_itself = by_hand and in_casadi("by_itself", jacobians(ours.model, False), ours.model, folder)  # the larger text
+    by_itself = by_hand and in_casadi(
+        "by_itself", jacobians(ours.model, False), ours.model, folder
+    )  # the larger text
     states = peers.random_states(size[0])
-    libraries = (peers.build_library(source, peers.CACHE) for source in (peers.PLAIN, peers.DERIVATIVES))
+    libraries = (
+        peers.build_library(source, peers.CACHE) for source in (peers.PLAIN, peers.DERIVATIVES)
+    )
     plain, tuned = (peers.PinocchioBench(*size, ours.parameters, library) for library in libraries)
     with plain, tuned:
         found = {"plain": plain.derivatives_closure, "revolutes": tuned.derivatives_closure}
@@ -234,12 +274,18 @@ def compared(ours: Fixture, others: dict[str, peers.Closure | None], states: pee
     return row
 
 
-def pinocchio_difference(model: st.Model, peer: peers.PinocchioBench, states: peers.States, path: str = "") -> float:
-    """Largest difference in the rows of omega and the tail, whose columns are the same relative to the torso."""
+def pinocchio_difference(
+    model: st.Model, peer: peers.PinocchioBench, states: peers.States, path: str = ""
+) -> float:
+    """Largest difference in the rows of omega and the tail, whose columns are the same relative to
+    the torso.
+    """
     errors = []
     for state in zip(*states, strict=True):
         found = peer.forward_dynamics_derivatives(*state, path)
-        for a, b, first in zip(model.forward_dynamics_derivatives(*state), found, (6, 3, 0), strict=True):
+        for a, b, first in zip(
+            model.forward_dynamics_derivatives(*state), found, (6, 3, 0), strict=True
+        ):
             errors.append(difference(a[3:, first:], b[3:, first:]))
     return max(errors)
 
@@ -263,17 +309,20 @@ def difference(a: np.ndarray, b: np.ndarray) -> float:
 
 
 def hessian_times(folder: Path) -> list[dict]:
-    """Nanoseconds of the Hessian of lambda^T (H v_dot + C) from C, all blocks that are not zero, rounds interleaved.
+    """Nanoseconds of the Hessian of lambda^T (H v_dot + C) from C, all blocks that are not zero,
+    rounds interleaved.
 
-    CasADi: SX, Jacobian of the gradient, its lower triangle only, and the mixed block; cse, gcc -O2 -march=native.
-    Ratio by minima (by medians in brackets).
+    CasADi: SX, Jacobian of the gradient, its lower triangle only, and the mixed block; cse, gcc -O2
+    -march=native. Ratio by minima (by medians in brackets).
     """
     rows = []
     for size in SIZES[:2]:
         ours = fixture(generated(folder, size, (*IN_SX, HESSIAN)), folder, HESSIAN)
         peer = in_casadi("hessian", hessian(ours.model), ours.model, folder)
         states = multiplied(peers.random_states(size[0]))
-        row = {"model": f"({size[0]}, {size[1]})"} | compared(ours, {"casadi": peer and peer.closure}, states)
+        row = {"model": f"({size[0]}, {size[1]})"} | compared(
+            ours, {"casadi": peer and peer.closure}, states
+        )
         row["gcc_s"] = peer.seconds if peer else OVER
         row["hessian_difference"] = hessian_difference(ours.model, peer, states) if peer else ""
         rows.append(row)
@@ -299,9 +348,11 @@ def hessian_difference(model: st.Model, peer: InCasadi, states: peers.States) ->
 
 
 def derivative_code(folder: Path) -> list[dict]:
-    """All ten derivative functions as loops: operations that a call executes, size of their C, processor seconds.
+    """All ten derivative functions as loops: operations that a call executes, size of their C,
+    processor seconds.
 
-    Generating is one process from its start; compiling is all that the compiler takes, with the runtime's flags.
+    Generating is one process from its start; compiling is all that the compiler takes, with the
+    runtime's flags.
     """
     rows = []
     for size in (*SIZES, (8, 16)):
@@ -318,7 +369,11 @@ def derivative_code(folder: Path) -> list[dict]:
             f"{name}_operations": counts[name]["operations"]
             for name in (JACOBIANS, "inverse_dynamics_derivatives", HESSIAN)
         }
-        row |= {"derivative_bytes": sources[0].stat().st_size, "generate_cpu": generate, "compile_cpu": spent}
+        row |= {
+            "derivative_bytes": sources[0].stat().st_size,
+            "generate_cpu": generate,
+            "compile_cpu": spent,
+        }
         rows.append(row)
     return rows
 

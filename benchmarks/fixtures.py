@@ -1,4 +1,6 @@
-"""Models to measure: a generated folder goes in, the model and a closure of its C forward dynamics come out."""
+"""Models to measure: a generated folder goes in, the model and a closure of its C forward dynamics
+come out.
+"""
 
 import ctypes
 import math
@@ -91,11 +93,24 @@ COLUMNS = {
 }
 
 
-def generated(parent: Path, segments: int, links: int | None = None, functions: str = "", real: str = "double") -> Path:
-    """Run the generator as `make model` does, for a continuum if there are no links; return the generated folder."""
+def generated(
+    parent: Path, segments: int, links: int | None = None, functions: str = "", real: str = "double"
+) -> Path:
+    """Run the generator as `make model` does, for a continuum if there are no links; return the
+    generated folder.
+    """
     tail = ["--tail", "articulated", "--links", str(links)] if links else ["--tail", "continuum"]
     tail += (["--functions", functions] if functions else []) + ["--real", real]
-    command = [sys.executable, "-m", "serpentail_codegen", *tail, "--segments", str(segments), "--output", str(parent)]
+    command = [
+        sys.executable,
+        "-m",
+        "serpentail_codegen",
+        *tail,
+        "--segments",
+        str(segments),
+        "--output",
+        str(parent),
+    ]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
     return parent / (f"articulated_m{segments}_n{links}" if links else f"continuum_m{segments}")
 
@@ -122,12 +137,14 @@ class Fixture:
 def fixture(folder: Path, scratch: Path, function: str = "forward_dynamics") -> Fixture:
     """Load a generated folder and compile an adapter to the timer's call.
 
-    The third array of the timer holds all inputs after q and v, one after the other; more than one output stays in the
-    context, behind the workspace, which begins at a cache line.
+    The third array of the timer holds all inputs after q and v, one after the other; more than one
+    output stays in the context, behind the workspace, which begins at a cache line.
     """
     model = st.load(folder)
     work = -(-(model.manifest["work"][function] + 1) // 8) * 8
-    inputs, outputs = (sizes(model.manifest["functions"][function][key]) for key in ("inputs", "outputs"))
+    inputs, outputs = (
+        sizes(model.manifest["functions"][function][key]) for key in ("inputs", "outputs")
+    )
     single = len(outputs) == 1
     arguments = ["q", "v", *offsets("rest", inputs[2:]), *offsets("out", outputs)]
     adapter = scratch / f"{model.name}_{function}.c"
@@ -140,10 +157,16 @@ def fixture(folder: Path, scratch: Path, function: str = "forward_dynamics") -> 
         arguments=", ".join(arguments),
     )
     adapter.write_text(text)
-    library = ctypes.CDLL(str(compile_library([adapter, folder / "src" / f"{model.name}.c"], folder / "include")))
+    library = ctypes.CDLL(
+        str(compile_library([adapter, folder / "src" / f"{model.name}.c"], folder / "include"))
+    )
     context = aligned(work + len(model.parameter_vector) + sum(outputs), float)
     context[work : work + len(model.parameter_vector)] = model.parameter_vector
-    return Fixture(model, Closure(ctypes.cast(library.measured, ctypes.c_void_p).value, context.ctypes.data), context)
+    return Fixture(
+        model,
+        Closure(ctypes.cast(library.measured, ctypes.c_void_p).value, context.ctypes.data),
+        context,
+    )
 
 
 def sizes(arguments: list[dict]) -> list[int]:

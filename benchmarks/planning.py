@@ -1,7 +1,9 @@
-"""Planning, measured: a folder for models goes in; rows of figures, each beside its target, come out.
+"""Planning, measured: a folder for models goes in; rows of figures, each beside its target, come
+out.
 
-All times are CPU seconds of this process.  The problem of one plan is that of Sect. 4.2 from a random tumbling start,
-59 nodes (Hermite-Simpson, 29 intervals), the guess passive flight for all ways of solving it.
+All times are CPU seconds of this process.  The problem of one plan is that of Sect. 4.2 from a
+random tumbling start, 59 nodes (Hermite-Simpson, 29 intervals), the guess passive flight for all
+ways of solving it.
 """
 
 import importlib.util
@@ -17,13 +19,26 @@ from serpentail.planning.nlp.node import dynamics
 from serpentail.planning.problem import SMOOTHING
 from serpentail_codegen.scene.parse import scene_for
 
-SLOWER, CAP = 500, 300.0  # times slower than the best, or s of CPU: what does not end is cut at the lesser
+SLOWER, CAP = (
+    500,
+    300.0,
+)  # times slower than the best, or s of CPU: what does not end is cut at the lesser
 EXAMPLE = 4  # the random start
 REPEATS = 5
-NODES = {"rule": "hermite-simpson", "intervals": 29, "tolerance": None, "retries": 0, "track": False}
+NODES = {
+    "rule": "hermite-simpson",
+    "intervals": 29,
+    "tolerance": None,
+    "retries": 0,
+    "track": False,
+}
 PAPER = righting.PAPER | {"intervals": 58, "track": False}
 LIMITED = {"options": {"ipopt.hessian_approximation": "limited-memory", "ipopt.max_iter": 3000}}
-STARTS = {(1, 3): (200, 0.5, 95), (2, 3): (50, 10.0, 80), (3, 2): (50, 10.0, 80)}  # starts, s, % of them
+STARTS = {
+    (1, 3): (200, 0.5, 95),
+    (2, 3): (50, 10.0, 80),
+    (3, 2): (50, 10.0, 80),
+}  # starts, s, % of them
 
 
 class Cut(Exception):
@@ -31,34 +46,54 @@ class Cut(Exception):
 
 
 def planning(folder: Path) -> list[dict]:
-    """Ways to solve one problem of 59 nodes; how often, and how fast, plans become true (<= 0.01 deg); planning again.
+    """Ways to solve one problem of 59 nodes; how often, and how fast, plans become true (<= 0.01
+    deg); planning again.
 
-    Paper's method: SciPy's SLSQP with finite differences of the trapezoidal program in Euler angles; cut, unsolved,
-    at 500 times the best way's time, 5 minutes at most.
+    Paper's method: SciPy's SLSQP with finite differences of the trapezoidal program in Euler
+    angles; cut, unsolved, at 500 times the best way's time, 5 minutes at most.
     """
     models = {size: righting.model(folder / "planning", *size) for size in STARTS}
     rat, free = models[1, 3], st.Goal(torso_rate=None)
-    rows = [*one_problem(rat), *replanned(rat), true_plans(rat, "(1, 3), upright at any rate", STARTS[1, 3], goal=free)]
-    return rows + [true_plans(models[m, n], f"({m}, {n}), at rest", STARTS[m, n]) for m, n in STARTS]
+    rows = [
+        *one_problem(rat),
+        *replanned(rat),
+        true_plans(rat, "(1, 3), upright at any rate", STARTS[1, 3], goal=free),
+    ]
+    return rows + [
+        true_plans(models[m, n], f"({m}, {n}), at rest", STARTS[m, n]) for m, n in STARTS
+    ]
 
 
 def plan(rat: st.Model, seed: int = EXAMPLE, **settings) -> st.Plan:
-    """Plan from a random start; the whole tail bends by 180 degrees as in Sect. 4.2, by 360 as in 4.3."""
+    """Plan from a random start; the whole tail bends by 180 degrees as in Sect. 4.2, by 360 as in
+    4.3.
+    """
     limits = righting.bounds(rat, np.pi if rat.segments == 1 else 2 * np.pi)
-    common = {"start": righting.tumbling(rat, seed), "duration": (0.3, righting.FLIGHT), "bounds": limits}
+    common = {
+        "start": righting.tumbling(rat, seed),
+        "duration": (0.3, righting.FLIGHT),
+        "bounds": limits,
+    }
     return st.plan(rat, **(common | settings))
 
 
 def one_problem(rat: st.Model) -> list[dict]:
     """Rows of one program solved in several ways, in turns."""
-    ways = {"exact Hessian": NODES, "L-BFGS Hessian": NODES | LIMITED, "paper's program, exact Hessian": PAPER}
+    ways = {
+        "exact Hessian": NODES,
+        "L-BFGS Hessian": NODES | LIMITED,
+        "paper's program, exact Hessian": PAPER,
+    }
     reports = {way: [] for way in ways}
     for _ in range(REPEATS):
         for way, settings in ways.items():
             reports[way].append(plan(rat, **settings).report)
     rows, best = [], min(r["solve_cpu_s"] for r in reports["exact Hessian"])
     for way, found in reports.items():
-        least, target = min(r["solve_cpu_s"] for r in found), "<= 0.15 s" if way == "exact Hessian" else ""
+        least, target = (
+            min(r["solve_cpu_s"] for r in found),
+            "<= 0.15 s" if way == "exact Hessian" else "",
+        )
         about = f"{found[0]['iterations']} iterations, {least / best:.1f}x, {found[0]['status']}"
         rows.append(figure(f"(1, 3), 59 nodes, {way}", f"{least:.3f} s", target, about))
     spent, about = finite_differences(rat, min(SLOWER * best, CAP))
@@ -81,13 +116,17 @@ def opty(rat: st.Model, best: float) -> dict:
 
     flight = righting.passive(rat, righting.tumbling(rat, EXAMPLE), righting.FLIGHT)
     guess = flight.resample(np.linspace(0, righting.FLIGHT, 59))
-    found = solved(scene_for("articulated", rat.segments, rat.links), guess, righting.bounds(rat), SMOOTHING)
+    found = solved(
+        scene_for("articulated", rat.segments, rat.links), guess, righting.bounds(rat), SMOOTHING
+    )
     about = f"{found['solve_s'] / best:.0f}x, {found['status']}; {found['setup_s']:.0f} s before"
     return figure(name, f"{found['solve_s']:.1f} s", "", about)
 
 
 def finite_differences(rat: st.Model, cap: float) -> tuple[float, str]:
-    """CPU seconds of SLSQP without derivatives on the paper's program, at most `cap`, and how it ended."""
+    """CPU seconds of SLSQP without derivatives on the paper's program, at most `cap`, and how it
+    ended.
+    """
     program, limits, w, h = captured(rat)
     nlp, fixed = program.program["nlp"], limits.least == limits.most
     begun = time.process_time()
@@ -99,11 +138,19 @@ def finite_differences(rat: st.Model, cap: float) -> tuple[float, str]:
 
     from scipy.optimize import Bounds, minimize
 
-    constraint = {"type": "eq", "fun": lambda x: (np.array(both(x)[1]).ravel() - limits.least)[fixed]}
+    constraint = {
+        "type": "eq",
+        "fun": lambda x: (np.array(both(x)[1]).ravel() - limits.least)[fixed],
+    }
     box, most = Bounds(limits.lower, limits.upper), {"maxiter": 10000}
     try:
         found = minimize(
-            lambda x: float(both(x)[0]), w, method="SLSQP", bounds=box, constraints=constraint, options=most
+            lambda x: float(both(x)[0]),
+            w,
+            method="SLSQP",
+            bounds=box,
+            constraints=constraint,
+            options=most,
         )
         status = f"{found.nit} iterations, success {found.success}"
     except Cut:
@@ -112,7 +159,9 @@ def finite_differences(rat: st.Model, cap: float) -> tuple[float, str]:
 
 
 def captured(rat: st.Model) -> tuple:
-    """The paper's program, its limits, passive flight as the guess and the momentum, as ``plan`` has them."""
+    """The paper's program, its limits, passive flight as the guess and the momentum, as ``plan``
+    has them.
+    """
     seen, solve = [], rounds.solve
 
     def note(engine, limits, w, h, multipliers=None):
@@ -129,23 +178,30 @@ def captured(rat: st.Model) -> tuple:
 
 
 def replanned(rat: st.Model) -> list[dict]:
-    """Plan again from states up to 1 % away, the plan before being the guess: the whole call, truth included."""
+    """Plan again from states up to 1 % away, the plan before being the guess: the whole call, truth
+    included.
+    """
     q, v = righting.tumbling(rat, EXAMPLE)
     first, random, times = plan(rat, track=False), np.random.default_rng(0), []
     for _ in range(20):
         near = q, v * (1 + random.uniform(-0.01, 0.01, v.size))
         begun = time.process_time()
         again = plan(rat, start=near, guess=first, tolerance=None, track=False)
-        times.append((time.process_time() - begun, again.report["solve_cpu_s"], again.report["converged"]))
+        times.append(
+            (time.process_time() - begun, again.report["solve_cpu_s"], again.report["converged"])
+        )
     call, solver, good = np.array(times[1:]).T
     about = (
-        f"least {1e3 * call.min():.1f} ms; solver {1e3 * np.median(solver):.1f} ms; {int(good.sum())} of {len(good)}"
+        f"least {1e3 * call.min():.1f} ms; solver {1e3 * np.median(solver):.1f} ms; "
+        f"{int(good.sum())} of {len(good)}"
     )
     return [figure("(1, 3), planning again", f"{1e3 * np.median(call):.1f} ms", "<= 30 ms", about)]
 
 
 def true_plans(rat: st.Model, name: str, target: tuple, **settings) -> dict:
-    """Plans that are true within a time, of random tumbling starts, upright and, unless told otherwise, at rest."""
+    """Plans that are true within a time, of random tumbling starts, upright and, unless told
+    otherwise, at rest.
+    """
     starts, seconds, share = target
     times, errors = [], []
     for seed in range(1, starts + 1):
@@ -154,5 +210,13 @@ def true_plans(rat: st.Model, name: str, target: tuple, **settings) -> dict:
         times.append(time.process_time() - begun if found.success else np.inf)
         errors.append(found.report["open_loop_attitude_error_deg"] or np.inf)
     within, true = np.mean(np.array(times) <= seconds), np.mean(np.isfinite(times))
-    about = f"{100 * true:.1f} % true at all; median {np.median(times):.2f} s, {np.median(errors):.4f} deg"
-    return figure(f"{name}, {starts} starts, within {seconds:g} s", f"{100 * within:.1f} %", f">= {share} %", about)
+    about = (
+        f"{100 * true:.1f} % true at all; median {np.median(times):.2f} s, {np.median(errors):.4f} "
+        "deg"
+    )
+    return figure(
+        f"{name}, {starts} starts, within {seconds:g} s",
+        f"{100 * within:.1f} %",
+        f">= {share} %",
+        about,
+    )

@@ -1,4 +1,6 @@
-"""Precisions: tails go in; time of forward dynamics against its error in float and double comes out."""
+"""Precisions: tails go in; time of forward dynamics against its error in float and double comes
+out.
+"""
 
 from pathlib import Path
 
@@ -14,9 +16,11 @@ EXACT = 10  # states that are compared with 40 digits
 
 
 def precision_times(folder: Path) -> list[dict]:
-    """Nanoseconds a state of forward dynamics, and the largest error of v_dot over its largest entry, 40 digits.
+    """Nanoseconds a state of forward dynamics, and the largest error of v_dot over its largest
+    entry, 40 digits.
 
-    States are those that float holds, so the error is of the arithmetic, and in float of rounded parameters.
+    States are those that float holds, so the error is of the arithmetic, and in float of rounded
+    parameters.
     """
     rows = []
     for size in ((1, 3), (3, 4), (6, 6), (1, None), (3, None)):
@@ -24,7 +28,11 @@ def precision_times(folder: Path) -> list[dict]:
         for real in ("double", "float"):
             model = st.load(generated(folder / real, *size, "forward_dynamics", real))
             alone, together = c_times(model)
-            row |= {f"{real}, ns": alone, f"side by side, {real}, ns": together, f"error, {real}": error(model)}
+            row |= {
+                f"{real}, ns": alone,
+                f"side by side, {real}, ns": together,
+                f"error, {real}": error(model),
+            }
         rows.append(row)
     return rows
 
@@ -32,7 +40,11 @@ def precision_times(folder: Path) -> list[dict]:
 def error(model: st.Model) -> float:
     """Largest error of v_dot, over the largest entry of each state's."""
     own = model.parameters
-    exact = ExactChain(own, model.segments, model.links) if model.links else ExactContinuum(own, model.segments)
+    exact = (
+        ExactChain(own, model.segments, model.links)
+        if model.links
+        else ExactContinuum(own, model.segments)
+    )
     states = [x.astype(np.float32).astype(float) for x in random_states(model, EXACT)]
     found = model.forward_dynamics(*states).astype(float)
     true = np.array([exact.forward_dynamics(*each) for each in zip(*states, strict=True)])

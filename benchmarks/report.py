@@ -1,4 +1,6 @@
-"""Reports: tables of figures go in, Markdown and HTML come out, with what changed since the last run."""
+"""Reports: tables of figures go in, Markdown and HTML come out, with what changed since the last
+run.
+"""
 
 import html
 import inspect
@@ -23,7 +25,9 @@ def written(folder: Path, report: dict, measures: dict[str, Callable], pictures:
     sections.insert(0, ("targets", about, judged(report)))
     sections.append(("since the last run", *changes(report, last)))
     head = ", ".join(str(value) for value in report["machine"].values())
-    text = "\n".join(["# Benchmark", "", head, "", *(line for s in sections for line in markdown(*s))])
+    text = "\n".join(
+        ["# Benchmark", "", head, "", *(line for s in sections for line in markdown(*s))]
+    )
     (folder / "report.md").write_text(text)
     (folder / "report.html").write_text(page(head, sections, pictures))
     path.write_text(json.dumps(report, indent=1))
@@ -31,7 +35,9 @@ def written(folder: Path, report: dict, measures: dict[str, Callable], pictures:
 
 
 def changes(report: dict, last: dict | None) -> tuple[str, list[dict]]:
-    """Return what to say of the last run, and the times that differ from its by more than noise explains."""
+    """Return what to say of the last run, and the times that differ from its by more than noise
+    explains.
+    """
     if last is None:
         return "This is the first run.", []
     if last["machine"] != report["machine"]:
@@ -41,8 +47,14 @@ def changes(report: dict, last: dict | None) -> tuple[str, list[dict]]:
         pairs = zip(table, last.get(name, []), strict=False) if isinstance(table, list) else ()
         for row, before in pairs:
             rows += [r for key in row if (r := change(name, row, before, key))]
-    about = f"Times that differ from the last run's by more than {NOTABLE - 1:.0%}; both may have been disturbed."
-    return about if rows else f"No time differs from the last run's by more than {NOTABLE - 1:.0%}.", rows
+    about = (
+        f"Times that differ from the last run's by more than {NOTABLE - 1:.0%}; both may have been "
+        "disturbed."
+    )
+    return (
+        about if rows else f"No time differs from the last run's by more than {NOTABLE - 1:.0%}.",
+        rows,
+    )
 
 
 def change(name: str, row: dict, before: dict, key: str) -> dict | None:
@@ -51,7 +63,10 @@ def change(name: str, row: dict, before: dict, key: str) -> dict | None:
     time = "ns" in key.split("_") or key.endswith((" ns", "_s", "_ms", "_us"))
     if not time or next(iter(row.values())) != next(iter(before.values())):
         return None
-    if not all(isinstance(x, float) and x > 0 for x in (old, new)) or 1 / NOTABLE < new / old < NOTABLE:
+    if (
+        not all(isinstance(x, float) and x > 0 for x in (old, new))
+        or 1 / NOTABLE < new / old < NOTABLE
+    ):
         return None
     which = str(next(iter(row.values())))
     return {
@@ -89,17 +104,29 @@ def cell(value) -> str:
 
 def page(head: str, sections: list[tuple], pictures: list[Path]) -> str:
     """Return the report as one HTML page beside its pictures."""
-    style = "body{font:15px sans-serif;max-width:70em;margin:2em auto}td,th{padding:.2em .8em;text-align:right}"
-    style += "th{border-bottom:1px solid}td:first-child,th:first-child{text-align:left}img{max-width:100%}"
+    style = (
+        "body{font:15px sans-serif;max-width:70em;margin:2em auto}td,th{padding:.2em "
+        ".8em;text-align:right}"
+    )
+    style += (
+        "th{border-bottom:1px "
+        "solid}td:first-child,th:first-child{text-align:left}img{max-width:100%}"
+    )
     body = "".join(section(*s) for s in sections)
     body += "".join(f'<p><img src="{p.name}" alt="{p.stem}"></p>' for p in pictures)
     title = "<!doctype html><html lang=en><meta charset=utf-8><title>Benchmark</title>"
-    return f"{title}<style>{style}</style><h1>Benchmark</h1><p>{html.escape(head)}</p>{body}</html>\n"
+    return (
+        f"{title}<style>{style}</style><h1>Benchmark</h1><p>{html.escape(head)}</p>{body}</html>\n"
+    )
 
 
 def section(name: str, about: str, rows: list[dict]) -> str:
     """Return a section as HTML."""
-    lines = [cells("th", heads(rows)), *(cells("td", map(cell, row.values())) for row in rows)] if rows else []
+    lines = (
+        [cells("th", heads(rows)), *(cells("td", map(cell, row.values())) for row in rows)]
+        if rows
+        else []
+    )
     title = html.escape(name.replace("_", " "))
     return f"<h2>{title}</h2><p>{html.escape(about)}</p><table>{''.join(lines)}</table>"
 

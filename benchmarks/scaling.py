@@ -1,4 +1,6 @@
-"""Scaling: sizes go in; nanoseconds of forward dynamics, and its share of the core's peak, come out."""
+"""Scaling: sizes go in; nanoseconds of forward dynamics, and its share of the core's peak, come
+out.
+"""
 
 import ctypes
 from pathlib import Path
@@ -20,20 +22,35 @@ ROUNDS, CALLS = 100, 64
 
 
 def scaling(folder: Path) -> list[dict]:
-    """Nanoseconds of forward dynamics against the size of the tail, and its share of the peak of multiply-adds.
+    """Nanoseconds of forward dynamics against the size of the tail, and its share of the peak of
+    multiply-adds.
 
-    Operations are additions, multiplications and divisions; lanes of rows are counted, so a sweep in lanes does more of
-    them, and faster.  The peak is measured in this run, of scalars (of vectors in brackets).
+    Operations are additions, multiplications and divisions; lanes of rows are counted, so a sweep
+    in lanes does more of them, and faster.  The peak is measured in this run, of scalars (of
+    vectors in brackets).
     """
     scalar, vector = peak(folder)
     rows = []
     for sweep, sizes in SWEEPS.items():
         for size in sizes:
-            ours = fixture(generated(folder / "scaling", *size, functions="forward_dynamics"), folder / "scaling")
-            least, _ = peers.time_rounds([ours.closure], peers.random_states(size[0]), ROUNDS, CALLS)[0]
+            ours = fixture(
+                generated(folder / "scaling", *size, functions="forward_dynamics"),
+                folder / "scaling",
+            )
+            least, _ = peers.time_rounds(
+                [ours.closure], peers.random_states(size[0]), ROUNDS, CALLS
+            )[0]
             entry = ours.model.manifest["functions"]["forward_dynamics"]
-            share = f"{entry['operations'] / least / scalar:.0%} ({entry['operations'] / least / vector:.0%})"
-            row = {"sweep": sweep, "model": label(*size), "ns": least, "operations": entry["operations"]}
+            share = (
+                f"{entry['operations'] / least / scalar:.0%} "
+                f"({entry['operations'] / least / vector:.0%})"
+            )
+            row = {
+                "sweep": sweep,
+                "model": label(*size),
+                "ns": least,
+                "operations": entry["operations"],
+            }
             rows.append(row | {"emission": entry["emission"], "of the peak": share})
     return rows
 
@@ -56,7 +73,11 @@ def draw(rows: list[dict], path: Path) -> None:
         times = [row["ns"] for row in rows if row["sweep"] == sweep]
         counts = [n if sweep.startswith("links") else m for m, n in sizes]
         axes.loglog(counts, times, marker=marker, label=sweep)
-    axes.set(xlabel="number of links or segments", ylabel="forward dynamics, ns", title="Run time against size")
+    axes.set(
+        xlabel="number of links or segments",
+        ylabel="forward dynamics, ns",
+        title="Run time against size",
+    )
     axes.grid(True, which="both", alpha=0.3)
     axes.legend(loc="upper left")
     figure.savefig(path, dpi=150)

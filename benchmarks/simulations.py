@@ -1,4 +1,6 @@
-"""Simulations: scenes in flight and on the ground go in; run time against error of every method comes out."""
+"""Simulations: scenes in flight and on the ground go in; run time against error of every method
+comes out.
+"""
 
 import subprocess
 import sys
@@ -32,7 +34,9 @@ def generated(folder: Path, name: str, contacts: str) -> st.Model:
     path = folder / "scenes" / f"{name}.toml"
     path.parent.mkdir(parents=True, exist_ok=True)
     touching = f'contacts = [{contacts}]\nfriction = "cone"\n' if contacts else ""
-    functions = '"energy", "momentum", "rollout", "implicit", "pfl", "tail_points", "forward_dynamics"'
+    functions = (
+        '"energy", "momentum", "rollout", "implicit", "pfl", "tail_points", "forward_dynamics"'
+    )
     functions += ', "contact_points", "contact_dynamics"' if contacts else ""
     text = f'kind = "articulated"\nsegments = 3\nlinks = 4\n{touching}functions = [{functions}]\n'
     path.write_text(text, encoding="utf-8")
@@ -52,7 +56,9 @@ def thrown(model: st.Model) -> tuple[np.ndarray, np.ndarray]:
 def flight(folder: Path) -> tuple[Callable, float]:
     """0.6 s of damped flight."""
     model = generated(folder, "flight_3_4", "")
-    return lambda **how: st.simulate(model, *thrown(model), controller=st.Damping(DAMPING), t_span=0.6, **how), 0.6
+    return lambda **how: st.simulate(
+        model, *thrown(model), controller=st.Damping(DAMPING), t_span=0.6, **how
+    ), 0.6
 
 
 def tracking(folder: Path) -> tuple[Callable, float]:
@@ -106,7 +112,14 @@ def scene_rows(name: str, folder: Path) -> list[dict]:
     for method, settings in SETTINGS.items():
         for options in settings:
             row = {"scene": name, "method": method, "setting": setting(options)}
-            rows.append(row | timed(lambda how=options | {"method": method}: run(output_step=span, **how), exact, span))
+            rows.append(
+                row
+                | timed(
+                    lambda how=options | {"method": method}: run(output_step=span, **how),
+                    exact,
+                    span,
+                )
+            )
     return rows
 
 
@@ -123,24 +136,29 @@ def timed(run: Callable, exact: st.Trajectory, span: float) -> dict:
 
 @cache
 def simulation_times(folder: Path) -> list[dict]:
-    """Processor time against error (largest of q at the end) of all methods in four scenes of a (3, 4) tail.
+    """Processor time against error (largest of q at the end) of all methods in four scenes of a (3,
+    4) tail.
 
-    Flight and tracking 0.6 s, sliding and impact 0.5 s; lsoda and dop853 are SciPy's on the compiled model.  nan: the
-    method failed, as one whose steps are too long does.
+    Flight and tracking 0.6 s, sliding and impact 0.5 s; lsoda and dop853 are SciPy's on the
+    compiled model.  nan: the method failed, as one whose steps are too long does.
     """
     return [row for name in SCENES for row in scene_rows(name, folder)]
 
 
 def least(rows: list[dict], methods: tuple[str, ...], error: float) -> dict:
     """The fastest run of some methods whose error is not above this."""
-    return min((row for row in rows if row["method"] in methods and row["error"] <= error), key=lambda row: row["ms"])
+    return min(
+        (row for row in rows if row["method"] in methods and row["error"] <= error),
+        key=lambda row: row["ms"],
+    )
 
 
 def simulation_summary(folder: Path) -> list[dict]:
-    """The fastest run of a generated method in each scene whose error is at most 1e-4, beside SciPy's LSODA's.
+    """The fastest run of a generated method in each scene whose error is at most 1e-4, beside
+    SciPy's LSODA's.
 
-    At the same bound of the error, and at the error that ours has: where stability, not accuracy, bounds our steps,
-    that is far below.
+    At the same bound of the error, and at the error that ours has: where stability, not accuracy,
+    bounds our steps, that is far below.
     """
     found = []
     for name in SCENES:
@@ -148,7 +166,10 @@ def simulation_summary(folder: Path) -> list[dict]:
         own, lsoda = least(rows, GENERATED, ERROR), least(rows, ("lsoda",), ERROR)
         equal = least(rows, ("lsoda",), own["error"])
         found.append(own | {"lsoda_ms": lsoda["ms"], "lsoda_error": lsoda["error"]})
-        found[-1] |= {"lsoda_ratio": lsoda["ms"] / own["ms"], "lsoda_ratio_at_our_error": equal["ms"] / own["ms"]}
+        found[-1] |= {
+            "lsoda_ratio": lsoda["ms"] / own["ms"],
+            "lsoda_ratio_at_our_error": equal["ms"] / own["ms"],
+        }
     return found
 
 
@@ -159,8 +180,16 @@ def draw(rows: list[dict], path: Path) -> None:
     figure = Figure(figsize=(9, 6.5), layout="constrained")
     for axes, name in zip(figure.subplots(2, 2).ravel(), SCENES, strict=True):
         for method, mark in zip(SETTINGS, "osd^xv", strict=True):
-            own = sorted((row["error"], row["ms"]) for row in rows if (row["scene"], row["method"]) == (name, method))
-            axes.loglog(*np.array(own).T, marker=mark, label=f"SciPy's {method}" if method in SCIPY else method)
+            own = sorted(
+                (row["error"], row["ms"])
+                for row in rows
+                if (row["scene"], row["method"]) == (name, method)
+            )
+            axes.loglog(
+                *np.array(own).T,
+                marker=mark,
+                label=f"SciPy's {method}" if method in SCIPY else method,
+            )
         axes.set(title=name, xlabel="error of q at the end [m, rad]", ylabel="processor time [ms]")
         axes.axvline(ERROR, color="0.7", linewidth=0.8)
         axes.grid(color="0.92")
@@ -170,7 +199,9 @@ def draw(rows: list[dict], path: Path) -> None:
 
 
 def mujoco_times(folder: Path) -> list[dict]:
-    """0.5 s of sliding on feet and tail by MuJoCo, whose contacts and ties are soft constraints: another physics."""
+    """0.5 s of sliding on feet and tail by MuJoCo, whose contacts and ties are soft constraints:
+    another physics.
+    """
     model = generated(folder, "ground_3_4", '"feet", "tail"').with_parameters(mu=0.3)
     start = standing(model)
     start["v0"][:2] = 0.8, 0.6
@@ -182,5 +213,6 @@ def mujoco_times(folder: Path) -> list[dict]:
     steps = (1e-3, 5e-4, 2e-4)
     times = [mujoco_scene.milliseconds(text, start["q0"], start["v0"], 0.5, step) for step in steps]
     return [
-        {"mujoco_step_s": step, "ms": ms, "real_time_factor": 500 / ms} for step, ms in zip(steps, times, strict=True)
+        {"mujoco_step_s": step, "ms": ms, "real_time_factor": 500 / ms}
+        for step, ms in zip(steps, times, strict=True)
     ]

@@ -4,7 +4,9 @@ from typing import NamedTuple
 
 
 class Target(NamedTuple):
-    """A column of a measure is to be at least so many times another, in the rows of these models; all if none."""
+    """A column of a measure is to be at least so many times another, in the rows of these models;
+    all if none.
+    """
 
     what: str
     measure: str
@@ -32,7 +34,9 @@ TARGETS = (
 
 
 def judged(report: dict) -> list[dict]:
-    """Return for each target and model how many times slower is asked, and was found; of what was left out, nothing."""
+    """Return for each target and model how many times slower is asked, and was found; of what was
+    left out, nothing.
+    """
     return [
         judgement(target, row["model"], row[target.slow] / row[target.fast])
         for target in TARGETS
@@ -44,4 +48,10 @@ def judged(report: dict) -> list[dict]:
 def judgement(target: Target, model: str, ratio: float) -> dict:
     """Return one row."""
     verdict = "met" if ratio >= target.least else "MISSED"
-    return {"slower": target.what, "model": model, "times, at least": target.least, "found": ratio, "verdict": verdict}
+    return {
+        "slower": target.what,
+        "model": model,
+        "times, at least": target.least,
+        "found": ratio,
+        "verdict": verdict,
+    }

@@ -1,13 +1,32 @@
-"""Machines that run the check: a name goes in, how to build for it and how to run what was built come out."""
+"""Machines that run the check: a name goes in, how to build for it and how to run what was built
+come out.
+"""
 
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
 HERE = Path(__file__).parent
-SEMIHOSTING = ("-display", "none", "-monitor", "none", "-serial", "none", "-chardev", "stdio,id=out")
+SEMIHOSTING = (
+    "-display",
+    "none",
+    "-monitor",
+    "none",
+    "-serial",
+    "none",
+    "-chardev",
+    "stdio,id=out",
+)
 SEMIHOSTING += ("-semihosting-config", "enable=on,target=native,chardev=out")
-WARNINGS = ("-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Wdouble-promotion", "-Wshadow", "-Werror")
+WARNINGS = (
+    "-pedantic",
+    "-Wall",
+    "-Wextra",
+    "-Wconversion",
+    "-Wdouble-promotion",
+    "-Wshadow",
+    "-Werror",
+)
 # As the runtime's profiles; fast lets the compiler fuse a * b + c.
 PROFILES = {
     "fast": ("-O2", "-ffp-contract=fast", "-fno-math-errno", "-fno-trapping-math"),
@@ -21,7 +40,9 @@ class ToolchainMissing(RuntimeError):
 
 @dataclass(frozen=True)
 class Board:
-    """One machine: its compiler and flags, its sources here, how to link and run, and what to install."""
+    """One machine: its compiler and flags, its sources here, how to link and run, and what to
+    install.
+    """
 
     name: str
     title: str
@@ -35,7 +56,11 @@ class Board:
 
     def need(self) -> None:
         """Raise ToolchainMissing unless compiler and emulator are on PATH."""
-        absent = [program for program in (self.compiler, *self.emulator[:1]) if shutil.which(program) is None]
+        absent = [
+            program
+            for program in (self.compiler, *self.emulator[:1])
+            if shutil.which(program) is None
+        ]
         if absent:
             raise ToolchainMissing(
                 f"{self.name}: {' and '.join(absent)} not on PATH; Debian, Ubuntu: "
@@ -44,7 +69,9 @@ class Board:
 
 
 def cortex(name: str, title: str, real: str, machine: str, fpu: str) -> Board:
-    """Return a Cortex-M of QEMU's mps2 boards; each instruction takes 1 ns there, so that SysTick counts them."""
+    """Return a Cortex-M of QEMU's mps2 boards; each instruction takes 1 ns there, so that SysTick
+    counts them.
+    """
     cpu = ("-mthumb", f"-mcpu=cortex-{name}", f"-mfpu={fpu}", "-mfloat-abi=hard")
     emulator = ("qemu-system-arm", "-M", machine, *SEMIHOSTING, "-icount", "shift=0", "-kernel")
     packages = ("gcc-arm-none-eabi", "libnewlib-arm-none-eabi", "qemu-system-arm")
@@ -55,10 +82,30 @@ def cortex(name: str, title: str, real: str, machine: str, fpu: str) -> Board:
 def riscv() -> Board:
     """Return the 32-bit RISC-V of QEMU's virt board."""
     cpu = ("--specs=picolibc.specs", "-march=rv32imafdc", "-mabi=ilp32d", "-mcmodel=medany")
-    emulator = ("qemu-system-riscv32", "-M", "virt", "-bios", "none", *SEMIHOSTING, "-icount", "shift=0", "-kernel")
+    emulator = (
+        "qemu-system-riscv32",
+        "-M",
+        "virt",
+        "-bios",
+        "none",
+        *SEMIHOSTING,
+        "-icount",
+        "shift=0",
+        "-kernel",
+    )
     packages = ("gcc-riscv64-unknown-elf", "picolibc-riscv64-unknown-elf", "qemu-system-misc")
     link = ("-nostartfiles", "-T", "riscv.ld")
-    return Board("rv32", "RV32GC", "double", "riscv64-unknown-elf-gcc", cpu, "riscv.c", link, emulator, packages)
+    return Board(
+        "rv32",
+        "RV32GC",
+        "double",
+        "riscv64-unknown-elf-gcc",
+        cpu,
+        "riscv.c",
+        link,
+        emulator,
+        packages,
+    )
 
 
 BOARDS = {

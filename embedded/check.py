@@ -1,4 +1,6 @@
-"""A generated folder and a board go in; the board's results beside the host's come out as a table, and a verdict."""
+"""A generated folder and a board go in; the board's results beside the host's come out as a table,
+and a verdict.
+"""
 
 import argparse
 import sys
@@ -12,16 +14,21 @@ from embedded.image import Image, build, manifest_of
 from embedded.results import Result, blocks, run
 from embedded.stack import deepest
 
-BOUND = 1e4  # units of the last place of an output's largest entry: what the fast profile may differ by
+BOUND = (
+    1e4  # units of the last place of an output's largest entry: what the fast profile may differ by
+)
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """One function on a board: whether its bits are the host's, by how much it differs, what a call costs."""
+    """One function on a board: whether its bits are the host's, by how much it differs, what a call
+    costs.
+    """
 
     name: str
     same_bits: bool
-    units: float  # largest difference from the host, in units of the last place of the output's largest entry
+    # largest difference from the host, in units of the last place of the output's largest entry
+    units: float
     instructions: int
     stack: int  # bytes, the sum of frames along the deepest chain of calls
     painted: int  # bytes, as found on the board
@@ -32,18 +39,30 @@ class Comparison:
 
 
 def compare(folder: Path, board: str, output: Path, profile: str | None = None) -> list[Comparison]:
-    """Build and run the check on a board and on the host; raises ToolchainMissing or RuntimeError."""
+    """Build and run the check on a board and on the host; raises ToolchainMissing or
+    RuntimeError.
+    """
     images = [build(folder, BOARDS[name], output / name, profile) for name in (board, "host")]
     results = [run(image) for image in images]
     depths = deepest(sorted(images[0].path.parent.glob("*.ci")))
-    return [_compared(images[0], name, results[0][name], results[1][name], depths) for name in results[0]]
+    return [
+        _compared(images[0], name, results[0][name], results[1][name], depths)
+        for name in results[0]
+    ]
 
 
-def _compared(image: Image, name: str, found: Result, host: Result, depths: dict[str, int]) -> Comparison:
+def _compared(
+    image: Image, name: str, found: Result, host: Result, depths: dict[str, int]
+) -> Comparison:
     if found.statuses != host.statuses:
-        raise RuntimeError(f"{name}: status {found.statuses} on {image.board.name}, {host.statuses} on the host")
+        raise RuntimeError(
+            f"{name}: status {found.statuses} on {image.board.name}, {host.statuses} on the host"
+        )
     epsilon = np.finfo(np.float32 if image.manifest["real"] == "float" else np.float64).eps
-    units = [_difference(found.values[:, part], host.values[:, part]) for part in blocks(image, name).values()]
+    units = [
+        _difference(found.values[:, part], host.values[:, part])
+        for part in blocks(image, name).values()
+    ]
     return Comparison(
         name,
         np.array_equal(found.bits, host.bits),
@@ -55,7 +74,9 @@ def _compared(image: Image, name: str, found: Result, host: Result, depths: dict
 
 
 def _difference(some: np.ndarray, others: np.ndarray) -> float:
-    """Return the largest difference relative to the largest entry of each state; infinite where one is no number."""
+    """Return the largest difference relative to the largest entry of each state; infinite where one
+    is no number.
+    """
     scale = np.abs(others).max(axis=1)
     difference = np.abs(some - others).max(axis=1)
     relative = difference / np.where(scale > 0, scale, 1)
@@ -79,7 +100,9 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("folder", type=Path, help="generated folder")
     p.add_argument("--board", choices=[name for name in BOARDS if name != "host"], default="m4")
     p.add_argument("--profile", choices=PROFILES, help="how to compile; default: the scene's")
-    p.add_argument("--output", type=Path, default=Path("output/embedded"), help="parent of what is built")
+    p.add_argument(
+        "--output", type=Path, default=Path("output/embedded"), help="parent of what is built"
+    )
     return p
 
 
@@ -97,7 +120,11 @@ def main() -> int:
     print(f"{arguments.folder} on {board.title} in QEMU, {profile} profile; against the host:")
     print("\n".join(table(rows)))
     bad = [row.name for row in rows if not row.holds(profile)]
-    promise = "the host's bits" if profile == "reproducible" else f"within {BOUND:g} units of the last place"
+    promise = (
+        "the host's bits"
+        if profile == "reproducible"
+        else f"within {BOUND:g} units of the last place"
+    )
     print(f"{'FAILED: ' + ', '.join(bad) + ' not ' if bad else ''}{promise}")
     return 1 if bad else 0
 

@@ -76,18 +76,45 @@ class Image:
 
 
 def build(folder: Path, board: Board, output: Path, profile: str | None = None) -> Image:
-    """Write cases.h and build the check for a board; raises ToolchainMissing, or RuntimeError with what gcc said."""
+    """Write cases.h and build the check for a board; raises ToolchainMissing, or RuntimeError with
+    what gcc said.
+    """
     board.need()
     manifest = manifest_of(folder)
     profile = profile or manifest["scene"]["profile"]
     states = stored_states(manifest)
     output.mkdir(parents=True, exist_ok=True)
     (output / "cases.h").write_text(cases(manifest, states))
-    flags = (*board.cpu, *PROFILES[profile], "-ffunction-sections", "-fdata-sections", "-fcallgraph-info=su")
-    model = compiled(board, folder / "src" / f"{manifest['prefix']}.c", output, ("-std=c99", *WARNINGS, *flags), folder)
-    harness = [compiled(board, HERE / name, output, (*C_LINES, *flags), folder) for name in ("check.c", board.port)]
+    flags = (
+        *board.cpu,
+        *PROFILES[profile],
+        "-ffunction-sections",
+        "-fdata-sections",
+        "-fcallgraph-info=su",
+    )
+    model = compiled(
+        board,
+        folder / "src" / f"{manifest['prefix']}.c",
+        output,
+        ("-std=c99", *WARNINGS, *flags),
+        folder,
+    )
+    harness = [
+        compiled(board, HERE / name, output, (*C_LINES, *flags), folder)
+        for name in ("check.c", board.port)
+    ]
     image = output / "image.elf"
-    command([board.compiler, *board.cpu, *board.link, *map(str, (model, *harness)), "-lm", "-o", str(image)])
+    command(
+        [
+            board.compiler,
+            *board.cpu,
+            *board.link,
+            *map(str, (model, *harness)),
+            "-lm",
+            "-o",
+            str(image),
+        ]
+    )
     return Image(board, image, manifest, states)
 
 
@@ -96,7 +123,9 @@ def manifest_of(folder: Path) -> dict:
     return json.loads((folder / "manifest.json").read_text())
 
 
-def compiled(board: Board, source: Path, output: Path, flags: tuple[str, ...], folder: Path) -> Path:
+def compiled(
+    board: Board, source: Path, output: Path, flags: tuple[str, ...], folder: Path
+) -> Path:
     """Compile one source; return its object file."""
     target = output / f"{source.stem}.o"
     include = ("-I", str(folder / "include"), "-I", str(output))
@@ -105,11 +134,14 @@ def compiled(board: Board, source: Path, output: Path, flags: tuple[str, ...], f
 
 
 def command(words: list[str]) -> str:
-    """Run a command beside the linker scripts; return what it printed, raise RuntimeError where it fails."""
+    """Run a command beside the linker scripts; return what it printed, raise RuntimeError where it
+    fails.
+    """
     done = subprocess.run(words, cwd=HERE, capture_output=True, text=True, check=False)
     if done.returncode:
         raise RuntimeError(
-            f"{' '.join(words)} failed with {done.returncode}:\n{(done.stdout + done.stderr)[:LONGEST_REPORT]}"
+            f"{' '.join(words)} failed with "
+            f"{done.returncode}:\n{(done.stdout + done.stderr)[:LONGEST_REPORT]}"
         )
     return done.stdout
 
@@ -130,9 +162,14 @@ def cases(manifest: dict, states: dict[str, np.ndarray]) -> str:
         cases=2 + len(lengths),
     )
     for name, entry in manifest["functions"].items():
-        text += CALL.format(name=name, prefix=manifest["prefix"], arguments=", ".join(arguments(entry, first)))
+        text += CALL.format(
+            name=name, prefix=manifest["prefix"], arguments=", ".join(arguments(entry, first))
+        )
     text += "\nstatic const struct a_case cases[CASES] = {\n"
-    text += "".join(f'  {{"{name}", call_{name}, {n}}},\n' for name, n in {"nothing": 0, "room": 0, **lengths}.items())
+    text += "".join(
+        f'  {{"{name}", call_{name}, {n}}},\n'
+        for name, n in {"nothing": 0, "room": 0, **lengths}.items()
+    )
     text += "};\n\nstatic const real states[STATES][INPUTS] = {\n"
     suffix = "f" if manifest["real"] == "float" else ""
     for row in np.hstack(list(states.values())):

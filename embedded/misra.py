@@ -1,4 +1,6 @@
-"""cppcheck: a generated folder goes in; its faults come out, and how often each rule of MISRA C:2012 is hit."""
+"""cppcheck: a generated folder goes in; its faults come out, and how often each rule of MISRA
+C:2012 is hit.
+"""
 
 import re
 import shutil
@@ -15,7 +17,8 @@ def need() -> None:
     """Raise ToolchainMissing unless cppcheck is installed."""
     if shutil.which("cppcheck") is None:
         raise ToolchainMissing(
-            "cppcheck is not on PATH; Debian, Ubuntu: apt-get install --no-install-recommends cppcheck"
+            "cppcheck is not on PATH; Debian, Ubuntu: apt-get install --no-install-recommends "
+            "cppcheck"
         )
 
 
@@ -33,5 +36,11 @@ def faults(folder: Path) -> str:
     """Return what cppcheck's own checks find in a model's source: nothing, where it is clean."""
     need()
     source = folder / "src" / f"{folder.name}.c"
-    words = [*CPPCHECK, "--enable=warning,performance,portability", "-I", str(folder / "include"), str(source)]
+    words = [
+        *CPPCHECK,
+        "--enable=warning,performance,portability",
+        "-I",
+        str(folder / "include"),
+        str(source),
+    ]
     return subprocess.run(words, capture_output=True, text=True, check=True).stderr

@@ -13,7 +13,9 @@ PATIENCE = 120  # s
 
 @dataclass(frozen=True)
 class Result:
-    """One function on all states: status and outputs as bits (states, length), instructions and stack of each call."""
+    """One function on all states: status and outputs as bits (states, length), instructions and
+    stack of each call.
+    """
 
     statuses: tuple[int, ...]
     bits: np.ndarray
@@ -30,17 +32,23 @@ def run(image: Image) -> dict[str, Result]:
     except subprocess.TimeoutExpired as error:
         raise RuntimeError(f"{' '.join(words)} did not end within {PATIENCE} s") from error
     if done.returncode:
-        raise RuntimeError(f"{' '.join(words)} ended with {done.returncode}:\n{done.stdout[-2000:]}{done.stderr}")
+        raise RuntimeError(
+            f"{' '.join(words)} ended with {done.returncode}:\n{done.stdout[-2000:]}{done.stderr}"
+        )
     return parsed(done.stdout, image.manifest["real"])
 
 
 def parsed(text: str, real: str) -> dict[str, Result]:
-    """Return results by function; instructions above those of a call of nothing, stack above that of a known room."""
+    """Return results by function; instructions above those of a call of nothing, stack above that
+    of a known room.
+    """
     rows: dict[str, list] = {}
     for line in text.splitlines():
         head, cost = line.split(" | ")
         name, _, status, *bits = head.split()
-        rows.setdefault(name, []).append((int(status), [int(word, 16) for word in bits], *map(int, cost.split())))
+        rows.setdefault(name, []).append(
+            (int(status), [int(word, 16) for word in bits], *map(int, cost.split()))
+        )
     idle, room = rows.pop("nothing")[0][2], rows.pop("room")[0][3]
     return {name: _result(lines, real, idle, room) for name, lines in rows.items()}
 
@@ -50,7 +58,9 @@ def _result(lines: list, real: str, idle: int, room: int) -> Result:
     statuses, bits, instructions, depths = zip(*lines, strict=True)
     bits = np.array(bits, whole)
     costs = tuple(n - idle for n in instructions)
-    return Result(statuses, bits, bits.view(kind).astype(float), costs, tuple(n - room for n in depths))
+    return Result(
+        statuses, bits, bits.view(kind).astype(float), costs, tuple(n - room for n in depths)
+    )
 
 
 def blocks(image: Image, name: str) -> dict[str, slice]:

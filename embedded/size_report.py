@@ -1,4 +1,6 @@
-"""Tails, forms of code and boards go in; flash, RAM, stack, instructions and float's error come out as tables."""
+"""Tails, forms of code and boards go in; flash, RAM, stack, instructions and float's error come out
+as tables.
+"""
 
 import re
 import sys
@@ -24,7 +26,15 @@ STRAIGHT_DERIVATIVES = ((1, 3), (1, None))
 IMPLICIT = ("implicit_factor", "implicit_solve")  # hand on what has no meaning of its own
 CONTACTS = ["feet", "tail"]
 REAL = {"m4": "float", "m7": "double"}
-HEAD = ("tail", "form", "function", "flash, bytes", "workspace, bytes", "stack, bytes", "instructions")
+HEAD = (
+    "tail",
+    "form",
+    "function",
+    "flash, bytes",
+    "workspace, bytes",
+    "stack, bytes",
+    "instructions",
+)
 
 
 @dataclass(frozen=True)
@@ -41,7 +51,15 @@ class Cost:
 
     def cells(self) -> tuple:
         """Return the row of its table."""
-        return (self.tail, self.form, f"`{self.function}`", self.flash, self.work, self.stack, self.instructions)
+        return (
+            self.tail,
+            self.form,
+            f"`{self.function}`",
+            self.flash,
+            self.work,
+            self.stack,
+            self.instructions,
+        )
 
 
 def label(segments: int, links: int | None) -> str:
@@ -51,8 +69,13 @@ def label(segments: int, links: int | None) -> str:
 
 def made(parent: Path, tail: tuple, form: str, real: str) -> Path:
     """Generate one model; return its folder."""
-    wanted = [*FUNCTIONS, *([DERIVATIVES] if form == "loops" or tail in STRAIGHT_DERIVATIVES else [])]
-    wanted += ["implicit"] if form == "loops" else []  # written out, every point is computed, in the ground or not
+    wanted = [
+        *FUNCTIONS,
+        *([DERIVATIVES] if form == "loops" or tail in STRAIGHT_DERIVATIVES else []),
+    ]
+    wanted += (
+        ["implicit"] if form == "loops" else []
+    )  # written out, every point is computed, in the ground or not
     options = {"functions": wanted, "contacts": CONTACTS, "emission": form, "real": real}
     scene = scene_for("articulated" if tail[1] else "continuum", *tail, **options)
     generate(scene, parent / form / real)
@@ -84,33 +107,60 @@ def flash(image: Image, name: str) -> int:
     """Return bytes of code and constants of one function with all that it calls, libc apart."""
     prefix, board = image.manifest["prefix"], image.board
     alone = image.path.with_name(f"{name}.elf")
-    options = ["-nostdlib", "-Wl,--gc-sections", f"-Wl,-e,{prefix}_{name}", "-Wl,--unresolved-symbols=ignore-all"]
-    command([board.compiler, *board.cpu, *options, str(image.path.with_name(f"{prefix}.o")), "-o", str(alone)])
-    return int(command([board.compiler.replace("gcc", "size"), str(alone)]).splitlines()[1].split()[0])
+    options = [
+        "-nostdlib",
+        "-Wl,--gc-sections",
+        f"-Wl,-e,{prefix}_{name}",
+        "-Wl,--unresolved-symbols=ignore-all",
+    ]
+    command(
+        [
+            board.compiler,
+            *board.cpu,
+            *options,
+            str(image.path.with_name(f"{prefix}.o")),
+            "-o",
+            str(alone),
+        ]
+    )
+    return int(
+        command([board.compiler.replace("gcc", "size"), str(alone)]).splitlines()[1].split()[0]
+    )
 
 
 def float_errors(image: Image, parent: Path) -> list[tuple]:
-    """Return (quantity, largest relative error of float on the board) against double on the host, same states."""
+    """Return (quantity, largest relative error of float on the board) against double on the host,
+    same states.
+    """
     prefix = image.manifest["prefix"]
     folder = parent / "loops" / "double" / prefix
     found, exact = run(image), run(build(folder, BOARDS["host"], folder / "build" / "host"))
     rows = []
     for name, result in found.items():
         for output, part in blocks(image, name).items() if name not in IMPLICIT else ():
-            rows += _block_errors(name, output, result.values[:, part], exact[name].values[:, part], image)
+            rows += _block_errors(
+                name, output, result.values[:, part], exact[name].values[:, part], image
+            )
     return rows
 
 
-def _block_errors(function: str, name: str, some: np.ndarray, exact: np.ndarray, image: Image) -> list[tuple]:
+def _block_errors(
+    function: str, name: str, some: np.ndarray, exact: np.ndarray, image: Image
+) -> list[tuple]:
     nv = image.manifest["dimensions"]["nv"]
     if name == "H":
         scale = np.sqrt(np.einsum("sii->si", exact.reshape(-1, nv, nv)))
-        error = (np.abs(some - exact).reshape(-1, nv, nv) / scale[:, :, None] / scale[:, None, :]).max()
+        error = (
+            np.abs(some - exact).reshape(-1, nv, nv) / scale[:, :, None] / scale[:, None, :]
+        ).max()
         return [("H, by sqrt(H_ii H_jj)", error)]
     if name == "v_dot":
         parts = {"p_ddot": slice(0, 3), "omega_dot": slice(3, 6), "q_t_ddot": slice(6, nv)}
         where = " in contact" if function == "contact_dynamics" else ""
-        return [(quantity + where, relative(some[:, part], exact[:, part])) for quantity, part in parts.items()]
+        return [
+            (quantity + where, relative(some[:, part], exact[:, part]))
+            for quantity, part in parts.items()
+        ]
     return [(name, relative(some, exact))]
 
 
@@ -125,19 +175,28 @@ def soft_double(parent: Path) -> str:
     folder = parent / "loops" / "double" / "articulated_m1_n3"
     found = run(build(folder, BOARDS["m4"], folder / "build" / "m4"))["forward_dynamics"]
     return (
-        f"In `double` a Cortex-M4F computes by software: {max(found.instructions):,} instructions for forward dynamics "
+        f"In `double` a Cortex-M4F computes by software: {max(found.instructions):,} instructions "
+        "for forward dynamics "
         "of (1, 3) in loops. Take `REAL=float` there."
     )
 
 
 def markdown(head: tuple, rows: list[tuple]) -> list[str]:
     """Return a table."""
-    return ["| " + " | ".join(map(cell, line)) + " |" for line in (head, ["---"] * len(head), *rows)]
+    return [
+        "| " + " | ".join(map(cell, line)) + " |" for line in (head, ["---"] * len(head), *rows)
+    ]
 
 
 def cell(value) -> str:
     """Return a cell: whole numbers with separators, others to two digits."""
-    return f"{value:,}" if isinstance(value, int) else f"{value:.1e}" if isinstance(value, float) else str(value)
+    return (
+        f"{value:,}"
+        if isinstance(value, int)
+        else f"{value:.1e}"
+        if isinstance(value, float)
+        else str(value)
+    )
 
 
 def report(parent: Path) -> str:
@@ -155,10 +214,23 @@ def report(parent: Path) -> str:
     by_tail = {tail: dict(float_errors(image, parent)) for tail, image in errors.items()}
     quantities = list(next(iter(by_tail.values())))
     rows = [(q, *(by_tail[tail][q] for tail in by_tail)) for q in quantities]
-    lines += ["### Error of `float`", "", *markdown(("quantity", *by_tail), rows), "", soft_double(parent), ""]
+    lines += [
+        "### Error of `float`",
+        "",
+        *markdown(("quantity", *by_tail), rows),
+        "",
+        soft_double(parent),
+        "",
+    ]
     folder = parent / "loops" / "float" / "articulated_m1_n3"
     return "\n".join(
-        [*lines, "### MISRA C:2012, for information", "", *markdown(("rule", "hits"), summary(folder)), ""]
+        [
+            *lines,
+            "### MISRA C:2012, for information",
+            "",
+            *markdown(("rule", "hits"), summary(folder)),
+            "",
+        ]
     )
 
 
@@ -172,7 +244,9 @@ def main() -> int:
         return 2
     document = DOCUMENT.read_text(encoding="utf-8")
     marks = r"(<!-- size-report -->\n).*?(<!-- /size-report -->)"
-    DOCUMENT.write_text(re.sub(marks, lambda m: f"{m[1]}{text}{m[2]}", document, flags=re.DOTALL), encoding="utf-8")
+    DOCUMENT.write_text(
+        re.sub(marks, lambda m: f"{m[1]}{text}{m[2]}", document, flags=re.DOTALL), encoding="utf-8"
+    )
     print(text)
     return 0
 

@@ -1,4 +1,6 @@
-"""Stack of a call: gcc's call graphs (-fcallgraph-info=su) go in, the deepest chain of each function comes out."""
+"""Stack of a call: gcc's call graphs (-fcallgraph-info=su) go in, the deepest chain of each
+function comes out.
+"""
 
 import re
 from collections import defaultdict
@@ -10,11 +12,15 @@ SIZE = re.compile(r"(\d+) bytes \((\w+)")
 
 
 class StackUnknown(RuntimeError):
-    """A chain of calls whose depth is not known when it is compiled: recursion, or a frame of variable size."""
+    """A chain of calls whose depth is not known when it is compiled: recursion, or a frame of
+    variable size.
+    """
 
 
 def deepest(graphs: list[Path]) -> dict[str, int]:
-    """Return bytes of stack by function, with all that it calls; functions of libc and libgcc count nothing."""
+    """Return bytes of stack by function, with all that it calls; functions of libc and libgcc count
+    nothing.
+    """
     frames, calls = {}, defaultdict(set)
     for path in graphs:
         text = path.read_text()
@@ -35,4 +41,6 @@ def _depth(title: str, frames: dict, calls: dict, chain: tuple[str, ...]) -> int
     size, kind = frames[title]
     if kind != "static":
         raise StackUnknown(f"{title}: its frame is {kind}")
-    return size + max((_depth(target, frames, calls, (*chain, title)) for target in calls[title]), default=0)
+    return size + max(
+        (_depth(target, frames, calls, (*chain, title)) for target in calls[title]), default=0
+    )

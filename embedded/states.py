@@ -1,4 +1,6 @@
-"""States to call functions on: a manifest goes in, rows of numbers, one entry for each named input, come out."""
+"""States to call functions on: a manifest goes in, rows of numbers, one entry for each named input,
+come out.
+"""
 
 import math
 
@@ -19,7 +21,9 @@ STANDING = np.radians([210, -40, 210, -40, 0, 0, 0, 0])  # gamma, delta of both 
 
 
 def stored_states(manifest: dict, count: int = 3, seed: int = 8) -> dict[str, np.ndarray]:
-    """Return (count, length) arrays by input name; every number is one that single precision holds too."""
+    """Return (count, length) arrays by input name; every number is one that single precision holds
+    too.
+    """
     rng = np.random.default_rng(seed)
     states = {}
     for entry in manifest["functions"].values():
@@ -38,7 +42,9 @@ def _drawn(rng: np.random.Generator, name: str, shape: tuple[int, int]) -> np.nd
     if name in RANGES:
         return rng.uniform(*RANGES[name], shape)
     scales = SCALES.get(name, (1,))
-    return rng.uniform(-1, 1, shape) * np.array([scales[min(k, len(scales) - 1)] for k in range(shape[1])])
+    return rng.uniform(-1, 1, shape) * np.array(
+        [scales[min(k, len(scales) - 1)] for k in range(shape[1])]
+    )
 
 
 def _configurations(rng: np.random.Generator, shape: tuple[int, int]) -> np.ndarray:

@@ -1,4 +1,5 @@
-"""The kangaroo rat kicking, and in flight after it: scenes go in; trajectories, pictures and a report come out.
+"""The kangaroo rat kicking, and in flight after it: scenes go in; trajectories, pictures and a
+report come out.
 
 Usage: python examples/demo.py [FOLDER], by default output/demo
 """
@@ -35,7 +36,9 @@ def step(words: str):
 
 
 def generate(scene: str, folder: Path) -> Path:
-    """Run the generator in a process of its own; the runtime needs only the folder that it writes."""
+    """Run the generator in a process of its own; the runtime needs only the folder that it
+    writes.
+    """
     source = ROOT / "scenes" / f"{scene}.toml"
     command = [sys.executable, "-m", "serpentail_codegen", str(source), "--output", str(folder)]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
@@ -63,18 +66,27 @@ def drift(vectors: np.ndarray) -> float:
 
 def report(model: st.Model, flight: st.Trajectory, check: st.Trajectory) -> str:
     """Return what the conservation laws and the other integrator say about a flight."""
-    weight = model.parameters["gravity"] * (model.parameters["torso_mass"] + model.parameters["tail_mass"])
+    weight = model.parameters["gravity"] * (
+        model.parameters["torso_mass"] + model.parameters["tail_mass"]
+    )
     level = flight.linear_momentum + weight * flight.t[:, None] * [0, 0, 1]
     damped = simpson(-np.sum(flight.tau * flight.v[:, 6:], axis=1), x=flight.t)
     lost = flight.energy[0] - flight.energy[-1]
     turned = np.ptp(st.pitch_roll_yaw(flight.q, unwrap=True)[:, 0])
     rows = {
         "pitch": f"{turned:.2f} rad in {FLIGHT} s of flight",
-        "speed": f"{flight.info['steps']} steps of Tsit5, {FLIGHT / flight.info['seconds']:.0f} times real time",
+        "speed": (
+            f"{flight.info['steps']} steps of Tsit5, "
+            f"{FLIGHT / flight.info['seconds']:.0f} times real time"
+        ),
         "momentum": f"constant to {drift(level):.0e}, gravity's impulse taken off",
-        "angular momentum": f"constant to {drift(flight.angular_momentum):.0e}, about the centre of mass",
+        "angular momentum": (
+            f"constant to {drift(flight.angular_momentum):.0e}, about the centre of mass"
+        ),
         "energy": f"{1e3 * lost:.4f} mJ less; the tail's damping took {1e3 * damped:.4f} mJ",
-        "Tsit5 and DOP853": f"differ by {np.abs(flight.q - check.q).max():.0e} at most (q, in m and rad)",
+        "Tsit5 and DOP853": (
+            f"differ by {np.abs(flight.q - check.q).max():.0e} at most (q, in m and rad)"
+        ),
     }
     return "\n".join(f"  {name + ':':<18}{words}" for name, words in rows.items())
 
@@ -88,14 +100,24 @@ def fly(scene: str, folder: Path) -> None:
         model = st.load(generated)
     q, v = start(model)
     with step(f"simulate {FLIGHT} s of flight, Tsit5 in C"):
-        flight = st.simulate(model, q, v, controller=st.Damping(K_DMP), t_span=FLIGHT, output_step=FRAME, rtol=1e-10)
+        flight = st.simulate(
+            model, q, v, controller=st.Damping(K_DMP), t_span=FLIGHT, output_step=FRAME, rtol=1e-10
+        )
     with step("simulate it again, SciPy's DOP853"):
         check = st.simulate(
-            model, q, v, controller=st.Damping(K_DMP), t_span=FLIGHT, output_step=FRAME, method="dop853"
+            model,
+            q,
+            v,
+            controller=st.Damping(K_DMP),
+            t_span=FLIGHT,
+            output_step=FRAME,
+            method="dop853",
         )
     with step("draw and save"):
         points = model.tail_points(flight.q)
-        st.filmstrip(flight, points, folder / f"{scene}_film.png", com=centre_of_mass(model, flight, points))
+        st.filmstrip(
+            flight, points, folder / f"{scene}_film.png", com=centre_of_mass(model, flight, points)
+        )
         st.time_plots(flight, folder / f"{scene}_time.png")
         flight.save(folder / f"{scene}.npz")
     print(report(model, flight, check), end="\n\n")
@@ -114,9 +136,14 @@ def kick(folder: Path) -> None:
         scene.film(motion, folder / "kick_film.png", KICK)
         motion.save(folder / "kick.npz")
     told = scene.summary(motion)
-    leap = "take-off {take_off_s:.3f} s, apex {apex_m:.3f} m, landing {recontact_s:.3f} s".format(**told)
+    leap = "take-off {take_off_s:.3f} s, apex {apex_m:.3f} m, landing {recontact_s:.3f} s".format(
+        **told
+    )
     speed = "{steps} steps, {real_time_factor:.0f} times faster than real time".format(**told)
-    print(f"  leap:             {leap} (paper: about 0.6 m, 1.08 s)\n  speed:            {speed}", end="\n\n")
+    print(
+        f"  leap:             {leap} (paper: about 0.6 m, 1.08 s)\n  speed:            {speed}",
+        end="\n\n",
+    )
 
 
 def main(folder: Path) -> None:

@@ -1,4 +1,6 @@
-"""Airborne righting, for the studies: sizes and settings go in; models, starts and plans come out."""
+"""Airborne righting, for the studies: sizes and settings go in; models, starts and plans come
+out.
+"""
 
 import subprocess
 import sys
@@ -13,14 +15,28 @@ ROOT = Path(__file__).resolve().parent.parent
 FLIGHT = 0.58  # s, from 0.1 s after the kick until shortly before landing
 TORQUE = 0.02  # N m
 K_DMP = 1e-3  # N m s, of the passive tail
-# 0.1 s after the kick: pitch (rad), velocity (m/s), spin (rad/s), and the whole tail's bend in pitch and its rate
-HEIGHT, VELOCITY, PITCH, SPIN, BEND, BEND_RATE = 0.34, (0.0, -0.302, 2.385), 3.80, 26.2, 3 * -0.558, 3 * 4.70
+# 0.1 s after the kick: pitch (rad), velocity (m/s), spin (rad/s), and the whole tail's bend in
+# pitch and its rate
+HEIGHT, VELOCITY, PITCH, SPIN, BEND, BEND_RATE = (
+    0.34,
+    (0.0, -0.302, 2.385),
+    3.80,
+    26.2,
+    3 * -0.558,
+    3 * 4.70,
+)
 FUNCTIONS = (
     "mass_matrix,bias_force,inverse_dynamics,forward_dynamics,energy,momentum,tail_points,rollout,"
     "forward_dynamics_derivatives,inverse_dynamics_derivatives,inverse_dynamics_vjp,forward_dynamics_vjp,"
     "inverse_dynamics_hessian,pfl"
 )
-PAPER = {"formulation": "full", "attitude": "euler", "rule": "trapezoidal", "tolerance": None, "retries": 0}
+PAPER = {
+    "formulation": "full",
+    "attitude": "euler",
+    "rule": "trapezoidal",
+    "tolerance": None,
+    "retries": 0,
+}
 PAPER |= {"smoothing": 0.0}
 
 
@@ -28,18 +44,26 @@ def model(folder: Path, segments: int, links: int | None) -> st.Model:
     """Generate and load a tail with exact derivatives; a continuum where links is None."""
     tail = ["--tail", "articulated", "--links", str(links)] if links else ["--tail", "continuum"]
     options = ["--segments", str(segments), "--functions", FUNCTIONS, "--output", str(folder)]
-    subprocess.run([sys.executable, "-m", "serpentail_codegen", *tail, *options], check=True, stdout=subprocess.DEVNULL)
+    subprocess.run(
+        [sys.executable, "-m", "serpentail_codegen", *tail, *options],
+        check=True,
+        stdout=subprocess.DEVNULL,
+    )
     return loaded(folder, segments, links)
 
 
 def loaded(folder: Path, segments: int, links: int | None) -> st.Model:
     """Load a tail that was generated."""
-    return st.load(folder / (f"articulated_m{segments}_n{links}" if links else f"continuum_m{segments}"))
+    return st.load(
+        folder / (f"articulated_m{segments}_n{links}" if links else f"continuum_m{segments}")
+    )
 
 
 def share(rat: st.Model) -> np.ndarray:
     """The part of the whole tail's pitch bend that each tail coordinate has, (2m,)."""
-    return np.tile([1.0, 0.0], rat.segments) / (rat.links * rat.segments if rat.links else rat.segments)
+    return np.tile([1.0, 0.0], rat.segments) / (
+        rat.links * rat.segments if rat.links else rat.segments
+    )
 
 
 def kicked(rat: st.Model) -> tuple[np.ndarray, np.ndarray]:
@@ -49,7 +73,9 @@ def kicked(rat: st.Model) -> tuple[np.ndarray, np.ndarray]:
 
 
 def tumbling(rat: st.Model, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return a random start: any pitch, up to 0.3 rad of roll and yaw, 10 to 28 rad/s of pitch and 6 about others."""
+    """Return a random start: any pitch, up to 0.3 rad of roll and yaw, 10 to 28 rad/s of pitch and
+    6 about others.
+    """
     random = np.random.default_rng(seed)
     q, v = kicked(rat)
     roll, yaw = random.uniform(-0.3, 0.3, 2)
@@ -57,12 +83,17 @@ def tumbling(rat: st.Model, seed: int) -> tuple[np.ndarray, np.ndarray]:
     q[3:7] = turn.as_quat(scalar_first=True)
     v[3:6] = random.uniform(10, 28), *random.uniform(-6, 6, 2)
     size = 3 * share(rat).max()
-    q[7:], v[6:] = size * random.uniform(-0.6, 0.6, rat.nq - 7), size * random.uniform(-5, 5, rat.nq - 7)
+    q[7:], v[6:] = (
+        size * random.uniform(-0.6, 0.6, rat.nq - 7),
+        size * random.uniform(-5, 5, rat.nq - 7),
+    )
     return q, v
 
 
 def bounds(rat: st.Model, turn: float = np.pi, rate: float | None = None) -> st.Bounds:
-    """Return the paper's bounds: joints share a bend of `turn` (rad) of the whole tail; torques 0.02 N m."""
+    """Return the paper's bounds: joints share a bend of `turn` (rad) of the whole tail; torques
+    0.02 N m.
+    """
     return st.Bounds(angle=turn * share(rat).max(), rate=rate, torque=TORQUE)
 
 
@@ -72,7 +103,9 @@ def passive(rat: st.Model, start, duration: float) -> st.Trajectory:
 
 
 def tracked(rat: st.Model, plan: st.Plan) -> st.Trajectory:
-    """Return the flight whose tail tracks a plan by PFL (Eq. 46), just before the end, where PFL wants it at rest."""
+    """Return the flight whose tail tracks a plan by PFL (Eq. 46), just before the end, where PFL
+    wants it at rest.
+    """
     start, law = (plan.problem.q0, plan.problem.v0), st.Pfl(rat, plan)
     end = np.nextafter(plan.duration, 0)
     return st.simulate(rat, *start, controller=law, t_span=end, method="dop853", rtol=1e-8)
@@ -82,9 +115,16 @@ def centre_of_mass(rat: st.Model, flight: st.Trajectory) -> np.ndarray:
     """Return the COM (K, 3), m: it falls freely."""
     mass = rat.parameters["torso_mass"] + rat.parameters["tail_mass"]
     points = rat.tail_points(flight.q[0])
-    start = (rat.parameters["torso_mass"] * flight.q[0, :3] + rat.parameters["tail_mass"] * _middle(points)) / mass
+    start = (
+        rat.parameters["torso_mass"] * flight.q[0, :3]
+        + rat.parameters["tail_mass"] * _middle(points)
+    ) / mass
     t = (flight.t - flight.t[0])[:, None]
-    return start + flight.linear_momentum[0] / mass * t - 0.5 * rat.parameters["gravity"] * t**2 * [0, 0, 1]
+    return (
+        start
+        + flight.linear_momentum[0] / mass * t
+        - 0.5 * rat.parameters["gravity"] * t**2 * [0, 0, 1]
+    )
 
 
 def _middle(points: np.ndarray) -> np.ndarray:
@@ -105,7 +145,12 @@ def row(plan: st.Plan) -> dict:
         "objective",
         "effort",
     )
-    names += ("solve_cpu_s", "open_loop_attitude_error_deg", "tracked_attitude_error_deg", "tracked_tail_error_rad")
+    names += (
+        "solve_cpu_s",
+        "open_loop_attitude_error_deg",
+        "tracked_attitude_error_deg",
+        "tracked_tail_error_rad",
+    )
     names += ("dyn_err", "energy_J", "peak_power_W")
     found = {name: np.nan if plan.report[name] is None else plan.report[name] for name in names}
     return found | {"stopped": plan.report["stopped"]}

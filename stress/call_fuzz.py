@@ -1,4 +1,6 @@
-"""Random calls: a model and a seed go in; calls that did worse than an answer or a refusal come out."""
+"""Random calls: a model and a seed go in; calls that did worse than an answer or a refusal come
+out.
+"""
 
 import inspect
 import math
@@ -27,7 +29,9 @@ class Target:
 
 @dataclass(frozen=True)
 class Fault:
-    """A call that did worse than an answer or a refusal: a bare error, a result that is no number, a hang."""
+    """A call that did worse than an answer or a refusal: a bare error, a result that is no number,
+    a hang.
+    """
 
     kind: str
     target: str
@@ -37,20 +41,66 @@ class Fault:
 
 @np.errstate(all="ignore")  # casts of what has no value of that type
 def values(like, rng) -> list:
-    """Return things to give in place of an argument: wrong types, shapes, layouts and numbers, and right ones."""
+    """Return things to give in place of an argument: wrong types, shapes, layouts and numbers, and
+    right ones.
+    """
     try:
         plain = np.asarray(like, float)
     except (TypeError, ValueError):
         plain = np.zeros(3)
     holed = plain.copy().reshape(-1)
     if holed.size:
-        holed[rng.integers(holed.size)] = rng.choice([np.nan, np.inf, -np.inf, 1e308, -1e160, 5e-324])
+        holed[rng.integers(holed.size)] = rng.choice(
+            [np.nan, np.inf, -np.inf, 1e308, -1e160, 5e-324]
+        )
     batch = np.stack([plain] * 3)
     return [
-        *(None, "x", b"", "", [], [[]], {}, set(), object(), Ellipsis, slice(None), 1j, True, "nan", Path("nowhere")),
-        *(math.nan, math.inf, -1, 0, -0.0, 1e-320, 1e308, 10**400, 2**63, -(2**70), np.float32(3), np.int8(3)),
-        *(np.array(1, object), np.zeros(0), np.zeros((2, 0)), np.zeros(3, complex), np.array(["a"])),
-        *(np.datetime64("now"), range(3), (1, 2), [1, [2, 3]], np.ma.masked_array([1.0, 2.0], [0, 1]), np.array(7)),
+        *(
+            None,
+            "x",
+            b"",
+            "",
+            [],
+            [[]],
+            {},
+            set(),
+            object(),
+            Ellipsis,
+            slice(None),
+            1j,
+            True,
+            "nan",
+            Path("nowhere"),
+        ),
+        *(
+            math.nan,
+            math.inf,
+            -1,
+            0,
+            -0.0,
+            1e-320,
+            1e308,
+            10**400,
+            2**63,
+            -(2**70),
+            np.float32(3),
+            np.int8(3),
+        ),
+        *(
+            np.array(1, object),
+            np.zeros(0),
+            np.zeros((2, 0)),
+            np.zeros(3, complex),
+            np.array(["a"]),
+        ),
+        *(
+            np.datetime64("now"),
+            range(3),
+            (1, 2),
+            [1, [2, 3]],
+            np.ma.masked_array([1.0, 2.0], [0, 1]),
+            np.array(7),
+        ),
         *(
             plain,
             plain.tolist(),
@@ -60,30 +110,82 @@ def values(like, rng) -> list:
             np.atleast_1d(plain)[::-1],
             plain.astype(np.float32),
         ),
-        *(plain.astype(np.float16), np.zeros_like(plain), plain * np.nan, plain * 1e300, plain * 1e155, plain * 1e-200),
-        *(batch, batch[:0], np.asfortranarray(batch), batch[::-1], np.stack([batch] * 2), plain.astype(">f8")),
-        *(holed.reshape(plain.shape), np.repeat(plain, 2)[::2], plain.astype(int), plain.astype("U8")),
-        *(np.broadcast_to(plain, (2, *plain.shape)), memoryview(plain.tobytes()), plain.astype(object)),
+        *(
+            plain.astype(np.float16),
+            np.zeros_like(plain),
+            plain * np.nan,
+            plain * 1e300,
+            plain * 1e155,
+            plain * 1e-200,
+        ),
+        *(
+            batch,
+            batch[:0],
+            np.asfortranarray(batch),
+            batch[::-1],
+            np.stack([batch] * 2),
+            plain.astype(">f8"),
+        ),
+        *(
+            holed.reshape(plain.shape),
+            np.repeat(plain, 2)[::2],
+            plain.astype(int),
+            plain.astype("U8"),
+        ),
+        *(
+            np.broadcast_to(plain, (2, *plain.shape)),
+            memoryview(plain.tobytes()),
+            plain.astype(object),
+        ),
     ]
 
 
 def targets(model: st.Model, parent: Path) -> list[Target]:
     """Return all functions to call, with good arguments."""
-    found = [Target(f"model.{name}", getattr(model, name), inputs(model, name)) for name in sorted(methods(model))]
+    found = [
+        Target(f"model.{name}", getattr(model, name), inputs(model, name))
+        for name in sorted(methods(model))
+    ]
     nt = model.nv - 6
     found += [
-        Target("model.external_force", model.external_force, {"force": (0, 0, 1), "moment": (0, 0, 0), "tail": None}),
-        Target("load", st.load, {"folder": model.folder, "parameters": {}, "profile": "fast", "compiled": True}),
+        Target(
+            "model.external_force",
+            model.external_force,
+            {"force": (0, 0, 1), "moment": (0, 0, 0), "tail": None},
+        ),
+        Target(
+            "load",
+            st.load,
+            {"folder": model.folder, "parameters": {}, "profile": "fast", "compiled": True},
+        ),
         Target("Legs", st.Legs, {"times": [0.0, 1.0], "gamma": 3.6, "delta": [0.0, 1.0]}),
         Target("Legs.fixed", st.Legs.fixed, {"gamma": 3.6, "delta": -0.3}),
-        Target("Legs.ramp", st.Legs.ramp, {"gamma": 3.6, "delta": (-0.3, -1.0), "at": 0.4, "rate": -70.0}),
-        Target("Reference", st.Reference, {"times": [0.0, 1.0], "angles": np.zeros((2, nt)), "blend": "quintic"}),
+        Target(
+            "Legs.ramp",
+            st.Legs.ramp,
+            {"gamma": 3.6, "delta": (-0.3, -1.0), "at": 0.4, "rate": -70.0},
+        ),
+        Target(
+            "Reference",
+            st.Reference,
+            {"times": [0.0, 1.0], "angles": np.zeros((2, nt)), "blend": "quintic"},
+        ),
         Target("Phases", st.Phases, {"phases": [(0.0, None)]}),
-        Target("polar_to_bend", st.polar_to_bend, dict.fromkeys(("phi", "theta", "phi_dot", "theta_dot"), 0.3)),
+        Target(
+            "polar_to_bend",
+            st.polar_to_bend,
+            dict.fromkeys(("phi", "theta", "phi_dot", "theta_dot"), 0.3),
+        ),
         Target("bend_to_polar", st.bend_to_polar, dict.fromkeys(("a", "b", "a_dot", "b_dot"), 0.3)),
-        Target("rotation_matrix", st.rotation_matrix, {"quaternion": np.array([0.5, 0.5, -0.5, 0.5])}),
+        Target(
+            "rotation_matrix", st.rotation_matrix, {"quaternion": np.array([0.5, 0.5, -0.5, 0.5])}
+        ),
         Target("pitch_roll_yaw", st.pitch_roll_yaw, {"q": np.full(model.nq, 0.5)}),
-        Target("Pfl", st.Pfl, {"model": model, "reference": ([0.0, 1.0], np.zeros((2, nt))), "kp": 1.0, "kd": 2.0}),
+        Target(
+            "Pfl",
+            st.Pfl,
+            {"model": model, "reference": ([0.0, 1.0], np.zeros((2, nt))), "kp": 1.0, "kd": 2.0},
+        ),
         *simulations(model),
     ]
     for name, value in model.parameters.items():
@@ -109,12 +211,28 @@ def simulations(model: st.Model) -> list[Target]:
     """Return simulations of 2 ms by every method."""
     q, v = np.zeros(model.nq), np.full(model.nv, 0.1)
     q[2:4] = 0.3, 1.0
-    common = {"model": model, "q0": q, "v0": v, "controller": st.Damping(1e-5), "t_span": 0.002, "output_step": 1e-3}
+    common = {
+        "model": model,
+        "q0": q,
+        "v0": v,
+        "controller": st.Damping(1e-5),
+        "t_span": 0.002,
+        "output_step": 1e-3,
+    }
     legs = {"legs": st.Legs.fixed(3.6, -0.3)} if "feet" in model.contacts else {}
-    ground = {"bristles0": np.zeros((sum(model.contacts.values()), 2)), "stop_at": [("touch_down", "feet")]}
+    ground = {
+        "bristles0": np.zeros((sum(model.contacts.values()), 2)),
+        "stop_at": [("touch_down", "feet")],
+    }
     ground = ground if legs else {}
     settings = {
-        "tsit5": {"rtol": 1e-6, "first_step": 1e-4, "least_step": 1e-9, "most_step": 1.0, "most_steps": 1000},
+        "tsit5": {
+            "rtol": 1e-6,
+            "first_step": 1e-4,
+            "least_step": 1e-9,
+            "most_step": 1.0,
+            "most_steps": 1000,
+        },
         "ros34pw2": {"rtol": 1e-6, "most_step": 1.0},
         "rk4": {"step": 1e-4},
         "implicit_euler": {"step": 1e-4},
@@ -135,7 +253,9 @@ def fuzz(found: list[Target], count: int, seed: int) -> list[Fault]:
     before = signal.signal(signal.SIGALRM, _too_long)
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", st.UnlikeBodies)  # any other is a fault where warnings are errors
+            warnings.simplefilter(
+                "ignore", st.UnlikeBodies
+            )  # any other is a fault where warnings are errors
             for _ in range(count):
                 target = found[rng.integers(len(found))]
                 fault = tried(target, changed(target, rng))
@@ -158,14 +278,22 @@ def changed(target: Target, rng) -> dict:
 
 def tried(target: Target, arguments: dict) -> Fault | None:
     """Call; return what is wrong with how it ended, or nothing."""
-    shown = ", ".join(f"{name}={value!r:.60}" for name, value in arguments.items() if name != "model")
+    shown = ", ".join(
+        f"{name}={value!r:.60}" for name, value in arguments.items() if name != "model"
+    )
     signal.setitimer(signal.ITIMER_REAL, SECONDS)
     try:
         result = target.function(**arguments)
     except st.SerpentailError as refusal:
-        return None if str(refusal).strip() else Fault("empty message", target.name, shown, repr(refusal))
+        return (
+            None
+            if str(refusal).strip()
+            else Fault("empty message", target.name, shown, repr(refusal))
+        )
     except Exception as error:
-        return Fault("hang" if isinstance(error, _TooLong) else "bare error", target.name, shown, repr(error))
+        return Fault(
+            "hang" if isinstance(error, _TooLong) else "bare error", target.name, shown, repr(error)
+        )
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
     return None if sound(result) else Fault("no number", target.name, shown, f"{result!r:.200}")

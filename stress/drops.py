@@ -1,4 +1,6 @@
-"""Drops: random falls on the ground by every method go in; gains of energy and refusals come out."""
+"""Drops: random falls on the ground by every method go in; gains of energy and refusals come
+out.
+"""
 
 from collections import Counter
 from functools import cache
@@ -9,7 +11,14 @@ import serpentail as st
 from stress.figures import Figure
 from tests.support.models import model_folder
 
-METHODS = {"ros34pw2": 60, "tsit5": 60, "rk4": 40, "implicit_euler": 60, "lsoda": 8, "dop853": 8}  # drops each
+METHODS = {
+    "ros34pw2": 60,
+    "tsit5": 60,
+    "rk4": 40,
+    "implicit_euler": 60,
+    "lsoda": 8,
+    "dop853": 8,
+}  # drops each
 DURATION = 0.5  # s
 GAIN = 1e-6  # of the energy at the start: what integration may add
 RANGE = "bent beyond the scene's bend_range"
@@ -31,12 +40,19 @@ def start(model: st.Model, rng) -> tuple[np.ndarray, np.ndarray]:
 
 
 def dropped(model: st.Model, method: str, count: int, seed: int) -> tuple[list[float], Counter]:
-    """Return the relative gain of energy of each drop that ended, and how often each refusal came."""
+    """Return the relative gain of energy of each drop that ended, and how often each refusal
+    came.
+    """
     rng, gains, refusals = np.random.default_rng(seed), [], Counter()
     for _ in range(count):
         q, v = start(model, rng)
         legs = st.Legs.fixed(rng.uniform(2, 4.5), rng.uniform(-1.5, 1))
-        settings = {"controller": st.Damping(1e-4), "legs": legs, "t_span": DURATION, "output_step": 0.01}
+        settings = {
+            "controller": st.Damping(1e-4),
+            "legs": legs,
+            "t_span": DURATION,
+            "output_step": 0.01,
+        }
         try:
             gains.append(gain(st.simulate(model, q, v, method=method, **settings)))
         except st.SimulationError as refusal:
@@ -45,7 +61,8 @@ def dropped(model: st.Model, method: str, count: int, seed: int) -> tuple[list[f
 
 
 def gain(motion: st.Trajectory) -> float:
-    """Return by how much the energy ever exceeds that of the start, relative to it; NaN where something is no number.
+    """Return by how much the energy ever exceeds that of the start, relative to it; NaN where
+    something is no number.
 
     The ground, its friction and the joints only take energy, and fixed legs give none.
     """

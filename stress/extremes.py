@@ -1,4 +1,6 @@
-"""Extremes: parameters far from an animal's go in; errors against 40 digits, and what is refused, come out."""
+"""Extremes: parameters far from an animal's go in; errors against 40 digits, and what is refused,
+come out.
+"""
 
 import numpy as np
 
@@ -9,7 +11,10 @@ from stress.subjects import changed, errors, judged, state, subject
 MICROGRAM = 1e-9  # kg
 CASES = {
     "links of 1 ug": lambda links: {"tail_mass": links * MICROGRAM},
-    "torso of 1 kg, links of 1 ug": lambda links: {"torso_mass": 1.0, "tail_mass": links * MICROGRAM},
+    "torso of 1 kg, links of 1 ug": lambda links: {
+        "torso_mass": 1.0,
+        "tail_mass": links * MICROGRAM,
+    },
     "torso of 1 kg": lambda links: {"torso_mass": 1.0},
     "torso of 1 mg": lambda links: {"torso_mass": 1e-6, "torso_inertia": (1e-12, 1e-12, 1e-12)},
     "torso of 1 t": lambda links: {"torso_mass": 1e3, "torso_inertia": (1e2, 2e2, 2e2)},
@@ -41,5 +46,7 @@ def measured() -> list[Figure]:
             other = changed(of, **change)
             bends = [rng.uniform(-1, 1, of.model.nv - 6), np.zeros(of.model.nv - 6)]
             unlike = max(1.0, disparity(other.model.parameters))
-            found += judged(of, name, [errors(other, *state(other, rng, bend)) for bend in bends], unlike)
+            found += judged(
+                of, name, [errors(other, *state(other, rng, bend)) for bend in bends], unlike
+            )
     return found

@@ -1,11 +1,15 @@
-"""Figures: what was found and what it may be at most go in; rows of a report that can fail come out."""
+"""Figures: what was found and what it may be at most go in; rows of a report that can fail come
+out.
+"""
 
 from dataclasses import asdict, dataclass
 
 
 @dataclass(frozen=True)
 class Figure:
-    """One number that was found, and its limit; ``of`` says of what, ``note`` what else is worth telling."""
+    """One number that was found, and its limit; ``of`` says of what, ``note`` what else is worth
+    telling.
+    """
 
     of: str
     found: float
@@ -19,13 +23,19 @@ class Figure:
 
     def row(self) -> dict:
         """Return the figure as plain data."""
-        return asdict(self) | {"found": float(self.found), "limit": float(self.limit), "passed": self.passed}
+        return asdict(self) | {
+            "found": float(self.found),
+            "limit": float(self.limit),
+            "passed": self.passed,
+        }
 
 
 def table(figures: list[Figure]) -> str:
     """Return figures as a table in Markdown."""
     head = ["| of | found | limit | | note |", "|---|---|---|---|---|"]
     rows = [
-        f"| {f.of} | {f.found:.3g} | {f.limit:.3g} | {'' if f.passed else '**FAILED**'} | {f.note} |" for f in figures
+        f"| {f.of} | {f.found:.3g} | {f.limit:.3g} | {'' if f.passed else '**FAILED**'} | {f.note} "
+        "|"
+        for f in figures
     ]
     return "\n".join([*head, *rows])

@@ -1,4 +1,6 @@
-"""Memory: a model and states far from ordinary go in; what sanitizers and valgrind say of its C at them comes out."""
+"""Memory: a model and states far from ordinary go in; what sanitizers and valgrind say of its C at
+them comes out.
+"""
 
 import subprocess
 from collections.abc import Iterator
@@ -16,16 +18,39 @@ from stress.subjects import Subject
 
 DRIVER = Path(__file__).parent / "driver.c"
 SANITIZED = ("-O0", "-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all")
-WATCHED = ("valgrind", "--quiet", "--error-exitcode=9", "--leak-check=full", "--errors-for-leak-kinds=definite")
+WATCHED = (
+    "valgrind",
+    "--quiet",
+    "--error-exitcode=9",
+    "--leak-check=full",
+    "--errors-for-leak-kinds=definite",
+)
 BARE, BATCH, ROWS = 0, 1, 2  # a function, its batch, its batch side by side
-NUMBERS = (np.nan, np.inf, -np.inf, 1e308, -1e300, 1e155, 1e80, 1e20, 3e9, 1e5, 1e-200, 5e-324, -0.0, 0.0)
+NUMBERS = (
+    np.nan,
+    np.inf,
+    -np.inf,
+    1e308,
+    -1e300,
+    1e155,
+    1e80,
+    1e20,
+    3e9,
+    1e5,
+    1e-200,
+    5e-324,
+    -0.0,
+    0.0,
+)
 STATUSES = {0, 1, 2, 3}
 ENDS = STATUSES | {33, 34}  # of runs: steps too small, too many
 
 
 @dataclass(frozen=True)
 class Case:
-    """One call of the driver: function and form, or a method of rollouts; its record; whether it must be refused."""
+    """One call of the driver: function and form, or a method of rollouts; its record; whether it
+    must be refused.
+    """
 
     name: str
     record: bytes
@@ -48,12 +73,15 @@ def driver(model: st.Model) -> str:
     for name, lengths, inputs in shapes(model):
         pointers = ", ".join(f"x[{k}]" for k in range(len(lengths)))
         bare.append(
-            f"static int bare_{name}(const @_parameters *p, real **x, real *work)\n{{\n  (void)work;\n"
+            f"static int bare_{name}(const @_parameters *p, real **x, real "
+            f"*work)\n{{\n  (void)work;\n"
             f"  return @_{name}(p, {pointers}, work);\n}}\n"
         )
         entries.append(
-            f"  {{ bare_{name}, @_batch_{name}, {f'@_side_by_side_{name}' if name in many else 'NULL'}, {inputs}, "
-            f"{len(lengths) - inputs}, {work[name]}, {many.get(name, 0)}, {{ {', '.join(map(str, lengths))} }} }},"
+            "  "
+            f"{{ bare_{name}, @_batch_{name}, {f'@_side_by_side_{name}' if name in many else 'NULL'}, {inputs}, "
+            f"{len(lengths) - inputs}, {work[name]}, {many.get(name, 0)}, "
+            f"{{ {', '.join(map(str, lengths))} }} }},"
         )
     rows += [f"int @_side_by_side_{name}(@_call *call);" for name in many]
     text = DRIVER.read_text()
@@ -74,7 +102,11 @@ def built(model: st.Model, folder: Path, *flags: str) -> Path:
     """Compile a model and its driver; return the program."""
     main, program = folder / "main.c", folder / "main"
     main.write_text(driver(model))
-    sources = [path for path in sorted((model.folder / "src").glob("*.c")) if not path.stem.endswith("_host")]
+    sources = [
+        path
+        for path in sorted((model.folder / "src").glob("*.c"))
+        if not path.stem.endswith("_host")
+    ]
     places = ("-I", model.folder / "include", "-I", model.folder / "src")
     command = ["gcc", "-std=c99", "-g", *flags, *places, main, *sources, "-o", program, "-lm"]
     subprocess.run(list(map(str, command)), check=True)
@@ -82,16 +114,22 @@ def built(model: st.Model, folder: Path, *flags: str) -> Path:
 
 
 def answers(program: Path, found: list[Case], *under: str) -> tuple[list[Answer], str]:
-    """Run a program on cases, under a tool or by itself; return what it answered, and the tool's report."""
+    """Run a program on cases, under a tool or by itself; return what it answered, and the tool's
+    report.
+    """
     given = b"".join(case.record for case in found)
     done = subprocess.run([*under, str(program)], input=given, capture_output=True, check=False)
     rows = [line.split() for line in done.stdout.decode().splitlines()]
     report = done.stderr.decode()
-    return [Answer(int(a), b == "1") for a, b in rows], report or (f"exit {done.returncode}" if done.returncode else "")
+    return [Answer(int(a), b == "1") for a, b in rows], report or (
+        f"exit {done.returncode}" if done.returncode else ""
+    )
 
 
 def insane(found: list[Case], told: list[Answer]) -> list[str]:
-    """Return what a sane model would not answer: a status unknown, a refusal not given, numbers that are none."""
+    """Return what a sane model would not answer: a status unknown, a refusal not given, numbers
+    that are none.
+    """
     wrong = [] if len(found) == len(told) else [f"{len(told)} answers to {len(found)} cases"]
     for case, answer in zip(found, told, strict=False):
         known = answer.status in (ENDS if case.name.startswith("rollout") else STATUSES)
@@ -106,14 +144,23 @@ def every(model: st.Model, seed: int) -> list[Case]:
     """Return all cases: every function in every form at every state, then runs by every method."""
     rng, vector = np.random.default_rng(seed), model.parameter_vector
     many, found = model.manifest["batch"]["work"], []
-    several = model.manifest["batch"]["states"] + 3  # more than are taken side by side at once, no multiple of that
+    several = (
+        model.manifest["batch"]["states"] + 3
+    )  # more than are taken side by side at once, no multiple of that
     for number, (name, lengths, inputs) in enumerate(shapes(model)):
         names = [a["name"] for a in model.manifest["functions"][name]["inputs"]]
         for given, parameters, refused in states(model, names, lengths[:inputs], rng):
             for form in (BARE, BATCH, *([ROWS] if name in many else [])):
                 count = several if form == ROWS else 1
                 arrays = [np.broadcast_to(x, (count, len(x))) for x in given]
-                found.append(Case(name, packed(model, 3 * number + form, count, 0, parameters, arrays), form, refused))
+                found.append(
+                    Case(
+                        name,
+                        packed(model, 3 * number + form, count, 0, parameters, arrays),
+                        form,
+                        refused,
+                    )
+                )
     return [*found, *runs(model, rng, 3 * (number + 1), vector)]
 
 
@@ -121,19 +168,29 @@ def packed(model: st.Model, which: int, count: int, method: int, parameters, arr
     """Return a record of the driver."""
     numbers = [parameters, *arrays]
     with np.errstate(over="ignore", under="ignore"):
-        body = b"".join(np.ascontiguousarray(x, model.parameter_vector.dtype).tobytes() for x in numbers)
+        body = b"".join(
+            np.ascontiguousarray(x, model.parameter_vector.dtype).tobytes() for x in numbers
+        )
     return np.array([which, count, method], np.intc).tobytes() + body
 
 
-def states(model: st.Model, names: list[str], lengths: list[int], rng) -> Iterator[tuple[list, np.ndarray, bool]]:
-    """Yield inputs, parameters, and whether they must be refused: poses, speeds, extremes, then a number anywhere."""
+def states(
+    model: st.Model, names: list[str], lengths: list[int], rng
+) -> Iterator[tuple[list, np.ndarray, bool]]:
+    """Yield inputs, parameters, and whether they must be refused: poses, speeds, extremes, then a
+    number anywhere.
+    """
     vector, nt = model.parameter_vector, model.nv - 6
     poses = folds(Subject("", model, None))
     poses |= {f"bend {bend:g}": np.full(nt, bend / np.sqrt(2)) for bend in (*SMALL, 6.0)}
     for bends in poses.values():
         yield good(model, names, lengths, rng, bends), vector, False
     for factor in (1.0, 1e-150, 1e100):
-        yield good(model, names, lengths, rng, rng.uniform(-1, 1, nt), factor * FAST[0]), vector, False
+        yield (
+            good(model, names, lengths, rng, rng.uniform(-1, 1, nt), factor * FAST[0]),
+            vector,
+            False,
+        )
     size = model.segments, model.links
     for change in cases(size).values():
         other = np.array(flat(model.manifest, resolve(model.manifest, change)))
@@ -145,11 +202,17 @@ def states(model: st.Model, names: list[str], lengths: list[int], rng) -> Iterat
             yield given, vector, not np.isfinite(number)
     if names[0] == "q":
         for number in NUMBERS:
-            yield good(model, names, lengths, rng, np.full(nt, number)), vector, not np.isfinite(number)
+            yield (
+                good(model, names, lengths, rng, np.full(nt, number)),
+                vector,
+                not np.isfinite(number),
+            )
         yield [np.zeros(length) for length in lengths], vector, True  # no quaternion
 
 
-def good(model: st.Model, names: list[str], lengths: list[int], rng, bends, speed: float = 10.0) -> list[np.ndarray]:
+def good(
+    model: st.Model, names: list[str], lengths: list[int], rng, bends, speed: float = 10.0
+) -> list[np.ndarray]:
     """Return inputs at random, q with these tail coordinates, the others of this size."""
     given = [rng.uniform(-speed, speed, length) for length in lengths]
     if names[0] == "q":
@@ -161,11 +224,29 @@ def runs(model: st.Model, rng, which: int, vector: np.ndarray) -> Iterator[Case]
     """Yield falls on the ground by every method: thrown, at huge speeds, from what is no state."""
     nt = model.nv - 6
     for method in model.manifest["simulation"]["methods"].values():
-        for speed, number, kp in ((1, 0, 0), (1, 0, 50), (1e3, 0, 0), (1e150, 0, 0), (1, np.nan, 0), (1, 1e300, 0)):
+        for speed, number, kp in (
+            (1, 0, 0),
+            (1, 0, 50),
+            (1e3, 0, 0),
+            (1e150, 0, 0),
+            (1, np.nan, 0),
+            (1, 1e300, 0),
+        ):
             q, v = drops.start(model, rng)
             q[rng.integers(model.nq)] += number
             span, begins = np.array([0.0, 1.0]), np.zeros(1)
             settings = np.array([kp, 1e-4, 1e-6, 1e-3 if method in (0, 3) else 0.0, 1e-7])
-            arrays = [q, speed * v, np.full(nt, 1e-4), np.array([0.0, 0.05, 0.1, 0.25]), begins, span]
+            arrays = [
+                q,
+                speed * v,
+                np.full(nt, 1e-4),
+                np.array([0.0, 0.05, 0.1, 0.25]),
+                begins,
+                span,
+            ]
             arrays += [np.array([3.6, -0.3, 3.6, -0.3]), np.zeros(nt), settings]
-            yield Case(f"rollout by method {method}", packed(model, which, 1, method, vector, arrays), BATCH)
+            yield Case(
+                f"rollout by method {method}",
+                packed(model, which, 1, method, vector, arrays),
+                BATCH,
+            )

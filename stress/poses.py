@@ -1,4 +1,6 @@
-"""Poses: bends from 1e-300 rad to the declared range, folds and coils go in; errors against 40 digits come out."""
+"""Poses: bends from 1e-300 rad to the declared range, folds and coils go in; errors against 40
+digits come out.
+"""
 
 from dataclasses import dataclass
 
@@ -7,7 +9,23 @@ import numpy as np
 from stress.figures import Figure
 from stress.subjects import Errors, Subject, errors, judged, state, subject
 
-SMALL = (0.0, 5e-324, 1e-300, 1e-200, 1e-154, 1e-100, 1e-30, 1e-16, 1e-12, 1e-8, 1e-6, 1e-4, 1e-3, 1e-2, 0.1)
+SMALL = (
+    0.0,
+    5e-324,
+    1e-300,
+    1e-200,
+    1e-154,
+    1e-100,
+    1e-30,
+    1e-16,
+    1e-12,
+    1e-8,
+    1e-6,
+    1e-4,
+    1e-3,
+    1e-2,
+    0.1,
+)
 LARGE = (0.3, 1.0, 2.0, np.pi, 4.0, 5.0, 6.0, 2 * np.pi * (1 - 1e-12))
 FAST = (1e3, 1e3, 1e3)
 
@@ -44,12 +62,16 @@ def of_sweep(points: list[Point]) -> list[Figure]:
     for segments in (1, 3):
         of = subject(segments, None)
         for what, bends in (("theta 0 to 0.1", SMALL), ("theta 0.3 to 2 pi", LARGE)):
-            found += judged(of, what, [p.errors for p in points if p.tail == of.name and p.bend in bends])
+            found += judged(
+                of, what, [p.errors for p in points if p.tail == of.name and p.bend in bends]
+            )
     return found
 
 
 def folds(of: Subject) -> dict[str, np.ndarray]:
-    """Return tail coordinates by name: joints folded back at pi, segments coiled by 2 pi, half turns in turn."""
+    """Return tail coordinates by name: joints folded back at pi, segments coiled by 2 pi, half
+    turns in turn.
+    """
     size, links = of.model.nv - 6, of.model.links or 1
     turns = np.resize([1.0, -1.0], size)
     if of.model.links:
@@ -90,7 +112,9 @@ def fast() -> list[Figure]:
 
 
 def attitudes() -> list[Figure]:
-    """Return by how much a quaternion's norm changes H, C and v_dot: it may have any norm whose square is a number."""
+    """Return by how much a quaternion's norm changes H, C and v_dot: it may have any norm whose
+    square is a number.
+    """
     rng, found = np.random.default_rng(4), []
     for size in ((1, 3), (3, None)):
         of = subject(*size)

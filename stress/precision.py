@@ -1,4 +1,6 @@
-"""Precision: models of float and of double go in; how far they differ per quantity and along flights comes out."""
+"""Precision: models of float and of double go in; how far they differ per quantity and along
+flights comes out.
+"""
 
 import numpy as np
 
@@ -14,7 +16,9 @@ FLIGHT = {"t_span": 0.6, "method": "rk4", "step": 1e-3, "output_step": 0.01}
 
 
 def measured() -> list[Figure]:
-    """Return the largest differences of H, C, energy, momentum and v_dot, and of flights of 0.6 s."""
+    """Return the largest differences of H, C, energy, momentum and v_dot, and of flights of 0.6
+    s.
+    """
     rng, found = np.random.default_rng(8), []
     for size in ((1, 3), (3, 4), (1, None), (3, None)):
         single, double = (subject(*size, real) for real in ("float", "double"))
@@ -49,9 +53,14 @@ def relative(x, reference) -> float:
 
 
 def flight(size, single: st.Model, double: st.Model, case) -> Figure:
-    """Return the largest difference of the torso's attitude and the tail's angles over 0.6 s of damped flight."""
+    """Return the largest difference of the torso's attitude and the tail's angles over 0.6 s of
+    damped flight.
+    """
     q, v, _ = case
     q[7:] *= 0.3
-    motions = [st.simulate(model, q, v, controller=st.Damping(1e-5), **FLIGHT) for model in (single, double)]
+    motions = [
+        st.simulate(model, q, v, controller=st.Damping(1e-5), **FLIGHT)
+        for model in (single, double)
+    ]
     apart = np.abs(motions[0].q[:, 3:] - motions[1].q[:, 3:]).max()
     return Figure(f"{label(*size)}: q over 0.6 s of flight, rad", float(apart), 5e-3)

@@ -13,15 +13,52 @@ from serpentail.scenes.simulate import scenario_of
 from serpentail_codegen.__main__ import parser, scene_of
 from serpentail_codegen.scene.problems import SceneError
 
-BYTES = (b"", b"\0", b"\xff", b"\xef\xbb\xbf", b"=", b"[", b"]", b"[[", b'"', b"'''", b"\\", b"#", b"\n", b"\r")
-# fmt: off
+BYTES = (
+    b"",
+    b"\0",
+    b"\xff",
+    b"\xef\xbb\xbf",
+    b"=",
+    b"[",
+    b"]",
+    b"[[",
+    b'"',
+    b"'''",
+    b"\\",
+    b"#",
+    b"\n",
+    b"\r",
+)
 PIECES = (
-    *BYTES, b"nan", b"-inf", b"1e999", b"1e308", b"-0.0", b"1e-320", b"9" * 30, b"0x7fffffffffffffff", b"true", b"{}",
-    b"[]", b"[nan]", b"1979-05-27", b'"all"', b'"continuum"', b'"polar"', b'"float"', b"[" * 3000, b"links", b"name",
-    b"[plan]", b"[simulate]", b"[parameters]", b"segments = 10000\n", b"contacts = [1]\n", b"functions = [[]]\n",
+    *BYTES,
+    b"nan",
+    b"-inf",
+    b"1e999",
+    b"1e308",
+    b"-0.0",
+    b"1e-320",
+    b"9" * 30,
+    b"0x7fffffffffffffff",
+    b"true",
+    b"{}",
+    b"[]",
+    b"[nan]",
+    b"1979-05-27",
+    b'"all"',
+    b'"continuum"',
+    b'"polar"',
+    b'"float"',
+    b"[" * 3000,
+    b"links",
+    b"name",
+    b"[plan]",
+    b"[simulate]",
+    b"[parameters]",
+    (b"segments = 10000\n"),
+    b"contacts = [1]\n",
+    b"functions = [[]]\n",
     b"\xc3\xa9",
 )
-# fmt: on
 
 
 def mutated(text: bytes, dice: random.Random) -> bytes:
@@ -34,16 +71,25 @@ def mutated(text: bytes, dice: random.Random) -> bytes:
     return text
 
 
-def faults(files: list[Path], count: int, dice: random.Random, folder: Path, model: st.Model) -> list[str]:
-    """Return what so many mutated files raised besides refusals, read by the generator and by each verb of the runtime.
+def faults(
+    files: list[Path], count: int, dice: random.Random, folder: Path, model: st.Model
+) -> list[str]:
+    """Return what so many mutated files raised besides refusals, read by the generator and by each
+    verb of the runtime.
 
-    model: one that motions of files with a table [simulate] are made ready for, whatever model they name.
+    model: one that motions of files with a table [simulate] are made ready for, whatever model they
+    name.
     """
     found, sources = [], [path.read_bytes() for path in files]
     path = folder / "mutated.toml"
     for _ in range(count):
         path.write_bytes(mutated(dice.choice(sources), dice))
-        for read in (generated, partial(refused, "plan"), partial(refused, "simulate"), partial(made_ready, model)):
+        for read in (
+            generated,
+            partial(refused, "plan"),
+            partial(refused, "simulate"),
+            partial(made_ready, model),
+        ):
             try:
                 read(path)
             except Exception as error:
@@ -58,7 +104,9 @@ def generated(path: Path) -> None:
 
 
 def refused(verb: str, path: Path) -> None:
-    """Plan or simulate a scene whose folder holds no model: the file is read, the folder refused."""
+    """Plan or simulate a scene whose folder holds no model: the file is read, the folder
+    refused.
+    """
     empty = path.parent / "empty"
     empty.mkdir(exist_ok=True)
     with contextlib.redirect_stderr(io.StringIO()) as words:

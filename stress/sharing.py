@@ -1,4 +1,6 @@
-"""Sharing: one model and many threads go in; how many of their results differ from those of one thread comes out."""
+"""Sharing: one model and many threads go in; how many of their results differ from those of one
+thread comes out.
+"""
 
 from concurrent.futures import ThreadPoolExecutor
 
@@ -19,11 +21,15 @@ def job(model: st.Model, seed: int) -> np.ndarray:
     batch = model.bias_force(np.stack([q] * 5), v).ravel()
     settings = {"legs": st.Legs.fixed(3.6, -0.3), "t_span": 0.05, "output_step": 0.01}
     motion = st.simulate(other, q, v, **settings)
-    return np.concatenate([model.mass_matrix(q).ravel(), batch, other.forward_dynamics(q, v, tau), motion.q.ravel()])
+    return np.concatenate(
+        [model.mass_matrix(q).ravel(), batch, other.forward_dynamics(q, v, tau), motion.q.ravel()]
+    )
 
 
 def measured() -> list[Figure]:
-    """Return how many results differ in some bit, and that a refusal in one thread harms no other."""
+    """Return how many results differ in some bit, and that a refusal in one thread harms no
+    other.
+    """
     model = drops.falling(1, 3)
     alone = [job(model, seed) for seed in range(JOBS)]
     with ThreadPoolExecutor(THREADS) as pool:

@@ -1,4 +1,6 @@
-"""`make stress`: drives models to their limits; writes figures, each with its limit, and plots to output/stress."""
+"""`make stress`: drives models to their limits; writes figures, each with its limit, and plots to
+output/stress.
+"""
 
 import argparse
 import json
@@ -33,12 +35,16 @@ def arguments() -> argparse.Namespace:
     """Return the command line's arguments."""
     p = argparse.ArgumentParser(description=__doc__)
     p.add_argument("--calls", type=int, default=2000, help="random calls and mutated scene files")
-    p.add_argument("--duration", type=float, default=flights.DURATION, help="of the long flights, in s")
+    p.add_argument(
+        "--duration", type=float, default=flights.DURATION, help="of the long flights, in s"
+    )
     return p.parse_args()
 
 
 def fuzzed(count: int) -> list[Figure]:
-    """Return how many random calls, and how many mutated scene files, ended worse than by an answer or a refusal."""
+    """Return how many random calls, and how many mutated scene files, ended worse than by an answer
+    or a refusal.
+    """
     found = []
     with tempfile.TemporaryDirectory() as name, warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -47,7 +53,12 @@ def fuzzed(count: int) -> list[Figure]:
             model = drops.falling(*size)
             faults = call_fuzz.fuzz(call_fuzz.targets(model, folder), count, seed=12)
             found.append(
-                Figure(f"{model.name}: {count} calls: faults", len(faults), 0, "; ".join(map(str, faults[:3])))
+                Figure(
+                    f"{model.name}: {count} calls: faults",
+                    len(faults),
+                    0,
+                    "; ".join(map(str, faults[:3])),
+                )
             )
         files, model = sorted((ROOT / "scenes").glob("*.toml")), drops.falling(3, 4)
         scenes = scene_fuzz.faults(files, count, random.Random(13), folder, model)
@@ -91,11 +102,16 @@ def main() -> int:
     OUTPUT.mkdir(parents=True, exist_ok=True)
     rows = {name: [figure.row() for figure in figures] for name, figures in found.items()}
     (OUTPUT / "report.json").write_text(json.dumps(rows, indent=1, default=float))
-    text = "\n\n".join(["# Stress", *(f"## {name}\n\n{table(figures)}" for name, figures in found.items())])
+    text = "\n\n".join(
+        ["# Stress", *(f"## {name}\n\n{table(figures)}" for name, figures in found.items())]
+    )
     (OUTPUT / "report.md").write_text(text + "\n")
     stress_plots.draw(found, swept, OUTPUT)
     failed = [figure for figures in found.values() for figure in figures if not figure.passed]
-    print(f"{sum(map(len, found.values()))} figures, {len(failed)} beyond their limits; {OUTPUT / 'report.md'}")
+    print(
+        f"{sum(map(len, found.values()))} figures, {len(failed)} beyond their limits; "
+        f"{OUTPUT / 'report.md'}"
+    )
     for figure in failed:
         print(f"  {figure}")
     return 1 if failed else 0

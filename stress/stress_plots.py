@@ -26,12 +26,16 @@ def bends(swept: list[Point]) -> Page:
     page = Page(figsize=(8, 6), layout="constrained")
     tails = list(dict.fromkeys(p.tail for p in swept))
     places = sorted({p.bend for p in swept})
-    for axes, tail in zip(page.subplots(len(tails), 1, sharex=True, sharey=True), tails, strict=True):
+    for axes, tail in zip(
+        page.subplots(len(tails), 1, sharex=True, sharey=True), tails, strict=True
+    ):
         points = [p for p in swept if p.tail == tail]
         for name, marker in (("H", "o"), ("C", "s"), ("per_condition", "^")):
             found = [max(getattr(p.errors, name), 1e-18) for p in points]
             words = "v_dot / cond(H)" if name == "per_condition" else name
-            axes.plot([places.index(p.bend) for p in points], found, marker, label=words, markersize=5)
+            axes.plot(
+                [places.index(p.bend) for p in points], found, marker, label=words, markersize=5
+            )
         axes.set(yscale="log", title=tail, ylabel="error against 30 digits")
         axes.grid(axis="x", color="0.9")
     axes.set_xticks(range(len(places)), [f"{bend:.3g}" for bend in places], rotation=60)
@@ -48,7 +52,12 @@ def conditions(found: dict[str, list[Figure]]) -> Page:
         solved = [f for f in figures if f.note.startswith("cond(H)")]
         numbers = [float(f.note.split()[1]) for f in solved]
         if solved:
-            axes.plot(numbers, [max(c * f.found, 1e-18) for c, f in zip(numbers, solved, strict=True)], ".", label=part)
+            axes.plot(
+                numbers,
+                [max(c * f.found, 1e-18) for c, f in zip(numbers, solved, strict=True)],
+                ".",
+                label=part,
+            )
     ends = np.array([1, max(10, axes.get_xlim()[1])])
     axes.plot(ends, PER_CONDITION * ends, "k--", label="5e-15 cond(H)")
     axes.set(xscale="log", yscale="log", xlabel="cond(H), unit diagonal", ylabel="error of v_dot")
@@ -66,7 +75,11 @@ def margins(found: dict[str, list[Figure]]) -> Page:
         shares = [max(f.found / f.limit, LEAST) for f in found[name] if f.limit > 0]
         axes.plot(shares, [row] * len(shares), "|", markersize=10)
     axes.axvline(1, color="k", linestyle="--")
-    axes.set(xscale="log", xlabel=f"found / limit (left edge: {LEAST:g} or less)", yticks=range(len(names)))
+    axes.set(
+        xscale="log",
+        xlabel=f"found / limit (left edge: {LEAST:g} or less)",
+        yticks=range(len(names)),
+    )
     axes.set(xlim=(LEAST / 2, 3), yticklabels=names)
     axes.invert_yaxis()
     return page

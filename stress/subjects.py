@@ -1,4 +1,6 @@
-"""Subjects: a tail's sizes and parameters go in; a generated model beside its exact reference comes out."""
+"""Subjects: a tail's sizes and parameters go in; a generated model beside its exact reference comes
+out.
+"""
 
 import warnings
 from dataclasses import dataclass
@@ -10,7 +12,12 @@ import serpentail as st
 from stress.figures import Figure
 from tests.references.exact_chain import ExactChain
 from tests.references.exact_continuum import ExactContinuum
-from tests.references.metrics import block_error, equilibrated_condition, force_error, mass_matrix_error
+from tests.references.metrics import (
+    block_error,
+    equilibrated_condition,
+    force_error,
+    mass_matrix_error,
+)
 from tests.support.models import model_folder
 
 FUNCTIONS = [
@@ -45,18 +52,24 @@ class Subject:
 
     @property
     def limit(self) -> float:
-        """Rounding of H, in the units of its diagonal: what one body adds, and a little for each of a long chain."""
+        """Rounding of H, in the units of its diagonal: what one body adds, and a little for each of
+        a long chain.
+        """
         return EPS * (64 + self.links)
 
     @property
     def solved_limit(self) -> float:
-        """Error of v_dot over cond(H): 5e-15, and more where hundreds of links add up their rounding."""
+        """Error of v_dot over cond(H): 5e-15, and more where hundreds of links add up their
+        rounding.
+        """
         return PER_CONDITION * (1 + self.links / 256)
 
 
 @dataclass(frozen=True)
 class Errors:
-    """Errors at one state, without units: of H, C and v_dot, and the condition number of H with a unit diagonal."""
+    """Errors at one state, without units: of H, C and v_dot, and the condition number of H with a
+    unit diagonal.
+    """
 
     H: float
     C: float
@@ -97,7 +110,9 @@ def changed(of: Subject, **parameters) -> Subject:
     return Subject(f"{of.name} {', '.join(parameters)}", model, exact_of(model))
 
 
-def state(of: Subject, rng, bends: np.ndarray, speeds=(2.0, 20.0, 10.0)) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def state(
+    of: Subject, rng, bends: np.ndarray, speeds=(2.0, 20.0, 10.0)
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return q, v, tau with these tail coordinates, everything else at random."""
     quaternion = rng.normal(size=4)
     q = np.concatenate([rng.uniform(-1, 1, 3), quaternion / np.linalg.norm(quaternion), bends])
@@ -112,15 +127,26 @@ def errors(of: Subject, q, v, tau) -> Errors:
     H = of.exact.mass_matrix(q)
     condition = equilibrated_condition(H)
     try:
-        found = of.model.mass_matrix(q), of.model.bias_force(q, v), of.model.forward_dynamics(q, v, tau)
+        found = (
+            of.model.mass_matrix(q),
+            of.model.bias_force(q, v),
+            of.model.forward_dynamics(q, v, tau),
+        )
     except st.StateError as refusal:
         return Errors(0.0, 0.0, 0.0, condition, str(refusal))
     C, v_dot = of.exact.bias_force(q, v), of.exact.forward_dynamics(q, v, tau)
-    return Errors(mass_matrix_error(found[0], H), force_error(found[1], C, H), block_error(found[2], v_dot), condition)
+    return Errors(
+        mass_matrix_error(found[0], H),
+        force_error(found[1], C, H),
+        block_error(found[2], v_dot),
+        condition,
+    )
 
 
 def judged(of: Subject, what: str, found: list[Errors], disparity: float = 1.0) -> list[Figure]:
-    """Return the largest errors of H, C and v_dot over cond(H) of some states; a disparity of moments widens limits."""
+    """Return the largest errors of H, C and v_dot over cond(H) of some states; a disparity of
+    moments widens limits.
+    """
     worst = max(found, key=lambda e: e.per_condition)
     told = f"cond(H) {worst.condition:.2g}"
     refused = [e.refused for e in found if e.refused]
@@ -128,5 +154,10 @@ def judged(of: Subject, what: str, found: list[Errors], disparity: float = 1.0) 
     return [
         Figure(f"{of.name}, {what}: H", max(e.H for e in found), of.limit * disparity, note),
         Figure(f"{of.name}, {what}: C", max(e.C for e in found), of.limit * disparity),
-        Figure(f"{of.name}, {what}: v_dot / cond(H)", worst.per_condition, of.solved_limit * disparity, told),
+        Figure(
+            f"{of.name}, {what}: v_dot / cond(H)",
+            worst.per_condition,
+            of.solved_limit * disparity,
+            told,
+        ),
     ]

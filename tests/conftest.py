@@ -3,4 +3,6 @@
 
 def pytest_addoption(parser):
     """Add the switch that accepts what the generator emits now as the golden models."""
-    parser.addoption("--update-golden", action="store_true", help="rewrite tests/golden from the generator")
+    parser.addoption(
+        "--update-golden", action="store_true", help="rewrite tests/golden from the generator"
+    )

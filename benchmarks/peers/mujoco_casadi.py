@@ -1,4 +1,6 @@
-"""MuJoCo and CasADi beside the generated forward dynamics: models go in, nanoseconds and ratios come out."""
+"""MuJoCo and CasADi beside the generated forward dynamics: models go in, nanoseconds and ratios
+come out.
+"""
 
 import ctypes
 import importlib.util
@@ -18,10 +20,13 @@ ROUNDS, CALLS = 200, 128
 
 
 def other_peers(folder: Path) -> list[dict]:
-    """Nanoseconds of forward dynamics beside MuJoCo's and CasADi's, rounds interleaved; ratios by minima (by medians).
+    """Nanoseconds of forward dynamics beside MuJoCo's and CasADi's, rounds interleaved; ratios by
+    minima (by medians).
 
-    MuJoCo: the full chain of 2 m n hinges, its inertia and bias by its own functions, reduced and solved as
-    Pinocchio's is (mujoco_chain.c).  CasADi: C of the generated SX function, gcc -O2 -march=native, CasADi's default.
+    MuJoCo: the full chain of 2 m n hinges, its inertia and bias by its own functions, reduced and
+    solved as
+    Pinocchio's is (mujoco_chain.c).  CasADi: C of the generated SX function, gcc -O2 -march=native,
+    CasADi's default.
     Targets: MuJoCo 11x; CasADi 1.25x (m = 1), 1.7x (3, 4).
     """
     library = mujoco_library(folder)
@@ -38,7 +43,9 @@ def row(folder: Path, size: tuple[int, int], library: ctypes.CDLL) -> dict:
     pointer = ctypes.cast(library.mujoco_forward_dynamics, ctypes.c_void_p).value
     others = {"mujoco": peers.Closure(pointer, chain)}
     if size in IN_CASADI:
-        others["casadi"] = derivatives.in_casadi("fd", acceleration(ours.model), ours.model, folder).closure
+        others["casadi"] = derivatives.in_casadi(
+            "fd", acceleration(ours.model), ours.model, folder
+        ).closure
     found = derivatives.compared(ours, others, states)
     found |= {name: "" for name in ("casadi_ns", "casadi_ratio") if name not in found}
     found["v_dot_difference"] = difference(library, chain, ours.model, states)
@@ -47,16 +54,22 @@ def row(folder: Path, size: tuple[int, int], library: ctypes.CDLL) -> dict:
 
 
 def acceleration(model) -> ca.Function:
-    """Return v_dot of (q, v, tau, parameters), and nothing second, as the timer's adapter wants two outputs."""
+    """Return v_dot of (q, v, tau, parameters), and nothing second, as the timer's adapter wants two
+    outputs.
+    """
     graph = derivatives.Graph(model)
     tau = ca.SX.sym("tau", graph.nt)
-    arguments = {name: ca.vertsplit(x) for name, x in (("q", graph.q), ("v", graph.v), ("tau", tau))}
+    arguments = {
+        name: ca.vertsplit(x) for name, x in (("q", graph.q), ("v", graph.v), ("tau", tau))
+    }
     v_dot = ca.vertcat(*graph.module.forward_dynamics(graph.fields, **arguments)["v_dot"])
     return graph.finished(tau, [v_dot, ca.SX.zeros(1)])
 
 
 def mujoco_library(folder: Path) -> ctypes.CDLL:
-    """Compile mujoco_chain.c against the installed MuJoCo; PeerUnavailable where that is not there."""
+    """Compile mujoco_chain.c against the installed MuJoCo; PeerUnavailable where that is not
+    there.
+    """
     found = importlib.util.find_spec("mujoco")
     if found is None:
         raise peers.PeerUnavailable("MuJoCo is not installed: pip install mujoco")
@@ -64,7 +77,15 @@ def mujoco_library(folder: Path) -> ctypes.CDLL:
     shared = next(home.glob("libmujoco.so.*"))
     target = folder / "mujoco_chain.so"
     source = Path(__file__).parent / "mujoco_chain.c"
-    flags = ["-O2", "-march=native", "-fPIC", "-shared", "-I", str(home / "include"), f"-Wl,-rpath,{home}"]
+    flags = [
+        "-O2",
+        "-march=native",
+        "-fPIC",
+        "-shared",
+        "-I",
+        str(home / "include"),
+        f"-Wl,-rpath,{home}",
+    ]
     subprocess.run(["gcc", *flags, str(source), str(shared), "-o", str(target)], check=True)
     library = ctypes.CDLL(str(target))
     library.mujoco_chain_new.restype = ctypes.c_void_p
@@ -81,13 +102,18 @@ def chain_xml(folder: Path, model) -> Path:
     for k in reversed(range(count)):
         place = words(p["tail_mount"]) if k == 0 else f"0 {-length!r} 0"
         body = (
-            f'<body pos="{place}"><joint axis="1 0 0"/><joint axis="0 0 1"/><inertial pos="0 {-length / 2!r} 0" '
+            f'<body pos="{place}"><joint axis="1 0 0"/><joint axis="0 0 1"/><inertial pos="0 '
+            f'{-length / 2!r} 0" '
             f'mass="{p["tail_mass"] / count!r}" diaginertia="{inertia}"/>{body}</body>'
         )
-    torso = f'<inertial pos="0 0 0" mass="{p["torso_mass"]!r}" diaginertia="{words(p["torso_inertia"])}"/>'
+    torso = (
+        f'<inertial pos="0 0 0" mass="{p["torso_mass"]!r}" '
+        f'diaginertia="{words(p["torso_inertia"])}"/>'
+    )
     path = folder / f"{model.name}.xml"
     path.write_text(
-        f'<mujoco><compiler angle="radian" balanceinertia="false"/><option gravity="0 0 {-p["gravity"]!r}"/>'
+        '<mujoco><compiler angle="radian" balanceinertia="false"/><option gravity="0 0 '
+        f'{-p["gravity"]!r}"/>'
         f"<worldbody><body><freejoint/>{torso}{body}</body></worldbody></mujoco>"
     )
     return path

@@ -1,7 +1,8 @@
-"""A model on the ground for MuJoCo: an articulated model and foot points go in, MJCF and its run time come out.
+"""A model on the ground for MuJoCo: an articulated model and foot points go in, MJCF and its run
+time come out.
 
-Not the same physics: contacts are MuJoCo's soft constraints with an elliptic cone, and the joints that share an angle
-are tied by soft equalities.  For the run time of a like scene alone.
+Not the same physics: contacts are MuJoCo's soft constraints with an elliptic cone, and the joints
+that share an angle are tied by soft equalities.  For the run time of a like scene alone.
 """
 
 import time
@@ -12,10 +13,14 @@ POINT = 5e-4  # m, radius of the spheres that touch the plane
 
 
 def mjcf(model, feet: np.ndarray, damping: float) -> str:
-    """Return MJCF of torso, foot points (n, 3) (m, torso frame), and a tail whose joints share segments' angles."""
+    """Return MJCF of torso, foot points (n, 3) (m, torso frame), and a tail whose joints share
+    segments' angles.
+    """
     p, count = model.parameters, model.segments * model.links
     length, mass = p["tail_length"] / count, p["tail_mass"] / count
-    spheres = "".join(f'<geom type="sphere" size="{POINT}" pos="{_text(x)}" mass="0"/>' for x in feet)
+    spheres = "".join(
+        f'<geom type="sphere" size="{POINT}" pos="{_text(x)}" mass="0"/>' for x in feet
+    )
     tail = ""
     for k in reversed(range(count)):
         place = p["tail_mount"] if k == 0 else (0, -length, 0)
@@ -23,7 +28,10 @@ def mjcf(model, feet: np.ndarray, damping: float) -> str:
             f'<joint name="{name}{k}" axis="{axis}" damping="{damping / model.links}"/>'
             for name, axis in (("a", "1 0 0"), ("b", "0 0 1"))
         )
-        inertia = f'<inertial pos="0 {-length / 2} 0" mass="{mass}" diaginertia="{_text(p["link_inertia"])}"/>'
+        inertia = (
+            f'<inertial pos="0 {-length / 2} 0" mass="{mass}" '
+            f'diaginertia="{_text(p["link_inertia"])}"/>'
+        )
         tip = f'<geom type="sphere" size="{POINT}" pos="0 {-length} 0" mass="0"/>'
         tail = f'<body pos="{_text(place)}">{joints}{inertia}{tip}{tail}</body>'
     ties = "".join(
@@ -32,7 +40,10 @@ def mjcf(model, feet: np.ndarray, damping: float) -> str:
         if k % model.links
         for name in "ab"
     )
-    torso = f'<inertial pos="0 0 0" mass="{p["torso_mass"]}" diaginertia="{_text(p["torso_inertia"])}"/>'
+    torso = (
+        f'<inertial pos="0 0 0" mass="{p["torso_mass"]}" '
+        f'diaginertia="{_text(p["torso_inertia"])}"/>'
+    )
     option = f'<option gravity="0 0 {-p["gravity"]}" integrator="implicitfast" cone="elliptic"/>'
     defaults = f'<default><geom friction="{p["mu"]} 0 0" contype="0" conaffinity="1"/></default>'
     ground = '<geom type="plane" size="9 9 1" contype="1" conaffinity="0"/>'
@@ -42,7 +53,9 @@ def mjcf(model, feet: np.ndarray, damping: float) -> str:
 
 
 def milliseconds(text: str, q, v, span: float, step: float) -> float:
-    """Return the least processor time (ms) of a run of `span` s at steps of `step` s, out of three."""
+    """Return the least processor time (ms) of a run of `span` s at steps of `step` s, out of
+    three.
+    """
     import mujoco
 
     model = mujoco.MjModel.from_xml_string(text)

@@ -1,7 +1,9 @@
-"""opty on the righting problem: a model, a start and a guess go in; seconds and how it ended come out.
+"""opty on the righting problem: a model, a start and a guess go in; seconds and how it ended come
+out.
 
-Needs opty and cyipopt, which ``make setup`` does not install.  cyipopt builds against the IPOPT that CasADi brings,
-given an ipopt.pc that names its folder; it finds that library at run time once CasADi has solved a program.
+Needs opty and cyipopt, which ``make setup`` does not install.  cyipopt builds against the IPOPT
+that CasADi brings, given an ipopt.pc that names its folder; it finds that library at run time once
+CasADi has solved a program.
 """
 
 import sys
@@ -23,20 +25,32 @@ TIME = sympy.Symbol("t")
 
 
 def solved(scene: Scene, guess: st.Trajectory, bounds: st.Bounds, smoothing: float) -> dict:
-    """Plan by opty (midpoint rule, no Hessian) from where the guess starts: upright and at rest where it ends.
+    """Plan by opty (midpoint rule, no Hessian) from where the guess starts: upright and at rest
+    where it ends.
 
-    Returns setup_s and solve_s, CPU seconds of this process (the C compiler's are not counted), and the status.
+    Returns setup_s and solve_s, CPU seconds of this process (the C compiler's are not counted), and
+    the status.
     """
     sys.setrecursionlimit(100_000)  # SymPy's: expressions are deep
     from opty import Problem
 
     nodes, duration = guess.q.shape[0], guess.t[-1]
-    q, v, tau = (_functions(name, part.shape[1]) for name, part in (("q", guess.q), ("v", guess.v), ("u", guess.tau)))
+    q, v, tau = (
+        _functions(name, part.shape[1])
+        for name, part in (("q", guess.q), ("v", guess.v), ("u", guess.tau))
+    )
     step, states = duration / (nodes - 1), q + v
-    at_start = [x.func(0) - float(value) for x, value in zip(states, (*guess.q[0], *guess.v[0]), strict=True)]
+    at_start = [
+        x.func(0) - float(value)
+        for x, value in zip(states, (*guess.q[0], *guess.v[0]), strict=True)
+    ]
     at_end = [x.func(duration) for x in (q[4], q[5], *v[3:6])]
-    limits = dict.fromkeys(tau, (-bounds.torque, bounds.torque)) | dict.fromkeys(q[7:], (-bounds.angle, bounds.angle))
-    weights = np.concatenate([np.zeros(len(states) - len(tau)), np.full(len(tau), smoothing), np.ones(len(tau))])
+    limits = dict.fromkeys(tau, (-bounds.torque, bounds.torque)) | dict.fromkeys(
+        q[7:], (-bounds.angle, bounds.angle)
+    )
+    weights = np.concatenate(
+        [np.zeros(len(states) - len(tau)), np.full(len(tau), smoothing), np.ones(len(tau))]
+    )
     weights = step * np.repeat((weights / UNIT) ** 2, nodes)
     begun = time.process_time()
     problem = Problem(
@@ -55,26 +69,44 @@ def solved(scene: Scene, guess: st.Trajectory, bounds: st.Bounds, smoothing: flo
     for option, value in (("max_iter", MOST), ("print_level", 0), ("sb", "yes")):
         problem.add_option(option, value)
     begun = time.process_time()
-    _, info = problem.solve(np.concatenate([guess.q.T.ravel(), guess.v.T.ravel(), guess.tau.T.ravel()]))
+    _, info = problem.solve(
+        np.concatenate([guess.q.T.ravel(), guess.v.T.ravel(), guess.tau.T.ravel()])
+    )
     spent = time.process_time() - begun
     return {"setup_s": setup, "solve_s": spent, "status": info["status_msg"].decode()}
 
 
 def equations(scene: Scene, q: list, v: list, tau: list) -> sympy.Matrix:
-    """q_dot and H v_dot + C - [0; tau], all of them zero, as SymPy's expressions of functions of time."""
+    """q_dot and H v_dot + C - [0; tau], all of them zero, as SymPy's expressions of functions of
+    time.
+    """
     inverse = program(CATALOGUE["inverse_dynamics"], tail_of(scene))
     sizes = {"q": len(q), "v": len(v), "v_dot": len(v)}
     plain = {name: sympy.symbols(f"{name}:{size}") for name, size in sizes.items()}
     numbers = Numbers(sympy, lambda x: sympy.Float(float(x)))
-    known = {name: [numbers.convert(x) for x in np.ravel(value)] for name, value in scene.parameters.items()} | plain
+    known = {
+        name: [numbers.convert(x) for x in np.ravel(value)]
+        for name, value in scene.parameters.items()
+    } | plain
     arrays = (*inverse.of_role("parameters"), *inverse.of_role("input"))
     (output,) = inverse.of_role("output")
     force = Run(inverse, numbers, {a.name: list(known[a.name]) for a in arrays}).values[output.name]
-    moving = dict(zip((*plain["q"], *plain["v"], *plain["v_dot"]), (*q, *v, *(x.diff(TIME) for x in v)), strict=True))
+    moving = dict(
+        zip(
+            (*plain["q"], *plain["v"], *plain["v_dot"]),
+            (*q, *v, *(x.diff(TIME) for x in v)),
+            strict=True,
+        )
+    )
     balance = [f.xreplace(moving) - load for f, load in zip(force, [0] * 6 + tau, strict=True)]
     scaled = [x if k < 3 else 1e3 * x for k, x in enumerate(balance)]  # N m are small here
     (w, x, y, z), (a, b, c) = q[3:7], v[3:6]
-    turn = [-x * a - y * b - z * c, w * a + y * c - z * b, w * b - x * c + z * a, w * c + x * b - y * a]
+    turn = [
+        -x * a - y * b - z * c,
+        w * a + y * c - z * b,
+        w * b - x * c + z * a,
+        w * c + x * b - y * a,
+    ]
     rates = [*v[:3], *(entry / 2 for entry in turn), *v[6:]]
     return sympy.Matrix([x.diff(TIME) - rate for x, rate in zip(q, rates, strict=True)] + scaled)
 

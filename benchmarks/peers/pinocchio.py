@@ -30,7 +30,8 @@ SHARED_FLAGS = ("-fPIC", "-shared")
 C_FLAGS = ("-std=gnu11", "-O2")
 CXX_FLAGS = (
     "-std=c++17",
-    "-fvisibility=hidden",  # no symbol is shared with a Pinocchio library of another ABI in this process
+    # no symbol is shared with a Pinocchio library of another ABI in this process
+    "-fvisibility=hidden",
     "-O3",
     "-march=native",
     "-DNDEBUG",
@@ -42,7 +43,8 @@ TUNED_FLAGS = (
     "--param=inline-unit-growth=400",
     "--param=large-function-growth=2000",
 )
-# What the C++ source includes: a file of the headers, the distribution it comes with, the folder to search.
+# What the C++ source includes: a file of the headers, the distribution it comes with, the folder
+# to search.
 HEADERS = (
     ("pinocchio/multibody.hpp", "libpinocchio", "cmeel.prefix/include"),  # from release 4 on
     ("boost/variant.hpp", "cmeel-boost", "cmeel.prefix/include"),
@@ -80,7 +82,9 @@ class States(NamedTuple):
 
 
 def build_library(source: Path, output_dir: Path) -> Path:
-    """Compile a .c or .cpp file to a shared library, unless output_dir has it; PeerUnavailable says why not."""
+    """Compile a .c or .cpp file to a shared library, unless output_dir has it; PeerUnavailable says
+    why not.
+    """
     source, output_dir = Path(source), Path(output_dir)
     compiler, flags = _toolchain(source)
     texts = [path.read_text() for path in (source, *sorted(source.parent.glob("*.hpp")))]
@@ -95,7 +99,9 @@ def build_library(source: Path, output_dir: Path) -> Path:
 
 
 class PinocchioBench:
-    """The articulated tail in Pinocchio: v_dot, H and C of one state, and closures for the timer."""
+    """The articulated tail in Pinocchio: v_dot, H and C of one state, and closures for the
+    timer.
+    """
 
     def __init__(self, segments: int, links: int, parameters: Mapping, library: Path | None = None):
         """Build the chain from parameters by name (SI), link_inertia among them."""
@@ -104,7 +110,9 @@ class PinocchioBench:
         values = np.hstack([parameters[name] for name in PARAMETERS])
         self._chain = self._library.pinocchio_chain_new(segments, links, _pointer(values))
         if not self._chain:
-            raise PeerUnavailable(f"Pinocchio could not build a chain of {segments} x {links} links.")
+            raise PeerUnavailable(
+                f"Pinocchio could not build a chain of {segments} x {links} links."
+            )
 
     @property
     def closure(self) -> Closure:
@@ -118,7 +126,9 @@ class PinocchioBench:
 
     @property
     def derivatives_closure(self) -> Closure:
-        """The path to the Jacobians of v_dot through computeRNEADerivatives; of PLAIN and DERIVATIVES."""
+        """The path to the Jacobians of v_dot through computeRNEADerivatives; of PLAIN and
+        DERIVATIVES.
+        """
         return self._closure("pinocchio_forward_dynamics_derivatives")
 
     @property
@@ -127,7 +137,9 @@ class PinocchioBench:
         return self._closure("pinocchio_forward_dynamics_derivatives_own")
 
     def forward_dynamics_derivatives(self, q, v, tau, path: str = "") -> tuple[np.ndarray, ...]:
-        """Jacobians of v_dot, all relative to the torso: dq (nv, nv), dv (nv, nv), dtau (nv, nv - 6); path: "_own"."""
+        """Jacobians of v_dot, all relative to the torso: dq (nv, nv), dv (nv, nv), dtau (nv, nv -
+        6); path: "_own".
+        """
         self._call(f"pinocchio_forward_dynamics_derivatives{path}", (self.nv,), q, v, tau)
         results = tuple(np.empty((self.nv, columns)) for columns in (self.nv, self.nv, self.nv - 6))
         self._library.pinocchio_derivatives_result(self._chain, *map(_pointer, results))
@@ -163,7 +175,9 @@ class PinocchioBench:
         self.close()
 
     def _closure(self, name: str) -> Closure:
-        return Closure(ctypes.cast(getattr(self._library, name), ctypes.c_void_p).value, self._chain)
+        return Closure(
+            ctypes.cast(getattr(self._library, name), ctypes.c_void_p).value, self._chain
+        )
 
     def _call(self, name: str, shape: tuple[int, ...], *inputs) -> np.ndarray:
         arrays = [np.ascontiguousarray(x, dtype=float) for x in inputs]
@@ -173,12 +187,18 @@ class PinocchioBench:
         return out
 
 
-def time_rounds(closures: Sequence[Closure], states: States, rounds: int, calls: int) -> list[tuple[float, float]]:
-    """(minimum, median) over the rounds of the ns per call of each closure, in rounds A B C, A B C, ..."""
+def time_rounds(
+    closures: Sequence[Closure], states: States, rounds: int, calls: int
+) -> list[tuple[float, float]]:
+    """(minimum, median) over the rounds of the ns per call of each closure, in rounds A B C, A B C,
+    ...
+    """
     arrays = States(*(np.ascontiguousarray(x, dtype=float) for x in states))
     count = len(arrays.q)
     if not closures or min(rounds, calls, count) < 1 or any(len(x) != count for x in arrays):
-        raise ValueError("closures, rounds, calls and states: one at least, and as many q as v and tau")
+        raise ValueError(
+            "closures, rounds, calls and states: one at least, and as many q as v and tau"
+        )
     both = np.empty((2, len(closures)))
     failures = _timer().time_rounds(
         len(closures),
@@ -189,7 +209,9 @@ def time_rounds(closures: Sequence[Closure], states: States, rounds: int, calls:
         *map(_pointer, both),
     )
     if failures:
-        raise RuntimeError("out of memory" if failures < 0 else f"{failures} calls reported a failure")
+        raise RuntimeError(
+            "out of memory" if failures < 0 else f"{failures} calls reported a failure"
+        )
     return [(float(least), float(median)) for least, median in both.T]
 
 
@@ -239,7 +261,11 @@ def _declared(path: Path) -> ctypes.CDLL:
     library.pinocchio_chain_new.argtypes = [ctypes.c_int, ctypes.c_int, ctypes.c_void_p]
     library.pinocchio_chain_free.restype = None
     pointers = {"chain_free": 1, "mass_matrix": 3, "bias_force": 4}
-    pointers |= {"forward_dynamics": 5, "forward_dynamics_crba": 5, "forward_dynamics_derivatives": 5}
+    pointers |= {
+        "forward_dynamics": 5,
+        "forward_dynamics_crba": 5,
+        "forward_dynamics_derivatives": 5,
+    }
     pointers |= {"forward_dynamics_derivatives_own": 5, "derivatives_result": 4}
     for name in (name for name in pointers if hasattr(library, f"pinocchio_{name}")):
         getattr(library, f"pinocchio_{name}").argtypes = [ctypes.c_void_p] * pointers[name]
@@ -268,7 +294,9 @@ def _compiler(variable: str, programs: Sequence[str]) -> tuple[str, ...]:
         if shutil.which(command[0]):
             return tuple(command)
     sought = asked[0] if asked else ", ".join(programs)
-    raise PeerUnavailable(f"No compiler found ({sought}): install g++, or set {variable} to a command.")
+    raise PeerUnavailable(
+        f"No compiler found ({sought}): install g++, or set {variable} to a command."
+    )
 
 
 def _header_folder(header: str, distribution: str, folder: str) -> Path:

@@ -1,4 +1,6 @@
-"""SoRoMoX (JAX) beside the continuum's forward dynamics: sizes go in, nanoseconds and ratios come out."""
+"""SoRoMoX (JAX) beside the continuum's forward dynamics: sizes go in, nanoseconds and ratios come
+out.
+"""
 
 import importlib.util
 import math
@@ -19,10 +21,13 @@ ABSENT = "SoRoMoX is not installed, and left out: .venv/bin/pip install --editab
 
 
 def continuum_peer(folder: Path) -> list[dict]:
-    """Nanoseconds of a continuum's forward dynamics beside SoRoMoX's, one state, double, rounds interleaved.
+    """Nanoseconds of a continuum's forward dynamics beside SoRoMoX's, one state, double, rounds
+    interleaved.
 
-    SoRoMoX: floating, constant curvature, bending alone, five Gauss points a segment, jax.jit on the CPU; one call from
-    Python, and one inside a compiled loop, where Python costs nothing. The models differ: its rod has no torso and its
+    SoRoMoX: floating, constant curvature, bending alone, five Gauss points a segment, jax.jit on
+    the CPU; one call from
+    Python, and one inside a compiled loop, where Python costs nothing. The models differ: its rod
+    has no torso and its
     state derivative has the rates of q, too. Target: 100x.
     """
     if importlib.util.find_spec("soromox") is None:
@@ -33,7 +38,10 @@ def continuum_peer(folder: Path) -> list[dict]:
 
 def row(folder: Path, segments: int) -> dict:
     """Return the figures of one tail."""
-    ours, states = fixture(generated(folder / "speed", segments), folder / "speed"), peers.random_states(segments)
+    ours, states = (
+        fixture(generated(folder / "speed", segments), folder / "speed"),
+        peers.random_states(segments),
+    )
     call, loop = compiled(robot(ours), states)
     times = []
     for _ in range(ROUNDS):
@@ -43,7 +51,9 @@ def row(folder: Path, segments: int) -> dict:
     found = {"model": label(segments, None), "ns": least[0]}
     for k, name in enumerate(("SoRoMoX, a call", "in a compiled loop"), 1):
         found[f"{name}, ns"] = least[k]
-        found[f"{name}: times slower"] = f"{least[k] / least[0]:.0f}x ({median[k] / median[0]:.0f}x)"
+        found[f"{name}: times slower"] = (
+            f"{least[k] / least[0]:.0f}x ({median[k] / median[0]:.0f}x)"
+        )
     return found
 
 
@@ -64,13 +74,19 @@ def robot(ours: Fixture):
         radius=RADIUS,
         stiffness=np.zeros((6, 6)),
     )
-    structure = PCSStructure(strain_selector=jax.numpy.array([False, True, True, False, False, False] * segments))
+    structure = PCSStructure(
+        strain_selector=jax.numpy.array([False, True, True, False, False, False] * segments)
+    )
     gravity = jax.numpy.array([0.0, 0.0, -p["gravity"]])
-    return PCS.from_links([link] * segments, structure=structure, gravity=gravity, floating_base=True)
+    return PCS.from_links(
+        [link] * segments, structure=structure, gravity=gravity, floating_base=True
+    )
 
 
 def compiled(rod, states: peers.States) -> tuple[Callable, Callable]:
-    """Return calls of the rod's compiled dynamics: of one state; of LOOP states, one after the other."""
+    """Return calls of the rod's compiled dynamics: of one state; of LOOP states, one after the
+    other.
+    """
     import jax
 
     bends, length = states.q[:LOOP, 7:], float(rod.segment_length[0])

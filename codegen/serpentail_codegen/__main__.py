@@ -1,4 +1,6 @@
-"""Command line of the generator: a scene file, or a tail and its sizes, go in; a generated folder comes out."""
+"""Command line of the generator: a scene file, or a tail and its sizes, go in; a generated folder
+comes out.
+"""
 
 import argparse
 import sys
@@ -14,7 +16,10 @@ def parser() -> argparse.ArgumentParser:
     """Return the argument parser."""
     p = argparse.ArgumentParser(prog="python -m serpentail_codegen", description=__doc__)
     p.add_argument(
-        "scene", nargs="?", type=Path, help="scene file (TOML); leave out and give --tail, --segments, --links"
+        "scene",
+        nargs="?",
+        type=Path,
+        help="scene file (TOML); leave out and give --tail, --segments, --links",
     )
     p.add_argument("--tail", choices=KINDS, help="tail of a model without a scene file")
     p.add_argument("--segments", type=int, help="m")
@@ -24,13 +29,19 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--emission", help="auto, straight, loops, lanes or segments")
     p.add_argument("--profile", help="fast, or reproducible: the same bits on every machine")
     p.add_argument("--baked", action="store_true", help="fold the parameters into the code")
-    p.add_argument("--output", type=Path, default=Path("generated"), help="parent of the generated folder")
+    p.add_argument(
+        "--output", type=Path, default=Path("generated"), help="parent of the generated folder"
+    )
     return p
 
 
 def scene_of(arguments: argparse.Namespace):
     """Return the scene that the arguments describe."""
-    chosen = {name: getattr(arguments, name) for name in ("real", "emission", "profile") if getattr(arguments, name)}
+    chosen = {
+        name: getattr(arguments, name)
+        for name in ("real", "emission", "profile")
+        if getattr(arguments, name)
+    }
     if arguments.functions:
         names = arguments.functions
         chosen["functions"] = names if names == "all" else names.split(",")

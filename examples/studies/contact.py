@@ -1,4 +1,5 @@
-"""The paper's motions on the ground (Sects. 4 and 4.4): scenes go in; films, plots, trajectories and a table come out.
+"""The paper's motions on the ground (Sects. 4 and 4.4): scenes go in; films, plots, trajectories
+and a table come out.
 
 Usage: python -m examples.studies.contact [FOLDER], by default output/studies/contact
 """
@@ -21,14 +22,26 @@ SCENES = {  # the moments (s) that films show
     "self_recovery_continuum": (0.0, 0.25, 0.4, 0.5, 0.6, 0.75, 1.0, 1.3, 2.5),
 }
 PASSIVE = {"controller": {"kind": "damping", "damping": 1e-3}}
-# What must not stand: the same motions with the tail through the ground, and with one that only damps.
+# What must not stand: the same motions with the tail through the ground, and with one that only
+# damps.
 CONTRASTS = {
     f"{scene}, {words}": (scene, without, changes)
     for scene in SCENES
     if scene != "kick"
-    for words, without, changes in (("tail through the ground", "tail", {}), ("passive tail", None, PASSIVE))
+    for words, without, changes in (
+        ("tail through the ground", "tail", {}),
+        ("passive tail", None, PASSIVE),
+    )
 }
-SHOWN = ("take_off_s", "apex_m", "com_rise_m", "recontact_s", "pitch_at_end_rad", "upright_end", "standing_end")
+SHOWN = (
+    "take_off_s",
+    "apex_m",
+    "com_rise_m",
+    "recontact_s",
+    "pitch_at_end_rad",
+    "upright_end",
+    "standing_end",
+)
 SHOWN += ("peak_foot_force_N", "steps", "real_time_factor")
 DROPS, DROPPED = 20, 3.0  # random drops, and for how long (s)
 
@@ -40,7 +53,14 @@ def generated(scene: str, folder: Path, without: str | None) -> tuple[Path, Path
     source = folder / "scenes" / f"{name}.toml"
     source.parent.mkdir(parents=True, exist_ok=True)
     source.write_text(text.replace(f', "{without}"', "") if without else text, encoding="utf-8")
-    command = [sys.executable, "-m", "serpentail_codegen", str(source), "--output", str(folder / "generated")]
+    command = [
+        sys.executable,
+        "-m",
+        "serpentail_codegen",
+        str(source),
+        "--output",
+        str(folder / "generated"),
+    ]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
     return source, folder / "generated" / name
 
@@ -57,15 +77,24 @@ def drops(folder: Path) -> list[dict]:
     source, made = generated("self_recovery", folder, None)
     scene = st.scenario(source, made)
     model, rows = scene.model, []
-    weight = (model.parameters["torso_mass"] + model.parameters["tail_mass"]) * model.parameters["gravity"]
+    weight = (model.parameters["torso_mass"] + model.parameters["tail_mass"]) * model.parameters[
+        "gravity"
+    ]
     for seed in range(DROPS):
         random = np.random.default_rng(seed)
-        q = np.concatenate([[0, 0, 0.15], random.normal(size=4), random.uniform(-0.3, 0.3, 2 * model.segments)])
+        q = np.concatenate(
+            [[0, 0, 0.15], random.normal(size=4), random.uniform(-0.3, 0.3, 2 * model.segments)]
+        )
         v = random.uniform(-3, 3, model.nv) * np.where(np.arange(model.nv) < 3, 0.1, 1)
-        fall = st.simulate(model, q, v, controller=st.Damping(1e-3), legs=scene.legs, t_span=DROPPED, rtol=1e-5)
+        fall = st.simulate(
+            model, q, v, controller=st.Damping(1e-3), legs=scene.legs, t_span=DROPPED, rtol=1e-5
+        )
         forces = fall.contact.forces
         rows.append({"seed": seed, "speed_m_s": float(np.linalg.norm(fall.v[-1, :3]))})
-        rows[-1] |= {"load_over_weight": float(forces[-1, :, 2].sum() / weight), "steps": fall.info["steps"]}
+        rows[-1] |= {
+            "load_over_weight": float(forces[-1, :, 2].sum() / weight),
+            "steps": fall.info["steps"],
+        }
         rows[-1] |= {"least_normal_force_N": float(forces[..., 2].min())}
         rows[-1] |= {"cpu_s": fall.info["cpu_seconds"]}
     return rows
@@ -75,7 +104,9 @@ def table(rows: dict[str, dict]) -> str:
     """Return summaries as a Markdown table."""
     lines = [f"| scene | {' | '.join(SHOWN)} |", "|---" * (len(SHOWN) + 1) + "|"]
     for name, row in rows.items():
-        cells = [f"{x:.4g}" if isinstance(x, float) else str(x) for x in (row[key] for key in SHOWN)]
+        cells = [
+            f"{x:.4g}" if isinstance(x, float) else str(x) for x in (row[key] for key in SHOWN)
+        ]
         lines.append(f"| {name} | {' | '.join(cells)} |")
     return "\n".join(lines)
 
@@ -97,12 +128,18 @@ def main(folder: Path) -> None:
     loads = [row["load_over_weight"] for row in fallen]
     carried = f"{min(loads):.3f} to {max(loads):.3f} weights carried"
     print(f"{DROPS} random drops, after {DROPPED} s: at most {slowest:.2g} m/s, rolling; {carried}")
-    (folder / "contact.json").write_text(json.dumps({"scenes": rows, "drops": fallen}, indent=1), encoding="utf-8")
+    (folder / "contact.json").write_text(
+        json.dumps({"scenes": rows, "drops": fallen}, indent=1), encoding="utf-8"
+    )
     print(f"Films (*_film.png), plots (*_time.png) and trajectories (*.npz): {folder}")
 
 
 if __name__ == "__main__":
     try:
-        main(Path(sys.argv[1]).absolute() if sys.argv[1:] else ROOT / "output" / "studies" / "contact")
+        main(
+            Path(sys.argv[1]).absolute()
+            if sys.argv[1:]
+            else ROOT / "output" / "studies" / "contact"
+        )
     except st.SerpentailError as error:
         sys.exit(str(error))

@@ -1,4 +1,5 @@
-"""The paper's comparison of tail models (Sect. 4.1): one motion by both tails goes in; Fig. 8 and its cost come out.
+"""The paper's comparison of tail models (Sect. 4.1): one motion by both tails goes in; Fig. 8 and
+its cost come out.
 
 Usage: python -m examples.studies.models [FOLDER], by default output/studies/models
 """
@@ -36,7 +37,9 @@ WORDS = {
 
 
 def com_directions(steps: int = STEPS) -> np.ndarray:
-    """Return the tail COM's direction theta_com (steps + 1,), rad, at equal times: 0 to atan(pi / 2), a cubic."""
+    """Return the tail COM's direction theta_com (steps + 1,), rad, at equal times: 0 to atan(pi /
+    2), a cubic.
+    """
     s = np.linspace(0, 1, steps + 1)
     return FULL_TURN * (3 * s**2 - 2 * s**3)
 
@@ -47,9 +50,13 @@ def arc_direction(bend: np.ndarray) -> np.ndarray:
 
 
 def chain_direction(bend: np.ndarray, links: int) -> np.ndarray:
-    """Return theta_com (rad) of equal links that are bent by `bend` (rad) in all, each by bend / n."""
+    """Return theta_com (rad) of equal links that are bent by `bend` (rad) in all, each by bend /
+    n.
+    """
     angles = np.multiply.outer(bend, np.arange(1, links + 1) / links)
-    reach = links + 0.5 - np.arange(1, links + 1)  # how often a link counts: in itself half, in each one after it
+    reach = (
+        links + 0.5 - np.arange(1, links + 1)
+    )  # how often a link counts: in itself half, in each one after it
     return np.arctan2(np.sin(angles) @ reach, np.cos(angles) @ reach)
 
 
@@ -64,7 +71,9 @@ def bend_towards(direction: Callable, targets: np.ndarray) -> np.ndarray:
 
 
 def yaw_motion(model: st.Model) -> np.ndarray:
-    """Return the torso's yaw phi_z (STEPS + 1,), deg, in Sect. 4.1's motion of a tail of one segment."""
+    """Return the torso's yaw phi_z (STEPS + 1,), deg, in Sect. 4.1's motion of a tail of one
+    segment.
+    """
     if model.links is None:
         return torso_yaw(model, bend_towards(arc_direction, com_directions()))
     bends = bend_towards(lambda bend: chain_direction(bend, model.links), com_directions())
@@ -72,9 +81,11 @@ def yaw_motion(model: st.Model) -> np.ndarray:
 
 
 def torso_yaw(model: st.Model, angles: np.ndarray) -> np.ndarray:
-    """Return the yaw (K,), deg, of a torso at zero momentum whose tail takes the yaw coordinates (K,), rad, in turn.
+    """Return the yaw (K,), deg, of a torso at zero momentum whose tail takes the yaw coordinates
+    (K,), rad, in turn.
 
-    Zero momentum is H_bb v_b + H_bt q_t_dot = 0 (upper rows of Eq. 1): the path alone matters, not its timing.
+    Zero momentum is H_bb v_b + H_bt q_t_dot = 0 (upper rows of Eq. 1): the path alone matters, not
+    its timing.
     """
     q = np.zeros((len(angles) - 1, model.nq))
     q[:, 3], q[:, 8] = 1.0, (angles[1:] + angles[:-1]) / 2
@@ -89,28 +100,52 @@ def torso_yaw(model: st.Model, angles: np.ndarray) -> np.ndarray:
 
 
 def made(folder: Path, links: int | None) -> Path:
-    """Generate one segment of so many links, or a continuum for None; return the generated folder."""
+    """Generate one segment of so many links, or a continuum for None; return the generated
+    folder.
+    """
     tail = ["--tail", "articulated", "--links", str(links)] if links else ["--tail", "continuum"]
-    options = ["--segments", "1", "--functions", "mass_matrix,forward_dynamics", "--output", str(folder)]
-    subprocess.run([sys.executable, "-m", "serpentail_codegen", *tail, *options], check=True, stdout=subprocess.DEVNULL)
+    options = [
+        "--segments",
+        "1",
+        "--functions",
+        "mass_matrix,forward_dynamics",
+        "--output",
+        str(folder),
+    ]
+    subprocess.run(
+        [sys.executable, "-m", "serpentail_codegen", *tail, *options],
+        check=True,
+        stdout=subprocess.DEVNULL,
+    )
     return folder / (f"articulated_m1_n{links}" if links else "continuum_m1")
 
 
 def load_all(folder: Path) -> dict[int | None, Fixture]:
-    """Generate, compile and load every tail; the key is its number of links, None for the continuum."""
+    """Generate, compile and load every tail; the key is its number of links, None for the
+    continuum.
+    """
     tails = {}
     for done, links in enumerate((None, *LINKS), 1):
         name = f"articulated, n = {links}" if links else "continuum"
-        print(f"\r  generate and compile {done}/{len(LINKS) + 1}: {name:<24}", end="", file=sys.stderr, flush=True)
+        print(
+            f"\r  generate and compile {done}/{len(LINKS) + 1}: {name:<24}",
+            end="",
+            file=sys.stderr,
+            flush=True,
+        )
         tails[links] = fixture(made(folder, links), folder)
     print(file=sys.stderr)
     return tails
 
 
 def measure(tails: dict[int | None, Fixture]) -> dict:
-    """Return yaw, differences and run times of all tails, in plain numbers: what summary.json holds."""
+    """Return yaw, differences and run times of all tails, in plain numbers: what summary.json
+    holds.
+    """
     print("  move and time", file=sys.stderr, flush=True)
-    times = peers.time_rounds([tail.closure for tail in tails.values()], peers.random_states(1), ROUNDS, CALLS)
+    times = peers.time_rounds(
+        [tail.closure for tail in tails.values()], peers.random_states(1), ROUNDS, CALLS
+    )
     nanoseconds = {links: least for links, (least, _) in zip(tails, times, strict=True)}
     continuum = yaw_motion(tails[None].model)
     return {
@@ -123,7 +158,9 @@ def measure(tails: dict[int | None, Fixture]) -> dict:
 
 
 def row(model: st.Model, continuum_yaw: float) -> dict:
-    """Return what one articulated tail contributes to Fig. 8b, and how its forward dynamics is emitted."""
+    """Return what one articulated tail contributes to Fig. 8b, and how its forward dynamics is
+    emitted.
+    """
     yaw, thin = (yaw_motion(each)[-1] for each in (model, model.with_parameters(link_inertia=THIN)))
     emission = model.manifest["functions"]["forward_dynamics"]["emission"]
     differences = {"difference": yaw - continuum_yaw, "thin_difference": thin - continuum_yaw}
@@ -141,7 +178,10 @@ def table(study: dict) -> str:
     ]
     for r in study["articulated"]:
         differences = f"{r['difference']:9.4f}   {r['thin_difference']:9.4f}"
-        lines.append(f"{r['links']:6d}   {r['yaw']:9.3f}  {differences}  {r['ns']:5.0f}   {r['ns'] / arc['ns']:9.2f}x")
+        lines.append(
+            f"{r['links']:6d}   {r['yaw']:9.3f}  {differences}  {r['ns']:5.0f}   "
+            f"{r['ns'] / arc['ns']:9.2f}x"
+        )
     return "\n".join(lines)
 
 
@@ -158,6 +198,8 @@ def main(folder: Path) -> None:
 
 if __name__ == "__main__":
     try:
-        main(Path(sys.argv[1]).absolute() if sys.argv[1:] else ROOT / "output" / "studies" / "models")
+        main(
+            Path(sys.argv[1]).absolute() if sys.argv[1:] else ROOT / "output" / "studies" / "models"
+        )
     except (st.SerpentailError, peers.PeerUnavailable) as error:
         sys.exit(str(error))

@@ -1,4 +1,6 @@
-"""Figures of the comparison of tail models: its summary goes in, Fig. 8 and a diagram of cost go out as files."""
+"""Figures of the comparison of tail models: its summary goes in, Fig. 8 and a diagram of cost go
+out as files.
+"""
 
 import math
 from pathlib import Path
@@ -11,7 +13,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 GRID = {"color": "#e6e6e6", "linewidth": 0.6}
-AS_BUILT = {"color": TAIL, "marker": "o", "markersize": 4, "label": "links with their own inertia (as in the paper)"}
+AS_BUILT = {
+    "color": TAIL,
+    "marker": "o",
+    "markersize": 4,
+    "label": "links with their own inertia (as in the paper)",
+}
 THIN = {
     "color": HEAD,
     "marker": "s",
@@ -28,12 +35,16 @@ LABELS = dict.fromkeys((1, 3, 4, 6, 8, 12, 16, 24, 32, 64, 128, 256), (-7, -1)) 
 
 
 def draw_figure_8(study: dict, path: Path) -> Path:
-    """Draw (a) the torso's yaw over time and (b) the final difference over the number of links; return the path."""
+    """Draw (a) the torso's yaw over time and (b) the final difference over the number of links;
+    return the path.
+    """
     return write(path, lambda: _figure_8(study))
 
 
 def draw_cost(study: dict, path: Path) -> Path:
-    """Draw the time of one forward dynamics over the difference of final yaw, n at each mark; return the path."""
+    """Draw the time of one forward dynamics over the difference of final yaw, n at each mark;
+    return the path.
+    """
     return write(path, lambda: _cost(study))
 
 
@@ -55,7 +66,10 @@ def _motion(axes: "Axes", study: dict) -> None:
     """Fig. 8a, and its end enlarged."""
     curves = (
         (study["continuum"]["motion"], {"color": HEAD, "label": "continuum"}),
-        (study["motion_of_4_links"], {"color": TAIL, "linestyle": "--", "label": "articulated, $n = 4$"}),
+        (
+            study["motion_of_4_links"],
+            {"color": TAIL, "linestyle": "--", "label": "articulated, $n = 4$"},
+        ),
     )
     end = axes.inset_axes((0.12, 0.1, 0.36, 0.33), xlim=(0.9, 1.0), ylim=(-22.1, -20.9))
     for each in (axes, end):
@@ -63,7 +77,12 @@ def _motion(axes: "Axes", study: dict) -> None:
             each.plot(study["time"], curve, **style)
     _dress_inset(end, [curve[-1] for curve, _ in curves])
     axes.indicate_inset((0.9, -22.1, 0.1, 1.2), edgecolor=QUIET)
-    axes.set(xlabel="time / duration, $t / T$", ylabel=r"torso yaw $\phi_z$ [deg]", xlim=(0, 1.02), ylim=(-23.5, 1))
+    axes.set(
+        xlabel="time / duration, $t / T$",
+        ylabel=r"torso yaw $\phi_z$ [deg]",
+        xlim=(0, 1.02),
+        ylim=(-23.5, 1),
+    )
     axes.set_title("(a) one swing of the tail", fontsize=8, loc="left")
     axes.legend(loc="upper right")
 
@@ -74,8 +93,20 @@ def _dress_inset(axes: "Axes", ends: list[float]) -> None:
     axes.tick_params(labelsize=6, length=2)
     axes.set(xticks=[0.9, 0.95, 1.0], yticks=[-22, -21.5, -21])
     axes.grid(**GRID)
-    axes.annotate("", (0.994, ends[0]), (0.994, ends[1]), arrowprops={"arrowstyle": "<->", "shrinkA": 0, "shrinkB": 0})
-    axes.text(0.988, -21.6, f"{abs(ends[1] - ends[0]):.3f}\N{DEGREE SIGN}", ha="right", va="center", fontsize=6.5)
+    axes.annotate(
+        "",
+        (0.994, ends[0]),
+        (0.994, ends[1]),
+        arrowprops={"arrowstyle": "<->", "shrinkA": 0, "shrinkB": 0},
+    )
+    axes.text(
+        0.988,
+        -21.6,
+        f"{abs(ends[1] - ends[0]):.3f}\N{DEGREE SIGN}",
+        ha="right",
+        va="center",
+        fontsize=6.5,
+    )
 
 
 def _difference(axes: "Axes", study: dict) -> None:
@@ -89,7 +120,9 @@ def _difference(axes: "Axes", study: dict) -> None:
     axes.plot(links, [row["thin_difference"] for row in rows], **THIN)
     worst = min(rows, key=lambda row: row["difference"])
     axes.annotate(
-        f"{worst['difference']:.3f}\N{DEGREE SIGN} at $n = {worst['links']}$".replace("-", "\N{MINUS SIGN}", 1),
+        f"{worst['difference']:.3f}\N{DEGREE SIGN} at $n = {worst['links']}$".replace(
+            "-", "\N{MINUS SIGN}", 1
+        ),
         (worst["links"], worst["difference"]),
         textcoords="offset points",
         xytext=(12, -9),
@@ -97,7 +130,11 @@ def _difference(axes: "Axes", study: dict) -> None:
     axes.set_xscale("log", base=2)
     axes.set_xticks([2, 4, 8, 16, 32, 64], ["2", "4", "8", "16", "32", "64"])
     axes.xaxis.set_minor_locator(NullLocator())
-    axes.set(xlabel="links $n$", ylabel="final yaw, articulated\n\N{MINUS SIGN} continuum [deg]", ylim=(-0.5, 0.5))
+    axes.set(
+        xlabel="links $n$",
+        ylabel="final yaw, articulated\n\N{MINUS SIGN} continuum [deg]",
+        ylim=(-0.5, 0.5),
+    )
     axes.set_title("(b) difference of the final yaw", fontsize=8, loc="left")
     axes.legend(loc="upper right", fontsize=7)
 
@@ -130,7 +167,9 @@ def _cost(study: dict) -> "Figure":
     return figure
 
 
-def _joined_by_sign(differences: list[float], times: list[float]) -> tuple[list[float], list[float]]:
+def _joined_by_sign(
+    differences: list[float], times: list[float]
+) -> tuple[list[float], list[float]]:
     """Sizes of the differences and the times, with a gap wherever the sign changes."""
     x, y = [abs(differences[0])], [times[0]]
     for before, after, time in zip(differences, differences[1:], times[1:], strict=False):

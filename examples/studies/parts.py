@@ -1,4 +1,6 @@
-"""Parts of a study: what a part depends on and how to make it go in; what was made, kept as a JSON file, comes out."""
+"""Parts of a study: what a part depends on and how to make it go in; what was made, kept as a JSON
+file, comes out.
+"""
 
 import hashlib
 import json
@@ -19,7 +21,9 @@ def say(words: str) -> None:
 
 
 def part(path: Path, of: dict, make: Callable[[], dict | list]) -> dict | list:
-    """Return what the JSON file has if it was made of the same `of`, else make() and write it, whole or not at all."""
+    """Return what the JSON file has if it was made of the same `of`, else make() and write it,
+    whole or not at all.
+    """
     of = json.loads(json.dumps(of))
     try:
         found = json.loads(path.read_text())
@@ -35,8 +39,14 @@ def part(path: Path, of: dict, make: Callable[[], dict | list]) -> dict | list:
 
 
 def digest(*sources: Path) -> str:
-    """Return a hash of Python sources and templates, files or folders: what makes a part is what it depends on, too."""
-    inside = [p for source in sources for p in (sorted(source.rglob("*")) if source.is_dir() else [source])]
+    """Return a hash of Python sources and templates, files or folders: what makes a part is what it
+    depends on, too.
+    """
+    inside = [
+        p
+        for source in sources
+        for p in (sorted(source.rglob("*")) if source.is_dir() else [source])
+    ]
     files = [p for p in inside if p.suffix in (".py", ".jinja")]
     return hashlib.sha256(b"\0".join(p.read_bytes() for p in files)).hexdigest()[:16]
 

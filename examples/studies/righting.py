@@ -1,7 +1,10 @@
-"""Airborne righting (Sects. 4.2, 4.3): paper's problem and tails go in; Figs. 9 to 13, Table 2 and rates come out.
+"""Airborne righting (Sects. 4.2, 4.3): paper's problem and tails go in; Figs. 9 to 13, Table 2 and
+rates come out.
 
-Parts that were made once are kept in FOLDER/parts: a second run draws at once, one that was stopped goes on.
-Usage: python -m examples.studies.righting [FOLDER] [--starts 200], by default output/studies/righting
+Parts that were made once are kept in FOLDER/parts: a second run draws at once, one that was stopped
+goes on.
+Usage: python -m examples.studies.righting [FOLDER] [--starts 200], by default
+output/studies/righting
 """
 
 import argparse
@@ -16,7 +19,12 @@ import numpy as np
 import serpentail as st
 from examples import righting
 from examples.studies.parts import as_flight, as_lists, digest, part, say
-from examples.studies.righting_figures import draw_figure_10, draw_figure_11, draw_figure_13, draw_rates
+from examples.studies.righting_figures import (
+    draw_figure_10,
+    draw_figure_11,
+    draw_figure_13,
+    draw_rates,
+)
 
 FREQUENCIES = (20, 40, 60, 80, 100, 150, 200)  # Hz, nodes a second
 EXAMPLE = 4  # the random start of Fig. 11: both ways of planning converge on it
@@ -36,7 +44,10 @@ def name(segments: int, links: int | None) -> str:
 
 def models(folder: Path) -> dict[tuple, st.Model]:
     """Generate, where that was not done, and load the tails."""
-    of, found = {"generator": digest(righting.ROOT / "codegen"), "functions": righting.FUNCTIONS}, {}
+    of, found = (
+        {"generator": digest(righting.ROOT / "codegen"), "functions": righting.FUNCTIONS},
+        {},
+    )
     for size in (RAT, *TAILS, *MORE):
         make = partial(_content, folder, *size)
         part(folder / "kept" / f"model {name(*size)}.json", of, make)
@@ -57,7 +68,11 @@ class Study:
 
     def part(self, title: str, size: tuple, settings: dict, make) -> dict | list:
         """Return a part about one tail."""
-        of = {"model": self.rats[size].manifest["content_hash"], "program": self.program, "settings": settings}
+        of = {
+            "model": self.rats[size].manifest["content_hash"],
+            "program": self.program,
+            "settings": settings,
+        }
         return part(self.folder / "parts" / f"{title}.json", of, make)
 
     def film(self, size: tuple, flight: st.Trajectory, title: str) -> None:
@@ -79,17 +94,29 @@ def righted(study: Study) -> dict:
 
 def _righted(rat: st.Model) -> dict:
     start, limits = righting.kicked(rat), righting.bounds(rat)
-    plan = st.plan(rat, start=start, duration=(0.3, righting.FLIGHT), bounds=limits, retries=8, time_limit=LIMIT)
+    plan = st.plan(
+        rat,
+        start=start,
+        duration=(0.3, righting.FLIGHT),
+        bounds=limits,
+        retries=8,
+        time_limit=LIMIT,
+    )
     flights = {"planned": plan.trajectory, "tracked": righting.tracked(rat, plan)}
     flights["passive"] = righting.passive(rat, start, plan.duration)
     at = np.clip(plan.trajectory.t, 0, flights["tracked"].t[-1])
     deviation = flights["tracked"].resample(at).tail - plan.trajectory.tail
-    row = righting.row(plan) | {"mean_rad": deviation.mean(axis=0).tolist(), "std_rad": deviation.std(axis=0).tolist()}
+    row = righting.row(plan) | {
+        "mean_rad": deviation.mean(axis=0).tolist(),
+        "std_rad": deviation.std(axis=0).tolist(),
+    }
     return {"row": row, "flights": {kind: as_lists(flight) for kind, flight in flights.items()}}
 
 
 def frequencies(study: Study) -> dict:
-    """Fig. 11: what more nodes cost and bring, as the paper plans and as we do, on one random start."""
+    """Fig. 11: what more nodes cost and bring, as the paper plans and as we do, on one random
+    start.
+    """
     rows = {"paper": [], "ours": []}
     for frequency in FREQUENCIES:
         nodes = round(frequency * righting.FLIGHT)
@@ -104,18 +131,24 @@ def frequencies(study: Study) -> dict:
 
 def _example(rat: st.Model, settings: dict) -> dict:
     common = {"start": righting.tumbling(rat, EXAMPLE), "bounds": righting.bounds(rat)}
-    return righting.row(st.plan(rat, duration=righting.FLIGHT, time_limit=LIMIT, **common, **settings))
+    return righting.row(
+        st.plan(rat, duration=righting.FLIGHT, time_limit=LIMIT, **common, **settings)
+    )
 
 
 def segments(study: Study) -> dict:
-    """Sect. 4.3: tails of six links, from the kick's state, as the paper plans (100 Hz) and true."""
+    """Sect. 4.3: tails of six links, from the kick's state, as the paper plans (100 Hz) and
+    true.
+    """
     rows, flights = [], {}
     for size in (*TAILS, *MORE):
         rat = study.rats[size]
         true = study.part(f"Sect. 4.3 {name(*size)}", size, {}, partial(_true, rat))
         rows.append({"segments": size[0], "links": size[1], "ours": true["row"]})
         if size in TAILS:
-            rows[-1]["paper"] = study.part(f"Sect. 4.3 {name(*size)} paper", size, {}, partial(_paper, rat))
+            rows[-1]["paper"] = study.part(
+                f"Sect. 4.3 {name(*size)} paper", size, {}, partial(_paper, rat)
+            )
             flights[size] = as_flight(true["flight"])
             study.film(size, flights[size], f"fig12_m{size[0]}_n{size[1]}")
     draw_figure_13(flights, study.folder / "fig13.png")
@@ -124,14 +157,27 @@ def segments(study: Study) -> dict:
 
 def _true(rat: st.Model) -> dict:
     start, limits = righting.kicked(rat), righting.bounds(rat, 2 * np.pi)
-    plan = st.plan(rat, start=start, bounds=limits, duration=(0.3, righting.FLIGHT), retries=8, time_limit=LIMIT)
+    plan = st.plan(
+        rat,
+        start=start,
+        bounds=limits,
+        duration=(0.3, righting.FLIGHT),
+        retries=8,
+        time_limit=LIMIT,
+    )
     return {"row": righting.row(plan), "flight": as_lists(plan.trajectory)}
 
 
 def _paper(rat: st.Model) -> dict:
     start, limits = righting.kicked(rat), righting.bounds(rat, 2 * np.pi)
     plan = st.plan(
-        rat, start=start, bounds=limits, duration=righting.FLIGHT, **righting.PAPER, intervals=58, time_limit=LIMIT
+        rat,
+        start=start,
+        bounds=limits,
+        duration=righting.FLIGHT,
+        **righting.PAPER,
+        intervals=58,
+        time_limit=LIMIT,
     )
     return righting.row(plan)
 
@@ -146,7 +192,9 @@ def rates(study: Study, count: int) -> dict[str, list[dict]]:
 
 
 def rate(study: Study, kind: str, size: tuple, count: int, settings: dict) -> list[dict]:
-    """Return a row for every start; the whole tail bends by 180 degrees as in Sect. 4.2, or by 360 as in 4.3."""
+    """Return a row for every start; the whole tail bends by 180 degrees as in Sect. 4.2, or by 360
+    as in 4.3.
+    """
     rat, rows = study.rats[size], []
     turn = np.pi if size == RAT else 2 * np.pi
     limits = {
@@ -175,11 +223,16 @@ def _block(rat: st.Model, starts: range, settings: dict) -> list[dict]:
 
 def rate_lines(rates: dict[str, list[dict]]) -> list[str]:
     """Return the rates as text: successes, medians and tails of CPU time, error and objective."""
-    lines = ["random starts          true      of  cpu: median    95 %   most [s]  err [deg]  objective"]
+    lines = [
+        "random starts          true      of  cpu: median    95 %   most [s]  err [deg]  objective"
+    ]
     for kind, rows in rates.items():
         good = [r for r in rows if r["success"]]
         cpu = np.percentile([r["cpu_s"] for r in rows], [50, 95, 100])
-        medians = [np.median([r[key] for r in good]) for key in ("open_loop_attitude_error_deg", "objective")]
+        medians = [
+            np.median([r[key] for r in good])
+            for key in ("open_loop_attitude_error_deg", "objective")
+        ]
         numbers = "{:>12.2f}{:>8.2f}{:>11.2f}{:>11.4f}{:>11.2e}".format(*cpu, *medians)
         lines.append(f"{kind:<22}{len(good):>5}{len(rows):>8}{numbers}")
     return lines
@@ -187,11 +240,11 @@ def rate_lines(rates: dict[str, list[dict]]) -> list[str]:
 
 def table(study: dict) -> str:
     """Return the study as text."""
-    line = (
-        "{0:<22}{1[converged]!s:>6}{1[iterations]:>6}{1[duration_s]:>7.3f}{1[objective]:>11.2e}{1[solve_cpu_s]:>9.2f}"
-    )
+    line = "{0:<22}{1[converged]!s:>6}{1[iterations]:>6}{1[duration_s]:>7.3f}{1[objective]:>11.2e}{1[solve_cpu_s]:>9.2f}"
     line += "{1[open_loop_attitude_error_deg]:>10.4f}{1[energy_J]:>9.4f}{1[peak_power_W]:>8.3f}"
-    head = "plan                   conv.    it  T [s]  objective  cpu [s]  err [deg]    E [J]   P [W]"
+    head = (
+        "plan                   conv.    it  T [s]  objective  cpu [s]  err [deg]    E [J]   P [W]"
+    )
     lines = [head, line.format("(1, 3), Sect. 4.2", study["righting"])]
     for r in study["segments"]["rows"]:
         tail = name(r["segments"], r["links"])
@@ -206,7 +259,11 @@ def main(folder: Path, starts: int) -> None:
     """Do what of the study is not kept yet, and write its summary and figures."""
     say("generate and compile")
     study = Study(folder, models(folder / "generated"))
-    found = {"righting": righted(study), "frequencies": frequencies(study), "segments": segments(study)}
+    found = {
+        "righting": righted(study),
+        "frequencies": frequencies(study),
+        "segments": segments(study),
+    }
     draw_figure_11(found["frequencies"], folder / "fig11.png")
     found["rates"] = rates(study, starts)
     draw_rates(found["rates"], folder / "rates.png")
@@ -217,7 +274,9 @@ def main(folder: Path, starts: int) -> None:
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folder", nargs="?", type=Path, default=righting.ROOT / "output" / "studies" / "righting")
+    parser.add_argument(
+        "folder", nargs="?", type=Path, default=righting.ROOT / "output" / "studies" / "righting"
+    )
     parser.add_argument("--starts", type=int, default=200)
     given = parser.parse_args()
     try:

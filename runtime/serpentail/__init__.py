@@ -9,7 +9,10 @@ _HOME = {
     "Rollouts": "simulation.rollouts",
     "settle": "simulation.settle",
     **dict.fromkeys(["scenario", "Scenario"], "scenes.simulate"),
-    **dict.fromkeys(["Damping", "TorqueTable", "TorqueCurve", "NativeTorque", "Phases"], "simulation.controllers"),
+    **dict.fromkeys(
+        ["Damping", "TorqueTable", "TorqueCurve", "NativeTorque", "Phases"],
+        "simulation.controllers",
+    ),
     "Piecewise": "simulation.piecewise",
     **dict.fromkeys(["Legs", "Reference"], "simulation.schedules"),
     "Contact": "motion.contact",
@@ -43,7 +46,9 @@ __all__ = list(_HOME)
 def __getattr__(name: str):
     """Import a public name when it is first used: importing the package loads nothing else."""
     if name not in _HOME:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}; it has {', '.join(__all__)}")
+        raise AttributeError(
+            f"module {__name__!r} has no attribute {name!r}; it has {', '.join(__all__)}"
+        )
     value = getattr(import_module(f".{_HOME[name]}", __name__), name)
     globals()[name] = value
     return value

@@ -18,7 +18,9 @@ def product(a, b) -> list:
 
 
 def from_angles(angles: np.ndarray) -> np.ndarray:
-    """Return quaternions (..., 4) of pitch, roll and yaw (..., 3), rad, R = Rz(phi_z) Rx(phi_x) Ry(phi_y)."""
+    """Return quaternions (..., 4) of pitch, roll and yaw (..., 3), rad, R = Rz(phi_z) Rx(phi_x)
+    Ry(phi_y).
+    """
     c, s = np.cos(angles / 2), np.sin(angles / 2)
     zero = np.zeros_like(c[..., 0])
     pitch, roll = [c[..., 0], s[..., 0], zero, zero], [c[..., 1], zero, s[..., 1], zero]
@@ -35,7 +37,9 @@ def angle_deg(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def tilt_deg(quaternion: np.ndarray) -> np.ndarray:
-    """Return the angle (...) in degrees between the torso's z axis and the world's, of unit quaternions (..., 4)."""
+    """Return the angle (...) in degrees between the torso's z axis and the world's, of unit
+    quaternions (..., 4).
+    """
     q = np.asarray(quaternion)
     level = np.hypot(q[..., 1], q[..., 2])
     return np.degrees(2 * np.arctan2(level, np.hypot(q[..., 0], q[..., 3])))
@@ -45,7 +49,9 @@ Array = NDArray[np.float64]
 
 
 def rotation_matrix(quaternion: ArrayLike) -> Array:
-    """R, torso to world, (..., 3, 3), of quaternions (w, x, y, z), (..., 4), of any norm but zero."""
+    """R, torso to world, (..., 3, 3), of quaternions (w, x, y, z), (..., 4), of any norm but
+    zero.
+    """
     quaternion = finite_array("quaternion", quaternion)
     if quaternion.shape[-1:] != (4,):
         raise StateError(f"quaternion has shape {quaternion.shape}, not (4,) or (..., 4)")
@@ -61,10 +67,11 @@ def rotation_matrix(quaternion: ArrayLike) -> Array:
 
 
 def pitch_roll_yaw(q: ArrayLike, unwrap: bool = False) -> Array:
-    """Angles (phi_x, phi_y, phi_z), (..., 3), rad, R = Rz(phi_z) Rx(phi_x) Ry(phi_y), of q (..., 7+2m).
+    """Angles (phi_x, phi_y, phi_z), (..., 3), rad, R = Rz(phi_z) Rx(phi_x) Ry(phi_y), of q (...,
+    7+2m).
 
-    |phi_x| <= pi/2; at pi/2 itself one of the valid answers. unwrap, for q (K, 7+2m): continued along time
-    over whole turns and through phi_x = +-pi/2.
+    |phi_x| <= pi/2; at pi/2 itself one of the valid answers. unwrap, for q (K, 7+2m): continued
+    along time over whole turns and through phi_x = +-pi/2.
     """
     q = finite_array("q", q)
     if q.ndim == 0 or q.shape[-1] < 7:
@@ -73,7 +80,10 @@ def pitch_roll_yaw(q: ArrayLike, unwrap: bool = False) -> Array:
     first, second, third = (rotation[..., row, :] for row in range(3))
     yaw = np.arctan2(-first[..., 1], second[..., 1])
     c, s = np.cos(yaw)[..., None], np.sin(yaw)[..., None]
-    first, second = c * first + s * second, c * second - s * first  # Rz(-phi_z) R = Rx(phi_x) Ry(phi_y)
+    first, second = (
+        c * first + s * second,
+        c * second - s * first,
+    )  # Rz(-phi_z) R = Rx(phi_x) Ry(phi_y)
     pitch = np.arctan2(third[..., 1], second[..., 1])
     angles = np.stack([pitch, np.arctan2(first[..., 2], first[..., 0]), yaw], axis=-1)
     return _continued(angles) if unwrap else angles
@@ -89,13 +99,17 @@ def sign_continuous(quaternion: Array) -> Array:
 def quaternion_rate(quaternion: Array, omega: Array) -> Array:
     """q_dot = q (0, omega) / 2 with omega in the body frame."""
     w, u = quaternion[:, :1], quaternion[:, 1:]
-    return np.hstack([-np.sum(u * omega, axis=1, keepdims=True), w * omega + np.cross(u, omega)]) / 2
+    return (
+        np.hstack([-np.sum(u * omega, axis=1, keepdims=True), w * omega + np.cross(u, omega)]) / 2
+    )
 
 
 def _continued(angles: Array) -> Array:
     """Angles (K, 3) followed along time over whole turns and both Euler branches."""
     if angles.ndim != 2:
-        raise ValueError(f"q of {angles.ndim} dimensions cannot be unwrapped: give (K, 7 + 2m), time first")
+        raise ValueError(
+            f"q of {angles.ndim} dimensions cannot be unwrapped: give (K, 7 + 2m), time first"
+        )
     followed = angles.copy()
     followed[:1] = [_upright(first) for first in angles[:1]]
     for k in range(1, len(angles)):
@@ -109,14 +123,18 @@ def _branches(angles: Array) -> Array:
 
 
 def _upright(angles: Array) -> Array:
-    """The angles of one attitude with the least roll and yaw, which are within half a turn: a somersault is pitch."""
+    """The angles of one attitude with the least roll and yaw, which are within half a turn: a
+    somersault is pitch.
+    """
     branches = _branches(angles)
     branches[:, 1:] -= 2 * np.pi * np.round(branches[:, 1:] / (2 * np.pi))
     return np.asarray(branches[np.argmin(np.abs(branches[:, 1:]).sum(axis=1))])
 
 
 def _nearest(angles: Array, reference: Array) -> Array:
-    """The angles of one attitude, (x, y, z) or (pi - x, y + pi, z + pi) plus turns, closest to reference."""
+    """The angles of one attitude, (x, y, z) or (pi - x, y + pi, z + pi) plus turns, closest to
+    reference.
+    """
     branches = _branches(angles)
     branches += 2 * np.pi * np.round((reference - branches) / (2 * np.pi))
     return np.asarray(branches[np.argmin(np.abs(branches - reference).sum(axis=1))])

@@ -43,9 +43,15 @@ def choice(field: str, value, names: Collection[str]) -> None:
 
 def number(field: str, value, least: float = 0.0, above: bool = True) -> float:
     """Return a finite number above (or from) the least one; PlanningError else."""
-    good = isinstance(value, int | float | np.number) and not isinstance(value, bool) and np.isfinite(value)
+    good = (
+        isinstance(value, int | float | np.number)
+        and not isinstance(value, bool)
+        and np.isfinite(value)
+    )
     if not good or value < least or (above and value == least):
-        raise PlanningError(f"{field}: value {value!r}: needs a number {'above' if above else 'from'} {least:g}")
+        raise PlanningError(
+            f"{field}: value {value!r}: needs a number {'above' if above else 'from'} {least:g}"
+        )
     return float(value)
 
 

@@ -1,4 +1,6 @@
-"""Command line of the runtime: a verb and a generated folder or a scene go in, a report comes out."""
+"""Command line of the runtime: a verb and a generated folder or a scene go in, a report comes
+out.
+"""
 
 import argparse
 import json
@@ -21,8 +23,13 @@ def info(folder: str) -> dict:
         }
         for name, f in model.manifest["functions"].items()
     }
-    sizes = {name: getattr(model, name) for name in ("kind", "segments", "links", "samples", "nq", "nv")}
-    parameters = {name: list(value) if isinstance(value, tuple) else value for name, value in model.parameters.items()}
+    sizes = {
+        name: getattr(model, name) for name in ("kind", "segments", "links", "samples", "nq", "nv")
+    }
+    parameters = {
+        name: list(value) if isinstance(value, tuple) else value
+        for name, value in model.parameters.items()
+    }
     return {
         "name": model.name,
         "real": model.manifest["real"],
@@ -34,10 +41,15 @@ def info(folder: str) -> dict:
 
 def describe(report: dict) -> str:
     """Return an info report as text."""
-    shape = "{segments} segments x {links} links" if report["links"] else "{segments} continuum segments"
+    shape = (
+        "{segments} segments x {links} links"
+        if report["links"]
+        else "{segments} continuum segments"
+    )
     head = ("{name}: " + shape + ", nq {nq}, nv {nv}, {real}").format(**report)
     rows = [
-        f"  {name:<28}{f['emission']:<10}{f['operations']:>8} operations" for name, f in report["functions"].items()
+        f"  {name:<28}{f['emission']:<10}{f['operations']:>8} operations"
+        for name, f in report["functions"].items()
     ]
     return "\n".join([head, *rows])
 
@@ -50,27 +62,43 @@ def parser() -> argparse.ArgumentParser:
     verbs = p.add_subparsers(dest="verb", required=True)
     verb = verbs.add_parser("plan", help="plan the motion of a scene's table [plan]")
     verb.add_argument("scene", help="a scene file, such as scenes/righting_m1_n3.toml")
-    verb.add_argument("--folder", help="its generated folder, by default generated/ and the scene's name")
+    verb.add_argument(
+        "--folder", help="its generated folder, by default generated/ and the scene's name"
+    )
     verb.add_argument("--save", help="write the planned motion to this .npz file")
-    verb.add_argument("--json", choices=["-"], help="print one JSON object on stdout instead of text")
+    verb.add_argument(
+        "--json", choices=["-"], help="print one JSON object on stdout instead of text"
+    )
     verb = verbs.add_parser("simulate", help="simulate the motion of a scene's table [simulate]")
     verb.add_argument("scene", help="a scene file, such as scenes/kick.toml")
-    verb.add_argument("--folder", help="its generated folder, by default generated/ and the scene's name")
+    verb.add_argument(
+        "--folder", help="its generated folder, by default generated/ and the scene's name"
+    )
     verb.add_argument(
         "--set",
         action="append",
         default=[],
         metavar="NAME=VALUE",
         dest="changes",
-        help="another value of a parameter (mu=0.5) or of a key below [simulate] (duration=2, start.height=0.1)",
+        help=(
+            "another value of a parameter (mu=0.5) or of a key below "
+            "[simulate] (duration=2, start.height=0.1)"
+        ),
     )
     verb.add_argument("--save", help="write the motion to this .npz file")
     verb.add_argument("--film", help="draw it as a filmstrip, to this .png, .svg or .pdf file")
-    verb.add_argument("--json", choices=["-"], help="print one JSON object on stdout instead of text")
-    for name, words in (("info", "what a generated model is"), ("verify", "check the laws that a model must obey")):
+    verb.add_argument(
+        "--json", choices=["-"], help="print one JSON object on stdout instead of text"
+    )
+    for name, words in (
+        ("info", "what a generated model is"),
+        ("verify", "check the laws that a model must obey"),
+    ):
         verb = verbs.add_parser(name, help=words)
         verb.add_argument("folder", help="a generated folder, such as generated/articulated_m3_n4")
-        verb.add_argument("--json", choices=["-"], help="print one JSON object on stdout instead of text")
+        verb.add_argument(
+            "--json", choices=["-"], help="print one JSON object on stdout instead of text"
+        )
     return p
 
 

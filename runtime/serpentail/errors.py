@@ -28,14 +28,20 @@ class StateError(SerpentailError, ValueError):
 
 
 class SimulationError(SerpentailError):
-    """A simulation cannot go on; `trajectory` is the motion up to where it failed, None if it never began."""
+    """A simulation cannot go on; `trajectory` is the motion up to where it failed, None if it never
+    began.
+    """
 
     trajectory = None
 
 
 class PlanningError(SerpentailError, ValueError):
-    """A planning problem that cannot be posed: a wrong field, its value, and what to give instead."""
+    """A planning problem that cannot be posed: a wrong field, its value, and what to give
+    instead.
+    """
 
 
 class UnlikeBodies(UserWarning):
-    """Torso and tail so unlike in size that H loses digits: what is left of moments that cancel has their rounding."""
+    """Torso and tail so unlike in size that H loses digits: what is left of moments that cancel has
+    their rounding.
+    """

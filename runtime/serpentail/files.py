@@ -9,7 +9,9 @@ from pathlib import Path
 
 @contextlib.contextmanager
 def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """A file to write beside path, made to replace it on success and removed on failure; makes the folder."""
+    """A file to write beside path, made to replace it on success and removed on failure; makes the
+    folder.
+    """
     target = Path(path)
     target.parent.mkdir(parents=True, exist_ok=True)
     part = target.with_name(f".{target.name}.{secrets.token_hex(4)}.part")

@@ -1,4 +1,6 @@
-"""Tangents of programs: exact in rational arithmetic, where dual numbers run through the same loops."""
+"""Tangents of programs: exact in rational arithmetic, where dual numbers run through the same
+loops.
+"""
 
 from itertools import combinations
 
@@ -27,7 +29,12 @@ def subsets(names):
 def unit_rows(arguments, active):
     """``d_<input>`` of the active inputs, a lane for each of their scalars."""
     rows = iter(
-        np.array([[EXACT.const(int(x)) for x in row] for row in np.eye(sum(len(arguments[n]) for n in active))])
+        np.array(
+            [
+                [EXACT.const(int(x)) for x in row]
+                for row in np.eye(sum(len(arguments[n]) for n in active))
+            ]
+        )
     )
     return {f"d_{name}": [next(rows) for _ in arguments[name]] for name in active}
 
@@ -54,7 +61,9 @@ def test_tangents_are_those_of_dual_numbers(name):
         found = run(tangent_program(program, active), arguments | changes)
         for output, slopes in found.items():
             rows = expected[output.removeprefix("d_")]
-            assert slopes == [sum(a * b for a, b in zip(row, direction, strict=True)) for row in rows]
+            assert slopes == [
+                sum(a * b for a, b in zip(row, direction, strict=True)) for row in rows
+            ]
         still = {output for output, rows in expected.items() if f"d_{output}" not in found}
         assert not any(x for output in still for row in expected[output] for x in row)
 
@@ -64,7 +73,10 @@ def test_lanes_are_directions_side_by_side(name):
     program = PROGRAMS[name]
     arguments = numbers(program)
     for active in subsets(arguments_of(program)):
-        expected, lanes = jacobian(program, arguments, active), sum(len(arguments[n]) for n in active)
+        expected, lanes = (
+            jacobian(program, arguments, active),
+            sum(len(arguments[n]) for n in active),
+        )
         wide = tangent_program(program, active, lanes)
         assert {a.lanes for a in wide.arrays if a.name.startswith("d_")} == {lanes}
         found = run(wide, arguments | unit_rows(arguments, active))
@@ -74,11 +86,17 @@ def test_lanes_are_directions_side_by_side(name):
 
 @every_program
 def test_values_go_along_unchanged(name):
-    """A program whose outputs are kept local still computes them: a tangent program is the program and more."""
+    """A program whose outputs are kept local still computes them: a tangent program is the program
+    and more.
+    """
     program = PROGRAMS[name]
     arguments = numbers(program)
     wide = tangent_program(program, arguments_of(program), 2)
-    rows = {a.name: [np.array([EXACT.const(1)] * 2)] * a.length for a in wide.of_role("input") if a.lanes}
+    rows = {
+        a.name: [np.array([EXACT.const(1)] * 2)] * a.length
+        for a in wide.of_role("input")
+        if a.lanes
+    }
     values = Run(wide, EXACT, arguments | rows).values
     expected = Run(program, EXACT, arguments).values
     for a in wide.arrays:
@@ -97,13 +115,16 @@ def of_x(loops):
 
 @pytest.mark.parametrize("name", ["carry_up", "accumulators", "chain_up", "triangle"])
 def test_lanes_left_out_are_zero(name):
-    """In turn i nothing depends on what comes later: a run that leaves those lanes out gives the same.
+    """In turn i nothing depends on what comes later: a run that leaves those lanes out gives the
+    same.
 
     The outputs u are written within the loop: their lanes that are left out mean nothing.
     """
     program = chain_up() if name == "chain_up" else PROGRAMS[name]
     arguments = numbers(program)
-    wide, bounded = (tangent_program(program, ("x",), 3, **options) for options in ({}, {"bound": of_x}))
+    wide, bounded = (
+        tangent_program(program, ("x",), 3, **options) for options in ({}, {"bound": of_x})
+    )
     arguments |= unit_rows(arguments, ("x",))
     expected = jacobian(program, {n: arguments[n] for n in arguments_of(program)}, ("x",))
     for found in (run(wide, arguments), run(bounded, arguments), run(bounded, arguments, Narrow)):
@@ -129,7 +150,9 @@ def test_lanes_too_few_are_noticed():
     """The check above sees what a bound that is too tight does."""
     program = PROGRAMS["carry_up"]
     arguments = numbers(program)
-    tight = tangent_program(program, ("x",), 3, bound=lambda loops: Index((("i", 1),)) if loops else None)
+    tight = tangent_program(
+        program, ("x",), 3, bound=lambda loops: Index((("i", 1),)) if loops else None
+    )
     arguments |= unit_rows(arguments, ("x",))
     found = run(tight, arguments, Narrow)["d_u"]
     expected = jacobian(program, {n: arguments[n] for n in arguments_of(program)}, ("x",))["u"]
@@ -142,8 +165,17 @@ def test_lanes_too_few_are_noticed():
 def test_what_does_not_move_has_no_tangents():
     program = PROGRAMS["guarded"]
     names = {a.name for a in tangent_program(program, ("mass",)).arrays}
-    assert {"d_mass", "d_t", "d_u"} <= names and not {"d_x", "d_y", "d_w", "dead", "d_dead", "w"} & names
-    assert [a.role for a in tangent_program(program, ("mass",)).arrays if a.name == "d_mass"] == ["input"]
+    assert {"d_mass", "d_t", "d_u"} <= names and not {
+        "d_x",
+        "d_y",
+        "d_w",
+        "dead",
+        "d_dead",
+        "w",
+    } & names
+    assert [a.role for a in tangent_program(program, ("mass",)).arrays if a.name == "d_mass"] == [
+        "input"
+    ]
 
 
 def test_what_is_stored_anew_forgets_its_tangents():
@@ -165,7 +197,9 @@ def test_fills_are_added_where_lanes_differ():
     filled = {s.target.array.name for s in bounded.body if isinstance(s, Fill)}
     assert "d_a" in filled and "a" not in filled
     whole = tangent_program(chain_up(), ("x",), 3)
-    assert "d_a" not in {s.target.array.name for s in whole.body[:-1] if isinstance(s, Fill) and s.target.size > 1}
+    assert "d_a" not in {
+        s.target.array.name for s in whole.body[:-1] if isinstance(s, Fill) and s.target.size > 1
+    }
 
 
 @pytest.mark.parametrize("statement", ["factor", "solve"])

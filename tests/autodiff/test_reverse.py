@@ -1,4 +1,6 @@
-"""Adjoints of programs: exact in rational arithmetic, where dual numbers run through the same loops forward."""
+"""Adjoints of programs: exact in rational arithmetic, where dual numbers run through the same loops
+forward.
+"""
 
 import pytest
 
@@ -8,14 +10,30 @@ from serpentail_codegen.ir.builder import Builder
 from serpentail_codegen.ir.interpret import Run
 from serpentail_codegen.ir.program import Factor, Index, Loop, as_index, statements
 from tests.autodiff.test_forward import arguments_of, subsets
-from tests.support.programs import EXACT, NEXT, PROGRAMS, RECTANGULAR, SQUARE, TURN, built, jacobian, numbers
+from tests.support.programs import (
+    EXACT,
+    NEXT,
+    PROGRAMS,
+    RECTANGULAR,
+    SQUARE,
+    TURN,
+    built,
+    jacobian,
+    numbers,
+)
 
 every_program = pytest.mark.parametrize("name", RECTANGULAR)
 
 
 def gradients(program, arguments, wanted, given, seed=3):
-    """Weights of the given outputs, the adjoints that the program of adjoints gives, and what dual numbers say."""
-    weights = {name: xs for name, xs in numbers_of(program.of_role("output"), seed).items() if name in given}
+    """Weights of the given outputs, the adjoints that the program of adjoints gives, and what dual
+    numbers say.
+    """
+    weights = {
+        name: xs
+        for name, xs in numbers_of(program.of_role("output"), seed).items()
+        if name in given
+    }
     J = jacobian(program, arguments, wanted)
     terms = [(w, row) for name in given for w, row in zip(weights[name], J[name], strict=True)]
     expected = [sum(w * row[k] for w, row in terms) for k in range(len(terms[0][1]))]
@@ -28,14 +46,23 @@ def gradients(program, arguments, wanted, given, seed=3):
 
 def numbers_of(arrays, seed):
     """Random rationals for some arrays."""
-    return numbers(type("Arrays", (), {"of_role": staticmethod(lambda role: arrays if role == "input" else ())}), seed)
+    return numbers(
+        type(
+            "Arrays", (), {"of_role": staticmethod(lambda role: arrays if role == "input" else ())}
+        ),
+        seed,
+    )
 
 
 def connected(program, wanted, given):
-    """Tell if each wanted array may change a given output, and each given output depends on a wanted array."""
+    """Tell if each wanted array may change a given output, and each given output depends on a
+    wanted array.
+    """
     J = {name: jacobian(program, numbers(program), (name,)) for name in wanted}
     on = {(w, g): any(x for row in J[w][g] for x in row) for w in wanted for g in given}
-    return all(any(on[w, g] for g in given) for w in wanted) and all(any(on[w, g] for w in wanted) for g in given)
+    return all(any(on[w, g] for g in given) for w in wanted) and all(
+        any(on[w, g] for w in wanted) for g in given
+    )
 
 
 @every_program
@@ -62,19 +89,27 @@ def test_adjoints_are_the_transpose_of_tangents(name):
     values = Run(forward, EXACT, {n: inputs[n] for n in arguments_of(forward)}).values
     weights, back, _ = gradients(program, arguments, wanted, given)
     one = sum(b * d for n in given for b, d in zip(weights[n], values[f"d_{n}"], strict=True))
-    assert one == sum(b * d for b, d in zip(back, (x for n in wanted for x in directions[f"d_{n}"]), strict=True))
+    assert one == sum(
+        b * d for b, d in zip(back, (x for n in wanted for x in directions[f"d_{n}"]), strict=True)
+    )
 
 
 @every_program
 def test_tangents_of_adjoints_are_symmetric(name):
-    """The Hessian of a weighted sum of outputs, column by column, and what dual numbers say of the gradient."""
+    """The Hessian of a weighted sum of outputs, column by column, and what dual numbers say of the
+    gradient.
+    """
     program = RECTANGULAR[name]
     given = [a.name for a in program.of_role("output")]
     wanted = [n for n in arguments_of(program) if connected(program, [n], given)]
     back = adjoint_program(program, wanted, given)
-    arguments = numbers(program) | {f"b_{n}": xs for n, xs in numbers_of(program.of_role("output"), 3).items()}
+    arguments = numbers(program) | {
+        f"b_{n}": xs for n, xs in numbers_of(program.of_role("output"), 3).items()
+    }
     by_duals = jacobian(
-        back, {n: arguments[n] for n in arguments_of(back)}, [n for n in wanted if n in arguments_of(back)]
+        back,
+        {n: arguments[n] for n in arguments_of(back)},
+        [n for n in wanted if n in arguments_of(back)],
     )
     H = [row for n in wanted for row in by_duals[f"b_{n}"]]
     assert [list(column) for column in zip(*H, strict=True)] == H
@@ -107,7 +142,10 @@ def test_only_what_is_overwritten_is_kept():
 
 def test_each_turn_keeps_its_own_value():
     """Turns of nested loops are numbered from 0 on, the innermost fastest."""
-    loops = tuple(Loop(var, as_index(0), as_index(n), down, ()) for var, n, down in [("i", 2, False), ("j", 3, True)])
+    loops = tuple(
+        Loop(var, as_index(0), as_index(n), down, ())
+        for var, n, down in [("i", 2, False), ("j", 3, True)]
+    )
     number, count = turns(loops)
     assert count == 6
     assert [number.at({"i": i, "j": j}) for i in range(2) for j in range(3)] == list(range(6))
@@ -131,14 +169,18 @@ def test_forward_part_is_left_out_where_it_is_not_needed():
         b.copy(w[0], x[i], adds=True)
     back = adjoint_program(b.finish(), ("x",), ("w",))
     assert [s.downward for s in back.body if isinstance(s, Loop)] == [True]
-    assert Run(back, EXACT, {"x": [], "y": [], "mass": [], "b_w": [EXACT.const(5)]}).values["b_x"] == [5, 5, 5]
+    assert Run(back, EXACT, {"x": [], "y": [], "mass": [], "b_w": [EXACT.const(5)]}).values[
+        "b_x"
+    ] == [5, 5, 5]
 
 
 # What is refused
 
 
 def test_values_kept_in_a_triangle_are_refused():
-    with pytest.raises(ValueError, match=r"^loop j is no rectangle from 0 on: its turns cannot be numbered$"):
+    with pytest.raises(
+        ValueError, match=r"^loop j is no rectangle from 0 on: its turns cannot be numbered$"
+    ):
         adjoint_program(PROGRAMS["triangle"], ("x",), ("u",))
 
 
@@ -180,14 +222,25 @@ def test_statements_without_a_rule_are_refused(statement):
 
 
 def test_every_value_that_the_way_back_reads_is_there():
-    """Adjoint programs leave no statement that nothing needs, and read nothing that was not written."""
+    """Adjoint programs leave no statement that nothing needs, and read nothing that was not
+    written.
+    """
     for program in RECTANGULAR.values():
         given = [a.name for a in program.of_role("output")]
         wanted = [n for n in arguments_of(program) if connected(program, [n], given)]
         back = adjoint_program(program, wanted, given)
-        known = {a.name for a in (*back.of_role("input"), *back.of_role("parameters"), *back.of_role("constant"))}
+        known = {
+            a.name
+            for a in (
+                *back.of_role("input"),
+                *back.of_role("parameters"),
+                *back.of_role("constant"),
+            )
+        }
         for statement, _ in statements(back.body):
-            refs = getattr(statement, "reads", ()) or ([statement.source] if hasattr(statement, "source") else [])
+            refs = getattr(statement, "reads", ()) or (
+                [statement.source] if hasattr(statement, "source") else []
+            )
             assert {ref.array.name for ref in refs} <= known
             known |= {ref.array.name for ref in getattr(statement, "writes", ())}
             known |= {statement.target.array.name} if hasattr(statement, "target") else set()
@@ -243,7 +296,9 @@ def shared_by_inputs():
     return b.finish()
 
 
-@pytest.mark.parametrize("build", [shared_by_turns, shared_by_windows, shared_in_part, shared_by_inputs])
+@pytest.mark.parametrize(
+    "build", [shared_by_turns, shared_by_windows, shared_in_part, shared_by_inputs]
+)
 def test_shared_places_are_right_or_refused(build):
     program = build()
     try:

@@ -1,4 +1,6 @@
-"""Tangents and adjoints of steps: what they compute is what SymPy's derivatives of the same formulas say."""
+"""Tangents and adjoints of steps: what they compute is what SymPy's derivatives of the same
+formulas say.
+"""
 
 import random
 from fractions import Fraction
@@ -14,7 +16,15 @@ import sympy
 from serpentail_codegen.autodiff.step import adjoint, tangent
 from serpentail_codegen.ir.interpret import Numbers
 from serpentail_codegen.ir.step import Step
-from serpentail_codegen.ir.tape import BINARY, TERNARY, UNARY, Tape, live_nodes, operation_count, replay
+from serpentail_codegen.ir.tape import (
+    BINARY,
+    TERNARY,
+    UNARY,
+    Tape,
+    live_nodes,
+    operation_count,
+    replay,
+)
 
 INPUTS = (("x", 2), ("y", 1), ("z", 2))
 OUTPUTS = (("u", 1), ("w", 2))
@@ -43,7 +53,9 @@ def subsets(vectors):
 
 
 def grow(rng, operations=(*UNARY, *BINARY, *BINARY, *TERNARY), length=30):
-    """A tape of random operations, and pairs of a node and its SymPy expression; operands may repeat."""
+    """A tape of random operations, and pairs of a node and its SymPy expression; operands may
+    repeat.
+    """
     tape = Tape()
     pool = [(tape.input(k), leaf) for k, leaf in enumerate(LEAVES)]
     while len(pool) < length:
@@ -79,7 +91,14 @@ def random_step(seed, **options):
     rng = random.Random(seed)
     tape, pool = grow(rng, **options)
     chosen = [rng.choice(pool[-6:]), rng.choice(pool), rng.choice(pool[-6:])]
-    step = Step(f"random{seed}", "Random.", INPUTS, OUTPUTS, tuple(tape.nodes), tuple(node for node, _ in chosen))
+    step = Step(
+        f"random{seed}",
+        "Random.",
+        INPUTS,
+        OUTPUTS,
+        tuple(tape.nodes),
+        tuple(node for node, _ in chosen),
+    )
     return step, [e for _, e in chosen]
 
 
@@ -98,7 +117,9 @@ def point(seed, exact=False):
 
 def evaluated(step, vectors, algebra=MANY):
     """The outputs of a step by name."""
-    nodes = replay(step.nodes, [scalar for name, _ in step.inputs for scalar in vectors[name]], algebra)
+    nodes = replay(
+        step.nodes, [scalar for name, _ in step.inputs for scalar in vectors[name]], algebra
+    )
     results = iter(step.results)
     return {name: [nodes[next(results)] for _ in range(size)] for name, size in step.outputs}
 
@@ -138,7 +159,8 @@ def test_tangents_are_sympys_derivatives_in_a_direction(seed):
         direction = masked(vectors, INPUTS, active, "d_")
         found = evaluated(tangent(step, active), vectors)
         assert_close(
-            flat(found, ["u", "w"], "d_"), [sum(a * b for a, b in zip(row, direction, strict=True)) for row in J]
+            flat(found, ["u", "w"], "d_"),
+            [sum(a * b for a, b in zip(row, direction, strict=True)) for row in J],
         )
         assert {name: found[name] for name in ("u", "w")} == values
 
@@ -150,7 +172,12 @@ def test_adjoints_are_sympys_gradients_of_a_weighted_sum(seed):
     J = jacobian(expressions, vectors)
     for given in subsets(OUTPUTS):
         weights = masked(vectors, OUTPUTS, given, "b_")
-        gradient = iter([sum(w * a for w, a in zip(weights, column, strict=True)) for column in zip(*J, strict=True)])
+        gradient = iter(
+            [
+                sum(w * a for w, a in zip(weights, column, strict=True))
+                for column in zip(*J, strict=True)
+            ]
+        )
         expected = {name: [next(gradient) for _ in range(size)] for name, size in INPUTS}
         for wanted in subsets(INPUTS):
             found = evaluated(adjoint(step, wanted, given), vectors)
@@ -171,7 +198,9 @@ def test_both_are_exact_in_rational_arithmetic(seed):
     assert flat(found, ["u", "w"], "d_") == expected
     weights = masked(vectors, OUTPUTS, "uw", "b_")
     found = evaluated(adjoint(step, frozenset("xyz"), frozenset("uw")), vectors, FRACTIONS)
-    expected = [sum(w * a for w, a in zip(weights, column, strict=True)) for column in zip(*J, strict=True)]
+    expected = [
+        sum(w * a for w, a in zip(weights, column, strict=True)) for column in zip(*J, strict=True)
+    ]
     assert flat(found, "xyz", "b_") == expected
 
 
@@ -182,9 +211,20 @@ def test_adjoints_are_the_transpose_of_tangents(seed):
     vectors = point(seed)
     for active in subsets(INPUTS):
         for given in subsets(OUTPUTS):
-            forward, back = evaluated(tangent(step, active), vectors), evaluated(adjoint(step, active, given), vectors)
-            one = sum(a * b for n in given for a, b in zip(vectors[f"b_{n}"], forward[f"d_{n}"], strict=True))
-            two = sum(a * b for n in active for a, b in zip(back[f"b_{n}"], vectors[f"d_{n}"], strict=True))
+            forward, back = (
+                evaluated(tangent(step, active), vectors),
+                evaluated(adjoint(step, active, given), vectors),
+            )
+            one = sum(
+                a * b
+                for n in given
+                for a, b in zip(vectors[f"b_{n}"], forward[f"d_{n}"], strict=True)
+            )
+            two = sum(
+                a * b
+                for n in active
+                for a, b in zip(back[f"b_{n}"], vectors[f"d_{n}"], strict=True)
+            )
             assert_close([one], [two])
 
 
@@ -197,7 +237,9 @@ def test_tangents_of_adjoints_are_the_symmetric_hessian(seed):
     for k in range(len(LEAVES)):
         unit = iter(mpmath.mpf(j == k) for j in range(len(LEAVES)))
         directions = {f"d_{name}": [next(unit) for _ in range(size)] for name, size in INPUTS}
-        H.append(flat(evaluated(second, vectors | {"b_u": [mpmath.mpf(1)]} | directions), "xyz", "d_b_"))
+        H.append(
+            flat(evaluated(second, vectors | {"b_u": [mpmath.mpf(1)]} | directions), "xyz", "d_b_")
+        )
     terms = [sympy.diff(expressions[0], a, b) for a in LEAVES for b in LEAVES]
     expected = sympy.lambdify(LEAVES, terms, modules="mpmath")(*at)
     assert_close(flat({"": [h for row in H for h in row]}, [""]), expected)
@@ -212,7 +254,9 @@ def step_of_rule(build, names=("x",)):
     tape = Tape()
     nodes = [tape.input(k) for k in range(len(names))]
     result = build(tape, *nodes)
-    return Step("rule", "A rule.", tuple((n, 1) for n in names), (("u", 1),), tuple(tape.nodes), (result,))
+    return Step(
+        "rule", "A rule.", tuple((n, 1) for n in names), (("u", 1),), tuple(tape.nodes), (result,)
+    )
 
 
 X, Y = sympy.symbols("x y", positive=True)
@@ -234,7 +278,10 @@ RULES = {
     "itself": (lambda t, x: x, X),
     "max": (lambda t, x, y: t.max(x, y), sympy.Piecewise((X, X > Y), (Y, True))),
     "first": (lambda t, x, y: t.select(x, t.mul(x, y), y), X * Y),
-    "second": (lambda t, x, y: t.select(y, y, t.mul(x, y)), X * Y),  # y is negative where the rules are tried
+    "second": (
+        lambda t, x, y: t.select(y, y, t.mul(x, y)),
+        X * Y,
+    ),  # y is negative where the rules are tried
     "constant": (lambda t, x: t.const(3), sympy.Integer(3)),
 }
 
@@ -246,10 +293,21 @@ def test_each_rule_is_sympys(rule):
     step, at = step_of_rule(build, names), {X: mpmath.mpf(13) / 9, Y: mpmath.mpf(-7) / 5}
     for name in names:
         symbol = {"x": X, "y": Y}[name]
-        expected = sympy.lambdify((X, Y), sympy.diff(expression, symbol), modules="mpmath")(at[X], at[Y])
-        vectors = {"x": [at[X]], "y": [at[Y]], "d_x": [mpmath.mpf(1)], "d_y": [mpmath.mpf(1)], "b_u": [mpmath.mpf(1)]}
+        expected = sympy.lambdify((X, Y), sympy.diff(expression, symbol), modules="mpmath")(
+            at[X], at[Y]
+        )
+        vectors = {
+            "x": [at[X]],
+            "y": [at[Y]],
+            "d_x": [mpmath.mpf(1)],
+            "d_y": [mpmath.mpf(1)],
+            "b_u": [mpmath.mpf(1)],
+        }
         assert_close(evaluated(tangent(step, frozenset(name)), vectors)["d_u"], [expected])
-        assert_close(evaluated(adjoint(step, frozenset(name), frozenset("u")), vectors)[f"b_{name}"], [expected])
+        assert_close(
+            evaluated(adjoint(step, frozenset(name), frozenset("u")), vectors)[f"b_{name}"],
+            [expected],
+        )
 
 
 # Which vectors there are
@@ -278,7 +336,9 @@ def test_inputs_that_no_output_needs_vanish_and_have_zero_adjoints():
     tape = Tape()
     a, _, c = (tape.input(k) for k in range(3))
     nodes = (*tape.nodes, ("sin", c))
-    step = Step("part", "Part.", (("x", 2), ("y", 1), ("z", 1)), (("u", 1),), (*nodes, ("mul", a, 3)), (4,))
+    step = Step(
+        "part", "Part.", (("x", 2), ("y", 1), ("z", 1)), (("u", 1),), (*nodes, ("mul", a, 3)), (4,)
+    )
     forward = tangent(step, frozenset("xz"))
     assert "z" not in dict(forward.inputs) and "d_z" not in dict(forward.inputs)
     numbers = {"x": [2.0, 3.0], "y": [0.5], "b_u": [7.0]}
@@ -289,11 +349,20 @@ def test_inputs_that_no_output_needs_vanish_and_have_zero_adjoints():
 
 def test_an_output_that_counts_twice_has_the_sum_of_its_weights():
     step = Step(
-        "same", "One node, two outputs.", (("x", 1),), (("u", 1), ("w", 1)), (("input", 0), ("mul", 0, 0)), (1, 1)
+        "same",
+        "One node, two outputs.",
+        (("x", 1),),
+        (("u", 1), ("w", 1)),
+        (("input", 0), ("mul", 0, 0)),
+        (1, 1),
     )
     vectors = {"x": [Fraction(3)], "b_u": [Fraction(5)], "b_w": [Fraction(7)]}
-    assert evaluated(adjoint(step, frozenset("x"), frozenset("uw")), vectors, FRACTIONS) == {"b_x": [72]}
-    assert evaluated(adjoint(step, frozenset("x"), frozenset("w")), vectors, FRACTIONS) == {"b_x": [42]}
+    assert evaluated(adjoint(step, frozenset("x"), frozenset("uw")), vectors, FRACTIONS) == {
+        "b_x": [72]
+    }
+    assert evaluated(adjoint(step, frozenset("x"), frozenset("w")), vectors, FRACTIONS) == {
+        "b_x": [42]
+    }
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -302,13 +371,17 @@ def test_rows_are_their_directions_one_by_one(seed):
     vectors, lanes = point(seed), 3
     rng = random.Random(seed)
     rows = {
-        f"d_{n}": [np.array([mpmath.mpf(rng.randint(-9, 9)) for _ in range(lanes)]) for _ in range(s)]
+        f"d_{n}": [
+            np.array([mpmath.mpf(rng.randint(-9, 9)) for _ in range(lanes)]) for _ in range(s)
+        ]
         for n, s in INPUTS
     }
     forward = tangent(step, frozenset("xyz"))
     wide = evaluated(forward, vectors | rows)
     for lane in range(lanes):
-        alone = evaluated(forward, vectors | {name: [row[lane] for row in xs] for name, xs in rows.items()})
+        alone = evaluated(
+            forward, vectors | {name: [row[lane] for row in xs] for name, xs in rows.items()}
+        )
         for name in ("d_u", "d_w"):
             assert [MANY.lane(x, lane) for x in wide[name]] == alone[name]
 
@@ -319,13 +392,19 @@ def test_a_linear_step_has_no_products_and_no_values_in_its_derivatives():
     total = tape.sub(tape.add(a, tape.mul(tape.const(3), b)), c)
     step = Step("linear", "Linear.", (("x", 2), ("y", 1)), (("u", 1),), tuple(tape.nodes), (total,))
     forward, back = tangent(step, frozenset("xy")), adjoint(step, frozenset("xy"), frozenset("u"))
-    assert operation_count(forward.nodes, forward.results[1:]) == operation_count(step.nodes, step.results)
+    assert operation_count(forward.nodes, forward.results[1:]) == operation_count(
+        step.nodes, step.results
+    )
     assert back.inputs == (("b_u", 1),)
     assert operation_count(back.nodes, back.results) == 1
 
 
 @pytest.mark.parametrize(
-    "derive", [partial(tangent, active=frozenset("xz")), partial(adjoint, wanted=frozenset("xz"), given=frozenset("u"))]
+    "derive",
+    [
+        partial(tangent, active=frozenset("xz")),
+        partial(adjoint, wanted=frozenset("xz"), given=frozenset("u")),
+    ],
 )
 def test_derivatives_are_compact(derive):
     """No node and no vector is left that no output needs."""

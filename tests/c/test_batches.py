@@ -1,4 +1,6 @@
-"""Batches: states side by side give what each of them gives alone, in any number, from any thread, errors included."""
+"""Batches: states side by side give what each of them gives alone, in any number, from any thread,
+errors included.
+"""
 
 import ctypes
 import json
@@ -22,7 +24,12 @@ from tests.support.models import model_folder
 
 TAILS = {"articulated": Tail(2, 2), "continuum": Tail(2, 4, "continuum")}
 FORMS = [
-    pytest.param(tail, emission, real, marks=() if real == "double" and emission == usual else pytest.mark.slow)
+    pytest.param(
+        tail,
+        emission,
+        real,
+        marks=() if real == "double" and emission == usual else pytest.mark.slow,
+    )
     for tail, usual in ((("articulated", 2, 2), "straight"), (("continuum", 2, None), "loops"))
     for emission in ("straight", "loops")
     for real in ("double", "float")
@@ -62,7 +69,9 @@ def given(arguments, name):
 
 def alone(model, name, arguments):
     """Every state by a call of its own."""
-    return np.array([getattr(model, name)(*state) for state in zip(*given(arguments, name), strict=True)])
+    return np.array(
+        [getattr(model, name)(*state) for state in zip(*given(arguments, name), strict=True)]
+    )
 
 
 # Programs.
@@ -70,8 +79,12 @@ def alone(model, name, arguments):
 
 def numbers(program, rng):
     """Random arguments of a program, its parameters positive."""
-    parameters = {a.name: rng.uniform(0.1, 1, a.length).tolist() for a in program.of_role("parameters")}
-    return parameters | {a.name: rng.normal(size=a.length).tolist() for a in program.of_role("input")}
+    parameters = {
+        a.name: rng.uniform(0.1, 1, a.length).tolist() for a in program.of_role("parameters")
+    }
+    return parameters | {
+        a.name: rng.normal(size=a.length).tolist() for a in program.of_role("input")
+    }
 
 
 @pytest.mark.parametrize("tail", TAILS)
@@ -98,7 +111,9 @@ def test_a_program_written_out_means_the_same_and_guards_the_same(tail, name):
     values = numbers(single, np.random.default_rng(2))
     expected, found = (Run(p, Numbers(np), values) for p in (single, flattened(single)))
     for a in single.of_role("output"):
-        np.testing.assert_allclose(np.float64(found.values[a.name]), np.float64(expected.values[a.name]), rtol=1e-12)
+        np.testing.assert_allclose(
+            np.float64(found.values[a.name]), np.float64(expected.values[a.name]), rtol=1e-12
+        )
     pairs = [sorted((status, float(x)) for status, x in run.guards) for run in (found, expected)]
     assert len(pairs[0]) == len(pairs[1])
     for (status, x), (other, y) in zip(*pairs, strict=True):
@@ -106,7 +121,10 @@ def test_a_program_written_out_means_the_same_and_guards_the_same(tail, name):
 
 
 def test_what_depends_on_parameters_alone_stays_narrow():
-    arrays = {a.name: a.lanes for a in widened(program(FUNCTIONS["inverse_dynamics"], Tail(2, 2)), 8).arrays}
+    arrays = {
+        a.name: a.lanes
+        for a in widened(program(FUNCTIONS["inverse_dynamics"], Tail(2, 2)), 8).arrays
+    }
     assert arrays["q"] == arrays["force"] == 8
     assert arrays["link"] == arrays["tail_mass"] == 0
 
@@ -141,7 +159,9 @@ def test_any_number_of_states_gives_what_each_gives_alone(tail, emission, real, 
 def test_the_reproducible_profile_gives_the_same_bits(tail, emission, name):
     found = model(*tail, profile="reproducible", emission=emission)
     arguments = states(found, 11)
-    assert np.array_equal(getattr(found, name)(*given(arguments, name)), alone(found, name, arguments))
+    assert np.array_equal(
+        getattr(found, name)(*given(arguments, name)), alone(found, name, arguments)
+    )
 
 
 @mpmath.workdps(60)
@@ -149,7 +169,9 @@ def test_the_reproducible_profile_gives_the_same_bits(tail, emission, name):
 def test_sine_and_cosine_of_rows_are_good_to_the_last_digit(tmp_path, real):
     found = model(real=real)
     source = (found.folder / "src" / f"{found.name}_batch.c").read_text()
-    source = source.replace("#undef lanes", "").replace("#undef LANES", "").replace("#undef real", "")
+    source = (
+        source.replace("#undef lanes", "").replace("#undef LANES", "").replace("#undef real", "")
+    )
     name, number = found.name, np.float32 if real == "float" else np.float64
     source += f"""
 int row_lanes(void);
@@ -166,9 +188,23 @@ void row(const real *x, real *sine, real *cosine) {{
     library = ctypes.CDLL(str(compile_library([file], found.folder / "include")))
     width, rng = library.row_lanes(), np.random.default_rng(3)
     far, least = (number(1e4), -40) if real == "float" else (number(1e5), -300)
-    angles = [*rng.uniform(-4, 4, 320), *rng.uniform(-far, far, 320), *10.0 ** rng.uniform(least, 8, 96)]
-    angles += [k * np.pi / 4 for k in range(-40, 40)] + [k * np.pi / 2 for k in rng.integers(0, int(far / 2), 160)]
-    angles += [0.0, far, -far, np.nextafter(far, 2 * far), -np.nextafter(far, 2 * far), np.inf, -np.inf]
+    angles = [
+        *rng.uniform(-4, 4, 320),
+        *rng.uniform(-far, far, 320),
+        *10.0 ** rng.uniform(least, 8, 96),
+    ]
+    angles += [k * np.pi / 4 for k in range(-40, 40)] + [
+        k * np.pi / 2 for k in rng.integers(0, int(far / 2), 160)
+    ]
+    angles += [
+        0.0,
+        far,
+        -far,
+        np.nextafter(far, 2 * far),
+        -np.nextafter(far, 2 * far),
+        np.inf,
+        -np.inf,
+    ]
     angles = np.array(angles + [np.nan] * (-len(angles) % width)).astype(number).reshape(-1, width)
     pointer = [np.zeros(width, number) for _ in range(3)]
     for row in angles:
@@ -180,7 +216,9 @@ void row(const real *x, real *sine, real *cosine) {{
                 continue
             exact = mpmath.cos_sin(mpmath.mpf(float(x)))[::-1]
             for y, value in zip((sine, cosine), exact, strict=True):
-                assert abs(mpmath.mpf(float(y)) - value) <= 1.5 * float(np.spacing(number(abs(value)))), x
+                assert abs(mpmath.mpf(float(y)) - value) <= 1.5 * float(
+                    np.spacing(number(abs(value)))
+                ), x
 
 
 # The face.
@@ -189,7 +227,9 @@ void row(const real *x, real *sine, real *cosine) {{
 def test_a_few_states_compile_nothing_and_many_do_once(monkeypatch):
     monkeypatch.setattr("serpentail.model.batch.MANY", 1000)
     built = []
-    monkeypatch.setattr("serpentail.model.batch.compile_library", lambda *a: built.append(a) or compile_library(*a))
+    monkeypatch.setattr(
+        "serpentail.model.batch.compile_library", lambda *a: built.append(a) or compile_library(*a)
+    )
     found = st.load(model().folder)
     found.mass_matrix(states(found, 999)["q"])
     assert not built
@@ -202,14 +242,28 @@ def test_parameters_count_in_batches():
     heavy = model().with_parameters(torso_mass=1.0, link_radius=0.01)
     arguments = states(heavy, 9)
     expected = alone(heavy, "forward_dynamics", arguments)
-    np.testing.assert_allclose(heavy.forward_dynamics(*given(arguments, "forward_dynamics")), expected, rtol=1e-9)
+    np.testing.assert_allclose(
+        heavy.forward_dynamics(*given(arguments, "forward_dynamics")), expected, rtol=1e-9
+    )
 
 
 WRONG = {
-    "a number that is none": (lambda q, v: v.__setitem__((13, 4), np.nan), r"v\[4\] of state 13 is nan"),
-    "an infinite position": (lambda q, v: q.__setitem__((13, 0), np.inf), r"q\[0\] of state 13 is inf"),
-    "no attitude": (lambda q, v: q.__setitem__((13, slice(3, 7)), 0), r"quaternion q\[3:7\] of state 13 is zero"),
-    "what overflows": (lambda q, v: v.__setitem__((13, slice(None)), 1e200), "result of state 13 is not finite"),
+    "a number that is none": (
+        lambda q, v: v.__setitem__((13, 4), np.nan),
+        r"v\[4\] of state 13 is nan",
+    ),
+    "an infinite position": (
+        lambda q, v: q.__setitem__((13, 0), np.inf),
+        r"q\[0\] of state 13 is inf",
+    ),
+    "no attitude": (
+        lambda q, v: q.__setitem__((13, slice(3, 7)), 0),
+        r"quaternion q\[3:7\] of state 13 is zero",
+    ),
+    "what overflows": (
+        lambda q, v: v.__setitem__((13, slice(None)), 1e200),
+        "result of state 13 is not finite",
+    ),
 }
 
 
@@ -238,7 +292,9 @@ def test_threads_share_a_model():
     results = [None] * 6
 
     def work(k):
-        results[k] = [found.forward_dynamics(*given(batches[k], "forward_dynamics")) for _ in range(20)]
+        results[k] = [
+            found.forward_dynamics(*given(batches[k], "forward_dynamics")) for _ in range(20)
+        ]
 
     threads = [threading.Thread(target=work, args=(k,)) for k in range(6)]
     for thread in threads:

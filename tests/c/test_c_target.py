@@ -1,4 +1,6 @@
-"""The C text: it compiles without a warning, means what its program means bit for bit, and keeps to itself."""
+"""The C text: it compiles without a warning, means what its program means bit for bit, and keeps to
+itself.
+"""
 
 import ctypes
 import json
@@ -26,14 +28,36 @@ from serpentail_codegen.targets.c.routine import Routine, routine_lines
 from tests.references.parameters import random_states
 from tests.support.models import model_folder
 
-STRICT = ("-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Wdouble-promotion", "-Wshadow", "-Werror")
+STRICT = (
+    "-pedantic",
+    "-Wall",
+    "-Wextra",
+    "-Wconversion",
+    "-Wdouble-promotion",
+    "-Wshadow",
+    "-Werror",
+)
 C99 = ("-std=c99", *STRICT)
 PLAIN = ("-std=c99", "-fno-stack-protector", "-fno-pic")
-SANITIZED = ("-std=c99", "-g", "-O0", "-fsanitize=address,undefined,float-divide-by-zero", "-fno-sanitize-recover=all")
+SANITIZED = (
+    "-std=c99",
+    "-g",
+    "-O0",
+    "-fsanitize=address,undefined,float-divide-by-zero",
+    "-fno-sanitize-recover=all",
+)
 TAILS = {"m1_n1": (1, 1), "m2_n2": (2, 2), "arcs2": (2, None)}
-FORMS = [(tail, real, emission) for tail in TAILS for real in ("double", "float") for emission in ("straight", "loops")]
+FORMS = [
+    (tail, real, emission)
+    for tail in TAILS
+    for real in ("double", "float")
+    for emission in ("straight", "loops")
+]
 MODELS = {
-    **{f"{tail}_{real}_{emission}": {"real": real, "emission": emission} for tail, real, emission in FORMS},
+    **{
+        f"{tail}_{real}_{emission}": {"real": real, "emission": emission}
+        for tail, real, emission in FORMS
+    },
     "m1_n1_baked_straight": {"baked": True, "emission": "straight"},
     "m2_n2_baked_loops": {"baked": True, "emission": "loops"},
     "m2_n2_baked_float": {"baked": True, "emission": "loops", "real": "float"},
@@ -43,15 +67,22 @@ MODELS = {
     "m2_n2_float_reproducible": {"profile": "reproducible", "emission": "loops", "real": "float"},
 }
 REPRODUCIBLE = [name for name in MODELS if name.endswith("_reproducible")]
-HARDEST = {"double": 6381956970095103.0 * 2.0**797, "float": 16367173.0 * 2.0**72}  # nearest to a multiple of pi/2
+HARDEST = {
+    "double": 6381956970095103.0 * 2.0**797,
+    "float": 16367173.0 * 2.0**72,
+}  # nearest to a multiple of pi/2
 del MODELS["arcs2_float_straight"]  # its text is long, and what it shows others show
 every_model = pytest.mark.parametrize("name", MODELS)
-some_models = pytest.mark.parametrize("name", ["m1_n1_double_straight", "m1_n1_float_loops", "m1_n1_baked_straight"])
+some_models = pytest.mark.parametrize(
+    "name", ["m1_n1_double_straight", "m1_n1_float_loops", "m1_n1_baked_straight"]
+)
 
 
 def slow_but(*names):
     """Every model, all but the named ones in the slow suite."""
-    marked = [name if name in names else pytest.param(name, marks=pytest.mark.slow) for name in MODELS]
+    marked = [
+        name if name in names else pytest.param(name, marks=pytest.mark.slow) for name in MODELS
+    ]
     return pytest.mark.parametrize("name", marked)
 
 
@@ -64,13 +95,16 @@ class Model(SimpleNamespace):
         self.scene = parse_scene(self.manifest["scene"], name)
         self.include, self.header = self.folder / "include", self.folder / "include" / f"{name}.h"
         self.source, self.host, self.batch, self.simulation, self.flights = (
-            self.folder / "src" / f"{name}{part}.c" for part in ("", "_host", "_batch", "_simulation", "_flights")
+            self.folder / "src" / f"{name}{part}.c"
+            for part in ("", "_host", "_batch", "_simulation", "_flights")
         )
         self.example = self.folder / "example" / "main.c"
 
     @property
     def sources(self):
-        """The model, its host entries and, where it has them, its batches, its simulation and its flights."""
+        """The model, its host entries and, where it has them, its batches, its simulation and its
+        flights.
+        """
         parts = (self.source, self.host, self.batch, self.simulation, self.flights)
         return [path for path in parts if path.is_file()]
 
@@ -94,7 +128,9 @@ def models():
 
 def run(*command, cwd=None, env=None):
     """Run a command that must succeed; return what it printed."""
-    done = subprocess.run(list(map(str, command)), capture_output=True, text=True, check=False, cwd=cwd, env=env)
+    done = subprocess.run(
+        list(map(str, command)), capture_output=True, text=True, check=False, cwd=cwd, env=env
+    )
     assert done.returncode == 0, f"{shlex.join(map(str, command))}\n{done.stdout}{done.stderr}"
     return done.stdout
 
@@ -102,7 +138,10 @@ def run(*command, cwd=None, env=None):
 def compiled(tmp_path, source, *flags, compiler="gcc"):
     """Return the object file of a source; its compilation says nothing."""
     target = tmp_path / f"{source.stem}{len(list(tmp_path.iterdir()))}.o"
-    assert run(compiler, *flags, "-I", source.parent.parent / "include", "-c", source, "-o", target) == ""
+    assert (
+        run(compiler, *flags, "-I", source.parent.parent / "include", "-c", source, "-o", target)
+        == ""
+    )
     return target
 
 
@@ -124,7 +163,12 @@ def test_compiles_without_a_warning(models, tmp_path, compiler, name):
 
 @pytest.mark.parametrize("name", ["m2_n2_double_loops", "m2_n2_float_straight"])
 def test_optimiser_finds_nothing_to_warn_about(models, tmp_path, name):
-    for source in (models(name).source, models(name).batch, models(name).simulation, models(name).flights):
+    for source in (
+        models(name).source,
+        models(name).batch,
+        models(name).simulation,
+        models(name).flights,
+    ):
         compiled(tmp_path, source, *C99, "-O2")
 
 
@@ -141,13 +185,17 @@ def test_every_function_alone_compiles_without_a_warning(tmp_path, function, emi
 def test_header_is_cpp_and_links_from_it(models, tmp_path, name):
     model, main = models(name), tmp_path / "main.cpp"
     real = f"{name}_real"
-    inputs = "".join(f", x.{a['name']}" for a in model.manifest["functions"]["mass_matrix"]["inputs"])
+    inputs = "".join(
+        f", x.{a['name']}" for a in model.manifest["functions"]["mass_matrix"]["inputs"]
+    )
     main.write_text(
         f'#include "{name}.h"\n#include "{name}.h"\n#include <cmath>\n'
-        f"static struct {{ {real} q[{name.upper()}_NQ], H[{name.upper()}_NV * {name.upper()}_NV]; }} x;\n"
+        "static struct "
+        f"{{ {real} q[{name.upper()}_NQ], H[{name.upper()}_NV * {name.upper()}_NV]; }} x;\n"
         f"int main() {{\n  {name}_parameters p;\n  {name}_default_parameters(&p);\n  x.q[3] = 1;\n"
         f"  static {real} work[{name.upper()}_WORK_MASS_MATRIX + 1];\n"
-        f"  return {name}_mass_matrix(&p{inputs}, x.H, work) != {name.upper()}_OK || !(x.H[0] > 0);\n}}\n"
+        f"  return {name}_mass_matrix(&p{inputs}, x.H, work) != {name.upper()}_OK || !(x.H[0] > "
+        "0);\n}}\n"
     )
     run(
         "g++",
@@ -178,13 +226,18 @@ def symbols(path, *options):
 
 
 def assert_own_symbols(model, objects, *merged):
-    """A model defines what its header declares, and wants no more than the mathematics and memory of libc."""
+    """A model defines what its header declares, and wants no more than the mathematics and memory
+    of libc.
+    """
     suffix = "f" if model.manifest["real"] == "float" else ""
     parts = [{symbol for _, symbol in symbols(path, "-g", "--defined-only")} for path in objects]
     own, host, batch, simulation, *flights = parts
     defined = set().union(*parts)
     wanted = {symbol for path in objects for _, symbol in symbols(path, "-u")} - defined
-    assert wanted <= {f"{name}{suffix}" for name in ("sin", "cos", "sqrt", "pow", "ceil", *merged)} | MEMORY
+    assert (
+        wanted
+        <= {f"{name}{suffix}" for name in ("sin", "cos", "sqrt", "pow", "ceil", *merged)} | MEMORY
+    )
     header = model.include / f"{model.name}_simulation.h"
     for found, path in ((own, model.header), (simulation, header)):
         assert found == set(re.findall(r"^(?:int|void) (\w+)\(", path.read_text(), re.M))
@@ -214,14 +267,17 @@ def test_nothing_is_kept_between_calls(models, name):
 
 
 def test_models_link_into_one_program(models, tmp_path):
-    chosen = [models(name) for name in ("m1_n1_double_straight", "m2_n2_float_loops", "m2_n2_baked_loops")]
+    chosen = [
+        models(name) for name in ("m1_n1_double_straight", "m2_n2_float_loops", "m2_n2_baked_loops")
+    ]
     main, calls = tmp_path / "main.c", ""
     for m in chosen:
         calls += f"  {m.name}_parameters p_{m.name};\n  {m.name}_default_parameters(&p_{m.name});\n"
         calls += f"  sum += (double)p_{m.name}.gravity + {m.name.upper()}_NV;\n"
     includes = "".join(f'#include "{m.name}.h"\n' for m in chosen)
     main.write_text(
-        f'{includes}#include <stdio.h>\nint main(void)\n{{\n  double sum = 0.0;\n{calls}  printf("%g", sum);\n'
+        f"{includes}#include <stdio.h>\nint "
+        f'main(void)\n{{\n  double sum = 0.0;\n{calls}  printf("%g", sum);\n'
         "  return 0;\n}\n"
     )
     objects = [path for m in chosen for path in m.objects]
@@ -239,10 +295,14 @@ def test_example_builds_with_the_command_in_its_comment(models, tmp_path, name):
     printed = re.findall(r"v_dot\[(\d+)\] = (\S+)", run(folder / "a.out"))
     q = np.zeros(model.manifest["dimensions"]["nq"])
     q[3], q[7] = 1, 0.5
-    v_dot = interpreted(model, "forward_dynamics", {"q": q, "v": 0 * q[1:], "tau": 0 * q[7:]}, Numbers())["v_dot"]
+    v_dot = interpreted(
+        model, "forward_dynamics", {"q": q, "v": 0 * q[1:], "tau": 0 * q[7:]}, Numbers()
+    )["v_dot"]
     assert [int(k) for k, _ in printed] == list(range(len(v_dot)))
     tolerance = 1e-3 if "float" in name else 1e-6
-    np.testing.assert_allclose([float(x) for _, x in printed], v_dot, rtol=tolerance, atol=tolerance)
+    np.testing.assert_allclose(
+        [float(x) for _, x in printed], v_dot, rtol=tolerance, atol=tolerance
+    )
 
 
 # Numbers.
@@ -257,13 +317,19 @@ class Arithmetic(Numbers):
     """The arithmetic of a model's C: its rounding, its constants, its own sine and cosine."""
 
     def __init__(self, library):
-        functions = SimpleNamespace(sin=lambda x: self.each(x, 0), cos=lambda x: self.each(x, 1), sqrt=None)
+        functions = SimpleNamespace(
+            sin=lambda x: self.each(x, 0), cos=lambda x: self.each(x, 1), sqrt=None
+        )
         super().__init__(functions, library.number)
         self.library = library
 
     def each(self, x, k):
         """Sine or cosine of a number, or of each lane of a row."""
-        return np.array([self.library.sincos(lane)[k] for lane in x]) if np.ndim(x) else self.library.sincos(x)[k]
+        return (
+            np.array([self.library.sincos(lane)[k] for lane in x])
+            if np.ndim(x)
+            else self.library.sincos(x)[k]
+        )
 
     def const(self, value):
         """The nearest number of the C type, zero where that type has no normal number so small."""
@@ -278,10 +344,14 @@ def parameter_values(model):
 
 def interpreted(model, name, arguments, arithmetic):
     """Run a function's program; return its outputs."""
-    _, p = in_form(model.manifest["functions"][name]["emission"], CATALOGUE[name], tail_of(model.scene))
+    _, p = in_form(
+        model.manifest["functions"][name]["emission"], CATALOGUE[name], tail_of(model.scene)
+    )
     known = parameter_values(model) | arguments
     arrays = (*p.of_role("parameters"), *p.of_role("input"))
-    values = Run(p, arithmetic, {a.name: [arithmetic.convert(x) for x in known[a.name]] for a in arrays}).values
+    values = Run(
+        p, arithmetic, {a.name: [arithmetic.convert(x) for x in known[a.name]] for a in arrays}
+    ).values
     return {a.name: np.array(values[a.name]) for a in p.of_role("output")}
 
 
@@ -304,7 +374,19 @@ class Library:
             wrapper = model.folder / "example" / "wrapper.c"
             include, definition = WRAPPER.replace("@", model.name).split("\n", 1)
             wrapper.write_text(f"{include}\n{definition if '_sincos(' in model.text else ''}")
-            run("gcc", "-std=c99", *flags, "-fPIC", "-shared", "-I", model.include, wrapper, "-o", path, "-lm")
+            run(
+                "gcc",
+                "-std=c99",
+                *flags,
+                "-fPIC",
+                "-shared",
+                "-I",
+                model.include,
+                wrapper,
+                "-o",
+                path,
+                "-lm",
+            )
         self.library = ctypes.CDLL(str(path))
         sizes = [p["size"] for p in model.manifest["parameters"] if p["in_struct"]]
         self.parameters = np.full(sum(sizes), np.nan, self.number)
@@ -351,7 +433,9 @@ def states_of(model, count=2):
 
 def same(some, others):
     """Tell if two sets of outputs are equal, every entry but for the sign of a zero."""
-    return some.keys() == others.keys() and all(np.array_equal(some[name], others[name]) for name in some)
+    return some.keys() == others.keys() and all(
+        np.array_equal(some[name], others[name]) for name in some
+    )
 
 
 def bits(outputs):
@@ -364,10 +448,15 @@ def assert_means_the_program(model, *flags):
     library = Library(model, *flags)
     for state in states_of(model):
         for function in model.manifest["functions"]:
-            found, expected = library.call(function, state), interpreted(model, function, state, Arithmetic(library))
+            found, expected = (
+                library.call(function, state),
+                interpreted(model, function, state, Arithmetic(library)),
+            )
             if model.scene.baked and model.scene.real == "float":  # parameters are folded in double
                 for key, values in expected.items():
-                    np.testing.assert_allclose(found[key], values, rtol=1e-3, atol=1e-3 * np.abs(values).max())
+                    np.testing.assert_allclose(
+                        found[key], values, rtol=1e-3, atol=1e-3 * np.abs(values).max()
+                    )
             else:
                 assert same(found, expected), function
 
@@ -406,37 +495,66 @@ def test_default_parameters_are_the_scene_s_to_the_last_bit(models, name):
 
 def ulps(found, expected):
     """Distance in units of the last place of the expected number."""
-    return abs(mpmath.mpf(float(found)) - expected) / mpmath.mpf(float(np.spacing(found.dtype.type(abs(expected)))))
+    return abs(mpmath.mpf(float(found)) - expected) / mpmath.mpf(
+        float(np.spacing(found.dtype.type(abs(expected))))
+    )
 
 
 @mpmath.workdps(60)
 @pytest.mark.parametrize("name", ["m1_n1_double_straight", "m1_n1_float_loops", *REPRODUCIBLE])
 def test_sine_and_cosine_are_good_to_the_last_digit(models, name):
     library, rng = Library(models(name)), np.random.default_rng(1)
-    angles = [*rng.uniform(-4, 4, 300), *rng.uniform(-1e5, 1e5, 300), *10.0 ** rng.uniform(-300, 8, 100)]
-    angles += [k * np.pi / 4 for k in range(-40, 41)] + [k * np.pi / 2 for k in (1001, 44444, 63661, 63662, 63663)]
-    angles += [0.0, *(s * x for s in (1, -1) for end in (1e4, 1e5) for x in (end, np.nextafter(end, 0)))]
+    angles = [
+        *rng.uniform(-4, 4, 300),
+        *rng.uniform(-1e5, 1e5, 300),
+        *10.0 ** rng.uniform(-300, 8, 100),
+    ]
+    angles += [k * np.pi / 4 for k in range(-40, 41)] + [
+        k * np.pi / 2 for k in (1001, 44444, 63661, 63662, 63663)
+    ]
+    angles += [
+        0.0,
+        *(s * x for s in (1, -1) for end in (1e4, 1e5) for x in (end, np.nextafter(end, 0))),
+    ]
     angles = np.array(angles).astype(library.number)
-    for x in angles if name not in REPRODUCIBLE else angles[abs(angles) < (1e4 if "float" in name else 1e5)]:
+    for x in (
+        angles
+        if name not in REPRODUCIBLE
+        else angles[abs(angles) < (1e4 if "float" in name else 1e5)]
+    ):
         exact = mpmath.cos_sin(mpmath.mpf(float(x)))[::-1]
-        assert all(ulps(y, value) <= 1.5 for y, value in zip(library.sincos(x), exact, strict=True)), x
+        assert all(
+            ulps(y, value) <= 1.5 for y, value in zip(library.sincos(x), exact, strict=True)
+        ), x
 
 
 @mpmath.workdps(1000)
 @pytest.mark.parametrize("name", REPRODUCIBLE)
 def test_reproducible_sine_and_cosine_reduce_any_angle(models, name):
-    """Within 3 units of the last place as far as numbers go, without libm, and optimised or not to the same bits."""
+    """Within 3 units of the last place as far as numbers go, without libm, and optimised or not to
+    the same bits.
+    """
     model, rng = models(name), np.random.default_rng(3)
-    library, optimised, largest = Library(model), Library(model, "-O2"), np.finfo(float_of(model.scene.real)[0]).max
+    library, optimised, largest = (
+        Library(model),
+        Library(model, "-O2"),
+        np.finfo(float_of(model.scene.real)[0]).max,
+    )
     angles = 10.0 ** rng.uniform(3.9, np.log10(largest), 2000)
-    angles = np.array([*angles, largest, 1e4, 1e5, HARDEST[model.scene.real]]).astype(library.number)
-    angles = np.concatenate([angles, [k * np.pi / 2 for k in rng.integers(1e5, 1e9, 200)]]).astype(library.number)
+    angles = np.array([*angles, largest, 1e4, 1e5, HARDEST[model.scene.real]]).astype(
+        library.number
+    )
+    angles = np.concatenate([angles, [k * np.pi / 2 for k in rng.integers(1e5, 1e9, 200)]]).astype(
+        library.number
+    )
     for x in np.concatenate([angles, -angles[::9]]):
         exact = mpmath.cos_sin(mpmath.mpf(float(x)))[::-1]
         found = library.sincos(x)
         assert all(ulps(y, value) <= 3 for y, value in zip(found, exact, strict=True)), x
         assert found.tobytes() == optimised.sincos(x).tobytes()
-    assert not {"sin", "cos", "sinf", "cosf"} & {symbol for _, symbol in symbols(model.objects[0], "-u")}
+    assert not {"sin", "cos", "sinf", "cosf"} & {
+        symbol for _, symbol in symbols(model.objects[0], "-u")
+    }
 
 
 @pytest.mark.parametrize("name", REPRODUCIBLE)
@@ -444,7 +562,10 @@ def test_reproducible_models_refuse_what_would_change_their_bits(models, tmp_pat
     model = models(name)
     command = ["gcc", "-I", model.include, "-c", model.source, "-o", tmp_path / "model.o"]
     done = subprocess.run([*command, "-ffast-math"], capture_output=True, text=True, check=False)
-    assert done.returncode != 0 and f"{name} is reproducible: compile it without -ffast-math" in done.stderr
+    assert (
+        done.returncode != 0
+        and f"{name} is reproducible: compile it without -ffast-math" in done.stderr
+    )
 
 
 @needs("objdump")
@@ -478,7 +599,9 @@ def test_numbers_are_shortest_exact_decimals_of_the_right_type(models, name):
     literals = set(re.findall(NUMBER, code))
     assert len(literals) > 10
     suffix = "f" if model.manifest["real"] == "float" else ""
-    assert {text for text in literals if len(text) > len(repr(float(text.rstrip("f")))) + len(suffix)} == set()
+    assert {
+        text for text in literals if len(text) > len(repr(float(text.rstrip("f")))) + len(suffix)
+    } == set()
     assert {text for text in literals if text.endswith("f") != bool(suffix)} == set()
 
 
@@ -495,16 +618,27 @@ def test_not_a_number_is_reported(models, name):
 def test_what_the_header_lets_be_null_is_not_read(models, name):
     library, state = Library(models(name)), states_of(models(name))[0]
     for function in library.model.manifest["functions"]:
-        assert bits(library.call(function, state, spare=False)) == bits(library.call(function, state)), function
+        assert bits(library.call(function, state, spare=False)) == bits(
+            library.call(function, state)
+        ), function
 
 
-SWAP = Step("swap", "Exchange.", (("x", 3),), (("x", 3),), (("input", 0), ("input", 1), ("neg", 0)), (1, 2, 0))
+SWAP = Step(
+    "swap",
+    "Exchange.",
+    (("x", 3),),
+    (("x", 3),),
+    (("input", 0), ("input", 1), ("neg", 0)),
+    (1, 2, 0),
+)
 
 
 def test_outputs_of_a_step_may_overwrite_its_inputs(tmp_path):
     lines = "\n".join(routine_lines(Routine(SWAP), "double", "x"))
     source, path = tmp_path / "swap.c", tmp_path / "swap.so"
-    source.write_text(f"#define real double\nvoid swap(const real *x, real *x_out)\n{{\n{lines}\n}}\n")
+    source.write_text(
+        f"#define real double\nvoid swap(const real *x, real *x_out)\n{{\n{lines}\n}}\n"
+    )
     run("gcc", "-std=c99", "-shared", "-fPIC", source, "-o", path)
     x = (ctypes.c_double * 3)(1, 2, 3)
     ctypes.CDLL(str(path)).swap(x, x)
@@ -515,11 +649,17 @@ def test_outputs_of_a_step_may_overwrite_its_inputs(tmp_path):
 
 
 def test_text_of_a_long_tail_is_bounded():
-    """Under 100 kB for all functions of values, 45 kB more for the Jacobians of forward dynamics."""
+    """Under 100 kB for all functions of values, 45 kB more for the Jacobians of forward
+    dynamics.
+    """
     values = [name for name in NAMES if name not in DERIVATIVES]
 
     def size(segments, links, functions):
-        return Model("tail", segments, links, emission="loops", functions=functions).source.stat().st_size
+        return (
+            Model("tail", segments, links, emission="loops", functions=functions)
+            .source.stat()
+            .st_size
+        )
 
     assert size(8, 16, values) < 100_000
     assert size(8, 16, NAMES) < size(8, 16, values) + 45_000
@@ -536,8 +676,12 @@ def test_automatic_form_is_straight_until_the_code_grows_large():
 
 
 @needs("objdump")
-@pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="looks for x86-64 instructions")
-@pytest.mark.parametrize("name", ["m1_n1_float_straight", pytest.param("m2_n2_float_loops", marks=pytest.mark.slow)])
+@pytest.mark.skipif(
+    platform.machine() not in ("x86_64", "AMD64"), reason="looks for x86-64 instructions"
+)
+@pytest.mark.parametrize(
+    "name", ["m1_n1_float_straight", pytest.param("m2_n2_float_loops", marks=pytest.mark.slow)]
+)
 def test_float_model_has_no_double_arithmetic(models, tmp_path, name):
     double = re.compile(r"\bv?(?:cvtss2sd|cvtsd2ss|(?:add|sub|mul|div|sqrt)[sp]d)\b")
     for source in models(name).sources:
@@ -550,7 +694,12 @@ def test_float_model_has_no_double_arithmetic(models, tmp_path, name):
 @every_model
 def test_wrapped_lines_and_no_trailing_blanks(models, name):
     model = models(name)
-    for path in (model.header, *model.sources, model.include / f"{name}_simulation.h", model.example):
+    for path in (
+        model.header,
+        *model.sources,
+        model.include / f"{name}_simulation.h",
+        model.example,
+    ):
         text = path.read_text()
         assert text.isascii() and text.endswith("\n") and not text.endswith("\n\n")
         assert not re.search(r"[ \t]+$", text, re.M)
@@ -691,14 +840,23 @@ def driver(model):
     for name, entry in model.manifest["functions"].items():
         lengths = [int(np.prod(a["shape"])) for a in (*entry["inputs"], *entry["outputs"])]
         counts = f"{len(entry['inputs'])}, {len(entry['outputs'])}"
-        calls += f"  bad += call(@_batch_{name}, {counts}, (const int[]){{ {', '.join(map(str, lengths))} }}, "
+        calls += (
+            f"  bad += call(@_batch_{name}, {counts}, (const "
+            f"int[]){{ {', '.join(map(str, lengths))} }}, "
+        )
         calls += f"@@_WORK_{name.upper()}) != 0;\n"
     for c in re.findall(r"^int (\w+)\(const real \*\*arg.*;$", model.host.read_text(), re.M):
-        calls += f"  bad += external({c}, {c}_work, {c}_sparsity_in, {c}_name_in, {c}_sparsity_out) != 0;\n"
+        calls += (
+            f"  bad += external({c}, {c}_work, {c}_sparsity_in, "
+            f"{c}_name_in, {c}_sparsity_out) != 0;\n"
+        )
     text = DRIVER + (CASADI_DRIVER if double else "")
     if "rollout" in model.scene.functions:
         text = '#include "@_simulation.h"\n' + text
-    text += f"\nint main(void)\n{{\n  int bad = 0;\n{calls}{ROLLOUT if 'rollout' in model.scene.functions else ''}"
+    text += (
+        f"\nint "
+        f"main(void)\n{{\n  int bad = 0;\n{calls}{ROLLOUT if 'rollout' in model.scene.functions else ''}"
+    )
     text += '  printf("%d bad\\n", bad);\n  return bad;\n}\n'
     text = text.replace("//ground", GROUND if model.scene.contacts else "")
     if model.scene.contacts:
@@ -711,20 +869,42 @@ def test_sanitizers_find_nothing(models, tmp_path, name):
     model, main = models(name), tmp_path / "main.c"
     main.write_text(driver(model))
     folders = ("-I", model.include, "-I", model.host.parent)
-    run("gcc", *SANITIZED, *folders, main, model.source, model.simulation, "-o", tmp_path / "main", "-lm")
+    run(
+        "gcc",
+        *SANITIZED,
+        *folders,
+        main,
+        model.source,
+        model.simulation,
+        "-o",
+        tmp_path / "main",
+        "-lm",
+    )
     assert run(tmp_path / "main", env={"ASAN_OPTIONS": "detect_leaks=1"}) == "0 bad\n"
 
 
 def test_sanitizers_find_nothing_on_the_ground(tmp_path):
     functions = ["energy", "rollout", "implicit", "pfl"]
-    model = Model("ground", 1, 2, contacts=["feet", "tail", "torso"], functions=functions, emission="loops")
+    model = Model(
+        "ground", 1, 2, contacts=["feet", "tail", "torso"], functions=functions, emission="loops"
+    )
     for source in model.sources:
         compiled(tmp_path, source, *C99, "-O2")
     main, any_damping = tmp_path / "main.c", "call(@_batch_implicit_factor".replace("@", model.name)
     # damping at random is below zero, too, and its matrix then not positive definite
     main.write_text(driver(model).replace(f"bad += {any_damping}", f"bad += 0 * {any_damping}"))
     folders = ("-I", model.include, "-I", model.host.parent)
-    run("gcc", *SANITIZED, *folders, main, model.source, model.simulation, "-o", tmp_path / "main", "-lm")
+    run(
+        "gcc",
+        *SANITIZED,
+        *folders,
+        main,
+        model.source,
+        model.simulation,
+        "-o",
+        tmp_path / "main",
+        "-lm",
+    )
     assert run(tmp_path / "main", env={"ASAN_OPTIONS": "detect_leaks=0"}) == "0 bad\n"
 
 

@@ -1,4 +1,6 @@
-"""The C of derivatives: lanes of any width, any workspace and single precision mean what the programs mean."""
+"""The C of derivatives: lanes of any width, any workspace and single precision mean what the
+programs mean.
+"""
 
 import ctypes
 import re
@@ -15,14 +17,22 @@ from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.ir.program import Apply, statements
 from serpentail_codegen.scene.scene import DERIVATIVES
 from tests.references.metrics import equilibrated_condition
-from tests.support.derivative_models import derivative_model, jacobian_error, nest_of, parameters_of, states, tail_name
+from tests.support.derivative_models import (
+    derivative_model,
+    jacobian_error,
+    nest_of,
+    parameters_of,
+    states,
+    tail_name,
+)
 from tests.support.models import model_folder
 from tests.support.programs import Narrow
 
 FLOATS = Numbers(np, float)
 SIZES = [(2, 2, "loops"), (1, 3, "straight")]
 SIZES += [
-    pytest.param(size, marks=pytest.mark.slow) for size in [(3, 2, "loops"), (2, None, "loops"), (1, None, "straight")]
+    pytest.param(size, marks=pytest.mark.slow)
+    for size in [(3, 2, "loops"), (2, None, "loops"), (1, None, "straight")]
 ]
 ROUNDING = 1e-12  # largest error of a block, relative, where products and sums are fused
 UNFUSED = 1e-13  # the same where they are not
@@ -62,15 +72,22 @@ def interpreted(model, name, kind=Run):
     """The outputs of a function as its program means them, in order."""
     nest, state = nest_of(model, name), state_of(model)
     inputs = {a.name: list(state[a.name]) for a in nest.of_role("input")}
-    values = kind(nest, FLOATS, inputs | {n: list(x) for n, x in parameters_of(model).items()}).values
+    values = kind(
+        nest, FLOATS, inputs | {n: list(x) for n, x in parameters_of(model).items()}
+    ).values
     shapes = [a["shape"] for a in model.manifest["functions"][name]["outputs"]]
     arrays = nest.of_role("output")
-    return [np.array(values[a.name], float).reshape(shape) for a, shape in zip(arrays, shapes, strict=True)]
+    return [
+        np.array(values[a.name], float).reshape(shape)
+        for a, shape in zip(arrays, shapes, strict=True)
+    ]
 
 
 def limit(model, name, state, rounding=ROUNDING):
     """Largest error of a block; solving with H multiplies rounding."""
-    return rounding * (equilibrated_condition(model.mass_matrix(state["q"])) if "forward" in name else 1)
+    return rounding * (
+        equilibrated_condition(model.mass_matrix(state["q"])) if "forward" in name else 1
+    )
 
 
 def assert_close(found, expected, model, largest):
@@ -102,7 +119,14 @@ def built(model, build):
         "-fPIC",
         "-shared",
     ]
-    files = [f"-I{folder / 'include'}", copy, folder / "src" / f"{model.name}_host.c", "-o", library, "-lm"]
+    files = [
+        f"-I{folder / 'include'}",
+        copy,
+        folder / "src" / f"{model.name}_host.c",
+        "-o",
+        library,
+        "-lm",
+    ]
     subprocess.run([*command, *files], check=True)
     return Model(folder, model.manifest, model.parameters, ctypes.CDLL(str(library)))
 
@@ -117,15 +141,23 @@ def test_compiled_text_means_the_program(model, build, name):
 
 @every_function
 def test_lanes_that_are_left_out_are_not_looked_at(model, name):
-    """Computed lane by lane, without those that a step is told to leave, the outputs are the same and all numbers."""
+    """Computed lane by lane, without those that a step is told to leave, the outputs are the same
+    and all numbers.
+    """
     for one, other in zip(interpreted(model, name, Narrow), interpreted(model, name), strict=True):
         np.testing.assert_array_equal(one, other)
 
 
 def test_some_lanes_are_left_out():
-    """The check above has something to check: sweeps over segments compute what depends on them alone."""
+    """The check above has something to check: sweeps over segments compute what depends on them
+    alone.
+    """
     model = derivative_model(2, 2, "loops")
-    for name in ("inverse_dynamics_derivatives", "forward_dynamics_derivatives", "inverse_dynamics_hessian"):
+    for name in (
+        "inverse_dynamics_derivatives",
+        "forward_dynamics_derivatives",
+        "inverse_dynamics_hessian",
+    ):
         calls = [s for s, _ in statements(nest_of(model, name).body) if isinstance(s, Apply)]
         assert any(call.columns for call in calls), name
 
@@ -133,7 +165,9 @@ def test_some_lanes_are_left_out():
 @every_function
 @pytest.mark.parametrize("offset", [1, 3])
 def test_workspace_may_begin_anywhere_and_hold_anything(model, name, offset):
-    """Vectors need no alignment, and nothing is read that was not written: not even its not-a-numbers."""
+    """Vectors need no alignment, and nothing is read that was not written: not even its
+    not-a-numbers.
+    """
     state = state_of(model)
     other = Model(model.folder, model.manifest, model.parameters, model.library)
     kernel = other.kernel(name)
@@ -177,7 +211,10 @@ def test_parameters_given_late_count_in_derivatives(emission):
     size = (2, 2, "loops") if emission == "loops" else (1, 3, "straight")
     model = derivative_model(*size)
     p, state = model.parameters, state_of(model)
-    twice = {name: 2 * np.array(p[name]) for name in ("torso_mass", "torso_inertia", "tail_mass", "link_inertia")}
+    twice = {
+        name: 2 * np.array(p[name])
+        for name in ("torso_mass", "torso_inertia", "tail_mass", "link_inertia")
+    }
     heavy = model.with_parameters(**{n: x.tolist() for n, x in twice.items()})
     for name in (
         "inverse_dynamics_derivatives",
@@ -185,7 +222,9 @@ def test_parameters_given_late_count_in_derivatives(emission):
         "energy_derivatives",
         "momentum_derivatives",
     ):
-        for one, other in zip(outputs(heavy, name, state), outputs(model, name, state), strict=True):
+        for one, other in zip(
+            outputs(heavy, name, state), outputs(model, name, state), strict=True
+        ):
             np.testing.assert_array_equal(one, 2 * other)
 
 
@@ -197,7 +236,9 @@ def test_function_left_out_is_named(name):
     small = st.load(model_folder(1, 1, name="small", functions=["mass_matrix"]))
     state = state_of(small)
     known = {"forward_dynamics_jvp": ("q", "v", "tau", "dq", "dv", "dtau")}
-    third = {"inverse": ("q", "v", "v_dot"), "forward": ("q", "v", "tau")}.get(name.split("_")[0], ("q", "v"))
+    third = {"inverse": ("q", "v", "v_dot"), "forward": ("q", "v", "tau")}.get(
+        name.split("_")[0], ("q", "v")
+    )
     weights = ("multiplier",) if name.endswith(("vjp", "hessian")) else ()
     with pytest.raises(st.ModelError, match=f"^small was generated without {name!r} "):
         getattr(small, name)(*(state[n] for n in known.get(name, (*third, *weights))))
@@ -212,14 +253,19 @@ def test_wrong_arguments_are_named(name):
         for shape in [(), (size - 1,), (size + 1,), (2, size + 1), (size, 1)]:
             wrong = arguments(model, name, state | {argument: np.ones(shape)})
             with pytest.raises(
-                st.StateError, match=re.escape(f"{name}: {argument} has shape {shape}, not ({size},) or")
+                st.StateError,
+                match=re.escape(f"{name}: {argument} has shape {shape}, not ({size},) or"),
             ):
                 getattr(model, name)(*wrong)
         for bad in (np.nan, np.inf):
             spoiled = state[argument].copy()
             spoiled[size - 1] = bad
-            with pytest.raises(st.StateError, match=re.escape(f"{name}: {argument}[{size - 1}] is {bad}")):
-                getattr(model, name)(*(spoiled if j == k else x for j, x in enumerate(arguments(model, name, state))))
+            with pytest.raises(
+                st.StateError, match=re.escape(f"{name}: {argument}[{size - 1}] is {bad}")
+            ):
+                getattr(model, name)(
+                    *(spoiled if j == k else x for j, x in enumerate(arguments(model, name, state)))
+                )
 
 
 @every_function

@@ -1,4 +1,6 @@
-"""Microcontrollers: models give the host's bits, their stack is what their frames add up to, their costs are true."""
+"""Microcontrollers: models give the host's bits, their stack is what their frames add up to, their
+costs are true.
+"""
 
 import subprocess
 import sys
@@ -16,19 +18,28 @@ CROSS = [name for name in boards.BOARDS if name != "host"]
 REAL = {"m4": "float", "m7": "double", "rv32": "double"}
 FUNCTIONS = ["mass_matrix", "forward_dynamics", "pfl", "contact_dynamics"]
 LIBC_STACK = 16  # bytes: what memset and memcpy push, which no call graph of ours has
-NOT_TAKEN = 128  # bytes: branches that the stored states do not take, such as angles beyond all reason
+NOT_TAKEN = (
+    128  # bytes: branches that the stored states do not take, such as angles beyond all reason
+)
 
 
 def folder(name, profile, segments=1, links=3, **options):
     """A generated model with contact for a board."""
-    options = {"functions": FUNCTIONS, "contacts": ["feet"], "real": REAL[name], "profile": profile} | options
+    options = {
+        "functions": FUNCTIONS,
+        "contacts": ["feet"],
+        "real": REAL[name],
+        "profile": profile,
+    } | options
     return model_folder(segments, links, **options)
 
 
 def compared(tmp_path, name, profile, **options):
     """Every function of a model on a board beside the host."""
     board(name)
-    return {row.name: row for row in check.compare(folder(name, profile, **options), name, tmp_path)}
+    return {
+        row.name: row for row in check.compare(folder(name, profile, **options), name, tmp_path)
+    }
 
 
 @pytest.mark.parametrize("name", CROSS)
@@ -40,7 +51,9 @@ def test_reproducible_models_have_the_host_s_bits_everywhere(tmp_path, name):
 
 
 def assert_stack_is_the_sum_of_frames(rows):
-    """What the paint shows is the deepest chain of calls, or a little less where a branch is not taken."""
+    """What the paint shows is the deepest chain of calls, or a little less where a branch is not
+    taken.
+    """
     for row in rows.values():
         assert 0 < row.painted <= row.stack + LIBC_STACK, row
         assert row.painted >= row.stack - NOT_TAKEN, row
@@ -58,10 +71,19 @@ SLOW_FORMS = [
 @pytest.mark.parametrize(("name", "tail", "emission"), SLOW_FORMS)
 @pytest.mark.parametrize("profile", boards.PROFILES)
 def test_profiles_keep_their_promises_in_every_form(tmp_path, name, tail, emission, profile):
-    more = [*FUNCTIONS, "inverse_dynamics", "energy", "momentum", "tail_points", "forward_dynamics_derivatives"]
+    more = [
+        *FUNCTIONS,
+        "inverse_dynamics",
+        "energy",
+        "momentum",
+        "tail_points",
+        "forward_dynamics_derivatives",
+    ]
     sizes = {"segments": tail[0], "links": tail[1]}
     rows = compared(tmp_path, name, profile, **sizes, emission=emission, functions=more)
-    assert all(row.holds(profile) for row in rows.values()), "\n".join(check.table(list(rows.values())))
+    assert all(row.holds(profile) for row in rows.values()), "\n".join(
+        check.table(list(rows.values()))
+    )
     assert_stack_is_the_sum_of_frames(rows)
 
 
@@ -77,7 +99,9 @@ def test_profiles_keep_their_promises_in_every_form(tmp_path, name, tail, emissi
 )
 def test_forward_dynamics_keeps_its_budget(tmp_path, name, tail, emission, instructions):
     options = {"functions": ["forward_dynamics"], "contacts": [], "emission": emission}
-    row = compared(tmp_path, name, "fast", segments=tail[0], links=tail[1], **options)["forward_dynamics"]
+    row = compared(tmp_path, name, "fast", segments=tail[0], links=tail[1], **options)[
+        "forward_dynamics"
+    ]
     assert row.instructions <= instructions
     assert row.stack <= 2560  # bytes
 
@@ -87,8 +111,12 @@ def test_forward_dynamics_keeps_its_budget(tmp_path, name, tail, emission, instr
 def test_forward_dynamics_in_loops_is_small(tmp_path, name, tail):
     from embedded import size_report
 
-    model = folder(name, "fast", *tail, functions=["forward_dynamics"], contacts=[], emission="loops")
-    assert size_report.flash(image.build(model, board(name), tmp_path), "forward_dynamics") <= 6 * 1024
+    model = folder(
+        name, "fast", *tail, functions=["forward_dynamics"], contacts=[], emission="loops"
+    )
+    assert (
+        size_report.flash(image.build(model, board(name), tmp_path), "forward_dynamics") <= 6 * 1024
+    )
 
 
 # The instruments.
@@ -115,10 +143,14 @@ int main(void)
 def test_instructions_are_counted_one_by_one(tmp_path, name):
     """A loop of 1000 turns is 2001 instructions, and a few around it."""
     machine, source = board(name), tmp_path / "main.c"
-    source.write_text(COUNTING.replace("LOOP", LOOP[name]).replace("REGISTER", "t0" if name == "rv32" else "r0"))
+    source.write_text(
+        COUNTING.replace("LOOP", LOOP[name]).replace("REGISTER", "t0" if name == "rv32" else "r0")
+    )
     elf = str(tmp_path / "count.elf")
     sources = [str(source), machine.port]
-    image.command([machine.compiler, *machine.cpu, "-O2", "-I.", *machine.link, *sources, "-o", elf])
+    image.command(
+        [machine.compiler, *machine.cpu, "-O2", "-I.", *machine.link, *sources, "-o", elf]
+    )
     assert subprocess.run([*machine.emulator, elf], check=False).returncode == 0
 
 
@@ -138,7 +170,12 @@ def host_image(tmp_path):
 def test_a_wrong_bit_fails(host_image):
     exact = results.run(host_image)["forward_dynamics"].values[0]
     depths = {"call_forward_dynamics": 20, "call_room": 0}
-    expected = {0.0: (True, True), 1e-15: (False, True), 1e-9: (False, False), np.nan: (False, False)}
+    expected = {
+        0.0: (True, True),
+        1e-15: (False, True),
+        1e-9: (False, False),
+        np.nan: (False, False),
+    }
     for off, kept in expected.items():
         other = exact + off * np.abs(exact).max()
         row = check._compared(host_image, "forward_dynamics", result(other), result(exact), depths)
@@ -147,7 +184,9 @@ def test_a_wrong_bit_fails(host_image):
 
 def test_another_status_is_an_error(host_image):
     ones = result(np.ones(8))
-    with pytest.raises(RuntimeError, match=r"forward_dynamics: status \(1,\) on host, \(0,\) on the host"):
+    with pytest.raises(
+        RuntimeError, match=r"forward_dynamics: status \(1,\) on host, \(0,\) on the host"
+    ):
         check._compared(host_image, "forward_dynamics", replace(ones, statuses=(1,)), ones, {})
 
 
@@ -175,7 +214,8 @@ def test_stack_adds_up_along_calls(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("values", "message"), [({"callee": "f"}, "it calls itself"), ({"kind": "dynamic"}, "its frame is dynamic")]
+    ("values", "message"),
+    [({"callee": "f"}, "it calls itself"), ({"kind": "dynamic"}, "its frame is dynamic")],
 )
 def test_stack_that_cannot_be_known_is_an_error(tmp_path, values, message):
     with pytest.raises(stack.StackUnknown, match=message):
@@ -186,20 +226,35 @@ def test_stack_that_cannot_be_known_is_an_error(tmp_path, values, message):
 def test_missing_tools_are_named_with_their_packages(tmp_path, name):
     command = [sys.executable, "-m", "embedded.check", str(folder(name, "fast")), "--board", name]
     done = subprocess.run(
-        command, cwd=tmp_path, env={"PATH": "", "PYTHONPATH": str(ROOT)}, capture_output=True, text=True, check=False
+        command,
+        cwd=tmp_path,
+        env={"PATH": "", "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
     )
     assert done.returncode == 2
     assert boards.BOARDS[name].compiler in done.stderr and "not on PATH" in done.stderr
-    assert f"apt-get install --no-install-recommends {' '.join(boards.BOARDS[name].packages)}" in done.stderr
+    assert (
+        f"apt-get install --no-install-recommends {' '.join(boards.BOARDS[name].packages)}"
+        in done.stderr
+    )
 
 
 def test_size_report_names_missing_tools(tmp_path):
     before = (ROOT / "docs" / "embedded.md").read_bytes()
     command = [sys.executable, "-m", "embedded.size_report"]
     done = subprocess.run(
-        command, cwd=tmp_path, env={"PATH": "", "PYTHONPATH": str(ROOT)}, capture_output=True, text=True, check=False
+        command,
+        cwd=tmp_path,
+        env={"PATH": "", "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
     )
-    assert done.returncode == 2 and "apt-get install" in done.stderr and "Traceback" not in done.stderr
+    assert (
+        done.returncode == 2 and "apt-get install" in done.stderr and "Traceback" not in done.stderr
+    )
     assert (ROOT / "docs" / "embedded.md").read_bytes() == before
 
 

@@ -1,4 +1,6 @@
-"""Emitted C at states far from ordinary: sanitizers and valgrind find nothing, and would find what is put in."""
+"""Emitted C at states far from ordinary: sanitizers and valgrind find nothing, and would find what
+is put in.
+"""
 
 import re
 import shutil
@@ -14,10 +16,21 @@ GROUND = {"contacts": ["feet", "tail", "torso"]}
 MODELS = {
     "articulated": ((1, 3), {"functions": "all"}),
     "continuum": ((2, None), {"functions": "all"}),
-    "single": ((2, 2), {"functions": "all", "real": "float", "profile": "reproducible", "emission": "loops"}),
-    "small": ((1, 1), {"functions": ["energy", "forward_dynamics", "rollout", "implicit", "pfl"], "emission": "loops"}),
+    "single": (
+        (2, 2),
+        {"functions": "all", "real": "float", "profile": "reproducible", "emission": "loops"},
+    ),
+    "small": (
+        (1, 1),
+        {
+            "functions": ["energy", "forward_dynamics", "rollout", "implicit", "pfl"],
+            "emission": "loops",
+        },
+    ),
 }
-every_model = pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow) for n in MODELS if n != "small"])
+every_model = pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=pytest.mark.slow) for n in MODELS if n != "small"]
+)
 FAULTS = {
     "cast": "const volatile int turns = (int)q[7];\n  (void)turns;",
     "overflow": "volatile int large = 2147483647;\n  large += q[3] > 0.0;",
@@ -52,7 +65,9 @@ def test_nothing_is_found(tmp_path, request, name, tool):
     found = memory.every(of, 1)
     told, report = memory.answers(memory.built(of, tmp_path, *flags), found, *under)
     assert report == "" and memory.insane(found, told) == []
-    assert len({answer.status for answer in told}) >= 4  # answered, refused, and runs that ended early
+    assert (
+        len({answer.status for answer in told}) >= 4
+    )  # answered, refused, and runs that ended early
 
 
 @pytest.mark.parametrize(
@@ -66,7 +81,10 @@ def test_nothing_is_found(tmp_path, request, name, tool):
     ],
 )
 def test_what_is_put_in_is_found(tmp_path, request, tool, fault, words):
-    of = st.load(shutil.copytree(model("small").folder, tmp_path / "copy" / model("small").name), compiled=False)
+    of = st.load(
+        shutil.copytree(model("small").folder, tmp_path / "copy" / model("small").name),
+        compiled=False,
+    )
     source = of.folder / "src" / f"{of.name}.c"
     head, put = rf"(int {of.name}_energy\([^)]*\)\n{{\n)", FAULTS[fault].replace("NQ", str(of.nq))
     text, count = re.subn(head, rf"\1  {put}\n", source.read_text())

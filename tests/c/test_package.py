@@ -1,4 +1,6 @@
-"""The folder of a model as a package for C: it builds alone, explains itself, and analysers find nothing."""
+"""The folder of a model as a package for C: it builds alone, explains itself, and analysers find
+nothing.
+"""
 
 import re
 import shutil
@@ -18,7 +20,14 @@ FLIGHT = ["mass_matrix", "forward_dynamics"]
 MODELS = {
     "flight": ((1, 3), {"functions": FLIGHT, "emission": "loops"}),
     "reproducible": ((1, 1), {"functions": FLIGHT, "profile": "reproducible", "real": "float"}),
-    "contact": ((1, 2), {"functions": ["pfl", "contact_dynamics"], "contacts": ["feet", "tail"], "emission": "loops"}),
+    "contact": (
+        (1, 2),
+        {
+            "functions": ["pfl", "contact_dynamics"],
+            "contacts": ["feet", "tail"],
+            "emission": "loops",
+        },
+    ),
     "arc": ((1, None), {"functions": FLIGHT, "emission": "loops", "real": "float"}),
 }
 SLOW = ("reproducible", "arc")
@@ -37,13 +46,17 @@ def package(tmp_path):
     return lambda name: shutil.copytree(model_of(name).folder, tmp_path / name)
 
 
-@pytest.mark.parametrize("name", ["flight", "contact", *(pytest.param(n, marks=pytest.mark.slow) for n in SLOW)])
+@pytest.mark.parametrize(
+    "name", ["flight", "contact", *(pytest.param(n, marks=pytest.mark.slow) for n in SLOW)]
+)
 def test_makefile_builds_library_and_example(package, name):
     folder = package(name)
     assert run("make", "-s", "all", "example", cwd=folder, env=BARE) == ""
     assert (folder / "build" / f"libpackage_{name}.a").is_file()
     printed = run(folder / "build" / "example")
-    assert re.search(r"tau = -?\d" if name == "contact" else r"v_dot\[2\] = -9\.\d", printed), printed
+    assert re.search(r"tau = -?\d" if name == "contact" else r"v_dot\[2\] = -9\.\d", printed), (
+        printed
+    )
     run("make", "-s", "clean", cwd=folder, env=BARE)
     assert not (folder / "build").exists()
 
@@ -52,7 +65,9 @@ def test_makefile_builds_library_and_example(package, name):
 def test_makefile_builds_for_a_microcontroller_as_it_says(package, name):
     board(name)
     folder = package("reproducible" if name == "m4" else "flight")
-    command = re.search(r"#   make (CC=\S+ AR=\S+) \\\n#\s+(CFLAGS=\".*?\")", (folder / "Makefile").read_text())
+    command = re.search(
+        r"#   make (CC=\S+ AR=\S+) \\\n#\s+(CFLAGS=\".*?\")", (folder / "Makefile").read_text()
+    )
     assert f"cortex-{name}" in command[2]
     run("sh", "-c", f"make -s {command[1]} {command[2]}", cwd=folder)
     (library,) = folder.glob("build/*.a")
@@ -80,7 +95,9 @@ def test_another_project_adds_two_models(package, tmp_path):
     )
     includes = "".join(f'#include "package_{name}.h"\n' for name in names)
     sizes = " + ".join(f"PACKAGE_{name.upper()}_NV" for name in names)
-    (tmp_path / "own.c").write_text(f"{includes}int main(void)\n{{\n  return {sizes} == 16 ? 0 : 1;\n}}\n")
+    (tmp_path / "own.c").write_text(
+        f"{includes}int main(void)\n{{\n  return {sizes} == 16 ? 0 : 1;\n}}\n"
+    )
     run("cmake", "-S", tmp_path, "-B", tmp_path / "build", env=BARE)
     run("cmake", "--build", tmp_path / "build", env=BARE)
     run(tmp_path / "build" / "own")
@@ -97,20 +114,38 @@ def test_a_cpp_compiler_takes_the_source(package, tmp_path, name):
 
 def test_a_cpp_compiler_takes_a_rollout(tmp_path):
     model = Model("package_rollout", 1, 1, functions=["forward_dynamics", "rollout"])
-    run("g++", "-x", "c++", "-Wall", "-Werror", "-I", model.include, "-c", model.source, "-o", tmp_path / "model.o")
+    run(
+        "g++",
+        "-x",
+        "c++",
+        "-Wall",
+        "-Werror",
+        "-I",
+        model.include,
+        "-c",
+        model.source,
+        "-o",
+        tmp_path / "model.o",
+    )
 
 
 @every_model
 def test_readme_names_every_function_and_symbol_that_the_header_has(package, name):
     folder = package(name)
-    readme, header = (folder / "README.md").read_text(), (folder / "include" / f"package_{name}.h").read_text()
+    readme, header = (
+        (folder / "README.md").read_text(),
+        (folder / "include" / f"package_{name}.h").read_text(),
+    )
     listed = set(re.findall(r"^\| `(\w+)` \| (?:loops|straight)", readme, re.MULTILINE))
     declared = set(re.findall(rf"^int package_{name}_(\w+)\(", header, re.MULTILINE))
     assert listed == declared
     assert all(
-        word in header for word in re.findall(rf"\b(?:package|PACKAGE)_{name}_\w+\b(?!\.)", readme, re.IGNORECASE)
+        word in header
+        for word in re.findall(rf"\b(?:package|PACKAGE)_{name}_\w+\b(?!\.)", readme, re.IGNORECASE)
     )
-    for file in re.findall(r"`((?:include|src|example)/\S+|Makefile|CMakeLists\.txt|\w+\.json)`", readme):
+    for file in re.findall(
+        r"`((?:include|src|example)/\S+|Makefile|CMakeLists\.txt|\w+\.json)`", readme
+    ):
         assert (folder / file).is_file(), file
 
 
@@ -125,10 +160,22 @@ def test_licence_is_the_project_s(package):
 @pytest.mark.slow
 @every_model
 def test_gcc_s_analyser_finds_nothing(package, tmp_path, name):
-    """All but reads of what is unset: the analyser does not follow loops; the next test sees to that."""
+    """All but reads of what is unset: the analyser does not follow loops; the next test sees to
+    that.
+    """
     folder = package(name)
-    flags = (*C99, "-O2", "-fanalyzer", "-Wno-analyzer-use-of-uninitialized-value", "-I", folder / "include")
-    assert run("gcc", *flags, "-c", folder / "src" / f"package_{name}.c", "-o", tmp_path / "model.o") == ""
+    flags = (
+        *C99,
+        "-O2",
+        "-fanalyzer",
+        "-Wno-analyzer-use-of-uninitialized-value",
+        "-I",
+        folder / "include",
+    )
+    assert (
+        run("gcc", *flags, "-c", folder / "src" / f"package_{name}.c", "-o", tmp_path / "model.o")
+        == ""
+    )
 
 
 @every_model
@@ -136,9 +183,15 @@ def test_gcc_s_analyser_finds_nothing(package, tmp_path, name):
 def test_nothing_depends_on_what_a_local_variable_held(name, level):
     """Locals full of zeros, then full of a pattern: the same bits."""
     model = model_of(name)
-    blank, dirty = (Library(model, level, f"-ftrivial-auto-var-init={fill}") for fill in ("zero", "pattern"))
+    blank, dirty = (
+        Library(model, level, f"-ftrivial-auto-var-init={fill}") for fill in ("zero", "pattern")
+    )
     rng = np.random.default_rng(4)
-    more = {"accelerations": rng.uniform(-1, 1, 2), "bristles": np.zeros(100), "legs": rng.uniform(-1, 1, 8)}
+    more = {
+        "accelerations": rng.uniform(-1, 1, 2),
+        "bristles": np.zeros(100),
+        "legs": rng.uniform(-1, 1, 8),
+    }
     for state in states_of(model):
         for function, entry in model.manifest["functions"].items():
             lengths = {a["name"]: int(np.prod(a["shape"])) for a in entry["inputs"]}
@@ -149,7 +202,9 @@ def test_nothing_depends_on_what_a_local_variable_held(name, level):
 def test_a_local_variable_that_is_read_unset_would_be_found(tmp_path):
     """The control: two fills, two results."""
     source = tmp_path / "unset.c"
-    source.write_text("int main(void)\n{\n  volatile int x[2];\n  return x[1] & 1 ? 0 : x[1] != 0;\n}\n")
+    source.write_text(
+        "int main(void)\n{\n  volatile int x[2];\n  return x[1] & 1 ? 0 : x[1] != 0;\n}\n"
+    )
     found = []
     for fill in ("zero", "pattern"):
         run("gcc", f"-ftrivial-auto-var-init={fill}", source, "-o", tmp_path / fill)
@@ -171,4 +226,7 @@ def test_cppcheck_would_find_a_fault_and_misra_is_counted(tmp_path):
         "int f(void);\nint f(void)\n{\n  int x[2];\n  return x[2];\n}\n"
     )
     assert "out of bounds" in misra.faults(tmp_path)
-    assert dict(misra.summary(model_folder(1, 1, functions=["mass_matrix"], emission="loops")))["12.1"] > 10
+    assert (
+        dict(misra.summary(model_folder(1, 1, functions=["mass_matrix"], emission="loops")))["12.1"]
+        > 10
+    )

@@ -1,4 +1,6 @@
-"""Derivatives of compiled functions in CasADi: those of the SX functions, with exact sparsity, and IPOPT takes them."""
+"""Derivatives of compiled functions in CasADi: those of the SX functions, with exact sparsity, and
+IPOPT takes them.
+"""
 
 import re
 import subprocess
@@ -19,7 +21,9 @@ from tests.references.parameters import random_states
 from tests.support import collocation
 from tests.support.models import model_folder
 
-PARTS = sorted({part for name, orders in DERIVATIVES.items() for part in (name, *orders[0], *orders[1])})
+PARTS = sorted(
+    {part for name, orders in DERIVATIVES.items() for part in (name, *orders[0], *orders[1])}
+)
 BY_PARAMETERS = [f"{name}_parameter_derivatives" for name in DERIVATIVES]
 TAILS = {"m1_n3": (1, 3), "m3_n4": (3, 4), "arcs1": (1, None), "arcs2": (2, None)}
 LAST = {"inverse_dynamics": "v_dot", "forward_dynamics": "tau"}
@@ -50,7 +54,10 @@ def inputs(model, name, state):
 
 def states(model):
     """States by name: each kind of tail, one at rest, one whose quaternion has another norm."""
-    rows = {kind: [x[0].copy() for x in random_states(model.scene.segments, 3, 1, kind)] for kind in KINDS}
+    rows = {
+        kind: [x[0].copy() for x in random_states(model.scene.segments, 3, 1, kind)]
+        for kind in KINDS
+    }
     rows["still"] = [x.copy() for x in rows["random"]]
     rows["still"][1][:] = 0
     rows["long"] = [x.copy() for x in rows["random"]]
@@ -60,7 +67,10 @@ def states(model):
 
 def pair(model, name, kind):
     """A derivative of the compiled function, and of the SX function."""
-    return [collocation.derivatives(f)[kind] for f in (model.external(name), model.module.function(name))]
+    return [
+        collocation.derivatives(f)[kind]
+        for f in (model.external(name), model.module.function(name))
+    ]
 
 
 @every_kind
@@ -68,8 +78,12 @@ def pair(model, name, kind):
 def test_ports_are_those_that_casadi_gives_its_own_functions(model, name, kind):
     compiled, symbolic = pair(model, name, kind)
     assert compiled.name_in() == symbolic.name_in() and compiled.name_out() == symbolic.name_out()
-    assert [compiled.size_in(k) for k in compiled.name_in()] == [symbolic.size_in(k) for k in symbolic.name_in()]
-    assert [compiled.size_out(k) for k in compiled.name_out()] == [symbolic.size_out(k) for k in symbolic.name_out()]
+    assert [compiled.size_in(k) for k in compiled.name_in()] == [
+        symbolic.size_in(k) for k in symbolic.name_in()
+    ]
+    assert [compiled.size_out(k) for k in compiled.name_out()] == [
+        symbolic.size_out(k) for k in symbolic.name_out()
+    ]
 
 
 @every_kind
@@ -91,7 +105,9 @@ def dense(sparsity):
 @every_kind
 @every_function
 def test_sparsity_is_that_of_the_numbers(model, name, kind):
-    """Neither an entry too few (CasADi's own pattern bounds them from above, numbers from below) nor one too many."""
+    """Neither an entry too few (CasADi's own pattern bounds them from above, numbers from below)
+    nor one too many.
+    """
     compiled, symbolic = pair(model, name, kind)
     seen = {}
     for state in zip(*random_states(model.scene.segments, 5, 4, "random"), strict=True):
@@ -120,7 +136,9 @@ def test_graphs_see_the_sparsity(model, name):
     rows = [casadi.horzcat(*(second.sparsity_out(f"jac_adj_{a}_{b}") for b in keys)) for a in keys]
     assert hessian.sparsity() == casadi.vertcat(*rows)
     first = f.jacobian()
-    assert jacobian.sparsity() == casadi.horzcat(*(first.sparsity_out(f"jac_{f.name_out(0)}_{b}") for b in keys))
+    assert jacobian.sparsity() == casadi.horzcat(
+        *(first.sparsity_out(f"jac_{f.name_out(0)}_{b}") for b in keys)
+    )
 
 
 @every_function
@@ -144,8 +162,17 @@ def test_map_differentiates_each_state(model, name):
 def checked(f, parameters, folder):
     """What IPOPT says when it compares derivatives with differences."""
     text = folder / "ipopt.txt"
-    options = {"derivative_test": "second-order", "derivative_test_perturbation": 1e-7, "output_file": str(text)}
-    options |= {"point_perturbation_radius": 0.1, "nlp_scaling_method": "none", "file_print_level": 4, "max_iter": 0}
+    options = {
+        "derivative_test": "second-order",
+        "derivative_test_perturbation": 1e-7,
+        "output_file": str(text),
+    }
+    options |= {
+        "point_perturbation_radius": 0.1,
+        "nlp_scaling_method": "none",
+        "file_print_level": 4,
+        "max_iter": 0,
+    }
     collocation.plan(f, parameters, nodes=2, **options)
     return text.read_text()
 
@@ -177,7 +204,10 @@ def test_ipopt_would_find_an_error_in_the_derivatives(small, tmp_path, name, rig
 
 @every_function
 def test_plan_is_that_of_the_symbolic_function(small, name):
-    found, expected = (collocation.plan(f, small.vector) for f in (small.external(name), small.module.function(name)))
+    found, expected = (
+        collocation.plan(f, small.vector)
+        for f in (small.external(name), small.module.function(name))
+    )
     assert found.success and expected.success
     assert found.iter_count == expected.iter_count
     assert found.value == pytest.approx(expected.value, rel=1e-12)
@@ -189,16 +219,23 @@ def test_plan_is_that_of_the_symbolic_function(small, name):
 
 @every_function
 def test_first_derivatives_by_parameters(small, name):
-    at = inputs(small, name, states(small)["random"]) | {f"out_{small.external(name).name_out(0)}": 0}
+    at = inputs(small, name, states(small)["random"]) | {
+        f"out_{small.external(name).name_out(0)}": 0
+    }
     assert small.external(name).is_diff_in() == [True] * 4
-    for kind, block in (("jac", f"jac_{small.external(name).name_out(0)}_parameters"), ("adj1", "adj_parameters")):
+    for kind, block in (
+        ("jac", f"jac_{small.external(name).name_out(0)}_parameters"),
+        ("adj1", "adj_parameters"),
+    ):
         found, expected = (f(**at, **seeds(f))[block] for f in pair(small, name, kind))
         assert collocation.difference(found, expected) < 1e-12
 
 
 def seeds(f):
     """Weights of an adjoint's outputs."""
-    return {key: np.cos(np.arange(f.numel_in(key))) for key in f.name_in() if key.startswith("adj_")}
+    return {
+        key: np.cos(np.arange(f.numel_in(key))) for key in f.name_in() if key.startswith("adj_")
+    }
 
 
 @every_function
@@ -211,7 +248,9 @@ def test_second_derivatives_by_parameters_are_not_a_number(small, name):
     blocks = [casadi.hessian(total, x[3])[0], casadi.jacobian(casadi.gradient(total, x[0]), x[3])]
     for block in casadi.Function("blocks", x, blocks)(*at):
         assert np.all(np.isnan(block.full()[3 if block.size1() == 9 else 0 :]))
-    assert np.all(np.isfinite(casadi.Function("of_v", x, [casadi.hessian(total, x[1])[0]])(*at).full()))
+    assert np.all(
+        np.isfinite(casadi.Function("of_v", x, [casadi.hessian(total, x[1])[0]])(*at).full())
+    )
 
 
 def test_parameters_without_derivatives_are_declared_so(model):
@@ -249,7 +288,9 @@ def test_scene_has_the_derivatives_that_its_functions_allow(functions, kinds):
     folder = model_folder(1, 1, functions=functions)
     text = (folder / "src" / f"{folder.name}_host.c").read_text()
     found = re.findall(rf"^int (\w*?){folder.name}_casadi_(\w+)\(const real \*\*arg.*;", text, re.M)
-    assert sorted(found) == sorted([("", name) for name in functions] + [(kind, functions[0]) for kind in kinds])
+    assert sorted(found) == sorted(
+        [("", name) for name in functions] + [(kind, functions[0]) for kind in kinds]
+    )
 
 
 def test_runtime_and_generator_agree_on_what_derivatives_need():
@@ -259,14 +300,20 @@ def test_runtime_and_generator_agree_on_what_derivatives_need():
 @pytest.fixture(scope="module")
 def loaded():
     """A loaded model with first derivatives of forward dynamics alone."""
-    return st.load(model_folder(1, 1, functions=["forward_dynamics", "energy", "forward_dynamics_derivatives"]))
+    return st.load(
+        model_folder(1, 1, functions=["forward_dynamics", "energy", "forward_dynamics_derivatives"])
+    )
 
 
 def test_missing_derivatives_are_named(loaded):
     assert loaded.casadi.external("forward_dynamics", derivatives=1).jacobian().n_out() == 4
-    with pytest.raises(st.ModelError, match="'forward_dynamics_vjp', 'inverse_dynamics_hessian', 'mass_matrix'"):
+    with pytest.raises(
+        st.ModelError, match="'forward_dynamics_vjp', 'inverse_dynamics_hessian', 'mass_matrix'"
+    ):
         loaded.casadi.external("forward_dynamics", derivatives=2)
-    with pytest.raises(st.ModelError, match="energy: only inverse_dynamics and forward_dynamics have"):
+    with pytest.raises(
+        st.ModelError, match="energy: only inverse_dynamics and forward_dynamics have"
+    ):
         loaded.casadi.external("energy", derivatives=1)
 
 
@@ -275,10 +322,16 @@ def test_folded_function_takes_the_parameters_of_the_model(loaded):
     f, g = (model.casadi.external("forward_dynamics", folded=True) for model in (loaded, heavy))
     assert f.name_in() == ["q", "v", "tau"] and f.name_out() == ["v_dot"]
     q, v, _, tau = (x[0] for x in random_states(1, 3, 1, "random"))
-    np.testing.assert_allclose(f(q, v, tau).full().ravel(), loaded.forward_dynamics(q, v, tau), rtol=1e-14)
-    np.testing.assert_allclose(g(q, v, tau).full().ravel(), heavy.forward_dynamics(q, v, tau), rtol=1e-14)
+    np.testing.assert_allclose(
+        f(q, v, tau).full().ravel(), loaded.forward_dynamics(q, v, tau), rtol=1e-14
+    )
+    np.testing.assert_allclose(
+        g(q, v, tau).full().ravel(), heavy.forward_dynamics(q, v, tau), rtol=1e-14
+    )
     block = f.jacobian()(q=q, v=v, tau=tau)["jac_v_dot_tau"]
-    np.testing.assert_allclose(block.full(), loaded.forward_dynamics_derivatives(q, v, tau)[2], rtol=1e-12)
+    np.testing.assert_allclose(
+        block.full(), loaded.forward_dynamics_derivatives(q, v, tau)[2], rtol=1e-12
+    )
     assert len(loaded.casadi.external("energy", folded=True)(q, v)) == 2
     symbols = [casadi.MX.sym(key, f.size1_in(key), 3) for key in f.name_in()]
     of_q = casadi.jacobian(f.map(3)(*symbols), symbols[0])
@@ -299,7 +352,11 @@ def test_second_derivatives_that_a_scene_lacks_are_refused(loaded):
 def oldest():
     """The oldest casadi that this package takes."""
     project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]
-    return next(re.search(r">=([\d.]+)", need)[1] for need in project["dependencies"] if need.startswith("casadi"))
+    return next(
+        re.search(r">=([\d.]+)", need)[1]
+        for need in project["dependencies"]
+        if need.startswith("casadi")
+    )
 
 
 @pytest.mark.slow
@@ -307,21 +364,38 @@ def oldest():
 def test_every_casadi_takes_the_same_library(small, tmp_path, version):
     venv.create(tmp_path / "venv", with_pip=True)
     python = tmp_path / "venv" / "bin" / "python"
-    install = [python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", f"casadi{version}", "numpy"]
+    install = [
+        python,
+        "-m",
+        "pip",
+        "install",
+        "--quiet",
+        "--disable-pip-version-check",
+        f"casadi{version}",
+        "numpy",
+    ]
     done = subprocess.run(install, capture_output=True, text=True, check=False)
     if done.returncode:
         pytest.skip(f"pip cannot install casadi{version}: {done.stderr.strip()[-300:]}")
     parameters = ",".join(map(repr, map(float, small.vector.full().ravel())))
     module = [str(small.folder), f"{small.name}_casadi", str(small.library), parameters]
-    done = subprocess.run([python, collocation.__file__, *module], capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stdout.splitlines()[-1:]) == (0, [f"casadi {installed(python)}: all agree"]), done
+    done = subprocess.run(
+        [python, collocation.__file__, *module], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stdout.splitlines()[-1:]) == (
+        0,
+        [f"casadi {installed(python)}: all agree"],
+    ), done
     assert not version or installed(python) == version.removeprefix("==")
 
 
 def installed(python):
     """The version of casadi that an interpreter finds."""
     return subprocess.run(
-        [python, "-c", "import casadi; print(casadi.__version__)"], capture_output=True, text=True, check=True
+        [python, "-c", "import casadi; print(casadi.__version__)"],
+        capture_output=True,
+        text=True,
+        check=True,
     ).stdout.strip()
 
 
@@ -332,8 +406,12 @@ def test_example_of_the_document_runs(tmp_path):
     text = (Path(__file__).parents[2] / "docs" / "casadi.md").read_text()
     (example,) = re.findall(r"^```python\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
     (tmp_path / "generated").mkdir()
-    (tmp_path / "generated" / "planned").symlink_to(model_folder(1, 3, functions=PARTS, name="planned"))
-    done = subprocess.run([sys.executable, "-c", example], cwd=tmp_path, capture_output=True, text=True, check=False)
+    (tmp_path / "generated" / "planned").symlink_to(
+        model_folder(1, 3, functions=PARTS, name="planned")
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", example], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
     assert (done.returncode, done.stdout.split()[-1:]) == (0, ["Solve_Succeeded"]), done.stderr
     for name, (first, second) in DERIVATIVES.items():
         row = next(line for line in text.splitlines() if line.startswith(f"| `{name}` |"))

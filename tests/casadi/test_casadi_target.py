@@ -1,4 +1,6 @@
-"""The CasADi module: it stands alone, its functions say what they take, and they compute what the C computes."""
+"""The CasADi module: it stands alone, its functions say what they take, and they compute what the C
+computes.
+"""
 
 import importlib.util
 import json
@@ -55,7 +57,12 @@ class Model(SimpleNamespace):
         self.manifest = json.loads((self.folder / "manifest.json").read_text())
         self.scene = parse_scene(self.manifest["scene"], self.name)
         total = self.manifest["dimensions"]["total"]
-        self.lengths = self.manifest["dimensions"] | {"points": total + 1, "rows": 3 * (total + 1), "1": 1, "3": 3}
+        self.lengths = self.manifest["dimensions"] | {
+            "points": total + 1,
+            "rows": 3 * (total + 1),
+            "1": 1,
+            "3": 3,
+        }
         fields = [p["name"] for p in self.manifest["parameters"] if p["in_struct"]]
         self.parameters = {name: np.ravel(self.scene.parameters[name]).tolist() for name in fields}
         q, v, v_dot, tau = (rows.T for rows in random_states(self.scene.segments, 8, 3, "random"))
@@ -65,7 +72,9 @@ class Model(SimpleNamespace):
 
     def inputs(self, function, state=0):
         """The inputs of a function at one state, by name, parameters included."""
-        return {name: self.states[name][:, state] for name in SHAPES[function][0]} | {"parameters": self.vector}
+        return {name: self.states[name][:, state] for name in SHAPES[function][0]} | {
+            "parameters": self.vector
+        }
 
     def shape(self, text):
         """Rows and columns of a shape in SHAPES."""
@@ -107,17 +116,26 @@ def assert_close(found, expected, tolerance=1e-12):
 
 def test_module_needs_casadi_and_nothing_else(model):
     script = (
-        "import sys; sys.modules |= dict.fromkeys(['serpentail', 'serpentail_codegen', 'sympy', 'scipy', 'jinja2'])\n"
+        "import sys; sys.modules |= dict.fromkeys(['serpentail', 'serpentail_codegen', 'sympy', "
+        "'scipy', 'jinja2'])\n"
         f"sys.path.insert(0, {str(model.folder)!r}); import {model.name}_casadi as module\n"
         "f = module.function('mass_matrix'); print(f.n_in(), f.n_out())"
     )
-    done = subprocess.run([sys.executable, "-I", "-c", script], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-I", "-c", script], capture_output=True, text=True, check=False
+    )
     assert (done.stdout, done.stderr) == ("2 1\n", "")
 
 
 def test_module_has_every_function(model):
-    assert set(model.module.SIGNATURES) == set(SHAPES) == set(model.manifest["functions"]) - set(DERIVATIVES)
-    assert {name: len(values) for name, values in model.parameters.items()} == model.module.PARAMETERS
+    assert (
+        set(model.module.SIGNATURES)
+        == set(SHAPES)
+        == set(model.manifest["functions"]) - set(DERIVATIVES)
+    )
+    assert {
+        name: len(values) for name, values in model.parameters.items()
+    } == model.module.PARAMETERS
 
 
 @every_function
@@ -139,14 +157,18 @@ def interpreted(model, function, arguments, algebra):
     """Run a function's program on numbers, matrices row-major; return its outputs by name."""
     p = program(FUNCTIONS[function], tail_of(model.scene))
     arrays = (*p.of_role("parameters"), *p.of_role("input"))
-    return Run(p, algebra, {a.name: [algebra.convert(x) for x in arguments[a.name]] for a in arrays}).values
+    return Run(
+        p, algebra, {a.name: [algebra.convert(x) for x in arguments[a.name]] for a in arrays}
+    ).values
 
 
 @every_function
 def test_sx_and_compiled_c_compute_what_the_program_means(model, function):
     for state in range(3):
         inputs = model.inputs(function, state)
-        arguments = model.parameters | {name: model.states[name][:, state] for name in SHAPES[function][0]}
+        arguments = model.parameters | {
+            name: model.states[name][:, state] for name in SHAPES[function][0]
+        }
         values = interpreted(model, function, arguments, Numbers())
         shapes = {name: model.shape(text) for name, text in SHAPES[function][1].items()}
         expected = {name: np.array(values[name]).reshape(shape) for name, shape in shapes.items()}
@@ -163,16 +185,24 @@ def test_parameters_can_be_changed_in_a_call_and_not_once_folded(model):
     del (free := dict(inputs))["parameters"]
     found = full(model.module.function("energy")(**inputs))
     assert_close(full(model.module.function("energy", doubled)(**free)), found)
-    assert not np.allclose(found["kinetic"], full(model.module.function("energy", model.parameters)(**free))["kinetic"])
+    assert not np.allclose(
+        found["kinetic"], full(model.module.function("energy", model.parameters)(**free))["kinetic"]
+    )
     with pytest.raises(KeyError, match="torso_mass"):
         model.module.function("energy", {"gravity": 9.8})
 
 
 @pytest.mark.parametrize("source", ["symbolic", "external"])
 def test_map_is_one_state_after_another(model, source):
-    f = model.module.function("forward_dynamics") if source == "symbolic" else model.external("forward_dynamics")
+    f = (
+        model.module.function("forward_dynamics")
+        if source == "symbolic"
+        else model.external("forward_dynamics")
+    )
     names = SHAPES["forward_dynamics"][0]
-    mapped = np.array(f.map(3)(*(model.states[name] for name in names), casadi.repmat(model.vector, 1, 3)))
+    mapped = np.array(
+        f.map(3)(*(model.states[name] for name in names), casadi.repmat(model.vector, 1, 3))
+    )
     for state in range(3):
         one = np.array(f(**model.inputs("forward_dynamics", state))["v_dot"])
         np.testing.assert_array_equal(mapped[:, [state]], one)
@@ -200,8 +230,13 @@ def test_jacobian_is_the_limit_of_differences(model):
     jacobian = f.jacobian()
     at = model.inputs("forward_dynamics")
     found = full(jacobian(**at, out_v_dot=np.zeros(f.size_out("v_dot"))))
-    parameters = [central_differences(model, "forward_dynamics", "v_dot", name) for name in model.parameters]
-    expected = {name: central_differences(model, "forward_dynamics", "v_dot", name) for name in ("q", "v", "tau")}
+    parameters = [
+        central_differences(model, "forward_dynamics", "v_dot", name) for name in model.parameters
+    ]
+    expected = {
+        name: central_differences(model, "forward_dynamics", "v_dot", name)
+        for name in ("q", "v", "tau")
+    }
     expected["parameters"] = np.hstack(parameters)
     assert_close(found, {f"jac_v_dot_{name}": values for name, values in expected.items()}, 1e-10)
 
@@ -236,9 +271,12 @@ def test_baked_scene_leaves_the_module_free():
 
 def test_float_model_has_no_external():
     model = Model(1, 1, real="float", functions=["mass_matrix"])
-    assert "casadi" not in (model.folder / "src" / f"{model.name}_host.c").read_text().split("*/", 1)[1]
+    assert (
+        "casadi"
+        not in (model.folder / "src" / f"{model.name}_host.c").read_text().split("*/", 1)[1]
+    )
     double = Model(1, 1, functions=["mass_matrix"])
     assert "casadi_mass_matrix" in (double.folder / "src" / f"{double.name}_host.c").read_text()
-    assert model.path.read_text().replace(model.manifest["content_hash"], "") == double.path.read_text().replace(
-        double.manifest["content_hash"], ""
-    )
+    assert model.path.read_text().replace(
+        model.manifest["content_hash"], ""
+    ) == double.path.read_text().replace(double.manifest["content_hash"], "")

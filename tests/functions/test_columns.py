@@ -56,7 +56,10 @@ def test_an_elimination_written_out_solves(rows, wide):
     d = Builder("solve", "Solve.")
     A, given = d.array("A", padded(rows), rows), d.array("given", padded(rows), rows, role="input")
     x = d.wide("x", rows, wide) if wide else d.array("x", rows)
-    right, out = d.array("b", rows, role="input"), d.array("out", rows * max(wide, 1), role="output")
+    right, out = (
+        d.array("b", rows, role="input"),
+        d.array("out", rows * max(wide, 1), role="output"),
+    )
     d.copy(A.part(0, A.length), given.part(0, given.length))
     if wide:
         rights = [d.array(f"b{k}", rows, role="input") for k in range(wide)]
@@ -65,7 +68,8 @@ def test_an_elimination_written_out_solves(rows, wide):
         spread = _spread(rows, wide)
         d.apply(
             spread,
-            {f"b{k}": rights[k][0] for k in range(wide)} | {f"at{k}": at.part(k, 1) for k in range(wide)},
+            {f"b{k}": rights[k][0] for k in range(wide)}
+            | {f"at{k}": at.part(k, 1) for k in range(wide)},
             x=x[0],
         )
     else:
@@ -78,11 +82,15 @@ def test_an_elimination_written_out_solves(rows, wide):
     whole = d.finish()
     flat = np.zeros((rows, padded(rows)))
     flat[:, :rows] = matrix
-    values = {"given": flat.ravel().tolist(), "b": b[:, 0].tolist()} | {f"b{k}": b[:, k].tolist() for k in range(wide)}
+    values = {"given": flat.ravel().tolist(), "b": b[:, 0].tolist()} | {
+        f"b{k}": b[:, k].tolist() for k in range(wide)
+    }
     straight = written_out(whole, 12)
     assert not any(isinstance(s, Factor | Solve) for s, _ in statements(straight.body))
     for p in (whole, straight):
-        np.testing.assert_allclose(outputs(p, values)["out"].reshape(rows, -1), np.linalg.solve(matrix, b), rtol=1e-11)
+        np.testing.assert_allclose(
+            outputs(p, values)["out"].reshape(rows, -1), np.linalg.solve(matrix, b), rtol=1e-11
+        )
     assert outputs(whole, values)["out"].tolist() == outputs(straight, values)["out"].tolist()
     values["given"][0] = -1.0
     assert min(float(np.min(x)) for _, x in Run(straight, Numbers(np), values).guards) < 0
@@ -115,16 +123,23 @@ def test_factor_and_solve_invert():
     half = rng.normal(size=(6, 6))
     matrix, b = half @ half.T + np.eye(6), rng.normal(size=6)
     factored, pivots = ldl_factor(Numbers(np), [list(matrix[k, : k + 1]) for k in range(6)])
-    np.testing.assert_allclose(ldl_solve(Numbers(np), factored, list(b)), np.linalg.solve(matrix, b), rtol=1e-10)
+    np.testing.assert_allclose(
+        ldl_solve(Numbers(np), factored, list(b)), np.linalg.solve(matrix, b), rtol=1e-10
+    )
     assert np.prod(np.array(pivots)) == pytest.approx(np.linalg.det(matrix), rel=1e-10)
 
 
 @pytest.mark.parametrize("size", [(2, 4), (3, 4), pytest.param((7, 3), marks=pytest.mark.slow)])
 def test_long_tails_run_in_lanes_and_agree_with_loops(size):
     names = ["forward_dynamics", "mass_matrix", "bias_force"]
-    fast, plain = (st.load(model_folder(*size, functions=names, emission=e)) for e in ("lanes", "loops"))
+    fast, plain = (
+        st.load(model_folder(*size, functions=names, emission=e)) for e in ("lanes", "loops")
+    )
     text = (fast.folder / "src" / f"{fast.name}.c").read_text()
-    assert "gather_lanes" in text and "gather_lanes" not in (plain.folder / "src" / f"{plain.name}.c").read_text()
+    assert (
+        "gather_lanes" in text
+        and "gather_lanes" not in (plain.folder / "src" / f"{plain.name}.c").read_text()
+    )
     for q, v, *_ in zip(*random_states(size[0], 1, 5, "random"), strict=True):
         tau = 0.01 * v[6:]
         H, found = plain.mass_matrix(q), fast.forward_dynamics(q, v, tau)

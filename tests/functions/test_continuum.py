@@ -1,4 +1,6 @@
-"""The continuum tail in the runtime: right at every bend, refused beyond its range, convertible to polar angles."""
+"""The continuum tail in the runtime: right at every bend, refused beyond its range, convertible to
+polar angles.
+"""
 
 import subprocess
 
@@ -45,7 +47,9 @@ def test_every_bend_is_right_to_rounding(model, exact, theta):
 
 def test_beyond_the_range_is_refused(model):
     q, v, tau = bent(6.3)
-    with pytest.raises(st.StateError, match=r"segment 1 is bent by 6\.3 rad, beyond the scene's 6\.28"):
+    with pytest.raises(
+        st.StateError, match=r"segment 1 is bent by 6\.3 rad, beyond the scene's 6\.28"
+    ):
         model.forward_dynamics(q, v, tau)
     batch = np.stack([bent(1.0)[0], q])
     with pytest.raises(st.StateError, match="segment 1 of state 1 is bent"):
@@ -74,7 +78,9 @@ def test_the_articulated_tail_converges_to_it(model):
     q = bent(1.5)[0]
     errors = []
     for links in (16, 32, 64):
-        folder = model_folder(1, links, functions=["mass_matrix"], parameters={"link_inertia": [0.0, 0.0, 0.0]})
+        folder = model_folder(
+            1, links, functions=["mass_matrix"], parameters={"link_inertia": [0.0, 0.0, 0.0]}
+        )
         joints, scale = q.copy(), np.diag([1.0] * 6 + [1 / links] * 2)
         joints[7:] /= links
         H = scale @ st.load(folder).mass_matrix(joints) @ scale
@@ -121,6 +127,9 @@ def test_info_tells_of_arcs(model):
 def test_the_c_example_without_forward_dynamics_tells_the_sizes(tmp_path):
     folder = model_folder(2, None, functions=["energy"])
     sources = [folder / "example" / "main.c", folder / "src" / f"{folder.name}.c"]
-    subprocess.run(["cc", "-std=c99", "-I", folder / "include", *sources, "-lm", "-o", tmp_path / "main"], check=True)
+    subprocess.run(
+        ["cc", "-std=c99", "-I", folder / "include", *sources, "-lm", "-o", tmp_path / "main"],
+        check=True,
+    )
     printed = subprocess.run([tmp_path / "main"], capture_output=True, text=True, check=True).stdout
     assert printed == "continuum_m2: 2 segments, 5 samples each\n"

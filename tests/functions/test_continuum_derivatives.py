@@ -1,4 +1,6 @@
-"""Derivatives of the continuum's CasADi functions are those of its definition in 60 digits, at every bend."""
+"""Derivatives of the continuum's CasADi functions are those of its definition in 60 digits, at
+every bend.
+"""
 
 from functools import cache
 from itertools import combinations, pairwise
@@ -14,18 +16,30 @@ from tests.references.metrics import BLOCKS, equilibrated_condition
 from tests.references.parameters import TABLE_1, random_states
 from tests.support.models import model_folder
 
-BENDS = (0.0, 1e-300, 1e-8, 1e-3, 0.1, 1.0, pi, 6.28)  # rad, of every segment; the range ends at 2 pi
+BENDS = (
+    0.0,
+    1e-300,
+    1e-8,
+    1e-3,
+    0.1,
+    1.0,
+    pi,
+    6.28,
+)  # rad, of every segment; the range ends at 2 pi
 QUICK = {1: (0.0, 6.28), 2: (0.0,)}  # by segments; the others are in the slow suite
 INPUTS = {
     "bias_force": ("q", "v"),
     "inverse_dynamics": ("q", "v", "v_dot"),
     "forward_dynamics": ("q", "v", "tau"),
 }
-NEGLIGIBLE = 1e-6  # of the largest derivative in the same rows: smaller blocks of columns are compared with that
+# of the largest derivative in the same rows: smaller blocks of columns are compared with that
+NEGLIGIBLE = 1e-6
 every_bend = pytest.mark.parametrize(
     ("segments", "bend"),
     [
-        pytest.param(m, bend, marks=[] if bend in QUICK[m] else pytest.mark.slow, id=f"m{m}-{bend:.3g}")
+        pytest.param(
+            m, bend, marks=[] if bend in QUICK[m] else pytest.mark.slow, id=f"m{m}-{bend:.3g}"
+        )
         for m in (1, 2)
         for bend in BENDS
     ],
@@ -33,10 +47,11 @@ every_bend = pytest.mark.parametrize(
 
 
 class Unrounded(ExactContinuum):
-    """The exact continuum with numbers of many digits on both sides, and its derivatives by central differences.
+    """The exact continuum with numbers of many digits on both sides, and its derivatives by central
+    differences.
 
-    With 60 digits, steps of 2^-50 (rad, rad/s, ...) and 20 nodes these are right to 1e-28 up to a bend of 2 pi, second
-    ones to 1e-26.
+    With 60 digits, steps of 2^-50 (rad, rad/s, ...) and 20 nodes these are right to 1e-28 up to a
+    bend of 2 pi, second ones to 1e-26.
     """
 
     def __init__(self, segments, digits=60, bits=50, nodes=20):
@@ -61,23 +76,36 @@ class Unrounded(ExactContinuum):
         return np.array(list(self.mp.cholesky_solve(mass, self.mp.matrix(force.tolist()))))
 
     def power(self, weights, q, v, v_dot):
-        """weights . (H v_dot + C): the power of all forces in the motion with the rates `weights`."""
+        """weights . (H v_dot + C): the power of all forces in the motion with the rates
+        `weights`.
+        """
         velocities, accelerations = self._points(q, weights)[1], 2 * self._points(q, v, v_dot)[2]
         spin, omega, omega_dot = (self._exact(x[3:6]) for x in (weights, v, v_dot))
         moment = self.torso_inertia * omega_dot + np.cross(omega, self.torso_inertia * omega)
-        return np.sum(self.masses @ (velocities * (accelerations + self.gravity))) + np.dot(spin, moment)
+        return np.sum(self.masses @ (velocities * (accelerations + self.gravity))) + np.dot(
+            spin, moment
+        )
 
     def jacobian(self, function, *arguments):
-        """Derivatives (*values, inputs) by all entries of all arguments, in this continuum's numbers."""
+        """Derivatives (*values, inputs) by all entries of all arguments, in this continuum's
+        numbers.
+        """
         x, parts = self._exact(np.concatenate(arguments)), places(arguments)
         pairs = [(x + e, x - e) for e in self.step * np.eye(len(x))]
-        columns = [function(*(up[p] for p in parts)) - function(*(down[p] for p in parts)) for up, down in pairs]
+        columns = [
+            function(*(up[p] for p in parts)) - function(*(down[p] for p in parts))
+            for up, down in pairs
+        ]
         return np.stack(columns, axis=-1) / (2 * self.step)
 
     def hessian(self, function, x):
         """Second derivatives (inputs, inputs) of a number, in this continuum's numbers."""
         x, steps = self._exact(x), self.step * np.eye(len(x))
-        middle, up, down = function(x), [function(x + e) for e in steps], [function(x - e) for e in steps]
+        middle, up, down = (
+            function(x),
+            [function(x + e) for e in steps],
+            [function(x - e) for e in steps],
+        )
         twice = np.diag(np.array(up) + down - 2 * middle)
         for i, j in combinations(range(len(x)), 2):
             both = function(x + steps[i] + steps[j]) + function(x - steps[i] - steps[j])
@@ -101,7 +129,9 @@ def model(segments):
 
 
 def state(segments, bend):
-    """q, v, v_dot and tau, by name, of a tail whose segments are bent equally, each in a plane of its own."""
+    """q, v, v_dot and tau, by name, of a tail whose segments are bent equally, each in a plane of
+    its own.
+    """
     q, v, v_dot, tau = (rows[0] for rows in random_states(segments, 23, 1, "straight"))
     phi = np.random.default_rng(segments).uniform(0, 2 * pi, segments)
     q[7:] = bend * np.stack([np.cos(phi), np.sin(phi)], axis=1).ravel()
@@ -122,7 +152,9 @@ def _jacobian(segments, name):
 
 
 def column_blocks(words, arguments):
-    """Columns of each part of the arguments: position, quaternion, tail; translation, rotation, tail; torques."""
+    """Columns of each part of the arguments: position, quaternion, tail; translation, rotation,
+    tail; torques.
+    """
     cuts = {"q": (3, 7), "v": (3, 6), "v_dot": (3, 6), "tau": ()}
     blocks = []
     for word, place in zip(words, places(arguments), strict=True):
@@ -132,7 +164,9 @@ def column_blocks(words, arguments):
 
 
 def blockwise_error(values, reference, rows, columns):
-    """Largest error over pairs of blocks, relative to a pair's largest entry, but see NEGLIGIBLE."""
+    """Largest error over pairs of blocks, relative to a pair's largest entry, but see
+    NEGLIGIBLE.
+    """
     errors = []
     for row in rows:
         floor = NEGLIGIBLE * np.abs(reference[row]).max()
@@ -148,7 +182,9 @@ def first_derivative_error(segments, name, at):
     words = INPUTS[name]
     arguments = [at[word] for word in words]
     reference = exact(segments).jacobian(getattr(exact(segments), name), *arguments).astype(float)
-    return blockwise_error(derivatives(segments, name, *arguments), reference, BLOCKS, column_blocks(words, arguments))
+    return blockwise_error(
+        derivatives(segments, name, *arguments), reference, BLOCKS, column_blocks(words, arguments)
+    )
 
 
 @every_bend
@@ -176,7 +212,9 @@ def test_first_derivatives_of_accelerations(segments, bend):
 
 @every_bend
 def test_second_derivatives_of_a_sum_of_forces(segments, bend):
-    """By bends, angular velocity and bend rates; each block of forces has the same weight in the sum."""
+    """By bends, angular velocity and bend rates; each block of forces has the same weight in the
+    sum.
+    """
     q, v, v_dot, _ = state(segments, bend).values()
     weights = equal_weights(exact(segments).inverse_dynamics(q, v, v_dot).astype(float))
     bends = 2 * segments
@@ -185,10 +223,16 @@ def test_second_derivatives_of_a_sum_of_forces(segments, bend):
         return joined([q[:7], x[:bends]]), joined([v[:3], x[bends:]]), v_dot
 
     x = np.concatenate([q[7:], v[3:]])
-    reference = exact(segments).hessian(lambda x: exact(segments).power(weights, *arguments(x, np.concatenate)), x)
+    reference = exact(segments).hessian(
+        lambda x: exact(segments).power(weights, *arguments(x, np.concatenate)), x
+    )
     x_symbol = casadi.SX.sym("x", len(x))
-    force = model(segments).casadi.inverse_dynamics(*arguments(x_symbol, lambda parts: casadi.vertcat(*parts)))
-    hessian = casadi.Function("hessian", [x_symbol], [casadi.hessian(casadi.dot(weights, force), x_symbol)[0]])
+    force = model(segments).casadi.inverse_dynamics(
+        *arguments(x_symbol, lambda parts: casadi.vertcat(*parts))
+    )
+    hessian = casadi.Function(
+        "hessian", [x_symbol], [casadi.hessian(casadi.dot(weights, force), x_symbol)[0]]
+    )
     blocks = [slice(0, bends), slice(bends, bends + 3), slice(bends + 3, None)]
     assert blockwise_error(np.array(hessian(x)), reference.astype(float), blocks, blocks) <= 1e-13
 
@@ -206,7 +250,8 @@ def test_the_references_have_25_digits():
     few, many = (each.jacobian(each.forward_dynamics, q, v, tau) for each in (exact(1), more))
     assert np.abs(few - many).max() <= 1e-25 * np.abs(many).max()
     few, many = (
-        each.hessian(lambda x, each=each: each.power(v, [*q[:7], *x], v, v_dot), q[7:]) for each in (exact(1), more)
+        each.hessian(lambda x, each=each: each.power(v, [*q[:7], *x], v, v_dot), q[7:])
+        for each in (exact(1), more)
     )
     assert np.abs(few - many).max() <= 1e-25 * np.abs(many).max()
 
@@ -214,4 +259,6 @@ def test_the_references_have_25_digits():
 def test_power_is_the_sum_of_forces():
     q, v, v_dot, _ = state(2, 1.0).values()
     force = exact(2).inverse_dynamics(q, v, v_dot)
-    assert abs(exact(2).power(v, q, v, v_dot) - np.dot(v, force)) <= 1e-50 * np.dot(abs(v), abs(force))
+    assert abs(exact(2).power(v, q, v, v_dot) - np.dot(v, force)) <= 1e-50 * np.dot(
+        abs(v), abs(force)
+    )

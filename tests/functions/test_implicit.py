@@ -16,7 +16,9 @@ GAINS = {"passive": (0.0, 0.0), "tracked": (4e4, 400.0), "damped": (0.0, 30.0)}
 
 def solved(model, state, damping, gains, weight, r):
     """k of (1 - w J) k = r, r and k in three parts."""
-    factors = model.kernel("implicit_factor")(state[0], state[1], damping, gains, weight, *state[2:])
+    factors = model.kernel("implicit_factor")(
+        state[0], state[1], damping, gains, weight, *state[2:]
+    )
     return np.concatenate(model.kernel("implicit_solve")(factors, *r))
 
 
@@ -27,7 +29,9 @@ def right_hand_side(model, rng, count):
 
 
 def torso_and_tail(J, H, w):
-    """S of S (k_v - r_v) = forces: what is left of H (1 - w J) when q and bristles are eliminated."""
+    """S of S (k_v - r_v) = forces: what is left of H (1 - w J) when q and bristles are
+    eliminated.
+    """
     nv, W = len(H), np.eye(len(J)) - w * J
     own, others = np.arange(nv, 2 * nv), np.r_[:nv, 2 * nv : len(J)]
     rest = np.linalg.solve(W[np.ix_(others, others)], W[np.ix_(others, own)])
@@ -51,7 +55,10 @@ def test_solution_is_that_of_the_dense_system(case, friction, gains):
     refused, slides = 0, 0
     for q, v, _, bristles, legs in each(model, count=8):
         state, H = (q, v, bristles, legs), model.mass_matrix(q)
-        J = {share: reference.jacobian(state, H, damping, GAINS[gains], share) for share in (0.0, 1.0)}
+        J = {
+            share: reference.jacobian(state, H, damping, GAINS[gains], share)
+            for share in (0.0, 1.0)
+        }
         slides += not np.array_equal(J[0], J[1])
         for w, share in product((1e-5, 1e-3, 0.1), J):
             r = right_hand_side(model, rng, len(bristles))
@@ -62,7 +69,9 @@ def test_solution_is_that_of_the_dense_system(case, friction, gains):
                 refused += 1
                 continue
             expected = np.linalg.solve(np.eye(len(J[share])) - w * J[share], np.concatenate(r))
-            np.testing.assert_allclose(found, expected, rtol=1e-8, atol=1e-9 * np.abs(expected).max())
+            np.testing.assert_allclose(
+                found, expected, rtol=1e-8, atol=1e-9 * np.abs(expected).max()
+            )
     assert slides and refused <= 3
 
 
@@ -90,11 +99,15 @@ def test_in_the_air_bristles_relax_and_nothing_else_happens():
     state = (q, rng.normal(size=8), rng.normal(size=20), legs)
     w = 0.01
     expected = np.concatenate([r[0] + w * r[1], r[1], r[2] / (1 + w / model.parameters["D_f"])])
-    np.testing.assert_allclose(solved(model, state, np.zeros(2), (0, 0), (w, 1.0), r), expected, rtol=1e-14)
+    np.testing.assert_allclose(
+        solved(model, state, np.zeros(2), (0, 0), (w, 1.0), r), expected, rtol=1e-14
+    )
 
 
 def refused(model, seed, w):
-    """States 20 mm deep in the ground whose systems have a pivot that is not positive, as what jams gives."""
+    """States 20 mm deep in the ground whose systems have a pivot that is not positive, as what jams
+    gives.
+    """
     factor, still = model.kernel("implicit_factor"), np.r_[np.ones(4), np.zeros(4)]
     for q, v, _, bristles, legs in zip(*near_ground(model, seed, 400), strict=True):
         q[2] -= model.contact_points(q, v, legs)[0][:, 2].min() + 0.02
@@ -117,6 +130,8 @@ def test_a_step_of_what_jams_is_taken_as_if_friction_did_not_follow_the_load():
         start = {"legs": held, "bristles0": bristles.reshape(-1, 2), "t_span": w}
         flight = st.simulate(model, q, v, method="implicit_euler", step=w, output_step=w, **start)
         expected = v + k[model.nv : 2 * model.nv]
-        np.testing.assert_allclose(flight.v[-1], expected, rtol=1e-8, atol=1e-9 * np.abs(expected).max())
+        np.testing.assert_allclose(
+            flight.v[-1], expected, rtol=1e-8, atol=1e-9 * np.abs(expected).max()
+        )
         count += 1
     assert count

@@ -1,4 +1,6 @@
-"""Generated partial feedback linearisation: the tail gets the accelerations asked for, wherever the torso is."""
+"""Generated partial feedback linearisation: the tail gets the accelerations asked for, wherever the
+torso is.
+"""
 
 import numpy as np
 import pytest
@@ -55,7 +57,9 @@ def test_tracking_by_it_is_tracking_without_it():
     own, other = (model_of(2, 3, names) for names in (["pfl"], ["mass_matrix", "inverse_dynamics"]))
     q, v, _, _ = (rows[0] for rows in random_states(2, 3, 1, "random"))
     expected = Pfl(other, reference)(0.3, q, v)
-    np.testing.assert_allclose(Pfl(own, reference)(0.3, q, v), expected, atol=1e-10 * np.abs(expected).max())
+    np.testing.assert_allclose(
+        Pfl(own, reference)(0.3, q, v), expected, atol=1e-10 * np.abs(expected).max()
+    )
 
 
 def test_operations_are_those_of_the_function():
@@ -69,9 +73,13 @@ def test_under_a_torso_that_stays_a_link_needs_its_own_inertia():
     """One link on a torso so heavy that it stays: tau = (I + m (L / 2)^2) alpha_ddot."""
     parameters = {"torso_mass": 1e9, "torso_inertia": [1e9, 1e9, 1e9]}
     model = model_of(1, 1, ["pfl"], parameters=parameters)
-    m, length, inertia = (model.parameters[name] for name in ("tail_mass", "tail_length", "link_inertia"))
+    m, length, inertia = (
+        model.parameters[name] for name in ("tail_mass", "tail_length", "link_inertia")
+    )
     tau = model.pfl([0, 0, 0, 1, 0, 0, 0, 0, 0], np.zeros(8), [3.0, 5.0])
-    np.testing.assert_allclose(tau, np.array([3, 5]) * (np.array(inertia)[[0, 2]] + m * length**2 / 4), rtol=1e-9)
+    np.testing.assert_allclose(
+        tau, np.array([3, 5]) * (np.array(inertia)[[0, 2]] + m * length**2 / 4), rtol=1e-9
+    )
 
 
 @pytest.mark.parametrize(("segments", "links", "options"), CASES)

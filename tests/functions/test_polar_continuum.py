@@ -1,4 +1,6 @@
-"""The paper's closed forms in polar angles: right where they can be, wrong by 1 / theta^4, refused at theta = 0."""
+"""The paper's closed forms in polar angles: right where they can be, wrong by 1 / theta^4, refused
+at theta = 0.
+"""
 
 import subprocess
 from functools import cache
@@ -37,17 +39,26 @@ def reference(segments):
 
 
 def polar_state(segments, theta, seed=0):
-    """(q, v, v_dot, tau), every segment bent by theta, torques on phi that stay finite in bend components."""
+    """(q, v, v_dot, tau), every segment bent by theta, torques on phi that stay finite in bend
+    components.
+    """
     rng = np.random.default_rng([seed, segments])
     nv = 6 + 2 * segments
     q, v, v_dot = rng.normal(size=nv + 1), 10 * rng.normal(size=nv), 100 * rng.normal(size=nv)
     q[3:7] /= np.linalg.norm(q[3:7])
     q[7::2], q[8::2] = rng.uniform(0, 2 * np.pi, segments), theta
-    return q, v, v_dot, 1e-3 * rng.normal(size=(segments, 2)).ravel() * np.tile([theta, 1.0], segments)
+    return (
+        q,
+        v,
+        v_dot,
+        1e-3 * rng.normal(size=(segments, 2)).ravel() * np.tile([theta, 1.0], segments),
+    )
 
 
 def errors(polar, state):
-    """Errors of H, H v_dot + C and v_dot of a polar model; forces and accelerations are compared in bend components."""
+    """Errors of H, H v_dot + C and v_dot of a polar model; forces and accelerations are compared in
+    bend components.
+    """
     (q, v, v_dot, tau), exact = state, reference(polar.segments)
     q_bend, v_bend = exact.state(q, v)
     force = exact.bend.inverse_dynamics(q_bend, v_bend, exact.acceleration(q, v, v_dot))
@@ -55,7 +66,9 @@ def errors(polar, state):
     return (
         mass_matrix_error(polar.mass_matrix(q), exact.mass_matrix(q)),
         block_error(numbers(exact.force(q, polar.inverse_dynamics(q, v, v_dot))), force),
-        block_error(numbers(exact.acceleration(q, v, polar.forward_dynamics(q, v, tau))), acceleration),
+        block_error(
+            numbers(exact.acceleration(q, v, polar.forward_dynamics(q, v, tau))), acceleration
+        ),
     )
 
 
@@ -112,12 +125,17 @@ def test_entries_of_appendix_b_are_the_integrals(theta):
     angles = sympy.Integer(0), sympy.Rational(theta)
     trig = polar_continuum.segment_trigonometry(unchanged, angles)["trig"]
     forms = polar_continuum.slice_integrals(unchanged, angles, trig)
-    E, Q = polar_continuum.matrix_E(forms["E_v"]), polar_continuum.matrix_Q(forms["E_v"], forms["Q_v"])
+    E, Q = (
+        polar_continuum.matrix_E(forms["E_v"]),
+        polar_continuum.matrix_Q(forms["E_v"], forms["Q_v"]),
+    )
     with mpmath.workdps(40):
         bend = mpmath.mpf(theta)
         for matrix, other in ((E, f_v), (Q, f_a)):
             for k, j in np.ndindex(matrix.shape):
-                expected = mpmath.quad(lambda x, k=k, j=j, f=other: f_v(bend, x)[k] * f(bend, x)[j], [0, 1])
+                expected = mpmath.quad(
+                    lambda x, k=k, j=j, f=other: f_v(bend, x)[k] * f(bend, x)[j], [0, 1]
+                )
                 assert abs(mpmath.mpf(str(matrix[k, j].evalf(60))) - expected) <= 1e-35, (k, j)
 
 
@@ -128,13 +146,17 @@ def test_entries_of_appendix_b_are_the_integrals(theta):
 @pytest.mark.parametrize("theta", MODERATE)
 def test_moderate_bends_are_right_up_to_cancellation(theta, emission):
     polar = model(EMISSIONS[emission][0], emission=emission)
-    rounding = 2e-15 + 1e-14 / theta**4  # five times the worst found: the terms that cancel are 1 / theta^4 times H
+    rounding = (
+        2e-15 + 1e-14 / theta**4
+    )  # five times the worst found: the terms that cancel are 1 / theta^4 times H
     for seed in range(3):
         state = polar_state(polar.segments, theta, seed)
         inertia, force, v_dot = errors(polar, state)
         assert inertia <= rounding
         assert force <= 2 * rounding
-        assert v_dot <= 4 * rounding * equilibrated_condition(reference(polar.segments).mass_matrix(state[0]))
+        assert v_dot <= 4 * rounding * equilibrated_condition(
+            reference(polar.segments).mass_matrix(state[0])
+        )
 
 
 def test_error_grows_as_theta_to_the_minus_four_and_that_of_the_bend_form_does_not():
@@ -171,7 +193,9 @@ def test_energy_momentum_and_points_are_the_reference_s():
     q, v, *_ = polar_state(2, 1.3)
     q_bend, v_bend = exact.state(q, v)
     np.testing.assert_allclose(polar.energy(q, v), exact.bend.energy(q_bend, v_bend), rtol=1e-14)
-    for found, expected in zip(polar.momentum(q, v), exact.bend.momentum(q_bend, v_bend), strict=True):
+    for found, expected in zip(
+        polar.momentum(q, v), exact.bend.momentum(q_bend, v_bend), strict=True
+    ):
         np.testing.assert_allclose(found, expected, rtol=1e-13, atol=1e-15)
     np.testing.assert_allclose(polar.tail_points(q), exact.bend.tail_points(q_bend, 5), atol=1e-15)
 
@@ -180,10 +204,17 @@ def test_jacobians_and_world_axes_follow_from_the_bend_form():
     polar, bend = model(2), model(2, "bend")
     q, v, *_ = polar_state(2, 1.3)
     (q_bend, _), J = in_bend(q, v), rate_map(q)
-    np.testing.assert_allclose(polar.tail_point_jacobians(q), bend.tail_point_jacobians(q_bend) @ J, atol=1e-14)
-    assert mass_matrix_error(polar.mass_matrix_world(q), J.T @ bend.mass_matrix_world(q_bend) @ J) <= 1e-14
+    np.testing.assert_allclose(
+        polar.tail_point_jacobians(q), bend.tail_point_jacobians(q_bend) @ J, atol=1e-14
+    )
+    assert (
+        mass_matrix_error(polar.mass_matrix_world(q), J.T @ bend.mass_matrix_world(q_bend) @ J)
+        <= 1e-14
+    )
     bias, bias_world = polar.bias_force(q, v), polar.bias_force_world(q, v)
-    np.testing.assert_allclose(np.delete(bias_world, [3, 4, 5]), np.delete(bias, [3, 4, 5]), rtol=1e-12)
+    np.testing.assert_allclose(
+        np.delete(bias_world, [3, 4, 5]), np.delete(bias, [3, 4, 5]), rtol=1e-12
+    )
     assert np.linalg.norm(bias_world[3:6]) == pytest.approx(np.linalg.norm(bias[3:6]), rel=1e-12)
 
 
@@ -199,7 +230,10 @@ def test_external_loads_balance():
 def test_a_flight_far_from_straight_is_that_of_the_bend_form():
     polar, bend = model(1), model(1, "bend")
     q, v = np.array([0, 0, 0, 1.0, 0, 0, 0, 0.4, 1.5]), np.array([0, 0, 2.0, 6, 1, -2, 3.0, 1.0])
-    flights = [st.simulate(m, *start, t_span=0.05, step=1e-4) for m, start in ((polar, (q, v)), (bend, in_bend(q, v)))]
+    flights = [
+        st.simulate(m, *start, t_span=0.05, step=1e-4)
+        for m, start in ((polar, (q, v)), (bend, in_bend(q, v)))
+    ]
     end = in_bend(flights[0].q[-1], flights[0].v[-1])
     np.testing.assert_allclose(end[0], flights[1].q[-1], atol=1e-10)
     np.testing.assert_allclose(end[1], flights[1].v[-1], atol=1e-8)
@@ -208,23 +242,44 @@ def test_a_flight_far_from_straight_is_that_of_the_bend_form():
 def test_c_example_runs_at_a_bend(tmp_path):
     polar = model(2)
     sources = [polar.folder / "example" / "main.c", polar.folder / "src" / f"{polar.name}.c"]
-    strict = ["-std=c99", "-O2", "-pedantic", "-Wall", "-Wextra", "-Werror", "-I", polar.folder / "include"]
+    strict = [
+        "-std=c99",
+        "-O2",
+        "-pedantic",
+        "-Wall",
+        "-Wextra",
+        "-Werror",
+        "-I",
+        polar.folder / "include",
+    ]
     subprocess.run(["cc", *strict, *sources, "-lm", "-o", tmp_path / "example"], check=True)
     run = subprocess.run([tmp_path / "example"], capture_output=True, text=True, check=True)
     printed = [float(line.split(" = ")[1]) for line in run.stdout.splitlines()]
     q = np.array([0, 0, 0, 1.0, 0, 0, 0, 0, 0.5, 0, 0.5])
-    np.testing.assert_allclose(printed, polar.forward_dynamics(q, np.zeros(10), np.zeros(4)), rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(
+        printed, polar.forward_dynamics(q, np.zeros(10), np.zeros(4)), rtol=1e-6, atol=1e-6
+    )
 
 
-@pytest.mark.parametrize("name", [name for name in FUNCTIONS if name not in ("rollout", *DERIVATIVES)])
+@pytest.mark.parametrize(
+    "name", [name for name in FUNCTIONS if name not in ("rollout", *DERIVATIVES)]
+)
 def test_casadi_and_c_agree(name):
     polar, (q, v, v_dot, tau) = model(2, emission="loops"), polar_state(2, 1.3)
-    given = {"q": q, "v": v, "v_dot": v_dot, "tau": tau, "f_ext": polar.external_force(force=(1.0, 2.0, 3.0))}
+    given = {
+        "q": q,
+        "v": v,
+        "v_dot": v_dot,
+        "tau": tau,
+        "f_ext": polar.external_force(force=(1.0, 2.0, 3.0)),
+    }
     arguments = [given[a["name"]] for a in polar.manifest["functions"][name]["inputs"]]
     found, expected = polar.kernel(name)(*arguments), getattr(polar.casadi, name)(*arguments)
     pairs = zip(found, expected, strict=True) if isinstance(found, tuple) else [(found, expected)]
     for x, y in pairs:
-        np.testing.assert_allclose(np.ravel(x), np.ravel(np.array(y)), rtol=1e-11, atol=1e-13 * np.abs(x).max())
+        np.testing.assert_allclose(
+            np.ravel(x), np.ravel(np.array(y)), rtol=1e-11, atol=1e-13 * np.abs(x).max()
+        )
 
 
 # Misuse
@@ -234,8 +289,15 @@ def test_casadi_and_c_agree(name):
 def test_a_straight_segment_is_refused(theta):
     polar, (q, v, v_dot, tau) = model(2), polar_state(2, 1.0)
     q[10] = theta
-    message = r"segment 2 has theta = \S+ rad: polar coordinates have no value at theta = 0; use coordinates = \"bend\""
-    calls = (polar.mass_matrix, q), (polar.inverse_dynamics, q, v, v_dot), (polar.forward_dynamics, q, v, tau)
+    message = (
+        r"segment 2 has theta = \S+ rad: polar coordinates have no value at "
+        r"theta = 0; use coordinates = \"bend\""
+    )
+    calls = (
+        (polar.mass_matrix, q),
+        (polar.inverse_dynamics, q, v, v_dot),
+        (polar.forward_dynamics, q, v, tau),
+    )
     for function, *arguments in (*calls, (polar.tail_points, q), (polar.energy, q, v)):
         with pytest.raises(st.StateError, match=message):
             function(*arguments)
@@ -245,7 +307,9 @@ def test_a_straight_segment_is_refused(theta):
 
 
 def test_beyond_the_range_is_refused():
-    with pytest.raises(st.StateError, match=r"segment 1 is bent by 6\.3 rad, beyond the scene's 6\.28"):
+    with pytest.raises(
+        st.StateError, match=r"segment 1 is bent by 6\.3 rad, beyond the scene's 6\.28"
+    ):
         model(1).mass_matrix(polar_state(1, 6.3)[0])
 
 
@@ -254,7 +318,9 @@ def test_verification_is_refused():
         laws(model(1))
 
 
-@pytest.mark.parametrize(("tail", "links", "coordinates"), [("articulated", 2, "polar"), ("continuum", None, "joint")])
+@pytest.mark.parametrize(
+    ("tail", "links", "coordinates"), [("articulated", 2, "polar"), ("continuum", None, "joint")]
+)
 def test_coordinates_of_the_other_tail_are_refused(tail, links, coordinates):
     with pytest.raises(SceneError) as caught:
         scene_for(tail, 1, links, coordinates=coordinates)

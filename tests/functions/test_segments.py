@@ -31,10 +31,14 @@ def test_segments_give_the_same_acceleration(size, name):
 
 def test_what_needs_the_matrix_goes_in_lanes():
     for name in ("forward_dynamics_derivatives", "mass_matrix", "pfl"):
-        assert program(CATALOGUE[name], Tail(3, 2), "segments") == program(CATALOGUE[name], Tail(3, 2), "lanes")
+        assert program(CATALOGUE[name], Tail(3, 2), "segments") == program(
+            CATALOGUE[name], Tail(3, 2), "lanes"
+        )
 
 
-@pytest.mark.parametrize(("size", "form"), [((1, 64), "lanes"), ((3, 4), "lanes"), ((4, 4), "segments")])
+@pytest.mark.parametrize(
+    ("size", "form"), [((1, 64), "lanes"), ((3, 4), "lanes"), ((4, 4), "segments")]
+)
 def test_long_tails_of_several_segments_go_by_segments(size, form):
     assert fastest(FUNCTIONS[FUNCTION], Tail(*size))[0] == form
 
@@ -53,7 +57,9 @@ def chain(size):
 
 def states(segments, kind):
     """Two tuples (q, v, v_dot, tau)."""
-    found = list(zip(*random_states(segments, 11, 2, "random" if kind == "coiled" else kind), strict=True))
+    found = list(
+        zip(*random_states(segments, 11, 2, "random" if kind == "coiled" else kind), strict=True)
+    )
     if kind == "coiled":
         for (q, *_), coil in zip(found, COILS, strict=True):
             q[7:] = np.tile(coil, segments)
@@ -61,8 +67,14 @@ def states(segments, kind):
 
 
 def worst_error(size, kind):
-    """Largest error of v_dot, and of that over the condition number of the scaled H, against 40 digits."""
-    model, exact, found = st.load(model_folder(*size, functions=[FUNCTION], emission="segments")), chain(size), []
+    """Largest error of v_dot, and of that over the condition number of the scaled H, against 40
+    digits.
+    """
+    model, exact, found = (
+        st.load(model_folder(*size, functions=[FUNCTION], emission="segments")),
+        chain(size),
+        [],
+    )
     for q, v, _, tau in states(size[0], kind):
         error = block_error(model.forward_dynamics(q, v, tau), exact.forward_dynamics(q, v, tau))
         found.append((error, error / equilibrated_condition(exact.mass_matrix(q))))
@@ -70,7 +82,12 @@ def worst_error(size, kind):
 
 
 slow = pytest.mark.slow
-EXACT_SIZES = [(1, 3), (3, 4), (8, 2), *(pytest.param(s, marks=slow) for s in ((2, 16), (6, 6), (8, 16), (20, 4)))]
+EXACT_SIZES = [
+    (1, 3),
+    (3, 4),
+    (8, 2),
+    *(pytest.param(s, marks=slow) for s in ((2, 16), (6, 6), (8, 16), (20, 4))),
+]
 
 
 @pytest.mark.parametrize("size", EXACT_SIZES, ids=lambda size: f"m{size[0]}_n{size[1]}")
@@ -82,7 +99,9 @@ def test_accelerations_are_exact_to_rounding(size, kind):
 
 
 def signs(segments, **changed):
-    """Which pivots are positive: two of each segment from the last one on, then six of the torso."""
+    """Which pivots are positive: two of each segment from the last one on, then six of the
+    torso.
+    """
     found = Run(segments, Numbers(np), arguments(segments) | changed).guards
     assert [status for status, _ in found] == ["NOT_POSITIVE_DEFINITE"] * 12
     return [value > 0 for _, value in found]
@@ -91,7 +110,9 @@ def signs(segments, **changed):
 def test_every_pivot_is_guarded():
     segments = program(FUNCTIONS[FUNCTION], Tail(3, 2), "segments")
     assert all(signs(segments))
-    assert signs(segments, torso_mass=[-1e3])[:6] == [True] * 6 and not all(signs(segments, torso_mass=[-1e3]))
+    assert signs(segments, torso_mass=[-1e3])[:6] == [True] * 6 and not all(
+        signs(segments, torso_mass=[-1e3])
+    )
     assert signs(segments, tail_mass=[-1.0], link_inertia=[-1.0] * 3)[:2] == [False] * 2
 
 
@@ -112,17 +133,23 @@ def test_the_manifest_tells_how_v_dot_comes_about(size, options, emission):
     assert model.manifest["functions"]["energy"]["emission"] in ("straight", "loops")
 
 
-@pytest.mark.parametrize("options", [{"real": "float"}, {"profile": "reproducible"}, {"baked": True}])
+@pytest.mark.parametrize(
+    "options", [{"real": "float"}, {"profile": "reproducible"}, {"baked": True}]
+)
 def test_segments_serve_every_kind_of_scene(options):
     model = st.load(model_folder(3, 4, functions=[FUNCTION], emission="segments", **options))
     q, v, _, tau = states(3, "random")[0]
-    error = block_error(model.forward_dynamics(q, v, tau), chain((3, 4)).forward_dynamics(q, v, tau))
+    error = block_error(
+        model.forward_dynamics(q, v, tau), chain((3, 4)).forward_dynamics(q, v, tau)
+    )
     assert error <= (1e-3 if "real" in options else 1e-13)
 
 
 def test_contact_goes_by_segments_too():
     options = {"functions": ["contact_dynamics"], "contacts": ["tail", "torso"]}
-    models = [st.load(model_folder(3, 2, emission=form, **options)) for form in ("segments", "loops")]
+    models = [
+        st.load(model_folder(3, 2, emission=form, **options)) for form in ("segments", "loops")
+    ]
     q, v, _, tau = states(3, "random")[0]
     q[2] = 0.02
     segments, loops = (model.contact_dynamics(q, v, tau, np.zeros(14)) for model in models)

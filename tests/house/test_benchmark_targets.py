@@ -6,7 +6,10 @@ from benchmarks.targets import TARGETS, judged
 TIMES = {"plain_ns": 1400.0, "tuned_ns": 1300.0, "mujoco_ns": 1099.0, "casadi_ns": 126.0}
 REPORT = {
     "speed": [{"model": "(1, 3)", "ns": 100.0} | TIMES, {"model": "(8, 16)", "ns": 100.0} | TIMES],
-    "other_peers": [{"model": "(1, 3)", "ns": 100.0} | TIMES, {"model": "(6, 6)", "ns": 99.0, "casadi_ns": ""} | TIMES],
+    "other_peers": [
+        {"model": "(1, 3)", "ns": 100.0} | TIMES,
+        {"model": "(6, 6)", "ns": 99.0, "casadi_ns": ""} | TIMES,
+    ],
     "continuum_peer": [{"left out": "not installed"}],
     "jacobian_times": [{"model": "(1, 3)", "ns": 100.0} | TIMES],
     "batch_times": [{"model": "(1, 3)", "one by one, ns": 61.0, "side by side, ns": 10.0}],
@@ -14,7 +17,10 @@ REPORT = {
 
 
 def test_a_target_is_met_from_its_ratio_on_in_the_rows_that_it_names():
-    found = [(row["slower"].split(":")[1].strip(), row["model"], row["verdict"]) for row in judged(REPORT)]
+    found = [
+        (row["slower"].split(":")[1].strip(), row["model"], row["verdict"])
+        for row in judged(REPORT)
+    ]
     assert found == [
         ("Pinocchio, coupled, as documented", "(1, 3)", "met"),
         ("Pinocchio, coupled, as documented", "(8, 16)", "MISSED"),

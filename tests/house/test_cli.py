@@ -1,4 +1,6 @@
-"""The command line: reports go to stdout, complaints to stderr, and the exit status tells which it was."""
+"""The command line: reports go to stdout, complaints to stderr, and the exit status tells which it
+was.
+"""
 
 import json
 import subprocess
@@ -81,7 +83,10 @@ def test_verify_as_json(run, folder):
 
 @pytest.mark.parametrize("form", [[], ["--json", "-"]])
 def test_failed_check_is_status_1(run, folder, monkeypatch, form):
-    found = [verify.Check("a law", "It holds.", 2.0, 1.0, "a state"), verify.Check("another", "It holds.", 0.0, 1.0)]
+    found = [
+        verify.Check("a law", "It holds.", 2.0, 1.0, "a state"),
+        verify.Check("another", "It holds.", 0.0, 1.0),
+    ]
     monkeypatch.setattr(verify, "laws", lambda _: found)
     status, out, err = run("verify", folder, *form)
     assert (status, err) == (1, "")
@@ -124,11 +129,15 @@ def test_help_names_every_verb(capsys):
     assert "info" in out and "verify" in out
 
 
-@pytest.mark.parametrize("program", [[str(Path(sys.executable).parent / "serpentail")], ["-m", "serpentail.cli"]])
+@pytest.mark.parametrize(
+    "program", [[str(Path(sys.executable).parent / "serpentail")], ["-m", "serpentail.cli"]]
+)
 def test_installed_program(program, folder, tmp_path):
     command = program if len(program) == 1 else [sys.executable, *program]
     good, bad = (
-        subprocess.run([*command, "info", place, "--json", "-"], capture_output=True, text=True, check=False)
+        subprocess.run(
+            [*command, "info", place, "--json", "-"], capture_output=True, text=True, check=False
+        )
         for place in (folder, str(tmp_path))
     )
     assert (good.returncode, good.stderr) == (0, "") and json.loads(good.stdout)["name"] == "tail"

@@ -1,4 +1,6 @@
-"""Generated folders are a function of the scene: same bytes, nothing written twice, never half a file."""
+"""Generated folders are a function of the scene: same bytes, nothing written twice, never half a
+file.
+"""
 
 import json
 import os
@@ -31,7 +33,11 @@ def scene(**options):
 
 def texts(folder):
     """Every file below a folder by its name, as bytes."""
-    return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file()
+    }
 
 
 @pytest.fixture
@@ -66,14 +72,18 @@ def test_same_bytes_under_any_hash_seed_and_from_any_folder(expected, tmp_path, 
     functions = ",".join(reversed(OPTIONS["functions"]))
     tail = ("--tail", "articulated", "--segments", "2", "--links", "2", "--emission", "loops")
     surroundings = {"PYTHONHASHSEED": seed, "LC_ALL": "C", "TZ": f"Etc/GMT+{seed}"}
-    printed = call(*tail, "--functions", functions, "--output", "made/here", cwd=cwd, **surroundings)
+    printed = call(
+        *tail, "--functions", functions, "--output", "made/here", cwd=cwd, **surroundings
+    )
     assert f"made/here/{NAME}: {len(FILES)} files written" in printed
     assert texts(cwd / "made" / "here" / NAME) == expected
 
 
 def test_texts_tell_nothing_of_where_and_when(expected, tmp_path):
     for name, text in expected.items():
-        assert str(tmp_path).encode() not in text and str(Path.home()).encode() + b"/" not in text, name
+        assert (
+            str(tmp_path).encode() not in text and str(Path.home()).encode() + b"/" not in text
+        ), name
         assert not re.search(rb"\b20\d\d-\d\d-\d\d|\b\d\d:\d\d:\d\d\b", text), name
 
 
@@ -81,7 +91,9 @@ def test_second_generation_writes_nothing(expected, tmp_path):
     folder = tmp_path / "expected" / NAME
     before = {path: (path.stat().st_mtime_ns, path.stat().st_ino) for path in folder.rglob("*")}
     assert generate(scene(), tmp_path / "expected") == []
-    assert {path: (path.stat().st_mtime_ns, path.stat().st_ino) for path in folder.rglob("*")} == before
+    assert {
+        path: (path.stat().st_mtime_ns, path.stat().st_ino) for path in folder.rglob("*")
+    } == before
     assert texts(folder) == expected
 
 
@@ -120,7 +132,9 @@ def test_a_baked_parameter_changes_only_the_code_and_the_hash(tmp_path):
 
 def test_manifest_describes_the_files(expected):
     manifest = json.loads(expected[MANIFEST])
-    assert manifest["files"] == {name: digest(expected[name].decode()) for name in sorted(FILES - {MANIFEST})}
+    assert manifest["files"] == {
+        name: digest(expected[name].decode()) for name in sorted(FILES - {MANIFEST})
+    }
     for name in (HEADER, CASADI):
         assert manifest["content_hash"] in expected[name].decode()
     assert f'return "{manifest["abi_hash"]}";' in expected[HOST].decode()
@@ -139,7 +153,10 @@ def test_hashes_tell_what_changed(tmp_path):
     other, same = hashes(tmp_path, parameters={"gravity": 1.62})
     assert other != content and same == abi
     contents, abis = zip(
-        *(hashes(tmp_path, **o) for o in ({"real": "float"}, {"functions": ["energy"]}, {"emission": "straight"})),
+        *(
+            hashes(tmp_path, **o)
+            for o in ({"real": "float"}, {"functions": ["energy"]}, {"emission": "straight"})
+        ),
         strict=True,
     )
     assert len({content, other, *contents}) == 5
@@ -156,7 +173,15 @@ def test_files_of_an_earlier_generation_go_and_others_stay(tmp_path):
 
 @pytest.mark.parametrize(
     "manifest",
-    ["", "{", "[]", "{}", '{"files": 3}', "null", '{"files": {"../outside.txt": "", "/outside.txt": "", "lost": ""}}'],
+    [
+        "",
+        "{",
+        "[]",
+        "{}",
+        '{"files": 3}',
+        "null",
+        '{"files": {"../outside.txt": "", "/outside.txt": "", "lost": ""}}',
+    ],
 )
 def test_damaged_manifest_does_no_harm(tmp_path, manifest):
     folder, outside = tmp_path / "folder", tmp_path / "outside.txt"
@@ -185,7 +210,9 @@ class Interrupted(Exception):
 @pytest.mark.parametrize("moment", range(6))
 @pytest.mark.parametrize("where", ["rename", "write"])
 def test_interrupted_generation_leaves_whole_files(expected, tmp_path, monkeypatch, moment, where):
-    """Each file is the old or the new one, the manifest never newer than the rest; the next run completes."""
+    """Each file is the old or the new one, the manifest never newer than the rest; the next run
+    completes.
+    """
     old_root, new_scene = tmp_path / "expected", scene(real="float")
     folder = old_root / NAME
     generate(new_scene, tmp_path / "new")
@@ -209,5 +236,7 @@ def test_interrupted_generation_leaves_whole_files(expected, tmp_path, monkeypat
     assert all(text in (expected[key], new[key]) for key, text in found.items())
     assert found.keys() == expected.keys() and found[MANIFEST] == expected[MANIFEST]
     assert generate(new_scene, old_root)
-    visible = {key: text for key, text in texts(folder).items() if not Path(key).name.startswith(".")}
+    visible = {
+        key: text for key, text in texts(folder).items() if not Path(key).name.startswith(".")
+    }
     assert visible == new

@@ -19,7 +19,12 @@ from serpentail_codegen.scene.parse import parse_scene
 from serpentail_codegen.scene.scene import ALL
 
 ROOT = Path(__file__).parents[2]
-DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *sorted(ROOT.glob("docs/*.md"))]
+DOCUMENTS = [
+    ROOT / "README.md",
+    ROOT / "CONTRIBUTING.md",
+    ROOT / "CHANGELOG.md",
+    *sorted(ROOT.glob("docs/*.md")),
+]
 README = DOCUMENTS[0].read_text(encoding="utf-8")
 CODEGEN, RUNTIME = ROOT / "codegen" / "serpentail_codegen", ROOT / "runtime" / "serpentail"
 MADE = ("generated/", "output/", "include/", "src/", "example/")  # folders that commands make
@@ -39,7 +44,9 @@ def code(document: Path) -> list[str]:
     text = document.read_text(encoding="utf-8")
     fenced = re.findall(r"^```\w*\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
     lines = [line.split("#")[0] for lines in fenced for line in lines.splitlines()]
-    return lines + re.findall(r"`([^`\n]+)`", re.sub(r"^```.*?^```$", "", text, flags=re.MULTILINE | re.DOTALL))
+    return lines + re.findall(
+        r"`([^`\n]+)`", re.sub(r"^```.*?^```$", "", text, flags=re.MULTILINE | re.DOTALL)
+    )
 
 
 def run(command: list[str], folder: Path) -> str:
@@ -63,10 +70,14 @@ def folder(tmp_path_factory) -> Path:
 
 def test_python_example_runs(folder):
     printed = run([sys.executable, "-c", block("python")], folder)
-    residual, flight = re.fullmatch(r"H v_dot \+ C = \[(.*?)\]\n(.*)\n", printed, re.DOTALL).groups()
+    residual, flight = re.fullmatch(
+        r"H v_dot \+ C = \[(.*?)\]\n(.*)\n", printed, re.DOTALL
+    ).groups()
     assert np.abs(np.array(residual.split(), float)).max() < 1e-12
     height, damped = map(float, re.search(r"height (\S+) m, (\S+) J", flight).groups())
-    assert height == pytest.approx(0.3 + 2 * 0.5 - 9.8 / 2 * 0.5**2, abs=0.1)  # of B, not of the centre of mass
+    assert height == pytest.approx(
+        0.3 + 2 * 0.5 - 9.8 / 2 * 0.5**2, abs=0.1
+    )  # of B, not of the centre of mass
     assert 0 < damped < 0.1
 
 
@@ -117,7 +128,9 @@ def test_demo_runs_anywhere_and_writes_its_files(tmp_path):
 def test_make_targets_and_variables_exist(document):
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
     targets = re.findall(r"^([a-z][a-z-]*):", makefile, re.MULTILINE)
-    variables = re.findall(r"^(\w+) *\??:?=", makefile, re.MULTILINE) + re.findall(r"\$\((\w+)\)", makefile)
+    variables = re.findall(r"^(\w+) *\??:?=", makefile, re.MULTILINE) + re.findall(
+        r"\$\((\w+)\)", makefile
+    )
     for line in code(document):
         for call in re.findall(r"^ *make\b(.*)", line):
             for word in call.split():
@@ -132,7 +145,9 @@ def test_files_exist(document):
     names += [span for span in code(document) if re.fullmatch(r"[\w.-]+(/[\w.-]*)+", span)]
     homes = (ROOT, document.parent, CODEGEN, RUNTIME)
     missing = [
-        name for name in names if not name.startswith(MADE) and not any((home / name).exists() for home in homes)
+        name
+        for name in names
+        if not name.startswith(MADE) and not any((home / name).exists() for home in homes)
     ]
     assert [name for name in missing if name not in ("fall.c", "articulated_m3_n4.h")] == []
 
@@ -164,7 +179,12 @@ def test_verbs_exist(document):
 
 @every_document
 def test_documents_name_no_machine(document):
-    assert re.findall(r"(?<![\w.~])/(?:home|root|tmp|work|Users)/", document.read_text(encoding="utf-8")) == []
+    assert (
+        re.findall(
+            r"(?<![\w.~])/(?:home|root|tmp|work|Users)/", document.read_text(encoding="utf-8")
+        )
+        == []
+    )
 
 
 # Contents
@@ -183,16 +203,26 @@ def test_links_resolve(document):
 def test_pictures_are_small_and_used():
     for picture in (ROOT / "docs" / "images").iterdir():
         assert picture.stat().st_size < 200_000
-        assert any(f"images/{picture.name}" in document.read_text(encoding="utf-8") for document in DOCUMENTS)
+        assert any(
+            f"images/{picture.name}" in document.read_text(encoding="utf-8")
+            for document in DOCUMENTS
+        )
 
 
 def test_benchmark_block_can_be_filled():
-    assert len(re.findall(r"^<!-- bench -->$.*?^<!-- /bench -->$", README, re.MULTILINE | re.DOTALL)) == 1
+    assert (
+        len(re.findall(r"^<!-- bench -->$.*?^<!-- /bench -->$", README, re.MULTILINE | re.DOTALL))
+        == 1
+    )
     assert README.count("bench -->") == 2
 
 
 def test_quoted_errors_are_the_ones_raised():
-    sources = "".join(path.read_text(encoding="utf-8") for home in (CODEGEN, RUNTIME) for path in home.rglob("*.py"))
+    sources = "".join(
+        path.read_text(encoding="utf-8")
+        for home in (CODEGEN, RUNTIME)
+        for path in home.rglob("*.py")
+    )
     rows = re.findall(r"^\| `(.*?)` \|", README.split("## Errors you may meet")[1], re.MULTILINE)
     assert rows
     for message in rows:
@@ -201,21 +231,27 @@ def test_quoted_errors_are_the_ones_raised():
 
 
 def test_changelog_names_every_emitted_function():
-    lines = re.findall(r"^- (`.*?):", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), re.MULTILINE)
+    lines = re.findall(
+        r"^- (`.*?):", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), re.MULTILINE
+    )
     named = {name for line in lines for name in re.findall(r"`(\w+)`", line)}
     assert set(ALL) <= named
 
 
 def test_theory_has_every_parameter_with_its_unit():
     rows = re.findall(
-        r"^\| `(\w+)` \| ([^|]+) \|", (ROOT / "docs" / "theory.md").read_text(encoding="utf-8"), re.MULTILINE
+        r"^\| `(\w+)` \| ([^|]+) \|",
+        (ROOT / "docs" / "theory.md").read_text(encoding="utf-8"),
+        re.MULTILINE,
     )
     assert {(p.name, p.unit) for p in PARAMETERS} <= set(rows)
 
 
 def test_theory_has_every_equation_that_the_code_names():
     theory = (ROOT / "docs" / "theory.md").read_text(encoding="utf-8")
-    sources = "".join((CODEGEN / f"{name}.py").read_text(encoding="utf-8") for name in ("kinematics", "dynamics"))
+    sources = "".join(
+        (CODEGEN / f"{name}.py").read_text(encoding="utf-8") for name in ("kinematics", "dynamics")
+    )
     found = {int(n) for n in re.findall(r"\bEqs?\. (\d+)", sources)}
     listed = set()
     for first, last in re.findall(r"\bEqs?\. (\d+)(?:,? (?:to|and)? ?(\d+))?", theory):

@@ -1,4 +1,5 @@
-"""Golden models: two tiny models as text, so that a review shows what a change of the generator does to its output.
+"""Golden models: two tiny models as text, so that a review shows what a change of the generator
+does to its output.
 
 ``make golden`` accepts what the generator emits now.
 """
@@ -14,14 +15,23 @@ from serpentail_codegen.scene.parse import scene_for
 
 GOLDEN = Path(__file__).parents[1] / "golden"
 MODELS = {
-    "golden_straight": {"size": (1, 1), "emission": "straight", "functions": ["mass_matrix", "forward_dynamics"]},
-    "golden_loops": {"size": (2, 2), "emission": "loops", "functions": ["bias_force", "forward_dynamics"]},
+    "golden_straight": {
+        "size": (1, 1),
+        "emission": "straight",
+        "functions": ["mass_matrix", "forward_dynamics"],
+    },
+    "golden_loops": {
+        "size": (2, 2),
+        "emission": "loops",
+        "functions": ["bias_force", "forward_dynamics"],
+    },
 }
 LONGEST_REPORT = 200  # lines of difference that a failure shows
 
 
 def emitted(name, root):
-    """The header, the model and the CasADi module that the generator emits, by their names in the golden folder.
+    """The header, the model and the CasADi module that the generator emits, by their names in the
+    golden folder.
 
     Python is stored as text, so that no tool formats or checks it.
     """
@@ -29,16 +39,26 @@ def emitted(name, root):
     generate(scene_for("articulated", *options.pop("size"), name=name, **options), root)
     files = (f"include/{name}.h", f"src/{name}.c", f"{name}_casadi.py")
     names = [Path(file).name + ".txt" * file.endswith(".py") for file in files]
-    return {stored: (root / name / file).read_text() for stored, file in zip(names, files, strict=True)}
+    return {
+        stored: (root / name / file).read_text() for stored, file in zip(names, files, strict=True)
+    }
 
 
 def differences(folder, texts):
-    """Unified differences from the golden files to the texts, files missing on either side included."""
-    stored = {path.name: path.read_text() for path in sorted(folder.glob("*"))} if folder.is_dir() else {}
+    """Unified differences from the golden files to the texts, files missing on either side
+    included.
+    """
+    stored = (
+        {path.name: path.read_text() for path in sorted(folder.glob("*"))}
+        if folder.is_dir()
+        else {}
+    )
     lines = []
     for name in sorted(stored.keys() | texts.keys()):
         before, after = (some.get(name, "").splitlines() for some in (stored, texts))
-        lines += difflib.unified_diff(before, after, f"golden/{name}", f"emitted/{name}", lineterm="")
+        lines += difflib.unified_diff(
+            before, after, f"golden/{name}", f"emitted/{name}", lineterm=""
+        )
     return lines
 
 
@@ -77,7 +97,9 @@ def test_every_difference_is_shown(tmp_path):
     accept(tmp_path / "golden", texts)
     assert differences(tmp_path / "golden", texts) == []
     shown = report(differences(tmp_path / "golden", {"a.c": "one\n2\n", "c.py": "four\n"}))
-    assert all(line in shown.splitlines() for line in ("--- golden/a.c", "-two", "+2", "-three", "+four"))
+    assert all(
+        line in shown.splitlines() for line in ("--- golden/a.c", "-two", "+2", "-three", "+four")
+    )
     accept(tmp_path / "golden", {"c.py": "four\n"})
     assert [path.name for path in (tmp_path / "golden").iterdir()] == ["c.py"]
     long = report([f"+{k}" for k in range(LONGEST_REPORT + 7)])

@@ -21,7 +21,10 @@ def fresh(program, *arguments):
 
 
 def test_import_takes_less_than_150_ms():
-    program = "import time; start = time.perf_counter(); import serpentail; print(time.perf_counter() - start)"
+    program = (
+        "import time; start = time.perf_counter(); import serpentail; print(time.perf_counter() - "
+        "start)"
+    )
     assert min(float(fresh(program)) for _ in range(5)) < 0.15
 
 
@@ -34,7 +37,8 @@ def test_flight_needs_numpy_alone():
     program = (
         "import sys, serpentail as st\n"
         "model = st.load(sys.argv[1])\n"
-        "flight = st.simulate(model, [0, 0, 0, 1, 0, 0, 0, 0, 0], [0] * 8, controller=st.Damping(), t_span=0.01)\n"
+        "flight = st.simulate(model, [0, 0, 0, 1, 0, 0, 0, 0, 0], [0] * 8, "
+        "controller=st.Damping(), t_span=0.01)\n"
         f"assert len(flight.t) == 201; {LOADED}"
     )
     assert fresh(program, folder).split() == ["numpy"]

@@ -16,7 +16,10 @@ ORDER = ("TAIL=articulated", "M=1", "N=1", "FUNCTIONS=mass_matrix")
 NAME = "articulated_m1_n1"
 UP_TO_DATE = f"generated/{NAME} is up to date\n"
 # Programs of .venv: this interpreter, and no installation, which would reach the real environment.
-PROGRAM = '#!/bin/sh\ncase "$*" in *"pip install"*) echo "no pip in here" >&2; exit 9;; esac\nexec {} "$@"\n'
+PROGRAM = (
+    '#!/bin/sh\ncase "$*" in *"pip install"*) echo "no pip in here" >&2; exit 9;; esac\nexec {} '
+    '"$@"\n'
+)
 
 
 @pytest.fixture
@@ -28,7 +31,10 @@ def tree(tmp_path):
         shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
     programs = tmp_path / ".venv" / "bin"
     programs.mkdir(parents=True)
-    for name, command in (("python", sys.executable), ("serpentail", f"{sys.executable} -m serpentail.cli")):
+    for name, command in (
+        ("python", sys.executable),
+        ("serpentail", f"{sys.executable} -m serpentail.cli"),
+    ):
         (programs / name).write_text(PROGRAM.format(command))
         (programs / name).chmod(0o755)
     (tmp_path / ".venv" / ".ready").touch()
@@ -40,9 +46,15 @@ def make(tree):
     """Return a function that runs make there, away from a make that runs these tests."""
 
     def run(*arguments, **more):
-        own = {k: v for k, v in os.environ.items() if k not in VARIABLES and not re.match("MAKE|MFLAGS", k)}
+        own = {
+            k: v
+            for k, v in os.environ.items()
+            if k not in VARIABLES and not re.match("MAKE|MFLAGS", k)
+        }
         own |= {"PYTHONPATH": str(tree / "codegen"), "LC_ALL": "C", **more}
-        return subprocess.run(["make", *arguments], cwd=tree, env=own, capture_output=True, text=True, check=False)
+        return subprocess.run(
+            ["make", *arguments], cwd=tree, env=own, capture_output=True, text=True, check=False
+        )
 
     return run
 
@@ -54,7 +66,9 @@ def lines(done):
 
 def built(tree):
     """Time of every file that a build wrote."""
-    return {path: path.stat().st_mtime_ns for path in (tree / "generated").rglob("*") if path.is_file()}
+    return {
+        path: path.stat().st_mtime_ns for path in (tree / "generated").rglob("*") if path.is_file()
+    }
 
 
 def manifest(tree, name=NAME):
@@ -82,7 +96,10 @@ def test_plan_of_a_model(tree, make):
     done = make("-n", "model", "TAIL=articulated", "M=2", "N=2")
     assert (done.returncode, done.stderr) == (0, "")
     generate, tell = (line for line in lines(done) if line.startswith(".venv/bin/"))
-    assert generate == ".venv/bin/python -m serpentail_codegen --tail articulated --segments 2 --links 2"
+    assert (
+        generate
+        == ".venv/bin/python -m serpentail_codegen --tail articulated --segments 2 --links 2"
+    )
     assert tell == ".venv/bin/serpentail info generated/articulated_m2_n2"
     assert not (tree / "generated").exists()
 
@@ -92,14 +109,18 @@ def test_plan_of_options(make, size):
     options = ("REAL=float", "EMISSION=loops", "BAKED=1", "FUNCTIONS=energy,momentum")
     done = make("-n", "model", *size, *options)
     wanted = (
-        "--tail articulated --segments 1 --links 3 --real float --emission loops --baked --functions energy,momentum"
+        "--tail articulated --segments 1 --links 3 --real float --emission loops --baked "
+        "--functions energy,momentum"
     )
     assert f".venv/bin/python -m serpentail_codegen {wanted}" in lines(done)
 
 
 def test_plan_of_a_scene(make):
     done = make("-n", "model", "SCENE=scenes/kangaroo_rat_m1_n3.toml", "REAL=float")
-    assert ".venv/bin/python -m serpentail_codegen scenes/kangaroo_rat_m1_n3.toml --real float" in lines(done)
+    assert (
+        ".venv/bin/python -m serpentail_codegen scenes/kangaroo_rat_m1_n3.toml --real float"
+        in lines(done)
+    )
     assert ".venv/bin/serpentail info generated/kangaroo_rat_m1_n3" in lines(done)
 
 
@@ -132,13 +153,22 @@ def test_changed_generator_looks_again_and_writes_only_what_differs(tree, make):
     assert make("model", *ORDER).returncode == 0
     age(tree)
     before = built(tree)
-    (tree / "codegen" / "serpentail_codegen" / "kinematics.py").touch()
+    (tree / "codegen" / "serpentail_codegen" / "mechanics" / "link.py").touch()
     done = make("model", *ORDER)
     assert done.returncode == 0 and f"generated/{NAME}: up to date" in done.stdout
     stamp = tree / "generated" / NAME / ".made"
     after = built(tree)
     assert {path for path in after if after[path] != before[path]} == {stamp}
-    template = tree / "codegen" / "serpentail_codegen" / "targets" / "c" / "templates" / "model" / "model.c.jinja"
+    template = (
+        tree
+        / "codegen"
+        / "serpentail_codegen"
+        / "targets"
+        / "c"
+        / "templates"
+        / "model"
+        / "model.c.jinja"
+    )
     template.write_text("/* another start */\n" + template.read_text())
     assert "files written" in make("model", *ORDER).stdout
     source = tree / "generated" / NAME / "src" / f"{NAME}.c"
@@ -190,7 +220,9 @@ def test_unknown_target(make):
 
 def test_failed_build_is_tried_again(tree, make):
     failed = make("model", *ORDER, CC="no-such-cc", SERPENTAIL_CACHE=str(tree / "cache"))
-    assert failed.returncode == 2 and "CC='no-such-cc' does not work as a C compiler" in failed.stderr
+    assert (
+        failed.returncode == 2 and "CC='no-such-cc' does not work as a C compiler" in failed.stderr
+    )
     again = make("model", *ORDER)
     assert again.returncode == 0 and "mass_matrix" in again.stdout
 

@@ -1,4 +1,6 @@
-"""Bad calls and scenes are answered or refused, drops gain no energy, and what once broke stays mended."""
+"""Bad calls and scenes are answered or refused, drops gain no energy, and what once broke stays
+mended.
+"""
 
 import random
 from pathlib import Path
@@ -38,18 +40,36 @@ def test_random_calls_are_answered_or_refused(standing, lying, count, tmp_path, 
         assert call_fuzz.fuzz(call_fuzz.targets(model, tmp_path), count, seed) == []
 
 
-@pytest.mark.parametrize(("found", "passed"), [(1.0, True), (1.1, False), (np.nan, False), (np.inf, False)])
+@pytest.mark.parametrize(
+    ("found", "passed"), [(1.0, True), (1.1, False), (np.nan, False), (np.inf, False)]
+)
 def test_a_figure_beyond_its_limit_fails(found, passed):
     figure = Figure("it", found, 1.0)
-    assert (figure.passed, figure.row()["passed"], "**FAILED**" in table([figure])) == (passed, passed, not passed)
+    assert (figure.passed, figure.row()["passed"], "**FAILED**" in table([figure])) == (
+        passed,
+        passed,
+        not passed,
+    )
 
 
 def test_plots_are_drawn(tmp_path):
     errors = [Errors(1e-16, 0.0, 1e-15, condition) for condition in (3.0, 1e4)]
-    swept = [Point(tail, bend, e) for tail in ("one", "two") for bend, e in zip((0.0, 1.0), errors, strict=True)]
-    figures = [Figure("v_dot", 1e-16, 5e-15, "cond(H) 1e4"), Figure("faults", 0, 0), Figure("drift", 0.0, 1e-6)]
+    swept = [
+        Point(tail, bend, e)
+        for tail in ("one", "two")
+        for bend, e in zip((0.0, 1.0), errors, strict=True)
+    ]
+    figures = [
+        Figure("v_dot", 1e-16, 5e-15, "cond(H) 1e4"),
+        Figure("faults", 0, 0),
+        Figure("drift", 0.0, 1e-6),
+    ]
     stress_plots.draw({"Part": figures}, swept, tmp_path)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["bends.png", "condition.png", "margins.png"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "bends.png",
+        "condition.png",
+        "margins.png",
+    ]
 
 
 @pytest.mark.parametrize("result", [np.array([1.0, np.nan]), (1.0, (np.inf,))])
@@ -74,12 +94,19 @@ def test_mutated_scene_files_are_read_or_refused(count, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("method", ["ros34pw2", "tsit5", "dop853"])
 def test_a_drop_gains_no_energy(method):
-    """The drop whose samples before the landing once had two thirds too much; dop853 once gave it up."""
+    """The drop whose samples before the landing once had two thirds too much; dop853 once gave it
+    up.
+    """
     model, rng = drops.falling(1, None), np.random.default_rng(11)
     for _ in range(26):
         q, v = drops.start(model, rng)
         legs = st.Legs.fixed(rng.uniform(2, 4.5), rng.uniform(-1.5, 1))
-    settings = {"controller": st.Damping(1e-4), "legs": legs, "t_span": drops.DURATION, "output_step": 0.01}
+    settings = {
+        "controller": st.Damping(1e-4),
+        "legs": legs,
+        "t_span": drops.DURATION,
+        "output_step": 0.01,
+    }
     assert drops.gain(st.simulate(model, q, v, method=method, **settings)) <= drops.GAIN
 
 
@@ -93,7 +120,9 @@ UNLIKE = {
 
 @pytest.mark.parametrize("change", UNLIKE.values(), ids=UNLIKE)
 def test_bodies_of_unlike_size_are_told(lying, change):
-    with pytest.warns(st.UnlikeBodies, match=r"unlike by .*: H may be off by as many roundings; are the"):
+    with pytest.warns(
+        st.UnlikeBodies, match=r"unlike by .*: H may be off by as many roundings; are the"
+    ):
         other = lying.with_parameters(**change)
     with pytest.warns(st.UnlikeBodies):
         st.load(lying.folder, parameters=change)
@@ -105,7 +134,10 @@ def test_the_warning_is_true(lying):
     off = {}
     for name, change in UNLIKE.items():
         of = changed(Subject("", lying, None), **change)
-        straight = [errors_of_mass_matrix(of, state(of, np.random.default_rng(k), np.zeros(4))[0]) for k in range(5)]
+        straight = [
+            errors_of_mass_matrix(of, state(of, np.random.default_rng(k), np.zeros(4))[0])
+            for k in range(5)
+        ]
         off[name] = max(straight) / disparity(of.model.parameters)
     assert max(off.values()) < np.finfo(float).eps
     worst = max(off, key=lambda name: off[name] * disparity(lying.parameters | UNLIKE[name]))
@@ -117,8 +149,16 @@ def test_bodies_without_the_warning_keep_their_digits(request, name):
     """Random bodies as unlike as may be without it."""
     of, rng, quiet = Subject("", request.getfixturevalue(name), None), np.random.default_rng(4), 0
     while quiet < 12:
-        heavy, long, wide = 10 ** rng.uniform(-4, 4), 10 ** rng.uniform(-3, 3), 10 ** rng.uniform(-3, 3)
-        change = {"tail_mass": 3.5e-3 * heavy, "tail_length": 0.2 * long, "tail_mount": (0, -0.04 * wide, 4e-3 * wide)}
+        heavy, long, wide = (
+            10 ** rng.uniform(-4, 4),
+            10 ** rng.uniform(-3, 3),
+            10 ** rng.uniform(-3, 3),
+        )
+        change = {
+            "tail_mass": 3.5e-3 * heavy,
+            "tail_length": 0.2 * long,
+            "tail_mount": (0, -0.04 * wide, 4e-3 * wide),
+        }
         if 1e2 < disparity(of.model.parameters | change) < UNLIKE_FROM:
             other, quiet = Subject("", of.model.with_parameters(**change), None), quiet + 1
             for bends in (np.zeros(of.model.nv - 6), rng.uniform(-1, 1, of.model.nv - 6)):
@@ -135,7 +175,9 @@ def test_vjp_of_a_model_with_contacts_is_that_of_flight(standing):
     rng = np.random.default_rng(5)
     arguments = [rng.normal(size=n) for n in (flight.nq, flight.nv, 2, flight.nv)]
     for found, expected in zip(
-        standing.forward_dynamics_vjp(*arguments), flight.forward_dynamics_vjp(*arguments), strict=True
+        standing.forward_dynamics_vjp(*arguments),
+        flight.forward_dynamics_vjp(*arguments),
+        strict=True,
     ):
         np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12 * np.abs(expected).max())
 
@@ -147,28 +189,51 @@ def test_vjp_of_a_model_with_contacts_is_that_of_flight(standing):
         ({"stop_at": np.zeros((2, 2))}, "stop_at"),
         ({"method": "rk4", "step": 1e-320}, "step 1e-320: too short"),
         ({"output_step": 1e-320}, "output_step 1e-320: more than"),
-        ({"method": "lsoda", "t_span": 1e-320}, "output_step .*: too short to move the time: give 1e-100"),
-        ({"t_span": (1e10, 1e10 + 4e-6)}, "output_step .*: too short to move the time: give 2.2e-06 s"),
+        (
+            {"method": "lsoda", "t_span": 1e-320},
+            "output_step .*: too short to move the time: give 1e-100",
+        ),
+        (
+            {"t_span": (1e10, 1e10 + 4e-6)},
+            "output_step .*: too short to move the time: give 2.2e-06 s",
+        ),
         ({"method": "ros34pw2", "rtol": 1e-320}, "rtol 1e-320: too near to rounding: give 2.2e-14"),
         ({"method": "dop853", "rtol": 1e-15}, "rtol 1e-15: too near to rounding"),
-        ({"method": "ros34pw2", "most_step": 1e-200}, "most_step 1e-200: too short to move the time"),
+        (
+            {"method": "ros34pw2", "most_step": 1e-200},
+            "most_step 1e-200: too short to move the time",
+        ),
     ],
 )
 def test_simulations_that_cannot_be_are_refused(standing, settings, words):
     q = np.array([0, 0, 0.3, 1, 0, 0, 0, 0, 0.0])
     with pytest.raises(st.SimulationError, match=words):
-        st.simulate(standing, q, np.zeros(8), legs=st.Legs.fixed(3.6, -0.3), **({"t_span": 0.01} | settings))
+        st.simulate(
+            standing, q, np.zeros(8), legs=st.Legs.fixed(3.6, -0.3), **({"t_span": 0.01} | settings)
+        )
 
 
 @pytest.mark.parametrize(
     ("call", "words"),
     [
         (lambda model: st.Legs.ramp(3.6, (-0.3, -1.0), 0.4, 1e-320), "takes inf s"),
-        (lambda model: st.Reference([0.0, 1.0], [1, [2, 3]]), "Reference: angles is not made of real numbers"),
-        (lambda model: st.Pfl(model, ([0.0, 1.0], np.zeros((2, 2))), 10**60), "Pfl: kp is not made of real numbers"),
-        (lambda model: st.Pfl(model, np.zeros((2, 3), complex)), "Pfl: times is not made of real numbers"),
+        (
+            lambda model: st.Reference([0.0, 1.0], [1, [2, 3]]),
+            "Reference: angles is not made of real numbers",
+        ),
+        (
+            lambda model: st.Pfl(model, ([0.0, 1.0], np.zeros((2, 2))), 10**60),
+            "Pfl: kp is not made of real numbers",
+        ),
+        (
+            lambda model: st.Pfl(model, np.zeros((2, 3), complex)),
+            "Pfl: times is not made of real numbers",
+        ),
         (lambda model: st.Pfl(model, ([0.0], np.zeros((1, 2)))), "Pfl: one node only"),
-        (lambda model: model.external_force(moment=(0, np.nan, 0)), "external_force: moment is not finite"),
+        (
+            lambda model: model.external_force(moment=(0, np.nan, 0)),
+            "external_force: moment is not finite",
+        ),
     ],
 )
 def test_arguments_that_the_fuzz_once_broke_are_refused(standing, call, words):

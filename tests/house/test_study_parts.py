@@ -1,4 +1,6 @@
-"""Parts of studies: kept files are read, and made anew exactly where what they depend on has changed."""
+"""Parts of studies: kept files are read, and made anew exactly where what they depend on has
+changed.
+"""
 
 import numpy as np
 import pytest

@@ -1,4 +1,6 @@
-"""Programs as parts of others: what depends on what, what nothing needs, and one program within another."""
+"""Programs as parts of others: what depends on what, what nothing needs, and one program within
+another.
+"""
 
 from fractions import Fraction
 
@@ -11,9 +13,21 @@ from serpentail_codegen.ir.dataflow import expanded, influencing, pruned, reache
 from serpentail_codegen.ir.interpret import Run
 from serpentail_codegen.ir.program import Apply, Guard, Loop, statements
 from tests.autodiff.test_forward import arguments_of
-from tests.support.programs import EXACT, NEXT, PROGRAMS, RECTANGULAR, SQUARE, TURN, built, numbers, step_of
+from tests.support.programs import (
+    EXACT,
+    NEXT,
+    PROGRAMS,
+    RECTANGULAR,
+    SQUARE,
+    TURN,
+    built,
+    numbers,
+    step_of,
+)
 
-SPLIT = step_of("split", (("x", 1), ("y", 1)), (("s", 1), ("z", 1)), lambda t, x, y: [t.mul(x, x), t.mul(y, y)])
+SPLIT = step_of(
+    "split", (("x", 1), ("y", 1)), (("s", 1), ("z", 1)), lambda t, x, y: [t.mul(x, x), t.mul(y, y)]
+)
 
 
 def outputs(program, arguments):
@@ -54,7 +68,13 @@ def test_dependence_goes_both_ways():
     assert reached(body, {"x"}) == {"x", "p", "q", "w", "u"}  # a step is one: it may take x to u
     assert reached(body, {"q"}) == {"q", "w"}
     assert reached(body, {"mass"}) == {"mass"}
-    assert influencing(body, {"w"}) == {"w", "p", "q", "x", "mass"}  # an output that is not wanted needs nothing
+    assert influencing(body, {"w"}) == {
+        "w",
+        "p",
+        "q",
+        "x",
+        "mass",
+    }  # an output that is not wanted needs nothing
     assert influencing(body, {"u"}) == {"u", "y"}
 
 
@@ -78,7 +98,10 @@ def test_sums_read_what_they_add_to():
     added, squared, stored = b.finish().body
     assert reads(added) == (x[0], w[0]) and writes(added) == (w[0],)
     assert reads(squared) == (y[0], u[0]) and reads(stored) == (y[0],)
-    assert reads(Guard(w[0], "TOO_SMALL", ())) == (w[0],) and writes(Guard(w[0], "TOO_SMALL", ())) == ()
+    assert (
+        reads(Guard(w[0], "TOO_SMALL", ())) == (w[0],)
+        and writes(Guard(w[0], "TOO_SMALL", ())) == ()
+    )
 
 
 # What nothing needs
@@ -91,7 +114,9 @@ def test_pruning_keeps_the_outputs(name):
 
 
 def test_nothing_unneeded_is_left():
-    """Every array matters to an output; every loop has a body; no output of a step is dropped by nobody."""
+    """Every array matters to an output; every loop has a body; no output of a step is dropped by
+    nobody.
+    """
     for name, program in made():
         needed = influencing(program.body, {a.name for a in program.of_role("output")})
         known = {a.name for a in program.arrays if a.role in ("input", "output", "parameters")}
@@ -112,7 +137,12 @@ def test_outputs_of_a_step_go_one_by_one():
         b.apply(TURN, {"x": x.part(0, 2), "y": y[i]}, s=b.array("t", 2)[0])
     program = pruned(b.finish())
     (call,) = [s for s in program.body if isinstance(s, Apply)]
-    assert (call.step.name, call.reads, call.writes, call.adds) == ("split_s", (x[0],), (w[0],), (False,))
+    assert (call.step.name, call.reads, call.writes, call.adds) == (
+        "split_s",
+        (x[0],),
+        (w[0],),
+        (False,),
+    )
     assert not any(isinstance(s, Loop) for s in program.body)
     assert [a.name for a in program.arrays] == ["mass", "x", "y", "u", "w"]
 
@@ -157,8 +187,20 @@ def test_called_names_carry_the_programs_name():
     b, a, y, z = outer()
     b.call(PROGRAMS["nested"], x=a, y=y, u=z, w=b.array("w", 1))
     program = expanded(b.finish())
-    assert [array.name for array in program.arrays] == ["mass", "a", "y", "z", "w", "nest_s", "nest_t"]
-    assert all(ref.array in program.arrays for s, _ in statements(program.body) for ref in (*reads(s), *writes(s)))
+    assert [array.name for array in program.arrays] == [
+        "mass",
+        "a",
+        "y",
+        "z",
+        "w",
+        "nest_s",
+        "nest_t",
+    ]
+    assert all(
+        ref.array in program.arrays
+        for s, _ in statements(program.body)
+        for ref in (*reads(s), *writes(s))
+    )
 
 
 def test_called_in_a_loop_it_runs_in_every_turn():
@@ -173,7 +215,9 @@ def test_called_in_a_loop_it_runs_in_every_turn():
     assert found["total"] == [2 * outputs(PROGRAMS["accumulators"], given)["w"][0]]
 
 
-@pytest.mark.parametrize(("left_out", "role"), [("x", "input"), ("y", "input"), ("u", "output"), ("w", "output")])
+@pytest.mark.parametrize(
+    ("left_out", "role"), [("x", "input"), ("y", "input"), ("u", "output"), ("w", "output")]
+)
 def test_arguments_that_are_not_bound_are_named(left_out, role):
     b, a, y, z = outer()
     given = {"x": a, "y": y, "u": z, "w": b.array("w", 1)}
@@ -201,5 +245,7 @@ def test_parameters_are_shared():
     b.call(PROGRAMS["carry_up"], x=a, y=y, u=z, w=b.array("w", 1))
     program = b.finish()
     assert [array.name for array in program.of_role("parameters")] == ["mass"]
-    run = Run(program, EXACT, {"mass": [Fraction(3)], "a": [Fraction(0)] * 3, "y": [Fraction(1)] * 3})
+    run = Run(
+        program, EXACT, {"mass": [Fraction(3)], "a": [Fraction(0)] * 3, "y": [Fraction(1)] * 3}
+    )
     assert run.values["z"] == [1, 1, 1]

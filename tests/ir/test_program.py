@@ -1,4 +1,6 @@
-"""Programs: what loops over steps mean, that unrolling keeps every bit of it, and that the solver solves."""
+"""Programs: what loops over steps mean, that unrolling keeps every bit of it, and that the solver
+solves.
+"""
 
 import math
 import random
@@ -23,14 +25,21 @@ from tests.references.parameters import TABLE_1, random_states
 
 TAILS = {"m1_n2": Tail(1, 2), "m2_n3": Tail(2, 3), "continuum_m2": Tail(2, 3, "continuum")}
 FLOATS = Numbers(math, float)
-EXACT = Numbers(SimpleNamespace(sin=lambda x: x / (1 + x * x), cos=lambda x: 1 / (1 + x * x), sqrt=None), Fraction)
+EXACT = Numbers(
+    SimpleNamespace(sin=lambda x: x / (1 + x * x), cos=lambda x: 1 / (1 + x * x), sqrt=None),
+    Fraction,
+)
 
 
 def random_index(rng):
-    """An affine index of up to three loop variables: its coefficients, its offset, and the index."""
+    """An affine index of up to three loop variables: its coefficients, its offset, and the
+    index.
+    """
     factors = {name: rng.randint(-4, 4) for name in rng.sample("ijl", rng.randint(0, 3))}
     offset = rng.randint(-9, 9)
-    index = sum((factor * Index(((name, 1),)) for name, factor in factors.items()), as_index(offset))
+    index = sum(
+        (factor * Index(((name, 1),)) for name, factor in factors.items()), as_index(offset)
+    )
     return factors, offset, index
 
 
@@ -63,22 +72,35 @@ def step_of(name, inputs, outputs, build):
 
 SUM = step_of("plus", (("x", 1), ("y", 1)), (("z", 1),), lambda t, x, y: [t.add(x, y)])
 SWAP = step_of("swap", (("x", 2),), (("x", 2),), lambda t, a, b: [b, a])
-SPLIT = step_of("split", (("x", 2), ("y", 1)), (("u", 1), ("v", 2)), lambda t, a, b, c: [c, t.add(a, b), t.mul(a, b)])
+SPLIT = step_of(
+    "split",
+    (("x", 2), ("y", 1)),
+    (("u", 1), ("v", 2)),
+    lambda t, a, b, c: [c, t.add(a, b), t.mul(a, b)],
+)
 
 
 def outputs(builder, **arguments):
-    """Run what a builder recorded on exact numbers, interpreted and unrolled; both give the same."""
+    """Run what a builder recorded on exact numbers, interpreted and unrolled; both give the
+    same.
+    """
     program = builder.finish()
     names = [array.name for array in program.of_role("output")]
     values = Run(program, EXACT, arguments).values
     tape, nodes, _ = unroll(program)
     order = (*program.of_role("parameters"), *program.of_role("input"))
-    replayed = replay(tape.nodes, [scalar for array in order for scalar in arguments[array.name]], EXACT)
-    assert {name: [replayed[node] for node in nodes[name]] for name in names} == {name: values[name] for name in names}
+    replayed = replay(
+        tape.nodes, [scalar for array in order for scalar in arguments[array.name]], EXACT
+    )
+    assert {name: [replayed[node] for node in nodes[name]] for name in names} == {
+        name: values[name] for name in names
+    }
     return values[names[0]] if len(names) == 1 else {name: values[name] for name in names}
 
 
-@pytest.mark.parametrize(("downward", "expected"), [(False, [1, 11, 111, 1111]), (True, [1111, 1110, 1100, 1000])])
+@pytest.mark.parametrize(
+    ("downward", "expected"), [(False, [1, 11, 111, 1111]), (True, [1111, 1110, 1100, 1000])]
+)
 def test_loops_run_in_their_direction(downward, expected):
     b = Builder("sums", "Running sums.")
     x, y, total = b.array("x", 1, 4, "input"), b.array("y", 1, 4, "output"), b.array("total", 1)
@@ -133,7 +155,11 @@ def test_arrays_count_vectors():
 
 def test_trailing_underscore_adds():
     b = Builder("sums", "Sum and sum of squares.")
-    x, u, v = b.array("x", 1, 3, "input"), b.array("u", 1, role="output"), b.array("v", 2, role="output")
+    x, u, v = (
+        b.array("x", 1, 3, "input"),
+        b.array("u", 1, role="output"),
+        b.array("v", 2, role="output"),
+    )
     b.fill(u[0], 100)
     b.fill(v[0], 1, 2)
     with b.loop("i", 3) as i:
@@ -164,7 +190,11 @@ def test_unwanted_outputs_go_with_all_that_only_they_need():
     assert outputs(b, x=[4]) == [4]
     (call,) = b.finish().body
     assert isinstance(call, Apply)
-    assert (call.step.name, call.step.inputs, call.step.outputs) == ("split_u", (("y", 1),), (("u", 1),))
+    assert (call.step.name, call.step.inputs, call.step.outputs) == (
+        "split_u",
+        (("y", 1),),
+        (("u", 1),),
+    )
     assert len(call.step.nodes) == 1
 
 
@@ -214,7 +244,11 @@ def test_guards_note_what_must_be_positive_in_order():
         b.guard(x[i], "TOO_SMALL", y[0])
     assert outputs(b, x=[1, -2, 3]) == [0]
     p = b.finish()
-    assert Run(p, EXACT, {"x": [1, -2, 3]}).guards == [("TOO_SMALL", 1), ("TOO_SMALL", -2), ("TOO_SMALL", 3)]
+    assert Run(p, EXACT, {"x": [1, -2, 3]}).guards == [
+        ("TOO_SMALL", 1),
+        ("TOO_SMALL", -2),
+        ("TOO_SMALL", 3),
+    ]
     assert unroll(p)[2] == [("TOO_SMALL", node) for node in range(3)]
 
 
@@ -237,7 +271,14 @@ def arguments_of(program, tail, convert):
     """Table 1 and a random state for the parameters and inputs of a program."""
     q, v, v_dot, tau = (rows[0] for rows in random_states(tail.segments, 3, 1, "random"))
     f_ext = np.random.default_rng(4).uniform(-1, 1, 6 + 3 * (tail.total + 1))
-    known = {"q": q, "v": v, "v_dot": v_dot, "tau": tau, "f_ext": f_ext, "link_inertia": (4.9e-8, 2e-9, 5e-8)} | TABLE_1
+    known = {
+        "q": q,
+        "v": v,
+        "v_dot": v_dot,
+        "tau": tau,
+        "f_ext": f_ext,
+        "link_inertia": (4.9e-8, 2e-9, 5e-8),
+    } | TABLE_1
     arrays = (*program.of_role("parameters"), *program.of_role("input"))
     return {a.name: [convert(x) for x in np.ravel(known[a.name]).tolist()] for a in arrays}
 
@@ -258,14 +299,21 @@ def interpreted_values(program, arguments, algebra):
 
 def rounded(x):
     """A coarse rational: exact arithmetic on it stays small."""
-    return Fraction(round(x * 64), 64) if abs(x) > 1 / 16 else Fraction(x).limit_denominator(1 << 30)
+    return (
+        Fraction(round(x * 64), 64) if abs(x) > 1 / 16 else Fraction(x).limit_denominator(1 << 30)
+    )
 
 
 def test_unrolling_keeps_every_bit(function, tail):
-    """Signs of zeros aside: no two constants that round meet in these programs, so folding changes no rounding."""
+    """Signs of zeros aside: no two constants that round meet in these programs, so folding changes
+    no rounding.
+    """
     p = program(function, tail)
     arguments = arguments_of(p, tail, float)
-    unrolled, interpreted = unrolled_values(p, arguments, FLOATS), interpreted_values(p, arguments, FLOATS)
+    unrolled, interpreted = (
+        unrolled_values(p, arguments, FLOATS),
+        interpreted_values(p, arguments, FLOATS),
+    )
     assert unrolled == interpreted
     assert all(math.isfinite(x) for values in interpreted.values() for x in values)
 
@@ -281,7 +329,9 @@ def test_unrolling_and_baking_are_exact_in_rational_arithmetic(function):
 
 
 def unrolled_results(program, fixed=None):
-    """Unroll; return the tape and all nodes that are wanted of it, what must be positive included."""
+    """Unroll; return the tape and all nodes that are wanted of it, what must be positive
+    included.
+    """
     tape, nodes, guards = unroll(program, fixed)
     return tape, [node for found in nodes.values() for node in found] + [node for _, node in guards]
 
@@ -289,8 +339,14 @@ def unrolled_results(program, fixed=None):
 def test_baking_leaves_no_parameter_and_adds_no_operation(function, tail):
     p = program(function, tail)
     arguments = arguments_of(p, tail, float)
-    tape, results = unrolled_results(p, {array.name: arguments[array.name] for array in p.of_role("parameters")})
-    read = {tape.nodes[node][1] for node in live_nodes(tape.nodes, results) if tape.nodes[node][0] == "input"}
+    tape, results = unrolled_results(
+        p, {array.name: arguments[array.name] for array in p.of_role("parameters")}
+    )
+    read = {
+        tape.nodes[node][1]
+        for node in live_nodes(tape.nodes, results)
+        if tape.nodes[node][0] == "input"
+    }
     assert min(read) >= sum(array.length for array in p.of_role("parameters"))
     free, free_results = unrolled_results(p)
     assert len(live_nodes(tape.nodes, results)) <= len(live_nodes(free.nodes, free_results))
@@ -300,13 +356,18 @@ def test_a_batch_is_its_states_one_by_one(function, tail):
     p = program(function, tail)
     one = arguments_of(p, tail, float)
     inputs = {array.name for array in p.of_role("input")}
-    stretched = {name: [np.array([x, 0.9 * x]) if name in inputs else x for x in xs] for name, xs in one.items()}
+    stretched = {
+        name: [np.array([x, 0.9 * x]) if name in inputs else x for x in xs]
+        for name, xs in one.items()
+    }
     shrunk = {name: [0.9 * x if name in inputs else x for x in xs] for name, xs in one.items()}
     batch = interpreted_values(p, stretched, Numbers(np, float))
     for k, arguments in enumerate((one, shrunk)):
         for name, expected in interpreted_values(p, arguments, FLOATS).items():
             values = [np.broadcast_to(x, 2)[k] for x in batch[name]]
-            np.testing.assert_allclose(values, expected, rtol=1e-9, atol=1e-12 * np.max(np.abs(expected)))
+            np.testing.assert_allclose(
+                values, expected, rtol=1e-9, atol=1e-12 * np.max(np.abs(expected))
+            )
 
 
 # LDL^T.
@@ -331,7 +392,9 @@ def test_solver_is_exact_in_rational_arithmetic(size):
     assert [sum(a * value for a, value in zip(row, x, strict=True)) for row in A] == b
     minors = [Fraction(round(np.linalg.det(np.array(A)[k:, k:]))) for k in reversed(range(size))]
     assert [math.prod(pivots[: k + 1]) for k in range(size)] == minors
-    assert [list(map(Fraction, row[: k + 1])) for k, row in enumerate(A)] == lower  # the arguments are left alone
+    assert [
+        list(map(Fraction, row[: k + 1])) for k, row in enumerate(A)
+    ] == lower  # the arguments are left alone
 
 
 @pytest.mark.parametrize("size", [1, 3, 9, 22])
@@ -341,7 +404,9 @@ def test_solver_agrees_with_numpy(size):
     A, b = half @ half.T + 0.1 * np.eye(size), rng.normal(size=size)
     factors, pivots = ldl_factor(FLOATS, [row[: k + 1] for k, row in enumerate(A.tolist())])
     x = ldl_solve(FLOATS, factors, b.tolist())
-    np.testing.assert_allclose(x, np.linalg.solve(A, b), rtol=0, atol=1e-14 * np.linalg.cond(A) * np.abs(x).max())
+    np.testing.assert_allclose(
+        x, np.linalg.solve(A, b), rtol=0, atol=1e-14 * np.linalg.cond(A) * np.abs(x).max()
+    )
     assert min(pivots) > 0
 
 
@@ -356,7 +421,9 @@ def test_pair_solver_is_exact_in_rational_arithmetic(size):
     A, b = positive_definite(rng, size), [rng.randint(-9, 9) for _ in range(size)]
     A = [[x + rng.choice((-1, 1)) * (k != j) for j, x in enumerate(row)] for k, row in enumerate(A)]
     turned = [list(column) for column in zip(*A, strict=True)]
-    triangles = [[[Fraction(x) for x in row[: k + 1]] for k, row in enumerate(rows)] for rows in (A, turned)]
+    triangles = [
+        [[Fraction(x) for x in row[: k + 1]] for k, row in enumerate(rows)] for rows in (A, turned)
+    ]
     *factors, pivots = pair_factor(EXACT, *triangles)
     x = pair_solve(EXACT, *factors, [Fraction(value) for value in b])
     assert [sum(a * value for a, value in zip(row, x, strict=True)) for row in A] == b
@@ -395,11 +462,15 @@ def test_solve_statement_solves_in_place():
 
 # Conditions.
 
-COUNT = step_of("count", (("x", 1), ("y", 1)), (("z", 1),), lambda t, x, y: [t.add(t.mul(x, y), t.const(1))])
+COUNT = step_of(
+    "count", (("x", 1), ("y", 1)), (("z", 1),), lambda t, x, y: [t.add(t.mul(x, y), t.const(1))]
+)
 
 
 def conditional():
-    """Conditions in a loop and in each other: what is written under one is read, summed up and overwritten after it."""
+    """Conditions in a loop and in each other: what is written under one is read, summed up and
+    overwritten after it.
+    """
     b = Builder("choosy", "Conditions.")
     x, y, u = b.array("x", 1, 4, "input"), b.array("y", 1, 4, "input"), b.array("u", 1, 4, "output")
     w, t = b.array("w", 1, role="output"), b.array("t", 1)
@@ -435,16 +506,24 @@ def plainly(x, y):
 @pytest.mark.parametrize("seed", range(20))
 def test_conditions_run_what_they_ask_for_and_unroll_to_choices(seed):
     rng, p = random.Random(seed), conditional()
-    given = {name: [Fraction(rng.randint(-3, 3), rng.randint(1, 2)) for _ in range(4)] for name in "xy"}
+    given = {
+        name: [Fraction(rng.randint(-3, 3), rng.randint(1, 2)) for _ in range(4)] for name in "xy"
+    }
     values = Run(p, EXACT, given).values
     assert (values["u"], values["w"][0]) == plainly(given["x"], given["y"])
     assert unrolled_values(p, given, EXACT) == {"u": values["u"], "w": values["w"]}
-    assert unrolled_values(p, given, EXACT, fixed=["x", "y"]) == {"u": values["u"], "w": values["w"]}
+    assert unrolled_values(p, given, EXACT, fixed=["x", "y"]) == {
+        "u": values["u"],
+        "w": values["w"],
+    }
 
 
 def test_a_condition_survives_being_called():
     b = Builder("outer", "Calls.")
-    arrays = {name: b.array(name, 1, 4, role) for name, role in (("x", "input"), ("y", "input"), ("u", "output"))}
+    arrays = {
+        name: b.array(name, 1, 4, role)
+        for name, role in (("x", "input"), ("y", "input"), ("u", "output"))
+    }
     b.call(conditional(), **arrays, w=b.array("w", 1, role="output"))
     p, given = b.finish(), {"x": [1, -1, 2, 0], "y": [1, 2, -3, 4]}
     assert branches(p) and not branches(program(FUNCTIONS["mass_matrix"], Tail(1, 1)))
@@ -464,7 +543,11 @@ def test_a_guard_under_a_condition_cannot_be_unrolled():
 
 def test_a_lane_of_several_rows_is_read_and_written():
     b = Builder("down", "Columns of lanes.")
-    x, u, rows = b.array("x", 2, 3, role="input"), b.array("u", 2, 3, role="output"), b.wide("rows", 4, 3)
+    x, u, rows = (
+        b.array("x", 2, 3, role="input"),
+        b.array("u", 2, 3, role="output"),
+        b.wide("rows", 4, 3),
+    )
     b.fill(rows.part(0, 4), 7)
     with b.loop("i", 3) as i:
         b.copy(rows.down(2, i, 2), x[i])
@@ -473,7 +556,9 @@ def test_a_lane_of_several_rows_is_read_and_written():
     values = Run(b.finish(), EXACT, {"x": [Fraction(k) for k in range(6)]}).values
     assert values["u"] == [7, 1, 7, 3, 7, 5]
     assert [list(row) for row in values["rows"][2:]] == [[1, 3, 5], [0, 2, 4]]
-    assert "rat_swap_x_apart_8(rows + i + 16, x_new);" in "".join(in_loops(b.finish(), "double", "rat").lines)
+    assert "rat_swap_x_apart_8(rows + i + 16, x_new);" in "".join(
+        in_loops(b.finish(), "double", "rat").lines
+    )
 
 
 def test_c_steps_read_scalars_that_lie_apart():

@@ -1,4 +1,6 @@
-"""The tape: each distinct operation once, folded by identities that hold exactly and round alike."""
+"""The tape: each distinct operation once, folded by identities that hold exactly and round
+alike.
+"""
 
 import math
 import random
@@ -10,15 +12,37 @@ import pytest
 
 from serpentail_codegen.ir.interpret import Numbers
 from serpentail_codegen.ir.step import Step, compacted, specialised
-from serpentail_codegen.ir.tape import BINARY, TERNARY, UNARY, Tape, exact_quotient, live_nodes, operation_count, replay
+from serpentail_codegen.ir.tape import (
+    BINARY,
+    TERNARY,
+    UNARY,
+    Tape,
+    exact_quotient,
+    live_nodes,
+    operation_count,
+    replay,
+)
 
 INPUTS = 4
 SEEDS = range(40)
-CONSTANTS = (0, 1, -1, 2, -2, 0.5, -1.0, Fraction(1, 4))  # their sums and products are exact in float64
+CONSTANTS = (
+    0,
+    1,
+    -1,
+    2,
+    -2,
+    0.5,
+    -1.0,
+    Fraction(1, 4),
+)  # their sums and products are exact in float64
 
-# Exact stand-ins with the only laws that folding may use: sin is odd, cos even, and their values at 0 and 1.
+# Exact stand-ins with the only laws that folding may use: sin is odd, cos even, and their values
+# at 0 and 1.
 RATIONAL = Numbers(
-    SimpleNamespace(sin=lambda x: x / (1 + x * x), cos=lambda x: 1 / (1 + x * x), sqrt=lambda x: x * x), Fraction
+    SimpleNamespace(
+        sin=lambda x: x / (1 + x * x), cos=lambda x: 1 / (1 + x * x), sqrt=lambda x: x * x
+    ),
+    Fraction,
 )
 FLOATS = Numbers(math, float)
 
@@ -38,8 +62,12 @@ def grow(rng, algebra, tape, leaves, length=80):
     while len(pool) < length:
         op = rng.choice(BINARY * 2 + UNARY + TERNARY)
         count = next(k for k, ops in enumerate((UNARY, BINARY, TERNARY), 1) if op in ops)
-        nodes, values = zip(*(_operand(rng, algebra, tape, pool) for _ in range(count)), strict=True)
-        if op == "div" and (values[1] == 0 or (algebra is FLOATS and None not in map(tape.value, nodes))):
+        nodes, values = zip(
+            *(_operand(rng, algebra, tape, pool) for _ in range(count)), strict=True
+        )
+        if op == "div" and (
+            values[1] == 0 or (algebra is FLOATS and None not in map(tape.value, nodes))
+        ):
             continue
         if op == "sqrt" and values[0] < 0:
             continue
@@ -51,7 +79,9 @@ def grow(rng, algebra, tape, leaves, length=80):
 
 def _operand(rng, algebra, tape, pool):
     constant = rng.choice(CONSTANTS)
-    return (tape.const(constant), algebra.const(constant)) if rng.random() < 0.2 else rng.choice(pool)
+    return (
+        (tape.const(constant), algebra.const(constant)) if rng.random() < 0.2 else rng.choice(pool)
+    )
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -70,7 +100,9 @@ def test_recording_rounds_as_direct_evaluation_does(seed):
     leaves = [rng.uniform(-3, 3) for _ in range(INPUTS)]
     pool = grow(rng, FLOATS, tape, leaves)
     values = replay(tape.nodes, leaves, FLOATS)
-    assert [values[node].hex() for node, value in pool if value] == [value.hex() for _, value in pool if value]
+    assert [values[node].hex() for node, value in pool if value] == [
+        value.hex() for _, value in pool if value
+    ]
     assert all(values[node] == 0 for node, value in pool if not value)
 
 
@@ -128,7 +160,12 @@ def test_zero_and_one_vanish(tape):
     assert tape.add(a, zero) == tape.add(zero, a) == tape.sub(a, zero) == a
     assert tape.mul(a, one) == tape.mul(one, a) == tape.div(a, one) == a
     assert tape.mul(a, zero) == tape.mul(zero, a) == tape.div(zero, a) == tape.sub(a, a) == zero
-    assert tape.sub(zero, a) == tape.mul(a, tape.const(-1)) == tape.div(a, tape.const(-1)) == tape.neg(a)
+    assert (
+        tape.sub(zero, a)
+        == tape.mul(a, tape.const(-1))
+        == tape.div(a, tape.const(-1))
+        == tape.neg(a)
+    )
     assert tape.sin(zero) == tape.sqrt(zero) == zero
     assert tape.cos(zero) == tape.sqrt(one) == one
 
@@ -229,12 +266,16 @@ def random_step(seed):
     rng, tape = random.Random(seed), Tape()
     pool = grow(rng, FLOATS, tape, [rng.uniform(-3, 3) for _ in range(INPUTS)], 25)
     results = tuple(node for node, _ in rng.sample(pool, 3))
-    return Step("step", "Random.", (("x", 2), ("y", 2)), (("u", 1), ("w", 2)), tuple(tape.nodes), results)
+    return Step(
+        "step", "Random.", (("x", 2), ("y", 2)), (("u", 1), ("w", 2)), tuple(tape.nodes), results
+    )
 
 
 def evaluated(step, **vectors):
     """Return the scalars of a step's outputs."""
-    nodes = replay(step.nodes, [scalar for name, _ in step.inputs for scalar in vectors[name]], FLOATS)
+    nodes = replay(
+        step.nodes, [scalar for name, _ in step.inputs for scalar in vectors[name]], FLOATS
+    )
     return [nodes[result] for result in step.results]
 
 
@@ -245,14 +286,18 @@ def test_live_nodes_are_what_the_results_reach(seed):
     for result in step.results:
         reachable(step.nodes, result, live)
     assert live_nodes(step.nodes, step.results) == sorted(live)
-    assert operation_count(step.nodes, step.results) == sum(step.nodes[node][0] in BINARY for node in live)
+    assert operation_count(step.nodes, step.results) == sum(
+        step.nodes[node][0] in BINARY for node in live
+    )
 
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_compacted_step_keeps_meaning_and_drops_the_rest(seed):
     step = random_step(seed)
     small = compacted(step)
-    rng = random.Random(seed)  # the scalars with which the step grew: none of its square roots is of a negative
+    rng = random.Random(
+        seed
+    )  # the scalars with which the step grew: none of its square roots is of a negative
     vectors = {name: [rng.uniform(-3, 3) for _ in range(size)] for name, size in step.inputs}
     assert evaluated(small, **vectors) == evaluated(step, **vectors)
     assert live_nodes(small.nodes, small.results) == list(range(len(small.nodes)))
@@ -271,9 +316,16 @@ def test_specialised_step_is_the_step_at_these_values():
     tape = Tape()
     x, y, z, w = (tape.input(k) for k in range(4))
     results = (tape.add(tape.mul(x, y), z), tape.div(w, y))
-    step = Step("step", "Two vectors.", (("a", 2), ("b", 2)), (("u", 2),), tuple(tape.nodes), results)
+    step = Step(
+        "step", "Two vectors.", (("a", 2), ("b", 2)), (("u", 2),), tuple(tape.nodes), results
+    )
     still = specialised(step, "still", a=(0, 2))
-    assert (still.name, still.doc, still.inputs, still.outputs) == ("still", step.doc, (("b", 2),), step.outputs)
+    assert (still.name, still.doc, still.inputs, still.outputs) == (
+        "still",
+        step.doc,
+        (("b", 2),),
+        step.outputs,
+    )
     assert evaluated(still, b=(3.0, 5.0)) == evaluated(step, a=(0, 2), b=(3.0, 5.0)) == [3.0, 2.5]
     assert operation_count(still.nodes, still.results) == 1
     assert specialised(step, "step") == step

@@ -1,4 +1,6 @@
-"""Contact with the ground: points, velocities, forces and accelerations against plain NumPy and limiting cases."""
+"""Contact with the ground: points, velocities, forces and accelerations against plain NumPy and
+limiting cases.
+"""
 
 import math
 from functools import cache
@@ -46,12 +48,16 @@ def model(request):
 
 
 def near_ground(model, seed, count=20):
-    """Random states with the torso about as high as the legs are long: some points touch, some do not."""
+    """Random states with the torso about as high as the legs are long: some points touch, some do
+    not.
+    """
     rng = np.random.default_rng(seed)
     q, v, _, tau = random_states(model.segments, seed, count, "random")
     q[:, 2] = rng.uniform(-0.05, 0.15, count)
     q[:, 7:] *= 0.5
-    legs = rng.uniform([3, -1.5, 3, -1.5, -80, -80, -80, -80], [4.2, 0, 4.2, 0, 80, 80, 80, 80], (count, 8))
+    legs = rng.uniform(
+        [3, -1.5, 3, -1.5, -80, -80, -80, -80], [4.2, 0, 4.2, 0, 80, 80, 80, 80], (count, 8)
+    )
     points = sum(entry["count"] for entry in model.manifest["contacts"])
     return q, v, tau, rng.normal(0, 2e-3, (count, 2 * points)), legs
 
@@ -81,7 +87,9 @@ def test_points_and_velocities_are_the_references(model):
     reference = Contacts(model)
     for q, v, _, _, legs in each(model):
         positions, velocities = model.contact_points(q, v, legs)
-        np.testing.assert_allclose(positions, reference.positions(q, legs).real, atol=3e-15 * (1 + abs(q[:3]).max()))
+        np.testing.assert_allclose(
+            positions, reference.positions(q, legs).real, atol=3e-15 * (1 + abs(q[:3]).max())
+        )
         scale = abs(velocities).max()
         np.testing.assert_allclose(velocities, reference.velocities(q, v, legs), atol=1e-13 * scale)
 
@@ -111,12 +119,18 @@ def test_forces_and_accelerations_are_the_references(case, friction):
     for q, v, tau, bristles, legs in each(model):
         v_dot, rates, forces = model.contact_dynamics(q, v, tau, bristles, legs)
         expected, expected_rates = reference.laws(q, v, bristles, legs)
-        np.testing.assert_allclose(forces, expected, rtol=1e-9, atol=1e-12 * (1 + abs(expected).max()))
-        np.testing.assert_allclose(rates, expected_rates, rtol=1e-9, atol=1e-9 * (1 + abs(expected_rates).max()))
+        np.testing.assert_allclose(
+            forces, expected, rtol=1e-9, atol=1e-12 * (1 + abs(expected).max())
+        )
+        np.testing.assert_allclose(
+            rates, expected_rates, rtol=1e-9, atol=1e-9 * (1 + abs(expected_rates).max())
+        )
         load = np.einsum("kai,ka->i", reference.jacobians(q, legs), expected)
         residual = model.mass_matrix(q) @ v_dot + model.bias_force(q, v) - load
         residual[6:] -= tau
-        scale = (np.abs(load) + np.abs(model.bias_force(q, v))) / np.sqrt(np.diag(model.mass_matrix(q)))
+        scale = (np.abs(load) + np.abs(model.bias_force(q, v))) / np.sqrt(
+            np.diag(model.mass_matrix(q))
+        )
         assert np.abs(residual / np.sqrt(np.diag(model.mass_matrix(q)))).max() < 1e-10 * scale.max()
         touched += np.count_nonzero(expected[:, 2])
     assert touched > 20
@@ -142,7 +156,9 @@ def test_the_ground_never_pulls_and_friction_stays_within_its_bound(friction):
     rng = np.random.default_rng(8)
     for _ in range(500):
         mu = rng.uniform(0, 2)
-        f, _ = law(friction, rng.normal(0, 0.01), rng.normal(0, 5, 3), rng.normal(0, 1e-3, 2), mu=mu)
+        f, _ = law(
+            friction, rng.normal(0, 0.01), rng.normal(0, 5, 3), rng.normal(0, 1e-3, 2), mu=mu
+        )
         size = np.abs(f[:2]).max() if friction in ("box", "paper") else np.linalg.norm(f[:2])
         assert f[2] >= 0 and size <= mu * f[2] * (1 + 1e-14)
 
@@ -158,9 +174,14 @@ def test_no_force_without_depth_and_bristles_relax(friction):
 def test_a_box_is_stronger_on_diagonals_and_a_cone_is_not():
     for angle in np.linspace(0, 2 * np.pi, 17):
         velocity = [10 * np.cos(angle), 10 * np.sin(angle), 0]
-        sizes = {name: np.linalg.norm(law(name, 0.01, velocity, [0.0, 0.0])[0][:2]) for name in ("cone", "box")}
+        sizes = {
+            name: np.linalg.norm(law(name, 0.01, velocity, [0.0, 0.0])[0][:2])
+            for name in ("cone", "box")
+        }
         assert sizes["cone"] == pytest.approx(1, rel=1e-12)
-        expected = np.hypot(*(np.sign(np.round(velocity[:2], 9)) if angle % (np.pi / 2) > 1e-9 else (1, 0)))
+        expected = np.hypot(
+            *(np.sign(np.round(velocity[:2], 9)) if angle % (np.pi / 2) > 1e-9 else (1, 0))
+        )
         assert sizes["box"] == pytest.approx(expected, rel=1e-12)
 
 
@@ -172,10 +193,14 @@ def test_what_sticks_does_not_drift():
 
 
 def slide(friction, angle, h=2e-4, seconds=0.6):
-    """Path of 0.1 kg at 1 m/s, pressed down by its weight at mu = 0.5: place, velocity and bristle at every step."""
+    """Path of 0.1 kg at 1 m/s, pressed down by its weight at mu = 0.5: place, velocity and bristle
+    at every step.
+    """
     mass, mu, speed = 0.1, 0.5, 1.0
     depth = (mass * 9.8 / 1000) ** (2 / 3)
-    state = np.concatenate([np.zeros(2), speed * np.array([np.cos(angle), np.sin(angle)]), np.zeros(2)])
+    state = np.concatenate(
+        [np.zeros(2), speed * np.array([np.cos(angle), np.sin(angle)]), np.zeros(2)]
+    )
 
     def rates(s):
         f, rate = law(friction, depth, [s[2], s[3], 0.0], s[4:].tolist(), mu=mu)
@@ -212,7 +237,9 @@ def test_operations_are_those_of_the_functions(friction):
     model = touching(2, 2, friction=friction)
     for q, v, tau, bristles, legs in each(model, count=5):
         found = model.casadi.contact_dynamics(q, v, tau, bristles, legs)
-        for one, other in zip(found, model.contact_dynamics(q, v, tau, bristles, legs), strict=True):
+        for one, other in zip(
+            found, model.contact_dynamics(q, v, tau, bristles, legs), strict=True
+        ):
             scalars = np.array(one).reshape(other.shape)
             np.testing.assert_allclose(scalars, other, atol=1e-9 * (1 + np.abs(other).max()))
         found = model.casadi.contact_points(q, v, legs)
@@ -222,7 +249,9 @@ def test_operations_are_those_of_the_functions(friction):
 
 @pytest.mark.parametrize("friction", FRICTION)
 def test_derivatives_are_numbers_in_the_air_and_right_on_the_ground(friction):
-    """CasADi's derivatives of the operations against central differences of the compiled function."""
+    """CasADi's derivatives of the operations against central differences of the compiled
+    function.
+    """
     model = touching(1, 2, friction=friction)
     q, v, tau, bristles, legs = (rows[:6] for rows in near_ground(model, 3, 6))
     f = model.casadi.contact_dynamics
@@ -231,8 +260,13 @@ def test_derivatives_are_numbers_in_the_air_and_right_on_the_ground(friction):
     for k in range(6):
         exact = np.array(slope(q[k], v[k], tau[k], bristles[k], legs[k]))
         units = 1e-5 * np.eye(model.nv)
-        ends = [model.contact_dynamics(q[k], v[k] + side * units, tau[k], bristles[k], legs[k])[0] for side in (1, -1)]
-        np.testing.assert_allclose(exact, (ends[0] - ends[1]).T / 2e-5, rtol=1e-3, atol=1e-5 * np.abs(exact).max())
+        ends = [
+            model.contact_dynamics(q[k], v[k] + side * units, tau[k], bristles[k], legs[k])[0]
+            for side in (1, -1)
+        ]
+        np.testing.assert_allclose(
+            exact, (ends[0] - ends[1]).T / 2e-5, rtol=1e-3, atol=1e-5 * np.abs(exact).max()
+        )
     high = q[0] + np.eye(model.nq)[2]
     assert np.isfinite(np.array(slope(high, v[0], tau[0], bristles[0], legs[0]))).all()
 
@@ -256,7 +290,8 @@ def test_a_flight_pays_nothing_for_contact(emission):
         folder = model_folder(2, 2, name="rat", functions=names, emission=emission, **options)
         text = (folder / "src" / "rat.c").read_text()
         texts.append(
-            text[text.index("#if defined(__GNUC__)") : text.index("void rat_default")] + text[text.index("}\n") :]
+            text[text.index("#if defined(__GNUC__)") : text.index("void rat_default")]
+            + text[text.index("}\n") :]
         )
         assert ("K_n" in (folder / "include" / "rat.h").read_text()) == bool(options)
     assert texts[0] == texts[1]
@@ -279,10 +314,14 @@ def test_legs_are_given_where_there_are_feet():
     with pytest.raises(st.StateError, match=r"legs has shape \(4,\), not \(8,\)"):
         touching().contact_points(np.eye(9)[3], np.zeros(8), np.zeros(4))
     with pytest.raises(st.StateError, match=r"bristles has shape \(10, 2\), not \(20,\)"):
-        touching().contact_dynamics(np.eye(9)[3], np.zeros(8), np.zeros(2), np.zeros((10, 2)), np.zeros(8))
+        touching().contact_dynamics(
+            np.eye(9)[3], np.zeros(8), np.zeros(2), np.zeros((10, 2)), np.zeros(8)
+        )
 
 
-@pytest.mark.parametrize(("name", "value"), [("mu", -0.1), ("K_n", 0.0), ("D_f", 0.0), ("K_f", -1), ("L_m2t", -1)])
+@pytest.mark.parametrize(
+    ("name", "value"), [("mu", -0.1), ("K_n", 0.0), ("D_f", 0.0), ("K_f", -1), ("L_m2t", -1)]
+)
 def test_unphysical_parameters_are_refused(name, value):
     with pytest.raises(st.ModelError, match=f"{name}: value"):
         touching().with_parameters(**{name: value})
@@ -310,7 +349,9 @@ def test_compiles_without_a_warning(tmp_path, size, options):
 
 def test_optimiser_finds_nothing_to_warn_about(tmp_path):
     functions = ["contact_points", "contact_dynamics", "pfl", "implicit"]
-    folder = model_folder(2, 2, name="rat", contacts=list(ALL), functions=functions, emission="loops")
+    folder = model_folder(
+        2, 2, name="rat", contacts=list(ALL), functions=functions, emission="loops"
+    )
     compiled(tmp_path, folder / "src" / "rat.c", *C99, "-O2")
 
 
@@ -318,12 +359,18 @@ def test_single_precision_is_single_precision():
     model, exact = touching(1, 2, real="float"), touching(1, 2)
     for q, v, *others in each(model, count=5):
         state = q, 0.1 * v, *others
-        for one, other in zip(model.contact_dynamics(*state), exact.contact_dynamics(*state), strict=True):
+        for one, other in zip(
+            model.contact_dynamics(*state), exact.contact_dynamics(*state), strict=True
+        ):
             np.testing.assert_allclose(one, other, rtol=1e-3, atol=1e-4 * (1 + np.abs(other).max()))
 
 
 def test_the_manifest_names_the_points():
     entry = touching(2, 3).manifest["contacts"]
-    assert entry == [{"group": "feet", "count": 6}, {"group": "tail", "count": 6}, {"group": "torso", "count": 1}]
+    assert entry == [
+        {"group": "feet", "count": 6},
+        {"group": "tail", "count": 6},
+        {"group": "torso", "count": 1},
+    ]
     assert "RAT_CONTACTS = 13 " in (touching(2, 3).folder / "include" / "rat.h").read_text()
     assert touching(1, 3, contacts=(), functions=("mass_matrix",)).contacts == {}

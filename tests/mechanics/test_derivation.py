@@ -1,7 +1,8 @@
-"""The derivation: every step and every function equals its definition, exactly, in rational arithmetic.
+"""The derivation: every step and every function equals its definition, exactly, in rational
+arithmetic.
 
-SymPy differentiates the joint turns; products carry derivatives by Leibniz' rule; sines and cosines are rational
-points of the circle, so nothing is rounded and equality is equality.
+SymPy differentiates the joint turns; products carry derivatives by Leibniz' rule; sines and cosines
+are rational points of the circle, so nothing is rounded and equality is equality.
 """
 
 import math
@@ -27,7 +28,9 @@ from serpentail_codegen.mechanics.lower import Recorder, derive
 
 X, Y, Z = (eye(3).col(k) for k in range(3))
 # an angle is given by the tangent of its half
-CIRCLE = SimpleNamespace(sin=lambda x: 2 * x / (1 + x * x), cos=lambda x: (1 - x * x) / (1 + x * x), sqrt=None)
+CIRCLE = SimpleNamespace(
+    sin=lambda x: 2 * x / (1 + x * x), cos=lambda x: (1 - x * x) / (1 + x * x), sqrt=None
+)
 EXACT = Numbers(CIRCLE, Rational)
 
 
@@ -44,7 +47,11 @@ def vee(S):
 
 def rotation(axis, angle):
     """Rodrigues' formula."""
-    return sympy.cos(angle) * eye(3) + sympy.sin(angle) * skew(axis) + (1 - sympy.cos(angle)) * axis * axis.T
+    return (
+        sympy.cos(angle) * eye(3)
+        + sympy.sin(angle) * skew(axis)
+        + (1 - sympy.cos(angle)) * axis * axis.T
+    )
 
 
 @cache
@@ -77,7 +84,9 @@ def moved(point, scale, R, vector):
 
 
 class Body(SimpleNamespace):
-    """A rigid body in motion: mass, principal inertia about the COM, and jets of R, its joint and its COM."""
+    """A rigid body in motion: mass, principal inertia about the COM, and jets of R, its joint and
+    its COM.
+    """
 
     @property
     def omega(self):
@@ -111,12 +120,23 @@ class State(SimpleNamespace):
 
         names = ("gravity", "torso_mass", "tail_mass", "tail_length")
         parameters = {name: numbers(1, 1) for name in names}
-        parameters |= {"torso_inertia": numbers(3, 1), "tail_mount": numbers(3), "link_inertia": numbers(3, 1)}
+        parameters |= {
+            "torso_inertia": numbers(3, 1),
+            "tail_mount": numbers(3),
+            "link_inertia": numbers(3, 1),
+        }
         tail = Tail(m, n)
         super().__init__(tail=tail, parameters=parameters, p=numbers(3), quaternion=numbers(4, 1))
-        self.halves, self.tau, self.f_ext = numbers(2 * m), numbers(2 * m), numbers(6 + 3 * (tail.total + 1))
+        self.halves, self.tau, self.f_ext = (
+            numbers(2 * m),
+            numbers(2 * m),
+            numbers(6 + 3 * (tail.total + 1)),
+        )
         self.v, self.v_dot = numbers(tail.nv), numbers(tail.nv)
-        self.mass, self.length = parameters["tail_mass"][0] / tail.total, parameters["tail_length"][0] / tail.total
+        self.mass, self.length = (
+            parameters["tail_mass"][0] / tail.total,
+            parameters["tail_length"][0] / tail.total,
+        )
 
     @property
     def arguments(self):
@@ -129,11 +149,19 @@ class State(SimpleNamespace):
         """The vector that steps know as ``link``, by the parallel axis theorem."""
         m, L = self.mass, self.length
         steiner = m * (L / 2) ** 2
-        return Matrix([m, L, m * L / 2]).col_join(self.parameters["link_inertia"] + steiner * Matrix([1, 0, 1]))
+        return Matrix([m, L, m * L / 2]).col_join(
+            self.parameters["link_inertia"] + steiner * Matrix([1, 0, 1])
+        )
 
     def joint(self, segment):
         """The vector that steps know as ``joint``."""
-        return Matrix([f(x) for x in self.halves[2 * segment : 2 * segment + 2] for f in (CIRCLE.cos, CIRCLE.sin)])
+        return Matrix(
+            [
+                f(x)
+                for x in self.halves[2 * segment : 2 * segment + 2]
+                for f in (CIRCLE.cos, CIRCLE.sin)
+            ]
+        )
 
     def tail_vector(self, v, segment):
         """The two entries of a velocity or acceleration that belong to a segment."""
@@ -147,14 +175,29 @@ class State(SimpleNamespace):
         p = [self.p, v[0:3, :], v_dot[0:3, :]]
         mount = moved(p, 1, R, self.parameters["tail_mount"])
         inertia = diag(*self.parameters["torso_inertia"])
-        found = [Body(mass=self.parameters["torso_mass"][0], inertia=inertia, R=R, joint=p, com=p, end=mount)]
+        found = [
+            Body(
+                mass=self.parameters["torso_mass"][0],
+                inertia=inertia,
+                R=R,
+                joint=p,
+                com=p,
+                end=mount,
+            )
+        ]
         for g in range(self.tail.total):
             i, parent = g // self.tail.links, found[-1]
             halves = self.halves[2 * i : 2 * i + 2]
-            R = product(parent.R, joint_turn(halves, self.tail_vector(v, i), self.tail_vector(v_dot, i)))
-            com, end = (moved(parent.end, -part * self.length, R, Y) for part in (Rational(1, 2), 1))
+            R = product(
+                parent.R, joint_turn(halves, self.tail_vector(v, i), self.tail_vector(v_dot, i))
+            )
+            com, end = (
+                moved(parent.end, -part * self.length, R, Y) for part in (Rational(1, 2), 1)
+            )
             inertia = diag(*self.parameters["link_inertia"])
-            found.append(Body(mass=self.mass, inertia=inertia, R=R, joint=parent.end, com=com, end=end))
+            found.append(
+                Body(mass=self.mass, inertia=inertia, R=R, joint=parent.end, com=com, end=end)
+            )
         return found
 
     def columns(self):
@@ -164,7 +207,9 @@ class State(SimpleNamespace):
     def mass_matrix(self):
         """H from twice the kinetic energy as a quadratic form."""
         columns = self.columns()
-        return Matrix(self.tail.nv, self.tail.nv, lambda k, other: kinetic_form(columns[k], columns[other]))
+        return Matrix(
+            self.tail.nv, self.tail.nv, lambda k, other: kinetic_form(columns[k], columns[other])
+        )
 
     def force(self, v_dot):
         """H v_dot + C by virtual work (d'Alembert)."""
@@ -181,20 +226,25 @@ class State(SimpleNamespace):
 
     def point_jacobian(self):
         """d(tail points)/dt = J v, a row for each of x, y, z of each point."""
-        return Matrix.hstack(*(Matrix.vstack(*(body.end[1] for body in column)) for column in self.columns()))
+        return Matrix.hstack(
+            *(Matrix.vstack(*(body.end[1] for body in column)) for column in self.columns())
+        )
 
 
 def kinetic_form(some, others):
     """Sum of m v . v' + omega . I omega'."""
     return sum(
-        a.mass * a.com[1].dot(b.com[1]) + a.omega.dot(b.inertia * b.omega) for a, b in zip(some, others, strict=True)
+        a.mass * a.com[1].dot(b.com[1]) + a.omega.dot(b.inertia * b.omega)
+        for a, b in zip(some, others, strict=True)
     )
 
 
 def call(function, **vectors):
     """Replay a derived step on exact numbers; return its outputs as columns."""
     step = derive(function)
-    values = replay(step.nodes, [scalar for name, _ in step.inputs for scalar in vectors[name]], EXACT)
+    values = replay(
+        step.nodes, [scalar for name, _ in step.inputs for scalar in vectors[name]], EXACT
+    )
     results = iter([values[node] for node in step.results])
     return {name: Matrix([next(results) for _ in range(size)]) for name, size in step.outputs}
 
@@ -203,7 +253,9 @@ def run(name, state):
     """Run a function's program on exact numbers; return its outputs as columns."""
     p = program(FUNCTIONS[name], state.tail)
     names = {array.name for array in (*p.of_role("parameters"), *p.of_role("input"))}
-    found = Run(p, EXACT, {name: values for name, values in state.arguments.items() if name in names}).values
+    found = Run(
+        p, EXACT, {name: values for name, values in state.arguments.items() if name in names}
+    ).values
     return {array.name: Matrix(found[array.name]) for array in p.of_role("output")}
 
 
@@ -217,7 +269,9 @@ def state(request):
 def links(state):
     """Every link with its parent and its segment, at v and v_dot."""
     bodies = state.bodies(state.v, state.v_dot)
-    return [(parent, body, g // state.tail.links) for g, (parent, body) in enumerate(pairwise(bodies))]
+    return [
+        (parent, body, g // state.tail.links) for g, (parent, body) in enumerate(pairwise(bodies))
+    ]
 
 
 # Kinematics, step by step.
@@ -238,20 +292,30 @@ def test_trigonometry_of_a_joint(state):
         sine, cosine, double = sympy.sin(angle), sympy.cos(angle), 2 * angle
         expected = [sine**2, sympy.sin(double) / 2, sympy.sin(double), sympy.cos(double), cosine**2]
         numbers = {sympy.cos(angle): c, sympy.sin(angle): s}
-        assert twice[5 * k : 5 * k + 5, :] == Matrix([sympy.expand_trig(e).xreplace(numbers) for e in expected])
+        assert twice[5 * k : 5 * k + 5, :] == Matrix(
+            [sympy.expand_trig(e).xreplace(numbers) for e in expected]
+        )
 
 
 def test_angular_velocity_is_that_of_the_rotation(state, links):
     for parent, body, i in links:
         rates = state.tail_vector(state.v, i)
-        assert call(link.link_angular_velocity, joint=state.joint(i), rates=rates, w=parent.omega)["w"] == body.omega
+        assert (
+            call(link.link_angular_velocity, joint=state.joint(i), rates=rates, w=parent.omega)["w"]
+            == body.omega
+        )
 
 
 def test_link_motion_is_the_second_derivative_of_the_pose(state, links):
     for parent, body, i in links:
         rates, accelerations = (state.tail_vector(v, i) for v in (state.v, state.v_dot))
         here = {"w": parent.omega, "w_dot": parent.omega_dot, "a": parent.R[0].T * parent.end[2]}
-        known = {"joint": state.joint(i), "rates": rates, "accelerations": accelerations, "link": state.link()}
+        known = {
+            "joint": state.joint(i),
+            "rates": rates,
+            "accelerations": accelerations,
+            "link": state.link(),
+        }
         motion = call(link.link_motion, **known, **here)
         assert (motion["w"], motion["w_dot"]) == (body.omega, body.omega_dot)
         assert motion["a_joint"] == body.R[0].T * body.joint[2]
@@ -262,8 +326,13 @@ def test_link_motion_is_the_second_derivative_of_the_pose(state, links):
 def test_link_velocity_is_the_derivative_of_the_pose(state, links):
     for parent, body, i in links:
         u = parent.R[0].T * parent.end[1]
-        found = call(link.link_linear_velocity, joint=state.joint(i), link=state.link(), w=body.omega, u=u)
-        assert (found["u_joint"], found["u"]) == (body.R[0].T * body.joint[1], body.R[0].T * body.end[1])
+        found = call(
+            link.link_linear_velocity, joint=state.joint(i), link=state.link(), w=body.omega, u=u
+        )
+        assert (found["u_joint"], found["u"]) == (
+            body.R[0].T * body.joint[1],
+            body.R[0].T * body.end[1],
+        )
 
 
 def test_mount_moves_with_the_torso(state, links):
@@ -272,7 +341,9 @@ def test_mount_moves_with_the_torso(state, links):
     u = call(torso.torso_velocity, R=R, p_dot=state.v[:3])["u"]
     assert call(torso.mount_velocity, u=u, w=torso.omega, tail_mount=r)["u"] == R.T * mount[1]
     a = call(torso.torso_acceleration, R=R, p_ddot=state.v_dot[:3], gravity=[0])["a"]
-    at_mount = call(torso.mount_acceleration, w=torso.omega, w_dot=torso.omega_dot, a=a, tail_mount=r)["a_mount"]
+    at_mount = call(
+        torso.mount_acceleration, w=torso.omega, w_dot=torso.omega_dot, a=a, tail_mount=r
+    )["a_mount"]
     assert at_mount == R.T * mount[2]
     assert call(torso.mount_position, R=R, p=state.p, tail_mount=r)["P"] == mount[0]
 
@@ -283,7 +354,10 @@ def test_mount_moves_with_the_torso(state, links):
 def test_link_properties_are_those_of_one_of_equal_links(state):
     names = ("tail_mass", "tail_length", "link_inertia")
     known = {name: state.parameters[name] for name in names}
-    assert call(link.link_properties, share=[Rational(1, state.tail.total)], **known)["link"] == state.link()
+    assert (
+        call(link.link_properties, share=[Rational(1, state.tail.total)], **known)["link"]
+        == state.link()
+    )
 
 
 def wrench_about(point, body):
@@ -303,7 +377,12 @@ def test_link_wrench_is_newton_and_euler_about_the_joint(state, links):
         a_joint, a_com = R.T * body.joint[2], R.T * body.com[2]
         swing = (a_joint - a_com) * 2 / state.length
         found = call(
-            link.link_wrench, link=state.link(), w=body.omega, w_dot=body.omega_dot, a_joint=a_joint, swing=swing
+            link.link_wrench,
+            link=state.link(),
+            w=body.omega,
+            w_dot=body.omega_dot,
+            a_joint=a_joint,
+            swing=swing,
         )
         assert found["F"] == in_frame(R, wrench_about(body.joint[0], body))
 
@@ -313,17 +392,24 @@ def test_gathered_wrench_is_the_sum_over_all_links_beyond(state, links):
     for k in reversed(range(len(links))):
         parent, body, i = links[k]
         own = in_frame(body.R[0], wrench_about(body.joint[0], body))
-        found = call(link.gather_wrench, joint=state.joint(i), link=state.link(), F=own, F_next=beyond)
+        found = call(
+            link.gather_wrench, joint=state.joint(i), link=state.link(), F=own, F_next=beyond
+        )
         total = sum((wrench_about(body.joint[0], other) for _, other, _ in links[k:]), zeros(6, 1))
         beyond = found["F_next"]
         assert beyond == in_frame(parent.R[0], total)
-        assert list(found["torque"]) == [total[3:, :].dot(parent.R[0].col(0)), total[3:, :].dot(body.R[0].col(2))]
+        assert list(found["torque"]) == [
+            total[3:, :].dot(parent.R[0].col(0)),
+            total[3:, :].dot(body.R[0].col(2)),
+        ]
 
 
 def test_link_momentum_and_kinetic_energy_are_their_definitions(state, links):
     for _, body, _ in links:
         R, momentum = body.R[0], body.mass * body.com[1]
-        found = call(link.link_momentum, link=state.link(), w=body.omega, u_joint=R.T * body.joint[1])
+        found = call(
+            link.link_momentum, link=state.link(), w=body.omega, u_joint=R.T * body.joint[1]
+        )
         about_joint = body.spin + (body.com[0] - body.joint[0]).cross(momentum)
         assert found["F"] == in_frame(R, Matrix.vstack(momentum, about_joint))
         assert found["kinetic"][0] == kinetic_form([body], [body]) / 2
@@ -336,7 +422,9 @@ def test_double_angles_turn_an_inertia(state, axes, axis, part):
     angle = sympy.Symbol("angle")
     c, s = joint[2 * part : 2 * part + 2]
     turn = rotation(axis, angle).xreplace({sympy.cos(angle): c, sympy.sin(angle): s})
-    found = link.turned_inertia(lambda _, value: value, axes, turn, twice[5 * part : 5 * part + 5], inertia)
+    found = link.turned_inertia(
+        lambda _, value: value, axes, turn, twice[5 * part : 5 * part + 5], inertia
+    )
     assert rotations.symmetric(found) == turn * rotations.symmetric(inertia) * turn.T
 
 
@@ -344,9 +432,18 @@ def composite(bodies, R, origin):
     """Mass, first moment and inertia about a point, in the axes of R, summed over bodies."""
     arms = [body.com[0] - origin for body in bodies]
     h = sum((body.mass * r for body, r in zip(bodies, arms, strict=True)), zeros(3, 1))
-    spread = [body.mass * (r.dot(r) * eye(3) - r * r.T) for body, r in zip(bodies, arms, strict=True)]
-    inertia = sum((b.R[0] * b.inertia * b.R[0].T + x for b, x in zip(bodies, spread, strict=True)), zeros(3, 3))
-    return Matrix([sum(body.mass for body in bodies)]), R.T * h, rotations.entries(R.T * inertia * R)
+    spread = [
+        body.mass * (r.dot(r) * eye(3) - r * r.T) for body, r in zip(bodies, arms, strict=True)
+    ]
+    inertia = sum(
+        (b.R[0] * b.inertia * b.R[0].T + x for b, x in zip(bodies, spread, strict=True)),
+        zeros(3, 3),
+    )
+    return (
+        Matrix([sum(body.mass for body in bodies)]),
+        R.T * h,
+        rotations.entries(R.T * inertia * R),
+    )
 
 
 def momentum_about(origin, bodies, R):
@@ -358,12 +455,16 @@ def momentum_about(origin, bodies, R):
 
 
 def gathered_segment(state, i, beyond):
-    """Apply gather_links over a segment; return what it carries and the sums of H_pp, H_py and H_yy."""
+    """Apply gather_links over a segment; return what it carries and the sums of H_pp, H_py and
+    H_yy.
+    """
     twice = call(link.double_angles, joint=state.joint(i))["twice"]
     carried = {**beyond, "pitch": zeros(6, 1), "yaw": zeros(6, 1)}
     own = Counter()
     for _ in range(state.tail.links):
-        found = call(link.gather_links, joint=state.joint(i), twice=twice, link=state.link(), **carried)
+        found = call(
+            link.gather_links, joint=state.joint(i), twice=twice, link=state.link(), **carried
+        )
         carried = {name: found[name] for name in carried}
         own.update({name: found[name][0] for name in ("H_pp", "H_py", "H_yy")})
     return carried, own
@@ -383,7 +484,9 @@ def test_gathered_links_are_sums_over_the_links_from_definition():
         assert carried["pitch"] == momentum_about(root, columns[pitch][first:], R)
         assert carried["yaw"] == momentum_about(root, columns[yaw][first:], R)
         assert own == {"H_pp": H[pitch, pitch], "H_py": H[pitch, yaw], "H_yy": H[yaw, yaw]}
-        found = call(link.gather_moment, joint=state.joint(i), link=state.link(), mass=[0], h=zeros(3, 1))
+        found = call(
+            link.gather_moment, joint=state.joint(i), link=state.link(), mass=[0], h=zeros(3, 1)
+        )
         last = columns[pitch][first + state.tail.links - 1]
         before = columns[pitch][first + state.tail.links - 2]
         assert (found["mass"], found["h"]) == composite([last], before.R[0], last.joint[0])[:2]
@@ -416,13 +519,18 @@ def test_forward_dynamics_solves_the_equations_of_motion(state):
     assert state.force(run("forward_dynamics", state)["v_dot"]) == tau
     J, f = state.point_jacobian(), state.f_ext
     at_torso = Matrix.vstack(f[:6, :], zeros(state.tail.nt, 1))
-    assert state.force(run("forward_dynamics_external", state)["v_dot"]) == tau + at_torso + J.T * f[6:, :]
+    assert (
+        state.force(run("forward_dynamics_external", state)["v_dot"])
+        == tau + at_torso + J.T * f[6:, :]
+    )
 
 
 def test_tail_points_and_their_jacobians(state):
     points = Matrix.vstack(*(body.end[0] for body in state.bodies()))
     assert run("tail_points", state)["points"] == points
-    J = Matrix(3 * (state.tail.total + 1), state.tail.nv, list(run("tail_point_jacobians", state)["J"]))
+    J = Matrix(
+        3 * (state.tail.total + 1), state.tail.nv, list(run("tail_point_jacobians", state)["J"])
+    )
     assert state.point_jacobian() == J
 
 
@@ -445,14 +553,27 @@ def test_energy_and_momentum_are_sums_over_bodies(state):
 def lowered(e, **numbers):
     """Lower an expression and evaluate it at numbers."""
     recorder = Recorder()
-    symbols = {name: recorder.symbol(name, recorder.tape.input(k)) for k, name in enumerate(numbers)}
+    symbols = {
+        name: recorder.symbol(name, recorder.tape.input(k)) for k, name in enumerate(numbers)
+    }
     node = recorder.lower(sympy.sympify(e, locals=symbols))
     return replay(recorder.tape.nodes, list(numbers.values()), EXACT)[node]
 
 
 @pytest.mark.parametrize(
     "text",
-    ["x + y - 3*x*y", "2*x/3", "-x/y", "x**3", "x**-2", "y/(3*x)", "1/(x + y)", "x*y/(x - y)/2", "(x + 1)**2*y", "-3"],
+    [
+        "x + y - 3*x*y",
+        "2*x/3",
+        "-x/y",
+        "x**3",
+        "x**-2",
+        "y/(3*x)",
+        "1/(x + y)",
+        "x*y/(x - y)/2",
+        "(x + 1)**2*y",
+        "-3",
+    ],
 )
 def test_lowering_keeps_the_value(text):
     x, y = Rational(3, 7), Rational(-5, 2)
@@ -497,7 +618,10 @@ def test_derived_steps_are_named_after_their_function():
     step = derive(link.link_wrench)
     assert (step.name, step.outputs) == ("link_wrench", (("F", 6),))
     assert step.inputs == (("link", 6), ("w", 3), ("w_dot", 3), ("a_joint", 3), ("swing", 3))
-    assert step.doc == "Inertial wrench of one link at its joint (Eq. 17), Newton and Euler in the link frame."
+    assert (
+        step.doc
+        == "Inertial wrench of one link at its joint (Eq. 17), Newton and Euler in the link frame."
+    )
     assert derive(link.link_wrench) is step
 
 
@@ -520,7 +644,11 @@ class Counting:
 def executed(name, m, n):
     """Operations that a function executes in loops."""
     p, algebra = program(FUNCTIONS[name], Tail(m, n)), Counting()
-    Run(p, algebra, {a.name: [None] * a.length for a in (*p.of_role("parameters"), *p.of_role("input"))})
+    Run(
+        p,
+        algebra,
+        {a.name: [None] * a.length for a in (*p.of_role("parameters"), *p.of_role("input"))},
+    )
     return algebra.count
 
 
@@ -528,7 +656,9 @@ def straight(name, m, n):
     """Operations of a function without loops."""
     tape, outputs, guards = unroll(program(FUNCTIONS[name], Tail(m, n)))
     guarded = [node for _, node in guards]
-    return operation_count(tape.nodes, [node for nodes in outputs.values() for node in nodes] + guarded)
+    return operation_count(
+        tape.nodes, [node for nodes in outputs.values() for node in nodes] + guarded
+    )
 
 
 def step_cost(*functions):
@@ -569,7 +699,9 @@ def test_choices_are_lowered_as_sympy_means_them(x, y):
     assert [found[n] for n in nodes] == [float(e.subs({a: x, b: y})) for e in choices]
 
 
-@pytest.mark.parametrize("e", ["Piecewise((a, a > 0))", "Piecewise((a, Eq(a, b)), (b, True))", "Min(a, b)"])
+@pytest.mark.parametrize(
+    "e", ["Piecewise((a, a > 0))", "Piecewise((a, Eq(a, b)), (b, True))", "Min(a, b)"]
+)
 def test_choices_that_no_rule_lowers_are_refused(e):
     recorder = Recorder()
     symbols = {name: recorder.symbol(name, recorder.tape.input(k)) for k, name in enumerate("ab")}

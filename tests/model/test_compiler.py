@@ -14,7 +14,13 @@ from pathlib import Path
 
 import pytest
 
-from serpentail.errors import CompileFailed, CompilerNotFound, ModelError, SerpentailError, StateError
+from serpentail.errors import (
+    CompileFailed,
+    CompilerNotFound,
+    ModelError,
+    SerpentailError,
+    StateError,
+)
 from serpentail.model import compiler, toolchain
 from serpentail.model.cache import cache_folder
 
@@ -104,7 +110,9 @@ def test_text_compiles_once_wherever_it_lies(model, tmp_path, script):
 
 def test_every_input_reaches_the_key(model, tmp_path):
     (source,), include = model
-    built = [compiler.compile_library(*model, profile=profile) for profile in ("fast", "reproducible")]
+    built = [
+        compiler.compile_library(*model, profile=profile) for profile in ("fast", "reproducible")
+    ]
     (source.parent / "private.h").write_text("#define PRIVATE 1\n")
     built.append(compiler.compile_library(*model))
     (include / "scale.h").write_text("#define SCALE 3.0\n")
@@ -132,7 +140,9 @@ def test_another_processor_gets_another_library(model, monkeypatch, script):
     built = []
     for processor in ("zen", "lake"):
         monkeypatch.setenv("PROCESSOR", processor)
-        monkeypatch.setattr("serpentail.model.toolchain._processor", lambda processor=processor: processor)
+        monkeypatch.setattr(
+            "serpentail.model.toolchain._processor", lambda processor=processor: processor
+        )
         built.append(compiler.compile_library(*model))
     assert built[0].parent != built[1].parent
     forbid_processes(monkeypatch)
@@ -161,7 +171,9 @@ def test_native_flag_falls_back(model, script):
 
 
 def test_profiles_differ_in_contraction():
-    fast, exact = (compiler.describe_compiler(profile)["flags"] for profile in ("fast", "reproducible"))
+    fast, exact = (
+        compiler.describe_compiler(profile)["flags"] for profile in ("fast", "reproducible")
+    )
     assert "-ffp-contract=fast" in fast and "-ffp-contract=off" in exact
     assert not [flag for flag in exact if "native" in flag]
     assert "-ffast-math" not in fast + exact
@@ -174,7 +186,9 @@ def test_description_tells_no_folder(monkeypatch):
     assert described["version"]
 
 
-@pytest.mark.parametrize("chosen", ["no-such-cc -O3", "false", 'unbalanced "quote', "env no-such-cc"])
+@pytest.mark.parametrize(
+    "chosen", ["no-such-cc -O3", "false", 'unbalanced "quote', "env no-such-cc"]
+)
 def test_broken_cc_is_named_and_not_replaced(model, monkeypatch, cache, chosen):
     monkeypatch.setenv("CC", chosen)
     with pytest.raises(CompilerNotFound) as caught:
@@ -239,7 +253,11 @@ def test_failing_source_shows_the_compilers_words(model, cache):
         compiler.compile_library([source], include)
     failure = caught.value
     assert "exit code 1" in str(failure) and str(source) in str(failure)
-    assert failure.returncode == 1 and str(source) in failure.command and "undeclared_name" in failure.stderr
+    assert (
+        failure.returncode == 1
+        and str(source) in failure.command
+        and "undeclared_name" in failure.stderr
+    )
     assert pickle.loads(pickle.dumps(failure)).stderr == failure.stderr
     assert not libraries(cache)
 
@@ -276,13 +294,16 @@ def test_eight_processes_at_once(model, cache):
     (source,), include = model
     program = (
         "import ctypes, pathlib, sys; from serpentail.model import compiler; path = pathlib.Path\n"
-        "library = ctypes.CDLL(str(compiler.compile_library([path(sys.argv[1])], path(sys.argv[2]))))\n"
+        "library = ctypes.CDLL(str(compiler.compile_library([path(sys.argv[1])], "
+        "path(sys.argv[2]))))\n"
         "library.twice.restype = ctypes.c_double; print(library.twice(ctypes.c_double(21.0)))"
     )
     command = [sys.executable, "-c", program, str(source), str(include)]
     surroundings = {**os.environ, "PYTHONPATH": str(Path(compiler.__file__).parents[2])}
     crowd = [
-        subprocess.Popen(command, env=surroundings, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        subprocess.Popen(
+            command, env=surroundings, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
         for _ in range(8)
     ]
     assert [process.communicate() for process in crowd] == [("42.0\n", "")] * 8
@@ -291,7 +312,10 @@ def test_eight_processes_at_once(model, cache):
 
 def test_killed_compile_leaves_no_library(model, script, cache, monkeypatch):
     (source,), include = model
-    script('for word; do case $word in *.part) echo half > $word; touch "$0.busy"; sleep 60;; esac; done')
+    script(
+        'for word; do case $word in *.part) echo half > $word; touch "$0.busy"; sleep 60;; esac; '
+        "done"
+    )
     program = (
         "import pathlib, sys; from serpentail.model import compiler; path = pathlib.Path\n"
         "compiler.compile_library([path(sys.argv[1])], path(sys.argv[2]))"
@@ -348,7 +372,9 @@ def test_missing_files_are_a_model_error(model, tmp_path):
 
 
 def test_profile_names_are_checked(model):
-    with pytest.raises(SerpentailError, match="unknown build profile 'quick'; choose one of fast, reproducible"):
+    with pytest.raises(
+        SerpentailError, match="unknown build profile 'quick'; choose one of fast, reproducible"
+    ):
         compiler.compile_library(*model, profile="quick")
     with pytest.raises(SerpentailError, match="'quick'"):
         compiler.describe_compiler("quick")

@@ -1,4 +1,6 @@
-"""Generated folders: what does not fit together is refused with its name and the way out; the cache serves many."""
+"""Generated folders: what does not fit together is refused with its name and the way out; the cache
+serves many.
+"""
 
 import json
 import os
@@ -20,7 +22,9 @@ AGAIN = "generate it again (`make model`, or python -m serpentail_codegen SCENE.
 @pytest.fixture
 def folder(tmp_path):
     """A copy of the smallest model, to break."""
-    return shutil.copytree(model_folder(1, 1, name="tail", functions=["mass_matrix"]), tmp_path / "tail")
+    return shutil.copytree(
+        model_folder(1, 1, name="tail", functions=["mass_matrix"]), tmp_path / "tail"
+    )
 
 
 @pytest.fixture
@@ -69,7 +73,9 @@ def test_intact_copy_loads(folder):
 @pytest.mark.parametrize("place", ["nowhere", "tail/src", "tail/manifest.json"])
 def test_folder_without_manifest_says_how_to_make_one(folder, tmp_path, place):
     message = refusal(tmp_path / place)
-    assert message.startswith(f"{tmp_path / place} is no generated folder (it has no manifest.json)")
+    assert message.startswith(
+        f"{tmp_path / place} is no generated folder (it has no manifest.json)"
+    )
     assert "make model TAIL=articulated M=3 N=4" in message
 
 
@@ -77,7 +83,9 @@ def test_folder_without_manifest_says_how_to_make_one(folder, tmp_path, place):
 def test_damaged_manifest(folder, text):
     (folder / "manifest.json").write_text(text, encoding="latin-1")
     message = refusal(folder)
-    assert message.startswith(f"{folder / 'manifest.json'} is damaged (") and message.endswith(AGAIN)
+    assert message.startswith(f"{folder / 'manifest.json'} is damaged (") and message.endswith(
+        AGAIN
+    )
 
 
 def test_half_a_manifest(folder):
@@ -107,31 +115,44 @@ def test_manifest_without_an_entry(folder, key):
     assert "manifest.json is damaged (" in refusal(folder) and key in refusal(folder)
 
 
-@pytest.mark.parametrize("change", [{"generator": "0.0.9"}, {"format": 2}, {"generator": "0.0.9", "parameters": None}])
+@pytest.mark.parametrize(
+    "change", [{"generator": "0.0.9"}, {"format": 2}, {"generator": "0.0.9", "parameters": None}]
+)
 def test_folder_of_another_generator_is_stale(folder, change):
     edit(folder, **change)
     message = refusal(folder)
     assert f"{folder} is stale: made by format {change.get('format', 1)}, " in message
-    assert f"this is format 1, {st.__version__}" in message.replace("generator ", "") and message.endswith(AGAIN)
+    assert f"this is format 1, {st.__version__}" in message.replace(
+        "generator ", ""
+    ) and message.endswith(AGAIN)
 
 
-@pytest.mark.parametrize("name", ["src/tail.c", "src/tail_host.c", "include/tail.h", "tail_casadi.py"])
+@pytest.mark.parametrize(
+    "name", ["src/tail.c", "src/tail_host.c", "include/tail.h", "tail_casadi.py"]
+)
 def test_changed_file_is_named(folder, name):
     (folder / name).write_text((folder / name).read_text() + " ")
-    assert refusal(folder) == f"{folder / name} was changed after it was generated: delete {folder} and {AGAIN}"
+    assert (
+        refusal(folder)
+        == f"{folder / name} was changed after it was generated: delete {folder} and {AGAIN}"
+    )
 
 
 @pytest.mark.parametrize("name", ["src/tail.c", "include/tail.h", "tail_casadi.py"])
 def test_missing_file_is_named(folder, name):
     (folder / name).unlink()
-    expected = f"{folder / name} cannot be read (No such file or directory): delete {folder} and {AGAIN}"
+    expected = (
+        f"{folder / name} cannot be read (No such file or directory): delete {folder} and {AGAIN}"
+    )
     assert refusal(folder) == expected
 
 
 def larger(manifest):
     """The tail of a segment more: what C then reads lies beyond the arrays it is given."""
     sizes = manifest["dimensions"]
-    return manifest | {"dimensions": sizes | {"segments": 2, "nq": sizes["nq"] + 2, "nv": sizes["nv"] + 2}}
+    return manifest | {
+        "dimensions": sizes | {"segments": 2, "nq": sizes["nq"] + 2, "nv": sizes["nv"] + 2}
+    }
 
 
 def heavier(manifest):
@@ -140,11 +161,15 @@ def heavier(manifest):
     return manifest
 
 
-@pytest.mark.parametrize("change", [larger, heavier, lambda manifest: manifest | {"work": {"mass_matrix": 0, "x": 1}}])
+@pytest.mark.parametrize(
+    "change", [larger, heavier, lambda manifest: manifest | {"work": {"mass_matrix": 0, "x": 1}}]
+)
 def test_manifest_changed_by_hand_is_named(folder, change):
     edit(folder, change)
     message = refusal(folder)
-    assert message.startswith(f"{folder / 'manifest.json'} was changed after it was generated: delete {folder}")
+    assert message.startswith(
+        f"{folder / 'manifest.json'} was changed after it was generated: delete {folder}"
+    )
     assert "st.load(folder, parameters=...)" in message
 
 
@@ -156,7 +181,9 @@ def test_manifest_laid_out_anew_is_the_same(folder):
 def test_manifest_of_other_code(folder):
     edit(folder, signed, abi_hash="0123456789abcdef")
     message = refusal(folder)
-    assert "the manifest 0123456789abcdef" in message and message.endswith(f"delete {folder} and {AGAIN}")
+    assert "the manifest 0123456789abcdef" in message and message.endswith(
+        f"delete {folder} and {AGAIN}"
+    )
 
 
 # Compilers
@@ -165,20 +192,26 @@ def test_manifest_of_other_code(folder):
 @pytest.mark.parametrize("chosen", ["no-such-cc", "false"])
 def test_broken_cc_is_named(folder, cache, monkeypatch, chosen):
     monkeypatch.setenv("CC", chosen)
-    with pytest.raises(st.CompilerNotFound, match=f"CC='{chosen}' does not work as a C compiler.*set CC to"):
+    with pytest.raises(
+        st.CompilerNotFound, match=f"CC='{chosen}' does not work as a C compiler.*set CC to"
+    ):
         st.load(folder)
 
 
 def test_no_compiler_says_how_to_get_one(folder, cache, monkeypatch, tmp_path):
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setitem(sys.modules, "ziglang", None)
-    with pytest.raises(st.CompilerNotFound, match=r"no C compiler works here.*apt install gcc.*pip install ziglang"):
+    with pytest.raises(
+        st.CompilerNotFound, match=r"no C compiler works here.*apt install gcc.*pip install ziglang"
+    ):
         st.load(folder)
 
 
 def test_compilers_message_is_shown(folder, cache, script):
     script('case "$*" in *-shared*) echo "tail.c:7: out of patience" >&2; exit 3;; esac')
-    with pytest.raises(st.CompileFailed, match=r"exit code 3\ntail\.c:7: out of patience\nCommand: ") as caught:
+    with pytest.raises(
+        st.CompileFailed, match=r"exit code 3\ntail\.c:7: out of patience\nCommand: "
+    ) as caught:
         st.load(folder)
     assert caught.value.returncode == 3 and isinstance(caught.value, st.SerpentailError)
     assert not list(cache.rglob("*.so")) and not list(cache.rglob("*.part"))
@@ -188,7 +221,9 @@ def test_library_that_cannot_be_loaded(folder, cache, monkeypatch):
     foreign = folder / "foreign.so"
     foreign.write_text("of another machine")
     monkeypatch.setattr("serpentail.model.library.compile_library", lambda *_: foreign)
-    with pytest.raises(st.SerpentailError, match=r"cannot be loaded \(.*foreign\.so.*set SERPENTAIL_CACHE"):
+    with pytest.raises(
+        st.SerpentailError, match=r"cannot be loaded \(.*foreign\.so.*set SERPENTAIL_CACHE"
+    ):
         st.load(folder)
 
 
@@ -196,14 +231,19 @@ def test_library_that_cannot_be_loaded(folder, cache, monkeypatch):
 
 
 def test_four_processes_load_one_model(folder, cache, script, tmp_path):
-    """All meet before the compiler starts, compile at once, and end with one library that is whole."""
+    """All meet before the compiler starts, compile at once, and end with one library that is
+    whole.
+    """
     meet = (
         f'case "$*" in *-shared*) touch {tmp_path}/$$.here; '
         f"for n in 1 2 3 4 5 6 7 8 9; do "
         f"[ $(ls {tmp_path} | grep -c here) -ge 4 ] && break; sleep 1; done;; esac"
     )
     script(meet)
-    program = f"import sys, serpentail as st; print(st.load(sys.argv[1]).mass_matrix({UPRIGHT}).tobytes().hex())"
+    program = (
+        "import sys, serpentail as st; "
+        f"print(st.load(sys.argv[1]).mass_matrix({UPRIGHT}).tobytes().hex())"
+    )
     command = [sys.executable, "-c", program, str(folder)]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     crowd = [subprocess.Popen(command, env=os.environ, **pipes) for _ in range(4)]

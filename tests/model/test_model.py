@@ -1,4 +1,6 @@
-"""Models: every function takes any array of numbers, alone or in batches, and refuses the rest by name."""
+"""Models: every function takes any array of numbers, alone or in batches, and refuses the rest by
+name.
+"""
 
 import copy
 import gc
@@ -142,7 +144,9 @@ def test_single_states_are_repeated_over_a_batch(model, name):
 
 
 def test_batches_of_different_size_are_refused(model):
-    with pytest.raises(st.StateError, match=r"^forward_dynamics: batch sizes differ \(1, 3, 5\): give one$"):
+    with pytest.raises(
+        st.StateError, match=r"^forward_dynamics: batch sizes differ \(1, 3, 5\): give one$"
+    ):
         model.forward_dynamics(states(3)["q"], states(5)["v"], states(1)["tau"])
     with pytest.raises(st.StateError, match=r"^energy: batch sizes differ \(0, 1\): give one$"):
         model.energy(states(1)["q"], states(0)["v"])
@@ -174,8 +178,13 @@ def test_layout_does_not_matter(model, name, kind):
 @pytest.mark.parametrize("kind", [np.float32, np.float16, np.int64, np.int8, np.uint16, list])
 def test_numbers_of_any_type(model, name, kind):
     whole = {key: np.arange(1, 1 + size) % 5 for key, size in SIZES.items()}
-    changed = {key: value.tolist() if kind is list else value.astype(kind) for key, value in whole.items()}
-    assert_same(call(model, name, changed), call(model, name, {k: v.astype(float) for k, v in whole.items()}))
+    changed = {
+        key: value.tolist() if kind is list else value.astype(kind) for key, value in whole.items()
+    }
+    assert_same(
+        call(model, name, changed),
+        call(model, name, {k: v.astype(float) for k, v in whole.items()}),
+    )
 
 
 def test_arguments_are_left_alone(model):
@@ -231,7 +240,9 @@ def test_other_things_than_real_numbers_are_refused(model, name, value):
     for argument in CALLS[name][0]:
         if argument == "f_ext" and value is None:
             continue  # no load
-        with pytest.raises(st.StateError, match=f"^{name}: {argument} is not made of real numbers: "):
+        with pytest.raises(
+            st.StateError, match=f"^{name}: {argument} is not made of real numbers: "
+        ):
             call(model, name, state() | {argument: value})
 
 
@@ -239,10 +250,23 @@ def test_other_things_than_real_numbers_are_refused(model, name, value):
 def test_wrong_shape_is_named_with_the_right_one(model, name):
     for argument in CALLS[name][0]:
         size = SIZES[argument]
-        for shape in [(), (0,), (size - 1,), (size + 1,), (3, size - 1), (size, 3), (2, 2, size), (size, 1), (1, 0)]:
+        for shape in [
+            (),
+            (0,),
+            (size - 1,),
+            (size + 1,),
+            (3, size - 1),
+            (size, 3),
+            (2, 2, size),
+            (size, 1),
+            (1, 0),
+        ]:
             with pytest.raises(st.StateError) as caught:
                 call(model, name, state() | {argument: np.zeros(shape)})
-            assert str(caught.value) == f"{name}: {argument} has shape {shape}, not ({size},) or (batch, {size})"
+            assert (
+                str(caught.value)
+                == f"{name}: {argument} has shape {shape}, not ({size},) or (batch, {size})"
+            )
 
 
 @every_function
@@ -256,18 +280,25 @@ def test_not_finite_entry_is_named_with_its_place(model, name, bad):
         assert str(caught.value) == f"{name}: {argument}[{5 % NT}] is {bad}: give finite numbers"
         with pytest.raises(st.StateError) as caught:
             call(model, name, batch)
-        assert str(caught.value) == f"{name}: {argument}[2] of state 6 is {bad}: give finite numbers"
+        assert (
+            str(caught.value) == f"{name}: {argument}[2] of state 6 is {bad}: give finite numbers"
+        )
 
 
 @every_function
-@pytest.mark.parametrize(("norm", "words"), [(0.0, "is zero"), (1e-160, "has norm 1e-160"), (1e200, "has norm 1e+200")])
+@pytest.mark.parametrize(
+    ("norm", "words"), [(0.0, "is zero"), (1e-160, "has norm 1e-160"), (1e200, "has norm 1e+200")]
+)
 def test_quaternion_without_direction_is_named(model, name, norm, words):
     one, batch = state(), states(9)
     one["q"][3:7] = batch["q"][6, 3:7] = 0, norm, 0, 0
     for arguments, where in ((one, ""), (batch, " of state 6")):
         with pytest.raises(st.StateError) as caught:
             call(model, name, arguments)
-        assert str(caught.value) == f"{name}: the quaternion q[3:7]{where} {words}: upright is (1, 0, 0, 0)"
+        assert (
+            str(caught.value)
+            == f"{name}: the quaternion q[3:7]{where} {words}: upright is (1, 0, 0, 0)"
+        )
 
 
 @every_function
@@ -295,7 +326,10 @@ def test_indefinite_inertia_is_named():
     """A tail so long that H overflows."""
     with pytest.warns(st.UnlikeBodies, match="unlike by inf"):
         endless = st.load(folder(), {"link_inertia": (1, 1, 1), "tail_length": 1e200})
-    words = "forward_dynamics: the inertia matrix{} is not positive definite: is a value too large, or a parameter"
+    words = (
+        "forward_dynamics: the inertia matrix{} is not positive definite: is a value too large, or "
+        "a parameter"
+    )
     for arguments, where in ((state(), ""), (states(2), " of state 0")):
         with pytest.raises(st.StateError, match=f"^{words.format(where)}"):
             call(endless, "forward_dynamics", arguments)
@@ -307,7 +341,9 @@ def test_result_beyond_numbers_is_named(model, name):
     one["v"] *= 1e200
     batch["v"][6] *= 1e200
     for arguments, where in ((one, ""), (batch, " of state 6")):
-        with pytest.raises(st.StateError, match=f"^{name}: the result{where} is not finite: is a value too large"):
+        with pytest.raises(
+            st.StateError, match=f"^{name}: the result{where} is not finite: is a value too large"
+        ):
             call(model, name, arguments)
 
 
@@ -318,9 +354,14 @@ def test_aliases_of_the_field(model):
     s = state()
     assert_same(model.crba(s["q"]), model.mass_matrix(s["q"]))
     assert_same(model.nle(s["q"], s["v"]), model.bias_force(s["q"], s["v"]))
-    assert_same(model.rnea(s["q"], s["v"], s["v_dot"]), model.inverse_dynamics(s["q"], s["v"], s["v_dot"]))
+    assert_same(
+        model.rnea(s["q"], s["v"], s["v_dot"]), model.inverse_dynamics(s["q"], s["v"], s["v_dot"])
+    )
     for load in (None, s["f_ext"]):
-        assert_same(model.aba(s["q"], s["v"], s["tau"], load), model.forward_dynamics(s["q"], s["v"], s["tau"], load))
+        assert_same(
+            model.aba(s["q"], s["v"], s["tau"], load),
+            model.forward_dynamics(s["q"], s["v"], s["tau"], load),
+        )
 
 
 @pytest.mark.parametrize("name", [name for name in CALLS if name != "mass_matrix"])
@@ -328,7 +369,8 @@ def test_function_left_out_is_named_with_the_remedy(small, name):
     with pytest.raises(st.ModelError) as caught:
         call(small, name, state())
     assert str(caught.value) == (
-        f"small was generated without {name!r} (it has mass_matrix): add it to `functions` of the scene, "
+        f"small was generated without {name!r} (it has mass_matrix): add it to `functions` of the "
+        "scene, "
         "then generate it again"
     )
 
@@ -341,7 +383,9 @@ def test_casadi_knows_the_same_functions(small):
 
 
 def test_external_force_takes_loads_by_name(model):
-    load = model.external_force(force=(1, 2, 3), moment=[4, 5, 6], tail=np.arange(7, 7 + 3 * POINTS).reshape(-1, 3))
+    load = model.external_force(
+        force=(1, 2, 3), moment=[4, 5, 6], tail=np.arange(7, 7 + 3 * POINTS).reshape(-1, 3)
+    )
     np.testing.assert_array_equal(load, np.arange(1.0, 7 + 3 * POINTS))
     np.testing.assert_array_equal(model.external_force(), np.zeros(SIZES["f_ext"]))
 
@@ -364,15 +408,21 @@ def test_parameters_change_without_a_compiler(model, no_process):
     s = state()
     for heavy in (st.load(folder(), parameters=double), model.with_parameters(**double)):
         np.testing.assert_array_equal(heavy.mass_matrix(s["q"]), 2 * model.mass_matrix(s["q"]))
-        np.testing.assert_array_equal(heavy.bias_force(s["q"], s["v"]), 2 * model.bias_force(s["q"], s["v"]))
-        assert heavy.parameters["link_inertia"] == tuple(2 * np.array(model.parameters["link_inertia"]))
+        np.testing.assert_array_equal(
+            heavy.bias_force(s["q"], s["v"]), 2 * model.bias_force(s["q"], s["v"])
+        )
+        assert heavy.parameters["link_inertia"] == tuple(
+            2 * np.array(model.parameters["link_inertia"])
+        )
 
 
 def test_parameters_given_late_are_those_of_a_scene(model):
     changes = {"tail_mass": 0.02, "tail_mount": [0.01, -0.05, 0.002], "gravity": 1.6}
     other = st.load(folder(parameters=changes))
     for name in CALLS:
-        assert_same(call(model.with_parameters(**changes), name, state()), call(other, name, state()))
+        assert_same(
+            call(model.with_parameters(**changes), name, state()), call(other, name, state())
+        )
 
 
 def test_first_model_keeps_its_parameters(model):
@@ -386,7 +436,10 @@ def test_changes_of_parameters_add_up(model):
     light = model.with_parameters(tail_mass=0.001).with_parameters(link_radius=0.01)
     assert light.parameters == model.with_parameters(tail_mass=0.001, link_radius=0.01).parameters
     given = light.with_parameters(link_inertia=(1e-6, 1e-8, 1e-6)).with_parameters(tail_mass=0.002)
-    assert given.parameters["link_inertia"] == (1e-6, 1e-8, 1e-6) and "link_radius" not in given.parameters
+    assert (
+        given.parameters["link_inertia"] == (1e-6, 1e-8, 1e-6)
+        and "link_radius" not in given.parameters
+    )
     assert given.with_parameters(link_radius=0.01, tail_mass=0.001).parameters == light.parameters
 
 
@@ -394,16 +447,25 @@ def test_wrong_parameters_are_refused(model):
     for attempt in (lambda p: st.load(folder(), p), lambda p: model.with_parameters(**p)):
         with pytest.raises(st.ModelError) as caught:
             attempt({"tail_mas": 1, "gravity": -1})
-        assert "did you mean 'tail_mass'?" in str(caught.value) and "gravity: value -1" in str(caught.value)
+        assert "did you mean 'tail_mass'?" in str(caught.value) and "gravity: value -1" in str(
+            caught.value
+        )
 
 
 def test_baked_model_has_the_same_values_and_refuses_others(model):
     baked = st.load(folder(baked=True))
     for name in CALLS:
-        for found, expected in zip(call(baked, name, state()), call(model, name, state()), strict=True):
-            np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12 * np.abs(expected).max())
+        for found, expected in zip(
+            call(baked, name, state()), call(model, name, state()), strict=True
+        ):
+            np.testing.assert_allclose(
+                found, expected, rtol=1e-9, atol=1e-12 * np.abs(expected).max()
+            )
     assert baked.with_parameters().parameters == model.parameters
-    for attempt in (lambda: baked.with_parameters(gravity=1.6), lambda: st.load(baked.folder, {"gravity": 1.6})):
+    for attempt in (
+        lambda: baked.with_parameters(gravity=1.6),
+        lambda: st.load(baked.folder, {"gravity": 1.6}),
+    ):
         with pytest.raises(st.ModelError, match="baked = false"):
             attempt()
 
@@ -415,19 +477,28 @@ def test_float_model(model):
     single = st.load(folder(real="float"))
     for arguments in (state(), states(3)):
         for name in CALLS:
-            expected = call(model, name, {k: np.float32(a).astype(float) for k, a in arguments.items()})
+            expected = call(
+                model, name, {k: np.float32(a).astype(float) for k, a in arguments.items()}
+            )
             exact = call(single, name, {k: np.float32(a) for k, a in arguments.items()})
             assert_same(call(single, name, arguments), exact)
             for found, reference in zip(exact, expected, strict=True):
                 assert found.dtype == np.float32
-                np.testing.assert_allclose(found, reference, rtol=2e-2, atol=1e-3 * np.abs(reference).max())
+                np.testing.assert_allclose(
+                    found, reference, rtol=2e-2, atol=1e-3 * np.abs(reference).max()
+                )
     with pytest.raises(st.StateError, match=r"v\[0\] is inf"):
         single.bias_force(state()["q"], [1e39] + [0] * (NV - 1))
 
 
 def test_a_scene_s_profile_is_that_of_its_library():
-    folders = {name: model_folder(1, 1, functions=["mass_matrix"], profile=name) for name in ("fast", "reproducible")}
-    assert {name: st.load(path).profile for name, path in folders.items()} == {name: name for name in folders}
+    folders = {
+        name: model_folder(1, 1, functions=["mass_matrix"], profile=name)
+        for name in ("fast", "reproducible")
+    }
+    assert {name: st.load(path).profile for name, path in folders.items()} == {
+        name: name for name in folders
+    }
     assert st.load(folders["reproducible"], profile="fast").profile == "fast"
 
 
@@ -435,8 +506,12 @@ def test_profiles_agree_to_rounding(model):
     exact = st.load(folder(), profile="reproducible")
     assert exact.library._name != model.library._name
     for name in CALLS:
-        for found, expected in zip(call(exact, name, state()), call(model, name, state()), strict=True):
-            np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12 * np.abs(expected).max())
+        for found, expected in zip(
+            call(exact, name, state()), call(model, name, state()), strict=True
+        ):
+            np.testing.assert_allclose(
+                found, expected, rtol=1e-9, atol=1e-12 * np.abs(expected).max()
+            )
     with pytest.raises(st.SerpentailError, match="unknown build profile 'quick'"):
         st.load(folder(), profile="quick")
 
@@ -466,7 +541,9 @@ def restless():
 def test_eight_threads_on_one_model(model, restless):
     batch = states(1000)
     names = ("q", "v", "tau")
-    expected = np.array([model.forward_dynamics(*state) for state in zip(*map(batch.get, names), strict=True)])
+    expected = np.array(
+        [model.forward_dynamics(*state) for state in zip(*map(batch.get, names), strict=True)]
+    )
     found, together = np.zeros((8, *expected.shape)), threading.Barrier(8)
 
     def work(thread):
@@ -524,12 +601,16 @@ def test_pickled_model_goes_to_another_process(monkeypatch, tmp_path):
         f"print(model.profile, model.mass_matrix({state()['q'].tolist()}).tobytes().hex())"
     )
     command = [sys.executable, "-c", program]
-    done = subprocess.run(command, cwd=tmp_path, env=os.environ, check=True, capture_output=True, text=True)
+    done = subprocess.run(
+        command, cwd=tmp_path, env=os.environ, check=True, capture_output=True, text=True
+    )
     assert done.stdout.split() == ["reproducible", model.mass_matrix(state()["q"]).tobytes().hex()]
 
 
 def test_one_state_costs_few_calls(model):
-    """A call on matching arrays runs three Python functions; a conversion of arguments would show here."""
+    """A call on matching arrays runs three Python functions; a conversion of arguments would show
+    here.
+    """
     s, events = state(), []
     model.forward_dynamics(s["q"], s["v"], s["tau"])
     sys.setprofile(lambda frame, event, _: events.append((event, frame.f_code.co_name)))

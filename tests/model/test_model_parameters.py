@@ -1,4 +1,6 @@
-"""Parameters: what a caller gives reaches the model as it would from a scene, or is refused with what to do."""
+"""Parameters: what a caller gives reaches the model as it would from a scene, or is refused with
+what to do.
+"""
 
 import json
 
@@ -75,7 +77,9 @@ def test_flat_is_the_struct(manifest):
     assert flat(manifest, values)[5:8] == [1.0, 2.0, 3.0]
 
 
-@pytest.mark.parametrize("three", [[1, 2, 2.5], (1, 2, 2.5), np.array([1, 2, 2.5]), np.float32([1, 2, 2.5])])
+@pytest.mark.parametrize(
+    "three", [[1, 2, 2.5], (1, 2, 2.5), np.array([1, 2, 2.5]), np.float32([1, 2, 2.5])]
+)
 def test_three_numbers_in_any_row(manifest, three):
     assert resolve(manifest, {"torso_inertia": three})["torso_inertia"] == (1.0, 2.0, 2.5)
 
@@ -89,8 +93,14 @@ def test_one_number_of_any_type(manifest, one):
 @pytest.mark.parametrize(
     ("name", "value"),
     [
-        *[("tail_mass", bad) for bad in (0, -1, np.nan, np.inf, "3", True, None, 1j, [1.0], np.array([1.0]), 10**400)],
-        *[("torso_inertia", bad) for bad in ("123", {1, 2, 3}, [1, 2], [1, 1, "1"], [[1, 1, 1]], 1.0, [1, 2, 3.1])],
+        *[
+            ("tail_mass", bad)
+            for bad in (0, -1, np.nan, np.inf, "3", True, None, 1j, [1.0], np.array([1.0]), 10**400)
+        ],
+        *[
+            ("torso_inertia", bad)
+            for bad in ("123", {1, 2, 3}, [1, 2], [1, 1, "1"], [[1, 1, 1]], 1.0, [1, 2, 3.1])
+        ],
         ("tail_mount", [0, 0, np.nan]),
         ("tail_mount", [[1], [1, 2]]),
         ("gravity", -9.8),
@@ -104,17 +114,27 @@ def test_wrong_value_is_named_with_its_unit(manifest, name, value):
 
 
 def test_unknown_name_is_answered_with_the_likely_one(manifest):
-    assert "tail_mas: no such parameter; did you mean 'tail_mass'?" in refusal(manifest, {"tail_mas": 1})
+    assert "tail_mas: no such parameter; did you mean 'tail_mass'?" in refusal(
+        manifest, {"tail_mas": 1}
+    )
     for strange in ("colour", 3):
         message = refusal(manifest, {strange: 1})
         assert f"{strange}: no such parameter; there are " in message and "torso_mass" in message
 
 
 def test_all_problems_come_at_once(manifest):
-    wrong = {"tail_mas": 1, "torso_mass": -1, "link_radius": 0.1, "link_inertia": INERTIA, "gravity": "9.8"}
+    wrong = {
+        "tail_mas": 1,
+        "torso_mass": -1,
+        "link_radius": 0.1,
+        "link_inertia": INERTIA,
+        "gravity": "9.8",
+    }
     lines = refusal(manifest, wrong).splitlines()
     assert len(lines) == 4
-    for line, name in zip(lines, ("tail_mas", "torso_mass", "gravity", "link_radius and link_inertia"), strict=True):
+    for line, name in zip(
+        lines, ("tail_mas", "torso_mass", "gravity", "link_radius and link_inertia"), strict=True
+    ):
         assert f"{name}: " in line
 
 

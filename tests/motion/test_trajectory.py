@@ -1,4 +1,6 @@
-"""Laws of sampled motions: interpolation against analytic motions, files bit by bit, angles by inversion."""
+"""Laws of sampled motions: interpolation against analytic motions, files bit by bit, angles by
+inversion.
+"""
 
 import dataclasses
 import json
@@ -14,7 +16,9 @@ PRECESSION, TILT, SPIN = 7.0, 0.6, 11.0  # rad/s, rad, rad/s of a torque-free sy
 
 
 def top(t):
-    """Attitude (w, x, y, z) and body rate of a torque-free symmetric top: R = Rz(a t) Rx(tilt) Rz(b t)."""
+    """Attitude (w, x, y, z) and body rate of a torque-free symmetric top: R = Rz(a t) Rx(tilt) Rz(b
+    t).
+    """
     turns = np.stack([PRECESSION * t, TILT + 0 * t, SPIN * t], axis=1)
     rotation = Rotation.from_euler("ZXZ", turns)
     omega = PRECESSION * rotation.as_matrix()[:, 2, :] + [0, 0, SPIN]  # a R^T z + b z
@@ -46,7 +50,9 @@ def motion(t, segments=2):
 
 def fields(trajectory):
     """The nine arrays and the info of a trajectory by name."""
-    found = {entry.name: getattr(trajectory, entry.name) for entry in dataclasses.fields(trajectory)}
+    found = {
+        entry.name: getattr(trajectory, entry.name) for entry in dataclasses.fields(trajectory)
+    }
     return {name: value for name, value in found.items() if value is not None}
 
 
@@ -102,15 +108,31 @@ def test_fields_are_private_and_read_only():
         ("q", lambda q: q * 1j, r"q has .* complex128: give real numbers"),
         ("q", lambda q: [[0.0], [0.0, 1.0]], r"q is ragged: give rows"),
         ("v", lambda v: v[:, 1:], r"v has shape \(41, 9\): give \(41, 10\)"),
-        ("v", lambda v: np.where(v > 0, np.nan, v), r"v\[0, 1\] is nan \(shape \(41, 10\)\): give finite"),
+        (
+            "v",
+            lambda v: np.where(v > 0, np.nan, v),
+            r"v\[0, 1\] is nan \(shape \(41, 10\)\): give finite",
+        ),
         ("tau", lambda tau: tau[:, :0], r"tau has shape \(41, 0\): give \(41, 4\)"),
         ("kinetic", lambda kinetic: kinetic[:, None], r"kinetic has shape \(41, 1\): give \(41,\)"),
-        ("potential", lambda potential: potential[:-1], r"potential has shape \(40,\): give \(41,\)"),
+        (
+            "potential",
+            lambda potential: potential[:-1],
+            r"potential has shape \(40,\): give \(41,\)",
+        ),
         ("linear_momentum", lambda p: p.T, r"linear_momentum has shape \(3, 41\): give \(41, 3\)"),
         ("angular_momentum", lambda h: h * np.inf, r"angular_momentum\[0, 0\] is inf"),
-        ("angular_momentum", lambda h: h.astype(str), r"angular_momentum has .*: give real numbers"),
+        (
+            "angular_momentum",
+            lambda h: h.astype(str),
+            r"angular_momentum has .*: give real numbers",
+        ),
         ("info", lambda info: info | {"seconds": np.nan}, "info is not JSON-ready .*: convert"),
-        ("info", lambda info: info | {"seconds": np.zeros(2)}, "info is not JSON-ready .*: convert"),
+        (
+            "info",
+            lambda info: info | {"seconds": np.zeros(2)},
+            "info is not JSON-ready .*: convert",
+        ),
         ("info", lambda info: [info], "info is a list: give a dict"),
     ],
 )
@@ -204,15 +226,21 @@ def test_resample_reproduces_the_samples(flight):
     for name in ("t", "q", "tau"):
         np.testing.assert_allclose(getattr(again, name), getattr(flight, name), rtol=0, atol=4e-16)
     for name in ("v", "kinetic", "potential", "linear_momentum", "angular_momentum"):
-        np.testing.assert_allclose(getattr(again, name), getattr(flight, name), rtol=1e-14, atol=1e-15)
+        np.testing.assert_allclose(
+            getattr(again, name), getattr(flight, name), rtol=1e-14, atol=1e-15
+        )
 
 
 def attitude_error(trajectory):
-    """Largest angle between sampled and true attitudes, rad, and largest error of the other coordinates."""
+    """Largest angle between sampled and true attitudes, rad, and largest error of the other
+    coordinates.
+    """
     truth = motion(trajectory.t)
     turn = rotation_matrix(truth.attitude).swapaxes(1, 2) @ rotation_matrix(trajectory.attitude)
     angle = np.linalg.norm(turn - np.eye(3), axis=(1, 2)).max() / np.sqrt(2)
-    return np.array([angle, np.abs(trajectory.tail - truth.tail).max(), np.abs(trajectory.v - truth.v).max()])
+    return np.array(
+        [angle, np.abs(trajectory.tail - truth.tail).max(), np.abs(trajectory.v - truth.v).max()]
+    )
 
 
 def test_resample_converges_to_the_free_top_and_the_sines():
@@ -236,7 +264,9 @@ def test_resample_does_not_depend_on_quaternion_signs(flight):
     q[:, 3:7] *= np.random.default_rng(2).choice([-1.0, 1.0], len(q))[:, None]
     q[0, 3:7] = flight.q[0, 3:7]
     t = np.linspace(0, 0.4, 333)
-    np.testing.assert_array_equal(dataclasses.replace(flight, q=q).resample(t).q, flight.resample(t).q)
+    np.testing.assert_array_equal(
+        dataclasses.replace(flight, q=q).resample(t).q, flight.resample(t).q
+    )
 
 
 def test_torque_is_linear_and_energies_do_not_overshoot(flight):
@@ -251,7 +281,9 @@ def test_torque_is_linear_and_energies_do_not_overshoot(flight):
 
 @pytest.mark.parametrize(("t", "first"), [([0.1, 0.5, 0.6], "0.5"), ([-0.25, 0.1], "-0.25")])
 def test_the_first_time_outside_is_named(flight, t, first):
-    with pytest.raises(ValueError, match=f"t = {first} s is outside the trajectory: give times from 0.0 to 0.4 s"):
+    with pytest.raises(
+        ValueError, match=f"t = {first} s is outside the trajectory: give times from 0.0 to 0.4 s"
+    ):
         flight.resample(t)
 
 
@@ -286,7 +318,9 @@ def configurations(quaternion):
 def test_rotation_matrix_agrees_with_scipy():
     quaternion = np.random.default_rng(3).normal(size=(4, 50, 4))
     expected = Rotation.from_quat(quaternion.reshape(-1, 4)[:, [1, 2, 3, 0]]).as_matrix()
-    np.testing.assert_allclose(rotation_matrix(quaternion).reshape(-1, 3, 3), expected, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(
+        rotation_matrix(quaternion).reshape(-1, 3, 3), expected, rtol=0, atol=1e-15
+    )
 
 
 def test_pitch_roll_yaw_inverts_the_product_of_rotations():
@@ -294,14 +328,18 @@ def test_pitch_roll_yaw_inverts_the_product_of_rotations():
     angles = pitch_roll_yaw(configurations(quaternion))
     assert angles.shape == (5, 200, 3)
     assert np.abs(angles[..., 0]).max() <= np.pi / 2
-    np.testing.assert_allclose(euler(angles), rotation_matrix(quaternion).reshape(-1, 3, 3), rtol=0, atol=1e-15)
+    np.testing.assert_allclose(
+        euler(angles), rotation_matrix(quaternion).reshape(-1, 3, 3), rtol=0, atol=1e-15
+    )
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
 def test_a_turn_about_one_axis_is_that_angle(axis):
     quaternion = np.zeros(4)
     quaternion[0], quaternion[1 + axis] = np.cos(0.35), np.sin(0.35)
-    np.testing.assert_allclose(pitch_roll_yaw(configurations(quaternion)), 0.7 * np.eye(3)[axis], rtol=0, atol=1e-15)
+    np.testing.assert_allclose(
+        pitch_roll_yaw(configurations(quaternion)), 0.7 * np.eye(3)[axis], rtol=0, atol=1e-15
+    )
 
 
 @pytest.mark.parametrize("short", [0, 1e-3, 1e-8, 1e-12])
@@ -309,14 +347,18 @@ def test_pitch_roll_yaw_inverts_near_the_singularity(short):
     angles = np.stack(np.broadcast_arrays(np.pi / 2 - short, 0.4, np.linspace(-3, 3, 50)), axis=-1)
     rotation = euler(angles)
     quaternion = Rotation.from_matrix(rotation).as_quat()[:, [3, 0, 1, 2]]
-    np.testing.assert_allclose(euler(pitch_roll_yaw(configurations(quaternion))), rotation, rtol=0, atol=2e-15)
+    np.testing.assert_allclose(
+        euler(pitch_roll_yaw(configurations(quaternion))), rotation, rtol=0, atol=2e-15
+    )
 
 
 def test_unwrapped_pitch_counts_the_turns_of_a_somersault():
     angle = np.linspace(0, 5 * np.pi, 300)
     quaternion = np.stack([np.cos(angle / 2), np.sin(angle / 2), 0 * angle, 0 * angle], axis=1)
     unwrapped = pitch_roll_yaw(configurations(quaternion), unwrap=True)
-    np.testing.assert_allclose(unwrapped, np.stack([angle, 0 * angle, 0 * angle], axis=1), rtol=0, atol=1e-12)
+    np.testing.assert_allclose(
+        unwrapped, np.stack([angle, 0 * angle, 0 * angle], axis=1), rtol=0, atol=1e-12
+    )
 
 
 def test_unwrapped_angles_are_continuous_and_still_the_attitude():

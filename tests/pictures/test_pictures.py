@@ -1,4 +1,6 @@
-"""Laws of the figures: true silhouettes and visibility, equal scales, nothing hidden, equal bytes twice."""
+"""Laws of the figures: true silhouettes and visibility, equal scales, nothing hidden, equal bytes
+twice.
+"""
 
 import dataclasses
 import os
@@ -22,7 +24,11 @@ from serpentail.pictures.time_plots import time_plots
 
 SEMI_AXES = np.array([0.0315, 0.0495, 0.027])
 MOUNT = np.array([0, -0.0405, 0.0045])
-SPEEDS = {"up": (0.5, 2.8), "far": (2.6, 2.8), "still": (0.0, 0.0)}  # forward and up at the start, m/s
+SPEEDS = {
+    "up": (0.5, 2.8),
+    "far": (2.6, 2.8),
+    "still": (0.0, 0.0),
+}  # forward and up at the start, m/s
 STARTS = {".pdf": b"%PDF-", ".png": b"\x89PNG", ".svg": b"<?xml"}
 
 
@@ -50,7 +56,9 @@ def flight(speed=SPEEDS["up"], segments=2, samples=59):
 
 
 def tail_points(trajectory, links=4, length=0.19466):
-    """Joints (K, m links + 1, 3) of an articulated tail: R_j = R_{j-1} Rx(alpha) Rz(beta), links along -y."""
+    """Joints (K, m links + 1, 3) of an articulated tail: R_j = R_{j-1} Rx(alpha) Rz(beta), links
+    along -y.
+    """
     rotation = rotation_matrix(trajectory.attitude)
     points = [trajectory.q[:, :3] + rotation @ MOUNT]
     for i in range(trajectory.segments):
@@ -116,7 +124,9 @@ def test_the_torso_hides_exactly_what_a_ray_to_the_viewer_hits(view, seed):
     clear = ray.min(axis=0) > 1
     grazing = np.abs(ray.min(axis=0) - 1) < 1e-3
     over = frame.in_front(points, view)
-    under_but_clear = outside & ~over & clear  # beside the torso: drawn under it, nothing covers it there
+    under_but_clear = (
+        outside & ~over & clear
+    )  # beside the torso: drawn under it, nothing covers it there
     spread = view.matrix[:2] @ frame.rotation * SEMI_AXES
     flat = view.of(points - frame.torso)[:, :2]
     covered = np.einsum("ni,ij,nj->n", flat, np.linalg.inv(spread @ spread.T), flat) < 1
@@ -153,7 +163,8 @@ def test_the_same_bytes_twice_whatever_the_user_has_set(tmp_path, suffix):
 
 def test_drawing_leaves_pyplot_alone_and_importing_leaves_matplotlib_alone(tmp_path):
     code = (
-        "import sys, serpentail.pictures.filmstrip, serpentail.pictures.time_plots, serpentail.motion.trajectory\n"
+        "import sys, serpentail.pictures.filmstrip, serpentail.pictures.time_plots, "
+        "serpentail.motion.trajectory\n"
         "assert 'matplotlib' not in sys.modules and 'scipy' not in sys.modules\n"
         "from tests.pictures.test_pictures import flight, tail_points\n"
         "serpentail.pictures.filmstrip.filmstrip(flight(), tail_points(flight()), 'film.svg')\n"
@@ -161,7 +172,10 @@ def test_drawing_leaves_pyplot_alone_and_importing_leaves_matplotlib_alone(tmp_p
         "assert 'matplotlib.pyplot' not in sys.modules\n"
     )
     packages = [str(Path(plots.__file__).parents[2]), str(Path(__file__).parents[2])]
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join(packages), "PYTHONDONTWRITEBYTECODE": "1"}
+    environment = os.environ | {
+        "PYTHONPATH": os.pathsep.join(packages),
+        "PYTHONDONTWRITEBYTECODE": "1",
+    }
     subprocess.run([sys.executable, "-c", code], cwd=tmp_path, env=environment, check=True)
 
 
@@ -197,7 +211,10 @@ def test_unknown_suffix_lists_the_known(tmp_path, name):
         ({"points": np.zeros((58, 9, 3))}, r"points has shape \(58, 9, 3\): give \(59, P, 3\)"),
         ({"points": np.zeros((59, 9))}, r"points has shape \(59, 9\): give"),
         ({"points": np.zeros((59, 0, 3))}, r"points has shape \(59, 0, 3\): give"),
-        ({"points": np.full((59, 9, 3), np.nan)}, r"points \(59, 9, 3\) has values that are not finite"),
+        (
+            {"points": np.full((59, 9, 3), np.nan)},
+            r"points \(59, 9, 3\) has values that are not finite",
+        ),
         ({"com": np.zeros(3)}, r"com has shape \(3,\): give \(59, 3\)"),
         ({"frames": 0}, "frames is 0: give a whole number"),
         ({"frames": 2.5}, "frames is 2.5: give a whole number"),
@@ -249,7 +266,10 @@ def test_panels_have_one_scale_and_show_everything(speed, frames):
     np.testing.assert_allclose(scales[: 2 * frames], scales[0][0], rtol=2e-3)
     for k, frame in enumerate(film):
         for axes, view in ((panels[k], SIDE), (panels[frames + k], TOP)):
-            shown = np.vstack([frame.outline(view), view.of(frame.tail)[:, :2]]) - view.of(frame.com)[:2]
+            shown = (
+                np.vstack([frame.outline(view), view.of(frame.tail)[:, :2]])
+                - view.of(frame.com)[:2]
+            )
             assert (shown > [axes.get_xlim()[0], axes.get_ylim()[0]]).all()
             assert (shown < [axes.get_xlim()[1], axes.get_ylim()[1]]).all()
 
@@ -274,7 +294,9 @@ def test_centre_of_mass_given_moves_the_windows():
     trajectory = flight()
     com = trajectory.q[:, :3] + [0, -0.1, 0.02]
     (plain, _), (moved, _) = drawn_film(trajectory), drawn_film(trajectory, com=com)
-    np.testing.assert_allclose(np.subtract(moved.axes[0].get_xlim(), plain.axes[0].get_xlim()), 0.1, atol=1e-12)
+    np.testing.assert_allclose(
+        np.subtract(moved.axes[0].get_xlim(), plain.axes[0].get_xlim()), 0.1, atol=1e-12
+    )
 
 
 @pytest.mark.parametrize("segments", [0, 1, 3, 8])
@@ -296,6 +318,8 @@ def test_time_plots_label_everything_and_legends_cover_nothing(segments):
 
 
 def test_a_conserved_momentum_is_drawn_flat():
-    trajectory = dataclasses.replace(flight(), angular_momentum=np.full((59, 3), 1e-3) * (1 + 1e-13 * np.eye(59, 3)))
+    trajectory = dataclasses.replace(
+        flight(), angular_momentum=np.full((59, 3), 1e-3) * (1 + 1e-13 * np.eye(59, 3))
+    )
     figure = plots._draw_times(trajectory)
     assert np.ptp(figure.axes[-1].get_ylim()) >= 0.01

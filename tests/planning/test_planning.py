@@ -1,4 +1,6 @@
-"""Plans: formulations agree, laws hold, and the truth that a report tells is that of an independent integration."""
+"""Plans: formulations agree, laws hold, and the truth that a report tells is that of an independent
+integration.
+"""
 
 import re
 import signal
@@ -28,7 +30,12 @@ from serpentail_codegen.scene.parse import load_scene
 from tests.support.models import model_folder
 from tests.support.tumbling import DURATION, FUNCTIONS, planned, rat, start
 
-FORMS = [("airborne", "quaternion"), ("translation-free", "quaternion"), ("full", "quaternion"), ("full", "euler")]
+FORMS = [
+    ("airborne", "quaternion"),
+    ("translation-free", "quaternion"),
+    ("full", "quaternion"),
+    ("full", "euler"),
+]
 every_form = pytest.mark.parametrize(("formulation", "attitude"), FORMS)
 
 
@@ -39,7 +46,12 @@ def rate(model, plan):
         q, v = y[: model.nq], y[model.nq :]
         w, x, y_, z = q[3:7]
         a, b, c = v[3:6]
-        turn = [-x * a - y_ * b - z * c, w * a + y_ * c - z * b, w * b - x * c + z * a, w * c + x * b - y_ * a]
+        turn = [
+            -x * a - y_ * b - z * c,
+            w * a + y_ * c - z * b,
+            w * b - x * c + z * a,
+            w * c + x * b - y_ * a,
+        ]
         tau = plan.torque(t)[0] - plan.problem.damping * v[6:]
         return np.concatenate([v[:3], np.array(turn) / 2, v[6:], model.forward_dynamics(q, v, tau)])
 
@@ -57,7 +69,9 @@ def integrated(model, plan):
 
 @every_form
 def test_plans_of_all_formulations_reach_the_goal_in_truth(formulation, attitude):
-    plan = planned(formulation=formulation, attitude=attitude, guess=planned())  # one of several optima
+    plan = planned(
+        formulation=formulation, attitude=attitude, guess=planned()
+    )  # one of several optima
     report = plan.report
     assert plan.success and report["converged"] and report["dynamics"] == "compiled"
     assert report["open_loop_attitude_error_deg"] <= 0.01
@@ -86,7 +100,9 @@ def test_airborne_plans_conserve_momentum_between_their_nodes_too():
     flight = planned().trajectory
     assert np.ptp(flight.angular_momentum, axis=0).max() < 1e-15
     fall = flight.linear_momentum - flight.linear_momentum[0]
-    np.testing.assert_allclose(fall, flight.t[:, None] * [0, 0, -9.8 * (0.10572 + 0.00351)], atol=1e-12)
+    np.testing.assert_allclose(
+        fall, flight.t[:, None] * [0, 0, -9.8 * (0.10572 + 0.00351)], atol=1e-12
+    )
 
 
 def test_planned_positions_have_the_planned_velocities():
@@ -104,7 +120,9 @@ def test_planned_positions_have_the_planned_velocities():
 
 
 def test_symbolic_and_compiled_dynamics_give_the_same_plan():
-    one, other = (planned(dynamics=source, tolerance=None, intervals=8) for source in ("compiled", "symbolic"))
+    one, other = (
+        planned(dynamics=source, tolerance=None, intervals=8) for source in ("compiled", "symbolic")
+    )
     assert (one.report["dynamics"], other.report["dynamics"]) == ("compiled", "symbolic")
     assert one.report["objective"] == pytest.approx(other.report["objective"], rel=1e-7)
     np.testing.assert_allclose(one.solution.w, other.solution.w, atol=1e-5)
@@ -112,7 +130,9 @@ def test_symbolic_and_compiled_dynamics_give_the_same_plan():
 
 def test_scene_without_derivatives_takes_the_symbolic_dynamics():
     model = rat(exact=False)
-    plan = st.plan(model, start=start(model), duration=DURATION, intervals=6, tolerance=None, track=False)
+    plan = st.plan(
+        model, start=start(model), duration=DURATION, intervals=6, tolerance=None, track=False
+    )
     assert plan.report["dynamics"] == "symbolic" and plan.report["converged"]
     with pytest.raises(st.ModelError, match="generated without"):
         st.plan(model, start=start(model), duration=DURATION, dynamics="compiled")
@@ -126,7 +146,9 @@ def test_refinement_reduces_the_true_error():
 
 
 def test_multipliers_are_carried_to_another_mesh():
-    """The solver finds about the same ones there, from nothing; on the mesh itself they stay, to rounding."""
+    """The solver finds about the same ones there, from nothing; on the mesh itself they stay, to
+    rounding.
+    """
     settings = AGAIN | {"start": start(rat()), "bounds": st.Bounds(angle=0.45)}
     programs, solutions = [], []
     for intervals in (24, 36):
@@ -134,7 +156,9 @@ def test_multipliers_are_carried_to_another_mesh():
         programs.append(program_of(rat(), plan.problem, plan.mesh, plan.rule, dynamics(rat())))
         solutions.append(plan.solution.multipliers)
     assert np.abs(solutions[0][0]).max() > 1e-3  # a bound is active
-    for kept, given in zip(carried(solutions[0], programs[0], programs[0]), solutions[0], strict=True):
+    for kept, given in zip(
+        carried(solutions[0], programs[0], programs[0]), solutions[0], strict=True
+    ):
         np.testing.assert_allclose(kept, given, atol=1e-12)
     for found, wanted in zip(carried(solutions[0], *programs), solutions[1], strict=True):
         assert np.linalg.norm(found - wanted) < 0.1 * np.linalg.norm(wanted)
@@ -164,7 +188,10 @@ def test_planning_again_from_a_plan_takes_fewer_iterations():
 
 
 def test_plans_are_the_same_in_two_runs():
-    model, settings = rat(), {"duration": DURATION, "intervals": 6, "tolerance": None, "track": False}
+    model, settings = (
+        rat(),
+        {"duration": DURATION, "intervals": 6, "tolerance": None, "track": False},
+    )
     one, two = (st.plan(model, start=start(model), **settings) for _ in range(2))
     np.testing.assert_array_equal(one.solution.w, two.solution.w)
 
@@ -181,7 +208,11 @@ def test_damping_is_part_of_the_motion():
 
 def test_free_duration_least_time_is_shorter_and_at_its_bounds():
     model = rat()
-    settings = {"start": start(model), "bounds": st.Bounds(angle=np.pi / 3, torque=0.005), "track": False}
+    settings = {
+        "start": start(model),
+        "bounds": st.Bounds(angle=np.pi / 3, torque=0.005),
+        "track": False,
+    }
     plan = st.plan(model, duration=(0.05, 0.6), objective="time", tolerance=None, **settings)
     assert plan.report["converged"] and plan.duration < 0.9 * DURATION
     assert plan.report["objective"] == pytest.approx(plan.duration, rel=1e-6)
@@ -199,11 +230,15 @@ def test_energy_plans_take_less_energy():
 def test_rate_and_torque_rate_bounds_hold_at_the_nodes():
     model = rat()
     bounds = st.Bounds(angle=np.pi / 3, rate=4.0, torque_rate=0.04)
-    plan = st.plan(model, start=start(model), duration=DURATION, bounds=bounds, tolerance=None, track=False)
+    plan = st.plan(
+        model, start=start(model), duration=DURATION, bounds=bounds, tolerance=None, track=False
+    )
     assert plan.report["converged"]
     assert np.abs(plan.curve.at(plan.curve.ends)["tail_rate"]).max() <= 4.0 + 1e-6
     nodes = plan.curve.nodes["torque"].reshape(-1, 2)
-    times = (plan.curve.ends[:-1, None] + np.diff(plan.curve.ends)[:, None] * plan.rule.nodes).ravel()
+    times = (
+        plan.curve.ends[:-1, None] + np.diff(plan.curve.ends)[:, None] * plan.rule.nodes
+    ).ravel()
     steepest = np.max(np.abs(np.diff(nodes, axis=0)) / np.diff(times)[:, None])
     assert 0.039 < steepest <= 0.04 * (1 + 1e-6)
 
@@ -211,11 +246,15 @@ def test_rate_and_torque_rate_bounds_hold_at_the_nodes():
 def test_goals_of_the_tail_and_of_a_whole_attitude():
     model, wanted = rat(), from_angles(np.array([0.1, -0.05, 0.2]))
     goal = st.Goal(attitude=wanted, torso_rate=None, tail=(0.1, None), tail_rate=(None, 0.0))
-    plan = st.plan(model, start=start(model), goal=goal, duration=DURATION, tolerance=None, track=False)
+    plan = st.plan(
+        model, start=start(model), goal=goal, duration=DURATION, tolerance=None, track=False
+    )
     assert plan.report["converged"]
     end = plan.trajectory
     assert angle_deg(end.attitude[-1], wanted) < 1e-5
-    assert end.tail[-1, 0] == pytest.approx(0.1, abs=1e-7) and end.v[-1, 7] == pytest.approx(0, abs=1e-6)
+    assert end.tail[-1, 0] == pytest.approx(0.1, abs=1e-7) and end.v[-1, 7] == pytest.approx(
+        0, abs=1e-6
+    )
 
 
 def test_effort_counts_rates_as_torques_of_a_damper():
@@ -223,7 +262,9 @@ def test_effort_counts_rates_as_torques_of_a_damper():
     for plan in (planned(**fine), planned(**fine, smoothing=0.0)):
         flight, c = plan.trajectory, plan.problem.smoothing
         integrand = np.sum(flight.tau**2 + (c * flight.v[:, 6:]) ** 2, axis=1)
-        assert plan.report["objective"] == pytest.approx(np.trapezoid(integrand, flight.t), rel=1e-2)
+        assert plan.report["objective"] == pytest.approx(
+            np.trapezoid(integrand, flight.t), rel=1e-2
+        )
     assert plan.report["objective"] == pytest.approx(plan.report["effort"], rel=1e-12)
     assert plan.report["effort"] < planned(**fine).report["effort"]
 
@@ -233,7 +274,10 @@ def test_own_objective_and_path_constraint():
     plan = planned(objective=_bend, path=((_first_rate, -4.0, 9.0),), **settings)
     assert plan.report["converged"]
     assert plan.curve.at(plan.curve.ends)["tail_rate"][1:, 0].min() >= -4.0 - 1e-5
-    bend = [np.trapezoid(np.sum(p.trajectory.tail**2, axis=1), p.trajectory.t) for p in (plan, planned(**settings))]
+    bend = [
+        np.trapezoid(np.sum(p.trajectory.tail**2, axis=1), p.trajectory.t)
+        for p in (plan, planned(**settings))
+    ]
     assert bend[0] < bend[1]
 
 
@@ -254,8 +298,13 @@ def test_solver_uses_one_thread_and_gives_back_the_others():
 
 
 def test_several_guesses_are_at_least_as_good_as_one():
-    one, many = planned(tolerance=None, intervals=8), planned(tolerance=None, intervals=8, multi_start=3)
-    assert many.report["guesses"] >= 3 and many.report["objective"] <= one.report["objective"] * (1 + 1e-6)
+    one, many = (
+        planned(tolerance=None, intervals=8),
+        planned(tolerance=None, intervals=8, multi_start=3),
+    )
+    assert many.report["guesses"] >= 3 and many.report["objective"] <= one.report["objective"] * (
+        1 + 1e-6
+    )
 
 
 @pytest.mark.slow
@@ -264,7 +313,13 @@ def test_other_tails_reach_their_goal_in_truth(size):
     model = rat(*size)
     bounds = st.Bounds(angle=np.pi / 3, rate=30.0)
     plan = st.plan(
-        model, start=start(model), duration=DURATION, bounds=bounds, damping=1e-5, tolerance=0.1, most_intervals=120
+        model,
+        start=start(model),
+        duration=DURATION,
+        bounds=bounds,
+        damping=1e-5,
+        tolerance=0.1,
+        most_intervals=120,
     )
     assert plan.success and plan.report["tracked_attitude_error_deg"] < 0.2
 
@@ -279,13 +334,19 @@ def test_attitude_coordinates_agree():
         R = [rotation_matrix(coordinates.as_quaternion(c + s * slope)) for s in (-step, step)]
         turn = rotation_matrix(from_angles(angles)).T @ (R[1] - R[0]) / (2 * step)
         np.testing.assert_allclose([turn[2, 1], turn[0, 2], turn[1, 0]], omega, atol=1e-9)
-        np.testing.assert_allclose(np.array(coordinates.quaternion(casadi.DM(c))).ravel(), from_angles(angles))
+        np.testing.assert_allclose(
+            np.array(coordinates.quaternion(casadi.DM(c))).ravel(), from_angles(angles)
+        )
 
 
 def test_torques_that_no_model_survives_are_an_infinite_error():
-    """A motion that leaves what the model describes has no truth: nan from there on, never an exception."""
+    """A motion that leaves what the model describes has no truth: nan from there on, never an
+    exception.
+    """
     plan, model = planned(tolerance=None), rat()
-    wild = replace(plan.curve, nodes=plan.curve.nodes | {"torque": 1e9 + 0 * plan.curve.nodes["torque"]})
+    wild = replace(
+        plan.curve, nodes=plan.curve.nodes | {"torque": 1e9 + 0 * plan.curve.nodes["torque"]}
+    )
     start = (plan.problem.q0, plan.problem.v0)
     assert np.isnan(np.concatenate(open_loop(model, wild, 0.0, start))).all()
     errors = local_errors(model, wild, 0.0, *(np.tile(x, (len(wild.ends), 1)) for x in start))
@@ -304,7 +365,12 @@ def test_example_of_the_document_runs(tmp_path, monkeypatch, capsys):
 
 # Planning again, and being told to stop.
 
-AGAIN = {"duration": DURATION, "bounds": st.Bounds(angle=np.pi / 3), "tolerance": None, "track": False}
+AGAIN = {
+    "duration": DURATION,
+    "bounds": st.Bounds(angle=np.pi / 3),
+    "tolerance": None,
+    "track": False,
+}
 
 
 def test_planning_again_from_neighbouring_states_derives_nothing(monkeypatch):
@@ -322,9 +388,15 @@ def test_other_problems_and_models_share_no_program():
     """A kept program answers for its own problem only: damping, goal and model all matter."""
     model, coarse = rat(), {"intervals": 4}
     tilted = st.Goal(attitude=from_angles(np.array([0.1, 0, 0])))
-    found = [st.plan(model, start=start(model), **AGAIN, **coarse, **own) for own in ({}, {"damping": 1e-3})]
+    found = [
+        st.plan(model, start=start(model), **AGAIN, **coarse, **own)
+        for own in ({}, {"damping": 1e-3})
+    ]
     found += [st.plan(model, start=start(model), goal=tilted, **AGAIN, **coarse)]
-    heavy = st.load(model_folder(1, 3, functions=list(dict.fromkeys(FUNCTIONS))), parameters={"tail_mass": 0.005})
+    heavy = st.load(
+        model_folder(1, 3, functions=list(dict.fromkeys(FUNCTIONS))),
+        parameters={"tail_mass": 0.005},
+    )
     found += [st.plan(heavy, start=start(model), **AGAIN, **coarse)]
     assert len({plan.report["objective"] for plan in found}) == 4
     again = st.plan(model, start=start(model), **AGAIN, **coarse)
@@ -356,7 +428,9 @@ def test_interrupt_in_a_later_round_returns_the_round_before(monkeypatch):
         return split(run, last)
 
     monkeypatch.setattr(rounds.Run, "_split", interrupted)
-    plan = st.plan(rat(), start=start(rat()), intervals=6, **AGAIN | {"tolerance": 1e-9, "rounds": 30})
+    plan = st.plan(
+        rat(), start=start(rat()), intervals=6, **AGAIN | {"tolerance": 1e-9, "rounds": 30}
+    )
     assert not plan.success and plan.report["converged"]
     assert (plan.report["stopped"], plan.report["intervals"]) == ("interrupt", 6)
 
@@ -372,7 +446,8 @@ def test_time_limit_ends_a_solve_inside_and_returns_its_iterate():
     assert (cut.success, cut.report["stopped"], cut.report["guesses"]) == (False, "time limit", 1)
     assert cut.report["status"] == "User_Requested_Stop" and cut.report["iterations"] > 1
     free, limited = (
-        st.plan(model, start=start(model), intervals=6, **AGAIN, **own) for own in ({}, {"time_limit": 60})
+        st.plan(model, start=start(model), intervals=6, **AGAIN, **own)
+        for own in ({}, {"time_limit": 60})
     )
     assert limited.report["stopped"] is None and limited.success
     np.testing.assert_array_equal(free.solution.w, limited.solution.w)

@@ -1,4 +1,6 @@
-"""Planning problems that cannot be posed: the error names field, value and remedy, before anything is solved."""
+"""Planning problems that cannot be posed: the error names field, value and remedy, before anything
+is solved.
+"""
 
 import json
 import tomllib
@@ -71,7 +73,9 @@ def test_what_is_wrong_is_named(changes, words):
 
 
 def test_scenes_without_a_function_are_refused():
-    model = st.load(model_folder(1, 1, functions=["mass_matrix", "forward_dynamics", "energy", "momentum"]))
+    model = st.load(
+        model_folder(1, 1, functions=["mass_matrix", "forward_dynamics", "energy", "momentum"])
+    )
     with pytest.raises(st.ModelError, match="'inverse_dynamics'"):
         st.plan(model, start=start(model), duration=DURATION)
 
@@ -83,7 +87,11 @@ def test_goal_that_cannot_be_reached_is_flagged():
     bounds = st.Bounds(angle=np.pi / 3, torque=1e-4)
     settings = {"retries": 0, "options": {"ipopt.max_iter": 60}}
     plan = st.plan(model, start=(q, v), duration=0.1, bounds=bounds, **settings)
-    assert not plan.success and not plan.report["converged"] and plan.report["status"] != "Solve_Succeeded"
+    assert (
+        not plan.success
+        and not plan.report["converged"]
+        and plan.report["status"] != "Solve_Succeeded"
+    )
     json.dumps(plan.report, allow_nan=False)
 
 
@@ -95,8 +103,12 @@ def table() -> dict:
 
 
 def test_scene_has_the_arguments_of_plan():
-    arguments = plan_arguments(table() | {"tolerance": "free", "goal": {"attitude": "free", "tail": ["free", 0.1]}})
-    assert arguments["tolerance"] is None and arguments["goal"] == st.Goal(attitude=None, tail=(None, 0.1))
+    arguments = plan_arguments(
+        table() | {"tolerance": "free", "goal": {"attitude": "free", "tail": ["free", 0.1]}}
+    )
+    assert arguments["tolerance"] is None and arguments["goal"] == st.Goal(
+        attitude=None, tail=(None, 0.1)
+    )
     assert np.linalg.norm(arguments["start"][0][3:7]) == pytest.approx(1, abs=1e-15)
 
 
@@ -105,7 +117,10 @@ def test_scene_has_the_arguments_of_plan():
     [
         ({"start": {"q": []}}, "plan.start: value {'q': []}: needs q and v"),
         ({"goal": 3}, "needs a table, under a line [plan.goal]"),
-        ({"goal": {"attitud": "upright"}}, "plan.goal: key: value 'attitud': did you mean 'attitude'?"),
+        (
+            {"goal": {"attitud": "upright"}},
+            "plan.goal: key: value 'attitud': did you mean 'attitude'?",
+        ),
         ({"bounds": {"torques": 1}}, "did you mean 'torque'?"),
         ({"intervalls": 3}, "did you mean 'intervals'?"),
         ({"guess": 3}, "plan.guess: value 3: only programs can give it"),
@@ -127,19 +142,36 @@ def test_scene_without_a_plan(tmp_path, text):
 def test_command_line_prints_one_object(tmp_path, capsys):
     folder = model_folder(1, 3, functions=list(dict.fromkeys(FUNCTIONS)))
     q, v = start(rat())
-    text = f"[plan]\nduration = {DURATION}\nintervals = 8\n[plan.start]\nq = {q.tolist()}\nv = {v.tolist()}\n"
+    text = (
+        f"[plan]\nduration = {DURATION}\nintervals = 8\n[plan.start]\nq = {q.tolist()}\nv = "
+        f"{v.tolist()}\n"
+    )
     (tmp_path / "own.toml").write_text(text)
     saved = tmp_path / "own.npz"
     status = cli.main(
-        ["plan", str(tmp_path / "own.toml"), "--folder", str(folder), "--json", "-", "--save", str(saved)]
+        [
+            "plan",
+            str(tmp_path / "own.toml"),
+            "--folder",
+            str(folder),
+            "--json",
+            "-",
+            "--save",
+            str(saved),
+        ]
     )
     out, err = capsys.readouterr()
     report = json.loads(out)
     assert (status, err, out.count("\n")) == (0, "", 1)
     assert report["success"] and report["open_loop_attitude_error_deg"] <= 0.01
-    assert {"iterations", "solve_cpu_s", "objective", "tracked_attitude_error_deg", "dyn_err", "energy_J"} <= set(
-        report
-    )
+    assert {
+        "iterations",
+        "solve_cpu_s",
+        "objective",
+        "tracked_attitude_error_deg",
+        "dyn_err",
+        "energy_J",
+    } <= set(report)
     assert st.Trajectory.load(saved).t[-1] == pytest.approx(DURATION)
     assert cli.main(["plan", str(tmp_path / "none.toml")]) == 2
     assert "scene file" in capsys.readouterr().err

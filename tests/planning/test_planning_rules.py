@@ -1,4 +1,6 @@
-"""Collocation rules and the program that is built of them, compared with exact integrals and an exact optimum."""
+"""Collocation rules and the program that is built of them, compared with exact integrals and an
+exact optimum.
+"""
 
 import casadi
 import numpy as np
@@ -12,7 +14,11 @@ from serpentail.planning.nlp.node import Layout, Node
 from serpentail.planning.nlp.rules import MOST_DEGREE, rule
 from serpentail.planning.nlp.transcription import collocate, places
 
-SCHEMES = [("trapezoidal", None), ("hermite-simpson", None), *(("lobatto", d) for d in range(1, MOST_DEGREE + 1))]
+SCHEMES = [
+    ("trapezoidal", None),
+    ("hermite-simpson", None),
+    *(("lobatto", d) for d in range(1, MOST_DEGREE + 1)),
+]
 SCHEMES += [("radau", d) for d in range(1, MOST_DEGREE + 1)]
 every_rule = pytest.mark.parametrize(("name", "degree"), SCHEMES)
 
@@ -40,19 +46,25 @@ def test_defects_vanish_for_polynomials(name, degree):
 def test_known_rules():
     np.testing.assert_allclose(rule("trapezoidal").slopes, [[0.5, 0.5]], atol=1e-15)
     simpson = rule("hermite-simpson")
-    np.testing.assert_allclose(simpson.slopes, [[5 / 24, 1 / 3, -1 / 24], [1 / 6, 2 / 3, 1 / 6]], atol=1e-15)
+    np.testing.assert_allclose(
+        simpson.slopes, [[5 / 24, 1 / 3, -1 / 24], [1 / 6, 2 / 3, 1 / 6]], atol=1e-15
+    )
     np.testing.assert_allclose(rule("radau", 2).nodes, [1 / 3, 1], atol=1e-15)
 
 
 @pytest.mark.parametrize(
-    ("name", "degree"), [("midpoint", None), ("radau", 0), ("radau", 6), ("radau", 2.0), ("trapezoidal", 3)]
+    ("name", "degree"),
+    [("midpoint", None), ("radau", 0), ("radau", 6), ("radau", 2.0), ("trapezoidal", 3)],
 )
 def test_unknown_rules_are_refused(name, degree):
-    with pytest.raises(st.PlanningError, match="rule: value 'midpoint'" if name == "midpoint" else "degree: value"):
+    with pytest.raises(
+        st.PlanningError, match="rule: value 'midpoint'" if name == "midpoint" else "degree: value"
+    ):
         rule(name, degree)
 
 
-# A harmonic oscillator x_ddot = u - x, brought from rest at 0 to rest at 1 within T with the least effort.
+# A harmonic oscillator x_ddot = u - x, brought from rest at 0 to rest at 1 within T with the
+# least effort.
 
 T = 2.0
 
@@ -61,7 +73,10 @@ def least_effort() -> float:
     """d^T W^-1 d with the Gramian W of the oscillator, by quadrature far beyond rounding."""
     A, b = np.array([[0.0, 1.0], [-1.0, 0.0]]), np.array([0.0, 1.0])
     x, w = np.polynomial.legendre.leggauss(40)
-    W = sum(weight * np.outer(expm(A * t) @ b, expm(A * t) @ b) for t, weight in zip(T * (x + 1) / 2, w, strict=True))
+    W = sum(
+        weight * np.outer(expm(A * t) @ b, expm(A * t) @ b)
+        for t, weight in zip(T * (x + 1) / 2, w, strict=True)
+    )
     return float(np.linalg.solve(T / 2 * W, [1, 0])[0])
 
 
@@ -99,7 +114,12 @@ def found_effort(name, degree, intervals) -> float:
 
 @pytest.mark.parametrize(
     ("name", "degree", "coarse", "order"),
-    [("trapezoidal", None, 16, 2), ("hermite-simpson", None, 6, 4), ("radau", 2, 8, 3), ("radau", 3, 4, 5)],
+    [
+        ("trapezoidal", None, 16, 2),
+        ("hermite-simpson", None, 6, 4),
+        ("radau", 2, 8, 3),
+        ("radau", 3, 4, 5),
+    ],
 )
 def test_optimum_converges_at_the_order_of_the_rule(name, degree, coarse, order):
     errors = [abs(found_effort(name, degree, n) - least_effort()) for n in (coarse, 2 * coarse)]

@@ -1,1 +1,3 @@
-"""Independent references, one per rigid-body library, that the generated models are compared with."""
+"""Independent references, one per rigid-body library, that the generated models are compared
+with.
+"""

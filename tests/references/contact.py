@@ -1,6 +1,8 @@
-"""Contact in plain NumPy: a state and parameters go in, points, velocities, Jacobians, forces and stiffness come out.
+"""Contact in plain NumPy: a state and parameters go in, points, velocities, Jacobians, forces and
+stiffness come out.
 
-Every formula also takes complex numbers: velocities and Jacobians are complex steps of the points' places.
+Every formula also takes complex numbers: velocities and Jacobians are complex steps of the points'
+places.
 """
 
 import numpy as np
@@ -61,7 +63,9 @@ def articulated(parameters, q_t, links):
 
 
 def continuum(parameters, q_t, samples):
-    """Equally spaced points of every arc, in the torso frame: Gauss-Legendre quadrature of the tangent."""
+    """Equally spaced points of every arc, in the torso frame: Gauss-Legendre quadrature of the
+    tangent.
+    """
     R, P, out = np.eye(3), np.array(parameters["tail_mount"]), []
     length = parameters["tail_length"] / (len(q_t) // 2)
     nodes, weights = np.polynomial.legendre.leggauss(12)
@@ -85,7 +89,9 @@ class Contacts:
         self.friction, self.nv = model.manifest["scene"]["friction"], model.nv
 
     def places(self, R, q_t, legs):
-        """All points in the torso frame; the torso's lowest is a point of it, so it has no derivative."""
+        """All points in the torso frame; the torso's lowest is a point of it, so it has no
+        derivative.
+        """
         P, out = self.parameters, []
         if "feet" in self.groups:
             out += feet(P, legs)
@@ -110,12 +116,17 @@ class Contacts:
 
     def jacobians(self, q, legs):
         """d(velocity)/dv, (K, 3, nv): the legs' rates have no share in it."""
-        return np.moveaxis([self.positions(q, legs, unit).imag / STEP for unit in np.eye(self.nv)], 0, 2)
+        return np.moveaxis(
+            [self.positions(q, legs, unit).imag / STEP for unit in np.eye(self.nv)], 0, 2
+        )
 
     def laws(self, q, v, bristles, legs):
         """Forces (K, 3) and bristle rates (2K,)."""
         places, motion = self.positions(q, legs).real, self.velocities(q, v, legs)
-        found = [self.law(*one) for one in zip(places, motion, np.reshape(bristles, (-1, 2)), strict=True)]
+        found = [
+            self.law(*one)
+            for one in zip(places, motion, np.reshape(bristles, (-1, 2)), strict=True)
+        ]
         return np.array([f for f, _ in found]), np.concatenate([rate for _, rate in found])
 
     def law(self, place, velocity, bristle, bounding=lambda normal: normal):
@@ -149,7 +160,8 @@ class Contacts:
         return np.where(np.abs(trial.real) <= limit.real, trial, np.sign(trial.real) * limit)
 
     def slopes(self, place, velocity, bristle, share):
-        """Derivatives of force (3) and bristle rate (2) by place, velocity (3 each) and bristle (2), by complex steps.
+        """Derivatives of force (3) and bristle rate (2) by place, velocity (3 each) and bristle
+        (2), by complex steps.
 
         share: of how friction's bound moves with the load, which a W-method may leave out.
         """
@@ -158,14 +170,17 @@ class Contacts:
             x = np.concatenate([place, velocity, bristle]).astype(complex)
             x[k] += 1j * STEP
             bound = self.normal(-place[2], -velocity[2])
-            force, rate = self.law(x[:3], x[3:6], x[6:], lambda normal: bound + share * (normal - bound))
+            force, rate = self.law(
+                x[:3], x[3:6], x[6:], lambda normal: bound + share * (normal - bound)
+            )
             return np.concatenate([force, rate]).imag / STEP
 
         J = np.array([found(k) for k in range(8)]).T
         return J[:, :3], J[:, 3:6], J[:, 6:]
 
     def jacobian(self, state, H, damping, gains, share=1.0):
-        """J of the rates of (q in its tangent space, v, bristles), of contact, joint damping and tracking gains.
+        """J of the rates of (q in its tangent space, v, bristles), of contact, joint damping and
+        tracking gains.
 
         state: (q, v, bristles, legs).
         """
@@ -174,7 +189,9 @@ class Contacts:
         nv, count = self.nv, len(bristles)
         by_q, by_v, by_u = np.zeros((nv, nv)), np.zeros((nv, nv)), np.zeros((nv, 2 * count))
         u_q, u_v, u_u = (np.zeros((2 * count, size)) for size in (nv, nv, 2 * count))
-        points = zip(self.positions(q, legs).real, self.velocities(q, v, legs), bristles, strict=True)
+        points = zip(
+            self.positions(q, legs).real, self.velocities(q, v, legs), bristles, strict=True
+        )
         for k, (J, point) in enumerate(zip(self.jacobians(q, legs), points, strict=True)):
             by_place, by_velocity, by_bristle = self.slopes(*point, share)
             own = slice(2 * k, 2 * k + 2)

@@ -1,4 +1,6 @@
-"""From parameters and (m, n) to the articulated tail's dynamics, by the paper's recursion to 40 digits."""
+"""From parameters and (m, n) to the articulated tail's dynamics, by the paper's recursion to 40
+digits.
+"""
 
 from itertools import pairwise
 from typing import NamedTuple
@@ -20,7 +22,9 @@ class Body(NamedTuple):
 
 
 class ExactChain:
-    """Sums over bodies of full Jacobians and wrenches; float64 in, float64 rounded from many digits out."""
+    """Sums over bodies of full Jacobians and wrenches; float64 in, float64 rounded from many digits
+    out.
+    """
 
     def __init__(self, parameters, segments, links, digits=40):
         """Open a private context of that many digits and read the parameters exactly."""
@@ -64,7 +68,9 @@ class ExactChain:
         """(kinetic, potential), the potential sum m g z."""
         bodies, kinetic, potential = self._bodies(q), self.mp.zero, self.mp.zero
         for body, (velocity, omega) in zip(bodies, self._velocities(bodies, v), strict=True):
-            kinetic += body.mass * _dot(velocity, velocity) + _dot(omega, _times(body.inertia, omega))
+            kinetic += body.mass * _dot(velocity, velocity) + _dot(
+                omega, _times(body.inertia, omega)
+            )
             potential += body.mass * _dot(self.gravity, body.com)
         return float(kinetic / 2), float(potential)
 
@@ -95,7 +101,9 @@ class ExactChain:
         q = self._exact(q)
         axes, joint = self._torso_axes(q[3:7]), q[:3]
         inertia = _world_inertia(axes, self.torso_inertia)
-        bodies = [Body(self.torso_mass, inertia, axes, joint, self.zero, _times(axes, self.mount), 0)]
+        bodies = [
+            Body(self.torso_mass, inertia, axes, joint, self.zero, _times(axes, self.mount), 0)
+        ]
         for segment in range(1, self.segments + 1):
             relative = self._joint_rotation(*q[5 + 2 * segment : 7 + 2 * segment])
             for _ in range(self.links):
@@ -106,7 +114,10 @@ class ExactChain:
 
     def _link(self, axes, joint, segment):
         """The link that hangs along -y_j from its joint (Eqs. 13, 15, A13)."""
-        to_com, to_next = _scaled(-self.link_length / 2, axes[1]), _scaled(-self.link_length, axes[1])
+        to_com, to_next = (
+            _scaled(-self.link_length / 2, axes[1]),
+            _scaled(-self.link_length, axes[1]),
+        )
         inertia = _world_inertia(axes, self.link_inertia)
         return Body(self.link_mass, inertia, axes, _plus(joint, to_com), to_com, to_next, segment)
 
@@ -125,7 +136,9 @@ class ExactChain:
         return [[cb, ca * sb, sa * sb], [-sb, ca * cb, sa * cb], [self.mp.zero, -sa, ca]]
 
     def _jacobians(self, bodies):
-        """Yield each body's (J_com, J_omega) as columns, those of later segments left out (A5 to A8)."""
+        """Yield each body's (J_com, J_omega) as columns, those of later segments left out (A5 to
+        A8).
+        """
         # the paper's omega_b is R_b omega in v's body components, so J_{0,omega} is [0, R_b, 0]
         joint, angular = self.unit + 3 * [self.zero], 3 * [self.zero] + bodies[0].axes
         yield joint, angular
@@ -145,7 +158,9 @@ class ExactChain:
         for parent, body in pairwise(bodies):
             alpha_dot, beta_dot = v[4 + 2 * body.segment : 6 + 2 * body.segment]
             joint = _plus(joint, _cross(omega, parent.to_next))  # A3
-            omega = _plus(omega, _scaled(alpha_dot, parent.axes[0]), _scaled(beta_dot, body.axes[2]))  # A1
+            omega = _plus(
+                omega, _scaled(alpha_dot, parent.axes[0]), _scaled(beta_dot, body.axes[2])
+            )  # A1
             yield _plus(joint, _cross(omega, body.to_com)), omega  # A2
 
     def _accelerations(self, bodies, omegas, v, v_dot):
@@ -153,9 +168,13 @@ class ExactChain:
         v, v_dot = self._exact(v), self._exact(v_dot)
         joint, omega_dot = v_dot[:3], _times(bodies[0].axes, v_dot[3:6])  # omega x omega = 0
         yield joint, omega_dot
-        for (parent, body), (omega_parent, omega) in zip(pairwise(bodies), pairwise(omegas), strict=True):
+        for (parent, body), (omega_parent, omega) in zip(
+            pairwise(bodies), pairwise(omegas), strict=True
+        ):
             own = slice(4 + 2 * body.segment, 6 + 2 * body.segment)
-            joint = _plus(joint, _point_acceleration(omega_parent, omega_dot, parent.to_next))  # A11
+            joint = _plus(
+                joint, _point_acceleration(omega_parent, omega_dot, parent.to_next)
+            )  # A11
             pitch = _axis_acceleration(parent.axes[0], omega_parent, v[own][0], v_dot[own][0])
             yaw = _axis_acceleration(body.axes[2], omega, v[own][1], v_dot[own][1])
             omega_dot = _plus(omega_dot, pitch, yaw)  # A9
@@ -173,7 +192,10 @@ class ExactChain:
             for row, momentum in enumerate(momenta):
                 for column in range(row + 1):
                     lower[row][column] += self.mp.fdot(columns[column], momentum)
-        return [[lower[max(row, column)][min(row, column)] for column in range(self.nv)] for row in range(self.nv)]
+        return [
+            [lower[max(row, column)][min(row, column)] for column in range(self.nv)]
+            for row in range(self.nv)
+        ]
 
     def _force(self, bodies, v, v_dot):
         """sum_j J_com^T m (v_dot + g) + J_omega^T (I omega_dot + omega~ I omega) (Eqs. 3, 17)."""

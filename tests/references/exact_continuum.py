@@ -1,4 +1,6 @@
-"""From parameters and m to the continuum tail's dynamics, by point masses moved along power series, to 40 digits."""
+"""From parameters and m to the continuum tail's dynamics, by point masses moved along power series,
+to 40 digits.
+"""
 
 from functools import lru_cache
 
@@ -13,9 +15,10 @@ TORSO_ROTATION = range(3, 6)
 class ExactContinuum:
     """Sums over slices at Gauss-Legendre nodes; float64 in, float64 rounded from many digits out.
 
-    A motion is an array of Taylor coefficients in the time t, up to t^2. It starts at q with the rates v and v_dot;
-    the rate of the motion along one coordinate is a column of the Jacobian. The quadrature by 24 nodes is wrong by
-    2e-38 at a bend of 2 pi per segment, by 3e-24 at 4 pi; longer turns want more nodes.
+    A motion is an array of Taylor coefficients in the time t, up to t^2. It starts at q with the
+    rates v and v_dot; the rate of the motion along one coordinate is a column of the Jacobian. The
+    quadrature by 24 nodes is wrong by 2e-38 at a bend of 2 pi per segment, by 3e-24 at 4 pi; longer
+    turns want more nodes.
     """
 
     def __init__(self, parameters, segments, digits=40, nodes=24):
@@ -24,7 +27,9 @@ class ExactContinuum:
         self.nq, self.nv = 7 + 2 * segments, 6 + 2 * segments
         self.mp = mpmath.mp.clone()
         self.mp.dps = digits
-        self._stumpff_taylor = lru_cache(maxsize=4096)(self._stumpff_taylor)  # the same bends in every motion
+        self._stumpff_taylor = lru_cache(maxsize=4096)(
+            self._stumpff_taylor
+        )  # the same bends in every motion
         self._jacobian = lru_cache(maxsize=64)(self._jacobian)
         torso_mass, tail_mass, tail_length = (
             self.mp.mpf(parameters[name]) for name in ("torso_mass", "tail_mass", "tail_length")
@@ -73,7 +78,9 @@ class ExactContinuum:
         return _rounded(linear), _rounded(angular + spin)
 
     def tail_points(self, q, samples):
-        """World positions (m samples + 1, 3) of equally spaced slices, from the mount to the tip."""
+        """World positions (m samples + 1, 3) of equally spaced slices, from the mount to the
+        tip.
+        """
         fractions = [self.mp.mpf(sample) / samples for sample in range(1, samples + 1)]
         frames = list(self._frames(*self._path(q)))
         slices = [self._slices(*frame, fractions)[0] for frame in frames]
@@ -81,7 +88,12 @@ class ExactContinuum:
 
     def _exact(self, vector):
         """The entries, float64 or already numbers of this continuum's context, as such numbers."""
-        return np.array([entry if isinstance(entry, self.mp.mpf) else self.mp.mpf(float(entry)) for entry in vector])
+        return np.array(
+            [
+                entry if isinstance(entry, self.mp.mpf) else self.mp.mpf(float(entry))
+                for entry in vector
+            ]
+        )
 
     def _jacobian(self, q):
         """J^T (nv, 3 points): the rates of all points in the motion along each coordinate."""
@@ -94,7 +106,9 @@ class ExactContinuum:
         return mass_matrix
 
     def _force(self, jacobian, q, v, v_dot):
-        """sum_x J_x^T m_x (p_ddot_x + g) + J_omega^T (I_b omega_dot + omega~ I_b omega) (Eqs. 3, 19)."""
+        """sum_x J_x^T m_x (p_ddot_x + g) + J_omega^T (I_b omega_dot + omega~ I_b omega) (Eqs. 3,
+        19).
+        """
         accelerations = 2 * self._points(q, v, v_dot)[2]
         force = jacobian @ (self.masses[:, None] * (accelerations + self.gravity)).ravel()
         omega, omega_dot = self._exact(v[3:6]), self._exact(v_dot[3:6])
@@ -108,13 +122,18 @@ class ExactContinuum:
         return np.concatenate([origin[:, None], *slices], axis=1)
 
     def _path(self, q, *rates):
-        """p + t p_dot + t^2 p_ddot / 2, the bends likewise, and R_b Exp(t omega + t^2 omega_dot / 2)."""
+        """p + t p_dot + t^2 p_ddot / 2, the bends likewise, and R_b Exp(t omega + t^2 omega_dot /
+        2).
+        """
         # up to t^2: its second derivative at t = 0 is R_b (omega~ omega~ + omega_dot~)
-        rates = [self._exact(rate) / self.mp.factorial(order) for order, rate in enumerate(rates, 1)]
+        rates = [
+            self._exact(rate) / self.mp.factorial(order) for order, rate in enumerate(rates, 1)
+        ]
         position = self._exact(q)
         starts = (position[:3], 0 * position[:3], position[7:])
         origin, turn, bends = (
-            np.array([start, *(rate[block] for rate in rates)]) for start, block in zip(starts, BLOCKS, strict=True)
+            np.array([start, *(rate[block] for rate in rates)])
+            for start, block in zip(starts, BLOCKS, strict=True)
         )
         return origin, _product([self._torso_axes(q)], self._rotation(turn)), bends
 
@@ -122,7 +141,9 @@ class ExactContinuum:
         """R_b = I + 2 (w e~ + e~ e~) / |quaternion|^2, with the quaternion (w, e)."""
         quaternion = self._exact(q[3:7])
         cross = _skew(quaternion[1:])
-        return np.eye(3) + (cross * quaternion[0] + cross @ cross) * (2 / np.dot(quaternion, quaternion))
+        return np.eye(3) + (cross * quaternion[0] + cross @ cross) * (
+            2 / np.dot(quaternion, quaternion)
+        )
 
     def _frames(self, origin, axes, bends):
         """Yield each segment's (root, R_i, [a_i, b_i]) (Eqs. 33, 34)."""
@@ -133,11 +154,16 @@ class ExactContinuum:
             axes = _product(axes, self._rotation(np.stack([a, 0 * a, b], axis=1)))
 
     def _slices(self, root, axes, bend, fractions):
-        """p_x = root + R_i L (-sigma y + gamma (b x_axis - a z_axis)) at fractions x of a segment (Eq. 20)."""
+        """p_x = root + R_i L (-sigma y + gamma (b x_axis - a z_axis)) at fractions x of a segment
+        (Eq. 20).
+        """
         # sigma = sin(theta x) / theta and gamma = (1 - cos(theta x)) / theta^2
         a, b = bend
         argument = _product(a, a) + _product(b, b)
-        sigma, gamma = (np.stack([self._stumpff(k, argument * x**2) * x**k for x in fractions], axis=1) for k in (1, 2))
+        sigma, gamma = (
+            np.stack([self._stumpff(k, argument * x**2) * x**k for x in fractions], axis=1)
+            for k in (1, 2)
+        )
         local = np.stack([_product(b, gamma), -sigma, -_product(a, gamma)], axis=2)
         return root + _product(local * self.segment_length, axes.transpose(0, 2, 1))
 
@@ -159,7 +185,9 @@ class ExactContinuum:
 
     def _stumpff_taylor(self, k, argument):
         """(c_k, c_k', c_k'' / 2) of c_k(z) = sum_j (-z)^j / (2 j + k)!, term by term."""
-        guard = 20 + int(1.5 * self.mp.sqrt(argument))  # bits; the largest term is below exp(sqrt(z))
+        guard = 20 + int(
+            1.5 * self.mp.sqrt(argument)
+        )  # bits; the largest term is below exp(sqrt(z))
         with self.mp.workprec(self.mp.prec + guard):
             return [self._stumpff_derivative(k, argument, order) for order in range(3)]
 
@@ -174,7 +202,9 @@ class ExactContinuum:
         return total
 
     def _gauss_legendre(self, count):
-        """Nodes and weights on [0, 1]: the roots of P_n, by Newton's steps from cos(pi (j - 1/4) / (n + 1/2))."""
+        """Nodes and weights on [0, 1]: the roots of P_n, by Newton's steps from cos(pi (j - 1/4) /
+        (n + 1/2)).
+        """
         with self.mp.workprec(self.mp.prec + 20):
             angles = [self.mp.pi * (4 * j - 1) / (4 * count + 2) for j in range(1, count + 1)]
             roots = np.array([self.mp.cos(angle) for angle in angles])
@@ -195,9 +225,14 @@ def _skew(a):
 
 
 def _product(a, b):
-    """Coefficients c_k = sum_i a_i b_{k-i} of a product of power series, cut like the longer; one may be constant."""
+    """Coefficients c_k = sum_i a_i b_{k-i} of a product of power series, cut like the longer; one
+    may be constant.
+    """
     order = max(len(a), len(b))
-    terms = [[np.dot(a[i], b[k - i]) for i in range(k + 1) if i < len(a) and k - i < len(b)] for k in range(order)]
+    terms = [
+        [np.dot(a[i], b[k - i]) for i in range(k + 1) if i < len(a) and k - i < len(b)]
+        for k in range(order)
+    ]
     return np.array([sum(row[1:], row[0]) for row in terms])
 
 

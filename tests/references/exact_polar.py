@@ -1,4 +1,6 @@
-"""From states in polar angles (phi, theta) to the same states in bend components, exactly, for `ExactContinuum`."""
+"""From states in polar angles (phi, theta) to the same states in bend components, exactly, for
+`ExactContinuum`.
+"""
 
 import numpy as np
 
@@ -6,10 +8,12 @@ from tests.references.exact_continuum import ExactContinuum
 
 
 class ExactPolar:
-    """Moves states, forces and accelerations between q_t = (phi_1, theta_1, ...) and (a_1, b_1, ...), to many digits.
+    """Moves states, forces and accelerations between q_t = (phi_1, theta_1, ...) and (a_1, b_1,
+    ...), to many digits.
 
-    a = -theta cos(phi), b = theta sin(phi); with the Jacobian J of that map the tail's inertia is J^T H J, a force on
-    the rates of the angles J^T times the one on (a_dot, b_dot), and v_dot of the bend J v_dot + J_dot v.
+    a = -theta cos(phi), b = theta sin(phi); with the Jacobian J of that map the tail's inertia is
+    J^T H J, a force on the rates of the angles J^T times the one on (a_dot, b_dot), and v_dot of
+    the bend J v_dot + J_dot v.
     """
 
     def __init__(self, parameters, segments, digits=50):
@@ -64,4 +68,9 @@ class ExactPolar:
 
     def _exact(self, vector):
         """The entries as numbers of many digits."""
-        return np.array([entry if isinstance(entry, self.mp.mpf) else self.mp.mpf(float(entry)) for entry in vector])
+        return np.array(
+            [
+                entry if isinstance(entry, self.mp.mpf) else self.mp.mpf(float(entry))
+                for entry in vector
+            ]
+        )

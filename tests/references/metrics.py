@@ -1,4 +1,6 @@
-"""From a mass matrix or a (force, torque, tail) vector, and its reference, to an error without units."""
+"""From a mass matrix or a (force, torque, tail) vector, and its reference, to an error without
+units.
+"""
 
 import numpy as np
 
@@ -13,7 +15,9 @@ def mass_matrix_error(mass, mass_ref):
 
 
 def block_error(x, x_ref):
-    """Largest over (force, torque, tail) of max|d| / max|ref|; a zero block is scaled by the others."""
+    """Largest over (force, torque, tail) of max|d| / max|ref|; a zero block is scaled by the
+    others.
+    """
     x, x_ref = np.asarray(x), np.asarray(x_ref)
     floor = NEGLIGIBLE * np.max(np.abs(x_ref)) or 1.0
     return float(max(_scaled_error(x[block], x_ref[block], floor) for block in BLOCKS))
@@ -22,11 +26,14 @@ def block_error(x, x_ref):
 def force_error(force, force_ref, mass_ref):
     """Largest |dC_i| / sqrt(H_ii) over the largest |C_i| / sqrt(H_ii).
 
-    C_i sums products of a Jacobian's column with accelerations, both weighted by masses: by Cauchy and Schwarz no sum
-    of its terms is above sqrt(H_ii) times the norm of the latter, however much they cancel.
+    C_i sums products of a Jacobian's column with accelerations, both weighted by masses: by Cauchy
+    and Schwarz no sum of its terms is above sqrt(H_ii) times the norm of the latter, however much
+    they cancel.
     """
     scale = np.sqrt(np.diag(mass_ref))
-    return float(np.max(np.abs(force - force_ref) / scale) / (np.max(np.abs(force_ref) / scale) or 1.0))
+    return float(
+        np.max(np.abs(force - force_ref) / scale) / (np.max(np.abs(force_ref) / scale) or 1.0)
+    )
 
 
 def equilibrated_condition(mass):

@@ -1,4 +1,6 @@
-"""From parameters and (m, n) to the articulated tail's dynamics, by MuJoCo on a reduced chain of hinges."""
+"""From parameters and (m, n) to the articulated tail's dynamics, by MuJoCo on a reduced chain of
+hinges.
+"""
 
 import mujoco
 import numpy as np
@@ -6,7 +8,9 @@ from scipy.linalg import cho_factor, cho_solve
 
 
 class MujocoChain:
-    """A free joint with 2 m n unlimited hinges, no constraint of any kind, reduced to nv = 6 + 2m by G."""
+    """A free joint with 2 m n unlimited hinges, no constraint of any kind, reduced to nv = 6 + 2m
+    by G.
+    """
 
     def __init__(self, parameters, segments, links):
         """Compile the free chain and index which reduced coordinate turns each hinge."""
@@ -68,7 +72,9 @@ class MujocoChain:
     def tail_point_jacobians(self, q):
         """J (N+1, 3, nv) of the tail points, world axes: d(point)/dt = J v."""
         self._evaluate(q)
-        return np.array([self._full_jacobian(site) @ self.reduction for site in range(self.model.nsite)])
+        return np.array(
+            [self._full_jacobian(site) @ self.reduction for site in range(self.model.nsite)]
+        )
 
     def _full_jacobian(self, site):
         """Linear rows of one point's Jacobian on the free chain, world axes."""
@@ -109,10 +115,14 @@ def _build(parameters, count):
 
 
 def _bare_spec(gravity):
-    """A description in radians whose compiler leaves the given masses, inertias and frames alone."""
+    """A description in radians whose compiler leaves the given masses, inertias and frames
+    alone.
+    """
     spec = mujoco.MjSpec()
     spec.option.gravity = (0.0, 0.0, -gravity)
-    spec.option.disableflags = mujoco.mjtDisableBit.mjDSBL_CONSTRAINT | mujoco.mjtDisableBit.mjDSBL_CONTACT
+    spec.option.disableflags = (
+        mujoco.mjtDisableBit.mjDSBL_CONSTRAINT | mujoco.mjtDisableBit.mjDSBL_CONTACT
+    )
     compiler = spec.compiler
     compiler.degree = compiler.balanceinertia = compiler.alignfree = compiler.fusestatic = False
     compiler.boundmass = compiler.boundinertia = 0.0
@@ -139,13 +149,17 @@ def _add_link(parent, origin, parameters, count):
 
 
 def _add_link_mass(link, parameters, count):
-    """One link's mass with its COM mid-link: the given diagonal, or MuJoCo's own ellipsoid (r, L/2, r)."""
+    """One link's mass with its COM mid-link: the given diagonal, or MuJoCo's own ellipsoid (r, L/2,
+    r).
+    """
     mass, half = parameters["tail_mass"] / count, parameters["tail_length"] / count / 2
     diagonal = parameters.get("link_inertia")
     if diagonal is None:
         radius = parameters["link_radius"]
         size = (radius, half, radius)
-        link.add_geom(type=mujoco.mjtGeom.mjGEOM_ELLIPSOID, size=size, pos=(0.0, -half, 0.0), mass=mass)
+        link.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_ELLIPSOID, size=size, pos=(0.0, -half, 0.0), mass=mass
+        )
     else:
         _set_inertia(link, mass, (0.0, -half, 0.0), diagonal)
 

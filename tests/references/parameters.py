@@ -1,4 +1,6 @@
-"""The paper's Table 1 in SI units, and seeded states (q, v, v_dot, tau) of a tail with m segments."""
+"""The paper's Table 1 in SI units, and seeded states (q, v, v_dot, tau) of a tail with m
+segments.
+"""
 
 from math import pi
 
@@ -36,7 +38,9 @@ def _quaternions(rng, count):
 def _blocks(rng, count, segments, scales):
     """Rows of a linear, an angular and a tail part, each uniform within its own scale."""
     sizes = (3, 3, 2 * segments)
-    return np.hstack([rng.uniform(-s, s, (count, size)) for s, size in zip(scales, sizes, strict=True)])
+    return np.hstack(
+        [rng.uniform(-s, s, (count, size)) for s, size in zip(scales, sizes, strict=True)]
+    )
 
 
 def _random_angles(rng, shape):

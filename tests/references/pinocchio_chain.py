@@ -1,4 +1,6 @@
-"""From parameters and (m, n) to the articulated tail's dynamics, by Pinocchio on a reduced revolute chain."""
+"""From parameters and (m, n) to the articulated tail's dynamics, by Pinocchio on a reduced revolute
+chain.
+"""
 
 import numpy as np
 import pinocchio as pin
@@ -19,7 +21,8 @@ class PinocchioChain:
     def mass_matrix(self, q):
         """H = T^T H_full T."""
         full_q, transform = self._full_configuration(q)
-        # LOCAL: WORLD sums inertias about the world origin, which costs two digits when p is a metre away
+        # LOCAL: WORLD sums inertias about the world origin, which costs two digits when p
+        # is a metre away
         upper = np.triu(pin.crba(self.model, self.data, full_q, pin.Convention.LOCAL))
         full_mass = upper + np.triu(upper, 1).T
         return transform.T @ full_mass @ transform
@@ -33,7 +36,9 @@ class PinocchioChain:
         full_q, transform = self._full_configuration(q)
         full_v = transform @ v
         full_v_dot = transform @ v_dot
-        full_v_dot[:3] -= np.cross(v[3:6], full_v[:3])  # d(R^T p_dot)/dt = R^T p_ddot - omega x R^T p_dot
+        full_v_dot[:3] -= np.cross(
+            v[3:6], full_v[:3]
+        )  # d(R^T p_dot)/dt = R^T p_ddot - omega x R^T p_dot
         return transform.T @ pin.rnea(self.model, self.data, full_q, full_v, full_v_dot)
 
     def forward_dynamics(self, q, v, tau, generalized_force=None):
@@ -73,7 +78,9 @@ class PinocchioChain:
         return pin.getFrameJacobian(self.model, self.data, point, pin.LOCAL_WORLD_ALIGNED)[:3]
 
     def _full_configuration(self, q):
-        """q_full, its quaternion (x, y, z, w), and T with v_full = T v = [R^T p_dot, omega, G q_t_dot]."""
+        """q_full, its quaternion (x, y, z, w), and T with v_full = T v = [R^T p_dot, omega, G
+        q_t_dot].
+        """
         w, x, y, z = q[3:7] / np.linalg.norm(q[3:7])
         transform = np.zeros((self.model.nv, self.nv))
         transform[:3, :3] = pin.Quaternion(w, x, y, z).toRotationMatrix().T
@@ -88,7 +95,10 @@ def _build(parameters, count):
     model.gravity.linear = np.array([0.0, 0.0, -parameters["gravity"]])
     joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "torso")
     model.appendBodyToJoint(joint, _torso_inertia(parameters), pin.SE3.Identity())
-    step, inertia = np.array([0.0, -parameters["tail_length"] / count, 0.0]), _link_inertia(parameters, count)
+    step, inertia = (
+        np.array([0.0, -parameters["tail_length"] / count, 0.0]),
+        _link_inertia(parameters, count),
+    )
     points, origin = [], np.array(parameters["tail_mount"], dtype=float)
     for index in range(count):
         points.append(_add_point(model, joint, origin, f"joint_{index}"))
@@ -118,7 +128,9 @@ def _torso_inertia(parameters):
 
 
 def _link_inertia(parameters, count):
-    """One link's inertia, its COM mid-link: the given diagonal, or Pinocchio's own ellipsoid (r, L/2, r)."""
+    """One link's inertia, its COM mid-link: the given diagonal, or Pinocchio's own ellipsoid (r,
+    L/2, r).
+    """
     mass, half = parameters["tail_mass"] / count, parameters["tail_length"] / count / 2
     diagonal = parameters.get("link_inertia")
     if diagonal is None:

@@ -1,4 +1,6 @@
-"""Scenes with a table [simulate]: the paper's motions come out of them, and what is wrong in one is named."""
+"""Scenes with a table [simulate]: the paper's motions come out of them, and what is wrong in one is
+named.
+"""
 
 import json
 import re
@@ -46,7 +48,9 @@ def told(name, **changes):
 
 @pytest.fixture
 def scene(tmp_path, monkeypatch):
-    """Return a function from text that is added to, or put for other text of, a simple scene to its file's path."""
+    """Return a function from text that is added to, or put for other text of, a simple scene to its
+    file's path.
+    """
     monkeypatch.chdir(tmp_path)
     text = SIMPLE.replace('kind = "art', 'name = "simple"\nkind = "art')
     Path("generated").mkdir()
@@ -81,7 +85,9 @@ def test_kick_is_the_papers():
         assert summary[name] == pytest.approx(value, abs=tolerance), name
     at = int(np.argmin(np.abs(motion.t - 0.5)))
     pitch = st.pitch_roll_yaw(motion.q, unwrap=True)[:, 0]
-    assert pitch[at] == pytest.approx(3.80, abs=0.01) and motion.v[at, 3] == pytest.approx(26.2, abs=0.1)
+    assert pitch[at] == pytest.approx(3.80, abs=0.01) and motion.v[at, 3] == pytest.approx(
+        26.2, abs=0.1
+    )
     assert pitch[np.argmin(np.abs(motion.t - 1.08))] == pytest.approx(18.7, abs=0.05)
     assert summary["pitch_at_end_rad"] == pitch[-1] and summary["method"] == "ros34pw2"
 
@@ -89,7 +95,9 @@ def test_kick_is_the_papers():
 def test_kick_starts_at_rest():
     scene, motion, _ = told("kick")
     before = motion.t < 0.4
-    assert np.abs(motion.q[before] - scene.q0).max() < 1e-3 and np.abs(motion.v[before]).max() < 1e-2
+    assert (
+        np.abs(motion.q[before] - scene.q0).max() < 1e-3 and np.abs(motion.v[before]).max() < 1e-2
+    )
     assert np.degrees(st.pitch_roll_yaw(scene.q0)[0]) == pytest.approx(12.8, abs=0.2)
     loads = motion.contact.forces[0, :3, 2]
     assert loads[:2].min() > 5 * loads[2] > 0  # on A and M
@@ -117,7 +125,9 @@ def test_self_recovery_stands(name):
     scene, _, summary = told(name)
     assert scene.q0[2] == pytest.approx(0.0167, abs=2e-4)
     assert st.rotation_matrix(scene.q0[3:7])[2, 2] < -0.99
-    assert summary["standing_end"] is True and summary["upright_end"] == pytest.approx(0.976, abs=2e-3)
+    assert summary["standing_end"] is True and summary["upright_end"] == pytest.approx(
+        0.976, abs=2e-3
+    )
     assert told(name, controller={"kind": "damping", "damping": 1e-3})[2]["upright_end"] < 0
 
 
@@ -181,12 +191,19 @@ def test_a_settled_start_is_at_rest(scene):
 def test_a_saved_motion_is_a_reference(scene, tmp_path):
     flight = st.scenario(scene()).simulate()
     flight.save(tmp_path / "flight.npz")
-    found = st.scenario(scene('[simulate.reference]\nfile = "flight.npz"\n[simulate.controller]\nkind = "pfl"\n'))
-    np.testing.assert_allclose(found.controller.curve.at(0.01)[0], flight.resample([0.01]).tail[0], atol=1e-9)
+    found = st.scenario(
+        scene('[simulate.reference]\nfile = "flight.npz"\n[simulate.controller]\nkind = "pfl"\n')
+    )
+    np.testing.assert_allclose(
+        found.controller.curve.at(0.01)[0], flight.resample([0.01]).tail[0], atol=1e-9
+    )
 
 
 def test_moves_follow_each_other():
-    moves = [{"at": 0.4, "delta": -1.3, "rate": 70.0}, {"at": 0.6, "delta": -0.5, "gamma": 3.0, "duration": 0.1}]
+    moves = [
+        {"at": 0.4, "delta": -1.3, "rate": 70.0},
+        {"at": 0.6, "delta": -0.5, "gamma": 3.0, "duration": 0.1},
+    ]
     curve = st.Legs.moves(3.6, -0.2, moves).curve
     values, rates, _ = curve.at([0.0, 0.4, 0.5, 0.65, 1.0])
     np.testing.assert_allclose(values[:, 0], [3.6, 3.6, 3.6, 3.3, 3.0])
@@ -202,35 +219,88 @@ WRONG = [
     ({"duration": "duration = -1.0"}, "", "simulate.duration -1.0: give a number above 0"),
     ({"duration": ""}, "", "simulate.duration: no value: needs seconds"),
     ({"duration": "duration = nan"}, "", "simulate.duration nan"),
-    ({"duration": "duratoin = 1.0"}, "", "simulate: key: value 'duratoin': did you mean 'duration'?"),
+    (
+        {"duration": "duratoin = 1.0"},
+        "",
+        "simulate: key: value 'duratoin': did you mean 'duration'?",
+    ),
     ({"height": "height = -0.05"}, "", r"q0: point \d+ \((tail|feet)\) is .* mm deep at the start"),
     ({"height": "height = nan"}, "", "simulate.start.height nan: give a finite number"),
     ({"height": "heigth = 0.1"}, "", "simulate.start: key: value 'heigth': did you mean 'height'?"),
-    ({"height": "velocity = [1, 2]"}, "", "simulate.start.velocity: value .*: needs three finite numbers"),
-    ({"height": "height = 0.1\nvelocity = [0, 0, 1]\nsettle = {}"}, "", "has no velocity and no rate"),
-    ({"height": "height = 0.1\nsettle = { rounds = 0 }"}, "", "rounds 0: give a whole number from 1"),
-    ({"height": "height = 0.1\nbends = [0.1, 0.2]"}, "", r"bends has shape \(1, 2\): give \(times, 1\)"),
-    ({"gamma": ""}, "", "simulate.legs: value .*: needs gamma, delta"),
-    ({"delta": "delta = -0.26\nmoves = [{ at = 0.1, delta = -1.0 }]"}, "", "needs at, gamma or delta, and one of rate"),
-    ({"delta": "delta = -0.26\nmoves = [{ at = 0.1, delta = -1.0, rate = -1 }]"}, "", r"moves\[0\].rate -1"),
-    ({"delta": "delta = -0.26\nmoves = [{ at = 0.1, delta = -0.26, rate = 1 }]"}, "", "and another angle than before"),
-    ({"delta": "delta = -0.26\nmoves = [{ at = 0.1, dleta = 1, rate = 1 }]"}, "", "did you mean 'delta'?"),
     (
-        {"delta": "delta = 0.0\nmoves = [{at = 0.1, delta = 1.0, duration = 0.2}, {at = 0.2, delta = 0.0, rate = 9}]"},
+        {"height": "velocity = [1, 2]"},
+        "",
+        "simulate.start.velocity: value .*: needs three finite numbers",
+    ),
+    (
+        {"height": "height = 0.1\nvelocity = [0, 0, 1]\nsettle = {}"},
+        "",
+        "has no velocity and no rate",
+    ),
+    (
+        {"height": "height = 0.1\nsettle = { rounds = 0 }"},
+        "",
+        "rounds 0: give a whole number from 1",
+    ),
+    (
+        {"height": "height = 0.1\nbends = [0.1, 0.2]"},
+        "",
+        r"bends has shape \(1, 2\): give \(times, 1\)",
+    ),
+    ({"gamma": ""}, "", "simulate.legs: value .*: needs gamma, delta"),
+    (
+        {"delta": "delta = -0.26\nmoves = [{ at = 0.1, delta = -1.0 }]"},
+        "",
+        "needs at, gamma or delta, and one of rate",
+    ),
+    (
+        {"delta": "delta = -0.26\nmoves = [{ at = 0.1, delta = -1.0, rate = -1 }]"},
+        "",
+        r"moves\[0\].rate -1",
+    ),
+    (
+        {"delta": "delta = -0.26\nmoves = [{ at = 0.1, delta = -0.26, rate = 1 }]"},
+        "",
+        "and another angle than before",
+    ),
+    (
+        {"delta": "delta = -0.26\nmoves = [{ at = 0.1, dleta = 1, rate = 1 }]"},
+        "",
+        "did you mean 'delta'?",
+    ),
+    (
+        {
+            "delta": (
+                "delta = 0.0\nmoves = [{at = 0.1, delta = 1.0, duration = 0.2}, "
+                "{at = 0.2, delta = 0.0, rate = 9}]"
+            )
+        },
         "",
         r"legs.moves\[1\].at: value 0.2: the move before it ends at 0.3 s",
     ),
     ({"delta": "delta = [0.0, 1.0]\ntimes = [1.0, 0.0]"}, "", "Legs: times must increase"),
     ({}, '[simulate.controller]\nkind = "pfl"\n', "tracks a reference: add a table"),
     ({}, '[simulate.controller]\nkind = "pdf"\n', "did you mean 'pfl'?"),
-    ({}, '[simulate.controller]\nkind = "damping"\ndamping = -1.0\n', "damping -1.0: give finite numbers, 0 or above"),
+    (
+        {},
+        '[simulate.controller]\nkind = "damping"\ndamping = -1.0\n',
+        "damping -1.0: give finite numbers, 0 or above",
+    ),
     (
         {},
         '[simulate.controller]\nkind = "damping"\nkp = 1.0\n',
         "key: value 'kp': needs 'kind' or 'damping'",
     ),
-    ({}, '[[simulate.controller]]\nkind = "none"\n', r"simulate.controller\[0\]: .* needs a table with begin"),
-    ({}, "[simulate.reference]\ntimes = [0.0, 0.0]\nbends = [[0.1], [0.2]]\n", "Reference: times must increase"),
+    (
+        {},
+        '[[simulate.controller]]\nkind = "none"\n',
+        r"simulate.controller\[0\]: .* needs a table with begin",
+    ),
+    (
+        {},
+        "[simulate.reference]\ntimes = [0.0, 0.0]\nbends = [[0.1], [0.2]]\n",
+        "Reference: times must increase",
+    ),
     ({}, "[simulate.reference]\ntimes = [0.0]\n", "needs times and bends, or a file"),
     ({}, '[simulate.reference]\nfile = "none.npz"\n', "no trajectory file"),
 ]
@@ -262,9 +332,14 @@ def test_wrong_changes_are_named(scene, changes, words):
 
 
 def test_a_folder_of_another_scene_is_refused(scene):
-    with pytest.raises(st.ModelError, match=r"has contacts = .*: generate it again, `make model SCENE=simple.toml`"):
+    with pytest.raises(
+        st.ModelError, match=r"has contacts = .*: generate it again, `make model SCENE=simple.toml`"
+    ):
         st.scenario(scene(contacts='contacts = ["feet"]'))
-    assert st.scenario(scene(contacts='contacts = ["tail", "feet"]')).model.contacts == {"feet": 6, "tail": 2}
+    assert st.scenario(scene(contacts='contacts = ["tail", "feet"]')).model.contacts == {
+        "feet": 6,
+        "tail": 2,
+    }
 
 
 def test_scene_without_a_motion(scene):
@@ -280,12 +355,26 @@ def test_scene_without_a_motion(scene):
 
 
 def test_simulate_prints_one_json_object(scene, capsys):
-    arguments = ["simulate", scene(), "--set", "mu=0.5", "--set", "duration=0.01", "--save", "a.npz", "--json", "-"]
+    arguments = [
+        "simulate",
+        scene(),
+        "--set",
+        "mu=0.5",
+        "--set",
+        "duration=0.01",
+        "--save",
+        "a.npz",
+        "--json",
+        "-",
+    ]
     assert cli.main(arguments) == 0
     out, err = capsys.readouterr()
     summary = json.loads(out)
     assert out.count("\n") == 1 and not err
-    names = "take_off_s apex_m com_rise_m recontact_s pitch_at_end_rad upright_end peak_foot_force_N steps cpu_s"
+    names = (
+        "take_off_s apex_m com_rise_m recontact_s pitch_at_end_rad upright_end peak_foot_force_N "
+        "steps cpu_s"
+    )
     assert set(names.split()) | {"real_time_factor", "method"} <= set(summary)
     saved = st.Trajectory.load("a.npz")
     assert saved.t[-1] == 0.01 and saved.info["parameters"]["mu"] == 0.5
@@ -299,7 +388,11 @@ def test_simulate_prints_a_table_and_draws(scene, capsys):
 
 @pytest.mark.parametrize(
     ("given", "words"),
-    [("mu=-1", "mu: value -1"), ("mu", "--set mu: needs NAME=VALUE"), ("duration=0", "give a number above 0")],
+    [
+        ("mu=-1", "mu: value -1"),
+        ("mu", "--set mu: needs NAME=VALUE"),
+        ("duration=0", "give a number above 0"),
+    ],
 )
 def test_wrong_sets_are_status_2(scene, capsys, given, words):
     assert cli.main(["simulate", scene(), "--set", given, "--json", "-"]) == 2
@@ -325,8 +418,13 @@ def test_a_scene_that_cannot_be_generated_is_status_2(tmp_path, monkeypatch, cap
 def test_a_flight_is_a_scene_too(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     functions = '["energy", "momentum", "rollout", "tail_points"]'
-    text = f"kind = 'articulated'\nsegments = 1\nlinks = 1\nfunctions = {functions}\n[simulate]\nduration = 0.1\n"
-    Path("tumble.toml").write_text(text + "start = { height = 1.0, velocity = [0, 0, 2], rate = [9, 0, 0] }\n")
+    text = (
+        "kind = 'articulated'\nsegments = 1\nlinks = 1\nfunctions = "
+        f"{functions}\n[simulate]\nduration = 0.1\n"
+    )
+    Path("tumble.toml").write_text(
+        text + "start = { height = 1.0, velocity = [0, 0, 2], rate = [9, 0, 0] }\n"
+    )
     assert cli.main(["simulate", "tumble.toml", "--json", "-", "--film", "tumble.png"]) == 0
     summary = json.loads(capsys.readouterr().out)
     assert summary["method"] == "tsit5" and summary["take_off_s"] is summary["standing_end"] is None

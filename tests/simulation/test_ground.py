@@ -1,4 +1,6 @@
-"""Motion on the ground: the paper's jumps come out, methods agree, and touch-downs and take-offs are found."""
+"""Motion on the ground: the paper's jumps come out, methods agree, and touch-downs and take-offs
+are found.
+"""
 
 from functools import cache
 
@@ -27,12 +29,19 @@ def crouched():
     q = np.zeros(model.nq)
     q[2:5] = 0.0178, np.cos(0.11), np.sin(0.11)
     legs = st.Legs.fixed(GAMMA, CROUCH)
-    return st.simulate(model, q, np.zeros(model.nv), controller=PASSIVE, legs=legs, t_span=1.5, rtol=1e-6)
+    return st.simulate(
+        model, q, np.zeros(model.nv), controller=PASSIVE, legs=legs, t_span=1.5, rtol=1e-6
+    )
 
 
 def kick(model=None, **settings):
     still = crouched()
-    settings = {"controller": PASSIVE, "legs": KICK, "t_span": 1.2, "bristles0": still.contact.bristles[-1]} | settings
+    settings = {
+        "controller": PASSIVE,
+        "legs": KICK,
+        "t_span": 1.2,
+        "bristles0": still.contact.bristles[-1],
+    } | settings
     return st.simulate(model or rat("feet"), still.q[-1], 0 * still.v[-1], **settings)
 
 
@@ -52,11 +61,15 @@ def test_the_kick_is_the_papers():
     take_off, touch_down = flight.events
     assert (take_off["kind"], touch_down["kind"]) == ("take_off", "touch_down")
     assert take_off["group"] == touch_down["group"] == "feet"
-    assert take_off["time"] == pytest.approx(0.404, abs=1e-3) and touch_down["time"] == pytest.approx(1.095, abs=2e-3)
+    assert take_off["time"] == pytest.approx(0.404, abs=1e-3) and touch_down[
+        "time"
+    ] == pytest.approx(1.095, abs=2e-3)
     apex = flight.q[:, 2].max()
     assert apex == pytest.approx(0.632, abs=2e-3)
     at = int(np.argmin(np.abs(flight.t - 0.5)))
-    assert flight.v[at, 3] == pytest.approx(26.2, abs=0.1) and flight.tail[at, 0] == pytest.approx(-0.558, abs=2e-3)
+    assert flight.v[at, 3] == pytest.approx(26.2, abs=0.1) and flight.tail[at, 0] == pytest.approx(
+        -0.558, abs=2e-3
+    )
     airborne = (flight.t > take_off["time"]) & (flight.t < touch_down["time"])
     assert not flight.contact.forces[airborne].any() and flight.contact.forces[flight.t < 0.4].any()
 
@@ -130,7 +143,11 @@ def test_a_dropped_tail_and_torso_touch_down():
     q = np.zeros(model.nq)
     q[2:4] = 0.2, 1
     flight = st.simulate(model, q, np.zeros(model.nv), controller=PASSIVE, t_span=1.0)
-    first = {event["group"]: event["time"] for event in reversed(flight.events) if event["kind"] == "touch_down"}
+    first = {
+        event["group"]: event["time"]
+        for event in reversed(flight.events)
+        if event["kind"] == "touch_down"
+    }
     height = 0.2 - 0.027
     assert first["torso"] == pytest.approx(np.sqrt(2 * height / 9.8), rel=0.05)
     assert set(first) == {"tail", "torso"}
@@ -145,7 +162,10 @@ def test_a_dropped_tail_and_torso_touch_down():
         ({"legs": 3.0}, "this model has feet: give Legs"),
         ({"bristles0": np.zeros((5, 2))}, r"bristles0 has shape \(5, 2\): give \(6, 2\)"),
         ({"bristles0": np.full((6, 2), np.nan)}, "finite"),
-        ({"stop_at": [("take_off", "tail")]}, r"give a list of pairs out of \('touch_down', 'feet'\)"),
+        (
+            {"stop_at": [("take_off", "tail")]},
+            r"give a list of pairs out of \('touch_down', 'feet'\)",
+        ),
         ({"stop_at": 3}, "give a list of pairs"),
     ],
 )
@@ -159,7 +179,8 @@ def test_start_in_the_ground_is_refused_with_its_depth():
     q = crouched().q[-1].copy()
     q[2] -= 0.05
     with pytest.raises(
-        st.SimulationError, match=r"^q0: point \d \(feet\) is 5\d(\.\d)? mm deep .*: raise q0\[2\] by 0\.05"
+        st.SimulationError,
+        match=r"^q0: point \d \(feet\) is 5\d(\.\d)? mm deep .*: raise q0\[2\] by 0\.05",
     ):
         st.simulate(model, q, np.zeros(model.nv), legs=KICK)
 
@@ -168,7 +189,10 @@ def test_start_in_the_ground_is_refused_with_its_depth():
     ("make", "words"),
     [
         (lambda: st.Legs([0, 0], [1, 2], 0), "times must increase"),
-        (lambda: st.Legs([0, 1], [1, 2, 3], 0), r"gamma has shape \(3,\), not a number, \(2,\) or \(2, 2\)"),
+        (
+            lambda: st.Legs([0, 1], [1, 2, 3], 0),
+            r"gamma has shape \(3,\), not a number, \(2,\) or \(2, 2\)",
+        ),
         (lambda: st.Legs([0, 1], 1, [[1, 2, 3]] * 2), r"delta has shape \(2, 3\)"),
         (lambda: st.Legs([0, np.nan], 1, 2), "all entries be finite"),
         (lambda: st.Legs(["0"], 1, 2), "times is not made of real numbers"),

@@ -1,4 +1,6 @@
-"""Integration methods: coefficients fulfil their order conditions, and the generated loops keep what these promise."""
+"""Integration methods: coefficients fulfil their order conditions, and the generated loops keep
+what these promise.
+"""
 
 import os
 import signal
@@ -100,7 +102,9 @@ def rosenbrock_step(method, f, J, y, h):
     u, W = [], np.eye(len(y)) - h * method.gamma * J
     for row, coupling in zip(method.rows, method.couplings, strict=True):
         at = y + sum((a * x for a, x in zip(row, u, strict=True)), np.zeros_like(y))
-        right = h * method.gamma * f(at) + method.gamma * sum((c * x for c, x in zip(coupling, u, strict=True)), 0 * y)
+        right = h * method.gamma * f(at) + method.gamma * sum(
+            (c * x for c, x in zip(coupling, u, strict=True)), 0 * y
+        )
         u.append(np.linalg.solve(W, right))
     return y + np.array(method.weights) @ u
 
@@ -108,7 +112,11 @@ def rosenbrock_step(method, f, J, y, h):
 @pytest.mark.parametrize("matrix", ["exact", "wrong"])
 def test_transformed_method_converges(matrix):
     """On a pendulum, with its Jacobian and with any matrix."""
-    J = np.array([[0, 1], [-np.cos(0.7), -0.2]]) if matrix == "exact" else np.array([[1.0, -2], [3, -1]])
+    J = (
+        np.array([[0, 1], [-np.cos(0.7), -0.2]])
+        if matrix == "exact"
+        else np.array([[1.0, -2], [3, -1]])
+    )
 
     def f(y):
         return np.array([y[1], -np.sin(y[0]) - 0.2 * y[1]])
@@ -160,14 +168,24 @@ ONE_LENGTH = {"rtol": 1e6, "atol": 1e6}  # whatever the error, the step is the l
 
 @pytest.mark.parametrize(
     ("method", "order", "steps"),
-    [("tsit5", 4, (50, 100, 200)), ("ros34pw2", 3, (100, 200, 400)), ("implicit_euler", 1, (400, 800, 1600))],
+    [
+        ("tsit5", 4, (50, 100, 200)),
+        ("ros34pw2", 3, (100, 200, 400)),
+        ("implicit_euler", 1, (400, 800, 1600)),
+    ],
 )
 def test_error_falls_with_the_order(method, order, steps):
-    """At the ends of steps Tsit5 has order 5; between them, samples included here, its interpolant has 4."""
+    """At the ends of steps Tsit5 has order 5; between them, samples included here, its interpolant
+    has 4.
+    """
     errors = []
     for count in steps:
         h = 0.2 / count
-        own = {"step": h} if method == "implicit_euler" else {"first_step": h, "most_step": h} | ONE_LENGTH
+        own = (
+            {"step": h}
+            if method == "implicit_euler"
+            else {"first_step": h, "most_step": h} | ONE_LENGTH
+        )
         errors.append(apart(fly(method=method, output_step=0.2 / 150, **own), exact_on(151)))
     orders = np.log2(np.divide(errors[:-1], errors[1:]))
     assert (orders > order - 0.3).all() and (orders < order + 1.3).all(), (errors, orders)
@@ -180,7 +198,10 @@ def exact_on(samples):
 
 def test_tsit5_has_order_five_at_the_ends_of_steps():
     last = exact()
-    ends = [fly(first_step=h, most_step=h, method="tsit5", output_step=0.2, **ONE_LENGTH) for h in (4e-3, 2e-3, 1e-3)]
+    ends = [
+        fly(first_step=h, most_step=h, method="tsit5", output_step=0.2, **ONE_LENGTH)
+        for h in (4e-3, 2e-3, 1e-3)
+    ]
     errors = [np.abs(flight.q[-1] - last.q[-1]).max() for flight in ends]
     assert (np.log2(np.divide(errors[:-1], errors[1:])) > 4.6).all(), errors
 
@@ -189,7 +210,9 @@ def test_tsit5_has_order_five_at_the_ends_of_steps():
 def test_error_follows_the_tolerance(method):
     tolerances = [1e-4, 1e-6, 1e-8]
     errors = [apart(fly(method=method, rtol=tolerance), exact()) for tolerance in tolerances]
-    assert all(0.01 < error / tolerance < 100 for error, tolerance in zip(errors, tolerances, strict=True)), errors
+    assert all(
+        0.01 < error / tolerance < 100 for error, tolerance in zip(errors, tolerances, strict=True)
+    ), errors
 
 
 def test_energy_drifts_by_rounding():
@@ -201,7 +224,9 @@ def test_energy_drifts_by_rounding():
     assert np.abs(flight.energy - flight.energy[0]).max() < 1e-8 * flight.energy[0]
 
 
-KINKS = st.TorqueTable([0.031, 0.057, 0.093], np.array([[1, -2, 0, 3], [-3, 1, 2, -1], [2, 2, -1, 0]]) * 1e-4)
+KINKS = st.TorqueTable(
+    [0.031, 0.057, 0.093], np.array([[1, -2, 0, 3], [-3, 1, 2, -1], [2, 2, -1, 0]]) * 1e-4
+)
 
 
 def test_kinks_cost_no_accuracy():
@@ -220,9 +245,15 @@ def st_interp(t):
 
 def test_phases_act_one_after_another():
     damping = st.Damping(3e-5)
-    flight = fly(controller=st.Phases([(0.0, None), (0.05, damping), (0.15, None)]), output_step=1e-3)
+    flight = fly(
+        controller=st.Phases([(0.0, None), (0.05, damping), (0.15, None)]), output_step=1e-3
+    )
     t, acts = flight.t, np.abs(flight.tau).max(axis=1) > 0
-    assert not acts[t < 0.0495].any() and acts[(t > 0.0505) & (t < 0.1495)].all() and not acts[t > 0.1505].any()
+    assert (
+        not acts[t < 0.0495].any()
+        and acts[(t > 0.0505) & (t < 0.1495)].all()
+        and not acts[t > 0.1505].any()
+    )
     np.testing.assert_allclose(flight.tau[acts], -3e-5 * flight.v[acts, 6:], rtol=1e-12)
 
 
@@ -240,7 +271,8 @@ def test_stiff_damping_chooses_the_implicit_method(links):
 def test_tracking_in_c_is_tracking_in_python():
     m = model()
     reference = st.Reference(
-        [0.0, 0.05, 0.1, 0.2], [[0, 0, 0, 0], [0.3, -0.2, 0.1, 0.4], [0.3, -0.2, 0.1, 0.4], [0.0] * 4]
+        [0.0, 0.05, 0.1, 0.2],
+        [[0, 0, 0, 0], [0.3, -0.2, 0.1, 0.4], [0.3, -0.2, 0.1, 0.4], [0.0] * 4],
     )
     law = st.Pfl(m, reference)
     flight, checked = fly(controller=law, rtol=1e-9), fly(controller=law.__call__, method="dop853")
@@ -251,7 +283,10 @@ def test_tracking_in_c_is_tracking_in_python():
 def test_implicit_methods_track_too():
     m = model()
     law = st.Pfl(m, st.Reference([0.0, 0.1], [[0.0] * 4, [0.3, -0.2, 0.1, 0.4]]))
-    assert apart(fly(controller=law, method="ros34pw2", rtol=1e-6), fly(controller=law, rtol=1e-9)) < 1e-4
+    assert (
+        apart(fly(controller=law, method="ros34pw2", rtol=1e-6), fly(controller=law, rtol=1e-9))
+        < 1e-4
+    )
 
 
 def test_two_runs_are_bit_for_bit_the_same():
@@ -296,7 +331,8 @@ def test_exception_in_a_function_is_itself():
 def test_interrupt_ends_a_long_run():
     """Ctrl-C is heard though no Python runs in the loop."""
     script = (
-        "import sys, serpentail as st\nm = st.load(sys.argv[1])\nq = [0, 0, 0, 1] + [0] * (m.nq - 4)\n"
+        "import sys, serpentail as st\nm = st.load(sys.argv[1])\nq = [0, 0, 0, 1] + [0] * (m.nq - "
+        "4)\n"
         "print('ready', flush=True)\n"
         "st.simulate(m, q, [1.0] * m.nv, t_span=1e5, output_step=1e4, method='rk4', step=1e-5)"
     )
@@ -320,7 +356,10 @@ def test_interrupt_ends_a_long_run():
         (lambda: st.Phases([(0, 3)]), "controller 3: give"),
         (lambda: st.TorqueCurve(3), "give a Piecewise of 4 channels"),
         (lambda: st.NativeTorque("f"), "give a ctypes function or an address"),
-        (lambda: st.Reference([0, 1], [[0] * 4] * 2, "cubic"), "blend 'cubic': give one of linear, quintic, spline"),
+        (
+            lambda: st.Reference([0, 1], [[0] * 4] * 2, "cubic"),
+            "blend 'cubic': give one of linear, quintic, spline",
+        ),
         (lambda: st.Reference([1, 0], [[0] * 4] * 2), "times must increase"),
         (lambda: st.Reference([0], [[0] * 4]), "one node only"),
         (lambda: st.Pfl(model(), st.Reference([0, 1], [[0] * 2] * 2)), "has 2 angles, the tail 4"),
@@ -334,7 +373,9 @@ def test_misuse_is_named(controller, words):
 
 @pytest.mark.parametrize("name", ["legs", "bristles0", "stop_at"])
 def test_flight_has_no_ground(name):
-    with pytest.raises(st.SimulationError, match=f"^{name} .* touches nothing: leave it out, or add `contacts`"):
+    with pytest.raises(
+        st.SimulationError, match=f"^{name} .* touches nothing: leave it out, or add `contacts`"
+    ):
         fly(**{name: [1]})
 
 

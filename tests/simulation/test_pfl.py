@@ -39,7 +39,9 @@ def test_a_disturbed_tail_returns_to_the_plan():
     model, plan = rat(), planned()
     q, v = start(model)
     q[7:] += 0.05
-    flight = st.simulate(model, q, v, controller=st.Pfl(model, plan), t_span=plan.duration, method="dop853")
+    flight = st.simulate(
+        model, q, v, controller=st.Pfl(model, plan), t_span=plan.duration, method="dop853"
+    )
     error = np.abs(flight.resample(plan.trajectory.t).tail - plan.trajectory.tail).max(axis=1)
     assert error[0] > 0.049 and error[-1] < 1e-4
 
@@ -69,13 +71,16 @@ def test_misuse(reference, gains, words):
 
 
 def test_tracking_a_plan_takes_the_planned_torques():
-    """On the planned motion Eq. 46 is Eq. 1 solved for tau, at its ends, too, where one by rates is further off."""
+    """On the planned motion Eq. 46 is Eq. 1 solved for tau, at its ends, too, where one by rates is
+    further off.
+    """
     model, plan = rat(), planned(intervals=40, tolerance=None)
     flight = plan.trajectory
     times = np.append(flight.t[:-1], np.nextafter(plan.duration, 0))
     states = list(zip(times, flight.q, flight.v, strict=True))
     by_plan, by_rates = (
-        np.abs([law(*state) for state in states] - plan.torque(times)).max(axis=1) / np.abs(flight.tau).max()
+        np.abs([law(*state) for state in states] - plan.torque(times)).max(axis=1)
+        / np.abs(flight.tau).max()
         for law in (st.Pfl(model, plan), st.Pfl(model, flight))
     )
     assert by_plan[[0, -1]].max() < 1e-2 and np.median(by_plan) < 1e-2

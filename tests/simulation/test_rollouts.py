@@ -1,4 +1,6 @@
-"""Rollouts: many runs at once give what each gives alone, bit for bit, its error too, in any order, on any core."""
+"""Rollouts: many runs at once give what each gives alone, bit for bit, its error too, in any order,
+on any core.
+"""
 
 import ctypes
 import pickle
@@ -55,7 +57,9 @@ def same(rollouts, flights):
     for k, flight in enumerate(flights):
         np.testing.assert_array_equal(rollouts.t, flight.t)
         for name in PER_RUN:
-            np.testing.assert_array_equal(getattr(rollouts, name)[k], getattr(flight, name), err_msg=name)
+            np.testing.assert_array_equal(
+                getattr(rollouts, name)[k], getattr(flight, name), err_msg=name
+            )
 
 
 def own_info(info):
@@ -71,7 +75,10 @@ SETTINGS = {
     "dop853": {"method": "dop853"},
     "auto": {},
     "stiff": {"controller": st.Damping(1e-2)},
-    "table": {"controller": st.TorqueTable([0.0, 0.02], [[1e-5] * NT, [-1e-5] * NT], 1e-6), "t_span": (-0.01, 0.05)},
+    "table": {
+        "controller": st.TorqueTable([0.0, 0.02], [[1e-5] * NT, [-1e-5] * NT], 1e-6),
+        "t_span": (-0.01, 0.05),
+    },
     "function": {"controller": lambda t, q, v: -1e-6 * v[6:]},
     "phases": {"controller": st.Phases([(0.0, None), (0.02, DAMPING)])},
 }
@@ -105,7 +112,13 @@ def test_a_tracked_reference_and_single_precision(real):
 
 @pytest.mark.parametrize("method", ["ros34pw2", "tsit5", "implicit_euler"])
 def test_on_the_ground(method):
-    settings = {"legs": LEGS, "controller": st.Damping(1e-3), "t_span": 0.3, "method": method, "output_step": 0.02}
+    settings = {
+        "legs": LEGS,
+        "controller": st.Damping(1e-3),
+        "t_span": 0.3,
+        "method": method,
+        "output_step": 0.02,
+    }
     q, v = starts(rat(), 4)
     flights, found = alone(rat(), q, v, **settings), st.simulate(rat(), q, v, **settings)
     assert any(flight.events for flight in flights)
@@ -114,11 +127,19 @@ def test_on_the_ground(method):
         assert found[k].events == flight.events
         np.testing.assert_array_equal(found.bristles[k], flight.contact.bristles)
         for name in ("points", "forces", "bristles"):
-            np.testing.assert_array_equal(getattr(found[k].contact, name), getattr(flight.contact, name))
+            np.testing.assert_array_equal(
+                getattr(found[k].contact, name), getattr(flight.contact, name)
+            )
 
 
 def test_runs_that_stop_at_events():
-    settings = {"legs": LEGS, "t_span": 0.3, "output_step": 0.02, "stop_at": [("touch_down", "tail")], "rtol": 1e-6}
+    settings = {
+        "legs": LEGS,
+        "t_span": 0.3,
+        "output_step": 0.02,
+        "stop_at": [("touch_down", "tail")],
+        "rtol": 1e-6,
+    }
     q, v = starts(rat(), 6)
     q[0, 2] += 5  # which does not come down in time
     flights, found = alone(rat(), q, v, **settings), st.simulate(rat(), q, v, **settings)
@@ -128,7 +149,9 @@ def test_runs_that_stop_at_events():
         rows = len(flight.t) - stopped
         assert found.errors[k] is None and found.ends[k] == flight.t[-1]
         np.testing.assert_array_equal(found.q[k, :rows], flight.q[:rows])
-        assert all(np.isnan(getattr(found, name)[k, rows:]).all() for name in (*PER_RUN, "bristles"))
+        assert all(
+            np.isnan(getattr(found, name)[k, rows:]).all() for name in (*PER_RUN, "bristles")
+        )
         for name in ARRAYS:
             np.testing.assert_array_equal(getattr(found[k], name), getattr(flight, name))
     assert not np.isnan(found.q[0]).any() and np.isnan(found.q[1:, -1]).all()
@@ -158,19 +181,29 @@ def test_each_run_has_its_own_parameters():
     [
         {"link_radius": [0.001, 0.002, 0.003]},
         {"link_inertia": [[1e-7, 1e-8, 2e-7], [3e-7, 1e-8, 2e-7], [1e-7, 2e-8, 2e-7]]},
-        {"tail_length": [0.1, 0.2, 0.3], "tail_mass": [0.002, 0.003, 0.004], "gravity": [0, 1, 9.8]},
+        {
+            "tail_length": [0.1, 0.2, 0.3],
+            "tail_mass": [0.002, 0.003, 0.004],
+            "gravity": [0, 1, 9.8],
+        },
     ],
     ids="-".join,
 )
 def test_parameters_of_runs_are_those_of_models(own):
     vectors = tail().parameters_of_runs(own, 3).vectors
-    models = [tail().with_parameters(**{name: values[k] for name, values in own.items()}) for k in range(3)]
+    models = [
+        tail().with_parameters(**{name: values[k] for name, values in own.items()})
+        for k in range(3)
+    ]
     np.testing.assert_array_equal(vectors, [model.parameter_vector for model in models])
 
 
 def test_the_ground_may_differ_from_run_to_run():
     q, v = starts(rat(), 3)
-    own, settings = {"mu": [0.0, 0.5, 1.0], "K_n": [500.0, 1000.0, 2000.0]}, {"legs": LEGS, "t_span": 0.2}
+    own, settings = (
+        {"mu": [0.0, 0.5, 1.0], "K_n": [500.0, 1000.0, 2000.0]},
+        {"legs": LEGS, "t_span": 0.2},
+    )
     found = st.simulate(rat(), q, v, parameters=own, **settings)
     for k in range(3):
         model = rat().with_parameters(mu=own["mu"][k], K_n=own["K_n"][k])
@@ -183,10 +216,18 @@ def test_the_stiffest_run_chooses_the_method():
     q, v = starts(tail(), 3)
     settings = {"controller": st.Damping(1e-2), "t_span": 0.01}
     light = {"tail_mass": [0.1, 0.1, 0.001]}
-    methods = [st.simulate(tail().with_parameters(tail_mass=m), q[0], v[0], **settings) for m in (0.1, 0.001)]
+    methods = [
+        st.simulate(tail().with_parameters(tail_mass=m), q[0], v[0], **settings)
+        for m in (0.1, 0.001)
+    ]
     assert [flight.info["method"] for flight in methods] == ["tsit5", "ros34pw2"]
     assert st.simulate(tail(), q, v, parameters=light, **settings).info["method"] == "ros34pw2"
-    assert st.simulate(tail(), q[:2], v[:2], parameters={"tail_mass": [0.1, 0.1]}, **settings).info["method"] == "tsit5"
+    assert (
+        st.simulate(tail(), q[:2], v[:2], parameters={"tail_mass": [0.1, 0.1]}, **settings).info[
+            "method"
+        ]
+        == "tsit5"
+    )
 
 
 # Order and sharing.
@@ -201,7 +242,11 @@ def test_runs_do_not_depend_on_their_order_or_on_threads(monkeypatch):
     for threads in (1, 7):
         monkeypatch.setattr(rollouts, "cores", lambda threads=threads: threads)
         found.append(st.simulate(tail(), q, v, parameters={"tail_mass": own}, **settings))
-        found.append(st.simulate(tail(), q[order], v[order], parameters={"tail_mass": own[order]}, **settings))
+        found.append(
+            st.simulate(
+                tail(), q[order], v[order], parameters={"tail_mass": own[order]}, **settings
+            )
+        )
         assert [each.info["threads"] for each in found[-2:]] == [threads] * 2
     for name in PER_RUN:
         first = getattr(found[0], name)
@@ -215,7 +260,9 @@ def test_a_single_state_is_repeated():
     settings = {"t_span": 0.01, "step": 1e-3}
     for state in ((q[0], v), (q, v[0])):
         found = st.simulate(tail(), *state, **settings)
-        same(found, alone(tail(), *(np.broadcast_to(a, (3, a.shape[-1])) for a in state), **settings))
+        same(
+            found, alone(tail(), *(np.broadcast_to(a, (3, a.shape[-1])) for a in state), **settings)
+        )
 
 
 def test_one_row_is_one_of_many():
@@ -247,7 +294,12 @@ def test_rollouts_can_be_pickled():
 
 # Failures.
 
-PUSHED = {"t_span": (5, 6), "controller": st.TorqueTable([5.0], [[1e-4] * NT]), "output_step": 0.05, "method": "tsit5"}
+PUSHED = {
+    "t_span": (5, 6),
+    "controller": st.TorqueTable([5.0], [[1e-4] * NT]),
+    "output_step": 0.05,
+    "method": "tsit5",
+}
 
 
 @pytest.mark.parametrize("threads", [1, 3])
@@ -267,7 +319,10 @@ def test_a_run_that_fails_loses_no_other(monkeypatch, threads):
             with pytest.raises(st.SimulationError) as caught:
                 found[k]
             assert caught.value is own
-            flight, rows = error.trajectory, 0 if error.trajectory is None else len(error.trajectory.t)
+            flight, rows = (
+                error.trajectory,
+                0 if error.trajectory is None else len(error.trajectory.t),
+            )
             assert (own.trajectory is None) == (flight is None)
             assert rows or np.isnan(found.kinetic[k]).all()
         else:
@@ -335,7 +390,9 @@ def test_a_compiled_torque_that_refuses_ends_its_run(monkeypatch, threads):
 
     q, v = starts(tail(), 3)
     q[1, 0] = 50.0
-    found = st.simulate(tail(), q, v, t_span=0.01, controller=st.NativeTorque(torque), method="tsit5")
+    found = st.simulate(
+        tail(), q, v, t_span=0.01, controller=st.NativeTorque(torque), method="tsit5"
+    )
     assert [error is None for error in found.errors] == [True, False, True]
     assert "the compiled torque function did not return 0" in str(found.errors[1])
 
@@ -373,9 +430,13 @@ def any_number_is_many(monkeypatch):
 LAWS = {
     "none": None,
     "damping": st.Damping((1e-6, 2e-6, 3e-6, 4e-6)),
-    "table": st.TorqueTable([0.0, 0.0123, 0.031], np.outer([1, -1, 2], [1e-5, 2e-5, -1e-5, 1e-5]), 1e-6),
+    "table": st.TorqueTable(
+        [0.0, 0.0123, 0.031], np.outer([1, -1, 2], [1e-5, 2e-5, -1e-5, 1e-5]), 1e-6
+    ),
     "jumps": st.TorqueCurve(
-        st.Piecewise(np.array([0.01, 0.0207, 0.04]), 1e-5 * np.array([[[1.0, 0]] * NT, [[-2.0, 9]] * NT]))
+        st.Piecewise(
+            np.array([0.01, 0.0207, 0.04]), 1e-5 * np.array([[[1.0, 0]] * NT, [[-2.0, 9]] * NT])
+        )
     ),
 }
 FLIGHT = {"t_span": (0.005, 0.05), "method": "rk4", "step": 3e-4, "output_step": 5e-3}
@@ -400,7 +461,9 @@ def test_flights_abreast_are_what_they_are_alone(law):
         assert found.info["abreast"] == 8 and found.errors == [None] * count
         near(found, flights[:count])
         assert found[1].info["steps"] == flights[1].info["steps"]
-        assert found.info["evaluations"] == sum(flight.info["evaluations"] for flight in flights[:count])
+        assert found.info["evaluations"] == sum(
+            flight.info["evaluations"] for flight in flights[:count]
+        )
 
 
 FORMS = {
@@ -439,7 +502,10 @@ def test_each_lane_has_its_own_parameters():
     rng = np.random.default_rng(1)
     own = {"tail_mass": rng.uniform(0.002, 0.02, 11), "tail_mount": 0.02 * rng.normal(size=(11, 3))}
     found = st.simulate(tail(), q, v, parameters=own, **FLIGHT)
-    models = [tail().with_parameters(**{name: values[k] for name, values in own.items()}) for k in range(11)]
+    models = [
+        tail().with_parameters(**{name: values[k] for name, values in own.items()})
+        for k in range(11)
+    ]
     near(found, [st.simulate(model, q[k], v[k], **FLIGHT) for k, model in enumerate(models)])
 
 
@@ -450,7 +516,9 @@ def test_a_flight_that_fails_abreast_loses_no_other():
     found = st.simulate(tail(), q, v, **FLIGHT)
     with pytest.raises(st.SimulationError) as caught:
         st.simulate(tail(), q[2], v[2], **FLIGHT)
-    assert [k for k in range(12) if found.errors[k]] == [2] and str(found.errors[2]) == str(caught.value)
+    assert [k for k in range(12) if found.errors[k]] == [2] and str(found.errors[2]) == str(
+        caught.value
+    )
     others = [k for k in range(12) if k != 2]
     for k in others:
         flight = st.simulate(tail(), q[k], v[k], **FLIGHT)
@@ -461,7 +529,9 @@ def test_a_flight_that_fails_abreast_loses_no_other():
 def test_few_steps_compile_nothing_and_other_laws_fly_alone(monkeypatch):
     built = []
     compiled = compile_library
-    monkeypatch.setattr("serpentail.model.batch.compile_library", lambda *a: built.append(a) or compiled(*a))
+    monkeypatch.setattr(
+        "serpentail.model.batch.compile_library", lambda *a: built.append(a) or compiled(*a)
+    )
     model = st.load(tail().folder)
     q, v = starts(model, 9)
     assert st.simulate(model, q, v, **FLIGHT).info["abreast"] == 1 and not built
@@ -497,7 +567,10 @@ Q, V = starts(tail(), 4)
 WRONG_STATES = {
     "a number that is none": ((row_with(Q, (2, 1), np.nan), V), r"q0\[1\] of run 2 is not finite"),
     "a velocity without end": ((Q, row_with(V, (3, 0), np.inf)), r"v0\[0\] of run 3 is not finite"),
-    "no attitude": ((row_with(Q, (1, slice(3, 7)), 0), V), r"q0\[3:7\] of run 1 is the zero quaternion"),
+    "no attitude": (
+        (row_with(Q, (1, slice(3, 7)), 0), V),
+        r"q0\[3:7\] of run 1 is the zero quaternion",
+    ),
     "numbers that differ": ((Q, V[:3]), "q0 has 4 runs, v0 3"),
     "a wrong width": ((Q[:, 1:], V), rf"q0 has shape \(4, {NQ - 1}\), not .* of k runs"),
     "no rows": ((Q[:0], V[:0]), rf"q0 has shape \(0, {NQ}\)"),
@@ -512,16 +585,28 @@ def test_wrong_states_are_named(states, words):
 
 WRONG_PARAMETERS = {
     "unknown": ({"tail_mas": [1.0] * 4}, "tail_mas: no such parameter; did you mean 'tail_mass'"),
-    "too few": ({"tail_mass": [0.1] * 3}, r"tail_mass: value \[0.1, 0.1, 0.1\]: needs .* for each of 4 runs"),
+    "too few": (
+        {"tail_mass": [0.1] * 3},
+        r"tail_mass: value \[0.1, 0.1, 0.1\]: needs .* for each of 4 runs",
+    ),
     "one for all": ({"tail_mass": 0.1}, r"tail_mass: value 0.1: needs .* for each of 4 runs"),
-    "no vectors": ({"tail_mount": [0.1] * 4}, r"tail_mount: value .*: needs 3 finite numbers .* for each of 4 runs"),
-    "unphysical": ({"tail_mass": [0.1, 0.1, -0.1, 0.1]}, r"tail_mass of run 2: value -0.1: needs .* above 0"),
+    "no vectors": (
+        {"tail_mount": [0.1] * 4},
+        r"tail_mount: value .*: needs 3 finite numbers .* for each of 4 runs",
+    ),
+    "unphysical": (
+        {"tail_mass": [0.1, 0.1, -0.1, 0.1]},
+        r"tail_mass of run 2: value -0.1: needs .* above 0",
+    ),
     "not finite": ({"gravity": [0.1, np.nan, 0.1, 0.1]}, r"gravity of run 1: value nan"),
     "no body": (
         {"torso_inertia": [[1, 1, 1], [1, 1, 3], [1, 1, 1], [1, 1, 1]]},
         r"torso_inertia of run 1: value \[1.0",
     ),
-    "both": ({"link_radius": [0.1] * 4, "link_inertia": [[1, 1, 1]] * 4}, "give one of them, not both"),
+    "both": (
+        {"link_radius": [0.1] * 4, "link_inertia": [[1, 1, 1]] * 4},
+        "give one of them, not both",
+    ),
     "no mapping": ([("tail_mass", 1.0)], "needs a mapping"),
 }
 
@@ -534,7 +619,9 @@ def test_wrong_parameters_are_named(own, words):
 
 def test_bodies_of_unlike_size_in_one_run_are_warned_of_where_it_is_called():
     with pytest.warns(st.UnlikeBodies, match=r"unlike by 3\.9e\+06") as caught:
-        st.simulate(tail(), Q, V, parameters={"tail_length": [0.2, 200.0, 0.2, 0.2]}, t_span=1e-3, step=1e-3)
+        st.simulate(
+            tail(), Q, V, parameters={"tail_length": [0.2, 200.0, 0.2, 0.2]}, t_span=1e-3, step=1e-3
+        )
     assert caught[0].filename == __file__
 
 
@@ -551,21 +638,29 @@ def test_baked_parameters_stay():
 
 
 def test_too_many_samples_are_refused():
-    with pytest.raises(st.SimulationError, match=r"more than \d+ samples of 4 runs: give 4e-07 s or more"):
+    with pytest.raises(
+        st.SimulationError, match=r"more than \d+ samples of 4 runs: give 4e-07 s or more"
+    ):
         st.simulate(tail(), Q, V, t_span=1.0, output_step=1e-7)
 
 
 def test_a_start_deep_in_the_ground_is_named():
     q, v = starts(rat(), 3)
     q[1, 2] = -0.3
-    with pytest.raises(st.SimulationError, match=r"q0 of run 1: point \d+ \(\w+\) is \d+ mm deep at the start"):
+    with pytest.raises(
+        st.SimulationError, match=r"q0 of run 1: point \d+ \(\w+\) is \d+ mm deep at the start"
+    ):
         st.simulate(rat(), q, v, legs=LEGS)
 
 
 def test_bristles_of_another_number_of_runs_are_refused():
     q, v = starts(rat(), 3)
-    with pytest.raises(st.SimulationError, match=r"bristles0 has shape \(2, \d+, 2\): give \(\d+, 2\)"):
-        st.simulate(rat(), q, v, legs=LEGS, bristles0=np.zeros((2, sum(rat().contacts.values()), 2)))
+    with pytest.raises(
+        st.SimulationError, match=r"bristles0 has shape \(2, \d+, 2\): give \(\d+, 2\)"
+    ):
+        st.simulate(
+            rat(), q, v, legs=LEGS, bristles0=np.zeros((2, sum(rat().contacts.values()), 2))
+        )
 
 
 def test_many_starts_do_not_settle():

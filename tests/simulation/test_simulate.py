@@ -1,4 +1,6 @@
-"""Flight: what mechanics conserves stays, what damping takes is accounted for, and torque laws act as written."""
+"""Flight: what mechanics conserves stays, what damping takes is accounted for, and torque laws act
+as written.
+"""
 
 import functools
 import warnings
@@ -52,7 +54,10 @@ def centre_of_mass(model, flight):
 
 def error(flight, reference):
     """Largest difference of states."""
-    return max(np.abs(flight.q - reference.q).max(), np.abs(flight.v - reference.v).max() / np.abs(V0).max())
+    return max(
+        np.abs(flight.q - reference.q).max(),
+        np.abs(flight.v - reference.v).max() / np.abs(V0).max(),
+    )
 
 
 # Methods
@@ -132,10 +137,14 @@ def test_centre_of_mass_flies_a_parabola(model, gravity):
 
 
 @pytest.mark.parametrize(
-    "controller", [st.Damping(DAMPING), lambda t, q, v: -np.array(DAMPING) * v[6:]], ids=["Damping", "function"]
+    "controller",
+    [st.Damping(DAMPING), lambda t, q, v: -np.array(DAMPING) * v[6:]],
+    ids=["Damping", "function"],
 )
 def test_damping_takes_energy_by_its_power(model, fly, controller):
-    flight = fly(t_span=0.25, controller=controller, output_step=1.25e-4, method="tsit5", rtol=1e-10)
+    flight = fly(
+        t_span=0.25, controller=controller, output_step=1.25e-4, method="tsit5", rtol=1e-10
+    )
     power = flight.v[:, 6:] ** 2 @ DAMPING
     lost = flight.energy[0] - flight.energy[-1]
     assert lost > 1e-3 * flight.kinetic[0]
@@ -146,9 +155,15 @@ def test_damping_takes_energy_by_its_power(model, fly, controller):
 
 def test_torques_work(fly):
     """Energy changes by the work of the torques."""
-    flight = fly(t_span=0.25, controller=lambda t, q, v: 1e-5 * np.cos(9 * t + np.arange(NT)), output_step=1.25e-4)
+    flight = fly(
+        t_span=0.25,
+        controller=lambda t, q, v: 1e-5 * np.cos(9 * t + np.arange(NT)),
+        output_step=1.25e-4,
+    )
     work = simpson((flight.tau * flight.v[:, 6:]).sum(axis=1), x=flight.t)
-    assert abs(work) > 1e-6 and flight.energy[-1] - flight.energy[0] == pytest.approx(work, rel=1e-6)
+    assert abs(work) > 1e-6 and flight.energy[-1] - flight.energy[0] == pytest.approx(
+        work, rel=1e-6
+    )
 
 
 # Torque laws
@@ -165,7 +180,9 @@ def test_function_acts_as_damping_does(fly, settings):
 
 @both
 def test_one_damping_is_for_all_joints(fly, settings):
-    one, each = (fly(t_span=0.02, controller=st.Damping(d), **settings) for d in (2e-6, (2e-6,) * NT))
+    one, each = (
+        fly(t_span=0.02, controller=st.Damping(d), **settings) for d in (2e-6, (2e-6,) * NT)
+    )
     np.testing.assert_array_equal(one.q, each.q)
     assert (one.q != fly(t_span=0.02, **settings).q).any()
 
@@ -183,7 +200,9 @@ def interpolated(t):
 def test_table_is_linear_in_between_and_held_outside(fly, settings, damping):
     span = {"t_span": (2.0, 2.1), "output_step": 1e-3}
     flight = fly(controller=st.TorqueTable(NODES, TORQUES, damping), **span, **settings)
-    np.testing.assert_allclose(flight.tau, interpolated(flight.t) - flight.v[:, 6:] * damping, rtol=0, atol=1e-17)
+    np.testing.assert_allclose(
+        flight.tau, interpolated(flight.t) - flight.v[:, 6:] * damping, rtol=0, atol=1e-17
+    )
     assert (flight.tau[0] != flight.tau[30]).all()
     function = lambda t, q, v: interpolated(t) - damping * v[6:]  # noqa: E731
     user = fly(controller=st.Phases([(t, function) for t in (2.0, *NODES)]), **span, **settings)
@@ -199,7 +218,9 @@ def test_table_of_one_node_is_a_constant(fly):
 @both
 def test_start_time_is_the_clock_of_the_laws(fly, settings):
     times = []
-    if settings.get("method") == "dop853":  # the table has kinks, where steps depend on the last bit of t
+    if (
+        settings.get("method") == "dop853"
+    ):  # the table has kinks, where steps depend on the last bit of t
         settings = settings | {"rtol": 1e-12, "atol": 1e-14}
     early = fly(t_span=0.05, controller=st.TorqueTable([0.01, 0.02], TORQUES[:2]), **settings)
     late = fly(t_span=(3.0, 3.05), controller=st.TorqueTable([3.01, 3.02], TORQUES[:2]), **settings)
@@ -227,7 +248,9 @@ def test_function_gets_the_state_in_arrays_of_its_own(fly, settings):
 
 @both
 @pytest.mark.parametrize("number", [1, 2, 50])
-@pytest.mark.parametrize("raised", [KeyError("mine"), KeyboardInterrupt(), st.StateError("mine")], ids=repr)
+@pytest.mark.parametrize(
+    "raised", [KeyError("mine"), KeyboardInterrupt(), st.StateError("mine")], ids=repr
+)
 def test_exception_of_the_function_comes_through(fly, settings, number, raised):
     calls = []
 
@@ -243,7 +266,9 @@ def test_exception_of_the_function_comes_through(fly, settings, number, raised):
 
 
 @both
-@pytest.mark.parametrize("answer", [None, [0.0] * (NT + 1), [[0.0] * NT], 0.0, [np.nan] * NT, [np.inf] * NT])
+@pytest.mark.parametrize(
+    "answer", [None, [0.0] * (NT + 1), [[0.0] * NT], 0.0, [np.nan] * NT, [np.inf] * NT]
+)
 def test_wrong_answer_of_the_function_is_named(fly, settings, answer):
     words = rf"the controller gave (?s:.*) at t = 2 s, not {NT} finite torques"
     with pytest.raises(st.SimulationError, match=words):
@@ -288,8 +313,14 @@ def test_wrong_start_is_named(model, start, words):
 @pytest.mark.parametrize(
     ("settings", "words"),
     [
-        *[({"t_span": span}, "t_span") for span in (0, -1, (1, 1), (2, 1), (0, np.nan), (0, np.inf), (0, 1, 2), "1")],
-        *[({"t_span": span}, "t_span") for span in (None, (), [[0], [1]], ("0", "1"), (0, None), True, (0, 1j))],
+        *[
+            ({"t_span": span}, "t_span")
+            for span in (0, -1, (1, 1), (2, 1), (0, np.nan), (0, np.inf), (0, 1, 2), "1")
+        ],
+        *[
+            ({"t_span": span}, "t_span")
+            for span in (None, (), [[0], [1]], ("0", "1"), (0, None), True, (0, 1j))
+        ],
         *[
             ({name: x}, name)
             for name in ("step", "output_step")
@@ -299,10 +330,16 @@ def test_wrong_start_is_named(model, start, words):
         ({"method": "euler"}, "method 'euler': choose one of auto, rk4, tsit5, dop853, lsoda"),
         ({"method": "rk4", "rtol": 1e-6}, "rk4 has no setting 'rtol'; it has step, output_step"),
         ({"step": 1e-6, "rtol": 1e-6}, "rk4 has no setting 'rtol'; it has step, output_step"),
-        ({"method": "dop853", "step": 1}, "dop853 has no setting 'step'; it has rtol, atol, output_step"),
+        (
+            {"method": "dop853", "step": 1},
+            "dop853 has no setting 'step'; it has rtol, atol, output_step",
+        ),
         ({"stp": 1}, "no setting 'stp'"),
         ({"controller": 3.0}, "controller 3.0: give None, Damping, TorqueTable, .* or a function"),
-        *[({"controller": st.Damping(d)}, "damping") for d in (-1.0, np.nan, (1, 2), "1", None, [[0.0] * NT])],
+        *[
+            ({"controller": st.Damping(d)}, "damping")
+            for d in (-1.0, np.nan, (1, 2), "1", None, [[0.0] * NT])
+        ],
         (
             {"controller": st.TorqueTable([0, 1], [[0] * NT])},
             r"times \(2,\) and torques \(1, 4\), not \(K,\) and \(K, 4",
@@ -311,9 +348,18 @@ def test_wrong_start_is_named(model, start, words):
         ({"controller": st.TorqueTable(0, [0] * NT)}, "TorqueTable"),
         ({"controller": st.TorqueTable([1, 1], [[0] * NT] * 2)}, "times must increase"),
         ({"controller": st.TorqueTable([0], [[np.nan] * NT])}, "all entries be finite"),
-        ({"controller": st.TorqueTable(["0"], [[0] * NT])}, "TorqueTable: times is not made of real numbers"),
-        ({"controller": st.TorqueTable([0, 1], [[0] * NT, [0]])}, "TorqueTable: torques is not made of real numbers"),
-        ({"controller": st.TorqueTable([0], [[0] * NT], damping=-1)}, "damping -1: give finite numbers, 0 or above"),
+        (
+            {"controller": st.TorqueTable(["0"], [[0] * NT])},
+            "TorqueTable: times is not made of real numbers",
+        ),
+        (
+            {"controller": st.TorqueTable([0, 1], [[0] * NT, [0]])},
+            "TorqueTable: torques is not made of real numbers",
+        ),
+        (
+            {"controller": st.TorqueTable([0], [[0] * NT], damping=-1)},
+            "damping -1: give finite numbers, 0 or above",
+        ),
     ],
 )
 def test_wrong_setting_is_named(fly, settings, words):
@@ -323,10 +369,19 @@ def test_wrong_setting_is_named(fly, settings, words):
 
 @pytest.mark.parametrize("left_out", ["rollout", "energy", "momentum"])
 def test_function_left_out_is_named_before_the_flight(left_out):
-    wanted = [each for each in ("forward_dynamics", "energy", "momentum", "rollout") if each != left_out]
+    wanted = [
+        each for each in ("forward_dynamics", "energy", "momentum", "rollout") if each != left_out
+    ]
     model = st.load(model_folder(1, 1, name="tail", functions=wanted))
-    with pytest.raises(st.ModelError, match=f"tail was generated without '{left_out}' .*add it to `functions`"):
-        st.simulate(model, [0, 0, 0, 1, 0, 0, 0, 0, 0], [0] * 8, controller=lambda *_: pytest.fail("was called"))
+    with pytest.raises(
+        st.ModelError, match=f"tail was generated without '{left_out}' .*add it to `functions`"
+    ):
+        st.simulate(
+            model,
+            [0, 0, 0, 1, 0, 0, 0, 0, 0],
+            [0] * 8,
+            controller=lambda *_: pytest.fail("was called"),
+        )
 
 
 # Runs that diverge
@@ -358,7 +413,8 @@ def test_diverging_run_names_the_time(model, start, settings):
 def test_energy_beyond_numbers_names_the_sample(model):
     fast = [1e200] + [0] * (NV - 1)
     with pytest.raises(
-        st.SimulationError, match=r"^from t = 5 s to 5\.5 s, by sample: energy: the result of state 0 is not"
+        st.SimulationError,
+        match=r"^from t = 5 s to 5\.5 s, by sample: energy: the result of state 0 is not",
     ):
         st.simulate(model, Q0, fast, t_span=(5, 5.5), step=0.1, output_step=0.1)
 
@@ -368,7 +424,13 @@ def test_energy_beyond_numbers_names_the_sample(model):
 
 @pytest.mark.parametrize(
     ("span", "output_step", "intervals"),
-    [(0.3, None, 200), ((-1.0, 0.1), 0.1, 11), ((0.7, 1.7), 0.3, 3), (0.1, 1.0, 1), ((1.0, 1.01), 1e-4, 100)],
+    [
+        (0.3, None, 200),
+        ((-1.0, 0.1), 0.1, 11),
+        ((0.7, 1.7), 0.3, 3),
+        (0.1, 1.0, 1),
+        ((1.0, 1.01), 1e-4, 100),
+    ],
 )
 @both
 def test_samples_are_evenly_spaced_from_start_to_end(fly, settings, span, output_step, intervals):
@@ -384,11 +446,18 @@ def test_samples_are_evenly_spaced_from_start_to_end(fly, settings, span, output
 def test_step_divides_the_samples(fly):
     for step, used, steps in ((3e-3, 2.5e-3, 8), (2.5e-3, 2.5e-3, 8), (1.0, 5e-3, 4)):
         info = fly(t_span=0.02, output_step=5e-3, step=step).info
-        assert (info["step"], info["steps"], info["evaluations"]) == (pytest.approx(used), steps, 4 * steps)
+        assert (info["step"], info["steps"], info["evaluations"]) == (
+            pytest.approx(used),
+            steps,
+            4 * steps,
+        )
 
 
 def test_looser_tolerances_cost_less(fly):
-    costs = [fly(t_span=0.1, method="dop853", rtol=r, atol=r).info["evaluations"] for r in (1e-4, 1e-7, 1e-10)]
+    costs = [
+        fly(t_span=0.1, method="dop853", rtol=r, atol=r).info["evaluations"]
+        for r in (1e-4, 1e-7, 1e-10)
+    ]
     assert costs == sorted(set(costs))
 
 
@@ -411,14 +480,25 @@ def test_result_holds_energies_momenta_and_parameters(model):
 def test_flight_comes_back_from_its_file(fly, tmp_path):
     flight = fly(t_span=(1.0, 1.1), controller=st.Damping(DAMPING))
     again = st.Trajectory.load(flight.save(tmp_path / "flight"))
-    for name in ("t", "q", "v", "tau", "kinetic", "potential", "linear_momentum", "angular_momentum"):
+    for name in (
+        "t",
+        "q",
+        "v",
+        "tau",
+        "kinetic",
+        "potential",
+        "linear_momentum",
+        "angular_momentum",
+    ):
         np.testing.assert_array_equal(getattr(again, name), getattr(flight, name))
     assert again.info == flight.info
 
 
 def test_flight_between_its_samples(fly):
     """Coarse samples, resampled, follow the fine flight; samples themselves stay."""
-    fine, coarse = (fly(t_span=0.1, output_step=step, controller=st.Damping(DAMPING)) for step in (1e-4, 5e-4))
+    fine, coarse = (
+        fly(t_span=0.1, output_step=step, controller=st.Damping(DAMPING)) for step in (1e-4, 5e-4)
+    )
     np.testing.assert_allclose(coarse.resample(coarse.t).q, coarse.q, rtol=0, atol=1e-15)
     between = coarse.resample(fine.t)
     for name, limit in (("q", 1e-7), ("v", 1e-2), ("kinetic", 1e-6)):

@@ -1,7 +1,9 @@
-"""A small optimal control problem for ``casadi.Function``s of the dynamics; needs casadi and numpy alone.
+"""A small optimal control problem for ``casadi.Function``s of the dynamics; needs casadi and numpy
+alone.
 
-From a turning start the tail goes to given coordinates, its torques squared being least; implicit midpoint, the
-attitude a quaternion.  Run as a program, it compares a compiled model with its CasADi module.
+From a turning start the tail goes to given coordinates, its torques squared being least; implicit
+midpoint, the attitude a quaternion.  Run as a program, it compares a compiled model with its CasADi
+module.
 """
 
 import sys
@@ -18,7 +20,9 @@ def rate(q, v):
     """Return the rate of q: the quaternion turns with the angular velocity in body axes."""
     w, x, y, z = (q[3 + k] for k in range(4))
     a, b, c = (v[3 + k] for k in range(3))
-    turn = casadi.vertcat(-x * a - y * b - z * c, w * a + y * c - z * b, w * b - x * c + z * a, w * c + x * b - y * a)
+    turn = casadi.vertcat(
+        -x * a - y * b - z * c, w * a + y * c - z * b, w * b - x * c + z * a, w * c + x * b - y * a
+    )
     return casadi.vertcat(v[:3], 0.5 * turn, v[6:])
 
 
@@ -36,23 +40,37 @@ def problem(f, parameters, nodes):
         torque = TORQUE * tau[:, k]
         defects.append((q[:, k + 1] - q[:, k]) / STEP - rate(*at))
         if forward:
-            defects.append(2e-3 / nt**2 * (slope - f(*at, torque, parameters)))  # light segments accelerate more
+            defects.append(
+                2e-3 / nt**2 * (slope - f(*at, torque, parameters))
+            )  # light segments accelerate more
         else:
             defects.append(f(*at, slope, parameters) - casadi.vertcat(casadi.MX.zeros(6), torque))
     start_q, start_v = np.zeros(nq), np.zeros(nv)
     start_q[3], start_v[3], start_v[6] = 1, 0.3, 0.2
     ends = [q[:, 0] - start_q, v[:, 0] - start_v, q[7:, nodes] - 0.15 * np.arange(1, nt + 1) / nt]
-    nlp = {"x": casadi.veccat(q, v, tau), "f": casadi.sumsqr(tau), "g": casadi.veccat(*defects, *ends)}
-    guess = np.concatenate([np.tile(start_q, nodes + 1), np.tile(start_v, nodes + 1), np.ones(nt * nodes)])
+    nlp = {
+        "x": casadi.veccat(q, v, tau),
+        "f": casadi.sumsqr(tau),
+        "g": casadi.veccat(*defects, *ends),
+    }
+    guess = np.concatenate(
+        [np.tile(start_q, nodes + 1), np.tile(start_v, nodes + 1), np.ones(nt * nodes)]
+    )
     return nlp, guess
 
 
 def plan(f, parameters, nodes=8, **options):
-    """Solve by IPOPT with exact second derivatives; return the solution, its value, and how it was found."""
+    """Solve by IPOPT with exact second derivatives; return the solution, its value, and how it was
+    found.
+    """
     nlp, guess = problem(f, parameters, nodes)
-    solver = casadi.nlpsol("solver", "ipopt", nlp, QUIET | {f"ipopt.{key}": value for key, value in options.items()})
+    solver = casadi.nlpsol(
+        "solver", "ipopt", nlp, QUIET | {f"ipopt.{key}": value for key, value in options.items()}
+    )
     found = solver(x0=guess, lbg=0, ubg=0)
-    return SimpleNamespace(x=np.array(found["x"]).ravel(), value=float(found["f"]), **solver.stats())
+    return SimpleNamespace(
+        x=np.array(found["x"]).ravel(), value=float(found["f"]), **solver.stats()
+    )
 
 
 def derivatives(f):
@@ -61,14 +79,20 @@ def derivatives(f):
 
 
 def difference(a, b):
-    """Return the largest difference of two matrices, relative to the largest entry of the second."""
+    """Return the largest difference of two matrices, relative to the largest entry of the
+    second.
+    """
     a, b = (np.array(casadi.DM(x)) for x in (a, b))
     return np.max(np.abs(a - b), initial=0) / (np.max(np.abs(b), initial=0) + 1e-300)
 
 
 def blocks(f, at):
-    """Return the outputs of a derivative that do not concern the parameters, as sparse matrices by name."""
-    seeds = {name: np.sin(1 + np.arange(f.numel_in(name))) for name in f.name_in() if name not in at}
+    """Return the outputs of a derivative that do not concern the parameters, as sparse matrices by
+    name.
+    """
+    seeds = {
+        name: np.sin(1 + np.arange(f.numel_in(name))) for name in f.name_in() if name not in at
+    }
     found = f(**{name: at[name] if name in at else seeds[name] for name in f.name_in()})
     return {name: casadi.DM(value) for name, value in found.items() if "parameters" not in name}
 
@@ -76,17 +100,25 @@ def blocks(f, at):
 def main(module_folder, module_name, library, parameters):
     """Compare the compiled functions with those of the module; print what differs."""
     sys.path.insert(0, module_folder)
-    module, parameters, bad = __import__(module_name), casadi.DM([float(x) for x in parameters.split(",")]), []
+    module, parameters, bad = (
+        __import__(module_name),
+        casadi.DM([float(x) for x in parameters.split(",")]),
+        [],
+    )
     for name, last in (("forward_dynamics", "tau"), ("inverse_dynamics", "v_dot")):
         prefix = module_name.removesuffix("_casadi")
         f, g = casadi.external(f"{prefix}_casadi_{name}", library), module.function(name)
-        at = {key: np.cos(1 + np.arange(f.numel_in(key))) for key in ("q", "v", last)} | {"parameters": parameters}
+        at = {key: np.cos(1 + np.arange(f.numel_in(key))) for key in ("q", "v", last)} | {
+            "parameters": parameters
+        }
         at["tau"] = 1e-3 * at.get("tau", np.zeros(1))
         at = {key: value for key, value in at.items() if key in f.name_in()}
         for kind, mine in derivatives(f).items():
             theirs = blocks(derivatives(g)[kind], at)
             bad += [
-                (name, kind, key) for key, value in blocks(mine, at).items() if difference(value, theirs[key]) > 1e-11
+                (name, kind, key)
+                for key, value in blocks(mine, at).items()
+                if difference(value, theirs[key]) > 1e-11
             ]
         mine, theirs = plan(f, parameters), plan(g, parameters)
         bad += [(name, "plan")] if difference(mine.x, theirs.x) > 1e-8 or not mine.success else []

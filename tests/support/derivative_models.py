@@ -1,4 +1,6 @@
-"""Derivatives by other means: states to try, a complex step through the loops of a function, and a fair measure."""
+"""Derivatives by other means: states to try, a complex step through the loops of a function, and a
+fair measure.
+"""
 
 from functools import cache
 from math import pi
@@ -19,20 +21,35 @@ from tests.support.models import model_folder
 
 COMPLEX = Numbers(np, complex)
 STEP = 1e-30  # of the imaginary part: nothing is subtracted, so derivatives are as exact as values
-NEGLIGIBLE = 1e-6  # of the largest derivative in the same rows: smaller blocks of columns are compared with that
+# of the largest derivative in the same rows: smaller blocks of columns are compared with that
+NEGLIGIBLE = 1e-6
 KINDS = ("random", "straight", "folded", "still", "scaled")
-# what is differentiated: of every derivative function the function, and of its outputs (output, argument)
+# what is differentiated: of every derivative function the function, and of its outputs (output,
+# argument)
 FIRST = {
-    "inverse_dynamics_derivatives": ("inverse_dynamics", {"dq": ("force", "q"), "dv": ("force", "v")}),
+    "inverse_dynamics_derivatives": (
+        "inverse_dynamics",
+        {"dq": ("force", "q"), "dv": ("force", "v")},
+    ),
     "forward_dynamics_derivatives": (
         "forward_dynamics",
         {"dq": ("v_dot", "q"), "dv": ("v_dot", "v"), "dtau": ("v_dot", "tau")},
     ),
-    "inverse_dynamics_parameter_derivatives": ("inverse_dynamics", {"dparameters": ("force", "parameters")}),
-    "forward_dynamics_parameter_derivatives": ("forward_dynamics", {"dparameters": ("v_dot", "parameters")}),
+    "inverse_dynamics_parameter_derivatives": (
+        "inverse_dynamics",
+        {"dparameters": ("force", "parameters")},
+    ),
+    "forward_dynamics_parameter_derivatives": (
+        "forward_dynamics",
+        {"dparameters": ("v_dot", "parameters")},
+    ),
     "energy_derivatives": (
         "energy",
-        {"kinetic_dq": ("kinetic", "q"), "kinetic_dv": ("kinetic", "v"), "potential_dq": ("potential", "q")},
+        {
+            "kinetic_dq": ("kinetic", "q"),
+            "kinetic_dv": ("kinetic", "v"),
+            "potential_dq": ("potential", "q"),
+        },
     ),
     "momentum_derivatives": (
         "momentum",
@@ -49,8 +66,19 @@ FIRST = {
 @cache
 def derivative_model(segments, links, emission, **options):
     """A compiled model with all derivatives and what they are compared with."""
-    wanted = [*DERIVATIVES, "mass_matrix", "inverse_dynamics", "forward_dynamics", "energy", "momentum"]
-    options = {"emission": emission, "name": "tail", "functions": [*options.pop("functions", wanted)]} | options
+    wanted = [
+        *DERIVATIVES,
+        "mass_matrix",
+        "inverse_dynamics",
+        "forward_dynamics",
+        "energy",
+        "momentum",
+    ]
+    options = {
+        "emission": emission,
+        "name": "tail",
+        "functions": [*options.pop("functions", wanted)],
+    } | options
     return st.load(model_folder(segments, links, **options))
 
 
@@ -71,7 +99,9 @@ def states(model, kind, count=2):
 
 
 def tangent_of_q(q):
-    """Rates of q (nq, nv) when it moves with the unit velocities: of the quaternion, q * (0, omega) / 2."""
+    """Rates of q (nq, nv) when it moves with the unit velocities: of the quaternion, q * (0, omega)
+    / 2.
+    """
     w, x, y, z = q[3:7] / 2
     T = np.zeros((len(q), len(q) - 1))
     T[:3, :3] = np.eye(3)
@@ -90,11 +120,15 @@ def nest_of(model, function):
 def parameters_of(model):
     """The parameters of a model's functions by name."""
     sizes = {a.name: a.length for a in nest_of(model, "mass_matrix").of_role("parameters")}
-    return dict(zip(sizes, np.split(model.parameter_vector, np.cumsum([*sizes.values()])[:-1]), strict=True))
+    return dict(
+        zip(sizes, np.split(model.parameter_vector, np.cumsum([*sizes.values()])[:-1]), strict=True)
+    )
 
 
 def complex_step(model, function, state, argument):
-    """Derivatives of the outputs of a function with respect to one argument: name -> (length, directions)."""
+    """Derivatives of the outputs of a function with respect to one argument: name -> (length,
+    directions).
+    """
     nest, parameters = nest_of(model, function), parameters_of(model)
     vectors = parameters | {a.name: state[a.name] for a in nest.of_role("input")}
     if argument == "parameters":
@@ -105,7 +139,9 @@ def complex_step(model, function, state, argument):
         directions = {argument: tangent_of_q(x) if argument == "q" else np.eye(len(x))}
     count = next(iter(directions.values())).shape[1]
     steps = {name: directions.get(name, np.zeros((len(x), count))) for name, x in vectors.items()}
-    scalars = {name: list(np.asarray(x)[:, None] + 1j * STEP * steps[name]) for name, x in vectors.items()}
+    scalars = {
+        name: list(np.asarray(x)[:, None] + 1j * STEP * steps[name]) for name, x in vectors.items()
+    }
     run = Run(nest, COMPLEX, scalars)
     return {
         a.name: np.array([np.broadcast_to(x, count).imag for x in run.values[a.name]]) / STEP
@@ -125,7 +161,9 @@ def spans(size, nv):
 
 
 def jacobian_error(found, expected, nv, negligible=NEGLIGIBLE):
-    """Largest over blocks of max|d| / max|ref|; a block that is negligible in its rows is scaled by them."""
+    """Largest over blocks of max|d| / max|ref|; a block that is negligible in its rows is scaled by
+    them.
+    """
     found, expected = np.atleast_2d(found), np.atleast_2d(expected)
     assert found.shape == expected.shape
     worst = 0.0
@@ -139,5 +177,9 @@ def jacobian_error(found, expected, nv, negligible=NEGLIGIBLE):
 
 
 def parameter_scales(model):
-    """The magnitude of each parameter, so that its derivatives are forces; a zero has that of its vector."""
-    return np.concatenate([np.full(len(part), np.abs(part).max()) for part in parameters_of(model).values()])
+    """The magnitude of each parameter, so that its derivatives are forces; a zero has that of its
+    vector.
+    """
+    return np.concatenate(
+        [np.full(len(part), np.abs(part).max()) for part in parameters_of(model).values()]
+    )

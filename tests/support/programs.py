@@ -1,4 +1,6 @@
-"""Small loop nests for tests, all of exact arithmetic, and what checks them: dual numbers, and runs of few lanes."""
+"""Small loop nests for tests, all of exact arithmetic, and what checks them: dual numbers, and runs
+of few lanes.
+"""
 
 import random
 from fractions import Fraction
@@ -46,7 +48,9 @@ DUALS = Numbers(SimpleNamespace(sin=None, cos=None, sqrt=None), Dual)
 
 
 class Narrow(Run):
-    """A run that computes no lane beyond those that a step is told to; what was never computed is not a number."""
+    """A run that computes no lane beyond those that a step is told to; what was never computed is
+    not a number.
+    """
 
     def apply(self, call, at):
         """Run a step, then take back the lanes that are not its own."""
@@ -56,25 +60,34 @@ class Narrow(Run):
         for ref, rows in zip(wide, before, strict=True):
             own = np.arange(ref.lanes) < call.columns.at(at)
             pairs = zip(self.read(ref, at), rows, strict=True)
-            self.write(ref, at, [np.where(own, new, np.nan if old is None else old) for new, old in pairs])
+            self.write(
+                ref, at, [np.where(own, new, np.nan if old is None else old) for new, old in pairs]
+            )
 
 
 def jacobian(program, arguments, active):
-    """Derivatives of all outputs: name -> rows, with a column for each scalar of the active arrays."""
+    """Derivatives of all outputs: name -> rows, with a column for each scalar of the active
+    arrays.
+    """
     count = sum(len(arguments[name]) for name in active)
     units, duals = iter(np.eye(count, dtype=int).tolist()), {}
     for name in active:
         duals[name] = [Dual(x, next(units)) for x in arguments[name]]
     still = {name: [Dual(x) for x in xs] for name, xs in arguments.items() if name not in active}
     values = Run(program, DUALS, still | duals).values
-    return {a.name: [x.slopes or [0] * count for x in values[a.name]] for a in program.of_role("output")}
+    return {
+        a.name: [x.slopes or [0] * count for x in values[a.name]] for a in program.of_role("output")
+    }
 
 
 def numbers(program, seed=1):
     """Random rationals for the arguments of a program."""
     rng = random.Random(seed)
     arrays = (*program.of_role("parameters"), *program.of_role("input"))
-    return {a.name: [Fraction(rng.randint(-9, 9), rng.randint(1, 5)) for _ in range(a.length)] for a in arrays}
+    return {
+        a.name: [Fraction(rng.randint(-9, 9), rng.randint(1, 5)) for _ in range(a.length)]
+        for a in arrays
+    }
 
 
 def step_of(name, inputs, outputs, build):
@@ -96,11 +109,18 @@ TURN = step_of(
     (("s", 2),),
     lambda t, a, b, y: [t.sub(t.mul(a, y), b), t.add(a, t.mul(b, t.mul(y, y)))],
 )
-RATIO = step_of("ratio", (("x", 1), ("y", 1)), (("s", 1),), lambda t, x, y: [t.div(x, t.add(t.mul(y, y), t.const(1)))])
+RATIO = step_of(
+    "ratio",
+    (("x", 1), ("y", 1)),
+    (("s", 1),),
+    lambda t, x, y: [t.div(x, t.add(t.mul(y, y), t.const(1)))],
+)
 
 
 def built(count=3):
-    """A builder with inputs x, y of ``count`` scalars, a parameter and outputs u of ``count`` scalars and w of one."""
+    """A builder with inputs x, y of ``count`` scalars, a parameter and outputs u of ``count``
+    scalars and w of one.
+    """
     b = Builder("nest", "A loop nest.")
     mass = b.array("mass", 1, role="parameters")
     x, y = b.array("x", 1, count, "input"), b.array("y", 1, count, "input")
@@ -121,7 +141,9 @@ def carry(downward=False):
 
 
 def accumulators():
-    """A sum, and a sum that grows by a function of itself; both are read while they grow and after."""
+    """A sum, and a sum that grows by a function of itself; both are read while they grow and
+    after.
+    """
     b, mass, x, y, u, w = built()
     a, total = b.array("a", 1), b.array("total", 1)
     b.fill(a[0], 1)
@@ -153,7 +175,11 @@ def temporaries():
 def columns():
     """A 2 x 3 matrix column by column, written, added to and read with strides."""
     b = Builder("nest", "Strides.")
-    m, y, u = b.array("m", 6, role="input"), b.array("y", 1, 3, "input"), b.array("u", 6, role="output")
+    m, y, u = (
+        b.array("m", 6, role="input"),
+        b.array("y", 1, 3, "input"),
+        b.array("u", 6, role="output"),
+    )
     t = b.array("t", 6)
     b.fill(t[0], *range(6))
     with b.loop("i", 3) as i:
@@ -181,7 +207,9 @@ def nested():
 
 
 def chain():
-    """An array that grows from its own last entry; then a part of it is cleared, and used once more."""
+    """An array that grows from its own last entry; then a part of it is cleared, and used once
+    more.
+    """
     b, mass, x, y, u, w = built()
     a = b.array("a", 1, 4)
     b.copy(a[0], mass[0])

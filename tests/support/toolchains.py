@@ -1,4 +1,6 @@
-"""Cross compilers, emulators and analysers for tests: without them a test is skipped, in CI it fails."""
+"""Cross compilers, emulators and analysers for tests: without them a test is skipped, in CI it
+fails.
+"""
 
 import os
 import shutil

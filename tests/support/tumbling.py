@@ -1,4 +1,6 @@
-"""Tumbling kangaroo rats for tests of planning: a tail's sizes and a seed go in; a model and starts come out."""
+"""Tumbling kangaroo rats for tests of planning: a tail's sizes and a seed go in; a model and starts
+come out.
+"""
 
 from functools import cache
 
@@ -8,7 +10,9 @@ import serpentail as st
 from serpentail.model.casadi import DERIVATIVES
 from tests.support.models import model_folder
 
-EXACT = sorted({part for name, orders in DERIVATIVES.items() for part in (name, *orders[0], *orders[1])})
+EXACT = sorted(
+    {part for name, orders in DERIVATIVES.items() for part in (name, *orders[0], *orders[1])}
+)
 FUNCTIONS = [*EXACT, "bias_force", "pfl", "energy", "momentum", "rollout", "tail_points"]
 DURATION = 0.4  # s
 
@@ -16,12 +20,18 @@ DURATION = 0.4  # s
 @cache
 def rat(segments: int = 1, links: int | None = 3, exact: bool = True) -> st.Model:
     """Return a model; without its exact second derivatives, plans take its SX functions."""
-    functions = FUNCTIONS if exact else ["mass_matrix", "forward_dynamics", "inverse_dynamics", *FUNCTIONS[-4:]]
+    functions = (
+        FUNCTIONS
+        if exact
+        else ["mass_matrix", "forward_dynamics", "inverse_dynamics", *FUNCTIONS[-4:]]
+    )
     return st.load(model_folder(segments, links, functions=list(dict.fromkeys(functions))))
 
 
 def start(model: st.Model, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
-    """Return q0, v0 of a rat that was thrown up, pitched by a quarter turn or less, and turns about all axes."""
+    """Return q0, v0 of a rat that was thrown up, pitched by a quarter turn or less, and turns about
+    all axes.
+    """
     random = np.random.default_rng(seed)
     q, v = np.zeros(model.nq), np.zeros(model.nv)
     pitch = random.uniform(0.4, 1.2)
@@ -37,4 +47,6 @@ def planned(**settings) -> st.Plan:
     """Return a plan for the first start, made once a process."""
     model = rat()
     bounds = st.Bounds(angle=np.pi / 3)
-    return st.plan(model, start=start(model), duration=DURATION, bounds=bounds, track=False, **settings)
+    return st.plan(
+        model, start=start(model), duration=DURATION, bounds=bounds, track=False, **settings
+    )

@@ -1,4 +1,6 @@
-"""The 40-digit continuum agrees with exact laws to the last bit, with Lagrange's equations and with fine chains."""
+"""The 40-digit continuum agrees with exact laws to the last bit, with Lagrange's equations and with
+fine chains.
+"""
 
 from fractions import Fraction
 from math import pi
@@ -50,17 +52,23 @@ def at_rest(tail_rates):
 
 
 def assert_same_float64(x, x_ref):
-    """Every entry is the same float64, but for zeros that come out as what is left of many digits."""
+    """Every entry is the same float64, but for zeros that come out as what is left of many
+    digits.
+    """
     x, x_ref = np.asarray(x), np.asarray(x_ref)
     floor = RESIDUE * np.max(np.abs(x_ref))
-    np.testing.assert_array_equal(*(np.where(np.abs(values) < floor, 0.0, values) for values in (x, x_ref)))
+    np.testing.assert_array_equal(
+        *(np.where(np.abs(values) < floor, 0.0, values) for values in (x, x_ref))
+    )
 
 
 def assert_same_quantities(continuum, other, state):
     """Every quantity of two continuum tails is the same float64 at one state."""
     q, v, v_dot, tau = state
     assert_same_float64(continuum.mass_matrix(q), other.mass_matrix(q))
-    assert_same_float64(continuum.inverse_dynamics(q, v, v_dot), other.inverse_dynamics(q, v, v_dot))
+    assert_same_float64(
+        continuum.inverse_dynamics(q, v, v_dot), other.inverse_dynamics(q, v, v_dot)
+    )
     assert_same_float64(continuum.forward_dynamics(q, v, tau), other.forward_dynamics(q, v, tau))
     assert_same_float64(continuum.energy(q, v), other.energy(q, v))
     assert_same_float64(continuum.momentum(q, v), other.momentum(q, v))
@@ -91,7 +99,11 @@ def test_kinetic_energy_is_the_mass_matrix_form(exact, states):
 
 def test_momentum_is_the_upper_rows_of_mass_times_velocity(exact, states):
     for q, v, *_ in states:
-        mass, axes, (linear, angular) = exact.mass_matrix(q), torso_rotation(q), exact.momentum(q, v)
+        mass, axes, (linear, angular) = (
+            exact.mass_matrix(q),
+            torso_rotation(q),
+            exact.momentum(q, v),
+        )
         momentum = mass @ v
         np.testing.assert_allclose(linear, momentum[:3], atol=1e-14)
         # H_p,omega = -M (c - p)~ R_b
@@ -101,7 +113,9 @@ def test_momentum_is_the_upper_rows_of_mass_times_velocity(exact, states):
 
 def test_power_is_the_rate_of_energy(exact, states):
     for q, v, v_dot, _ in states:
-        after, before = (sum(exact.energy(displaced(q, v, time), v + time * v_dot)) for time in (STEP, -STEP))
+        after, before = (
+            sum(exact.energy(displaced(q, v, time), v + time * v_dot)) for time in (STEP, -STEP)
+        )
         power = v * exact.inverse_dynamics(q, v, v_dot)
         assert abs((after - before) / (2 * STEP) - sum(power)) <= 1e-8 * sum(abs(power))
 
@@ -109,7 +123,9 @@ def test_power_is_the_rate_of_energy(exact, states):
 def displaced(q, v, time):
     """The configuration reached from q in a time at the constant velocity v."""
     turned = Rotation.from_quat(q[3:7], scalar_first=True) * Rotation.from_rotvec(time * v[3:6])
-    return np.concatenate([q[:3] + time * v[:3], turned.as_quat(scalar_first=True), q[7:] + time * v[6:]])
+    return np.concatenate(
+        [q[:3] + time * v[:3], turned.as_quat(scalar_first=True), q[7:] + time * v[6:]]
+    )
 
 
 def test_translational_mass_is_the_nearest_float64_of_the_total(exact, states):
@@ -127,7 +143,9 @@ def test_more_digits_and_nodes_give_the_same_float64(kind):
 def test_every_bend_is_the_same_float64_with_more_digits_and_nodes(bend):
     q, v, v_dot, tau = states_of(1, "random")[0]
     state = np.concatenate([q[:7], [0.6 * bend, -0.8 * bend]]), v, v_dot, tau
-    assert_same_quantities(*(ExactContinuum(TABLE_1, 1, *size) for size in [(40, 24), (60, 32)]), state)
+    assert_same_quantities(
+        *(ExactContinuum(TABLE_1, 1, *size) for size in [(40, 24), (60, 32)]), state
+    )
 
 
 @pytest.mark.parametrize("count", [1, 2, 15, 24])
@@ -176,7 +194,9 @@ def test_planar_bend_is_the_closed_form_to_the_last_bit(bend, gravity):
 
 @mpmath.workdps(2000)
 def arc(parameters, bend, rates):
-    """H_tt, C_t and the potential of one segment bent by (a, 0) on a torso at rest, in sines and cosines of a."""
+    """H_tt, C_t and the potential of one segment bent by (a, 0) on a torso at rest, in sines and
+    cosines of a.
+    """
     names = ("tail_mass", "tail_length", "gravity")
     mass, length, gravity = (mpmath.mpf(parameters[name]) for name in names)
     a, (a_dot, b_dot) = mpmath.mpf(bend), (mpmath.mpf(rate) for rate in rates)
@@ -187,7 +207,9 @@ def arc(parameters, bend, rates):
     yaw_slope = (c2 / 2 - 2 * c - 6) / a**5 + (10 * s - 5 * s2 / 4) / a**6
     height, slope = -(a - s) / a**2, -(1 - c) / a**2 + 2 * (a - s) / a**3  # of the COM, over L
     moment, weight = mass * length**2, mass * gravity * length
-    whirl = (pitch - yaw) / a - yaw_slope / 2  # of the yaw rate into the pitch: the mean of p_a . p_bb
+    whirl = (
+        pitch - yaw
+    ) / a - yaw_slope / 2  # of the yaw rate into the pitch: the mean of p_a . p_bb
     bias = [
         moment * (pitch_slope * a_dot**2 / 2 + whirl * b_dot**2) + weight * slope,
         moment * yaw_slope * a_dot * b_dot,
@@ -201,7 +223,9 @@ def arc(parameters, bend, rates):
 def test_small_bend_tends_to_the_straight_tail(exact, bend):
     q, v, v_dot, _ = states_of(exact.segments, "random")[0]
     straight, bent = (np.concatenate([q[:7], size * q[7:]]) for size in (0.0, bend))
-    assert mass_matrix_error(exact.mass_matrix(bent), exact.mass_matrix(straight)) <= ROUNDING + bend
+    assert (
+        mass_matrix_error(exact.mass_matrix(bent), exact.mass_matrix(straight)) <= ROUNDING + bend
+    )
     force = exact.inverse_dynamics(straight, v, v_dot)
     assert block_error(exact.inverse_dynamics(bent, v, v_dot), force) <= ROUNDING + 10 * bend
 
@@ -224,16 +248,24 @@ def test_two_halves_are_one_segment(kind):
 def test_chain_of_massive_points_converges_at_first_order(segments, counts):
     q, v, v_dot, _ = states_of(segments, "random")[0]
     continuum = ExactContinuum(TABLE_1, segments)
-    reference = [continuum.mass_matrix(q), continuum.inverse_dynamics(q, v, v_dot), *continuum.momentum(q, v)]
+    reference = [
+        continuum.mass_matrix(q),
+        continuum.inverse_dynamics(q, v, v_dot),
+        *continuum.momentum(q, v),
+    ]
     errors = []
     for links in counts:
         values = chain_quantities(segments, links, (q, v, v_dot))
-        errors.append([np.linalg.norm(x - x_ref) for x, x_ref in zip(values, reference, strict=True)])
+        errors.append(
+            [np.linalg.norm(x - x_ref) for x, x_ref in zip(values, reference, strict=True)]
+        )
     np.testing.assert_allclose(np.array(errors[:-1]) / errors[1:], 2.0, atol=0.1)
 
 
 def chain_quantities(segments, links, state):
-    """H, H v_dot + C and momenta of links without inertia of their own, each turned by 1/n of its segment's bend."""
+    """H, H v_dot + C and momenta of links without inertia of their own, each turned by 1/n of its
+    segment's bend.
+    """
     chain = ExactChain({**TABLE_1, "link_inertia": (0.0, 0.0, 0.0)}, segments, links)
     share = np.concatenate([np.ones(6), np.full(2 * segments, 1 / links)])
     (q, v, v_dot), scale = state, np.concatenate([[1.0], share])
@@ -244,7 +276,9 @@ def chain_quantities(segments, links, state):
 
 @pytest.fixture(scope="module")
 def lagrange(exact):
-    """H and C of Lagrange's equations at x = [p, xi, q_t] with xi = 0, by automatic differentiation."""
+    """H and C of Lagrange's equations at x = [p, xi, q_t] with xi = 0, by automatic
+    differentiation.
+    """
     nv = exact.nv
     x, x_dot, axes = ca.SX.sym("x", nv), ca.SX.sym("x_dot", nv), ca.SX.sym("R", 3, 3)
     half = ca.skew(x[3:6] / 2)
@@ -262,7 +296,9 @@ def lagrange(exact):
 
 
 def paper_slices(x, axes, segments):
-    """Coordinates of B and of the slices at nodes, each with its mass, in polar form (Eqs. 20 to 23, 33)."""
+    """Coordinates of B and of the slices at nodes, each with its mass, in polar form (Eqs. 20 to
+    23, 33).
+    """
     nodes, weights = np.polynomial.legendre.leggauss(20)
     length, mass = TABLE_1["tail_length"] / segments, TABLE_1["tail_mass"] / segments
     points, masses = [x[:3]], [TABLE_1["torso_mass"], *np.tile(weights * mass / 2, segments)]
@@ -271,7 +307,10 @@ def paper_slices(x, axes, segments):
         a, b = x[6 + 2 * i], x[7 + 2 * i]
         theta, phi = ca.hypot(a, b), ca.atan2(b, -a)
         across, along = radial(axes, phi, length / theta), -length / theta * axes[:, 1]
-        slices = [root + across + ca.sin(theta * s) * along - ca.cos(theta * s) * across for s in (1 + nodes) / 2]
+        slices = [
+            root + across + ca.sin(theta * s) * along - ca.cos(theta * s) * across
+            for s in (1 + nodes) / 2
+        ]
         points += slices
         root = root + across + ca.sin(theta) * along - ca.cos(theta) * across
         axes = axes @ about_y(phi) @ about_x(-theta) @ about_y(-phi)
@@ -306,7 +345,9 @@ def test_lagrange_s_equations_of_the_paper_s_polar_form_agree(exact, lagrange, k
 
 @pytest.mark.parametrize("bend", [*BENDS, 300.0])
 def test_tip_of_a_planar_bend_is_the_arc_s_to_the_last_bit(bend):
-    mount, tip = ExactContinuum({**TABLE_1, "tail_mount": (0, 0, 0)}, 1).tail_points([*UPRIGHT, bend, 0.0], 1)
+    mount, tip = ExactContinuum({**TABLE_1, "tail_mount": (0, 0, 0)}, 1).tail_points(
+        [*UPRIGHT, bend, 0.0], 1
+    )
     with mpmath.workdps(700):
         a, length = mpmath.mpf(bend), mpmath.mpf(TABLE_1["tail_length"])
         expected = [0, -length * mpmath.sin(a) / a, -length * (1 - mpmath.cos(a)) / a]
@@ -318,7 +359,9 @@ def test_tail_points_integrate_the_turning_tangent(exact, states):
     for q, *_ in states:
         points = exact.tail_points(q, 4)
         assert points.shape == (4 * exact.segments + 1, 3)
-        np.testing.assert_allclose(points, tangent_integrals(q, exact.segments, 4), rtol=0, atol=1e-14)
+        np.testing.assert_allclose(
+            points, tangent_integrals(q, exact.segments, 4), rtol=0, atol=1e-14
+        )
         np.testing.assert_array_equal(points, exact.tail_points(q, 8)[::2])
 
 

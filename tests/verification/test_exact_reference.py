@@ -42,10 +42,14 @@ def states_of(segments, kind):
 
 
 def assert_same_float64(x, x_ref):
-    """Every entry is the same float64, but for zeros that come out as what is left of many digits."""
+    """Every entry is the same float64, but for zeros that come out as what is left of many
+    digits.
+    """
     x, x_ref = np.asarray(x), np.asarray(x_ref)
     floor = RESIDUE * np.max(np.abs(x_ref))
-    np.testing.assert_array_equal(*(np.where(np.abs(values) < floor, 0.0, values) for values in (x, x_ref)))
+    np.testing.assert_array_equal(
+        *(np.where(np.abs(values) < floor, 0.0, values) for values in (x, x_ref))
+    )
 
 
 def assert_same_quantities(chain, other, state):
@@ -78,7 +82,10 @@ def test_inverse_dynamics_agrees(exact, library, states):
 def test_forward_dynamics_agrees(exact, library, states):
     for q, v, _, tau in states:
         limit = 1e-13 * equilibrated_condition(exact.mass_matrix(q))
-        assert block_error(library.forward_dynamics(q, v, tau), exact.forward_dynamics(q, v, tau)) <= limit
+        assert (
+            block_error(library.forward_dynamics(q, v, tau), exact.forward_dynamics(q, v, tau))
+            <= limit
+        )
 
 
 def test_energy_agrees(exact, library, states):
@@ -88,7 +95,9 @@ def test_energy_agrees(exact, library, states):
 
 def test_momentum_agrees(exact, library, states):
     for q, v, *_ in states:
-        for momentum, momentum_ref in zip(library.momentum(q, v), exact.momentum(q, v), strict=True):
+        for momentum, momentum_ref in zip(
+            library.momentum(q, v), exact.momentum(q, v), strict=True
+        ):
             assert np.max(np.abs(momentum - momentum_ref)) <= 1e-13 * np.max(np.abs(momentum_ref))
 
 
@@ -100,7 +109,10 @@ def test_given_link_inertia_replaces_the_ellipsoid(library_class):
     ours, theirs = ExactChain(parameters, 2, 3), library_class(parameters, 2, 3)
     assert mass_matrix_error(theirs.mass_matrix(q), ours.mass_matrix(q)) <= 1e-13
     assert mass_matrix_error(ours.mass_matrix(q), ExactChain(TABLE_1, 2, 3).mass_matrix(q)) >= 1e-3
-    assert block_error(theirs.inverse_dynamics(q, v, v_dot), ours.inverse_dynamics(q, v, v_dot)) <= 1e-13
+    assert (
+        block_error(theirs.inverse_dynamics(q, v, v_dot), ours.inverse_dynamics(q, v, v_dot))
+        <= 1e-13
+    )
 
 
 def test_inverse_dynamics_is_mass_times_acceleration_plus_bias(exact, states):
@@ -160,12 +172,16 @@ def test_one_link_is_the_universal_pendulum_to_the_last_bit(kind):
         coupling, mass, bias = pendulum(q[7:], v[6:])
         assert_same_float64(chain.mass_matrix(upright)[:3, 6:], coupling)
         assert_same_float64(chain.mass_matrix(upright)[6:, 6:], mass)
-        assert_same_float64(chain.bias_force(upright, np.concatenate([np.zeros(6), v[6:]]))[6:], bias)
+        assert_same_float64(
+            chain.bias_force(upright, np.concatenate([np.zeros(6), v[6:]]))[6:], bias
+        )
 
 
 @mpmath.workdps(50)
 def pendulum(angles, rates):
-    """H_pt, H_tt and C_t of one link on a torso at rest in the world's axes, by Lagrange's equations."""
+    """H_pt, H_tt and C_t of one link on a torso at rest in the world's axes, by Lagrange's
+    equations.
+    """
     mass, gravity, half, across, along = one_link()
     (ca, sa), (cb, sb) = (mpmath.cos_sin(angle) for angle in angles)
     pitch = [0, half * cb * sa, -half * cb * ca]  # d p_com / d alpha

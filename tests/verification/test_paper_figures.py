@@ -1,4 +1,6 @@
-"""The paper's figures: numbers that independent computations of its studies gave must come out of the models."""
+"""The paper's figures: numbers that independent computations of its studies gave must come out of
+the models.
+"""
 
 import json
 import os
@@ -15,7 +17,13 @@ from examples.studies import models as study_models
 from tests.support.models import model_folder
 
 ROOT = Path(__file__).parents[2]
-DIFFERENCE = {2: -0.148, 4: -0.400, 8: -0.333, 16: -0.211, 32: -0.120}  # deg, articulated less continuum, Fig. 8b
+DIFFERENCE = {
+    2: -0.148,
+    4: -0.400,
+    8: -0.333,
+    16: -0.211,
+    32: -0.120,
+}  # deg, articulated less continuum, Fig. 8b
 THIN = {"link_inertia": study_models.THIN}
 
 
@@ -59,7 +67,9 @@ def test_directions_of_the_com_are_those_of_its_position():
     joints = bend * np.arange(1, links + 1) / links
     ends = np.cumsum(np.stack([np.sin(joints), np.cos(joints)]), axis=1)
     x, y = (ends - np.stack([np.sin(joints), np.cos(joints)]) / 2).mean(axis=1)
-    assert study_models.chain_direction(np.array(bend), links) == pytest.approx(np.arctan2(x, y), rel=1e-14)
+    assert study_models.chain_direction(np.array(bend), links) == pytest.approx(
+        np.arctan2(x, y), rel=1e-14
+    )
     assert study_models.chain_direction(np.array(bend), samples) == pytest.approx(
         study_models.arc_direction(bend), abs=2 / samples
     )
@@ -69,14 +79,18 @@ def test_bends_have_the_wanted_directions():
     targets = study_models.com_directions()
     bends = study_models.bend_towards(study_models.arc_direction, targets)
     assert (bends[0], bends[-1]) == (pytest.approx(0, abs=1e-12), pytest.approx(np.pi, rel=1e-12))
-    np.testing.assert_allclose(study_models.arc_direction(bends[1:]), targets[1:], rtol=0, atol=1e-11)
+    np.testing.assert_allclose(
+        study_models.arc_direction(bends[1:]), targets[1:], rtol=0, atol=1e-11
+    )
 
 
 @pytest.mark.slow
 def test_the_study_runs_anywhere_and_writes_its_files(tmp_path):
     command = [sys.executable, "-m", "examples.studies.models", "study"]
     path = {"PYTHONPATH": str(ROOT)}
-    done = subprocess.run(command, cwd=tmp_path, env=os.environ | path, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        command, cwd=tmp_path, env=os.environ | path, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stderr
     assert "continuum: final yaw -21.450 deg" in done.stdout
     study = json.loads((tmp_path / "study" / "summary.json").read_text())

@@ -30,7 +30,9 @@ def states(request, chains):
 def displaced(q, v, time):
     """The configuration reached from q in a time at the constant velocity v."""
     turned = Rotation.from_quat(q[3:7], scalar_first=True) * Rotation.from_rotvec(time * v[3:6])
-    return np.concatenate([q[:3] + time * v[:3], turned.as_quat(scalar_first=True), q[7:] + time * v[6:]])
+    return np.concatenate(
+        [q[:3] + time * v[:3], turned.as_quat(scalar_first=True), q[7:] + time * v[6:]]
+    )
 
 
 def tail_force(tau):
@@ -55,7 +57,9 @@ def test_mass_matrix_is_symmetric_and_the_same_on_every_call(chains, states):
 def test_translational_mass_is_the_total_mass(chains, states):
     total = TABLE_1["torso_mass"] + TABLE_1["tail_mass"]
     for chain in chains:
-        np.testing.assert_allclose(chain.mass_matrix(states[0][0])[:3, :3], total * np.eye(3), atol=1e-15)
+        np.testing.assert_allclose(
+            chain.mass_matrix(states[0][0])[:3, :3], total * np.eye(3), atol=1e-15
+        )
 
 
 def test_bias_forces_agree(chains, states):
@@ -80,7 +84,10 @@ def test_bias_force_does_not_depend_on_translation_velocity(chains, states):
 def test_inverse_dynamics_agree(chains, states):
     ours, theirs = chains
     for q, v, v_dot, _ in states:
-        assert block_error(theirs.inverse_dynamics(q, v, v_dot), ours.inverse_dynamics(q, v, v_dot)) <= 5e-13
+        assert (
+            block_error(theirs.inverse_dynamics(q, v, v_dot), ours.inverse_dynamics(q, v, v_dot))
+            <= 5e-13
+        )
 
 
 def test_inverse_dynamics_is_mass_times_acceleration_plus_bias(chains, states):
@@ -94,7 +101,10 @@ def test_forward_dynamics_agree(chains, states):
     ours, theirs = chains
     for q, v, _, tau in states:
         limit = 1e-13 * equilibrated_condition(ours.mass_matrix(q))
-        assert block_error(theirs.forward_dynamics(q, v, tau), ours.forward_dynamics(q, v, tau)) <= limit
+        assert (
+            block_error(theirs.forward_dynamics(q, v, tau), ours.forward_dynamics(q, v, tau))
+            <= limit
+        )
 
 
 def test_forward_dynamics_inverts_inverse_dynamics(chains, states):
@@ -114,7 +124,9 @@ def test_energies_agree(chains, states):
 def test_kinetic_energy_is_the_mass_matrix_form(chains, states):
     for chain in chains:
         for q, v, *_ in states:
-            assert chain.energy(q, v)[0] == pytest.approx(v @ chain.mass_matrix(q) @ v / 2, rel=1e-13)
+            assert chain.energy(q, v)[0] == pytest.approx(
+                v @ chain.mass_matrix(q) @ v / 2, rel=1e-13
+            )
 
 
 def test_energy_changes_by_the_power_of_the_applied_forces(chains, states):
@@ -147,14 +159,18 @@ def expected_points(q, segments, links):
     points = [q[:3] + rotation.apply(TABLE_1["tail_mount"])]
     for angles in np.repeat(np.reshape(q[7:], (segments, 2)), links, axis=0):
         rotation = rotation * Rotation.from_euler("XZ", angles)
-        points.append(points[-1] + rotation.apply([0, -TABLE_1["tail_length"] / (segments * links), 0]))
+        points.append(
+            points[-1] + rotation.apply([0, -TABLE_1["tail_length"] / (segments * links), 0])
+        )
     return np.array(points)
 
 
 def test_tail_point_jacobians_agree(chains, states):
     ours, theirs = chains
     for q, *_ in states:
-        np.testing.assert_allclose(theirs.tail_point_jacobians(q), ours.tail_point_jacobians(q), rtol=0, atol=2e-14)
+        np.testing.assert_allclose(
+            theirs.tail_point_jacobians(q), ours.tail_point_jacobians(q), rtol=0, atol=2e-14
+        )
 
 
 def test_tail_point_jacobians_are_the_derivatives_of_the_points(chains, states):
@@ -185,14 +201,23 @@ def test_given_link_inertia_replaces_the_ellipsoid():
     ours, theirs = (chain(parameters, 2, 3) for chain in CLASSES)
     q, v, v_dot, _ = (rows[0] for rows in random_states(2, 7, 1, "random"))
     assert mass_matrix_error(theirs.mass_matrix(q), ours.mass_matrix(q)) <= 1e-13
-    assert mass_matrix_error(ours.mass_matrix(q), PinocchioChain(TABLE_1, 2, 3).mass_matrix(q)) >= 1e-3
-    assert block_error(theirs.inverse_dynamics(q, v, v_dot), ours.inverse_dynamics(q, v, v_dot)) <= 5e-13
+    assert (
+        mass_matrix_error(ours.mass_matrix(q), PinocchioChain(TABLE_1, 2, 3).mass_matrix(q)) >= 1e-3
+    )
+    assert (
+        block_error(theirs.inverse_dynamics(q, v, v_dot), ours.inverse_dynamics(q, v, v_dot))
+        <= 5e-13
+    )
 
 
 @pytest.mark.parametrize("chain", CLASSES)
 def test_link_radius_means_a_uniform_ellipsoid(chain):
     q = random_states(1, 7, 1, "random")[0][0]
-    mass, half, radius = TABLE_1["tail_mass"] / 3, TABLE_1["tail_length"] / 6, TABLE_1["link_radius"]
+    mass, half, radius = (
+        TABLE_1["tail_mass"] / 3,
+        TABLE_1["tail_length"] / 6,
+        TABLE_1["link_radius"],
+    )
     across, along = mass / 5 * (half**2 + radius**2), mass / 5 * 2 * radius**2
     explicit = chain({**TABLE_1, "link_inertia": (across, along, across)}, 1, 3)
     implied = chain({**TABLE_1, "link_inertia": None}, 1, 3)

@@ -1,4 +1,6 @@
-"""Verification: sound models pass every check, and every kind of fault fails the check that is there for it."""
+"""Verification: sound models pass every check, and every kind of fault fails the check that is
+there for it.
+"""
 
 import copy
 import json
@@ -72,7 +74,9 @@ def failed(checks):
 
 
 def laws_broken(model, count=2):
-    """Names of the laws that a model breaks, CasADi's left out: they compare with the C, which is at fault here."""
+    """Names of the laws that a model breaks, CasADi's left out: they compare with the C, which is
+    at fault here.
+    """
     cases = list(states.states(model, count))
     entries = [entry for entry in verify.LAWS if "casadi" not in entry.name]
     return failed(verify.check(entry, model, cases) for entry in entries)
@@ -91,7 +95,9 @@ def broken(model, name, change):
 
 def times(factor):
     """A change that multiplies every output."""
-    return lambda result, *_: tuple(factor * x for x in result) if isinstance(result, tuple) else factor * result
+    return lambda result, *_: (
+        tuple(factor * x for x in result) if isinstance(result, tuple) else factor * result
+    )
 
 
 # Sound models
@@ -100,14 +106,18 @@ def times(factor):
 @pytest.mark.parametrize("name", SOUND)
 def test_sound_models_pass(name):
     segments, links, options = SOUND[name]
-    assert_sound(verify_model.verify(model_folder(segments, links, **options)), options.get("functions"))
+    assert_sound(
+        verify_model.verify(model_folder(segments, links, **options)), options.get("functions")
+    )
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SOUND_SLOW)
 def test_other_sound_models_pass(name):
     segments, links, options = SOUND_SLOW[name]
-    assert_sound(verify_model.verify(model_folder(segments, links, **options)), options.get("functions"))
+    assert_sound(
+        verify_model.verify(model_folder(segments, links, **options)), options.get("functions")
+    )
 
 
 def assert_sound(checks, functions=None):
@@ -121,7 +131,9 @@ def assert_sound(checks, functions=None):
 
 
 def on_demand(reason):
-    """Whether all functions that a reason says are missing are emitted only where a scene names them."""
+    """Whether all functions that a reason says are missing are emitted only where a scene names
+    them.
+    """
     absent = set(reason.removeprefix("not generated: ").split(", "))
     return absent <= {*ON_DEMAND, *FEEDBACK, *IMPLICIT}
 
@@ -150,16 +162,20 @@ def test_every_function_that_loses_a_number_breaks_a_law(having, name):
 def test_every_function_that_is_slightly_wrong_is_not_what_its_program_means(model, name):
     faulty = broken(model, name, times(1 + SLIGHT))
     cases = list(states.states(faulty, 1))
-    assert failed(verify.check(e, faulty, cases) for e in verify_model.interpreter_laws(faulty)) == {
-        f"interpreter: {name}"
-    }
+    assert failed(
+        verify.check(e, faulty, cases) for e in verify_model.interpreter_laws(faulty)
+    ) == {f"interpreter: {name}"}
 
 
-@pytest.mark.parametrize("reference", verify_model.REFERENCES[:3], ids=lambda reference: reference.title)
+@pytest.mark.parametrize(
+    "reference", verify_model.REFERENCES[:3], ids=lambda reference: reference.title
+)
 def test_every_quantity_that_is_slightly_wrong_disagrees_with_references(model, reference):
     for name in reference.names:
         faulty = broken(model, name, times(1 + SLIGHT))
-        found = failed(verify_model.reference_checks(reference, faulty, list(states.states(faulty, 1))))
+        found = failed(
+            verify_model.reference_checks(reference, faulty, list(states.states(faulty, 1)))
+        )
         assert f"{reference.title}: {name}" in found
 
 
@@ -265,17 +281,29 @@ FAULTS = {
     "attitude": ("mass_matrix", scaled_attitude, "quaternion has no norm and no sign"),
     "batch only": ("mass_matrix", batch_only, "batches are singles"),
     "drifting": ("bias_force", Drifting(), "calls repeat"),
-    "not a number": ("inverse_dynamics", not_a_number, "inverse dynamics is mass times acceleration plus bias"),
+    "not a number": (
+        "inverse_dynamics",
+        not_a_number,
+        "inverse dynamics is mass times acceleration plus bias",
+    ),
     "refused": ("momentum", refused, "momentum is mass times velocity"),
     "power": ("forward_dynamics", times(1 + SLIGHT), "energy changes by the power of the torques"),
-    "torques": ("forward_dynamics", times(1 + SLIGHT), "forward dynamics needs the torques it was given"),
+    "torques": (
+        "forward_dynamics",
+        times(1 + SLIGHT),
+        "forward dynamics needs the torques it was given",
+    ),
     "height": ("energy", heavier_at_height, "energy changes by the power of the torques"),
     "stretched": ("tail_points", stretched, "links have equal length"),
     "stretched columns": ("tail_points", stretched, "jacobians are the derivatives of the points"),
     "swapped": ("tail_point_jacobians", swapped, "jacobians are the derivatives of the points"),
     "loads": ("forward_dynamics_external", unloaded, "loads accelerate by their generalised force"),
     "no load": ("forward_dynamics_external", times(1 + SLIGHT), "no load is no change"),
-    "inverse": ("forward_dynamics_external", times(1 + SLIGHT), "forward dynamics inverts inverse dynamics"),
+    "inverse": (
+        "forward_dynamics_external",
+        times(1 + SLIGHT),
+        "forward dynamics inverts inverse dynamics",
+    ),
     "world mass": ("mass_matrix_world", times(1 + SLIGHT), "mass matrix in world axes"),
     "world bias": ("bias_force_world", times(1 + SLIGHT), "bias force in world axes"),
 }
@@ -310,18 +338,25 @@ def test_casadi_functions_that_are_slightly_wrong_fail(model):
     heavier = model.with_parameters(torso_mass=model.parameters["torso_mass"] * (1 + SLIGHT))
     faulty = copy.copy(model)
     faulty.__dict__["casadi"] = heavier.casadi
-    assert failed(verify.laws(faulty)) == {"casadi functions agree", "casadi externals are the compiled code"}
+    assert failed(verify.laws(faulty)) == {
+        "casadi functions agree",
+        "casadi externals are the compiled code",
+    }
 
 
 # Faults that all functions share
 
 
 def test_another_animal_obeys_the_laws_and_only_references_notice(model):
-    other = model.with_parameters(torso_inertia=[x * (1 + SLIGHT) for x in model.parameters["torso_inertia"]])
+    other = model.with_parameters(
+        torso_inertia=[x * (1 + SLIGHT) for x in model.parameters["torso_inertia"]]
+    )
     other.parameters = model.parameters
     assert laws_broken(other) == set()
     for reference in verify_model.REFERENCES[:3]:
-        found = failed(verify_model.reference_checks(reference, other, list(states.states(other, 1))))
+        found = failed(
+            verify_model.reference_checks(reference, other, list(states.states(other, 1)))
+        )
         assert f"{reference.title}: mass_matrix" in found
         assert f"{reference.title}: forward_dynamics" in found
 
@@ -331,7 +366,9 @@ def test_halves_of_segments_that_differ_from_wholes_fail(tmp_path):
     other = whole.with_parameters(tail_mass=whole.parameters["tail_mass"] * (1 + SLIGHT))
     check = verify_model.split_check(other, list(states.states(other, 1)), tmp_path)
     assert check.status == "failed"
-    assert verify_model.split_check(whole, list(states.states(whole, 1)), tmp_path).status == "passed"
+    assert (
+        verify_model.split_check(whole, list(states.states(whole, 1)), tmp_path).status == "passed"
+    )
 
 
 def without_gyroscopic_torque(let, link, w, w_dot, a_joint, swing):
@@ -362,14 +399,38 @@ def with_load_at_the_wrong_place(let, R, P, f_point, F_beyond):
     return LOAD_AT_POINT(let, R, P * 101 / 100, f_point, F_beyond)
 
 
-LINK_WRENCH, LOAD_AT_TORSO, LOAD_AT_POINT = link.link_wrench, loads.load_at_torso, loads.load_at_point
+LINK_WRENCH, LOAD_AT_TORSO, LOAD_AT_POINT = (
+    link.link_wrench,
+    loads.load_at_torso,
+    loads.load_at_point,
+)
 TORSO_ACCELERATION = torso.torso_acceleration
 DERIVATION_FAULTS = {
-    "gyroscopic": (link, "link_wrench", without_gyroscopic_torque, "momentum is constant in flight"),
-    "acceleration": (link, "link_wrench", without_joint_acceleration, "energy changes by the power of the torques"),
+    "gyroscopic": (
+        link,
+        "link_wrench",
+        without_gyroscopic_torque,
+        "momentum is constant in flight",
+    ),
+    "acceleration": (
+        link,
+        "link_wrench",
+        without_joint_acceleration,
+        "energy changes by the power of the torques",
+    ),
     "flat load": (loads, "load_at_torso", with_flat_load, "pose in the world turns all alike"),
-    "gravity": (torso, "torso_acceleration", with_weak_gravity, "forward dynamics needs the torques it was given"),
-    "load": (loads, "load_at_point", with_load_at_the_wrong_place, "loads accelerate by their generalised force"),
+    "gravity": (
+        torso,
+        "torso_acceleration",
+        with_weak_gravity,
+        "forward dynamics needs the torques it was given",
+    ),
+    "load": (
+        loads,
+        "load_at_point",
+        with_load_at_the_wrong_place,
+        "loads accelerate by their generalised force",
+    ),
 }
 
 
@@ -395,7 +456,10 @@ def test_what_was_left_out_is_said(tmp_path):
     assert omitted["Pinocchio: momentum"] == "not generated: momentum"
     assert omitted["halves of segments"] == "not generated: mass_matrix or bias_force"
     assert failed(checks) == set()
-    assert {c.name for c in checks if c.status == "passed"} >= {"mass matrix is symmetric", "calls repeat"}
+    assert {c.name for c in checks if c.status == "passed"} >= {
+        "mass matrix is symmetric",
+        "calls repeat",
+    }
     report = verify.summary(model, checks)
     assert report["counts"]["not checked"] == len(omitted)
     assert "not generated: energy" in verify.as_text(model, checks)
@@ -404,8 +468,12 @@ def test_what_was_left_out_is_said(tmp_path):
 
 @pytest.mark.parametrize("name", list(CATALOGUE))
 def test_a_model_of_one_function_is_checked(name):
-    asked = {"tracked_dynamics": ["pfl", "rollout"]}.get(name, [name.removesuffix("_factor").removesuffix("_solve")])
-    model = st.load(model_folder(1, 1, functions=asked, **({"contacts": ["tail"]} if name in CONTACT else {})))
+    asked = {"tracked_dynamics": ["pfl", "rollout"]}.get(
+        name, [name.removesuffix("_factor").removesuffix("_solve")]
+    )
+    model = st.load(
+        model_folder(1, 1, functions=asked, **({"contacts": ["tail"]} if name in CONTACT else {}))
+    )
     checks = verify.laws(model)
     assert failed(checks) == set()
     if name in TAKING_MORE:
@@ -426,7 +494,9 @@ def test_summary_is_strict_json(model):
     assert sound["passed"] is True and sound["counts"]["failed"] == 0
 
 
-@pytest.mark.parametrize(("error", "passed"), [(0.0, True), (1.0, True), (1.0 + 1e-15, False), (np.nan, False)])
+@pytest.mark.parametrize(
+    ("error", "passed"), [(0.0, True), (1.0, True), (1.0 + 1e-15, False), (np.nan, False)]
+)
 def test_a_check_passes_up_to_its_limit(error, passed):
     assert verify.Check("name", "Law.", error, 1.0).passed is passed
 
@@ -441,9 +511,14 @@ def test_command_writes_reports_and_returns_one_where_a_check_failed(tmp_path, c
     assert verify_model.main([str(folder), "--output", str(output)]) == 0
     report = json.loads((output / "articulated_m1_n2.json").read_text())
     assert report["passed"] and report["counts"]["failed"] == 0
-    assert "| mass matrix is symmetric | 0 | 0 | passed |" in (output / "articulated_m1_n2.md").read_text()
+    assert (
+        "| mass matrix is symmetric | 0 | 0 | passed |"
+        in (output / "articulated_m1_n2.md").read_text()
+    )
     assert len(capsys.readouterr().out.splitlines()) < 12
-    monkeypatch.setattr(verify_model, "verify", lambda folder: [verify.Check("name", "Law.", 2.0, 1.0)])
+    monkeypatch.setattr(
+        verify_model, "verify", lambda folder: [verify.Check("name", "Law.", 2.0, 1.0)]
+    )
     assert verify_model.main([str(folder), "--output", str(output)]) == 1
     assert "FAILED" in capsys.readouterr().out
 
@@ -461,8 +536,12 @@ def test_errors_are_measured_as_the_references_measure():
     root = rng.normal(size=(8, 8))
     H = root @ root.T
     other = H + 1e-9 * rng.normal(size=(8, 8))
-    assert errors.matrix_error(other, H) == pytest.approx(metrics.mass_matrix_error(other, H), rel=1e-12)
-    assert errors.block_error(other[0], H[0]) == pytest.approx(metrics.block_error(other[0], H[0]), rel=1e-12)
+    assert errors.matrix_error(other, H) == pytest.approx(
+        metrics.mass_matrix_error(other, H), rel=1e-12
+    )
+    assert errors.block_error(other[0], H[0]) == pytest.approx(
+        metrics.block_error(other[0], H[0]), rel=1e-12
+    )
     assert errors.condition(H) == pytest.approx(metrics.equilibrated_condition(H), rel=1e-12)
 
 
@@ -486,7 +565,9 @@ def test_moved_follows_the_velocity(model):
     rate = (there - law.moved(s.q, s.v, -1e-6)) / 2e-6
     w, x, y, z = s.q[3:7]
     Q = np.array([[-x, -y, -z], [w, -z, y], [z, w, -x], [-y, x, w]])
-    np.testing.assert_allclose(rate, np.concatenate([s.v[:3], Q @ s.v[3:6] / 2, s.v[6:]]), rtol=1e-8, atol=1e-8)
+    np.testing.assert_allclose(
+        rate, np.concatenate([s.v[:3], Q @ s.v[3:6] / 2, s.v[6:]]), rtol=1e-8, atol=1e-8
+    )
     assert np.linalg.norm(there[3:7]) == pytest.approx(1, abs=1e-14)
 
 
@@ -508,9 +589,13 @@ def test_states_are_of_all_kinds_seeded_and_exact_in_the_real_type():
 
 
 def exact_errors(model, chain, s):
-    """Errors of H, C and v_dot, the last relative to the condition number, by the references' measures."""
+    """Errors of H, C and v_dot, the last relative to the condition number, by the references'
+    measures.
+    """
     H = chain.mass_matrix(s.q)
-    v_dot = metrics.block_error(model.forward_dynamics(s.q, s.v, s.tau), chain.forward_dynamics(s.q, s.v, s.tau))
+    v_dot = metrics.block_error(
+        model.forward_dynamics(s.q, s.v, s.tau), chain.forward_dynamics(s.q, s.v, s.tau)
+    )
     return {
         "H": metrics.mass_matrix_error(model.mass_matrix(s.q), H),
         "C": metrics.block_error(model.bias_force(s.q, s.v), chain.bias_force(s.q, s.v)),
@@ -519,9 +604,15 @@ def exact_errors(model, chain, s):
 
 
 def limits(model, kind):
-    """Where every joint is folded, what H sums cancels: libraries' v_dot is off by 1e-14 to 2e-14, H by 3e-13."""
+    """Where every joint is folded, what H sums cancels: libraries' v_dot is off by 1e-14 to 2e-14,
+    H by 3e-13.
+    """
     crowd = 5 if kind == "folded" and (model.links or 0) > 8 else 1
-    return {"H": 1e-13 * crowd, "C": 1e-13 * crowd, "v_dot": 2e-14 * crowd if kind == "folded" else 5e-15}
+    return {
+        "H": 1e-13 * crowd,
+        "C": 1e-13 * crowd,
+        "v_dot": 2e-14 * crowd if kind == "folded" else 5e-15,
+    }
 
 
 def assert_accurate(model, chain, states):
@@ -529,12 +620,16 @@ def assert_accurate(model, chain, states):
     for s in states:
         limit = limits(model, s.kind)
         errors = exact_errors(model, chain, s)
-        assert {key: error for key, error in errors.items() if not error <= limit[key]} == {}, s.kind
+        assert {key: error for key, error in errors.items() if not error <= limit[key]} == {}, (
+            s.kind
+        )
 
 
 def lean(segments, links):
     """A model with what accuracy is measured of."""
-    return st.load(model_folder(segments, links, functions=["mass_matrix", "bias_force", "forward_dynamics"]))
+    return st.load(
+        model_folder(segments, links, functions=["mass_matrix", "bias_force", "forward_dynamics"])
+    )
 
 
 @pytest.mark.slow

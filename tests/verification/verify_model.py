@@ -1,4 +1,6 @@
-"""Verification report: a generated folder goes in; laws, interpreter, peers and exact arithmetic judge its model."""
+"""Verification report: a generated folder goes in; laws, interpreter, peers and exact arithmetic
+judge its model.
+"""
 
 import argparse
 import json
@@ -26,14 +28,25 @@ from serpentail_codegen.pipeline import generate, tail_of
 from serpentail_codegen.scene.parse import parse_scene
 
 STRICT = 22.5  # roundings: 5e-15 in double
-FOLDED = 4 * STRICT  # what H sums cancels in a folded tail: libraries are off by 1e-14 to 2e-14 there
-COMPARED = ("mass_matrix", "bias_force", "inverse_dynamics", "forward_dynamics", "energy", "momentum")
+FOLDED = (
+    4 * STRICT
+)  # what H sums cancels in a folded tail: libraries are off by 1e-14 to 2e-14 there
+COMPARED = (
+    "mass_matrix",
+    "bias_force",
+    "inverse_dynamics",
+    "forward_dynamics",
+    "energy",
+    "momentum",
+)
 POINTS = ("tail_points", "tail_point_jacobians")
 
 
 @dataclass(frozen=True)
 class Reference:
-    """Another derivation of one kind of tail: its class, what it computes, and whether it does so in many digits."""
+    """Another derivation of one kind of tail: its class, what it computes, and whether it does so
+    in many digits.
+    """
 
     title: str
     module: str
@@ -43,11 +56,17 @@ class Reference:
     exact: bool = False
 
     def opened(self, model: st.Model):
-        """Return the reference for a model's tail; ImportError, or ValueError where it refuses the parameters."""
+        """Return the reference for a model's tail; ImportError, or ValueError where it refuses the
+        parameters.
+        """
         sizes = (model.segments, model.links) if self.kind == "articulated" else (model.segments,)
-        return getattr(import_module(f"tests.references.{self.module}"), self.chain)(parameters(model), *sizes)
+        return getattr(import_module(f"tests.references.{self.module}"), self.chain)(
+            parameters(model), *sizes
+        )
 
-    def rows(self, model: st.Model, cases: list[State]) -> Iterator[tuple[str, str, list[State], float]]:
+    def rows(
+        self, model: st.Model, cases: list[State]
+    ) -> Iterator[tuple[str, str, list[State], float]]:
         """Yield title, function, states and limit (in roundings) of every comparison."""
         long = (
             2 * model.segments * (model.links or 1)
@@ -61,7 +80,9 @@ class Reference:
 
 
 REFERENCES = (
-    Reference("Pinocchio", "pinocchio_chain", "PinocchioChain", "articulated", (*COMPARED, *POINTS)),
+    Reference(
+        "Pinocchio", "pinocchio_chain", "PinocchioChain", "articulated", (*COMPARED, *POINTS)
+    ),
     Reference("MuJoCo", "mujoco_chain", "MujocoChain", "articulated", (*COMPARED, *POINTS)),
     Reference("40 digits", "exact_chain", "ExactChain", "articulated", exact=True),
     Reference("40 digits", "exact_continuum", "ExactContinuum", "continuum", exact=True),
@@ -91,7 +112,9 @@ def judge(model: st.Model) -> list[Check]:
 def interpreter_laws(model: st.Model) -> Iterator[Law]:
     """Yield, for every function, that the C gives what its program means."""
     text = "The C gives what the interpreter of its program gives."
-    for name in [name for name in CATALOGUE if name not in CONTACT | IMPLICIT]:  # these take more than a state
+    for name in [
+        name for name in CATALOGUE if name not in CONTACT | IMPLICIT
+    ]:  # these take more than a state
         yield Law(f"interpreter: {name}", text, interpreted(model, name), (name,), NEAR)
 
 
@@ -106,7 +129,9 @@ def interpreted(model: st.Model, name: str) -> Callable:
         given |= {key: np.ravel(value).tolist() for key, value in parameters(model).items()}
         values = Run(written(), Numbers(), given).values
         results = outputs(model, name, s)
-        return differences(model, name, s, [np.reshape(values[key], x.shape) for key, x in results.items()])
+        return differences(
+            model, name, s, [np.reshape(values[key], x.shape) for key, x in results.items()]
+        )
 
     return error
 
@@ -114,14 +139,19 @@ def interpreted(model: st.Model, name: str) -> Callable:
 def parameters(model: st.Model) -> dict:
     """Return the parameters as the model's real type holds them."""
     real = model.parameter_vector.dtype
-    return {name: np.asarray(value, real).astype(float).tolist() for name, value in model.parameters.items()}
+    return {
+        name: np.asarray(value, real).astype(float).tolist()
+        for name, value in model.parameters.items()
+    }
 
 
 # References: other derivations of the same tail
 
 
 def reference_checks(reference: Reference, model: st.Model, cases: list[State]) -> list[Check]:
-    """Return, for every quantity that a reference computes, whether the model agrees; none for another kind of tail."""
+    """Return, for every quantity that a reference computes, whether the model agrees; none for
+    another kind of tail.
+    """
     title, checks = reference.title, []
     text = f"The model agrees with {title}, v_dot relative to cond(H)."
     if reference.kind != model.manifest["scene"]["kind"]:
@@ -150,10 +180,13 @@ def agreement(chain, name: str) -> Callable:
 
 
 def split_check(model: st.Model, cases: list[State], parent: Path) -> Check:
-    """Return whether H and C depend on how equal joints are counted: against a model generated for this."""
+    """Return whether H and C depend on how equal joints are counted: against a model generated for
+    this.
+    """
     name = "halves of segments"
     text = (
-        "With equal halves, 2 m segments of n links are m segments of 2 n: H = G^T H G, C = G^T C, G repeating angles."
+        "With equal halves, 2 m segments of n links are m segments of 2 n: H = G^T H G, C = G^T C, "
+        "G repeating angles."
     )
     functions, sizes = ["mass_matrix", "bias_force"], partner_sizes(model)
     if sizes is None:
@@ -180,7 +213,9 @@ def partner_sizes(model: st.Model) -> tuple[int, int] | None:
 
 
 def split_errors(whole: st.Model, halves: st.Model, s: State) -> dict[str, float]:
-    """Return the errors of H and C at the state of the whole that a state of either model starts with."""
+    """Return the errors of H and C at the state of the whole that a state of either model starts
+    with.
+    """
     q, v = s.q[: whole.nq], s.v[: whole.nv]
     G = np.kron(np.eye(whole.segments), np.vstack([np.eye(2), np.eye(2)]))
     q_halves, v_halves = np.concatenate([q[:7], G @ q[7:]]), np.concatenate([v[:6], G @ v[6:]])
@@ -201,7 +236,8 @@ def markdown(model: st.Model, checks: list[Check]) -> str:
     lines = [
         f"# Verification of {model.name}",
         "",
-        f"{model.segments} segments{f' of {model.links} links' if model.links else ''}, {model.manifest['real']}; "
+        f"{model.segments} segments{f' of {model.links} links' if model.links else ''}, "
+        f"{model.manifest['real']}; "
         + ", ".join(f"{count} {status}" for status, count in counts.items())
         + ".",
         "",
@@ -228,11 +264,16 @@ def short_table(model: st.Model, checks: list[Check]) -> str:
     groups: dict[str, list[Check]] = {}
     for c in checks:
         groups.setdefault(c.name.partition(": ")[0] if ": " in c.name else "laws", []).append(c)
-    lines = [f"{model.name}", f"  {'':<12}{'passed':>8}{'failed':>8}{'not checked':>13}   largest error / limit"]
+    lines = [
+        f"{model.name}",
+        f"  {'':<12}{'passed':>8}{'failed':>8}{'not checked':>13}   largest error / limit",
+    ]
     for name, rows in groups.items():
         counts = summary(model, rows)["counts"]
         lines.append(
-            f"  {name:<12}" + "{passed:>8}{failed:>8}{not checked:>13}".format(**counts) + f"   {largest(rows)}"
+            f"  {name:<12}"
+            + "{passed:>8}{failed:>8}{not checked:>13}".format(**counts)
+            + f"   {largest(rows)}"
         )
     failed = [c for c in checks if not c.passed]
     return "\n".join(lines + ([as_text(model, failed)] if failed else []))
@@ -240,7 +281,9 @@ def short_table(model: st.Model, checks: list[Check]) -> str:
 
 def largest(rows: list[Check]) -> str:
     """Return the check that came nearest to its limit, or passed it."""
-    rated = [(np.nan_to_num(c.error / c.limit, nan=np.inf), c) for c in rows if c.limit and not c.omitted]
+    rated = [
+        (np.nan_to_num(c.error / c.limit, nan=np.inf), c) for c in rows if c.limit and not c.omitted
+    ]
     ratio, worst = max(rated, key=lambda pair: pair[0], default=(0, None))
     return f"{ratio:.2g}  {worst.name.rpartition(': ')[2]}" if worst else ""
 
@@ -249,7 +292,9 @@ def main(argv: list[str] | None = None) -> int:
     """Verify a folder, write the reports, print a short table; 1 if a check failed."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path, help="a generated folder")
-    parser.add_argument("--output", type=Path, default=Path("output/verify"), help="folder of the reports")
+    parser.add_argument(
+        "--output", type=Path, default=Path("output/verify"), help="folder of the reports"
+    )
     chosen = parser.parse_args(argv)
     try:
         checks, model = verify(chosen.folder), st.load(chosen.folder)

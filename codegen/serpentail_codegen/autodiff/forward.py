@@ -1,7 +1,8 @@
-"""Tangents of programs: a loop nest goes in, the loop nest that carries its derivatives along comes out.
+"""Tangents of programs: a loop nest goes in, the loop nest that carries its derivatives along comes
+out.
 
-Each active array ``x`` gets a companion ``d_x``.  With lanes, every scalar of it is a row with one number for each
-direction; without, it holds the derivative in one direction.
+Each active array ``x`` gets a companion ``d_x``.  With lanes, every scalar of it is a row with one
+number for each direction; without, it holds the derivative in one direction.
 """
 
 from collections.abc import Callable, Collection
@@ -19,8 +20,11 @@ def everywhere(loops: tuple[Loop, ...]) -> None:
     """Need all lanes in every loop."""
 
 
-def tangent_program(program: Program, active: Collection[str], lanes: int = 0, bound: Bound = everywhere) -> Program:
-    """Return the program that takes ``d_<input>`` of the active inputs along and gives ``d_<output>``.
+def tangent_program(
+    program: Program, active: Collection[str], lanes: int = 0, bound: Bound = everywhere
+) -> Program:
+    """Return the program that takes ``d_<input>`` of the active inputs along and gives
+    ``d_<output>``.
 
     ``bound`` tells how many lanes are needed inside given loops.
     """
@@ -41,7 +45,9 @@ def _role(array: Array) -> str:
 
 
 def _partly_written(body: tuple) -> list[Ref]:
-    """Return the rows that some statement writes in part of their lanes: the others must be zero."""
+    """Return the rows that some statement writes in part of their lanes: the others must be
+    zero.
+    """
     found = {}
     for statement, _ in statements(body):
         if getattr(statement, "columns", None):
@@ -95,7 +101,11 @@ class _Transform:
     def apply(self, call: Apply, columns: Index | None):
         """Yield a step with its tangents."""
         values = call.inputs()
-        turns = {name: self.turned[ref.array.name] for name, ref in values.items() if ref.array.name in self.turned}
+        turns = {
+            name: self.turned[ref.array.name]
+            for name, ref in values.items()
+            if ref.array.name in self.turned
+        }
         active = {name for name, ref in values.items() if self.moves(ref)}
         if any(ref.array.name in self.turned for ref in call.writes) or not active | turns.keys():
             yield call
@@ -105,7 +115,9 @@ class _Transform:
             return
         kinds = frozenset((name, found.turned) for name, found in turns.items())
         step = tangent(call.step, frozenset(active | turns.keys()), kinds)
-        tangents = {f"d_{name}_angles": self.of(found.angles(values[name])) for name, found in turns.items()}
+        tangents = {
+            f"d_{name}_angles": self.of(found.angles(values[name])) for name, found in turns.items()
+        }
         values |= tangents | {f"d_{name}": self.of(values[name]) for name in active}
         yield Apply(
             step,

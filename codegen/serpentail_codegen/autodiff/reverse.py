@@ -1,25 +1,45 @@
-"""Adjoints of programs: a loop nest goes in, the loop nest that runs it, then runs it backward, comes out.
+"""Adjoints of programs: a loop nest goes in, the loop nest that runs it, then runs it backward,
+comes out.
 
-Each array ``x`` that matters gets a companion ``b_x``, what the weighted outputs change by with x.  A value that is
-overwritten before the way back needs it is kept, one copy for each turn of its loops.
+Each array ``x`` that matters gets a companion ``b_x``, what the weighted outputs change by with x.
+A value that is overwritten before the way back needs it is kept, one copy for each turn of its
+loops.
 """
 
 from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 
 from ..ir.dataflow import influencing, inner_arrays, pruned, reached, writes
-from ..ir.program import Apply, Array, Copy, Fill, Guard, Index, Loop, Program, Ref, as_index, statements
+from ..ir.program import (
+    Apply,
+    Array,
+    Copy,
+    Fill,
+    Guard,
+    Index,
+    Loop,
+    Program,
+    Ref,
+    as_index,
+    statements,
+)
 from .angles import TurnedArray, turned_arrays
 from .step import adjoint
 
 
 def adjoint_program(program: Program, wanted: Collection[str], given: Collection[str]) -> Program:
-    """Return the program that takes ``b_<output>`` of the given outputs to ``b_<input>`` of the wanted inputs."""
+    """Return the program that takes ``b_<output>`` of the given outputs to ``b_<input>`` of the
+    wanted inputs.
+    """
     matters = reached(program.body, wanted) & influencing(program.body, given)
     turned = {name: found for name, found in turned_arrays(program).items() if name in matters}
     matters -= turned.keys()
     ends = [a for a in program.arrays if a.name in (*wanted, *given)]
-    companions = {a.name: Array(f"b_{a.name}", "local", a.size, a.count) for a in program.arrays if a.name in matters}
+    companions = {
+        a.name: Array(f"b_{a.name}", "local", a.size, a.count)
+        for a in program.arrays
+        if a.name in matters
+    }
     companions |= {a.name: Array(f"b_{a.name}_sum", "local", a.size, a.count) for a in ends}
     weights = [Array(f"b_{a.name}", "input", a.size, a.count) for a in ends if a.name in given]
     results = [Array(f"b_{a.name}", "output", a.size, a.count) for a in ends if a.name in wanted]
@@ -43,7 +63,9 @@ def turns(loops: tuple[Loop, ...]) -> tuple[Index, int]:
     number, count = as_index(0), 1
     for loop in reversed(loops):
         if loop.start.terms or loop.stop.terms or loop.start.offset:
-            raise ValueError(f"loop {loop.var} is no rectangle from 0 on: its turns cannot be numbered")
+            raise ValueError(
+                f"loop {loop.var} is no rectangle from 0 on: its turns cannot be numbered"
+            )
         number, count = number + count * Index(((loop.var, 1),)), count * loop.stop.offset
     return number, count
 
@@ -104,7 +126,9 @@ class _WayBack:
                 there, back = self.both(statement.body, (*loops, statement))
                 forward.append(replace(statement, body=there))
                 if back:
-                    backward.insert(0, replace(statement, body=back, downward=not statement.downward))
+                    backward.insert(
+                        0, replace(statement, body=back, downward=not statement.downward)
+                    )
                 continue
             there, back = self.statement(statement, loops)
             forward += there
@@ -140,7 +164,11 @@ class _WayBack:
         read, written = call.inputs(), call.outputs()
         stored = [ref for ref, adds in zip(call.writes, call.adds, strict=True) if not adds]
         given = frozenset(n for n, ref in written.items() if self.matters(ref))
-        turns = {n: self.turned[ref.array.name] for n, ref in read.items() if ref.array.name in self.turned}
+        turns = {
+            n: self.turned[ref.array.name]
+            for n, ref in read.items()
+            if ref.array.name in self.turned
+        }
         wanted = frozenset(n for n, ref in read.items() if self.matters(ref)) | turns.keys()
         if not given or not wanted:
             return [call], self.cleared(*stored)
@@ -158,7 +186,9 @@ class _WayBack:
         in_place = [ref in stored for ref in targets]
         for ref in stored:
             if sum(_overlap(ref, other) for other in targets) > (ref in targets):
-                raise ValueError(f"{call.step.name} overwrites part of what it reads in {ref.array.name}")
+                raise ValueError(
+                    f"{call.step.name} overwrites part of what it reads in {ref.array.name}"
+                )
         back = Apply(
             step,
             tuple(values[name] for name, _ in step.inputs),

@@ -1,7 +1,9 @@
-"""Derivatives of steps: a straight-line step goes in, the step of its tangents or of its adjoints comes out.
+"""Derivatives of steps: a straight-line step goes in, the step of its tangents or of its adjoints
+comes out.
 
-Both walk the tape once and differentiate each operation by its rule.  Tangents are called ``d_<vector>``, adjoints
-``b_<vector>``; where a tangent is wide it stands for all directions at once.
+Both walk the tape once and differentiate each operation by its rule.  Tangents are called
+``d_<vector>``, adjoints ``b_<vector>``; where a tangent is wide it stands for all directions at
+once.
 """
 
 from collections import Counter
@@ -18,7 +20,9 @@ def _quotient(tape: Tape, y: int, a: int, b: int) -> tuple[int, int]:
 
 
 def _chosen(tape: Tape, c: int) -> tuple[int, int]:
-    """1 for the operand that counts, 0 for the other; what does not count must have a derivative all the same."""
+    """1 for the operand that counts, 0 for the other; what does not count must have a derivative
+    all the same.
+    """
     one, zero = tape.const(1), tape.const(0)
     return tape.select(c, one, zero), tape.select(c, zero, one)
 
@@ -50,7 +54,9 @@ class Rules:
         op, *args = self.step.nodes[node]
         out: dict[int, int] = {}
         for operand, partial in zip(
-            args, PARTIALS[op](self.tape, self.values[node], *(self.values[a] for a in args)), strict=True
+            args,
+            PARTIALS[op](self.tape, self.values[node], *(self.values[a] for a in args)),
+            strict=True,
         ):
             out[operand] = self.tape.add(out[operand], partial) if operand in out else partial
         return out
@@ -58,12 +64,18 @@ class Rules:
     def finish(self, prefix: str, doc: str, inputs, outputs, results) -> Step:
         """Return what was recorded as a step."""
         name = f"{prefix}_{self.step.name}"
-        return compacted(Step(name, doc, tuple(inputs), tuple(outputs), tuple(self.tape.nodes), tuple(results)))
+        return compacted(
+            Step(name, doc, tuple(inputs), tuple(outputs), tuple(self.tape.nodes), tuple(results))
+        )
 
 
 def some_of(vectors, chosen: frozenset[str], word: str = "") -> str:
     """Return the chosen vectors as a part of a name, nothing where all are."""
-    return "" if len(chosen) == len(vectors) else "_".join([word, *(name for name, _ in vectors if name in chosen)])
+    return (
+        ""
+        if len(chosen) == len(vectors)
+        else "_".join([word, *(name for name, _ in vectors if name in chosen)])
+    )
 
 
 def spans(vectors) -> dict[str, range]:
@@ -76,9 +88,11 @@ def spans(vectors) -> dict[str, range]:
 
 
 class Combinations:
-    """Tangents as combinations of rows with narrow coefficients, summed up only where that saves work on rows.
+    """Tangents as combinations of rows with narrow coefficients, summed up only where that saves
+    work on rows.
 
-    A node that is used once goes into its use: d(a (b + c)) = a db + a dc + (b + c) da needs no row for d(b + c).
+    A node that is used once goes into its use: d(a (b + c)) = a db + a dc + (b + c) da needs no row
+    for d(b + c).
     """
 
     MOST = 2  # terms that are scaled one by one; more are summed first
@@ -109,7 +123,9 @@ class Combinations:
                 terms = changes[operand] = self.one_row(terms)
             for row, coefficient in terms.items():
                 total[row] = tape.add(total.get(row, tape.const(0)), tape.mul(partial, coefficient))
-        total = {row: coefficient for row, coefficient in total.items() if tape.value(coefficient) != 0}
+        total = {
+            row: coefficient for row, coefficient in total.items() if tape.value(coefficient) != 0
+        }
         return self.one_row(total) if self.uses[node] > 1 else total
 
 
@@ -117,7 +133,9 @@ Turns = frozenset[tuple[str, Turned]]
 
 
 def moved_inputs(rules: Rules, active: frozenset[str], turns: dict[str, Turned]):
-    """Return the tangents that a step takes, and the tangent of each of its input scalars as a combination of them."""
+    """Return the tangents that a step takes, and the tangent of each of its input scalars as a
+    combination of them.
+    """
     tape, count, moving, slopes = rules.tape, rules.count, [], {}
     for name, span in spans(rules.step.inputs).items():
         if name in turns:
@@ -136,7 +154,8 @@ def moved_inputs(rules: Rules, active: frozenset[str], turns: dict[str, Turned])
 
 @cache
 def tangent(step: Step, active: frozenset[str], turns: Turns = frozenset()) -> Step:
-    """Return the step with ``d_<output>`` for tangents ``d_<input>`` of the active inputs, and its own outputs.
+    """Return the step with ``d_<output>`` for tangents ``d_<input>`` of the active inputs, and its
+    own outputs.
 
     Of the inputs in ``turns``, which are sines and cosines, it takes ``d_<input>_angles``.
     """
@@ -149,15 +168,24 @@ def tangent(step: Step, active: frozenset[str], turns: Turns = frozenset()) -> S
         else:
             changes.append(combinations.of(node, changes))
     outputs = (*step.outputs, *((f"d_{name}", size) for name, size in step.outputs))
-    results = [rules.values[r] for r in step.results] + [combinations.summed(changes[r]) for r in step.results]
+    results = [rules.values[r] for r in step.results] + [
+        combinations.summed(changes[r]) for r in step.results
+    ]
     return rules.finish(
-        f"d{some_of(step.inputs, active)}", f"Tangents of {step.name}.", (*step.inputs, *moving), outputs, results
+        f"d{some_of(step.inputs, active)}",
+        f"Tangents of {step.name}.",
+        (*step.inputs, *moving),
+        outputs,
+        results,
     )
 
 
 @cache
-def adjoint(step: Step, wanted: frozenset[str], given: frozenset[str], turns: Turns = frozenset()) -> Step:
-    """Return the step that takes ``b_<output>`` of the given outputs to ``b_<input>`` of the wanted inputs.
+def adjoint(
+    step: Step, wanted: frozenset[str], given: frozenset[str], turns: Turns = frozenset()
+) -> Step:
+    """Return the step that takes ``b_<output>`` of the given outputs to ``b_<input>`` of the wanted
+    inputs.
 
     Of the inputs in ``turns``, which are sines and cosines, it gives ``b_<input>_angles``.
     """
@@ -183,7 +211,9 @@ def adjoint(step: Step, wanted: frozenset[str], given: frozenset[str], turns: Tu
             outputs.append((f"b_{name}_angles" if name in turned else f"b_{name}", len(own)))
             results += own
     partly = some_of(step.inputs, wanted) + some_of(step.outputs, given, "_of")
-    return rules.finish(f"b{partly}", f"Adjoints of {step.name}.", (*step.inputs, *incoming), outputs, results)
+    return rules.finish(
+        f"b{partly}", f"Adjoints of {step.name}.", (*step.inputs, *incoming), outputs, results
+    )
 
 
 def by_angles(tape: Tape, span: range, turned: Turned, weights: list[int]) -> list[int]:

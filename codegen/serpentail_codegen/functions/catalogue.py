@@ -80,7 +80,14 @@ _TABLE = (
     Function(
         "forward_dynamics_jvp",
         "directional derivative of v_dot from Eq. 1",
-        (Q, V, TAU, row("dq", "direction of q, in its tangent space"), row("dv", "direction of v"), DTAU_IN),
+        (
+            Q,
+            V,
+            TAU,
+            row("dq", "direction of q, in its tangent space"),
+            row("dv", "direction of v"),
+            DTAU_IN,
+        ),
         (row("dv_dot", "derivative of v_dot"),),
         jacobians.assemble_forward_dynamics_jvp,
     ),
@@ -88,12 +95,17 @@ _TABLE = (
         "forward_dynamics_vjp",
         "lambda^T times the Jacobians of v_dot from Eq. 1",
         (Q, V, TAU, MULTIPLIER),
-        (row("dq", "lambda^T d(v_dot)/d(q), in the tangent space"), row("dv", "lambda^T d(v_dot)/d(v)"), DTAU_OUT),
+        (
+            row("dq", "lambda^T d(v_dot)/d(q), in the tangent space"),
+            row("dv", "lambda^T d(v_dot)/d(v)"),
+            DTAU_OUT,
+        ),
         jacobians.assemble_forward_dynamics_vjp,
     ),
     Function(
         "inverse_dynamics_hessian",
-        "second derivatives of lambda^T (H v_dot + C); with respect to v_dot twice, or v_dot and v, they are zero",
+        "second derivatives of lambda^T (H v_dot + C); with respect to v_dot twice, or v_dot and "
+        "v, they are zero",
         (Q, V, V_DOT, MULTIPLIER),
         (
             square("qq", "with respect to q twice, in its tangent space (by the exponential map)"),
@@ -127,5 +139,7 @@ _TABLE = (
         jacobians.assemble_momentum_derivatives,
     ),
 )
-CATALOGUE = FUNCTIONS | {function.name: function for function in _TABLE} | CONTACT | FEEDBACK | IMPLICIT
+CATALOGUE = (
+    FUNCTIONS | {function.name: function for function in _TABLE} | CONTACT | FEEDBACK | IMPLICIT
+)
 SYMBOLIC = FUNCTIONS | CONTACT | FEEDBACK  # those that the CasADi module builds of operations

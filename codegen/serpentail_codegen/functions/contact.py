@@ -1,4 +1,6 @@
-"""Functions of the points that touch the ground: a draft goes in, their places, motion and forces are added to it."""
+"""Functions of the points that touch the ground: a draft goes in, their places, motion and forces
+are added to it.
+"""
 
 from dataclasses import dataclass
 
@@ -18,18 +20,27 @@ from .tail import Tail
 LEGS = Argument(
     "legs",
     lambda t: (8 * ("feet" in t.contacts),),
-    "gamma_1, delta_1 of the right leg, gamma_2, delta_2 of the left (rad), then their rates (rad/s)",
+    "gamma_1, delta_1 of the right leg, gamma_2, delta_2 of the left (rad), then their rates "
+    "(rad/s)",
 )
-POSITIONS = Argument("positions", lambda t: (t.points, 3), "points that can touch the ground (m, world)")
+POSITIONS = Argument(
+    "positions", lambda t: (t.points, 3), "points that can touch the ground (m, world)"
+)
 VELOCITIES = Argument("velocities", lambda t: (t.points, 3), "their velocities (m/s, world)")
-BRISTLES = Argument("bristles", lambda t: (2 * t.points,), "stretch of the friction springs (m, world x and y)")
+BRISTLES = Argument(
+    "bristles", lambda t: (2 * t.points,), "stretch of the friction springs (m, world x and y)"
+)
 BRISTLE_RATES = Argument("bristle_rates", lambda t: (2 * t.points,), "their rates (m/s)")
-FORCES = Argument("forces", lambda t: (t.points, 3), "forces of the ground on the points (N, world)")
+FORCES = Argument(
+    "forces", lambda t: (t.points, 3), "forces of the ground on the points (N, world)"
+)
 
 
 @dataclass(frozen=True)
 class Points:
-    """Arms and velocities of all points; where each group begins; columns of the tail's joints, one for a point."""
+    """Arms and velocities of all points; where each group begins; columns of the tail's joints, one
+    for a point.
+    """
 
     arms: Array
     velocities: Array
@@ -53,7 +64,12 @@ def gather_points(d: Draft, arrays: dict[str, Array]) -> Points:
     """All points that can touch the ground: feet, then tail, then the torso's lowest."""
     tail = d.tail
     columns = d.array("S_point", 12, tail.total) if "tail" in tail.contacts else None
-    points = Points(d.array("arm", 3, tail.points), d.array("velocity", 3, tail.points), first_points(tail), columns)
+    points = Points(
+        d.array("arm", 3, tail.points),
+        d.array("velocity", 3, tail.points),
+        first_points(tail),
+        columns,
+    )
     if "feet" in tail.contacts:
         place_feet(d, points, arrays["legs"])
     if "tail" in tail.contacts:
@@ -69,7 +85,11 @@ def place_feet(d: Draft, points: Points, angles: Array) -> None:
     sides = d.constant("sides", [1, -1])
     foot, rate = d.array("foot", 3, 3), d.array("foot_rate", 3, 3)
     with d.loop("l", 2) as leg:
-        reads = {"side": sides.part(leg, 1), "leg": angles.part(2 * leg, 2), "leg_rates": angles.part(4 + 2 * leg, 2)}
+        reads = {
+            "side": sides.part(leg, 1),
+            "leg": angles.part(2 * leg, 2),
+            "leg_rates": angles.part(4 + 2 * leg, 2),
+        }
         d.step(legs.foot_points, reads, foot=foot.part(0, 9), foot_rate=rate.part(0, 9))
         with d.loop("k", 3) as k:
             reads = {"place": foot[k], "drift": rate[k]}
@@ -77,7 +97,9 @@ def place_feet(d: Draft, points: Points, angles: Array) -> None:
 
 
 def place_tail(d: Draft, points: Points) -> None:
-    """The tail's points but the first: that one is the mount, a point of the torso and inside it."""
+    """The tail's points but the first: that one is the mount, a point of the torso and inside
+    it.
+    """
     mechanism(d).prepare_samples(d)
     here = sweeps.torso_pose(d, True, name="point")
     twist = {name: d.vector(name, 3) for name in ("turn", "slide")}
@@ -87,7 +109,12 @@ def place_tail(d: Draft, points: Points) -> None:
         S = points.S[g]
         d.step(mechanism(d).twist, here | d.sample(i), S=S)
         d.step(mechanism(d).pose, here | d.sample(i), **here)
-        d.step(con.carried_twist, {"S": S, "rates": d.rates(i)}, turn_=twist["turn"], slide_=twist["slide"])
+        d.step(
+            con.carried_twist,
+            {"S": S, "rates": d.rates(i)},
+            turn_=twist["turn"],
+            slide_=twist["slide"],
+        )
         d.step(con.point_on_tail, here | twist, **points.motion(g + points.first["tail"]))
 
 
@@ -106,12 +133,17 @@ def press(d: Draft, points: Points, arrays: dict[str, Array]) -> None:
     law = derive(con.contact_force, friction=d.tail.friction)
     with d.loop("k", d.tail.points) as k:
         reads = d.known | points.motion(k) | {"bristle": arrays["bristles"].part(2 * k, 2)}
-        writes = {"force": arrays["forces"].part(3 * k, 3), "rate": arrays["bristle_rates"].part(2 * k, 2)}
+        writes = {
+            "force": arrays["forces"].part(3 * k, 3),
+            "rate": arrays["bristle_rates"].part(2 * k, 2),
+        }
         d.apply(law, reads, **writes)
 
 
 def gather_contact_loads(d: Draft, points: Points, forces: Array, torques: Array) -> None:
-    """J^T f (Eq. 10): ``load_force, load_moment`` at B in torso axes; the joints' share is added to ``torques``."""
+    """J^T f (Eq. 10): ``load_force, load_moment`` at B in torso axes; the joints' share is added to
+    ``torques``.
+    """
     load = d.vector("load", 6)
     d.fill(load, 0)
 
@@ -120,10 +152,17 @@ def gather_contact_loads(d: Draft, points: Points, forces: Array, torques: Array
         d.step(con.load_about_torso, reads, load_=load)
 
     if points.S:
-        with d.loop("i", d.tail.segments, downward=True) as i, d.loop("j", d.tail.links, downward=True) as j:
+        with (
+            d.loop("i", d.tail.segments, downward=True) as i,
+            d.loop("j", d.tail.links, downward=True) as j,
+        ):
             g = d.tail.links * i + j
             add(g + points.first["tail"])
-            d.step(loads.joint_load, {"S": points.S[g], "F_beyond": load}, torque_=torques.part(2 * i, 2))
+            d.step(
+                loads.joint_load,
+                {"S": points.S[g], "F_beyond": load},
+                torque_=torques.part(2 * i, 2),
+            )
     for group in [name for name in d.tail.contacts if name != "tail"]:
         with d.loop("k", d.tail.groups[group]) as k:
             add(k + points.first[group])
@@ -131,7 +170,9 @@ def gather_contact_loads(d: Draft, points: Points, forces: Array, torques: Array
 
 
 def contact_torques(d: Draft, arrays: dict[str, Array]) -> Array:
-    """Forces of all points, their load at B; returns the torques of actuators and forces together."""
+    """Forces of all points, their load at B; returns the torques of actuators and forces
+    together.
+    """
     points = gather_points(d, arrays)
     press(d, points, arrays)
     torques = d.array("applied", d.tail.nt)
@@ -156,7 +197,8 @@ def assemble_contact_dynamics(d: Draft, arrays: dict[str, Array]) -> None:
 _TABLE = (
     Function(
         "contact_points",
-        "points that can touch the ground: A, M, T of the right foot, of the left; tail; the torso's lowest",
+        "points that can touch the ground: A, M, T of the right foot, of the left; tail; the "
+        "torso's lowest",
         (Q, V, LEGS),
         (POSITIONS, VELOCITIES),
         assemble_contact_points,

@@ -1,4 +1,6 @@
-"""Drafts: a tail's sizes go in; a builder comes out that finds the vectors its steps read by their names."""
+"""Drafts: a tail's sizes go in; a builder comes out that finds the vectors its steps read by their
+names.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -11,12 +13,14 @@ from .tail import Tail
 
 @dataclass
 class Draft(Builder):
-    """A function being assembled: the builder, the tail's sizes, and the vectors that steps find by name.
+    """A function being assembled: the builder, the tail's sizes, and the vectors that steps find by
+    name.
 
-    ``pieces`` are arrays with one entry a segment that describe its rigid links or its arc, ``samples`` those that
-    describe what lies between two tail points.  ``at_rest``: nothing moves, there are accelerations only.
-    ``dynamics`` of an articulated tail: "composite", H column by column; "lanes", its columns are lanes; "segments",
-    v_dot comes about without H where nothing else is asked for.
+    ``pieces`` are arrays with one entry a segment that describe its rigid links or its arc,
+    ``samples`` those that describe what lies between two tail points.  ``at_rest``: nothing moves,
+    there are accelerations only. ``dynamics`` of an articulated tail: "composite", H column by
+    column; "lanes", its columns are lanes; "segments", v_dot comes about without H where nothing
+    else is asked for.
     """
 
     tail: Tail | None = None

@@ -1,4 +1,6 @@
-"""The functions a scene can ask for: a tail's sizes go in, the loop nest of each function comes out."""
+"""The functions a scene can ask for: a tail's sizes go in, the loop nest of each function comes
+out.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -32,7 +34,9 @@ def assemble_mass_matrix(
     d.step(torso.mass_matrix_base, **{f"H_{r}": H.part(r * row, 6) for r in range(6)})
     with d.loop("k", tail.nt) as k:
         lower, upper = H.part((6 + k) * row, 6), H.part(6 + k, 6, stride=row)
-        d.step(torso.mass_matrix_column, {"column": column_of(columns, k)}, H_row=lower, H_column=upper)
+        d.step(
+            torso.mass_matrix_column, {"column": column_of(columns, k)}, H_row=lower, H_column=upper
+        )
         with d.loop("l", k) as other:
             d.copy(H.part((6 + other) * row + 6 + k, 1), H_tail(k, other))
 
@@ -55,7 +59,9 @@ def assemble_inverse_dynamics(d: Draft, arrays: dict[str, Array], world: bool = 
 
 
 def assemble_balance(d: Draft, arrays: dict[str, Array]) -> None:
-    """What H v_dot + C = loads is solved with: H without translation, factored, and C without gravity."""
+    """What H v_dot + C = loads is solved with: H without translation, factored, and C without
+    gravity.
+    """
     tail, A, bias = d.tail, arrays["A"], arrays["bias"]
     size = 3 + tail.nt
     row = padded(size)
@@ -73,10 +79,19 @@ def assemble_balance(d: Draft, arrays: dict[str, Array]) -> None:
     sweeps.core_bias(d, bias)
     d.known |= {name: arrays[name].part(0, arrays[name].length) for name in ("inverse_mass", "com")}
     rows = {f"A_{r}": A.part(r * row, r + 1) for r in range(3)}
-    d.step(translation.without_translation, inverse_mass=d.known["inverse_mass"], com=d.known["com"], **rows)
+    d.step(
+        translation.without_translation,
+        inverse_mass=d.known["inverse_mass"],
+        com=d.known["com"],
+        **rows,
+    )
     with d.loop("k", tail.nt) as k:
         column = column_of(columns, k)
-        d.step(translation.column_without_translation, {"column": column}, A_row=A.part((3 + k) * row, 3))
+        d.step(
+            translation.column_without_translation,
+            {"column": column},
+            A_row=A.part((3 + k) * row, 3),
+        )
         with d.loop("l", k + 1) as other:
             reads = {"column": column, "other": column_of(columns, other)}
             d.step(translation.pair_without_translation, reads, A_entry_=A_tail(k, other))
@@ -88,13 +103,21 @@ def balanced(d: Draft, q: Array, v: Array) -> "Balance":
     arrays = {a.name: d.array(a.name, a.length(d.tail)) for a in BALANCE.outputs}
     d.call(program(BALANCE, d.tail, d.dynamics), q=q, v=v, **arrays)
     bias = arrays["bias"]
-    d.known |= {name: arrays[name].part(0, arrays[name].length) for name in ("R", "inverse_mass", "com")}
-    d.known |= {"h": arrays["first_moment"].part(0, 3), "force": bias.part(0, 3), "moment": bias.part(3, 3)}
+    d.known |= {
+        name: arrays[name].part(0, arrays[name].length) for name in ("R", "inverse_mass", "com")
+    }
+    d.known |= {
+        "h": arrays["first_moment"].part(0, 3),
+        "force": bias.part(0, 3),
+        "moment": bias.part(3, 3),
+    }
     return Balance(arrays["A"], arrays["columns"], bias)
 
 
 def assemble_forward_dynamics(d: Draft, arrays: dict[str, Array]) -> "Balance":
-    """v_dot from H v_dot + C = [0; tau] + J^T f: translation eliminated, then LDL^T for omega_dot and q_t_ddot."""
+    """v_dot from H v_dot + C = [0; tau] + J^T f: translation eliminated, then LDL^T for omega_dot
+    and q_t_ddot.
+    """
     balance = balanced(d, arrays["q"], arrays["v"])
     torques = applied_load(d, arrays)
     loads = Loads({}, lambda k: balance.bias.part(6 + k, 1), lambda k: torques.part(k, 1))
@@ -127,7 +150,8 @@ def assemble_segment_dynamics(d: Draft, arrays: dict[str, Array]) -> None:
 
 @dataclass(frozen=True)
 class Loads:
-    """What accelerates the animal: ``load_force, load_moment`` less ``force, moment`` at B in torso axes, and torques.
+    """What accelerates the animal: ``load_force, load_moment`` less ``force, moment`` at B in torso
+    axes, and torques.
 
     ``at_torso`` names these and ``gravity``, which else are those that steps find by these names.
     ``inertial(k)`` is taken from the torque ``tau(k)``; None stands for zero.
@@ -140,7 +164,9 @@ class Loads:
 
 @dataclass(frozen=True)
 class Balance:
-    """H with translation eliminated, factored, and the tail's momentum columns: all that solving H x = loads needs."""
+    """H with translation eliminated, factored, and the tail's momentum columns: all that solving H
+    x = loads needs.
+    """
 
     A: Array
     columns: Array
@@ -168,7 +194,9 @@ class Balance:
 
 
 def applied_load(d: Draft, arrays: dict[str, Array]) -> Array:
-    """Loads from outside, at B in torso axes; returns the torques of actuators and loads together."""
+    """Loads from outside, at B in torso axes; returns the torques of actuators and loads
+    together.
+    """
     if "f_ext" not in arrays:
         d.known["load_force"] = d.known["load_moment"] = d.constant("unloaded", [0, 0, 0])[0]
         return arrays["tau"]
@@ -212,7 +240,12 @@ BALANCE = Function(
 SEGMENT_DYNAMICS = Function(
     "segment_dynamics",
     "v_dot from loads, segment by segment as articulated bodies",
-    (Q, V, Argument("at_torso", lambda t: (6,), "force and moment at B, torso axes"), replace(TAU, name="torques")),
+    (
+        Q,
+        V,
+        Argument("at_torso", lambda t: (6,), "force and moment at B, torso axes"),
+        replace(TAU, name="torques"),
+    ),
     (V_DOT,),
     assemble_segment_dynamics,
 )

@@ -1,4 +1,6 @@
-"""The functions a scene can ask for: a tail's sizes go in, the loop nest of each function comes out."""
+"""The functions a scene can ask for: a tail's sizes go in, the loop nest of each function comes
+out.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -37,7 +39,9 @@ class Function:
 
     def of(self, tail: Tail) -> "Function":
         """Return this function with the arguments that a tail has: those of a length."""
-        inputs, outputs = (tuple(a for a in some if a.length(tail)) for some in (self.inputs, self.outputs))
+        inputs, outputs = (
+            tuple(a for a in some if a.length(tail)) for some in (self.inputs, self.outputs)
+        )
         return replace(self, inputs=inputs, outputs=outputs)
 
 
@@ -47,14 +51,17 @@ def struct_parameters(model: Tail | Scene) -> tuple[Parameter, ...]:
 
 
 def program(function: Function, tail: Tail, dynamics: str = "composite") -> Program:
-    """Assemble one function for given sizes; other ``dynamics`` where vectors hold several numbers and tails are long.
+    """Assemble one function for given sizes; other ``dynamics`` where vectors hold several numbers
+    and tails are long.
 
     What they do not apply to is the same in all.
     """
     dynamics = dynamics if tail.kind == "articulated" else "composite"
     draft = Draft(function.name, function.doc, tail=tail, dynamics=dynamics)
     for parameter in struct_parameters(tail):
-        draft.known[parameter.name] = draft.array(parameter.name, parameter.size, role="parameters")[0]
+        draft.known[parameter.name] = draft.array(
+            parameter.name, parameter.size, role="parameters"
+        )[0]
     arrays = {a.name: draft.array(a.name, a.length(tail), role="input") for a in function.inputs}
     arrays |= {a.name: draft.array(a.name, a.length(tail), role="output") for a in function.outputs}
     draft.known |= {a.name: arrays[a.name][0] for a in function.inputs}

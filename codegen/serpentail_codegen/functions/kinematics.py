@@ -1,4 +1,6 @@
-"""The functions a scene can ask for: a tail's sizes go in, the loop nest of each function comes out."""
+"""The functions a scene can ask for: a tail's sizes go in, the loop nest of each function comes
+out.
+"""
 
 from ..ir.program import Array, Index
 from ..mechanics import loads, rotations
@@ -20,7 +22,9 @@ def assemble_tail_points(d: Draft, arrays: dict[str, Array]) -> None:
 
 
 def assemble_tail_point_jacobians(d: Draft, arrays: dict[str, Array]) -> None:
-    """d(point)/dt = J v for every tail point; arms start at B, so distance from the origin costs no accuracy."""
+    """d(point)/dt = J v for every tail point; arms start at B, so distance from the origin costs no
+    accuracy.
+    """
     J, tail = arrays["J"], d.tail
     d.store(rotations.quaternion_rotation, R=9)
     mechanism(d).prepare_samples(d)
@@ -46,5 +50,8 @@ def assemble_tail_point_jacobians(d: Draft, arrays: dict[str, Array]) -> None:
             point = tail.links * i + j + 1
             base_rows(point)
             with d.loop("l", i + 1) as segment:
-                rows = {f"J_{name}": row(point, axis, 6 + 2 * segment, 2) for axis, name in enumerate("xyz")}
+                rows = {
+                    f"J_{name}": row(point, axis, 6 + 2 * segment, 2)
+                    for axis, name in enumerate("xyz")
+                }
                 d.step(loads.point_jacobian_tail, {"S": S[segment], "arm": here["P"]}, **rows)

@@ -1,4 +1,6 @@
-"""Drafts: a tail's sizes go in; a builder comes out that finds the vectors its steps read by their names."""
+"""Drafts: a tail's sizes go in; a builder comes out that finds the vectors its steps read by their
+names.
+"""
 
 from dataclasses import dataclass
 from math import pi
@@ -6,7 +8,9 @@ from math import pi
 
 @dataclass(frozen=True)
 class Tail:
-    """Sizes of a tail of m segments: n links each, or a continuum with n samples each, bent by bend_range at most."""
+    """Sizes of a tail of m segments: n links each, or a continuum with n samples each, bent by
+    bend_range at most.
+    """
 
     segments: int
     links: int
@@ -38,7 +42,9 @@ class Tail:
 
     @property
     def groups(self) -> dict[str, int]:
-        """How many points each group has that can touch the ground: A, M and T of both feet, tail, torso."""
+        """How many points each group has that can touch the ground: A, M and T of both feet, tail,
+        torso.
+        """
         count = {"feet": 6, "tail": self.total, "torso": 1}
         return {name: count[name] for name in self.contacts}
 

@@ -1,4 +1,6 @@
-"""Loop nests over steps: the order in which steps are applied to flat arrays, for one emitted function."""
+"""Loop nests over steps: the order in which steps are applied to flat arrays, for one emitted
+function.
+"""
 
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -60,14 +62,20 @@ class Builder:
         self._bodies[-1].append(statement)
 
     def apply(self, step: Step, reads: dict[str, Ref], **writes: Ref) -> None:
-        """Apply a step to named vectors; outputs not named are dropped, a trailing ``_`` adds instead of storing."""
+        """Apply a step to named vectors; outputs not named are dropped, a trailing ``_`` adds
+        instead of storing.
+        """
         step = narrowed(step, {name.rstrip("_") for name in writes})
         inputs = tuple(reads[name] for name, _ in step.inputs)
         targets = tuple(writes.get(name, writes.get(name + "_")) for name, _ in step.outputs)
         for (name, size), ref in zip(step.inputs + step.outputs, inputs + targets, strict=True):
             if ref.size != size:
-                raise ValueError(f"{step.name} in {self.name}: {name} has {size} scalars, not {ref.size}")
-        self.emit(Apply(step, inputs, targets, tuple(name + "_" in writes for name, _ in step.outputs)))
+                raise ValueError(
+                    f"{step.name} in {self.name}: {name} has {size} scalars, not {ref.size}"
+                )
+        self.emit(
+            Apply(step, inputs, targets, tuple(name + "_" in writes for name, _ in step.outputs))
+        )
 
     def fill(self, target: Ref, *values: Number) -> None:
         """Store constants; one value is repeated."""
@@ -77,7 +85,8 @@ class Builder:
         """Copy scalars, or add them."""
         if target.size != source.size:
             raise ValueError(
-                f"{self.name}: {source.size} scalars of {source.array.name} do not fit {target.array.name}"
+                f"{self.name}: {source.size} scalars of {source.array.name} do not fit "
+                f"{target.array.name}"
             )
         self.emit(Copy(target, source, adds))
 
@@ -109,7 +118,9 @@ class Builder:
         """Run another program on arrays of this one."""
         for array in program.of_role("input") + program.of_role("output"):
             if array.name not in arguments:
-                raise ValueError(f"{program.name} in {self.name}: {array.role} {array.name} is not bound")
+                raise ValueError(
+                    f"{program.name} in {self.name}: {array.role} {array.name} is not bound"
+                )
         self.emit(Call(program, tuple(arguments.items())))
 
     @contextmanager
@@ -123,7 +134,9 @@ class Builder:
 
     @contextmanager
     def when(self, scalar: Ref):
-        """Open what is run only where a scalar is positive; the body must not change that scalar."""
+        """Open what is run only where a scalar is positive; the body must not change that
+        scalar.
+        """
         self._bodies.append([])
         yield
         self.emit(When(scalar, tuple(self._bodies.pop())))
@@ -141,7 +154,11 @@ def _narrowed(step: Step, wanted: frozenset[str]) -> Step:
             outputs.append((name, size))
             results += step.results[first : first + size]
         first += size
-    name = step.name if len(outputs) == len(step.outputs) else "_".join([step.name, *(n for n, _ in outputs)])
+    name = (
+        step.name
+        if len(outputs) == len(step.outputs)
+        else "_".join([step.name, *(n for n, _ in outputs)])
+    )
     return compacted(replace(step, name=name, outputs=tuple(outputs), results=tuple(results)))
 
 

@@ -1,4 +1,6 @@
-"""Programs in parts: rewriting a loop nest, dropping what nothing needs, writing out what a program calls."""
+"""Programs in parts: rewriting a loop nest, dropping what nothing needs, writing out what a program
+calls.
+"""
 
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import replace
@@ -27,7 +29,9 @@ from .program import (
 def reads(statement) -> tuple[Ref, ...]:
     """Return what a statement reads; sums and what is overwritten in place are read too."""
     if isinstance(statement, Apply):
-        return statement.reads + tuple(w for w, adds in zip(statement.writes, statement.adds, strict=True) if adds)
+        return statement.reads + tuple(
+            w for w, adds in zip(statement.writes, statement.adds, strict=True) if adds
+        )
     if isinstance(statement, Copy):
         return (statement.source, statement.target) if statement.adds else (statement.source,)
     if isinstance(statement, Factor | FactorPair):
@@ -54,7 +58,9 @@ def names(refs) -> set[str]:
 
 
 def rewritten(body: tuple, rewrite: Callable[[object], Iterator]) -> tuple:
-    """Return a loop nest with each statement replaced by those that ``rewrite`` yields; empty loops vanish."""
+    """Return a loop nest with each statement replaced by those that ``rewrite`` yields; empty loops
+    vanish.
+    """
     out = []
     for statement in body:
         if isinstance(statement, Loop):
@@ -68,7 +74,9 @@ def rewritten(body: tuple, rewrite: Callable[[object], Iterator]) -> tuple:
     return tuple(out)
 
 
-def _grown(body: tuple, start: Collection[str], more: Callable[[object, set[str]], set[str]]) -> set[str]:
+def _grown(
+    body: tuple, start: Collection[str], more: Callable[[object, set[str]], set[str]]
+) -> set[str]:
     """Return names with what each statement adds to them, until none adds any."""
     found, before = set(start), -1
     while before < len(found):
@@ -80,7 +88,9 @@ def _grown(body: tuple, start: Collection[str], more: Callable[[object, set[str]
 
 def reached(body: tuple, start: Collection[str]) -> set[str]:
     """Return the arrays that may depend on the arrays ``start``, by name."""
-    return _grown(body, start, lambda s, found: names(writes(s)) if names(reads(s)) & found else set())
+    return _grown(
+        body, start, lambda s, found: names(writes(s)) if names(reads(s)) & found else set()
+    )
 
 
 def influencing(body: tuple, end: Collection[str]) -> set[str]:
@@ -112,7 +122,9 @@ def _with_outputs(statement, needed: Collection[str]):
 
 
 def pruned(program: Program) -> Program:
-    """Return a program without the statements and arrays that no output needs; arrays are what is declared by name."""
+    """Return a program without the statements and arrays that no output needs; arrays are what is
+    declared by name.
+    """
     array = {a.name: a for a in program.arrays}
     needed = influencing(program.body, {a.name for a in program.of_role("output")})
 
@@ -153,7 +165,9 @@ def with_arrays(statement, array: Mapping[str, Array]):
 
 
 def expanded(program: Program) -> Program:
-    """Return a program with the programs that it calls written out; their own arrays are renamed."""
+    """Return a program with the programs that it calls written out; their own arrays are
+    renamed.
+    """
     arrays = {a.name: a for a in program.arrays}
 
     def rewrite(statement):

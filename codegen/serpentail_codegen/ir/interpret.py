@@ -1,6 +1,7 @@
 """The meaning of a program: arrays and an algebra go in, the program runs statement by statement.
 
-With numbers as the algebra this is the reference for every emitted text; with a tape it unrolls the loops.
+With numbers as the algebra this is the reference for every emitted text; with a tape it unrolls the
+loops.
 """
 
 import math
@@ -29,10 +30,17 @@ from .tape import Tape, replay
 
 
 class Numbers:
-    """The algebra of numbers that ``functions`` knows sin, cos and sqrt of; ``convert`` rounds an exact constant."""
+    """The algebra of numbers that ``functions`` knows sin, cos and sqrt of; ``convert`` rounds an
+    exact constant.
+    """
 
     def __init__(self, functions=math, convert=float):
-        self.sin, self.cos, self.sqrt, self.convert = functions.sin, functions.cos, functions.sqrt, convert
+        self.sin, self.cos, self.sqrt, self.convert = (
+            functions.sin,
+            functions.cos,
+            functions.sqrt,
+            convert,
+        )
 
     def const(self, value):
         """Return an exact constant as a number; what cannot take a fraction divides it."""
@@ -70,7 +78,9 @@ class Numbers:
 
 
 class Counter:
-    """The algebra that counts operations; its values are the numbers of lanes, 0 for a narrow scalar."""
+    """The algebra that counts operations; its values are the numbers of lanes, 0 for a narrow
+    scalar.
+    """
 
     def __init__(self):
         self.count = 0
@@ -101,7 +111,9 @@ def executed(program: Program) -> int:
 
 
 def applied(program: Program) -> int:
-    """Return how many nodes of steps one run evaluates, each row once: what unrolling has to write out or fold."""
+    """Return how many nodes of steps one run evaluates, each row once: what unrolling has to write
+    out or fold.
+    """
     return _applied(expanded(program).body, {})
 
 
@@ -120,16 +132,24 @@ def _applied(body: tuple, at: dict[str, int]) -> int:
 
 def branches(program: Program) -> bool:
     """Tell if some statements of a program are run only under a condition."""
-    return any(isinstance(outer, When) for _, around in statements(expanded(program).body) for outer in around)
+    return any(
+        isinstance(outer, When)
+        for _, around in statements(expanded(program).body)
+        for outer in around
+    )
 
 
 class Run:
-    """One run of a program over an algebra: ``values`` are arrays by name, ``guards`` what must be positive."""
+    """One run of a program over an algebra: ``values`` are arrays by name, ``guards`` what must be
+    positive.
+    """
 
     def __init__(self, program: Program, algebra, arguments: dict[str, list]):
         program, self.algebra, self.guards = expanded(program), algebra, []
         self.values = {a.name: [None] * a.length for a in program.arrays}
-        self.values |= {a.name: [algebra.const(v) for v in a.values] for a in program.of_role("constant")}
+        self.values |= {
+            a.name: [algebra.const(v) for v in a.values] for a in program.of_role("constant")
+        }
         self.values |= {name: list(scalars) for name, scalars in arguments.items()}
         self.body(program.body, {})
 
@@ -172,19 +192,26 @@ class Run:
             self.body(loop.body, at | {loop.var: value})
 
     def when(self, when: When, at: dict[str, int]) -> None:
-        """Run what a condition asks for; where the algebra cannot tell, choose between new and old values."""
+        """Run what a condition asks for; where the algebra cannot tell, choose between new and old
+        values.
+        """
         condition = self.read(when.scalar, at)[0]
         known = self.algebra.decide(condition)
         if known is not None:
             self.body(when.body if known else (), at)
             return
-        before, guards = {name: list(scalars) for name, scalars in self.values.items()}, len(self.guards)
+        before, guards = (
+            {name: list(scalars) for name, scalars in self.values.items()},
+            len(self.guards),
+        )
         self.body(when.body, at)
         if len(self.guards) > guards:
             raise ValueError("a guard under a condition cannot be unrolled")
         for name, old in before.items():
             pairs = zip(self.values[name], old, strict=True)
-            self.values[name] = [a if a == b or b is None else self.algebra.select(condition, a, b) for a, b in pairs]
+            self.values[name] = [
+                a if a == b or b is None else self.algebra.select(condition, a, b) for a, b in pairs
+            ]
 
     def apply(self, call: Apply, at: dict[str, int]) -> None:
         """Run a step: read everything, then write everything."""
@@ -194,7 +221,9 @@ class Run:
         for ref, adds in zip(call.writes, call.adds, strict=True):
             values = [next(results) for _ in range(ref.size)]
             if adds:
-                values = [self.algebra.add(a, b) for a, b in zip(self.read(ref, at), values, strict=True)]
+                values = [
+                    self.algebra.add(a, b) for a, b in zip(self.read(ref, at), values, strict=True)
+                ]
             self.write(ref, at, values)
 
     def fill(self, fill: Fill, at: dict[str, int]) -> None:
@@ -204,13 +233,18 @@ class Run:
     def unit(self, unit: Unit, at: dict[str, int]) -> None:
         """Store unit rows."""
         first, lanes = unit.first.at(at), unit.target.lanes
-        self.write(unit.target, at, [self.algebra.unit(first + k, lanes) for k in range(unit.target.size)])
+        self.write(
+            unit.target, at, [self.algebra.unit(first + k, lanes) for k in range(unit.target.size)]
+        )
 
     def copy(self, copy: Copy, at: dict[str, int]) -> None:
         """Copy or add scalars."""
         values = self.read(copy.source, at)
         if copy.adds:
-            values = [self.algebra.add(a, b) for a, b in zip(self.read(copy.target, at), values, strict=True)]
+            values = [
+                self.algebra.add(a, b)
+                for a, b in zip(self.read(copy.target, at), values, strict=True)
+            ]
         self.write(copy.target, at, values)
 
     def guard(self, guard: Guard, at: dict[str, int]) -> None:
@@ -237,7 +271,9 @@ class Run:
     def factorpair(self, factor: FactorPair, at: dict[str, int]) -> None:
         """Factor a pair of triangles."""
         size = factor.size
-        *pair, pivots = pair_factor(self.algebra, *(self.rows(factor.matrix, size, first) for first in (0, size)))
+        *pair, pivots = pair_factor(
+            self.algebra, *(self.rows(factor.matrix, size, first) for first in (0, size))
+        )
         self.guards += [("NOT_POSITIVE_DEFINITE", pivot) for pivot in pivots]
         for first, rows in zip((0, size), pair, strict=True):
             self.write_rows(factor.matrix, rows, first)
@@ -253,11 +289,14 @@ class Run:
         self.write(solve.x, at, ldl_solve(self.algebra, rows, self.read(solve.x, at)))
 
 
-def unroll(program: Program, fixed: dict[str, list] | None = None) -> tuple[Tape, dict, list[tuple[str, int]]]:
+def unroll(
+    program: Program, fixed: dict[str, list] | None = None
+) -> tuple[Tape, dict, list[tuple[str, int]]]:
     """Record a program as one straight line.
 
-    Inputs are numbered array by array in the order of declaration; ``fixed`` arrays are constants.  Returns the tape,
-    the nodes of every output array, and what must be positive: pairs of status and node.
+    Inputs are numbered array by array in the order of declaration; ``fixed`` arrays are constants.
+    Returns the tape, the nodes of every output array, and what must be positive: pairs of status
+    and node.
     """
     tape, arguments, first = Tape(), {}, 0
     for array in (*program.of_role("parameters"), *program.of_role("input")):

@@ -1,11 +1,13 @@
 """The meaning of a program: arrays and an algebra go in, the program runs statement by statement.
 
-With numbers as the algebra this is the reference for every emitted text; with a tape it unrolls the loops.
+With numbers as the algebra this is the reference for every emitted text; with a tape it unrolls the
+loops.
 """
 
 
 def ldl_factor(algebra, A: list[list]) -> tuple[list[list], list]:
-    """Factor A = L^T D L without pivoting, of its lower triangle; L below 1 / D on the diagonal, and the pivots D.
+    """Factor A = L^T D L without pivoting, of its lower triangle; L below 1 / D on the diagonal,
+    and the pivots D.
 
     From the last row up, because then all that a row takes from another one lies side by side.
     """
@@ -16,7 +18,10 @@ def ldl_factor(algebra, A: list[list]) -> tuple[list[list], list]:
         inverse = algebra.div(algebra.const(1), last[k])
         for i in reversed(range(k)):
             factor = algebra.mul(last[i], inverse)
-            A[i] = [algebra.sub(entry, algebra.mul(factor, other)) for entry, other in zip(A[i], last, strict=False)]
+            A[i] = [
+                algebra.sub(entry, algebra.mul(factor, other))
+                for entry, other in zip(A[i], last, strict=False)
+            ]
         A[k] = [algebra.mul(entry, inverse) for entry in last[:k]] + [inverse]
     return A, pivots
 
@@ -29,7 +34,8 @@ def ldl_solve(algebra, A: list[list], b: list) -> list:
 def pair_factor(algebra, A: list[list], B: list[list]) -> tuple[list[list], list[list], list]:
     """Factor A = U D L without pivoting, of the lower triangles A of it and B of its transpose.
 
-    From the last row up, as ``ldl_factor``.  Return L below 1 / D, the transpose of U below it, and the pivots D.
+    From the last row up, as ``ldl_factor``.  Return L below 1 / D, the transpose of U below it, and
+    the pivots D.
     """
     A, B, pivots = [list(row) for row in A], [list(row) for row in B], []
     for k in reversed(range(len(A))):
@@ -38,8 +44,13 @@ def pair_factor(algebra, A: list[list], B: list[list]) -> tuple[list[list], list
         for one, other in ((A, B), (B, A)):
             for i in range(k):
                 factor = algebra.mul(other[k][i], inverse)
-                one[i] = [algebra.sub(e, algebra.mul(factor, r)) for e, r in zip(one[i], one[k], strict=False)]
-        A[k], B[k] = ([algebra.mul(entry, inverse) for entry in row[k][:k]] + [inverse] for row in (A, B))
+                one[i] = [
+                    algebra.sub(e, algebra.mul(factor, r))
+                    for e, r in zip(one[i], one[k], strict=False)
+                ]
+        A[k], B[k] = (
+            [algebra.mul(entry, inverse) for entry in row[k][:k]] + [inverse] for row in (A, B)
+        )
     return A, B, pivots
 
 

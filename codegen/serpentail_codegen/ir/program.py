@@ -1,4 +1,6 @@
-"""Loop nests over steps: the order in which steps are applied to flat arrays, for one emitted function."""
+"""Loop nests over steps: the order in which steps are applied to flat arrays, for one emitted
+function.
+"""
 
 from dataclasses import dataclass
 
@@ -48,9 +50,11 @@ def as_index(value: Index | int) -> Index:
 class Array:
     """A flat array of ``count`` vectors of ``size`` scalars.
 
-    role: ``input`` and ``output`` are the function's arguments, ``parameters`` the parameter struct, ``constant`` has
+    role: ``input`` and ``output`` are the function's arguments, ``parameters`` the parameter
+    struct, ``constant`` has
     values known at generation, ``local`` lives during one call.
-    lanes: each scalar of a wide array is a row of so many numbers, stored ``row`` apart; 0 for ordinary scalars.
+    lanes: each scalar of a wide array is a row of so many numbers, stored ``row`` apart; 0 for
+    ordinary scalars.
     """
 
     name: str
@@ -88,7 +92,8 @@ class Array:
 
 @dataclass(frozen=True)
 class Ref:
-    """``size`` scalars of an array from an offset on, ``stride`` apart; with ``lane``, lanes of the first.
+    """``size`` scalars of an array from an offset on, ``stride`` apart; with ``lane``, lanes of the
+    first.
 
     With ``lane`` and a stride of the array's row it is one lane of ``size`` scalars.
     """
@@ -107,9 +112,11 @@ class Ref:
 
 @dataclass(frozen=True)
 class Apply:
-    """Apply a step: read vectors, then write its outputs; ``adds`` are the outputs that are added, not stored.
+    """Apply a step: read vectors, then write its outputs; ``adds`` are the outputs that are added,
+    not stored.
 
-    ``columns``: of wide vectors only so many lanes are needed, the others are zero or not looked at; None: all.
+    ``columns``: of wide vectors only so many lanes are needed, the others are zero or not looked
+    at; None: all.
     """
 
     step: Step
@@ -154,7 +161,9 @@ class Copy:
 
 @dataclass(frozen=True)
 class Loop:
-    """Run the body for ``var`` in [start, stop), upward or downward; ``start`` and ``stop`` are affine."""
+    """Run the body for ``var`` in [start, stop), upward or downward; ``start`` and ``stop`` are
+    affine.
+    """
 
     var: str
     start: Index
@@ -192,9 +201,11 @@ class Solve:
 
 @dataclass(frozen=True)
 class FactorPair:
-    """Factor A = U D L in place, A not symmetric but with positive pivots: as ``Factor``, for a pair of triangles.
+    """Factor A = U D L in place, A not symmetric but with positive pivots: as ``Factor``, for a
+    pair of triangles.
 
-    The matrix holds the lower triangle of A, then that of its transpose, each as ``Factor`` takes it.
+    The matrix holds the lower triangle of A, then that of its transpose, each as ``Factor`` takes
+    it.
     """
 
     matrix: Array
@@ -211,7 +222,9 @@ class SolvePair:
 
 @dataclass(frozen=True)
 class Guard:
-    """Give up with a status unless all scalars of a vector are positive; ``protects`` must not be used then."""
+    """Give up with a status unless all scalars of a vector are positive; ``protects`` must not be
+    used then.
+    """
 
     scalar: Ref
     status: str
@@ -220,7 +233,9 @@ class Guard:
 
 @dataclass(frozen=True)
 class Call:
-    """Run another program: its inputs and outputs are arrays of this one, by name; parameters are shared."""
+    """Run another program: its inputs and outputs are arrays of this one, by name; parameters are
+    shared.
+    """
 
     program: "Program"
     arguments: tuple[tuple[str, Array], ...]
@@ -241,7 +256,9 @@ class Program:
 
 
 def statements(body):
-    """Yield every statement of a loop nest with the loops and conditions around it, outermost first."""
+    """Yield every statement of a loop nest with the loops and conditions around it, outermost
+    first.
+    """
     for statement in body:
         if isinstance(statement, Loop | When):
             for inner, loops in statements(statement.body):

@@ -1,4 +1,6 @@
-"""A hash-consed tape: scalar operations go in, each distinct one is stored once, in evaluation order."""
+"""A hash-consed tape: scalar operations go in, each distinct one is stored once, in evaluation
+order.
+"""
 
 from dataclasses import dataclass
 
@@ -9,8 +11,8 @@ from .tape import LEAVES, Number, Tape, live_nodes, operands, replay
 class Step:
     """A straight-line function: named vectors in, named vectors out.
 
-    ``nodes`` are operations of a tape whose inputs are the scalars of ``inputs`` in order; ``results`` are the nodes
-    of the scalars of ``outputs`` in order.
+    ``nodes`` are operations of a tape whose inputs are the scalars of ``inputs`` in order;
+    ``results`` are the nodes of the scalars of ``outputs`` in order.
     """
 
     name: str
@@ -50,7 +52,9 @@ def specialised(step: Step, name: str, **constants: tuple[Number, ...]) -> Step:
     tape, scalars, first = Tape(), [], 0
     for vector, size in step.inputs:
         values = constants.get(vector)
-        scalars += [tape.input(first + k) if values is None else tape.const(values[k]) for k in range(size)]
+        scalars += [
+            tape.input(first + k) if values is None else tape.const(values[k]) for k in range(size)
+        ]
         first += size
     nodes = replay(step.nodes, scalars, tape)
     results = tuple(nodes[r] for r in step.results)

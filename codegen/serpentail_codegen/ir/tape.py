@@ -1,4 +1,6 @@
-"""A hash-consed tape: scalar operations go in, each distinct one is stored once, in evaluation order."""
+"""A hash-consed tape: scalar operations go in, each distinct one is stored once, in evaluation
+order.
+"""
 
 from fractions import Fraction
 
@@ -20,12 +22,14 @@ def operands(node: tuple) -> tuple[int, ...]:
 class Tape:
     """An append-only list of operations; a node is its position in the list.
 
-    The methods are an algebra on nodes: whatever computes with ``add, sub, mul, div, neg, sin, cos, sqrt, select`` and
-    ``const`` can be recorded here.  Rules: constants fold, 0 and 1 vanish, negation moves outward, operands of
-    commutative operations are ordered by node.  Nothing is re-associated or distributed, so rounding is kept.
+    The methods are an algebra on nodes: whatever computes with ``add, sub, mul, div, neg, sin, cos,
+    sqrt, select`` and ``const`` can be recorded here.  Rules: constants fold, 0 and 1 vanish,
+    negation moves outward, operands of commutative operations are ordered by node.  Nothing is
+    re-associated or distributed, so rounding is kept.
 
-    A node may be wide: a row of numbers, its lanes, one for each direction of differentiation.  Unit rows are wide,
-    and so is what is computed from a wide node; a narrow operand counts for every lane.
+    A node may be wide: a row of numbers, its lanes, one for each direction of differentiation.
+    Unit rows are wide, and so is what is computed from a wide node; a narrow operand counts for
+    every lane.
     """
 
     def __init__(self):
@@ -59,7 +63,9 @@ class Tape:
         return self._node("input", index)
 
     def const(self, value: Number) -> int:
-        """Return the node of an exact constant; integral values are stored as int, so 1 and 1.0 are one node."""
+        """Return the node of an exact constant; integral values are stored as int, so 1 and 1.0 are
+        one node.
+        """
         value = int(value) if value == int(value) else value
         return self.neg(self._node("const", -value)) if value < 0 else self._node("const", value)
 
@@ -135,7 +141,9 @@ class Tape:
             return a
         minus_a, minus_b = self._negated(a), self._negated(b)
         if minus_a is not None or minus_b is not None:
-            quotient = self.div(a if minus_a is None else minus_a, b if minus_b is None else minus_b)
+            quotient = self.div(
+                a if minus_a is None else minus_a, b if minus_b is None else minus_b
+            )
             return quotient if minus_a is not None and minus_b is not None else self.neg(quotient)
         return self._node("div", a, b)
 
@@ -178,7 +186,9 @@ class Tape:
 
 
 def lanes_of(node: tuple, lanes, inputs=()) -> int:
-    """Return how many lanes a node has, 0 if it is narrow, from those of earlier nodes and of the inputs."""
+    """Return how many lanes a node has, 0 if it is narrow, from those of earlier nodes and of the
+    inputs.
+    """
     op, *args = node
     if op in LEAVES:
         return args[1] if op == "unit" else inputs[args[0]] if inputs and op == "input" else 0
@@ -198,7 +208,9 @@ def exact_quotient(x: Number, y: Number) -> Number:
 
 
 def replay(nodes, scalars, algebra) -> list:
-    """Evaluate nodes in an algebra (numbers, another tape, CasADi symbols) with the given input scalars."""
+    """Evaluate nodes in an algebra (numbers, another tape, CasADi symbols) with the given input
+    scalars.
+    """
     values = []
     for op, *args in nodes:
         if op == "input":

@@ -1,12 +1,14 @@
-"""The continuum tail: bend components of constant-curvature segments in, poses, inertias and wrenches out (Sect. 2.3).
+"""The continuum tail: bend components of constant-curvature segments in, poses, inertias and
+wrenches out (Sect. 2.3).
 
-A segment's bend is (a, b), its rotation Exp([a, 0, b]); z = a^2 + b^2 is the squared bend angle.  Slice x in [0, 1]
-lies at ``L (-sigma y + gamma u)`` from the segment's root, with u = (b, 0, -a), sigma = x c1(x^2 z) and
-gamma = x^2 c2(x^2 z), c_k being Stumpff's functions.  These are entire functions of z: nothing is singular or lost
-where the segment is straight.
+A segment's bend is (a, b), its rotation Exp([a, 0, b]); z = a^2 + b^2 is the squared bend angle.
+Slice x in [0, 1] lies at ``L (-sigma y + gamma u)`` from the segment's root, with u = (b, 0, -a),
+sigma = x c1(x^2 z) and gamma = x^2 c2(x^2 z), c_k being Stumpff's functions.  These are entire
+functions of z: nothing is singular or lost where the segment is straight.
 
-The integrals over x of Eqs. 18, 19, which Appendix B writes in sines and powers of 1 / theta, are here seven form
-factors, exact rational combinations of c_k(z) and c_k(4 z), and their z-derivatives.
+The integrals over x of Eqs. 18, 19, which Appendix B writes in sines and powers of 1 / theta, are
+here seven form factors, exact rational combinations of c_k(z) and c_k(4 z), and their
+z-derivatives.
 """
 
 from sympy import Matrix, eye
@@ -27,7 +29,8 @@ def geometry(let, angles) -> tuple:
 
 
 def segment_tip(let, angles, tip, section) -> dict:
-    """Rotation to the tip (Eq. 33), its position (Eq. 34), and how both move with a and b, in the root frame.
+    """Rotation to the tip (Eq. 33), its position (Eq. 34), and how both move with a and b, in the
+    root frame.
 
     ``E`` = 1 + c1 K + c2 K^2; the tip turns by (1 + c2 K + c3 K^2) (a_dot, 0, b_dot).
     """
@@ -37,7 +40,10 @@ def segment_tip(let, angles, tip, section) -> dict:
     K_squared = k * k.T - (a * a + b * b) * eye(3)
     E = eye(3) + c1 * Matrix([[0, -b, 0], [b, 0, -a], [0, a, 0]]) + c2 * K_squared
     turn = Matrix([[1 - c3 * b * b, c3 * a * b], [c2 * b, -c2 * a], [c3 * a * b, 1 - c3 * a * a]])
-    move = [let("move", length * (2 * q * (c2_z * u - c1_z * Y) + c2 * d)) for q, d in zip((a, b), du, strict=True)]
+    move = [
+        let("move", length * (2 * q * (c2_z * u - c1_z * Y) + c2 * d))
+        for q, d in zip((a, b), du, strict=True)
+    ]
     return {
         "E": E,
         "r": length * (c2 * u - c1 * Y),
@@ -46,7 +52,9 @@ def segment_tip(let, angles, tip, section) -> dict:
 
 
 def segment_inertia(let, angles, shape, section) -> dict:
-    """A segment's first moment and inertia at its root, momentum columns of a and b, and 2 x 2 block of H (Eq. 18)."""
+    """A segment's first moment and inertia at its root, momentum columns of a and b, and 2 x 2
+    block of H (Eq. 18).
+    """
     a, b, _, u, du = geometry(let, angles)
     m, length = section
     f, (moment, spread) = factors(shape), let("mL", Matrix([m * length, m * length * length]))
@@ -75,9 +83,11 @@ def bending_rates(let, angles, rates) -> tuple:
 
 
 def relative_wrench(let, angles, rates, shape, w) -> tuple[Matrix, Matrix]:
-    """What bending adds at fixed rates: integrals of r_ddot over m L, of r x (2 w x r_dot + r_ddot) over m L^2.
+    """What bending adds at fixed rates: integrals of r_ddot over m L, of r x (2 w x r_dot + r_ddot)
+    over m L^2.
 
-    r = -sigma y + gamma u; with N the integral of r r_dot^T, that of r x (w x r_dot) is tr(N) w - N^T w.
+    r = -sigma y + gamma u; with N the integral of r r_dot^T, that of r x (w x r_dot) is tr(N) w -
+    N^T w.
     """
     f = factors(shape)
     _, _, _, u, _ = geometry(let, angles)
@@ -87,16 +97,23 @@ def relative_wrench(let, angles, rates, shape, w) -> tuple[Matrix, Matrix]:
     force = on_u * u + 2 * let("lean", f["g_z"] * z_dot) * u_dot - on_y * Y
     N_y = let("N_y", z_dot * (f["ss_z"] / 2 * wy - f["sz_g"] * w_u))
     N_u = let("N_u", z_dot * (f["gg_z"] / 2 * w_u - f["s_gz"] * wy))
-    coriolis = let("trace", f["g_z"] * z_dot) * w - N_y * Y - N_u * u - let("N_d", f["gg"] * w_u - f["sg"] * wy) * u_dot
+    coriolis = (
+        let("trace", f["g_z"] * z_dot) * w
+        - N_y * Y
+        - N_u * u
+        - let("N_d", f["gg"] * w_u - f["sg"] * wy) * u_dot
+    )
     moment = let("side", f["side_z"] * square_rate + f["side"] * z_ddot) * Y.cross(u)
     moment += f["gg_z"] * z_dot * area * Y - let("tilt", 2 * f["s_gz"] * z_dot) * Y.cross(u_dot)
     return force, 2 * coriolis + moment
 
 
 def relative_loads(let, angles, rates, shape, w) -> list:
-    """Integrals of dr/da and dr/db times w x (w x r) + 2 w x r_dot + r_ddot at fixed rates, over m L^2.
+    """Integrals of dr/da and dr/db times w x (w x r) + 2 w x r_dot + r_ddot at fixed rates, over m
+    L^2.
 
-    The last is Lagrange's: bending alone has the energy (gg (a_dot^2 + b_dot^2) + along (z_dot / 2)^2) / 2.
+    The last is Lagrange's: bending alone has the energy (gg (a_dot^2 + b_dot^2) + along (z_dot /
+    2)^2) / 2.
     """
     f = factors(shape)
     a, b, _, u, du = geometry(let, angles)
@@ -111,15 +128,31 @@ def relative_loads(let, angles, rates, shape, w) -> list:
     swing = let("swing", 2 * f["gg"] * wy)
     loads = []
     for k, (across, across_rate) in enumerate(((b, rates[1]), (-a, -rates[0]))):
-        relative = tilt * w[2 * k] + turn * across + swing * across_rate + f["gg_z"] * z_dot * rates[k]
+        relative = (
+            tilt * w[2 * k] + turn * across + swing * across_rate + f["gg_z"] * z_dot * rates[k]
+        )
         loads.append(angles[k] * common + lever * w.dot(du[k]) + relative)
     return loads
 
 
 def segment_wrench(
-    let, angles, rates, accelerations, shape, section, h_own, I_own, pitch_own, yaw_own, H_own, w, w_dot, a
+    let,
+    angles,
+    rates,
+    accelerations,
+    shape,
+    section,
+    h_own,
+    I_own,
+    pitch_own,
+    yaw_own,
+    H_own,
+    w,
+    w_dot,
+    a,
 ) -> dict:
-    """Inertial wrench of a segment at its root and its two generalised forces (Eq. 19), in the root frame.
+    """Inertial wrench of a segment at its root and its two generalised forces (Eq. 19), in the root
+    frame.
 
     ``w, w_dot, a`` are of the root frame.
     """
@@ -129,14 +162,25 @@ def segment_wrench(
     loads = relative_loads(let, angles, rates, shape, w)
     p = let("p", rates[0] * pitch_own[0:3, :] + rates[1] * yaw_own[0:3, :])
     bending = let("bending", accelerations[0] * pitch_own + accelerations[1] * yaw_own)
-    force = m * a + w_dot.cross(h_own) + w.cross(let("c", w.cross(h_own) + 2 * p)) + bending[0:3, :] + moment * force_r
+    force = (
+        m * a
+        + w_dot.cross(h_own)
+        + w.cross(let("c", w.cross(h_own) + 2 * p))
+        + bending[0:3, :]
+        + moment * force_r
+    )
     inertia = symmetric(I_own)
     torque = h_own.cross(a) + inertia * w_dot + w.cross(let("Iw", inertia * w)) + bending[3:6, :]
     own = []
     for k, column in enumerate((pitch_own, yaw_own)):
-        inertial = column[0:3, :].dot(a) + column[3:6, :].dot(w_dot) + spread * let("load", loads[k])
+        inertial = (
+            column[0:3, :].dot(a) + column[3:6, :].dot(w_dot) + spread * let("load", loads[k])
+        )
         own.append(inertial + H_own[k] * accelerations[0] + H_own[k + 1] * accelerations[1])
-    return {"F": Matrix([force, torque + spread * let("moment", moment_r)]), "torque_own": Matrix(own)}
+    return {
+        "F": Matrix([force, torque + spread * let("moment", moment_r)]),
+        "torque_own": Matrix(own),
+    }
 
 
 def rotated_inertia(let, E, I) -> Matrix:
@@ -144,8 +188,12 @@ def rotated_inertia(let, E, I) -> Matrix:
     return let("turned", entries(let("half", E * symmetric(I)) * E.T))
 
 
-def segment_motion(let, angles, rates, accelerations, section, tip, E, r, bend, w, w_dot, a) -> dict:
-    """Angular velocity, its rate and acceleration of the tip, in its frame, from the root's in the root frame."""
+def segment_motion(
+    let, angles, rates, accelerations, section, tip, E, r, bend, w, w_dot, a
+) -> dict:
+    """Angular velocity, its rate and acceleration of the tip, in its frame, from the root's in the
+    root frame.
+    """
     alpha, beta, _, u, du = geometry(let, angles)
     _, _, c3, c1_z, c2_z, c3_z, c1_zz, c2_zz = tip
     z_dot = let("z_dot", 2 * (alpha * rates[0] + beta * rates[1]))
@@ -153,18 +201,28 @@ def segment_motion(let, angles, rates, accelerations, section, tip, E, r, bend, 
     area = let("area", beta * rates[0] - alpha * rates[1])
     swing = let("swing", c3_z * z_dot * area)
     turn_rate = Matrix(
-        [-swing * beta - c3 * rates[1] * area, c2_z * z_dot * area, swing * alpha + c3 * rates[0] * area]
+        [
+            -swing * beta - c3 * rates[1] * area,
+            c2_z * z_dot * area,
+            swing * alpha + c3 * rates[0] * area,
+        ]
     )
     along = let("along", c1_zz * z_dot**2 + c1_z * z_ddot)
     across = let("across", c2_zz * z_dot**2 + c2_z * z_ddot)
-    r_ddot = section[1] * let("r_v", across * u - along * Y + 2 * c2_z * z_dot * (rates[0] * du[0] + rates[1] * du[1]))
+    r_ddot = section[1] * let(
+        "r_v", across * u - along * Y + 2 * c2_z * z_dot * (rates[0] * du[0] + rates[1] * du[1])
+    )
     turn, r_dot = velocity_columns(let, bend, rates)
     turn_q, move_q = velocity_columns(let, bend, accelerations)
     w_r = let("w_r", w.cross(r))
     w_tip_dot = w_dot + w.cross(turn) + turn_rate + turn_q
     a_tip = a + w_dot.cross(r) + w.cross(let("v", w_r + 2 * r_dot)) + r_ddot + move_q
     E = square(E).T
-    return {"w": E * let("w", w + turn), "w_dot": E * let("w_dot", w_tip_dot), "a": E * let("a", a_tip)}
+    return {
+        "w": E * let("w", w + turn),
+        "w_dot": E * let("w_dot", w_tip_dot),
+        "a": E * let("a", a_tip),
+    }
 
 
 def segment_power(
@@ -190,13 +248,30 @@ def segment_power(
     w_virtual,
     u_virtual,
 ) -> dict:
-    """Power of the inertial wrench of a segment and of its generalised forces (Eq. 19) under a virtual motion."""
+    """Power of the inertial wrench of a segment and of its generalised forces (Eq. 19) under a
+    virtual motion.
+    """
     own = segment_wrench(
-        let, angles, rates, accelerations, shape, section, h_own, I_own, pitch_own, yaw_own, H_own, w, w_dot, a
+        let,
+        angles,
+        rates,
+        accelerations,
+        shape,
+        section,
+        h_own,
+        I_own,
+        pitch_own,
+        yaw_own,
+        H_own,
+        w,
+        w_dot,
+        a,
     )
     F, torque = let("F", own["F"]), let("torque", own["torque_own"])
     power = F[0:3, :].dot(u_virtual) + F[3:6, :].dot(w_virtual) + torque.dot(virtual_rates)
-    motion = segment_motion(let, angles, rates, accelerations, section, tip, E, r, bend, w, w_dot, a)
+    motion = segment_motion(
+        let, angles, rates, accelerations, section, tip, E, r, bend, w, w_dot, a
+    )
     virtual = segment_velocity(let, virtual_rates, E, r, bend, w_virtual, u_virtual)
     return {"power": [power], **motion, "w_virtual": virtual["w"], "u_virtual": virtual["u"]}
 
@@ -213,7 +288,9 @@ def segment_pose(let, E, r, R, P) -> dict:
 
 
 def segment_twist(let, E, r, bend, R, P) -> dict:
-    """Spatial columns at B of a segment's bend: angular, then the velocity of the point of the tip's body at B."""
+    """Spatial columns at B of a segment's bend: angular, then the velocity of the point of the
+    tip's body at B.
+    """
     R = square(R)
     tip, out = let("tip", P + R * r), []
     for k in (0, 6):
@@ -223,7 +300,9 @@ def segment_twist(let, E, r, bend, R, P) -> dict:
 
 
 def gather_segment_wrench(let, E, r, bend, F, torque_own, F_next) -> dict:
-    """Add what the next segment passes on, in this segment's root frame; generalised forces of a and b."""
+    """Add what the next segment passes on, in this segment's root frame; generalised forces of a
+    and b.
+    """
     E = square(E)
     force, moment = let("force", E * F_next[0:3, :]), let("moment", E * F_next[3:6, :])
     torque = [bend[k : k + 3, :].dot(moment) + bend[k + 3 : k + 6, :].dot(force) for k in (0, 6)]
@@ -231,8 +310,12 @@ def gather_segment_wrench(let, E, r, bend, F, torque_own, F_next) -> dict:
     return {"F_next": total, "torque": torque_own + Matrix(torque)}
 
 
-def gather_segment(let, section, E, r, bend, h_own, I_own, pitch_own, yaw_own, H_own, mass, h, I) -> dict:
-    """Composite inertia at the root from what hangs at the tip, the momentum columns of a and b, their block of H."""
+def gather_segment(
+    let, section, E, r, bend, h_own, I_own, pitch_own, yaw_own, H_own, mass, h, I
+) -> dict:
+    """Composite inertia at the root from what hangs at the tip, the momentum columns of a and b,
+    their block of H.
+    """
     E = square(E)
     h_tip, I_tip = let("h_tip", E * h), symmetric(rotated_inertia(let, E, I))
     h_root = let("h_root", h_tip + mass[0] * r)
@@ -245,7 +328,10 @@ def gather_segment(let, section, E, r, bend, h_own, I_own, pitch_own, yaw_own, H
         L = let("L", I_tip * turn + h_tip.cross(move))
         twists.append((turn, move, p, L))
         columns.append(Matrix([own[0:3, :] + p, own[3:6, :] + L + r.cross(p)]))
-    beyond = [twists[i][0].dot(twists[j][3]) + twists[i][1].dot(twists[j][2]) for i, j in ((0, 0), (1, 0), (1, 1))]
+    beyond = [
+        twists[i][0].dot(twists[j][3]) + twists[i][1].dot(twists[j][2])
+        for i, j in ((0, 0), (1, 0), (1, 1))
+    ]
     return {
         "mass": mass + Matrix([section[0]]),
         "h": h_own + h_root,
@@ -274,7 +360,9 @@ def segment_momentum(let, rates, section, h_own, I_own, pitch_own, yaw_own, H_ow
     p = let("p", section[0] * u + w.cross(h_own) + relative[0:3, :])
     L = let("L", symmetric(I_own) * w + h_own.cross(u) + relative[3:6, :])
     own = rates[0] ** 2 * H_own[0] + 2 * rates[0] * rates[1] * H_own[1] + rates[1] ** 2 * H_own[2]
-    twice = let("twice", u.dot(p) + w.dot(L) + u.dot(relative[0:3, :]) + w.dot(relative[3:6, :]) + own)
+    twice = let(
+        "twice", u.dot(p) + w.dot(L) + u.dot(relative[0:3, :]) + w.dot(relative[3:6, :]) + own
+    )
     return {"F": Matrix([p, L]), "kinetic": [twice / 2]}
 
 

@@ -1,12 +1,14 @@
-"""The continuum tail: bend components of constant-curvature segments in, poses, inertias and wrenches out (Sect. 2.3).
+"""The continuum tail: bend components of constant-curvature segments in, poses, inertias and
+wrenches out (Sect. 2.3).
 
-A segment's bend is (a, b), its rotation Exp([a, 0, b]); z = a^2 + b^2 is the squared bend angle.  Slice x in [0, 1]
-lies at ``L (-sigma y + gamma u)`` from the segment's root, with u = (b, 0, -a), sigma = x c1(x^2 z) and
-gamma = x^2 c2(x^2 z), c_k being Stumpff's functions.  These are entire functions of z: nothing is singular or lost
-where the segment is straight.
+A segment's bend is (a, b), its rotation Exp([a, 0, b]); z = a^2 + b^2 is the squared bend angle.
+Slice x in [0, 1] lies at ``L (-sigma y + gamma u)`` from the segment's root, with u = (b, 0, -a),
+sigma = x c1(x^2 z) and gamma = x^2 c2(x^2 z), c_k being Stumpff's functions.  These are entire
+functions of z: nothing is singular or lost where the segment is straight.
 
-The integrals over x of Eqs. 18, 19, which Appendix B writes in sines and powers of 1 / theta, are here seven form
-factors, exact rational combinations of c_k(z) and c_k(4 z), and their z-derivatives.
+The integrals over x of Eqs. 18, 19, which Appendix B writes in sines and powers of 1 / theta, are
+here seven form factors, exact rational combinations of c_k(z) and c_k(4 z), and their
+z-derivatives.
 """
 
 from math import factorial
@@ -16,7 +18,8 @@ from sympy import Matrix, Rational
 HIGHEST = 9  # of Stumpff's functions that the form factors need
 SERIES_REACH = 6.4  # rad: up to there TERMS terms leave no more than rounding
 TERMS = 16
-# form factor: (coefficients k: of c_k(z), coefficients k: of c_k(4 z), order of the highest z-derivative)
+# form factor: (coefficients k: of c_k(z), coefficients k: of c_k(4 z), order of the highest
+# z-derivative)
 FACTORS = {
     "s": ({2: 1}, {}, 2),  # integral of sigma
     "g": ({3: 1}, {}, 2),  # of gamma; also half that of sigma^2 + z gamma^2
@@ -26,11 +29,15 @@ FACTORS = {
     "along": ({6: -2, 7: 2}, {7: 32}, 1),  # of 4 (sigma_z^2 + gamma gamma_z + z gamma_z^2)
     "side": ({5: Rational(1, 2)}, {6: -8}, 1),  # of sigma_z gamma - sigma gamma_z
 }
-SHAPE = tuple(name + suffix for name, (*_, top) in FACTORS.items() for suffix in ("", "_z", "_zz")[: top + 1])
+SHAPE = tuple(
+    name + suffix for name, (*_, top) in FACTORS.items() for suffix in ("", "_z", "_zz")[: top + 1]
+)
 
 
 def z_derivative(near: dict, far: dict) -> tuple[dict, dict]:
-    """Differentiate a combination by c_k' = (k c_{k+2} - c_{k+1}) / 2; the argument 4 z gives a factor 4."""
+    """Differentiate a combination by c_k' = (k c_{k+2} - c_{k+1}) / 2; the argument 4 z gives a
+    factor 4.
+    """
     out = ({}, {})
     for total, terms, inner in zip(out, (near, far), (1, 4), strict=True):
         for k, factor in terms.items():
@@ -40,7 +47,9 @@ def z_derivative(near: dict, far: dict) -> tuple[dict, dict]:
 
 
 def series(let, k: int, w):
-    """c_k(w) = sum over j of (-w)^j / (2 j + k)!: even and odd terms side by side, by Horner's rule in w^2."""
+    """c_k(w) = sum over j of (-w)^j / (2 j + k)!: even and odd terms side by side, by Horner's rule
+    in w^2.
+    """
     square, halves = let("square", w * w), []
     for first in (0, 1):
         total = Rational(1, factorial(2 * (TERMS - 2 + first) + k))
@@ -51,7 +60,9 @@ def series(let, k: int, w):
 
 
 def ladder(let, w) -> list:
-    """c_0 to c_HIGHEST at an argument up to SERIES_REACH^2: series on top, then c_k = 1 / k! - w c_{k+2} downward."""
+    """c_0 to c_HIGHEST at an argument up to SERIES_REACH^2: series on top, then c_k = 1 / k! - w
+    c_{k+2} downward.
+    """
     c = [0] * (HIGHEST + 1)
     for k in (HIGHEST, HIGHEST - 1):
         c[k] = series(let, k, w)
@@ -61,7 +72,9 @@ def ladder(let, w) -> list:
 
 
 def quadrupled(let, c: list) -> list:
-    """c_k(4 w) from c_k(w): the integral of (2 - s)^(k-1) cos(sqrt(w) s) / (k - 1)! over [0, 2], cut at 1."""
+    """c_k(4 w) from c_k(w): the integral of (2 - s)^(k-1) cos(sqrt(w) s) / (k - 1)! over [0, 2],
+    cut at 1.
+    """
     out = [2 * c[0] * c[0] - 1]
     for k in range(1, HIGHEST + 1):
         near = sum(c[j] * Rational(1, factorial(k - j)) for j in range(1, k + 1))
@@ -71,9 +84,11 @@ def quadrupled(let, c: list) -> list:
 
 
 def segment_shape(let, angles, levels: int = 1) -> dict:
-    """What bend does to a segment: its form factors, and c_1, c_2, c_3 with z-derivatives, which place the tip.
+    """What bend does to a segment: its form factors, and c_1, c_2, c_3 with z-derivatives, which
+    place the tip.
 
-    ``levels`` quadruplings carry the series from z / 4^levels to z, so bends up to SERIES_REACH * 2^levels are covered.
+    ``levels`` quadruplings carry the series from z / 4^levels to z, so bends up to SERIES_REACH *
+    2^levels are covered.
     """
     a, b = angles
     z = let("z", a * a + b * b)
@@ -85,11 +100,16 @@ def segment_shape(let, angles, levels: int = 1) -> dict:
     for near, far, highest in FACTORS.values():
         terms = near, far
         for _ in range(highest + 1):
-            value = sum(f * c[k] for k, f in terms[0].items()) + sum(f * c4[k] for k, f in terms[1].items())
+            value = sum(f * c[k] for k, f in terms[0].items()) + sum(
+                f * c4[k] for k, f in terms[1].items()
+            )
             shape.append(let("factor", value))
             terms = z_derivative(*terms)
     first = [let("c_z", (k * c[k + 2] - c[k + 1]) / 2) for k in (1, 2, 3)]
-    second = [let("c_zz", (k * (k + 2) * c[k + 4] - (2 * k + 1) * c[k + 3] + c[k + 2]) / 4) for k in (1, 2)]
+    second = [
+        let("c_zz", (k * (k + 2) * c[k + 4] - (2 * k + 1) * c[k + 3] + c[k + 2]) / 4)
+        for k in (1, 2)
+    ]
     return {"tip": Matrix([c[1], c[2], c[3], *first, *second]), "shape": Matrix(shape)}
 
 

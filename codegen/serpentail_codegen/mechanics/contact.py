@@ -1,7 +1,8 @@
-"""Contact with the ground: SymPy vectors of one point in, its motion, force and bristle rate out (Sect. 2.4).
+"""Contact with the ground: SymPy vectors of one point in, its motion, force and bristle rate out
+(Sect. 2.4).
 
-Points are given by ``arm``, from B in world axes, and ``velocity``, in the world.  The ground is z = 0.  A bristle is
-what the friction spring of a point is stretched by, in the world's x and y.
+Points are given by ``arm``, from B in world axes, and ``velocity``, in the world.  The ground is z
+= 0.  A bristle is what the friction spring of a point is stretched by, in the world's x and y.
 """
 
 from sympy import Matrix, Max, Piecewise, sqrt
@@ -10,20 +11,26 @@ from .rotations import square
 
 
 def point_on_torso(let, R, p_dot, omega, place, drift) -> dict:
-    """Arm and velocity of a point at ``place`` in the torso frame, which moves there at ``drift``."""
+    """Arm and velocity of a point at ``place`` in the torso frame, which moves there at
+    ``drift``.
+    """
     R = square(R)
     return {"arm": R * place, "velocity": p_dot + R * let("relative", omega.cross(place) + drift)}
 
 
 def lowest_point(let, R, torso_semi_axes) -> dict:
-    """The lowest point of the torso, an ellipsoid about B: place = -D^2 n / |D n|, n = R_b^T z, D its semi-axes."""
+    """The lowest point of the torso, an ellipsoid about B: place = -D^2 n / |D n|, n = R_b^T z, D
+    its semi-axes.
+    """
     scaled = let("D_n", torso_semi_axes.multiply_elementwise(square(R).row(2).T))
     length = let("length", sqrt(let("square", scaled.dot(scaled))))
     return {"place": -torso_semi_axes.multiply_elementwise(scaled) * let("inverse", 1 / length)}
 
 
 def torso_twist(let, R, p_dot, omega) -> dict:
-    """Angular velocity and velocity at B of the torso, world axes: where the tail's twists start."""
+    """Angular velocity and velocity at B of the torso, world axes: where the tail's twists
+    start.
+    """
     return {"turn": square(R) * omega, "slide": p_dot}
 
 
@@ -49,7 +56,9 @@ def bristle_properties(let, K_f, D_f) -> dict:
 
 
 def guarded(let, value, positive):
-    """Return a value where something is positive, else 1: what a root or quotient may be taken of."""
+    """Return a value where something is positive, else 1: what a root or quotient may be taken
+    of.
+    """
     return let("safe", Piecewise((value, positive > 0), (1, True)))
 
 
@@ -83,9 +92,11 @@ FRICTION = {"cone": cone, "box": box, "smooth": smooth, "paper": box}
 
 
 def bristle_rate(let, K_f, mobility, bristle, sliding, friction: str, depth, force) -> Matrix:
-    """-(f + K_f u) / (D_f K_f): slip while the point sticks, what keeps f while it slides, relaxation in the air.
+    """-(f + K_f u) / (D_f K_f): slip while the point sticks, what keeps f while it slides,
+    relaxation in the air.
 
-    ``paper``: slip as long as the point is in the ground, the anchor of Eq. 37 staying where it was.
+    ``paper``: slip as long as the point is in the ground, the anchor of Eq. 37 staying where it
+    was.
     """
     relaxing = -(force + K_f[0] * bristle) * mobility[0]
     if friction != "paper":
@@ -93,7 +104,9 @@ def bristle_rate(let, K_f, mobility, bristle, sliding, friction: str, depth, for
     return Matrix([Piecewise((sliding[k], depth > 0), (relaxing[k], True)) for k in (0, 1)])
 
 
-def contact_force(let, K_n, D_n, K_f, mu, drag, mobility, p, arm, velocity, bristle, friction: str = "cone") -> dict:
+def contact_force(
+    let, K_n, D_n, K_f, mu, drag, mobility, p, arm, velocity, bristle, friction: str = "cone"
+) -> dict:
     """Force of the ground on one point (Eqs. 35 to 37), world axes, and the rate of its bristle.
 
     The friction spring restores toward the anchor and opposes slip: Eq. 37 lacks that sign.

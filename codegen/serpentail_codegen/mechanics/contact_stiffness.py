@@ -1,12 +1,14 @@
-"""Contact linearised for implicit integrators: SymPy vectors of one point in, its stiffness and responses out.
+"""Contact linearised for implicit integrators: SymPy vectors of one point in, its stiffness and
+responses out.
 
-A W-method solves with 1 - w J, J from contact, damping and gains alone.  Of one point that moves by dx and dv, the
-normal force changes by df_n = -k_n dx - d_n dv, friction by g df_n - P (K_f du + D_f K_f dv), and the bristle's rate by
-P dv - ((1 - P) K_f du + g df_n) / (D_f K_f) (by dv with ``paper``): P, symmetric, is how friction follows the trial
-force, g how it follows the load, which bounds it while the point slides.  With the bristle eliminated, ``spring`` holds
-all that factoring and solving need: w k_n and a = w (d_n + w k_n), then (xx, xy, yy) of B and C, w times the force for
-a velocity and for a bristle's right-hand side, and of M and N, the bristle for its right-hand side and for a velocity;
-then h and e, friction and bristle for w df_n.
+A W-method solves with 1 - w J, J from contact, damping and gains alone.  Of one point that moves by
+dx and dv, the normal force changes by df_n = -k_n dx - d_n dv, friction by g df_n - P (K_f du + D_f
+K_f dv), and the bristle's rate by P dv - ((1 - P) K_f du + g df_n) / (D_f K_f) (by dv with
+``paper``): P, symmetric, is how friction follows the trial force, g how it follows the load, which
+bounds it while the point slides.  With the bristle eliminated, ``spring`` holds all that factoring
+and solving need: w k_n and a = w (d_n + w k_n), then (xx, xy, yy) of B and C, w times the force for
+a velocity and for a bristle's right-hand side, and of M and N, the bristle for its right-hand side
+and for a velocity; then h and e, friction and bristle for w df_n.
 """
 
 from sympy import Matrix, Piecewise, eye, sqrt
@@ -31,7 +33,9 @@ def normal_slopes(let, K_n, D_n, depth, rate, f_n) -> tuple:
     root = let("root", sqrt(guarded(let, depth, depth)))
     stiffness = let("k", K_n[0] * (root * 3 / 2 + D_n[0] * rate / (2 * root)))
     damping = let("d", K_n[0] * D_n[0] * root)
-    return tuple(let("slope", Piecewise((value, f_n > 0), (0, True))) for value in (stiffness, damping))
+    return tuple(
+        let("slope", Piecewise((value, f_n > 0), (0, True))) for value in (stiffness, damping)
+    )
 
 
 def cone_slope(let, trial, limit) -> Matrix:
@@ -48,13 +52,17 @@ def cone_slope(let, trial, limit) -> Matrix:
 
 def box_slope(let, trial, limit) -> Matrix:
     """P of a box: 1 along an axis that sticks, else 0."""
-    return Matrix.diag(*(Piecewise((1, let("room", limit**2 - t * t) > 0), (0, True)) for t in trial))
+    return Matrix.diag(
+        *(Piecewise((1, let("room", limit**2 - t * t) > 0), (0, True)) for t in trial)
+    )
 
 
 def smooth_slope(let, trial, limit) -> Matrix:
     """P of a smooth cone."""
     total = guarded(let, let("sum", limit**2 + trial.dot(trial)), limit)
-    return let("ratio", limit / let("length", sqrt(total))) * (eye(2) - let("along", trial * trial.T / total))
+    return let("ratio", limit / let("length", sqrt(total))) * (
+        eye(2) - let("along", trial * trial.T / total)
+    )
 
 
 SLOPE = {"cone": cone_slope, "box": box_slope, "smooth": smooth_slope, "paper": box_slope}
@@ -84,12 +92,29 @@ BOUND = {"cone": cone_bound, "box": box_bound, "smooth": smooth_bound, "paper": 
 
 
 def following_load(let, bound, pressing, mu, share) -> Matrix:
-    """g = mu df/d(bound), 0 where nothing presses; ``share`` 0 leaves it out, so that S is symmetric."""
-    return let("g", (bound * mu * share).applyfunc(lambda e: Piecewise((e, pressing > 0), (0, True))))
+    """g = mu df/d(bound), 0 where nothing presses; ``share`` 0 leaves it out, so that S is
+    symmetric.
+    """
+    return let(
+        "g", (bound * mu * share).applyfunc(lambda e: Piecewise((e, pressing > 0), (0, True)))
+    )
 
 
 def linearised_contact(
-    let, K_n, D_n, K_f, D_f, mu, drag, weight, bound_share, p, arm, velocity, bristle, friction: str = "cone"
+    let,
+    K_n,
+    D_n,
+    K_f,
+    D_f,
+    mu,
+    drag,
+    weight,
+    bound_share,
+    p,
+    arm,
+    velocity,
+    bristle,
+    friction: str = "cone",
 ) -> dict:
     """``spring`` of a point in the ground (Eqs. 35 to 37)."""
     w, depth, rate = weight[0], let("z", -(p[2] + arm[2])), -velocity[2]
@@ -155,7 +180,9 @@ def sliding(let, spring) -> dict:
 
 
 def sheared_torso(let, R, arm, spring) -> dict:
-    """J^T h and a J_z of one point for (p_dot, omega): S has their product, too, so it is not symmetric."""
+    """J^T h and a J_z of one point for (p_dot, omega): S has their product, too, so it is not
+    symmetric.
+    """
     R, h, lift = square(R).T, Matrix([spring[14], spring[15], 0]), Matrix([0, 0, spring[1]])
     push = Matrix([h, R * let("moment", arm.cross(h))])
     return {"push": push, "lift": Matrix([lift, R * let("turning", arm.cross(lift))])}
@@ -187,11 +214,16 @@ def tail_shift(let, J_k, coupling) -> dict:
 
 
 def contact_response(let, spring, motion_q, motion_v, lag) -> dict:
-    """Force on a point, w df, for right-hand sides of its place, velocity and bristle; ``pressed``: its place's."""
+    """Force on a point, w df, for right-hand sides of its place, velocity and bristle; ``pressed``:
+    its place's.
+    """
     across = plane(spring[2:5]) * motion_v[0:2, :] + plane(spring[5:8]) * lag
     pressed = let("pressed", -spring[0] * motion_q[2])
     load = let("load", pressed - spring[1] * motion_v[2])
-    return {"force": Matrix([load * spring[14] - across[0], load * spring[15] - across[1], load]), "pressed": [pressed]}
+    return {
+        "force": Matrix([load * spring[14] - across[0], load * spring[15] - across[1], load]),
+        "pressed": [pressed],
+    }
 
 
 def tail_response(let, J_k, force) -> dict:
@@ -207,7 +239,11 @@ def torso_response(let, R, load) -> dict:
 def bristle_response(let, spring, motion, lag, pressed) -> dict:
     """M r_u + N J k_v + e w df_n: a bristle in the ground."""
     load = let("load", pressed[0] - spring[1] * motion[2])
-    return {"k_u": plane(spring[8:11]) * lag + plane(spring[11:14]) * motion[0:2, :] + load * spring[16:18, :]}
+    return {
+        "k_u": plane(spring[8:11]) * lag
+        + plane(spring[11:14]) * motion[0:2, :]
+        + load * spring[16:18, :]
+    }
 
 
 def relaxation(let, D_f, weight) -> dict:

@@ -1,10 +1,12 @@
-"""Segments as articulated bodies: SymPy vectors in, the inertia and the loads that pass from segment to segment out.
+"""Segments as articulated bodies: SymPy vectors in, the inertia and the loads that pass from
+segment to segment out.
 
-The links of a segment move with its base and with its two coordinates.  A motion is (acceleration of the origin,
-angular acceleration), a wrench (force, moment), in the axes of the base they are about; the tip of a segment is the
-base of the next one.  With x = (motion of the base, second derivatives of the coordinates), K x + b is the wrench that
-moves a segment and all beyond, and the torques on its coordinates: K is 8 x 8.  Once the coordinates are eliminated it
-is A a + b of the base's motion a alone.  Lanes of K, A, b and T are the entries of x.
+The links of a segment move with its base and with its two coordinates.  A motion is (acceleration
+of the origin, angular acceleration), a wrench (force, moment), in the axes of the base they are
+about; the tip of a segment is the base of the next one.  With x = (motion of the base, second
+derivatives of the coordinates), K x + b is the wrench that moves a segment and all beyond, and the
+torques on its coordinates: K is 8 x 8.  Once the coordinates are eliminated it is A a + b of the
+base's motion a alone.  Lanes of K, A, b and T are the entries of x.
 """
 
 from sympy import Matrix, diag, zeros
@@ -18,18 +20,27 @@ def swept_by(arm) -> Matrix:
 
 
 def tip_motion(let, R, P, S) -> dict:
-    """What the tip's motion is made of: R^T, R^T (e_k x P), and in its axes the columns S at the tip (A5 to A8)."""
+    """What the tip's motion is made of: R^T, R^T (e_k x P), and in its axes the columns S at the
+    tip (A5 to A8).
+    """
     turn, parts = square(R).T, []
     for axis, velocity in ((S[0:3, :], S[3:6, :]), (S[6:9, :], S[9:12, :])):
         parts += [turn * let("at_tip", velocity + axis.cross(P)), turn * axis]
-    return {"tip_map": Matrix([*turn, *(turn * swept_by(P)), *(entry for part in parts for entry in part)])}
+    return {
+        "tip_map": Matrix(
+            [*turn, *(turn * swept_by(P)), *(entry for part in parts for entry in part)]
+        )
+    }
 
 
 def tip_matrix(tip_map) -> Matrix:
     """T, 6 x 8: motion of the tip in its own axes = T x, but for what velocities add."""
     turn, swept = square(tip_map[0:9, :]), square(tip_map[9:18, :])
     pitch, turn_pitch, yaw, turn_yaw = (tip_map[18 + 3 * k : 21 + 3 * k, :] for k in range(4))
-    return Matrix.vstack(Matrix.hstack(turn, swept, pitch, yaw), Matrix.hstack(zeros(3, 3), turn, turn_pitch, turn_yaw))
+    return Matrix.vstack(
+        Matrix.hstack(turn, swept, pitch, yaw),
+        Matrix.hstack(zeros(3, 3), turn, turn_pitch, turn_yaw),
+    )
 
 
 def tip_rows(let, tip_map) -> dict:
@@ -51,7 +62,9 @@ def own_inertia(let, mass, h, I, pitch, yaw, H_pp, H_py, H_yy) -> dict:
 
 
 def load_at_tip(let, A, b, coasting) -> dict:
-    """Wrench that moves all beyond a tip whose motion is ``coasting``, what velocities alone give it: A a + b."""
+    """Wrench that moves all beyond a tip whose motion is ``coasting``, what velocities alone give
+    it: A a + b.
+    """
     total = b[0]
     for k in range(6):
         total += let("moved", coasting[k] * A[k])
@@ -59,7 +72,9 @@ def load_at_tip(let, A, b, coasting) -> dict:
 
 
 def pass_on(let, T, tip_map, A_0, A_1, A_2, A_3, A_4, A_5, load) -> dict:
-    """What all beyond the tip adds to a segment: K by T^T A T, b by T^T load; ``A_0`` to ``A_5`` are the rows of A."""
+    """What all beyond the tip adds to a segment: K by T^T A T, b by T^T load; ``A_0`` to ``A_5``
+    are the rows of A.
+    """
     entries, A = tip_matrix(tip_map), (A_0, A_1, A_2, A_3, A_4, A_5)
     moved = [let("moved", sum((A[c][r] * T[c] for c in range(6)), 0)) for r in range(6)]
     K = [sum((entries[r, k] * moved[r] for r in range(6)), 0) for k in range(8)]
@@ -67,9 +82,11 @@ def pass_on(let, T, tip_map, A_0, A_1, A_2, A_3, A_4, A_5, load) -> dict:
 
 
 def free_coordinates(let, K, b, pitch_row, yaw_row, joint_load, torques) -> dict:
-    """Eliminate the coordinates, yaw first; the rows are the last of K, ``joint_load`` the last two entries of b.
+    """Eliminate the coordinates, yaw first; the rows are the last of K, ``joint_load`` the last two
+    entries of b.
 
-    ``shares`` tell each coordinate's second derivative: minus the sum of (the entries of x before it, 1) times them.
+    ``shares`` tell each coordinate's second derivative: minus the sum of (the entries of x before
+    it, 1) times them.
     """
     over_yaw = let("over_yaw", 1 / yaw_row[7])
     yaw_share = let("yaw_share", yaw_row[0:7, :] * over_yaw)
@@ -77,11 +94,15 @@ def free_coordinates(let, K, b, pitch_row, yaw_row, joint_load, torques) -> dict
     over_pitch = let("over_pitch", 1 / left[6])
     pitch_share = let("pitch_share", left[0:6, :] * over_pitch)
     yaw_load = let("yaw_load", joint_load[1] - torques[1])
-    pitch_load = let("pitch_load", (joint_load[0] - torques[0] - yaw_share[6] * yaw_load) * over_pitch)
+    pitch_load = let(
+        "pitch_load", (joint_load[0] - torques[0] - yaw_share[6] * yaw_load) * over_pitch
+    )
     yaw_load = let("yaw_load", yaw_load * over_yaw)
     pitch_lanes = let("pitch_lanes", K[6] - yaw_share[6] * K[7])
     return {
-        "A": [let("A", K[r] - yaw_share[r] * K[7]) - pitch_share[r] * pitch_lanes for r in range(6)],
+        "A": [
+            let("A", K[r] - yaw_share[r] * K[7]) - pitch_share[r] * pitch_lanes for r in range(6)
+        ],
         "b_base": [let("b", b[0] - yaw_load * K[7]) - pitch_load * pitch_lanes],
         "shares": Matrix([*pitch_share, pitch_load, *yaw_share, yaw_load]),
         "pivots": Matrix([left[6], yaw_row[7]]),
@@ -89,7 +110,9 @@ def free_coordinates(let, K, b, pitch_row, yaw_row, joint_load, torques) -> dict
 
 
 def outward(let, tip_map, shares, coasting, base) -> dict:
-    """Second derivatives of a segment's coordinates, and the motion of its tip, from that of its base."""
+    """Second derivatives of a segment's coordinates, and the motion of its tip, from that of its
+    base.
+    """
     pitch = let("pitch", -(shares[0:6, :].dot(base) + shares[6]))
     yaw = let("yaw", -(shares[7:13, :].dot(base) + shares[13] * pitch + shares[14]))
     free = Matrix([pitch, yaw])
@@ -97,17 +120,26 @@ def outward(let, tip_map, shares, coasting, base) -> dict:
 
 
 def freed_inertia(let, torso_mass, torso_inertia, tail_mount, A_0, A_1, A_2, A_3, A_4, A_5) -> dict:
-    """Inertia of torso and tail at B with free coordinates: lower triangle for (omega_dot, a), torso axes."""
+    """Inertia of torso and tail at B with free coordinates: lower triangle for (omega_dot, a),
+    torso axes.
+    """
     A, swept = Matrix.hstack(A_0, A_1, A_2, A_3, A_4, A_5).T, swept_by(tail_mount)
     force, moment = A[0:3, 0:3], A[3:6, 0:3]
     coupling = let("coupling", moment + swept.T * force)
     turning = A[3:6, 3:6] + moment * swept + swept.T * coupling.T
-    H = Matrix([[turning + diag(*torso_inertia), zeros(3, 3)], [coupling.T, force + diag(*[torso_mass[0]] * 3)]])
+    H = Matrix(
+        [
+            [turning + diag(*torso_inertia), zeros(3, 3)],
+            [coupling.T, force + diag(*[torso_mass[0]] * 3)],
+        ]
+    )
     return {f"H_{r}": H[r, 0 : r + 1].T for r in range(6)}
 
 
 def freed_wrench(let, tail_mount, a_mount, A_0, A_1, A_2, b_mount) -> dict:
-    """Wrench at B that moves a tail with free coordinates whose mount accelerates by ``a_mount`` and does not turn."""
+    """Wrench at B that moves a tail with free coordinates whose mount accelerates by ``a_mount``
+    and does not turn.
+    """
     F = let("F", b_mount + a_mount[0] * A_0 + a_mount[1] * A_1 + a_mount[2] * A_2)
     return {"F": Matrix([F[0:3, :], F[3:6, :] + tail_mount.cross(F[0:3, :])])}
 

@@ -1,6 +1,8 @@
-"""The legs: SymPy vectors in, places and velocities of the foot's three points in torso axes out (Sect. 2.1).
+"""The legs: SymPy vectors in, places and velocities of the foot's three points in torso axes out
+(Sect. 2.1).
 
-A leg moves in a plane parallel to the torso's y and z axes; two angles, gamma and delta, place all its points.
+A leg moves in a plane parallel to the torso's y and z axes; two angles, gamma and delta, place all
+its points.
 """
 
 from sympy import Matrix, cos, sin
@@ -13,7 +15,8 @@ def direction(let, angle, rate) -> tuple[Matrix, Matrix]:
 
 
 def foot_points(let, hip, side, L_h2d, L_d2k, L_k2a, L_a2m, L_m2t, delta_m, leg, leg_rates) -> dict:
-    """A, M and T from B, and their rates in B (Eqs. 5 to 9); ``side`` is 1 on the right, -1 on the left.
+    """A, M and T from B, and their rates in B (Eqs. 5 to 9); ``side`` is 1 on the right, -1 on the
+    left.
 
     The sole keeps the angle delta_m to the thigh: Eq. 8's gamma - delta is gamma - delta_m.
     """
@@ -23,6 +26,12 @@ def foot_points(let, hip, side, L_h2d, L_d2k, L_k2a, L_a2m, L_m2t, delta_m, leg,
     thigh = let("thigh", L_h2d[0] + L_k2a[0])
     ankle = let("A", Matrix([side[0] * hip[0], hip[1], hip[2]]) + thigh * upper + L_d2k[0] * lower)
     ankle_rate = let("A_dot", thigh * upper_rate + L_d2k[0] * lower_rate)
-    middle, middle_rate = let("M", ankle + L_a2m[0] * lower), let("M_dot", ankle_rate + L_a2m[0] * lower_rate)
+    middle, middle_rate = (
+        let("M", ankle + L_a2m[0] * lower),
+        let("M_dot", ankle_rate + L_a2m[0] * lower_rate),
+    )
     toe, toe_rate = middle - L_m2t[0] * sole, middle_rate - L_m2t[0] * sole_rate
-    return {"foot": Matrix([ankle, middle, toe]), "foot_rate": Matrix([ankle_rate, middle_rate, toe_rate])}
+    return {
+        "foot": Matrix([ankle, middle, toe]),
+        "foot_rate": Matrix([ankle_rate, middle_rate, toe_rate]),
+    }

@@ -1,8 +1,10 @@
-"""Dynamics of torso and links: SymPy vectors in, inertias, momenta and wrenches out (Sect. 2, Eqs. 2, 3, 16, 17).
+"""Dynamics of torso and links: SymPy vectors in, inertias, momenta and wrenches out (Sect. 2, Eqs.
+2, 3, 16, 17).
 
-A link is given by ``link`` = (m, L, m L / 2, I_x, I_y, I_z), the moments of inertia taken about its joint.  A body set
-is given by its mass, first moment ``h`` = sum m r, and ``I`` = (xx, yy, zz, xy, xz, yz) about the frame's origin.  A
-wrench or momentum ``F`` = (force or momentum, its moment about the origin).
+A link is given by ``link`` = (m, L, m L / 2, I_x, I_y, I_z), the moments of inertia taken about its
+joint.  A body set is given by its mass, first moment ``h`` = sum m r, and ``I`` = (xx, yy, zz, xy,
+xz, yz) about the frame's origin.  A wrench or momentum ``F`` = (force or momentum, its moment about
+the origin).
 """
 
 from sympy import Matrix, cos, sin, zeros
@@ -11,7 +13,9 @@ from .rotations import X, Y, Z, entries, rotation_x, rotation_z, square, symmetr
 
 
 def link_properties(let, tail_mass, tail_length, link_inertia, share) -> dict:
-    """Properties of one of N equal links, ``share`` = 1 / N: m_at = m_t / N, L_j2c = L_j2j / 2 (Sect. 4)."""
+    """Properties of one of N equal links, ``share`` = 1 / N: m_at = m_t / N, L_j2c = L_j2j / 2
+    (Sect. 4).
+    """
     m, length = let("even", Matrix([tail_mass[0], tail_length[0]]) * share[0])
     half_moment = let("b", m * length / 2)
     steiner = let("steiner", half_moment * length / 2)
@@ -33,12 +37,26 @@ def link_wrench(let, link, w, w_dot, a_joint, swing) -> dict:
     return {"F": Matrix([force, euler + b * Matrix([-a_joint[2], 0, a_joint[0]])])}
 
 
-def link_power(let, joint, rates, accelerations, virtual_rates, link, w, w_dot, a, w_virtual, u_virtual) -> dict:
-    """Power of the inertial wrench of one link (Eq. 17) under a virtual motion; both motions carried on."""
-    motion = {k: let(k, x) for k, x in link_motion(let, joint, rates, accelerations, link, w, w_dot, a).items()}
-    F = let("F", link_wrench(let, link, motion["w"], motion["w_dot"], motion["a_joint"], motion["swing"])["F"])
+def link_power(
+    let, joint, rates, accelerations, virtual_rates, link, w, w_dot, a, w_virtual, u_virtual
+) -> dict:
+    """Power of the inertial wrench of one link (Eq. 17) under a virtual motion; both motions
+    carried on.
+    """
+    motion = {
+        k: let(k, x)
+        for k, x in link_motion(let, joint, rates, accelerations, link, w, w_dot, a).items()
+    }
+    F = let(
+        "F",
+        link_wrench(let, link, motion["w"], motion["w_dot"], motion["a_joint"], motion["swing"])[
+            "F"
+        ],
+    )
     turn = let("turn", link_angular_velocity(let, joint, virtual_rates, w_virtual)["w"])
-    slide = {k: let(k, x) for k, x in link_linear_velocity(let, joint, link, turn, u_virtual).items()}
+    slide = {
+        k: let(k, x) for k, x in link_linear_velocity(let, joint, link, turn, u_virtual).items()
+    }
     power = F[0:3, :].dot(slide["u_joint"]) + F[3:6, :].dot(turn)
     carried = {name: motion[name] for name in ("w", "w_dot", "a")}
     return {"power": [power], **carried, "w_virtual": turn, "u_virtual": slide["u"]}
@@ -46,11 +64,15 @@ def link_power(let, joint, rates, accelerations, virtual_rates, link, w, w_dot, 
 
 def along_link(let, length, F) -> Matrix:
     """Move a wrench from the next joint to this one: n' = n + (-L y) x f."""
-    return let("moved", Matrix([F[0], F[1], F[2], F[3] - length * F[2], F[4], F[5] + length * F[0]]))
+    return let(
+        "moved", Matrix([F[0], F[1], F[2], F[3] - length * F[2], F[4], F[5] + length * F[0]])
+    )
 
 
 def gather_wrench(let, joint, link, F, F_next) -> dict:
-    """Add what the next link passes on, read the joint torques (A5 on Eq. 17), pass on to the parent frame."""
+    """Add what the next link passes on, read the joint torques (A5 on Eq. 17), pass on to the
+    parent frame.
+    """
     turn_x, turn_z = joint_turns(joint)
     total = let("total", F + along_link(let, link[1], F_next))
     mid = turned(let, "mid", turn_z, total)
@@ -66,7 +88,8 @@ def turned_inertia(let, axes, turn, twice, I) -> Matrix:
     d = let("d", tensor[i, i] - tensor[j, j])
     t = let("t", double_product * tensor[i, j])
     out = zeros(3, 3)
-    # sums, not I_ii - s^2 d: a thin link turned by 90 degrees would be the difference of two thick ones
+    # sums, not I_ii - s^2 d: a thin link turned by 90 degrees would be the difference of two
+    # thick ones
     out[i, i] = cosine_squared * tensor[i, i] + sine_squared * tensor[j, j] - t
     out[j, j] = sine_squared * tensor[i, i] + cosine_squared * tensor[j, j] + t
     out[k, k] = tensor[k, k]
@@ -78,20 +101,31 @@ def turned_inertia(let, axes, turn, twice, I) -> Matrix:
 
 
 def with_link(let, mass, link, h, I) -> tuple[Matrix, Matrix]:
-    """First moment and inertia about this joint of one link and what hangs at its end, ``mass, h, I`` at that end."""
+    """First moment and inertia about this joint of one link and what hangs at its end, ``mass, h,
+    I`` at that end.
+    """
     _, length, b, Ix, Iy, Iz = link
     moment = let("moment", h[1] - mass[0] * length)
     steiner = let("steiner", length * (h[1] + moment))
     h_sum = Matrix([h[0], moment - b, h[2]])
-    I_sum = [I[0] - steiner + Ix, I[1] + Iy, I[2] - steiner + Iz, I[3] + length * h[0], I[4], I[5] + length * h[2]]
+    I_sum = [
+        I[0] - steiner + Ix,
+        I[1] + Iy,
+        I[2] - steiner + Iz,
+        I[3] + length * h[0],
+        I[4],
+        I[5] + length * h[2],
+    ]
     return let("h_sum", h_sum), let("I_sum", Matrix(I_sum))
 
 
 def gather_links(let, joint, twice, link, mass, h, I, pitch, yaw) -> dict:
-    """One link of the tip-to-base sweep of Eq. 16: composite inertia and the momentum columns of the segment.
+    """One link of the tip-to-base sweep of Eq. 16: composite inertia and the momentum columns of
+    the segment.
 
-    ``pitch`` and ``yaw`` are momenta, at this frame's origin, of everything beyond per unit alpha_dot and beta_dot of
-    the segment's joints passed so far; ``H_pp, H_py, H_yy`` are what this joint adds to the segment's own block.
+    ``pitch`` and ``yaw`` are momenta, at this frame's origin, of everything beyond per unit
+    alpha_dot and beta_dot of the segment's joints passed so far; ``H_pp, H_py, H_yy`` are what this
+    joint adds to the segment's own block.
     """
     turn_x, turn_z = joint_turns(joint)
     h, I = with_link(let, mass, link, h, I)
@@ -99,7 +133,10 @@ def gather_links(let, joint, twice, link, mass, h, I, pitch, yaw) -> dict:
     H_yy, H_py = 2 * yaw[5] + I[2], pitch[5]
     yaw = let("yaw_here", yaw + Matrix([Z.cross(h), symmetric(I) * Z]))
 
-    h, I = let("h_mid", turn_z * h), let("I_mid", turned_inertia(let, (0, 1, 2), turn_z, twice[5:10], I))
+    h, I = (
+        let("h_mid", turn_z * h),
+        let("I_mid", turned_inertia(let, (0, 1, 2), turn_z, twice[5:10], I)),
+    )
     pitch, yaw = turned(let, "pitch_mid", turn_z, pitch), turned(let, "yaw_mid", turn_z, yaw)
     H_pp, H_py = 2 * pitch[3] + I[0], H_py + yaw[3]
     pitch = let("pitch_here", pitch + Matrix([X.cross(h), symmetric(I) * X]))
@@ -124,7 +161,9 @@ def gather_moment(let, joint, link, mass, h) -> dict:
 
 
 def link_momentum(let, link, w, u_joint) -> dict:
-    """Momentum of one link, its moment about the joint, and the kinetic energy (u . p + omega . L) / 2."""
+    """Momentum of one link, its moment about the joint, and the kinetic energy (u . p + omega . L)
+    / 2.
+    """
     m, _, b, Ix, Iy, Iz = link
     p = let("p", m * u_joint + b * Matrix([w[2], 0, -w[0]]))
     L = let("L", Matrix([Ix * w[0] - b * u_joint[2], Iy * w[1], Iz * w[2] + b * u_joint[0]]))
@@ -143,7 +182,9 @@ def joint_trigonometry(let, angles) -> dict:
 
 
 def double_angles(let, joint) -> dict:
-    """s^2, s c, 2 s c, c^2 - s^2 and c^2 of both joint angles: what turns a symmetric tensor in the plane."""
+    """s^2, s c, 2 s c, c^2 - s^2 and c^2 of both joint angles: what turns a symmetric tensor in the
+    plane.
+    """
     rows = []
     for c, s in (joint[0:2], joint[2:4]):
         sine_squared, product = let("k", Matrix([s * s, s * c]))
@@ -160,7 +201,9 @@ def link_pose(let, joint, link, R, P) -> dict:
 
 
 def joint_twist(let, joint, R, P) -> dict:
-    """Spatial columns of one joint at B: (x_{j-1}, p_j x x_{j-1}) and (z_j, p_j x z_j) (Eqs. A5, A7)."""
+    """Spatial columns of one joint at B: (x_{j-1}, p_j x x_{j-1}) and (z_j, p_j x z_j) (Eqs. A5,
+    A7).
+    """
     turn_x, _ = joint_turns(joint)
     pitch, yaw = square(R).col(0), let("yaw", square(R) * turn_x * Z)
     return {"S": Matrix([pitch, P.cross(pitch), yaw, P.cross(yaw)])}
@@ -174,23 +217,42 @@ def link_angular_velocity(let, joint, rates, w) -> dict:
 
 
 def link_linear_velocity(let, joint, link, w, u) -> dict:
-    """v_jnt of this joint in the frame of link j, and v_j+1,jnt = v_j,jnt - L omega_j x y_j (Eqs. A3, A4)."""
+    """v_jnt of this joint in the frame of link j, and v_j+1,jnt = v_j,jnt - L omega_j x y_j (Eqs.
+    A3, A4).
+    """
     turn_x, turn_z = joint_turns(joint)
     here = let("here", turn_z.T * let("mid", turn_x.T * u))
     return {"u_joint": here, "u": here - link[1] * w.cross(Y)}
 
 
 def link_motion(let, joint, rates, accelerations, link, w, w_dot, a) -> dict:
-    """omega_j (A1), omega_dot_j (A9), acceleration of this joint and the next (A11, A12), in the frame of link j.
+    """omega_j (A1), omega_dot_j (A9), acceleration of this joint and the next (A11, A12), in the
+    frame of link j.
 
-    ``swing`` is omega_dot x y + omega x (omega x y): accelerations along the link are multiples of it.
+    ``swing`` is omega_dot x y + omega x (omega x y): accelerations along the link are multiples of
+    it.
     """
     turn_x, turn_z = joint_turns(joint)
     w_mid = let("w_mid", turn_x.T * w + rates[0] * X)
-    w_dot_mid = let("w_dot_mid", turn_x.T * w_dot + accelerations[0] * X + rates[0] * w_mid.cross(X))
+    w_dot_mid = let(
+        "w_dot_mid", turn_x.T * w_dot + accelerations[0] * X + rates[0] * w_mid.cross(X)
+    )
     w_here = let("w_here", turn_z.T * w_mid + rates[1] * Z)
-    w_dot_here = let("w_dot_here", turn_z.T * w_dot_mid + accelerations[1] * Z + rates[1] * w_here.cross(Z))
+    w_dot_here = let(
+        "w_dot_here", turn_z.T * w_dot_mid + accelerations[1] * Z + rates[1] * w_here.cross(Z)
+    )
     a_here = let("a_here", turn_z.T * let("a_mid", turn_x.T * a))
-    products = let("ww", Matrix([w_here[0] * w_here[1], w_here[0] ** 2 + w_here[2] ** 2, w_here[1] * w_here[2]]))
-    swing = let("k", Matrix([products[0] - w_dot_here[2], -products[1], products[2] + w_dot_here[0]]))
-    return {"w": w_here, "w_dot": w_dot_here, "a_joint": a_here, "swing": swing, "a": a_here - link[1] * swing}
+    products = let(
+        "ww",
+        Matrix([w_here[0] * w_here[1], w_here[0] ** 2 + w_here[2] ** 2, w_here[1] * w_here[2]]),
+    )
+    swing = let(
+        "k", Matrix([products[0] - w_dot_here[2], -products[1], products[2] + w_dot_here[0]])
+    )
+    return {
+        "w": w_here,
+        "w_dot": w_dot_here,
+        "a_joint": a_here,
+        "swing": swing,
+        "a": a_here - link[1] * swing,
+    }

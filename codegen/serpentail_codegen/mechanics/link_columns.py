@@ -1,8 +1,10 @@
-"""Columns and bias of the articulated tail as lanes: one wrench of rows goes in, what a link makes of it comes out.
+"""Columns and bias of the articulated tail as lanes: one wrench of rows goes in, what a link makes
+of it comes out.
 
-Eqs. 16 and 17, from the tip to the base.  Lane k of ``F_lanes`` is the momentum of all links beyond per unit rate of
-tail coordinate k, the last lane their inertial wrench.  A lane is addressed by a row that is 1 there and 0 elsewhere:
-``at_pitch`` and ``at_yaw``, for the coordinates of the link's segment, and ``at_bias``.
+Eqs. 16 and 17, from the tip to the base.  Lane k of ``F_lanes`` is the momentum of all links beyond
+per unit rate of tail coordinate k, the last lane their inertial wrench.  A lane is addressed by a
+row that is 1 there and 0 elsewhere: ``at_pitch`` and ``at_yaw``, for the coordinates of the link's
+segment, and ``at_bias``.
 """
 
 from sympy import Matrix
@@ -12,14 +14,19 @@ from .rotations import X, Z, symmetric, turned
 
 
 def gather_composite(let, joint, twice, link, mass, h, I) -> dict:
-    """Mass, first moment and inertia of a link and all beyond, and the columns of its own joint (Eq. 16).
+    """Mass, first moment and inertia of a link and all beyond, and the columns of its own joint
+    (Eq. 16).
 
-    ``pitch`` is taken between the joint's two turns, ``yaw`` beyond both; ``own``: what each adds to H_pp and H_yy.
+    ``pitch`` is taken between the joint's two turns, ``yaw`` beyond both; ``own``: what each adds
+    to H_pp and H_yy.
     """
     turn_x, turn_z = joint_turns(joint)
     h, I = with_link(let, mass, link, h, I)
     yaw, H_yy = let("yaw", Matrix([Z.cross(h), symmetric(I) * Z])), I[2]
-    h, I = let("h_mid", turn_z * h), let("I_mid", turned_inertia(let, (0, 1, 2), turn_z, twice[5:10], I))
+    h, I = (
+        let("h_mid", turn_z * h),
+        let("I_mid", turned_inertia(let, (0, 1, 2), turn_z, twice[5:10], I)),
+    )
     pitch, H_pp = let("pitch", Matrix([X.cross(h), symmetric(I) * X])), I[0]
     return {
         "mass": mass + Matrix([link[0]]),
@@ -32,7 +39,9 @@ def gather_composite(let, joint, twice, link, mass, h, I) -> dict:
 
 
 def gather_lanes(let, joint, link, F, pitch, yaw, at_bias, at_pitch, at_yaw, F_lanes) -> dict:
-    """Add a link's wrench and columns, read what its joint feels, and pass all on to the parent's frame."""
+    """Add a link's wrench and columns, read what its joint feels, and pass all on to the parent's
+    frame.
+    """
     turn_x, turn_z = joint_turns(joint)
     total = let("total", along_link(let, link[1], F_lanes) + at_bias[0] * F + at_yaw[0] * yaw)
     mid = let("added", turned(let, "mid", turn_z, total) + at_pitch[0] * pitch)
@@ -46,7 +55,9 @@ def lanes_at_torso(let, tail_mount, F_lanes) -> dict:
 
 
 def torso_bias(let, torso_mass, torso_inertia, w, a, F) -> dict:
-    """Inertial force and moment of torso and tail at B, the tail's being ``F``; nothing turns faster."""
+    """Inertial force and moment of torso and tail at B, the tail's being ``F``; nothing turns
+    faster.
+    """
     euler = w.cross(let("I_w", torso_inertia.multiply_elementwise(w)))
     return {"force": F[0:3, :] + torso_mass[0] * a, "moment": F[3:6, :] + euler}
 
@@ -64,7 +75,8 @@ def row_without_translation(let, inverse_mass, column, F_lanes) -> dict:
 
 
 def segment_block(let, inverse_mass, columns, own, H_pp, H_py, H_yp, H_yy) -> dict:
-    """A segment's own block of H: pairs of its joints were met once, and count twice; a joint with itself counts once.
+    """A segment's own block of H: pairs of its joints were met once, and count twice; a joint with
+    itself counts once.
 
     Translation is eliminated already, so what it took is given back where it would count twice.
     """

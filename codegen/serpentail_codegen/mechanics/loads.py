@@ -1,8 +1,10 @@
-"""Dynamics of torso and links: SymPy vectors in, inertias, momenta and wrenches out (Sect. 2, Eqs. 2, 3, 16, 17).
+"""Dynamics of torso and links: SymPy vectors in, inertias, momenta and wrenches out (Sect. 2, Eqs.
+2, 3, 16, 17).
 
-A link is given by ``link`` = (m, L, m L / 2, I_x, I_y, I_z), the moments of inertia taken about its joint.  A body set
-is given by its mass, first moment ``h`` = sum m r, and ``I`` = (xx, yy, zz, xy, xz, yz) about the frame's origin.  A
-wrench or momentum ``F`` = (force or momentum, its moment about the origin).
+A link is given by ``link`` = (m, L, m L / 2, I_x, I_y, I_z), the moments of inertia taken about its
+joint.  A body set is given by its mass, first moment ``h`` = sum m r, and ``I`` = (xx, yy, zz, xy,
+xz, yz) about the frame's origin.  A wrench or momentum ``F`` = (force or momentum, its moment about
+the origin).
 """
 
 from sympy import Matrix
@@ -11,13 +13,17 @@ from .rotations import square
 
 
 def load_at_torso(let, R, f_torso, F_beyond) -> dict:
-    """All loads at B in torso axes; ``f_torso`` is a force in world axes and a moment in torso axes."""
+    """All loads at B in torso axes; ``f_torso`` is a force in world axes and a moment in torso
+    axes.
+    """
     force = square(R).T * f_torso[0:3, :] + F_beyond[0:3, :]
     return {"load_force": force, "load_moment": f_torso[3:6, :] + F_beyond[3:6, :]}
 
 
 def load_at_point(let, R, P, f_point, F_beyond) -> dict:
-    """Add a world force at a tail point to the wrench at B of all forces from this point to the tip."""
+    """Add a world force at a tail point to the wrench at B of all forces from this point to the
+    tip.
+    """
     force = let("force", square(R).T * f_point)
     return {"F_beyond": F_beyond + Matrix([force, P.cross(force)])}
 
@@ -30,12 +36,16 @@ def joint_load(let, S, F_beyond) -> dict:
 
 
 def point_jacobian_base(let, R, arm) -> dict:
-    """d(point)/d omega = -skew(arm) R_b for a point at ``arm`` from B, world axes (Eq. A7, the tilde restored)."""
+    """d(point)/d omega = -skew(arm) R_b for a point at ``arm`` from B, world axes (Eq. A7, the
+    tilde restored).
+    """
     return rows(Matrix.hstack(*(square(R).col(k).cross(arm) for k in range(3))))
 
 
 def point_jacobian_tail(let, S, arm) -> dict:
-    """d(point)/d(alpha_i, beta_i) = S_v + S_omega x arm: velocity of the point under the columns of segment i."""
+    """d(point)/d(alpha_i, beta_i) = S_v + S_omega x arm: velocity of the point under the columns of
+    segment i.
+    """
     columns = [S[3:6, :] + S[0:3, :].cross(arm), S[9:12, :] + S[6:9, :].cross(arm)]
     return rows(Matrix.hstack(*columns))
 

@@ -28,25 +28,41 @@ SIZES = {
     **dict.fromkeys(["inertial", "tau", "acceleration"], 1),
     **dict.fromkeys(["angles", "rates", "accelerations", "virtual_rates"], 2),
     **dict.fromkeys(["quaternion", "joint", "gradient"], 4),
-    **dict.fromkeys(["link", "I", "F", "F_next", "F_beyond", "pitch", "yaw", "column", "other", "f_torso"], 6),
-    **{"section": 2, "H_own": 3, "torque_own": 2, "I_own": 6, "pitch_own": 6, "yaw_own": 6, "tip": 8, "shape": 16},
+    **dict.fromkeys(
+        ["link", "I", "F", "F_next", "F_beyond", "pitch", "yaw", "column", "other", "f_torso"], 6
+    ),
+    **{
+        "section": 2,
+        "H_own": 3,
+        "torque_own": 2,
+        "I_own": 6,
+        "pitch_own": 6,
+        "yaw_own": 6,
+        "tip": 8,
+        "shape": 16,
+    },
     **{"E": 9, "bend": 12, "trig": 4, "E_v": 15, "Q_v": 10, "loading": 27},
     **{"twice": 10, "R": 9, "S": 12, "columns": 12, "F_lanes": 6, "own": 2},
     **{"tip_map": 30, "T": 6, "K": 8, "b": 1, "shares": 15},
-    **{"pitch_row": 8, "yaw_row": 8, "joint_load": 2, "torques": 2} | {f"A_{r}": 6 for r in range(6)},
+    **{"pitch_row": 8, "yaw_row": 8, "joint_load": 2, "torques": 2}
+    | {f"A_{r}": 6 for r in range(6)},
     **dict.fromkeys(["A", "coasting", "base", "b_mount", "at_torso"], 6),
     **dict.fromkeys(["at_bias", "at_pitch", "at_yaw", "H_pp", "H_py", "H_yp", "H_yy"], 1),
     **dict.fromkeys(["K_n", "D_n", "K_f", "D_f", "mu", "drag", "mobility"], 1),
     **dict.fromkeys(["L_h2d", "L_d2k", "L_k2a", "L_a2m", "L_m2t", "delta_m", "side"], 1),
     **{"leg": 2, "leg_rates": 2, "bristle": 2, "load": 6, "spring": 18, "lag": 2, "gains": 2},
-    **dict.fromkeys(["weight", "damping", "damped", "gain", "gain_q", "gain_v", "relax", "entry", "coupling"], 1),
+    **dict.fromkeys(
+        ["weight", "damping", "damped", "gain", "gain_q", "gain_v", "relax", "entry", "coupling"], 1
+    ),
     **dict.fromkeys(["change", "rate", "angle", "k_v", "bound_share", "pressed"], 1),
     **dict.fromkeys(["push_k", "push_l", "lift_k", "lift_l"], 1),
 }
 
 
 class Recorder:
-    """Lowers SymPy expressions to one tape; its ``let`` names intermediate results by fresh symbols."""
+    """Lowers SymPy expressions to one tape; its ``let`` names intermediate results by fresh
+    symbols.
+    """
 
     def __init__(self):
         self.tape = Tape()
@@ -124,11 +140,17 @@ class Recorder:
         if condition == True:  # noqa: E712  SymPy's own truth
             return self.lower(e)
         if not others:
-            raise TypeError(f"no rule lowers a Piecewise without a last case (..., True): {condition}")
+            raise TypeError(
+                f"no rule lowers a Piecewise without a last case (..., True): {condition}"
+            )
         if isinstance(condition, sympy.StrictGreaterThan | sympy.StrictLessThan):
-            return self.tape.select(self.lower(condition.gts - condition.lts), self.lower(e), self._cases(others))
+            return self.tape.select(
+                self.lower(condition.gts - condition.lts), self.lower(e), self._cases(others)
+            )
         if isinstance(condition, sympy.GreaterThan | sympy.LessThan):
-            return self.tape.select(self.lower(condition.lts - condition.gts), self._cases(others), self.lower(e))
+            return self.tape.select(
+                self.lower(condition.lts - condition.gts), self._cases(others), self.lower(e)
+            )
         raise TypeError(f"no rule lowers the condition {condition}")
 
 
@@ -141,7 +163,8 @@ def exact(number: sympy.Number):
 
 @cache
 def derive(function, **settings) -> Step:
-    """Derive a step: call ``function(let, *vectors)`` with SymPy vectors named by its arguments, lower its result.
+    """Derive a step: call ``function(let, *vectors)`` with SymPy vectors named by its arguments,
+    lower its result.
 
     Arguments with a default are settings of the derivation, not vectors.
     """
@@ -152,9 +175,13 @@ def derive(function, **settings) -> Step:
         vectors.append(recorder.vector(name, first, size))
         inputs.append((name, size))
         first += size
-    outputs = {name: list(value) for name, value in function(recorder.let, *vectors, **settings).items()}
+    outputs = {
+        name: list(value) for name, value in function(recorder.let, *vectors, **settings).items()
+    }
     results = tuple(recorder.lower(sympy.sympify(e)) for values in outputs.values() for e in values)
     sizes = tuple((name, len(values)) for name, values in outputs.items())
-    doc = inspect.getdoc(function).splitlines()[0]
-    name = function.__name__ + "".join(f"_{key}_{value}" for key, value in settings.items() if value)
+    doc = " ".join(inspect.getdoc(function).partition("\n\n")[0].split())
+    name = function.__name__ + "".join(
+        f"_{key}_{value}" for key, value in settings.items() if value
+    )
     return compacted(Step(name, doc, tuple(inputs), sizes, tuple(recorder.tape.nodes), results))

@@ -1,9 +1,14 @@
-"""The continuum tail as the paper writes it, for comparison only: polar angles in, inertias and wrenches out.
+"""The continuum tail as the paper writes it, for comparison only: polar angles in, inertias and
+wrenches out.
 
-Sect. 2.3 in the frame of a segment's root: slice x in [0, 1] lies at p_q + s_x a - c_x b with s_x = sin(theta x),
-c_x = cos(theta x), a = -r y, b = r (sin(phi) x + cos(phi) z) and r = L / theta (Eqs. 20 to 23).  What depends on x is
-integrated once and for all, which leaves the matrices E and Q of Appendix B: sines, cosines and powers of 1 / theta.
-They are kept as printed, without series, switch or smoothing: digits cancel as theta tends to 0, and there is no value
+Sect. 2.3 in the frame of a segment's root: slice x in [0, 1] lies at p_q + s_x a - c_x b with s_x =
+sin(theta x),
+c_x = cos(theta x), a = -r y, b = r (sin(phi) x + cos(phi) z) and r = L / theta (Eqs. 20 to 23).
+What depends on x is
+integrated once and for all, which leaves the matrices E and Q of Appendix B: sines, cosines and
+powers of 1 / theta.
+They are kept as printed, without series, switch or smoothing: digits cancel as theta tends to 0,
+and there is no value
 at theta = 0.  `continuum.py` is the same tail without these faults.
 """
 
@@ -20,14 +25,18 @@ def segment_trigonometry(let, angles) -> dict:
 
 
 def polar_margins(let, angles, bend_range) -> dict:
-    """Positive where a segment is bent at all, and where it is bent by less than the declared range, up to rounding."""
+    """Positive where a segment is bent at all, and where it is bent by less than the declared
+    range, up to rounding.
+    """
     square = let("square", angles[1] ** 2)
     limit = let("limit", bend_range[0] * bend_range[0] * Rational(10**12 + 1, 10**12))
     return {"bent": [square], "margin": [limit - square]}
 
 
 def slice_integrals(let, angles, trig) -> dict:
-    """E of Eq. 28, its upper triangle, and columns 5 and 9 of Q of Eq. 30; the others are E's (Appendix B)."""
+    """E of Eq. 28, its upper triangle, and columns 5 and 9 of Q of Eq. 30; the others are E's
+    (Appendix B).
+    """
     t, _, s, c = angles[1], *trig[1:]
     s2, c2, t2 = let("s2", sin(2 * t)), let("c2", cos(2 * t)), let("t2", t * t)
     t3, t4, six = let("t3", t2 * t), let("t4", t2 * t2), let("six", 6 * t2 - 3)
@@ -68,7 +77,9 @@ def intermediate_vectors(let, angles, trig, section) -> tuple:
 
 
 def slice_jacobian(let, angles, a, b, b_phi) -> list:
-    """J_v of Eq. 26, five blocks 3 x 8: columns for velocity and angular velocity of the root, phi_dot, theta_dot."""
+    """J_v of Eq. 26, five blocks 3 x 8: columns for velocity and angular velocity of the root,
+    phi_dot, theta_dot.
+    """
     a_theta, b_theta = let("a_theta", -a / angles[1]), let("b_theta", -b / angles[1])
     J_a = Matrix.hstack(zeros(3, 3), -skew(a), zeros(3, 1), a_theta)
     J_b = Matrix.hstack(zeros(3, 3), -skew(b), b_phi, b_theta)
@@ -83,8 +94,13 @@ def skew(v) -> Matrix:
 
 
 def segment_inertia(let, angles, trig, E_v, section) -> dict:
-    """H_i = m J_v^T o E o J_v (Eq. 28): first moment, inertia, columns of phi and theta and their block of H."""
-    J, E = slice_jacobian(let, angles, *intermediate_vectors(let, angles, trig, section)), matrix_E(E_v)
+    """H_i = m J_v^T o E o J_v (Eq. 28): first moment, inertia, columns of phi and theta and their
+    block of H.
+    """
+    J, E = (
+        slice_jacobian(let, angles, *intermediate_vectors(let, angles, trig, section)),
+        matrix_E(E_v),
+    )
     H = zeros(8, 8)
     for k in range(5):
         row = let("E_J", sum((E[k, j] * J[j] for j in range(5)), zeros(3, 8)))
@@ -100,16 +116,20 @@ def segment_inertia(let, angles, trig, E_v, section) -> dict:
 
 
 def segment_loading(let, angles, rates, accelerations, trig, section, w, w_dot, a) -> dict:
-    """h_v of Eq. 31, nine vectors: p_q_ddot (+ g), a_ddot, a_dot theta_dot, ..., b theta_dot^2, in the root frame.
+    """h_v of Eq. 31, nine vectors: p_q_ddot (+ g), a_ddot, a_dot theta_dot, ..., b theta_dot^2, in
+    the root frame.
 
-    ``w, w_dot, a`` are of the root; the paper's second block reads p_q, its first entry is the acceleration of p_q.
+    ``w, w_dot, a`` are of the root; the paper's second block reads p_q, its first entry is the
+    acceleration of p_q.
     """
     a_i, b_i, b_phi = intermediate_vectors(let, angles, trig, section)
     theta_dot, theta_ddot = rates[1], accelerations[1]
     shrink = let("shrink", -theta_dot / angles[1])  # r_dot / r
     shrink_rate = let("shrink_rate", 2 * shrink * shrink - theta_ddot / angles[1])  # r_ddot / r
     b_rate = shrink * b_i + rates[0] * b_phi
-    b_bend = shrink_rate * b_i - rates[0] ** 2 * b_i + (2 * shrink * rates[0] + accelerations[0]) * b_phi
+    b_bend = (
+        shrink_rate * b_i - rates[0] ** 2 * b_i + (2 * shrink * rates[0] + accelerations[0]) * b_phi
+    )
     a_dot, a_ddot = turning(let, a_i, shrink * a_i, shrink_rate * a_i, w, w_dot)
     b_dot, b_ddot = turning(let, b_i, b_rate, b_bend, w, w_dot)
     square = let("square", theta_dot**2)
@@ -119,15 +139,22 @@ def segment_loading(let, angles, rates, accelerations, trig, section, w, w_dot, 
 
 
 def turning(let, vector, rate, rate_rate, w, w_dot) -> tuple:
-    """First and second derivative of a vector in a frame that turns by ``w``, from those relative to the frame."""
+    """First and second derivative of a vector in a frame that turns by ``w``, from those relative
+    to the frame.
+    """
     v, rate = let("spun", w.cross(vector)), let("rate", rate)
     second = rate_rate + w_dot.cross(vector) + w.cross(let("swept", v + 2 * rate))
     return let("dot", v + rate), let("ddot", second)
 
 
 def segment_wrench(let, angles, trig, E_v, Q_v, section, loading) -> dict:
-    """tau_i = m J_v^T o Q o h_v (Eq. 30): inertial wrench at the root and generalised forces of phi and theta."""
-    J, Q = slice_jacobian(let, angles, *intermediate_vectors(let, angles, trig, section)), matrix_Q(E_v, Q_v)
+    """tau_i = m J_v^T o Q o h_v (Eq. 30): inertial wrench at the root and generalised forces of phi
+    and theta.
+    """
+    J, Q = (
+        slice_jacobian(let, angles, *intermediate_vectors(let, angles, trig, section)),
+        matrix_Q(E_v, Q_v),
+    )
     h = loading.reshape(9, 3)
     Q_h = let("Q_h", Q * h)
     force = let("tau", section[0] * sum((J[k].T * Q_h[k, :].T for k in range(5)), zeros(8, 1)))
@@ -135,7 +162,9 @@ def segment_wrench(let, angles, trig, E_v, Q_v, section, loading) -> dict:
 
 
 def segment_tip(let, angles, trig, section) -> dict:
-    """Rotation to the tip (Eq. 33), its position (Eq. 34), and how both move with phi and theta, in the root frame."""
+    """Rotation to the tip (Eq. 33), its position (Eq. 34), and how both move with phi and theta, in
+    the root frame.
+    """
     a, b, b_phi = intermediate_vectors(let, angles, trig, section)
     (s_phi, c_phi, s, c), lift = trig, let("lift", 1 - trig[3])
     about = Matrix([[c_phi, 0, s_phi], [0, 1, 0], [-s_phi, 0, c_phi]])
@@ -147,7 +176,9 @@ def segment_tip(let, angles, trig, section) -> dict:
 
 
 def segment_motion(let, rates, accelerations, trig, E, bend, loading, w, w_dot) -> dict:
-    """Angular velocity, its rate and acceleration of the tip, in its frame; Eq. 29 at x = 1 is its acceleration."""
+    """Angular velocity, its rate and acceleration of the tip, in its frame; Eq. 29 at x = 1 is its
+    acceleration.
+    """
     s_phi, c_phi, s, c = trig
     E = E.reshape(3, 3)
     phi_turn, theta_turn = bend[0:3, :], bend[6:9, :]
@@ -159,7 +190,11 @@ def segment_motion(let, rates, accelerations, trig, E, bend, loading, w, w_dot) 
     f_a = Matrix([1, s, 2 * c, c, -s, -c, 2 * s, s, c])  # Eq. 32 at x = 1
     a_tip = loading.reshape(9, 3).T * f_a
     E = E.T
-    return {"w": E * let("w", w + turn), "w_dot": E * let("w_dot", w_tip_dot), "a": E * let("a", a_tip)}
+    return {
+        "w": E * let("w", w + turn),
+        "w_dot": E * let("w_dot", w_tip_dot),
+        "a": E * let("a", a_tip),
+    }
 
 
 def part_of_arc(let, angles, fraction) -> dict:

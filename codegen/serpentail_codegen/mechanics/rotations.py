@@ -1,8 +1,9 @@
-"""Kinematics of the torso and the articulated tail: SymPy vectors in, SymPy vectors out (Sect. 2.2, Appendix A).
+"""Kinematics of the torso and the articulated tail: SymPy vectors in, SymPy vectors out (Sect. 2.2,
+Appendix A).
 
-Every link recursion is written in link-local frames: a universal joint is a turn about x, then a turn about z
-(Eq. 11), and a link lies along -y of its frame (Eq. 15).  ``let`` names an intermediate result, so that expressions
-stay small.
+Every link recursion is written in link-local frames: a universal joint is a turn about x, then a
+turn about z (Eq. 11), and a link lies along -y of its frame (Eq. 15).  ``let`` names an
+intermediate result, so that expressions stay small.
 """
 
 from sympy import Matrix, eye, sqrt
@@ -60,13 +61,19 @@ def square(R) -> Matrix:
 
 
 def quaternion_rotation(let, quaternion) -> dict:
-    """R_b from (w, x, y, z); only the direction of the quaternion counts, so it need not be normalised."""
+    """R_b from (w, x, y, z); only the direction of the quaternion counts, so it need not be
+    normalised.
+    """
     w, x, y, z = quaternion
     s = let("s", 2 / (w * w + x * x + y * y + z * z))
     sx, sy, sz = let("sq", Matrix([s * x, s * y, s * z]))
     xx, yy, zz = let("d", Matrix([sx * x, sy * y, sz * z]))
     xy, xz, yz, wx, wy, wz = let("e", Matrix([sx * y, sx * z, sy * z, sx * w, sy * w, sz * w]))
-    rows = [[1 - (yy + zz), xy - wz, xz + wy], [xy + wz, 1 - (xx + zz), yz - wx], [xz - wy, yz + wx, 1 - (xx + yy)]]
+    rows = [
+        [1 - (yy + zz), xy - wz, xz + wy],
+        [xy + wz, 1 - (xx + zz), yz - wx],
+        [xz - wy, yz + wx, 1 - (xx + yy)],
+    ]
     return {"R": Matrix(rows)}
 
 
@@ -90,7 +97,9 @@ def turned_quaternion(let, quaternion, turn) -> dict:
 
 
 def turn_gradient(let, quaternion, gradient) -> dict:
-    """Gradient with respect to a turn in body axes, from that with respect to a unit quaternion's four numbers."""
+    """Gradient with respect to a turn in body axes, from that with respect to a unit quaternion's
+    four numbers.
+    """
     w, x, y, z = quaternion
     gw, gx, gy, gz = gradient
     twice = [

@@ -1,8 +1,10 @@
-"""Dynamics of torso and links: SymPy vectors in, inertias, momenta and wrenches out (Sect. 2, Eqs. 2, 3, 16, 17).
+"""Dynamics of torso and links: SymPy vectors in, inertias, momenta and wrenches out (Sect. 2, Eqs.
+2, 3, 16, 17).
 
-A link is given by ``link`` = (m, L, m L / 2, I_x, I_y, I_z), the moments of inertia taken about its joint.  A body set
-is given by its mass, first moment ``h`` = sum m r, and ``I`` = (xx, yy, zz, xy, xz, yz) about the frame's origin.  A
-wrench or momentum ``F`` = (force or momentum, its moment about the origin).
+A link is given by ``link`` = (m, L, m L / 2, I_x, I_y, I_z), the moments of inertia taken about its
+joint.  A body set is given by its mass, first moment ``h`` = sum m r, and ``I`` = (xx, yy, zz, xy,
+xz, yz) about the frame's origin.  A wrench or momentum ``F`` = (force or momentum, its moment about
+the origin).
 """
 
 from sympy import Matrix, eye
@@ -12,8 +14,12 @@ from .rotations import Z, entries, square, symmetric
 
 def torso_power(let, torso_mass, torso_inertia, w, w_dot, a, w_virtual, u_virtual) -> dict:
     """Power of the torso's inertial wrench at B (Eq. 3) under a virtual motion, torso axes."""
-    euler = torso_inertia.multiply_elementwise(w_dot) + w.cross(let("I_w", torso_inertia.multiply_elementwise(w)))
-    return {"power": [torso_mass[0] * let("a_u", a.dot(u_virtual)) + w_virtual.dot(let("euler", euler))]}
+    euler = torso_inertia.multiply_elementwise(w_dot) + w.cross(
+        let("I_w", torso_inertia.multiply_elementwise(w))
+    )
+    return {
+        "power": [torso_mass[0] * let("a_u", a.dot(u_virtual)) + w_virtual.dot(let("euler", euler))]
+    }
 
 
 def column_at_torso(let, R, P, pitch, yaw) -> dict:
@@ -27,9 +33,12 @@ def column_at_torso(let, R, P, pitch, yaw) -> dict:
 
 
 def segment_coupling(let, S, columns) -> dict:
-    """Block of H between a segment and one beyond it: spatial columns at B times momentum columns at B (Eq. 16)."""
+    """Block of H between a segment and one beyond it: spatial columns at B times momentum columns
+    at B (Eq. 16).
+    """
     block = [
-        S[a : a + 3, :].dot(columns[b + 3 : b + 6, :]) + S[a + 3 : a + 6, :].dot(columns[b : b + 3, :])
+        S[a : a + 3, :].dot(columns[b + 3 : b + 6, :])
+        + S[a + 3 : a + 6, :].dot(columns[b : b + 3, :])
         for b in (0, 6)
         for a in (0, 6)
     ]
@@ -37,7 +46,9 @@ def segment_coupling(let, S, columns) -> dict:
 
 
 def torso_composite(let, tail_mount, torso_mass, torso_inertia, mass, h, I) -> dict:
-    """Mass, first moment and inertia of the whole animal at B, from the tail's at its mount (Eq. 2)."""
+    """Mass, first moment and inertia of the whole animal at B, from the tail's at its mount (Eq.
+    2).
+    """
     r = tail_mount
     h_B = let("h_B", h + mass[0] * r)
     total = symmetric(I) + let("spread", (h + h_B).dot(r)) * eye(3) - (h * r.T + r * h_B.T)
@@ -59,7 +70,9 @@ def torso_wrench(let, tail_mount, torso_mass, torso_inertia, w, w_dot, a, F_next
 
 
 def torso_momentum(let, tail_mount, torso_mass, torso_inertia, w, u_torso, F_next) -> dict:
-    """Momentum and angular momentum of torso and tail at B, torso axes; kinetic energy of the torso alone."""
+    """Momentum and angular momentum of torso and tail at B, torso axes; kinetic energy of the torso
+    alone.
+    """
     force, moment = F_next[0:3, :], F_next[3:6, :]
     p = let("p", torso_mass[0] * u_torso)
     L = let("L", torso_inertia.multiply_elementwise(w))
@@ -76,9 +89,14 @@ def potential_energy(let, gravity, R, p, mass, h) -> dict:
 
 
 def momentum_at_com(let, R, p_dot, mass, h, force, moment) -> dict:
-    """Momentum, and angular momentum about the COM, world axes; ``force, moment`` taken at rest of B."""
+    """Momentum, and angular momentum about the COM, world axes; ``force, moment`` taken at rest of
+    B.
+    """
     R = square(R)
-    return {"linear": mass[0] * p_dot + R * force, "angular": R * (moment - h.cross(force) / mass[0])}
+    return {
+        "linear": mass[0] * p_dot + R * force,
+        "angular": R * (moment - h.cross(force) / mass[0]),
+    }
 
 
 def mass_matrix_base(let, R, mass, h, I) -> dict:
@@ -110,7 +128,9 @@ def mount_velocity(let, u, w, tail_mount) -> dict:
 
 
 def mount_acceleration(let, w, w_dot, a, tail_mount) -> dict:
-    """v_dot_1,jnt of A11 in the torso frame; ``a`` is R_b^T (p_b_ddot + g), gravity being an acceleration of B."""
+    """v_dot_1,jnt of A11 in the torso frame; ``a`` is R_b^T (p_b_ddot + g), gravity being an
+    acceleration of B.
+    """
     return {"a_mount": a + w_dot.cross(tail_mount) + w.cross(let("r", w.cross(tail_mount)))}
 
 

@@ -1,8 +1,10 @@
-"""Dynamics of torso and links: SymPy vectors in, inertias, momenta and wrenches out (Sect. 2, Eqs. 2, 3, 16, 17).
+"""Dynamics of torso and links: SymPy vectors in, inertias, momenta and wrenches out (Sect. 2, Eqs.
+2, 3, 16, 17).
 
-A link is given by ``link`` = (m, L, m L / 2, I_x, I_y, I_z), the moments of inertia taken about its joint.  A body set
-is given by its mass, first moment ``h`` = sum m r, and ``I`` = (xx, yy, zz, xy, xz, yz) about the frame's origin.  A
-wrench or momentum ``F`` = (force or momentum, its moment about the origin).
+A link is given by ``link`` = (m, L, m L / 2, I_x, I_y, I_z), the moments of inertia taken about its
+joint.  A body set is given by its mass, first moment ``h`` = sum m r, and ``I`` = (xx, yy, zz, xy,
+xz, yz) about the frame's origin.  A wrench or momentum ``F`` = (force or momentum, its moment about
+the origin).
 """
 
 from sympy import Matrix, eye
@@ -11,7 +13,9 @@ from .rotations import X, Y, Z, square, symmetric, world_acceleration
 
 
 def without_translation(let, mass, h, I) -> dict:
-    """Rotational block about the COM: I - (h . h 1 - h h^T) / M; COM from B, c = h / M; and 1 / M."""
+    """Rotational block about the COM: I - (h . h 1 - h h^T) / M; COM from B, c = h / M; and 1 /
+    M.
+    """
     inverse = let("inverse", 1 / mass[0])
     c = let("c", h * inverse)
     block = symmetric(I) - (let("spread", c.dot(h)) * eye(3) - c * h.T)
@@ -30,13 +34,17 @@ def pair_without_translation(let, inverse_mass, column, other) -> dict:
 
 
 def rotational_load(let, com, force, moment, load_force, load_moment) -> dict:
-    """Right-hand side for omega_dot: applied minus inertial moment about the COM; and the net force."""
+    """Right-hand side for omega_dot: applied minus inertial moment about the COM; and the net
+    force.
+    """
     net = let("net", load_force - force)
     return {"net": net, "rhs": load_moment - moment - com.cross(net)}
 
 
 def tail_load(let, inverse_mass, net, column, inertial, tau) -> dict:
-    """Right-hand side for one tail coordinate, translation eliminated: tau - c_k - f_k . net / M."""
+    """Right-hand side for one tail coordinate, translation eliminated: tau - c_k - f_k . net /
+    M.
+    """
     return {"rhs": [tau[0] - inertial[0] - inverse_mass[0] * column[0:3, :].dot(net)]}
 
 
@@ -52,7 +60,9 @@ def base_acceleration(let, R, gravity, inverse_mass, h, net, w_dot, tail_force) 
 
 
 def free_acceleration(let, inverse_mass, com, net, w_dot) -> dict:
-    """Acceleration of B, gravity taken off, of what a net force moves: net / M - omega_dot x c, torso axes."""
+    """Acceleration of B, gravity taken off, of what a net force moves: net / M - omega_dot x c,
+    torso axes.
+    """
     return {"a": inverse_mass[0] * net - w_dot.cross(com)}
 
 
@@ -62,7 +72,9 @@ def coupling_torque(let, column, a, w_dot) -> dict:
 
 
 def turned_acceleration(let, R, a) -> dict:
-    """How p_b_ddot = R_b a - g z moves with a turn of the torso in body axes: columns R_b (e_k x a), row by row."""
+    """How p_b_ddot = R_b a - g z moves with a turn of the torso in body axes: columns R_b (e_k x
+    a), row by row.
+    """
     columns = [square(R) * axis.cross(a) for axis in (X, Y, Z)]
     return {f"row_{r}": Matrix([column[r] for column in columns]) for r in range(3)}
 

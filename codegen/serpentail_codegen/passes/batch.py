@@ -1,7 +1,8 @@
-"""Batches: the program of one state goes in, the same program over several states side by side comes out.
+"""Batches: the program of one state goes in, the same program over several states side by side
+comes out.
 
-Every array that depends on an argument becomes wide, one lane for each state; what depends on parameters alone stays
-narrow, and is computed once for all.
+Every array that depends on an argument becomes wide, one lane for each state; what depends on
+parameters alone stays narrow, and is computed once for all.
 """
 
 from dataclasses import replace
@@ -23,19 +24,28 @@ def side_by_side(program: Program, states: int) -> Program:
 
 
 def with_own_parameters(program: Program, name: str) -> Program:
-    """Return a program by another name that takes its parameters as inputs, so that each state may have its own."""
+    """Return a program by another name that takes its parameters as inputs, so that each state may
+    have its own.
+    """
     program = expanded(program)
-    array = {a.name: replace(a, role="input") if a.role == "parameters" else a for a in program.arrays}
+    array = {
+        a.name: replace(a, role="input") if a.role == "parameters" else a for a in program.arrays
+    }
     body = rewritten(program.body, lambda statement: (with_arrays(statement, array),))
     return replace(program, name=name, arrays=tuple(array.values()), body=body)
 
 
 def flattened(program: Program, fixed: dict[str, list] | None = None) -> Program:
-    """Return a program that is one step, its loops written out, and guards; ``fixed`` arrays are constants."""
+    """Return a program that is one step, its loops written out, and guards; ``fixed`` arrays are
+    constants.
+    """
     tape, outputs, guards = unroll(program, fixed)
     inputs = (*program.of_role("parameters"), *program.of_role("input"))
     positive = {status: [node for name, node in guards if name == status] for status, _ in guards}
-    checks = {status: Array(f"positive_{k}", "local", len(nodes)) for k, (status, nodes) in enumerate(positive.items())}
+    checks = {
+        status: Array(f"positive_{k}", "local", len(nodes))
+        for k, (status, nodes) in enumerate(positive.items())
+    }
     targets = (*program.of_role("output"), *checks.values())
     results = [node for array in program.of_role("output") for node in outputs[array.name]]
     results += [node for nodes in positive.values() for node in nodes]

@@ -1,8 +1,9 @@
-"""Scheduling: nodes of a straight line go in, an order that hides latency without losing registers comes out.
+"""Scheduling: nodes of a straight line go in, an order that hides latency without losing registers
+comes out.
 
-Recursions leave a processor waiting for one result after another, while independent work stands further down the text
-than it can look ahead.  Longest remaining path first brings that work forward, until REGISTERS values are alive; then
-what frees registers goes first.
+Recursions leave a processor waiting for one result after another, while independent work stands
+further down the text than it can look ahead.  Longest remaining path first brings that work
+forward, until REGISTERS values are alive; then what frees registers goes first.
 """
 
 from collections import Counter

@@ -15,11 +15,17 @@ def plain(value: Value) -> float | list[float]:
 
 
 def fits(parameter: Parameter, value: Any) -> bool:
-    """Tell if a value has the parameter's size, is made of finite numbers, and keeps the parameter's rule."""
+    """Tell if a value has the parameter's size, is made of finite numbers, and keeps the
+    parameter's rule.
+    """
     if (parameter.size > 1) != isinstance(value, list | tuple):
         return False
     numbers = value if parameter.size > 1 else [value]
-    return len(numbers) == parameter.size and all(map(_is_finite, numbers)) and parameter.check.holds(numbers)
+    return (
+        len(numbers) == parameter.size
+        and all(map(_is_finite, numbers))
+        and parameter.check.holds(numbers)
+    )
 
 
 def _is_finite(x: Any) -> bool:
@@ -29,7 +35,9 @@ def _is_finite(x: Any) -> bool:
 
 def number_problem(parameter: Parameter, value: object) -> Problem:
     """Say what the parameter needs: size, rule, unit and default."""
-    shape = "a finite number" if parameter.size == 1 else f"an array of {parameter.size} finite numbers"
+    shape = (
+        "a finite number" if parameter.size == 1 else f"an array of {parameter.size} finite numbers"
+    )
     default = "computed" if parameter.default is None else plain(parameter.default)
     remedy = f"needs {shape}{parameter.check.text}, in {parameter.unit} (default: {default})"
     return Problem(f"parameters.{parameter.name}", value, remedy)
@@ -57,13 +65,17 @@ def kind_problems(table: Mapping[str, Any], own: Only) -> list[Problem]:
         choices = " or ".join(f'"{name}"' for name in own.coordinates)
         remedy = f"needs {choices}; polar angles are singular at theta = 0, convert states"
         problems.append(Problem("coordinates", table["coordinates"], remedy))
-    elif table.get("coordinates") == "polar" and (wanted := _derivatives_in(table.get("functions"))):
+    elif table.get("coordinates") == "polar" and (
+        wanted := _derivatives_in(table.get("functions"))
+    ):
         remedy = f'has no derivatives, such as {wanted[0]}: use "bend", which has'
         problems.append(Problem("coordinates", "polar", remedy))
     return problems
 
 
-def contact_problems(table: Mapping[str, Any], values: Mapping[str, Any], contacts: Collection[str]) -> list[Problem]:
+def contact_problems(
+    table: Mapping[str, Any], values: Mapping[str, Any], contacts: Collection[str]
+) -> list[Problem]:
     """Return a problem for all that needs contacts which the scene does not have."""
     problems, given = [], table.get("parameters", {})
     needs = {p.name: p.needs for p in PARAMETERS if p.needs and p.needs not in contacts}
@@ -92,8 +104,12 @@ def _derivatives_in(wanted: Any) -> list[str]:
 
 def single_problems(parameters: Mapping[str, Value]) -> list[Problem]:
     """Return a problem for each parameter that single precision cannot hold."""
-    flat = {name: value if isinstance(value, tuple) else (value,) for name, value in parameters.items()}
-    wrong = [n for n, xs in flat.items() if any(x and not SINGLE[0] <= abs(x) <= SINGLE[1] for x in xs)]
+    flat = {
+        name: value if isinstance(value, tuple) else (value,) for name, value in parameters.items()
+    }
+    wrong = [
+        n for n, xs in flat.items() if any(x and not SINGLE[0] <= abs(x) <= SINGLE[1] for x in xs)
+    ]
     remedy = 'beyond single precision, 1.2e-38 to 3.4e38; set real = "double"'
     return [Problem(f"parameters.{name}", plain(parameters[name]), remedy) for name in wrong]
 
@@ -105,16 +121,23 @@ def tail_links(values: Mapping[str, Any]) -> int:
 
 
 def function_problems(wanted: Any) -> list[Problem]:
-    """Return a problem for each entry that is unknown or listed before, or one for what is no array."""
+    """Return a problem for each entry that is unknown or listed before, or one for what is no
+    array.
+    """
     if not isinstance(wanted, list | tuple) or not wanted:
-        remedy = 'needs an array of names, such as ["mass_matrix"]; leave it out for the usual ones, or "all"'
+        remedy = (
+            'needs an array of names, such as ["mass_matrix"]; leave it out for the usual ones, or '
+            '"all"'
+        )
         return [Problem("functions", wanted, remedy)]
     problems = []
     for i, name in enumerate(wanted):
         if name not in ALL:
             problems.append(Problem(f"functions[{i}]", name, f"unknown; {suggest(name, ALL)}"))
         elif name in wanted[:i]:
-            problems.append(Problem(f"functions[{i}]", name, "listed before; remove one of the two"))
+            problems.append(
+                Problem(f"functions[{i}]", name, "listed before; remove one of the two")
+            )
     return problems
 
 

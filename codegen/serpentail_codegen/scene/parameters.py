@@ -1,4 +1,6 @@
-"""The physical parameters of a model: their names, sizes, units, defaults and rules, and a set of checked values."""
+"""The physical parameters of a model: their names, sizes, units, defaults and rules, and a set of
+checked values.
+"""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -18,7 +20,8 @@ class Rule:
 
 
 ANY = Rule("", lambda _: True)
-# Rules for the numbers of a parameter; 1e-12 lets a flat body, with equal sums, pass in spite of rounding.
+# Rules for the numbers of a parameter; 1e-12 lets a flat body, with equal sums, pass in spite of
+# rounding.
 POSITIVE = Rule(" above 0", lambda x: min(x) > 0)
 NOT_NEGATIVE = Rule(", 0 or above", lambda x: min(x) >= 0)
 BODY_INERTIA = Rule(
@@ -29,7 +32,9 @@ BODY_INERTIA = Rule(
 
 @dataclass(frozen=True)
 class Parameter:
-    """One physical parameter: `size` numbers in `unit`; a default of None is computed from the others."""
+    """One physical parameter: `size` numbers in `unit`; a default of None is computed from the
+    others.
+    """
 
     name: str
     size: int
@@ -37,46 +42,127 @@ class Parameter:
     unit: str
     check: Rule
     meaning: str
-    needs: str = ""  # a group of contact points, or "contacts": any of them; empty: every scene has it
+    needs: str = (
+        ""  # a group of contact points, or "contacts": any of them; empty: every scene has it
+    )
 
 
 # The defaults are the kangaroo rat of the paper's Table 1. B is the torso frame, at the torso COM.
-# fmt: off
 PARAMETERS = (
-    Parameter("gravity", 1, 9.8, "m/s^2", NOT_NEGATIVE, "gravitational acceleration, along -z of the world"),
+    Parameter(
+        "gravity",
+        1,
+        9.8,
+        "m/s^2",
+        NOT_NEGATIVE,
+        ("gravitational acceleration, along -z of the world"),
+    ),
     Parameter("torso_mass", 1, 0.10572, "kg", POSITIVE, "mass of the torso"),
-    Parameter("torso_inertia", 3, (6.722e-05, 3.639e-05, 7.279e-05), "kg m^2", BODY_INERTIA,
-              "principal moments of inertia of the torso about its COM, axes of B"),
-    Parameter("tail_mount", 3, (0.0, -0.0405, 0.0045), "m", ANY, "root of the tail from the torso COM, in B"),
+    Parameter(
+        "torso_inertia",
+        3,
+        (6.722e-05, 3.639e-05, 7.279e-05),
+        "kg m^2",
+        BODY_INERTIA,
+        "principal moments of inertia of the torso about its COM, axes of B",
+    ),
+    Parameter(
+        "tail_mount",
+        3,
+        (0.0, -0.0405, 0.0045),
+        "m",
+        ANY,
+        ("root of the tail from the torso COM, in B"),
+    ),
     Parameter("tail_mass", 1, 0.00351, "kg", POSITIVE, "mass of the whole tail"),
     Parameter("tail_length", 1, 0.19466, "m", POSITIVE, "length of the whole tail"),
-    Parameter("link_radius", 1, 0.0029, "m", NOT_NEGATIVE, "radius of the ellipsoid that gives link_inertia"),
-    Parameter("link_inertia", 3, None, "kg m^2", NOT_NEGATIVE,
-              "principal moments of inertia of one link about its COM, y along the link"),
+    Parameter(
+        "link_radius",
+        1,
+        0.0029,
+        "m",
+        NOT_NEGATIVE,
+        ("radius of the ellipsoid that gives link_inertia"),
+    ),
+    Parameter(
+        "link_inertia",
+        3,
+        None,
+        "kg m^2",
+        NOT_NEGATIVE,
+        "principal moments of inertia of one link about its COM, y along the link",
+    ),
     Parameter("K_n", 1, 1000.0, "N/m^1.5", POSITIVE, "stiffness of the ground", "contacts"),
-    Parameter("D_n", 1, 0.75, "s/m", NOT_NEGATIVE, "damping of the ground, over its stiffness", "contacts"),
+    Parameter(
+        "D_n",
+        1,
+        0.75,
+        "s/m",
+        NOT_NEGATIVE,
+        ("damping of the ground, over its stiffness"),
+        "contacts",
+    ),
     Parameter("K_f", 1, 600.0, "N/m", POSITIVE, "stiffness of the friction spring", "contacts"),
-    Parameter("D_f", 1, 0.01, "s", POSITIVE, "damping of the friction spring, over its stiffness", "contacts"),
+    Parameter(
+        "D_f",
+        1,
+        0.01,
+        "s",
+        POSITIVE,
+        ("damping of the friction spring, over its stiffness"),
+        "contacts",
+    ),
     Parameter("mu", 1, 1.0, "1", NOT_NEGATIVE, "coefficient of friction", "contacts"),
     Parameter("L_h2d", 1, 0.008, "m", NOT_NEGATIVE, "leg linkage from H to D", "feet"),
     Parameter("L_d2k", 1, 0.024, "m", NOT_NEGATIVE, "leg linkage from D to the knee K", "feet"),
-    Parameter("L_k2a", 1, 0.032, "m", NOT_NEGATIVE, "leg linkage from the knee K to the ankle A", "feet"),
-    Parameter("L_a2m", 1, 0.035, "m", NOT_NEGATIVE, "leg linkage from the ankle A to the metatarsal M", "feet"),
-    Parameter("L_m2t", 1, 0.016, "m", NOT_NEGATIVE, "leg linkage from the metatarsal M to the toe T", "feet"),
+    Parameter(
+        "L_k2a", 1, 0.032, "m", NOT_NEGATIVE, ("leg linkage from the knee K to the ankle A"), "feet"
+    ),
+    Parameter(
+        "L_a2m",
+        1,
+        0.035,
+        "m",
+        NOT_NEGATIVE,
+        ("leg linkage from the ankle A to the metatarsal M"),
+        "feet",
+    ),
+    Parameter(
+        "L_m2t",
+        1,
+        0.016,
+        "m",
+        NOT_NEGATIVE,
+        ("leg linkage from the metatarsal M to the toe T"),
+        "feet",
+    ),
     Parameter("delta_m", 1, pi / 6, "rad", ANY, "angle of the sole against the thigh", "feet"),
-    Parameter("hip", 3, (0.0225, -0.018, 0.01125), "m", ANY, "p_b2h of the right leg, in B; the left one mirrors x",
-              "feet"),
-    Parameter("torso_semi_axes", 3, (0.0315, 0.0495, 0.027), "m", POSITIVE,
-              "semi-axes of the torso, an ellipsoid about B", "torso"),
+    Parameter(
+        "hip",
+        3,
+        (0.0225, -0.018, 0.01125),
+        "m",
+        ANY,
+        ("p_b2h of the right leg, in B; the left one mirrors x"),
+        "feet",
+    ),
+    Parameter(
+        "torso_semi_axes",
+        3,
+        (0.0315, 0.0495, 0.027),
+        "m",
+        POSITIVE,
+        "semi-axes of the torso, an ellipsoid about B",
+        "torso",
+    ),
 )
-
-
-# fmt: on
 
 
 @dataclass(frozen=True, eq=False)
 class Parameters(Mapping[str, Value]):
-    """Resolved parameters by name, in PARAMETERS' order; no link_radius where link_inertia was given."""
+    """Resolved parameters by name, in PARAMETERS' order; no link_radius where link_inertia was
+    given.
+    """
 
     entries: tuple[tuple[str, Value], ...]
 

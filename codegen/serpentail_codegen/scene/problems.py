@@ -1,4 +1,6 @@
-"""What is wrong with a scene: fields, values and remedies go in; an error with one line for each comes out."""
+"""What is wrong with a scene: fields, values and remedies go in; an error with one line for each
+comes out.
+"""
 
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
@@ -18,7 +20,9 @@ ALIASES = {
 
 @dataclass(frozen=True)
 class Problem:
-    """One thing that is wrong with a scene: where, the value found (None: nothing), and what to do."""
+    """One thing that is wrong with a scene: where, the value found (None: nothing), and what to
+    do.
+    """
 
     field: str
     value: object
@@ -29,7 +33,9 @@ class Problem:
 
 
 class SceneError(ValueError):
-    """A scene that cannot be used; `problems` has all that is wrong with it, str() one line for each."""
+    """A scene that cannot be used; `problems` has all that is wrong with it, str() one line for
+    each.
+    """
 
     def __init__(self, problems: Iterable[Problem]) -> None:
         self.problems = tuple(problems)

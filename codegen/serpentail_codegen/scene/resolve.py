@@ -18,13 +18,20 @@ def parameters_of(kind: str, contacts: Collection[str] = ()) -> tuple[Parameter,
 
 
 def resolve_parameters(
-    given: Mapping[str, Any], tail_links: int, kind: str = "articulated", contacts: Collection[str] = ()
+    given: Mapping[str, Any],
+    tail_links: int,
+    kind: str = "articulated",
+    contacts: Collection[str] = (),
 ) -> Parameters:
     """Check the given parameters and fill in the others, for N = m n links; raises SceneError."""
     if not isinstance(given, Mapping):
-        raise SceneError([Problem("parameters", given, "needs to be a table, under a line [parameters]")])
+        raise SceneError(
+            [Problem("parameters", given, "needs to be a table, under a line [parameters]")]
+        )
     unused = "link_radius" if "link_inertia" in given else "link_inertia"
-    values = {p.name: p.default for p in parameters_of(kind, contacts) if p.name != unused} | dict(given)
+    values = {p.name: p.default for p in parameters_of(kind, contacts) if p.name != unused} | dict(
+        given
+    )
     problems = unknown_keys(given, "parameters.", NAMES)
     if "link_inertia" in given and "link_radius" in given:
         remedy = "given together with link_radius, which it overrides; remove one of the two"
@@ -40,16 +47,24 @@ def resolve_parameters(
 
 
 def _ellipsoid_inertia(parameters: Mapping[str, Any], tail_links: int) -> tuple[float, ...]:
-    """I = m/5 [L^2/4 + r^2, 2 r^2, L^2/4 + r^2]: uniform ellipsoid of semi-axes (r, L/2, r), long in y."""
+    """I = m/5 [L^2/4 + r^2, 2 r^2, L^2/4 + r^2]: uniform ellipsoid of semi-axes (r, L/2, r), long
+    in y.
+    """
     m, L = parameters["tail_mass"] / tail_links, parameters["tail_length"] / tail_links
     r = parameters["link_radius"]
     across, along = m / 5 * (L * L / 4 + r * r), m / 5 * (2 * r * r)
     if not math.isfinite(across + along):
-        remedy = "computed from tail_mass, tail_length and link_radius, but not finite; use kg and m"
+        remedy = (
+            "computed from tail_mass, tail_length and link_radius, but not finite; use kg and m"
+        )
         raise SceneError([Problem("parameters.link_inertia", [across, along, across], remedy)])
     return (across, along, across)
 
 
 def _floats(value: Any) -> Value:
     """Return checked numbers as floats; + 0.0 turns -0.0 into 0.0."""
-    return tuple(float(x) + 0.0 for x in value) if isinstance(value, list | tuple) else float(value) + 0.0
+    return (
+        tuple(float(x) + 0.0 for x in value)
+        if isinstance(value, list | tuple)
+        else float(value) + 0.0
+    )

@@ -8,17 +8,32 @@ from typing import Any
 
 from .parameters import ANY, PARAMETERS, Parameters, Rule
 
-# fmt: off
 KINDS = ("articulated", "continuum")
 FUNCTIONS = (
-    "mass_matrix", "bias_force", "inverse_dynamics", "forward_dynamics", "forward_dynamics_external",
-    "energy", "momentum", "tail_points", "tail_point_jacobians",
-    "mass_matrix_world", "bias_force_world", "rollout", "forward_dynamics_derivatives",
+    "mass_matrix",
+    "bias_force",
+    "inverse_dynamics",
+    "forward_dynamics",
+    "forward_dynamics_external",
+    "energy",
+    "momentum",
+    "tail_points",
+    "tail_point_jacobians",
+    "mass_matrix_world",
+    "bias_force_world",
+    "rollout",
+    "forward_dynamics_derivatives",
 )
 EXACT = (
-    "inverse_dynamics_derivatives", "inverse_dynamics_parameter_derivatives", "forward_dynamics_parameter_derivatives",
-    "inverse_dynamics_vjp", "forward_dynamics_jvp", "forward_dynamics_vjp", "inverse_dynamics_hessian",
-    "energy_derivatives", "momentum_derivatives",
+    "inverse_dynamics_derivatives",
+    "inverse_dynamics_parameter_derivatives",
+    "forward_dynamics_parameter_derivatives",
+    "inverse_dynamics_vjp",
+    "forward_dynamics_jvp",
+    "forward_dynamics_vjp",
+    "inverse_dynamics_hessian",
+    "energy_derivatives",
+    "momentum_derivatives",
 )
 DERIVATIVES = (*EXACT, "forward_dynamics_derivatives")
 ON_DEMAND = (*EXACT, "pfl", "implicit")  # emitted where a scene names them
@@ -26,7 +41,6 @@ TOUCHING = ("contact_points", "contact_dynamics")  # of scenes with contacts
 ALL = (*FUNCTIONS, *ON_DEMAND, *TOUCHING)
 GROUPS = ("feet", "tail", "torso")  # of contact points, in their order
 FRICTION = ("cone", "box", "smooth", "paper")
-# fmt: on
 C_HEADERS = frozenset(
     [
         "assert",
@@ -74,8 +88,11 @@ FLAG = Rule("true or false, without quotes", lambda x: isinstance(x, bool))
 COUNT = Rule("a whole number, 1 or above", lambda x: _is_whole(x) and x >= 1)
 TEXT = Rule('a text, in "quotes"', lambda x: isinstance(x, str))
 NAME = Rule(
-    'a text of a-z, 0-9 and _, a letter first, that names no C header: rename the file, or set name = "..." in it',
-    lambda x: isinstance(x, str) and re.fullmatch("[a-z][a-z0-9_]*", x) is not None and x not in C_HEADERS,
+    "a text of a-z, 0-9 and _, a letter first, that names no C header: rename the file, or set "
+    'name = "..." in it',
+    lambda x: (
+        isinstance(x, str) and re.fullmatch("[a-z][a-z0-9_]*", x) is not None and x not in C_HEADERS
+    ),
 )
 BEND = Rule(
     "a number of radians above 0 and up to 100",
@@ -94,7 +111,9 @@ def _table(name: str) -> Rule:
 
 @dataclass(frozen=True)
 class Scene:
-    """What to generate: a tail of `segments` x `links`, its parameters, the functions, and in which form."""
+    """What to generate: a tail of `segments` x `links`, its parameters, the functions, and in which
+    form.
+    """
 
     name: str  # prefix of every C symbol and generated file
     kind: str
@@ -102,18 +121,23 @@ class Scene:
     links: int  # n, in each segment; 1 for a continuum
     functions: tuple[str, ...]  # in the order of FUNCTIONS
     parameters: Parameters
-    coordinates: str = "joint"  # of q_t: joint angles alpha_i, beta_i; "bend": a_i, b_i; "polar": phi_i, theta_i
+    coordinates: str = (
+        "joint"  # of q_t: joint angles alpha_i, beta_i; "bend": a_i, b_i; "polar": phi_i, theta_i
+    )
     samples: int = 5  # tail points in each segment of a continuum
     bend_range: float = 2 * math.pi  # rad, largest bend of a continuum segment
     baked: bool = False  # parameters folded into the code, behind the same ABI
     real: str = "double"
     emission: str = "auto"
     profile: str = "fast"  # or the same bits on every machine
-    contacts: tuple[str, ...] = ()  # groups of points that can touch the ground, in the order of GROUPS
+    contacts: tuple[
+        str, ...
+    ] = ()  # groups of points that can touch the ground, in the order of GROUPS
     friction: str = "cone"
 
 
-# The keys of a scene file: default (None: required) and rule; ANY where a function of its own checks.
+# The keys of a scene file: default (None: required) and rule; ANY where a function of its own
+# checks.
 KEYS: dict[str, tuple[Any, Rule]] = {
     "name": (None, NAME),
     "description": ("", TEXT),
@@ -131,7 +155,10 @@ KEYS: dict[str, tuple[Any, Rule]] = {
     "profile": (Scene.profile, _one_of(["fast", "reproducible"])),
     "contacts": ((), CONTACTS),
     "friction": (Scene.friction, _one_of(FRICTION)),
-    "plan": ({}, _table("plan")),  # a motion to plan, and one to simulate: for the runtime, which checks them
+    "plan": (
+        {},
+        _table("plan"),
+    ),  # a motion to plan, and one to simulate: for the runtime, which checks them
     "simulate": ({}, _table("simulate")),
 }
 NAMES = tuple(parameter.name for parameter in PARAMETERS)

@@ -1,4 +1,6 @@
-"""Text that all targets share: nodes of a tape and a dialect go in, one definition a line comes out."""
+"""Text that all targets share: nodes of a tape and a dialect go in, one definition a line comes
+out.
+"""
 
 from collections import Counter, defaultdict
 from dataclasses import dataclass
@@ -31,7 +33,9 @@ class Dialect:
     load: str = ""  # the lanes at an address that are in turn
 
     def literal(self, value) -> str:
-        """Print a number by its shortest exact decimal; what a single-precision real cannot hold is zero."""
+        """Print a number by its shortest exact decimal; what a single-precision real cannot hold is
+        zero.
+        """
         tiny = self.suffix and abs(value) < LEAST_SINGLE
         return repr(0.0 if tiny else float(value)) + self.suffix
 
@@ -40,10 +44,11 @@ EARLY, LATE = "early", "late"  # narrow nodes; LATE ones need a lane of some row
 
 
 class Scalars:
-    """Prints the nodes that the results need; a product or sign that is used once goes into its use.
+    """Prints the nodes that the results need; a product or sign that is used once goes into its
+    use.
 
-    ``rows`` are the lanes of the inputs that are rows, by number.  Nodes are printed part by part: narrow ones first,
-    then those of so many lanes, then narrow ones that need a lane.
+    ``rows`` are the lanes of the inputs that are rows, by number.  Nodes are printed part by part:
+    narrow ones first, then those of so many lanes, then narrow ones that need a lane.
     """
 
     def __init__(self, nodes, results, names, dialect: Dialect, rows: dict[int, int] | None = None):
@@ -52,10 +57,14 @@ class Scalars:
         self.uses = Counter(a for n in self.live for a in operands(nodes[n]))
         self.uses.update(results)
         self.text: dict[object, str] = {}
-        self.stored: dict[int, int] = {}  # rows of which a lane is needed: where they are in the workspace
+        self.stored: dict[
+            int, int
+        ] = {}  # rows of which a lane is needed: where they are in the workspace
         self.count = 0
         self.part, self.lanes = self._parts(rows or {})
-        self.abroad = {a for n in self.live for a in operands(nodes[n]) if self.part[a] != self.part[n]}
+        self.abroad = {
+            a for n in self.live for a in operands(nodes[n]) if self.part[a] != self.part[n]
+        }
         self.results = results
 
     def _parts(self, rows: dict[int, int]) -> tuple[dict, dict]:
@@ -65,16 +74,22 @@ class Scalars:
         lanes, part = {}, {}
         for n in sorted(self.live):
             lanes[n] = lanes_of(self.nodes[n], lanes, inputs)
-            late = self.nodes[n][0] == "lane" or any(part[a] == LATE for a in operands(self.nodes[n]))
+            late = self.nodes[n][0] == "lane" or any(
+                part[a] == LATE for a in operands(self.nodes[n])
+            )
             if late and lanes[n]:
                 raise ValueError("a row that needs a lane of another row cannot be printed")
             part[n] = LATE if late else lanes[n] or EARLY
         return part, lanes
 
     def lines(self, part=EARLY) -> list[str]:
-        """Return the definitions of a part in evaluation order; ``text`` then tells how to write any node."""
+        """Return the definitions of a part in evaluation order; ``text`` then tells how to write
+        any node.
+        """
         out = []
-        for node in scheduled(self.nodes, [n for n in self.live if self.part[n] == part], self.results):
+        for node in scheduled(
+            self.nodes, [n for n in self.live if self.part[n] == part], self.results
+        ):
             op, *args = self.nodes[node]
             if op in ("sin", "cos") and self.dialect.sincos:
                 out += self._sincos(args[0])
@@ -119,7 +134,11 @@ class Scalars:
             return self.dialect.select.format(c=c, a=a, b=b, zero=self.dialect.literal(0))
         if op == "lane":
             return f"work[{self.stored[args[0]] + args[1]}]"
-        return self._leaf(op, args) if op in LEAVES else f"{self.dialect.functions[op]}({self.text[args[0]]})"
+        return (
+            self._leaf(op, args)
+            if op in LEAVES
+            else f"{self.dialect.functions[op]}({self.text[args[0]]})"
+        )
 
     def _leaf(self, op: str, args) -> str:
         if op == "const":

@@ -7,7 +7,12 @@ from ..scene.scene import Scene
 from .c.simulation import layouts
 
 FORMAT = 1
-CHECKS = {ANY: "finite", POSITIVE: "positive", NOT_NEGATIVE: "not_negative", BODY_INERTIA: "body_inertia"}
+CHECKS = {
+    ANY: "finite",
+    POSITIVE: "positive",
+    NOT_NEGATIVE: "not_negative",
+    BODY_INERTIA: "body_inertia",
+}
 
 
 def manifest(scene: Scene, context: dict, emitted: list) -> dict:
@@ -26,10 +31,15 @@ def manifest(scene: Scene, context: dict, emitted: list) -> dict:
         "real": context["real"],
         "scene": scene_to_dict(scene),
         "dimensions": {
-            name: getattr(context["tail"], name) for name in ("segments", "links", "total", "nq", "nv", "nt")
+            name: getattr(context["tail"], name)
+            for name in ("segments", "links", "total", "nq", "nv", "nt")
         },
-        "contacts": [{"group": name, "count": count} for name, count in context["tail"].groups.items()],
-        "parameters": [parameter_entry(scene, p) for p in parameters_of(scene.kind, scene.contacts)],
+        "contacts": [
+            {"group": name, "count": count} for name, count in context["tail"].groups.items()
+        ],
+        "parameters": [
+            parameter_entry(scene, p) for p in parameters_of(scene.kind, scene.contacts)
+        ],
         "functions": {e.function.name: function_entry(e, context["tail"]) for e in emitted},
         "work": work,
         **simulation,
@@ -37,14 +47,20 @@ def manifest(scene: Scene, context: dict, emitted: list) -> dict:
 
 
 def simulation_entry(context: dict) -> dict:
-    """Return what a caller must know of simulations: methods by their numbers, the members of records."""
+    """Return what a caller must know of simulations: methods by their numbers, the members of
+    records.
+    """
     has = context["has"]
-    methods = {name: number for number, name in enumerate(context["methods"]) if name in has.methods}
+    methods = {
+        name: number for number, name in enumerate(context["methods"]) if name in has.methods
+    }
     return {"methods": methods, "records": layouts(has)}
 
 
 def parameter_entry(scene: Scene, parameter) -> dict:
-    """Return what a caller must know of a parameter; its default is the scene's value, null where it is computed."""
+    """Return what a caller must know of a parameter; its default is the scene's value, null where
+    it is computed.
+    """
     value = scene.parameters.get(parameter.name)
     return {
         "name": parameter.name,
@@ -62,7 +78,9 @@ def function_entry(emitted, tail) -> dict:
     function = emitted.function
 
     def entries(arguments):
-        return [{"name": a.name, "shape": list(a.shape(tail)), "meaning": a.meaning} for a in arguments]
+        return [
+            {"name": a.name, "shape": list(a.shape(tail)), "meaning": a.meaning} for a in arguments
+        ]
 
     return {
         "doc": function.doc,

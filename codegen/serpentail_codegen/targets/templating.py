@@ -7,7 +7,9 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 @cache
 def environment(target: str) -> Environment:
-    """Return the environment of a target's templates; an undefined name in a template is an error."""
+    """Return the environment of a target's templates; an undefined name in a template is an
+    error.
+    """
     return Environment(
         loader=PackageLoader(f"serpentail_codegen.targets.{target}"),
         undefined=StrictUndefined,

@@ -1,4 +1,6 @@
-"""Files: their texts go in, files and a manifest come out; a file whose text did not change is not touched."""
+"""Files: their texts go in, files and a manifest come out; a file whose text did not change is not
+touched.
+"""
 
 import hashlib
 import json
@@ -12,7 +14,9 @@ def digest(text: str) -> str:
 
 
 def signed(manifest: dict) -> dict:
-    """Return a manifest with the SHA-256 of all its other entries, so that a loader sees a change by hand."""
+    """Return a manifest with the SHA-256 of all its other entries, so that a loader sees a change
+    by hand.
+    """
     entries = {key: value for key, value in manifest.items() if key != "manifest_hash"}
     return entries | {"manifest_hash": digest(json.dumps(entries, sort_keys=True))}
 
@@ -29,8 +33,12 @@ def write_if_changed(path: Path, text: str) -> bool:
 
 
 def write_folder(folder: Path, files: dict[str, str], manifest: dict) -> list[str]:
-    """Write all files, the manifest last, and drop what an earlier generation left; return the changed names."""
-    manifest = signed(manifest | {"files": {name: digest(text) for name, text in sorted(files.items())}})
+    """Write all files, the manifest last, and drop what an earlier generation left; return the
+    changed names.
+    """
+    manifest = signed(
+        manifest | {"files": {name: digest(text) for name, text in sorted(files.items())}}
+    )
     changed = [name for name, text in files.items() if write_if_changed(folder / name, text)]
     _remove_stale(folder, set(files))
     text = json.dumps(manifest, indent=1, ensure_ascii=False) + "\n"

@@ -1,4 +1,6 @@
-"""Many states at once: the C that evaluates several states side by side, compiled when first needed."""
+"""Many states at once: the C that evaluates several states side by side, compiled when first
+needed.
+"""
 
 import ctypes
 import threading
@@ -6,7 +8,8 @@ from pathlib import Path
 
 from .compiler import compile_library
 
-MANY = 1000  # states: from here on a batch pays for compiling the C of batches, which takes a second or two
+# states: from here on a batch pays for compiling the C of batches, which takes a second or two
+MANY = 1000
 LATE = ("batch", "flights")  # sources of a model that are compiled when they are needed
 
 
@@ -22,21 +25,31 @@ class Late:
         with self.lock:
             if self.library is None:
                 source = self.folder / "src" / self.source
-                self.library = ctypes.CDLL(str(compile_library([source], self.folder / "include", self.profile)))
+                self.library = ctypes.CDLL(
+                    str(compile_library([source], self.folder / "include", self.profile))
+                )
         function = getattr(self.library, name)
         function.argtypes = [ctypes.c_void_p]
         return function
 
 
 class SideBySide:
-    """The C of one model that evaluates batches, or simulates flights, several states side by side."""
+    """The C of one model that evaluates batches, or simulates flights, several states side by
+    side.
+    """
 
     def __init__(self, folder: Path, manifest: dict, profile: str):
-        self.prefix, self.states, self.work = manifest["prefix"], manifest["batch"]["states"], manifest["batch"]["work"]
+        self.prefix, self.states, self.work = (
+            manifest["prefix"],
+            manifest["batch"]["states"],
+            manifest["batch"]["work"],
+        )
         self.batch, self.flights = (Late(folder, manifest, profile, part) for part in LATE)
 
     def entry(self, name: str, count: int):
-        """Return the C function for a batch of so many states, or None where one state at a time is better."""
+        """Return the C function for a batch of so many states, or None where one state at a time is
+        better.
+        """
         if name not in self.work or count < (MANY if self.batch.library is None else self.states):
             return None
         return self.batch.function(f"{self.prefix}_side_by_side_{name}")

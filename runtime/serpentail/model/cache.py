@@ -15,11 +15,14 @@ CACHE_FORMAT = 1  # part of every name in the cache: raise it when the meaning o
 REMEDY_CACHE = "set SERPENTAIL_CACHE to a folder you can write"
 
 
-# The cache: <folder>/<key>/<digest of the library>.so, so one rename publishes a library with its proof.
+# The cache: <folder>/<key>/<digest of the library>.so, so one rename publishes a library with its
+# proof.
 
 
 def cache_folder(cache: Path | None) -> Path:
-    """Return the cache: the argument, else $SERPENTAIL_CACHE, else $XDG_CACHE_HOME or ~/.cache, absolute."""
+    """Return the cache: the argument, else $SERPENTAIL_CACHE, else $XDG_CACHE_HOME or ~/.cache,
+    absolute.
+    """
     own = cache or os.environ.get("SERPENTAIL_CACHE")
     shared = os.environ.get("XDG_CACHE_HOME", "")
     if not os.path.isabs(shared):  # the XDG specification has relative paths ignored

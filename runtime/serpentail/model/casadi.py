@@ -21,7 +21,9 @@ DERIVATIVES = {
 
 
 class CasadiFunctions:
-    """Attribute access builds a ``casadi.Function`` once; ``symbolic`` and ``external`` take parameters as an input."""
+    """Attribute access builds a ``casadi.Function`` once; ``symbolic`` and ``external`` take
+    parameters as an input.
+    """
 
     def __init__(self, model):
         self._model = model
@@ -31,7 +33,9 @@ class CasadiFunctions:
         if name.startswith("_"):
             raise AttributeError(name)
         values = {
-            p["name"]: self._model.parameters[p["name"]] for p in self._model.manifest["parameters"] if p["in_struct"]
+            p["name"]: self._model.parameters[p["name"]]
+            for p in self._model.manifest["parameters"]
+            if p["in_struct"]
         }
         function = self._module.function(self._symbolic(name), values)
         setattr(self, name, function)
@@ -42,7 +46,9 @@ class CasadiFunctions:
 
     @property
     def parameter_vector(self) -> casadi.DM:
-        """The model's parameters, in the order that ``symbolic`` and ``external`` functions take them."""
+        """The model's parameters, in the order that ``symbolic`` and ``external`` functions take
+        them.
+        """
         return casadi.DM(flat(self._model.manifest, self._model.parameters))
 
     def symbolic(self, name: str) -> casadi.Function:
@@ -50,9 +56,11 @@ class CasadiFunctions:
         return self._module.function(self._symbolic(name))
 
     def external(self, name: str, derivatives: int = 0, folded: bool = False) -> casadi.Function:
-        """Return the compiled C as a function whose last input is the parameter vector (double models only).
+        """Return the compiled C as a function whose last input is the parameter vector (double
+        models only).
 
-        derivatives: 1 or 2 raises ModelError here where the scene lacks what exact derivatives of that order are made
+        derivatives: 1 or 2 raises ModelError here where the scene lacks what exact derivatives of
+        that order are made
         of; else CasADi raises when it differentiates.  Those with respect to parameters need
         ``<name>_parameter_derivatives`` in the scene, and are first ones.
         folded: take the model's parameters instead of an input.
@@ -60,7 +68,8 @@ class CasadiFunctions:
         prefix = self._model.manifest["prefix"]
         if self._model.manifest["real"] != "double":
             raise ModelError(
-                f'{prefix} is a {self._model.manifest["real"]} model: casadi.external needs real = "double"'
+                f"{prefix} is a {self._model.manifest['real']} model: casadi.external needs real = "
+                '"double"'
             )
         if self._model.library is None:
             raise ModelError(f"{prefix} was loaded with compiled=False: load it again to use its C")
@@ -72,11 +81,16 @@ class CasadiFunctions:
         outputs = function(*inputs, self.parameter_vector)
         outputs = outputs if isinstance(outputs, tuple) else (outputs,)
         ports = (function.name_in()[:-1], function.name_out())
-        return casadi.Function(name, inputs, outputs, *ports, {"always_inline": True})  # graphs then see the blocks
+        return casadi.Function(
+            name, inputs, outputs, *ports, {"always_inline": True}
+        )  # graphs then see the blocks
 
     def _symbolic(self, name: str) -> str:
         if self._known(name) not in self._module.SIGNATURES:
-            remedy = f'differentiate the function by CasADi, or take the compiled one, external("{name}")'
+            remedy = (
+                "differentiate the function by CasADi, or take the compiled one, "
+                f'external("{name}")'
+            )
             raise ModelError(f"{self._model.name} has no SX operations of {name}: {remedy}")
         return name
 
@@ -84,9 +98,13 @@ class CasadiFunctions:
         """Raise ModelError where a scene lacks what derivatives of this order are made of."""
         if derivatives and name not in DERIVATIVES:
             has = " and ".join(DERIVATIVES)
-            raise ModelError(f"{name}: only {has} have compiled derivatives for CasADi: use casadi.symbolic")
+            raise ModelError(
+                f"{name}: only {has} have compiled derivatives for CasADi: use casadi.symbolic"
+            )
         wanted = [part for order in DERIVATIVES.get(name, ())[:derivatives] for part in order]
-        lacking = [part for part in dict.fromkeys(wanted) if part not in self._model.manifest["functions"]]
+        lacking = [
+            part for part in dict.fromkeys(wanted) if part not in self._model.manifest["functions"]
+        ]
         if lacking:
             raise self._model.without(*lacking)
 

@@ -16,14 +16,20 @@ from .toolchain import Toolchain, check_profile, examine, recall, run_command
 
 SHARED_FLAGS = ("-fPIC", "-shared")
 LONGEST_REPORT = 6000  # characters of a compiler's output that an error shows
-REMEDY_FAILED = "Generate the model again if its files were edited; else try another compiler with CC=..."
+REMEDY_FAILED = (
+    "Generate the model again if its files were edited; else try another compiler with CC=..."
+)
 
 
-def compile_library(sources: Sequence[Path], include: Path, profile: str = "fast", cache: Path | None = None) -> Path:
-    """Return the shared library of `sources` and the headers in `include`, compiled unless the cache has it.
+def compile_library(
+    sources: Sequence[Path], include: Path, profile: str = "fast", cache: Path | None = None
+) -> Path:
+    """Return the shared library of `sources` and the headers in `include`, compiled unless the
+    cache has it.
 
-    `profile` is "fast" or "reproducible"; `cache` defaults to $SERPENTAIL_CACHE, then the user's cache.
-    Raises CompilerNotFound, CompileFailed, ModelError (unreadable sources), SerpentailError (profile, cache).
+    `profile` is "fast" or "reproducible"; `cache` defaults to $SERPENTAIL_CACHE, then the user's
+    cache. Raises CompilerNotFound, CompileFailed, ModelError (unreadable sources), SerpentailError
+    (profile, cache).
     """
     check_profile(profile)
     folder = cache_folder(cache)
@@ -32,9 +38,12 @@ def compile_library(sources: Sequence[Path], include: Path, profile: str = "fast
     library = trusted(folder / _key(text, noted)) if noted else None
     if library:
         return library
-    # A note may describe a compiler since upgraded behind a wrapper, so nothing is built on its word.
+    # A note may describe a compiler since upgraded behind a wrapper, so nothing is built on
+    # its word.
     toolchain = examine(profile, folder)
-    return trusted(folder / _key(text, toolchain)) or _build(sources, include, text, toolchain, folder)
+    return trusted(folder / _key(text, toolchain)) or _build(
+        sources, include, text, toolchain, folder
+    )
 
 
 def describe_compiler(profile: str = "fast") -> dict[str, object]:
@@ -49,18 +58,26 @@ def describe_compiler(profile: str = "fast") -> dict[str, object]:
 
 
 def _text_digest(sources: Sequence[Path], include: Path) -> str:
-    """Return the digest of names and contents of the sources, in order, and of the headers they can reach."""
+    """Return the digest of names and contents of the sources, in order, and of the headers they can
+    reach.
+    """
     if not sources or not include.is_dir():
         raise ModelError(f"no sources, or no header folder {include}; generate the model again")
     try:
         named = [(path.name, path) for path in sources] + list(_headers(sources, include))
-        return digest([(name, hashlib.sha256(path.read_bytes()).hexdigest()) for name, path in named])
+        return digest(
+            [(name, hashlib.sha256(path.read_bytes()).hexdigest()) for name, path in named]
+        )
     except OSError as error:
-        raise ModelError(f"cannot read {error.filename}: {error.strerror}; generate it again") from error
+        raise ModelError(
+            f"cannot read {error.filename}: {error.strerror}; generate it again"
+        ) from error
 
 
 def _headers(sources: Sequence[Path], include: Path) -> Iterator[tuple[str, Path]]:
-    """Yield the headers below `include` and beside the sources, each with its name there, sorted."""
+    """Yield the headers below `include` and beside the sources, each with its name there,
+    sorted.
+    """
     for path in sorted(include.rglob("*.h")):
         yield path.relative_to(include).as_posix(), path
     for folder in dict.fromkeys(path.parent for path in sources):
@@ -69,7 +86,9 @@ def _headers(sources: Sequence[Path], include: Path) -> Iterator[tuple[str, Path
 
 
 def _key(text: str, toolchain: Toolchain) -> str:
-    """Return the name of the library's place: the C text and all that its machine code depends on."""
+    """Return the name of the library's place: the C text and all that its machine code depends
+    on.
+    """
     command = _public_command((os.path.realpath(toolchain.command[0]), *toolchain.command[1:]))
     flags = (*toolchain.flags, *SHARED_FLAGS)
     return digest([text, command, toolchain.version, flags, toolchain.target, _c_library()])
@@ -81,14 +100,20 @@ def _public_command(command: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def _c_library() -> str:
-    """Return the C library's version: code linked against a newer one need not load with an older one."""
+    """Return the C library's version: code linked against a newer one need not load with an older
+    one.
+    """
     with contextlib.suppress(AttributeError, ValueError, OSError):
         return os.confstr("CS_GNU_LIBC_VERSION") or ""
     return ""
 
 
-def _build(sources: Sequence[Path], include: Path, text: str, toolchain: Toolchain, folder: Path) -> Path:
-    """Compile into a file of our own and publish it by one rename: others see the whole library or none."""
+def _build(
+    sources: Sequence[Path], include: Path, text: str, toolchain: Toolchain, folder: Path
+) -> Path:
+    """Compile into a file of our own and publish it by one rename: others see the whole library or
+    none.
+    """
     place = folder / _key(text, toolchain)
     try:
         with temporary_file(folder) as part:

@@ -18,7 +18,9 @@ MOST_ARRAYS = 8
 
 
 class Call(ctypes.Structure):
-    """The generated C's argument record: parameters, batch size, the state that failed, workspace, arrays."""
+    """The generated C's argument record: parameters, batch size, the state that failed, workspace,
+    arrays.
+    """
 
     _fields_ = (
         ("parameters", ctypes.c_void_p),
@@ -46,7 +48,9 @@ def aligned(count: int, dtype) -> np.ndarray:
 
 
 class Buffers(threading.local):
-    """Arrays that one thread hands to C: their addresses are taken once, so a call on one state costs little."""
+    """Arrays that one thread hands to C: their addresses are taken once, so a call on one state
+    costs little.
+    """
 
     def __init__(self, dtype, inputs, outputs, work: int, parameters: np.ndarray):
         self.inputs = [np.zeros(shape, dtype) for shape in inputs]
@@ -63,9 +67,11 @@ class Buffers(threading.local):
 
 
 class Rows:
-    """A compiled function on rows of many runs, each with its own parameters; where they lie is looked up once.
+    """A compiled function on rows of many runs, each with its own parameters; where they lie is
+    looked up once.
 
-    parameters (runs, scalars); inputs and outputs (runs, rows, ...), of the model's reals.  For one thread.
+    parameters (runs, scalars); inputs and outputs (runs, rows, ...), of the model's reals.  For one
+    thread.
     """
 
     def __init__(self, kernel: "Kernel", parameters: np.ndarray, inputs, outputs):
@@ -77,7 +83,9 @@ class Rows:
         self.address = ctypes.addressof(self.call)
 
     def __call__(self, run: int, rows: int) -> None:
-        """Evaluate the first rows of a run; StateError, which counts all rows from the first run's on."""
+        """Evaluate the first rows of a run; StateError, which counts all rows from the first run's
+        on.
+        """
         call = self.call
         call.parameters, call.count = self.parameters[0] + run * self.parameters[1], rows
         for k, (first, apart) in enumerate(self.places):
@@ -90,7 +98,14 @@ class Rows:
 class Kernel:
     """One compiled function of a model: single states, or arrays with a leading batch axis."""
 
-    def __init__(self, library: ctypes.CDLL, many: SideBySide, manifest: dict, name: str, parameters: np.ndarray):
+    def __init__(
+        self,
+        library: ctypes.CDLL,
+        many: SideBySide,
+        manifest: dict,
+        name: str,
+        parameters: np.ndarray,
+    ):
         entry = manifest["functions"][name]
         self.name, self.dtype = name, parameters.dtype
         self.names = [a["name"] for a in entry["inputs"]]
@@ -104,7 +119,9 @@ class Kernel:
         self.buffers = Buffers(self.dtype, self.shapes, self.out_shapes, self.work, parameters)
 
     def __call__(self, *arrays):
-        """Evaluate; StateError names the argument that has a wrong shape or a value that is not finite."""
+        """Evaluate; StateError names the argument that has a wrong shape or a value that is not
+        finite.
+        """
         buffers, dtype = self.buffers, self.dtype
         if len(arrays) != len(buffers.slots):
             raise TypeError(f"{self.name} takes {', '.join(self.names)}")
@@ -117,20 +134,32 @@ class Kernel:
         return buffers.only.copy() if buffers.only is not None else buffers.results()
 
     def _any(self, arrays):
-        arrays = [self._checked(*item) for item in zip(self.names, self.shapes, arrays, strict=True)]
-        counts = {a.shape[0] for a, shape in zip(arrays, self.shapes, strict=True) if a.ndim > len(shape)}
+        arrays = [
+            self._checked(*item) for item in zip(self.names, self.shapes, arrays, strict=True)
+        ]
+        counts = {
+            a.shape[0] for a, shape in zip(arrays, self.shapes, strict=True) if a.ndim > len(shape)
+        }
         if not counts:
             outputs = self._batch(1, arrays)
             return tuple(o[0] for o in outputs) if isinstance(outputs, tuple) else outputs[0]
         if len(counts) > 1:
-            raise StateError(f"{self.name}: batch sizes differ ({', '.join(map(str, sorted(counts)))}): give one")
+            raise StateError(
+                f"{self.name}: batch sizes differ ({', '.join(map(str, sorted(counts)))}): give one"
+            )
         return self._batch(counts.pop(), arrays)
 
     def _checked(self, name: str, shape: tuple[int, ...], value) -> np.ndarray:
         array = real_array(f"{self.name}: {name}", value, self.dtype)
-        if array.shape[array.ndim - len(shape) :] != shape or array.ndim > len(shape) + 1 or array.ndim < len(shape):
+        if (
+            array.shape[array.ndim - len(shape) :] != shape
+            or array.ndim > len(shape) + 1
+            or array.ndim < len(shape)
+        ):
             size = ", ".join(map(str, shape))
-            raise StateError(f"{self.name}: {name} has shape {array.shape}, not ({size},) or (batch, {size})")
+            raise StateError(
+                f"{self.name}: {name} has shape {array.shape}, not ({size},) or (batch, {size})"
+            )
         return array
 
     def _batch(self, count: int, arrays):
@@ -147,15 +176,21 @@ class Kernel:
     def _each(self, inputs, outputs, first: int, last: int) -> None:
         """Evaluate states [first, last) one by one."""
         work = aligned(self.work, self.dtype)
-        call = call_record(self.parameters, last - first, work, [a[first:last] for a in (*inputs, *outputs)])
+        call = call_record(
+            self.parameters, last - first, work, [a[first:last] for a in (*inputs, *outputs)]
+        )
         if status := self.function(ctypes.addressof(call)):
             self.fail(status, first + call.failed, inputs)
 
     def _side_by_side(self, function, inputs, outputs, first: int, last: int) -> None:
-        """Evaluate states [first, last) side by side; those among which one fails are taken again, one by one."""
+        """Evaluate states [first, last) side by side; those among which one fails are taken again,
+        one by one.
+        """
         work = aligned(self.many.work[self.name], self.dtype)
         while first < last:
-            call = call_record(self.parameters, last - first, work, [a[first:last] for a in (*inputs, *outputs)])
+            call = call_record(
+                self.parameters, last - first, work, [a[first:last] for a in (*inputs, *outputs)]
+            )
             if not function(ctypes.addressof(call)):
                 return
             first += call.failed
@@ -186,7 +221,9 @@ class Kernel:
         limits, norm = np.finfo(self.dtype), math.hypot(*q[3:7])
         if not limits.tiny <= norm * norm <= limits.max:
             words = f"has norm {norm:.3g}" if norm else "is zero"
-            raise StateError(f"{self.name}: the quaternion q[3:7]{state} {words}: upright is (1, 0, 0, 0)")
+            raise StateError(
+                f"{self.name}: the quaternion q[3:7]{state} {words}: upright is (1, 0, 0, 0)"
+            )
 
     def _out_of_range(self, q, state: str) -> str:
         """Say which segment has a bend that the model does not cover, and what to do."""
@@ -194,6 +231,12 @@ class Kernel:
         least, worst = int(bends.argmin()), int(bends.argmax())
         if self.polar and bends[worst] <= self.bend_range:
             what = f"segment {least + 1}{state} has theta = {bends[least]:.6g} rad"
-            return f'{what}: polar coordinates have no value at theta = 0; use coordinates = "bend" in the scene'
-        what = f"segment {worst + 1}{state} is bent by {bends[worst]:.6g} rad, beyond the scene's {self.bend_range:.6g}"
+            return (
+                f"{what}: polar coordinates have no value at theta = 0; use "
+                f'coordinates = "bend" in the scene'
+            )
+        what = (
+            f"segment {worst + 1}{state} is bent by {bends[worst]:.6g} rad, beyond the scene's "
+            f"{self.bend_range:.6g}"
+        )
         return f"{what}: set a larger `bend_range` in the scene, then generate the model again"

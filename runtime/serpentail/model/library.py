@@ -12,19 +12,26 @@ NOT_POSITIVE_DEFINITE, NOT_FINITE, OUT_OF_RANGE = 1, 2, 3
 
 
 def open_library(folder: Path, manifest: dict, profile: str) -> ctypes.CDLL:
-    """Compile (or find in the cache) and load a model's C; ModelError where it is not what the manifest says."""
+    """Compile (or find in the cache) and load a model's C; ModelError where it is not what the
+    manifest says.
+    """
     prefix = manifest["prefix"]
     late = {f"src/{prefix}_{part}.c" for part in LATE}
-    sources = [folder / name for name in manifest["files"] if name.startswith("src/") and name not in late]
+    sources = [
+        folder / name for name in manifest["files"] if name.startswith("src/") and name not in late
+    ]
     path = compile_library(sources, folder / "include", profile)
     try:
         library = ctypes.CDLL(str(path))
     except OSError as error:
-        raise SerpentailError(f"the compiled model cannot be loaded ({error}): set SERPENTAIL_CACHE") from error
+        raise SerpentailError(
+            f"the compiled model cannot be loaded ({error}): set SERPENTAIL_CACHE"
+        ) from error
     abi_hash = getattr(library, f"{prefix}_abi_hash")
     abi_hash.restype = ctypes.c_char_p
     if abi_hash().decode() != manifest["abi_hash"]:
         raise ModelError(
-            f"{path} has interface {abi_hash().decode()}, the manifest {manifest['abi_hash']}: {remedy(folder)}"
+            f"{path} has interface {abi_hash().decode()}, the manifest {manifest['abi_hash']}: "
+            f"{remedy(folder)}"
         )
     return library

@@ -1,4 +1,6 @@
-"""Generated folders: a folder goes in, its manifest comes out, checked against the files beside it."""
+"""Generated folders: a folder goes in, its manifest comes out, checked against the files beside
+it.
+"""
 
 import hashlib
 import json
@@ -24,11 +26,14 @@ KEYS = [
 
 
 def read_manifest(folder: Path) -> dict:
-    """Return the manifest of a generated folder; ModelError where it is missing, stale or does not fit its files."""
+    """Return the manifest of a generated folder; ModelError where it is missing, stale or does not
+    fit its files.
+    """
     path = folder / "manifest.json"
     if not path.is_file():
         raise ModelError(
-            f"{folder} is no generated folder (it has no manifest.json): make one, as by `make model TAIL=articulated "
+            f"{folder} is no generated folder (it has no manifest.json): make one, as by `make "
+            "model TAIL=articulated "
             "M=3 N=4`, or python -m serpentail_codegen SCENE.toml"
         )
     try:
@@ -41,29 +46,40 @@ def read_manifest(folder: Path) -> dict:
 
 def remedy(folder: Path) -> str:
     """Say how to make a folder anew."""
-    return f"delete {folder} and generate it again (`make model`, or python -m serpentail_codegen SCENE.toml)"
+    return (
+        f"delete {folder} and generate it again (`make model`, or python "
+        f"-m serpentail_codegen SCENE.toml)"
+    )
 
 
 def _check(folder: Path, manifest: dict) -> None:
     if (manifest["format"], manifest["generator"]) != (FORMAT, __version__):
         made = f"format {manifest['format']}, generator {manifest['generator']}"
-        raise ModelError(f"{folder} is stale: made by {made}, this is format {FORMAT}, {__version__}: {remedy(folder)}")
+        raise ModelError(
+            f"{folder} is stale: made by {made}, this is format {FORMAT}, {__version__}: "
+            f"{remedy(folder)}"
+        )
     absent = [key for key in KEYS if key not in manifest]
     if absent:
         raise ValueError(f"it lacks {', '.join(absent)}")
     entries = {key: value for key, value in manifest.items() if key != "manifest_hash"}
     if _sha256(json.dumps(entries, sort_keys=True).encode()) != manifest["manifest_hash"]:
         raise ModelError(
-            f"{folder / 'manifest.json'} was changed after it was generated: {remedy(folder)}; parameters are changed "
+            f"{folder / 'manifest.json'} was changed after it was generated: {remedy(folder)}; "
+            "parameters are changed "
             "by st.load(folder, parameters=...), sizes by another scene"
         )
     for name, digest in manifest["files"].items():
         try:
             found = _sha256((folder / name).read_bytes())
         except OSError as error:
-            raise ModelError(f"{folder / name} cannot be read ({error.strerror}): {remedy(folder)}") from error
+            raise ModelError(
+                f"{folder / name} cannot be read ({error.strerror}): {remedy(folder)}"
+            ) from error
         if found != digest:
-            raise ModelError(f"{folder / name} was changed after it was generated: {remedy(folder)}")
+            raise ModelError(
+                f"{folder / name} was changed after it was generated: {remedy(folder)}"
+            )
 
 
 def _sha256(content: bytes) -> str:

@@ -1,4 +1,6 @@
-"""Models: a generated folder goes in, a model whose methods evaluate its equations of motion comes out."""
+"""Models: a generated folder goes in, a model whose methods evaluate its equations of motion comes
+out.
+"""
 
 from collections.abc import Mapping
 from functools import cached_property
@@ -27,13 +29,17 @@ def load(
     parameters: name -> number or 3 numbers, SI; override the scene's, without recompiling.
     profile: "fast" (this CPU, FMA) or "reproducible" (same bits everywhere); None: the scene's.
     compiled: False needs no C compiler; then only ``model.casadi`` evaluates.
-    Raises ModelError (folder missing, stale or changed; parameter unknown or unphysical), CompilerNotFound,
-    CompileFailed.  Warns UnlikeBodies where torso and tail are so unlike in size that H loses digits.
+    Raises ModelError (folder missing, stale or changed; parameter unknown or unphysical),
+    CompilerNotFound,
+    CompileFailed.  Warns UnlikeBodies where torso and tail are so unlike in size that H loses
+    digits.
     """
     try:
         folder = Path(folder)
     except TypeError:
-        raise ModelError(f"folder: value {folder!r:.60}: needs the path of a generated folder") from None
+        raise ModelError(
+            f"folder: value {folder!r:.60}: needs the path of a generated folder"
+        ) from None
     manifest = read_manifest(folder)
     values = resolve(manifest, parameters)
     warn_of_unlike(values)
@@ -47,17 +53,26 @@ def load(
 class Model:
     """Equations of motion H(q) v_dot + C(q, v) = [0 (6); tau] + J^T f of one tail, SI units.
 
-    q (nq = 7 + 2m): position of B in the world, quaternion (w, x, y, z) of any norm but 0, tail coordinates: joint
-    angles (alpha_i, beta_i) of an articulated tail, bend components (a_i, b_i) of a continuum, or polar angles
-    (phi_i, theta_i) of one whose scene has coordinates = "polar", which is for comparison only.
-    v (nv = 6 + 2m): velocity of B in the world, angular velocity in the body frame, rates of the tail coordinates.
-    Every method also takes arrays with a leading batch axis; a single state is repeated over a batch.  All raise
-    StateError on a wrong shape or a value that is not finite, ModelError where the scene left the function out.
-    With the profile "fast" the last digits of a state may depend on the size of its batch.
-    Threads may share a model; a pickled one is loaded anew from its folder.
+    q (nq = 7 + 2m): position of B in the world, quaternion (w, x, y, z) of any norm but 0, tail
+    coordinates: joint angles (alpha_i, beta_i) of an articulated tail, bend components (a_i, b_i)
+    of a continuum, or polar angles (phi_i, theta_i) of one whose scene has coordinates = "polar",
+    which is for comparison only. v (nv = 6 + 2m): velocity of B in the world, angular velocity in
+    the body frame, rates of the tail coordinates. Every method also takes arrays with a leading
+    batch axis; a single state is repeated over a batch.  All raise StateError on a wrong shape or a
+    value that is not finite, ModelError where the scene left the function out. With the profile
+    "fast" the last digits of a state may depend on the size of its batch. Threads may share a
+    model; a pickled one is loaded anew from its folder.
     """
 
-    def __init__(self, folder: Path, manifest: dict, parameters: Mapping, library, profile: str = "fast", many=None):
+    def __init__(
+        self,
+        folder: Path,
+        manifest: dict,
+        parameters: Mapping,
+        library,
+        profile: str = "fast",
+        many=None,
+    ):
         self.folder, self.manifest, self.parameters = folder, manifest, parameters
         self.library, self.profile = library, profile
         sizes = manifest["dimensions"]
@@ -72,7 +87,9 @@ class Model:
         self.parameter_vector = np.array(flat(manifest, parameters), dtype)
         made = manifest["functions"] if library else ()
         self.many = many or SideBySide(folder, manifest, profile)
-        self.kernels = {name: Kernel(library, self.many, manifest, name, self.parameter_vector) for name in made}
+        self.kernels = {
+            name: Kernel(library, self.many, manifest, name, self.parameter_vector) for name in made
+        }
 
     def __repr__(self) -> str:
         pieces = f" x {self.links} links" if self.links else " continuum segments"
@@ -85,7 +102,9 @@ class Model:
         return Model(self.folder, self.manifest, values, self.library, self.profile, self.many)
 
     def parameters_of_runs(self, changes: Mapping[str, object] | None, runs: int) -> RunParameters:
-        """Return the parameters of many runs; changes: name -> (runs,) or (runs, 3), SI, or None."""
+        """Return the parameters of many runs; changes: name -> (runs,) or (runs, 3), SI, or
+        None.
+        """
         if changes is None or (isinstance(changes, Mapping) and not changes):
             vectors = np.broadcast_to(self.parameter_vector, (runs, len(self.parameter_vector)))
             return RunParameters({}, self.parameters, vectors)
@@ -107,7 +126,10 @@ class Model:
         """Return a compiled function; ModelError where the scene did not ask for it."""
         found = self.kernels.get(name)
         if found is None and self.library is None:
-            raise ModelError(f"{self.name} was loaded with compiled=False: only model.casadi evaluates; load it again")
+            raise ModelError(
+                f"{self.name} was loaded with compiled=False: only model.casadi evaluates; load it "
+                "again"
+            )
         if found is None:
             raise self.without(name)
         return found
@@ -116,7 +138,8 @@ class Model:
         """Return the error that functions are not there."""
         has = ", ".join(self.manifest["work"])
         return ModelError(
-            f"{self.name} was generated without {', '.join(map(repr, names))} (it has {has}): add it to `functions` of "
+            f"{self.name} was generated without {', '.join(map(repr, names))} (it has {has}): add "
+            "it to `functions` of "
             "the scene, then generate it again"
         )
 
@@ -135,26 +158,38 @@ class Model:
     def forward_dynamics(self, q, v, tau, f_ext=None):
         """v_dot (nv,) of Eq. 1 for joint torques tau (2m,).
 
-        f_ext (6 + 3 (N + 1),): force at B (N, world), moment (N m, body), a force (N, world) at every tail point;
-        see ``external_force``.
+        f_ext (6 + 3 (N + 1),): force at B (N, world), moment (N m, body), a force (N, world) at
+        every tail point; see ``external_force``.
         """
         if f_ext is None:
             return self.kernel("forward_dynamics")(q, v, tau)
         return self.kernel("forward_dynamics_external")(q, v, tau, f_ext)
 
     def external_force(self, force=(0, 0, 0), moment=(0, 0, 0), tail=None):
-        """Return f_ext: force at B (3, N, world), moment (3, N m, body), tail forces (N + 1, 3, N, world) or None."""
+        """Return f_ext: force at B (3, N, world), moment (3, N m, body), tail forces (N + 1, 3, N,
+        world) or None.
+        """
         points = self.manifest["dimensions"]["total"] + 1
         shapes = {"force": (3,), "moment": (3,), "tail": (points, 3)}
-        given = {"force": force, "moment": moment, "tail": np.zeros((points, 3)) if tail is None else tail}
-        arrays = {name: finite_array(f"external_force: {name}", value) for name, value in given.items()}
+        given = {
+            "force": force,
+            "moment": moment,
+            "tail": np.zeros((points, 3)) if tail is None else tail,
+        }
+        arrays = {
+            name: finite_array(f"external_force: {name}", value) for name, value in given.items()
+        }
         for name, shape in shapes.items():
             if arrays[name].shape != shape:
-                raise StateError(f"external_force: {name} has shape {arrays[name].shape}, not {shape}")
+                raise StateError(
+                    f"external_force: {name} has shape {arrays[name].shape}, not {shape}"
+                )
         return np.concatenate([array.ravel() for array in arrays.values()])
 
     def energy(self, q, v):
-        """(kinetic, potential) energy (J); potential is zero at the height of the world's origin."""
+        """(kinetic, potential) energy (J); potential is zero at the height of the world's
+        origin.
+        """
         return self.kernel("energy")(q, v)
 
     def momentum(self, q, v):
@@ -162,7 +197,9 @@ class Model:
         return self.kernel("momentum")(q, v)
 
     def tail_points(self, q):
-        """Joint positions, then the tip (N + 1, 3), world (m), Eqs. 13 to 15; of a continuum, samples of its arcs."""
+        """Joint positions, then the tip (N + 1, 3), world (m), Eqs. 13 to 15; of a continuum,
+        samples of its arcs.
+        """
         return self.kernel("tail_points")(q)
 
     def tail_point_jacobians(self, q):
@@ -174,27 +211,34 @@ class Model:
         return self.kernel("mass_matrix_world")(q)
 
     def bias_force_world(self, q, v):
-        """C (nv,) for velocities (p_dot, omega in world axes, q_t_dot); the argument v has omega in the body frame."""
+        """C (nv,) for velocities (p_dot, omega in world axes, q_t_dot); the argument v has omega in
+        the body frame.
+        """
         return self.kernel("bias_force_world")(q, v)
 
     def pfl(self, q, v, accelerations):
-        """tau (2m,) (N m) that gives the tail ``accelerations`` (2m,) (rad/s^2) in flight, Eq. 46."""
+        """tau (2m,) (N m) that gives the tail ``accelerations`` (2m,) (rad/s^2) in flight, Eq.
+        46.
+        """
         return self.kernel("pfl")(q, v, accelerations)
 
     def contact_points(self, q, v, legs=None):
-        """(positions (K, 3) (m), velocities (K, 3) (m/s)), world, of what can touch the ground, Eqs. 5 to 15.
+        """(positions (K, 3) (m), velocities (K, 3) (m/s)), world, of what can touch the ground,
+        Eqs. 5 to 15.
 
-        Their order is that of ``contacts``: A, M and T of the right foot, then of the left; the tail's joints but the
-        mount, and its tip, or samples of its arcs; the torso's lowest point.
-        legs (8,): gamma_1, delta_1 (right), gamma_2, delta_2 (rad), then their rates; only where there are feet.
+        Their order is that of ``contacts``: A, M and T of the right foot, then of the left; the
+        tail's joints but the mount, and its tip, or samples of its arcs; the torso's lowest point.
+        legs (8,): gamma_1, delta_1 (right), gamma_2, delta_2 (rad), then their rates; only where
+        there are feet.
         """
         return self.kernel("contact_points")(*self._with_legs((q, v), legs))
 
     def contact_dynamics(self, q, v, tau, bristles, legs=None):
-        """(v_dot (nv,), bristle_rates (2K,) (m/s), forces (K, 3) (N, world)) of Eq. 1 with contact, Eqs. 35 to 37.
+        """(v_dot (nv,), bristle_rates (2K,) (m/s), forces (K, 3) (N, world)) of Eq. 1 with contact,
+        Eqs. 35 to 37.
 
-        bristles (2K,): stretch of the points' friction springs (m), world x and y in turn, a part of the state that
-        starts at zero.  legs as in ``contact_points``.
+        bristles (2K,): stretch of the points' friction springs (m), world x and y in turn, a part
+        of the state that starts at zero.  legs as in ``contact_points``.
         """
         return self.kernel("contact_dynamics")(*self._with_legs((q, v, tau, bristles), legs))
 
@@ -204,34 +248,49 @@ class Model:
             return arrays if legs is None else (*arrays, legs)
         if legs is None:
             raise StateError(f"{self.name} has feet: give legs, 4 angles (rad) and 4 rates (rad/s)")
-        raise StateError(f'{self.name} has no feet, but legs were given: leave them out, or add "feet" to `contacts`')
+        raise StateError(
+            f'{self.name} has no feet, but legs were given: leave them out, or add "feet" to '
+            "`contacts`"
+        )
 
     def forward_dynamics_derivatives(self, q, v, tau):
-        """(dq (nv, nv), dv (nv, nv), dtau (nv, 2m)): exact Jacobians of v_dot of Eq. 1, -H^-1 d(H v_dot + C).
+        """(dq (nv, nv), dv (nv, nv), dtau (nv, 2m)): exact Jacobians of v_dot of Eq. 1, -H^-1 d(H
+        v_dot + C).
 
-        dq is taken in the tangent space of q, as all derivatives are: column k is the rate of v_dot when q moves with
-        the velocity e_k, so columns 3 to 5 are turns of the torso in the body frame.
+        dq is taken in the tangent space of q, as all derivatives are: column k is the rate of v_dot
+        when q moves with the velocity e_k, so columns 3 to 5 are turns of the torso in the body
+        frame.
         """
         return self.kernel("forward_dynamics_derivatives")(q, v, tau)
 
     def forward_dynamics_parameter_derivatives(self, q, v, tau):
-        """(nv, number of parameters): Jacobian of v_dot, in the order of ``casadi.parameter_vector``."""
+        """(nv, number of parameters): Jacobian of v_dot, in the order of
+        ``casadi.parameter_vector``.
+        """
         return self.kernel("forward_dynamics_parameter_derivatives")(q, v, tau)
 
     def forward_dynamics_jvp(self, q, v, tau, dq, dv, dtau):
-        """Derivative of v_dot (nv,) in the direction dq (nv,), dv (nv,), dtau (2m,), without forming Jacobians."""
+        """Derivative of v_dot (nv,) in the direction dq (nv,), dv (nv,), dtau (2m,), without
+        forming Jacobians.
+        """
         return self.kernel("forward_dynamics_jvp")(q, v, tau, dq, dv, dtau)
 
     def forward_dynamics_vjp(self, q, v, tau, multiplier):
-        """(dq (nv,), dv (nv,), dtau (2m,)): gradient of multiplier^T v_dot, without forming Jacobians."""
+        """(dq (nv,), dv (nv,), dtau (2m,)): gradient of multiplier^T v_dot, without forming
+        Jacobians.
+        """
         return self.kernel("forward_dynamics_vjp")(q, v, tau, multiplier)
 
     def inverse_dynamics_derivatives(self, q, v, v_dot):
-        """(dq (nv, nv), dv (nv, nv)): exact Jacobians of H v_dot + C; that with respect to v_dot is H."""
+        """(dq (nv, nv), dv (nv, nv)): exact Jacobians of H v_dot + C; that with respect to v_dot is
+        H.
+        """
         return self.kernel("inverse_dynamics_derivatives")(q, v, v_dot)
 
     def inverse_dynamics_parameter_derivatives(self, q, v, v_dot):
-        """(nv, number of parameters): Jacobian of H v_dot + C, in the order of ``casadi.parameter_vector``."""
+        """(nv, number of parameters): Jacobian of H v_dot + C, in the order of
+        ``casadi.parameter_vector``.
+        """
         return self.kernel("inverse_dynamics_parameter_derivatives")(q, v, v_dot)
 
     def inverse_dynamics_vjp(self, q, v, v_dot, multiplier):
@@ -241,8 +300,8 @@ class Model:
     def inverse_dynamics_hessian(self, q, v, v_dot, multiplier):
         """(qq, qv, vv, aq), each (nv, nv): second derivatives of multiplier^T (H v_dot + C).
 
-        qq by turns through the exponential map, symmetric; qv has rows of q; aq = d(H multiplier)/dq has rows of v_dot.
-        The blocks (v_dot, v_dot) and (v_dot, v) are zero.
+        qq by turns through the exponential map, symmetric; qv has rows of q; aq = d(H
+        multiplier)/dq has rows of v_dot. The blocks (v_dot, v_dot) and (v_dot, v) are zero.
         """
         return self.kernel("inverse_dynamics_hessian")(q, v, v_dot, multiplier)
 
@@ -251,7 +310,9 @@ class Model:
         return self.kernel("energy_derivatives")(q, v)
 
     def momentum_derivatives(self, q, v):
-        """(linear_dq, linear_dv, angular_dq, angular_dv), each (3, nv): Jacobians of ``momentum``."""
+        """(linear_dq, linear_dv, angular_dq, angular_dv), each (3, nv): Jacobians of
+        ``momentum``.
+        """
         return self.kernel("momentum_derivatives")(q, v)
 
     crba = mass_matrix
@@ -261,7 +322,9 @@ class Model:
 
     @cached_property
     def casadi(self):
-        """``casadi.Function``s by name, the parameters folded in: ``model.casadi.forward_dynamics(q, v, tau)``."""
+        """``casadi.Function``s by name, the parameters folded in:
+        ``model.casadi.forward_dynamics(q, v, tau)``.
+        """
         from .casadi import CasadiFunctions
 
         return CasadiFunctions(self)

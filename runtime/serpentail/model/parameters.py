@@ -24,26 +24,36 @@ UNLIKE = 1e4  # from here on H may be off by 1e-12 of its diagonal: docs/stabili
 
 
 def resolve(manifest: dict, changes: Mapping[str, object] | None) -> MappingProxyType:
-    """Return name -> float or tuple (SI) of all parameters; ModelError lists everything that is wrong."""
+    """Return name -> float or tuple (SI) of all parameters; ModelError lists everything that is
+    wrong.
+    """
     values = {p["name"]: p["default"] for p in manifest["parameters"] if p["default"] is not None}
     given = _given(manifest, changes, None)
     values = completed(manifest, without_replaced(values, given) | given)
     return MappingProxyType(
-        {n: float(v) if np.ndim(v) == 0 else tuple(np.asarray(v, float).tolist()) for n, v in values.items()}
+        {
+            n: float(v) if np.ndim(v) == 0 else tuple(np.asarray(v, float).tolist())
+            for n, v in values.items()
+        }
     )
 
 
 @dataclass(frozen=True, eq=False)
 class RunParameters:
-    """Parameters of k runs: what is changed, all values by name, numbers or arrays (k,), (k, 3), and the C structs."""
+    """Parameters of k runs: what is changed, all values by name, numbers or arrays (k,), (k, 3),
+    and the C structs.
+    """
 
     changes: dict[str, np.ndarray]
     values: dict[str, object]
     vectors: np.ndarray
 
     @classmethod
-    def checked(cls, manifest: dict, own: Mapping[str, Value], changes, runs: int) -> "RunParameters":
-        """Return a model's own parameters, others where they change: name -> (runs,) or (runs, 3), SI.
+    def checked(
+        cls, manifest: dict, own: Mapping[str, Value], changes, runs: int
+    ) -> "RunParameters":
+        """Return a model's own parameters, others where they change: name -> (runs,) or (runs, 3),
+        SI.
 
         ModelError lists everything that is wrong, and the run.
         """
@@ -52,7 +62,11 @@ class RunParameters:
         fields = [(p["name"], p["size"]) for p in manifest["parameters"] if p["in_struct"]]
         columns = (np.asarray(values[name], float).reshape(-1, size) for name, size in fields)
         vectors = np.hstack([np.broadcast_to(a, (runs, a.shape[1])) for a in columns])
-        return cls(given, values, vectors.astype(np.float32 if manifest["real"] == "float" else np.float64, order="C"))
+        return cls(
+            given,
+            values,
+            vectors.astype(np.float32 if manifest["real"] == "float" else np.float64, order="C"),
+        )
 
     def of(self, k: int) -> dict[str, np.ndarray]:
         """Return the changes of run k."""
@@ -60,14 +74,18 @@ class RunParameters:
 
 
 def without_replaced(own: Mapping[str, Value], changes: Mapping[str, object]) -> dict[str, Value]:
-    """Return the values that stay: of link_radius and link_inertia the one that is given replaces the other."""
+    """Return the values that stay: of link_radius and link_inertia the one that is given replaces
+    the other.
+    """
     other = {"link_inertia": "link_radius", "link_radius": "link_inertia"}
     gone = {other[name] for name in changes if name in other}
     return {name: value for name, value in own.items() if name not in gone}
 
 
 def completed(manifest: dict, values: Mapping) -> dict:
-    """Return the values with link_inertia where it follows from link_radius, numbers or one of each run."""
+    """Return the values with link_inertia where it follows from link_radius, numbers or one of each
+    run.
+    """
     if "link_radius" not in values:
         return dict(values)
     moments = np.broadcast_arrays(*ellipsoid(values, manifest["dimensions"]["total"]))
@@ -77,7 +95,9 @@ def completed(manifest: dict, values: Mapping) -> dict:
 def _given(manifest: dict, changes, runs: int | None) -> dict:
     """Return a caller's changes checked, of one model or, with a leading axis, of many runs."""
     if not isinstance(changes, Mapping | None):
-        raise ModelError(f"parameters: value {changes!r:.60}: needs a mapping, such as {{'gravity': 9.8}}")
+        raise ModelError(
+            f"parameters: value {changes!r:.60}: needs a mapping, such as {{'gravity': 9.8}}"
+        )
     fields = {p["name"]: p for p in manifest["parameters"]}
     problems, given = [], {}
     for name, value in (changes or {}).items():
@@ -90,7 +110,8 @@ def _given(manifest: dict, changes, runs: int | None) -> dict:
         problems.append("link_radius and link_inertia: give one of them, not both")
     if given and manifest["scene"]["baked"]:
         problems.append(
-            "the parameters are baked into this model: set `baked = false` in its scene and generate it again"
+            "the parameters are baked into this model: set `baked = false` in its scene and "
+            "generate it again"
         )
     if problems:
         raise ModelError("parameters: " + "\n            ".join(problems))
@@ -98,25 +119,38 @@ def _given(manifest: dict, changes, runs: int | None) -> dict:
 
 
 def ellipsoid(values: Mapping[str, Value], links: int) -> tuple[float, float, float]:
-    """Moments of inertia (kg m^2) of one link, an ellipsoid with semi-axes (r, L / 2, r) and the link along y."""
+    """Moments of inertia (kg m^2) of one link, an ellipsoid with semi-axes (r, L / 2, r) and the
+    link along y.
+    """
     m, length, r = values["tail_mass"] / links, values["tail_length"] / links, values["link_radius"]
     with np.errstate(over="ignore", invalid="ignore"):
         across, along = m / 5 * (length * length / 4 + r * r), m / 5 * (2 * r * r)
         sound = np.isfinite(across + along).all()
     if not sound:
-        raise ModelError("parameters: tail_mass, tail_length and link_radius give no finite link_inertia: use kg and m")
+        raise ModelError(
+            "parameters: tail_mass, tail_length and link_radius give no finite link_inertia: use "
+            "kg and m"
+        )
     return across, along, across
 
 
 def disparity(values: Mapping[str, Value]) -> float:
-    """Return how unlike torso and tail are: moments of inertia that cancel in H over what is left, or their lengths.
+    """Return how unlike torso and tail are: moments of inertia that cancel in H over what is left,
+    or their lengths.
 
-    That is the larger of m (|b2t| + L)^2 / min I_b and |b2t| / L, m and L being the tail's mass and length; of many
-    runs the largest.
+    That is the larger of m (|b2t| + L)^2 / min I_b and |b2t| / L, m and L being the tail's mass and
+    length; of many runs the largest.
     """
     with np.errstate(all="ignore"):
-        mount, length = np.linalg.norm(values["tail_mount"], axis=-1), np.asarray(values["tail_length"])
-        moments = np.asarray(values["tail_mass"]) * (mount + length) ** 2 / np.min(values["torso_inertia"], axis=-1)
+        mount, length = (
+            np.linalg.norm(values["tail_mount"], axis=-1),
+            np.asarray(values["tail_length"]),
+        )
+        moments = (
+            np.asarray(values["tail_mass"])
+            * (mount + length) ** 2
+            / np.min(values["torso_inertia"], axis=-1)
+        )
         return float(np.max(np.maximum(moments, mount / length)))
 
 
@@ -125,7 +159,9 @@ def warn_of_unlike(values: Mapping[str, Value], calls: int = 2) -> None:
     found = disparity(values)
     if found > UNLIKE:
         sizes = "tail_mass, tail_length, tail_mount, torso_inertia"
-        words = f"torso and tail are unlike by {found:.1e} ({sizes}): H may be off by as many roundings"
+        words = (
+            f"torso and tail are unlike by {found:.1e} ({sizes}): H may be off by as many roundings"
+        )
         warnings.warn(f"{words}; are the units kg and m?", UnlikeBodies, stacklevel=calls + 1)
 
 
@@ -150,7 +186,9 @@ def _checked(fields: dict, name: str, value: object, runs: int | None) -> np.nda
     numbers = _numbers(value, (() if runs is None else (runs,)) + ((size,) if size > 1 else ()))
     holds, words = CHECKS[fields[name]["check"]]
     kind = "a finite number" if size == 1 else f"{size} finite numbers"
-    needs = f"needs {kind} ({fields[name]['unit']}), {words}" + ("" if runs is None else f", for each of {runs} runs")
+    needs = f"needs {kind} ({fields[name]['unit']}), {words}" + (
+        "" if runs is None else f", for each of {runs} runs"
+    )
     if numbers is None:
         return f"{name}: value {value!r:.200}: {needs}"
     rows = numbers.reshape(-1, size)
@@ -158,7 +196,9 @@ def _checked(fields: dict, name: str, value: object, runs: int | None) -> np.nda
         wrong = np.flatnonzero(~(np.isfinite(rows).all(axis=1) & holds(rows)))
     if not len(wrong):
         return numbers
-    which, found = ("", value) if runs is None else (f" of run {wrong[0]}", numbers[wrong[0]].tolist())
+    which, found = (
+        ("", value) if runs is None else (f" of run {wrong[0]}", numbers[wrong[0]].tolist())
+    )
     return f"{name}{which}: value {found!r}: {needs}"
 
 

@@ -1,4 +1,6 @@
-"""Polar coordinates of continuum segments: the paper's (phi, theta) in, bend components (a, b) out, and back."""
+"""Polar coordinates of continuum segments: the paper's (phi, theta) in, bend components (a, b) out,
+and back.
+"""
 
 import numpy as np
 
@@ -7,7 +9,8 @@ from ..errors import StateError
 
 
 def polar_to_bend(phi, theta, phi_dot=0.0, theta_dot=0.0):
-    """Return (a, b, a_dot, b_dot) of a = -theta cos(phi), b = theta sin(phi); rad and rad/s, any equal shapes.
+    """Return (a, b, a_dot, b_dot) of a = -theta cos(phi), b = theta sin(phi); rad and rad/s, any
+    equal shapes.
 
     Raises StateError where a value is no finite number, or the results are beyond numbers.
     """
@@ -20,13 +23,17 @@ def polar_to_bend(phi, theta, phi_dot=0.0, theta_dot=0.0):
 
 
 def bend_to_polar(a, b, a_dot=0.0, b_dot=0.0):
-    """Return (phi, theta, phi_dot, theta_dot), theta > 0; StateError where a segment is straight: phi has no value."""
+    """Return (phi, theta, phi_dot, theta_dot), theta > 0; StateError where a segment is straight:
+    phi has no value.
+    """
     a, b, a_dot, b_dot = _alike({"a": a, "b": b, "a_dot": a_dot, "b_dot": b_dot})
     with np.errstate(over="ignore"):
         theta = np.hypot(a, b)
     if not (theta > 0).all():
         straight = np.argwhere(~(theta > 0)).tolist()[0]
-        raise StateError(f"segment {straight or ''} is straight: phi has no value there; stay with a and b")
+        raise StateError(
+            f"segment {straight or ''} is straight: phi has no value there; stay with a and b"
+        )
     with np.errstate(all="ignore"):
         phi_dot = (a_dot * (b / theta) - b_dot * (a / theta)) / theta
         theta_dot = (a / theta) * a_dot + (b / theta) * b_dot
@@ -39,12 +46,17 @@ def _alike(given: dict) -> list[np.ndarray]:
     try:
         return np.broadcast_arrays(*arrays)
     except ValueError:
-        shapes = ", ".join(f"{name} {array.shape}" for name, array in zip(given, arrays, strict=True))
+        shapes = ", ".join(
+            f"{name} {array.shape}" for name, array in zip(given, arrays, strict=True)
+        )
         raise StateError(f"shapes differ: {shapes}: give equal ones") from None
 
 
 def _numbers(*results: np.ndarray) -> tuple[np.ndarray, ...]:
     """Return results, unless one is beyond numbers."""
     if not all(np.isfinite(x).all() for x in results):
-        raise StateError("the converted state is beyond numbers: is an angle or a rate too large, or theta too small?")
+        raise StateError(
+            "the converted state is beyond numbers: is an angle or a rate too large, or theta too "
+            "small?"
+        )
     return results

@@ -20,10 +20,18 @@ from .cache import digest, temporary_file
 
 # -std=c99 alone turns contraction off, so the fast profile asks for it by name.
 PROFILES = {
-    "fast": ("-std=c99", "-O2", "-ffp-contract=fast", "-fno-tree-vectorize", "-fno-math-errno", "-fno-trapping-math"),
+    "fast": (
+        "-std=c99",
+        "-O2",
+        "-ffp-contract=fast",
+        "-fno-tree-vectorize",
+        "-fno-math-errno",
+        "-fno-trapping-math",
+    ),
     "reproducible": ("-std=c99", "-O2", "-ffp-contract=off"),
 }
-# The first of these that the compiler takes joins the profile. Only zig takes `baseline`: unasked, it builds
+# The first of these that the compiler takes joins the profile. Only zig takes `baseline`:
+# unasked, it builds
 # for the processor at hand, where gcc and clang build for any processor of its family.
 CPU_FLAGS = {"fast": ("-march=native", "-mcpu=native"), "reproducible": ("-mcpu=baseline",)}
 PROGRAMS = ("cc", "gcc", "clang")
@@ -41,20 +49,26 @@ class Toolchain:
     command: tuple[str, ...]
     flags: tuple[str, ...]
     version: str
-    target: str  # digest of the processor and instruction set that the flags stand for on this machine
+    target: (
+        str  # digest of the processor and instruction set that the flags stand for on this machine
+    )
 
 
 def check_profile(profile: str) -> None:
     """Raise SerpentailError unless `profile` is known."""
     if not isinstance(profile, str) or profile not in PROFILES:
-        raise SerpentailError(f"unknown build profile {profile!r}; choose one of {', '.join(PROFILES)}")
+        raise SerpentailError(
+            f"unknown build profile {profile!r}; choose one of {', '.join(PROFILES)}"
+        )
 
 
 # The compiler: which one, and what it resolves its flags to.
 
 
 def candidates() -> Iterator[tuple[str, ...]]:
-    """Yield the commands to try: $CC alone if it is set, else what is on PATH, then the ziglang wheel."""
+    """Yield the commands to try: $CC alone if it is set, else what is on PATH, then the ziglang
+    wheel.
+    """
     chosen = os.environ.get("CC", "").strip()
     if chosen:
         yield _split(chosen)
@@ -69,12 +83,16 @@ def _split(chosen: str) -> tuple[str, ...]:
     try:
         program, *arguments = shlex.split(chosen)
     except ValueError as error:
-        raise CompilerNotFound(f"CC={chosen!r} is not a command: {error}. {REMEDY_NOT_FOUND}") from error
+        raise CompilerNotFound(
+            f"CC={chosen!r} is not a command: {error}. {REMEDY_NOT_FOUND}"
+        ) from error
     return (shutil.which(program) or program, *arguments)
 
 
 def examine(profile: str, folder: Path) -> Toolchain:
-    """Return the first candidate that answers, asking it afresh, and leave notes on all that were asked."""
+    """Return the first candidate that answers, asking it afresh, and leave notes on all that were
+    asked.
+    """
     refusals = []
     for command in candidates():
         try:
@@ -95,7 +113,10 @@ def _not_found(refusals: list[str]) -> str:
         return f"CC={chosen!r} does not work as a C compiler: {refusals[0]}. {REMEDY_NOT_FOUND}"
     absent = [f"{program} (not on PATH)" for program in PROGRAMS if not shutil.which(program)]
     zig = [] if importlib.util.find_spec("ziglang") else ["the ziglang wheel (not installed)"]
-    return f"no C compiler works here; tried {', '.join([*absent, *refusals, *zig])}. {REMEDY_NOT_FOUND}"
+    return (
+        f"no C compiler works here; tried "
+        f"{', '.join([*absent, *refusals, *zig])}. {REMEDY_NOT_FOUND}"
+    )
 
 
 def _ask(command: tuple[str, ...], profile: str) -> Toolchain:
@@ -109,7 +130,9 @@ def _ask(command: tuple[str, ...], profile: str) -> Toolchain:
 
 
 def _cpu_flag(command: tuple[str, ...], profile: str) -> tuple[str, ...]:
-    """Return the first of the profile's processor flags that the compiler takes in silence, or none."""
+    """Return the first of the profile's processor flags that the compiler takes in silence, or
+    none.
+    """
     nothing = ("-E", "-x", "c", os.devnull)
     usual = run_command((*command, *nothing)).stderr
     for flag in CPU_FLAGS[profile]:
@@ -120,7 +143,9 @@ def _cpu_flag(command: tuple[str, ...], profile: str) -> tuple[str, ...]:
 
 
 def _target(command: tuple[str, ...], flags: tuple[str, ...]) -> str:
-    """Return a digest of what `flags` resolve to: gcc's list of them, else the macros they define."""
+    """Return a digest of what `flags` resolve to: gcc's list of them, else the macros they
+    define.
+    """
     questions = (("-Q", "--help=target"), ("-dM", "-E", "-x", "c", os.devnull))
     answers = (run_command((*command, *flags, *question)) for question in questions)
     listings = (answer.stdout for answer in answers if answer.returncode == 0 and answer.stdout)
@@ -128,7 +153,9 @@ def _target(command: tuple[str, ...], flags: tuple[str, ...]) -> str:
 
 
 def run_command(command: Sequence[str]) -> subprocess.CompletedProcess[str]:
-    """Return the finished `command`, run in the C locale; one that cannot start counts as exit code 127."""
+    """Return the finished `command`, run in the C locale; one that cannot start counts as exit code
+    127.
+    """
     surroundings = {**os.environ, "LC_ALL": "C"}
     try:
         return subprocess.run(
@@ -148,7 +175,9 @@ def run_command(command: Sequence[str]) -> subprocess.CompletedProcess[str]:
 
 
 def recall(profile: str, folder: Path) -> Toolchain | None:
-    """Return the first working candidate as noted earlier on such a processor, or None to ask afresh."""
+    """Return the first working candidate as noted earlier on such a processor, or None to ask
+    afresh.
+    """
     for command in candidates():
         note = _read_note(_note_path(folder, command, profile))
         if note is None:
@@ -159,7 +188,9 @@ def recall(profile: str, folder: Path) -> Toolchain | None:
 
 
 def _note_path(folder: Path, command: tuple[str, ...], profile: str) -> Path:
-    """Return the note's place, named by the programs' files, the flags to choose from and the processor."""
+    """Return the note's place, named by the programs' files, the flags to choose from and the
+    processor.
+    """
     programs = [_file_identity(path) for path in map(shutil.which, command) if path]
     choices = (PROFILES[profile], CPU_FLAGS[profile])
     return folder / "compilers" / f"{digest([command, programs, choices, _processor()])}.json"
@@ -177,10 +208,16 @@ def _read_note(path: Path) -> dict[str, Any] | None:
         note = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
-    return note if isinstance(note, dict) and {"works", "flags", "version", "target"} <= note.keys() else None
+    return (
+        note
+        if isinstance(note, dict) and {"works", "flags", "version", "target"} <= note.keys()
+        else None
+    )
 
 
-def _write_note(folder: Path, command: tuple[str, ...], profile: str, toolchain: Toolchain | None) -> None:
+def _write_note(
+    folder: Path, command: tuple[str, ...], profile: str, toolchain: Toolchain | None
+) -> None:
     """Keep what was learnt; a cache that cannot be written still serves, until a build needs it."""
     blank = Toolchain(command, (), "", "")
     note = {"works": toolchain is not None, **asdict(toolchain or blank)}
@@ -191,11 +228,22 @@ def _write_note(folder: Path, command: tuple[str, ...], profile: str, toolchain:
 
 
 def _processor() -> str:
-    """Return the processor's model and features, read without a new process, else the machine's name."""
+    """Return the processor's model and features, read without a new process, else the machine's
+    name.
+    """
     with contextlib.suppress(OSError):
         return Path("/sys/devices/system/cpu/modalias").read_text()
     with contextlib.suppress(OSError):
-        names = ("model name", "flags", "Features", "CPU implementer", "CPU part", "cpu\t", "isa", "uarch")
+        names = (
+            "model name",
+            "flags",
+            "Features",
+            "CPU implementer",
+            "CPU part",
+            "cpu\t",
+            "isa",
+            "uarch",
+        )
         lines = Path("/proc/cpuinfo").read_text(errors="replace").splitlines()
         return "\n".join(sorted({line for line in lines if line.startswith(names)}))
     return " ".join(os.uname())

@@ -25,7 +25,9 @@ def pool() -> ThreadPoolExecutor:
 
 
 def shared(count: int, run: Callable[[int, int], None]) -> None:
-    """Call ``run(first, last)`` for shares of a batch, on all cores where it is large; the first error is raised."""
+    """Call ``run(first, last)`` for shares of a batch, on all cores where it is large; the first
+    error is raised.
+    """
     shares = max(1, min(cores(), count // SHARE))
     ends = [count * k // shares for k in range(shares + 1)]
     if shares == 1:
@@ -36,8 +38,11 @@ def shared(count: int, run: Callable[[int, int], None]) -> None:
         future.result()
 
 
-def in_turn(count: int, threads: int, work: Callable[[Iterator[int], threading.Event], None]) -> None:
-    """Call ``work(numbers, ended)`` in so many threads, which take the numbers below ``count`` in turn.
+def in_turn(
+    count: int, threads: int, work: Callable[[Iterator[int], threading.Event], None]
+) -> None:
+    """Call ``work(numbers, ended)`` in so many threads, which take the numbers below ``count`` in
+    turn.
 
     The first error, Ctrl-C among them, sets ``ended`` and is raised when all threads have returned.
     """

@@ -1,4 +1,6 @@
-"""Contact of a motion: sampled points, forces and bristles go in; depths and groups by name come out."""
+"""Contact of a motion: sampled points, forces and bristles go in; depths and groups by name come
+out.
+"""
 
 from dataclasses import dataclass, fields, replace
 
@@ -7,10 +9,12 @@ import numpy as np
 
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """What touches the ground in K samples of P points: the feet's A, M and T (right, then left), the tail, the torso.
+    """What touches the ground in K samples of P points: the feet's A, M and T (right, then left),
+    the tail, the torso.
 
-    points (K, P, 3) m, world; forces (K, P, 3) N of the ground, world; bristles (K, P, 2) m, stretch of the friction
-    springs; groups: how many of the points are feet, tail and torso, in that order.
+    points (K, P, 3) m, world; forces (K, P, 3) N of the ground, world; bristles (K, P, 2) m,
+    stretch of the friction springs; groups: how many of the points are feet, tail and torso, in
+    that order.
     """
 
     points: np.ndarray
@@ -34,7 +38,12 @@ class Contact:
         """Return the points of one group; KeyError where the motion has none."""
         first = sum(list(self.groups.values())[: self._place(group)])
         rows = slice(first, first + self.groups[group])
-        return Contact(self.points[:, rows], self.forces[:, rows], self.bristles[:, rows], {group: self.groups[group]})
+        return Contact(
+            self.points[:, rows],
+            self.forces[:, rows],
+            self.bristles[:, rows],
+            {group: self.groups[group]},
+        )
 
     def _place(self, group: str) -> int:
         if group not in self.groups:
@@ -45,7 +54,9 @@ class Contact:
         """Return this contact with a function applied to every array (K, columns)."""
         arrays = {name: getattr(self, name) for name in ARRAYS}
         flat = {name: change(a.reshape(len(a), -1)) for name, a in arrays.items()}
-        return replace(self, **{name: a.reshape(len(a), *arrays[name].shape[1:]) for name, a in flat.items()})
+        return replace(
+            self, **{name: a.reshape(len(a), *arrays[name].shape[1:]) for name, a in flat.items()}
+        )
 
 
 ARRAYS = tuple(entry.name for entry in fields(Contact) if entry.name != "groups")

@@ -15,13 +15,18 @@ def inside(times: Array, span: Array) -> Array:
     slack = 4 * np.finfo(float).eps * max(abs(span[0]), abs(span[-1]))
     outside = times[(times < span[0] - slack) | (times > span[-1] + slack)]
     if outside.size:
-        raise ValueError(f"t = {outside[0]} s is outside the trajectory: give times from {span[0]} to {span[-1]} s")
+        raise ValueError(
+            f"t = {outside[0]} s is outside the trajectory: give times from {span[0]} to "
+            f"{span[-1]} s"
+        )
     return np.clip(times, span[0], span[-1])
 
 
 @dataclass(frozen=True)
 class Rows:
-    """Where n times lie among samples: the rows before and after, the fraction between, the step (n, 1)."""
+    """Where n times lie among samples: the rows before and after, the fraction between, the step
+    (n, 1).
+    """
 
     before: NDArray[np.intp]
     after: NDArray[np.intp]
@@ -31,7 +36,9 @@ class Rows:
     @classmethod
     def at(cls, times: Array, samples: Array) -> "Rows":
         """Locate times inside the span of the samples."""
-        before = np.clip(np.searchsorted(samples, times, side="right") - 1, 0, max(len(samples) - 2, 0))
+        before = np.clip(
+            np.searchsorted(samples, times, side="right") - 1, 0, max(len(samples) - 2, 0)
+        )
         after = np.minimum(before + 1, len(samples) - 1)
         step = samples[after] - samples[before]
         fraction = (times - samples[before]) / np.where(step > 0, step, 1)

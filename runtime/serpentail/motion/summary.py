@@ -1,18 +1,26 @@
-"""Summaries: a trajectory and its model go in; what a motion on the ground or in flight came to, as data, comes out."""
+"""Summaries: a trajectory and its model go in; what a motion on the ground or in flight came to, as
+data, comes out.
+"""
 
 import numpy as np
 
 from ..attitude import pitch_roll_yaw, rotation_matrix
 from .trajectory import Trajectory
 
-UPRIGHT, SLOW, CARRIED = 0.9, 0.05, 0.5  # of standing: z of the torso's z axis, m/s of B, share of the weight on feet
+UPRIGHT, SLOW, CARRIED = (
+    0.9,
+    0.05,
+    0.5,
+)  # of standing: z of the torso's z axis, m/s of B, share of the weight on feet
 
 
 def summary(model, motion: Trajectory) -> dict:
     """Return what a motion came to, ready for JSON; None where there is no such number.
 
-    take_off_s, recontact_s: the flight about the apex, with nothing on the ground; apex_m: highest B; com_rise_m:
-    highest centre of mass over its start; pitch_at_end_rad: turns counted; upright_end: z of the torso's z axis;
+    take_off_s, recontact_s: the flight about the apex, with nothing on the ground; apex_m: highest
+    B; com_rise_m:
+    highest centre of mass over its start; pitch_at_end_rad: turns counted; upright_end: z of the
+    torso's z axis;
     standing_end: upright, at rest, on its feet; peaks: largest force on one
     point, A, M or T of both feet together, in the samples.
     """
@@ -37,19 +45,25 @@ def summary(model, motion: Trajectory) -> dict:
 def _effort(motion: Trajectory) -> dict:
     """Method, counts and processor time."""
     info, span = motion.info, float(motion.t[-1] - motion.t[0])
-    counts = {name: info.get(name) for name in ("method", "reason", "steps", "rejected", "evaluations")}
+    counts = {
+        name: info.get(name) for name in ("method", "reason", "steps", "rejected", "evaluations")
+    }
     return counts | {"cpu_s": info["cpu_seconds"], "real_time_factor": span / info["cpu_seconds"]}
 
 
 def com_rise(model, motion: Trajectory) -> float | None:
-    """Highest rise (m) of the centre of mass over its start, by the potential energy M g z; None without gravity."""
+    """Highest rise (m) of the centre of mass over its start, by the potential energy M g z; None
+    without gravity.
+    """
     p = model.parameters
     weight = (p["torso_mass"] + p["tail_mass"]) * p["gravity"]
     return float((motion.potential.max() - motion.potential[0]) / weight) if weight else None
 
 
 def flight(motion: Trajectory) -> tuple[float | None, float | None]:
-    """Times (s) at which the flight about the highest point begins and ends; None for what is not in the motion."""
+    """Times (s) at which the flight about the highest point begins and ends; None for what is not
+    in the motion.
+    """
     if motion.contact is None:
         return None, None
     apex = motion.t[motion.q[:, 2].argmax()]
@@ -60,8 +74,12 @@ def flight(motion: Trajectory) -> tuple[float | None, float | None]:
 
 
 def airborne(motion: Trajectory) -> list[tuple[float, float | None]]:
-    """Begin and end of every time in which nothing touches the ground; -inf, None where it is beyond the motion."""
-    touching = {group for group in motion.contact.groups if (motion.contact.of(group).depth[0] > 0).any()}
+    """Begin and end of every time in which nothing touches the ground; -inf, None where it is
+    beyond the motion.
+    """
+    touching = {
+        group for group in motion.contact.groups if (motion.contact.of(group).depth[0] > 0).any()
+    }
     begin, spans = None if touching else -np.inf, []
     for event in motion.events:
         if event["kind"] == "take_off":
@@ -80,7 +98,9 @@ def upright(motion: Trajectory) -> float:
 
 
 def standing(model, motion: Trajectory) -> bool | None:
-    """Tell if it ends on its feet: upright, at rest, half of the weight on them; None where it has no feet."""
+    """Tell if it ends on its feet: upright, at rest, half of the weight on them; None where it has
+    no feet.
+    """
     if motion.contact is None or "feet" not in motion.contact.groups:
         return None
     p = model.parameters
@@ -91,7 +111,9 @@ def standing(model, motion: Trajectory) -> bool | None:
 
 
 def peak_force(motion: Trajectory, group: str) -> float | None:
-    """Largest force (N) on a point of a group, of both feet together; None where the motion has no such group."""
+    """Largest force (N) on a point of a group, of both feet together; None where the motion has no
+    such group.
+    """
     if motion.contact is None or group not in motion.contact.groups:
         return None
     forces = motion.contact.of(group).forces

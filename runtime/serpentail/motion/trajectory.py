@@ -1,4 +1,6 @@
-"""Sampled motions: states, torques, energies and momenta at given times in, files and new samplings out."""
+"""Sampled motions: states, torques, energies and momenta at given times in, files and new samplings
+out.
+"""
 
 import dataclasses
 import json
@@ -24,11 +26,13 @@ UNIT_TOLERANCE = 1e-3  # how far a stored quaternion's norm may drift from 1
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """K samples of a motion with m tail segments, SI; the arrays are read-only copies, ValueError if unsound.
+    """K samples of a motion with m tail segments, SI; the arrays are read-only copies, ValueError
+    if unsound.
 
-    t (K,) s, increasing; q (K, 7+2m), v (K, 6+2m); tau (K, 2m) N m; kinetic, potential (K,) J; in the world
-    linear_momentum (K, 3) kg m/s and, about the COM, angular_momentum (K, 3) kg m2/s; info: JSON-ready dict;
-    contact: points, forces and bristles of a motion on the ground, None in flight.
+    t (K,) s, increasing; q (K, 7+2m), v (K, 6+2m); tau (K, 2m) N m; kinetic, potential (K,) J; in
+    the world linear_momentum (K, 3) kg m/s and, about the COM, angular_momentum (K, 3) kg m2/s;
+    info: JSON-ready dict; contact: points, forces and bristles of a motion on the ground, None in
+    flight.
     """
 
     t: Array
@@ -49,7 +53,9 @@ class Trajectory:
         for name, shape in _shapes(self.t, self.q).items():
             found = getattr(self, name).shape
             if found != shape:
-                raise ValueError(f"{name} has shape {found}: give {shape}, to match the shapes of t and q")
+                raise ValueError(
+                    f"{name} has shape {found}: give {shape}, to match the shapes of t and q"
+                )
         _check_time(self.t)
         _check_unit(self.attitude)
         object.__setattr__(self, "info", json.loads(_json(self.info)))
@@ -61,7 +67,9 @@ class Trajectory:
 
     @property
     def events(self) -> list[dict[str, Any]]:
-        """Touch-downs and take-offs in order: time (s), group, kind ("touch_down" or "take_off")."""
+        """Touch-downs and take-offs in order: time (s), group, kind ("touch_down" or
+        "take_off").
+        """
         return self.info.get("events", [])
 
     @property
@@ -96,10 +104,14 @@ class Trajectory:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
-        """Read a saved file; FileNotFoundError if absent, ValueError if damaged or not a trajectory."""
+        """Read a saved file; FileNotFoundError if absent, ValueError if damaged or not a
+        trajectory.
+        """
         source = _npz(path)
         if not source.is_file():
-            raise FileNotFoundError(f"no trajectory file {str(source)!r}: check the name, or save one first")
+            raise FileNotFoundError(
+                f"no trajectory file {str(source)!r}: check the name, or save one first"
+            )
         fields = _read(source)
         try:
             return cls(**_parsed(fields))
@@ -107,21 +119,30 @@ class Trajectory:
             raise ValueError(f"{str(source)!r} holds no sound trajectory: {error}") from error
 
     def resample(self, t: ArrayLike) -> Self:
-        """The motion at the increasing times t (n,), s, inside its span; ValueError names the first outside.
+        """The motion at the increasing times t (n,), s, inside its span; ValueError names the first
+        outside.
 
-        p and q_t: cubic Hermite through positions and velocities. Attitude: the same on the quaternion with
-        q_dot = q (0, omega) / 2, normalised (samples less than half a turn apart). v, energies and momenta:
+        p and q_t: cubic Hermite through positions and velocities. Attitude: the same on the
+        quaternion with
+        q_dot = q (0, omega) / 2, normalised (samples less than half a turn apart). v, energies and
+        momenta:
         monotone cubic, so no overshoot at impacts. tau and contact: linear, since they may jump.
         """
         times = inside(_real("t", t), self.t)
         rows = Rows.at(times, self.t)
-        smooth: dict[str, Any] = {name: monotone(self.t, getattr(self, name), times) for name in SMOOTH}
+        smooth: dict[str, Any] = {
+            name: monotone(self.t, getattr(self, name), times) for name in SMOOTH
+        }
         q = hermite_q(rows, self.q, self.v)
         contact = self.contact.mapped(rows.linear) if self.contact else None
-        return dataclasses.replace(self, t=times, q=q, tau=rows.linear(self.tau), contact=contact, **smooth)
+        return dataclasses.replace(
+            self, t=times, q=q, tau=rows.linear(self.tau), contact=contact, **smooth
+        )
 
 
-ARRAYS = tuple(entry.name for entry in dataclasses.fields(Trajectory) if entry.name not in ("info", "contact"))
+ARRAYS = tuple(
+    entry.name for entry in dataclasses.fields(Trajectory) if entry.name not in ("info", "contact")
+)
 CONTACT = "contact_"  # before the names of a contact's arrays in a file
 SMOOTH = ("v", "kinetic", "potential", "linear_momentum", "angular_momentum")
 
@@ -133,11 +154,15 @@ def _real(name: str, value: ArrayLike) -> Array:
     except ValueError as error:
         raise ValueError(f"{name} is ragged: give rows of equal length") from error
     if not np.can_cast(array.dtype, np.float64, "same_kind"):
-        raise ValueError(f"{name} has shape {array.shape} and type {array.dtype}: give real numbers")
+        raise ValueError(
+            f"{name} has shape {array.shape} and type {array.dtype}: give real numbers"
+        )
     array = array.astype(np.float64, order="C")
     if not np.isfinite(array).all():
         first = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
-        raise ValueError(f"{name}{list(first)} is {array[first]} (shape {array.shape}): give finite numbers only")
+        raise ValueError(
+            f"{name}{list(first)} is {array[first]} (shape {array.shape}): give finite numbers only"
+        )
     array.setflags(write=False)
     return array
 
@@ -150,7 +175,8 @@ def _shapes(t: Array, q: Array) -> dict[str, tuple[int, ...]]:
     width = q.shape[1] if q.ndim == 2 else 0
     if width < 7 or width % 2 == 0:
         raise ValueError(
-            f"q has shape {q.shape}: give ({samples}, 7 + 2m), position, quaternion and 2m tail coordinates"
+            f"q has shape {q.shape}: give ({samples}, 7 + 2m), position, quaternion and 2m tail "
+            "coordinates"
         )
     vectors = {"v": width - 1, "tau": width - 7, "linear_momentum": 3, "angular_momentum": 3}
     columns = {name: (samples, count) for name, count in vectors.items()}
@@ -163,7 +189,8 @@ def _check_time(t: Array) -> None:
     if late.size:
         k = int(late[0]) + 1
         raise ValueError(
-            f"t has shape {t.shape} and t[{k}] = {t[k]} follows {t[k - 1]}: give strictly increasing times"
+            f"t has shape {t.shape} and t[{k}] = {t[k]} follows {t[k - 1]}: give strictly "
+            "increasing times"
         )
 
 
@@ -181,7 +208,9 @@ def _json(info: Any) -> str:
         if isinstance(info, dict):
             return json.dumps(info, allow_nan=False)
     except (TypeError, ValueError) as error:
-        raise ValueError(f"info is not JSON-ready ({error}): convert arrays by tolist(), use None for nan") from error
+        raise ValueError(
+            f"info is not JSON-ready ({error}): convert arrays by tolist(), use None for nan"
+        ) from error
     raise ValueError(f"info is a {type(info).__name__}: give a dict of plain JSON values")
 
 
@@ -203,14 +232,25 @@ def _read(source: Path) -> dict[str, Any]:
             return {name: stored[name] for name in (*ARRAYS, "info", *touching)}
     except KeyError as error:
         raise ValueError(f"{str(source)!r} is not a trajectory: {error.args[0]}") from error
-    except (ValueError, EOFError, NotImplementedError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
-        raise ValueError(f"{str(source)!r} is damaged or not a trajectory ({error}): save it again") from error
+    except (
+        ValueError,
+        EOFError,
+        NotImplementedError,
+        RuntimeError,
+        zipfile.BadZipFile,
+        zlib.error,
+    ) as error:
+        raise ValueError(
+            f"{str(source)!r} is damaged or not a trajectory ({error}): save it again"
+        ) from error
 
 
 def _parsed(fields: dict[str, Any]) -> dict[str, Any]:
     """The arguments of a trajectory from the fields of a file."""
     own = {name: value for name, value in fields.items() if not name.startswith(CONTACT)}
-    touching = {name.removeprefix(CONTACT): value for name, value in fields.items() if name not in own}
+    touching = {
+        name.removeprefix(CONTACT): value for name, value in fields.items() if name not in own
+    }
     if touching:
         own["contact"] = Contact(**touching | {"groups": json.loads(str(touching["groups"]))})
     return own | {"info": json.loads(str(fields["info"]))}

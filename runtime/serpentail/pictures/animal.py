@@ -1,4 +1,6 @@
-"""Animals: a moment of a motion and a view go in; torso, tail, legs and forces of the ground are drawn on axes."""
+"""Animals: a moment of a motion and a view go in; torso, tail, legs and forces of the ground are
+drawn on axes.
+"""
 
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -17,7 +19,9 @@ LONGEST = 0.06  # m, the arrow of the largest force of a film
 
 @dataclass(frozen=True)
 class Body:
-    """The drawn torso: its ellipsoid's semi-axes and the tail's root, both in the torso frame, m."""
+    """The drawn torso: its ellipsoid's semi-axes and the tail's root, both in the torso frame,
+    m.
+    """
 
     semi_axes: tuple[float, float, float] = (0.0315, 0.0495, 0.027)
     tail_mount: tuple[float, float, float] = (0.0, -0.0405, 0.0045)
@@ -33,7 +37,9 @@ class Body:
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """An orthographic view; the rows of its matrix are the world directions right, up, towards the viewer."""
+    """An orthographic view; the rows of its matrix are the world directions right, up, towards the
+    viewer.
+    """
 
     name: str
     right: str
@@ -51,9 +57,11 @@ TOP = View("top", "y", "\u2212x", np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]])
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """One moment of a film: time, torso position and rotation, root and tail (P + 1, 3), COM; world, SI.
+    """One moment of a film: time, torso position and rotation, root and tail (P + 1, 3), COM;
+    world, SI.
 
-    On the ground also legs (L, J, 3) and arrows (n, 2, 3) of its forces, from the point that is pushed to the tip.
+    On the ground also legs (L, J, 3) and arrows (n, 2, 3) of its forces, from the point that is
+    pushed to the tip.
     """
 
     time: float
@@ -75,25 +83,35 @@ class Frame:
         return view.of(self.torso)[:2] + silhouette(self.rotation, self.body.semi_axes, view)
 
     def in_front(self, world: Array, view: View) -> NDArray[np.bool_]:
-        """Which world points x (n, 3) it cannot hide: |u| >= 1, near side, u = diag(a)^-1 R^T (x - p)."""
+        """Which world points x (n, 3) it cannot hide: |u| >= 1, near side, u = diag(a)^-1 R^T (x -
+        p).
+        """
         u = (world - self.torso) @ self.rotation / self.body.semi_axes
         towards = view.matrix[2] @ self.rotation / self.body.semi_axes
         return np.asarray((np.linalg.norm(u, axis=1) > 1 - 1e-9) & (u @ towards > -1e-6))
 
 
 def silhouette(rotation: Array, semi_axes: ArrayLike, view: View = SIDE, count: int = 121) -> Array:
-    """Outline (count, 2), m, about the centre, of an ellipsoid turned by R: ellipse P R diag(a^2) R^T P^T."""
+    """Outline (count, 2), m, about the centre, of an ellipsoid turned by R: ellipse P R diag(a^2)
+    R^T P^T.
+    """
     spread = view.matrix[:2] @ rotation * np.asarray(semi_axes, dtype=float)
     angle = np.linspace(0, 2 * np.pi, count)
-    return np.stack([np.cos(angle), np.sin(angle)], axis=1) @ np.linalg.cholesky(spread @ spread.T).T
+    return (
+        np.stack([np.cos(angle), np.sin(angle)], axis=1) @ np.linalg.cholesky(spread @ spread.T).T
+    )
 
 
 def arrows(points: Array, forces: Array, largest: float) -> Array:
-    """Arrows (n, 2, 3) of forces at points (P, 3): as long as the root of force over the largest, which has LONGEST."""
+    """Arrows (n, 2, 3) of forces at points (P, 3): as long as the root of force over the largest,
+    which has LONGEST.
+    """
     sizes = np.linalg.norm(forces, axis=1)
     acting = sizes > 1e-4 * largest
     shown, sizes = forces[acting], sizes[acting, None]
-    return np.stack([points[acting], points[acting] + LONGEST * shown / np.sqrt(sizes * largest)], axis=1)
+    return np.stack(
+        [points[acting], points[acting] + LONGEST * shown / np.sqrt(sizes * largest)], axis=1
+    )
 
 
 def tick(body: Body) -> Array:
@@ -114,12 +132,16 @@ class Pen:
 
     def plot(self, world: Array, mark: str, zorder: float, **look: Any) -> None:
         """World points (n, 3) as matplotlib's mark says."""
-        self.axes.plot(*self.view.of(world - self.origin).T[:2], mark, zorder=self.level + zorder, **look)
+        self.axes.plot(
+            *self.view.of(world - self.origin).T[:2], mark, zorder=self.level + zorder, **look
+        )
 
     def torso(self) -> None:
         """The filled silhouette."""
         outline = self.frame.outline(self.view) - self.view.of(self.origin)[:2]
-        self.axes.fill(*outline.T, facecolor=TORSO, edgecolor=INK, linewidth=0.7, zorder=self.level + 0.4)
+        self.axes.fill(
+            *outline.T, facecolor=TORSO, edgecolor=INK, linewidth=0.7, zorder=self.level + 0.4
+        )
 
     def line(self, corners: Array, **look: Any) -> None:
         """A line, all of it under the torso, and again over it where the torso cannot hide it."""
@@ -136,7 +158,11 @@ class Pen:
     def arrow(self, ends: Array) -> None:
         """An arrow from a world point to another, (2, 3), over all else."""
         tail, head = self.view.of(ends - self.origin)[:, :2]
-        look = {"arrowstyle": "-|>,head_width=0.12,head_length=0.25", "color": FORCE, "linewidth": 1.0}
+        look = {
+            "arrowstyle": "-|>,head_width=0.12,head_length=0.25",
+            "color": FORCE,
+            "linewidth": 1.0,
+        }
         look |= {"shrinkA": 0, "shrinkB": 0, "zorder": self.level + 0.9}
         self.axes.annotate("", head, tail, arrowprops=look)
 
@@ -151,7 +177,9 @@ class Pen:
 
 
 def draw_animal(pen: Pen) -> None:
-    """Torso, legs, tail, a dot at every tail point if they are few enough to be told apart, and the ground's forces."""
+    """Torso, legs, tail, a dot at every tail point if they are few enough to be told apart, and the
+    ground's forces.
+    """
     pen.torso()
     for leg in pen.frame.legs:
         pen.line(leg, color=LEG, linewidth=1.4)
@@ -163,10 +191,14 @@ def draw_animal(pen: Pen) -> None:
 
 
 def draw_marks(pen: Pen) -> None:
-    """The back's midline and tick, and the head end: a full dot on the near side, a ring on the far side."""
+    """The back's midline and tick, and the head end: a full dot on the near side, a ring on the far
+    side.
+    """
     _, length, height = pen.frame.body.semi_axes
     angle = np.linspace(0, np.pi, 61)
-    back = pen.frame.world(np.stack([0 * angle, length * np.cos(angle), height * np.sin(angle)], axis=1))
+    back = pen.frame.world(
+        np.stack([0 * angle, length * np.cos(angle), height * np.sin(angle)], axis=1)
+    )
     pen.plot(pen.visible(back), "-", 0.5, color=INK, linewidth=0.7)
     pen.line(pen.frame.world(tick(pen.frame.body)), color=INK, linewidth=1.4)
     head = pen.frame.world([[0, length, 0]])

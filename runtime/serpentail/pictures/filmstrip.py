@@ -1,4 +1,6 @@
-"""Filmstrips: a trajectory and its tail points in, SVG, PDF or PNG files of the moving animal out."""
+"""Filmstrips: a trajectory and its tail points in, SVG, PDF or PNG files of the moving animal
+out.
+"""
 
 import dataclasses
 import math
@@ -13,7 +15,21 @@ from numpy.typing import ArrayLike
 
 from ..attitude import rotation_matrix
 from ..motion.trajectory import Trajectory
-from .animal import FORCE, LEG, LONGEST, SIDE, TOP, Body, Frame, Pen, View, arrows, draw_animal, draw_marks, tick
+from .animal import (
+    FORCE,
+    LEG,
+    LONGEST,
+    SIDE,
+    TOP,
+    Body,
+    Frame,
+    Pen,
+    View,
+    arrows,
+    draw_animal,
+    draw_marks,
+    tick,
+)
 from .style import HEAD, INK, QUIET, TAIL, Array, writable, write
 
 if TYPE_CHECKING:
@@ -37,7 +53,9 @@ PER_LINE = 6  # most frames on a line
 
 @dataclass(frozen=True)
 class Page:
-    """A film's page, inches: frames, panel width, heights of two rows, path panel (width, height) if any."""
+    """A film's page, inches: frames, panel width, heights of two rows, path panel (width, height)
+    if any.
+    """
 
     frames: int
     column: float
@@ -76,7 +94,13 @@ class Page:
     def panel(self, k: int, row: int) -> tuple[float, float, float, float]:
         """Place of frame k's panel in the upper (0) or lower (1) row of its line."""
         line, column = divmod(k, self.per_line)
-        top = self.base + self.film[1] - line * (TITLES + GAP + sum(self.rows)) - TITLES - self.rows[0]
+        top = (
+            self.base
+            + self.film[1]
+            - line * (TITLES + GAP + sum(self.rows))
+            - TITLES
+            - self.rows[0]
+        )
         x, y = LEFT + column * (self.column + GAP), top - row * (GAP + self.rows[1])
         return x, y, self.column, self.rows[row]
 
@@ -94,45 +118,58 @@ def filmstrip(
     com: ArrayLike | None = None,
     **look: Any,
 ) -> Path:
-    """Draw moments of a motion, side (y, z) over top (y, -x) view at one scale, and the COM path; return path.
+    """Draw moments of a motion, side (y, z) over top (y, -x) view at one scale, and the COM path;
+    return path.
 
-    points (K, P, 3): the tail in the world at every sample, m; frames: how many, or their times (s); com (K, 3), m, by
-    default the torso's.  look: legs (K, L, J, 3), their joints in the world, m (see ``leg_joints``); semi_axes and
-    tail_mount, m (see Body).  On the ground, arrows are its forces.  No path panel when the COM stays within half a
-    torso's length.
+    points (K, P, 3): the tail in the world at every sample, m; frames: how many, or their times
+    (s); com (K, 3), m, by default the torso's.  look: legs (K, L, J, 3), their joints in the world,
+    m (see ``leg_joints``); semi_axes and tail_mount, m (see Body).  On the ground, arrows are its
+    forces.  No path panel when the COM stays within half a torso's length.
     """
     path, legs = writable(path), look.pop("legs", None)
     body = Body(**look)
     count = len(trajectory.t)
     points = _checked("points", points, (count, -1, 3))
     com = trajectory.q[:, :3] if com is None else _checked("com", com, (count, 3))
-    legs = np.zeros((count, 0, 2, 3)) if legs is None else _checked("legs", legs, (count, -1, -1, 3))
+    legs = (
+        np.zeros((count, 0, 2, 3)) if legs is None else _checked("legs", legs, (count, -1, -1, 3))
+    )
     moments = _moments(trajectory.t, frames)
     film = [_frame(trajectory, points, com, body, k) for k in moments]
-    film = [dataclasses.replace(frame, legs=legs[k]) for frame, k in zip(film, moments, strict=True)]
+    film = [
+        dataclasses.replace(frame, legs=legs[k]) for frame, k in zip(film, moments, strict=True)
+    ]
     film, largest = _with_forces(film, trajectory, moments)
     return write(path, lambda: _draw_film(film, com, largest))
 
 
-def _with_forces(film: list[Frame], trajectory: Trajectory, moments: list[int]) -> tuple[list[Frame], float]:
+def _with_forces(
+    film: list[Frame], trajectory: Trajectory, moments: list[int]
+) -> tuple[list[Frame], float]:
     """Frames with arrows of the ground's forces, and the largest of these, N; 0 in flight."""
     if trajectory.contact is None:
         return film, 0.0
     points, forces = trajectory.contact.points[moments], trajectory.contact.forces[moments]
     largest = float(np.linalg.norm(forces, axis=-1).max())
     shown = [arrows(x, f, largest) for x, f in zip(points, forces, strict=True)]
-    return [dataclasses.replace(f, arrows=a, grounded=True) for f, a in zip(film, shown, strict=True)], largest
+    return [
+        dataclasses.replace(f, arrows=a, grounded=True) for f, a in zip(film, shown, strict=True)
+    ], largest
 
 
 def _checked(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Array:
     """A finite array of the shape, where -1 is any size but 0."""
     array = np.asarray(value, dtype=float)
-    fits = array.ndim == len(shape) and all(k in (n, -1) for n, k in zip(array.shape, shape, strict=True))
+    fits = array.ndim == len(shape) and all(
+        k in (n, -1) for n, k in zip(array.shape, shape, strict=True)
+    )
     if not fits or not array.size:
         wanted = str(shape).replace("-1", "P")
         raise ValueError(f"{name} has shape {array.shape}: give {wanted}, one row per sample")
     if not np.isfinite(array).all():
-        raise ValueError(f"{name} {array.shape} has values that are not finite: give finite positions in m")
+        raise ValueError(
+            f"{name} {array.shape} has values that are not finite: give finite positions in m"
+        )
     return array
 
 
@@ -151,14 +188,18 @@ def _frame(trajectory: Trajectory, points: Array, com: Array, body: Body, k: int
     """Sample k of the film."""
     torso, rotation = trajectory.q[k, :3], rotation_matrix(trajectory.attitude[k])
     root = torso + rotation @ body.tail_mount
-    return Frame(float(trajectory.t[k]), torso, rotation, np.vstack([root, points[k]]), com[k], body)
+    return Frame(
+        float(trajectory.t[k]), torso, rotation, np.vstack([root, points[k]]), com[k], body
+    )
 
 
 def _draw_film(film: list[Frame], com: Array, largest: float = 0.0) -> "Figure":
     """The film's page."""
     from matplotlib.figure import Figure
 
-    windows = [_window([_drawn(f, view) - view.of(f.com)[:2] for f in film]) for view in (SIDE, TOP)]
+    windows = [
+        _window([_drawn(f, view) - view.of(f.com)[:2] for f in film]) for view in (SIDE, TOP)
+    ]
     page = _page(film, windows, com)
     figure = Figure(figsize=page.size)
     for row in range(2):
@@ -182,7 +223,9 @@ def _window(shapes: list[Array], margin: float = 0.012) -> Array:
 
 
 def _page(film: list[Frame], windows: list[Array], com: Array) -> Page:
-    """Sizes from the windows; the path panel beside the film where it fits, else below it, or nowhere."""
+    """Sizes from the windows; the path panel beside the film where it fits, else below it, or
+    nowhere.
+    """
     (wide, high), (_, deep) = (window[1] - window[0] for window in windows)
     column = min(max(1.4 * math.sqrt(wide / high), 1.35), 1.9)
     alone = Page(len(film), column, (column * high / wide, column * deep / wide), None, False)
@@ -200,8 +243,12 @@ def _path_window(film: list[Frame], com: Array) -> Array:
     return _window([*(_drawn(frame, SIDE) for frame in film), SIDE.of(com)[:, :2]])
 
 
-def _draw_row(figure: "Figure", page: Page, row: int, film: list[Frame], window: Array, com: Array) -> None:
-    """One view of every frame, each about its own COM, with the view's name and directions at the left."""
+def _draw_row(
+    figure: "Figure", page: Page, row: int, film: list[Frame], window: Array, com: Array
+) -> None:
+    """One view of every frame, each about its own COM, with the view's name and directions at the
+    left.
+    """
     view = (SIDE, TOP)[row]
     for k, frame in enumerate(film):
         x, y, width, height = page.panel(k, row)
@@ -233,7 +280,10 @@ def _draw_directions(axes: "Axes", view: View) -> None:
     head = "-|>,head_width=0.15,head_length=0.3"
     arrow = {"arrowstyle": head, "color": INK, "linewidth": 0.8, "shrinkA": 0, "shrinkB": 0}
     axes.text(0.45, 0.88, view.name, ha="center", va="center", weight="bold")
-    for end, name, where in (((0.7, 0.2), view.right, (0.8, 0.2)), ((0.3, 0.6), view.up, (0.3, 0.7))):
+    for end, name, where in (
+        ((0.7, 0.2), view.right, (0.8, 0.2)),
+        ((0.3, 0.6), view.up, (0.3, 0.7)),
+    ):
         axes.annotate("", end, (0.3, 0.2), arrowprops=arrow)
         axes.text(*where, name, ha="center", va="center", style="italic")
 
@@ -258,7 +308,11 @@ def _draw_key(figure: "Figure", page: Page, window: Array, key: dict[str, dict[s
     handles = [Line2D([], [], label=name, **look) for name, look in key.items()]
     corner = ((LEFT + length + 0.6) / page.size[0], (page.base - 0.17) / page.size[1])
     figure.legend(
-        handles=handles, loc="center left", bbox_to_anchor=corner, ncols=5 if len(key) < 6 else 4, columnspacing=1.4
+        handles=handles,
+        loc="center left",
+        bbox_to_anchor=corner,
+        ncols=5 if len(key) < 6 else 4,
+        columnspacing=1.4,
     )
 
 
@@ -275,4 +329,6 @@ def _draw_path(axes: "Axes", film: list[Frame], com: Array) -> None:
         disc = {"color": "white", "markersize": 8, "markeredgecolor": INK, "markeredgewidth": 0.5}
         pens[-1].plot(frame.com[None], "o", 2, **disc)
         y, z, _ = SIDE.of(frame.com)
-        axes.text(y, z, str(k + 1), ha="center", va="center_baseline", fontsize=6, zorder=len(film) + 2)
+        axes.text(
+            y, z, str(k + 1), ha="center", va="center_baseline", fontsize=6, zorder=len(film) + 2
+        )

@@ -1,4 +1,6 @@
-"""Limbs: a model, a motion and its legs' angles go in; joints of both legs and the centre of mass come out, to draw."""
+"""Limbs: a model, a motion and its legs' angles go in; joints of both legs and the centre of mass
+come out, to draw.
+"""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,13 +12,20 @@ SIDES = (1.0, -1.0)  # the left hip mirrors the right one in x
 
 
 def leg_joints(model, motion: Trajectory, angles: ArrayLike) -> np.ndarray:
-    """Return hip, D, knee, ankle A, M and T of both legs, (K, 2, 6, 3), m, world, for drawings: Eqs. 5 to 8.
+    """Return hip, D, knee, ankle A, M and T of both legs, (K, 2, 6, 3), m, world, for drawings:
+    Eqs. 5 to 8.
 
-    angles (K, 4): gamma and delta (rad) of the right leg, then of the left, as ``Legs.curve`` has them.
+    angles (K, 4): gamma and delta (rad) of the right leg, then of the left, as ``Legs.curve`` has
+    them.
     """
     gamma, delta = np.moveaxis(np.reshape(np.asarray(angles, float), (-1, 2, 2)), -1, 0)
     p = model.parameters
-    steps = [p["L_h2d"] * _ray(gamma), p["L_d2k"] * _ray(delta), p["L_k2a"] * _ray(gamma), p["L_a2m"] * _ray(delta)]
+    steps = [
+        p["L_h2d"] * _ray(gamma),
+        p["L_d2k"] * _ray(delta),
+        p["L_k2a"] * _ray(gamma),
+        p["L_a2m"] * _ray(delta),
+    ]
     steps.append(-p["L_m2t"] * _ray(gamma - p["delta_m"]))
     hips = np.array(p["hip"]) * [[side, 1.0, 1.0] for side in SIDES]
     local = hips[None, :, None] + np.concatenate(
@@ -27,7 +36,9 @@ def leg_joints(model, motion: Trajectory, angles: ArrayLike) -> np.ndarray:
 
 
 def centre_of_mass(model, motion: Trajectory) -> np.ndarray:
-    """Return the centre of mass (K, 3), m, world; of a continuum as if it were straight between its tail points."""
+    """Return the centre of mass (K, 3), m, world; of a continuum as if it were straight between its
+    tail points.
+    """
     torso, tail = model.parameters["torso_mass"], model.parameters["tail_mass"]
     points = model.tail_points(motion.q)
     middle = ((points[:, 1:] + points[:, :-1]) / 2).mean(axis=1)

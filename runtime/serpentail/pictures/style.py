@@ -14,7 +14,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
-METADATA: dict[str, dict[str, Any]] = {".pdf": {"CreationDate": None}, ".png": {}, ".svg": {"Date": None}}
+METADATA: dict[str, dict[str, Any]] = {
+    ".pdf": {"CreationDate": None},
+    ".png": {},
+    ".svg": {"Date": None},
+}
 DPI = 200
 INK, QUIET, TORSO, TAIL, HEAD = "#222222", "#8c8c8c", "#c6e0f0", "#d55e00", "#0072b2"
 STYLE: dict[str, Any] = {
@@ -35,7 +39,9 @@ def writable(path: str | os.PathLike[str]) -> Path:
     """The path, if its suffix names a known format."""
     path = Path(path)
     if path.suffix.lower() not in METADATA:
-        raise ValueError(f"figure {str(path)!r} has suffix {path.suffix!r}: use one of {', '.join(METADATA)}")
+        raise ValueError(
+            f"figure {str(path)!r} has suffix {path.suffix!r}: use one of {', '.join(METADATA)}"
+        )
     return path
 
 

@@ -1,4 +1,6 @@
-"""Figures over time: a trajectory in, SVG, PDF or PNG files out; and how every figure is written."""
+"""Figures over time: a trajectory in, SVG, PDF or PNG files out; and how every figure is
+written.
+"""
 
 import os
 from collections.abc import Sequence
@@ -15,12 +17,18 @@ from .style import INK, TAIL, Array, writable, write
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-TRIPLE = (("#0072b2", "-"), ("#d55e00", "--"), ("#009e73", "-."))  # Okabe and Ito, dashed for grey prints
+TRIPLE = (
+    ("#0072b2", "-"),
+    ("#d55e00", "--"),
+    ("#009e73", "-."),
+)  # Okabe and Ito, dashed for grey prints
 
 
 @dataclass(frozen=True, eq=False)
 class Panel:
-    """One axis of the time plots: label, curves (K, n), their names, (colour, dash) styles, least span."""
+    """One axis of the time plots: label, curves (K, n), their names, (colour, dash) styles, least
+    span.
+    """
 
     label: str
     curves: Array
@@ -31,7 +39,9 @@ class Panel:
 
 
 def time_plots(trajectory: Trajectory, path: str | os.PathLike[str]) -> Path:
-    """Draw attitude, tail, rates, torques, energies and momenta over one time axis; return the path."""
+    """Draw attitude, tail, rates, torques, energies and momenta over one time axis; return the
+    path.
+    """
     if len(trajectory.t) < 2:
         raise ValueError("the trajectory has one sample: give at least two to draw over time")
     return write(writable(path), lambda: _draw_times(trajectory))
@@ -61,13 +71,19 @@ def _draw_panel(axes: "Axes", t: Array, panel: Panel) -> None:
     margin = 0.06 * (high - low) + max(0.0, panel.span - (high - low)) / 2
     axes.set(ylabel=panel.label, ylim=(low - margin, high + margin))
     if panel.roots:
-        axes.set_yscale("function", functions=(lambda x: np.sign(x) * np.sqrt(np.abs(x)), lambda x: np.sign(x) * x**2))
+        axes.set_yscale(
+            "function",
+            functions=(lambda x: np.sign(x) * np.sqrt(np.abs(x)), lambda x: np.sign(x) * x**2),
+        )
         axes.set_ylim(0, max(panel.span, high) * 1.1)
     axes.grid(color="#e6e6e6", linewidth=0.6)
     axes.set_axisbelow(True)
     if "[deg]" in panel.label:
         axes.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 1.5, 3, 4.5, 9, 10]))
-    many = {"ncols": 2 if len(panel.names) > 3 else 1, "fontsize": 7 if len(panel.names) < 10 else 6}
+    many = {
+        "ncols": 2 if len(panel.names) > 3 else 1,
+        "fontsize": 7 if len(panel.names) < 10 else 6,
+    }
     axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), labelspacing=0.3, **many)
 
 
@@ -83,7 +99,13 @@ def _panels(trajectory: Trajectory) -> list[Panel]:
         *_tail_panels(trajectory),
         *_ground_panels(trajectory),
         Panel("torso rate\n[rad/s]", trajectory.v[:, 3:6], rates, TRIPLE, 0.1),
-        Panel("energy [mJ]", energies, ("kinetic", "potential", "total"), (*TRIPLE[:2], (INK, "-")), 1.0),
+        Panel(
+            "energy [mJ]",
+            energies,
+            ("kinetic", "potential", "total"),
+            (*TRIPLE[:2], (INK, "-")),
+            1.0,
+        ),
         Panel("momentum\n[mN s]", 1e3 * trajectory.linear_momentum, world, TRIPLE, 1.0),
         Panel("angular mom.\n[mN m s]", 1e3 * trajectory.angular_momentum, world, TRIPLE, 0.01),
     ]
@@ -94,22 +116,35 @@ def _ground_panels(trajectory: Trajectory) -> list[Panel]:
     contact = trajectory.contact
     if contact is None:
         return []
-    forces = np.stack([contact.of(group).forces[..., 2].sum(axis=1) for group in contact.groups], axis=1)
+    forces = np.stack(
+        [contact.of(group).forces[..., 2].sum(axis=1) for group in contact.groups], axis=1
+    )
     height = 1e3 * trajectory.q[:, 2:3]
     return [
         Panel("height [mm]", height, ("of B",), ((INK, "-"),), 1.0),
-        Panel("normal force\n[N]", forces, tuple(contact.groups), TRIPLE[: forces.shape[1]], 1.0, roots=True),
+        Panel(
+            "normal force\n[N]",
+            forces,
+            tuple(contact.groups),
+            TRIPLE[: forces.shape[1]],
+            1.0,
+            roots=True,
+        ),
     ]
 
 
 def _tail_panels(trajectory: Trajectory) -> list[Panel]:
-    """Tail coordinates and torques, a colour per segment, pitch drawn and yaw dashed; none without a tail."""
+    """Tail coordinates and torques, a colour per segment, pitch drawn and yaw dashed; none without
+    a tail.
+    """
     from matplotlib import colormaps
 
     segments = trajectory.segments
     if not segments:
         return []
-    colours = [TAIL] if segments == 1 else list(colormaps["viridis"](np.linspace(0, 0.85, segments)))
+    colours = (
+        [TAIL] if segments == 1 else list(colormaps["viridis"](np.linspace(0, 0.85, segments)))
+    )
     styles = [(colour, dash) for dash in ("-", "--") for colour in colours]
     names = [f"{bend} {i + 1}" for bend in ("pitch", "yaw") for i in range(segments)]
     order = [*range(0, 2 * segments, 2), *range(1, 2 * segments, 2)]

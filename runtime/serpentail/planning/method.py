@@ -5,7 +5,9 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class Method:
-    """How to solve: rule and degree, mesh, tolerance (deg, None: no demand) of the truth, solver, guesses."""
+    """How to solve: rule and degree, mesh, tolerance (deg, None: no demand) of the truth, solver,
+    guesses.
+    """
 
     rule: str = "radau"
     degree: int | None = None

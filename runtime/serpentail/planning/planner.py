@@ -17,27 +17,44 @@ from .rounds import Run
 
 
 def plan(model, *, start, goal=None, duration, bounds=None, **settings):
-    """Plan a motion of the tail by direct collocation (Sect. 3), and tell what its torques really do.
+    """Plan a motion of the tail by direct collocation (Sect. 3), and tell what its torques really
+    do.
 
-    start: (q0 (nq,), v0 (nv,)).  goal: Goal (default: upright, torso at rest).  duration: s, or (least, most) where it
+    start: (q0 (nq,), v0 (nv,)).  goal: Goal (default: upright, torso at rest).  duration: s, or
+    (least, most) where it
     is free.  bounds: Bounds (default: |tau| <= 0.02 N m).
-    The problem: objective "effort" (integral of tau^2 + (smoothing q_t_dot)^2), "energy" (of sum |tau q_t_dot|),
-    "time", or a function of a point; smoothing (N m s), without which plans whirl a light tail; damping (N m s, Eq. 47,
-    in addition to the planned torques); path, rows (function of a point, least, most); a point has the CasADi blocks
-    tail, tail_rate, torso_rate, torque, attitude, quaternion in SI; formulation "airborne" (angular momentum conserved
+    The problem: objective "effort" (integral of tau^2 + (smoothing q_t_dot)^2), "energy" (of sum
+    |tau q_t_dot|),
+    "time", or a function of a point; smoothing (N m s), without which plans whirl a light tail;
+    damping (N m s, Eq. 47,
+    in addition to the planned torques); path, rows (function of a point, least, most); a point has
+    the CasADi blocks
+    tail, tail_rate, torso_rate, torque, attitude, quaternion in SI; formulation "airborne" (angular
+    momentum conserved
     by construction), "translation-free", "full"; attitude "quaternion", "euler".
-    The method: rule "radau" (default), "lobatto", "hermite-simpson", "trapezoidal"; degree; intervals; tolerance (deg)
-    of the true attitude at the end, None for no demand; rounds of refinement; most_intervals; solver, options of
-    ``casadi.nlpsol``; guess: a Plan or a Trajectory (default: passive flight); guess_damping (N m s); multi_start:
-    guesses solved, the best is kept; retries: more guesses after failures; seed; dynamics "auto", "compiled",
+    The method: rule "radau" (default), "lobatto", "hermite-simpson", "trapezoidal"; degree;
+    intervals; tolerance (deg)
+    of the true attitude at the end, None for no demand; rounds of refinement; most_intervals;
+    solver, options of
+    ``casadi.nlpsol``; guess: a Plan or a Trajectory (default: passive flight); guess_damping (N m
+    s); multi_start:
+    guesses solved, the best is kept; retries: more guesses after failures; seed; dynamics "auto",
+    "compiled",
     "symbolic"; time_limit (s) of the search; track: simulate with PFL, too.
-    Programs and solvers are kept: planning again on a plan's mesh, from another start, derives nothing.  Ctrl-C ends
-    the search, as the time limit does, and the best so far is returned; a second one raises KeyboardInterrupt.
-    Returns a Plan; look at its ``success`` and ``report``.  Raises PlanningError (a field, its value, the remedy),
+    Programs and solvers are kept: planning again on a plan's mesh, from another start, derives
+    nothing.  Ctrl-C ends
+    the search, as the time limit does, and the best so far is returned; a second one raises
+    KeyboardInterrupt.
+    Returns a Plan; look at its ``success`` and ``report``.  Raises PlanningError (a field, its
+    value, the remedy),
     ModelError (the scene lacks functions).
     """
     problem, method = _checked(model, start, goal, duration, bounds, settings)
-    missing = [name for name in ("mass_matrix", "inverse_dynamics", "rollout") if name not in model.manifest["work"]]
+    missing = [
+        name
+        for name in ("mass_matrix", "inverse_dynamics", "rollout")
+        if name not in model.manifest["work"]
+    ]
     if missing:
         raise model.without(*missing)
     begun = time.perf_counter()
@@ -57,7 +74,13 @@ def _checked(model, start, goal, duration, bounds, settings) -> tuple[Problem, M
     goal, bounds = Goal() if goal is None else goal, Bounds() if bounds is None else bounds
     problem = checked_problem(model, start, goal, duration, bounds, **own)
     method = Method(**{name: value for name, value in settings.items() if name not in SETTINGS})
-    for name, least in (("intervals", 1), ("rounds", 0), ("most_intervals", 1), ("multi_start", 1), ("retries", 0)):
+    for name, least in (
+        ("intervals", 1),
+        ("rounds", 0),
+        ("most_intervals", 1),
+        ("multi_start", 1),
+        ("retries", 0),
+    ):
         value = getattr(method, name)
         if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
             raise PlanningError(f"{name}: value {value!r}: needs a whole number from {least}")
@@ -65,7 +88,9 @@ def _checked(model, start, goal, duration, bounds, settings) -> tuple[Problem, M
         if getattr(method, name) is not None:
             number(name, getattr(method, name))
     if not isinstance(method.options, dict):
-        raise PlanningError(f"options: value {method.options!r}: needs a dict, such as {{'ipopt.max_iter': 500}}")
+        raise PlanningError(
+            f"options: value {method.options!r}: needs a dict, such as {{'ipopt.max_iter': 500}}"
+        )
     _check_guess(model, method.guess)
     number("guess_damping", method.guess_damping, above=False)
     choice("dynamics", method.dynamics, ("auto", "compiled", "symbolic"))
@@ -80,4 +105,6 @@ def _check_guess(model, guess) -> None:
     if not isinstance(motion, Trajectory):
         raise PlanningError(f"guess: value {guess!r}: needs a Plan or a Trajectory")
     if motion.q.shape[1] != model.nq or len(motion.t) < 2:
-        raise PlanningError(f"guess: q has shape {motion.q.shape}: needs at least two samples of {model.nq}")
+        raise PlanningError(
+            f"guess: q has shape {motion.q.shape}: needs at least two samples of {model.nq}"
+        )

@@ -1,4 +1,6 @@
-"""Planning problems: what a user asks for goes in, checked field by field; a frozen Problem comes out."""
+"""Planning problems: what a user asks for goes in, checked field by field; a frozen Problem comes
+out.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
@@ -12,7 +14,8 @@ from .nlp.coordinates import KINDS
 from .nlp.node import FORMULATIONS
 
 OBJECTIVES = ("effort", "energy", "time")
-SMOOTHING = 3e-4  # N m s: the effort counts a tail's rates as torques, or a plan whirls a light tail at no cost
+# N m s: the effort counts a tail's rates as torques, or a plan whirls a light tail at no cost
+SMOOTHING = 3e-4
 SLACK = 1e-6  # rad, rad/s: how far a start may be beyond its bounds
 
 
@@ -20,8 +23,10 @@ SLACK = 1e-6  # rad, rad/s: how far a start may be beyond its bounds
 class Goal:
     """What holds at the end; None leaves a part free, and so does a None among the tail's numbers.
 
-    attitude: "upright" (any yaw) or a quaternion (w, x, y, z), torso to world.  torso_rate (3,): rad/s in body axes.
-    tail (2m,): rad.  tail_rate (2m,): rad/s.  turns (2,): whole turns of pitch and roll at an upright end, for the
+    attitude: "upright" (any yaw) or a quaternion (w, x, y, z), torso to world.  torso_rate (3,):
+    rad/s in body axes.
+    tail (2m,): rad.  tail_rate (2m,): rad/s.  turns (2,): whole turns of pitch and roll at an
+    upright end, for the
     attitude "euler" alone; by default those nearest to the guess, as in Sect. 3.2.
     """
 
@@ -34,7 +39,8 @@ class Goal:
 
 @dataclass(frozen=True)
 class Bounds:
-    """Largest magnitudes along the motion, each one number or one a tail coordinate; None: no bound.
+    """Largest magnitudes along the motion, each one number or one a tail coordinate; None: no
+    bound.
 
     angle (rad), rate (rad/s), torque (N m), torque_rate (N m/s, from node to node).
     """
@@ -47,7 +53,9 @@ class Bounds:
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """A checked problem: arrays have their shapes, values are finite, the start obeys its bounds."""
+    """A checked problem: arrays have their shapes, values are finite, the start obeys its
+    bounds.
+    """
 
     q0: np.ndarray
     v0: np.ndarray
@@ -66,7 +74,9 @@ SETTINGS = ("objective", "smoothing", "damping", "path", "formulation", "attitud
 
 
 def checked_problem(model, start, goal, duration, bounds, **settings) -> Problem:
-    """Return the problem; PlanningError names the first field that is wrong, its value and the remedy."""
+    """Return the problem; PlanningError names the first field that is wrong, its value and the
+    remedy.
+    """
     q0, v0 = _start(model, start)
     goal, bounds = _goal(goal, q0.size - 7), _bounds(bounds, q0.size - 7)
     _start_inside(q0[7:], bounds.angle, "angle", "rad")
@@ -75,7 +85,9 @@ def checked_problem(model, start, goal, duration, bounds, **settings) -> Problem
     wrong |= {name: partial(number, name, above=False) for name in ("smoothing", "damping")}
     for name, bound in (("tail", bounds.angle), ("tail_rate", bounds.rate)):
         _goal_inside(name, getattr(goal, name), bound)
-    settings = {name: wrong.get(name, lambda value: value)(value) for name, value in settings.items()}
+    settings = {
+        name: wrong.get(name, lambda value: value)(value) for name, value in settings.items()
+    }
     choice("formulation", settings.get("formulation", "airborne"), FORMULATIONS)
     choice("attitude", settings.get("attitude", "quaternion"), KINDS)
     return Problem(q0, v0, goal, _duration(duration), bounds, **settings)
@@ -102,7 +114,11 @@ def _goal(goal, size: int) -> Goal:
     if not isinstance(goal, Goal):
         raise PlanningError(f"goal: value {goal!r}: needs a serpentail.Goal")
     attitude = goal.attitude
-    if attitude is not None and attitude != "upright" if isinstance(attitude, str) else attitude is not None:
+    if (
+        attitude is not None and attitude != "upright"
+        if isinstance(attitude, str)
+        else attitude is not None
+    ):
         attitude = _vector("goal.attitude", attitude, 4)
         if np.linalg.norm(attitude) == 0:
             raise PlanningError("goal.attitude: the zero quaternion: upright is (1, 0, 0, 0)")
@@ -121,9 +137,13 @@ def _some(field: str, value, size: int) -> np.ndarray | None:
         array = np.array([np.nan if entry is None else float(entry) for entry in value])
         free = np.array([entry is None for entry in value])
     except (TypeError, ValueError):
-        raise PlanningError(f"{field}: value {value!r}: needs {size} numbers, None where free") from None
+        raise PlanningError(
+            f"{field}: value {value!r}: needs {size} numbers, None where free"
+        ) from None
     if array.shape != (size,) or not np.isfinite(array[~free]).all():
-        raise PlanningError(f"{field}: value {value!r}: needs {size} finite numbers, None where free")
+        raise PlanningError(
+            f"{field}: value {value!r}: needs {size} finite numbers, None where free"
+        )
     return array
 
 
@@ -145,7 +165,8 @@ def _start_inside(values: np.ndarray, bound: np.ndarray | None, name: str, unit:
     k = int(np.argmax(np.abs(values) - bound))
     if abs(values[k]) > bound[k] + SLACK:
         raise PlanningError(
-            f"bounds.{name}: the start's tail coordinate {k} has {values[k]:.6g} {unit}, beyond {bound[k]:.6g}: "
+            f"bounds.{name}: the start's tail coordinate {k} has {values[k]:.6g} {unit}, beyond "
+            f"{bound[k]:.6g}: "
             "widen the bound, or start inside it"
         )
 
@@ -156,13 +177,18 @@ def _goal_inside(name: str, values: np.ndarray | None, bound: np.ndarray | None)
     beyond = np.flatnonzero(np.abs(values) > bound)  # nan: free
     if beyond.size:
         k = beyond[0]
-        raise PlanningError(f"goal.{name}: entry {k} is {values[k]:.6g}, beyond its bound {bound[k]:.6g}: change one")
+        raise PlanningError(
+            f"goal.{name}: entry {k} is {values[k]:.6g}, beyond its bound {bound[k]:.6g}: change "
+            "one"
+        )
 
 
 def _duration(duration) -> tuple[float, float]:
     pair = duration if isinstance(duration, tuple | list) else (duration, duration)
     if len(pair) != 2:
-        raise PlanningError(f"duration: value {duration!r}: needs one number, or (least, most), in s")
+        raise PlanningError(
+            f"duration: value {duration!r}: needs one number, or (least, most), in s"
+        )
     least, most = (number("duration", value) for value in pair)
     if most < least:
         raise PlanningError(f"duration: value {duration!r}: needs least <= most, in s")
@@ -179,7 +205,9 @@ def _path(path) -> tuple:
     rows = []
     for k, row in enumerate(path):
         if not isinstance(row, tuple | list) or len(row) != 3 or not callable(row[0]):
-            raise PlanningError(f"path[{k}]: value {row!r}: needs (function of a point, least, most)")
+            raise PlanningError(
+                f"path[{k}]: value {row!r}: needs (function of a point, least, most)"
+            )
         least, most = float(row[1]), float(row[2])
         if not least <= most:
             raise PlanningError(f"path[{k}]: bounds ({least}, {most}): needs least <= most")

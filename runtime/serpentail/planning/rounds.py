@@ -1,4 +1,6 @@
-"""Rounds: a problem and a method go in; solutions on finer and finer meshes, and the best one's plan, come out."""
+"""Rounds: a problem and a method go in; solutions on finer and finer meshes, and the best one's
+plan, come out.
+"""
 
 import time
 from dataclasses import dataclass
@@ -28,7 +30,9 @@ SLIGHT = 0.05  # of the torques' unit: what pushes the first guess out of a plan
 
 @dataclass(frozen=True, eq=False)
 class Round:
-    """One solution on one mesh: q, v planned at the ends of intervals, and true at the end of all."""
+    """One solution on one mesh: q, v planned at the ends of intervals, and true at the end of
+    all.
+    """
 
     program: Transcription
     solution: Solution
@@ -38,8 +42,12 @@ class Round:
 
     @property
     def error(self) -> float:
-        """True error (deg) of the attitude at the end, against the plan or the goal, the larger one; inf if lost."""
-        error = max(attitude_errors(self.program.problem, self.planned[0][-1, 3:7], self.true[0][3:7]))
+        """True error (deg) of the attitude at the end, against the plan or the goal, the larger
+        one; inf if lost.
+        """
+        error = max(
+            attitude_errors(self.program.problem, self.planned[0][-1, 3:7], self.true[0][3:7])
+        )
         return error if np.isfinite(error) else np.inf
 
 
@@ -47,7 +55,13 @@ class Run:
     """One call of ``plan``: what stays the same in all its rounds, and what they have cost."""
 
     def __init__(self, model, problem: Problem, method: Method, equations: Dynamics, scheme: Rule):
-        self.model, self.problem, self.method, self.equations, self.rule = model, problem, method, equations, scheme
+        self.model, self.problem, self.method, self.equations, self.rule = (
+            model,
+            problem,
+            method,
+            equations,
+            scheme,
+        )
         self.start = (problem.q0, problem.v0)
         self.h = model.momentum(*self.start)[1]
         self.attitude = attitude(problem.attitude)
@@ -56,13 +70,17 @@ class Run:
         self.stopped: str | None = None
 
     def first(self) -> Round:
-        """Return the best solution on the first mesh, of as many guesses as asked for, and more if all fail."""
+        """Return the best solution on the first mesh, of as many guesses as asked for, and more if
+        all fail.
+        """
         method, before = self.method, self.method.guess
         again = isinstance(before, Plan) and before.rule is self.rule
         program = self._transcribed(before.mesh if again else uniform(method.intervals))
         found: list[Solution] = []
         for k in range(method.multi_start + method.retries):
-            if found and ((k >= method.multi_start and any(s.success for s in found)) or self._stopped()):
+            if found and (
+                (k >= method.multi_start and any(s.success for s in found)) or self._stopped()
+            ):
                 break
             found.append(self._given(program) if k == 0 else self._solved(program, self._pushed(k)))
         return self._round(program, min(found, key=lambda s: (not s.success, s.value)))
@@ -94,7 +112,16 @@ class Run:
         own |= self.spent | {"wall_s": wall_s}
         summary = {"success": good} | report(self, best, trajectory) | own
         program = best.program
-        return Plan(good, trajectory, summary, self.problem, best.curve, program.mesh, self.rule, best.solution)
+        return Plan(
+            good,
+            trajectory,
+            summary,
+            self.problem,
+            best.curve,
+            program.mesh,
+            self.rule,
+            best.solution,
+        )
 
     def _stopped(self) -> bool:
         """Tell, and note why, whether the search should end that is not done."""
@@ -113,29 +140,47 @@ class Run:
         if guess is None:
             return self._solved(program, self._pushed(0))
         if not isinstance(guess, Plan):
-            return self._solved(program, of_trajectory(self.model, guess, self.attitude, self.problem.damping))
+            return self._solved(
+                program, of_trajectory(self.model, guess, self.attitude, self.problem.damping)
+            )
         form = (guess.problem.formulation, guess.problem.attitude)
         if form != (self.problem.formulation, self.problem.attitude):
-            return self._solved(program, of_trajectory(self.model, guess.trajectory, self.attitude), "close")
+            return self._solved(
+                program, of_trajectory(self.model, guess.trajectory, self.attitude), "close"
+            )
         multipliers, sizes = guess.solution.multipliers, (program.places.size, program.rows)
         same = tuple(part.size for part in multipliers) == sizes
-        return self._near(program, Motion(guess.duration, guess.curve.at), multipliers if same else None)
+        return self._near(
+            program, Motion(guess.duration, guess.curve.at), multipliers if same else None
+        )
 
     def _near(self, program: Transcription, motion: Motion, multipliers) -> Solution:
-        """Solve from a motion that is close to a solution, with multipliers or without; as from afar if that fails."""
-        found = self._solved(program, motion, "close" if multipliers is None else "same", multipliers)
+        """Solve from a motion that is close to a solution, with multipliers or without; as from
+        afar if that fails.
+        """
+        found = self._solved(
+            program, motion, "close" if multipliers is None else "same", multipliers
+        )
         return found if found.success or self.stopped else self._solved(program, motion)
 
     def _pushed(self, k: int) -> Motion:
-        """Passive flight; the tail is pushed a little out of a plane of symmetry (k = 0), or about at random."""
+        """Passive flight; the tail is pushed a little out of a plane of symmetry (k = 0), or about
+        at random.
+        """
         method, (least, most) = self.method, self.problem.duration
         duration = least + (most - least) * (1.0, 0.5, 0.75, 0.25)[k % 4]
         size = float(torque_unit(self.problem).mean()) * (SLIGHT if k == 0 else 1.0)
         push = pushes(np.random.default_rng([method.seed, k]), size, self.model.nv - 6)
-        return passive(self.model, self.problem, self.attitude, method.guess_damping, duration, push)
+        return passive(
+            self.model, self.problem, self.attitude, method.guess_damping, duration, push
+        )
 
-    def _solved(self, program: Transcription, motion: Motion, near: str = "far", multipliers=None) -> Solution:
-        """Solve from a motion that is far from a solution, close to one, or one of the same program."""
+    def _solved(
+        self, program: Transcription, motion: Motion, near: str = "far", multipliers=None
+    ) -> Solution:
+        """Solve from a motion that is far from a solution, close to one, or one of the same
+        program.
+        """
         begun = time.perf_counter()
         engine = solver(program, self.method.solver, self.method.options, near)
         self.spent["derive_s"] += time.perf_counter() - begun
@@ -151,14 +196,20 @@ class Run:
 
     def _start_blocks(self) -> dict[str, np.ndarray]:
         q, v = self.start
-        blocks = {"position": q[:3], "attitude": self.attitude.coordinates(q[None])[0], "tail": q[7:]}
+        blocks = {
+            "position": q[:3],
+            "attitude": self.attitude.coordinates(q[None])[0],
+            "tail": q[7:],
+        }
         return blocks | {"velocity": v[:3], "torso_rate": v[3:6], "tail_rate": v[6:]}
 
     def _round(self, program: Transcription, solution: Solution) -> Round:
         """Return a round: the solution's curve, and its truth."""
         found = curve(program, solution.w, self.h)
         begun = time.perf_counter()
-        planned = full_state(self.model, self.start, self.attitude, found.ends, found.at(found.ends))
+        planned = full_state(
+            self.model, self.start, self.attitude, found.ends, found.at(found.ends)
+        )
         true = open_loop(self.model, found, self.problem.damping, self.start)
         self.spent["truth_s"] += time.perf_counter() - begun
         return Round(program, solution, found, planned, true)
@@ -169,4 +220,6 @@ class Run:
         errors = local_errors(self.model, last.curve, self.problem.damping, *last.planned)
         self.spent["truth_s"] += time.perf_counter() - begun
         factor = min(0.3 * self.method.tolerance / last.error, 0.3)
-        return refined(last.program.mesh, errors, factor, self.rule.order, self.method.most_intervals)
+        return refined(
+            last.program.mesh, errors, factor, self.rule.order, self.method.most_intervals
+        )

@@ -1,4 +1,6 @@
-"""Changes: texts such as "mu=0.5", or values by dotted names, and nested tables go in; changed tables come out."""
+"""Changes: texts such as "mu=0.5", or values by dotted names, and nested tables go in; changed
+tables come out.
+"""
 
 import tomllib
 from collections.abc import Iterable, Mapping
@@ -7,7 +9,9 @@ from ..errors import SimulationError
 
 
 def parsed(texts: Iterable[str]) -> dict:
-    """Return name -> value of texts NAME=VALUE, values as in a scene file; a plain word stands for a text."""
+    """Return name -> value of texts NAME=VALUE, values as in a scene file; a plain word stands for
+    a text.
+    """
     values = {}
     for text in texts:
         name, sign, value = text.partition("=")
@@ -21,7 +25,9 @@ def parsed(texts: Iterable[str]) -> dict:
 
 
 def changed(table: Mapping, changes: Mapping) -> dict:
-    """Return a copy of a table with new values: "start.pitch", or "legs.moves.0.rate" in an array of tables."""
+    """Return a copy of a table with new values: "start.pitch", or "legs.moves.0.rate" in an array
+    of tables.
+    """
     for name, value in changes.items():
         table = _with(table, name.split("."), value, name)
     return dict(table)
@@ -35,4 +41,6 @@ def _with(part, path: list[str], value, name: str):
     if isinstance(part, list) and first.isdigit() and int(first) < len(part):
         k = int(first)
         return [*part[:k], _with(part[k], rest, value, name) if rest else value, *part[k + 1 :]]
-    raise SimulationError(f"change {name!r}: {first!r} is not in {part!r}: name a key, or a place from 0")
+    raise SimulationError(
+        f"change {name!r}: {first!r} is not in {part!r}: name a key, or a place from 0"
+    )

@@ -1,4 +1,6 @@
-"""Scenarios: a scene file with a table [simulate] goes in; its model, start, schedules and settings come out."""
+"""Scenarios: a scene file with a table [simulate] goes in; its model, start, schedules and settings
+come out.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -38,9 +40,11 @@ LAWS = {  # kinds of controllers and what each has
 
 @dataclass(frozen=True, eq=False)
 class Scenario:
-    """A motion to simulate: a model, its start (q0, v0), and what ``st.simulate`` takes besides, as data.
+    """A motion to simulate: a model, its start (q0, v0), and what ``st.simulate`` takes besides, as
+    data.
 
-    duration (s) from t = 0 on; controller, legs as in ``simulate``; settings: the rest of its arguments.
+    duration (s) from t = 0 on; controller, legs as in ``simulate``; settings: the rest of its
+    arguments.
     """
 
     model: Model
@@ -52,31 +56,52 @@ class Scenario:
     settings: dict = field(default_factory=dict)
 
     def simulate(self, **changes) -> Trajectory:
-        """Return the motion; changes are arguments of ``st.simulate`` that take the place of the scenario's."""
+        """Return the motion; changes are arguments of ``st.simulate`` that take the place of the
+        scenario's.
+        """
         own = {"controller": self.controller, "t_span": self.duration} | self.settings
         own |= {} if self.legs is None else {"legs": self.legs}
         return simulate(self.model, self.q0, self.v0, **own | changes)
 
     def film(self, motion: Trajectory, path: str | Path, frames: int | Sequence[float] = 8) -> Path:
-        """Draw moments of a motion: torso, legs, tail and the ground's forces; frames: how many, or their times (s)."""
+        """Draw moments of a motion: torso, legs, tail and the ground's forces; frames: how many, or
+        their times (s).
+        """
         model, p = self.model, self.model.parameters
         look = {"tail_mount": p["tail_mount"]}
         look |= {"semi_axes": p["torso_semi_axes"]} if "torso_semi_axes" in p else {}
-        look |= {} if self.legs is None else {"legs": leg_joints(model, motion, self.legs.curve.at(motion.t)[0])}
-        return filmstrip(motion, model.tail_points(motion.q), path, frames, com=centre_of_mass(model, motion), **look)
+        look |= (
+            {}
+            if self.legs is None
+            else {"legs": leg_joints(model, motion, self.legs.curve.at(motion.t)[0])}
+        )
+        return filmstrip(
+            motion,
+            model.tail_points(motion.q),
+            path,
+            frames,
+            com=centre_of_mass(model, motion),
+            **look,
+        )
 
     def summary(self, motion: Trajectory) -> dict:
-        """Return what a motion came to: take-off, apex, how it ends, peak forces, steps and time; SI."""
+        """Return what a motion came to: take-off, apex, how it ends, peak forces, steps and time;
+        SI.
+        """
         return summary(self.model, motion)
 
 
-def scenario(path: str | Path, folder: str | Path | None = None, changes: Mapping | None = None) -> Scenario:
+def scenario(
+    path: str | Path, folder: str | Path | None = None, changes: Mapping | None = None
+) -> Scenario:
     """Return what a scene file's table [simulate] describes.
 
     folder: the generated one, by default generated/<scene>, made first where it is missing.
-    changes: new values by name, of parameters of the model, or of keys below [simulate], such as "duration",
+    changes: new values by name, of parameters of the model, or of keys below [simulate], such as
+    "duration",
     "start.pitch" or "legs.moves.0.rate".
-    Raises SimulationError with field, value and remedy, ModelError where parameters are wrong or the folder is of
+    Raises SimulationError with field, value and remedy, ModelError where parameters are wrong or
+    the folder is of
     another scene.
     """
     scene = read_scene(path, SimulationError)
@@ -85,7 +110,9 @@ def scenario(path: str | Path, folder: str | Path | None = None, changes: Mappin
     parameters = {name: value for name, value in (changes or {}).items() if name not in own}
     for name in parameters:
         if "." in name:
-            raise SimulationError(f"change {name!r}: unknown; needs a parameter, or a key below [simulate]")
+            raise SimulationError(
+                f"change {name!r}: unknown; needs a parameter, or a key below [simulate]"
+            )
     model = model_of(scene, path, folder, parameters)
     return scenario_of(model, changed(table, own), Path(path).parent)
 
@@ -97,13 +124,20 @@ def scenario_of(model: Model, table: Mapping, parent: Path) -> Scenario:
         raise SimulationError("simulate.duration: no value: needs seconds")
     legs = _legs(table["legs"]) if "legs" in table else None
     reference = _reference(model, table["reference"], parent) if "reference" in table else None
-    acting = {"controller": _controller(model, table.get("controller", {"kind": "none"}), reference)}
+    acting = {
+        "controller": _controller(model, table.get("controller", {"kind": "none"}), reference)
+    }
     acting |= {} if legs is None else {"legs": legs}
     settings = {name: table[name] for name in ("method", *NUMBERS) if name in table}
     start = _start(model, table.get("start", {}), reference, acting | _of_settling(settings))
     q0, v0, still = start
     return Scenario(
-        model, q0, v0, positive("simulate.duration", table["duration"]), settings=settings | still, **acting
+        model,
+        q0,
+        v0,
+        positive("simulate.duration", table["duration"]),
+        settings=settings | still,
+        **acting,
     )
 
 
@@ -123,7 +157,10 @@ def _legs(table) -> Legs:
     table = _checked("simulate.legs", table, LEGS)
     missing = [name for name in ("gamma", "delta") if name not in table]
     if missing or {"moves", "times"} <= set(table):
-        raise SimulationError(f"simulate.legs: value {dict(table)!r}: needs gamma, delta, and moves or times, not both")
+        raise SimulationError(
+            f"simulate.legs: value {dict(table)!r}: needs gamma, delta, and moves or times, not "
+            "both"
+        )
     if "times" in table:
         return Legs(table["times"], table["gamma"], table["delta"])
     start = [finite(f"simulate.legs.{name}", table[name]) for name in ("gamma", "delta")]
@@ -137,9 +174,13 @@ def _reference(model: Model, table, parent: Path):
         try:
             return Trajectory.load(parent / str(table["file"]))
         except (OSError, ValueError) as error:
-            raise SimulationError(f"simulate.reference.file: value {table['file']!r}: {error}") from error
+            raise SimulationError(
+                f"simulate.reference.file: value {table['file']!r}: {error}"
+            ) from error
     if not {"times", "bends"} <= set(table) or "file" in table:
-        raise SimulationError(f"simulate.reference: value {dict(table)!r}: needs times and bends, or a file")
+        raise SimulationError(
+            f"simulate.reference: value {dict(table)!r}: needs times and bends, or a file"
+        )
     return Reference.of_bends(model, table["times"], table["bends"], table.get("blend", "quintic"))
 
 
@@ -163,7 +204,11 @@ def _controller(model: Model, given, reference) -> Controller:
 def _law(model: Model, where: str, table: Mapping, reference) -> Controller:
     kind = table.get("kind")
     known(f"{where}.kind", kind, LAWS, SimulationError)
-    own = {name: value for name, value in _checked(where, table, ("kind", *LAWS[kind])).items() if name != "kind"}
+    own = {
+        name: value
+        for name, value in _checked(where, table, ("kind", *LAWS[kind])).items()
+        if name != "kind"
+    }
     if kind == "none":
         return None
     if kind == "damping":
@@ -171,7 +216,9 @@ def _law(model: Model, where: str, table: Mapping, reference) -> Controller:
     if kind == "torques":
         return TorqueTable(**{"times": None, "torques": None} | own)
     if reference is None:
-        raise SimulationError(f"{where}: kind 'pfl' tracks a reference: add a table [simulate.reference]")
+        raise SimulationError(
+            f"{where}: kind 'pfl' tracks a reference: add a table [simulate.reference]"
+        )
     return Pfl(model, reference, **{"kp": KP, "kd": KD} | own)
 
 
@@ -185,7 +232,9 @@ def _start(model: Model, table, reference, acting: dict) -> tuple[np.ndarray, np
     if "settle" not in table:
         return q, v, {}
     if v.any():
-        raise SimulationError("simulate.start.settle: a start that settles has no velocity and no rate: remove them")
+        raise SimulationError(
+            "simulate.start.settle: a start that settles has no velocity and no rate: remove them"
+        )
     rest = _checked("simulate.start.settle", table["settle"], ("rounds", "duration"))
     q, v, bristles = settle(model, q, **acting | dict(rest))
     return q, v, {"bristles0": bristles}
@@ -195,7 +244,9 @@ def _pose(table) -> np.ndarray:
     """Position and quaternion of R = Rz(yaw) Rx(pitch) Ry(roll)."""
     from scipy.spatial.transform import Rotation
 
-    height, pitch, roll, yaw = (finite(f"simulate.start.{name}", table.get(name, 0.0)) for name in ("height", *ANGLES))
+    height, pitch, roll, yaw = (
+        finite(f"simulate.start.{name}", table.get(name, 0.0)) for name in ("height", *ANGLES)
+    )
     turn = Rotation.from_euler("ZXY", [yaw, pitch, roll])
     return np.array([0, 0, height, *np.roll(turn.as_quat(), 1)])
 

@@ -1,4 +1,6 @@
-"""What acts in a run: controllers and legs go in; the C interface's record of them and times to stop at come out."""
+"""What acts in a run: controllers and legs go in; the C interface's record of them and times to
+stop at come out.
+"""
 
 import ctypes
 
@@ -11,13 +13,17 @@ from .records import Records
 
 
 class Drive:
-    """Controllers and legs as the C interface takes them; ``error`` keeps what a function of the user's raised."""
+    """Controllers and legs as the C interface takes them; ``error`` keeps what a function of the
+    user's raised.
+    """
 
     def __init__(self, records: Records, controller: Controller, legs: Piecewise | None = None):
         self.records, self.model, self.error = records, records.model, None
         self.nt = self.model.nv - 6
         self.float_errors = np.geterr()  # the user's: SciPy's methods work with their own
-        pairs = [(begin, self._own(parts_of(each, self.nt))) for begin, each in phases_of(controller)]
+        pairs = [
+            (begin, self._own(parts_of(each, self.nt))) for begin, each in phases_of(controller)
+        ]
         self.parts = [parts for _, parts in pairs]
         self.legs = legs
         stops = {*self._kinks(pairs), *([] if legs is None else legs.kinks(2).tolist())}
@@ -28,14 +34,18 @@ class Drive:
             "drive",
             phases=len(pairs),
             begins=begins,
-            controllers=records.records("controller", [self._controller(parts) for parts in self.parts]),
+            controllers=records.records(
+                "controller", [self._controller(parts) for parts in self.parts]
+            ),
             stops=len(self.stops),
             stop_times=self.stops,
             **own,
         )
 
     def _own(self, parts: Parts) -> Parts:
-        """Return the parts as this model has them: PFL as a function of Python where its C is missing."""
+        """Return the parts as this model has them: PFL as a function of Python where its C is
+        missing.
+        """
         if parts.pfl is None or self.records.has("controller", "reference"):
             return parts
         return Parts(user=parts.pfl)
@@ -67,8 +77,12 @@ class Drive:
 
     def _table(self, curve: Piecewise) -> ctypes.Structure:
         pieces, channels, powers = curve.coefficients.shape
-        arrays = {name: self.records.array(getattr(curve, name)) for name in ("times", "coefficients")}
-        return self.records.record("piecewise", pieces=pieces, channels=channels, degree=powers - 1, **arrays)
+        arrays = {
+            name: self.records.array(getattr(curve, name)) for name in ("times", "coefficients")
+        }
+        return self.records.record(
+            "piecewise", pieces=pieces, channels=channels, degree=powers - 1, **arrays
+        )
 
     def _callback(self, user):
         """Return a C function that calls the user's; what that raises is kept, and ends the run."""
@@ -88,14 +102,21 @@ class Drive:
         return function
 
     def _user_torque(self, user, t: float, q, v) -> np.ndarray:
-        """Torques of the user's function; what is no state any more gives none, which ends the step."""
-        q, v = (np.ctypeslib.as_array(a, (n,)).copy() for a, n in ((q, self.model.nq), (v, self.model.nv)))
+        """Torques of the user's function; what is no state any more gives none, which ends the
+        step.
+        """
+        q, v = (
+            np.ctypeslib.as_array(a, (n,)).copy()
+            for a, n in ((q, self.model.nq), (v, self.model.nv))
+        )
         if not (np.isfinite(q).all() and np.isfinite(v).all()):
             return np.full(self.nt, np.nan)
         with np.errstate(**self.float_errors):
             result = np.asarray(user(t, q, v), float)
         if result.shape != (self.nt,) or not np.isfinite(result).all():
-            raise SimulationError(f"the controller gave {result!r} at t = {t:.6g} s, not {self.nt} finite torques")
+            raise SimulationError(
+                f"the controller gave {result!r} at t = {t:.6g} s, not {self.nt} finite torques"
+            )
         return result
 
 
@@ -104,5 +125,7 @@ def _native(law: NativeTorque) -> dict:
     native = isinstance(law.function, ctypes._CFuncPtr)
     function = ctypes.cast(law.function, ctypes.c_void_p).value if native else law.function
     if not isinstance(function, int) or function <= 0 or not isinstance(law.context, int | None):
-        raise SimulationError(f"NativeTorque: {law!r}: give a ctypes function or an address, and an address or None")
+        raise SimulationError(
+            f"NativeTorque: {law!r}: give a ctypes function or an address, and an address or None"
+        )
     return {"function": function, "context": law.context}

@@ -1,4 +1,6 @@
-"""Flights abreast: many starts and steps that all share go in; the generated C makes several flights at once."""
+"""Flights abreast: many starts and steps that all share go in; the generated C makes several
+flights at once.
+"""
 
 import ctypes
 from dataclasses import dataclass
@@ -14,13 +16,16 @@ from .piecewise import Piecewise
 from .records import structure
 from .start import Start
 
-MANY = 1_000_000  # steps of all runs: from here on compiling the C of flights pays, which takes a second or two
+# steps of all runs: from here on compiling the C of flights pays, which takes a second or two
+MANY = 1_000_000
 LONG = 1_000_000  # steps of one run: beyond, what all runs share fills the memory
 
 
 @dataclass(frozen=True, eq=False)
 class Steps:
-    """Steps that all runs share: lengths (n,) in s, torques (n, 3, 2m) in N m or None, where samples follow (n,)."""
+    """Steps that all runs share: lengths (n,) in s, torques (n, 3, 2m) in N m or None, where
+    samples follow (n,).
+    """
 
     lengths: np.ndarray
     torques: np.ndarray | None
@@ -28,7 +33,9 @@ class Steps:
 
     @classmethod
     def planned(cls, start: Start, drive: Drive, step: float) -> "Steps":
-        """Return the steps between samples and stops, all as long in between and about ``step`` (s)."""
+        """Return the steps between samples and stops, all as long in between and about ``step``
+        (s).
+        """
         edges = _edges(start, drive)
         left, slack = _parts(edges)
         counts = _counts(edges, step)
@@ -41,7 +48,9 @@ class Steps:
         curve = drive.parts[0].torques
         if curve is None:
             return cls(lengths, None, due.astype(np.intc))
-        torques = np.stack([at(curve, begin), at(curve, (begin + end) / 2), before(curve, end)], axis=1)
+        torques = np.stack(
+            [at(curve, begin), at(curve, (begin + end) / 2), before(curve, end)], axis=1
+        )
         return cls(lengths, torques, due.astype(np.intc))
 
 
@@ -76,7 +85,11 @@ def before(curve: Piecewise, t: np.ndarray) -> np.ndarray:
 def pays(memory: Memory, drive: Drive, method: Method) -> bool:
     """Tell whether runs can be made abreast, and are so many that it pays."""
     start, parts = memory.start, drive.parts[0]
-    if method.name != "rk4" or "flights" not in memory.records.model.manifest or len(drive.parts) > 1:
+    if (
+        method.name != "rk4"
+        or "flights" not in memory.records.model.manifest
+        or len(drive.parts) > 1
+    ):
         return False
     if any(part is not None for part in (parts.pfl, parts.native, parts.user)):
         return False
@@ -95,11 +108,18 @@ class Abreast:
         self.function = model.many.flights.function(f"{model.name}_side_by_side_flights")
         self.steps = Steps.planned(memory.start, drive, method.settings["step"])
         damping, curve, times = drive.parts[0].damping, drive.parts[0].torques, memory.start.times
-        sampled = 0.0 if curve is None else np.vstack([at(curve, times[:1]), before(curve, times[1:])])
+        sampled = (
+            0.0 if curve is None else np.vstack([at(curve, times[:1]), before(curve, times[1:])])
+        )
         self.torques = np.asarray(sampled, dtype)
-        shared = {"lengths": self.steps.lengths, "damping": np.zeros(drive.nt) if damping is None else damping}
+        shared = {
+            "lengths": self.steps.lengths,
+            "damping": np.zeros(drive.nt) if damping is None else damping,
+        }
         shared |= {} if self.steps.torques is None else {"torques": self.steps.torques}
-        self.arrays = {name: np.ascontiguousarray(a, dtype) for name, a in shared.items()} | {"due": self.steps.due}
+        self.arrays = {name: np.ascontiguousarray(a, dtype) for name, a in shared.items()} | {
+            "due": self.steps.due
+        }
 
     @property
     def groups(self) -> int:
@@ -115,10 +135,21 @@ class Abreast:
         rows = slice(self.runs(group).start, self.runs(group).stop)
         state, out = self.memory.state, self.memory.out
         arrays = {"parameters": np.ascontiguousarray(self.memory.parameters.vectors[rows])}
-        arrays |= {"q": state["q"][rows], "v": state["v"][rows], "q_out": out["q"][rows], "v_out": out["v"][rows]}
+        arrays |= {
+            "q": state["q"][rows],
+            "v": state["v"][rows],
+            "q_out": out["q"][rows],
+            "v_out": out["v"][rows],
+        }
         arrays |= self.arrays | {"work": aligned(self.work, self.dtype)}
-        numbers = {"count": len(self.runs(group)), "samples": out["q"].shape[1], "steps": len(self.steps.lengths)}
-        record = self.record(**numbers, pause=PAUSE, **{name: a.ctypes.data for name, a in arrays.items()})
+        numbers = {
+            "count": len(self.runs(group)),
+            "samples": out["q"].shape[1],
+            "steps": len(self.steps.lengths),
+        }
+        record = self.record(
+            **numbers, pause=PAUSE, **{name: a.ctypes.data for name, a in arrays.items()}
+        )
         while record.step < record.steps:
             if ended.is_set():
                 return None

@@ -1,4 +1,6 @@
-"""Runs of the generated C: starts, a drive and a method go in; samples, and what ended each run, come out."""
+"""Runs of the generated C: starts, a drive and a method go in; samples, and what ended each run,
+come out.
+"""
 
 import ctypes
 from dataclasses import dataclass
@@ -21,10 +23,19 @@ MOST_STEPS = 2**31 - 1  # that the C interface counts
 PAUSE = 2000  # steps between looks at signals, such as Ctrl-C
 COUNTS = ("steps", "rejected", "evaluations", "factorisations")
 WHY = {
-    NOT_FINITE: "the state is not finite any more: is the step too long, or a velocity or torque too large?",
-    NOT_POSITIVE_DEFINITE: "the inertia matrix is not positive definite: is the step too long, or a torque too large?",
-    OUT_OF_RANGE: "a segment is bent beyond the scene's bend_range: is the torque too large, or the range too small?",
-    STEP_TOO_SMALL: "the tolerance would need steps that are too short: is the motion stiff, or rtol too small?",
+    NOT_FINITE: (
+        "the state is not finite any more: is the step too long, or a velocity or torque too large?"
+    ),
+    NOT_POSITIVE_DEFINITE: (
+        "the inertia matrix is not positive definite: is the step too long, or a torque too large?"
+    ),
+    OUT_OF_RANGE: (
+        "a segment is bent beyond the scene's bend_range: is the torque "
+        "too large, or the range too small?"
+    ),
+    STEP_TOO_SMALL: (
+        "the tolerance would need steps that are too short: is the motion stiff, or rtol too small?"
+    ),
     TOO_MANY_STEPS: "most_steps were not enough: is the motion stiff, or rtol too small?",
     TORQUE_FAILED: "the compiled torque function did not return 0: what has it refused?",
 }
@@ -32,7 +43,9 @@ WHY = {
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """What a method gives: samples of the motion up to where it came, and what ended it before its end."""
+    """What a method gives: samples of the motion up to where it came, and what ended it before its
+    end.
+    """
 
     t: np.ndarray
     q: np.ndarray
@@ -45,7 +58,9 @@ class Samples:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What a run came to: samples written, its end (s), counts and events, what failed, a stop between samples."""
+    """What a run came to: samples written, its end (s), counts and events, what failed, a stop
+    between samples.
+    """
 
     done: int
     end: float
@@ -55,17 +70,29 @@ class Outcome:
 
 
 class Memory:
-    """Arrays of k runs: parameters; states (k, size), from start to end; samples (k, intervals + 1, size)."""
+    """Arrays of k runs: parameters; states (k, size), from start to end; samples (k, intervals + 1,
+    size).
+    """
 
     def __init__(self, records: Records, start: Start, ground: Ground, parameters: RunParameters):
         model, dtype = records.model, records.dtype
         self.records, self.start, self.ground, self.parameters = records, start, ground, parameters
-        self.state = {"q": np.array(start.q0, dtype, order="C"), "v": np.array(start.v0, dtype, order="C")}
+        self.state = {
+            "q": np.array(start.q0, dtype, order="C"),
+            "v": np.array(start.v0, dtype, order="C"),
+        }
         sizes = {"q": model.nq, "v": model.nv, "tau": model.nv - 6, "bristles": 2 * ground.points}
         if ground.points:
             self.state["bristles"] = np.array(ground.bristles.reshape(start.runs, -1), dtype)
-        self.out = {name: np.zeros((start.runs, start.intervals + 1, size), dtype) for name, size in sizes.items()}
-        arrays = {"parameters": parameters.vectors} | self.state | {f"{name}_out": a for name, a in self.out.items()}
+        self.out = {
+            name: np.zeros((start.runs, start.intervals + 1, size), dtype)
+            for name, size in sizes.items()
+        }
+        arrays = (
+            {"parameters": parameters.vectors}
+            | self.state
+            | {f"{name}_out": a for name, a in self.out.items()}
+        )
         places = [(member, a.ctypes.data, a.strides[0]) for member, a in arrays.items()]
         self.places = [place for place in places if records.has("run", place[0])]
 
@@ -75,11 +102,19 @@ class Memory:
 
 
 class CompiledRun:
-    """A record of the generated C that takes up one run of a memory after another; each thread needs its own."""
+    """A record of the generated C that takes up one run of a memory after another; each thread
+    needs its own.
+    """
 
     def __init__(self, memory: Memory, drive: Drive, method: Method):
         records, start, ground = memory.records, memory.start, memory.ground
-        self.memory, self.records, self.drive, self.start, self.ground = memory, records, drive, start, ground
+        self.memory, self.records, self.drive, self.start, self.ground = (
+            memory,
+            records,
+            drive,
+            start,
+            ground,
+        )
         self.model = records.model
         members = dict(start_members(method), pause=PAUSE, samples=start.intervals + 1)
         members["times"] = records.array(start.times)
@@ -114,7 +149,9 @@ class CompiledRun:
         return found
 
     def go(self, ended: Event | None = None) -> int:
-        """Advance to the end, to what ends the run before, or till ``ended`` is set; return the status."""
+        """Advance to the end, to what ends the run before, or till ``ended`` is set; return the
+        status.
+        """
         status = PAUSED
         while status == PAUSED and not (ended and ended.is_set()):
             status = self.rollout(self.address)
@@ -126,12 +163,20 @@ class CompiledRun:
         info = {name: getattr(record, name) for name in COUNTS}
         if self.ground.points:
             count = min(record.events, MOST_EVENTS)
-            events = zip(self.event_times[:count].tolist(), self.event_kinds[:count].tolist(), strict=True)
+            events = zip(
+                self.event_times[:count].tolist(), self.event_kinds[:count].tolist(), strict=True
+            )
             info["events"] = [self.ground.event(t, number) for t, number in events]
         failure = self.drive.error
         if failure is None and status not in (0, STOPPED_AT_EVENT):
             failure = failed(status, record.t)
-        return Outcome(record.done, record.t, info, failure, self._stop() if status == STOPPED_AT_EVENT else None)
+        return Outcome(
+            record.done,
+            record.t,
+            info,
+            failure,
+            self._stop() if status == STOPPED_AT_EVENT else None,
+        )
 
     def samples(self, status: int) -> Samples:
         """Return the samples written, and what a status means."""
@@ -147,7 +192,10 @@ class CompiledRun:
         pointer = ctypes.c_void_p
         state_rate = self.function("state_rate", self.records.real, pointer, pointer, pointer)
         state_rate(self.address, self.record.t, *(a.ctypes.data for a in (y, y_dot, tau)))
-        return {name: array.copy() for name, array in state.items()} | {"t": self.record.t, "tau": tau}
+        return {name: array.copy() for name, array in state.items()} | {
+            "t": self.record.t,
+            "tau": tau,
+        }
 
 
 def sampled(times: np.ndarray, arrays: dict[str, np.ndarray], outcome: Outcome) -> Samples:
@@ -163,7 +211,9 @@ def sampled(times: np.ndarray, arrays: dict[str, np.ndarray], outcome: Outcome) 
 
 def start_members(method: Method) -> dict:
     """Return a method's settings as members of the run's record."""
-    own = {name: x for name, x in method.settings.items() if name not in ("first_step", "most_steps")}
+    own = {
+        name: x for name, x in method.settings.items() if name not in ("first_step", "most_steps")
+    }
     own["step"] = method.settings.get("step", method.settings.get("first_step", 0))
     return own | {"most_steps": int(min(method.settings.get("most_steps", np.inf), MOST_STEPS))}
 

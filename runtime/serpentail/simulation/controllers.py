@@ -10,12 +10,16 @@ from ..errors import SimulationError
 from .pfl import Pfl
 from .piecewise import Piecewise, checked_nodes, linear
 
-CHOICES = "None, Damping, TorqueTable, TorqueCurve, Pfl, Phases, NativeTorque or a function (t, q, v)"
+CHOICES = (
+    "None, Damping, TorqueTable, TorqueCurve, Pfl, Phases, NativeTorque or a function (t, q, v)"
+)
 
 
 @dataclass(frozen=True, eq=False)
 class Parts:
-    """What one controller adds up: damping (2m,), torques, a tracked reference, a function of C or of Python."""
+    """What one controller adds up: damping (2m,), torques, a tracked reference, a function of C or
+    of Python.
+    """
 
     damping: np.ndarray | None = None
     torques: Piecewise | None = None
@@ -42,7 +46,9 @@ class Damping:
 
 @dataclass(frozen=True)
 class TorqueTable:
-    """Torques (K, 2m) in N m at increasing times (K,) in s: linear in between, held outside; less damping q_t_dot."""
+    """Torques (K, 2m) in N m at increasing times (K,) in s: linear in between, held outside; less
+    damping q_t_dot.
+    """
 
     times: object
     torques: object
@@ -64,15 +70,19 @@ class TorqueCurve:
     def parts(self, nt: int) -> Parts:
         """Return what it adds up for 2m tail coordinates."""
         if not isinstance(self.torques, Piecewise) or self.torques.channels != nt:
-            raise SimulationError(f"TorqueCurve: torques {self.torques!r}: give a Piecewise of {nt} channels")
+            raise SimulationError(
+                f"TorqueCurve: torques {self.torques!r}: give a Piecewise of {nt} channels"
+            )
         return Parts(_damping(self.damping, nt), self.torques)
 
 
 @dataclass(frozen=True)
 class NativeTorque:
-    """A compiled function, ``int f(void *context, real t, const real *q, const real *v, real *tau)``, 0 for success.
+    """A compiled function, ``int f(void *context, real t, const real *q, const real *v, real
+    *tau)``, 0 for success.
 
-    function: a ctypes function, or an address; context: an address, or None.  The caller keeps both alive.
+    function: a ctypes function, or an address; context: an address, or None.  The caller keeps both
+    alive.
     """
 
     function: object
@@ -85,7 +95,9 @@ class NativeTorque:
 
 @dataclass(frozen=True, eq=False)
 class Phases:
-    """Controllers one after another: pairs of a time (s), increasing, and the controller that acts from then on."""
+    """Controllers one after another: pairs of a time (s), increasing, and the controller that acts
+    from then on.
+    """
 
     phases: tuple
 
@@ -94,14 +106,27 @@ class Phases:
         try:
             pairs = tuple((begin, controller) for begin, controller in self.phases)
         except (TypeError, ValueError):
-            raise SimulationError(f"Phases: {self.phases!r}: give pairs (time, controller)") from None
+            raise SimulationError(
+                f"Phases: {self.phases!r}: give pairs (time, controller)"
+            ) from None
         begins = (
-            real_array("Phases: times", [begin for begin, _ in pairs], error=SimulationError) if pairs else np.ones(0)
+            real_array("Phases: times", [begin for begin, _ in pairs], error=SimulationError)
+            if pairs
+            else np.ones(0)
         )
-        if begins.ndim != 1 or not len(begins) or not np.isfinite(begins).all() or (np.diff(begins) <= 0).any():
-            raise SimulationError(f"Phases: times {begins.tolist()}: give one or more, finite and increasing, in s")
+        if (
+            begins.ndim != 1
+            or not len(begins)
+            or not np.isfinite(begins).all()
+            or (np.diff(begins) <= 0).any()
+        ):
+            raise SimulationError(
+                f"Phases: times {begins.tolist()}: give one or more, finite and increasing, in s"
+            )
         if any(isinstance(controller, Phases) for _, controller in pairs):
-            raise SimulationError("Phases: one of the controllers is Phases itself: put all pairs in one list")
+            raise SimulationError(
+                "Phases: one of the controllers is Phases itself: put all pairs in one list"
+            )
         object.__setattr__(self, "phases", pairs)
 
 
@@ -114,7 +139,9 @@ def phases_of(controller: Controller) -> tuple[tuple[float, object], ...]:
 
 
 def parts_of(controller: Controller, nt: int) -> Parts:
-    """Return the parts of one controller for 2m tail coordinates; SimulationError where it cannot be one."""
+    """Return the parts of one controller for 2m tail coordinates; SimulationError where it cannot
+    be one.
+    """
     if controller is None:
         return Parts()
     if isinstance(controller, Pfl):

@@ -7,7 +7,9 @@ from .ground import Ground
 
 
 def judged(model, found: Samples, ground: Ground) -> Trajectory:
-    """Return the trajectory of samples, or raise what ended the run, which keeps the trajectory up to there."""
+    """Return the trajectory of samples, or raise what ended the run, which keeps the trajectory up
+    to there.
+    """
     if not len(found.t):
         raise found.failure
     try:
@@ -23,9 +25,13 @@ def judged(model, found: Samples, ground: Ground) -> Trajectory:
 
 
 def measured(model, found: Samples, ground: Ground) -> Trajectory:
-    """Return samples with energies, momenta and forces; StateError where these are beyond numbers."""
+    """Return samples with energies, momenta and forces; StateError where these are beyond
+    numbers.
+    """
     info = found.info | {"model": model.name}
-    info["parameters"] = {name: list(x) if isinstance(x, tuple) else x for name, x in model.parameters.items()}
+    info["parameters"] = {
+        name: list(x) if isinstance(x, tuple) else x for name, x in model.parameters.items()
+    }
     measures = *model.energy(found.q, found.v), *model.momentum(found.q, found.v)
     contact = ground.contact(model, found.t, (found.q, found.v, found.tau, found.bristles))
     return Trajectory(found.t, found.q, found.v, found.tau, *measures, info, contact)

@@ -1,4 +1,6 @@
-"""Integration methods: a name and settings go in; a checked choice, and why it was made, come out."""
+"""Integration methods: a name and settings go in; a checked choice, and why it was made, come
+out.
+"""
 
 from dataclasses import dataclass
 
@@ -12,10 +14,13 @@ ADAPTIVE = ("tsit5", "ros34pw2")
 SCIPY = ("dop853", "lsoda")
 SETTINGS = {
     **dict.fromkeys(FIXED, ("step",)),
-    **dict.fromkeys(ADAPTIVE, ("rtol", "atol", "first_step", "least_step", "most_step", "most_steps")),
+    **dict.fromkeys(
+        ADAPTIVE, ("rtol", "atol", "first_step", "least_step", "most_step", "most_steps")
+    ),
     **dict.fromkeys(SCIPY, ("rtol", "atol")),
 }
-STIFF = 5e3  # 1/s: a fastest decay beyond this limits the steps of an explicit method, not their accuracy
+# 1/s: a fastest decay beyond this limits the steps of an explicit method, not their accuracy
+STIFF = 5e3
 LEAST = 100  # roundings that a relative tolerance must allow, as SciPy's methods ask
 SINGLE = {"tsit5": 1e-4, "ros34pw2": 1e-3}  # tolerances in single precision
 
@@ -36,40 +41,60 @@ class Method:
 
 
 def checked_method(name: str, settings: dict, available, single: bool) -> Method:
-    """Return a method by its name with settings checked and filled in; SimulationError names what is wrong."""
+    """Return a method by its name with settings checked and filled in; SimulationError names what
+    is wrong.
+    """
     known = [each for each in SETTINGS if each in available or each in SCIPY]
     if not isinstance(name, str) or name not in known:
         raise SimulationError(f"method {name!r}: choose one of auto, {', '.join(known)}")
     unknown = [key for key in settings if key not in SETTINGS[name]]
     if unknown:
         has = ", ".join((*SETTINGS[name], "output_step"))
-        raise SimulationError(f"{name} has no setting {', '.join(map(repr, unknown))}; it has {has}")
+        raise SimulationError(
+            f"{name} has no setting {', '.join(map(repr, unknown))}; it has {has}"
+        )
     checked = {key: positive(key, value) for key, value in settings.items()}
     least = LEAST * np.finfo(np.float32 if single and name not in SCIPY else float).eps
     if checked.get("rtol", 1.0) < least:
-        raise SimulationError(f"rtol {checked['rtol']:.3g}: too near to rounding: give {least:.2g} or more")
+        raise SimulationError(
+            f"rtol {checked['rtol']:.3g}: too near to rounding: give {least:.2g} or more"
+        )
     return Method(name, "", _defaults(name, single, checked))
 
 
 def _defaults(name: str, single: bool, given: dict) -> dict:
-    """Return settings with defaults: tolerances that suit a method and a precision, a step of 0.1 ms."""
+    """Return settings with defaults: tolerances that suit a method and a precision, a step of 0.1
+    ms.
+    """
     if name in FIXED:
         return {"step": 1e-4} | given
     if name in SCIPY:
         return ({"rtol": 1e-6, "atol": 1e-6} if single else {"rtol": 1e-10, "atol": 1e-12}) | given
     rtol = given.get("rtol", SINGLE[name] if single else 1e-4 if name == "ros34pw2" else 1e-8)
-    return {"rtol": rtol, "atol": given.get("atol", rtol), "most_step": np.inf, "most_steps": 10**6} | given
+    return {
+        "rtol": rtol,
+        "atol": given.get("atol", rtol),
+        "most_step": np.inf,
+        "most_steps": 10**6,
+    } | given
 
 
 def chosen(settings: dict, available, decay: float | None) -> tuple[str, str]:
-    """Return the method of "auto" and why; ``decay`` (1/s) is the fastest by joint damping, None on the ground."""
+    """Return the method of "auto" and why; ``decay`` (1/s) is the fastest by joint damping, None on
+    the ground.
+    """
     if "step" in settings:
-        fixed = "rk4" if decay is not None or "implicit_euler" not in available else "implicit_euler"
+        fixed = (
+            "rk4" if decay is not None or "implicit_euler" not in available else "implicit_euler"
+        )
         return fixed, "a step of a fixed length was asked for"
     if decay is None and "ros34pw2" in available:
         return "ros34pw2", "contact with the ground: stiff"
     if decay is None:
-        return "tsit5", "contact with the ground, but the scene has no `implicit` for a method that suits it"
+        return (
+            "tsit5",
+            "contact with the ground, but the scene has no `implicit` for a method that suits it",
+        )
     if decay > STIFF and "ros34pw2" in available:
         return "ros34pw2", f"joint damping decays at {decay:.2g} 1/s: stiff"
     return "tsit5", "flight" + (f", joint damping decays at {decay:.2g} 1/s" if decay else "")

@@ -1,4 +1,6 @@
-"""Functions of time: nodes go in; polynomials piece by piece, which the generated C evaluates, come out."""
+"""Functions of time: nodes go in; polynomials piece by piece, which the generated C evaluates, come
+out.
+"""
 
 from dataclasses import dataclass
 
@@ -12,7 +14,8 @@ SAME = 1e-9  # a jump that is smaller, over the largest value, is rounding
 
 @dataclass(frozen=True, eq=False)
 class Piecewise:
-    """Polynomials of t - times[k]: coefficients (pieces, channels, degree + 1), constants first; times (pieces + 1,) s.
+    """Polynomials of t - times[k]: coefficients (pieces, channels, degree + 1), constants first;
+    times (pieces + 1,) s.
 
     Before the first time and after the last the values there are held.
     """
@@ -26,7 +29,9 @@ class Piecewise:
         return self.coefficients.shape[1]
 
     def at(self, t) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Values, rates and accelerations, (channels,) or (K, channels), at t or t (K,), s; of two pieces the later."""
+        """Values, rates and accelerations, (channels,) or (K, channels), at t or t (K,), s; of two
+        pieces the later.
+        """
         t = np.asarray(t, float)
         inside = np.clip(t, self.times[0], self.times[-1])
         piece = np.clip(np.searchsorted(self.times, t, "right") - 1, 0, len(self.times) - 2)
@@ -36,7 +41,9 @@ class Piecewise:
         return value, np.where(held, 0.0, rate), np.where(held, 0.0, acceleration)
 
     def kinks(self, orders: int) -> np.ndarray:
-        """Times at which a derivative below this order jumps, beginning and end of what is held among them."""
+        """Times at which a derivative below this order jumps, beginning and end of what is held
+        among them.
+        """
         jumps = np.zeros(len(self.times), bool)
         for order in range(orders):
             c = _derived(self.coefficients, order)
@@ -64,7 +71,9 @@ def _horner(coefficients: np.ndarray, x) -> np.ndarray:
 
 
 def checked_nodes(what: str, name: str, nodes: tuple, width: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return increasing times (K,) and values (K, width), all finite; SimulationError names what is wrong."""
+    """Return increasing times (K,) and values (K, width), all finite; SimulationError names what is
+    wrong.
+    """
     times = real_array(f"{what}: times", nodes[0], error=SimulationError)
     values = real_array(f"{what}: {name}", nodes[1], error=SimulationError)
     if times.ndim != 1 or len(times) == 0 or values.shape != (len(times), width):
@@ -97,13 +106,22 @@ def spline(times: np.ndarray, values: np.ndarray, ends: object = "not-a-knot") -
 
 
 def blends(times: np.ndarray, values: np.ndarray) -> Piecewise:
-    """From rest to rest: quintics 10 s^3 - 15 s^4 + 6 s^5 between nodes, at which rate and acceleration are zero."""
+    """From rest to rest: quintics 10 s^3 - 15 s^4 + 6 s^5 between nodes, at which rate and
+    acceleration are zero.
+    """
     if len(times) == 1:
         return constant(times[0], values[0])
     rise, width = np.diff(values, axis=0), np.diff(times)[:, None]
     zero = np.zeros_like(rise)
     with np.errstate(all="ignore"):
-        rows = [values[:-1], zero, zero, 10 * rise / width**3, -15 * rise / width**4, 6 * rise / width**5]
+        rows = [
+            values[:-1],
+            zero,
+            zero,
+            10 * rise / width**3,
+            -15 * rise / width**4,
+            6 * rise / width**5,
+        ]
     if not np.isfinite(rows).all():
         raise SimulationError(f"times {times.tolist()!s:.60}: too close to each other for a blend")
     return Piecewise(times, np.stack(rows, axis=-1))

@@ -1,4 +1,6 @@
-"""Records of the generated C: a manifest's list of members goes in, ctypes structures and kept arrays come out."""
+"""Records of the generated C: a manifest's list of members goes in, ctypes structures and kept
+arrays come out.
+"""
 
 import ctypes
 from functools import cached_property, lru_cache
@@ -27,7 +29,9 @@ class Records:
 
     def record(self, name: str, **members) -> ctypes.Structure:
         """Return a record, zero but for these members; arrays are given by their addresses."""
-        found = self.types[name](**{member: self._plain(value) for member, value in members.items()})
+        found = self.types[name](
+            **{member: self._plain(value) for member, value in members.items()}
+        )
         self.kept.append(found)
         return found
 
@@ -54,7 +58,16 @@ class Records:
 
 @lru_cache(maxsize=64)
 def structure(name: str, members: tuple, real: type) -> type[ctypes.Structure]:
-    """Return the structure type of members, pairs of name and kind, made once: that takes some 40 us."""
-    kinds = {"pointer": ctypes.c_void_p, "int": ctypes.c_int, "long": ctypes.c_long, "size_t": ctypes.c_size_t}
+    """Return the structure type of members, pairs of name and kind, made once: that takes some 40
+    us.
+    """
+    kinds = {
+        "pointer": ctypes.c_void_p,
+        "int": ctypes.c_int,
+        "long": ctypes.c_long,
+        "size_t": ctypes.c_size_t,
+    }
     kinds["real"] = real
-    return type(name, (ctypes.Structure,), {"_fields_": [(member, kinds[kind]) for member, kind in members]})
+    return type(
+        name, (ctypes.Structure,), {"_fields_": [(member, kinds[kind]) for member, kind in members]}
+    )

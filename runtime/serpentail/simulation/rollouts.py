@@ -1,4 +1,6 @@
-"""Rollouts: compiled runs of many starts go in; their samples, measures and errors come out, made on all cores."""
+"""Rollouts: compiled runs of many starts go in; their samples, measures and errors come out, made
+on all cores.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -23,7 +25,9 @@ MEASURES = {"energy": ("kinetic", "potential"), "momentum": ("linear_momentum", 
 
 @dataclass(frozen=True, eq=False)
 class Source:
-    """What rollouts are of: a model, the parameters of every run, the ground, what each run came to, and its method."""
+    """What rollouts are of: a model, the parameters of every run, the ground, what each run came
+    to, and its method.
+    """
 
     model: object
     parameters: RunParameters
@@ -38,19 +42,26 @@ class Source:
 
     def trajectory(self, k: int, samples: Samples) -> Trajectory:
         """Return the trajectory of run k, or raise what ended it."""
-        return judged(self.model_of(k), replace(samples, info=samples.info | self.told), self.ground)
+        return judged(
+            self.model_of(k), replace(samples, info=samples.info | self.told), self.ground
+        )
 
 
 @dataclass(frozen=True, eq=False)
 class Rollouts:
-    """k motions, sampled at the same s times; the arrays are read-only, rows after a motion's end NaN.
+    """k motions, sampled at the same s times; the arrays are read-only, rows after a motion's end
+    NaN.
 
-    t (s,) s; q (k, s, 7+2m), v (k, s, 6+2m); tau (k, s, 2m) N m; kinetic, potential (k, s) J; linear_momentum,
+    t (s,) s; q (k, s, 7+2m), v (k, s, 6+2m); tau (k, s, 2m) N m; kinetic, potential (k, s) J;
+    linear_momentum,
     angular_momentum (k, s, 3); bristles (k, s, points, 2) m: as Trajectory has them.
-    ends (k,) s: when each run ended: at the last time, at an event of ``stop_at``, or where it failed.
+    ends (k,) s: when each run ended: at the last time, at an event of ``stop_at``, or where it
+    failed.
     errors: None or the SimulationError of each run, which keeps the trajectory up to there.
-    info: what all have in common, JSON-ready; steps, rejected, evaluations and factorisations are those of all.
-    ``rollouts[k]`` is the Trajectory of run k, with its own parameters, counts and contact, or raises its error.
+    info: what all have in common, JSON-ready; steps, rejected, evaluations and factorisations are
+    those of all.
+    ``rollouts[k]`` is the Trajectory of run k, with its own parameters, counts and contact, or
+    raises its error.
     """
 
     t: np.ndarray
@@ -91,11 +102,15 @@ class Flights:
         self.threads = 1 if of_python else min(cores(), self.tasks)
         self.model = memory.records.model
         self.outcomes: list[Outcome] = [None] * runs
-        self.source = Source(self.model, memory.parameters, memory.ground, self.outcomes, method.told)
+        self.source = Source(
+            self.model, memory.parameters, memory.ground, self.outcomes, method.told
+        )
         self.measures = {}
         for kernel in map(self.model.kernel, MEASURES):
             shapes = zip(MEASURES[kernel.name], kernel.out_shapes, strict=True)
-            self.measures |= {name: np.zeros((runs, samples, *shape), kernel.dtype) for name, shape in shapes}
+            self.measures |= {
+                name: np.zeros((runs, samples, *shape), kernel.dtype) for name, shape in shapes
+            }
         self.unmeasured: list[int] = []  # whose energy or momentum no number holds
 
     def fly(self, numbers: Iterator[int], ended: Event) -> None:
@@ -111,7 +126,11 @@ class Flights:
 
     def fly_abreast(self, groups: Iterator[int], ended: Event) -> None:
         """Take up groups of runs; those among which one cannot go on are made again, one by one."""
-        abreast, start, measures = self.abreast, self.memory.start, [self._rows(name) for name in MEASURES]
+        abreast, start, measures = (
+            self.abreast,
+            self.memory.start,
+            [self._rows(name) for name in MEASURES],
+        )
         steps = len(abreast.steps.lengths)
         info = dict.fromkeys(COUNTS, 0) | {"steps": steps, "evaluations": 4 * steps}
         for group in groups:
@@ -150,16 +169,23 @@ class Flights:
     def rollouts(self, info: dict) -> Rollouts:
         """Return what all runs came to."""
         errors = [None] * len(self.outcomes)
-        for k in sorted({*self.unmeasured, *(k for k, each in enumerate(self.outcomes) if each.failure)}):
+        for k in sorted(
+            {*self.unmeasured, *(k for k, each in enumerate(self.outcomes) if each.failure)}
+        ):
             errors[k] = self._judge(k)
-        arrays = {name: np.asarray(a, float) for name, a in (self.memory.out | self.measures).items()}
+        arrays = {
+            name: np.asarray(a, float) for name, a in (self.memory.out | self.measures).items()
+        }
         for k, outcome in enumerate(self.outcomes):
             if outcome.done < len(self.memory.start.times):
                 for array in arrays.values():
                     array[k, outcome.done :] = np.nan
         shape = (*arrays["q"].shape[:2], self.memory.ground.points, 2)
         arrays["bristles"] = arrays["bristles"].reshape(shape)
-        arrays |= {"t": np.array(self.memory.start.times), "ends": np.array([each.end for each in self.outcomes])}
+        arrays |= {
+            "t": np.array(self.memory.start.times),
+            "ends": np.array([each.end for each in self.outcomes]),
+        }
         for array in arrays.values():
             array.setflags(write=False)
         counts = {name: sum(each.info.get(name, 0) for each in self.outcomes) for name in COUNTS}
@@ -175,7 +201,9 @@ class Flights:
         except SimulationError as caught:
             trajectory, error = caught.trajectory, caught
         for name, array in self.measures.items():
-            array[k, : outcome.done] = np.nan if trajectory is None else getattr(trajectory, name)[: outcome.done]
+            array[k, : outcome.done] = (
+                np.nan if trajectory is None else getattr(trajectory, name)[: outcome.done]
+            )
         return error
 
     def _rows(self, name: str) -> Rows:

@@ -18,8 +18,8 @@ BLENDS = {"linear": linear, "quintic": blends, "spline": spline}
 class Reference:
     """Tail angles (K, 2m) in rad at increasing times (K,) in s, held outside: what Pfl can track.
 
-    blend: "quintic", from rest to rest between nodes (equal nodes hold); "spline", a cubic one through all nodes;
-    "linear", whose rate jumps.  ``curve`` is the function of time.
+    blend: "quintic", from rest to rest between nodes (equal nodes hold); "spline", a cubic one
+    through all nodes; "linear", whose rate jumps.  ``curve`` is the function of time.
     """
 
     times: object
@@ -30,20 +30,30 @@ class Reference:
     def __post_init__(self) -> None:
         """Refuse nodes that are no motion."""
         if not isinstance(self.blend, str) or self.blend not in BLENDS:
-            raise SimulationError(f"Reference: blend {self.blend!r}: give one of {', '.join(BLENDS)}")
+            raise SimulationError(
+                f"Reference: blend {self.blend!r}: give one of {', '.join(BLENDS)}"
+            )
         angles = real_array("Reference: angles", self.angles, error=SimulationError)
-        nodes = checked_nodes("Reference", "angles", (self.times, angles), angles.shape[1] if angles.ndim == 2 else 0)
+        nodes = checked_nodes(
+            "Reference", "angles", (self.times, angles), angles.shape[1] if angles.ndim == 2 else 0
+        )
         if len(nodes[0]) < 2:
             raise SimulationError("Reference: one node only: give two or more")
         object.__setattr__(self, "curve", BLENDS[self.blend](*nodes))
 
     @classmethod
     def of_bends(cls, model, times, bends, blend: str = "quintic") -> Self:
-        """Return the reference of either tail whose segments bend by (K, m, 2) rad, pitch and yaw; (K, m): pitch alone.
+        """Return the reference of either tail whose segments bend by (K, m, 2) rad, pitch and yaw;
+        (K, m): pitch alone.
 
-        A segment's bend is what its links turn in all: each of n takes 1/n of it, a continuum all of it.
+        A segment's bend is what its links turn in all: each of n takes 1/n of it, a continuum all
+        of it.
         """
-        return cls(times, shared_among_links(model, real_array("bends", bends, error=SimulationError)), blend)
+        return cls(
+            times,
+            shared_among_links(model, real_array("bends", bends, error=SimulationError)),
+            blend,
+        )
 
 
 def shared_among_links(model, bends: np.ndarray) -> np.ndarray:
@@ -51,7 +61,9 @@ def shared_among_links(model, bends: np.ndarray) -> np.ndarray:
     m = model.segments
     if bends.shape[1:] not in ((m,), (m, 2)):
         shape = f"(times, {m}) or (times, {m}, 2)"
-        raise SimulationError(f"bends has shape {bends.shape}: give {shape}: pitch, or pitch and yaw, of each segment")
+        raise SimulationError(
+            f"bends has shape {bends.shape}: give {shape}: pitch, or pitch and yaw, of each segment"
+        )
     both = bends if bends.ndim == 3 else np.stack([bends, 0 * bends], axis=-1)
     return both.reshape(len(bends), 2 * m) / (model.links or 1)
 
@@ -60,7 +72,8 @@ def shared_among_links(model, bends: np.ndarray) -> np.ndarray:
 class Legs:
     """Leg angles gamma, delta (rad) at increasing times (K,) in s: linear in between, held outside.
 
-    gamma, delta: a number, which never changes; (K,), of both legs; or (K, 2), of the right and the left leg.
+    gamma, delta: a number, which never changes; (K,), of both legs; or (K, 2), of the right and the
+    left leg.
     """
 
     times: object
@@ -72,7 +85,9 @@ class Legs:
         """Refuse nodes that are no motion."""
         times = np.atleast_1d(real_array("Legs: times", self.times, error=SimulationError))
         gamma, delta = (_both_legs(name, getattr(self, name), times) for name in ("gamma", "delta"))
-        nodes = checked_nodes("Legs", "angles", (times, np.stack([gamma, delta], axis=-1).reshape(len(times), 4)), 4)
+        nodes = checked_nodes(
+            "Legs", "angles", (times, np.stack([gamma, delta], axis=-1).reshape(len(times), 4)), 4
+        )
         object.__setattr__(self, "curve", linear(*nodes))
 
     @classmethod
@@ -82,22 +97,31 @@ class Legs:
 
     @classmethod
     def ramp(cls, gamma: float, delta: tuple[float, float], at: float, rate: float) -> Self:
-        """Legs whose delta goes from one angle to another at a rate (rad/s, of any sign) from a time (s) on: a kick."""
+        """Legs whose delta goes from one angle to another at a rate (rad/s, of any sign) from a
+        time (s) on: a kick.
+        """
         delta = real_array("Legs.ramp: delta", delta, error=SimulationError)
         if delta.shape != (2,):
-            raise SimulationError(f"Legs.ramp: delta has shape {delta.shape}: give two angles, from and to")
-        numbers = real_array("Legs.ramp: gamma, delta, at, rate", [gamma, *delta, at, rate], error=SimulationError)
+            raise SimulationError(
+                f"Legs.ramp: delta has shape {delta.shape}: give two angles, from and to"
+            )
+        numbers = real_array(
+            "Legs.ramp: gamma, delta, at, rate", [gamma, *delta, at, rate], error=SimulationError
+        )
         if not np.isfinite(numbers).all() or rate == 0 or delta[0] == delta[1]:
             given = f"Legs.ramp: delta {tuple(delta.tolist())}, at {at!r}, rate {rate!r}"
-            raise SimulationError(f"{given}: give finite numbers, two angles that differ, and a rate that is not 0")
+            raise SimulationError(
+                f"{given}: give finite numbers, two angles that differ, and a rate that is not 0"
+            )
         return cls.moves(gamma, delta[0], [{"at": at, "delta": delta[1], "rate": math.fabs(rate)}])
 
     @classmethod
     def moves(cls, gamma: float, delta: float, moves) -> Self:
-        """Legs at gamma, delta (rad) that move from time to time, both legs alike, and are held in between.
+        """Legs at gamma, delta (rad) that move from time to time, both legs alike, and are held in
+        between.
 
-        Each move is a mapping: at (s), its end's gamma, delta or both (rad), and duration (s) or rate (rad/s, of the
-        angle that goes farther).  Moves follow each other in time.
+        Each move is a mapping: at (s), its end's gamma, delta or both (rad), and duration (s) or
+        rate (rad/s, of the angle that goes farther).  Moves follow each other in time.
         """
         nodes = [(-math.inf, (gamma, delta))]
         for number, move in enumerate(moves):
@@ -119,7 +143,9 @@ MOVE = ("at", "gamma", "delta", "duration", "rate")
 
 
 def _move(field: str, move, last) -> list:
-    """Return the nodes (time, (gamma, delta)) that a move adds after the last one; SimulationError where it cannot."""
+    """Return the nodes (time, (gamma, delta)) that a move adds after the last one; SimulationError
+    where it cannot.
+    """
     if not isinstance(move, Mapping):
         raise SimulationError(f"{field}: value {move!r}: needs a table of {', '.join(MOVE)}")
     for name, value in move.items():
@@ -127,12 +153,21 @@ def _move(field: str, move, last) -> list:
         finite(f"{field}.{name}", value)
     (end, angles), at = last, move.get("at")
     if at is None or not {"gamma", "delta"} & set(move) or ("rate" in move) == ("duration" in move):
-        raise SimulationError(f"{field}: value {dict(move)!r}: needs at, gamma or delta, and one of rate, duration")
+        raise SimulationError(
+            f"{field}: value {dict(move)!r}: needs at, gamma or delta, and one of rate, duration"
+        )
     goal = move.get("gamma", angles[0]), move.get("delta", angles[1])
     way = max(abs(float(x) - float(y)) for x, y in zip(goal, angles, strict=True))
-    duration = move["duration"] if "duration" in move else way / positive(f"{field}.rate", move["rate"])
+    duration = (
+        move["duration"] if "duration" in move else way / positive(f"{field}.rate", move["rate"])
+    )
     if not 0 < duration < math.inf:
-        raise SimulationError(f"{field}: takes {duration!r} s: needs a duration above 0, and another angle than before")
+        raise SimulationError(
+            f"{field}: takes {duration!r} s: needs a duration above 0, and another angle than "
+            "before"
+        )
     if at < end:
-        raise SimulationError(f"{field}.at: value {at!r}: the move before it ends at {end:.6g} s: move it after that")
+        raise SimulationError(
+            f"{field}.at: value {at!r}: the move before it ends at {end:.6g} s: move it after that"
+        )
     return [(at + duration, goal)] if at == end else [(at, angles), (at + duration, goal)]

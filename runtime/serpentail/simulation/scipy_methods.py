@@ -11,14 +11,20 @@ from .methods import Method
 
 
 class StateRate:
-    """y = (q, v) -> y_dot by the compiled model; with ``trials``, a state that has none gives NaN, not an error."""
+    """y = (q, v) -> y_dot by the compiled model; with ``trials``, a state that has none gives NaN,
+    not an error.
+    """
 
     def __init__(self, run: CompiledRun, trials: bool):
         self.trials, self.refused = trials, None
         self.run, pointer, dtype = run, ctypes.c_void_p, run.records.dtype
         self.function = run.function("state_rate", run.records.real, pointer, pointer, pointer)
         size = sum(map(len, run.state.values()))
-        self.y, self.y_dot, self.tau = np.zeros(size, dtype), np.zeros(size, dtype), np.zeros(run.drive.nt, dtype)
+        self.y, self.y_dot, self.tau = (
+            np.zeros(size, dtype),
+            np.zeros(size, dtype),
+            np.zeros(run.drive.nt, dtype),
+        )
         self.addresses = [a.ctypes.data for a in (self.y, self.y_dot, self.tau)]
 
     def __call__(self, t: float, y: np.ndarray) -> np.ndarray:
@@ -65,7 +71,9 @@ class Tape:
 
 @np.errstate(all="ignore")  # a trial step may overflow, and is then taken again, shorter
 def integrate_by_scipy(run: CompiledRun, method: Method) -> Samples:
-    """Integrate from stop to stop; what ends the run before its end goes with the samples up to there."""
+    """Integrate from stop to stop; what ends the run before its end goes with the samples up to
+    there.
+    """
     rate = StateRate(run, method.name == "dop853")  # which takes a step with NaN again, shorter
     tape, counts = Tape(rate, run.start.times), {"steps": 0, "evaluations": 0}
     ends = [*(t for t in run.drive.stops if run.start.start < t < run.start.end), run.start.end]
@@ -81,7 +89,9 @@ def integrate_by_scipy(run: CompiledRun, method: Method) -> Samples:
             raise
         failure = error
     done = len(tape.states)
-    q, v, bristles = np.split(np.array(tape.states), [run.model.nq, run.model.nq + run.model.nv], axis=1)
+    q, v, bristles = np.split(
+        np.array(tape.states), [run.model.nq, run.model.nq + run.model.nv], axis=1
+    )
     bristles = bristles.reshape(done, run.ground.points, 2)
     return Samples(tape.times[:done], q, v, np.array(tape.torques), bristles, counts, failure)
 
@@ -99,7 +109,9 @@ def _smooth_part(rate: StateRate, method: Method, part, tape: Tape, counts: dict
             raise rate.refused
         if solver.status == "failed":
             reason = (message or "the step failed").rstrip(".").lower()
-            raise SimulationError(f"at t = {solver.t:.6g} s {reason}: is the motion stiff, or rtol too small?")
+            raise SimulationError(
+                f"at t = {solver.t:.6g} s {reason}: is the motion stiff, or rtol too small?"
+            )
         counts["steps"] += 1
         interpolant = solver.dense_output()
         for at in tape.due(solver.t):

@@ -16,7 +16,9 @@ EPS = float(np.finfo(float).eps)
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """Checked starts q0 (k, nq), v0 (k, nv) and their output grid; ``many`` tells k runs from a single one."""
+    """Checked starts q0 (k, nq), v0 (k, nv) and their output grid; ``many`` tells k runs from a
+    single one.
+    """
 
     q0: np.ndarray
     v0: np.ndarray
@@ -28,7 +30,10 @@ class Start:
     @classmethod
     def checked(cls, model, state, t_span, output_step) -> "Start":
         """Return starts; StateError or SimulationError where an argument is wrong."""
-        given = [checked_states(*item) for item in zip(("q0", "v0"), state, (model.nq, model.nv), strict=True)]
+        given = [
+            checked_states(*item)
+            for item in zip(("q0", "v0"), state, (model.nq, model.nv), strict=True)
+        ]
         many = any(array.ndim == 2 for array in given)
         q0, v0 = _paired(*given)
         norms = np.array([math.hypot(*quaternion) for quaternion in q0[:, 3:7].tolist()])
@@ -41,11 +46,15 @@ class Start:
         if len(q0) * (end - start) > MOST_SAMPLES * step:
             remedy = f"give {len(q0) * (end - start) / MOST_SAMPLES:.2g} s or more"
             whose = f" of {len(q0)} runs" if many else ""
-            raise SimulationError(f"output_step {step:.3g}: more than {MOST_SAMPLES} samples{whose}: {remedy}")
+            raise SimulationError(
+                f"output_step {step:.3g}: more than {MOST_SAMPLES} samples{whose}: {remedy}"
+            )
         checked = cls(q0, v0, start, end, max(1, round((end - start) / step)), many)
         least = max(SHORTEST, EPS * max(abs(start), abs(end)))
         if checked.interval < least:
-            raise SimulationError(f"output_step {step:.3g}: too short to move the time: give {least:.2g} s or more")
+            raise SimulationError(
+                f"output_step {step:.3g}: too short to move the time: give {least:.2g} s or more"
+            )
         return checked
 
     @property
@@ -79,7 +88,10 @@ def checked_states(name: str, value, size: int) -> np.ndarray:
     """Return finite vectors (size,) or (k, size); StateError names what is wrong."""
     array = real_array(name, value)
     if array.shape[-1:] != (size,) or array.ndim > 2 or not array.size:
-        raise StateError(f"{name} has shape {array.shape}, not ({size},) of one start state, or (k, {size}) of k runs")
+        raise StateError(
+            f"{name} has shape {array.shape}, not ({size},) of one start state, or (k, {size}) of "
+            "k runs"
+        )
     wrong = np.argwhere(~np.isfinite(array))
     if len(wrong):
         where = f" of run {wrong[0][0]}" if array.ndim == 2 else ""
@@ -88,9 +100,15 @@ def checked_states(name: str, value, size: int) -> np.ndarray:
 
 
 def _paired(q0: np.ndarray, v0: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return copies (k, size), a single one being repeated; StateError where the numbers of runs differ."""
+    """Return copies (k, size), a single one being repeated; StateError where the numbers of runs
+    differ.
+    """
     counts = {len(array) for array in (q0, v0) if array.ndim == 2}
     if len(counts) > 1:
-        raise StateError(f"q0 has {len(q0)} runs, v0 {len(v0)}: give as many of both, or one of either")
+        raise StateError(
+            f"q0 has {len(q0)} runs, v0 {len(v0)}: give as many of both, or one of either"
+        )
     runs = counts.pop() if counts else 1
-    return tuple(np.array(np.broadcast_to(array, (runs, array.shape[-1])), order="C") for array in (q0, v0))
+    return tuple(
+        np.array(np.broadcast_to(array, (runs, array.shape[-1])), order="C") for array in (q0, v0)
+    )

@@ -1,4 +1,6 @@
-"""Laws of contact, tracking and implicit steps: a model and a state go in; the errors of what must hold come out."""
+"""Laws of contact, tracking and implicit steps: a model and a state go in; the errors of what must
+hold come out.
+"""
 
 from dataclasses import replace
 
@@ -19,7 +21,11 @@ law = registry(LAWS)
 
 def legs(model: Model, time: float = 0.0) -> tuple[np.ndarray, ...]:
     """Return the legs at a time, where the model has legs."""
-    return (np.concatenate([LEGS[:4] + time * LEGS[4:], LEGS[4:]]),) if "feet" in model.contacts else ()
+    return (
+        (np.concatenate([LEGS[:4] + time * LEGS[4:], LEGS[4:]]),)
+        if "feet" in model.contacts
+        else ()
+    )
 
 
 def bristles(model: Model) -> np.ndarray:
@@ -35,14 +41,18 @@ def sunk(model: Model, s: State) -> State:
 
 @law("pfl", "forward_dynamics", units=NEAR)
 def tail_gets_the_accelerations_that_torques_are_for(model: Model, s: State):
-    """The torques of partial feedback linearisation give the wanted accelerations, relative to cond(H)."""
+    """The torques of partial feedback linearisation give the wanted accelerations, relative to
+    cond(H).
+    """
     v_dot = model.forward_dynamics(s.q, s.v, model.pfl(s.q, s.v, s.accelerations))
     return relative(v_dot[6:], s.accelerations, v_dot) / sensitivity(model, s.q)
 
 
 @law("tracked_dynamics", "pfl", "forward_dynamics", units=NEAR)
 def tracking_moves_as_its_torques_do(model: Model, s: State):
-    """What gives the torques of partial feedback linearisation gives v_dot under them, relative to cond(H)."""
+    """What gives the torques of partial feedback linearisation gives v_dot under them, relative to
+    cond(H).
+    """
     tau, v_dot = model.kernel("tracked_dynamics")(s.q, s.v, s.accelerations)
     expected = model.forward_dynamics(s.q, s.v, tau)
     torques = model.pfl(s.q, s.v, s.accelerations)
@@ -55,7 +65,11 @@ def tracking_moves_as_its_torques_do(model: Model, s: State):
 @law("implicit_factor", "implicit_solve", "mass_matrix", units=NEAR)
 def implicit_steps_solve_their_system(model: Model, s: State):
     """High up, (1 - w J) k = r with J of damping and gains alone, relative to cond(H)."""
-    w, damping, high = 1e-3, np.linspace(1e-3, 2e-3, model.nv - 6), s.q + 100.0 * (np.arange(model.nq) == 2)
+    w, damping, high = (
+        1e-3,
+        np.linspace(1e-3, 2e-3, model.nv - 6),
+        s.q + 100.0 * (np.arange(model.nq) == 2),
+    )
     u = (bristles(model),) if model.contacts else ()
     H = model.mass_matrix(s.q).astype(float)
     weight, ground = ([w, 1.0], (*u, *legs(model))) if u else ([w], ())
@@ -80,10 +94,16 @@ def velocities_are_the_rates_of_the_points(model: Model, s: State):
     rate = fastest(model, s.v) + np.abs(LEGS[4:]).max()
 
     def positions(time: float) -> np.ndarray:
-        return model.contact_points(moved(s.q, s.v, time), s.v, *legs(model, time))[0][:count].astype(float)
+        return model.contact_points(moved(s.q, s.v, time), s.v, *legs(model, time))[0][
+            :count
+        ].astype(float)
 
     change, largest = slope(positions, rate)
-    return relative(model.contact_points(s.q, s.v, *legs(model))[1][:count], change, np.abs(change) + rate * largest)
+    return relative(
+        model.contact_points(s.q, s.v, *legs(model))[1][:count],
+        change,
+        np.abs(change) + rate * largest,
+    )
 
 
 @law("contact_points", units=NEAR, only="contact")
@@ -98,7 +118,9 @@ def points_are_carried_by_the_torso(model: Model, s: State):
 
 @law("contact_points", "contact_dynamics", "mass_matrix", "bias_force", units=NEAR, only="contact")
 def the_ground_accelerates_by_its_generalised_force(model: Model, s: State):
-    """H v_dot + C = [0; tau] + J^T f, where a column of J is what one speed more adds to velocities, cond(H) aside."""
+    """H v_dot + C = [0; tau] + J^T f, where a column of J is what one speed more adds to
+    velocities, cond(H) aside.
+    """
     s = sunk(model, s)
     v_dot, _, forces = model.contact_dynamics(s.q, s.v, s.tau, bristles(model), *legs(model))
     H, C = (x.astype(float) for x in (model.mass_matrix(s.q), model.bias_force(s.q, s.v)))
@@ -118,4 +140,6 @@ def the_ground_never_pulls_nor_holds_by_more_than_friction(model: Model, s: Stat
     sides, limit = forces[:, :2].astype(float), P["mu"] * forces[:, 2].astype(float)
     boxed = model.manifest["scene"]["friction"] in ("box", "paper")
     size = np.abs(sides).max(axis=1) if boxed else np.linalg.norm(sides, axis=1)
-    return relative(np.maximum(size - limit, 0) + np.maximum(-limit, 0), 0, size + np.finfo(float).tiny)
+    return relative(
+        np.maximum(size - limit, 0) + np.maximum(-limit, 0), 0, size + np.finfo(float).tiny
+    )

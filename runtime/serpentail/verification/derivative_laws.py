@@ -1,4 +1,6 @@
-"""Laws of derivatives: a model and a state go in; how far exact derivatives are from slopes along motions comes out."""
+"""Laws of derivatives: a model and a state go in; how far exact derivatives are from slopes along
+motions comes out.
+"""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -20,8 +22,12 @@ def along(s: State, time: float) -> State:
     return replace(s, q=moved(s.q, s.dq, time), v=s.v + time * s.dv, tau=s.tau + time * s.dtau)
 
 
-def slopes(model: Model, s: State, f: Callable[[State], np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Return how fast a function changes along the state's directions, and the size that its rounding scales with."""
+def slopes(
+    model: Model, s: State, f: Callable[[State], np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return how fast a function changes along the state's directions, and the size that its
+    rounding scales with.
+    """
     s = replace(s, q=np.concatenate([0 * s.q[:3], s.q[3:]]))
     rate = max(1.0, fastest(model, s.dq))
     change, largest = slope(lambda t: np.asarray(f(along(s, t)), float), rate)
@@ -39,18 +45,25 @@ def inverse_dynamics_changes_by_its_jacobians(model: Model, s: State):
     """dq, dv times a direction are the slope of H v_dot + C along it."""
     dq, dv = model.inverse_dynamics_derivatives(s.q, s.v, s.v_dot)
     return block_slope_error(
-        dq @ s.dq + dv @ s.dv, slopes(model, s, lambda at: model.inverse_dynamics(at.q, at.v, s.v_dot))
+        dq @ s.dq + dv @ s.dv,
+        slopes(model, s, lambda at: model.inverse_dynamics(at.q, at.v, s.v_dot)),
     )
 
 
-@law("mass_matrix", "inverse_dynamics", "forward_dynamics", "forward_dynamics_derivatives", units=FAR)
+@law(
+    "mass_matrix", "inverse_dynamics", "forward_dynamics", "forward_dynamics_derivatives", units=FAR
+)
 def forward_dynamics_changes_by_its_jacobians(model: Model, s: State):
-    """H times the change of v_dot is that of tau less the slope of H v_dot + C at fixed v_dot; H dtau = [0; 1]."""
+    """H times the change of v_dot is that of tau less the slope of H v_dot + C at fixed v_dot; H
+    dtau = [0; 1].
+    """
     v_dot, H = model.forward_dynamics(s.q, s.v, s.tau), model.mass_matrix(s.q).astype(float)
     dq, dv, dtau = (x.astype(float) for x in model.forward_dynamics_derivatives(s.q, s.v, s.tau))
     change, largest = slopes(model, s, lambda at: model.inverse_dynamics(at.q, at.v, v_dot))
     unit = np.eye(model.nv)[:, 6:]
-    terms = np.abs(H) @ (np.abs(dq) @ np.abs(s.dq) + np.abs(dv) @ np.abs(s.dv))  # what H times the change sums up
+    terms = np.abs(H) @ (
+        np.abs(dq) @ np.abs(s.dq) + np.abs(dv) @ np.abs(s.dv)
+    )  # what H times the change sums up
     return {
         "dq, dv": block_slope_error(-H @ (dq @ s.dq + dv @ s.dv), (change, largest + terms)),
         "dtau": relative(H @ dtau, unit, np.abs(H) @ np.abs(dtau)),
@@ -66,7 +79,10 @@ def products_are_those_with_the_jacobians(model: Model, s: State):
     vjp = model.forward_dynamics_vjp(s.q, s.v, s.tau, s.multiplier)
     terms = [np.abs(j) @ np.abs(d) for j, d in zip(J, directions, strict=True)]
     there = block_error(jvp, sum(j @ d for j, d in zip(J, directions, strict=True)), sum(terms))
-    back = [relative(x, s.multiplier @ j, np.abs(s.multiplier) @ np.abs(j)) for x, j in zip(vjp, J, strict=True)]
+    back = [
+        relative(x, s.multiplier @ j, np.abs(s.multiplier) @ np.abs(j))
+        for x, j in zip(vjp, J, strict=True)
+    ]
     return {"jvp": there, "vjp": worst(back)}
 
 
@@ -76,12 +92,16 @@ def gradient_is_the_product_with_the_jacobians(model: Model, s: State):
     J = [*model.inverse_dynamics_derivatives(s.q, s.v, s.v_dot), model.mass_matrix(s.q)]
     found = model.inverse_dynamics_vjp(s.q, s.v, s.v_dot, s.multiplier)
     sizes = [np.abs(s.multiplier) @ np.abs(j.astype(float)) for j in J]
-    return worst(relative(x, s.multiplier @ j, size) for x, j, size in zip(found, J, sizes, strict=True))
+    return worst(
+        relative(x, s.multiplier @ j, size) for x, j, size in zip(found, J, sizes, strict=True)
+    )
 
 
 @law("inverse_dynamics_vjp", "inverse_dynamics_hessian", units=FAR)
 def gradient_changes_by_the_hessian(model: Model, s: State):
-    """The Hessian times a direction is the slope of the gradient along it; turns in q commute by half a bracket."""
+    """The Hessian times a direction is the slope of the gradient along it; turns in q commute by
+    half a bracket.
+    """
     qq, qv, vv, aq = model.inverse_dynamics_hessian(s.q, s.v, s.v_dot, s.multiplier)
 
     def gradient(at: State) -> np.ndarray:
@@ -100,13 +120,18 @@ def gradient_changes_by_the_hessian(model: Model, s: State):
 
 @law("energy", "energy_derivatives", "mass_matrix", units=FAR)
 def energies_change_by_their_gradients(model: Model, s: State):
-    """The gradients of both energies times a direction are their slopes; that of kinetic energy in v is H v."""
+    """The gradients of both energies times a direction are their slopes; that of kinetic energy in
+    v is H v.
+    """
     kinetic_dq, kinetic_dv, potential_dq = model.energy_derivatives(s.q, s.v)
     change, largest = slopes(model, s, lambda at: np.hstack(model.energy(at.q, at.v)))
     found = np.array([kinetic_dq @ s.dq + kinetic_dv @ s.dv, potential_dq @ s.dq])
     size = largest + np.abs(change)
     momentum = block_error(kinetic_dv, model.mass_matrix(s.q).astype(float) @ s.v)
-    return {"slopes": worst(relative(f, c, n) for f, c, n in zip(found, change, size, strict=True)), "H v": momentum}
+    return {
+        "slopes": worst(relative(f, c, n) for f, c, n in zip(found, change, size, strict=True)),
+        "H v": momentum,
+    }
 
 
 @law("momentum", "momentum_derivatives", units=FAR)
@@ -115,7 +140,9 @@ def momentum_changes_by_its_jacobians(model: Model, s: State):
     linear_dq, linear_dv, angular_dq, angular_dv = model.momentum_derivatives(s.q, s.v)
     change, largest = slopes(model, s, lambda at: np.stack(model.momentum(at.q, at.v)))
     found = np.stack([linear_dq @ s.dq + linear_dv @ s.dv, angular_dq @ s.dq + angular_dv @ s.dv])
-    return worst(relative(f, c, n + np.abs(c)) for f, c, n in zip(found, change, largest, strict=True))
+    return worst(
+        relative(f, c, n + np.abs(c)) for f, c, n in zip(found, change, largest, strict=True)
+    )
 
 
 @law(
@@ -126,11 +153,15 @@ def momentum_changes_by_its_jacobians(model: Model, s: State):
     units=FAR,
 )
 def parameters_move_both_dynamics_alike(model: Model, s: State):
-    """H times the change of v_dot with a parameter is minus that of H v_dot + C at the same v_dot."""
+    """H times the change of v_dot with a parameter is minus that of H v_dot + C at the same
+    v_dot.
+    """
     v_dot, H = model.forward_dynamics(s.q, s.v, s.tau), model.mass_matrix(s.q).astype(float)
     forward = model.forward_dynamics_parameter_derivatives(s.q, s.v, s.tau).astype(float)
     inverse = model.inverse_dynamics_parameter_derivatives(s.q, s.v, v_dot).astype(float)
     return worst(
         relative(row, -other, size)
-        for row, other, size in zip(H @ forward, inverse, np.abs(H) @ np.abs(forward) + np.abs(inverse), strict=True)
+        for row, other, size in zip(
+            H @ forward, inverse, np.abs(H) @ np.abs(forward) + np.abs(inverse), strict=True
+        )
     )

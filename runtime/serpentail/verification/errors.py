@@ -5,7 +5,11 @@ import numpy as np
 from ..model.model import Model
 from .states import State, outputs, total_mass
 
-BLOCKS = (slice(0, 3), slice(3, 6), slice(6, None))  # of forces and accelerations: B's translation, rotation, tail
+BLOCKS = (
+    slice(0, 3),
+    slice(3, 6),
+    slice(6, None),
+)  # of forces and accelerations: B's translation, rotation, tail
 NEGLIGIBLE = 1e-6  # a block this much smaller than the largest is scaled by the largest
 DERIVATIVES = (  # functions that CasADi's own differentiation stands for
     "forward_dynamics_derivatives",
@@ -27,7 +31,9 @@ def rounding(model: Model) -> float:
 
 
 def differences(model: Model, name: str, state: State, references) -> float:
-    """Return the largest error of a function's outputs against references, in order; what is solved for, by cond(H)."""
+    """Return the largest error of a function's outputs against references, in order; what is solved
+    for, by cond(H).
+    """
     found = outputs(model, name, state).items()
     pairs = [(key, x, reference) for (key, x), reference in zip(found, references, strict=True)]
     solved = name.startswith("forward_dynamics_") and name in DERIVATIVES
@@ -40,7 +46,9 @@ def differences(model: Model, name: str, state: State, references) -> float:
 
 
 def cancelled(model: Model, output: str, state: State) -> float:
-    """Return the size of what the whole animal's translation adds to a derivative, which cancels in its turns, or 0."""
+    """Return the size of what the whole animal's translation adds to a derivative, which cancels in
+    its turns, or 0.
+    """
     speed, weights = (np.linalg.norm(x[:3]) for x in (state.v, state.multiplier))
     load = np.linalg.norm(state.v_dot[:3]) + model.parameters["gravity"]
     sizes = {"kinetic_dq": speed**2, "qq": load * weights, "aq": weights}
@@ -49,7 +57,10 @@ def cancelled(model: Model, output: str, state: State) -> float:
 
 def same_bits(model: Model, names, state: State, other: State) -> dict[str, float]:
     """Return by function how many outputs differ between two states."""
-    return {name: differing_outputs(outputs(model, name, state), outputs(model, name, other)) for name in names}
+    return {
+        name: differing_outputs(outputs(model, name, state), outputs(model, name, other))
+        for name in names
+    }
 
 
 def differing_outputs(found: dict, others: dict) -> float:
@@ -100,7 +111,8 @@ def condition(H) -> float:
 
 
 def sensitivity(model: Model, q: np.ndarray) -> float:
-    """Return the condition number that an error of v_dot is divided by; of its tail's part where H is missing.
+    """Return the condition number that an error of v_dot is divided by; of its tail's part where H
+    is missing.
 
     1 where neither H nor v_dot is there.
     """
@@ -124,7 +136,11 @@ def difference(model: Model, q: np.ndarray, output: str, x, reference) -> float:
     if output == "v_dot":
         return block_error(x, reference) / sensitivity(model, q)
     if output == "potential":
-        height = abs(q[2]) + model.parameters["tail_length"] + np.linalg.norm(model.parameters["tail_mount"])
+        height = (
+            abs(q[2])
+            + model.parameters["tail_length"]
+            + np.linalg.norm(model.parameters["tail_mount"])
+        )
         return relative(x, reference, total_mass(model) * model.parameters["gravity"] * height)
     return relative(x, reference)
 

@@ -15,7 +15,9 @@ FEW = 8  # links in a segment
 
 @dataclass(frozen=True)
 class Law:
-    """A law: how to find its error at a state, or errors by place, how large they may be, and what it needs."""
+    """A law: how to find its error at a state, or errors by place, how large they may be, and what
+    it needs.
+    """
 
     name: str
     text: str
@@ -26,7 +28,9 @@ class Law:
     only: str = ""  # real type or kind of tail of the models that it holds for
 
     def limit(self, model: Model) -> float:
-        """Return the limit; beyond a few links, the n^2 pairs that an entry of H sums cancel where they are folded."""
+        """Return the limit; beyond a few links, the n^2 pairs that an entry of H sums cancel where
+        they are folded.
+        """
         units = self.units
         if units and (model.links or model.samples) > FEW:
             units = max(units, model.segments * (model.links or model.samples) ** 2)
@@ -34,14 +38,23 @@ class Law:
 
 
 def registry(laws: list[Law]):
-    """Return a decorator that adds a function (model, state) -> error, or errors by place, to a list of laws.
+    """Return a decorator that adds a function (model, state) -> error, or errors by place, to a
+    list of laws.
 
     Its name and docstring are the law's.
     """
 
     def law(*needs: str, **limits):
         def register(error):
-            laws.append(Law(error.__name__.replace("_", " "), error.__doc__, error, needs, **limits))
+            laws.append(
+                Law(
+                    error.__name__.replace("_", " "),
+                    " ".join(error.__doc__.split()),
+                    error,
+                    needs,
+                    **limits,
+                )
+            )
             return error
 
         return register
@@ -55,9 +68,11 @@ STENCIL = (6 / 7, -15 / 56, 5 / 63, -1 / 56, 1 / 385, -1 / 5544)  # central diff
 
 
 def slope(f: Callable[[float], np.ndarray], rate: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return df/dt at t = 0 and the largest |f| used, for f made of sines and cosines of up to ``rate`` (rad/s).
+    """Return df/dt at t = 0 and the largest |f| used, for f made of sines and cosines of up to
+    ``rate`` (rad/s).
 
-    Relative to rate |f| the truncation is 8e-5 (rate step)^12 = 8e-17, and a rounding of f counts 1 / (rate step).
+    Relative to rate |f| the truncation is 8e-5 (rate step)^12 = 8e-17, and a rounding of f counts 1
+    / (rate step).
     """
     step = 0.1 / rate
     samples = [(w, f(k * step), f(-k * step)) for k, w in enumerate(STENCIL, 1)]

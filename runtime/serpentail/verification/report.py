@@ -1,4 +1,6 @@
-"""Verification: a loaded model goes in; the checks of its laws, each with its error and limit, come out as a report."""
+"""Verification: a loaded model goes in; the checks of its laws, each with its error and limit, come
+out as a report.
+"""
 
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
@@ -17,7 +19,9 @@ LAWS = (*VALUE_LAWS, *derivative_laws.LAWS, *contact_laws.LAWS)
 
 @dataclass(frozen=True)
 class Check:
-    """A law in one sentence, the largest error found, and its limit; or why the law was not checked."""
+    """A law in one sentence, the largest error found, and its limit; or why the law was not
+    checked.
+    """
 
     name: str
     law: str
@@ -44,13 +48,17 @@ def laws(model: Model) -> list[Check]:
 
 
 def check(entry: Law, model: Model, cases: list[State]) -> Check:
-    """Check one law; one that speaks of functions the scene left out is not checked, and says so."""
+    """Check one law; one that speaks of functions the scene left out is not checked, and says
+    so.
+    """
     limit, reason = entry.limit(model), unchecked(entry, model)
     if reason:
         return Check(entry.name, entry.text, 0.0, limit, omitted=reason)
     found = [item for case in cases for item in errors_at(entry, model, case)]
     if not found:
-        return Check(entry.name, entry.text, 0.0, limit, omitted="not generated: any function it speaks of")
+        return Check(
+            entry.name, entry.text, 0.0, limit, omitted="not generated: any function it speaks of"
+        )
     where, error = max(found, key=lambda item: (np.isnan(item[1]), item[1]))
     return Check(entry.name, entry.text, float(error), limit, "" if error == 0 else where)
 
@@ -59,14 +67,21 @@ def unchecked(entry: Law, model: Model) -> str:
     """Return why a law cannot be checked, or nothing."""
     made = {*model.manifest["functions"], *model.manifest["work"]}
     absent = ", ".join(name for name in entry.needs if name not in made)
-    kinds = ("", model.manifest["real"], model.manifest["scene"]["kind"], *(["contact"] if model.contacts else []))
+    kinds = (
+        "",
+        model.manifest["real"],
+        model.manifest["scene"]["kind"],
+        *(["contact"] if model.contacts else []),
+    )
     if entry.only not in kinds:
         return f"only for {entry.only} models"
     return f"not generated: {absent}" if absent else ""
 
 
 def errors_at(entry: Law, model: Model, state: State) -> Iterator[tuple[str, float]]:
-    """Yield (place, error) of one state; what the model refuses to compute is an error that is not a number."""
+    """Yield (place, error) of one state; what the model refuses to compute is an error that is not
+    a number.
+    """
     try:
         with np.errstate(all="ignore"):  # what is no number fails
             errors = entry.error(model, state)
@@ -82,8 +97,16 @@ def summary(model: Model, checks: list[Check]) -> dict:
     for entry in checks:
         error = entry.error if np.isfinite(entry.error) and not entry.omitted else None
         rows.append(asdict(entry) | {"error": error, "status": entry.status})
-    counts = {status: sum(c.status == status for c in checks) for status in ("passed", "failed", "not checked")}
-    head = {"name": model.name, "real": model.manifest["real"], "segments": model.segments, "links": model.links}
+    counts = {
+        status: sum(c.status == status for c in checks)
+        for status in ("passed", "failed", "not checked")
+    }
+    head = {
+        "name": model.name,
+        "real": model.manifest["real"],
+        "segments": model.segments,
+        "links": model.links,
+    }
     return head | {"passed": all(c.passed for c in checks), "counts": counts, "checks": rows}
 
 
@@ -97,7 +120,10 @@ def as_text(model: Model, checks: list[Check]) -> str:
         if c.omitted:
             lines.append(f"  {c.name:<{width}}  not checked: {c.omitted}")
             continue
-        lines.append(f"  {c.name:<{width}}  {c.error:>9.2g}  {c.limit:>9.2g}  {'' if c.passed else 'FAILED '}{c.where}")
+        lines.append(
+            f"  {c.name:<{width}}  {c.error:>9.2g}  {c.limit:>9.2g}  "
+            f"{'' if c.passed else 'FAILED '}{c.where}"
+        )
         if not c.passed:
             lines.append(f"  {'':<{width}}  {c.law}")
     return "\n".join(lines)

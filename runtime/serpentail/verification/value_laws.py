@@ -1,4 +1,6 @@
-"""Laws: a model and a state go in; the error of every law that the model must obey there comes out."""
+"""Laws: a model and a state go in; the error of every law that the model must obey there comes
+out.
+"""
 
 from dataclasses import replace
 from itertools import starmap
@@ -34,7 +36,9 @@ law = registry(LAWS)
 
 
 def changed_axes(top: np.ndarray, middle: np.ndarray, size: int) -> np.ndarray:
-    """Return blkdiag(top, middle, 1): how a change of axes acts on velocities, forces and accelerations."""
+    """Return blkdiag(top, middle, 1): how a change of axes acts on velocities, forces and
+    accelerations.
+    """
     X = np.eye(size)
     X[:3, :3], X[3:6, 3:6] = top, middle
     return X
@@ -71,7 +75,9 @@ def translation_carries_the_whole_mass(model: Model, s: State):
 def inverse_dynamics_is_mass_times_acceleration_plus_bias(model: Model, s: State):
     """Inverse dynamics is H v_dot + C, relative to |H| |v_dot| + |C|."""
     H, C = model.mass_matrix(s.q), model.bias_force(s.q, s.v)
-    return block_error(model.inverse_dynamics(s.q, s.v, s.v_dot), H @ s.v_dot + C, abs(H) @ abs(s.v_dot) + abs(C))
+    return block_error(
+        model.inverse_dynamics(s.q, s.v, s.v_dot), H @ s.v_dot + C, abs(H) @ abs(s.v_dot) + abs(C)
+    )
 
 
 @law("mass_matrix", "inverse_dynamics", "forward_dynamics", units=NEAR)
@@ -88,7 +94,9 @@ def forward_dynamics_inverts_inverse_dynamics(model: Model, s: State):
     """Under the loads that v_dot needs, forward dynamics returns v_dot, relative to cond(H)."""
     force = model.inverse_dynamics(s.q, s.v, s.v_dot)
     load = model.external_force(force[:3], force[3:6])
-    return difference(model, s.q, "v_dot", model.forward_dynamics(s.q, s.v, force[6:], load), s.v_dot)
+    return difference(
+        model, s.q, "v_dot", model.forward_dynamics(s.q, s.v, force[6:], load), s.v_dot
+    )
 
 
 @law("mass_matrix", "energy", units=NEAR)
@@ -99,13 +107,18 @@ def kinetic_energy_is_half_v_H_v(model: Model, s: State):
 
 @law("mass_matrix", "momentum", units=NEAR)
 def momentum_is_mass_times_velocity(model: Model, s: State):
-    """Momentum is the upper part of H v; angular momentum is the middle part, moved from B to the COM."""
+    """Momentum is the upper part of H v; angular momentum is the middle part, moved from B to the
+    COM.
+    """
     linear, angular = model.momentum(s.q, s.v)
     force, moment = (model.mass_matrix(s.q) @ s.v)[:6].reshape(2, 3)
     arm = center_of_mass(model, s.q) - s.q[:3]
     moment = rotation_matrix(s.q[3:7]) @ moment
     scale = abs(moment) + abs(np.cross(arm, force))
-    return {"linear": relative(linear, force), "angular": relative(angular, moment - np.cross(arm, force), scale)}
+    return {
+        "linear": relative(linear, force),
+        "angular": relative(angular, moment - np.cross(arm, force), scale),
+    }
 
 
 def center_of_mass(model: Model, q: np.ndarray) -> np.ndarray:
@@ -118,7 +131,9 @@ def center_of_mass(model: Model, q: np.ndarray) -> np.ndarray:
 
 @law("energy", "forward_dynamics", units=NEAR)
 def energy_changes_by_the_power_of_the_torques(model: Model, s: State):
-    """Along forward dynamics dE/dt = tau . q_t_dot, relative to the energy times the links' fastest turn."""
+    """Along forward dynamics dE/dt = tau . q_t_dot, relative to the energy times the links' fastest
+    turn.
+    """
     v_dot = model.forward_dynamics(s.q, s.v, s.tau).astype(float)
     rate = 2 * fastest(model, s.v)  # energy has products of two sines
 
@@ -130,13 +145,17 @@ def energy_changes_by_the_power_of_the_torques(model: Model, s: State):
 
 
 def flight(model: Model, s: State):
-    """Fly without torques, links turning at up to 10 rad/s: an undamped tail whips, and long ones faster."""
+    """Fly without torques, links turning at up to 10 rad/s: an undamped tail whips, and long ones
+    faster.
+    """
     return simulate(model, s.q, 10 / fastest(model, s.v) * s.v, t_span=FLIGHT, step=FLIGHT / STEPS)
 
 
 @law("rollout", "energy", "momentum", units=4 * STEPS, floor=1e-10)
 def energy_is_constant_in_flight(model: Model, s: State):
-    """In 0.2 s of flight without torques (RK4, 0.1 ms) kinetic plus potential energy stays as it is."""
+    """In 0.2 s of flight without torques (RK4, 0.1 ms) kinetic plus potential energy stays as it
+    is.
+    """
     found = flight(model, s)
     return relative(found.energy, found.energy[0], abs(found.kinetic) + abs(found.potential))
 
@@ -148,7 +167,10 @@ def momentum_is_constant_in_flight(model: Model, s: State):
     weight = total_mass(model) * model.parameters["gravity"]
     linear = found.linear_momentum[0] - np.outer(found.t, [0, 0, weight])
     angular = found.angular_momentum
-    return {"linear": relative(found.linear_momentum, linear), "angular": relative(angular, angular[0])}
+    return {
+        "linear": relative(found.linear_momentum, linear),
+        "angular": relative(angular, angular[0]),
+    }
 
 
 @law("rollout", "mass_matrix", "energy", "momentum", units=4 * STEPS, floor=1e-10)
@@ -172,7 +194,9 @@ def pose_in_the_world_turns_all_alike(model: Model, s: State):
     loads = s.f_ext.reshape(-1, 3) @ Z.T
     loads[1:2] = s.f_ext[3:6]
     turned = replace(s, q=q, f_ext=loads.ravel())
-    turned = replace(turned, **{name: X @ getattr(s, name) for name in ("v", "v_dot", "dq", "dv", "multiplier")})
+    turned = replace(
+        turned, **{name: X @ getattr(s, name) for name in ("v", "v_dot", "dq", "dv", "multiplier")}
+    )
     found = {}
     for name in judged(model):
         axes = changed_axes(Z, Z if name in WORLD else np.eye(3), model.nv)
@@ -196,8 +220,12 @@ def turned_outputs(model: Model, found: dict, X: np.ndarray, shift: np.ndarray) 
 
 @law()
 def position_and_speed_of_the_torso_do_not_matter(model: Model, s: State):
-    """Another position and velocity of B leave H, C, v_dot and Jacobians as they are, bit for bit."""
-    far = replace(s, q=s.q + 5.0 * (np.arange(model.nq) < 3), v=s.v - 3.0 * (np.arange(model.nv) < 3))
+    """Another position and velocity of B leave H, C, v_dot and Jacobians as they are, bit for
+    bit.
+    """
+    far = replace(
+        s, q=s.q + 5.0 * (np.arange(model.nq) < 3), v=s.v - 3.0 * (np.arange(model.nv) < 3)
+    )
     return same_bits(model, [name for name in judged(model) if name not in PLACED], s, far)
 
 
@@ -224,18 +252,28 @@ def links_have_equal_length(model: Model, s: State):
 
 @law("tail_points", "tail_point_jacobians", units=NEAR)
 def jacobians_are_the_derivatives_of_the_points(model: Model, s: State):
-    """J v is the derivative of the tail points along each unit velocity, relative to |points| times the links' turn."""
+    """J v is the derivative of the tail points along each unit velocity, relative to |points| times
+    the links' turn.
+    """
     q = s.q.copy()
     q[:3] = 0
     J, found = model.tail_point_jacobians(q), []
     for k, unit in enumerate(np.eye(model.nv)):
         rate = max(1.0, fastest(model, unit))
-        column, largest = slope(lambda t, v=unit: model.tail_points(moved(q, v, t)).astype(float), rate)
+        column, largest = slope(
+            lambda t, v=unit: model.tail_points(moved(q, v, t)).astype(float), rate
+        )
         found.append(relative(J[:, :, k], column, rate * largest))
     return worst(found)
 
 
-@law("mass_matrix", "forward_dynamics", "forward_dynamics_external", "tail_point_jacobians", units=NEAR)
+@law(
+    "mass_matrix",
+    "forward_dynamics",
+    "forward_dynamics_external",
+    "tail_point_jacobians",
+    units=NEAR,
+)
 def loads_accelerate_by_their_generalised_force(model: Model, s: State):
     """H (v_dot under loads - v_dot without) = [f; n; 0] + sum J_k^T f_k, relative to cond(H)."""
     H, J = model.mass_matrix(s.q).astype(float), model.tail_point_jacobians(s.q)
@@ -250,7 +288,9 @@ def loads_accelerate_by_their_generalised_force(model: Model, s: State):
 def no_load_is_no_change(model: Model, s: State):
     """Forward dynamics under zero loads is forward dynamics, relative to cond(H)."""
     free = model.forward_dynamics(s.q, s.v, s.tau)
-    return difference(model, s.q, "v_dot", model.forward_dynamics(s.q, s.v, s.tau, 0 * s.f_ext), free)
+    return difference(
+        model, s.q, "v_dot", model.forward_dynamics(s.q, s.v, s.tau, 0 * s.f_ext), free
+    )
 
 
 @law("mass_matrix", "mass_matrix_world", units=NEAR)
@@ -287,7 +327,9 @@ def batches_are_singles(model: Model, s: State):
         result = model.kernel(name)(*map(np.stack, stacked))
         whole = named(model, name, result)
         singles = [outputs(model, name, case) for case in cases]
-        found[name] = differing_outputs(whole, {key: np.stack([one[key] for one in singles]) for key in whole})
+        found[name] = differing_outputs(
+            whole, {key: np.stack([one[key] for one in singles]) for key in whole}
+        )
     return found
 
 
@@ -295,7 +337,9 @@ def batches_are_singles(model: Model, s: State):
 def casadi_functions_agree(model: Model, s: State):
     """The CasADi functions of SX operations give what the C gives, v_dot relative to cond(H)."""
     return {
-        name: differences(model, name, s, casadi_outputs(model, name, getattr(model.casadi, name), s))
+        name: differences(
+            model, name, s, casadi_outputs(model, name, getattr(model.casadi, name), s)
+        )
         for name in judged(model)
         if name not in DERIVATIVES
     }
@@ -306,6 +350,10 @@ def casadi_externals_are_the_compiled_code(model: Model, s: State):
     """casadi.external on the compiled C gives the bits of the model's own call."""
     found = {}
     for name in judged(model):
-        results = casadi_outputs(model, name, model.casadi.external(name), s, model.casadi.parameter_vector)
-        found[name] = sum(starmap(differing, zip(outputs(model, name, s).values(), results, strict=True)))
+        results = casadi_outputs(
+            model, name, model.casadi.external(name), s, model.casadi.parameter_vector
+        )
+        found[name] = sum(
+            starmap(differing, zip(outputs(model, name, s).values(), results, strict=True))
+        )
     return found

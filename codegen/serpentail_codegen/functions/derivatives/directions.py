@@ -1,7 +1,8 @@
-"""Directions of differentiation: a tail's sizes go in; which lane stands for which, and where its results belong.
+"""Directions of differentiation: a tail's sizes go in; which lane stands for which, and where its
+results belong.
 
-Derivatives with respect to q are in the tangent space: position of B, a turn of the torso in body axes, tail
-coordinates; the columns of such a matrix are those of a velocity v.
+Derivatives with respect to q are in the tangent space: position of B, a turn of the torso in body
+axes, tail coordinates; the columns of such a matrix are those of a velocity v.
 """
 
 from dataclasses import dataclass
@@ -17,7 +18,9 @@ TORSO = {"turn": (3, True), "p_dot": (0, False), "omega": (3, False)}
 
 @dataclass(frozen=True)
 class Directions:
-    """Which lane stands for which direction: some of the torso, then coordinates and rates of segment after segment."""
+    """Which lane stands for which direction: some of the torso, then coordinates and rates of
+    segment after segment.
+    """
 
     tail: Tail
     torso: tuple[str, ...]
@@ -39,7 +42,9 @@ class Directions:
         return self.base + self.each * self.tail.segments
 
     def outward(self, loops: tuple[Loop, ...]) -> Index | None:
-        """Where a sweep goes from the torso to the tip, segment i depends on the segments up to i alone."""
+        """Where a sweep goes from the torso to the tip, segment i depends on the segments up to i
+        alone.
+        """
         return None if any(loop.downward for loop in loops) else self.up_to(loops)
 
     def up_to(self, loops: tuple[Loop, ...]) -> Index | None:
@@ -56,7 +61,9 @@ class Directions:
         return self.each * i + (self.base + 2)
 
     def tangents(self, d: Draft) -> dict[str, Array]:
-        """Declare ``d_q`` and ``d_v`` and store the directions in them as rows; the quaternion known is a unit one."""
+        """Declare ``d_q`` and ``d_v`` and store the directions in them as rows; the quaternion
+        known is a unit one.
+        """
         label = "_".join(self.torso) or "tail"
         d_q = d.wide(f"d_q_{label}", d.tail.nq, self.count)
         d_v = d.wide(f"d_v_{label}", d.tail.nv, self.count) if self.rates else None
@@ -81,7 +88,9 @@ class Directions:
         with d.loop("row", source.length) as r:
             for lane, name in enumerate(self.torso):
                 column, is_q = TORSO[name]
-                d.copy((of_q if is_q else of_v).part(nv * r + column, 3), source.lane(r, 3 * lane, 3))
+                d.copy(
+                    (of_q if is_q else of_v).part(nv * r + column, 3), source.lane(r, 3 * lane, 3)
+                )
             with d.loop("i", self.tail.segments) as i:
                 d.copy(of_q.part(nv * r + 2 * i + 6, 2), source.lane(r, self.of_q(i), 2))
                 if self.rates:

@@ -1,4 +1,6 @@
-"""Second derivatives: a tail's sizes go in, the loop nest of the Hessian of lambda^T (H v_dot + C) comes out."""
+"""Second derivatives: a tail's sizes go in, the loop nest of the Hessian of lambda^T (H v_dot + C)
+comes out.
+"""
 
 from ...autodiff.forward import tangent_program
 from ...autodiff.reverse import adjoint_program
@@ -11,7 +13,8 @@ from .jacobians import INERTIA, VIRTUAL_POWER, with_unit_quaternion
 
 
 def assemble_inverse_dynamics_hessian(d: Draft, arrays: dict[str, Array]) -> None:
-    """Tangents of the gradient of lambda^T (H v_dot + C) with respect to q and v; its mixed block by those of H lambda.
+    """Tangents of the gradient of lambda^T (H v_dot + C) with respect to q and v; its mixed block
+    by those of H lambda.
 
     Only the lower triangle is computed: rows of segment i in the lanes of segments up to i.
     """
@@ -24,7 +27,15 @@ def assemble_inverse_dynamics_hessian(d: Draft, arrays: dict[str, Array]) -> Non
     q = with_unit_quaternion(d, arrays["q"])
     given = {"q": q} | {name: arrays[name] for name in ("v", "v_dot", "multiplier")}
     d_q = directions.tangents(d)
-    d.call(inner, b_power=d.constant("one", [1]), d_b_q=b_q, d_b_v=b_v, d_b_v_dot=b_v_dot, **given, **d_q)
+    d.call(
+        inner,
+        b_power=d.constant("one", [1]),
+        d_b_q=b_q,
+        d_b_v=b_v,
+        d_b_v_dot=b_v_dot,
+        **given,
+        **d_q,
+    )
     turn = d.wide("d_b_turn", 3, directions.count)
     d.step(rotations.turn_gradient, {"gradient": b_q.part(3, 4)}, turn=turn[0])
     mirror(d, directions, {"turn": turn[0], "omega": b_v.part(3, 3)}, (b_q, b_v), arrays)
@@ -33,13 +44,17 @@ def assemble_inverse_dynamics_hessian(d: Draft, arrays: dict[str, Array]) -> Non
         d.copy(arrays["aq"].part(nv * row + 3, 3), b_v_dot.lane(row, 0, 3))
 
 
-def mirror(d: Draft, directions: Directions, torso: dict[str, Ref], rows: tuple[Array, Array], out: dict) -> None:
+def mirror(
+    d: Draft, directions: Directions, torso: dict[str, Ref], rows: tuple[Array, Array], out: dict
+) -> None:
     """Copy the lower triangle of the Hessian to the blocks qq, qv and vv, and mirror it."""
     nv, m = d.tail.nv, d.tail.segments
     for name in ("qq", "qv", "vv"):
         d.fill(out[name].part(0, nv * nv), 0)
 
-    def place(row: Ref, of_row: tuple[Index, bool], lane: Index, of_lane: tuple[Index, bool], size: int) -> None:
+    def place(
+        row: Ref, of_row: tuple[Index, bool], lane: Index, of_lane: tuple[Index, bool], size: int
+    ) -> None:
         """Copy lanes of one row to the block it belongs to, and to the mirrored place."""
         (r, row_is_q), (c, lane_is_q) = of_row, of_lane
         source = row.array.lane(row.offset, lane, size)
@@ -68,10 +83,15 @@ def mirror(d: Draft, directions: Directions, torso: dict[str, Ref], rows: tuple[
 
 
 def mixed_block(d: Draft, q: Array, multiplier: Array, aq: Array) -> None:
-    """d(H lambda)/d(q_t): tangents of the inertia's force for the acceleration lambda, then turned to world axes."""
+    """d(H lambda)/d(q_t): tangents of the inertia's force for the acceleration lambda, then turned
+    to world axes.
+    """
     nv, directions = d.tail.nv, Directions(d.tail, (), rates=False)
     inner = tangent_program(program(INERTIA, d.tail), ("q",), directions.count, directions.outward)
-    rows, body = d.wide("inertial_rows", nv, directions.count), d.array("multiplier_in_torso_axes", nv)
+    rows, body = (
+        d.wide("inertial_rows", nv, directions.count),
+        d.array("multiplier_in_torso_axes", nv),
+    )
     d.store(rotations.quaternion_rotation, R=9)
     d.step(torso.torso_velocity, {"p_dot": multiplier.part(0, 3)}, u=body.part(0, 3))
     d.copy(body.part(3, nv - 3), multiplier.part(3, nv - 3))

@@ -1,4 +1,5 @@
-"""Exact first derivatives: a tail's sizes go in, loop nests of Jacobians and of products with them come out.
+"""Exact first derivatives: a tail's sizes go in, loop nests of Jacobians and of products with them
+come out.
 
 Nothing depends on the position of B or on its velocity.
 """
@@ -23,11 +24,13 @@ MULTIPLIER = Argument("multiplier", lambda t: (t.nv,), "weights lambda of the ro
 POWER = Argument("power", lambda t: (1,), "lambda^T (H v_dot + C)")
 
 
-# ---- the functions that are differentiated -----------------------------------------------------------------------
+# ---- the functions that are differentiated -------------------------------------------------------
 
 
 def assemble_core(d: Draft, arrays: dict[str, Array]) -> None:
-    """H v_dot + C in torso axes throughout, v_dot[0:3] being R^T (p_b_ddot + g z): no attitude, no gravity."""
+    """H v_dot + C in torso axes throughout, v_dot[0:3] being R^T (p_b_ddot + g z): no attitude, no
+    gravity.
+    """
     v_dot, force = arrays["v_dot"], arrays["force"]
     mechanism(d).prepare(d)
     d.known |= {"w": d.known["omega"], "w_dot": v_dot.part(3, 3), "a": v_dot.part(0, 3)}
@@ -41,7 +44,11 @@ def assemble_virtual_power(d: Draft, arrays: dict[str, Array]) -> None:
     v_dot, multiplier = arrays["v_dot"], arrays["multiplier"]
     d.store(rotations.quaternion_rotation, R=9)
     mechanism(d).prepare(d)
-    d.known |= {"w": d.known["omega"], "w_dot": v_dot.part(3, 3), "w_virtual": multiplier.part(3, 3)}
+    d.known |= {
+        "w": d.known["omega"],
+        "w_dot": v_dot.part(3, 3),
+        "w_virtual": multiplier.part(3, 3),
+    }
     d.known["p_ddot"] = v_dot.part(0, 3)
     d.store(torso.torso_acceleration, a=3)
     d.step(torso.torso_velocity, {"p_dot": multiplier.part(0, 3)}, u=d.vector("u_virtual", 3))
@@ -57,15 +64,21 @@ def assemble_inertia(d: Draft, arrays: dict[str, Array]) -> None:
 CORE = Function("core", "H v_dot + C in torso axes", (Q, V, V_DOT), (FORCE,), assemble_core)
 INERTIA = Function("inertia", "H v_dot in torso axes", (Q, V_DOT), (FORCE,), assemble_inertia)
 VIRTUAL_POWER = Function(
-    "virtual_power", "lambda^T (H v_dot + C)", (Q, V, V_DOT, MULTIPLIER), (POWER,), assemble_virtual_power
+    "virtual_power",
+    "lambda^T (H v_dot + C)",
+    (Q, V, V_DOT, MULTIPLIER),
+    (POWER,),
+    assemble_virtual_power,
 )
 
 
-# ---- Jacobians ----------------------------------------------------------------------------------------------------
+# ---- Jacobians -----------------------------------------------------------------------------------
 
 
 def with_unit_quaternion(d: Draft, q: Array) -> Array:
-    """Return q with a unit quaternion, which turns are taken at: of any other, squares may overflow."""
+    """Return q with a unit quaternion, which turns are taken at: of any other, squares may
+    overflow.
+    """
     unit = d.array("q_unit", d.tail.nq)
     d.copy(unit.part(0, 3), q.part(0, 3))
     d.step(rotations.unit_quaternion, unit=unit.part(3, 4))
@@ -78,7 +91,10 @@ def assemble_inverse_dynamics_derivatives(d: Draft, arrays: dict[str, Array]) ->
     """Tangents of H v_dot + C along all directions at once."""
     directions = Directions(d.tail, ("turn", "omega"))
     inner = tangent_program(
-        program(FUNCTIONS["inverse_dynamics"], d.tail), ("q", "v"), directions.count, directions.outward
+        program(FUNCTIONS["inverse_dynamics"], d.tail),
+        ("q", "v"),
+        directions.count,
+        directions.outward,
     )
     rows = d.wide("rows", d.tail.nv, directions.count)
     given = {"q": with_unit_quaternion(d, arrays["q"]), "v": arrays["v"], "v_dot": arrays["v_dot"]}
@@ -101,14 +117,18 @@ def loads(d: Draft, **at_torso: Ref) -> dict[str, Ref]:
     return zeros | {"gravity": d.zero(1)} | at_torso
 
 
-def less(d: Draft, rows: Array, tau: Callable[[Index], Ref] | None = None, **at_torso: Ref) -> Loads:
+def less(
+    d: Draft, rows: Array, tau: Callable[[Index], Ref] | None = None, **at_torso: Ref
+) -> Loads:
     """Loads of H x = tau - rows, rows being a change of H v_dot + C in torso axes."""
     at_torso = loads(d, force=rows.part(0, 3), moment=rows.part(3, 3), **at_torso)
     return Loads(at_torso, lambda k: rows.part(6 + k, 1), tau)
 
 
 def assemble_forward_dynamics_derivatives(d: Draft, arrays: dict[str, Array]) -> None:
-    """-H^-1 times the tangents of H v_dot + C at fixed v_dot; with respect to tau, columns of H^-1."""
+    """-H^-1 times the tangents of H v_dot + C at fixed v_dot; with respect to tau, columns of
+    H^-1.
+    """
     tail, nv = d.tail, d.tail.nv
     balance, body = forward_dynamics_first(d, arrays)
     directions = Directions(tail, ("omega",))
@@ -135,7 +155,9 @@ def torques(d: Draft, balance: Balance, dtau: Array) -> None:
 
 def assemble_inverse_dynamics_parameter_derivatives(d: Draft, arrays: dict[str, Array]) -> None:
     """Tangents of H v_dot + C with respect to every parameter."""
-    rows = parameter_tangents(d, FUNCTIONS["inverse_dynamics"], {n: arrays[n] for n in ("q", "v", "v_dot")})
+    rows = parameter_tangents(
+        d, FUNCTIONS["inverse_dynamics"], {n: arrays[n] for n in ("q", "v", "v_dot")}
+    )
     spread_parameters(d, rows, arrays["dparameters"])
 
 
@@ -154,7 +176,9 @@ def assemble_forward_dynamics_parameter_derivatives(d: Draft, arrays: dict[str, 
 
 
 def parameter_tangents(d: Draft, function: Function, given: dict[str, Array]) -> Array:
-    """Return the tangents of a force with respect to every parameter, a lane for each number of the struct."""
+    """Return the tangents of a force with respect to every parameter, a lane for each number of the
+    struct.
+    """
     count, lane, tangents = parameter_count(d.tail), 0, {}
     names = [p.name for p in struct_parameters(d.tail)]
     inner = tangent_program(program(function, d.tail), names, count)
@@ -180,7 +204,7 @@ def parameter_count(tail: Tail) -> int:
     return sum(p.size for p in struct_parameters(tail))
 
 
-# ---- products with Jacobians --------------------------------------------------------------------------------------
+# ---- products with Jacobians ---------------------------------------------------------------------
 
 
 def assemble_forward_dynamics_jvp(d: Draft, arrays: dict[str, Array]) -> None:
@@ -207,16 +231,23 @@ def assemble_inverse_dynamics_vjp(d: Draft, arrays: dict[str, Array]) -> None:
 
 
 def in_tangent_space(d: Draft, gradient: Array, dq: Array) -> None:
-    """Turn a gradient with respect to the numbers of q into one with respect to a velocity's directions."""
+    """Turn a gradient with respect to the numbers of q into one with respect to a velocity's
+    directions.
+    """
     d.copy(dq.part(0, 3), gradient.part(0, 3))
     d.step(rotations.turn_gradient, {"gradient": gradient.part(3, 4)}, turn=dq.part(3, 3))
     d.copy(dq.part(6, d.tail.nt), gradient.part(7, d.tail.nt))
 
 
 def assemble_forward_dynamics_vjp(d: Draft, arrays: dict[str, Array]) -> None:
-    """lambda^T times the Jacobian of v_dot: mu = H^-1 lambda, then minus the gradient of mu^T (H v_dot + C)."""
+    """lambda^T times the Jacobian of v_dot: mu = H^-1 lambda, then minus the gradient of mu^T (H
+    v_dot + C).
+    """
     tail, multiplier = d.tail, arrays["multiplier"]
-    v_dot, mu = d.array("acceleration", tail.nv), d.array("response", tail.nv)  # "mu" is a parameter of contact
+    v_dot, mu = (
+        d.array("acceleration", tail.nv),
+        d.array("response", tail.nv),
+    )  # "mu" is a parameter of contact
     balance = assemble_forward_dynamics(d, arrays | {"v_dot": v_dot})
     d.step(torso.torso_velocity, {"p_dot": multiplier.part(0, 3)}, u=d.vector("pull", 3))
     at_torso = loads(d, load_force=d.known["pull"], load_moment=multiplier.part(3, 3))
@@ -230,7 +261,7 @@ def assemble_forward_dynamics_vjp(d: Draft, arrays: dict[str, Array]) -> None:
     d.copy(arrays["dtau"].part(0, tail.nt), mu.part(6, tail.nt))
 
 
-# ---- energy and momentum ------------------------------------------------------------------------------------------
+# ---- energy and momentum -------------------------------------------------------------------------
 
 
 def assemble_energy_derivatives(d: Draft, arrays: dict[str, Array]) -> None:
@@ -239,7 +270,9 @@ def assemble_energy_derivatives(d: Draft, arrays: dict[str, Array]) -> None:
     for name, wanted in (("kinetic", ("q", "v")), ("potential", ("q",))):
         inner = adjoint_program(program(FUNCTIONS["energy"], d.tail), wanted, (name,))
         gradient = d.array(f"{name}_gradient", d.tail.nq)
-        given = {"q": q, "v": arrays["v"]} | ({"b_v": arrays["kinetic_dv"]} if "v" in wanted else {})
+        given = {"q": q, "v": arrays["v"]} | (
+            {"b_v": arrays["kinetic_dv"]} if "v" in wanted else {}
+        )
         weight = {f"b_{name}": d.constant(f"one_{name}", [1]), "b_q": gradient}
         d.call(inner, **given, **weight)
         in_tangent_space(d, gradient, arrays[f"{name}_dq"])

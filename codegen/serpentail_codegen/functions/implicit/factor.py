@@ -1,9 +1,11 @@
-"""Implicit integrators' linear systems: a draft goes in, factoring and solving with 1 - w J are added to it.
+"""Implicit integrators' linear systems: a draft goes in, factoring and solving with 1 - w J are
+added to it.
 
-J is the Jacobian of the rates of (q in its tangent space, v, bristles), of contact, joint damping and tracking gains
-alone.  With k_q = r_q + w k_v and the bristles eliminated, S (k_v - r_v) = forces is left, S = H + stiffness, symmetric
-and positive definite but for points that slide: there friction follows the load, and S takes two triangles.
-Eliminating translation is what the first three pivots of S do.
+J is the Jacobian of the rates of (q in its tangent space, v, bristles), of contact, joint damping
+and tracking gains alone.  With k_q = r_q + w k_v and the bristles eliminated, S (k_v - r_v) =
+forces is left, S = H + stiffness, symmetric and positive definite but for points that slide: there
+friction follows the load, and S takes two triangles. Eliminating translation is what the first
+three pivots of S do.
 """
 
 from ...ir.program import Array, Index, padded
@@ -16,7 +18,7 @@ from ..draft import Draft
 from ..dynamics import assemble_mass_matrix
 from .layout import Factors, each_contact, first_tail_point
 
-# ---- factoring ------------------------------------------------------------------------------------------------------
+# ---- factoring -----------------------------------------------------------------------------------
 
 
 def assemble_factor(d: Draft, arrays: dict[str, Array]) -> None:
@@ -48,7 +50,11 @@ def add_gains(d: Draft, f: Factors) -> None:
         entry = f.entry("S", 6 + k, 6 + other)
         d.copy(f.entry("H_tail", k, other), entry)
         d.copy(f.entry("H_tail", other, k), entry)
-        d.step(stiff.gained, {"gain": f("gain_v"), "entry": f.entry("H_tail", k, other)}, S_entry_=entry)
+        d.step(
+            stiff.gained,
+            {"gain": f("gain_v"), "entry": f.entry("H_tail", k, other)},
+            S_entry_=entry,
+        )
 
 
 def add_contacts(d: Draft, f: Factors, arrays: dict[str, Array]) -> None:
@@ -78,7 +84,10 @@ def keep_point(d: Draft, f: Factors, points: Points, number: Index) -> None:
 def stiffen(d: Draft, f: Factors, points: Points, number: Index, bristles: Array) -> None:
     """Linearise a point in the ground, and add its stiffness to the torso's block of S."""
     law = derive(stiff.linearised_contact, friction=d.tail.friction)
-    reads = points.motion(number) | {"bristle": bristles.part(2 * number, 2), "spring": f("spring", number)}
+    reads = points.motion(number) | {
+        "bristle": bristles.part(2 * number, 2),
+        "spring": f("spring", number),
+    }
     d.apply(law, d.known | reads, spring=f("spring", number))
     rows = {f"S_{r}_": f.entry("S", r, 0, r + 1) for r in range(6)}
     d.step(stiff.stiffened_torso, reads, **rows)
@@ -100,17 +109,31 @@ def add_tail_contacts(d: Draft, f: Factors, points: Points, bristles: Array) -> 
                 stiffen(d, f, points, number, bristles)
                 with d.loop("l", i + 1) as segment:
                     rows = {f"J_{axis}": f.row(g, k, segment) for k, axis in enumerate("xyz")}
-                    d.step(loads.point_jacobian_tail, {"S": S[segment], "arm": f("arm", number)}, **rows)
+                    d.step(
+                        loads.point_jacobian_tail,
+                        {"S": S[segment], "arm": f("arm", number)},
+                        **rows,
+                    )
                 with d.loop("k", 2 * i + 2) as k:
-                    reads = {"arm": f("arm", number), "spring": f("spring", number), "J_k": f.column(g, k)}
-                    d.step(stiff.stiffened_column, reads, force=force, S_row_=f.entry("S", 6 + k, 0, 6))
+                    reads = {
+                        "arm": f("arm", number),
+                        "spring": f("spring", number),
+                        "J_k": f.column(g, k),
+                    }
+                    d.step(
+                        stiff.stiffened_column, reads, force=force, S_row_=f.entry("S", 6 + k, 0, 6)
+                    )
                     with d.loop("l", k + 1) as other:
                         reads = {"J_k": f.column(g, other), "force": force}
-                        d.step(stiff.coupled_columns, reads, S_entry_=f.entry("S", 6 + k, 6 + other))
+                        d.step(
+                            stiff.coupled_columns, reads, S_entry_=f.entry("S", 6 + k, 6 + other)
+                        )
 
 
 def add_sliding(d: Draft, f: Factors) -> None:
-    """The transpose of S, and what makes them differ: the points that slide, whose friction follows the load."""
+    """The transpose of S, and what makes them differ: the points that slide, whose friction follows
+    the load.
+    """
     nv, row = d.tail.nv, padded(d.tail.nv)
     d.copy(f.array.part(f.first("S_turned"), nv * row), f.array.part(f.first("S"), nv * row))
     slip, push, lift = d.array("slip", 1)[0], d.array("push", nv), d.array("lift", nv)
@@ -129,11 +152,16 @@ def add_sliding(d: Draft, f: Factors) -> None:
     each_contact(d, f, shear)
 
 
-def shear_tail(d: Draft, f: Factors, number: Index, segment: Index, columns: tuple[Array, Array]) -> None:
+def shear_tail(
+    d: Draft, f: Factors, number: Index, segment: Index, columns: tuple[Array, Array]
+) -> None:
     """The tail's part of both columns of a tail point."""
     push, lift = columns
     with d.loop("k", 2 * segment + 2) as k:
-        reads = {"J_k": f.column(number + -first_tail_point(d.tail), k), "spring": f("spring", number)}
+        reads = {
+            "J_k": f.column(number + -first_tail_point(d.tail), k),
+            "spring": f("spring", number),
+        }
         d.step(stiff.sheared_column, reads, push=push.part(6 + k, 1), lift=lift.part(6 + k, 1))
 
 
@@ -143,4 +171,9 @@ def shear_triangles(d: Draft, f: Factors, count: Index | int, columns: tuple[Arr
     with d.loop("k", count) as k, d.loop("l", k + 1) as other:
         reads = {"push_k": push.part(k, 1), "push_l": push.part(other, 1)}
         reads |= {"lift_k": lift.part(k, 1), "lift_l": lift.part(other, 1)}
-        d.step(stiff.sheared_entries, reads, entry_=f.entry("S", k, other), turned_=f.entry("S_turned", k, other))
+        d.step(
+            stiff.sheared_entries,
+            reads,
+            entry_=f.entry("S", k, other),
+            turned_=f.entry("S_turned", k, other),
+        )

@@ -1,9 +1,11 @@
-"""Implicit integrators' linear systems: a draft goes in, factoring and solving with 1 - w J are added to it.
+"""Implicit integrators' linear systems: a draft goes in, factoring and solving with 1 - w J are
+added to it.
 
-J is the Jacobian of the rates of (q in its tangent space, v, bristles), of contact, joint damping and tracking gains
-alone.  With k_q = r_q + w k_v and the bristles eliminated, S (k_v - r_v) = forces is left, S = H + stiffness, symmetric
-and positive definite but for points that slide: there friction follows the load, and S takes two triangles.
-Eliminating translation is what the first three pivots of S do.
+J is the Jacobian of the rates of (q in its tangent space, v, bristles), of contact, joint damping
+and tracking gains alone.  With k_q = r_q + w k_v and the bristles eliminated, S (k_v - r_v) =
+forces is left, S = H + stiffness, symmetric and positive definite but for points that slide: there
+friction follows the load, and S takes two triangles. Eliminating translation is what the first
+three pivots of S do.
 """
 
 from dataclasses import dataclass
@@ -43,7 +45,9 @@ class Factors:
     def first(self, name: str) -> int:
         """Where a part begins."""
         names = list(blocks(self.tail))
-        return sum(size * count for size, count in list(blocks(self.tail).values())[: names.index(name)])
+        return sum(
+            size * count for size, count in list(blocks(self.tail).values())[: names.index(name)]
+        )
 
     def __call__(self, name: str, k: Index | int = 0) -> Ref:
         """Entry k of a part."""
@@ -56,7 +60,9 @@ class Factors:
 
     def row(self, point: Index | int, axis: int, segment: Index | int) -> Ref:
         """How a tail point moves along an axis with the two coordinates of a segment."""
-        return self.array.part(self.first("J") + 3 * self.tail.nt * point + axis + 6 * segment, 2, 3)
+        return self.array.part(
+            self.first("J") + 3 * self.tail.nt * point + axis + 6 * segment, 2, 3
+        )
 
     def column(self, point: Index | int, k: Index | int) -> Ref:
         """How a tail point moves with tail coordinate k."""

@@ -1,9 +1,11 @@
-"""Implicit integrators' linear systems: a draft goes in, factoring and solving with 1 - w J are added to it.
+"""Implicit integrators' linear systems: a draft goes in, factoring and solving with 1 - w J are
+added to it.
 
-J is the Jacobian of the rates of (q in its tangent space, v, bristles), of contact, joint damping and tracking gains
-alone.  With k_q = r_q + w k_v and the bristles eliminated, S (k_v - r_v) = forces is left, S = H + stiffness, symmetric
-and positive definite but for points that slide: there friction follows the load, and S takes two triangles.
-Eliminating translation is what the first three pivots of S do.
+J is the Jacobian of the rates of (q in its tangent space, v, bristles), of contact, joint damping
+and tracking gains alone.  With k_q = r_q + w k_v and the bristles eliminated, S (k_v - r_v) =
+forces is left, S = H + stiffness, symmetric and positive definite but for points that slide: there
+friction follows the load, and S takes two triangles. Eliminating translation is what the first
+three pivots of S do.
 """
 
 from dataclasses import dataclass
@@ -14,12 +16,17 @@ from ...mechanics import contact_stiffness as stiff
 from ..draft import Draft
 from .layout import Factors, each_contact, first_tail_point
 
-# ---- solving --------------------------------------------------------------------------------------------------------
+# ---- solving -------------------------------------------------------------------------------------
 
 
 def assemble_solve(d: Draft, arrays: dict[str, Array]) -> None:
     """k_v from S (k_v - r_v) = forces, then k_q and the bristles."""
-    f, r_q, r_v, k_v = Factors(arrays["factors"], d.tail), arrays["r_q"], arrays["r_v"], arrays["k_v"]
+    f, r_q, r_v, k_v = (
+        Factors(arrays["factors"], d.tail),
+        arrays["r_q"],
+        arrays["r_v"],
+        arrays["k_v"],
+    )
     d.known |= {name: f(name) for name in ("gain_q", "gain_v", "weight")}
     d.fill(k_v[0], 0)
     tail_response(d, f, arrays)
@@ -30,7 +37,9 @@ def assemble_solve(d: Draft, arrays: dict[str, Array]) -> None:
     else:
         d.solve(f.array, k_v[0])
     with d.loop("k", d.tail.nv) as k:
-        d.step(stiff.total_rate, {"change": k_v.part(k, 1), "rate": r_v.part(k, 1)}, k_v=k_v.part(k, 1))
+        d.step(
+            stiff.total_rate, {"change": k_v.part(k, 1), "rate": r_v.part(k, 1)}, k_v=k_v.part(k, 1)
+        )
         reads = {"k_v": k_v.part(k, 1), "angle": r_q.part(k, 1)}
         d.step(stiff.total_place, reads, k_q=arrays["k_q"].part(k, 1))
     if d.tail.contacts:
@@ -44,7 +53,11 @@ def tail_response(d: Draft, f: Factors, arrays: dict[str, Array]) -> None:
         reads = {"damped": f("damped", k), "rate": r_v.part(6 + k, 1)}
         d.step(stiff.damped_response, reads, rhs=x.part(6 + k, 1))
     with d.when(f("gain_v")), d.loop("k", d.tail.nt) as k, d.loop("l", d.tail.nt) as other:
-        reads = {"entry": f.entry("H_tail", k, other), "angle": r_q.part(6 + other, 1), "rate": r_v.part(6 + other, 1)}
+        reads = {
+            "entry": f.entry("H_tail", k, other),
+            "angle": r_q.part(6 + other, 1),
+            "rate": r_v.part(6 + other, 1),
+        }
         d.step(stiff.gain_response, reads, rhs_=x.part(6 + k, 1))
 
 
@@ -58,7 +71,9 @@ class Shift:
     def at(self, d: Draft, f: Factors, number: Index, segment: Index | None, motion: Ref) -> None:
         """Store how a point moves: a point of the torso, or tail point ``number`` in a segment."""
         d.step(
-            stiff.point_shift, {"shift": self.v.part(0, 3), "turn": self.turn, "arm": f("arm", number)}, motion=motion
+            stiff.point_shift,
+            {"shift": self.v.part(0, 3), "turn": self.turn, "arm": f("arm", number)},
+            motion=motion,
         )
         if segment is not None:
             point = number + -first_tail_point(d.tail)
@@ -75,7 +90,9 @@ def shift(d: Draft, v: Array) -> Shift:
 
 
 def contact_response(d: Draft, f: Factors, arrays: dict[str, Array]) -> Array:
-    """Forces of the points in the ground for the right-hand sides; returns the loads for r_q alone."""
+    """Forces of the points in the ground for the right-hand sides; returns the loads for r_q
+    alone.
+    """
     x, at_q, at_v = arrays["k_v"], shift(d, arrays["r_q"]), shift(d, arrays["r_v"])
     reads = {name: d.array(name, 3)[0] for name in ("motion_q", "motion_v")}
     force, load = d.array("force_response", 3)[0], d.array("load_response", 6)[0]
@@ -86,13 +103,19 @@ def contact_response(d: Draft, f: Factors, arrays: dict[str, Array]) -> Array:
         with d.when(f("depth", number)):
             at_q.at(d, f, number, segment, reads["motion_q"])
             at_v.at(d, f, number, segment, reads["motion_v"])
-            point = {"spring": f("spring", number), "lag": arrays["r_u"].part(2 * number, 2), "arm": f("arm", number)}
+            point = {
+                "spring": f("spring", number),
+                "lag": arrays["r_u"].part(2 * number, 2),
+                "arm": f("arm", number),
+            }
             d.step(stiff.contact_response, reads | point, force=force, pressed=pressed[number])
             d.step(con.load_about_torso, point | {"force": force}, load_=load)
             if segment is not None:
                 with d.loop("k", 2 * segment + 2) as k:
                     column = f.column(number + -first_tail_point(d.tail), k)
-                    d.step(stiff.tail_response, {"J_k": column, "force": force}, rhs_=x.part(6 + k, 1))
+                    d.step(
+                        stiff.tail_response, {"J_k": column, "force": force}, rhs_=x.part(6 + k, 1)
+                    )
 
     each_contact(d, f, respond)
     d.step(stiff.torso_response, {"load": load}, rhs=x.part(0, 6))
@@ -108,7 +131,12 @@ def solve_bristles(d: Draft, f: Factors, arrays: dict[str, Array], pressed: Arra
         d.step(stiff.relaxed, {"lag": lag}, k_u=k_u)
         with d.when(f("depth", number)):
             at.at(d, f, number, segment, motion)
-            reads = {"spring": f("spring", number), "motion": motion, "lag": lag, "pressed": pressed[number]}
+            reads = {
+                "spring": f("spring", number),
+                "motion": motion,
+                "lag": lag,
+                "pressed": pressed[number],
+            }
             d.step(stiff.bristle_response, reads, k_u=k_u)
 
     each_contact(d, f, respond)

@@ -1,7 +1,8 @@
 """Sweeps over the tail: a draft goes in, loop nests that several functions share are added to it.
 
-Forward sweeps go from the torso to the tip, backward sweeps from the tip to the torso; ``i`` counts segments, ``g``
-pieces or tail points.  What a sweep carries from piece to piece is updated in place.
+Forward sweeps go from the torso to the tip, backward sweeps from the tip to the torso; ``i`` counts
+segments, ``g`` pieces or tail points.  What a sweep carries from piece to piece is updated in
+place.
 """
 
 from collections.abc import Callable
@@ -24,16 +25,20 @@ def mechanism(d: Draft) -> Mechanism:
 
 @contextmanager
 def each_piece(d: Draft, downward: bool = False):
-    """Open the loops over segments and their pieces; yields the segment and the number of the piece."""
+    """Open the loops over segments and their pieces; yields the segment and the number of the
+    piece.
+    """
     pieces = mechanism(d).pieces(d.tail)
     with d.loop("i", d.tail.segments, downward) as i, d.loop("j", pieces, downward) as j:
         yield i, pieces * i + j
 
 
 def forward_wrenches(d: Draft, v_dot: Array | None) -> Array:
-    """Velocities and accelerations to the tip, and the inertial wrench of every piece (Eqs. A1 to A12, 17, 19).
+    """Velocities and accelerations to the tip, and the inertial wrench of every piece (Eqs. A1 to
+    A12, 17, 19).
 
-    Starts from ``w``, ``w_dot`` and ``a`` of the torso; ``v_dot`` None means that the tail does not accelerate.
+    Starts from ``w``, ``w_dot`` and ``a`` of the torso; ``v_dot`` None means that the tail does not
+    accelerate.
     """
     wrench = d.array("wrench", 6, d.tail.segments * mechanism(d).pieces(d.tail))
     here = {name: d.array(f"{name}_here", 3)[0] for name in ("w", "w_dot", "a")}
@@ -46,7 +51,9 @@ def forward_wrenches(d: Draft, v_dot: Array | None) -> Array:
 
 
 def gather_wrenches(d: Draft, wrench: Array, torque: Callable[[Index], Ref] | None) -> None:
-    """Sum wrenches (or momenta) from the tip to the tail mount, in ``F_next``; torques add up per segment."""
+    """Sum wrenches (or momenta) from the tip to the tail mount, in ``F_next``; torques add up per
+    segment.
+    """
     total, pieces = d.vector("F_next", 6), mechanism(d).pieces(d.tail)
     d.fill(total, 0)
     with d.loop("i", d.tail.segments, downward=True) as i:
@@ -59,14 +66,23 @@ def gather_wrenches(d: Draft, wrench: Array, torque: Callable[[Index], Ref] | No
 
 
 def virtual_power(d: Draft, power: Ref, multiplier: Array, v_dot: Array) -> None:
-    """Sum the power of all inertial wrenches when the animal moves with the velocity ``multiplier``.
+    """Sum the power of all inertial wrenches when the animal moves with the velocity
+    ``multiplier``.
 
-    Starts from ``w``, ``w_dot``, ``a`` of the torso and ``w_virtual``, ``u_virtual``, its virtual velocities.
+    Starts from ``w``, ``w_dot``, ``a`` of the torso and ``w_virtual``, ``u_virtual``, its virtual
+    velocities.
     """
-    carried = {name: d.array(f"{name}_here", 3)[0] for name in ("w", "w_dot", "a", "w_virtual", "u_virtual")}
+    carried = {
+        name: d.array(f"{name}_here", 3)[0]
+        for name in ("w", "w_dot", "a", "w_virtual", "u_virtual")
+    }
     d.step(torso.torso_power, power=power)
     d.step(torso.mount_acceleration, a_mount=carried["a"])
-    d.step(torso.mount_velocity, {"w": d.known["w_virtual"], "u": d.known["u_virtual"]}, u=carried["u_virtual"])
+    d.step(
+        torso.mount_velocity,
+        {"w": d.known["w_virtual"], "u": d.known["u_virtual"]},
+        u=carried["u_virtual"],
+    )
     for name in ("w", "w_dot", "w_virtual"):
         d.copy(carried[name], d.known[name])
     with each_piece(d) as (i, _):
@@ -75,7 +91,8 @@ def virtual_power(d: Draft, power: Ref, multiplier: Array, v_dot: Array) -> None
 
 
 def gather_momentum(d: Draft, p_dot: Ref, kinetic: Ref | None = None) -> None:
-    """``mass`` and first moment ``h`` of the animal, and its momentum ``force, moment``, at B, which moves with p_dot.
+    """``mass`` and first moment ``h`` of the animal, and its momentum ``force, moment``, at B,
+    which moves with p_dot.
 
     With ``kinetic`` the kinetic energy is summed there, and momentum is not.
     """
@@ -86,7 +103,9 @@ def gather_momentum(d: Draft, p_dot: Ref, kinetic: Ref | None = None) -> None:
     d.copy(d.vector("u_torso", 3), u)
     d.copy(w, d.known["omega"])
     d.step(torso.mount_velocity, u=u)
-    momentum = None if kinetic else d.array("momenta", 6, d.tail.segments * mechanism(d).pieces(d.tail))
+    momentum = (
+        None if kinetic else d.array("momenta", 6, d.tail.segments * mechanism(d).pieces(d.tail))
+    )
     if kinetic:
         d.fill(kinetic, 0)
     with each_piece(d) as (i, g):
@@ -100,7 +119,9 @@ def gather_momentum(d: Draft, p_dot: Ref, kinetic: Ref | None = None) -> None:
 
 
 def gather_moment(d: Draft) -> None:
-    """Mass and first moment of the tail at its mount, then with the torso at B, in ``mass`` and ``h``."""
+    """Mass and first moment of the tail at its mount, then with the torso at B, in ``mass`` and
+    ``h``.
+    """
     carried = {name: d.vector(name, size) for name, size in (("mass", 1), ("h", 3))}
     for ref in carried.values():
         d.fill(ref, 0)
@@ -109,21 +130,31 @@ def gather_moment(d: Draft) -> None:
     d.step(torso.torso_moment, **carried)
 
 
-def gather_inertia(d: Draft, roots: dict[str, Array], columns: Array, H_tail: Block | None = None) -> None:
-    """Composite inertia in ``mass, h, I`` at B; each segment's momentum columns at B and its own block of H."""
+def gather_inertia(
+    d: Draft, roots: dict[str, Array], columns: Array, H_tail: Block | None = None
+) -> None:
+    """Composite inertia in ``mass, h, I`` at B; each segment's momentum columns at B and its own
+    block of H.
+    """
     sizes = {"mass": 1, "h": 3, "I": 6, "pitch": 6, "yaw": 6}
     carried = {name: d.vector(name, size) for name, size in sizes.items()}
     for name in ("mass", "h", "I"):
         d.fill(carried[name], 0)
     with d.loop("i", d.tail.segments, downward=True) as i:
-        places = {"H_pp_": (2 * i, 2 * i), "H_py_": (2 * i + 1, 2 * i), "H_yy_": (2 * i + 1, 2 * i + 1)}
+        places = {
+            "H_pp_": (2 * i, 2 * i),
+            "H_py_": (2 * i + 1, 2 * i),
+            "H_yy_": (2 * i + 1, 2 * i + 1),
+        }
         own = {name: H_tail(*place) for name, place in places.items()} if H_tail else {}
         for ref in (carried["pitch"], carried["yaw"], *own.values()):
             d.fill(ref, 0)
         with d.loop("j", mechanism(d).pieces(d.tail), downward=True):
             d.step(mechanism(d).gather, d.piece(i), **carried, **own)
         d.step(
-            torso.column_at_torso, {name: array[i] for name, array in roots.items()}, columns=columns.part(12 * i, 12)
+            torso.column_at_torso,
+            {name: array[i] for name, array in roots.items()},
+            columns=columns.part(12 * i, 12),
         )
     d.step(torso.torso_composite, **{name: carried[name] for name in ("mass", "h", "I")})
 
@@ -133,8 +164,12 @@ def segment_columns(d: Draft) -> Array:
     return d.array("S", 12, max(d.tail.segments - 1, 1))
 
 
-def forward_roots(d: Draft, here: dict[str, Ref], roots: dict[str, Array], S: Array | None = None) -> None:
-    """Pose of every segment's root, and spatial columns of all segments but the last, from pose ``R, P`` on."""
+def forward_roots(
+    d: Draft, here: dict[str, Ref], roots: dict[str, Array], S: Array | None = None
+) -> None:
+    """Pose of every segment's root, and spatial columns of all segments but the last, from pose
+    ``R, P`` on.
+    """
     last = d.tail.segments - 1
     with d.loop("i", last) as i:
         for name, ref in here.items():
@@ -155,7 +190,8 @@ def segment_roots(d: Draft) -> dict[str, Array]:
 
 
 def tail_inertia(d: Draft, H_tail: Block, columns: Array, world: bool = False) -> Array:
-    """All that H is made of (Eqs. 2, 16, 18): ``mass, h, I`` at B, momentum columns, H of the tail (lower triangle).
+    """All that H is made of (Eqs. 2, 16, 18): ``mass, h, I`` at B, momentum columns, H of the tail
+    (lower triangle).
 
     In torso axes, or with ``world`` the columns in world axes.
     """
@@ -165,17 +201,28 @@ def tail_inertia(d: Draft, H_tail: Block, columns: Array, world: bool = False) -
     forward_roots(d, here, roots, S)
     gather_inertia(d, roots, columns, H_tail)
     with d.loop("i", d.tail.segments, start=1) as i, d.loop("l", i) as segment:
-        block = {"H_pitch": H_tail(2 * i, 2 * segment, 2), "H_yaw": H_tail(2 * i + 1, 2 * segment, 2)}
-        d.step(torso.segment_coupling, {"S": S[segment], "columns": columns.part(12 * i, 12)}, **block)
+        block = {
+            "H_pitch": H_tail(2 * i, 2 * segment, 2),
+            "H_yaw": H_tail(2 * i + 1, 2 * segment, 2),
+        }
+        d.step(
+            torso.segment_coupling, {"S": S[segment], "columns": columns.part(12 * i, 12)}, **block
+        )
     return columns
 
 
-def torso_pose(d: Draft, world: bool, origin: Ref | None = None, name: str = "link") -> dict[str, Ref]:
-    """Pose of the tail mount, to be carried along the tail: from B in torso axes, or in world axes from an origin."""
+def torso_pose(
+    d: Draft, world: bool, origin: Ref | None = None, name: str = "link"
+) -> dict[str, Ref]:
+    """Pose of the tail mount, to be carried along the tail: from B in torso axes, or in world axes
+    from an origin.
+    """
     here = {"R": d.array(f"R_{name}", 9)[0], "P": d.array(f"P_{name}", 3)[0]}
     if world:
         d.copy(here["R"], d.known["R"])
-        d.step(torso.mount_position, {"p": origin or d.constant("origin", [0, 0, 0])[0]}, P=here["P"])
+        d.step(
+            torso.mount_position, {"p": origin or d.constant("origin", [0, 0, 0])[0]}, P=here["P"]
+        )
     else:
         d.fill(here["R"], *IDENTITY)
         d.copy(here["P"], d.known["tail_mount"])
@@ -188,7 +235,9 @@ def column_of(columns: Array, k: Index) -> Ref:
 
 
 def core_bias(d: Draft, bias: Array) -> None:
-    """C without gravity and translation: force and moment at B in torso axes, then the tail's forces."""
+    """C without gravity and translation: force and moment at B in torso axes, then the tail's
+    forces.
+    """
     zero = d.zero(3)
     d.known |= {"w": d.known["omega"], "w_dot": zero, "a": zero}
     wrench = forward_wrenches(d, None)
@@ -212,7 +261,9 @@ def sample_joints(d: Draft) -> tuple[Array, Array]:
 
 
 def gather_loads(d: Draft, f_ext: Array, torques: Array) -> None:
-    """J^T f of the loads in ``f_ext``: ``load_force, load_moment`` at B; the joints' share is added to ``torques``."""
+    """J^T f of the loads in ``f_ext``: ``load_force, load_moment`` at B; the joints' share is added
+    to ``torques``.
+    """
     S, points = sample_joints(d)
     beyond = d.vector("F_beyond", 6)
     d.fill(beyond, 0)
@@ -221,7 +272,10 @@ def gather_loads(d: Draft, f_ext: Array, torques: Array) -> None:
         reads = {"P": points[point], "f_point": f_ext.part(6 + 3 * point, 3)}
         d.step(loads.load_at_point, reads, F_beyond=beyond)
 
-    with d.loop("i", d.tail.segments, downward=True) as i, d.loop("j", d.tail.links, downward=True) as j:
+    with (
+        d.loop("i", d.tail.segments, downward=True) as i,
+        d.loop("j", d.tail.links, downward=True) as j,
+    ):
         g = d.tail.links * i + j
         add_load(g + 1)
         d.step(loads.joint_load, {"S": S[g]}, torque_=torques.part(2 * i, 2))

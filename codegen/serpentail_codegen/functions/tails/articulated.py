@@ -1,6 +1,8 @@
-"""The tails: for each, which steps describe one piece of a segment, so that the same sweeps serve both.
+"""The tails: for each, which steps describe one piece of a segment, so that the same sweeps serve
+both.
 
-A segment of the articulated tail has n pieces, its links; a segment of the continuum tail is one piece.
+A segment of the articulated tail has n pieces, its links; a segment of the continuum tail is one
+piece.
 """
 
 from fractions import Fraction
@@ -10,7 +12,7 @@ from ...mechanics import link
 from ..draft import Draft
 from .mechanism import Mechanism, motion, still
 
-# ---- articulated: link by link in link-local frames ---------------------------------------------------------------
+# ---- articulated: link by link in link-local frames ----------------------------------------------
 
 
 def prepare_link(d: Draft) -> None:
@@ -44,7 +46,13 @@ def move_link(d: Draft, i: Index, here: dict[str, Ref], v_dot: Array | None, wre
         if name not in d.known:
             d.vector(name, 3)
     reads = d.known | d.piece(i) | here | motion(d, i, v_dot)
-    d.apply(still(d, link.link_motion, bool(v_dot)), reads, a_joint=d.known["a_joint"], swing=d.known["swing"], **here)
+    d.apply(
+        still(d, link.link_motion, bool(v_dot)),
+        reads,
+        a_joint=d.known["a_joint"],
+        swing=d.known["swing"],
+        **here,
+    )
     d.apply(still(d, link.link_wrench), d.known | here, F=wrench)
 
 

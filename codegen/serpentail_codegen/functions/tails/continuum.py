@@ -1,6 +1,8 @@
-"""The tails: for each, which steps describe one piece of a segment, so that the same sweeps serve both.
+"""The tails: for each, which steps describe one piece of a segment, so that the same sweeps serve
+both.
 
-A segment of the articulated tail has n pieces, its links; a segment of the continuum tail is one piece.
+A segment of the articulated tail has n pieces, its links; a segment of the continuum tail is one
+piece.
 """
 
 from fractions import Fraction
@@ -13,7 +15,7 @@ from ...mechanics.lower import derive
 from ..draft import Draft
 from .mechanism import Mechanism, motion, still
 
-# ---- continuum: arc by arc in the arcs' root frames ---------------------------------------------------------------
+# ---- continuum: arc by arc in the arcs' root frames ----------------------------------------------
 
 ARC = {"tip": 8, "shape": 16, "E": 9, "r": 3, "bend": 12}
 OWN = {"h_own": 3, "I_own": 6, "pitch_own": 6, "yaw_own": 6, "H_own": 3}
@@ -49,8 +51,14 @@ def prepare_arc_samples(d: Draft) -> None:
     d.known["share"] = d.constant("share_sample", [fraction / d.tail.segments])[0]
     d.step(arc.section_properties, section=d.array("section_sample", 2)[0])
     section = {"section": next(a for a in d.arrays if a.name == "section_sample")[0]}
-    d.samples |= {name: d.array(f"{name}_sample", ARC[name], d.tail.segments) for name in ("E", "r", "bend")}
-    part, tip, margin = d.array("part", 2)[0], d.array("tip_sample", 8)[0], d.array("margin_sample", 1)[0]
+    d.samples |= {
+        name: d.array(f"{name}_sample", ARC[name], d.tail.segments) for name in ("E", "r", "bend")
+    }
+    part, tip, margin = (
+        d.array("part", 2)[0],
+        d.array("tip_sample", 8)[0],
+        d.array("margin_sample", 1)[0],
+    )
     if "bend_range" not in d.known:
         d.known["bend_range"] = d.constant("bend_range", [d.tail.bend_range])[0]
     with d.loop("i", d.tail.segments) as i:
@@ -64,11 +72,15 @@ def prepare_arc_samples(d: Draft) -> None:
 
 
 def move_arc(d: Draft, i: Index, here: dict[str, Ref], v_dot: Array | None, wrench: Ref) -> None:
-    """Store the inertial wrench of one arc and its generalised forces, then carry ``w, w_dot, a`` to its tip."""
+    """Store the inertial wrench of one arc and its generalised forces, then carry ``w, w_dot, a``
+    to its tip.
+    """
     if "torque_own" not in d.pieces:
         d.pieces["torque_own"] = d.array("torque_own", 2, d.tail.segments)
     reads = d.known | d.piece(i) | here | motion(d, i, v_dot)
-    d.apply(still(d, arc.segment_wrench, bool(v_dot)), reads, F=wrench, torque_own=reads["torque_own"])
+    d.apply(
+        still(d, arc.segment_wrench, bool(v_dot)), reads, F=wrench, torque_own=reads["torque_own"]
+    )
     d.apply(still(d, arc.segment_motion, bool(v_dot)), reads, **here)
 
 

@@ -1,6 +1,8 @@
-"""The tails: for each, which steps describe one piece of a segment, so that the same sweeps serve both.
+"""The tails: for each, which steps describe one piece of a segment, so that the same sweeps serve
+both.
 
-A segment of the articulated tail has n pieces, its links; a segment of the continuum tail is one piece.
+A segment of the articulated tail has n pieces, its links; a segment of the continuum tail is one
+piece.
 """
 
 from collections.abc import Callable
@@ -15,7 +17,9 @@ from ..tail import Tail
 
 @dataclass(frozen=True)
 class Mechanism:
-    """How one piece moves, what it weighs, and how it passes things on; steps are SymPy functions."""
+    """How one piece moves, what it weighs, and how it passes things on; steps are SymPy
+    functions.
+    """
 
     pieces: Callable[[Tail], int]
     prepare: Callable[[Draft, bool], None]
@@ -31,9 +35,14 @@ class Mechanism:
 
 
 def still(d: Draft, function: Callable, moving: bool = True):
-    """Return a step, specialised to a tail that does not accelerate unless it does, and to rest where the draft is."""
+    """Return a step, specialised to a tail that does not accelerate unless it does, and to rest
+    where the draft is.
+    """
     step = derive(function)
-    zeros = {"rest": {"rates": (0, 0), "w": (0, 0, 0)} if d.at_rest else {}, "unforced": {"accelerations": (0, 0)}}
+    zeros = {
+        "rest": {"rates": (0, 0), "w": (0, 0, 0)} if d.at_rest else {},
+        "unforced": {"accelerations": (0, 0)},
+    }
     zeros["unforced"] = {} if moving else zeros["unforced"]
     for name, constants in zeros.items():
         step = specialised(step, f"{step.name}_{name}", **constants) if constants else step

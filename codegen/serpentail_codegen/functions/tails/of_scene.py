@@ -1,6 +1,8 @@
-"""The tails: for each, which steps describe one piece of a segment, so that the same sweeps serve both.
+"""The tails: for each, which steps describe one piece of a segment, so that the same sweeps serve
+both.
 
-A segment of the articulated tail has n pieces, its links; a segment of the continuum tail is one piece.
+A segment of the articulated tail has n pieces, its links; a segment of the continuum tail is one
+piece.
 """
 
 from ..tail import Tail

@@ -1,4 +1,6 @@
-"""The C of batches: emitted functions of a scene go in, the text of the file that evaluates many states comes out."""
+"""The C of batches: emitted functions of a scene go in, the text of the file that evaluates many
+states comes out.
+"""
 
 from dataclasses import dataclass
 
@@ -16,7 +18,9 @@ from .routine import CFunction
 from .views import ArgumentView, callee_view, step_views
 
 STATES = {"double": 8, "float": 16}  # side by side: lanes of the widest vector
-STRAIGHT_UP_TO = 10000  # nodes: beyond, loops are hardly slower, and compile in a quarter of the time
+STRAIGHT_UP_TO = (
+    10000  # nodes: beyond, loops are hardly slower, and compile in a quarter of the time
+)
 BATCHED = ("mass_matrix", "bias_force", "inverse_dynamics", "forward_dynamics")
 
 
@@ -54,14 +58,18 @@ def _batch(scene: Scene, tail: Tail, function: Function) -> Batch:
 
 
 def straight(scene: Scene, program: Program) -> bool:
-    """Return whether a batch has no loops; there are no sweeps in lanes here that would overtake straight lines."""
+    """Return whether a batch has no loops; there are no sweeps in lanes here that would overtake
+    straight lines.
+    """
     if scene.emission == "auto":
         return applied(program) <= STRAIGHT_UP_TO and not branches(program)
     return scene.emission == "straight"
 
 
 class BatchView:
-    """A batch as the template sees it: its arguments, the function of their rows, their workspace."""
+    """A batch as the template sees it: its arguments, the function of their rows, their
+    workspace.
+    """
 
     def __init__(self, batch: Batch, tail: Tail, prefix: str):
         function = batch.function
@@ -81,9 +89,15 @@ def batch_file(scene: Scene, tail: Tail, found: list[Batch], context: dict) -> d
         "steps": step_views(found, scene.real, scene.name),
         "helpers": sorted(set().union(*(b.body.helpers for b in found)) | {"lanes", "everywhere"}),
     }
-    return {f"src/{scene.name}_batch.c": render("c", "batch/batch.c.jinja", context | own)} if found else {}
+    return (
+        {f"src/{scene.name}_batch.c": render("c", "batch/batch.c.jinja", context | own)}
+        if found
+        else {}
+    )
 
 
 def batch_entry(scene: Scene, found: list[Batch]) -> dict:
-    """Return what a loader must know of the batches: how many states side by side, and each one's workspace."""
+    """Return what a loader must know of the batches: how many states side by side, and each one's
+    workspace.
+    """
     return {"states": STATES[scene.real], "work": {b.function.name: b.work for b in found}}

@@ -1,4 +1,6 @@
-"""The C of flights: a scene's forward dynamics go in, the text of the file that simulates many states comes out."""
+"""The C of flights: a scene's forward dynamics go in, the text of the file that simulates many
+states comes out.
+"""
 
 from dataclasses import dataclass
 
@@ -25,7 +27,11 @@ RECORD = fields(
     ("samples", "long", "of each"),
     ("damping", "const real *", "[NT] N m s"),
     ("lengths", "const real *", "[steps] (s)"),
-    ("torques", "const real *", "[steps][3][NT] (N m) at beginning, middle and end of each step; NULL: none"),
+    (
+        "torques",
+        "const real *",
+        "[steps][3][NT] (N m) at beginning, middle and end of each step; NULL: none",
+    ),
     ("due", "const int *", "[steps] whether a sample follows"),
     ("steps", "long", ""),
     ("pause", "long", "steps of one call"),
@@ -37,7 +43,9 @@ RECORD = fields(
 
 @dataclass(frozen=True)
 class Flights:
-    """Forward dynamics over rows of states and of their parameters: its program, and the C of that."""
+    """Forward dynamics over rows of states and of their parameters: its program, and the C of
+    that.
+    """
 
     states: int
     program: Program
@@ -72,7 +80,14 @@ def flights(scene: Scene, tail: Tail, emitted: list[Emitted]) -> Flights | None:
     own = single if scene.baked else with_own_parameters(single, "forward_dynamics_of_flights")
     rows = side_by_side(own, states)
     count = 0 if scene.baked else sum(a.length for a in single.of_role("parameters"))
-    return Flights(states, rows, in_loops(rows, scene.real, scene.name, fixed), count, tail.nq + tail.nv, tail.nt)
+    return Flights(
+        states,
+        rows,
+        in_loops(rows, scene.real, scene.name, fixed),
+        count,
+        tail.nq + tail.nv,
+        tail.nt,
+    )
 
 
 def flights_file(scene: Scene, found: Flights | None, context: dict) -> dict[str, str]:
@@ -93,7 +108,10 @@ def _own(scene: Scene, found: Flights) -> dict:
         "widest": found.states,
         "rows": callee_view(found.program, found.body, scene.name),
         "arguments": ", ".join(names),
-        "record": [{"type": typed(f.type, scene.name), "name": f.name, "meaning": f.meaning} for f in RECORD],
+        "record": [
+            {"type": typed(f.type, scene.name), "name": f.name, "meaning": f.meaning}
+            for f in RECORD
+        ],
         "parameter_count": found.parameters,
         "state": found.state,
         "inner": found.inner,
@@ -104,6 +122,12 @@ def _own(scene: Scene, found: Flights) -> dict:
 
 
 def flights_entry(found: Flights | None) -> dict:
-    """Return what a loader must know of flights: how many side by side, their workspace, the members of the record."""
+    """Return what a loader must know of flights: how many side by side, their workspace, the
+    members of the record.
+    """
     members = [[f.name, f.kind] for f in RECORD]
-    return {"flights": {"states": found.states, "work": found.work, "record": members}} if found else {}
+    return (
+        {"flights": {"states": found.states, "work": found.work, "record": members}}
+        if found
+        else {}
+    )

@@ -1,7 +1,9 @@
-"""``casadi.external``: a scene's C functions go in; what CasADi can call of them, derivatives included, comes out.
+"""``casadi.external``: a scene's C functions go in; what CasADi can call of them, derivatives
+included, comes out.
 
-CasADi looks for ``jac_f``, ``adj1_f`` and ``jac_adj1_f`` beside ``f``.  It differentiates by the four numbers of the
-quaternion, the C functions by a turn of the torso: turn = T d(quaternion), T (3, 4) = 2 vec(conj(q) .) / |q|^2.
+CasADi looks for ``jac_f``, ``adj1_f`` and ``jac_adj1_f`` beside ``f``.  It differentiates by the
+four numbers of the quaternion, the C functions by a turn of the torso: turn = T d(quaternion), T
+(3, 4) = 2 vec(conj(q) .) / |q|^2.
 """
 
 from collections.abc import Callable, Collection
@@ -14,7 +16,8 @@ from ...functions.tail import Tail
 from ...scene.scene import Scene
 
 VECTOR = 8  # doubles in a cache line
-# where the numbers begin that anything depends on: neither the position of B nor its velocity matters
+# where the numbers begin that anything depends on: neither the position of B nor its velocity
+# matters
 MOVING = {"q": 3, "v": 3}
 Nonzero = Callable[[int, int], bool]
 
@@ -30,7 +33,9 @@ def nowhere(row: int, column: int) -> bool:
 
 
 def pattern(rows: int, columns: int, nonzero: Nonzero = everywhere) -> tuple[int, ...]:
-    """Return a sparsity pattern as CasADi reads it: the size, then 1 if dense, else column starts and rows."""
+    """Return a sparsity pattern as CasADi reads it: the size, then 1 if dense, else column starts
+    and rows.
+    """
     found = [[r for r in range(rows) if nonzero(r, c)] for c in range(columns)]
     if sum(map(len, found)) == rows * columns:
         return (rows, columns, 1)
@@ -45,7 +50,9 @@ def moves(name: str, k: int) -> bool:
 
 @dataclass(frozen=True)
 class Port:
-    """An input or output of a CasADi function: where its numbers lie in a dense array, if anywhere."""
+    """An input or output of a CasADi function: where its numbers lie in a dense array, if
+    anywhere.
+    """
 
     name: str
     pattern: tuple[int, ...]
@@ -57,7 +64,9 @@ class Port:
 
 @dataclass
 class External:
-    """One function for CasADi: its ports, and lines of C from arrays of its inputs to arrays of its outputs."""
+    """One function for CasADi: its ports, and lines of C from arrays of its inputs to arrays of its
+    outputs.
+    """
 
     symbol: str
     doc: str
@@ -84,7 +93,9 @@ class External:
         """Call a helper of the template, which fills new arrays of the given lengths."""
         self.arrays |= made
         self.helpers.add(helper)
-        self.lines.append(f"{self.prefix}_casadi_{helper}({', '.join(map(str, (*arguments, *made)))});")
+        self.lines.append(
+            f"{self.prefix}_casadi_{helper}({', '.join(map(str, (*arguments, *made)))});"
+        )
 
     def unknown(self, name: str) -> None:
         """Make an array of one number that is none."""
@@ -105,7 +116,7 @@ class External:
         return self.places()["work"] + self.inner_work + VECTOR - 1
 
 
-# ---- functions as they are ------------------------------------------------------------------------------------------
+# ---- functions as they are -----------------------------------------------------------------------
 
 
 def plain(start, name: str, sizes: dict[str, int]) -> External:
@@ -114,21 +125,27 @@ def plain(start, name: str, sizes: dict[str, int]) -> External:
     function = CATALOGUE[name].of(e.tail)
     names = [a.name for a in (*function.inputs, *function.outputs)]
     e.call(name, *names)
-    fixed = any(f.name == name and f.has(e.works, "jac_") and not f.by_parameters(e.works) for f in DYNAMICS)
+    fixed = any(
+        f.name == name and f.has(e.works, "jac_") and not f.by_parameters(e.works) for f in DYNAMICS
+    )
     e.inputs = [Port(a.name, pattern(a.length(e.tail), 1), a.name) for a in function.inputs]
     e.inputs.append(Port("parameters", pattern(sizes["parameters"], 1), differentiable=not fixed))
     for a in function.outputs:
         columns = a.shape(e.tail)[-1] if len(a.shape(e.tail)) > 1 else 1
-        e.outputs.append(Port(a.name, pattern(a.length(e.tail) // columns, columns), a.name, columns))
+        e.outputs.append(
+            Port(a.name, pattern(a.length(e.tail) // columns, columns), a.name, columns)
+        )
     return e
 
 
-# ---- derivatives ----------------------------------------------------------------------------------------------------
+# ---- derivatives ---------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class Dynamics:
-    """Inverse or forward dynamics: what it takes last and gives, and which C functions its derivatives are made of."""
+    """Inverse or forward dynamics: what it takes last and gives, and which C functions its
+    derivatives are made of.
+    """
 
     name: str
     last: str
@@ -144,7 +161,11 @@ class Dynamics:
 
     def has(self, works: Collection[str], kind: str) -> bool:
         """Tell if the functions are there that a derivative is made of."""
-        parts = {"jac_": self.jacobian, "adj1_": self.adjoint, "jac_adj1_": self.adjoint + self.jacobian + self.hessian}
+        parts = {
+            "jac_": self.jacobian,
+            "adj1_": self.adjoint,
+            "jac_adj1_": self.adjoint + self.jacobian + self.hessian,
+        }
         return {self.name, *parts[kind]} <= set(works)
 
     def by_parameters(self, works: Collection[str]) -> bool:
@@ -155,12 +176,16 @@ class Dynamics:
         """Tell if output ``row`` depends on input ``column``."""
         if on == "v_dot":  # H: the mass in its first corner
             return row == column or max(row, column) >= 3
-        if on == "q" and self.name == "forward_dynamics" and column < 7:  # accelerations turn with the torso
+        if (
+            on == "q" and self.name == "forward_dynamics" and column < 7
+        ):  # accelerations turn with the torso
             return row < 3 <= column
         return moves(on, column)
 
     def curved(self, a: str, b: str, row: int, column: int) -> bool:
-        """Tell if the derivative of the weighted outputs by number ``row`` of a depends on number ``column`` of b."""
+        """Tell if the derivative of the weighted outputs by number ``row`` of a depends on number
+        ``column`` of b.
+        """
         if b == f"adj_{self.gives}":
             return self.depends(a, column, row)
         return moves(a, row) and moves(b, column)
@@ -207,10 +232,17 @@ def by_parameters(e: External, f: Dynamics) -> dict[str, str]:
 
 
 def ports_in(f: Dynamics, sizes: dict[str, int], known: bool, order: int) -> list[Port]:
-    """Return the inputs of f's Jacobian (order 1), of its adjoint (2), and of the adjoint's Jacobian (3)."""
+    """Return the inputs of f's Jacobian (order 1), of its adjoint (2), and of the adjoint's
+    Jacobian (3).
+    """
     names = (*f.inputs, "parameters")
     ports = [
-        Port(n, pattern(sizes[n], 1), n if n in f.inputs else "", differentiable=n != "parameters" or known)
+        Port(
+            n,
+            pattern(sizes[n], 1),
+            n if n in f.inputs else "",
+            differentiable=n != "parameters" or known,
+        )
         for n in names
     ]
     ports.append(Port(f"out_{f.gives}", pattern(sizes[f.gives], 1)))
@@ -226,14 +258,25 @@ def jacobian(e: External, f: Dynamics, sizes: dict[str, int]) -> None:
     arrays = first_derivatives(e, f) | by_parameters(e, f)
     e.inputs = ports_in(f, sizes, "parameters" in arrays, 1)
     for n in (*f.inputs, "parameters"):
-        blocks = pattern(sizes[f.gives], sizes[n], partial(f.depends, n) if n in arrays else nowhere)
+        blocks = pattern(
+            sizes[f.gives], sizes[n], partial(f.depends, n) if n in arrays else nowhere
+        )
         e.outputs.append(Port(f"jac_{f.gives}_{n}", blocks, arrays.get(n, ""), sizes[n]))
 
 
 def adjoint(e: External, f: Dynamics, sizes: dict[str, int]) -> None:
     """Make ``adj1_f``."""
     weights = f"adj_{f.gives}"
-    e.call(f"{f.name}_vjp", "q", "v", f.last, weights, "turn_gradient", "v_gradient", f"{f.last}_gradient")
+    e.call(
+        f"{f.name}_vjp",
+        "q",
+        "v",
+        f.last,
+        weights,
+        "turn_gradient",
+        "v_gradient",
+        f"{f.last}_gradient",
+    )
     e.use("quaternion_rows", "q", 1, "turn_gradient", q_gradient=e.tail.nq)
     found = by_parameters(e, f)
     count = sizes["parameters"]
@@ -244,12 +287,19 @@ def adjoint(e: External, f: Dynamics, sizes: dict[str, int]) -> None:
     e.inputs = ports_in(f, sizes, bool(found), 2)
     for n in (*f.inputs, "parameters"):
         e.outputs.append(
-            Port(f"adj_{n}", pattern(sizes[n], 1), f"{n}_gradient", differentiable=n in f.inputs or bool(found))
+            Port(
+                f"adj_{n}",
+                pattern(sizes[n], 1),
+                f"{n}_gradient",
+                differentiable=n in f.inputs or bool(found),
+            )
         )
 
 
 def tangent_hessian(e: External, f: Dynamics) -> None:
-    """Second derivatives of the weighted outputs by velocities: ``qq``, ``qv``, ``vv``, ``aq`` or ``tq``."""
+    """Second derivatives of the weighted outputs by velocities: ``qq``, ``qv``, ``vv``, ``aq`` or
+    ``tq``.
+    """
     weights, blocks = f"adj_{f.gives}", ("qq", "qv", "vv", "aq")
     if f.name == "inverse_dynamics":
         e.call("inverse_dynamics_hessian", "q", "v", "v_dot", weights, *blocks)
@@ -263,7 +313,9 @@ def tangent_hessian(e: External, f: Dynamics) -> None:
 
 
 def second_derivatives(e: External, f: Dynamics) -> dict[tuple[str, str], tuple[str, int, int]]:
-    """Compute second derivatives; return the array of each block with its strides, by row and column."""
+    """Compute second derivatives; return the array of each block with its strides, by row and
+    column.
+    """
     nq, nv, weights = e.tail.nq, e.tail.nv, f"adj_{f.gives}"
     last, rows = f.last, nv if f.last == "v_dot" else e.tail.nt
     first = first_derivatives(e, f)
@@ -274,14 +326,24 @@ def second_derivatives(e: External, f: Dynamics) -> dict[tuple[str, str], tuple[
     e.use("curvature", "q", "q_gradient", "by_qq")
     e.use("quaternion_rows", "q", nv, "qv", by_qv=nq * nv)
     e.use("quaternion_columns", "q", rows, "aq" if last == "v_dot" else "tq", by_last=rows * nq)
-    sources = {("q", "q"): ("by_qq", nq, 1), ("q", "v"): ("by_qv", nv, 1), ("v", "q"): ("by_qv", 1, nv)}
-    sources |= {("v", "v"): ("vv", nv, 1), (last, "q"): ("by_last", nq, 1), ("q", last): ("by_last", 1, nq)}
+    sources = {
+        ("q", "q"): ("by_qq", nq, 1),
+        ("q", "v"): ("by_qv", nv, 1),
+        ("v", "q"): ("by_qv", 1, nv),
+    }
+    sources |= {
+        ("v", "v"): ("vv", nv, 1),
+        (last, "q"): ("by_last", nq, 1),
+        ("q", last): ("by_last", 1, nq),
+    }
     columns = {"q": nq, "v": nv, last: rows}
     return sources | {(a, weights): (array, 1, columns[a]) for a, array in first.items()}
 
 
 def hessian(e: External, f: Dynamics, sizes: dict[str, int]) -> None:
-    """Make ``jac_adj1_f``; no C function gives second derivatives with respect to parameters: they are not a number."""
+    """Make ``jac_adj1_f``; no C function gives second derivatives with respect to parameters: they
+    are not a number.
+    """
     sources = second_derivatives(e, f)
     known = f.by_parameters(e.works)
     e.inputs = ports_in(f, sizes, known, 3)
@@ -299,18 +361,26 @@ def hessian(e: External, f: Dynamics, sizes: dict[str, int]) -> None:
             e.outputs.append(Port(f"jac_adj_{a}_{b}", blocks, *source))
 
 
-# ---- a scene's functions --------------------------------------------------------------------------------------------
+# ---- a scene's functions -------------------------------------------------------------------------
 
 
 def externals(scene: Scene, tail: Tail, works: dict[str, int]) -> list[External]:
-    """Return every function that CasADi can call, derivatives after the function that they belong to."""
+    """Return every function that CasADi can call, derivatives after the function that they belong
+    to.
+    """
     sizes = {"q": tail.nq, "v": tail.nv, "v_dot": tail.nv, "force": tail.nv, "tau": tail.nt}
     sizes["parameters"] = sum(p.size for p in struct_parameters(scene))
 
     def start(name: str, kind: str) -> External:
         symbol, doc = f"{kind}{scene.name}_casadi_{name}", f"{kind}{name}"
-        hidden = () if not scene.baked else [n for n in works if n.endswith("_parameter_derivatives") and n != name]
-        return External(symbol, doc, tail, scene.name, {n: work for n, work in works.items() if n not in hidden})
+        hidden = (
+            ()
+            if not scene.baked
+            else [n for n in works if n.endswith("_parameter_derivatives") and n != name]
+        )
+        return External(
+            symbol, doc, tail, scene.name, {n: work for n, work in works.items() if n not in hidden}
+        )
 
     found = [plain(start, name, sizes) for name in works]
     for f in DYNAMICS:

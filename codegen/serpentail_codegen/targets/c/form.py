@@ -15,7 +15,8 @@ from .straight import straight_line
 
 STRAIGHT_UP_TO = 7000  # nodes: beyond, the text leaves the instruction cache and compile time grows
 STRAIGHT_BESIDE_LANES = 3500  # nodes: where there is a sweep in lanes, too, that is faster beyond
-SEGMENTS_FROM = 128  # columns of H times links, the work of a sweep in lanes: from here on segments are no slower
+# columns of H times links, the work of a sweep in lanes: from here on segments are no slower
+SEGMENTS_FROM = 128
 ELIMINATED = 12  # rows: smaller matrices are factored without loops
 
 
@@ -31,7 +32,11 @@ class Emitted:
 def emit(scene: Scene, tail: Tail, function: Function) -> Emitted:
     """Print one function in the form that the scene asks for."""
     fixed = baked_values(scene)
-    form, program = fastest(function, tail) if scene.emission == "auto" else in_form(scene.emission, function, tail)
+    form, program = (
+        fastest(function, tail)
+        if scene.emission == "auto"
+        else in_form(scene.emission, function, tail)
+    )
     printer = straight_line if form == "straight" else in_loops
     return Emitted(function, printer(program, scene.real, scene.name, fixed), form)
 
@@ -39,15 +44,17 @@ def emit(scene: Scene, tail: Tail, function: Function) -> Emitted:
 def fastest(function: Function, tail: Tail) -> tuple[str, Program]:
     """Return the form that runs fastest on a processor with vectors, and the program in that form.
 
-    Straight lines are fastest until their text crowds the instruction cache, if all of them are always run; sweeps in
-    lanes overtake them before that, and sweeps by segments overtake both.
+    Straight lines are fastest until their text crowds the instruction cache, if all of them are
+    always run; sweeps in lanes overtake them before that, and sweeps by segments overtake both.
     """
     long = tail.segments > 1 and tail.nt * tail.total >= SEGMENTS_FROM
     form, swept = in_form("segments" if long else "lanes", function, tail)
     if form == "segments":
         return form, swept
     program = assemble(function, tail)
-    if applied(program) <= (STRAIGHT_BESIDE_LANES if form == "lanes" else STRAIGHT_UP_TO) and not branches(program):
+    if applied(program) <= (
+        STRAIGHT_BESIDE_LANES if form == "lanes" else STRAIGHT_UP_TO
+    ) and not branches(program):
         return "straight", program
     return form, swept
 

@@ -1,4 +1,6 @@
-"""C function bodies: programs go in, the lines of their C functions come out, straight or as loops over steps."""
+"""C function bodies: programs go in, the lines of their C functions come out, straight or as loops
+over steps.
+"""
 
 from ...ir.interpret import executed
 from ...ir.program import (
@@ -43,14 +45,24 @@ class LoopPrinter:
         body = self._body(self.program.body)
         declarations, work = self._declarations()
         own = padded(work)  # what is called begins at a whole vector, too
-        lines = (*declarations, *(line.replace(CALLEES_WORK, str(own)) for line in body), "return STATUS_OK;")
-        work = max([work, *(own + function.work for _, function in self.callees.values() if function.work)])
+        lines = (
+            *declarations,
+            *(line.replace(CALLEES_WORK, str(own)) for line in body),
+            "return STATUS_OK;",
+        )
+        work = max(
+            [work, *(own + function.work for _, function in self.callees.values() if function.work)]
+        )
         routines, callees = tuple(self.routines.values()), tuple(self.callees.values())
-        return CFunction(lines, work, routines, frozenset(self.helpers), executed(self.program), callees)
+        return CFunction(
+            lines, work, routines, frozenset(self.helpers), executed(self.program), callees
+        )
 
     def _declarations(self) -> tuple[list[str], int]:
         lines, work = [], 0
-        for array in sorted(self.used.values(), key=lambda a: not a.lanes):  # rows first, where vectors are aligned
+        for array in sorted(
+            self.used.values(), key=lambda a: not a.lanes
+        ):  # rows first, where vectors are aligned
             values = self.fixed.get(array.name, array.values)
             if array.role == "constant" or array.name in self.fixed:
                 text = ", ".join(self.dialect.literal(v) for v in values)
@@ -65,7 +77,9 @@ class LoopPrinter:
     def _ref(self, ref: Ref) -> Ref:
         if ref.array.name in self.fixed:
             values = tuple(self.fixed[ref.array.name])
-            ref = Ref(Array(ref.array.name, "constant", ref.array.size, 1, values), ref.offset, ref.size)
+            ref = Ref(
+                Array(ref.array.name, "constant", ref.array.size, 1, values), ref.offset, ref.size
+            )
         self.used.setdefault(ref.array.name, ref.array)
         return ref
 
@@ -90,20 +104,31 @@ class LoopPrinter:
         if target.size > FEW and len(set(fill.values)) == 1:
             value = self.dialect.literal(fill.values[0])
             return [f"{self._helper('fill')}({target.size}, {value}, {pointer(target)});"]
-        return [f"{scalar(target, k)} = {self.dialect.literal(v)};" for k, v in enumerate(fill.values)]
+        return [
+            f"{scalar(target, k)} = {self.dialect.literal(v)};" for k, v in enumerate(fill.values)
+        ]
 
     def _fill_rows(self, target: Ref, values) -> list[str]:
         if not any(values):
-            return [f"{self._helper('clear_rows')}({target.size * target.array.row}, {pointer(target)});"]
+            return [
+                f"{self._helper('clear_rows')}({target.size * target.array.row}, "
+                f"{pointer(target)});"
+            ]
         fill, row = self._helper("fill_rows"), target.array.row
         texts = [self.dialect.literal(v) for v in values]
-        return [f"{fill}({row}, {text}, {pointer(one)});" for text, one in zip(texts, singles(target), strict=True)]
+        return [
+            f"{fill}({row}, {text}, {pointer(one)});"
+            for text, one in zip(texts, singles(target), strict=True)
+        ]
 
     def _unit(self, unit: Unit) -> list[str]:
         target, row = self._ref(unit.target), unit.target.array.row
         zeros = f"{self._helper('clear_rows')}({target.size * row}, {pointer(target)});"
         ones = [target.offset * row + k * row + unit.first + k for k in range(target.size)]
-        return [zeros, *(f"{target.array.name}[{index_text(at)}] = {self.dialect.literal(1)};" for at in ones)]
+        return [
+            zeros,
+            *(f"{target.array.name}[{index_text(at)}] = {self.dialect.literal(1)};" for at in ones),
+        ]
 
     def _copy(self, copy: Copy) -> list[str]:
         target, source = self._ref(copy.target), self._ref(copy.source)
@@ -134,14 +159,19 @@ class LoopPrinter:
         given = self._ref(guard.scalar)
         test = f"!({' && '.join(f'{scalar(given, k)} > {self.dialect.literal(0)}' for k in range(given.size))})"
         if given.lanes:
-            test = f"!{self._helper('all_positive')}({given.size * given.array.row}, {pointer(given)})"
+            test = (
+                f"!{self._helper('all_positive')}({given.size * given.array.row}, {pointer(given)})"
+            )
         return [f"if ({test}) {{", f"  return STATUS_{guard.status};", "}"]
 
     def _factor(self, factor: Factor) -> list[str]:
         matrix = self._ref(factor.matrix[0])
         if matrix.lanes:
             self.helpers |= {"all_positive"}
-            call = f"{self._helper('ldl_factor_side_by_side')}({factor.size}, {matrix.array.row}, {pointer(matrix)})"
+            call = (
+                f"{self._helper('ldl_factor_side_by_side')}({factor.size}, {matrix.array.row}, "
+                f"{pointer(matrix)})"
+            )
         else:
             self.helpers |= {"lanes"}
             call = f"{self._helper('ldl_factor')}({factor.size}, {pointer(matrix)})"
@@ -179,7 +209,14 @@ class LoopPrinter:
         for array in (*call.program.of_role("input"), *call.program.of_role("output")):
             arguments.append(pointer(self._ref(given[array.name].part(0, 1))))
         text = f"{self.prefix}_{name}({', '.join(arguments)}, work + {CALLEES_WORK})"
-        return ["{", f"  const int status = {text};", "  if (status != STATUS_OK) {", "    return status;", "  }", "}"]
+        return [
+            "{",
+            f"  const int status = {text};",
+            "  if (status != STATUS_OK) {",
+            "    return status;",
+            "  }",
+            "}",
+        ]
 
     def _apply(self, call: Apply) -> list[str]:
         outputs = list(zip(call.step.outputs, map(self._ref, call.writes), call.adds, strict=True))
@@ -202,22 +239,34 @@ class LoopPrinter:
         if target.lanes:
             source = Array(f"{name}_new", "local", target.size, lanes=target.lanes)[0]
             return self._copy_rows(target, source, "add_rows" if adds else "copy_rows")
-        return [f"{scalar(target, k)} {'+=' if adds else '='} {name}_new[{k}];" for k in range(target.size)]
+        return [
+            f"{scalar(target, k)} {'+=' if adds else '='} {name}_new[{k}];"
+            for k in range(target.size)
+        ]
 
     def _routine(self, call: Apply) -> tuple[Routine, int]:
         """Return what to call, and the lanes of its rows."""
-        wide = {n: ref for named in (call.inputs(), call.outputs()) for n, ref in named.items() if ref.lanes}
+        wide = {
+            n: ref
+            for named in (call.inputs(), call.outputs())
+            for n, ref in named.items()
+            if ref.lanes
+        }
         written = zip(call.outputs().items(), call.adds, strict=True)
         adds = {name for (name, ref), adds in written if adds and ref.stride == 1}
         row = next((ref.array.row for ref in wide.values()), 1)
         apart = tuple((name, ref.stride) for name, ref in call.inputs().items() if ref.stride > 1)
         if any(name in wide for name, _ in apart):
-            raise ValueError(f"{call.step.name} reads rows from places apart, which a pointer cannot show")
+            raise ValueError(
+                f"{call.step.name} reads rows from places apart, which a pointer cannot show"
+            )
         routine = Routine(call.step, frozenset(wide), row, frozenset(adds), apart)
         if self.routines.setdefault(routine.name, routine) != routine:
             raise ValueError(f"two steps are called {routine.name}")
         given = [
-            padded(wide[name].lanes) if name in wide else 0 for name, size in call.step.inputs for _ in range(size)
+            padded(wide[name].lanes) if name in wide else 0
+            for name, size in call.step.inputs
+            for _ in range(size)
         ]
         self.helpers |= called(call.step.nodes, given) | ({"lanes"} if wide else set())
         return routine, next((ref.lanes for ref in wide.values()), 0)

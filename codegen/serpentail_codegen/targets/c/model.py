@@ -27,13 +27,19 @@ def offered(tail: Tail, views: list["FunctionView"]) -> Has:
     """Return what the simulation of a scene with these functions can do."""
     outputs = {f.name: f.outputs for f in views}
     factors = outputs["implicit_factor"][0].length if "implicit_factor" in outputs else 0
-    return Has("pfl" in outputs, factors, tail.points, tuple(tail.groups.items()), "feet" in tail.contacts)
+    return Has(
+        "pfl" in outputs, factors, tail.points, tuple(tail.groups.items()), "feet" in tail.contacts
+    )
 
 
 def abi_hash(scene: Scene, tail: Tail, views: list[FunctionView]) -> str:
-    """Digest of what a caller relies on: symbols, argument sizes, workspace, the parameter struct."""
+    """Digest of what a caller relies on: symbols, argument sizes, workspace, the parameter
+    struct.
+    """
     interface = [scene.name, scene.real, [[p.name, p.size] for p in struct_parameters(scene)]]
-    interface += [[f.name, [[a.name, a.length] for a in (*f.inputs, *f.outputs)], f.work] for f in views]
+    interface += [
+        [f.name, [[a.name, a.length] for a in (*f.inputs, *f.outputs)], f.work] for f in views
+    ]
     if "rollout" in scene.functions:
         interface += layouts(offered(tail, views)).items()
     return hashlib.sha256(json.dumps(interface).encode()).hexdigest()[:16]
@@ -53,7 +59,9 @@ def c_context(scene: Scene, tail: Tail, emitted: list[Emitted], version: str) ->
     return joined(
         {name: literal(value) for name, value in numbers.items()},
         {
-            "title": f"{scene.kind} tail, {tail.segments} segments x {tail.links} {PIECES[scene.kind]}",
+            "title": (
+                f"{scene.kind} tail, {tail.segments} segments x {tail.links} {PIECES[scene.kind]}"
+            ),
             "pieces": PIECES[scene.kind],
             "prefix": scene.name,
             "vector": VECTOR,
@@ -109,5 +117,9 @@ def c_files(scene: Scene, context: dict) -> dict[str, str]:
         f"src/{name}.c": render("c", "model/model.c.jinja", context),
         f"src/{name}_host.c": render("c", "model/host.c.jinja", context),
         "example/main.c": render("c", "model/example.c.jinja", context),
-        **({path: render("c", template, context) for template, path in places.items()} if "has" in context else {}),
+        **(
+            {path: render("c", template, context) for template, path in places.items()}
+            if "has" in context
+            else {}
+        ),
     }

@@ -1,4 +1,6 @@
-"""The package around a model's C: the templates' data go in, the files that build, explain and license it come out."""
+"""The package around a model's C: the templates' data go in, the files that build, explain and
+license it come out.
+"""
 
 from ..templating import render
 

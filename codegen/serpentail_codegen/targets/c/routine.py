@@ -1,4 +1,6 @@
-"""C function bodies: programs go in, the lines of their C functions come out, straight or as loops over steps."""
+"""C function bodies: programs go in, the lines of their C functions come out, straight or as loops
+over steps.
+"""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -10,7 +12,9 @@ from ..expressions import Dialect, Scalars, index_text
 
 @dataclass(frozen=True)
 class Routine:
-    """A step as one C function: its rows and how far apart, the outputs that are added, inputs that lie apart."""
+    """A step as one C function: its rows and how far apart, the outputs that are added, inputs that
+    lie apart.
+    """
 
     step: Step
     rows: frozenset[str] = frozenset()
@@ -32,9 +36,11 @@ class Routine:
 
 @dataclass(frozen=True)
 class CFunction:
-    """One C function body: its lines, the scalars of workspace, the routines and helpers it calls, what it costs.
+    """One C function body: its lines, the scalars of workspace, the routines and helpers it calls,
+    what it costs.
 
-    ``operations`` are executed, each lane counted; ``callees`` are the programs that it calls, with their C functions.
+    ``operations`` are executed, each lane counted; ``callees`` are the programs that it calls, with
+    their C functions.
     """
 
     lines: tuple[str, ...]
@@ -50,10 +56,18 @@ def dialect(real: str, prefix: str = "") -> Dialect:
     suffix = "f" if real == "float" else ""
     sincos = f"real {{sine}}, {{cosine}}; {prefix}_sincos({{argument}}, &{{sine}}, &{{cosine}});"
     functions = {"sqrt": "sqrt" + suffix}
-    sincos_row = f"lanes {{sine}}, {{cosine}}; {prefix}_sincos_row({{argument}}, &{{sine}}, &{{cosine}});"
+    sincos_row = (
+        f"lanes {{sine}}, {{cosine}}; {prefix}_sincos_row({{argument}}, &{{sine}}, &{{cosine}});"
+    )
     row, load = "const lanes {name} = {text};", "LOAD({address} + c)"
     return Dialect(
-        "const real {name} = {text};", suffix, functions, sincos=sincos, sincos_row=sincos_row, row=row, load=load
+        "const real {name} = {text};",
+        suffix,
+        functions,
+        sincos=sincos,
+        sincos_row=sincos_row,
+        row=row,
+        load=load,
     )
 
 
@@ -97,7 +111,9 @@ def routine_arguments(routine: Routine) -> str:
 
 
 def routine_lines(routine: Routine, real: str, prefix: str) -> list[str]:
-    """Print the body of a step: inputs by their names, outputs as ``<name>_out``; rows in a loop over lanes."""
+    """Print the body of a step: inputs by their names, outputs as ``<name>_out``; rows in a loop
+    over lanes.
+    """
     step, row = routine.step, routine.row
     names, rows = [], {}
     for name, size in step.inputs:
@@ -116,7 +132,10 @@ def routine_lines(routine: Routine, real: str, prefix: str) -> list[str]:
             if name in routine.rows:
                 text = scalars.text[node] if scalars.lanes[node] else f"WIDE({scalars.text[node]})"
                 address = f"&{name}_out[{k * row}] + c"
-                stores.append(f"STORE({address}, {f'LOAD({address}) + {text}' if name in routine.adds else text});")
+                stores.append(
+                    f"STORE({address}, "
+                    f"{f'LOAD({address}) + {text}' if name in routine.adds else text});"
+                )
             else:
                 narrow.append((name, k, scalars.text[node]))
     # every input is read before an output is written: outputs may overwrite inputs
@@ -124,5 +143,7 @@ def routine_lines(routine: Routine, real: str, prefix: str) -> list[str]:
     lines += [f"const real {name} = {text};" for text, name in late.items()]
     lines += each_lane("count", wide + stores) if stores else []
     for name, k, text in narrow:
-        lines.append(f"{name}_out[{k}] {'+=' if name in routine.adds else '='} {late.get(text, text)};")
+        lines.append(
+            f"{name}_out[{k}] {'+=' if name in routine.adds else '='} {late.get(text, text)};"
+        )
     return lines

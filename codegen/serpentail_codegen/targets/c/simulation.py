@@ -1,4 +1,6 @@
-"""The simulation's C files: what a scene has goes in; records, coefficients and workspace come out."""
+"""The simulation's C files: what a scene has goes in; records, coefficients and workspace come
+out.
+"""
 
 import re
 from collections.abc import Iterable
@@ -12,9 +14,30 @@ from .tableaux import RK4, ROS34PW2, TSIT5, Explicit, Rosenbrock, transformed
 
 NAMES = r"\b(real|piecewise|controller|drive|parameters|torque)\b"
 SLOTS = 11  # states in the workspace: see simulation/workspace.c.jinja
-MACROS = ("NQ", "NV", "NT", "SIZE", "SLOT", "START", "END", "STAGES", "END_RATE", "TRIAL", "RIGHT", "TAU")
+MACROS = (
+    "NQ",
+    "NV",
+    "NT",
+    "SIZE",
+    "SLOT",
+    "START",
+    "END",
+    "STAGES",
+    "END_RATE",
+    "TRIAL",
+    "RIGHT",
+    "TAU",
+)
 MACROS += ("TABLE", "FORCES", "PRESSURES", "REACHED", "POINTS", "GROUPS", "FACTORS", "INNER")
-NUMBERS = {"three": 3, "four": 4, "five": 5, "hundred": 100, "fifth": 0.2, "nearly": 0.99, "hundredth": 0.01}
+NUMBERS = {
+    "three": 3,
+    "four": 4,
+    "five": 5,
+    "hundred": 100,
+    "fifth": 0.2,
+    "nearly": 0.99,
+    "hundredth": 0.01,
+}
 NUMBERS |= {"milli": 1e-3, "millionth": 1e-6, "small": 1e-10, "tiny_error": 1e-6}
 NUMBERS |= {"safety": 0.9, "share": 0.85, "memory": 0.2}  # of the PI controller
 # The methods' numbers in C, in order; those with True need `implicit`.
@@ -37,7 +60,9 @@ class Field:
 
 @dataclass(frozen=True)
 class Has:
-    """What a scene's simulation can do: feedback linearisation, W-methods, groups of contact points, legs."""
+    """What a scene's simulation can do: feedback linearisation, W-methods, groups of contact
+    points, legs.
+    """
 
     pfl: bool
     factors: int  # reals of implicit_factor's, 0 without
@@ -72,12 +97,19 @@ def records(has: Has) -> dict[str, list[Field]]:
         "piecewise": PIECEWISE,
         "controller": CONTROLLER[:2] + (PFL if has.pfl else []) + CONTROLLER[2:],
         "drive": DRIVE + (LEGS if has.legs else []),
-        "run": START + (BRISTLES[:1] if has.contacts else []) + SETTINGS + SAMPLES + (contact_samples(has)) + KEPT,
+        "run": START
+        + (BRISTLES[:1] if has.contacts else [])
+        + SETTINGS
+        + SAMPLES
+        + (contact_samples(has))
+        + KEPT,
     }
 
 
 DESCRIPTIONS = {
-    "piecewise": "Functions of time, polynomials piece by piece: torques, reference motions, leg angles.",
+    "piecewise": (
+        "Functions of time, polynomials piece by piece: torques, reference motions, leg angles."
+    ),
     "controller": "Torques of the tail: the sum of the parts that are there.",
     "drive": "What acts in a run: controllers, one after another, and where they are not smooth.",
     "run": "A run, zero but for what its caller sets: all up to `work`.",
@@ -85,7 +117,9 @@ DESCRIPTIONS = {
 
 
 def layouts(has: Has) -> dict[str, list[list[str]]]:
-    """Return the members of every record, name and kind, as a caller in another language needs them."""
+    """Return the members of every record, name and kind, as a caller in another language needs
+    them.
+    """
     return {record: [[f.name, f.kind] for f in members] for record, members in records(has).items()}
 
 
@@ -94,7 +128,11 @@ PIECEWISE = fields(
     ("channels", "int", "functions of time in the table"),
     ("degree", "int", "of the polynomials"),
     ("times", "const real *", "[pieces + 1] increasing (s)"),
-    ("coefficients", "const real *", "[pieces][channels][degree + 1] of powers of t - times[piece], constants first"),
+    (
+        "coefficients",
+        "const real *",
+        "[pieces][channels][degree + 1] of powers of t - times[piece], constants first",
+    ),
 )
 CONTROLLER = fields(
     ("damping", "const real *", "[NT] N m s: tau = -damping q_t_dot (Eq. 47); NULL: none"),
@@ -103,7 +141,11 @@ CONTROLLER = fields(
     ("context", "void *", "its first argument"),
 )
 PFL = fields(
-    ("reference", "const piecewise *", "of NT channels (rad) that Eq. 46 tracks, added; NULL: none"),
+    (
+        "reference",
+        "const piecewise *",
+        "of NT channels (rad) that Eq. 46 tracks, added; NULL: none",
+    ),
     ("kp", "real", "1/s^2"),
     ("kd", "real", "1/s"),
     ("feedforward", "int", "whether the reference's acceleration is asked for"),
@@ -115,7 +157,9 @@ DRIVE = fields(
     ("stops", "int", "number of times where what acts jumps or has a kink"),
     ("stop_times", "const real *", "[stops] increasing (s): steps end there"),
 )
-LEGS = fields(("legs", "const piecewise *", "of 4 channels: gamma_1, delta_1, gamma_2, delta_2 (rad)"))
+LEGS = fields(
+    ("legs", "const piecewise *", "of 4 channels: gamma_1, delta_1, gamma_2, delta_2 (rad)")
+)
 START = fields(
     ("parameters", "const parameters *", "of the model"),
     ("drive", "const drive *", "what acts"),
@@ -146,7 +190,12 @@ SAMPLES = fields(
     ("work", "real *", "[WORK_ROLLOUT]; holds the run between calls"),
 )
 EVENT_FIELDS = fields(
-    ("stop_at", "int", "sum of 1 << event: the run ends at the first of these; event = 2 group + (0: down, 1: off)"),
+    (
+        "stop_at",
+        "int",
+        "sum of 1 << event: the run ends at the first of these; event = 2 group + (0: down, 1: "
+        "off)",
+    ),
     ("most_events", "long", "that fit"),
     ("event_times", "real *", "[most_events] (s)"),
     ("event_kinds", "int *", "[most_events]"),
@@ -173,7 +222,9 @@ def contact_samples(has: Has) -> list[Field]:
 
 
 def simulation_context(scene: Scene, tail: Tail, has: Has, works: dict[str, int]) -> dict:
-    """Return what the simulation's templates lay out; ``works`` is the workspace of every function."""
+    """Return what the simulation's templates lay out; ``works`` is the workspace of every
+    function.
+    """
     literal = dialect(scene.real).literal
     size, table = tail.nq + tail.nv + 2 * has.contacts, max(4 * tail.nt, 2 * tail.nv)
     own = SLOTS * size + tail.nt + table + 5 * has.contacts
@@ -201,14 +252,23 @@ def simulation_context(scene: Scene, tail: Tail, has: Has, works: dict[str, int]
 
 
 def ground_damping(scene: Scene) -> str:
-    """Return D_n of Eq. 36 as C text: a member of the parameters, or a number where these are folded in."""
-    return dialect(scene.real).literal(scene.parameters["D_n"]) if scene.baked else "run->parameters->D_n"
+    """Return D_n of Eq. 36 as C text: a member of the parameters, or a number where these are
+    folded in.
+    """
+    return (
+        dialect(scene.real).literal(scene.parameters["D_n"])
+        if scene.baked
+        else "run->parameters->D_n"
+    )
 
 
 def record_views(scene: Scene, has: Has) -> dict[str, list[dict]]:
     """Return the records with the C types that this model's header gives them."""
     return {
-        record: [{"type": typed(f.type, scene.name), "name": f.name, "meaning": f.meaning} for f in members]
+        record: [
+            {"type": typed(f.type, scene.name), "name": f.name, "meaning": f.meaning}
+            for f in members
+        ]
         for record, members in records(has).items()
     }
 
@@ -220,7 +280,9 @@ def typed(text: str, prefix: str) -> str:
 
 
 def explicit(method: Explicit, real: str) -> dict:
-    """Return a Runge-Kutta method's coefficients as C text, rows without their zeros above the diagonal."""
+    """Return a Runge-Kutta method's coefficients as C text, rows without their zeros above the
+    diagonal.
+    """
     return {
         "nodes": literals(method.nodes, real),
         "rows": [literals(row, real) for row in method.rows[1:]],

@@ -1,4 +1,6 @@
-"""C function bodies: programs go in, the lines of their C functions come out, straight or as loops over steps."""
+"""C function bodies: programs go in, the lines of their C functions come out, straight or as loops
+over steps.
+"""
 
 from ...ir.interpret import unroll
 from ...ir.program import Program, padded
@@ -13,15 +15,23 @@ def straight_line(program: Program, real: str, prefix: str, fixed=None) -> CFunc
     results = [node for a in program.of_role("output") for node in outputs[a.name]]
     arrays = (*program.of_role("parameters"), *program.of_role("input"))
     names = [scalar(a.part(0, a.length), k) for a in arrays for k in range(a.length)]
-    scalars = Scalars(tape.nodes, [*results, *(node for _, node in guards)], names, dialect(real, prefix))
+    scalars = Scalars(
+        tape.nodes, [*results, *(node for _, node in guards)], names, dialect(real, prefix)
+    )
     lines = scalars.lines(EARLY)
     rows, work = wide_lines(scalars)
     lines += rows + scalars.lines(LATE)
-    targets = [scalar(a.part(0, a.length), k) for a in program.of_role("output") for k in range(a.length)]
-    lines += [f"{target} = {scalars.text[node]};" for target, node in zip(targets, results, strict=True)]
+    targets = [
+        scalar(a.part(0, a.length), k) for a in program.of_role("output") for k in range(a.length)
+    ]
+    lines += [
+        f"{target} = {scalars.text[node]};" for target, node in zip(targets, results, strict=True)
+    ]
     zero = dialect(real).literal(0)
     for status in dict.fromkeys(status for status, _ in guards):
-        tests = " && ".join(f"{scalars.text[node]} > {zero}" for name, node in guards if name == status)
+        tests = " && ".join(
+            f"{scalars.text[node]} > {zero}" for name, node in guards if name == status
+        )
         lines += [f"if (!({tests})) {{", f"  return STATUS_{status};", "}"]
     lines.append("return STATUS_OK;")
     operations = sum((tape.lanes[n] or 1) for n in scalars.live if tape.nodes[n][0] in BINARY)
@@ -30,7 +40,9 @@ def straight_line(program: Program, real: str, prefix: str, fixed=None) -> CFunc
 
 
 def wide_lines(scalars: Scalars) -> tuple[list[str], int]:
-    """Print the rows, those of equal length in one loop; rows of which a lane is needed go to the workspace."""
+    """Print the rows, those of equal length in one loop; rows of which a lane is needed go to the
+    workspace.
+    """
     lines, work = [], 0
     needed = sorted({scalars.nodes[n][1] for n in scalars.live if scalars.nodes[n][0] == "lane"})
     for lanes in sorted({scalars.lanes[n] for n in scalars.live} - {0}):

@@ -1,4 +1,6 @@
-"""Integration methods: literature's coefficients go in, as exact literals; what the C templates print comes out."""
+"""Integration methods: literature's coefficients go in, as exact literals; what the C templates
+print comes out.
+"""
 
 from dataclasses import dataclass
 from fractions import Fraction
@@ -8,18 +10,23 @@ Row = tuple[float, ...]
 
 @dataclass(frozen=True)
 class Explicit:
-    """A Runge-Kutta method: stage s at t + nodes[s] h from rows[s]; weights of the result and of its error."""
+    """A Runge-Kutta method: stage s at t + nodes[s] h from rows[s]; weights of the result and of
+    its error.
+    """
 
     nodes: Row
     rows: tuple[Row, ...]
     weights: Row
     error: Row = ()
-    dense: tuple[Row, ...] = ()  # of stage i: weight at the part x of a step, x dense[i][0] + x^2 dense[i][1] + ...
+    dense: tuple[
+        Row, ...
+    ] = ()  # of stage i: weight at the part x of a step, x dense[i][0] + x^2 dense[i][1] + ...
 
 
 @dataclass(frozen=True)
 class Rosenbrock:
-    """A Rosenbrock method as it is computed, free of products with J, any approximation of the rate's Jacobian.
+    """A Rosenbrock method as it is computed, free of products with J, any approximation of the
+    rate's Jacobian.
 
     (1 - h gamma J) u_s = h gamma f(t + nodes[s] h, y + sum rows[s] u) + gamma sum couplings[s] u.
     """
@@ -32,9 +39,13 @@ class Rosenbrock:
     error: Row
 
 
-RK4 = Explicit((0.0, 0.5, 0.5, 1.0), ((), (0.5,), (0.0, 0.5), (0.0, 0.0, 1.0)), (1 / 6, 1 / 3, 1 / 3, 1 / 6))
-# Ch. Tsitouras, Runge-Kutta pairs of order 5(4) satisfying only the first column simplifying assumption, Comput.
-# Math. Appl. 62 (2011) 770-775; the last stage is the first of the next step, the interpolant has order 4.
+RK4 = Explicit(
+    (0.0, 0.5, 0.5, 1.0), ((), (0.5,), (0.0, 0.5), (0.0, 0.0, 1.0)), (1 / 6, 1 / 3, 1 / 3, 1 / 6)
+)
+# Ch. Tsitouras, Runge-Kutta pairs of order 5(4) satisfying only the first column simplifying
+# assumption, Comput.
+# Math. Appl. 62 (2011) 770-775; the last stage is the first of the next step, the interpolant has
+# order 4.
 TSIT5 = Explicit(
     nodes=(0.0, 0.161, 0.327, 0.9, 0.9800255409045097, 1.0, 1.0),
     rows=(
@@ -43,8 +54,21 @@ TSIT5 = Explicit(
         (-0.008480655492356989, 0.335480655492357),
         (2.8971530571054935, -6.359448489975075, 4.3622954328695815),
         (5.325864828439257, -11.748883564062828, 7.4955393428898365, -0.09249506636175525),
-        (5.86145544294642, -12.92096931784711, 8.159367898576159, -0.071584973281401, -0.028269050394068383),
-        (0.09646076681806523, 0.01, 0.4798896504144996, 1.379008574103742, -3.290069515436081, 2.324710524099774),
+        (
+            5.86145544294642,
+            -12.92096931784711,
+            8.159367898576159,
+            -0.071584973281401,
+            -0.028269050394068383,
+        ),
+        (
+            0.09646076681806523,
+            0.01,
+            0.4798896504144996,
+            1.379008574103742,
+            -3.290069515436081,
+            2.324710524099774,
+        ),
     ),
     weights=(
         0.09646076681806523,
@@ -78,7 +102,9 @@ TSIT5 = Explicit(
 
 @dataclass(frozen=True)
 class Classical:
-    """A Rosenbrock method as papers state it: alpha and gamma below their diagonals, the diagonal of gamma."""
+    """A Rosenbrock method as papers state it: alpha and gamma below their diagonals, the diagonal
+    of gamma.
+    """
 
     gamma: float
     alpha: tuple[Row, ...]
@@ -87,7 +113,8 @@ class Classical:
     embedded: Row
 
 
-# J. Rang, L. Angermann, New Rosenbrock W-methods of order 3 for PDAEs of index 1, BIT 45 (2005) 761-787: order 3 with
+# J. Rang, L. Angermann, New Rosenbrock W-methods of order 3 for PDAEs of index 1, BIT 45 (2005)
+# 761-787: order 3 with
 # any J, order 2 embedded, L-stable and stiffly accurate with the exact J.
 ROS34PW2 = Classical(
     gamma=0.435866521508459,
@@ -109,14 +136,17 @@ ROS34PW2 = Classical(
 
 
 def transformed(method: Classical) -> Rosenbrock:
-    """Return a method in the unknowns u = Gamma k (Hairer and Wanner, Eq. IV.7.25), computed without rounding."""
+    """Return a method in the unknowns u = Gamma k (Hairer and Wanner, Eq. IV.7.25), computed
+    without rounding.
+    """
     size, gamma = len(method.weights), Fraction(method.gamma)
     lower = [[*map(Fraction, row), gamma] for row in method.below]
     inverse = _inverse(lower)
 
     def times(row: Row) -> Row:
         return tuple(
-            float(sum(Fraction(x) * inverse[i][j] for i, x in enumerate(row) if i >= j)) for j in range(len(row))
+            float(sum(Fraction(x) * inverse[i][j] for i, x in enumerate(row) if i >= j))
+            for j in range(len(row))
         )
 
     return Rosenbrock(
@@ -126,7 +156,10 @@ def transformed(method: Classical) -> Rosenbrock:
         couplings=tuple(tuple(float(-inverse[i][j]) for j in range(i)) for i in range(size)),
         weights=times(method.weights),
         error=times(
-            tuple(float(Fraction(b) - Fraction(e)) for b, e in zip(method.weights, method.embedded, strict=True))
+            tuple(
+                float(Fraction(b) - Fraction(e))
+                for b, e in zip(method.weights, method.embedded, strict=True)
+            )
         ),
     )
 

@@ -11,7 +11,8 @@ from ...scene.scene import Scene
 from .form import Emitted, values
 from .routine import CFunction, Routine, dialect, routine_arguments, routine_lines
 
-LARGE = 100  # operations: a step that is written out wherever it is called; larger ones as the compiler sees fit
+# operations: a step that is written out wherever it is called; larger ones as the compiler sees fit
+LARGE = 100
 
 
 class ArgumentView:
@@ -33,7 +34,9 @@ class FunctionView:
         views = [ArgumentView(a, tail) for a in (*function.inputs, *function.outputs)]
         self.inputs, self.outputs = views[: len(function.inputs)], views[len(function.inputs) :]
         real = f"{prefix}_real"
-        arguments = [f"const {real} *{a.name}" for a in self.inputs] + [f"{real} *{a.name}" for a in self.outputs]
+        arguments = [f"const {real} *{a.name}" for a in self.inputs] + [
+            f"{real} *{a.name}" for a in self.outputs
+        ]
         head = f"const {prefix}_parameters *parameters"
         self.prototype = wrapped(f"int {prefix}_{self.name}(", [head, *arguments, f"{real} *work"])
         self.names = ", ".join(a.name for a in views)
@@ -78,7 +81,9 @@ def step_views(emitted, real: str, prefix: str) -> list[dict]:
     return [
         {
             "name": routine.name,
-            "kind": "STEP" if operation_count(routine.step.nodes, routine.step.results) < LARGE else "static void",
+            "kind": "STEP"
+            if operation_count(routine.step.nodes, routine.step.results) < LARGE
+            else "static void",
             "doc": routine.step.doc,
             "lines": routine_lines(routine, real, prefix),
             "arguments": routine_arguments(routine),

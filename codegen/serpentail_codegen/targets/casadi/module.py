@@ -1,4 +1,6 @@
-"""The CasADi target: a scene's programs go in, a Python module that builds ``casadi.Function``s comes out."""
+"""The CasADi target: a scene's programs go in, a Python module that builds ``casadi.Function``s
+comes out.
+"""
 
 import re
 
@@ -12,7 +14,12 @@ from ...scene.scene import Scene
 from ..expressions import Dialect, Scalars, index_text
 from ..templating import render
 
-PYTHON = Dialect("{name} = {text}", "", {"sin": "sin", "cos": "cos", "sqrt": "sqrt"}, "if_else({c} > {zero}, {a}, {b})")
+PYTHON = Dialect(
+    "{name} = {text}",
+    "",
+    {"sin": "sin", "cos": "cos", "sqrt": "sqrt"},
+    "if_else({c} > {zero}, {a}, {b})",
+)
 
 
 def slice_text(ref: Ref) -> str:
@@ -21,7 +28,9 @@ def slice_text(ref: Ref) -> str:
     if ref.size == ref.array.length:
         return f"{name}[:]"
     stop = index_text(ref.offset + ((ref.size - 1) * ref.stride + 1))
-    return f"{name}[{index_text(ref.offset)} : {stop}{f' : {ref.stride}' if ref.stride > 1 else ''}]"
+    return (
+        f"{name}[{index_text(ref.offset)} : {stop}{f' : {ref.stride}' if ref.stride > 1 else ''}]"
+    )
 
 
 def step_view(step: Step) -> dict:
@@ -32,7 +41,12 @@ def step_view(step: Step) -> dict:
     outputs = [[scalars.text[next(results)] for _ in range(size)] for _, size in step.outputs]
     final = ", ".join(f"[{', '.join(texts)}]" for texts in outputs)
     arguments = ", ".join(name for name, _ in step.inputs)
-    return {"name": step.name, "doc": step.doc, "arguments": arguments, "lines": [*lines, f"return ({final},)"]}
+    return {
+        "name": step.name,
+        "doc": step.doc,
+        "arguments": arguments,
+        "lines": [*lines, f"return ({final},)"],
+    }
 
 
 class PythonPrinter:
@@ -46,7 +60,11 @@ class PythonPrinter:
         """Return the body of the function."""
         body = self._body(self.program.body)
         used = set(re.findall(r"\w+", " ".join(body)))
-        arrays = [a for a in self.program.arrays if a.role == "output" or (a.role == "local" and a.name in used)]
+        arrays = [
+            a
+            for a in self.program.arrays
+            if a.role == "output" or (a.role == "local" and a.name in used)
+        ]
         lines = [f"{a.name} = [0.0] * {a.length}" for a in arrays]
         constants = [a for a in self.program.of_role("constant") if a.name in used]
         lines += [f"{a.name} = [{', '.join(map(PYTHON.literal, a.values))}]" for a in constants]
@@ -64,21 +82,31 @@ class PythonPrinter:
     def _fill(self, fill: Fill) -> list[str]:
         values = ", ".join(map(PYTHON.literal, fill.values))
         if len(set(fill.values)) == 1:
-            return [f"{slice_text(fill.target)} = [{PYTHON.literal(fill.values[0])}] * {fill.target.size}"]
+            return [
+                f"{slice_text(fill.target)} = [{PYTHON.literal(fill.values[0])}] * "
+                f"{fill.target.size}"
+            ]
         return [f"{slice_text(fill.target)} = [{values}]"]
 
     def _copy(self, copy: Copy) -> list[str]:
         return [f"{slice_text(copy.target)} = {slice_text(copy.source)}"]
 
     def _guard(self, guard: Guard) -> list[str]:
-        return [f"{slice_text(ref)} = where({slice_text(guard.scalar)}, {slice_text(ref)})" for ref in guard.protects]
+        return [
+            f"{slice_text(ref)} = where({slice_text(guard.scalar)}, {slice_text(ref)})"
+            for ref in guard.protects
+        ]
 
     def _factor(self, factor: Factor) -> list[str]:
-        return [f"{factor.matrix.name} = ldl_factor({factor.matrix.name}, {factor.size}, {padded(factor.size)})"]
+        return [
+            f"{factor.matrix.name} = ldl_factor({factor.matrix.name}, {factor.size}, "
+            f"{padded(factor.size)})"
+        ]
 
     def _solve(self, solve: Solve) -> list[str]:
         return [
-            f"{slice_text(solve.x)} = ldl_solve({solve.matrix.name}, {slice_text(solve.x)}, {padded(solve.x.size)})"
+            f"{slice_text(solve.x)} = ldl_solve({solve.matrix.name}, {slice_text(solve.x)}, "
+            f"{padded(solve.x.size)})"
         ]
 
     def _apply(self, call: Apply) -> list[str]:
@@ -114,8 +142,16 @@ def casadi_module(scene: Scene, tail: Tail, functions, version: str, content_has
         )
         steps |= printer.steps
     sizes = {p.name: p.size for p in struct_parameters(scene)}
-    data = {"scene": scene, "version": version, "content_hash": content_hash, "functions": views, "sizes": sizes}
+    data = {
+        "scene": scene,
+        "version": version,
+        "content_hash": content_hash,
+        "functions": views,
+        "sizes": sizes,
+    }
     selects = any(op == "select" for s in steps.values() for op, *_ in s.nodes)
     return render(
-        "casadi", "module.py.jinja", data | {"steps": [step_view(s) for s in steps.values()], "selects": selects}
+        "casadi",
+        "module.py.jinja",
+        data | {"steps": [step_view(s) for s in steps.values()], "selects": selects},
     )

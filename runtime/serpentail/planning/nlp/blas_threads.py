@@ -1,6 +1,7 @@
 """Threads: a solver's run goes in; that its BLAS uses one thread meanwhile comes out.
 
-Blocks of a plan's matrices are small: threads that share one wait for each other, and on busy cores for long.
+Blocks of a plan's matrices are small: threads that share one wait for each other, and on busy cores
+for long.
 """
 
 import ctypes

@@ -1,4 +1,6 @@
-"""Limits: a transcription and its guess go in; bounds of the unknowns and of the constraints come out."""
+"""Limits: a transcription and its guess go in; bounds of the unknowns and of the constraints come
+out.
+"""
 
 from dataclasses import dataclass
 
@@ -19,12 +21,16 @@ class Limits:
 
 
 def limits(program: Transcription, start: dict[str, np.ndarray], angles: np.ndarray) -> Limits:
-    """Return the limits for a start (blocks in SI) and the Euler angles (3,) at the end of the guess."""
+    """Return the limits for a start (blocks in SI) and the Euler angles (3,) at the end of the
+    guess.
+    """
     problem, where = program.problem, program.places
     least, most = -np.full(where.size, np.inf), np.full(where.size, np.inf)
     least[0], most[0] = problem.duration
     _along(program, least, most)
-    states = np.concatenate([start[name] / program.form.units[name] for name, _ in program.form.states])
+    states = np.concatenate(
+        [start[name] / program.form.units[name] for name, _ in program.form.states]
+    )
     least[where.states[0]] = most[where.states[0]] = states
     _at_the_end(program, least, most)
     rows = _rows(program, angles)
@@ -61,7 +67,11 @@ def _at_the_end(program: Transcription, least: np.ndarray, most: np.ndarray) -> 
         if value is None:
             continue
         state = name in dict(form.states)
-        place = columns(program, name, *((where.states, form.states) if state else (where.others, form.algebraic)))[-1]
+        place = columns(
+            program,
+            name,
+            *((where.states, form.states) if state else (where.others, form.algebraic)),
+        )[-1]
         given = np.isfinite(value)
         least[place[given]] = most[place[given]] = (value / form.units[name])[given]
 
@@ -72,7 +82,11 @@ def _rows(program: Transcription, angles: np.ndarray) -> tuple[np.ndarray, np.nd
     path = _path(problem, one.path)
     per_node = np.tile(np.column_stack([np.zeros((2, one.residuals)), path]), len(where.others))
     goal = _goal_values(problem.goal, program.attitude, angles)
-    direct = np.zeros(0) if problem.bounds.torque_rate is None else np.full(2 * where.controls[1:].size, -np.inf)
+    direct = (
+        np.zeros(0)
+        if problem.bounds.torque_rate is None
+        else np.full(2 * where.controls[1:].size, -np.inf)
+    )
     defects = np.zeros((len(where.states) - 1) * where.states.shape[1])
     least = np.concatenate([defects, per_node[0], goal, direct])
     return least, np.concatenate([defects, per_node[1], goal, np.zeros_like(direct)])
@@ -83,11 +97,15 @@ def _path(problem, size: int) -> np.ndarray:
     if not problem.path:
         return np.zeros((2, 0))
     each = size // len(problem.path)
-    return np.repeat([[a for _, a, _ in problem.path], [b for _, _, b in problem.path]], each, axis=1)
+    return np.repeat(
+        [[a for _, a, _ in problem.path], [b for _, _, b in problem.path]], each, axis=1
+    )
 
 
 def _goal_values(goal, coordinates: Attitude, angles: np.ndarray) -> np.ndarray:
-    """What the goal's rows of the attitude have to be: zero, or Euler angles nearest to the guess's."""
+    """What the goal's rows of the attitude have to be: zero, or Euler angles nearest to the
+    guess's.
+    """
     count = len(goal_matrix(goal.attitude, coordinates))
     if coordinates.kind == "quaternion" or not count:
         return np.zeros(count)

@@ -1,4 +1,6 @@
-"""What is kept: how to make a thing, and what it depends on, go in; the thing, made only once, comes out."""
+"""What is kept: how to make a thing, and what it depends on, go in; the thing, made only once,
+comes out.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field

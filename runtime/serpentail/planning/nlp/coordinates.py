@@ -1,4 +1,6 @@
-"""Attitude coordinates: a name goes in; conversions and rates come out, for numbers and for CasADi."""
+"""Attitude coordinates: a name goes in; conversions and rates come out, for numbers and for
+CasADi.
+"""
 
 from dataclasses import dataclass
 
@@ -12,7 +14,8 @@ KINDS = {"quaternion": 4, "euler": 3}
 
 @dataclass(frozen=True)
 class Attitude:
-    """Coordinates of the torso's attitude: "quaternion" (w, x, y, z), or "euler" (phi_x, phi_y, phi_z) in rad.
+    """Coordinates of the torso's attitude: "quaternion" (w, x, y, z), or "euler" (phi_x, phi_y,
+    phi_z) in rad.
 
     R = Rz(phi_z) Rx(phi_x) Ry(phi_y) as in reports.
     """
@@ -42,7 +45,8 @@ class Attitude:
         w = [omega[k] for k in range(3)]
         if self.kind == "quaternion":
             return ca.vertcat(*(entry / 2 for entry in product([c[k] for k in range(4)], [0, *w])))
-        # Ry(phi_y) omega is in the axes before the roll: (phi_x_dot, phi_y_dot + sin(phi_x) phi_z_dot, cos(phi_x) ...)
+        # Ry(phi_y) omega is in the axes before the roll: (phi_x_dot, phi_y_dot +
+        # sin(phi_x) phi_z_dot, cos(phi_x) ...)
         cy, sy = ca.cos(c[1]), ca.sin(c[1])
         across, up = cy * w[0] + sy * w[2], cy * w[2] - sy * w[0]
         yaw = up / ca.cos(c[0])

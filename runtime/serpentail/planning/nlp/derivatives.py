@@ -1,4 +1,6 @@
-"""Assembly: a node's function and linear maps go in; a program's functions and exact derivatives come out."""
+"""Assembly: a node's function and linear maps go in; a program's functions and exact derivatives
+come out.
+"""
 
 from dataclasses import dataclass
 
@@ -10,7 +12,9 @@ from .node_calls import MappedNode
 
 @dataclass(frozen=True, eq=False)
 class Assembly:
-    """f = cost Y + direct w, g = linear w + weights Y, Y (nodes * size) being the node's function at w[places]."""
+    """f = cost Y + direct w, g = linear w + weights Y, Y (nodes * size) being the node's function
+    at w[places].
+    """
 
     node: Node
     places: np.ndarray  # (unknowns of a node, nodes)
@@ -20,7 +24,9 @@ class Assembly:
     direct: np.ndarray
 
     def functions(self) -> dict:
-        """Return nlp, grad_f, jac_g and hess_lag, with CasADi's names and inputs, and values: Y (size, nodes)."""
+        """Return nlp, grad_f, jac_g and hess_lag, with CasADi's names and inputs, and values: Y
+        (size, nodes).
+        """
         import casadi as ca
 
         w, h = ca.MX.sym("x", len(self.direct)), ca.MX.sym("p", 3)
@@ -31,7 +37,10 @@ class Assembly:
         mu = lam_f * ca.DM(self.cost) + ca.mtimes(_dm(self.weights.T.tocsc()), lam_g)
         Y, J = ca.vec(mapped.values(Z, h)), mapped.jacobians(Z, h)
         S = mapped.hessians(Z, h, ca.reshape(mu, self.node.size, self.places.shape[1]))
-        f, g = self._objective(mapped, Z, h, w), ca.mtimes(_dm(self.linear), w) + ca.mtimes(_dm(self.weights), Y)
+        f, g = (
+            self._objective(mapped, Z, h, w),
+            ca.mtimes(_dm(self.linear), w) + ca.mtimes(_dm(self.weights), Y),
+        )
         rows, columns = _pattern(one.jacobian.sparsity_out(0))
         pattern, matrix, constant = self._jacobian(rows, columns)
         triangle, gather = self._hessian(*_pattern(one.hessian.sparsity_out(0)))
@@ -43,7 +52,11 @@ class Assembly:
             "grad_f": ca.Function("nlp_grad_f", [w, h], [f, grad], ["x", "p"], ["f", "grad:f:x"]),
             "jac_g": ca.Function("nlp_jac_g", [w, h], [g, jac], ["x", "p"], ["g", "jac:g:x"]),
             "hess_lag": ca.Function(
-                "nlp_hess_l", [w, h, lam_f, lam_g], [hess], ["x", "p", "lam:f", "lam:g"], ["triu:hess:gamma:x:x"]
+                "nlp_hess_l",
+                [w, h, lam_f, lam_g],
+                [hess],
+                ["x", "p", "lam:f", "lam:g"],
+                ["triu:hess:gamma:x:x"],
             ),
         }
 
@@ -64,7 +77,9 @@ class Assembly:
         return ca.mtimes(gather, mapped.slopes(Z, h)) + ca.DM(self.direct)
 
     def _jacobian(self, rows, columns):
-        """Pattern of the constraints' Jacobian, the map from the nodes' Jacobians to its entries, the constant part."""
+        """Pattern of the constraints' Jacobian, the map from the nodes' Jacobians to its entries,
+        the constant part.
+        """
         count, size = self.places.shape[1], self.node.size
         value_row = (np.arange(count)[:, None] * size + rows).ravel()
         place = self.places[columns].T.ravel()
@@ -74,21 +89,30 @@ class Assembly:
         k = start[entry] + inside
         constant = self.linear.tocoo()
         row, column = (
-            np.concatenate(x) for x in ((self.weights.indices[k], constant.row), (place[entry], constant.col))
+            np.concatenate(x)
+            for x in ((self.weights.indices[k], constant.row), (place[entry], constant.col))
         )
-        key, position = np.unique(column.astype(np.int64) * self.linear.shape[0] + row, return_inverse=True)
+        key, position = np.unique(
+            column.astype(np.int64) * self.linear.shape[0] + row, return_inverse=True
+        )
         pattern = _sparsity(key, self.linear.shape)
         moving = position[: len(k)]
         fixed = np.bincount(position[len(k) :], constant.data, len(key))
         return pattern, _sparse(self.weights.data[k], moving, entry, (len(key), place.size)), fixed
 
     def _hessian(self, rows, columns):
-        """Pattern of the upper triangle of the Lagrangian's Hessian, and the map from the nodes' ones to it."""
+        """Pattern of the upper triangle of the Lagrangian's Hessian, and the map from the nodes'
+        ones to it.
+        """
         row, column = self.places[rows].T.ravel(), self.places[columns].T.ravel()
         upper = np.flatnonzero(row <= column)
         n = len(self.direct)
-        key, position = np.unique(column[upper].astype(np.int64) * n + row[upper], return_inverse=True)
-        return _sparsity(key, (n, n)), _sparse(np.ones(len(upper)), position, upper, (len(key), row.size))
+        key, position = np.unique(
+            column[upper].astype(np.int64) * n + row[upper], return_inverse=True
+        )
+        return _sparsity(key, (n, n)), _sparse(
+            np.ones(len(upper)), position, upper, (len(key), row.size)
+        )
 
 
 def _pattern(sparsity) -> tuple[np.ndarray, np.ndarray]:

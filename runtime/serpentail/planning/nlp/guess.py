@@ -1,4 +1,6 @@
-"""Guesses: a motion (passive, planned before, or on a coarser mesh) goes in; where the solver starts comes out."""
+"""Guesses: a motion (passive, planned before, or on a coarser mesh) goes in; where the solver
+starts comes out.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,14 +13,18 @@ from .transcription import Transcription
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """A motion at times of one's choice: t (K,) s -> blocks (K, size) in SI by name; its duration in s."""
+    """A motion at times of one's choice: t (K,) s -> blocks (K, size) in SI by name; its duration
+    in s.
+    """
 
     duration: float
     at: Callable[[np.ndarray], dict[str, np.ndarray]]
 
 
 def passive(model, problem, coordinates, damping: float, duration: float, push=None) -> Motion:
-    """Return the motion whose tail only damps (Eq. 47), the paper's guess (Sect. 3.2), pushed by torques (n, 2m)."""
+    """Return the motion whose tail only damps (Eq. 47), the paper's guess (Sect. 3.2), pushed by
+    torques (n, 2m).
+    """
     from ...simulation.controllers import TorqueTable
     from ...simulation.simulate import simulate
 
@@ -38,10 +44,22 @@ def pushes(random: np.random.Generator, size: float, tail: int) -> np.ndarray:
 def of_trajectory(model, flight, coordinates, damping: float = 0.0) -> Motion:
     """Return the motion of a trajectory; what damping gives is taken off its torques."""
     mass = model.parameters["torso_mass"] + model.parameters["tail_mass"]
-    drift = np.einsum("kji,kj->ki", rotation_matrix(flight.attitude), flight.v[:, :3] - flight.linear_momentum / mass)
+    drift = np.einsum(
+        "kji,kj->ki",
+        rotation_matrix(flight.attitude),
+        flight.v[:, :3] - flight.linear_momentum / mass,
+    )
     torque = flight.tau + damping * flight.v[:, 6:]
-    rows = {"position": flight.q[:, :3], "attitude": coordinates.coordinates(flight.q), "tail": flight.q[:, 7:]}
-    rows |= {"velocity": flight.v[:, :3], "torso_rate": flight.v[:, 3:6], "tail_rate": flight.v[:, 6:]}
+    rows = {
+        "position": flight.q[:, :3],
+        "attitude": coordinates.coordinates(flight.q),
+        "tail": flight.q[:, 7:],
+    }
+    rows |= {
+        "velocity": flight.v[:, :3],
+        "torso_rate": flight.v[:, 3:6],
+        "tail_rate": flight.v[:, 6:],
+    }
     rows |= {"drift": drift, "torque": torque}
     t = flight.t - flight.t[0]
 
@@ -62,6 +80,9 @@ def unknowns(motion: Motion, program: Transcription, duration: float) -> np.ndar
     w = np.zeros(where.size)
     w[0] = duration
     w[where.states] = np.column_stack([blocks[name] / form.units[name] for name, _ in form.states])
-    others = [blocks[name][where.first :] / form.units[name] for name in (*(n for n, _ in form.algebraic), "torque")]
+    others = [
+        blocks[name][where.first :] / form.units[name]
+        for name in (*(n for n, _ in form.algebraic), "torque")
+    ]
     w[where.others] = np.column_stack(others)
     return w

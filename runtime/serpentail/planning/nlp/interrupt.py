@@ -1,4 +1,6 @@
-"""Interrupts: Ctrl-C or a time limit while a plan is made goes in; why to end with what there is comes out."""
+"""Interrupts: Ctrl-C or a time limit while a plan is made goes in; why to end with what there is
+comes out.
+"""
 
 import math
 import signal
@@ -20,7 +22,8 @@ def asked() -> str | None:
 
 @contextmanager
 def heeded(time_limit: float | None = None) -> Iterator[None]:
-    """Take the first Ctrl-C as a wish to stop, a second one as usual; only the main thread gets signals.
+    """Take the first Ctrl-C as a wish to stop, a second one as usual; only the main thread gets
+    signals.
 
     time_limit: s from now, after which stopping is wished, too.
     """

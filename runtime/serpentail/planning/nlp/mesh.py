@@ -1,4 +1,6 @@
-"""Meshes: how many intervals, or errors of a solution on them, go in; where the intervals end comes out."""
+"""Meshes: how many intervals, or errors of a solution on them, go in; where the intervals end comes
+out.
+"""
 
 from dataclasses import dataclass
 
@@ -46,7 +48,8 @@ def uniform(intervals: int) -> Mesh:
 
 
 def refined(mesh: Mesh, errors: np.ndarray, factor: float, order: int, most: int) -> Mesh:
-    """Return a mesh on which errors (N,) of the intervals should sum to `factor` of what they do, at most `most` long.
+    """Return a mesh on which errors (N,) of the intervals should sum to `factor` of what they do,
+    at most `most` long.
 
     Errors are spread evenly; one of an interval of width h falls like h^(order + 1).
     """

@@ -1,7 +1,9 @@
 """Multipliers: those of a solved program go in; those of the same problem on another mesh come out.
 
-Along the motion they are weights of the quadrature times functions of time, which are carried from mesh to mesh: the
-costate for the defects, others for what holds at every node and for bounds.  What the goal fixes adds to those of the
+Along the motion they are weights of the quadrature times functions of time, which are carried from
+mesh to mesh: the
+costate for the defects, others for what holds at every node and for bounds.  What the goal fixes
+adds to those of the
 last node what no weight has a part in: these are taken as they are.
 """
 
@@ -11,7 +13,8 @@ from .transcription import Transcription
 
 
 def carried(multipliers: tuple[np.ndarray, np.ndarray], old: Transcription, new: Transcription):
-    """Return multipliers of the unknowns and of the constraints of `new`; None for other rules than Radau's.
+    """Return multipliers of the unknowns and of the constraints of `new`; None for other rules than
+    Radau's.
 
     Those of the attitude at the end stay; those of torque rates begin at zero.
     """
@@ -30,19 +33,30 @@ def _of_unknowns(lam: np.ndarray, old: Transcription, new: Transcription) -> np.
 
 
 def _of_rows(lam: np.ndarray, old: Transcription, new: Transcription) -> np.ndarray:
-    """Those of defects, whose rows have the width of their interval in them, of what holds at nodes, and the rest."""
+    """Those of defects, whose rows have the width of their interval in them, of what holds at
+    nodes, and the rest.
+    """
     node, count, K = old.node, len(old.places.others), old.rule.steps
-    defects, held, rest = np.split(lam, np.cumsum([count * node.rates, count * (node.residuals + node.path)]))
+    defects, held, rest = np.split(
+        lam, np.cumsum([count * node.rates, count * (node.residuals + node.path)])
+    )
     costate = defects.reshape(count, -1) * np.repeat(old.mesh.widths, K)[:, None] / _weights(old)
     defects = _between(costate, old, new) * _weights(new) / np.repeat(new.mesh.widths, K)[:, None]
     held = _along(held.reshape(count, -1), old, new)
     left = new.rows - defects.size - held.size
-    return np.concatenate([defects.ravel(), held.ravel(), rest if len(rest) == left else np.zeros(left)])
+    return np.concatenate(
+        [defects.ravel(), held.ravel(), rest if len(rest) == left else np.zeros(left)]
+    )
 
 
 def _along(rows: np.ndarray, old: Transcription, new: Transcription) -> np.ndarray:
-    """Multipliers (N, c) of the nodes, as functions that are straight between them; those of the last one stay."""
-    values, (times, other) = rows / _weights(old), (p.fractions[p.places.first :] for p in (old, new))
+    """Multipliers (N, c) of the nodes, as functions that are straight between them; those of the
+    last one stay.
+    """
+    values, (times, other) = (
+        rows / _weights(old),
+        (p.fractions[p.places.first :] for p in (old, new)),
+    )
     columns = [np.interp(other, times[:-1], column) for column in values[:-1].T]
     found = np.reshape(columns, (-1, len(other))).T * _weights(new)
     found[-1] = rows[-1]

@@ -10,21 +10,31 @@ from ...errors import ModelError
 from .coordinates import Attitude
 from .node_calls import Call, NodeDerivatives, linear_call
 
-# name -> blocks of the state, which has a rate, and of the algebraic unknowns, which a node's equations determine
+# name -> blocks of the state, which has a rate, and of the algebraic unknowns, which a node's
+# equations determine
 FORMULATIONS = {
     "airborne": (("attitude", "tail", "tail_rate"), ("drift", "torso_rate")),
     "translation-free": (("attitude", "tail", "torso_rate", "tail_rate"), ()),
     "full": (("position", "attitude", "tail", "velocity", "torso_rate", "tail_rate"), ()),
 }
 # units in which unknowns are of the order of 1
-UNITS = {"position": 0.1, "attitude": 1.0, "tail": 1.0, "velocity": 1.0, "torso_rate": 10.0, "tail_rate": 10.0}
+UNITS = {
+    "position": 0.1,
+    "attitude": 1.0,
+    "tail": 1.0,
+    "velocity": 1.0,
+    "torso_rate": 10.0,
+    "tail_rate": 10.0,
+}
 UNITS |= {"drift": 0.1}
 SMOOTH = 1e-4  # W, below which |power| is rounded off
 
 
 @dataclass(frozen=True, eq=False)
 class Dynamics:
-    """Equations of motion as CasADi functions, and where they come from: "compiled" or "symbolic"."""
+    """Equations of motion as CasADi functions, and where they come from: "compiled" or
+    "symbolic".
+    """
 
     forward: object
     inverse: object
@@ -33,7 +43,9 @@ class Dynamics:
 
 
 def dynamics(model, source: str = "auto") -> Dynamics:
-    """Return the compiled functions where the scene has their exact second derivatives, else the SX ones."""
+    """Return the compiled functions where the scene has their exact second derivatives, else the SX
+    ones.
+    """
     names = ("forward_dynamics", "inverse_dynamics")
     if source != "symbolic":
         try:
@@ -47,7 +59,9 @@ def dynamics(model, source: str = "auto") -> Dynamics:
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """The unknowns of a node: names and sizes of the blocks of state, algebraic unknowns and controls, with units."""
+    """The unknowns of a node: names and sizes of the blocks of state, algebraic unknowns and
+    controls, with units.
+    """
 
     states: tuple[tuple[str, int], ...]
     algebraic: tuple[tuple[str, int], ...]
@@ -55,7 +69,11 @@ class Layout:
 
     def sizes(self) -> tuple[int, int, int]:
         """Numbers of states, algebraic unknowns and controls."""
-        return sum(n for _, n in self.states), sum(n for _, n in self.algebraic), self.units["torque"].size
+        return (
+            sum(n for _, n in self.states),
+            sum(n for _, n in self.algebraic),
+            self.units["torque"].size,
+        )
 
     def scale(self, blocks) -> np.ndarray:
         """Units of the unknowns of some blocks, in a row."""
@@ -65,17 +83,24 @@ class Layout:
 def layout(formulation: str, attitude: Attitude, tail: int, torque: np.ndarray) -> Layout:
     """Return the layout of a formulation for 2m tail coordinates and the unit (2m,) of torques."""
     sizes = {"attitude": attitude.size, "tail": tail, "tail_rate": tail}
-    states, algebraic = ([(name, sizes.get(name, 3)) for name in part] for part in FORMULATIONS[formulation])
-    units = {name: np.full(size, UNITS[name]) for name, size in (*states, *algebraic)} | {"torque": torque}
+    states, algebraic = (
+        [(name, sizes.get(name, 3)) for name in part] for part in FORMULATIONS[formulation]
+    )
+    units = {name: np.full(size, UNITS[name]) for name, size in (*states, *algebraic)} | {
+        "torque": torque
+    }
     return Layout(tuple(states), tuple(algebraic), units)
 
 
 @dataclass(frozen=True, eq=False)
 class Node:
-    """A node's function y(zeta, h, results of calls), calls of inputs linear in zeta, and the sizes in y.
+    """A node's function y(zeta, h, results of calls), calls of inputs linear in zeta, and the sizes
+    in y.
 
-    zeta: [duration, states, algebraic unknowns, torques] in units.  h (3,): angular momentum about the COM (kg m^2/s,
-    world), which the airborne formulation conserves.  y: duration * rates of the states, algebraic residuals, path
+    zeta: [duration, states, algebraic unknowns, torques] in units.  h (3,): angular momentum about
+    the COM (kg m^2/s,
+    world), which the airborne formulation conserves.  y: duration * rates of the states, algebraic
+    residuals, path
     constraints, duration * objective, all in units.
     """
 
@@ -99,7 +124,8 @@ class Node:
 def node(model, problem, attitude: Attitude, form: Layout, equations: Dynamics) -> Node:
     """Return the function of one node.
 
-    The dynamics is evaluated at the identity attitude: in body axes only gravity depends on the attitude.
+    The dynamics is evaluated at the identity attitude: in body axes only gravity depends on the
+    attitude.
     """
     import casadi as ca
 
@@ -109,16 +135,23 @@ def node(model, problem, attitude: Attitude, form: Layout, equations: Dynamics) 
     calls = _calls(model, problem, point, zeta, equations)[: 2 if na else 1]
     results = [ca.SX.sym("result", call.function.size1_out(0)) for call in calls]
     rates = _rates(model, point, attitude, results[0])
-    parts = [zeta[0] * ca.vertcat(*(rates[name] for name, _ in form.states)) / form.scale(form.states)]
+    parts = [
+        zeta[0] * ca.vertcat(*(rates[name] for name, _ in form.states)) / form.scale(form.states)
+    ]
     parts.append(_momentum(model, point, h, results[1]) if na else ca.SX.zeros(0))
-    parts.append(ca.vertcat(ca.SX.zeros(0), *(ca.vec(ca.SX(function(point))) for function, _, _ in problem.path)))
+    parts.append(
+        ca.vertcat(
+            ca.SX.zeros(0), *(ca.vec(ca.SX(function(point))) for function, _, _ in problem.path)
+        )
+    )
     parts.append(zeta[0] * cost(problem, point, form.units["torque"]))
     function = ca.Function("node", [zeta, h, *results], [ca.vertcat(*parts)])
     return Node(function, tuple(calls), nx, parts[1].size1(), parts[2].size1())
 
 
 def _calls(model, problem, point, zeta, equations: Dynamics) -> list[Call]:
-    """Forward dynamics with the tail's damping, and H v of the motion relative to the COM, at the identity attitude.
+    """Forward dynamics with the tail's damping, and H v of the motion relative to the COM, at the
+    identity attitude.
 
     H v is inverse dynamics at rest with v_dot = v, gravity's H (g z, 0) taken off.
     """
@@ -131,7 +164,11 @@ def _calls(model, problem, point, zeta, equations: Dynamics) -> list[Call]:
     if hasattr(point, "drift"):
         gravity = ca.DM([0, 0, model.parameters["gravity"]])
         motion = ca.vertcat(point.drift - gravity, point.torso_rate, point.tail_rate)
-        calls.append(linear_call(equations.inverse, zeta, [q, ca.DM.zeros(model.nv), motion, *equations.more]))
+        calls.append(
+            linear_call(
+                equations.inverse, zeta, [q, ca.DM.zeros(model.nv), motion, *equations.more]
+            )
+        )
     return calls
 
 
@@ -161,7 +198,8 @@ def _rates(model, point, attitude: Attitude, v_dot) -> dict:
 
 
 def _momentum(model, point, h, found):
-    """Momentum H v of the motion relative to the COM less (0, R^T h), in units: where it is zero, omega carries h.
+    """Momentum H v of the motion relative to the COM less (0, R^T h), in units: where it is zero,
+    omega carries h.
 
     Where the linear momentum is zero, the angular momentum about B is that about the COM.
     """
@@ -170,7 +208,9 @@ def _momentum(model, point, h, found):
     mass = model.parameters["torso_mass"] + model.parameters["tail_mass"]
     inertia = float(np.mean(model.parameters["torso_inertia"]))
     body = turned(point.quaternion, h, -1)
-    return ca.vertcat(found[:3] / (mass * UNITS["drift"]), (found[3:6] - body) / (inertia * UNITS["torso_rate"]))
+    return ca.vertcat(
+        found[:3] / (mass * UNITS["drift"]), (found[3:6] - body) / (inertia * UNITS["torso_rate"])
+    )
 
 
 def turned(quaternion, x, sense: int = 1):
@@ -178,7 +218,9 @@ def turned(quaternion, x, sense: int = 1):
     import casadi as ca
 
     w, u = sense * quaternion[0], quaternion[1:]
-    return ((w**2 - ca.dot(u, u)) * x + 2 * ca.dot(u, x) * u + 2 * w * ca.cross(u, x)) / ca.sumsqr(quaternion)
+    return ((w**2 - ca.dot(u, u)) * x + 2 * ca.dot(u, x) * u + 2 * w * ca.cross(u, x)) / ca.sumsqr(
+        quaternion
+    )
 
 
 def cost(problem, point, unit: np.ndarray):
@@ -188,7 +230,11 @@ def cost(problem, point, unit: np.ndarray):
     if callable(problem.objective):
         return problem.objective(point)
     if problem.objective == "effort":
-        return (ca.sumsqr(point.torque) + problem.smoothing**2 * ca.sumsqr(point.tail_rate)) / unit.mean() ** 2
+        return (
+            ca.sumsqr(point.torque) + problem.smoothing**2 * ca.sumsqr(point.tail_rate)
+        ) / unit.mean() ** 2
     if problem.objective == "energy":
-        return ca.sum1(ca.sqrt((point.torque * point.tail_rate) ** 2 + SMOOTH**2) - SMOOTH) / (unit.mean() * 10)
+        return ca.sum1(ca.sqrt((point.torque * point.tail_rate) ** 2 + SMOOTH**2) - SMOOTH) / (
+            unit.mean() * 10
+        )
     return ca.SX(0)

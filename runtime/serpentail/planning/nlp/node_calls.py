@@ -1,7 +1,9 @@
-"""Calls: functions inside a node's function go in; values and exact derivatives at all nodes come out.
+"""Calls: functions inside a node's function go in; values and exact derivatives at all nodes come
+out.
 
-A node's function is y(zeta, h, e), e being results of calls e = c(L zeta + l).  With E = c' L, its Jacobian is
-y_zeta + y_e E, and the Hessian of mu^T y is [I; E]^T (mu^T y)'' [I; E] + L^T (nu^T c)'' L with nu = y_e^T mu.
+A node's function is y(zeta, h, e), e being results of calls e = c(L zeta + l).  With E = c' L, its
+Jacobian is y_zeta + y_e E, and the Hessian of mu^T y is [I; E]^T (mu^T y)'' [I; E] + L^T (nu^T c)''
+L with nu = y_e^T mu.
 """
 
 from dataclasses import dataclass
@@ -35,7 +37,9 @@ def linear_call(function, zeta, arguments) -> Call:
 
 
 class NodeDerivatives:
-    """A node's function and its exact derivatives as CasADi functions of zeta, h and what its calls give."""
+    """A node's function and its exact derivatives as CasADi functions of zeta, h and what its calls
+    give.
+    """
 
     def __init__(self, node):
         import casadi as ca
@@ -47,7 +51,11 @@ class NodeDerivatives:
         self.hessians_of_calls = [call.function.reverse(1).jacobian() for call in node.calls]
         self.cost = ca.Function("cost", [self.zeta, self.h], [self.y[-1]])
         self.slope = ca.Function("slope", [self.zeta, self.h], [ca.jacobian(self.y[-1], self.zeta)])
-        self.jacobian, self.weights, self.hessian = self._jacobian(), self._weights(), self._hessian()
+        self.jacobian, self.weights, self.hessian = (
+            self._jacobian(),
+            self._weights(),
+            self._hessian(),
+        )
 
     def _blocks(self):
         """Symbols of the calls' Jacobians by their moving inputs."""
@@ -64,7 +72,10 @@ class NodeDerivatives:
 
         rows = []
         for call, parts in zip(self.calls, blocks, strict=True):
-            terms = [ca.mtimes(part, call.inputs[k][0]) for k, part in zip(call.moving, parts, strict=True)]
+            terms = [
+                ca.mtimes(part, call.inputs[k][0])
+                for k, part in zip(call.moving, parts, strict=True)
+            ]
             rows.append(sum(terms[1:], terms[0]))
         return ca.vertcat(*rows)
 
@@ -74,7 +85,9 @@ class NodeDerivatives:
         blocks = self._blocks()
         direct, through = ca.jacobian(self.y, self.zeta), _jacobian_of_parts(self.y, self.results)
         total = direct + ca.mtimes(through, self._by_zeta(blocks))
-        return ca.Function("jacobian", [self.zeta, self.h, *self.results, *chain.from_iterable(blocks)], [total])
+        return ca.Function(
+            "jacobian", [self.zeta, self.h, *self.results, *chain.from_iterable(blocks)], [total]
+        )
 
     def _weights(self):
         """nu of every call."""
@@ -83,7 +96,9 @@ class NodeDerivatives:
         mu = ca.SX.sym("mu", self.node.size)
         total = ca.dot(mu, self.y)
         return ca.Function(
-            "weights", [self.zeta, self.h, *self.results, mu], [ca.gradient(total, r) for r in self.results]
+            "weights",
+            [self.zeta, self.h, *self.results, mu],
+            [ca.gradient(total, r) for r in self.results],
         )
 
     def _hessian(self):
@@ -104,7 +119,9 @@ class NodeDerivatives:
 
 
 class MappedNode:
-    """A node's function at all of `count` nodes: unknowns Z (n, count) and h (3) go in, rows of values come out."""
+    """A node's function at all of `count` nodes: unknowns Z (n, count) and h (3) go in, rows of
+    values come out.
+    """
 
     def __init__(self, one: NodeDerivatives, count: int):
         self.one, self.count = one, count
@@ -112,7 +129,10 @@ class MappedNode:
     def _inputs(self, call: Call, Z):
         import casadi as ca
 
-        return [ca.mtimes(matrix, Z) + ca.repmat(offset, 1, self.count) for matrix, offset in call.inputs]
+        return [
+            ca.mtimes(matrix, Z) + ca.repmat(offset, 1, self.count)
+            for matrix, offset in call.inputs
+        ]
 
     def _first(self, Z):
         """Results of all calls, and their Jacobians by the moving inputs."""
@@ -154,17 +174,26 @@ class MappedNode:
         results, blocks = self._first(Z)
         nus = self.one.weights.map(self.count).call([Z, self._repeated(h), *results, mu])
         seconds = []
-        for call, hessian, result, nu in zip(self.one.calls, self.one.hessians_of_calls, results, nus, strict=True):
-            unused = [ca.MX(hessian.size1_in(k), self.count) for k in range(len(call.inputs) + 2, hessian.n_in())]
+        for call, hessian, result, nu in zip(
+            self.one.calls, self.one.hessians_of_calls, results, nus, strict=True
+        ):
+            unused = [
+                ca.MX(hessian.size1_in(k), self.count)
+                for k in range(len(call.inputs) + 2, hessian.n_in())
+            ]
             found = hessian.map(self.count).call([*self._inputs(call, Z), result, nu, *unused])
             seconds += [found[place] for _, _, place in _pairs(call)]
-        return _entries(self.one.hessian.map(self.count)(Z, self._repeated(h), *results, mu, *blocks, *seconds))
+        return _entries(
+            self.one.hessian.map(self.count)(Z, self._repeated(h), *results, mu, *blocks, *seconds)
+        )
 
 
 def _pairs(call: Call) -> list[tuple[int, int, int]]:
-    """Moving inputs i, j and the output of the adjoint's Jacobian that has their second derivatives.
+    """Moving inputs i, j and the output of the adjoint's Jacobian that has their second
+    derivatives.
 
-    The adjoint's outputs are those by input 0, 1, ..; its inputs the call's, its result and the weights of that.
+    The adjoint's outputs are those by input 0, 1, ..; its inputs the call's, its result and the
+    weights of that.
     """
     count = len(call.inputs) + 2
     return [(i, j, i * count + j) for i in call.moving for j in call.moving]

@@ -8,7 +8,12 @@ from numpy.polynomial import Legendre, Polynomial
 
 from ...errors import PlanningError
 
-FAMILIES = {"trapezoidal": 1, "hermite-simpson": 2, "lobatto": 3, "radau": 3}  # name -> default degree
+FAMILIES = {
+    "trapezoidal": 1,
+    "hermite-simpson": 2,
+    "lobatto": 3,
+    "radau": 3,
+}  # name -> default degree
 MOST_DEGREE = 5
 
 
@@ -17,8 +22,8 @@ class Rule:
     """One interval [0, 1] of a collocation Runge-Kutta method (Radau IIA, Lobatto IIIA).
 
     nodes (K,): where the equations hold; supports (S + 1,): where the states are unknowns, 0 first.
-    The defects are states (S, S + 1) X - h slopes (S, K) F = 0, F being the rates at the nodes; the integral of a
-    function over the interval is h weights (K,) times its values at the nodes.
+    The defects are states (S, S + 1) X - h slopes (S, K) F = 0, F being the rates at the nodes; the
+    integral of a function over the interval is h weights (K,) times its values at the nodes.
     """
 
     name: str
@@ -55,17 +60,21 @@ class Rule:
 def rule(name: str, degree: int | None = None) -> Rule:
     """Return a rule; PlanningError where the name is unknown or the degree none that it has.
 
-    "trapezoidal" (the paper's, Eqs. 41, 42), "hermite-simpson" (Lobatto of degree 2), "lobatto" (degree + 1 nodes, both
-    ends among them), "radau" (degree nodes, the right end among them).
+    "trapezoidal" (the paper's, Eqs. 41, 42), "hermite-simpson" (Lobatto of degree 2), "lobatto"
+    (degree + 1 nodes, both ends among them), "radau" (degree nodes, the right end among them).
     """
     if name not in FAMILIES:
         raise PlanningError(f"rule: value {name!r}: needs {' or '.join(map(repr, FAMILIES))}")
     fixed = name in ("trapezoidal", "hermite-simpson")
     degree = FAMILIES[name] if degree is None else degree
     if isinstance(degree, bool) or not isinstance(degree, int) or not 1 <= degree <= MOST_DEGREE:
-        raise PlanningError(f"degree: value {degree!r}: needs a whole number from 1 to {MOST_DEGREE}")
+        raise PlanningError(
+            f"degree: value {degree!r}: needs a whole number from 1 to {MOST_DEGREE}"
+        )
     if fixed and degree != FAMILIES[name]:
-        raise PlanningError(f"degree: value {degree!r}: {name} has {FAMILIES[name]}; leave it out, or use 'radau'")
+        raise PlanningError(
+            f"degree: value {degree!r}: {name} has {FAMILIES[name]}; leave it out, or use 'radau'"
+        )
     return _rule(name, degree)
 
 
@@ -75,7 +84,9 @@ def _rule(name: str, degree: int) -> Rule:
 
 
 def _radau(name: str, degree: int) -> Rule:
-    """Radau IIA in derivative form: A^-1 (X - X_0) = h F, so that each rate is in one equation only."""
+    """Radau IIA in derivative form: A^-1 (X - X_0) = h F, so that each rate is in one equation
+    only.
+    """
     nodes = _roots(Legendre.basis(degree) - Legendre.basis(degree - 1))
     A = _integrals(nodes, nodes)
     inverse = np.linalg.inv(A)

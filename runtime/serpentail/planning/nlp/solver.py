@@ -1,4 +1,6 @@
-"""Solvers: a program, limits and a guess go in; the unknowns that CasADi's nlpsol finds come out."""
+"""Solvers: a program, limits and a guess go in; the unknowns that CasADi's nlpsol finds come
+out.
+"""
 
 import time
 from dataclasses import dataclass
@@ -13,22 +15,39 @@ from .cache import kept
 from .interrupt import asked
 from .transcription import Transcription
 
-IPOPT = {"ipopt.print_level": 0, "ipopt.sb": "yes", "ipopt.max_iter": 300, "ipopt.nlp_scaling_method": "none"}
+IPOPT = {
+    "ipopt.print_level": 0,
+    "ipopt.sb": "yes",
+    "ipopt.max_iter": 300,
+    "ipopt.nlp_scaling_method": "none",
+}
 IPOPT |= {"ipopt.mu_strategy": "adaptive"}  # half the iterations
-IPOPT |= {"ipopt.bound_push": 1e-3, "ipopt.bound_frac": 1e-3}  # a tenth of the usual: a quarter fewer iterations
-IPOPT |= {"ipopt.watchdog_shortened_iter_trigger": 0}  # else multipliers may grow without bound, and steps shrink
-IPOPT |= {"ipopt.mumps_pivtol": 1e-8, "ipopt.mumps_pivtolmax": 1e-6}  # else pivots are delayed: up to 20 times slower
+IPOPT |= {
+    "ipopt.bound_push": 1e-3,
+    "ipopt.bound_frac": 1e-3,
+}  # a tenth of the usual: a quarter fewer iterations
+IPOPT |= {
+    "ipopt.watchdog_shortened_iter_trigger": 0
+}  # else multipliers may grow without bound, and steps shrink
+IPOPT |= {
+    "ipopt.mumps_pivtol": 1e-8,
+    "ipopt.mumps_pivtolmax": 1e-6,
+}  # else pivots are delayed: up to 20 times slower
 CLOSE = {"ipopt.mu_strategy": "monotone", "ipopt.mu_init": 1e-5}  # to a solution
 CLOSE |= {"ipopt.bound_push": 1e-6, "ipopt.bound_frac": 1e-6}
 SAME = CLOSE | {"ipopt.mu_init": 1e-7, "ipopt.warm_start_init_point": "yes"}  # with its multipliers
-SAME |= {f"ipopt.warm_start_{part}": 1e-8 for part in ("bound_push", "bound_frac", "mult_bound_push")}
+SAME |= {
+    f"ipopt.warm_start_{part}": 1e-8 for part in ("bound_push", "bound_frac", "mult_bound_push")
+}
 NEARNESS = {"far": {}, "close": CLOSE, "same": SAME}
 EXACT = ("grad_f", "jac_g", "hess_lag")
 
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """What a solver found: unknowns and multipliers, whether it says that they solve the problem, and its cost."""
+    """What a solver found: unknowns and multipliers, whether it says that they solve the problem,
+    and its cost.
+    """
 
     w: np.ndarray
     multipliers: tuple[np.ndarray, np.ndarray]
@@ -39,20 +58,31 @@ class Solution:
     cpu_s: float
 
 
-def solver(program: Transcription, name: str = "ipopt", options: dict | None = None, near: str = "far"):
-    """Return CasADi's solver of a program; PlanningError where there is none of that name, or an option is unknown."""
+def solver(
+    program: Transcription, name: str = "ipopt", options: dict | None = None, near: str = "far"
+):
+    """Return CasADi's solver of a program; PlanningError where there is none of that name, or an
+    option is unknown.
+    """
     import casadi as ca
 
     if not ca.has_nlpsol(name):
-        raise PlanningError(f"solver: value {name!r}: CasADi has no such solver here; 'ipopt' comes with it")
+        raise PlanningError(
+            f"solver: value {name!r}: CasADi has no such solver here; 'ipopt' comes with it"
+        )
     given = {"print_time": False, "error_on_fail": False}
     if name == "ipopt":
         given |= IPOPT | NEARNESS[near]
     given |= options or {}
     try:
-        return kept((program.places, name, repr(sorted(given.items()))), partial(_engine, program, name, given))
+        return kept(
+            (program.places, name, repr(sorted(given.items()))),
+            partial(_engine, program, name, given),
+        )
     except RuntimeError as error:
-        raise PlanningError(f"options: value {options!r}: {name} refuses them: {_reason(error)}") from error
+        raise PlanningError(
+            f"options: value {options!r}: {name} refuses them: {_reason(error)}"
+        ) from error
 
 
 def _engine(program: Transcription, name: str, options: dict):
@@ -60,8 +90,13 @@ def _engine(program: Transcription, name: str, options: dict):
 
     if name != "ipopt":
         return ca.nlpsol("plan", name, program.program["nlp"], options)
-    exact, watch = {key: program.program[key] for key in EXACT}, _watch(program.places.size, program.rows)
-    engine = ca.nlpsol("plan", name, program.program["nlp"], exact | {"iteration_callback": watch} | options)
+    exact, watch = (
+        {key: program.program[key] for key in EXACT},
+        _watch(program.places.size, program.rows),
+    )
+    engine = ca.nlpsol(
+        "plan", name, program.program["nlp"], exact | {"iteration_callback": watch} | options
+    )
     engine.watch = watch  # CasADi keeps no callback alive
     return engine
 
@@ -101,7 +136,9 @@ def solve(engine, limits: Limits, w: np.ndarray, h: np.ndarray, multipliers=None
     finite = bool(np.isfinite(x).all())
     status = str(stats.get("return_status", "unknown"))
     good = bool(stats.get("success", False)) and finite
-    return Solution(x, (lam_x, lam_g), float(found["f"]), good, status, int(stats.get("iter_count", -1)), spent)
+    return Solution(
+        x, (lam_x, lam_g), float(found["f"]), good, status, int(stats.get("iter_count", -1)), spent
+    )
 
 
 def _reason(error: Exception) -> str:

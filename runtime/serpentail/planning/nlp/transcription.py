@@ -1,7 +1,9 @@
-"""Transcription: a problem, a mesh and a rule go in; a nonlinear program with exact sparse derivatives comes out.
+"""Transcription: a problem, a mesh and a rule go in; a nonlinear program with exact sparse
+derivatives comes out.
 
-Objective and constraints are linear in the unknowns w and in the values Y of one function at all nodes:
-f = cost Y + direct w, g = linear w + weights Y.  All derivatives follow from those of that one function.
+Objective and constraints are linear in the unknowns w and in the values Y of one function at all
+nodes: f = cost Y + direct w, g = linear w + weights Y.  All derivatives follow from those of that
+one function.
 """
 
 from dataclasses import dataclass, replace
@@ -20,7 +22,9 @@ from .rules import Rule
 
 @dataclass(frozen=True, eq=False)
 class Places:
-    """Where the unknowns are in w: duration 0, states (P, nx) of all points, the others (N, na + nu) of all nodes."""
+    """Where the unknowns are in w: duration 0, states (P, nx) of all points, the others (N, na +
+    nu) of all nodes.
+    """
 
     states: np.ndarray
     others: np.ndarray
@@ -51,7 +55,12 @@ def places(form: Layout, mesh: Mesh, rule: Rule) -> Places:
     widths = np.full(points, nx + na + nu)
     widths[:first] = nx
     starts = 1 + np.concatenate([[0], np.cumsum(widths)[:-1]])
-    return Places(starts[:, None] + np.arange(nx), (starts[first:] + nx)[:, None] + np.arange(na + nu), na, first)
+    return Places(
+        starts[:, None] + np.arange(nx),
+        (starts[first:] + nx)[:, None] + np.arange(na + nu),
+        na,
+        first,
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,11 +84,22 @@ class Transcription:
         return self.mesh.points(self.rule)
 
 
-def program_of(model, problem: Problem, mesh: Mesh, rule: Rule, equations: Dynamics) -> Transcription:
-    """Return the program of a problem on a mesh; one that differs in start, duration or limits alone shares it."""
+def program_of(
+    model, problem: Problem, mesh: Mesh, rule: Rule, equations: Dynamics
+) -> Transcription:
+    """Return the program of a problem on a mesh; one that differs in start, duration or limits
+    alone shares it.
+    """
     goal, bounds = problem.goal.attitude, problem.bounds
     of = [None if x is None else tuple(x) for x in (goal, bounds.torque, bounds.torque_rate)]
-    of += [problem.objective, problem.smoothing, problem.damping, problem.path, problem.formulation, problem.attitude]
+    of += [
+        problem.objective,
+        problem.smoothing,
+        problem.damping,
+        problem.path,
+        problem.formulation,
+        problem.attitude,
+    ]
     of += [model, equations.source]
     coordinates = attitude(problem.attitude)
     form = layout(problem.formulation, coordinates, model.nv - 6, torque_unit(problem))
@@ -88,29 +108,48 @@ def program_of(model, problem: Problem, mesh: Mesh, rule: Rule, equations: Dynam
     return replace(kept((*of, tuple(mesh.ends), rule), make), problem=problem)
 
 
-def transcribe(problem: Problem, mesh: Mesh, rule: Rule, equations: Dynamics, form: Layout, one: Node) -> Transcription:
+def transcribe(
+    problem: Problem, mesh: Mesh, rule: Rule, equations: Dynamics, form: Layout, one: Node
+) -> Transcription:
     """Return the program of a problem on a mesh, of the function of one node."""
     coordinates = attitude(problem.attitude)
     where = places(form, mesh, rule)
     direct = _direct_rows(problem, form, where, mesh, rule, coordinates)
     program = collocate(one, where, (mesh, rule), direct, problem.objective == "time").functions()
     return Transcription(
-        problem, mesh, rule, coordinates, form, equations, one, where, program, program["nlp"].size1_out("g")
+        problem,
+        mesh,
+        rule,
+        coordinates,
+        form,
+        equations,
+        one,
+        where,
+        program,
+        program["nlp"].size1_out("g"),
     )
 
 
-def collocate(one: Node, where: Places, scheme: tuple[Mesh, Rule], direct, time: bool = False) -> Assembly:
-    """Return the defects of all intervals, residuals and path constraints of all nodes, then rows `direct` of w.
+def collocate(
+    one: Node, where: Places, scheme: tuple[Mesh, Rule], direct, time: bool = False
+) -> Assembly:
+    """Return the defects of all intervals, residuals and path constraints of all nodes, then rows
+    `direct` of w.
 
     time: the duration is added to the objective.
     """
     mesh, rule = scheme
-    weights, defects = _node_rows(one, mesh, rule, len(where.others)), _defect_rows(where, mesh, rule)
+    weights, defects = (
+        _node_rows(one, mesh, rule, len(where.others)),
+        _defect_rows(where, mesh, rule),
+    )
     linear = _stack([(defects, weights.shape[0]), (direct, direct.shape[0])])
     slope = np.zeros(where.size)
     slope[0] = time
     weights = _pad(weights, linear.shape[0])
-    return Assembly(one, where.nodes(), linear, weights, _cost(one, mesh, rule, len(where.others)), slope)
+    return Assembly(
+        one, where.nodes(), linear, weights, _cost(one, mesh, rule, len(where.others)), slope
+    )
 
 
 def torque_unit(problem: Problem) -> np.ndarray:
@@ -131,17 +170,23 @@ def _defect_rows(where: Places, mesh: Mesh, rule: Rule):
 
 
 def _node_rows(one: Node, mesh: Mesh, rule: Rule, nodes: int):
-    """How the defects, residuals and path constraints are made of the nodes' values: rows (.., nodes * size)."""
+    """How the defects, residuals and path constraints are made of the nodes' values: rows (..,
+    nodes * size).
+    """
     from scipy.sparse import coo_matrix, vstack
 
     nx, N, S, K = one.rates, mesh.intervals, rule.steps, len(rule.nodes)
     interval, i, j, x = np.meshgrid(*map(np.arange, (N, S, K, nx)), indexing="ij")
     rows, columns = (interval * S + i) * nx + x, (interval * S + j) * one.size + x
     values = -mesh.widths[:, None, None, None] * rule.slopes[None, :, :, None] + 0 * x
-    defects = coo_matrix((values.ravel(), (rows.ravel(), columns.ravel())), (N * S * nx, nodes * one.size))
+    defects = coo_matrix(
+        (values.ravel(), (rows.ravel(), columns.ravel())), (N * S * nx, nodes * one.size)
+    )
     extra = one.residuals + one.path
     chosen = (np.arange(nodes)[:, None] * one.size + nx + np.arange(extra)).ravel()
-    at_nodes = coo_matrix((np.ones(chosen.size), (np.arange(chosen.size), chosen)), (chosen.size, nodes * one.size))
+    at_nodes = coo_matrix(
+        (np.ones(chosen.size), (np.arange(chosen.size), chosen)), (chosen.size, nodes * one.size)
+    )
     return vstack([defects, at_nodes]).tocsc()
 
 
@@ -153,7 +198,9 @@ def _cost(one: Node, mesh: Mesh, rule: Rule, nodes: int) -> np.ndarray:
     return cost.ravel()
 
 
-def _direct_rows(problem: Problem, form: Layout, where: Places, mesh: Mesh, rule: Rule, coordinates: Attitude):
+def _direct_rows(
+    problem: Problem, form: Layout, where: Places, mesh: Mesh, rule: Rule, coordinates: Attitude
+):
     """Rows of w alone: the attitude at the end, then the torques' steps within +- rate * time."""
     from scipy.sparse import coo_matrix, vstack
 
@@ -172,11 +219,20 @@ def _torque_steps(problem: Problem, form: Layout, where: Places, times: np.ndarr
     from scipy.sparse import coo_matrix
 
     controls = where.controls
-    count, most = controls[1:].size, np.outer(np.diff(times), problem.bounds.torque_rate / form.units["torque"])
+    count, most = (
+        controls[1:].size,
+        np.outer(np.diff(times), problem.bounds.torque_rate / form.units["torque"]),
+    )
     row, ones = np.arange(count), np.ones(count)
-    rows, columns = np.tile(row, 3), np.concatenate([controls[1:].ravel(), controls[:-1].ravel(), 0 * row])
+    rows, columns = (
+        np.tile(row, 3),
+        np.concatenate([controls[1:].ravel(), controls[:-1].ravel(), 0 * row]),
+    )
     return [
-        coo_matrix((np.concatenate([s * ones, -s * ones, -most.ravel()]), (rows, columns)), (count, where.size))
+        coo_matrix(
+            (np.concatenate([s * ones, -s * ones, -most.ravel()]), (rows, columns)),
+            (count, where.size),
+        )
         for s in (1, -1)
     ]
 
@@ -186,7 +242,9 @@ def _starts(blocks) -> np.ndarray:
 
 
 def goal_matrix(goal, coordinates: Attitude) -> np.ndarray:
-    """Rows (.., size) of the attitude at the end that have to be zero, for "euler" to be given values."""
+    """Rows (.., size) of the attitude at the end that have to be zero, for "euler" to be given
+    values.
+    """
     if goal is None:
         return np.zeros((0, coordinates.size))
     if coordinates.kind == "euler":

@@ -19,9 +19,11 @@ class Plan:
     """A planned motion and its truth.
 
     success: the solver converged, and the torques, applied open loop, end within the tolerance.
-    trajectory: the planned motion, torques included (before damping), sampled at all ends of intervals and between.
+    trajectory: the planned motion, torques included (before damping), sampled at all ends of
+    intervals and between.
     report: JSON-ready summary; errors in degrees, times in s, energy in J, power in W.
-    problem, mesh, rule, solution: what was asked and solved; ``torque`` and ``curve`` give values at any time.
+    problem, mesh, rule, solution: what was asked and solved; ``torque`` and ``curve`` give values
+    at any time.
     """
 
     success: bool
@@ -50,7 +52,10 @@ class Plan:
 def sample_times(ends: np.ndarray) -> np.ndarray:
     """Return times that divide every interval evenly, at least SAMPLES in all."""
     parts = np.ceil(np.diff(ends) / ends[-1] * SAMPLES).astype(int)
-    rows = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(ends[:-1], ends[1:], parts, strict=True)]
+    rows = [
+        np.linspace(a, b, n, endpoint=False)
+        for a, b, n in zip(ends[:-1], ends[1:], parts, strict=True)
+    ]
     return np.append(np.concatenate(rows), ends[-1])
 
 
@@ -60,4 +65,6 @@ def sampled(model, problem: Problem, curve: Curve) -> Trajectory:
     blocks = curve.at(times)
     q, v = full_state(model, (problem.q0, problem.v0), attitude(problem.attitude), times, blocks)
     info = {"model": model.name, "kind": "plan"}
-    return Trajectory(times, q, v, blocks["torque"], *model.energy(q, v), *model.momentum(q, v), info)
+    return Trajectory(
+        times, q, v, blocks["torque"], *model.energy(q, v), *model.momentum(q, v), info
+    )

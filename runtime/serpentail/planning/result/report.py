@@ -14,19 +14,38 @@ TRACKED = 580  # samples of a tracked motion
 
 
 def report(run, best, trajectory: Trajectory) -> dict:
-    """Return the summary of a run's best round, whose planned trajectory is given; None for what is not finite."""
+    """Return the summary of a run's best round, whose planned trajectory is given; None for what is
+    not finite.
+    """
     problem, solution, mesh = run.problem, best.solution, best.program.mesh
     energy, power = work(trajectory)
-    found = {"converged": solution.success, "status": solution.status, "formulation": problem.formulation}
+    found = {
+        "converged": solution.success,
+        "status": solution.status,
+        "formulation": problem.formulation,
+    }
     found |= {"attitude": problem.attitude, "rule": run.rule.name, "degree": run.rule.degree}
-    found |= {"intervals": mesh.intervals, "nodes": len(best.program.places.others), "dynamics": run.equations.source}
-    found |= {"duration_s": best.curve.duration, "objective": objective(best), "effort": effort(best.curve)}
+    found |= {
+        "intervals": mesh.intervals,
+        "nodes": len(best.program.places.others),
+        "dynamics": run.equations.source,
+    }
+    found |= {
+        "duration_s": best.curve.duration,
+        "objective": objective(best),
+        "effort": effort(best.curve),
+    }
     found |= {"energy_J": energy, "peak_power_W": power} | truth(run, best, trajectory)
-    return {name: None if isinstance(x, float) and not np.isfinite(x) else x for name, x in found.items()}
+    return {
+        name: None if isinstance(x, float) and not np.isfinite(x) else x
+        for name, x in found.items()
+    }
 
 
 def truth(run, best, planned: Trajectory) -> dict:
-    """Return the errors of the plan at its end: torques applied open loop, and the tail tracked by PFL."""
+    """Return the errors of the plan at its end: torques applied open loop, and the tail tracked by
+    PFL.
+    """
     apart, from_goal = attitude_errors(run.problem, best.planned[0][-1, 3:7], best.true[0][3:7])
     rates = np.abs(best.true[1][3:] - best.planned[1][-1, 3:]).max()
     found = {"open_loop_attitude_error_deg": apart, "open_loop_goal_error_deg": from_goal}
@@ -40,7 +59,9 @@ def truth(run, best, planned: Trajectory) -> dict:
         return found
     deviation = flight.resample(np.clip(planned.t, 0, flight.t[-1])).tail - planned.tail
     return found | {
-        "tracked_attitude_error_deg": max(attitude_errors(run.problem, planned.attitude[-1], flight.attitude[-1])),
+        "tracked_attitude_error_deg": max(
+            attitude_errors(run.problem, planned.attitude[-1], flight.attitude[-1])
+        ),
         "tracked_tail_error_rad": float(np.abs(deviation).max()),
         "dyn_err": dynamics_error(planned, flight),
     }
@@ -66,8 +87,12 @@ def work(trajectory: Trajectory) -> tuple[float, float]:
     return float(np.trapezoid(power, trajectory.t)), float(power.max())
 
 
-def attitude_errors(problem: Problem, planned: np.ndarray, found: np.ndarray) -> tuple[float, float]:
-    """Angles (deg) between an attitude reached (4,) and that planned (4,), and between it and the goal."""
+def attitude_errors(
+    problem: Problem, planned: np.ndarray, found: np.ndarray
+) -> tuple[float, float]:
+    """Angles (deg) between an attitude reached (4,) and that planned (4,), and between it and the
+    goal.
+    """
     apart, goal = float(angle_deg(planned, found)), problem.goal.attitude
     if goal is None:
         return apart, apart
@@ -82,7 +107,9 @@ def tracked(model, problem: Problem, planned: Trajectory) -> Trajectory:
 
 
 def dynamics_error(planned: Trajectory, found: Trajectory) -> float:
-    """L2 distance over time of x = (p, phi, q_t, p_dot, omega, q_t_dot), SI, between two motions (Eq. 50)."""
+    """L2 distance over time of x = (p, phi, q_t, p_dot, omega, q_t_dot), SI, between two motions
+    (Eq. 50).
+    """
     at = found.resample(np.clip(planned.t, found.t[0], found.t[-1]))
     difference = _states(planned) - _states(at)
     difference[:, 3:6] -= 2 * np.pi * np.round(difference[0, 3:6] / (2 * np.pi))

@@ -1,4 +1,6 @@
-"""Truth: a planned curve goes in; what its torques really do, interval by interval and from end to end, comes out."""
+"""Truth: a planned curve goes in; what its torques really do, interval by interval and from end to
+end, comes out.
+"""
 
 import numpy as np
 
@@ -13,13 +15,16 @@ STEP = 1e-4  # s, longest RK4 step
 
 
 def applied(model, torques: Piecewise, damping: float, q, v) -> tuple[np.ndarray, np.ndarray]:
-    """Return q, v at the end of planned torques applied from the state q, v; nan where they blow up.
+    """Return q, v at the end of planned torques applied from the state q, v; nan where they blow
+    up.
 
     RK4 in C, its torques being the plan's own polynomials, steps ending where they join.
     """
     duration, step = float(torques.times[-1]), min(STEP, np.diff(torques.times).min() / 4)
     try:
-        return end_state(model, q, v, controller=TorqueCurve(torques, damping), duration=duration, step=step)
+        return end_state(
+            model, q, v, controller=TorqueCurve(torques, damping), duration=duration, step=step
+        )
     except SimulationError:  # bent or whirled beyond what the model describes
         return np.full_like(q, np.nan), np.full_like(v, np.nan)
 
@@ -37,9 +42,11 @@ def open_loop(model, curve: Curve, damping: float, start) -> tuple[np.ndarray, n
 
 
 def local_errors(model, curve: Curve, damping: float, q, v) -> np.ndarray:
-    """Return an error (N,) of every interval: from its planned start to its planned end, q, v (N + 1, ..) at the ends.
+    """Return an error (N,) of every interval: from its planned start to its planned end, q, v (N +
+    1, ..) at the ends.
 
-    The largest of the attitude's angle (rad), the tail's angles (rad) and rates (rad/s, weighed by the interval).
+    The largest of the attitude's angle (rad), the tail's angles (rad) and rates (rad/s, weighed by
+    the interval).
     """
     errors, torques = np.zeros(len(q) - 1), planned_torques(curve)
     for k, width in enumerate(np.diff(curve.ends)):
