@@ -9,7 +9,14 @@ import pytest
 from serpentail_codegen.autodiff.forward import tangent_program
 from serpentail_codegen.autodiff.reverse import adjoint_program
 from serpentail_codegen.ir.builder import Builder
-from serpentail_codegen.ir.dataflow import expanded, influencing, pruned, reached, reads, writes
+from serpentail_codegen.ir.dataflow import (
+    backward_slice,
+    forward_slice,
+    inlined,
+    pruned,
+    reads,
+    writes,
+)
 from serpentail_codegen.ir.interpret import Run
 from serpentail_codegen.ir.program import Apply, Guard, Loop, statements
 from tests.autodiff.test_forward import arguments_of
@@ -65,17 +72,23 @@ def diamond():
 
 def test_dependence_goes_both_ways():
     body = diamond().body
-    assert reached(body, {"x"}) == {"x", "p", "q", "w", "u"}  # a step is one: it may take x to u
-    assert reached(body, {"q"}) == {"q", "w"}
-    assert reached(body, {"mass"}) == {"mass"}
-    assert influencing(body, {"w"}) == {
+    assert forward_slice(body, {"x"}) == {
+        "x",
+        "p",
+        "q",
+        "w",
+        "u",
+    }  # a step is one: it may take x to u
+    assert forward_slice(body, {"q"}) == {"q", "w"}
+    assert forward_slice(body, {"mass"}) == {"mass"}
+    assert backward_slice(body, {"w"}) == {
         "w",
         "p",
         "q",
         "x",
         "mass",
     }  # an output that is not wanted needs nothing
-    assert influencing(body, {"u"}) == {"u", "y"}
+    assert backward_slice(body, {"u"}) == {"u", "y"}
 
 
 def test_dependence_goes_around_loops():
@@ -86,8 +99,8 @@ def test_dependence_goes_around_loops():
         b.copy(t[0], s[0])
         b.copy(s[0], x[i])
         b.copy(u[i], t[0])
-    assert "u" in reached(b.finish().body, {"x"})
-    assert "x" in influencing(b.finish().body, {"u"})
+    assert "u" in forward_slice(b.finish().body, {"x"})
+    assert "x" in backward_slice(b.finish().body, {"u"})
 
 
 def test_sums_read_what_they_add_to():
@@ -118,7 +131,7 @@ def test_nothing_unneeded_is_left():
     nobody.
     """
     for name, program in made():
-        needed = influencing(program.body, {a.name for a in program.of_role("output")})
+        needed = backward_slice(program.body, {a.name for a in program.of_role("output")})
         known = {a.name for a in program.arrays if a.role in ("input", "output", "parameters")}
         assert {a.name for a in program.arrays} == needed | known, name
         for statement, loops in statements(program.body):
@@ -186,7 +199,7 @@ def test_called_program_means_the_same(name):
 def test_called_names_carry_the_programs_name():
     b, a, y, z = outer()
     b.call(PROGRAMS["nested"], x=a, y=y, u=z, w=b.array("w", 1))
-    program = expanded(b.finish())
+    program = inlined(b.finish())
     assert [array.name for array in program.arrays] == [
         "mass",
         "a",
@@ -233,7 +246,7 @@ def test_what_is_called_twice_has_arrays_of_its_own_each_time():
     b.copy(total[0], w[0])
     b.call(PROGRAMS["nested"], x=a, y=y, u=z, w=w)
     b.copy(total[0], w[0], adds=True)
-    names = [array.name for array in expanded(b.finish()).arrays]
+    names = [array.name for array in inlined(b.finish()).arrays]
     assert len(set(names)) == len(names)
     given = numbers(PROGRAMS["nested"])
     found = outputs(b.finish(), {"mass": given["mass"], "a": given["x"], "y": given["y"]})

@@ -8,7 +8,7 @@ number for each direction; without, it holds the derivative in one direction.
 from collections.abc import Callable, Collection
 from dataclasses import replace
 
-from ..ir.dataflow import inner_arrays, pruned, reached, writes
+from ..ir.dataflow import forward_slice, inner_arrays, pruned, writes
 from ..ir.program import Apply, Array, Copy, Fill, Guard, Index, Loop, Program, Ref, statements
 from .angles import TurnedArray, turned_arrays
 from .step import tangent
@@ -28,7 +28,7 @@ def tangent_program(
 
     ``bound`` tells how many lanes are needed inside given loops.
     """
-    moving, turned = reached(program.body, active), turned_arrays(program)
+    moving, turned = forward_slice(program.body, active), turned_arrays(program)
     turned = {name: found for name, found in turned.items() if name in moving}
     own = [a for a in program.arrays if a.name in moving - turned.keys()]
     companions = {a.name: Array(f"d_{a.name}", _role(a), a.size, a.count, lanes=lanes) for a in own}

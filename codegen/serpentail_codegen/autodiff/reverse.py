@@ -9,7 +9,7 @@ loops.
 from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 
-from ..ir.dataflow import influencing, inner_arrays, pruned, reached, writes
+from ..ir.dataflow import backward_slice, forward_slice, inner_arrays, pruned, writes
 from ..ir.program import (
     Apply,
     Array,
@@ -31,7 +31,7 @@ def adjoint_program(program: Program, wanted: Collection[str], given: Collection
     """Return the program that takes ``b_<output>`` of the given outputs to ``b_<input>`` of the
     wanted inputs.
     """
-    matters = reached(program.body, wanted) & influencing(program.body, given)
+    matters = forward_slice(program.body, wanted) & backward_slice(program.body, given)
     turned = {name: found for name, found in turned_arrays(program).items() if name in matters}
     matters -= turned.keys()
     ends = [a for a in program.arrays if a.name in (*wanted, *given)]

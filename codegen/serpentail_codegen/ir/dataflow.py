@@ -74,7 +74,7 @@ def rewritten(body: tuple, rewrite: Callable[[object], Iterator]) -> tuple:
     return tuple(out)
 
 
-def _grown(
+def _fixpoint(
     body: tuple, start: Collection[str], more: Callable[[object, set[str]], set[str]]
 ) -> set[str]:
     """Return names with what each statement adds to them, until none adds any."""
@@ -86,21 +86,21 @@ def _grown(
     return found
 
 
-def reached(body: tuple, start: Collection[str]) -> set[str]:
+def forward_slice(body: tuple, start: Collection[str]) -> set[str]:
     """Return the arrays that may depend on the arrays ``start``, by name."""
-    return _grown(
+    return _fixpoint(
         body, start, lambda s, found: names(writes(s)) if names(reads(s)) & found else set()
     )
 
 
-def influencing(body: tuple, end: Collection[str]) -> set[str]:
+def backward_slice(body: tuple, end: Collection[str]) -> set[str]:
     """Return the arrays that the arrays ``end`` may depend on, by name."""
 
     def more(statement, found: set[str]) -> set[str]:
         targets = statement.protects if isinstance(statement, Guard) else writes(statement)
         return names(reads(_with_outputs(statement, found))) if names(targets) & found else set()
 
-    return _grown(body, end, more)
+    return _fixpoint(body, end, more)
 
 
 def _with_outputs(statement, needed: Collection[str]):
@@ -126,7 +126,7 @@ def pruned(program: Program) -> Program:
     declared by name.
     """
     array = {a.name: a for a in program.arrays}
-    needed = influencing(program.body, {a.name for a in program.of_role("output")})
+    needed = backward_slice(program.body, {a.name for a in program.of_role("output")})
 
     def rewrite(statement):
         if isinstance(statement, Guard):
@@ -164,7 +164,7 @@ def with_arrays(statement, array: Mapping[str, Array]):
     return replace(statement, **changes)
 
 
-def expanded(program: Program) -> Program:
+def inlined(program: Program) -> Program:
     """Return a program with the programs that it calls written out; their own arrays are
     renamed.
     """
@@ -173,7 +173,7 @@ def expanded(program: Program) -> Program:
     def rewrite(statement):
         if not isinstance(statement, Call):
             return (statement,)
-        inner, arguments = expanded(statement.program), dict(statement.arguments)
+        inner, arguments = inlined(statement.program), dict(statement.arguments)
         array = {a.name: arguments.get(a.name) or _own(a, inner.name, arrays) for a in inner.arrays}
         return rewritten(inner.body, lambda s: (with_arrays(s, array),))
 

@@ -6,7 +6,7 @@ loops.
 
 import math
 
-from .dataflow import expanded
+from .dataflow import inlined
 from .ldl import ldl_factor, ldl_solve, pair_factor, pair_solve
 from .program import (
     Apply,
@@ -114,7 +114,7 @@ def applied(program: Program) -> int:
     """Return how many nodes of steps one run evaluates, each row once: what unrolling has to write
     out or fold.
     """
-    return _applied(expanded(program).body, {})
+    return _applied(inlined(program).body, {})
 
 
 def _applied(body: tuple, at: dict[str, int]) -> int:
@@ -134,7 +134,7 @@ def branches(program: Program) -> bool:
     """Tell if some statements of a program are run only under a condition."""
     return any(
         isinstance(outer, When)
-        for _, around in statements(expanded(program).body)
+        for _, around in statements(inlined(program).body)
         for outer in around
     )
 
@@ -145,7 +145,7 @@ class Run:
     """
 
     def __init__(self, program: Program, algebra, arguments: dict[str, list]):
-        program, self.algebra, self.guards = expanded(program), algebra, []
+        program, self.algebra, self.guards = inlined(program), algebra, []
         self.values = {a.name: [None] * a.length for a in program.arrays}
         self.values |= {
             a.name: [algebra.const(v) for v in a.values] for a in program.of_role("constant")

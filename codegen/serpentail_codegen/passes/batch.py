@@ -7,7 +7,7 @@ parameters alone stays narrow, and is computed once for all.
 
 from dataclasses import replace
 
-from ..ir.dataflow import expanded, reached, rewritten, with_arrays
+from ..ir.dataflow import forward_slice, inlined, rewritten, with_arrays
 from ..ir.interpret import unroll
 from ..ir.program import Apply, Array, Guard, Program
 from ..ir.step import Step, compacted
@@ -15,9 +15,9 @@ from ..ir.step import Step, compacted
 
 def side_by_side(program: Program, states: int) -> Program:
     """Return a program over so many states, its inputs and outputs rows of them."""
-    program = expanded(program)
+    program = inlined(program)
     arguments = {a.name for a in program.arrays if a.role in ("input", "output")}
-    wide = reached(program.body, arguments)
+    wide = forward_slice(program.body, arguments)
     array = {a.name: replace(a, lanes=states) if a.name in wide else a for a in program.arrays}
     body = rewritten(program.body, lambda statement: (with_arrays(statement, array),))
     return replace(program, name=f"{program.name}_rows", arrays=tuple(array.values()), body=body)
@@ -27,7 +27,7 @@ def with_own_parameters(program: Program, name: str) -> Program:
     """Return a program by another name that takes its parameters as inputs, so that each state may
     have its own.
     """
-    program = expanded(program)
+    program = inlined(program)
     array = {
         a.name: replace(a, role="input") if a.role == "parameters" else a for a in program.arrays
     }

@@ -7,7 +7,7 @@ import re
 from ...functions.function import program as assemble
 from ...functions.function import struct_parameters
 from ...functions.tail import Tail
-from ...ir.dataflow import expanded
+from ...ir.dataflow import inlined
 from ...ir.program import Apply, Copy, Factor, Fill, Guard, Loop, Program, Ref, Solve, padded
 from ...ir.step import Step
 from ...scene.scene import Scene
@@ -53,7 +53,7 @@ class PythonPrinter:
     """Prints a program as Python loops over lists."""
 
     def __init__(self, program: Program):
-        self.program = expanded(program)
+        self.program = inlined(program)
         self.steps: dict[str, Step] = {}
 
     def lines(self) -> list[str]:
