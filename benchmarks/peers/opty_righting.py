@@ -14,7 +14,7 @@ import sympy
 
 import serpentail as st
 from serpentail_codegen.functions.catalogue import CATALOGUE
-from serpentail_codegen.functions.function import program
+from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.pipeline import tail_of
 from serpentail_codegen.scene.scene import Scene
@@ -80,7 +80,7 @@ def equations(scene: Scene, q: list, v: list, tau: list) -> sympy.Matrix:
     """q_dot and H v_dot + C - [0; tau], all of them zero, as SymPy's expressions of functions of
     time.
     """
-    inverse = program(CATALOGUE["inverse_dynamics"], tail_of(scene))
+    inverse = assemble(CATALOGUE["inverse_dynamics"], tail_of(scene))
     sizes = {"q": len(q), "v": len(v), "v_dot": len(v)}
     plain = {name: sympy.symbols(f"{name}:{size}") for name, size in sizes.items()}
     numbers = Numbers(sympy, lambda x: sympy.Float(float(x)))

@@ -13,7 +13,7 @@ import pytest
 
 import serpentail as st
 from serpentail.model.compiler import compile_library
-from serpentail_codegen.functions.function import program
+from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.functions.plain import FUNCTIONS
 from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.ir.interpret import Numbers, Run
@@ -90,7 +90,7 @@ def numbers(program, rng):
 @pytest.mark.parametrize("tail", TAILS)
 @pytest.mark.parametrize("name", BATCHED)
 def test_a_program_of_many_states_means_each_of_them(tail, name):
-    single, rng = program(FUNCTIONS[name], TAILS[tail]), np.random.default_rng(1)
+    single, rng = assemble(FUNCTIONS[name], TAILS[tail]), np.random.default_rng(1)
     states = [numbers(single, rng) for _ in range(3)]
     for state in states[1:]:
         state.update({a.name: states[0][a.name] for a in single.of_role("parameters")})
@@ -107,7 +107,7 @@ def test_a_program_of_many_states_means_each_of_them(tail, name):
 @pytest.mark.parametrize("tail", TAILS)
 @pytest.mark.parametrize("name", BATCHED)
 def test_a_program_written_out_means_the_same_and_guards_the_same(tail, name):
-    single = program(FUNCTIONS[name], TAILS[tail])
+    single = assemble(FUNCTIONS[name], TAILS[tail])
     values = numbers(single, np.random.default_rng(2))
     expected, found = (Run(p, Numbers(np), values) for p in (single, flattened(single)))
     for a in single.of_role("output"):
@@ -123,7 +123,7 @@ def test_a_program_written_out_means_the_same_and_guards_the_same(tail, name):
 def test_what_depends_on_parameters_alone_stays_narrow():
     arrays = {
         a.name: a.lanes
-        for a in widened(program(FUNCTIONS["inverse_dynamics"], Tail(2, 2)), 8).arrays
+        for a in widened(assemble(FUNCTIONS["inverse_dynamics"], Tail(2, 2)), 8).arrays
     }
     assert arrays["q"] == arrays["force"] == 8
     assert arrays["link"] == arrays["tail_mass"] == 0

@@ -13,7 +13,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from serpentail_codegen.functions.function import program
+from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.functions.plain import FUNCTIONS
 from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.pipeline import tail_of
@@ -155,7 +155,7 @@ def test_inputs_and_outputs_are_named_and_shaped_as_documented(model, function):
 
 def interpreted(model, function, arguments, algebra):
     """Run a function's program on numbers, matrices row-major; return its outputs by name."""
-    p = program(FUNCTIONS[function], tail_of(model.scene))
+    p = assemble(FUNCTIONS[function], tail_of(model.scene))
     arrays = (*p.of_role("parameters"), *p.of_role("input"))
     return Run(
         p, algebra, {a.name: [algebra.convert(x) for x in arguments[a.name]] for a in arrays}

@@ -5,7 +5,7 @@ import pytest
 
 import serpentail as st
 from serpentail_codegen.functions.catalogue import CATALOGUE
-from serpentail_codegen.functions.function import program
+from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.functions.plain import FUNCTIONS
 from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.ir.builder import Builder
@@ -34,7 +34,9 @@ def outputs(program, given):
 
 def assert_same_acceleration(size, name, dynamics):
     """Other dynamics are another program, and mean what H column by column means."""
-    plain, other = (program(FUNCTIONS[name], Tail(*size), each) for each in ("composite", dynamics))
+    plain, other = (
+        assemble(FUNCTIONS[name], Tail(*size), each) for each in ("composite", dynamics)
+    )
     assert plain != other
     given = arguments(plain)
     expected, found = outputs(plain, given)["v_dot"], outputs(other, given)["v_dot"]
@@ -114,7 +116,7 @@ def _spread(rows, wide):
 
 
 def test_matrices_beyond_the_limit_keep_their_loops():
-    long = program(FUNCTIONS["forward_dynamics"], Tail(7, 1), "lanes")
+    long = assemble(FUNCTIONS["forward_dynamics"], Tail(7, 1), "lanes")
     assert written_out(long, 12) == long
 
 
@@ -154,7 +156,9 @@ def test_long_tails_run_in_lanes_and_agree_with_loops(size):
 def test_the_fast_form_serves_derivatives_too():
     tail = Tail(3, 4)
     name = "forward_dynamics_derivatives"
-    plain, lanes = (program(CATALOGUE[name], tail, dynamics) for dynamics in ("composite", "lanes"))
+    plain, lanes = (
+        assemble(CATALOGUE[name], tail, dynamics) for dynamics in ("composite", "lanes")
+    )
     given = arguments(plain)
     expected, found = outputs(plain, given), outputs(lanes, given)
     for key, value in expected.items():

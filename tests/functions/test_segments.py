@@ -7,7 +7,7 @@ import pytest
 
 import serpentail as st
 from serpentail_codegen.functions.catalogue import CATALOGUE
-from serpentail_codegen.functions.function import program
+from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.functions.plain import FUNCTIONS
 from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.ir.interpret import Numbers, Run
@@ -31,7 +31,7 @@ def test_segments_give_the_same_acceleration(size, name):
 
 def test_what_needs_the_matrix_goes_in_lanes():
     for name in ("forward_dynamics_derivatives", "mass_matrix", "pfl"):
-        assert program(CATALOGUE[name], Tail(3, 2), "segments") == program(
+        assert assemble(CATALOGUE[name], Tail(3, 2), "segments") == assemble(
             CATALOGUE[name], Tail(3, 2), "lanes"
         )
 
@@ -46,7 +46,7 @@ def test_long_tails_of_several_segments_go_by_segments(size, form):
 @pytest.mark.parametrize("name", ["forward_dynamics", "mass_matrix"])
 def test_a_continuum_has_one_form_of_dynamics(name):
     tail = Tail(3, 2, "continuum")
-    assert program(FUNCTIONS[name], tail, "segments") == program(FUNCTIONS[name], tail)
+    assert assemble(FUNCTIONS[name], tail, "segments") == assemble(FUNCTIONS[name], tail)
 
 
 @cache
@@ -108,7 +108,7 @@ def signs(segments, **changed):
 
 
 def test_every_pivot_is_guarded():
-    segments = program(FUNCTIONS[FUNCTION], Tail(3, 2), "segments")
+    segments = assemble(FUNCTIONS[FUNCTION], Tail(3, 2), "segments")
     assert all(signs(segments))
     assert signs(segments, torso_mass=[-1e3])[:6] == [True] * 6 and not all(
         signs(segments, torso_mass=[-1e3])

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from serpentail_codegen.functions.function import program
+from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.functions.plain import FUNCTIONS
 from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.ir.builder import Builder, narrowed
@@ -308,7 +308,7 @@ def test_unrolling_keeps_every_bit(function, tail):
     """Signs of zeros aside: no two constants that round meet in these programs, so folding changes
     no rounding.
     """
-    p = program(function, tail)
+    p = assemble(function, tail)
     arguments = arguments_of(p, tail, float)
     unrolled, interpreted = (
         unrolled_values(p, arguments, FLOATS),
@@ -320,7 +320,7 @@ def test_unrolling_keeps_every_bit(function, tail):
 
 def test_unrolling_and_baking_are_exact_in_rational_arithmetic(function):
     tail = Tail(1, 2)
-    p = program(function, tail)
+    p = assemble(function, tail)
     arguments = arguments_of(p, tail, rounded)
     interpreted = interpreted_values(p, arguments, EXACT)
     names = [array.name for array in p.of_role("parameters")]
@@ -337,7 +337,7 @@ def unrolled_results(program, fixed=None):
 
 
 def test_baking_leaves_no_parameter_and_adds_no_operation(function, tail):
-    p = program(function, tail)
+    p = assemble(function, tail)
     arguments = arguments_of(p, tail, float)
     tape, results = unrolled_results(
         p, {array.name: arguments[array.name] for array in p.of_role("parameters")}
@@ -353,7 +353,7 @@ def test_baking_leaves_no_parameter_and_adds_no_operation(function, tail):
 
 
 def test_a_batch_is_its_states_one_by_one(function, tail):
-    p = program(function, tail)
+    p = assemble(function, tail)
     one = arguments_of(p, tail, float)
     inputs = {array.name for array in p.of_role("input")}
     stretched = {
@@ -526,7 +526,7 @@ def test_a_condition_survives_being_called():
     }
     b.call(conditional(), **arrays, w=b.array("w", 1, role="output"))
     p, given = b.finish(), {"x": [1, -1, 2, 0], "y": [1, 2, -3, 4]}
-    assert branches(p) and not branches(program(FUNCTIONS["mass_matrix"], Tail(1, 1)))
+    assert branches(p) and not branches(assemble(FUNCTIONS["mass_matrix"], Tail(1, 1)))
     values = Run(p, EXACT, given).values
     assert (values["u"], values["w"][0]) == plainly(**given)
 

@@ -17,7 +17,7 @@ import sympy
 from sympy import Matrix, Rational, diag, eye, zeros
 from sympy.algebras.quaternion import Quaternion
 
-from serpentail_codegen.functions.function import program
+from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.functions.plain import FUNCTIONS
 from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.ir.interpret import Numbers, Run, unroll
@@ -251,7 +251,7 @@ def call(function, **vectors):
 
 def run(name, state):
     """Run a function's program on exact numbers; return its outputs as columns."""
-    p = program(FUNCTIONS[name], state.tail)
+    p = assemble(FUNCTIONS[name], state.tail)
     names = {array.name for array in (*p.of_role("parameters"), *p.of_role("input"))}
     found = Run(
         p, EXACT, {name: values for name, values in state.arguments.items() if name in names}
@@ -602,7 +602,7 @@ def applied_steps():
     """Every step that a function applies, for several sizes."""
     for tail in (Tail(1, 1), Tail(1, 3), Tail(3, 2), Tail(2, 3, "continuum")):
         for function in FUNCTIONS.values():
-            for statement, _ in statements(program(function, tail).body):
+            for statement, _ in statements(assemble(function, tail).body):
                 if isinstance(statement, Apply):
                     yield statement.step
 
@@ -643,7 +643,7 @@ class Counting:
 
 def executed(name, m, n):
     """Operations that a function executes in loops."""
-    p, algebra = program(FUNCTIONS[name], Tail(m, n)), Counting()
+    p, algebra = assemble(FUNCTIONS[name], Tail(m, n)), Counting()
     Run(
         p,
         algebra,
@@ -654,7 +654,7 @@ def executed(name, m, n):
 
 def straight(name, m, n):
     """Operations of a function without loops."""
-    tape, outputs, guards = unroll(program(FUNCTIONS[name], Tail(m, n)))
+    tape, outputs, guards = unroll(assemble(FUNCTIONS[name], Tail(m, n)))
     guarded = [node for _, node in guards]
     return operation_count(
         tape.nodes, [node for nodes in outputs.values() for node in nodes] + guarded

@@ -4,7 +4,7 @@ import random
 
 import pytest
 
-from serpentail_codegen.functions.function import program
+from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.functions.plain import FUNCTIONS
 from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.ir.interpret import unroll
@@ -14,7 +14,7 @@ from serpentail_codegen.passes import schedule
 
 def straight(segments, links):
     """Nodes and results of forward dynamics."""
-    tape, outputs, guards = unroll(program(FUNCTIONS["forward_dynamics"], Tail(segments, links)))
+    tape, outputs, guards = unroll(assemble(FUNCTIONS["forward_dynamics"], Tail(segments, links)))
     return tape.nodes, [*outputs["v_dot"], *(node for _, node in guards)]
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 import serpentail as st
 from serpentail_codegen.functions.catalogue import CATALOGUE
-from serpentail_codegen.functions.function import program
+from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.ir.dataflow import inlined
 from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.pipeline import tail_of
@@ -114,7 +114,7 @@ def tangent_of_q(q):
 def nest_of(model, function):
     """The loop nest of a model's function, what it calls written out."""
     scene = parse_scene(model.manifest["scene"], model.name)
-    return inlined(program(CATALOGUE[function], tail_of(scene)))
+    return inlined(assemble(CATALOGUE[function], tail_of(scene)))
 
 
 def parameters_of(model):

@@ -21,7 +21,7 @@ from serpentail.verification.report import Check, as_text, check, laws, summary
 from serpentail.verification.states import State, arguments, outputs, states
 from serpentail_codegen.functions.catalogue import CATALOGUE
 from serpentail_codegen.functions.contact import CONTACT
-from serpentail_codegen.functions.function import program
+from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.functions.implicit.functions import IMPLICIT
 from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.pipeline import generate, tail_of
@@ -122,7 +122,7 @@ def interpreted(model: st.Model, name: str) -> Callable:
     """Return the law's error: the C against the program, run on Python's floats."""
     scene = parse_scene(model.manifest["scene"], model.name)
     function = CATALOGUE[name]
-    written = cache(lambda: program(function, tail_of(scene)))
+    written = cache(lambda: assemble(function, tail_of(scene)))
 
     def error(model: st.Model, s: State) -> float:
         given = {a.name: getattr(s, a.name).tolist() for a in function.inputs}

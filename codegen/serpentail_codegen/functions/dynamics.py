@@ -9,7 +9,7 @@ from ..ir.program import Array, Index, Ref, padded
 from ..mechanics import rotations, torso, translation
 from .arguments import TAU, V_DOT, Q, V
 from .draft import Draft
-from .function import Argument, Function, program
+from .function import Argument, Function, assemble
 from .sweeps import sweeps
 from .sweeps.columns import balance_in_lanes
 from .sweeps.segments import accelerate
@@ -101,7 +101,7 @@ def assemble_balance(d: Draft, arrays: dict[str, Array]) -> None:
 def balanced(d: Draft, q: Array, v: Array) -> "Balance":
     """Call the balance, and let steps find by their names what it gives."""
     arrays = {a.name: d.array(a.name, a.length(d.tail)) for a in BALANCE.outputs}
-    d.call(program(BALANCE, d.tail, d.dynamics), q=q, v=v, **arrays)
+    d.call(assemble(BALANCE, d.tail, d.dynamics), q=q, v=v, **arrays)
     bias = arrays["bias"]
     d.known |= {
         name: arrays[name].part(0, arrays[name].length) for name in ("R", "inverse_mass", "com")
@@ -140,7 +140,7 @@ def accelerate_by_segments(d: Draft, arrays: dict[str, Array], torques: Array) -
     for k, name in enumerate(("load_force", "load_moment")):
         d.copy(load.part(3 * k, 3), d.known[name])
     arguments = {name: arrays[name] for name in ("q", "v", "v_dot")}
-    d.call(program(SEGMENT_DYNAMICS, d.tail), at_torso=load, torques=torques, **arguments)
+    d.call(assemble(SEGMENT_DYNAMICS, d.tail), at_torso=load, torques=torques, **arguments)
 
 
 def assemble_segment_dynamics(d: Draft, arrays: dict[str, Array]) -> None:

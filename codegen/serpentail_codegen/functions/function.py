@@ -50,7 +50,7 @@ def struct_parameters(model: Tail | Scene) -> tuple[Parameter, ...]:
     return tuple(p for p in parameters_of(model.kind, model.contacts) if p.name != "link_radius")
 
 
-def program(function: Function, tail: Tail, dynamics: str = "composite") -> Program:
+def assemble(function: Function, tail: Tail, dynamics: str = "composite") -> Program:
     """Assemble one function for given sizes; other ``dynamics`` where vectors hold several numbers
     and tails are long.
 

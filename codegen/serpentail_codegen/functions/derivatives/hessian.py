@@ -7,7 +7,7 @@ from ...autodiff.reverse import adjoint_program
 from ...ir.program import Array, Index, Ref, as_index
 from ...mechanics import rotations, torso
 from ..draft import Draft
-from ..function import program
+from ..function import assemble
 from .directions import TORSO, Directions
 from .jacobians import INERTIA, VIRTUAL_POWER, with_unit_quaternion
 
@@ -20,7 +20,7 @@ def assemble_inverse_dynamics_hessian(d: Draft, arrays: dict[str, Array]) -> Non
     """
     tail, nv = d.tail, d.tail.nv
     directions = Directions(tail, ("turn", "omega"))
-    inner = adjoint_program(program(VIRTUAL_POWER, tail), ("q", "v", "v_dot"), ("power",))
+    inner = adjoint_program(assemble(VIRTUAL_POWER, tail), ("q", "v", "v_dot"), ("power",))
     inner = tangent_program(inner, ("q", "v"), directions.count, directions.up_to)
     b_q, b_v = d.wide("d_b_q", tail.nq, directions.count), d.wide("d_b_v", nv, directions.count)
     b_v_dot = d.wide("d_b_v_dot", nv, directions.count)
@@ -87,7 +87,7 @@ def mixed_block(d: Draft, q: Array, multiplier: Array, aq: Array) -> None:
     to world axes.
     """
     nv, directions = d.tail.nv, Directions(d.tail, (), rates=False)
-    inner = tangent_program(program(INERTIA, d.tail), ("q",), directions.count, directions.outward)
+    inner = tangent_program(assemble(INERTIA, d.tail), ("q",), directions.count, directions.outward)
     rows, body = (
         d.wide("inertial_rows", nv, directions.count),
         d.array("multiplier_in_torso_axes", nv),

@@ -13,7 +13,7 @@ from ...mechanics import rotations, torso, translation
 from ..arguments import FORCE, V_DOT, Q, V
 from ..draft import Draft
 from ..dynamics import Balance, Loads, assemble_forward_dynamics
-from ..function import Argument, Function, program, struct_parameters
+from ..function import Argument, Function, assemble, struct_parameters
 from ..plain import FUNCTIONS
 from ..sweeps import sweeps
 from ..sweeps.sweeps import mechanism
@@ -91,7 +91,7 @@ def assemble_inverse_dynamics_derivatives(d: Draft, arrays: dict[str, Array]) ->
     """Tangents of H v_dot + C along all directions at once."""
     directions = Directions(d.tail, ("turn", "omega"))
     inner = tangent_program(
-        program(FUNCTIONS["inverse_dynamics"], d.tail),
+        assemble(FUNCTIONS["inverse_dynamics"], d.tail),
         ("q", "v"),
         directions.count,
         directions.outward,
@@ -132,7 +132,7 @@ def assemble_forward_dynamics_derivatives(d: Draft, arrays: dict[str, Array]) ->
     tail, nv = d.tail, d.tail.nv
     balance, body = forward_dynamics_first(d, arrays)
     directions = Directions(tail, ("omega",))
-    inner = tangent_program(program(CORE, tail), ("q", "v"), directions.count, directions.outward)
+    inner = tangent_program(assemble(CORE, tail), ("q", "v"), directions.count, directions.outward)
     rows, x = d.wide("rows", nv, directions.count), d.wide("x", nv, directions.count)
     given = {name: arrays[name] for name in ("q", "v")}
     d.call(inner, d_force=rows, v_dot=body, **given, **directions.tangents(d))
@@ -181,7 +181,7 @@ def parameter_tangents(d: Draft, function: Function, given: dict[str, Array]) ->
     """
     count, lane, tangents = parameter_count(d.tail), 0, {}
     names = [p.name for p in struct_parameters(d.tail)]
-    inner = tangent_program(program(function, d.tail), names, count)
+    inner = tangent_program(assemble(function, d.tail), names, count)
     for p in struct_parameters(d.tail):
         if any(a.name == f"d_{p.name}" for a in inner.arrays):
             tangents[f"d_{p.name}"] = d.wide(f"d_{p.name}", p.size, count)
@@ -213,7 +213,7 @@ def assemble_forward_dynamics_jvp(d: Draft, arrays: dict[str, Array]) -> None:
     balance, body = forward_dynamics_first(d, arrays)
     d_q, rows, x = d.array("d_q", d.tail.nq), d.array("rows", nv), arrays["dv_dot"]
     d.copy(d_q.part(7, d.tail.nt), arrays["dq"].part(6, d.tail.nt))
-    inner = tangent_program(program(CORE, d.tail), ("q", "v"))
+    inner = tangent_program(assemble(CORE, d.tail), ("q", "v"))
     d.call(inner, q=arrays["q"], v=arrays["v"], v_dot=body, d_q=d_q, d_v=arrays["dv"], d_force=rows)
     balance.solve(d, less(d, rows, lambda k: arrays["dtau"].part(k, 1)), x)
     reads = {"a": body.part(0, 3), "turn": arrays["dq"].part(3, 3), "p_ddot": x.part(0, 3)}
@@ -222,7 +222,7 @@ def assemble_forward_dynamics_jvp(d: Draft, arrays: dict[str, Array]) -> None:
 
 def assemble_inverse_dynamics_vjp(d: Draft, arrays: dict[str, Array]) -> None:
     """Gradient of lambda^T (H v_dot + C), by one way out along the tail and one back."""
-    inner = adjoint_program(program(VIRTUAL_POWER, d.tail), ("q", "v", "v_dot"), ("power",))
+    inner = adjoint_program(assemble(VIRTUAL_POWER, d.tail), ("q", "v", "v_dot"), ("power",))
     one, gradient = d.constant("one", [1]), d.array("gradient", d.tail.nq)
     q = with_unit_quaternion(d, arrays["q"])
     given = {"q": q} | {name: arrays[name] for name in ("v", "v_dot", "multiplier")}
@@ -252,7 +252,7 @@ def assemble_forward_dynamics_vjp(d: Draft, arrays: dict[str, Array]) -> None:
     d.step(torso.torso_velocity, {"p_dot": multiplier.part(0, 3)}, u=d.vector("pull", 3))
     at_torso = loads(d, load_force=d.known["pull"], load_moment=multiplier.part(3, 3))
     balance.solve(d, Loads(at_torso, tau=lambda k: multiplier.part(6 + k, 1)), mu)
-    inner = adjoint_program(program(VIRTUAL_POWER, tail), ("q", "v"), ("power",))
+    inner = adjoint_program(assemble(VIRTUAL_POWER, tail), ("q", "v"), ("power",))
     minus, gradient = d.constant("minus", [-1]), d.array("gradient", tail.nq)
     q = with_unit_quaternion(d, arrays["q"])
     given = {"q": q, "v": arrays["v"], "v_dot": v_dot, "multiplier": mu}
@@ -268,7 +268,7 @@ def assemble_energy_derivatives(d: Draft, arrays: dict[str, Array]) -> None:
     """Gradients of kinetic and potential energy."""
     q = with_unit_quaternion(d, arrays["q"])
     for name, wanted in (("kinetic", ("q", "v")), ("potential", ("q",))):
-        inner = adjoint_program(program(FUNCTIONS["energy"], d.tail), wanted, (name,))
+        inner = adjoint_program(assemble(FUNCTIONS["energy"], d.tail), wanted, (name,))
         gradient = d.array(f"{name}_gradient", d.tail.nq)
         given = {"q": q, "v": arrays["v"]} | (
             {"b_v": arrays["kinetic_dv"]} if "v" in wanted else {}
@@ -281,7 +281,7 @@ def assemble_energy_derivatives(d: Draft, arrays: dict[str, Array]) -> None:
 def assemble_momentum_derivatives(d: Draft, arrays: dict[str, Array]) -> None:
     """Tangents of momentum and angular momentum along all directions at once."""
     directions = Directions(d.tail, ("turn", "p_dot", "omega"))
-    inner = tangent_program(program(FUNCTIONS["momentum"], d.tail), ("q", "v"), directions.count)
+    inner = tangent_program(assemble(FUNCTIONS["momentum"], d.tail), ("q", "v"), directions.count)
     rows = {name: d.wide(f"{name}_rows", 3, directions.count) for name in ("linear", "angular")}
     outputs = {f"d_{name}": row for name, row in rows.items()}
     q = with_unit_quaternion(d, arrays["q"])

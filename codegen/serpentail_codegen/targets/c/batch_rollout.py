@@ -4,7 +4,7 @@ states comes out.
 
 from dataclasses import dataclass
 
-from ...functions.function import program as assemble
+from ...functions.function import assemble as assemble
 from ...functions.tail import Tail
 from ...ir.program import Program, padded
 from ...passes.batch import flattened, side_by_side, with_own_parameters
