@@ -25,12 +25,10 @@ def generate(scene: Scene, output: Path) -> list[str]:
     emitted = [emit(scene, tail, function) for function in wanted]
     context = c_context(scene, tail, emitted, __version__)
     context["content_hash"] = digest("".join(c_files(scene, context).values()))[:16]
-    side_by_side = batches(scene, tail, emitted)
+    batched = batches(scene, tail, emitted)
     together = flights(scene, tail, emitted)
     files = (
-        c_files(scene, context)
-        | batch_file(scene, tail, side_by_side, context)
-        | package_files(context)
+        c_files(scene, context) | batch_file(scene, tail, batched, context) | package_files(context)
     )
     files |= flights_file(scene, together, context)
     module = casadi_module(
@@ -39,7 +37,7 @@ def generate(scene: Scene, output: Path) -> list[str]:
     files[f"{scene.name}_casadi.py"] = module
     described = (
         manifest(scene, context, emitted)
-        | {"batch": batch_entry(scene, side_by_side)}
+        | {"batch": batch_entry(scene, batched)}
         | flights_entry(together)
     )
     return write_folder(output / scene.name, files, described)

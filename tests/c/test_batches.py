@@ -17,8 +17,8 @@ from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.functions.plain import FUNCTIONS
 from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.ir.interpret import Numbers, Run
-from serpentail_codegen.passes.batch import flattened
-from serpentail_codegen.passes.batch import side_by_side as widened
+from serpentail_codegen.passes.batch import batched as widened
+from serpentail_codegen.passes.batch import unrolled_step
 from serpentail_codegen.targets.c.batch import BATCHED, STATES
 from tests.support.models import model_folder
 
@@ -109,7 +109,7 @@ def test_a_program_of_many_states_means_each_of_them(tail, name):
 def test_a_program_written_out_means_the_same_and_guards_the_same(tail, name):
     single = assemble(FUNCTIONS[name], TAILS[tail])
     values = numbers(single, np.random.default_rng(2))
-    expected, found = (Run(p, Numbers(np), values) for p in (single, flattened(single)))
+    expected, found = (Run(p, Numbers(np), values) for p in (single, unrolled_step(single)))
     for a in single.of_role("output"):
         np.testing.assert_allclose(
             np.float64(found.values[a.name]), np.float64(expected.values[a.name]), rtol=1e-12

@@ -12,7 +12,7 @@ from serpentail_codegen.ir.builder import Builder
 from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.ir.ldl import ldl_factor, ldl_solve
 from serpentail_codegen.ir.program import Factor, Solve, padded, statements
-from serpentail_codegen.passes.unrolled_ldl import written_out
+from serpentail_codegen.passes.unrolled_ldl import unrolled_ldl
 from tests.references.parameters import random_states
 from tests.support.models import model_folder
 
@@ -87,7 +87,7 @@ def test_an_elimination_written_out_solves(rows, wide):
     values = {"given": flat.ravel().tolist(), "b": b[:, 0].tolist()} | {
         f"b{k}": b[:, k].tolist() for k in range(wide)
     }
-    straight = written_out(whole, 12)
+    straight = unrolled_ldl(whole, 12)
     assert not any(isinstance(s, Factor | Solve) for s, _ in statements(straight.body))
     for p in (whole, straight):
         np.testing.assert_allclose(
@@ -117,7 +117,7 @@ def _spread(rows, wide):
 
 def test_matrices_beyond_the_limit_keep_their_loops():
     long = assemble(FUNCTIONS["forward_dynamics"], Tail(7, 1), "lanes")
-    assert written_out(long, 12) == long
+    assert unrolled_ldl(long, 12) == long
 
 
 def test_factor_and_solve_invert():

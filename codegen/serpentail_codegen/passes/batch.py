@@ -13,7 +13,7 @@ from ..ir.program import Apply, Array, Guard, Program
 from ..ir.step import Step, compacted
 
 
-def side_by_side(program: Program, states: int) -> Program:
+def batched(program: Program, states: int) -> Program:
     """Return a program over so many states, its inputs and outputs rows of them."""
     program = inlined(program)
     arguments = {a.name for a in program.arrays if a.role in ("input", "output")}
@@ -35,7 +35,7 @@ def with_own_parameters(program: Program, name: str) -> Program:
     return replace(program, name=name, arrays=tuple(array.values()), body=body)
 
 
-def flattened(program: Program, fixed: dict[str, list] | None = None) -> Program:
+def unrolled_step(program: Program, fixed: dict[str, list] | None = None) -> Program:
     """Return a program that is one step, its loops written out, and guards; ``fixed`` arrays are
     constants.
     """

@@ -15,7 +15,7 @@ from ..ir.step import Step, compacted
 from ..ir.tape import Tape
 
 
-def written_out(program: Program, largest: int) -> Program:
+def unrolled_ldl(program: Program, largest: int) -> Program:
     """Return a program without loops of eliminations in matrices of up to ``largest`` rows."""
     pivots: dict[str, Array] = {}
 
@@ -37,7 +37,7 @@ def written_out(program: Program, largest: int) -> Program:
                 step, tuple(given[name] for name, _ in step.inputs), (statement.x,), (False,)
             )
         elif isinstance(statement, Call):
-            yield replace(statement, program=written_out(statement.program, largest))
+            yield replace(statement, program=unrolled_ldl(statement.program, largest))
         else:
             yield statement
 

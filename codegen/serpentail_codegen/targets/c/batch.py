@@ -9,7 +9,7 @@ from ...functions.function import assemble as assemble
 from ...functions.tail import Tail
 from ...ir.interpret import applied, branches
 from ...ir.program import Program
-from ...passes.batch import flattened, side_by_side
+from ...passes.batch import batched, unrolled_step
 from ...scene.scene import Scene
 from ..templating import render
 from .form import Emitted, baked_values
@@ -52,8 +52,8 @@ def batches(scene: Scene, tail: Tail, emitted: list[Emitted]) -> list[Batch]:
 
 def _batch(scene: Scene, tail: Tail, function: Function) -> Batch:
     fixed, single, states = baked_values(scene), assemble(function, tail), STATES[scene.real]
-    single = flattened(single, fixed) if straight(scene, single) else single
-    rows = side_by_side(single, states)
+    single = unrolled_step(single, fixed) if straight(scene, single) else single
+    rows = batched(single, states)
     return Batch(function, states, rows, in_loops(rows, scene.real, scene.name, fixed))
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from ...functions.function import assemble as assemble
 from ...functions.tail import Tail
 from ...ir.program import Program, padded
-from ...passes.batch import flattened, side_by_side, with_own_parameters
+from ...passes.batch import batched, unrolled_step, with_own_parameters
 from ...scene.scene import Scene
 from ..templating import render
 from .batch import STATES, straight
@@ -76,9 +76,9 @@ def flights(scene: Scene, tail: Tail, emitted: list[Emitted]) -> Flights | None:
         return None
     (single,) = (e for e in emitted if e.function.name == "forward_dynamics")
     fixed, states, single = baked_values(scene), STATES[scene.real], assemble(single.function, tail)
-    single = flattened(single, fixed) if straight(scene, single) else single
+    single = unrolled_step(single, fixed) if straight(scene, single) else single
     own = single if scene.baked else with_own_parameters(single, "forward_dynamics_of_flights")
-    rows = side_by_side(own, states)
+    rows = batched(own, states)
     count = 0 if scene.baked else sum(a.length for a in single.of_role("parameters"))
     return Flights(
         states,

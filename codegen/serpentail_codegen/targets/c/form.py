@@ -7,7 +7,7 @@ from ...functions.function import assemble as assemble
 from ...functions.tail import Tail
 from ...ir.interpret import applied, branches
 from ...ir.program import Program
-from ...passes.unrolled_ldl import written_out
+from ...passes.unrolled_ldl import unrolled_ldl
 from ...scene.scene import Scene
 from .loops import in_loops
 from .routine import CFunction
@@ -70,8 +70,8 @@ def in_form(form: str, function: Function, tail: Tail) -> tuple[str, Program]:
     lanes = assemble(function, tail, "lanes")
     segments = assemble(function, tail, "segments") if form == "segments" else lanes
     if segments != lanes:
-        return "segments", written_out(segments, ELIMINATED)
-    return "loops" if lanes == program else "lanes", written_out(lanes, ELIMINATED)
+        return "segments", unrolled_ldl(segments, ELIMINATED)
+    return "loops" if lanes == program else "lanes", unrolled_ldl(lanes, ELIMINATED)
 
 
 def baked_values(scene: Scene) -> dict[str, list]:
