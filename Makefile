@@ -73,6 +73,7 @@ lint: $(READY)
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/ruff format --check .
 	$(VENV)/bin/lint-imports --no-cache
+	$(VENV)/bin/mypy
 
 model: $(STAMP)
 	@echo "generated/$(MODEL) is up to date"

@@ -1,0 +1,41 @@
+"""Where the numbers of a state lie: the one place that knows how q, v and tau are laid out."""
+
+from dataclasses import dataclass
+
+POSITION = slice(0, 3)  # of B in q, world (m)
+QUATERNION = slice(3, 7)  # in q, (w, x, y, z)
+VELOCITY = slice(0, 3)  # of B in v, world (m/s); of forces in generalised forces (N)
+OMEGA = slice(3, 6)  # in v, body axes (rad/s); of moments in generalised forces (N m)
+TORSO_NQ, TORSO_NV = 7, 6  # numbers of the torso in q and in v
+TAIL_Q, TAIL_V = slice(TORSO_NQ, None), slice(TORSO_NV, None)  # tail coordinates, and their rates
+PER_SEGMENT = 2  # coordinates of a segment
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The layout of a model of m segments: q (nq,), v (nv,), tau (nt,)."""
+
+    segments: int
+
+    @property
+    def nt(self) -> int:
+        """Tail coordinates, and torques."""
+        return PER_SEGMENT * self.segments
+
+    @property
+    def nq(self) -> int:
+        """Numbers of a configuration."""
+        return TORSO_NQ + self.nt
+
+    @property
+    def nv(self) -> int:
+        """Numbers of a velocity."""
+        return TORSO_NV + self.nt
+
+    def segment_q(self, i: int) -> slice:
+        """Where the coordinates of segment i (from 0) lie in q."""
+        return slice(TORSO_NQ + PER_SEGMENT * i, TORSO_NQ + PER_SEGMENT * (i + 1))
+
+    def segment_v(self, i: int) -> slice:
+        """Where the rates of segment i (from 0) lie in v."""
+        return slice(TORSO_NV + PER_SEGMENT * i, TORSO_NV + PER_SEGMENT * (i + 1))
