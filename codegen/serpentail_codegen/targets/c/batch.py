@@ -5,7 +5,7 @@ states comes out.
 from dataclasses import dataclass
 
 from ...functions.function import Function
-from ...functions.function import assemble as assemble
+from ...functions.function import assemble
 from ...functions.tail import Tail
 from ...ir.interpret import applied, branches
 from ...ir.program import Program

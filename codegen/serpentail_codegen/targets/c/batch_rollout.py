@@ -4,7 +4,7 @@ states comes out.
 
 from dataclasses import dataclass
 
-from ...functions.function import assemble as assemble
+from ...functions.function import assemble
 from ...functions.tail import Tail
 from ...ir.program import Program, padded
 from ...passes.batch import batched, unrolled_step, with_own_parameters

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from ...functions.function import Function, struct_parameters
-from ...functions.function import assemble as assemble
+from ...functions.function import assemble
 from ...functions.tail import Tail
 from ...ir.interpret import applied, branches
 from ...ir.program import Program

@@ -4,7 +4,7 @@ comes out.
 
 import re
 
-from ...functions.function import assemble as assemble
+from ...functions.function import assemble
 from ...functions.function import struct_parameters
 from ...functions.tail import Tail
 from ...ir.dataflow import inlined
