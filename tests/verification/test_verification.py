@@ -8,7 +8,7 @@ import re
 
 import numpy as np
 import pytest
-from sympy import Matrix
+from sympy import eye
 
 import serpentail as st
 from serpentail.verification import errors, law, states
@@ -19,6 +19,7 @@ from serpentail_codegen.functions.contact import CONTACT
 from serpentail_codegen.functions.implicit.functions import IMPLICIT
 from serpentail_codegen.functions.pfl import FEEDBACK
 from serpentail_codegen.mechanics import link, loads, torso
+from serpentail_codegen.mechanics.shapes import M33, V1, V3, V6
 from serpentail_codegen.pipeline import generate
 from serpentail_codegen.scene.parse import scene_for
 from serpentail_codegen.scene.scene import ON_DEMAND
@@ -371,30 +372,30 @@ def test_halves_of_segments_that_differ_from_wholes_fail(tmp_path):
     )
 
 
-def without_gyroscopic_torque(let, link, w, w_dot, a_joint, swing):
+def without_gyroscopic_torque(let, link: V6, w: V3, w_dot: V3, a_joint: V3, swing: V3):
     """A link's wrench without omega x I omega, which does no work."""
     wrench = LINK_WRENCH(let, link, w, w_dot, a_joint, swing)["F"]
     return {"F": wrench - LINK_WRENCH(let, link, w, 0 * w_dot, 0 * a_joint, 0 * swing)["F"]}
 
 
-def without_joint_acceleration(let, link, w, w_dot, a_joint, swing):
+def without_joint_acceleration(let, link: V6, w: V3, w_dot: V3, a_joint: V3, swing: V3):
     """A link's wrench whose moment leaves out how its joint accelerates."""
     F = LINK_WRENCH(let, link, w, w_dot, a_joint, swing)["F"]
     still = LINK_WRENCH(let, link, w, w_dot, 0 * a_joint, swing)["F"]
     return {"F": F[0:3, :].col_join(still[3:6, :])}
 
 
-def with_flat_load(let, R, f_torso, F_beyond):
+def with_flat_load(let, R: M33, f_torso: V6, F_beyond: V6):
     """Loads at B taken as if B were upright."""
-    return LOAD_AT_TORSO(let, 0 * R + Matrix([1, 0, 0, 0, 1, 0, 0, 0, 1]), f_torso, F_beyond)
+    return LOAD_AT_TORSO(let, eye(3), f_torso, F_beyond)
 
 
-def with_weak_gravity(let, R, p_ddot, gravity):
+def with_weak_gravity(let, R: M33, p_ddot: V3, gravity: V1):
     """Gravity in C and forward dynamics that differs from the potential's."""
     return TORSO_ACCELERATION(let, R, p_ddot, gravity * 2)
 
 
-def with_load_at_the_wrong_place(let, R, P, f_point, F_beyond):
+def with_load_at_the_wrong_place(let, R: M33, P: V3, f_point: V3, F_beyond: V6):
     """Tail loads that act 1 % too far from B."""
     return LOAD_AT_POINT(let, R, P * 101 / 100, f_point, F_beyond)
 

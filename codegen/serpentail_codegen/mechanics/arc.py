@@ -14,10 +14,11 @@ z-derivatives.
 from sympy import Matrix, eye
 
 from .arc_shape import factors
-from .rotations import X, Y, Z, entries, square, symmetric
+from .rotations import X, Y, Z, entries, symmetric
+from .shapes import M33, V1, V2, V3, V6, V8, V12, V16
 
 
-def section_properties(let, tail_mass, tail_length, share) -> dict:
+def section_properties(let, tail_mass: V1, tail_length: V1, share: V1) -> dict:
     """Mass and length of one of m equal pieces, ``share`` = 1 / m (m_ct, L_ct)."""
     return {"section": Matrix([tail_mass[0], tail_length[0]]) * share[0]}
 
@@ -28,7 +29,7 @@ def geometry(let, angles) -> tuple:
     return a, b, Matrix([a, 0, b]), Matrix([b, 0, -a]), (-Z, X)
 
 
-def segment_tip(let, angles, tip, section) -> dict:
+def segment_tip(let, angles: V2, tip: V8, section: V2) -> dict:
     """Rotation to the tip (Eq. 33), its position (Eq. 34), and how both move with a and b, in the
     root frame.
 
@@ -51,7 +52,7 @@ def segment_tip(let, angles, tip, section) -> dict:
     }
 
 
-def segment_inertia(let, angles, shape, section) -> dict:
+def segment_inertia(let, angles: V2, shape: V16, section: V2) -> dict:
     """A segment's first moment and inertia at its root, momentum columns of a and b, and 2 x 2
     block of H (Eq. 18).
     """
@@ -137,19 +138,19 @@ def relative_loads(let, angles, rates, shape, w) -> list:
 
 def segment_wrench(
     let,
-    angles,
-    rates,
-    accelerations,
-    shape,
-    section,
-    h_own,
-    I_own,
-    pitch_own,
-    yaw_own,
-    H_own,
-    w,
-    w_dot,
-    a,
+    angles: V2,
+    rates: V2,
+    accelerations: V2,
+    shape: V16,
+    section: V2,
+    h_own: V3,
+    I_own: V6,
+    pitch_own: V6,
+    yaw_own: V6,
+    H_own: V3,
+    w: V3,
+    w_dot: V3,
+    a: V3,
 ) -> dict:
     """Inertial wrench of a segment at its root and its two generalised forces (Eq. 19), in the root
     frame.
@@ -189,7 +190,18 @@ def rotated_inertia(let, E, I) -> Matrix:
 
 
 def segment_motion(
-    let, angles, rates, accelerations, section, tip, E, r, bend, w, w_dot, a
+    let,
+    angles: V2,
+    rates: V2,
+    accelerations: V2,
+    section: V2,
+    tip: V8,
+    E: M33,
+    r: V3,
+    bend: V12,
+    w: V3,
+    w_dot: V3,
+    a: V3,
 ) -> dict:
     """Angular velocity, its rate and acceleration of the tip, in its frame, from the root's in the
     root frame.
@@ -217,7 +229,7 @@ def segment_motion(
     w_r = let("w_r", w.cross(r))
     w_tip_dot = w_dot + w.cross(turn) + turn_rate + turn_q
     a_tip = a + w_dot.cross(r) + w.cross(let("v", w_r + 2 * r_dot)) + r_ddot + move_q
-    E = square(E).T
+    E = E.T
     return {
         "w": E * let("w", w + turn),
         "w_dot": E * let("w_dot", w_tip_dot),
@@ -227,26 +239,26 @@ def segment_motion(
 
 def segment_power(
     let,
-    angles,
-    rates,
-    accelerations,
-    virtual_rates,
-    shape,
-    section,
-    tip,
-    E,
-    r,
-    bend,
-    h_own,
-    I_own,
-    pitch_own,
-    yaw_own,
-    H_own,
-    w,
-    w_dot,
-    a,
-    w_virtual,
-    u_virtual,
+    angles: V2,
+    rates: V2,
+    accelerations: V2,
+    virtual_rates: V2,
+    shape: V16,
+    section: V2,
+    tip: V8,
+    E: M33,
+    r: V3,
+    bend: V12,
+    h_own: V3,
+    I_own: V6,
+    pitch_own: V6,
+    yaw_own: V6,
+    H_own: V3,
+    w: V3,
+    w_dot: V3,
+    a: V3,
+    w_virtual: V3,
+    u_virtual: V3,
 ) -> dict:
     """Power of the inertial wrench of a segment and of its generalised forces (Eq. 19) under a
     virtual motion.
@@ -282,16 +294,15 @@ def velocity_columns(let, bend, rates) -> tuple[Matrix, Matrix]:
     return total[0:3, :], total[3:6, :]
 
 
-def segment_pose(let, E, r, R, P) -> dict:
+def segment_pose(let, E: M33, r: V3, R: M33, P: V3) -> dict:
     """R_{i+1} = R_i E (Eq. 33) and p_{i+1} = p_i + R_i r (Eq. 34)."""
-    return {"R": square(R) * square(E), "P": P + square(R) * r}
+    return {"R": R * E, "P": P + R * r}
 
 
-def segment_twist(let, E, r, bend, R, P) -> dict:
+def segment_twist(let, E: M33, r: V3, bend: V12, R: M33, P: V3) -> dict:
     """Spatial columns at B of a segment's bend: angular, then the velocity of the point of the
     tip's body at B.
     """
-    R = square(R)
     tip, out = let("tip", P + R * r), []
     for k in (0, 6):
         turn = let("turn", R * bend[k : k + 3, :])
@@ -299,11 +310,10 @@ def segment_twist(let, E, r, bend, R, P) -> dict:
     return {"S": Matrix(out)}
 
 
-def gather_segment_wrench(let, E, r, bend, F, torque_own, F_next) -> dict:
+def gather_segment_wrench(let, E: M33, r: V3, bend: V12, F: V6, torque_own: V2, F_next: V6) -> dict:
     """Add what the next segment passes on, in this segment's root frame; generalised forces of a
     and b.
     """
-    E = square(E)
     force, moment = let("force", E * F_next[0:3, :]), let("moment", E * F_next[3:6, :])
     torque = [bend[k : k + 3, :].dot(moment) + bend[k + 3 : k + 6, :].dot(force) for k in (0, 6)]
     total = Matrix([F[0:3, :] + force, F[3:6, :] + moment + r.cross(force)])
@@ -311,12 +321,23 @@ def gather_segment_wrench(let, E, r, bend, F, torque_own, F_next) -> dict:
 
 
 def gather_segment(
-    let, section, E, r, bend, h_own, I_own, pitch_own, yaw_own, H_own, mass, h, I
+    let,
+    section: V2,
+    E: M33,
+    r: V3,
+    bend: V12,
+    h_own: V3,
+    I_own: V6,
+    pitch_own: V6,
+    yaw_own: V6,
+    H_own: V3,
+    mass: V1,
+    h: V3,
+    I: V6,
 ) -> dict:
     """Composite inertia at the root from what hangs at the tip, the momentum columns of a and b,
     their block of H.
     """
-    E = square(E)
     h_tip, I_tip = let("h_tip", E * h), symmetric(rotated_inertia(let, E, I))
     h_root = let("h_root", h_tip + mass[0] * r)
     spread = let("spread", (h_tip + h_root).dot(r))
@@ -342,19 +363,30 @@ def gather_segment(
     }
 
 
-def gather_segment_moment(let, section, E, r, h_own, mass, h) -> dict:
+def gather_segment_moment(let, section: V2, E: M33, r: V3, h_own: V3, mass: V1, h: V3) -> dict:
     """Mass and first moment of a segment and all beyond, at its root."""
-    return {"mass": mass + Matrix([section[0]]), "h": h_own + square(E) * h + mass[0] * r}
+    return {"mass": mass + Matrix([section[0]]), "h": h_own + E * h + mass[0] * r}
 
 
-def segment_velocity(let, rates, E, r, bend, w, u) -> dict:
+def segment_velocity(let, rates: V2, E: M33, r: V3, bend: V12, w: V3, u: V3) -> dict:
     """Angular and linear velocity of the tip, in its frame."""
     turn, move = velocity_columns(let, bend, rates)
-    E = square(E).T
+    E = E.T
     return {"w": E * let("w", w + turn), "u": E * let("u", u + w.cross(r) + move)}
 
 
-def segment_momentum(let, rates, section, h_own, I_own, pitch_own, yaw_own, H_own, w, u) -> dict:
+def segment_momentum(
+    let,
+    rates: V2,
+    section: V2,
+    h_own: V3,
+    I_own: V6,
+    pitch_own: V6,
+    yaw_own: V6,
+    H_own: V3,
+    w: V3,
+    u: V3,
+) -> dict:
     """Momentum of a segment, its moment about the root, and its kinetic energy."""
     relative = let("relative", rates[0] * pitch_own + rates[1] * yaw_own)
     p = let("p", section[0] * u + w.cross(h_own) + relative[0:3, :])
@@ -366,11 +398,11 @@ def segment_momentum(let, rates, section, h_own, I_own, pitch_own, yaw_own, H_ow
     return {"F": Matrix([p, L]), "kinetic": [twice / 2]}
 
 
-def part_of_bend(let, angles, fraction) -> dict:
+def part_of_bend(let, angles: V2, fraction: V1) -> dict:
     """Bend of an n-th of a segment."""
     return {"part": angles * fraction[0]}
 
 
-def columns_of_bend(let, bend, fraction) -> dict:
+def columns_of_bend(let, bend: V12, fraction: V1) -> dict:
     """Columns for the rates of a whole segment from those for the rates of an n-th of it."""
     return {"bend": bend * fraction[0]}

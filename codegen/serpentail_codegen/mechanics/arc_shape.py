@@ -15,6 +15,8 @@ from math import factorial
 
 from sympy import Matrix, Rational
 
+from .shapes import V1, V2
+
 HIGHEST = 9  # of Stumpff's functions that the form factors need
 SERIES_REACH = 6.4  # rad: up to there TERMS terms leave no more than rounding
 TERMS = 16
@@ -38,7 +40,7 @@ def z_derivative(near: dict, far: dict) -> tuple[dict, dict]:
     """Differentiate a combination by c_k' = (k c_{k+2} - c_{k+1}) / 2; the argument 4 z gives a
     factor 4.
     """
-    out = ({}, {})
+    out: tuple[dict, dict] = ({}, {})
     for total, terms, inner in zip(out, (near, far), (1, 4), strict=True):
         for k, factor in terms.items():
             for step, weight in ((2, Rational(k, 2)), (1, Rational(-1, 2))):
@@ -83,7 +85,7 @@ def quadrupled(let, c: list) -> list:
     return out
 
 
-def segment_shape(let, angles, levels: int = 1) -> dict:
+def segment_shape(let, angles: V2, levels: int = 1) -> dict:
     """What bend does to a segment: its form factors, and c_1, c_2, c_3 with z-derivatives, which
     place the tip.
 
@@ -113,7 +115,7 @@ def segment_shape(let, angles, levels: int = 1) -> dict:
     return {"tip": Matrix([c[1], c[2], c[3], *first, *second]), "shape": Matrix(shape)}
 
 
-def bend_margin(let, angles, bend_range) -> dict:
+def bend_margin(let, angles: V2, bend_range: V1) -> dict:
     """Positive where a segment is bent by less than the declared range, up to rounding."""
     limit = let("limit", bend_range[0] * bend_range[0] * Rational(10**12 + 1, 10**12))
     return {"margin": [limit - angles[0] ** 2 - angles[1] ** 2]}

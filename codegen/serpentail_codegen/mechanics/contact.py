@@ -7,50 +7,49 @@ Points are given by ``arm``, from B in world axes, and ``velocity``, in the worl
 
 from sympy import Matrix, Max, Piecewise, sqrt
 
-from .rotations import square
+from .shapes import M33, V1, V2, V3, V6, V12
 
 
-def point_on_torso(let, R, p_dot, omega, place, drift) -> dict:
+def point_on_torso(let, R: M33, p_dot: V3, omega: V3, place: V3, drift: V3) -> dict:
     """Arm and velocity of a point at ``place`` in the torso frame, which moves there at
     ``drift``.
     """
-    R = square(R)
     return {"arm": R * place, "velocity": p_dot + R * let("relative", omega.cross(place) + drift)}
 
 
-def lowest_point(let, R, torso_semi_axes) -> dict:
+def lowest_point(let, R: M33, torso_semi_axes: V3) -> dict:
     """The lowest point of the torso, an ellipsoid about B: place = -D^2 n / |D n|, n = R_b^T z, D
     its semi-axes.
     """
-    scaled = let("D_n", torso_semi_axes.multiply_elementwise(square(R).row(2).T))
+    scaled = let("D_n", torso_semi_axes.multiply_elementwise(R.row(2).T))
     length = let("length", sqrt(let("square", scaled.dot(scaled))))
     return {"place": -torso_semi_axes.multiply_elementwise(scaled) * let("inverse", 1 / length)}
 
 
-def torso_twist(let, R, p_dot, omega) -> dict:
+def torso_twist(let, R: M33, p_dot: V3, omega: V3) -> dict:
     """Angular velocity and velocity at B of the torso, world axes: where the tail's twists
     start.
     """
-    return {"turn": square(R) * omega, "slide": p_dot}
+    return {"turn": R * omega, "slide": p_dot}
 
 
-def carried_twist(let, S, rates) -> dict:
+def carried_twist(let, S: V12, rates: V2) -> dict:
     """What one joint or bend adds to the twist about B of all beyond."""
     total = rates[0] * S[0:6, :] + rates[1] * S[6:12, :]
     return {"turn": total[0:3, :], "slide": total[3:6, :]}
 
 
-def point_on_tail(let, P, turn, slide) -> dict:
+def point_on_tail(let, P: V3, turn: V3, slide: V3) -> dict:
     """Arm and velocity of a point at ``P`` from B of a body with a twist about B."""
     return {"arm": P, "velocity": slide + turn.cross(P)}
 
 
-def position(let, p, arm) -> dict:
+def position(let, p: V3, arm: V3) -> dict:
     """A point in the world."""
     return {"position": p + arm}
 
 
-def bristle_properties(let, K_f, D_f) -> dict:
+def bristle_properties(let, K_f: V1, D_f: V1) -> dict:
     """Damping D_f K_f of a bristle, and 1 over it."""
     return {"drag": D_f * K_f[0], "mobility": [let("mobility", 1 / (D_f[0] * K_f[0]))]}
 
@@ -105,7 +104,18 @@ def bristle_rate(let, K_f, mobility, bristle, sliding, friction: str, depth, for
 
 
 def contact_force(
-    let, K_n, D_n, K_f, mu, drag, mobility, p, arm, velocity, bristle, friction: str = "cone"
+    let,
+    K_n: V1,
+    D_n: V1,
+    K_f: V1,
+    mu: V1,
+    drag: V1,
+    mobility: V1,
+    p: V3,
+    arm: V3,
+    velocity: V3,
+    bristle: V2,
+    friction: str = "cone",
 ) -> dict:
     """Force of the ground on one point (Eqs. 35 to 37), world axes, and the rate of its bristle.
 
@@ -119,12 +129,12 @@ def contact_force(
     return {"force": Matrix([force, Matrix([f_n])]), "rate": rate}
 
 
-def load_about_torso(let, arm, force) -> dict:
+def load_about_torso(let, arm: V3, force: V3) -> dict:
     """Force and moment at B of the force on a point, world axes (Eq. 10)."""
     return {"load": Matrix([force, arm.cross(force)])}
 
 
-def load_in_torso(let, R, load) -> dict:
+def load_in_torso(let, R: M33, load: V6) -> dict:
     """Force and moment at B in torso axes."""
-    R = square(R).T
+    R = R.T
     return {"load_force": R * load[0:3, :], "load_moment": R * load[3:6, :]}

@@ -14,7 +14,8 @@ and for a velocity; then h and e, friction and bristle for w df_n.
 from sympy import Matrix, Piecewise, eye, sqrt
 
 from .contact import guarded, normal_force
-from .rotations import X, Y, Z, square
+from .rotations import X, Y, Z
+from .shapes import M33, V1, V2, V3, V6, V18
 
 
 def plane(entries) -> Matrix:
@@ -102,18 +103,18 @@ def following_load(let, bound, pressing, mu, share) -> Matrix:
 
 def linearised_contact(
     let,
-    K_n,
-    D_n,
-    K_f,
-    D_f,
-    mu,
-    drag,
-    weight,
-    bound_share,
-    p,
-    arm,
-    velocity,
-    bristle,
+    K_n: V1,
+    D_n: V1,
+    K_f: V1,
+    D_f: V1,
+    mu: V1,
+    drag: V1,
+    weight: V1,
+    bound_share: V1,
+    p: V3,
+    arm: V3,
+    velocity: V3,
+    bristle: V2,
     friction: str = "cone",
 ) -> dict:
     """``spring`` of a point in the ground (Eqs. 35 to 37)."""
@@ -143,7 +144,7 @@ def inverted(let, A) -> Matrix:
     return Matrix([[c, -b], [-b, a]]) * inverse
 
 
-def depth_of_point(let, p, arm) -> dict:
+def depth_of_point(let, p: V3, arm: V3) -> dict:
     """How deep a point is in the ground."""
     return {"depth": [-(p[2] + arm[2])]}
 
@@ -154,66 +155,65 @@ def stiffened(let, spring, velocity) -> Matrix:
     return Matrix([across[0], across[1], spring[1] * velocity[2]])
 
 
-def stiffened_torso(let, R, arm, spring) -> dict:
+def stiffened_torso(let, R: M33, arm: V3, spring: V18) -> dict:
     """J^T G J of one point for (p_dot, omega): lower triangle, row by row."""
-    R = square(R)
     turning = [let("J", (R * axis).cross(arm)) for axis in (X, Y, Z)]
     columns = [*(eye(3).col(k) for k in range(3)), *turning]
     forces = [let("G_J", stiffened(let, spring, column)) for column in columns]
     return {f"S_{r}": Matrix([columns[k].dot(forces[r]) for k in range(r + 1)]) for r in range(6)}
 
 
-def stiffened_column(let, R, arm, spring, J_k) -> dict:
+def stiffened_column(let, R: M33, arm: V3, spring: V18, J_k: V3) -> dict:
     """G J_k of one tail coordinate, and its coupling with (p_dot, omega)."""
     force = let("G_J", stiffened(let, spring, J_k))
-    return {"force": force, "S_row": Matrix([force, square(R).T * let("moment", arm.cross(force))])}
+    return {"force": force, "S_row": Matrix([force, R.T * let("moment", arm.cross(force))])}
 
 
-def coupled_columns(let, J_k, force) -> dict:
+def coupled_columns(let, J_k: V3, force: V3) -> dict:
     """J_l . G J_k."""
     return {"S_entry": [J_k.dot(force)]}
 
 
-def sliding(let, spring) -> dict:
+def sliding(let, spring: V18) -> dict:
     """|h|^2: positive where friction follows the load."""
     return {"slip": [spring[14] ** 2 + spring[15] ** 2]}
 
 
-def sheared_torso(let, R, arm, spring) -> dict:
+def sheared_torso(let, R: M33, arm: V3, spring: V18) -> dict:
     """J^T h and a J_z of one point for (p_dot, omega): S has their product, too, so it is not
     symmetric.
     """
-    R, h, lift = square(R).T, Matrix([spring[14], spring[15], 0]), Matrix([0, 0, spring[1]])
+    R, h, lift = R.T, Matrix([spring[14], spring[15], 0]), Matrix([0, 0, spring[1]])
     push = Matrix([h, R * let("moment", arm.cross(h))])
     return {"push": push, "lift": Matrix([lift, R * let("turning", arm.cross(lift))])}
 
 
-def sheared_column(let, spring, J_k) -> dict:
+def sheared_column(let, spring: V18, J_k: V3) -> dict:
     """The same for one tail coordinate."""
     return {"push": [spring[14] * J_k[0] + spring[15] * J_k[1]], "lift": [spring[1] * J_k[2]]}
 
 
-def sheared_entries(let, push_k, push_l, lift_k, lift_l) -> dict:
+def sheared_entries(let, push_k: V1, push_l: V1, lift_k: V1, lift_l: V1) -> dict:
     """push_k lift_l, and what is opposite it."""
     return {"entry": [push_k[0] * lift_l[0]], "turned": [lift_k[0] * push_l[0]]}
 
 
-def torso_turn(let, R, rotation) -> dict:
+def torso_turn(let, R: M33, rotation: V3) -> dict:
     """A turn or turning rate from torso axes to world axes."""
-    return {"turn": square(R) * rotation}
+    return {"turn": R * rotation}
 
 
-def point_shift(let, shift, turn, arm) -> dict:
+def point_shift(let, shift: V3, turn: V3, arm: V3) -> dict:
     """What moves a point of the torso: J (shift, rotation)."""
     return {"motion": shift + turn.cross(arm)}
 
 
-def tail_shift(let, J_k, coupling) -> dict:
+def tail_shift(let, J_k: V3, coupling: V1) -> dict:
     """What one tail coordinate adds to it."""
     return {"motion": J_k * coupling[0]}
 
 
-def contact_response(let, spring, motion_q, motion_v, lag) -> dict:
+def contact_response(let, spring: V18, motion_q: V3, motion_v: V3, lag: V2) -> dict:
     """Force on a point, w df, for right-hand sides of its place, velocity and bristle; ``pressed``:
     its place's.
     """
@@ -226,17 +226,17 @@ def contact_response(let, spring, motion_q, motion_v, lag) -> dict:
     }
 
 
-def tail_response(let, J_k, force) -> dict:
+def tail_response(let, J_k: V3, force: V3) -> dict:
     """A force's share in one tail coordinate."""
     return {"rhs": [J_k.dot(force)]}
 
 
-def torso_response(let, R, load) -> dict:
+def torso_response(let, R: M33, load: V6) -> dict:
     """A load about B as forces on (p_dot, omega)."""
-    return {"rhs": Matrix([load[0:3, :], square(R).T * load[3:6, :]])}
+    return {"rhs": Matrix([load[0:3, :], R.T * load[3:6, :]])}
 
 
-def bristle_response(let, spring, motion, lag, pressed) -> dict:
+def bristle_response(let, spring: V18, motion: V3, lag: V2, pressed: V1) -> dict:
     """M r_u + N J k_v + e w df_n: a bristle in the ground."""
     load = let("load", pressed[0] - spring[1] * motion[2])
     return {
@@ -246,48 +246,48 @@ def bristle_response(let, spring, motion, lag, pressed) -> dict:
     }
 
 
-def relaxation(let, D_f, weight) -> dict:
+def relaxation(let, D_f: V1, weight: V1) -> dict:
     """1 / (1 + w / D_f): a bristle in the air."""
     return {"relax": [1 / (1 + let("lag", weight[0] / D_f[0]))]}
 
 
-def relaxed(let, relax, lag) -> dict:
+def relaxed(let, relax: V1, lag: V2) -> dict:
     """A bristle in the air."""
     return {"k_u": lag * relax[0]}
 
 
-def gain_weights(let, weight, gains) -> dict:
+def gain_weights(let, weight: V1, gains: V2) -> dict:
     """w K_p, and w (K_d + w K_p), which is 0 where there are no gains."""
     w = weight[0]
     proportional = let("w_K_p", w * gains[0])
     return {"gain_q": [proportional], "gain_v": [w * gains[1] + w * proportional]}
 
 
-def damped(let, weight, damping) -> dict:
+def damped(let, weight: V1, damping: V1) -> dict:
     """w times the damping of one tail coordinate."""
     return {"damped": [weight[0] * damping[0]]}
 
 
-def damped_response(let, damped, rate) -> dict:
+def damped_response(let, damped: V1, rate: V1) -> dict:
     """Its force for a right-hand side."""
     return {"rhs": [-damped[0] * rate[0]]}
 
 
-def gained(let, gain, entry) -> dict:
+def gained(let, gain: V1, entry: V1) -> dict:
     """Gain times an entry of H_tt."""
     return {"S_entry": [gain[0] * entry[0]]}
 
 
-def gain_response(let, gain_q, gain_v, entry, angle, rate) -> dict:
+def gain_response(let, gain_q: V1, gain_v: V1, entry: V1, angle: V1, rate: V1) -> dict:
     """The force of one coordinate's gains on another: -H_kl (w K_p r_q + w (K_d + w K_p) r_v)."""
     return {"rhs": [-entry[0] * (gain_q[0] * angle[0] + gain_v[0] * rate[0])]}
 
 
-def total_rate(let, change, rate) -> dict:
+def total_rate(let, change: V1, rate: V1) -> dict:
     """k_v = r_v + change."""
     return {"k_v": change + rate}
 
 
-def total_place(let, weight, k_v, angle) -> dict:
+def total_place(let, weight: V1, k_v: V1, angle: V1) -> dict:
     """k_q = r_q + w k_v."""
     return {"k_q": angle + weight[0] * k_v}

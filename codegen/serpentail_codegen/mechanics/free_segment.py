@@ -11,7 +11,8 @@ base's motion a alone.  Lanes of K, A, b and T are the entries of x.
 
 from sympy import Matrix, diag, zeros
 
-from .rotations import X, Y, Z, square, symmetric
+from .rotations import X, Y, Z, symmetric
+from .shapes import M33, V1, V2, V3, V6, V8, V12, V15, V30
 
 
 def swept_by(arm) -> Matrix:
@@ -19,11 +20,11 @@ def swept_by(arm) -> Matrix:
     return Matrix.hstack(*(axis.cross(arm) for axis in (X, Y, Z)))
 
 
-def tip_motion(let, R, P, S) -> dict:
+def tip_motion(let, R: M33, P: V3, S: V12) -> dict:
     """What the tip's motion is made of: R^T, R^T (e_k x P), and in its axes the columns S at the
     tip (A5 to A8).
     """
-    turn, parts = square(R).T, []
+    turn, parts = R.T, []
     for axis, velocity in ((S[0:3, :], S[3:6, :]), (S[6:9, :], S[9:12, :])):
         parts += [turn * let("at_tip", velocity + axis.cross(P)), turn * axis]
     return {
@@ -35,7 +36,7 @@ def tip_motion(let, R, P, S) -> dict:
 
 def tip_matrix(tip_map) -> Matrix:
     """T, 6 x 8: motion of the tip in its own axes = T x, but for what velocities add."""
-    turn, swept = square(tip_map[0:9, :]), square(tip_map[9:18, :])
+    turn, swept = (tip_map[k : k + 9, :].reshape(3, 3) for k in (0, 9))
     pitch, turn_pitch, yaw, turn_yaw = (tip_map[18 + 3 * k : 21 + 3 * k, :] for k in range(4))
     return Matrix.vstack(
         Matrix.hstack(turn, swept, pitch, yaw),
@@ -43,17 +44,19 @@ def tip_matrix(tip_map) -> Matrix:
     )
 
 
-def tip_rows(let, tip_map) -> dict:
+def tip_rows(let, tip_map: V30) -> dict:
     """The rows of T."""
     return {f"T_{r}": tip_matrix(tip_map).row(r).T for r in range(6)}
 
 
-def tip_angular_velocity(let, tip_map, rates, w) -> dict:
+def tip_angular_velocity(let, tip_map: V30, rates: V2, w: V3) -> dict:
     """omega of the tip (A1), in its axes."""
     return {"w": tip_matrix(tip_map)[3:6, 3:8] * Matrix([w, rates])}
 
 
-def own_inertia(let, mass, h, I, pitch, yaw, H_pp, H_py, H_yy) -> dict:
+def own_inertia(
+    let, mass: V1, h: V3, I: V6, pitch: V6, yaw: V6, H_pp: V1, H_py: V1, H_yy: V1
+) -> dict:
     """Rows of K of a segment's own links: their composite inertia and momentum columns (Eq. 16)."""
     body = Matrix([[diag(*[mass[0]] * 3), swept_by(h)], [swept_by(h).T, symmetric(I)]])
     columns, block = Matrix.hstack(pitch, yaw), Matrix([[H_pp[0], H_py[0]], [H_py[0], H_yy[0]]])
@@ -61,7 +64,7 @@ def own_inertia(let, mass, h, I, pitch, yaw, H_pp, H_py, H_yy) -> dict:
     return {f"K_{r}": K.row(r).T for r in range(8)}
 
 
-def load_at_tip(let, A, b, coasting) -> dict:
+def load_at_tip(let, A: V6, b: V1, coasting: V6) -> dict:
     """Wrench that moves all beyond a tip whose motion is ``coasting``, what velocities alone give
     it: A a + b.
     """
@@ -71,7 +74,9 @@ def load_at_tip(let, A, b, coasting) -> dict:
     return {"load": [total]}
 
 
-def pass_on(let, T, tip_map, A_0, A_1, A_2, A_3, A_4, A_5, load) -> dict:
+def pass_on(
+    let, T: V6, tip_map: V30, A_0: V6, A_1: V6, A_2: V6, A_3: V6, A_4: V6, A_5: V6, load: V6
+) -> dict:
     """What all beyond the tip adds to a segment: K by T^T A T, b by T^T load; ``A_0`` to ``A_5``
     are the rows of A.
     """
@@ -81,7 +86,9 @@ def pass_on(let, T, tip_map, A_0, A_1, A_2, A_3, A_4, A_5, load) -> dict:
     return {"K": K, "b": [sum((load[r] * T[r] for r in range(6)), 0)]}
 
 
-def free_coordinates(let, K, b, pitch_row, yaw_row, joint_load, torques) -> dict:
+def free_coordinates(
+    let, K: V8, b: V1, pitch_row: V8, yaw_row: V8, joint_load: V2, torques: V2
+) -> dict:
     """Eliminate the coordinates, yaw first; the rows are the last of K, ``joint_load`` the last two
     entries of b.
 
@@ -109,7 +116,7 @@ def free_coordinates(let, K, b, pitch_row, yaw_row, joint_load, torques) -> dict
     }
 
 
-def outward(let, tip_map, shares, coasting, base) -> dict:
+def outward(let, tip_map: V30, shares: V15, coasting: V6, base: V6) -> dict:
     """Second derivatives of a segment's coordinates, and the motion of its tip, from that of its
     base.
     """
@@ -119,7 +126,18 @@ def outward(let, tip_map, shares, coasting, base) -> dict:
     return {"accelerations": free, "base": coasting + tip_matrix(tip_map) * Matrix([base, free])}
 
 
-def freed_inertia(let, torso_mass, torso_inertia, tail_mount, A_0, A_1, A_2, A_3, A_4, A_5) -> dict:
+def freed_inertia(
+    let,
+    torso_mass: V1,
+    torso_inertia: V3,
+    tail_mount: V3,
+    A_0: V6,
+    A_1: V6,
+    A_2: V6,
+    A_3: V6,
+    A_4: V6,
+    A_5: V6,
+) -> dict:
     """Inertia of torso and tail at B with free coordinates: lower triangle for (omega_dot, a),
     torso axes.
     """
@@ -136,7 +154,7 @@ def freed_inertia(let, torso_mass, torso_inertia, tail_mount, A_0, A_1, A_2, A_3
     return {f"H_{r}": H[r, 0 : r + 1].T for r in range(6)}
 
 
-def freed_wrench(let, tail_mount, a_mount, A_0, A_1, A_2, b_mount) -> dict:
+def freed_wrench(let, tail_mount: V3, a_mount: V3, A_0: V6, A_1: V6, A_2: V6, b_mount: V6) -> dict:
     """Wrench at B that moves a tail with free coordinates whose mount accelerates by ``a_mount``
     and does not turn.
     """
@@ -144,6 +162,6 @@ def freed_wrench(let, tail_mount, a_mount, A_0, A_1, A_2, b_mount) -> dict:
     return {"F": Matrix([F[0:3, :], F[3:6, :] + tail_mount.cross(F[0:3, :])])}
 
 
-def net_load(let, at_torso, force, moment) -> dict:
+def net_load(let, at_torso: V6, force: V3, moment: V3) -> dict:
     """Applied less inertial loads at B, for (omega_dot, a)."""
     return {"rhs": Matrix([at_torso[3:6, :] - moment, at_torso[0:3, :] - force])}

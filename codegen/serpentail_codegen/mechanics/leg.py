@@ -7,6 +7,8 @@ its points.
 
 from sympy import Matrix, cos, sin
 
+from .shapes import V1, V2, V3
+
 
 def direction(let, angle, rate) -> tuple[Matrix, Matrix]:
     """u_h of Eq. 9 and its rate."""
@@ -14,7 +16,19 @@ def direction(let, angle, rate) -> tuple[Matrix, Matrix]:
     return Matrix([0, c, s]), let("u_dot", Matrix([0, -s * rate, c * rate]))
 
 
-def foot_points(let, hip, side, L_h2d, L_d2k, L_k2a, L_a2m, L_m2t, delta_m, leg, leg_rates) -> dict:
+def foot_points(
+    let,
+    hip: V3,
+    side: V1,
+    L_h2d: V1,
+    L_d2k: V1,
+    L_k2a: V1,
+    L_a2m: V1,
+    L_m2t: V1,
+    delta_m: V1,
+    leg: V2,
+    leg_rates: V2,
+) -> dict:
     """A, M and T from B, and their rates in B (Eqs. 5 to 9); ``side`` is 1 on the right, -1 on the
     left.
 

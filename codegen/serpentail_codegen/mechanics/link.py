@@ -9,10 +9,11 @@ the origin).
 
 from sympy import Matrix, cos, sin, zeros
 
-from .rotations import X, Y, Z, entries, rotation_x, rotation_z, square, symmetric, turned
+from .rotations import X, Y, Z, entries, rotation_x, rotation_z, symmetric, turned
+from .shapes import M33, V1, V2, V3, V4, V6, V10
 
 
-def link_properties(let, tail_mass, tail_length, link_inertia, share) -> dict:
+def link_properties(let, tail_mass: V1, tail_length: V1, link_inertia: V3, share: V1) -> dict:
     """Properties of one of N equal links, ``share`` = 1 / N: m_at = m_t / N, L_j2c = L_j2j / 2
     (Sect. 4).
     """
@@ -23,7 +24,7 @@ def link_properties(let, tail_mass, tail_length, link_inertia, share) -> dict:
     return {"link": Matrix([m, length, half_moment, Ix + steiner, Iy, Iz + steiner])}
 
 
-def link_wrench(let, link, w, w_dot, a_joint, swing) -> dict:
+def link_wrench(let, link: V6, w: V3, w_dot: V3, a_joint: V3, swing: V3) -> dict:
     """Inertial wrench of one link at its joint (Eq. 17), Newton and Euler in the link frame."""
     m, _, b, Ix, Iy, Iz = link
     force = m * a_joint - b * swing
@@ -38,7 +39,17 @@ def link_wrench(let, link, w, w_dot, a_joint, swing) -> dict:
 
 
 def link_power(
-    let, joint, rates, accelerations, virtual_rates, link, w, w_dot, a, w_virtual, u_virtual
+    let,
+    joint: V4,
+    rates: V2,
+    accelerations: V2,
+    virtual_rates: V2,
+    link: V6,
+    w: V3,
+    w_dot: V3,
+    a: V3,
+    w_virtual: V3,
+    u_virtual: V3,
 ) -> dict:
     """Power of the inertial wrench of one link (Eq. 17) under a virtual motion; both motions
     carried on.
@@ -69,7 +80,7 @@ def along_link(let, length, F) -> Matrix:
     )
 
 
-def gather_wrench(let, joint, link, F, F_next) -> dict:
+def gather_wrench(let, joint: V4, link: V6, F: V6, F_next: V6) -> dict:
     """Add what the next link passes on, read the joint torques (A5 on Eq. 17), pass on to the
     parent frame.
     """
@@ -119,7 +130,9 @@ def with_link(let, mass, link, h, I) -> tuple[Matrix, Matrix]:
     return let("h_sum", h_sum), let("I_sum", Matrix(I_sum))
 
 
-def gather_links(let, joint, twice, link, mass, h, I, pitch, yaw) -> dict:
+def gather_links(
+    let, joint: V4, twice: V10, link: V6, mass: V1, h: V3, I: V6, pitch: V6, yaw: V6
+) -> dict:
     """One link of the tip-to-base sweep of Eq. 16: composite inertia and the momentum columns of
     the segment.
 
@@ -153,14 +166,14 @@ def gather_links(let, joint, twice, link, mass, h, I, pitch, yaw) -> dict:
     }
 
 
-def gather_moment(let, joint, link, mass, h) -> dict:
+def gather_moment(let, joint: V4, link: V6, mass: V1, h: V3) -> dict:
     """Mass and first moment of one link and all beyond, about its joint, in the parent's frame."""
     turn_x, turn_z = joint_turns(joint)
     here = Matrix([h[0], h[1] - mass[0] * link[1] - link[2], h[2]])
     return {"mass": mass + Matrix([link[0]]), "h": turn_x * let("mid", turn_z * here)}
 
 
-def link_momentum(let, link, w, u_joint) -> dict:
+def link_momentum(let, link: V6, w: V3, u_joint: V3) -> dict:
     """Momentum of one link, its moment about the joint, and the kinetic energy (u . p + omega . L)
     / 2.
     """
@@ -175,13 +188,13 @@ def joint_turns(joint) -> tuple[Matrix, Matrix]:
     return rotation_x(joint[0], joint[1]), rotation_z(joint[2], joint[3])
 
 
-def joint_trigonometry(let, angles) -> dict:
+def joint_trigonometry(let, angles: V2) -> dict:
     """Cosines and sines of (alpha_i, beta_i), once for the n equal joints of segment i."""
     alpha, beta = angles
     return {"joint": Matrix([cos(alpha), sin(alpha), cos(beta), sin(beta)])}
 
 
-def double_angles(let, joint) -> dict:
+def double_angles(let, joint: V4) -> dict:
     """s^2, s c, 2 s c, c^2 - s^2 and c^2 of both joint angles: what turns a symmetric tensor in the
     plane.
     """
@@ -192,31 +205,31 @@ def double_angles(let, joint) -> dict:
     return {"twice": Matrix(rows)}
 
 
-def link_pose(let, joint, link, R, P) -> dict:
+def link_pose(let, joint: V4, link: V6, R: M33, P: V3) -> dict:
     """R_j = R_{j-1} R_x R_z (Eqs. 11, 12) and the next joint p_j+1 = p_j - L y_j (Eqs. 14, 15)."""
     turn_x, turn_z = joint_turns(joint)
-    mid = let("mid", square(R) * turn_x)
+    mid = let("mid", R * turn_x)
     turned = let("turned", mid * turn_z)
     return {"R": turned, "P": P - link[1] * turned.col(1)}
 
 
-def joint_twist(let, joint, R, P) -> dict:
+def joint_twist(let, joint: V4, R: M33, P: V3) -> dict:
     """Spatial columns of one joint at B: (x_{j-1}, p_j x x_{j-1}) and (z_j, p_j x z_j) (Eqs. A5,
     A7).
     """
     turn_x, _ = joint_turns(joint)
-    pitch, yaw = square(R).col(0), let("yaw", square(R) * turn_x * Z)
+    pitch, yaw = R.col(0), let("yaw", R * turn_x * Z)
     return {"S": Matrix([pitch, P.cross(pitch), yaw, P.cross(yaw)])}
 
 
-def link_angular_velocity(let, joint, rates, w) -> dict:
+def link_angular_velocity(let, joint: V4, rates: V2, w: V3) -> dict:
     """omega_j = omega_{j-1} + alpha_dot x_{j-1} + beta_dot z_j (Eq. A1), in the frame of link j."""
     turn_x, turn_z = joint_turns(joint)
     mid = let("mid", turn_x.T * w + rates[0] * X)
     return {"w": turn_z.T * mid + rates[1] * Z}
 
 
-def link_linear_velocity(let, joint, link, w, u) -> dict:
+def link_linear_velocity(let, joint: V4, link: V6, w: V3, u: V3) -> dict:
     """v_jnt of this joint in the frame of link j, and v_j+1,jnt = v_j,jnt - L omega_j x y_j (Eqs.
     A3, A4).
     """
@@ -225,7 +238,9 @@ def link_linear_velocity(let, joint, link, w, u) -> dict:
     return {"u_joint": here, "u": here - link[1] * w.cross(Y)}
 
 
-def link_motion(let, joint, rates, accelerations, link, w, w_dot, a) -> dict:
+def link_motion(
+    let, joint: V4, rates: V2, accelerations: V2, link: V6, w: V3, w_dot: V3, a: V3
+) -> dict:
     """omega_j (A1), omega_dot_j (A9), acceleration of this joint and the next (A11, A12), in the
     frame of link j.
 

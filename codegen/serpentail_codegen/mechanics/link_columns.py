@@ -11,9 +11,10 @@ from sympy import Matrix
 
 from .link import along_link, joint_turns, turned_inertia, with_link
 from .rotations import X, Z, symmetric, turned
+from .shapes import V1, V2, V3, V4, V6, V10, V12
 
 
-def gather_composite(let, joint, twice, link, mass, h, I) -> dict:
+def gather_composite(let, joint: V4, twice: V10, link: V6, mass: V1, h: V3, I: V6) -> dict:
     """Mass, first moment and inertia of a link and all beyond, and the columns of its own joint
     (Eq. 16).
 
@@ -38,7 +39,18 @@ def gather_composite(let, joint, twice, link, mass, h, I) -> dict:
     }
 
 
-def gather_lanes(let, joint, link, F, pitch, yaw, at_bias, at_pitch, at_yaw, F_lanes) -> dict:
+def gather_lanes(
+    let,
+    joint: V4,
+    link: V6,
+    F: V6,
+    pitch: V6,
+    yaw: V6,
+    at_bias: V1,
+    at_pitch: V1,
+    at_yaw: V1,
+    F_lanes: V6,
+) -> dict:
     """Add a link's wrench and columns, read what its joint feels, and pass all on to the parent's
     frame.
     """
@@ -48,13 +60,13 @@ def gather_lanes(let, joint, link, F, pitch, yaw, at_bias, at_pitch, at_yaw, F_l
     return {"F_lanes": turned(let, "out", turn_x, mid), "H_pitch": [mid[3]], "H_yaw": [total[5]]}
 
 
-def lanes_at_torso(let, tail_mount, F_lanes) -> dict:
+def lanes_at_torso(let, tail_mount: V3, F_lanes: V6) -> dict:
     """Move all wrenches from the tail mount to B."""
     force = F_lanes[0:3, :]
     return {"F_lanes": Matrix([force, F_lanes[3:6, :] + tail_mount.cross(force)])}
 
 
-def torso_bias(let, torso_mass, torso_inertia, w, a, F) -> dict:
+def torso_bias(let, torso_mass: V1, torso_inertia: V3, w: V3, a: V3, F: V6) -> dict:
     """Inertial force and moment of torso and tail at B, the tail's being ``F``; nothing turns
     faster.
     """
@@ -62,19 +74,21 @@ def torso_bias(let, torso_mass, torso_inertia, w, a, F) -> dict:
     return {"force": F[0:3, :] + torso_mass[0] * a, "moment": F[3:6, :] + euler}
 
 
-def lanes_without_translation(let, com, F_lanes) -> dict:
+def lanes_without_translation(let, com: V3, F_lanes: V6) -> dict:
     """Coupling of omega with the tail coordinates about the COM: n_k - c x f_k."""
     coupling = F_lanes[3:6, :] - com.cross(F_lanes[0:3, :])
     return {f"A_{r}": [coupling[r]] for r in range(3)}
 
 
-def row_without_translation(let, inverse_mass, column, F_lanes) -> dict:
+def row_without_translation(let, inverse_mass: V1, column: V6, F_lanes: V6) -> dict:
     """What eliminating translation takes from a row of H: f_k . f_l / M for all l."""
     scaled = let("scaled", column[0:3, :] * inverse_mass[0])
     return {"H_row": [-scaled.dot(F_lanes[0:3, :])]}
 
 
-def segment_block(let, inverse_mass, columns, own, H_pp, H_py, H_yp, H_yy) -> dict:
+def segment_block(
+    let, inverse_mass: V1, columns: V12, own: V2, H_pp: V1, H_py: V1, H_yp: V1, H_yy: V1
+) -> dict:
     """A segment's own block of H: pairs of its joints were met once, and count twice; a joint with
     itself counts once.
 

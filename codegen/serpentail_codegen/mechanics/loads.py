@@ -9,40 +9,40 @@ the origin).
 
 from sympy import Matrix
 
-from .rotations import square
+from .shapes import M33, V3, V6, V12
 
 
-def load_at_torso(let, R, f_torso, F_beyond) -> dict:
+def load_at_torso(let, R: M33, f_torso: V6, F_beyond: V6) -> dict:
     """All loads at B in torso axes; ``f_torso`` is a force in world axes and a moment in torso
     axes.
     """
-    force = square(R).T * f_torso[0:3, :] + F_beyond[0:3, :]
+    force = R.T * f_torso[0:3, :] + F_beyond[0:3, :]
     return {"load_force": force, "load_moment": f_torso[3:6, :] + F_beyond[3:6, :]}
 
 
-def load_at_point(let, R, P, f_point, F_beyond) -> dict:
+def load_at_point(let, R: M33, P: V3, f_point: V3, F_beyond: V6) -> dict:
     """Add a world force at a tail point to the wrench at B of all forces from this point to the
     tip.
     """
-    force = let("force", square(R).T * f_point)
+    force = let("force", R.T * f_point)
     return {"F_beyond": F_beyond + Matrix([force, P.cross(force)])}
 
 
-def joint_load(let, S, F_beyond) -> dict:
+def joint_load(let, S: V12, F_beyond: V6) -> dict:
     """Generalised force of the tail loads on one joint: J^T f by its spatial columns (Eq. 10)."""
     force, moment = F_beyond[0:3, :], F_beyond[3:6, :]
     pitch = S[0:3, :].dot(moment) + S[3:6, :].dot(force)
     return {"torque": Matrix([pitch, S[6:9, :].dot(moment) + S[9:12, :].dot(force)])}
 
 
-def point_jacobian_base(let, R, arm) -> dict:
+def point_jacobian_base(let, R: M33, arm: V3) -> dict:
     """d(point)/d omega = -skew(arm) R_b for a point at ``arm`` from B, world axes (Eq. A7, the
     tilde restored).
     """
-    return rows(Matrix.hstack(*(square(R).col(k).cross(arm) for k in range(3))))
+    return rows(Matrix.hstack(*(R.col(k).cross(arm) for k in range(3))))
 
 
-def point_jacobian_tail(let, S, arm) -> dict:
+def point_jacobian_tail(let, S: V12, arm: V3) -> dict:
     """d(point)/d(alpha_i, beta_i) = S_v + S_omega x arm: velocity of the point under the columns of
     segment i.
     """

@@ -1,62 +1,15 @@
 """From SymPy to the tape: a function of SymPy vectors goes in, a straight-line step comes out."""
 
 import inspect
+from collections.abc import Callable
 from fractions import Fraction
 from functools import cache
+from typing import Annotated, Any, get_origin
 
 import sympy
 
 from ..ir.step import Step, compacted
 from ..ir.tape import Tape
-
-# scalars of every named quantity that is no 3-vector
-SIZES = {
-    **dict.fromkeys(
-        [
-            "gravity",
-            "torso_mass",
-            "tail_mass",
-            "tail_length",
-            "share",
-            "fraction",
-            "bend_range",
-            "mass",
-            "inverse_mass",
-        ],
-        1,
-    ),
-    **dict.fromkeys(["inertial", "tau", "acceleration"], 1),
-    **dict.fromkeys(["angles", "rates", "accelerations", "virtual_rates"], 2),
-    **dict.fromkeys(["quaternion", "joint", "gradient"], 4),
-    **dict.fromkeys(
-        ["link", "I", "F", "F_next", "F_beyond", "pitch", "yaw", "column", "other", "f_torso"], 6
-    ),
-    **{
-        "section": 2,
-        "H_own": 3,
-        "torque_own": 2,
-        "I_own": 6,
-        "pitch_own": 6,
-        "yaw_own": 6,
-        "tip": 8,
-        "shape": 16,
-    },
-    **{"E": 9, "bend": 12, "trig": 4, "E_v": 15, "Q_v": 10, "loading": 27},
-    **{"twice": 10, "R": 9, "S": 12, "columns": 12, "F_lanes": 6, "own": 2},
-    **{"tip_map": 30, "T": 6, "K": 8, "b": 1, "shares": 15},
-    **{"pitch_row": 8, "yaw_row": 8, "joint_load": 2, "torques": 2}
-    | {f"A_{r}": 6 for r in range(6)},
-    **dict.fromkeys(["A", "coasting", "base", "b_mount", "at_torso"], 6),
-    **dict.fromkeys(["at_bias", "at_pitch", "at_yaw", "H_pp", "H_py", "H_yp", "H_yy"], 1),
-    **dict.fromkeys(["K_n", "D_n", "K_f", "D_f", "mu", "drag", "mobility"], 1),
-    **dict.fromkeys(["L_h2d", "L_d2k", "L_k2a", "L_a2m", "L_m2t", "delta_m", "side"], 1),
-    **{"leg": 2, "leg_rates": 2, "bristle": 2, "load": 6, "spring": 18, "lag": 2, "gains": 2},
-    **dict.fromkeys(
-        ["weight", "damping", "damped", "gain", "gain_q", "gain_v", "relax", "entry", "coupling"], 1
-    ),
-    **dict.fromkeys(["change", "rate", "angle", "k_v", "bound_share", "pressed"], 1),
-    **dict.fromkeys(["push_k", "push_l", "lift_k", "lift_l"], 1),
-}
 
 
 class Recorder:
@@ -162,25 +115,40 @@ def exact(number: sympy.Number):
 
 
 @cache
-def derive(function, **settings) -> Step:
-    """Derive a step: call ``function(let, *vectors)`` with SymPy vectors named by its arguments,
-    lower its result.
+def declared_shapes(function: Callable) -> dict[str, tuple[int, int]]:
+    """Rows and columns of each vector that a step reads, as its annotations say.
 
-    Arguments with a default are settings of the derivation, not vectors.
+    Its first argument is ``let``; arguments with a default are settings of the derivation.
     """
-    recorder, first, vectors, inputs = Recorder(), 0, [], []
     arguments = inspect.signature(function).parameters.values()
-    for name in [a.name for a in arguments if a.default is a.empty][1:]:
-        size = SIZES.get(name, 3)
-        vectors.append(recorder.vector(name, first, size))
+    shapes = {}
+    for argument in [a for a in arguments if a.default is a.empty][1:]:
+        if get_origin(argument.annotation) is not Annotated:
+            raise TypeError(
+                f"{function.__name__}: {argument.name} needs an annotation of mechanics.shapes"
+            )
+        shapes[argument.name] = argument.annotation.__metadata__[0]
+    return shapes
+
+
+@cache
+def derive(function: Callable, **settings: Any) -> Step:
+    """Derive a step: call ``function(let, *vectors)`` with SymPy vectors of the declared shapes."""
+    # symbols of the declared shapes stand for the vectors
+    recorder, first, vectors, inputs = Recorder(), 0, [], []
+    for name, (rows, columns) in declared_shapes(function).items():
+        size = rows * columns
+        vectors.append(recorder.vector(name, first, size).reshape(rows, columns))
         inputs.append((name, size))
         first += size
+
+    # what the function returns is recorded on the tape
     outputs = {
         name: list(value) for name, value in function(recorder.let, *vectors, **settings).items()
     }
     results = tuple(recorder.lower(sympy.sympify(e)) for values in outputs.values() for e in values)
     sizes = tuple((name, len(values)) for name, values in outputs.items())
-    doc = " ".join(inspect.getdoc(function).partition("\n\n")[0].split())
+    doc = " ".join((inspect.getdoc(function) or "").partition("\n\n")[0].split())
     name = function.__name__ + "".join(
         f"_{key}_{value}" for key, value in settings.items() if value
     )

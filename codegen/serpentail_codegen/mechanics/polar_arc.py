@@ -15,16 +15,17 @@ at theta = 0.  `continuum.py` is the same tail without these faults.
 from sympy import Matrix, Rational, cos, eye, sin, zeros
 
 from .rotations import X, Y, Z, entries
+from .shapes import M33, V1, V2, V3, V4, V10, V12, V15, V27
 
 UPPER = tuple((k, j) for k in range(5) for j in range(k, 5))  # entries of E that Appendix B lists
 
 
-def segment_trigonometry(let, angles) -> dict:
+def segment_trigonometry(let, angles: V2) -> dict:
     """Sine and cosine of phi, then of theta."""
     return {"trig": [sin(angles[0]), cos(angles[0]), sin(angles[1]), cos(angles[1])]}
 
 
-def polar_margins(let, angles, bend_range) -> dict:
+def polar_margins(let, angles: V2, bend_range: V1) -> dict:
     """Positive where a segment is bent at all, and where it is bent by less than the declared
     range, up to rounding.
     """
@@ -33,11 +34,11 @@ def polar_margins(let, angles, bend_range) -> dict:
     return {"bent": [square], "margin": [limit - square]}
 
 
-def slice_integrals(let, angles, trig) -> dict:
+def slice_integrals(let, angles: V2, trig: V4) -> dict:
     """E of Eq. 28, its upper triangle, and columns 5 and 9 of Q of Eq. 30; the others are E's
     (Appendix B).
     """
-    t, _, s, c = angles[1], *trig[1:]
+    t, s, c = angles[1], trig[2], trig[3]
     s2, c2, t2 = let("s2", sin(2 * t)), let("c2", cos(2 * t)), let("t2", t * t)
     t3, t4, six = let("t3", t2 * t), let("t4", t2 * t2), let("six", 6 * t2 - 3)
     E22, E23 = Rational(1, 2) - s2 / (4 * t), (-2 * t * c2 + s2) / (8 * t2)
@@ -93,7 +94,7 @@ def skew(v) -> Matrix:
     return Matrix([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
 
 
-def segment_inertia(let, angles, trig, E_v, section) -> dict:
+def segment_inertia(let, angles: V2, trig: V4, E_v: V15, section: V2) -> dict:
     """H_i = m J_v^T o E o J_v (Eq. 28): first moment, inertia, columns of phi and theta and their
     block of H.
     """
@@ -115,7 +116,9 @@ def segment_inertia(let, angles, trig, E_v, section) -> dict:
     }
 
 
-def segment_loading(let, angles, rates, accelerations, trig, section, w, w_dot, a) -> dict:
+def segment_loading(
+    let, angles: V2, rates: V2, accelerations: V2, trig: V4, section: V2, w: V3, w_dot: V3, a: V3
+) -> dict:
     """h_v of Eq. 31, nine vectors: p_q_ddot (+ g), a_ddot, a_dot theta_dot, ..., b theta_dot^2, in
     the root frame.
 
@@ -147,7 +150,9 @@ def turning(let, vector, rate, rate_rate, w, w_dot) -> tuple:
     return let("dot", v + rate), let("ddot", second)
 
 
-def segment_wrench(let, angles, trig, E_v, Q_v, section, loading) -> dict:
+def segment_wrench(
+    let, angles: V2, trig: V4, E_v: V15, Q_v: V10, section: V2, loading: V27
+) -> dict:
     """tau_i = m J_v^T o Q o h_v (Eq. 30): inertial wrench at the root and generalised forces of phi
     and theta.
     """
@@ -161,7 +166,7 @@ def segment_wrench(let, angles, trig, E_v, Q_v, section, loading) -> dict:
     return {"F": force[0:6, :], "torque_own": force[6:8, :]}
 
 
-def segment_tip(let, angles, trig, section) -> dict:
+def segment_tip(let, angles: V2, trig: V4, section: V2) -> dict:
     """Rotation to the tip (Eq. 33), its position (Eq. 34), and how both move with phi and theta, in
     the root frame.
     """
@@ -175,12 +180,13 @@ def segment_tip(let, angles, trig, section) -> dict:
     return {"E": E, "r": r, "bend": Matrix([*phi_turn, *(lift * b_phi), *theta_turn, *theta_move])}
 
 
-def segment_motion(let, rates, accelerations, trig, E, bend, loading, w, w_dot) -> dict:
+def segment_motion(
+    let, rates: V2, accelerations: V2, trig: V4, E: M33, bend: V12, loading: V27, w: V3, w_dot: V3
+) -> dict:
     """Angular velocity, its rate and acceleration of the tip, in its frame; Eq. 29 at x = 1 is its
     acceleration.
     """
     s_phi, c_phi, s, c = trig
-    E = E.reshape(3, 3)
     phi_turn, theta_turn = bend[0:3, :], bend[6:9, :]
     turn = let("turn", rates[0] * phi_turn + rates[1] * theta_turn)
     # the rates of phi_turn = y - E y and theta_turn = (-cos(phi), 0, sin(phi))
@@ -197,11 +203,11 @@ def segment_motion(let, rates, accelerations, trig, E, bend, loading, w, w_dot) 
     }
 
 
-def part_of_arc(let, angles, fraction) -> dict:
+def part_of_arc(let, angles: V2, fraction: V1) -> dict:
     """Polar angles of an n-th of a segment."""
     return {"part": [angles[0], angles[1] * fraction[0]]}
 
 
-def columns_of_arc(let, bend, fraction) -> dict:
+def columns_of_arc(let, bend: V12, fraction: V1) -> dict:
     """Columns for the rates of a whole segment from those for the rates of an n-th of it."""
     return {"bend": Matrix([bend[0:6, :], bend[6:12, :] * fraction[0]])}

@@ -8,6 +8,8 @@ intermediate result, so that expressions stay small.
 
 from sympy import Matrix, eye, sqrt
 
+from .shapes import M33, V1, V3, V4, V6
+
 
 def symmetric(I) -> Matrix:
     """Return the symmetric 3 x 3 matrix of (xx, yy, zz, xy, xz, yz)."""
@@ -25,21 +27,20 @@ def turned(let, name, turn, F) -> Matrix:
     return let(name, Matrix([turn * F[0:3, :], turn * F[3:6, :]]))
 
 
-def world_vector(let, R, vector) -> dict:
+def world_vector(let, R: M33, vector: V3) -> dict:
     """Turn a vector from torso axes to world axes."""
-    return {"vector": square(R) * vector}
+    return {"vector": R * vector}
 
 
-def world_composite(let, R, h, I) -> dict:
+def world_composite(let, R: M33, h: V3, I: V6) -> dict:
     """First moment and inertia turned from torso axes to world axes (Eq. A14)."""
-    R = square(R)
     half = let("half", R * symmetric(I))
     return {"h": R * h, "I": entries(half * R.T)}
 
 
-def world_acceleration(let, R, gravity, a) -> dict:
+def world_acceleration(let, R: M33, gravity: V1, a: V3) -> dict:
     """p_b_ddot = R_b a - g z."""
-    return {"p_ddot": square(R) * a - gravity[0] * Z}
+    return {"p_ddot": R * a - gravity[0] * Z}
 
 
 X, Y, Z = (Matrix(row) for row in eye(3).tolist())
@@ -55,12 +56,7 @@ def rotation_z(c, s) -> Matrix:
     return Matrix([[c, -s, 0], [s, c, 0], [0, 0, 1]])
 
 
-def square(R) -> Matrix:
-    """Return the 3 x 3 matrix whose nine entries are given row by row."""
-    return Matrix(3, 3, list(R))
-
-
-def quaternion_rotation(let, quaternion) -> dict:
+def quaternion_rotation(let, quaternion: V4) -> dict:
     """R_b from (w, x, y, z); only the direction of the quaternion counts, so it need not be
     normalised.
     """
@@ -77,13 +73,13 @@ def quaternion_rotation(let, quaternion) -> dict:
     return {"R": Matrix(rows)}
 
 
-def unit_quaternion(let, quaternion) -> dict:
+def unit_quaternion(let, quaternion: V4) -> dict:
     """The quaternion over its norm."""
     norm = let("norm", sqrt(let("square", quaternion.dot(quaternion))))
     return {"unit": quaternion * let("inverse", 1 / norm)}
 
 
-def turned_quaternion(let, quaternion, turn) -> dict:
+def turned_quaternion(let, quaternion: V4, turn: V3) -> dict:
     """Rate of a unit quaternion for a rate of turn in body axes: q (0, turn) / 2."""
     w, x, y, z = quaternion
     half = [let("half", entry / 2) for entry in turn]
@@ -96,7 +92,7 @@ def turned_quaternion(let, quaternion, turn) -> dict:
     return {"rate": Matrix(rates)}
 
 
-def turn_gradient(let, quaternion, gradient) -> dict:
+def turn_gradient(let, quaternion: V4, gradient: V4) -> dict:
     """Gradient with respect to a turn in body axes, from that with respect to a unit quaternion's
     four numbers.
     """

@@ -9,10 +9,13 @@ the origin).
 
 from sympy import Matrix, eye
 
-from .rotations import Z, entries, square, symmetric
+from .rotations import Z, entries, symmetric
+from .shapes import M33, V1, V3, V6, V12
 
 
-def torso_power(let, torso_mass, torso_inertia, w, w_dot, a, w_virtual, u_virtual) -> dict:
+def torso_power(
+    let, torso_mass: V1, torso_inertia: V3, w: V3, w_dot: V3, a: V3, w_virtual: V3, u_virtual: V3
+) -> dict:
     """Power of the torso's inertial wrench at B (Eq. 3) under a virtual motion, torso axes."""
     euler = torso_inertia.multiply_elementwise(w_dot) + w.cross(
         let("I_w", torso_inertia.multiply_elementwise(w))
@@ -22,9 +25,8 @@ def torso_power(let, torso_mass, torso_inertia, w, w_dot, a, w_virtual, u_virtua
     }
 
 
-def column_at_torso(let, R, P, pitch, yaw) -> dict:
+def column_at_torso(let, R: M33, P: V3, pitch: V6, yaw: V6) -> dict:
     """Momentum columns of a segment, from its root frame at ``P`` to the torso frame at B."""
-    R = square(R)
     out = []
     for column in (pitch, yaw):
         force = let("force", R * column[0:3, :])
@@ -32,7 +34,7 @@ def column_at_torso(let, R, P, pitch, yaw) -> dict:
     return {"columns": Matrix(out)}
 
 
-def segment_coupling(let, S, columns) -> dict:
+def segment_coupling(let, S: V12, columns: V12) -> dict:
     """Block of H between a segment and one beyond it: spatial columns at B times momentum columns
     at B (Eq. 16).
     """
@@ -45,7 +47,9 @@ def segment_coupling(let, S, columns) -> dict:
     return {"H_pitch": Matrix(block[0:2]), "H_yaw": Matrix(block[2:4])}
 
 
-def torso_composite(let, tail_mount, torso_mass, torso_inertia, mass, h, I) -> dict:
+def torso_composite(
+    let, tail_mount: V3, torso_mass: V1, torso_inertia: V3, mass: V1, h: V3, I: V6
+) -> dict:
     """Mass, first moment and inertia of the whole animal at B, from the tail's at its mount (Eq.
     2).
     """
@@ -56,12 +60,14 @@ def torso_composite(let, tail_mount, torso_mass, torso_inertia, mass, h, I) -> d
     return {"mass": mass + torso_mass, "h": h_B, "I": entries(total) + diagonal}
 
 
-def torso_moment(let, tail_mount, torso_mass, mass, h) -> dict:
+def torso_moment(let, tail_mount: V3, torso_mass: V1, mass: V1, h: V3) -> dict:
     """Mass and first moment of the whole animal at B, from the tail's at its mount."""
     return {"mass": mass + torso_mass, "h": h + mass[0] * tail_mount}
 
 
-def torso_wrench(let, tail_mount, torso_mass, torso_inertia, w, w_dot, a, F_next) -> dict:
+def torso_wrench(
+    let, tail_mount: V3, torso_mass: V1, torso_inertia: V3, w: V3, w_dot: V3, a: V3, F_next: V6
+) -> dict:
     """Inertial wrench of torso and tail at B (Eq. 3), ``F_next`` being the tail's at its mount."""
     force, moment = F_next[0:3, :], F_next[3:6, :]
     I_w = let("I_w", torso_inertia.multiply_elementwise(w))
@@ -69,7 +75,9 @@ def torso_wrench(let, tail_mount, torso_mass, torso_inertia, w, w_dot, a, F_next
     return {"force": force + torso_mass[0] * a, "moment": moment + tail_mount.cross(force) + euler}
 
 
-def torso_momentum(let, tail_mount, torso_mass, torso_inertia, w, u_torso, F_next) -> dict:
+def torso_momentum(
+    let, tail_mount: V3, torso_mass: V1, torso_inertia: V3, w: V3, u_torso: V3, F_next: V6
+) -> dict:
     """Momentum and angular momentum of torso and tail at B, torso axes; kinetic energy of the torso
     alone.
     """
@@ -83,57 +91,56 @@ def torso_momentum(let, tail_mount, torso_mass, torso_inertia, w, u_torso, F_nex
     }
 
 
-def potential_energy(let, gravity, R, p, mass, h) -> dict:
+def potential_energy(let, gravity: V1, R: M33, p: V3, mass: V1, h: V3) -> dict:
     """g (M z_b + z . R_b h)."""
-    return {"potential": [gravity[0] * (mass[0] * p[2] + square(R).row(2).dot(h))]}
+    return {"potential": [gravity[0] * (mass[0] * p[2] + R.row(2).dot(h))]}
 
 
-def momentum_at_com(let, R, p_dot, mass, h, force, moment) -> dict:
+def momentum_at_com(let, R: M33, p_dot: V3, mass: V1, h: V3, force: V3, moment: V3) -> dict:
     """Momentum, and angular momentum about the COM, world axes; ``force, moment`` taken at rest of
     B.
     """
-    R = square(R)
     return {
         "linear": mass[0] * p_dot + R * force,
         "angular": R * (moment - h.cross(force) / mass[0]),
     }
 
 
-def mass_matrix_base(let, R, mass, h, I) -> dict:
+def mass_matrix_base(let, R: M33, mass: V1, h: V3, I: V6) -> dict:
     """The 6 x 6 block of H for (p_dot world, omega body): M 1, -R skew(h), I."""
-    skewed = square(R) * Matrix([[0, h[2], -h[1]], [-h[2], 0, h[0]], [h[1], -h[0], 0]])
+    skewed = R * Matrix([[0, h[2], -h[1]], [-h[2], 0, h[0]], [h[1], -h[0], 0]])
     upper, lower = Matrix.hstack(mass[0] * eye(3), skewed), Matrix.hstack(skewed.T, symmetric(I))
     return {f"H_{k}": Matrix.vstack(upper, lower).row(k).T for k in range(6)}
 
 
-def mass_matrix_column(let, R, column) -> dict:
+def mass_matrix_column(let, R: M33, column: V6) -> dict:
     """Coupling of one tail coordinate with (p_dot world, omega body)."""
-    values = Matrix([square(R) * column[0:3, :], column[3:6, :]])
+    values = Matrix([R * column[0:3, :], column[3:6, :]])
     return {"H_column": values, "H_row": values}
 
 
-def mount_position(let, R, p, tail_mount) -> dict:
+def mount_position(let, R: M33, p: V3, tail_mount: V3) -> dict:
     """p_1,jnt = p_b + R_b p_b2t (Eq. 14)."""
-    return {"P": p + square(R) * tail_mount}
+    return {"P": p + R * tail_mount}
 
 
-def torso_velocity(let, R, p_dot) -> dict:
+def torso_velocity(let, R: M33, p_dot: V3) -> dict:
     """v_b in the torso frame."""
-    return {"u": square(R).T * p_dot}
+    return {"u": R.T * p_dot}
 
 
-def mount_velocity(let, u, w, tail_mount) -> dict:
+def mount_velocity(let, u: V3, w: V3, tail_mount: V3) -> dict:
     """v_1,jnt = v_b + omega_b x p_b2t (Eq. A3) in the torso frame."""
     return {"u": u + w.cross(tail_mount)}
 
 
-def mount_acceleration(let, w, w_dot, a, tail_mount) -> dict:
+def mount_acceleration(let, w: V3, w_dot: V3, a: V3, tail_mount: V3) -> dict:
     """v_dot_1,jnt of A11 in the torso frame; ``a`` is R_b^T (p_b_ddot + g), gravity being an
     acceleration of B.
     """
     return {"a_mount": a + w_dot.cross(tail_mount) + w.cross(let("r", w.cross(tail_mount)))}
 
 
-def torso_acceleration(let, R, p_ddot, gravity) -> dict:
+def torso_acceleration(let, R: M33, p_ddot: V3, gravity: V1) -> dict:
     """a = R_b^T (p_b_ddot + g z): all that gravity and translation do in flight (Eqs. 3, 17)."""
-    return {"a": square(R).T * (p_ddot + gravity[0] * Z)}
+    return {"a": R.T * (p_ddot + gravity[0] * Z)}
