@@ -23,7 +23,7 @@ from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.ir.interpret import Numbers, Run, unroll
 from serpentail_codegen.ir.program import Apply, statements
 from serpentail_codegen.ir.tape import operation_count, replay
-from serpentail_codegen.mechanics import link, rotations
+from serpentail_codegen.mechanics import link, rotations, torso
 from serpentail_codegen.mechanics.lower import Recorder, derive
 
 X, Y, Z = (eye(3).col(k) for k in range(3))
@@ -336,13 +336,13 @@ def test_link_velocity_is_the_derivative_of_the_pose(state, links):
 
 
 def test_mount_moves_with_the_torso(state, links):
-    torso, r = links[0][0], state.parameters["tail_mount"]
-    R, mount = torso.R[0], torso.end
+    body, r = links[0][0], state.parameters["tail_mount"]
+    R, mount = body.R[0], body.end
     u = call(torso.torso_velocity, R=R, p_dot=state.v[:3])["u"]
-    assert call(torso.mount_velocity, u=u, w=torso.omega, tail_mount=r)["u"] == R.T * mount[1]
+    assert call(torso.mount_velocity, u=u, w=body.omega, tail_mount=r)["u"] == R.T * mount[1]
     a = call(torso.torso_acceleration, R=R, p_ddot=state.v_dot[:3], gravity=[0])["a"]
     at_mount = call(
-        torso.mount_acceleration, w=torso.omega, w_dot=torso.omega_dot, a=a, tail_mount=r
+        torso.mount_acceleration, w=body.omega, w_dot=body.omega_dot, a=a, tail_mount=r
     )["a_mount"]
     assert at_mount == R.T * mount[2]
     assert call(torso.mount_position, R=R, p=state.p, tail_mount=r)["P"] == mount[0]
