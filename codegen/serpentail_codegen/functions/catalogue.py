@@ -3,8 +3,8 @@
 from .arguments import TAU, V_DOT, Q, V
 from .contact import CONTACT
 from .derivatives import jacobians
+from .derivatives.differentiated import MULTIPLIER
 from .derivatives.hessian import assemble_inverse_dynamics_hessian
-from .derivatives.jacobians import MULTIPLIER
 from .function import Argument, Function
 from .implicit.functions import IMPLICIT
 from .pfl import FEEDBACK

@@ -1,21 +1,20 @@
-"""Functions of the points that touch the ground: a draft goes in, their places, motion and forces
-are added to it.
-"""
+"""Functions of the points that touch the ground: their places, motion and forces."""
 
 from dataclasses import dataclass
 
 from ..ir.program import Array, Index, Ref
-from ..mechanics import contact as con
-from ..mechanics import leg as legs
-from ..mechanics import loads, rotations
+from ..mechanics import contact, leg, loads
 from ..mechanics.lower import derive
 from .arguments import TAU, V_DOT, Q, V
 from .draft import Draft
-from .dynamics import Loads, accelerate_by_segments, balanced
+from .dynamics import accelerate_by_segments, copied_torques, factored_dynamics
 from .function import Argument, Function
+from .layout import coordinates
+from .scope import State, Torso, Vectors
 from .sweeps import sweeps
 from .sweeps.sweeps import mechanism
 from .tail import Tail
+from .tails.mechanism import Segments
 
 LEGS = Argument(
     "legs",
@@ -47,151 +46,161 @@ class Points:
     first: dict[str, int]
     S: Array | None = None
 
-    def motion(self, k: Index | int) -> dict[str, Ref]:
+    def motion(self, k: Index | int) -> Vectors:
         """Arm and velocity of point k."""
-        return {"arm": self.arms[k], "velocity": self.velocities[k]}
+        return Vectors({"arm": self.arms[k], "velocity": self.velocities[k]})
+
+    @property
+    def columns(self) -> Array:
+        """Columns of the tail's joints."""
+        if self.S is None:
+            raise ValueError("no points of the tail touch the ground")
+        return self.S
 
 
 def first_points(tail: Tail) -> dict[str, int]:
     """Number of the first point of each group."""
-    first, out = 0, {}
+    first, numbers = 0, {}
     for name, count in tail.groups.items():
-        out[name], first = first, first + count
-    return out
+        numbers[name] = first
+        first += count
+    return numbers
 
 
-def gather_points(d: Draft, arrays: dict[str, Array]) -> Points:
-    """All points that can touch the ground: feet, then tail, then the torso's lowest."""
-    tail = d.tail
-    columns = d.array("S_point", 12, tail.total) if "tail" in tail.contacts else None
-    points = Points(
-        d.array("arm", 3, tail.points),
-        d.array("velocity", 3, tail.points),
-        first_points(tail),
-        columns,
-    )
+def gather_points(
+    draft: Draft, state: State, R: Ref, arrays: dict[str, Array], segments: Segments | None = None
+) -> Points:
+    """All points that can touch the ground: feet, then tail, then the torso's lowest.
+
+    ``segments`` describes the tail's pieces, if something else has asked for them before.
+    """
+    tail, torso = draft.tail, state.torso(R)
+    S = draft.array("S_point", 12, tail.total) if "tail" in tail.contacts else None
+    arms, velocities = draft.array("arm", 3, tail.points), draft.array("velocity", 3, tail.points)
+    points = Points(arms, velocities, first_points(tail), S)
     if "feet" in tail.contacts:
-        place_feet(d, points, arrays["legs"])
+        place_feet(draft, torso, points, arrays["legs"])
     if "tail" in tail.contacts:
-        place_tail(d, points)
+        samples = mechanism(draft).prepare_samples(draft, state, segments)
+        place_tail(draft, torso, samples, points)
     if "torso" in tail.contacts:
-        d.store(con.lowest_point, place=3)
-        d.step(con.point_on_torso, {"drift": d.zero(3)}, **points.motion(points.first["torso"]))
+        place = draft.store(contact.lowest_point, torso, place=3)
+        drift, motion = {"drift": draft.zero(3)}, points.motion(points.first["torso"])
+        draft.step(contact.point_on_torso, torso, place, drift, **motion)
     return points
 
 
-def place_feet(d: Draft, points: Points, angles: Array) -> None:
-    """A, M and T of the right foot, then of the left."""
-    sides = d.constant("sides", [1, -1])
-    foot, rate = d.array("foot", 3, 3), d.array("foot_rate", 3, 3)
-    with d.loop("l", 2) as leg:
+def place_feet(draft: Draft, torso: Torso, points: Points, angles: Array) -> None:
+    """A, M and T of the right foot, then of the left (Eqs. 5 to 9)."""
+    sides = draft.constant("sides", [1, -1])
+    foot, rate = draft.array("foot", 3, 3), draft.array("foot_rate", 3, 3)
+    with draft.loop("l", 2) as side:
         reads = {
-            "side": sides.part(leg, 1),
-            "leg": angles.part(2 * leg, 2),
-            "leg_rates": angles.part(4 + 2 * leg, 2),
+            "side": sides.part(side, 1),
+            "leg": angles.part(2 * side, 2),
+            "leg_rates": angles.part(4 + 2 * side, 2),
         }
-        d.step(legs.foot_points, reads, foot=foot.part(0, 9), foot_rate=rate.part(0, 9))
-        with d.loop("k", 3) as k:
-            reads = {"place": foot[k], "drift": rate[k]}
-            d.step(con.point_on_torso, reads, **points.motion(3 * leg + k + points.first["feet"]))
+        writes = {"foot": foot.part(0, 9), "foot_rate": rate.part(0, 9)}
+        draft.step(leg.foot_points, reads, **writes)
+        with draft.loop("k", 3) as k:
+            place = {"place": foot[k], "drift": rate[k]}
+            motion = points.motion(3 * side + k + points.first["feet"])
+            draft.step(contact.point_on_torso, torso, place, **motion)
 
 
-def place_tail(d: Draft, points: Points) -> None:
+def place_tail(draft: Draft, torso: Torso, samples: Segments, points: Points) -> None:
     """The tail's points but the first: that one is the mount, a point of the torso and inside
     it.
     """
-    mechanism(d).prepare_samples(d)
-    here = sweeps.torso_pose(d, True, name="point")
-    twist = {name: d.vector(name, 3) for name in ("turn", "slide")}
-    d.step(con.torso_twist, **twist)
-    with d.loop("i", d.tail.segments) as i, d.loop("j", d.tail.links) as j:
-        g = d.tail.links * i + j
-        S = points.S[g]
-        d.step(mechanism(d).twist, here | d.sample(i), S=S)
-        d.step(mechanism(d).pose, here | d.sample(i), **here)
-        d.step(
-            con.carried_twist,
-            {"S": S, "rates": d.rates(i)},
-            turn_=twist["turn"],
-            slide_=twist["slide"],
-        )
-        d.step(con.point_on_tail, here | twist, **points.motion(g + points.first["tail"]))
+    # fixed samples of an arc, not its one lowest point (Eqs. 38, 39), which jumps from end to end
+    tail, steps, S = draft.tail, mechanism(draft), points.columns
+    pose = sweeps.torso_pose(draft, torso.R, name="point")
+    twist = draft.store(contact.torso_twist, torso, turn=3, slide=3)
+    added = {f"{name}_": ref for name, ref in twist.named.items()}
+    with draft.loop("i", tail.segments) as i, draft.loop("j", tail.links) as j:
+        g = tail.links * i + j
+        draft.step(steps.twist, pose, samples.at(i), S=S[g])
+        draft.step(steps.pose, pose, samples.at(i), **pose)
+        draft.step(contact.carried_twist, {"S": S[g]}, samples.motion(i), **added)
+        motion = points.motion(g + points.first["tail"])
+        draft.step(contact.point_on_tail, pose, twist, **motion)
 
 
-def assemble_contact_points(d: Draft, arrays: dict[str, Array]) -> None:
+def assemble_contact_points(draft: Draft, arrays: dict[str, Array]) -> None:
     """Places and velocities of all points."""
-    d.store(rotations.quaternion_rotation, R=9)
-    points = gather_points(d, arrays)
-    with d.loop("k", d.tail.points) as k:
-        d.step(con.position, points.motion(k), position=arrays["positions"].part(3 * k, 3))
-        d.copy(arrays["velocities"].part(3 * k, 3), points.velocities[k])
+    state = State(arrays["q"], arrays["v"])
+    R = sweeps.attitude(draft, state)
+    points = gather_points(draft, state, R, arrays)
+    with draft.loop("k", draft.tail.points) as k:
+        position = arrays["positions"].part(3 * k, 3)
+        draft.step(contact.position, state.torso(R), points.motion(k), position=position)
+        draft.copy(arrays["velocities"].part(3 * k, 3), points.velocities[k])
 
 
-def press(d: Draft, points: Points, arrays: dict[str, Array]) -> None:
+def press(draft: Draft, torso: Torso, points: Points, arrays: dict[str, Array]) -> None:
     """Forces and bristle rates of all points."""
-    d.store(con.bristle_properties, drag=1, mobility=1)
-    law = derive(con.contact_force, friction=d.tail.friction)
-    with d.loop("k", d.tail.points) as k:
-        reads = d.known | points.motion(k) | {"bristle": arrays["bristles"].part(2 * k, 2)}
+    properties = draft.store(contact.bristle_properties, drag=1, mobility=1)
+    law = derive(contact.contact_force, friction=draft.tail.friction)
+    with draft.loop("k", draft.tail.points) as k:
+        bristle = {"bristle": arrays["bristles"].part(2 * k, 2)}
         writes = {
             "force": arrays["forces"].part(3 * k, 3),
             "rate": arrays["bristle_rates"].part(2 * k, 2),
         }
-        d.apply(law, reads, **writes)
+        draft.step(law, torso, properties, points.motion(k), bristle, **writes)
 
 
-def gather_contact_loads(d: Draft, points: Points, forces: Array, torques: Array) -> None:
-    """J^T f (Eq. 10): ``load_force, load_moment`` at B in torso axes; the joints' share is added to
-    ``torques``.
+def gather_contact_loads(
+    draft: Draft, R: Ref, points: Points, forces: Array, torques: Array
+) -> Vectors:
+    """J^T f (Eq. 10): returns ``load_force, load_moment`` at B in torso axes; the joints' part is
+    added to ``torques``.
     """
-    load = d.vector("load", 6)
-    d.fill(load, 0)
+    load = draft.vector("load", 6)
+    draft.fill(load, 0)
 
     def add(k: Index | int) -> None:
         reads = {"arm": points.arms[k], "force": forces.part(3 * k, 3)}
-        d.step(con.load_about_torso, reads, load_=load)
+        draft.step(contact.load_about_torso, reads, load_=load)
 
     if points.S:
         with (
-            d.loop("i", d.tail.segments, downward=True) as i,
-            d.loop("j", d.tail.links, downward=True) as j,
+            draft.loop("i", draft.tail.segments, downward=True) as i,
+            draft.loop("j", draft.tail.links, downward=True) as j,
         ):
-            g = d.tail.links * i + j
+            g = draft.tail.links * i + j
             add(g + points.first["tail"])
-            d.step(
-                loads.joint_load,
-                {"S": points.S[g], "F_beyond": load},
-                torque_=torques.part(2 * i, 2),
-            )
-    for group in [name for name in d.tail.contacts if name != "tail"]:
-        with d.loop("k", d.tail.groups[group]) as k:
+            reads = {"S": points.S[g], "F_beyond": load}
+            draft.step(loads.joint_load, reads, torque_=coordinates(torques, i))
+    for group in [name for name in draft.tail.contacts if name != "tail"]:
+        with draft.loop("k", draft.tail.groups[group]) as k:
             add(k + points.first[group])
-    d.store(con.load_in_torso, load_force=3, load_moment=3)
+    reads = {"R": R, "load": load}
+    return draft.store(contact.load_in_torso, reads, load_force=3, load_moment=3)
 
 
-def contact_torques(d: Draft, arrays: dict[str, Array]) -> Array:
-    """Forces of all points, their load at B; returns the torques of actuators and forces
+def contact_load(
+    draft: Draft, state: State, R: Ref, arrays: dict[str, Array]
+) -> tuple[Vectors, Array]:
+    """Forces of all points; returns their load at B, and the torques of actuators and forces
     together.
     """
-    points = gather_points(d, arrays)
-    press(d, points, arrays)
-    torques = d.array("applied", d.tail.nt)
-    with d.loop("k", d.tail.nt) as k:
-        d.copy(torques.part(k, 1), arrays["tau"].part(k, 1))
-    gather_contact_loads(d, points, arrays["forces"], torques)
-    return torques
+    points = gather_points(draft, state, R, arrays)
+    press(draft, state.torso(R), points, arrays)
+    torques = copied_torques(draft, arrays["tau"])
+    return gather_contact_loads(draft, R, points, arrays["forces"], torques), torques
 
 
-def assemble_contact_dynamics(d: Draft, arrays: dict[str, Array]) -> None:
-    """v_dot from H v_dot + C = [0; tau] + J^T f with the ground's forces."""
-    if d.dynamics == "segments":
-        d.store(rotations.quaternion_rotation, R=9)
-        accelerate_by_segments(d, arrays, contact_torques(d, arrays))
+def assemble_contact_dynamics(draft: Draft, arrays: dict[str, Array]) -> None:
+    """v_dot from Eq. 1, H v_dot + C = [0; tau] + J^T f, with the ground's forces."""
+    state = State(arrays["q"], arrays["v"])
+    if draft.dynamics == "segments":
+        R = sweeps.attitude(draft, state)
+        accelerate_by_segments(draft, arrays, *contact_load(draft, state, R, arrays))
         return
-    balance = balanced(d, arrays["q"], arrays["v"])
-    torques = contact_torques(d, arrays)
-    loads = Loads({}, lambda k: balance.bias.part(6 + k, 1), lambda k: torques.part(k, 1))
-    balance.solve(d, loads, arrays["v_dot"])
+    factored = factored_dynamics(draft, arrays["q"], arrays["v"])
+    applied, torques = contact_load(draft, state, factored.R, arrays)
+    factored.solve(draft, factored.loads(applied, torques), arrays["v_dot"])
 
 
 _TABLE = (

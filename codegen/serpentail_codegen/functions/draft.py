@@ -1,67 +1,98 @@
-"""Drafts: a tail's sizes go in; a builder comes out that finds the vectors its steps read by their
-names.
-"""
+"""A function being assembled: a builder that knows the tail, and checks what each step reads."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from types import MappingProxyType
 
-from ..ir.builder import Builder
-from ..ir.program import Array, Index, Ref
-from ..mechanics.lower import derive
+from ..ir.builder import Builder, narrowed
+from ..ir.program import Ref
+from ..ir.step import Step
+from ..ir.tape import Number
+from ..mechanics.lower import declared_shapes, derive
+from ..scene.parameters import Parameter
+from .scope import Instead, Scope, Vectors
 from .tail import Tail
 
+Reads = Scope | Mapping[str, Ref]
 
-@dataclass
+
+@dataclass(kw_only=True)
 class Draft(Builder):
-    """A function being assembled: the builder, the tail's sizes, and the vectors that steps find by
-    name.
+    """A function being assembled: the builder, the tail's sizes, and the model's parameters.
 
-    ``pieces`` are arrays with one entry a segment that describe its rigid links or its arc,
-    ``samples`` those that describe what lies between two tail points.  ``at_rest``: nothing moves,
-    there are accelerations only. ``dynamics`` of an articulated tail: "composite", H column by
-    column; "lanes", its columns are lanes; "segments", v_dot comes about without H where nothing
-    else is asked for.
+    ``dynamics`` of an articulated tail: "composite", H column by column; "lanes", its columns are
+    lanes; "segments", v_dot comes about without H where nothing else is asked for.
     """
 
-    tail: Tail | None = None
-    at_rest: bool = False
+    tail: Tail
     dynamics: str = "composite"
-    known: dict[str, Ref] = field(default_factory=dict)
-    pieces: dict[str, Array] = field(default_factory=dict)
-    samples: dict[str, Array] = field(default_factory=dict)
+    parameters: Mapping[str, Ref] = field(default_factory=dict, init=False)
 
-    def step(self, function: Callable, reads: dict[str, Ref] | None = None, **writes: Ref) -> None:
-        """Apply the step derived from a kinematics or dynamics function."""
-        self.apply(derive(function), self.known | (reads or {}), **writes)
+    def declare_parameters(self, parameters: Iterable[Parameter]) -> None:
+        """Declare the parameter struct: steps find its numbers by their names."""
+        refs = {p.name: self.array(p.name, p.size, role="parameters")[0] for p in parameters}
+        self.parameters = MappingProxyType(refs)
+
+    def step(self, function: Callable[..., dict] | Step, *reads: Reads, **writes: Ref) -> None:
+        """Apply a step, or the one derived from a function of mechanics.
+
+        Parameters are found by their names, all else is passed: from a scope the step takes what
+        it declares, from a plain dictionary it must read everything.
+        """
+        step = function if isinstance(function, Step) else derive(function)
+        declared = set(dict(step.inputs) if function is step else declared_shapes(function))
+        found = self._found(step.name, declared, reads)
+
+        # of what the step declares, its unwanted outputs may need some that is not there
+        wanted = narrowed(step, {name.rstrip("_") for name in writes})
+        for name, _ in wanted.inputs:
+            if name not in found:
+                raise ValueError(f"{step.name} in {self.name}: nothing gives {name}")
+        for name, ref in writes.items():
+            if ref.array.role == "parameters":
+                raise ValueError(
+                    f"{step.name} in {self.name}: {name} would overwrite the parameter "
+                    f"{ref.array.name}"
+                )
+        self.apply(step, found, **writes)
+
+    def _found(self, step: str, declared: set[str], reads: Iterable[Reads]) -> dict[str, Ref]:
+        """Return what a step reads by name; refuse unknown and double names."""
+        found: dict[str, Ref] = {}
+        for given in reads:
+            scope = isinstance(given, Scope) and not isinstance(given, Instead)
+            for name in declared.intersection(given.keys()) if scope else given.keys():
+                if name not in declared:
+                    raise ValueError(f"{step} in {self.name}: it does not read {name}")
+                if (name in self.parameters) != isinstance(given, Instead):
+                    not_one = "no parameter" if isinstance(given, Instead) else "a parameter"
+                    raise ValueError(f"{step} in {self.name}: {name} is {not_one}")
+                if name in found:
+                    raise ValueError(f"{step} in {self.name}: {name} is given twice")
+                found[name] = given[name]
+        parameters = {name: ref for name, ref in self.parameters.items() if name in declared}
+        return parameters | found
+
+    def store(self, function: Callable[..., dict] | Step, *reads: Reads, **sizes: int) -> Vectors:
+        """Apply a step and return its outputs, new local vectors of the same names."""
+        outputs = {name: self.vector(name, size) for name, size in sizes.items()}
+        self.step(function, *reads, **outputs)
+        return Vectors(outputs)
 
     def vector(self, name: str, size: int) -> Ref:
-        """Declare a local vector that steps find by its name."""
-        self.known[name] = self.array(name, size)[0]
-        return self.known[name]
+        """Declare a local vector."""
+        return self.array(name, size)[0]
+
+    def vectors(self, **sizes: int) -> Vectors:
+        """Declare local vectors."""
+        return Vectors({name: self.vector(name, size) for name, size in sizes.items()})
+
+    def fixed(self, name: str, values: Iterable[Number]) -> Ref:
+        """Return a constant, which is declared once."""
+        values = tuple(values)
+        same = [a for a in self.arrays if (a.name, a.role, a.values) == (name, "constant", values)]
+        return (same[0] if same else self.constant(name, values))[0]
 
     def zero(self, size: int) -> Ref:
         """Return zeros."""
-        name = f"zero_{size}"
-        if name not in self.known:
-            self.known[name] = self.constant(name, [0] * size)[0]
-        return self.known[name]
-
-    def store(self, function: Callable, **sizes: int) -> None:
-        """Apply a step, keeping its outputs in new local vectors of the same names."""
-        self.step(function, **{name: self.vector(name, size) for name, size in sizes.items()})
-
-    def angles(self, i: Index) -> Ref:
-        """Coordinates of segment i."""
-        return self.known["q"].array.part(7 + 2 * i, 2)
-
-    def rates(self, i: Index) -> Ref:
-        """Rates of the coordinates of segment i."""
-        return self.zero(2) if self.at_rest else self.known["v"].array.part(6 + 2 * i, 2)
-
-    def piece(self, i: Index) -> dict[str, Ref]:
-        """What describes the links or the arc of segment i."""
-        return {name: array[i] for name, array in self.pieces.items()} | {"angles": self.angles(i)}
-
-    def sample(self, i: Index) -> dict[str, Ref]:
-        """What describes segment i between two tail points."""
-        return {name: array[i] for name, array in self.samples.items()}
+        return self.fixed(f"zero_{size}", [0] * size)

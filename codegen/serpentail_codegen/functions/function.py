@@ -58,16 +58,8 @@ def assemble(function: Function, tail: Tail, dynamics: str = "composite") -> Pro
     """
     dynamics = dynamics if tail.kind == "articulated" else "composite"
     draft = Draft(function.name, function.doc, tail=tail, dynamics=dynamics)
-    for parameter in struct_parameters(tail):
-        draft.known[parameter.name] = draft.array(
-            parameter.name, parameter.size, role="parameters"
-        )[0]
+    draft.declare_parameters(struct_parameters(tail))
     arrays = {a.name: draft.array(a.name, a.length(tail), role="input") for a in function.inputs}
     arrays |= {a.name: draft.array(a.name, a.length(tail), role="output") for a in function.outputs}
-    draft.known |= {a.name: arrays[a.name][0] for a in function.inputs}
-    if "q" in arrays:
-        draft.known |= {"p": arrays["q"].part(0, 3), "quaternion": arrays["q"].part(3, 4)}
-    if "v" in arrays:
-        draft.known |= {"p_dot": arrays["v"].part(0, 3), "omega": arrays["v"].part(3, 3)}
     function.assemble(draft, arrays)
     return draft.finish()

@@ -1,57 +1,58 @@
-"""The functions a scene can ask for: a tail's sizes go in, the loop nest of each function comes
-out.
-"""
+"""The tail's points and their Jacobians."""
 
-from ..ir.program import Array, Index
-from ..mechanics import loads, rotations
+from ..ir.program import Array, Index, Ref
+from ..mechanics import loads
 from .draft import Draft
+from .layout import OMEGA, TORSO_NV, coordinate
+from .scope import State
 from .sweeps import sweeps
 from .sweeps.sweeps import mechanism
 
 
-def assemble_tail_points(d: Draft, arrays: dict[str, Array]) -> None:
-    """The joints and the tip, or equally spaced samples of every segment."""
-    points, tail = arrays["points"], d.tail
-    d.store(rotations.quaternion_rotation, R=9)
-    mechanism(d).prepare_samples(d)
-    here = sweeps.torso_pose(d, True, d.known["p"])
-    d.copy(points.part(0, 3), here["P"])
-    with d.loop("i", tail.segments) as i, d.loop("j", tail.links) as j:
-        d.step(mechanism(d).pose, here | d.sample(i), **here)
-        d.copy(points.part(3 * (tail.links * i + j + 1), 3), here["P"])
+def assemble_tail_points(draft: Draft, arrays: dict[str, Array]) -> None:
+    """The joints and the tip (Eqs. 14, 15), or equally spaced samples of every segment."""
+    points, tail, state = arrays["points"], draft.tail, State(arrays["q"])
+    R = sweeps.attitude(draft, state)
+    samples = mechanism(draft).prepare_samples(draft, state, None)
+    pose = sweeps.torso_pose(draft, R, state.position)
+    draft.copy(points.part(0, 3), pose.P)
+    with draft.loop("i", tail.segments) as i, draft.loop("j", tail.links) as j:
+        draft.step(mechanism(draft).pose, pose, samples.at(i), **pose)
+        draft.copy(points.part(3 * (tail.links * i + j + 1), 3), pose.P)
 
 
-def assemble_tail_point_jacobians(d: Draft, arrays: dict[str, Array]) -> None:
-    """d(point)/dt = J v for every tail point; arms start at B, so distance from the origin costs no
-    accuracy.
+def assemble_tail_point_jacobians(draft: Draft, arrays: dict[str, Array]) -> None:
+    """d(point)/dt = J v for every tail point (Eqs. A5 to A8); arms start at B, so distance from the
+    origin costs no accuracy.
     """
-    J, tail = arrays["J"], d.tail
-    d.store(rotations.quaternion_rotation, R=9)
-    mechanism(d).prepare_samples(d)
-    S = d.array("S", 12, tail.segments)
-    here = sweeps.torso_pose(d, True)
+    J, tail, state = arrays["J"], draft.tail, State(arrays["q"])
+    R = sweeps.attitude(draft, state)
+    samples = mechanism(draft).prepare_samples(draft, state, None)
+    S = draft.array("S", 12, tail.segments)
+    pose = sweeps.torso_pose(draft, R)
 
-    def row(point: Index, axis: int, first: Index | int, size: int):
+    def rows(point: Index, first: Index | int, size: int) -> dict[str, Ref]:
+        return {f"J_{name}": row(point, axis, first, size) for axis, name in enumerate("xyz")}
+
+    def row(point: Index, axis: int, first: Index | int, size: int) -> Ref:
         return J.part((3 * tail.nv) * point + axis * tail.nv + first, size)
 
-    def base_rows(point: Index):
-        d.fill(J.part((3 * tail.nv) * point, 3 * tail.nv), 0)
+    def base_rows(point: Index) -> None:
+        draft.fill(J.part((3 * tail.nv) * point, 3 * tail.nv), 0)
         for axis in range(3):
-            d.fill(row(point, axis, axis, 1), 1)
-        rows = {f"J_{name}": row(point, axis, 3, 3) for axis, name in enumerate("xyz")}
-        d.step(loads.point_jacobian_base, {"arm": here["P"]}, **rows)
+            draft.fill(row(point, axis, axis, 1), 1)
+        reads = {"R": R, "arm": pose.P}
+        draft.step(loads.point_jacobian_base, reads, **rows(point, OMEGA.start, 3))
 
     base_rows(Index())
-    with d.loop("i", tail.segments) as i:
-        d.fill(S[i], 0)
-        with d.loop("j", tail.links) as j:
-            d.step(mechanism(d).twist, here | d.sample(i), S_=S[i])
-            d.step(mechanism(d).pose, here | d.sample(i), **here)
+    with draft.loop("i", tail.segments) as i:
+        draft.fill(S[i], 0)
+        with draft.loop("j", tail.links) as j:
+            draft.step(mechanism(draft).twist, pose, samples.at(i), S_=S[i])
+            draft.step(mechanism(draft).pose, pose, samples.at(i), **pose)
             point = tail.links * i + j + 1
             base_rows(point)
-            with d.loop("l", i + 1) as segment:
-                rows = {
-                    f"J_{name}": row(point, axis, 6 + 2 * segment, 2)
-                    for axis, name in enumerate("xyz")
-                }
-                d.step(loads.point_jacobian_tail, {"S": S[segment], "arm": here["P"]}, **rows)
+            with draft.loop("l", i + 1) as segment:
+                reads = {"S": S[segment], "arm": pose.P}
+                first = TORSO_NV + coordinate(segment)
+                draft.step(loads.point_jacobian_tail, reads, **rows(point, first, 2))

@@ -1,14 +1,15 @@
-"""Partial feedback linearisation: a draft goes in, the torques that give wanted tail accelerations
-are added to it.
-"""
+"""Partial feedback linearisation: the torques that give the tail wanted accelerations."""
 
 from ..ir.program import Array, padded
 from ..mechanics import rotations, torso, translation
 from .arguments import V_DOT, Q, V
 from .draft import Draft
 from .function import Argument, Function
+from .layout import OMEGA, VELOCITY, block, coordinates, tail_v
+from .scope import Motion, State, Vectors
 from .sweeps import sweeps
 from .sweeps.sweeps import column_of, mechanism
+from .tails.mechanism import Segments
 
 ACCELERATIONS = Argument(
     "accelerations", lambda t: (t.nt,), "wanted accelerations of the tail coordinates (rad/s^2)"
@@ -16,60 +17,62 @@ ACCELERATIONS = Argument(
 TORQUES = Argument("tau", lambda t: (t.nt,), "torques (N m), conjugate to the tail coordinates")
 
 
-def assemble_pfl(d: Draft, arrays: dict[str, Array]) -> None:
+def assemble_pfl(draft: Draft, arrays: dict[str, Array]) -> None:
     """Torques of Eq. 46 without X: six rows of Eq. 1 give the torso's accelerations, the others
     then the torques.
 
     In flight gravity moves torso and tail alike, and torques depend on neither place nor attitude.
     With ``v_dot`` among the arguments it is all accelerations, which need no forward dynamics then.
     """
-    tail, tau = d.tail, arrays["tau"]
-    v_dot = arrays.get("v_dot") or d.array("v_dot", tail.nv)
-    mechanism(d).prepare(d, True)
-    columns, roots = d.array("columns", 12, tail.segments), sweeps.segment_roots(d)
-    sweeps.forward_roots(d, sweeps.torso_pose(d, world=False), roots)
-    sweeps.gather_inertia(d, roots, columns)
-    with d.loop("k", tail.nt) as k:
-        d.copy(v_dot.part(6 + k, 1), arrays["accelerations"].part(k, 1))
-    tail_alone(d, v_dot, tau)
-    free_torso(d)
-    with d.loop("k", tail.nt) as k:
-        d.step(
-            translation.coupling_torque, {"column": column_of(columns, k)}, torque_=tau.part(k, 1)
-        )
+    tail, tau, state = draft.tail, arrays["tau"], State(arrays["q"], arrays["v"])
+    v_dot = arrays.get("v_dot") or draft.array("v_dot", tail.nv)
+
+    # composite inertia, and the momentum columns of the tail coordinates
+    segments = mechanism(draft).prepare(draft, state, True)
+    columns, roots = draft.array("columns", 12, tail.segments), sweeps.segment_roots(draft)
+    sweeps.forward_roots(draft, segments, sweeps.torso_pose(draft), roots)
+    composite = sweeps.gather_inertia(draft, segments, roots, columns)
+
+    # torques of a torso that does not accelerate, then how it does, and what that adds
+    with draft.loop("k", tail.nt) as k:
+        draft.copy(tail_v(v_dot, k), arrays["accelerations"].part(k, 1))
+    wrench = tail_alone(draft, segments, v_dot, tau)
+    motion = free_torso(draft, composite, wrench)
+    with draft.loop("k", tail.nt) as k:
+        column = {"column": column_of(columns, k)}
+        draft.step(translation.coupling_torque, motion, column, torque_=tau.part(k, 1))
     if "v_dot" in arrays:
-        d.store(rotations.quaternion_rotation, R=9)
-        d.step(rotations.world_acceleration, p_ddot=v_dot.part(0, 3))
-        d.copy(v_dot.part(3, 3), d.known["w_dot"])
+        reads = {"R": sweeps.attitude(draft, state), "a": motion["a"]}
+        draft.step(rotations.world_acceleration, reads, p_ddot=block(v_dot, VELOCITY))
+        draft.copy(block(v_dot, OMEGA), motion["w_dot"])
 
 
-def tail_alone(d: Draft, v_dot: Array, tau: Array) -> None:
+def tail_alone(draft: Draft, segments: Segments, v_dot: Array, tau: Array) -> Vectors:
     """``force, moment`` at B, and torques, of the tail that ``v_dot`` moves while the torso does
     not accelerate.
     """
-    d.known |= {"w": d.known["omega"], "w_dot": d.zero(3), "a": d.zero(3)}
-    wrench = sweeps.forward_wrenches(d, v_dot)
-    sweeps.gather_wrenches(d, wrench, lambda i: tau.part(2 * i, 2))
-    d.store(torso.torso_wrench, force=3, moment=3)
+    motion = Motion(segments.state.omega, draft.zero(3), draft.zero(3))
+    wrenches = sweeps.forward_wrenches(draft, segments, motion, v_dot)
+    total = sweeps.gather_wrenches(draft, segments, wrenches, lambda i: coordinates(tau, i))
+    return draft.store(torso.torso_wrench, motion, total, force=3, moment=3)
 
 
-def free_torso(d: Draft) -> None:
+def free_torso(draft: Draft, composite: Vectors, wrench: Vectors) -> Vectors:
     """``w_dot`` and ``a`` of the torso that balance ``force, moment``: translation eliminated, then
     LDL^T.
     """
-    A, w_dot = d.array("A", padded(3), 3), d.vector("w_dot", 3)
-    d.known |= dict.fromkeys(["load_force", "load_moment"], d.zero(3))
+    A, w_dot = draft.array("A", padded(3), 3), draft.vectors(w_dot=3)
+    unloaded = dict.fromkeys(["load_force", "load_moment"], draft.zero(3))
     rows = {f"A_{r}": A.part(padded(3) * r, r + 1) for r in range(3)}
-    d.step(
-        translation.without_translation,
-        inverse_mass=d.vector("inverse_mass", 1),
-        com=d.vector("com", 3),
-        **rows,
-    )
-    d.step(translation.rotational_load, net=d.vector("net", 3), rhs=w_dot)
-    d.factor(A, 3)
-    d.solve(A, w_dot)
-    d.store(translation.free_acceleration, a=3)
+    center = draft.vectors(inverse_mass=1, com=3)
+    draft.step(translation.without_translation, composite, **center, **rows)
+    net = draft.vectors(net=3)
+    reads = center.only("com"), wrench, unloaded
+    draft.step(translation.rotational_load, *reads, rhs=w_dot["w_dot"], **net)
+    draft.factor(A, 3)
+    draft.solve(A, w_dot["w_dot"])
+    free = draft.store(translation.free_acceleration, center, net, w_dot, a=3)
+    return Vectors({**w_dot, **free})
 
 
 WANTED = (Q, V, ACCELERATIONS)

@@ -1,18 +1,17 @@
-"""Drafts: a tail's sizes go in; a builder comes out that finds the vectors its steps read by their
-names.
-"""
+"""The sizes that decide what a model's functions look like."""
 
 from dataclasses import dataclass
 from math import pi
 
+from .layout import Layout
+
 
 @dataclass(frozen=True)
-class Tail:
+class Tail(Layout):
     """Sizes of a tail of m segments: n links each, or a continuum with n samples each, bent by
     bend_range at most.
     """
 
-    segments: int
     links: int
     kind: str = "articulated"
     bend_range: float = 2 * pi
@@ -24,21 +23,6 @@ class Tail:
     def total(self) -> int:
         """N = m n links or samples: tail points but the first."""
         return self.segments * self.links
-
-    @property
-    def nt(self) -> int:
-        """Tail coordinates."""
-        return 2 * self.segments
-
-    @property
-    def nq(self) -> int:
-        """Scalars of a configuration."""
-        return 7 + self.nt
-
-    @property
-    def nv(self) -> int:
-        """Scalars of a velocity."""
-        return 6 + self.nt
 
     @property
     def groups(self) -> dict[str, int]:

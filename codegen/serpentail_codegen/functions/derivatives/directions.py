@@ -1,8 +1,8 @@
-"""Directions of differentiation: a tail's sizes go in; which lane stands for which, and where its
-results belong.
+"""Which lane of a wide vector stands for which direction of differentiation, and where its results
+belong.
 
-Derivatives with respect to q are in the tangent space: position of B, a turn of the torso in body
-axes, tail coordinates; the columns of such a matrix are those of a velocity v.
+Derivatives with respect to q are in the tangent space: position of B, a rotation of the torso in
+body axes, tail coordinates; the columns of such a matrix are those of a velocity v.
 """
 
 from dataclasses import dataclass
@@ -10,10 +10,21 @@ from dataclasses import dataclass
 from ...ir.program import Array, Index, Loop
 from ...mechanics import rotations
 from ..draft import Draft
+from ..layout import (
+    OMEGA,
+    PER_SEGMENT,
+    QUATERNION,
+    TORSO_NV,
+    VELOCITY,
+    block,
+    coordinate,
+    segment_q,
+    segment_v,
+)
 from ..tail import Tail
 
-# directions of the torso: first column in the tangent of q or v, and whether it is q
-TORSO = {"turn": (3, True), "p_dot": (0, False), "omega": (3, False)}
+# directions of the torso: where they are in the tangent of q or v, and whether it is q
+TORSO = {"turn": (OMEGA, True), "p_dot": (VELOCITY, False), "omega": (OMEGA, False)}
 
 
 @dataclass(frozen=True)
@@ -34,7 +45,7 @@ class Directions:
     @property
     def each(self) -> int:
         """Lanes of one segment."""
-        return 4 if self.rates else 2
+        return (2 if self.rates else 1) * PER_SEGMENT
 
     @property
     def count(self) -> int:
@@ -58,40 +69,43 @@ class Directions:
 
     def of_v(self, i: Index) -> Index:
         """First lane of the rates of segment i."""
-        return self.each * i + (self.base + 2)
+        return self.each * i + (self.base + PER_SEGMENT)
 
-    def tangents(self, d: Draft) -> dict[str, Array]:
-        """Declare ``d_q`` and ``d_v`` and store the directions in them as rows; the quaternion
-        known is a unit one.
+    def tangents(self, draft: Draft, q: Array) -> dict[str, Array]:
+        """Declare ``d_q`` and ``d_v`` and store the directions in them as rows; q has a unit
+        quaternion.
         """
         label = "_".join(self.torso) or "tail"
-        d_q = d.wide(f"d_q_{label}", d.tail.nq, self.count)
-        d_v = d.wide(f"d_v_{label}", d.tail.nv, self.count) if self.rates else None
+        d_q = draft.wide(f"d_q_{label}", self.tail.nq, self.count)
+        tangents = {"d_q": d_q}
+        if self.rates:
+            tangents["d_v"] = draft.wide(f"d_v_{label}", self.tail.nv, self.count)
         for lane, name in enumerate(self.torso):
             if name == "turn":
-                turn = d.wide(f"d_{label}", 3, self.count)
-                d.unit(turn[0], 3 * lane)
-                d.step(rotations.turned_quaternion, {"turn": turn[0]}, rate=d_q.part(3, 4))
+                turn = draft.wide(f"d_{label}", 3, self.count)[0]
+                draft.unit(turn, 3 * lane)
+                reads = {"quaternion": block(q, QUATERNION), "turn": turn}
+                draft.step(rotations.turned_quaternion, reads, rate=block(d_q, QUATERNION))
             else:
-                d.unit(d_v.part(TORSO[name][0], 3), 3 * lane)
-        with d.loop("i", self.tail.segments) as i:
-            d.unit(d_q.part(7 + 2 * i, 2), self.of_q(i))
+                draft.unit(block(tangents["d_v"], TORSO[name][0]), 3 * lane)
+        with draft.loop("i", self.tail.segments) as i:
+            draft.unit(segment_q(d_q, i), self.of_q(i))
             if self.rates:
-                d.unit(d_v.part(6 + 2 * i, 2), self.of_v(i))
-        return {"d_q": d_q, "d_v": d_v} if self.rates else {"d_q": d_q}
+                draft.unit(segment_v(tangents["d_v"], i), self.of_v(i))
+        return tangents
 
-    def spread(self, d: Draft, source: Array, of_q: Array, of_v: Array | None = None) -> None:
+    def spread(self, draft: Draft, source: Array, of_q: Array, of_v: Array | None = None) -> None:
         """Copy wide rows to the columns of matrices (rows, nv)."""
         nv = self.tail.nv
         for target in (of_q, of_v) if of_v else (of_q,):
-            d.fill(target.part(0, target.length), 0)
-        with d.loop("row", source.length) as r:
+            draft.fill(target.part(0, target.length), 0)
+        with draft.loop("row", source.length) as r:
             for lane, name in enumerate(self.torso):
-                column, is_q = TORSO[name]
-                d.copy(
-                    (of_q if is_q else of_v).part(nv * r + column, 3), source.lane(r, 3 * lane, 3)
-                )
-            with d.loop("i", self.tail.segments) as i:
-                d.copy(of_q.part(nv * r + 2 * i + 6, 2), source.lane(r, self.of_q(i), 2))
-                if self.rates:
-                    d.copy(of_v.part(nv * r + 2 * i + 6, 2), source.lane(r, self.of_v(i), 2))
+                where, is_q = TORSO[name]
+                target = of_q if is_q or not of_v else of_v
+                draft.copy(target.part(nv * r + where.start, 3), source.lane(r, 3 * lane, 3))
+            with draft.loop("i", self.tail.segments) as i:
+                column = nv * r + coordinate(i) + TORSO_NV
+                draft.copy(of_q.part(column, 2), source.lane(r, self.of_q(i), PER_SEGMENT))
+                if of_v:
+                    draft.copy(of_v.part(column, 2), source.lane(r, self.of_v(i), PER_SEGMENT))

@@ -1,5 +1,4 @@
-"""Exact first derivatives: a tail's sizes go in, loop nests of Jacobians and of products with them
-come out.
+"""Exact first derivatives: Jacobians, and products with them.
 
 Nothing depends on the position of B or on its velocity.
 """
@@ -10,193 +9,156 @@ from ...autodiff.forward import tangent_program
 from ...autodiff.reverse import adjoint_program
 from ...ir.program import Array, Index, Ref
 from ...mechanics import rotations, torso, translation
-from ..arguments import FORCE, V_DOT, Q, V
 from ..draft import Draft
-from ..dynamics import Balance, Loads, assemble_forward_dynamics
-from ..function import Argument, Function, assemble, struct_parameters
+from ..dynamics import FactoredDynamics, Loads, assemble_forward_dynamics
+from ..function import Function, assemble, struct_parameters
+from ..layout import OMEGA, POSITION, QUATERNION, VELOCITY, block, tail_v
 from ..plain import FUNCTIONS
-from ..sweeps import sweeps
-from ..sweeps.sweeps import mechanism
+from ..scope import Vectors
 from ..tail import Tail
+from .differentiated import CORE, VIRTUAL_POWER
 from .directions import Directions
-
-MULTIPLIER = Argument("multiplier", lambda t: (t.nv,), "weights lambda of the rows")
-POWER = Argument("power", lambda t: (1,), "lambda^T (H v_dot + C)")
-
-
-# ---- the functions that are differentiated -------------------------------------------------------
-
-
-def assemble_core(d: Draft, arrays: dict[str, Array]) -> None:
-    """H v_dot + C in torso axes throughout, v_dot[0:3] being R^T (p_b_ddot + g z): no attitude, no
-    gravity.
-    """
-    v_dot, force = arrays["v_dot"], arrays["force"]
-    mechanism(d).prepare(d)
-    d.known |= {"w": d.known["omega"], "w_dot": v_dot.part(3, 3), "a": v_dot.part(0, 3)}
-    wrench = sweeps.forward_wrenches(d, v_dot)
-    sweeps.gather_wrenches(d, wrench, lambda i: force.part(6 + 2 * i, 2))
-    d.step(torso.torso_wrench, force=force.part(0, 3), moment=force.part(3, 3))
-
-
-def assemble_virtual_power(d: Draft, arrays: dict[str, Array]) -> None:
-    """lambda^T (H v_dot + C) as one sum over the links, from the torso to the tip."""
-    v_dot, multiplier = arrays["v_dot"], arrays["multiplier"]
-    d.store(rotations.quaternion_rotation, R=9)
-    mechanism(d).prepare(d)
-    d.known |= {
-        "w": d.known["omega"],
-        "w_dot": v_dot.part(3, 3),
-        "w_virtual": multiplier.part(3, 3),
-    }
-    d.known["p_ddot"] = v_dot.part(0, 3)
-    d.store(torso.torso_acceleration, a=3)
-    d.step(torso.torso_velocity, {"p_dot": multiplier.part(0, 3)}, u=d.vector("u_virtual", 3))
-    sweeps.virtual_power(d, arrays["power"][0], multiplier, v_dot)
-
-
-def assemble_inertia(d: Draft, arrays: dict[str, Array]) -> None:
-    """The core at rest: H v_dot in torso axes."""
-    d.at_rest, d.known["omega"] = True, d.zero(3)
-    assemble_core(d, arrays)
-
-
-CORE = Function("core", "H v_dot + C in torso axes", (Q, V, V_DOT), (FORCE,), assemble_core)
-INERTIA = Function("inertia", "H v_dot in torso axes", (Q, V_DOT), (FORCE,), assemble_inertia)
-VIRTUAL_POWER = Function(
-    "virtual_power",
-    "lambda^T (H v_dot + C)",
-    (Q, V, V_DOT, MULTIPLIER),
-    (POWER,),
-    assemble_virtual_power,
-)
-
 
 # ---- Jacobians -----------------------------------------------------------------------------------
 
 
-def with_unit_quaternion(d: Draft, q: Array) -> Array:
-    """Return q with a unit quaternion, which turns are taken at: of any other, squares may
+def with_unit_quaternion(draft: Draft, q: Array) -> Array:
+    """Return q with a unit quaternion, which rotations are taken at: of any other, squares may
     overflow.
     """
-    unit = d.array("q_unit", d.tail.nq)
-    d.copy(unit.part(0, 3), q.part(0, 3))
-    d.step(rotations.unit_quaternion, unit=unit.part(3, 4))
-    d.copy(unit.part(7, d.tail.nt), q.part(7, d.tail.nt))
-    d.known["quaternion"] = unit.part(3, 4)
+    unit = draft.array("q_unit", draft.tail.nq)
+    draft.copy(block(unit, POSITION), block(q, POSITION))
+    quaternion = {"quaternion": block(q, QUATERNION)}
+    draft.step(rotations.unit_quaternion, quaternion, unit=block(unit, QUATERNION))
+    draft.copy(draft.tail.all_q(unit), draft.tail.all_q(q))
     return unit
 
 
-def assemble_inverse_dynamics_derivatives(d: Draft, arrays: dict[str, Array]) -> None:
+def assemble_inverse_dynamics_derivatives(draft: Draft, arrays: dict[str, Array]) -> None:
     """Tangents of H v_dot + C along all directions at once."""
-    directions = Directions(d.tail, ("turn", "omega"))
-    inner = tangent_program(
-        assemble(FUNCTIONS["inverse_dynamics"], d.tail),
-        ("q", "v"),
-        directions.count,
-        directions.outward,
-    )
-    rows = d.wide("rows", d.tail.nv, directions.count)
-    given = {"q": with_unit_quaternion(d, arrays["q"]), "v": arrays["v"], "v_dot": arrays["v_dot"]}
-    d.call(inner, d_force=rows, **given, **directions.tangents(d))
-    directions.spread(d, rows, arrays["dq"], arrays["dv"])
+    directions = Directions(draft.tail, ("turn", "omega"))
+    function = assemble(FUNCTIONS["inverse_dynamics"], draft.tail)
+    inner = tangent_program(function, ("q", "v"), directions.count, directions.outward)
+    rows = draft.wide("rows", draft.tail.nv, directions.count)
+    q = with_unit_quaternion(draft, arrays["q"])
+    given = {"q": q, "v": arrays["v"], "v_dot": arrays["v_dot"]}
+    draft.call(inner, d_force=rows, **given, **directions.tangents(draft, q))
+    directions.spread(draft, rows, arrays["dq"], arrays["dv"])
 
 
-def forward_dynamics_first(d: Draft, arrays: dict[str, Array]) -> tuple[Balance, Array]:
+def forward_dynamics_first(
+    draft: Draft, arrays: dict[str, Array]
+) -> tuple[FactoredDynamics, Array]:
     """Forward dynamics, then its acceleration with R^T (p_b_ddot + g z) in place of p_b_ddot."""
-    v_dot, body = d.array("acceleration", d.tail.nv), d.array("body_acceleration", d.tail.nv)
-    balance = assemble_forward_dynamics(d, arrays | {"v_dot": v_dot})
-    d.step(torso.torso_acceleration, {"p_ddot": v_dot.part(0, 3)}, a=body.part(0, 3))
-    d.copy(body.part(3, d.tail.nv - 3), v_dot.part(3, d.tail.nv - 3))
-    return balance, body
+    nv = draft.tail.nv
+    v_dot, body = draft.array("acceleration", nv), draft.array("body_acceleration", nv)
+    factored = assemble_forward_dynamics(draft, arrays | {"v_dot": v_dot})
+    reads = {"R": factored.R, "p_ddot": block(v_dot, VELOCITY)}
+    draft.step(torso.torso_acceleration, reads, a=block(body, VELOCITY))
+    draft.copy(body.part(OMEGA.start, nv - 3), v_dot.part(OMEGA.start, nv - 3))
+    return factored, body
 
 
-def loads(d: Draft, **at_torso: Ref) -> dict[str, Ref]:
+def loads_at_torso(draft: Draft, **loads: Ref) -> Vectors:
     """Loads at the torso of a system H x = loads; what is not named is zero."""
-    zeros = dict.fromkeys(("force", "moment", "load_force", "load_moment"), d.zero(3))
-    return zeros | {"gravity": d.zero(1)} | at_torso
+    names = ("force", "moment", "load_force", "load_moment")
+    return Vectors(dict.fromkeys(names, draft.zero(3)) | loads)
 
 
-def less(
-    d: Draft, rows: Array, tau: Callable[[Index], Ref] | None = None, **at_torso: Ref
+def weightless(draft: Draft, tau: Callable[[Index], Ref] | None, **loads: Ref) -> Loads:
+    """Loads of a system H x = loads without gravity; what is not named is zero."""
+    return Loads(loads_at_torso(draft, **loads), tau=tau, gravity=draft.zero(1))
+
+
+def minus(
+    draft: Draft,
+    rows: Array,
+    tau: Callable[[Index], Ref] | None = None,
+    gravity: Ref | None = None,
 ) -> Loads:
     """Loads of H x = tau - rows, rows being a change of H v_dot + C in torso axes."""
-    at_torso = loads(d, force=rows.part(0, 3), moment=rows.part(3, 3), **at_torso)
-    return Loads(at_torso, lambda k: rows.part(6 + k, 1), tau)
+    change = {"force": block(rows, VELOCITY), "moment": block(rows, OMEGA)}
+    at_torso, none = loads_at_torso(draft, **change), draft.zero(1)
+    return Loads(at_torso, lambda k: tail_v(rows, k), tau, gravity or none)
 
 
-def assemble_forward_dynamics_derivatives(d: Draft, arrays: dict[str, Array]) -> None:
+def assemble_forward_dynamics_derivatives(draft: Draft, arrays: dict[str, Array]) -> None:
     """-H^-1 times the tangents of H v_dot + C at fixed v_dot; with respect to tau, columns of
     H^-1.
     """
-    tail, nv = d.tail, d.tail.nv
-    balance, body = forward_dynamics_first(d, arrays)
+    tail, nv = draft.tail, draft.tail.nv
+    factored, body = forward_dynamics_first(draft, arrays)
     directions = Directions(tail, ("omega",))
     inner = tangent_program(assemble(CORE, tail), ("q", "v"), directions.count, directions.outward)
-    rows, x = d.wide("rows", nv, directions.count), d.wide("x", nv, directions.count)
+    rows, x = draft.wide("rows", nv, directions.count), draft.wide("x", nv, directions.count)
     given = {name: arrays[name] for name in ("q", "v")}
-    d.call(inner, d_force=rows, v_dot=body, **given, **directions.tangents(d))
-    balance.solve(d, less(d, rows), x)
-    directions.spread(d, x, arrays["dq"], arrays["dv"])
-    turned = {f"row_{r}": arrays["dq"].part(nv * r + 3, 3) for r in range(3)}
-    d.step(translation.turned_acceleration, {"a": body.part(0, 3)}, **turned)
-    torques(d, balance, arrays["dtau"])
+    tangents = directions.tangents(draft, arrays["q"])
+    draft.call(inner, d_force=rows, v_dot=body, **given, **tangents)
+    factored.solve(draft, minus(draft, rows), x)
+    directions.spread(draft, x, arrays["dq"], arrays["dv"])
+
+    # how p_b_ddot moves with a rotation of the torso
+    turned = {f"row_{r}": arrays["dq"].part(nv * r + OMEGA.start, 3) for r in range(3)}
+    reads = {"R": factored.R, "a": block(body, VELOCITY)}
+    draft.step(translation.turned_acceleration, reads, **turned)
+    torque_columns(draft, factored, arrays["dtau"])
 
 
-def torques(d: Draft, balance: Balance, dtau: Array) -> None:
+def torque_columns(draft: Draft, factored: FactoredDynamics, dtau: Array) -> None:
     """Columns of H^-1 that belong to tau."""
-    nt, nv = d.tail.nt, d.tail.nv
-    unit, x = d.wide("unit_torque", nt, nt), d.wide("x_torque", nv, nt)
-    d.unit(unit.part(0, nt), 0)
-    balance.solve(d, Loads(loads(d), tau=lambda k: unit.part(k, 1)), x)
-    with d.loop("row", nv) as r:
-        d.copy(dtau.part(nt * r, nt), x.lane(r, 0, nt))
+    nt, nv = draft.tail.nt, draft.tail.nv
+    unit, x = draft.wide("unit_torque", nt, nt), draft.wide("x_torque", nv, nt)
+    draft.unit(unit.part(0, nt), 0)
+    factored.solve(draft, weightless(draft, lambda k: unit.part(k, 1)), x)
+    with draft.loop("row", nv) as r:
+        draft.copy(dtau.part(nt * r, nt), x.lane(r, 0, nt))
 
 
-def assemble_inverse_dynamics_parameter_derivatives(d: Draft, arrays: dict[str, Array]) -> None:
+# ---- with respect to parameters ------------------------------------------------------------------
+
+
+def assemble_inverse_dynamics_parameter_derivatives(draft: Draft, arrays: dict[str, Array]) -> None:
     """Tangents of H v_dot + C with respect to every parameter."""
-    rows = parameter_tangents(
-        d, FUNCTIONS["inverse_dynamics"], {n: arrays[n] for n in ("q", "v", "v_dot")}
-    )
-    spread_parameters(d, rows, arrays["dparameters"])
+    given = {name: arrays[name] for name in ("q", "v", "v_dot")}
+    rows = parameter_tangents(draft, FUNCTIONS["inverse_dynamics"], given)
+    spread_parameters(draft, rows, arrays["dparameters"])
 
 
-def assemble_forward_dynamics_parameter_derivatives(d: Draft, arrays: dict[str, Array]) -> None:
+def assemble_forward_dynamics_parameter_derivatives(draft: Draft, arrays: dict[str, Array]) -> None:
     """-H^-1 times the tangents of H v_dot + C with respect to every parameter, at fixed v_dot."""
-    count = parameter_count(d.tail)
-    balance, body = forward_dynamics_first(d, arrays)
-    rows, x = (
-        parameter_tangents(d, CORE, {"q": arrays["q"], "v": arrays["v"], "v_dot": body}),
-        d.wide("x", d.tail.nv, count),
-    )
-    gravity = d.wide("d_gravity_z", 1, count)[0]
-    d.unit(gravity, 0)  # it is the first parameter: p_b_ddot falls by as much
-    balance.solve(d, less(d, rows, gravity=gravity), x)
-    spread_parameters(d, x, arrays["dparameters"])
+    count = parameter_count(draft.tail)
+    factored, body = forward_dynamics_first(draft, arrays)
+    given = {"q": arrays["q"], "v": arrays["v"], "v_dot": body}
+    rows = parameter_tangents(draft, CORE, given)
+    x = draft.wide("x", draft.tail.nv, count)
+    gravity = draft.wide("d_gravity_z", 1, count)[0]
+    draft.unit(gravity, 0)  # it is the first parameter: p_b_ddot falls by as much
+    factored.solve(draft, minus(draft, rows, gravity=gravity), x)
+    spread_parameters(draft, x, arrays["dparameters"])
 
 
-def parameter_tangents(d: Draft, function: Function, given: dict[str, Array]) -> Array:
+def parameter_tangents(draft: Draft, function: Function, given: dict[str, Array]) -> Array:
     """Return the tangents of a force with respect to every parameter, a lane for each number of the
     struct.
     """
-    count, lane, tangents = parameter_count(d.tail), 0, {}
-    names = [p.name for p in struct_parameters(d.tail)]
-    inner = tangent_program(assemble(function, d.tail), names, count)
-    for p in struct_parameters(d.tail):
+    count, lane, tangents = parameter_count(draft.tail), 0, {}
+    names = [p.name for p in struct_parameters(draft.tail)]
+    inner = tangent_program(assemble(function, draft.tail), names, count)
+    for p in struct_parameters(draft.tail):
         if any(a.name == f"d_{p.name}" for a in inner.arrays):
-            tangents[f"d_{p.name}"] = d.wide(f"d_{p.name}", p.size, count)
-            d.unit(tangents[f"d_{p.name}"][0], lane)
+            tangents[f"d_{p.name}"] = draft.wide(f"d_{p.name}", p.size, count)
+            draft.unit(tangents[f"d_{p.name}"][0], lane)
         lane += p.size
-    rows = d.wide("rows", d.tail.nv, count)
-    d.call(inner, d_force=rows, **given, **tangents)
+    rows = draft.wide("rows", draft.tail.nv, count)
+    draft.call(inner, d_force=rows, **given, **tangents)
     return rows
 
 
-def spread_parameters(d: Draft, source: Array, dparameters: Array) -> None:
+def spread_parameters(draft: Draft, source: Array, dparameters: Array) -> None:
     """Copy rows to a matrix with a column for each number of the parameter struct."""
-    count = parameter_count(d.tail)
-    with d.loop("row", d.tail.nv) as row:
-        d.copy(dparameters.part(count * row, count), source.lane(row, 0, count))
+    count = parameter_count(draft.tail)
+    with draft.loop("row", draft.tail.nv) as row:
+        draft.copy(dparameters.part(count * row, count), source.lane(row, 0, count))
 
 
 def parameter_count(tail: Tail) -> int:
@@ -207,84 +169,93 @@ def parameter_count(tail: Tail) -> int:
 # ---- products with Jacobians ---------------------------------------------------------------------
 
 
-def assemble_forward_dynamics_jvp(d: Draft, arrays: dict[str, Array]) -> None:
+def assemble_forward_dynamics_jvp(draft: Draft, arrays: dict[str, Array]) -> None:
     """Directional derivative of v_dot."""
-    nv = d.tail.nv
-    balance, body = forward_dynamics_first(d, arrays)
-    d_q, rows, x = d.array("d_q", d.tail.nq), d.array("rows", nv), arrays["dv_dot"]
-    d.copy(d_q.part(7, d.tail.nt), arrays["dq"].part(6, d.tail.nt))
-    inner = tangent_program(assemble(CORE, d.tail), ("q", "v"))
-    d.call(inner, q=arrays["q"], v=arrays["v"], v_dot=body, d_q=d_q, d_v=arrays["dv"], d_force=rows)
-    balance.solve(d, less(d, rows, lambda k: arrays["dtau"].part(k, 1)), x)
-    reads = {"a": body.part(0, 3), "turn": arrays["dq"].part(3, 3), "p_ddot": x.part(0, 3)}
-    d.step(translation.turning_acceleration, reads, p_ddot=x.part(0, 3))
+    tail = draft.tail
+    factored, body = forward_dynamics_first(draft, arrays)
+    d_q, rows, x = draft.array("d_q", tail.nq), draft.array("rows", tail.nv), arrays["dv_dot"]
+    draft.copy(tail.all_q(d_q), tail.all_v(arrays["dq"]))
+    inner = tangent_program(assemble(CORE, tail), ("q", "v"))
+    given = {"q": arrays["q"], "v": arrays["v"], "v_dot": body}
+    draft.call(inner, **given, d_q=d_q, d_v=arrays["dv"], d_force=rows)
+    factored.solve(draft, minus(draft, rows, lambda k: arrays["dtau"].part(k, 1)), x)
+
+    # how p_b_ddot moves with a rotation of the torso
+    p_ddot = block(x, VELOCITY)
+    reads = {"a": block(body, VELOCITY), "turn": block(arrays["dq"], OMEGA), "p_ddot": p_ddot}
+    draft.step(translation.turning_acceleration, {"R": factored.R}, reads, p_ddot=p_ddot)
 
 
-def assemble_inverse_dynamics_vjp(d: Draft, arrays: dict[str, Array]) -> None:
+def assemble_inverse_dynamics_vjp(draft: Draft, arrays: dict[str, Array]) -> None:
     """Gradient of lambda^T (H v_dot + C), by one way out along the tail and one back."""
-    inner = adjoint_program(assemble(VIRTUAL_POWER, d.tail), ("q", "v", "v_dot"), ("power",))
-    one, gradient = d.constant("one", [1]), d.array("gradient", d.tail.nq)
-    q = with_unit_quaternion(d, arrays["q"])
+    inner = adjoint_program(assemble(VIRTUAL_POWER, draft.tail), ("q", "v", "v_dot"), ("power",))
+    one, gradient = draft.constant("one", [1]), draft.array("gradient", draft.tail.nq)
+    q = with_unit_quaternion(draft, arrays["q"])
     given = {"q": q} | {name: arrays[name] for name in ("v", "v_dot", "multiplier")}
-    d.call(inner, b_power=one, b_q=gradient, b_v=arrays["dv"], b_v_dot=arrays["dv_dot"], **given)
-    in_tangent_space(d, gradient, arrays["dq"])
+    gradients = {"b_q": gradient, "b_v": arrays["dv"], "b_v_dot": arrays["dv_dot"]}
+    draft.call(inner, b_power=one, **gradients, **given)
+    in_tangent_space(draft, q, gradient, arrays["dq"])
 
 
-def in_tangent_space(d: Draft, gradient: Array, dq: Array) -> None:
-    """Turn a gradient with respect to the numbers of q into one with respect to a velocity's
+def in_tangent_space(draft: Draft, q: Array, gradient: Array, dq: Array) -> None:
+    """Make of a gradient with respect to the numbers of q one with respect to a velocity's
     directions.
     """
-    d.copy(dq.part(0, 3), gradient.part(0, 3))
-    d.step(rotations.turn_gradient, {"gradient": gradient.part(3, 4)}, turn=dq.part(3, 3))
-    d.copy(dq.part(6, d.tail.nt), gradient.part(7, d.tail.nt))
+    draft.copy(block(dq, POSITION), block(gradient, POSITION))
+    reads = {"quaternion": block(q, QUATERNION), "gradient": block(gradient, QUATERNION)}
+    draft.step(rotations.turn_gradient, reads, turn=block(dq, OMEGA))
+    draft.copy(draft.tail.all_v(dq), draft.tail.all_q(gradient))
 
 
-def assemble_forward_dynamics_vjp(d: Draft, arrays: dict[str, Array]) -> None:
+def assemble_forward_dynamics_vjp(draft: Draft, arrays: dict[str, Array]) -> None:
     """lambda^T times the Jacobian of v_dot: mu = H^-1 lambda, then minus the gradient of mu^T (H
     v_dot + C).
     """
-    tail, multiplier = d.tail, arrays["multiplier"]
-    v_dot, mu = (
-        d.array("acceleration", tail.nv),
-        d.array("response", tail.nv),
-    )  # "mu" is a parameter of contact
-    balance = assemble_forward_dynamics(d, arrays | {"v_dot": v_dot})
-    d.step(torso.torso_velocity, {"p_dot": multiplier.part(0, 3)}, u=d.vector("pull", 3))
-    at_torso = loads(d, load_force=d.known["pull"], load_moment=multiplier.part(3, 3))
-    balance.solve(d, Loads(at_torso, tau=lambda k: multiplier.part(6 + k, 1)), mu)
+    tail, multiplier = draft.tail, arrays["multiplier"]
+    v_dot, mu = draft.array("acceleration", tail.nv), draft.array("response", tail.nv)
+    factored = assemble_forward_dynamics(draft, arrays | {"v_dot": v_dot})
+
+    # mu = H^-1 lambda: the multiplier is a load at B and torques
+    pull, p_dot = draft.vector("pull", 3), block(multiplier, VELOCITY)
+    draft.step(torso.torso_velocity, {"R": factored.R, "p_dot": p_dot}, u=pull)
+    load = {"load_force": pull, "load_moment": block(multiplier, OMEGA)}
+    factored.solve(draft, weightless(draft, lambda k: tail_v(multiplier, k), **load), mu)
+
+    # minus the gradient of mu^T (H v_dot + C)
     inner = adjoint_program(assemble(VIRTUAL_POWER, tail), ("q", "v"), ("power",))
-    minus, gradient = d.constant("minus", [-1]), d.array("gradient", tail.nq)
-    q = with_unit_quaternion(d, arrays["q"])
+    weight, gradient = draft.constant("minus", [-1]), draft.array("gradient", tail.nq)
+    q = with_unit_quaternion(draft, arrays["q"])
     given = {"q": q, "v": arrays["v"], "v_dot": v_dot, "multiplier": mu}
-    d.call(inner, b_power=minus, b_q=gradient, b_v=arrays["dv"], **given)
-    in_tangent_space(d, gradient, arrays["dq"])
-    d.copy(arrays["dtau"].part(0, tail.nt), mu.part(6, tail.nt))
+    draft.call(inner, b_power=weight, b_q=gradient, b_v=arrays["dv"], **given)
+    in_tangent_space(draft, q, gradient, arrays["dq"])
+    draft.copy(arrays["dtau"].part(0, tail.nt), tail.all_v(mu))
 
 
 # ---- energy and momentum -------------------------------------------------------------------------
 
 
-def assemble_energy_derivatives(d: Draft, arrays: dict[str, Array]) -> None:
+def assemble_energy_derivatives(draft: Draft, arrays: dict[str, Array]) -> None:
     """Gradients of kinetic and potential energy."""
-    q = with_unit_quaternion(d, arrays["q"])
+    q = with_unit_quaternion(draft, arrays["q"])
     for name, wanted in (("kinetic", ("q", "v")), ("potential", ("q",))):
-        inner = adjoint_program(assemble(FUNCTIONS["energy"], d.tail), wanted, (name,))
-        gradient = d.array(f"{name}_gradient", d.tail.nq)
-        given = {"q": q, "v": arrays["v"]} | (
-            {"b_v": arrays["kinetic_dv"]} if "v" in wanted else {}
-        )
-        weight = {f"b_{name}": d.constant(f"one_{name}", [1]), "b_q": gradient}
-        d.call(inner, **given, **weight)
-        in_tangent_space(d, gradient, arrays[f"{name}_dq"])
+        inner = adjoint_program(assemble(FUNCTIONS["energy"], draft.tail), wanted, (name,))
+        gradient = draft.array(f"{name}_gradient", draft.tail.nq)
+        bound = {"q": q, "v": arrays["v"], "b_q": gradient}
+        if "v" in wanted:
+            bound["b_v"] = arrays["kinetic_dv"]
+        bound[f"b_{name}"] = draft.constant(f"one_{name}", [1])
+        draft.call(inner, **bound)
+        in_tangent_space(draft, q, gradient, arrays[f"{name}_dq"])
 
 
-def assemble_momentum_derivatives(d: Draft, arrays: dict[str, Array]) -> None:
+def assemble_momentum_derivatives(draft: Draft, arrays: dict[str, Array]) -> None:
     """Tangents of momentum and angular momentum along all directions at once."""
-    directions = Directions(d.tail, ("turn", "p_dot", "omega"))
-    inner = tangent_program(assemble(FUNCTIONS["momentum"], d.tail), ("q", "v"), directions.count)
-    rows = {name: d.wide(f"{name}_rows", 3, directions.count) for name in ("linear", "angular")}
+    directions, function = Directions(draft.tail, ("turn", "p_dot", "omega")), FUNCTIONS["momentum"]
+    inner = tangent_program(assemble(function, draft.tail), ("q", "v"), directions.count)
+    names = ("linear", "angular")
+    rows = {name: draft.wide(f"{name}_rows", 3, directions.count) for name in names}
     outputs = {f"d_{name}": row for name, row in rows.items()}
-    q = with_unit_quaternion(d, arrays["q"])
-    d.call(inner, q=q, v=arrays["v"], **outputs, **directions.tangents(d))
+    q = with_unit_quaternion(draft, arrays["q"])
+    draft.call(inner, q=q, v=arrays["v"], **outputs, **directions.tangents(draft, q))
     for name, row in rows.items():
-        directions.spread(d, row, arrays[f"{name}_dq"], arrays[f"{name}_dv"])
+        directions.spread(draft, row, arrays[f"{name}_dq"], arrays[f"{name}_dv"])

@@ -1,5 +1,4 @@
-"""Implicit integrators' linear systems: a draft goes in, factoring and solving with 1 - w J are
-added to it.
+"""Factoring 1 - w J for implicit integrators.
 
 J is the Jacobian of the rates of (q in its tangent space, v, bristles), of contact, joint damping
 and tracking gains alone.  With k_q = r_q + w k_v and the bristles eliminated, S (k_v - r_v) =
@@ -8,172 +7,213 @@ friction follows the load, and S takes two triangles. Eliminating translation is
 three pivots of S do.
 """
 
-from ...ir.program import Array, Index, padded
-from ...mechanics import contact as con
-from ...mechanics import contact_stiffness as stiff
-from ...mechanics import loads
+from dataclasses import dataclass
+
+from ...ir.program import Array, Index, Ref, padded
+from ...ir.step import Step
+from ...mechanics import contact, loads
+from ...mechanics import contact_stiffness as stiffness
 from ...mechanics.lower import derive
 from ..contact import Points, gather_points
 from ..draft import Draft
-from ..dynamics import assemble_mass_matrix
+from ..dynamics import fill_mass_matrix
+from ..layout import TORSO_NV, coordinate
+from ..scope import State, Torso, Vectors
+from ..tails.mechanism import Segments
 from .layout import Factors, each_contact, first_tail_point
 
-# ---- factoring -----------------------------------------------------------------------------------
 
-
-def assemble_factor(d: Draft, arrays: dict[str, Array]) -> None:
+def assemble_factor(draft: Draft, arrays: dict[str, Array]) -> None:
     """S = H + tail damping and gains + J^T G J of the points in the ground, and its LDL^T."""
-    f = Factors(arrays["factors"], d.tail)
-    d.known["weight"] = arrays["weight"].part(0, 1)
-    assemble_mass_matrix(d, {"H": f.array}, apart=padded)
-    room = padded(d.tail.nv) - d.tail.nv
-    with d.loop("k", d.tail.nv if room else 0) as k:
-        d.fill(f.entry("S", k, d.tail.nv, room), 0)
-    d.copy(f("weight"), d.known["weight"])
-    add_gains(d, f)
-    with d.loop("k", d.tail.nt) as k:
-        d.step(stiff.damped, {"damping": arrays["damping"].part(k, 1)}, damped=f("damped", k))
-        d.copy(f.entry("S", 6 + k, 6 + k), f("damped", k), adds=True)
-    if d.tail.contacts:
-        add_contacts(d, f, arrays)
-        add_sliding(d, f)
-        d.factor_pair(f.array, d.tail.nv)
+    f, nv = Factors(arrays["factors"], draft.tail), draft.tail.nv
+    state, weight = State(arrays["q"], arrays["v"]), {"weight": arrays["weight"].part(0, 1)}
+    segments, R = fill_mass_matrix(draft, state, f.array, padded(nv))
+
+    # what fills up the rows of S
+    room = padded(nv) - nv
+    with draft.loop("k", nv if room else 0) as k:
+        draft.fill(f.entry("S", k, nv, room), 0)
+    draft.copy(f("weight"), weight["weight"])
+
+    # joints
+    add_gains(draft, f, weight | {"gains": arrays["gains"][0]})
+    with draft.loop("k", draft.tail.nt) as k:
+        damping = {"damping": arrays["damping"].part(k, 1)}
+        draft.step(stiffness.damped, weight, damping, damped=f("damped", k))
+        draft.copy(f.tail_entry(k, k), f("damped", k), adds=True)
+
+    # the ground
+    if draft.tail.contacts:
+        add_contacts(draft, f, state, R, segments, arrays)
+        add_sliding(draft, f, R)
+        draft.factor_pair(f.array, nv)
     else:
-        d.factor(f.array, d.tail.nv)
+        draft.factor(f.array, nv)
 
 
-def add_gains(d: Draft, f: Factors) -> None:
+def add_gains(draft: Draft, f: Factors, weights: dict[str, Ref]) -> None:
     """Tracking gains act through H_tt, which solving needs, too."""
-    d.step(stiff.gain_weights, gain_q=f("gain_q"), gain_v=f("gain_v"))
-    d.fill(f.array.part(f.first("H_tail"), d.tail.nt**2), 0)
-    with d.when(f("gain_v")), d.loop("k", d.tail.nt) as k, d.loop("l", k + 1) as other:
-        entry = f.entry("S", 6 + k, 6 + other)
-        d.copy(f.entry("H_tail", k, other), entry)
-        d.copy(f.entry("H_tail", other, k), entry)
-        d.step(
-            stiff.gained,
-            {"gain": f("gain_v"), "entry": f.entry("H_tail", k, other)},
-            S_entry_=entry,
-        )
+    gains = {name: f(name) for name in ("gain_q", "gain_v")}
+    draft.step(stiffness.gain_weights, weights, **gains)
+    draft.fill(f.array.part(f.first("H_tail"), draft.tail.nt**2), 0)
+    with (
+        draft.when(f("gain_v")),
+        draft.loop("k", draft.tail.nt) as k,
+        draft.loop("l", k + 1) as other,
+    ):
+        entry = f.tail_entry(k, other)
+        draft.copy(f.entry("H_tail", k, other), entry)
+        draft.copy(f.entry("H_tail", other, k), entry)
+        reads = {"gain": f("gain_v"), "entry": f.entry("H_tail", k, other)}
+        draft.step(stiffness.gained, reads, S_entry_=entry)
 
 
-def add_contacts(d: Draft, f: Factors, arrays: dict[str, Array]) -> None:
+# ---- points in the ground ------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Ground:
+    """What linearising a point reads: the torso, weights and bristles; and the law."""
+
+    torso: Torso
+    weights: Vectors
+    bristles: Array
+    law: Step
+    points: Points
+
+
+def add_contacts(
+    draft: Draft,
+    f: Factors,
+    state: State,
+    R: Ref,
+    segments: Segments,
+    arrays: dict[str, Array],
+) -> None:
     """The points in the ground, linearised; the others cost a comparison."""
-    d.copy(f("R"), d.known["R"])
-    d.known["bound_share"] = arrays["weight"].part(1, 1)
-    d.step(stiff.relaxation, relax=f("relax"))
-    d.step(con.bristle_properties, drag=d.vector("drag", 1))
-    points = gather_points(d, arrays)
-    for group in [name for name in d.tail.contacts if name != "tail"]:
-        with d.loop("k", d.tail.groups[group]) as k:
+    draft.copy(f("R"), R)
+    weight = {"weight": arrays["weight"].part(0, 1), "bound_share": arrays["weight"].part(1, 1)}
+    draft.step(stiffness.relaxation, Vectors(weight), relax=f("relax"))
+    drag = draft.store(contact.bristle_properties, drag=1)
+    points = gather_points(draft, state, R, arrays, segments)
+    law = derive(stiffness.linearised_contact, friction=draft.tail.friction)
+    weights = Vectors({**weight, **drag})
+    ground = Ground(state.torso(R), weights, arrays["bristles"], law, points)
+    for group in [name for name in draft.tail.contacts if name != "tail"]:
+        with draft.loop("k", draft.tail.groups[group]) as k:
             number = k + points.first[group]
-            keep_point(d, f, points, number)
-            with d.when(f("depth", number)):
-                stiffen(d, f, points, number, arrays["bristles"])
+            keep_point(draft, f, ground, number)
+            with draft.when(f("depth", number)):
+                stiffen(draft, f, ground, number)
     if points.S:
-        add_tail_contacts(d, f, points, arrays["bristles"])
+        add_tail_contacts(draft, f, ground)
 
 
-def keep_point(d: Draft, f: Factors, points: Points, number: Index) -> None:
+def keep_point(draft: Draft, f: Factors, ground: Ground, number: Index) -> None:
     """Arm and depth of a point, and no stiffness so far."""
-    d.copy(f("arm", number), points.arms[number])
-    d.step(stiff.depth_of_point, {"arm": points.arms[number]}, depth=f("depth", number))
-    d.fill(f("spring", number), 0)
+    arm = ground.points.arms[number]
+    draft.copy(f("arm", number), arm)
+    draft.step(stiffness.depth_of_point, ground.torso, {"arm": arm}, depth=f("depth", number))
+    draft.fill(f("spring", number), 0)
 
 
-def stiffen(d: Draft, f: Factors, points: Points, number: Index, bristles: Array) -> None:
+def stiffen(draft: Draft, f: Factors, ground: Ground, number: Index) -> None:
     """Linearise a point in the ground, and add its stiffness to the torso's block of S."""
-    law = derive(stiff.linearised_contact, friction=d.tail.friction)
-    reads = points.motion(number) | {
-        "bristle": bristles.part(2 * number, 2),
-        "spring": f("spring", number),
-    }
-    d.apply(law, d.known | reads, spring=f("spring", number))
-    rows = {f"S_{r}_": f.entry("S", r, 0, r + 1) for r in range(6)}
-    d.step(stiff.stiffened_torso, reads, **rows)
+    motion, spring = ground.points.motion(number), {"spring": f("spring", number)}
+    bristle = {"bristle": ground.bristles.part(2 * number, 2)}
+    draft.step(ground.law, ground.torso, ground.weights, motion, bristle, **spring)
+    rows = {f"S_{r}_": f.entry("S", r, 0, r + 1) for r in range(TORSO_NV)}
+    draft.step(stiffness.stiffened_torso, ground.torso, motion, spring, **rows)
 
 
-def add_tail_contacts(d: Draft, f: Factors, points: Points, bristles: Array) -> None:
+def add_tail_contacts(draft: Draft, f: Factors, ground: Ground) -> None:
     """Tail points: as those of the torso, and their columns of the tail's coordinates."""
-    tail = d.tail
-    S, force = d.array("S_segment", 12, tail.segments), d.array("force_column", 3)[0]
-    with d.loop("i", tail.segments) as i:
-        d.fill(S[i], 0)
-        with d.loop("j", tail.links) as j:
+    tail, points = draft.tail, ground.points
+    S, force = draft.array("S_segment", 12, tail.segments), draft.vector("force_column", 3)
+    with draft.loop("i", tail.segments) as i:
+        draft.fill(S[i], 0)
+        with draft.loop("j", tail.links) as j:
             g = tail.links * i + j
             number = g + points.first["tail"]
-            d.copy(S[i], points.S[g], adds=True)
-            keep_point(d, f, points, number)
-            d.fill(f("J", g), 0)
-            with d.when(f("depth", number)):
-                stiffen(d, f, points, number, bristles)
-                with d.loop("l", i + 1) as segment:
+            draft.copy(S[i], points.columns[g], adds=True)
+            keep_point(draft, f, ground, number)
+            draft.fill(f("J", g), 0)
+            with draft.when(f("depth", number)):
+                stiffen(draft, f, ground, number)
+                arm = {"arm": f("arm", number)}
+                with draft.loop("l", i + 1) as segment:
                     rows = {f"J_{axis}": f.row(g, k, segment) for k, axis in enumerate("xyz")}
-                    d.step(
-                        loads.point_jacobian_tail,
-                        {"S": S[segment], "arm": f("arm", number)},
-                        **rows,
-                    )
-                with d.loop("k", 2 * i + 2) as k:
-                    reads = {
-                        "arm": f("arm", number),
-                        "spring": f("spring", number),
-                        "J_k": f.column(g, k),
-                    }
-                    d.step(
-                        stiff.stiffened_column, reads, force=force, S_row_=f.entry("S", 6 + k, 0, 6)
-                    )
-                    with d.loop("l", k + 1) as other:
-                        reads = {"J_k": f.column(g, other), "force": force}
-                        d.step(
-                            stiff.coupled_columns, reads, S_entry_=f.entry("S", 6 + k, 6 + other)
-                        )
+                    draft.step(loads.point_jacobian_tail, {"S": S[segment]}, arm, **rows)
+                spring = {"R": ground.torso.R, "spring": f("spring", number)} | arm
+                stiffen_tail(draft, f, g, coordinate(i + 1), spring, force)
 
 
-def add_sliding(d: Draft, f: Factors) -> None:
+def stiffen_tail(
+    draft: Draft, f: Factors, point: Index, count: Index, spring: dict[str, Ref], force: Ref
+) -> None:
+    """Add the stiffness of a tail point to the first rows of the tail in S."""
+    with draft.loop("k", count) as k:
+        reads = spring | {"J_k": f.column(point, k)}
+        row = f.entry("S", TORSO_NV + k, 0, TORSO_NV)
+        draft.step(stiffness.stiffened_column, reads, force=force, S_row_=row)
+        with draft.loop("l", k + 1) as other:
+            reads = {"J_k": f.column(point, other), "force": force}
+            draft.step(stiffness.coupled_columns, reads, S_entry_=f.tail_entry(k, other))
+
+
+# ---- points that slide ---------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Shear:
+    """Columns of a point whose friction follows the load: along its friction, and up."""
+
+    push: Array
+    lift: Array
+
+    def entries(self, first: Index | int, size: int) -> dict[str, Ref]:
+        """Entries of both."""
+        return {"push": self.push.part(first, size), "lift": self.lift.part(first, size)}
+
+
+def add_sliding(draft: Draft, f: Factors, R: Ref) -> None:
     """The transpose of S, and what makes them differ: the points that slide, whose friction follows
     the load.
     """
-    nv, row = d.tail.nv, padded(d.tail.nv)
-    d.copy(f.array.part(f.first("S_turned"), nv * row), f.array.part(f.first("S"), nv * row))
-    slip, push, lift = d.array("slip", 1)[0], d.array("push", nv), d.array("lift", nv)
+    nv, row = draft.tail.nv, padded(draft.tail.nv)
+    draft.copy(f.array.part(f.first("S_turned"), nv * row), f.array.part(f.first("S"), nv * row))
+    slip = draft.vector("slip", 1)
+    shear = Shear(draft.array("push", nv), draft.array("lift", nv))
 
-    def shear(number: Index, segment: Index | None) -> None:
+    def respond(number: Index, segment: Index | None) -> None:
         spring = {"spring": f("spring", number)}
-        with d.when(f("depth", number)):
-            d.step(stiff.sliding, spring, slip=slip)
-            with d.when(slip):
-                reads = spring | {"arm": f("arm", number)}
-                d.step(stiff.sheared_torso, reads, push=push.part(0, 6), lift=lift.part(0, 6))
+        with draft.when(f("depth", number)):
+            draft.step(stiffness.sliding, spring, slip=slip)
+            with draft.when(slip):
+                at = {"R": R, "arm": f("arm", number)}
+                draft.step(stiffness.sheared_torso, at, spring, **shear.entries(0, TORSO_NV))
+                count: Index | int = TORSO_NV
                 if segment is not None:
-                    shear_tail(d, f, number, segment, (push, lift))
-                shear_triangles(d, f, 6 if segment is None else 2 * segment + 8, (push, lift))
+                    shear_tail(draft, f, number, segment, shear)
+                    count = coordinate(segment) + (TORSO_NV + coordinate(1))
+                shear_triangles(draft, f, count, shear)
 
-    each_contact(d, f, shear)
+    each_contact(draft, respond)
 
 
-def shear_tail(
-    d: Draft, f: Factors, number: Index, segment: Index, columns: tuple[Array, Array]
-) -> None:
+def shear_tail(draft: Draft, f: Factors, number: Index, segment: Index, shear: Shear) -> None:
     """The tail's part of both columns of a tail point."""
-    push, lift = columns
-    with d.loop("k", 2 * segment + 2) as k:
-        reads = {
-            "J_k": f.column(number + -first_tail_point(d.tail), k),
-            "spring": f("spring", number),
-        }
-        d.step(stiff.sheared_column, reads, push=push.part(6 + k, 1), lift=lift.part(6 + k, 1))
+    point = number + -first_tail_point(draft.tail)
+    with draft.loop("k", coordinate(segment + 1)) as k:
+        reads = {"J_k": f.column(point, k), "spring": f("spring", number)}
+        draft.step(stiffness.sheared_column, reads, **shear.entries(TORSO_NV + k, 1))
 
 
-def shear_triangles(d: Draft, f: Factors, count: Index | int, columns: tuple[Array, Array]) -> None:
-    """Add the product of two columns to S, and to its transpose."""
-    push, lift = columns
-    with d.loop("k", count) as k, d.loop("l", k + 1) as other:
+def shear_triangles(draft: Draft, f: Factors, count: Index | int, shear: Shear) -> None:
+    """Add the product of both columns to S, and to its transpose."""
+    push, lift = shear.push, shear.lift
+    with draft.loop("k", count) as k, draft.loop("l", k + 1) as other:
         reads = {"push_k": push.part(k, 1), "push_l": push.part(other, 1)}
         reads |= {"lift_k": lift.part(k, 1), "lift_l": lift.part(other, 1)}
-        d.step(
-            stiff.sheared_entries,
-            reads,
-            entry_=f.entry("S", k, other),
-            turned_=f.entry("S_turned", k, other),
-        )
+        writes = {"entry_": f.entry("S", k, other), "turned_": f.entry("S_turned", k, other)}
+        draft.step(stiffness.sheared_entries, reads, **writes)

@@ -1,17 +1,11 @@
-"""Implicit integrators' linear systems: a draft goes in, factoring and solving with 1 - w J are
-added to it.
+"""What factoring hands to solving: one array, its parts by their names."""
 
-J is the Jacobian of the rates of (q in its tangent space, v, bristles), of contact, joint damping
-and tracking gains alone.  With k_q = r_q + w k_v and the bristles eliminated, S (k_v - r_v) =
-forces is left, S = H + stiffness, symmetric and positive definite but for points that slide: there
-friction follows the load, and S takes two triangles. Eliminating translation is what the first
-three pivots of S do.
-"""
-
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from ...ir.program import Array, Index, Ref, padded
 from ..draft import Draft
+from ..layout import PER_SEGMENT, TORSO_NV
 from ..tail import Tail
 
 SPRING = 18  # numbers of a point's linearised contact
@@ -19,15 +13,15 @@ SPRING = 18  # numbers of a point's linearised contact
 
 def blocks(tail: Tail) -> dict[str, tuple[int, int]]:
     """Size and count of what factoring hands to solving, S first."""
-    found = {"S": (padded(tail.nv), tail.nv)}
+    parts = {"S": (padded(tail.nv), tail.nv)}
     if tail.contacts:
-        found |= {"S_turned": (padded(tail.nv), tail.nv)}
-    found |= {"H_tail": (tail.nt, tail.nt), "damped": (1, tail.nt)}
-    found |= dict.fromkeys(["gain_q", "gain_v", "weight"], (1, 1))
+        parts |= {"S_turned": (padded(tail.nv), tail.nv)}
+    parts |= {"H_tail": (tail.nt, tail.nt), "damped": (1, tail.nt)}
+    parts |= dict.fromkeys(["gain_q", "gain_v", "weight"], (1, 1))
     if tail.contacts:
-        found |= {"R": (9, 1), "relax": (1, 1), "depth": (1, tail.points), "arm": (3, tail.points)}
-        found |= {"spring": (SPRING, tail.points), "J": (3 * tail.nt, tail.groups.get("tail", 0))}
-    return found
+        parts |= {"R": (9, 1), "relax": (1, 1), "depth": (1, tail.points), "arm": (3, tail.points)}
+        parts |= {"spring": (SPRING, tail.points), "J": (3 * tail.nt, tail.groups.get("tail", 0))}
+    return parts
 
 
 def factors_size(tail: Tail) -> int:
@@ -44,10 +38,9 @@ class Factors:
 
     def first(self, name: str) -> int:
         """Where a part begins."""
-        names = list(blocks(self.tail))
-        return sum(
-            size * count for size, count in list(blocks(self.tail).values())[: names.index(name)]
-        )
+        parts = blocks(self.tail)
+        before = list(parts)[: list(parts).index(name)]
+        return sum(size * count for size, count in map(parts.__getitem__, before))
 
     def __call__(self, name: str, k: Index | int = 0) -> Ref:
         """Entry k of a part."""
@@ -58,11 +51,14 @@ class Factors:
         """Numbers of a matrix."""
         return self.array.part(self.first(name) + blocks(self.tail)[name][0] * row + column, size)
 
+    def tail_entry(self, k: Index, other: Index) -> Ref:
+        """The number of S for two tail coordinates."""
+        return self.entry("S", TORSO_NV + k, TORSO_NV + other)
+
     def row(self, point: Index | int, axis: int, segment: Index | int) -> Ref:
         """How a tail point moves along an axis with the two coordinates of a segment."""
-        return self.array.part(
-            self.first("J") + 3 * self.tail.nt * point + axis + 6 * segment, 2, 3
-        )
+        first = self.first("J") + 3 * self.tail.nt * point + axis
+        return self.array.part(first + 3 * PER_SEGMENT * segment, PER_SEGMENT, 3)
 
     def column(self, point: Index | int, k: Index | int) -> Ref:
         """How a tail point moves with tail coordinate k."""
@@ -74,14 +70,14 @@ def first_tail_point(tail: Tail) -> int:
     return tail.groups.get("feet", 0)
 
 
-def each_contact(d: Draft, f: Factors, respond) -> None:
+def each_contact(draft: Draft, respond: Callable[[Index, Index | None], None]) -> None:
     """Call ``respond(number, segment)`` for all points, tail points with their segment."""
-    first = 0
-    for group, count in d.tail.groups.items():
+    first, tail = 0, draft.tail
+    for group, count in tail.groups.items():
         if group == "tail":
-            with d.loop("i", d.tail.segments) as i, d.loop("j", d.tail.links) as j:
-                respond(d.tail.links * i + j + first, i)
+            with draft.loop("i", tail.segments) as i, draft.loop("j", tail.links) as j:
+                respond(tail.links * i + j + first, i)
         else:
-            with d.loop("j", count) as j:
+            with draft.loop("j", count) as j:
                 respond(j + first, None)
         first += count

@@ -1,64 +1,66 @@
-"""Implicit integrators' linear systems: a draft goes in, factoring and solving with 1 - w J are
-added to it.
+"""Solving with 1 - w J, which factoring has made triangles of.
 
-J is the Jacobian of the rates of (q in its tangent space, v, bristles), of contact, joint damping
-and tracking gains alone.  With k_q = r_q + w k_v and the bristles eliminated, S (k_v - r_v) =
-forces is left, S = H + stiffness, symmetric and positive definite but for points that slide: there
-friction follows the load, and S takes two triangles. Eliminating translation is what the first
-three pivots of S do.
+``f`` are the factors; r_q, r_v and r_u are right-hand sides for q in its tangent space, for v and
+for the bristles, k_q, k_v and k_u the solution.
 """
 
 from dataclasses import dataclass
 
 from ...ir.program import Array, Index, Ref
-from ...mechanics import contact as con
-from ...mechanics import contact_stiffness as stiff
+from ...mechanics import contact
+from ...mechanics import contact_stiffness as stiffness
 from ..draft import Draft
+from ..layout import OMEGA, TORSO_NV, VELOCITY, block, coordinate, tail_v
 from .layout import Factors, each_contact, first_tail_point
 
-# ---- solving -------------------------------------------------------------------------------------
 
-
-def assemble_solve(d: Draft, arrays: dict[str, Array]) -> None:
+def assemble_solve(draft: Draft, arrays: dict[str, Array]) -> None:
     """k_v from S (k_v - r_v) = forces, then k_q and the bristles."""
     f, r_q, r_v, k_v = (
-        Factors(arrays["factors"], d.tail),
+        Factors(arrays["factors"], draft.tail),
         arrays["r_q"],
         arrays["r_v"],
         arrays["k_v"],
     )
-    d.known |= {name: f(name) for name in ("gain_q", "gain_v", "weight")}
-    d.fill(k_v[0], 0)
-    tail_response(d, f, arrays)
-    if d.tail.contacts:
-        d.known |= {"R": f("R"), "relax": f("relax")}
-        pressed = contact_response(d, f, arrays)
-        d.solve_pair(f.array, k_v[0])
+    # forces for the right-hand sides
+    draft.fill(k_v[0], 0)
+    tail_response(draft, f, arrays)
+    pressed = None
+    if draft.tail.contacts:
+        pressed = contact_response(draft, f, arrays)
+        draft.solve_pair(f.array, k_v[0])
     else:
-        d.solve(f.array, k_v[0])
-    with d.loop("k", d.tail.nv) as k:
-        d.step(
-            stiff.total_rate, {"change": k_v.part(k, 1), "rate": r_v.part(k, 1)}, k_v=k_v.part(k, 1)
-        )
-        reads = {"k_v": k_v.part(k, 1), "angle": r_q.part(k, 1)}
-        d.step(stiff.total_place, reads, k_q=arrays["k_q"].part(k, 1))
-    if d.tail.contacts:
-        solve_bristles(d, f, arrays, pressed)
+        draft.solve(f.array, k_v[0])
+
+    # k_v from its change, and k_q
+    with draft.loop("k", draft.tail.nv) as k:
+        rate, angle = k_v.part(k, 1), r_q.part(k, 1)
+        reads = {"change": rate, "rate": r_v.part(k, 1)}
+        draft.step(stiffness.total_rate, reads, k_v=rate)
+        reads = {"weight": f("weight"), "k_v": rate, "angle": angle}
+        draft.step(stiffness.total_place, reads, k_q=arrays["k_q"].part(k, 1))
+    if pressed:
+        solve_bristles(draft, f, arrays, pressed)
 
 
-def tail_response(d: Draft, f: Factors, arrays: dict[str, Array]) -> None:
+def tail_response(draft: Draft, f: Factors, arrays: dict[str, Array]) -> None:
     """Forces of damping and gains for the right-hand sides."""
     r_q, r_v, x = arrays["r_q"], arrays["r_v"], arrays["k_v"]
-    with d.loop("k", d.tail.nt) as k:
-        reads = {"damped": f("damped", k), "rate": r_v.part(6 + k, 1)}
-        d.step(stiff.damped_response, reads, rhs=x.part(6 + k, 1))
-    with d.when(f("gain_v")), d.loop("k", d.tail.nt) as k, d.loop("l", d.tail.nt) as other:
+    with draft.loop("k", draft.tail.nt) as k:
+        reads = {"damped": f("damped", k), "rate": tail_v(r_v, k)}
+        draft.step(stiffness.damped_response, reads, rhs=tail_v(x, k))
+    gains = {name: f(name) for name in ("gain_q", "gain_v")}
+    with (
+        draft.when(f("gain_v")),
+        draft.loop("k", draft.tail.nt) as k,
+        draft.loop("l", draft.tail.nt) as other,
+    ):
         reads = {
             "entry": f.entry("H_tail", k, other),
-            "angle": r_q.part(6 + other, 1),
-            "rate": r_v.part(6 + other, 1),
+            "angle": tail_v(r_q, other),
+            "rate": tail_v(r_v, other),
         }
-        d.step(stiff.gain_response, reads, rhs_=x.part(6 + k, 1))
+        draft.step(stiffness.gain_response, gains, reads, rhs_=tail_v(x, k))
 
 
 @dataclass(frozen=True)
@@ -66,77 +68,81 @@ class Shift:
     """A velocity of the animal, to be seen at points: ``v``, and its rotation in world axes."""
 
     v: Array
-    turn: Ref
+    rotation: Ref
 
-    def at(self, d: Draft, f: Factors, number: Index, segment: Index | None, motion: Ref) -> None:
+    def at(
+        self, draft: Draft, f: Factors, number: Index, segment: Index | None, motion: Ref
+    ) -> None:
         """Store how a point moves: a point of the torso, or tail point ``number`` in a segment."""
-        d.step(
-            stiff.point_shift,
-            {"shift": self.v.part(0, 3), "turn": self.turn, "arm": f("arm", number)},
-            motion=motion,
-        )
-        if segment is not None:
-            point = number + -first_tail_point(d.tail)
-            with d.loop("k", 2 * segment + 2) as k:
-                reads = {"J_k": f.column(point, k), "coupling": self.v.part(6 + k, 1)}
-                d.step(stiff.tail_shift, reads, motion_=motion)
+        reads = {"shift": block(self.v, VELOCITY), "turn": self.rotation, "arm": f("arm", number)}
+        draft.step(stiffness.point_shift, reads, motion=motion)
+        if segment is None:
+            return
+        point = number + -first_tail_point(draft.tail)
+        with draft.loop("k", coordinate(segment + 1)) as k:
+            reads = {"J_k": f.column(point, k), "coupling": tail_v(self.v, k)}
+            draft.step(stiffness.tail_shift, reads, motion_=motion)
 
 
-def shift(d: Draft, v: Array) -> Shift:
-    """A velocity with its rotation turned to world axes."""
-    turn = d.array(f"turn_{v.name}", 3)[0]
-    d.step(stiff.torso_turn, {"rotation": v.part(3, 3)}, turn=turn)
-    return Shift(v, turn)
+def shift(draft: Draft, f: Factors, v: Array) -> Shift:
+    """A velocity with its rotation in world axes."""
+    rotation = draft.vector(f"turn_{v.name}", 3)
+    reads = {"R": f("R"), "rotation": block(v, OMEGA)}
+    draft.step(stiffness.torso_turn, reads, turn=rotation)
+    return Shift(v, rotation)
 
 
-def contact_response(d: Draft, f: Factors, arrays: dict[str, Array]) -> Array:
+def contact_response(draft: Draft, f: Factors, arrays: dict[str, Array]) -> Array:
     """Forces of the points in the ground for the right-hand sides; returns the loads for r_q
     alone.
     """
-    x, at_q, at_v = arrays["k_v"], shift(d, arrays["r_q"]), shift(d, arrays["r_v"])
-    reads = {name: d.array(name, 3)[0] for name in ("motion_q", "motion_v")}
-    force, load = d.array("force_response", 3)[0], d.array("load_response", 6)[0]
-    pressed = d.array("pressed", 1, d.tail.points)
-    d.fill(load, 0)
+    x = arrays["k_v"]
+    at_q, at_v = shift(draft, f, arrays["r_q"]), shift(draft, f, arrays["r_v"])
+    motions = {name: draft.vector(name, 3) for name in ("motion_q", "motion_v")}
+    force, load = draft.vector("force_response", 3), draft.vector("load_response", 6)
+    pressed = draft.array("pressed", 1, draft.tail.points)
+    draft.fill(load, 0)
 
     def respond(number: Index, segment: Index | None) -> None:
-        with d.when(f("depth", number)):
-            at_q.at(d, f, number, segment, reads["motion_q"])
-            at_v.at(d, f, number, segment, reads["motion_v"])
-            point = {
-                "spring": f("spring", number),
-                "lag": arrays["r_u"].part(2 * number, 2),
-                "arm": f("arm", number),
-            }
-            d.step(stiff.contact_response, reads | point, force=force, pressed=pressed[number])
-            d.step(con.load_about_torso, point | {"force": force}, load_=load)
-            if segment is not None:
-                with d.loop("k", 2 * segment + 2) as k:
-                    column = f.column(number + -first_tail_point(d.tail), k)
-                    d.step(
-                        stiff.tail_response, {"J_k": column, "force": force}, rhs_=x.part(6 + k, 1)
-                    )
+        with draft.when(f("depth", number)):
+            # how the point moves, and its force
+            at_q.at(draft, f, number, segment, motions["motion_q"])
+            at_v.at(draft, f, number, segment, motions["motion_v"])
+            point = {"spring": f("spring", number), "lag": arrays["r_u"].part(2 * number, 2)}
+            writes = {"force": force, "pressed": pressed[number]}
+            draft.step(stiffness.contact_response, motions, point, **writes)
 
-    each_contact(d, f, respond)
-    d.step(stiff.torso_response, {"load": load}, rhs=x.part(0, 6))
+            # the force on the torso, and on the tail's coordinates
+            reads = {"arm": f("arm", number), "force": force}
+            draft.step(contact.load_about_torso, reads, load_=load)
+            if segment is None:
+                return
+            with draft.loop("k", coordinate(segment + 1)) as k:
+                column = f.column(number + -first_tail_point(draft.tail), k)
+                reads = {"J_k": column, "force": force}
+                draft.step(stiffness.tail_response, reads, rhs_=tail_v(x, k))
+
+    each_contact(draft, respond)
+    reads = {"R": f("R"), "load": load}
+    draft.step(stiffness.torso_response, reads, rhs=x.part(0, TORSO_NV))
     return pressed
 
 
-def solve_bristles(d: Draft, f: Factors, arrays: dict[str, Array], pressed: Array) -> None:
+def solve_bristles(draft: Draft, f: Factors, arrays: dict[str, Array], pressed: Array) -> None:
     """k_u of all points."""
-    at, motion = shift(d, arrays["k_v"]), d.array("motion_k", 3)[0]
+    at, motion = shift(draft, f, arrays["k_v"]), draft.vector("motion_k", 3)
 
     def respond(number: Index, segment: Index | None) -> None:
         lag, k_u = arrays["r_u"].part(2 * number, 2), arrays["k_u"].part(2 * number, 2)
-        d.step(stiff.relaxed, {"lag": lag}, k_u=k_u)
-        with d.when(f("depth", number)):
-            at.at(d, f, number, segment, motion)
+        draft.step(stiffness.relaxed, {"relax": f("relax"), "lag": lag}, k_u=k_u)
+        with draft.when(f("depth", number)):
+            at.at(draft, f, number, segment, motion)
             reads = {
                 "spring": f("spring", number),
                 "motion": motion,
                 "lag": lag,
                 "pressed": pressed[number],
             }
-            d.step(stiff.bristle_response, reads, k_u=k_u)
+            draft.step(stiffness.bristle_response, reads, k_u=k_u)
 
-    each_contact(d, f, respond)
+    each_contact(draft, respond)

@@ -1,115 +1,139 @@
-"""The sweep of a long articulated tail: a draft goes in, H without translation and C come out of
-one sweep in lanes.
+"""The sweep of a long articulated tail that gives H without translation and C at once.
 
-All momentum columns and the bias wrench are lanes of one wrench that is swept from the tip to the
-base, so that the links need no pose and no column has to meet another one.  It pays where vectors
-hold several numbers.
+All momentum columns and the bias wrench are columns of one wide wrench that is swept from the tip
+to the base, so that the links need no pose and no column has to meet another one.  It pays where
+vectors hold several numbers: a column is a lane.
 """
 
 from collections.abc import Callable
 
 from ...ir.program import Array, Ref
-from ...mechanics import link_columns as lan
-from ...mechanics import torso, translation
+from ...mechanics import link_columns, torso, translation
 from ..draft import Draft
-from .sweeps import each_piece, forward_wrenches, mechanism
+from ..layout import OMEGA, VELOCITY, block, coordinate, tail_v
+from ..scope import Motion, State, Vectors
+from ..tails.mechanism import Segments, Wrenches
+from .sweeps import column_of, columns_of, each_piece, forward_wrenches, mechanism
 
 
-def balance_in_lanes(d: Draft, arrays: dict[str, Array], entry: Callable[..., Ref]) -> None:
+def factored_dynamics_by_columns(
+    draft: Draft, arrays: dict[str, Array], entry: Callable[..., Ref]
+) -> None:
     """Fill ``A`` (by ``entry(row, column)``, lower triangle), ``columns``, ``bias`` and what
     elimination needs.
     """
-    nt, columns, bias = d.tail.nt, arrays["columns"], arrays["bias"]
-    mechanism(d).prepare(d, True)
-    still = d.zero(3)
-    d.known |= {"w": d.known["omega"], "w_dot": still, "a": still}
-    wrench = forward_wrenches(d, None)
-    F_lanes, rows = d.wide("F_lanes", 6, nt + 1)[0], d.wide("H_rows", nt, nt + 1)
-    own = _gather(d, wrench, F_lanes, rows)
-    d.step(torso.torso_composite, **{name: d.known[name] for name in ("mass", "h", "I")})
-    d.copy(arrays["first_moment"].part(0, 3), d.known["h"])
-    d.step(lan.lanes_at_torso, {"F_lanes": F_lanes}, F_lanes=F_lanes)
-    total = d.array("F_tail", 6)[0]
+    nt, columns, bias = draft.tail.nt, arrays["columns"], arrays["bias"]
+    state = State(arrays["q"], arrays["v"])
+    segments = mechanism(draft).prepare(draft, state, True)
+    zero = draft.zero(3)
+    motion = Motion(state.omega, zero, zero)
+
+    # from the torso to the tip, and back with all columns
+    wrenches = forward_wrenches(draft, segments, motion, None)
+    F_columns, rows = draft.wide("F_lanes", 6, nt + 1)[0], draft.wide("H_rows", nt, nt + 1)
+    composite, own = _gather(draft, segments, wrenches, F_columns, rows)
+    draft.step(torso.torso_composite, composite, **composite)
+    draft.copy(arrays["first_moment"].part(0, 3), composite["h"])
+    draft.step(link_columns.lanes_at_torso, {"F_lanes": F_columns}, F_lanes=F_columns)
+
+    # the last column is the bias, the others are momenta
+    total = draft.vector("F_tail", 6)
     for r in range(6):
-        d.copy(total.array.part(r, 1), F_lanes.array.lane(r, nt))
-    d.step(lan.torso_bias, {"F": total}, force=bias.part(0, 3), moment=bias.part(3, 3))
-    with d.loop("k", nt) as k:
-        d.copy(bias.part(6 + k, 1), rows.lane(k, nt))
+        draft.copy(total.array.part(r, 1), F_columns.array.lane(r, nt))
+    reads = {"w": motion.w, "a": motion.a, "F": total}
+    writes = {"force": block(bias, VELOCITY), "moment": block(bias, OMEGA)}
+    draft.step(link_columns.torso_bias, reads, **writes)
+    with draft.loop("k", nt) as k:
+        draft.copy(tail_v(bias, k), rows.lane(k, nt))
         for r in range(6):
-            d.copy(columns.part(6 * k + r, 1), F_lanes.array.lane(r, k))
-    d.known |= {name: arrays[name].part(0, arrays[name].length) for name in ("inverse_mass", "com")}
+            draft.copy(columns.part(6 * k + r, 1), F_columns.array.lane(r, k))
+
+    # H without translation
+    names = ("inverse_mass", "com")
+    center = Vectors({name: arrays[name].part(0, arrays[name].length) for name in names})
     base = {f"A_{r}": entry(r, 0, r + 1) for r in range(3)}
-    d.step(
-        translation.without_translation,
-        inverse_mass=d.known["inverse_mass"],
-        com=d.known["com"],
-        **base,
-    )
-    _without_translation(d, F_lanes, rows, columns, entry)
-    _own_blocks(d, own, rows, columns, entry)
+    draft.step(translation.without_translation, composite, **center, **base)
+    _without_translation(draft, center, F_columns, rows, columns, entry)
+    _own_blocks(draft, center, own, rows, columns, entry)
 
 
-def _gather(d: Draft, wrench: Array, F_lanes: Ref, rows: Array) -> Array:
-    """Sweep from the tip to the mount; return what each segment's joints contribute to its block by
-    themselves.
+def _gather(
+    draft: Draft, segments: Segments, wrenches: Wrenches, F_columns: Ref, rows: Array
+) -> tuple[Vectors, Array]:
+    """Sweep from the tip to the mount; return ``mass, h, I``, and what each segment's joints
+    contribute to its block by themselves.
     """
-    tail, lanes = d.tail, rows.lanes
-    at, own = d.wide("at", lanes, lanes), d.array("own", 2, tail.segments)
-    d.unit(at.part(0, lanes), 0)
-    for ref in (F_lanes, rows.part(0, tail.nt), own.part(0, tail.nt)):
-        d.fill(ref, 0)
-    carried = {name: d.vector(name, size) for name, size in (("mass", 1), ("h", 3), ("I", 6))}
-    for ref in carried.values():
-        d.fill(ref, 0)
-    columns = {name: d.array(f"{name}_link", 6)[0] for name in ("pitch", "yaw")}
-    with each_piece(d, downward=True) as (i, g):
+    tail, lanes = draft.tail, rows.lanes
+    at, own = draft.wide("at", lanes, lanes), draft.array("own", 2, tail.segments)
+    draft.unit(at.part(0, lanes), 0)
+    for ref in (F_columns, rows.part(0, tail.nt), own.part(0, tail.nt)):
+        draft.fill(ref, 0)
+    composite = draft.vectors(mass=1, h=3, I=6)
+    for ref in composite.named.values():
+        draft.fill(ref, 0)
+    joint = Vectors({name: draft.vector(f"{name}_link", 6) for name in ("pitch", "yaw")})
+    with each_piece(draft, downward=True) as (i, g):
+        pitch, yaw = coordinate(i), coordinate(i, 1)
         places = {
             "at_bias": at.part(tail.nt, 1),
-            "at_pitch": at.part(2 * i, 1),
-            "at_yaw": at.part(2 * i + 1, 1),
+            "at_pitch": at.part(pitch, 1),
+            "at_yaw": at.part(yaw, 1),
         }
-        d.step(lan.gather_composite, d.piece(i), **carried, **columns, own_=own[i])
-        reads = d.piece(i) | columns | places | {"F": wrench[g], "F_lanes": F_lanes}
-        d.step(
-            lan.gather_lanes,
-            reads,
-            F_lanes=F_lanes,
-            H_pitch_=rows.part(2 * i, 1),
-            H_yaw_=rows.part(2 * i + 1, 1),
+        piece, lanes_of = segments.at(i), {"F_lanes": F_columns}
+        gather = link_columns.gather_composite
+        draft.step(gather, piece, composite, **composite, **joint, own_=own[i])
+        draft.step(
+            link_columns.gather_lanes,
+            *(piece, joint, places, wrenches.at(i, g), lanes_of),
+            H_pitch_=rows.part(pitch, 1),
+            H_yaw_=rows.part(yaw, 1),
+            **lanes_of,
         )
-    return own
+    return composite, own
 
 
 def _without_translation(
-    d: Draft, F_lanes: Ref, rows: Array, columns: Array, entry: Callable[..., Ref]
+    draft: Draft,
+    center: Vectors,
+    F_columns: Ref,
+    rows: Array,
+    columns: Array,
+    entry: Callable[..., Ref],
 ) -> None:
     """Eliminate translation from all rows; the coupling with omega goes to ``A``."""
-    coupling = d.wide("coupling", 3, rows.lanes)
-    d.step(
-        lan.lanes_without_translation,
-        {"F_lanes": F_lanes},
-        **{f"A_{r}": coupling.part(r, 1) for r in range(3)},
-    )
-    with d.loop("k", d.tail.nt) as k:
-        reads = {"column": columns.part(6 * k, 6), "F_lanes": F_lanes}
-        d.step(lan.row_without_translation, reads, H_row_=rows.part(k, 1))
+    coupling, reads = draft.wide("coupling", 3, rows.lanes), {"F_lanes": F_columns}
+    parts = {f"A_{r}": coupling.part(r, 1) for r in range(3)}
+    draft.step(link_columns.lanes_without_translation, center, reads, **parts)
+    with draft.loop("k", draft.tail.nt) as k:
+        column = {"column": column_of(columns, k)}
+        step = link_columns.row_without_translation
+        draft.step(step, center, reads, column, H_row_=rows.part(k, 1))
         for r in range(3):
-            d.copy(entry(3 + k, r), coupling.lane(r, k))
+            draft.copy(entry(3 + k, r), coupling.lane(r, k))
 
 
 def _own_blocks(
-    d: Draft, own: Array, rows: Array, columns: Array, entry: Callable[..., Ref]
+    draft: Draft,
+    center: Vectors,
+    own: Array,
+    rows: Array,
+    columns: Array,
+    entry: Callable[..., Ref],
 ) -> None:
     """Put the rows into ``A``: blocks of two segments as they are, those of one segment
     completed.
     """
-    with d.loop("i", d.tail.segments) as i:
-        pitch, yaw = 2 * i, 2 * i + 1
-        reads = {"own": own[i], "columns": columns.part(12 * i, 12)}
+    with draft.loop("i", draft.tail.segments) as i:
+        pitch, yaw = coordinate(i), coordinate(i, 1)
+        reads = {"own": own[i], "columns": columns_of(columns, i)}
         reads |= {"H_pp": rows.lane(pitch, pitch), "H_py": rows.lane(pitch, yaw)}
         reads |= {"H_yp": rows.lane(yaw, pitch), "H_yy": rows.lane(yaw, yaw)}
-        writes = {"A_pp": entry(3 + pitch, 3 + pitch), "A_yp": entry(3 + yaw, 3 + pitch)}
-        d.step(lan.segment_block, reads, **writes, A_yy=entry(3 + yaw, 3 + yaw))
-        with d.loop("k", pitch) as k:
-            for own_row in (pitch, yaw):
-                d.copy(entry(3 + own_row, 3 + k), rows.lane(k, own_row))
+        writes = {
+            "A_pp": entry(3 + pitch, 3 + pitch),
+            "A_yp": entry(3 + yaw, 3 + pitch),
+            "A_yy": entry(3 + yaw, 3 + yaw),
+        }
+        draft.step(link_columns.segment_block, center, reads, **writes)
+        with draft.loop("k", pitch) as k:
+            for row in (pitch, yaw):
+                draft.copy(entry(3 + row, 3 + k), rows.lane(k, row))

@@ -1,5 +1,4 @@
-"""Forward dynamics of a long articulated tail, by segments: a draft goes in, v_dot comes out
-without its matrix H.
+"""Forward dynamics of a long articulated tail, by segments: v_dot comes about without H.
 
 The links of all segments are swept at once, segment i in lane i.  Then one sweep takes the segments
 from the tip to the mount, each as an articulated body whose coordinates are free, and one takes
@@ -9,195 +8,229 @@ accelerations from the torso to the tip.
 from dataclasses import dataclass
 
 from ...ir.program import Array, Index, Ref, as_index
-from ...mechanics import free_segment as art
-from ...mechanics import link, rotations, torso
+from ...ir.tape import Number
+from ...mechanics import free_segment, link, rotations, torso
 from ...mechanics.link_columns import torso_bias
 from ..draft import Draft
-from ..tails.articulated import prepare_link
-from ..tails.mechanism import still
+from ..layout import OMEGA, PER_SEGMENT, VELOCITY, block, coordinates, segment_v
+from ..scope import State, Vectors
+from ..tails.articulated import link_properties
+from ..tails.mechanism import simplified
 from .sweeps import IDENTITY
 
 UNKNOWNS = 8  # motion of a segment's base, and two coordinates
+OWN_INERTIA = {"h": 3, "I": 6, "pitch": 6, "yaw": 6, "H_pp": 1, "H_py": 1, "H_yy": 1}
 
 
 @dataclass(frozen=True)
-class Sweeps:
-    """What is known of every segment: how its tip moves (lanes), what its coordinates' second
-    derivatives follow.
+class Passes:
+    """What the passes over the segments hand on: how each tip moves (lanes), what velocities alone
+    accelerate it by, what its coordinates' second derivatives follow from.
     """
 
     tip: Array
     coasting: Array
-    shares: Array
+    elimination: Array
 
-    def tip_of(self, i: Index) -> Ref:
+    def tip_of(self, i: Index) -> dict[str, Ref]:
         """What the motion of one tip is made of."""
-        return self.tip.down(0, i, self.tip.size)
+        return {"tip_map": self.tip.down(0, i, self.tip.size)}
 
 
-def accelerate(d: Draft, load: Array, torques: Array, v_dot: Array) -> None:
+@dataclass(frozen=True)
+class Body:
+    """All that hangs on the base of a segment: its wrench is A a + b for the base's motion a."""
+
+    A: Array
+    b: Array
+
+    def rows(self, count: int) -> dict[str, Ref]:
+        """The first rows of A, number by number."""
+        return {f"A_{r}": self.A.lane(r, 0, 6) for r in range(count)}
+
+
+def forward_dynamics(draft: Draft, state: State, load: Array, torques: Array, v_dot: Array) -> None:
     """Fill ``v_dot`` from a load (force, moment) at B in torso axes and torques."""
-    m = d.tail.segments
-    known = Sweeps(
-        _in_lanes(d, "tip_map", 30).array, d.array("coasting", 6, m), d.array("shares", 15, m)
-    )
-    _prepare(d)
-    _shape(d, known.tip)
-    _turn(d, known)
-    _move(d)
-    A, b = _inward(d, known, torques)
-    _at_torso(d, A, b, load, v_dot)
-    base = d.array("base", 6)
-    d.copy(base.part(0, 3), d.known["a_mount"])
-    d.copy(base.part(3, 3), v_dot.part(3, 3))
-    with d.loop("i", m) as i:
-        reads = {
-            "tip_map": known.tip_of(i),
-            "shares": known.shares[i],
-            "coasting": known.coasting[i],
-            "base": base[0],
-        }
-        d.step(art.outward, reads, accelerations=v_dot.part(6 + 2 * i, 2), base=base[0])
+    m = draft.tail.segments
+    tip = _wide(draft, "tip_map", 30).array
+    passes = Passes(tip, draft.array("coasting", 6, m), draft.array("shares", 15, m))
+
+    # all links at once, segment i in lane i
+    links = _prepare(draft, state)
+    inertia = _own_inertia(draft, links, passes)
+    w = _angular_velocities(draft, state, passes)
+    bias = _bias(draft, state, links, w)
+
+    # inward: all that hangs on the mount, then the torso; outward: accelerations
+    body = _inward_pass(draft, passes, inertia, bias, torques)
+    a_mount = _at_torso(draft, state, body, load, v_dot)
+    base = draft.array("base", 6)
+    draft.copy(base.part(0, 3), a_mount)
+    draft.copy(base.part(3, 3), block(v_dot, OMEGA))
+    with draft.loop("i", m) as i:
+        reads = {"shares": passes.elimination[i], "coasting": passes.coasting[i], "base": base[0]}
+        writes = {"accelerations": segment_v(v_dot, i), "base": base[0]}
+        draft.step(free_segment.outward, passes.tip_of(i), reads, **writes)
 
 
-def _in_lanes(d: Draft, name: str, size: int, *values) -> Ref:
-    """Declare a vector with one lane for each segment, found by its name; ``values`` are those it
-    begins with.
-    """
-    d.known[name] = d.wide(f"{name}_lanes", size, d.tail.segments)[0]
+def _wide(draft: Draft, name: str, size: int, *values: Number) -> Ref:
+    """Declare a vector with one lane for each segment; ``values`` are those it begins with."""
+    vector = draft.wide(f"{name}_lanes", size, draft.tail.segments)[0]
     if values:
-        d.fill(d.known[name], *values)
-    return d.known[name]
+        draft.fill(vector, *values)
+    return vector
 
 
-def _prepare(d: Draft) -> None:
-    """Link properties, trigonometry of all joints."""
-    prepare_link(d)
-    angles, rates = _in_lanes(d, "angles", 2, 0), _in_lanes(d, "rates", 2, 0)
-    with d.loop("i", d.tail.segments) as i:
-        d.copy(angles.array.down(0, i, 2), d.angles(i))
-        d.copy(rates.array.down(0, i, 2), d.rates(i))
-    d.step(link.joint_trigonometry, joint=_in_lanes(d, "joint", 4))
-    d.step(link.double_angles, twice=_in_lanes(d, "twice", 10))
+def _prepare(draft: Draft, state: State) -> Vectors:
+    """Link properties, coordinates, rates and trigonometry of all joints."""
+    properties = link_properties(draft)
+    angles, rates = _wide(draft, "angles", 2, 0), _wide(draft, "rates", 2, 0)
+    with draft.loop("i", draft.tail.segments) as i:
+        draft.copy(angles.array.down(0, i, PER_SEGMENT), state.angles(i))
+        draft.copy(rates.array.down(0, i, PER_SEGMENT), state.rates(i))
+    joint = _wide(draft, "joint", 4)
+    draft.step(link.joint_trigonometry, {"angles": angles}, joint=joint)
+    twice = _wide(draft, "twice", 10)
+    draft.step(link.double_angles, {"joint": joint}, twice=twice)
+    return Vectors({**properties, "rates": rates, "joint": joint, "twice": twice})
 
 
-def _shape(d: Draft, tip: Array) -> None:
+def _own_inertia(draft: Draft, links: Vectors, passes: Passes) -> Vectors:
     """How each tip moves, and the composite inertia of each segment's own links."""
-    here = {"R": _in_lanes(d, "R", 9, *IDENTITY), "P": _in_lanes(d, "P", 3, 0)}
-    S = _in_lanes(d, "S", 12, 0)
-    with d.loop("j", d.tail.links):
-        d.step(link.joint_twist, S_=S)
-        d.step(link.link_pose, **here)
-    d.step(art.tip_motion, tip_map=tip[0])
-    carried = {
-        name: _in_lanes(d, name, size, 0)
-        for name, size in (("h", 3), ("I", 6), ("pitch", 6), ("yaw", 6))
-    }
-    own = {f"{name}_": _in_lanes(d, name, 1, 0) for name in ("H_pp", "H_py", "H_yy")}
-    d.fill(d.vector("mass", 1), 0)
-    with d.loop("j", d.tail.links, downward=True):
-        d.step(link.gather_links, mass=d.known["mass"], **carried, **own)
+    # from the base to the tip
+    pose = {"R": _wide(draft, "R", 9, *IDENTITY), "P": _wide(draft, "P", 3, 0)}
+    S = _wide(draft, "S", 12, 0)
+    with draft.loop("j", draft.tail.links):
+        draft.step(link.joint_twist, links, pose, S_=S)
+        draft.step(link.link_pose, links, pose, **pose)
+    draft.step(free_segment.tip_motion, pose, {"S": S}, tip_map=passes.tip[0])
+
+    # from the tip to the base
+    inertia = Vectors({name: _wide(draft, name, size, 0) for name, size in OWN_INERTIA.items()})
+    mass = draft.vectors(mass=1)
+    draft.fill(mass["mass"], 0)
+    carried = inertia.only("h", "I", "pitch", "yaw")
+    own = {f"{name}_": inertia[name] for name in ("H_pp", "H_py", "H_yy")}
+    with draft.loop("j", draft.tail.links, downward=True):
+        draft.step(link.gather_links, links, mass, carried, **mass, **carried, **own)
+    return Vectors({**inertia, **mass})
 
 
-def _turn(d: Draft, known: Sweeps) -> None:
+def _angular_velocities(draft: Draft, state: State, passes: Passes) -> Ref:
     """Angular velocity of each segment's base."""
-    w, here = _in_lanes(d, "w", 3, 0), d.array("w_base", 3)[0]
-    d.copy(here, d.known["omega"])
-    with d.loop("i", d.tail.segments) as i:
-        d.copy(w.array.down(0, i, 3), here)
-        d.step(
-            art.tip_angular_velocity,
-            {"tip_map": known.tip_of(i), "rates": d.rates(i), "w": here},
-            w=here,
-        )
+    w, w_base = _wide(draft, "w", 3, 0), draft.vector("w_base", 3)
+    draft.copy(w_base, state.omega)
+    with draft.loop("i", draft.tail.segments) as i:
+        draft.copy(w.array.down(0, i, 3), w_base)
+        reads = {"rates": state.rates(i), "w": w_base}
+        draft.step(free_segment.tip_angular_velocity, passes.tip_of(i), reads, w=w_base)
+    return w
 
 
-def _move(d: Draft) -> None:
-    """Loads that velocities alone ask for in each segment, and what they alone accelerate its tip
-    by.
+def _bias(draft: Draft, state: State, links: Vectors, w: Ref) -> Vectors:
+    """Loads that velocities alone ask for in each segment, ``F_next`` and ``torque``, and what they
+    alone accelerate its tip by, ``w_dot`` and ``a``.
     """
-    here = {"w": d.known["w"], "w_dot": _in_lanes(d, "w_dot", 3, 0), "a": _in_lanes(d, "a", 3, 0)}
-    motion = here | {name: _in_lanes(d, name, 3) for name in ("a_joint", "swing")}
-    wrench = d.wide("wrench", 6 * d.tail.links, d.tail.segments)
-    with d.loop("j", d.tail.links) as j:
-        d.apply(still(d, link.link_motion, moving=False), d.known, **motion)
-        d.step(link.link_wrench, F=wrench.part(6 * j, 6))
-    total, torque = _in_lanes(d, "F_next", 6, 0), _in_lanes(d, "torque", 2, 0)
-    with d.loop("j", d.tail.links, downward=True) as j:
-        d.step(link.gather_wrench, {"F": wrench.part(6 * j, 6)}, F_next=total, torque_=torque)
+    # from the base to the tip
+    motion = {"w": w, "w_dot": _wide(draft, "w_dot", 3, 0), "a": _wide(draft, "a", 3, 0)}
+    joint = {name: _wide(draft, name, 3) for name in ("a_joint", "swing")}
+    wrench = draft.wide("wrench", 6 * draft.tail.links, draft.tail.segments)
+    link_motion = simplified(link.link_motion, state, forced=False)
+    with draft.loop("j", draft.tail.links) as j:
+        draft.step(link_motion, links, Vectors(motion), **motion, **joint)
+        reads = Vectors(motion), joint
+        draft.step(link.link_wrench, links, *reads, F=wrench.part(6 * j, 6))
+
+    # from the tip to the base
+    total, torque = _wide(draft, "F_next", 6, 0), _wide(draft, "torque", 2, 0)
+    with draft.loop("j", draft.tail.links, downward=True) as j:
+        loads = {"F": wrench.part(6 * j, 6), "F_next": total}
+        draft.step(link.gather_wrench, links, loads, F_next=total, torque_=torque)
+    coasting = {"w_dot": motion["w_dot"], "a": motion["a"]}
+    return Vectors({**coasting, "F_next": total, "torque": torque})
 
 
-def _inward(d: Draft, known: Sweeps, torques: Array) -> tuple[Array, Array]:
-    """From the tip to the mount, coordinates eliminated; return A and b of all that hangs on the
-    mount.
-    """
-    K, T = d.wide("K", UNKNOWNS, UNKNOWNS), d.wide("T", 6, UNKNOWNS)
-    b, load, pivots = d.wide("b", 1, UNKNOWNS), d.wide("load", 1, UNKNOWNS), d.array("pivots", 2)[0]
-    A, b_base = d.wide("A", 6, UNKNOWNS), d.wide("b_base", 1, UNKNOWNS)
+def _inward_pass(
+    draft: Draft, passes: Passes, inertia: Vectors, bias: Vectors, torques: Array
+) -> Body:
+    """From the tip to the mount, coordinates eliminated; return what hangs on the mount."""
+    K, T = draft.wide("K", UNKNOWNS, UNKNOWNS), draft.wide("T", 6, UNKNOWNS)
+    b, load = draft.wide("b", 1, UNKNOWNS), draft.wide("load", 1, UNKNOWNS)
+    pivots = draft.vector("pivots", 2)
+    body = Body(draft.wide("A", 6, UNKNOWNS), draft.wide("b_base", 1, UNKNOWNS))
+
+    def lane(vector: Ref, i: Index) -> Ref:
+        return vector.array.down(0, i, vector.size)
 
     def begin(i: Index) -> None:
-        names = ("h", "I", "pitch", "yaw", "H_pp", "H_py", "H_yy")
-        own = {name: d.known[name].array.down(0, i, d.known[name].size) for name in names}
-        d.step(art.own_inertia, own, **{f"K_{r}": K.lane(r, 0, UNKNOWNS) for r in range(UNKNOWNS)})
-        d.copy(b.lane(0, 0, 6), d.known["F_next"].array.down(0, i, 6))
-        d.copy(b.lane(0, 6, 2), d.known["torque"].array.down(0, i, 2))
+        """The segment alone: its inertia, loads, and what velocities accelerate its tip by."""
+        own = {name: lane(inertia[name], i) for name in OWN_INERTIA} | {"mass": inertia["mass"]}
+        rows = {f"K_{r}": K.lane(r, 0, UNKNOWNS) for r in range(UNKNOWNS)}
+        draft.step(free_segment.own_inertia, own, **rows)
+        draft.copy(b.lane(0, 0, 6), lane(bias["F_next"], i))
+        draft.copy(b.lane(0, 6, PER_SEGMENT), lane(bias["torque"], i))
         for name, first in (("a", 0), ("w_dot", 3)):
-            d.copy(known.coasting.part(6 * i + first, 3), d.known[name].array.down(0, i, 3))
+            draft.copy(passes.coasting.part(6 * i + first, 3), lane(bias[name], i))
 
     def end(i: Index) -> None:
+        """Its coordinates are free: eliminate them."""
         reads = {
             "K": K[0],
             "b": b[0],
-            "joint_load": b.lane(0, 6, 2),
-            "torques": torques.part(2 * i, 2),
+            "joint_load": b.lane(0, 6, PER_SEGMENT),
+            "torques": coordinates(torques, i),
+            "pitch_row": K.lane(6, 0, UNKNOWNS),
+            "yaw_row": K.lane(7, 0, UNKNOWNS),
         }
-        reads |= {"pitch_row": K.lane(6, 0, UNKNOWNS), "yaw_row": K.lane(7, 0, UNKNOWNS)}
-        writes = {"A": A[0], "b_base": b_base[0], "shares": known.shares[i]}
-        d.step(art.free_coordinates, reads, **writes, pivots=pivots)
-        d.guard(pivots, "NOT_POSITIVE_DEFINITE", *writes.values())
+        writes = {"A": body.A[0], "b_base": body.b[0], "shares": passes.elimination[i]}
+        draft.step(free_segment.free_coordinates, reads, **writes, pivots=pivots)
+        draft.guard(pivots, "NOT_POSITIVE_DEFINITE", *writes.values())
 
-    last = as_index(d.tail.segments - 1)
+    def to_parent(i: Index) -> None:
+        """Add what hangs on the segment's tip."""
+        tip = passes.tip_of(i)
+        rows = {f"T_{r}": T.lane(r, 0, UNKNOWNS) for r in range(6)}
+        draft.step(free_segment.tip_rows, tip, **rows)
+        beyond = {"A": body.A[0], "b": body.b[0], "coasting": passes.coasting[i]}
+        draft.step(free_segment.load_at_tip, beyond, load=load[0])
+        reads = {"T": T[0], "load": load.lane(0, 0, 6)} | tip | body.rows(6)
+        draft.step(free_segment.pass_on, reads, K_=K[0], b_=b[0])
+
+    last = as_index(draft.tail.segments - 1)
     begin(last)
     end(last)
-    with d.loop("i", d.tail.segments - 1, downward=True) as i:
+    with draft.loop("i", draft.tail.segments - 1, downward=True) as i:
         begin(i)
-        d.step(
-            art.tip_rows,
-            {"tip_map": known.tip_of(i)},
-            **{f"T_{r}": T.lane(r, 0, UNKNOWNS) for r in range(6)},
-        )
-        d.step(
-            art.load_at_tip,
-            {"A": A[0], "b": b_base[0], "coasting": known.coasting[i]},
-            load=load[0],
-        )
-        reads = {"T": T[0], "tip_map": known.tip_of(i), "load": load.lane(0, 0, 6)} | _rows(A, 6)
-        d.step(art.pass_on, reads, K_=K[0], b_=b[0])
+        to_parent(i)
         end(i)
-    return A, b_base
+    return body
 
 
-def _rows(A: Array, count: int) -> dict[str, Ref]:
-    """The first rows of A, number by number."""
-    return {f"A_{r}": A.lane(r, 0, 6) for r in range(count)}
+def _at_torso(draft: Draft, state: State, body: Body, load: Array, v_dot: Array) -> Ref:
+    """Accelerations of the torso; returns that of the mount."""
+    H, rhs = draft.array("H", UNKNOWNS, 6), draft.array("rhs", 6)
+    zero, omega = draft.zero(3), state.omega
+    F, a_mount = draft.vector("F_tail", 6), draft.vector("a_mount", 3)
+    rows = {f"H_{r}": H.part(UNKNOWNS * r, r + 1) for r in range(6)}
+    draft.step(free_segment.freed_inertia, body.rows(6), **rows)
+    draft.factor(H, 6)
 
+    # what velocities alone ask for at B
+    motion = {"w": omega, "w_dot": zero, "a": zero}
+    draft.step(torso.mount_acceleration, motion, a_mount=a_mount)
+    beyond = {"b_mount": body.b.lane(0, 0, 6), "a_mount": a_mount}
+    draft.step(free_segment.freed_wrench, body.rows(3), beyond, F=F)
+    inertial = {name: draft.vector(f"{name}_torso", 3) for name in ("force", "moment")}
+    draft.step(torso_bias, {"w": omega, "a": zero, "F": F}, **inertial)
+    draft.step(free_segment.net_load, inertial, {"at_torso": load[0]}, rhs=rhs[0])
+    draft.solve(H, rhs[0])
 
-def _at_torso(d: Draft, A: Array, b: Array, load: Array, v_dot: Array) -> None:
-    """Accelerations of the torso; leaves that of the mount in ``a_mount``."""
-    H, rhs, zero, omega = d.array("H", UNKNOWNS, 6), d.array("rhs", 6), d.zero(3), d.known["omega"]
-    F, a_mount = d.array("F_tail", 6)[0], d.vector("a_mount", 3)
-    d.step(
-        art.freed_inertia, _rows(A, 6), **{f"H_{r}": H.part(UNKNOWNS * r, r + 1) for r in range(6)}
-    )
-    d.factor(H, 6)
-    d.step(torso.mount_acceleration, {"w": omega, "w_dot": zero, "a": zero}, a_mount=a_mount)
-    d.step(art.freed_wrench, _rows(A, 3) | {"b_mount": b.lane(0, 0, 6)}, F=F)
-    inertial = {name: d.array(f"{name}_torso", 3)[0] for name in ("force", "moment")}
-    d.step(torso_bias, {"w": omega, "a": zero, "F": F}, **inertial)
-    d.step(art.net_load, inertial | {"at_torso": load[0]}, rhs=rhs[0])
-    d.solve(H, rhs[0])
-    w_dot, a = rhs.part(0, 3), rhs.part(3, 3)
-    d.copy(v_dot.part(3, 3), w_dot)
-    d.store(rotations.quaternion_rotation, R=9)
-    d.step(rotations.world_acceleration, {"a": a}, p_ddot=v_dot.part(0, 3))
-    d.step(torso.mount_acceleration, {"w": omega, "w_dot": w_dot, "a": a}, a_mount=a_mount)
+    # accelerations in the axes of v_dot, and of the mount
+    motion = {"w": omega, "w_dot": rhs.part(0, 3), "a": rhs.part(3, 3)}
+    draft.copy(block(v_dot, OMEGA), motion["w_dot"])
+    quaternion = {"quaternion": state.quaternion}
+    axes = draft.store(rotations.quaternion_rotation, quaternion, R=9)
+    reads = axes, {"a": motion["a"]}
+    draft.step(rotations.world_acceleration, *reads, p_ddot=block(v_dot, VELOCITY))
+    draft.step(torso.mount_acceleration, motion, a_mount=a_mount)
+    return a_mount

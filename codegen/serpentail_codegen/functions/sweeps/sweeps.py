@@ -1,232 +1,324 @@
-"""Sweeps over the tail: a draft goes in, loop nests that several functions share are added to it.
+"""The loops over the tail that several functions share.
 
 Forward sweeps go from the torso to the tip, backward sweeps from the tip to the torso; ``i`` counts
 segments, ``g`` pieces or tail points.  What a sweep carries from piece to piece is updated in
 place.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from ...ir.program import Array, Index, Ref
-from ...mechanics import loads, torso
+from ...ir.program import Array, Index, Ref, as_index
+from ...mechanics import loads, rotations, torso
 from ..draft import Draft
-from ..tails.mechanism import Mechanism, motion
+from ..layout import OMEGA, VELOCITY, block, coordinate, coordinates, segment_v
+from ..scope import Motion, Pose, State, Vectors
+from ..tails.mechanism import Mechanism, Segments, Wrenches
 from ..tails.of_scene import mechanism_of
 
-Block = Callable[[Index, Index], Ref]  # an entry of H, by the numbers of two tail coordinates
+Block = Callable[..., Ref]  # entries of H, by the numbers of two tail coordinates and how many
 IDENTITY = (1, 0, 0, 0, 1, 0, 0, 0, 1)
 
 
-def mechanism(d: Draft) -> Mechanism:
+def mechanism(draft: Draft) -> Mechanism:
     """Return the steps of the draft's tail."""
-    return mechanism_of(d.tail)
+    return mechanism_of(draft.tail)
+
+
+def attitude(draft: Draft, state: State) -> Ref:
+    """Store the rotation matrix of the torso."""
+    reads = {"quaternion": state.quaternion}
+    return draft.store(rotations.quaternion_rotation, reads, R=9)["R"]
 
 
 @contextmanager
-def each_piece(d: Draft, downward: bool = False):
+def each_piece(draft: Draft, downward: bool = False) -> Iterator[tuple[Index, Index]]:
     """Open the loops over segments and their pieces; yields the segment and the number of the
     piece.
     """
-    pieces = mechanism(d).pieces(d.tail)
-    with d.loop("i", d.tail.segments, downward) as i, d.loop("j", pieces, downward) as j:
+    pieces = mechanism(draft).pieces(draft.tail)
+    with (
+        draft.loop("i", draft.tail.segments, downward) as i,
+        draft.loop("j", pieces, downward) as j,
+    ):
         yield i, pieces * i + j
 
 
-def forward_wrenches(d: Draft, v_dot: Array | None) -> Array:
+# ---- wrenches ------------------------------------------------------------------------------------
+
+
+def forward_wrenches(
+    draft: Draft, segments: Segments, start: Motion, v_dot: Array | None
+) -> Wrenches:
     """Velocities and accelerations to the tip, and the inertial wrench of every piece (Eqs. A1 to
     A12, 17, 19).
 
-    Starts from ``w``, ``w_dot`` and ``a`` of the torso; ``v_dot`` None means that the tail does not
-    accelerate.
+    ``start`` is the torso's motion; ``v_dot`` None means that the tail does not accelerate.
     """
-    wrench = d.array("wrench", 6, d.tail.segments * mechanism(d).pieces(d.tail))
-    here = {name: d.array(f"{name}_here", 3)[0] for name in ("w", "w_dot", "a")}
-    d.copy(here["w"], d.known["w"])
-    d.copy(here["w_dot"], d.known["w_dot"])
-    d.step(torso.mount_acceleration, a_mount=here["a"])
-    with each_piece(d) as (i, g):
-        mechanism(d).move(d, i, here, v_dot, wrench[g])
-    return wrench
+    tail = mechanism(draft)
+    wrench = draft.array("wrench", 6, draft.tail.segments * tail.pieces(draft.tail))
+    motion = Motion(*(draft.vector(f"{name}_here", 3) for name in ("w", "w_dot", "a")))
+    draft.copy(motion.w, start.w)
+    draft.copy(motion.w_dot, start.w_dot)
+    draft.step(torso.mount_acceleration, start, a_mount=motion.a)
+    wrenches = Wrenches(wrench, tail.declare_torques(draft))
+    with each_piece(draft) as (i, g):
+        tail.move(draft, segments, i, motion, v_dot, wrenches.at(i, g))
+    return wrenches
 
 
-def gather_wrenches(d: Draft, wrench: Array, torque: Callable[[Index], Ref] | None) -> None:
+def gather_wrenches(
+    draft: Draft,
+    segments: Segments,
+    wrenches: Wrenches,
+    torque: Callable[[Index], Ref] | None = None,
+) -> Vectors:
     """Sum wrenches (or momenta) from the tip to the tail mount, in ``F_next``; torques add up per
     segment.
+
+    Of inertial wrenches this is the sum of Eq. 4.
     """
-    total, pieces = d.vector("F_next", 6), mechanism(d).pieces(d.tail)
-    d.fill(total, 0)
-    with d.loop("i", d.tail.segments, downward=True) as i:
-        writes = {"F_next": total}
+    total, pieces = draft.vectors(F_next=6), mechanism(draft).pieces(draft.tail)
+    draft.fill(total["F_next"], 0)
+    with draft.loop("i", draft.tail.segments, downward=True) as i:
+        writes = dict(total.named)
         if torque:
-            d.fill(torque(i), 0)
+            draft.fill(torque(i), 0)
             writes["torque_"] = torque(i)
-        with d.loop("j", pieces, downward=True) as j:
-            d.step(mechanism(d).gather_wrench, d.piece(i) | {"F": wrench[pieces * i + j]}, **writes)
+        with draft.loop("j", pieces, downward=True) as j:
+            wrench = wrenches.at(i, pieces * i + j)
+            step = mechanism(draft).gather_wrench
+            draft.step(step, segments.at(i), wrench, total, **writes)
+    return total
 
 
-def virtual_power(d: Draft, power: Ref, multiplier: Array, v_dot: Array) -> None:
+def core_bias(draft: Draft, segments: Segments, bias: Array) -> None:
+    """C without gravity and translation: force and moment at B in torso axes, then the tail's
+    forces.
+    """
+    zero = draft.zero(3)
+    motion = Motion(segments.state.omega, zero, zero)
+    wrenches = forward_wrenches(draft, segments, motion, None)
+    total = gather_wrenches(draft, segments, wrenches, lambda i: segment_v(bias, i))
+    torso_wrench(draft, motion, total, bias)
+
+
+def torso_wrench(draft: Draft, motion: Motion, total: Vectors, force: Array) -> None:
+    """Store the inertial force and moment of torso and tail, from the tail's at its mount."""
+    draft.step(
+        torso.torso_wrench,
+        motion,
+        total,
+        force=block(force, VELOCITY),
+        moment=block(force, OMEGA),
+    )
+
+
+def virtual_power(
+    draft: Draft,
+    segments: Segments,
+    start: Vectors,
+    multiplier: Array,
+    v_dot: Array,
+    power: Ref,
+) -> None:
     """Sum the power of all inertial wrenches when the animal moves with the velocity
     ``multiplier``.
 
-    Starts from ``w``, ``w_dot``, ``a`` of the torso and ``w_virtual``, ``u_virtual``, its virtual
+    ``start``: ``w``, ``w_dot``, ``a`` of the torso and ``w_virtual``, ``u_virtual``, its virtual
     velocities.
     """
-    carried = {
-        name: d.array(f"{name}_here", 3)[0]
-        for name in ("w", "w_dot", "a", "w_virtual", "u_virtual")
-    }
-    d.step(torso.torso_power, power=power)
-    d.step(torso.mount_acceleration, a_mount=carried["a"])
-    d.step(
-        torso.mount_velocity,
-        {"w": d.known["w_virtual"], "u": d.known["u_virtual"]},
-        u=carried["u_virtual"],
-    )
+    names = ("w", "w_dot", "a", "w_virtual", "u_virtual")
+    carried = Vectors({name: draft.vector(f"{name}_here", 3) for name in names})
+    draft.step(torso.torso_power, start, power=power)
+
+    # from B to the tail mount
+    draft.step(torso.mount_acceleration, start, a_mount=carried["a"])
+    virtual = {"w": start["w_virtual"], "u": start["u_virtual"]}
+    draft.step(torso.mount_velocity, virtual, u=carried["u_virtual"])
     for name in ("w", "w_dot", "w_virtual"):
-        d.copy(carried[name], d.known[name])
-    with each_piece(d) as (i, _):
-        reads = d.piece(i) | motion(d, i, v_dot) | {"virtual_rates": multiplier.part(6 + 2 * i, 2)}
-        d.step(mechanism(d).power, reads | carried, power_=power, **carried)
+        draft.copy(carried[name], start[name])
+
+    # from the mount to the tip
+    with each_piece(draft) as (i, _):
+        rates = segments.motion(i, v_dot), {"virtual_rates": segment_v(multiplier, i)}
+        step = mechanism(draft).power
+        draft.step(step, segments.at(i), *rates, carried, power_=power, **carried)
 
 
-def gather_momentum(d: Draft, p_dot: Ref, kinetic: Ref | None = None) -> None:
+# ---- momentum ------------------------------------------------------------------------------------
+
+
+def gather_momentum(draft: Draft, state: State, R: Ref, p_dot: Ref) -> Vectors:
     """``mass`` and first moment ``h`` of the animal, and its momentum ``force, moment``, at B,
     which moves with p_dot.
-
-    With ``kinetic`` the kinetic energy is summed there, and momentum is not.
     """
-    mechanism(d).prepare(d)
-    gather_moment(d)
-    w, u = d.vector("w", 3), d.vector("u", 3)
-    d.step(torso.torso_velocity, {"p_dot": p_dot}, u=u)
-    d.copy(d.vector("u_torso", 3), u)
-    d.copy(w, d.known["omega"])
-    d.step(torso.mount_velocity, u=u)
-    momentum = (
-        None if kinetic else d.array("momenta", 6, d.tail.segments * mechanism(d).pieces(d.tail))
-    )
-    if kinetic:
-        d.fill(kinetic, 0)
-    with each_piece(d) as (i, g):
-        mechanism(d).momentum(d, i, {"kinetic_": kinetic} if kinetic else {"F": momentum[g]})
-    d.known["w"] = d.known["omega"]
-    if kinetic:
-        d.step(torso.torso_momentum, kinetic_=kinetic)
-        return
-    gather_wrenches(d, momentum, None)
-    d.store(torso.torso_momentum, force=3, moment=3)
+    segments, moment, velocity, u_torso = _begin_momentum(draft, state, R, p_dot)
+    tail = mechanism(draft)
+    momenta = Wrenches(draft.array("momenta", 6, draft.tail.segments * tail.pieces(draft.tail)))
+    with each_piece(draft) as (i, g):
+        tail.momentum(draft, segments, i, velocity, momenta.at(i, g).named)
+    total = gather_wrenches(draft, segments, momenta)
+    reads = u_torso, {"w": state.omega}, total
+    momentum = draft.store(torso.torso_momentum, *reads, force=3, moment=3)
+    return Vectors({**moment, **momentum})
 
 
-def gather_moment(d: Draft) -> None:
+def gather_kinetic(draft: Draft, state: State, R: Ref, kinetic: Ref) -> Vectors:
+    """``mass`` and first moment ``h`` of the animal; sums its energy in ``kinetic``."""
+    segments, moment, velocity, u_torso = _begin_momentum(draft, state, R, state.velocity)
+    draft.fill(kinetic, 0)
+    with each_piece(draft) as (i, _):
+        mechanism(draft).momentum(draft, segments, i, velocity, {"kinetic_": kinetic})
+    draft.step(torso.torso_momentum, u_torso, {"w": state.omega}, kinetic_=kinetic)
+    return moment
+
+
+def _begin_momentum(
+    draft: Draft, state: State, R: Ref, p_dot: Ref
+) -> tuple[Segments, Vectors, Vectors, Vectors]:
+    """Return segments, mass and first moment, velocities of the tail mount, and of the torso."""
+    segments = mechanism(draft).prepare(draft, state, False)
+    moment = gather_moment(draft, segments)
+    velocity = draft.vectors(w=3, u=3)
+    draft.step(torso.torso_velocity, {"R": R, "p_dot": p_dot}, u=velocity["u"])
+    u_torso = draft.vectors(u_torso=3)
+    draft.copy(u_torso["u_torso"], velocity["u"])
+    draft.copy(velocity["w"], state.omega)
+    draft.step(torso.mount_velocity, velocity, u=velocity["u"])
+    return segments, moment, velocity, u_torso
+
+
+def gather_moment(draft: Draft, segments: Segments) -> Vectors:
     """Mass and first moment of the tail at its mount, then with the torso at B, in ``mass`` and
     ``h``.
     """
-    carried = {name: d.vector(name, size) for name, size in (("mass", 1), ("h", 3))}
-    for ref in carried.values():
-        d.fill(ref, 0)
-    with each_piece(d, downward=True) as (i, _):
-        d.step(mechanism(d).gather_moment, d.piece(i), **carried)
-    d.step(torso.torso_moment, **carried)
+    moment = draft.vectors(mass=1, h=3)
+    for ref in moment.named.values():
+        draft.fill(ref, 0)
+    with each_piece(draft, downward=True) as (i, _):
+        draft.step(mechanism(draft).gather_moment, segments.at(i), moment, **moment)
+    draft.step(torso.torso_moment, moment, **moment)
+    return moment
+
+
+# ---- inertia -------------------------------------------------------------------------------------
 
 
 def gather_inertia(
-    d: Draft, roots: dict[str, Array], columns: Array, H_tail: Block | None = None
-) -> None:
+    draft: Draft,
+    segments: Segments,
+    roots: dict[str, Array],
+    columns: Array,
+    H_tail: Block | None = None,
+) -> Vectors:
     """Composite inertia in ``mass, h, I`` at B; each segment's momentum columns at B and its own
     block of H.
     """
-    sizes = {"mass": 1, "h": 3, "I": 6, "pitch": 6, "yaw": 6}
-    carried = {name: d.vector(name, size) for name, size in sizes.items()}
-    for name in ("mass", "h", "I"):
-        d.fill(carried[name], 0)
-    with d.loop("i", d.tail.segments, downward=True) as i:
-        places = {
-            "H_pp_": (2 * i, 2 * i),
-            "H_py_": (2 * i + 1, 2 * i),
-            "H_yy_": (2 * i + 1, 2 * i + 1),
-        }
-        own = {name: H_tail(*place) for name, place in places.items()} if H_tail else {}
-        for ref in (carried["pitch"], carried["yaw"], *own.values()):
-            d.fill(ref, 0)
-        with d.loop("j", mechanism(d).pieces(d.tail), downward=True):
-            d.step(mechanism(d).gather, d.piece(i), **carried, **own)
-        d.step(
-            torso.column_at_torso,
-            {name: array[i] for name, array in roots.items()},
-            columns=columns.part(12 * i, 12),
-        )
-    d.step(torso.torso_composite, **{name: carried[name] for name in ("mass", "h", "I")})
+    composite = draft.vectors(mass=1, h=3, I=6)
+    momenta = draft.vectors(pitch=6, yaw=6)
+    for ref in composite.named.values():
+        draft.fill(ref, 0)
+    with draft.loop("i", draft.tail.segments, downward=True) as i:
+        # the segment's own block of H and its columns start anew, what is beyond goes on
+        own = _own_block(H_tail, i) if H_tail else {}
+        for ref in (*momenta.named.values(), *own.values()):
+            draft.fill(ref, 0)
+        with draft.loop("j", mechanism(draft).pieces(draft.tail), downward=True):
+            step = mechanism(draft).gather
+            draft.step(step, segments.at(i), composite, momenta, **composite, **momenta, **own)
+        root = {name: array[i] for name, array in roots.items()}
+        draft.step(torso.column_at_torso, root, momenta, columns=columns_of(columns, i))
+    draft.step(torso.torso_composite, composite, **composite)
+    return composite
 
 
-def segment_columns(d: Draft) -> Array:
-    """Declare the spatial columns of all segments but the last."""
-    return d.array("S", 12, max(d.tail.segments - 1, 1))
+def _own_block(H_tail: Block, i: Index) -> dict[str, Ref]:
+    """The lower triangle of H of one segment's two coordinates, to be added to."""
+    pitch, yaw = coordinate(i), coordinate(i, 1)
+    return {
+        "H_pp_": H_tail(pitch, pitch),
+        "H_py_": H_tail(yaw, pitch),
+        "H_yy_": H_tail(yaw, yaw),
+    }
+
+
+def segment_roots(draft: Draft) -> dict[str, Array]:
+    """Declare the pose of every segment's root."""
+    count = draft.tail.segments
+    return {"R": draft.array("R_root", 9, count), "P": draft.array("P_root", 3, count)}
 
 
 def forward_roots(
-    d: Draft, here: dict[str, Ref], roots: dict[str, Array], S: Array | None = None
+    draft: Draft,
+    segments: Segments,
+    pose: Pose,
+    roots: dict[str, Array],
+    S: Array | None = None,
 ) -> None:
-    """Pose of every segment's root, and spatial columns of all segments but the last, from pose
-    ``R, P`` on.
+    """Pose of every segment's root, and spatial columns of all segments but the last, from a pose
+    on.
     """
-    last = d.tail.segments - 1
-    with d.loop("i", last) as i:
-        for name, ref in here.items():
-            d.copy(roots[name][i], ref)
+    last, steps = draft.tail.segments - 1, mechanism(draft)
+
+    def copy_pose(i: Index) -> None:
+        for name, array in roots.items():
+            draft.copy(array[i], pose[name])
+
+    with draft.loop("i", last) as i:
+        copy_pose(i)
         if S:
-            d.fill(S[i], 0)
-        with d.loop("j", mechanism(d).pieces(d.tail)):
+            draft.fill(S[i], 0)
+        with draft.loop("j", steps.pieces(draft.tail)):
             if S:
-                d.step(mechanism(d).twist, here | d.piece(i), S_=S[i])
-            d.step(mechanism(d).pose, here | d.piece(i), **here)
-    for name, ref in here.items():
-        d.copy(roots[name][last], ref)
+                draft.step(steps.twist, pose, segments.at(i), S_=S[i])
+            draft.step(steps.pose, pose, segments.at(i), **pose)
+    copy_pose(as_index(last))
 
 
-def segment_roots(d: Draft) -> dict[str, Array]:
-    """Declare the pose of every segment's root."""
-    return {"R": d.array("R_root", 9, d.tail.segments), "P": d.array("P_root", 3, d.tail.segments)}
-
-
-def tail_inertia(d: Draft, H_tail: Block, columns: Array, world: bool = False) -> Array:
+def tail_inertia(
+    draft: Draft, state: State, H_tail: Block, columns: Array, R: Ref | None = None
+) -> tuple[Segments, Vectors]:
     """All that H is made of (Eqs. 2, 16, 18): ``mass, h, I`` at B, momentum columns, H of the tail
     (lower triangle).
 
-    In torso axes, or with ``world`` the columns in world axes.
+    The columns are in torso axes, or in world axes with the attitude R of the torso.  Returns the
+    segments, and ``mass, h, I``.
     """
-    mechanism(d).prepare(d, True)
-    here = torso_pose(d, world)
-    roots, S = segment_roots(d), segment_columns(d)
-    forward_roots(d, here, roots, S)
-    gather_inertia(d, roots, columns, H_tail)
-    with d.loop("i", d.tail.segments, start=1) as i, d.loop("l", i) as segment:
-        block = {
-            "H_pitch": H_tail(2 * i, 2 * segment, 2),
-            "H_yaw": H_tail(2 * i + 1, 2 * segment, 2),
+    segments = mechanism(draft).prepare(draft, state, True)
+    pose = torso_pose(draft, R)
+    roots = segment_roots(draft)
+    S = draft.array("S", 12, max(draft.tail.segments - 1, 1))
+    forward_roots(draft, segments, pose, roots, S)
+    composite = gather_inertia(draft, segments, roots, columns, H_tail)
+
+    # blocks of two segments
+    with draft.loop("i", draft.tail.segments, start=1) as i, draft.loop("l", i) as other:
+        first = coordinate(other)
+        blocks = {
+            "H_pitch": H_tail(coordinate(i), first, 2),
+            "H_yaw": H_tail(coordinate(i, 1), first, 2),
         }
-        d.step(
-            torso.segment_coupling, {"S": S[segment], "columns": columns.part(12 * i, 12)}, **block
-        )
-    return columns
+        reads = {"S": S[other], "columns": columns_of(columns, i)}
+        draft.step(torso.segment_coupling, reads, **blocks)
+    return segments, composite
 
 
 def torso_pose(
-    d: Draft, world: bool, origin: Ref | None = None, name: str = "link"
-) -> dict[str, Ref]:
-    """Pose of the tail mount, to be carried along the tail: from B in torso axes, or in world axes
-    from an origin.
+    draft: Draft, R: Ref | None = None, origin: Ref | None = None, name: str = "link"
+) -> Pose:
+    """Pose of the tail mount, to be carried along the tail: from B in torso axes, or with the
+    attitude R in world axes from an origin.
     """
-    here = {"R": d.array(f"R_{name}", 9)[0], "P": d.array(f"P_{name}", 3)[0]}
-    if world:
-        d.copy(here["R"], d.known["R"])
-        d.step(
-            torso.mount_position, {"p": origin or d.constant("origin", [0, 0, 0])[0]}, P=here["P"]
-        )
+    pose = Pose(draft.vector(f"R_{name}", 9), draft.vector(f"P_{name}", 3))
+    if R:
+        draft.copy(pose.R, R)
+        start = origin or draft.fixed("origin", [0, 0, 0])
+        draft.step(torso.mount_position, {"R": R, "p": start}, P=pose.P)
     else:
-        d.fill(here["R"], *IDENTITY)
-        d.copy(here["P"], d.known["tail_mount"])
-    return here
+        draft.fill(pose.R, *IDENTITY)
+        draft.copy(pose.P, draft.parameters["tail_mount"])
+    return pose
 
 
 def column_of(columns: Array, k: Index) -> Ref:
@@ -234,51 +326,49 @@ def column_of(columns: Array, k: Index) -> Ref:
     return columns.part(6 * k, 6)
 
 
-def core_bias(d: Draft, bias: Array) -> None:
-    """C without gravity and translation: force and moment at B in torso axes, then the tail's
-    forces.
-    """
-    zero = d.zero(3)
-    d.known |= {"w": d.known["omega"], "w_dot": zero, "a": zero}
-    wrench = forward_wrenches(d, None)
-    gather_wrenches(d, wrench, lambda i: bias.part(6 + 2 * i, 2))
-    d.step(torso.torso_wrench, force=bias.part(0, 3), moment=bias.part(3, 3))
+def columns_of(columns: Array, i: Index) -> Ref:
+    """Both momentum columns of segment i."""
+    return columns.part(12 * i, 12)
 
 
-def sample_joints(d: Draft) -> tuple[Array, Array]:
+# ---- loads ---------------------------------------------------------------------------------------
+
+
+def sample_joints(draft: Draft, state: State) -> tuple[Array, Array]:
     """Spatial columns between tail points, and all tail points, in torso axes from B."""
-    tail = d.tail
-    mechanism(d).prepare_samples(d)
-    S, points = d.array("S_joint", 12, tail.total), d.array("tail_point", 3, tail.total + 1)
-    here = torso_pose(d, world=False, name="joint")
-    d.copy(points[0], here["P"])
-    with d.loop("i", tail.segments) as i, d.loop("j", tail.links) as j:
+    tail, steps = draft.tail, mechanism(draft)
+    samples = steps.prepare_samples(draft, state, None)
+    S, points = draft.array("S_joint", 12, tail.total), draft.array("tail_point", 3, tail.total + 1)
+    pose = torso_pose(draft, name="joint")
+    draft.copy(points[0], pose.P)
+    with draft.loop("i", tail.segments) as i, draft.loop("j", tail.links) as j:
         g = tail.links * i + j
-        d.step(mechanism(d).twist, here | d.sample(i), S=S[g])
-        d.step(mechanism(d).pose, here | d.sample(i), **here)
-        d.copy(points[g + 1], here["P"])
+        draft.step(steps.twist, pose, samples.at(i), S=S[g])
+        draft.step(steps.pose, pose, samples.at(i), **pose)
+        draft.copy(points[g + 1], pose.P)
     return S, points
 
 
-def gather_loads(d: Draft, f_ext: Array, torques: Array) -> None:
-    """J^T f of the loads in ``f_ext``: ``load_force, load_moment`` at B; the joints' share is added
-    to ``torques``.
+def gather_loads(draft: Draft, state: State, R: Ref, f_ext: Array, torques: Array) -> Vectors:
+    """J^T f (Eq. 10) of the loads in ``f_ext``: returns ``load_force, load_moment`` at B; the
+    joints' part is added to ``torques``.
     """
-    S, points = sample_joints(d)
-    beyond = d.vector("F_beyond", 6)
-    d.fill(beyond, 0)
+    S, points = sample_joints(draft, state)
+    beyond = draft.vectors(F_beyond=6)
+    draft.fill(beyond["F_beyond"], 0)
 
-    def add_load(point):
-        reads = {"P": points[point], "f_point": f_ext.part(6 + 3 * point, 3)}
-        d.step(loads.load_at_point, reads, F_beyond=beyond)
+    def add_load(point: Index) -> None:
+        force = f_ext.part(6 + 3 * point, 3)
+        reads = {"R": R, "P": points[point], "f_point": force}
+        draft.step(loads.load_at_point, reads, beyond, **beyond)
 
     with (
-        d.loop("i", d.tail.segments, downward=True) as i,
-        d.loop("j", d.tail.links, downward=True) as j,
+        draft.loop("i", draft.tail.segments, downward=True) as i,
+        draft.loop("j", draft.tail.links, downward=True) as j,
     ):
-        g = d.tail.links * i + j
+        g = draft.tail.links * i + j
         add_load(g + 1)
-        d.step(loads.joint_load, {"S": S[g]}, torque_=torques.part(2 * i, 2))
+        draft.step(loads.joint_load, {"S": S[g]}, beyond, torque_=coordinates(torques, i))
     add_load(Index())
-    d.known["f_torso"] = f_ext.part(0, 6)
-    d.store(loads.load_at_torso, load_force=3, load_moment=3)
+    at_torso = {"R": R, "f_torso": f_ext.part(0, 6)}
+    return draft.store(loads.load_at_torso, at_torso, beyond, load_force=3, load_moment=3)

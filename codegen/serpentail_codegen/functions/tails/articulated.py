@@ -1,81 +1,89 @@
-"""The tails: for each, which steps describe one piece of a segment, so that the same sweeps serve
-both.
+"""The articulated tail: link by link, in the frames of the links."""
 
-A segment of the articulated tail has n pieces, its links; a segment of the continuum tail is one
-piece.
-"""
-
+from collections.abc import Mapping
 from fractions import Fraction
 
 from ...ir.program import Array, Index, Ref
 from ...mechanics import link
 from ..draft import Draft
-from .mechanism import Mechanism, motion, still
-
-# ---- articulated: link by link in link-local frames ----------------------------------------------
-
-
-def prepare_link(d: Draft) -> None:
-    """Properties of a link."""
-    d.known["share"] = d.constant("share", [Fraction(1, d.tail.total)])[0]
-    d.store(link.link_properties, link=6)
+from ..scope import Motion, State, Vectors
+from .mechanism import Mechanism, Segments, simplified
 
 
-def prepare_links(d: Draft, doubled: bool = False) -> None:
+def link_properties(draft: Draft) -> Vectors:
+    """Store the properties of a link, all being equal."""
+    share = draft.fixed("share", [Fraction(1, draft.tail.total)])
+    return draft.store(link.link_properties, {"share": share}, link=6)
+
+
+def prepare_links(draft: Draft, state: State, doubled: bool = False) -> Segments:
     """Link properties, and the trigonometry of every segment's joint."""
-    prepare_link(d)
-    d.pieces["joint"] = joint = d.array("joint", 4, d.tail.segments)
-    twice = d.array("twice", 10, d.tail.segments) if doubled else None
-    with d.loop("i", d.tail.segments) as i:
-        d.step(link.joint_trigonometry, {"angles": d.angles(i)}, joint=joint[i])
+    properties = link_properties(draft)
+    arrays = {"joint": draft.array("joint", 4, draft.tail.segments)}
+    if doubled:
+        arrays["twice"] = draft.array("twice", 10, draft.tail.segments)
+    with draft.loop("i", draft.tail.segments) as i:
+        joint = arrays["joint"][i]
+        draft.step(link.joint_trigonometry, {"angles": state.angles(i)}, joint=joint)
         if doubled:
-            d.pieces["twice"] = twice
-            d.step(link.double_angles, {"joint": joint[i]}, twice=twice[i])
-    d.samples |= d.pieces
+            draft.step(link.double_angles, {"joint": joint}, twice=arrays["twice"][i])
+    return Segments(state, arrays, properties.named)
 
 
-def prepare_link_samples(d: Draft) -> None:
+def prepare_link_samples(draft: Draft, state: State, segments: Segments | None) -> Segments:
     """Tail points are the joints: what describes the links describes them."""
-    if not d.samples:
-        prepare_links(d)
+    return segments or prepare_links(draft, state)
 
 
-def move_link(d: Draft, i: Index, here: dict[str, Ref], v_dot: Array | None, wrench: Ref) -> None:
+def no_torques(draft: Draft) -> Array | None:
+    """A link does not bend."""
+    return None
+
+
+def move_link(
+    draft: Draft,
+    segments: Segments,
+    i: Index,
+    motion: Motion,
+    v_dot: Array | None,
+    wrench: Vectors,
+) -> None:
     """Carry ``w, w_dot, a`` over one link and store its inertial wrench."""
-    for name in ("a_joint", "swing"):
-        if name not in d.known:
-            d.vector(name, 3)
-    reads = d.known | d.piece(i) | here | motion(d, i, v_dot)
-    d.apply(
-        still(d, link.link_motion, bool(v_dot)),
-        reads,
-        a_joint=d.known["a_joint"],
-        swing=d.known["swing"],
-        **here,
+    joint = draft.vectors(a_joint=3, swing=3)
+    draft.step(
+        simplified(link.link_motion, segments.state, v_dot is not None),
+        segments.at(i),
+        segments.motion(i, v_dot),
+        motion,
+        **joint,
+        **motion,
     )
-    d.apply(still(d, link.link_wrench), d.known | here, F=wrench)
+    inertial = simplified(link.link_wrench, segments.state)
+    draft.step(inertial, segments.at(i), motion, joint, F=wrench["F"])
 
 
-def link_momentum(d: Draft, i: Index, writes: dict[str, Ref]) -> None:
+def link_momentum(
+    draft: Draft, segments: Segments, i: Index, velocity: Vectors, writes: Mapping[str, Ref]
+) -> None:
     """Carry ``w, u`` over one link and give its momentum or kinetic energy."""
-    if "u_joint" not in d.known:
-        d.vector("u_joint", 3)
-    reads = d.piece(i) | {"rates": d.rates(i)}
-    d.step(link.link_angular_velocity, reads, w=d.known["w"])
-    d.step(link.link_linear_velocity, reads, u_joint=d.known["u_joint"], u=d.known["u"])
-    d.step(link.link_momentum, **writes)
+    piece, rates = segments.at(i), segments.motion(i)
+    joint = draft.vectors(u_joint=3)
+    draft.step(link.link_angular_velocity, piece, rates, velocity, w=velocity["w"])
+    draft.step(link.link_linear_velocity, piece, velocity, u=velocity["u"], **joint)
+    draft.step(link.link_momentum, piece, velocity, joint, **writes)
 
 
 ARTICULATED = Mechanism(
     pieces=lambda tail: tail.links,
     prepare=prepare_links,
     prepare_samples=prepare_link_samples,
+    declare_torques=no_torques,
+    move=move_link,
+    momentum=link_momentum,
     pose=link.link_pose,
     twist=link.joint_twist,
     gather=link.gather_links,
     gather_wrench=link.gather_wrench,
     gather_moment=link.gather_moment,
-    move=move_link,
-    momentum=link_momentum,
     power=link.link_power,
 )

@@ -1,10 +1,6 @@
-"""The tails: for each, which steps describe one piece of a segment, so that the same sweeps serve
-both.
+"""The continuum tail: arc by arc, in the frames of the arcs' roots."""
 
-A segment of the articulated tail has n pieces, its links; a segment of the continuum tail is one
-piece.
-"""
-
+from collections.abc import Mapping
 from fractions import Fraction
 from math import ceil, log2
 
@@ -13,9 +9,8 @@ from ...ir.step import Step
 from ...mechanics import arc, arc_shape
 from ...mechanics.lower import derive
 from ..draft import Draft
-from .mechanism import Mechanism, motion, still
-
-# ---- continuum: arc by arc in the arcs' root frames ----------------------------------------------
+from ..scope import Motion, State, Vectors
+from .mechanism import Mechanism, Segments, simplified
 
 ARC = {"tip": 8, "shape": 16, "E": 9, "r": 3, "bend": 12}
 OWN = {"h_own": 3, "I_own": 6, "pitch_own": 6, "yaw_own": 6, "H_own": 3}
@@ -27,80 +22,117 @@ def shape_step(bend_range: float) -> Step:
     return derive(arc_shape.segment_shape, levels=levels)
 
 
-def prepare_arcs(d: Draft, doubled: bool = False) -> None:
+def bend_range(draft: Draft) -> dict[str, Ref]:
+    """Return the range that bends are declared to stay in."""
+    return {"bend_range": draft.fixed("bend_range", [draft.tail.bend_range])}
+
+
+def section_properties(draft: Draft) -> Vectors:
+    """Store the properties of a segment, all being equal."""
+    share = draft.fixed("share", [Fraction(1, draft.tail.segments)])
+    return draft.store(arc.section_properties, {"share": share}, section=2)
+
+
+def prepare_arcs(draft: Draft, state: State, doubled: bool = False) -> Segments:
     """Shape, tip and own inertia of every segment."""
     del doubled
-    d.known["share"] = d.constant("share", [Fraction(1, d.tail.segments)])[0]
-    d.store(arc.section_properties, section=2)
-    d.pieces |= {name: d.array(name, size, d.tail.segments) for name, size in (ARC | OWN).items()}
-    d.known["bend_range"] = d.constant("bend_range", [d.tail.bend_range])[0]
-    margin = d.array("margin", 1)[0]
-    with d.loop("i", d.tail.segments) as i:
-        piece = d.piece(i)
-        d.apply(shape_step(d.tail.bend_range), piece, tip=piece["tip"], shape=piece["shape"])
-        d.step(arc_shape.bend_margin, piece, margin=margin)
-        d.guard(margin, "OUT_OF_RANGE", piece["tip"], piece["shape"])
-        d.step(arc.segment_tip, piece, E=piece["E"], r=piece["r"], bend=piece["bend"])
-        d.step(arc.segment_inertia, piece, **{name: piece[name] for name in OWN})
+    section, count = section_properties(draft), draft.tail.segments
+    arrays = {name: draft.array(name, size, count) for name, size in (ARC | OWN).items()}
+    segments = Segments(state, arrays, section.named)
+    limit, margin = bend_range(draft), draft.vector("margin", 1)
+    with draft.loop("i", count) as i:
+        piece = segments.at(i)
+        shape = shape_step(draft.tail.bend_range)
+        draft.step(shape, piece, **piece.only("tip", "shape"))
+        draft.step(arc_shape.bend_margin, piece, limit, margin=margin)
+        draft.guard(margin, "OUT_OF_RANGE", piece["tip"], piece["shape"])
+        draft.step(arc.segment_tip, piece, **piece.only("E", "r", "bend"))
+        draft.step(arc.segment_inertia, piece, **piece.only(*OWN))
+    return segments
 
 
-def prepare_arc_samples(d: Draft) -> None:
-    """Rotation, position and columns over one n-th of every segment."""
-    fraction = Fraction(1, d.tail.links)
-    d.known["fraction"] = d.constant("fraction", [fraction])[0]
-    d.known["share"] = d.constant("share_sample", [fraction / d.tail.segments])[0]
-    d.step(arc.section_properties, section=d.array("section_sample", 2)[0])
-    section = {"section": next(a for a in d.arrays if a.name == "section_sample")[0]}
-    d.samples |= {
-        name: d.array(f"{name}_sample", ARC[name], d.tail.segments) for name in ("E", "r", "bend")
+def sample_section(draft: Draft) -> tuple[dict[str, Ref], dict[str, Ref]]:
+    """Store the properties of one n-th of a segment; return the fraction, and them."""
+    part = Fraction(1, draft.tail.links)
+    fraction = {"fraction": draft.fixed("fraction", [part])}
+    share = draft.fixed("share_sample", [part / draft.tail.segments])
+    section = draft.vector("section_sample", 2)
+    draft.step(arc.section_properties, {"share": share}, section=section)
+    return fraction, {"section": section}
+
+
+def sample_arrays(draft: Draft) -> dict[str, Array]:
+    """Declare what describes one n-th of every segment."""
+    return {
+        name: draft.array(f"{name}_sample", ARC[name], draft.tail.segments)
+        for name in ("E", "r", "bend")
     }
-    part, tip, margin = (
-        d.array("part", 2)[0],
-        d.array("tip_sample", 8)[0],
-        d.array("margin_sample", 1)[0],
-    )
-    if "bend_range" not in d.known:
-        d.known["bend_range"] = d.constant("bend_range", [d.tail.bend_range])[0]
-    with d.loop("i", d.tail.segments) as i:
-        sample = d.sample(i)
-        d.step(arc.part_of_bend, {"angles": d.angles(i)}, part=part)
-        d.apply(shape_step(d.tail.bend_range / d.tail.links), {"angles": part}, tip=tip)
-        d.step(arc_shape.bend_margin, {"angles": d.angles(i)}, margin=margin)
-        d.guard(margin, "OUT_OF_RANGE", tip)
-        d.step(arc.segment_tip, {"angles": part, "tip": tip} | section, **sample)
-        d.step(arc.columns_of_bend, sample, bend=sample["bend"])
 
 
-def move_arc(d: Draft, i: Index, here: dict[str, Ref], v_dot: Array | None, wrench: Ref) -> None:
+def prepare_arc_samples(draft: Draft, state: State, segments: Segments | None) -> Segments:
+    """Rotation, position and columns over one n-th of every segment."""
+    del segments
+    fraction, section = sample_section(draft)
+    samples = Segments(state, sample_arrays(draft))
+    part, tip = draft.vector("part", 2), draft.vector("tip_sample", 8)
+    margin, limit = draft.vector("margin_sample", 1), bend_range(draft)
+    with draft.loop("i", draft.tail.segments) as i:
+        sample, angles = samples.at(i), {"angles": state.angles(i)}
+        shape = shape_step(draft.tail.bend_range / draft.tail.links)
+        draft.step(arc.part_of_bend, angles, fraction, part=part)
+        draft.step(shape, {"angles": part}, tip=tip)
+
+        # the range is one of whole segments
+        draft.step(arc_shape.bend_margin, angles, limit, margin=margin)
+        draft.guard(margin, "OUT_OF_RANGE", tip)
+        bent = {"angles": part, "tip": tip}
+        draft.step(arc.segment_tip, bent, section, **sample.only("E", "r", "bend"))
+        draft.step(arc.columns_of_bend, sample, fraction, bend=sample["bend"])
+    return samples
+
+
+def bending_torques(draft: Draft) -> Array | None:
+    """Declare the generalised forces of all segments' own bends."""
+    return draft.array("torque_own", 2, draft.tail.segments)
+
+
+def move_arc(
+    draft: Draft,
+    segments: Segments,
+    i: Index,
+    motion: Motion,
+    v_dot: Array | None,
+    wrench: Vectors,
+) -> None:
     """Store the inertial wrench of one arc and its generalised forces, then carry ``w, w_dot, a``
     to its tip.
     """
-    if "torque_own" not in d.pieces:
-        d.pieces["torque_own"] = d.array("torque_own", 2, d.tail.segments)
-    reads = d.known | d.piece(i) | here | motion(d, i, v_dot)
-    d.apply(
-        still(d, arc.segment_wrench, bool(v_dot)), reads, F=wrench, torque_own=reads["torque_own"]
-    )
-    d.apply(still(d, arc.segment_motion, bool(v_dot)), reads, **here)
+    reads = segments.at(i), segments.motion(i, v_dot), motion
+    forced = v_dot is not None
+    draft.step(simplified(arc.segment_wrench, segments.state, forced), *reads, **wrench)
+    draft.step(simplified(arc.segment_motion, segments.state, forced), *reads, **motion)
 
 
-def arc_momentum(d: Draft, i: Index, writes: dict[str, Ref]) -> None:
+def arc_momentum(
+    draft: Draft, segments: Segments, i: Index, velocity: Vectors, writes: Mapping[str, Ref]
+) -> None:
     """Give the momentum or kinetic energy of one arc, then carry ``w, u`` to its tip."""
-    reads = d.piece(i) | {"rates": d.rates(i)}
-    d.step(arc.segment_momentum, reads, **writes)
-    d.step(arc.segment_velocity, reads, w=d.known["w"], u=d.known["u"])
+    reads = segments.at(i), segments.motion(i), velocity
+    draft.step(arc.segment_momentum, *reads, **writes)
+    draft.step(arc.segment_velocity, *reads, **velocity)
 
 
 CONTINUUM = Mechanism(
     pieces=lambda tail: 1,
     prepare=prepare_arcs,
     prepare_samples=prepare_arc_samples,
+    declare_torques=bending_torques,
+    move=move_arc,
+    momentum=arc_momentum,
     pose=arc.segment_pose,
     twist=arc.segment_twist,
     gather=arc.gather_segment,
     gather_wrench=arc.gather_segment_wrench,
     gather_moment=arc.gather_segment_moment,
-    move=move_arc,
-    momentum=arc_momentum,
     power=arc.segment_power,
 )

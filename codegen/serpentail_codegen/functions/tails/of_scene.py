@@ -1,9 +1,4 @@
-"""The tails: for each, which steps describe one piece of a segment, so that the same sweeps serve
-both.
-
-A segment of the articulated tail has n pieces, its links; a segment of the continuum tail is one
-piece.
-"""
+"""Which tail a scene has."""
 
 from ..tail import Tail
 from .articulated import ARTICULATED

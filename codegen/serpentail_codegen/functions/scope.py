@@ -1,0 +1,125 @@
+"""Vectors that belong together, under the names by which steps read them.
+
+A sweep hands scopes on instead of single vectors; a step takes from a scope what it declares.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, fields
+
+from ..ir.program import Array, Index, Ref
+from .layout import OMEGA, POSITION, QUATERNION, VELOCITY, block, segment_q, segment_v
+
+
+class Scope:
+    """Named vectors; ``**scope`` passes all of them on."""
+
+    def vectors(self) -> Mapping[str, Ref]:
+        """Return the vectors by their names."""
+        raise NotImplementedError
+
+    def keys(self) -> Iterable[str]:
+        """Return the names."""
+        return self.vectors().keys()
+
+    def __getitem__(self, name: str) -> Ref:
+        return self.vectors()[name]
+
+
+@dataclass(frozen=True)
+class Vectors(Scope):
+    """Vectors of any names."""
+
+    named: Mapping[str, Ref]
+
+    def vectors(self) -> Mapping[str, Ref]:
+        """Return the vectors by their names."""
+        return self.named
+
+    def only(self, *names: str) -> "Vectors":
+        """Return some of the vectors."""
+        return Vectors({name: self.named[name] for name in names})
+
+
+class Instead(Vectors):
+    """Vectors that stand for the parameters of their names, which nothing else may do."""
+
+
+class Fields(Scope):
+    """A scope whose vectors are the fields of a dataclass."""
+
+    def vectors(self) -> Mapping[str, Ref]:
+        """Return the vectors by their names."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore
+
+
+@dataclass(frozen=True)
+class Pose(Fields):
+    """Where a frame is: its attitude and its origin."""
+
+    R: Ref
+    P: Ref
+
+
+@dataclass(frozen=True)
+class Motion(Fields):
+    """How a frame moves: angular velocity, its rate, and the acceleration of its origin."""
+
+    w: Ref
+    w_dot: Ref
+    a: Ref
+
+
+@dataclass(frozen=True)
+class Torso(Fields):
+    """The torso in the world: attitude, place, velocity and angular velocity (body axes)."""
+
+    R: Ref
+    p: Ref
+    p_dot: Ref
+    omega: Ref
+
+
+@dataclass(frozen=True)
+class State:
+    """The arguments q and v of a function; without v nothing moves, or nothing asks for it."""
+
+    q: Array
+    v: Array | None = None
+
+    @property
+    def quaternion(self) -> Ref:
+        """Attitude of the torso."""
+        return block(self.q, QUATERNION)
+
+    @property
+    def position(self) -> Ref:
+        """Position of B."""
+        return block(self.q, POSITION)
+
+    @property
+    def velocity(self) -> Ref:
+        """Velocity of B."""
+        return block(self._v, VELOCITY)
+
+    @property
+    def omega(self) -> Ref:
+        """Angular velocity of the torso."""
+        return block(self._v, OMEGA)
+
+    @property
+    def _v(self) -> Array:
+        if self.v is None:
+            raise ValueError("this function has no v among its arguments")
+        return self.v
+
+    def torso(self, R: Ref) -> Torso:
+        """Return what describes the torso, its attitude being R."""
+        return Torso(R, self.position, self.velocity, self.omega)
+
+    def angles(self, i: Index | int) -> Ref:
+        """Return the coordinates of segment i."""
+        return segment_q(self.q, i)
+
+    def rates(self, i: Index | int) -> Ref:
+        """Return the rates of the coordinates of segment i."""
+        return segment_v(self._v, i)
