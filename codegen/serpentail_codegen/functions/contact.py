@@ -7,12 +7,12 @@ from ..mechanics import contact, leg, loads
 from ..mechanics.lower import derive
 from .arguments import TAU, V_DOT, Q, V
 from .draft import Draft
-from .dynamics import accelerate_by_segments, copied_torques, factored_dynamics
+from .dynamics import accelerate_by_segments, copied_torques
+from .factored import factored_dynamics
 from .function import Argument, Function
 from .layout import coordinates
 from .scope import State, Torso, Vectors
-from .sweeps import sweeps
-from .sweeps.sweeps import mechanism
+from .sweeps.pieces import attitude, mechanism, torso_pose
 from .tail import Tail
 from .tails.mechanism import Segments
 
@@ -114,7 +114,7 @@ def place_tail(draft: Draft, torso: Torso, samples: Segments, points: Points) ->
     """
     # fixed samples of an arc, not its one lowest point (Eqs. 38, 39), which jumps from end to end
     tail, steps, S = draft.tail, mechanism(draft), points.columns
-    pose = sweeps.torso_pose(draft, torso.R, name="point")
+    pose = torso_pose(draft, torso.R, name="point")
     twist = draft.store(contact.torso_twist, torso, turn=3, slide=3)
     added = {f"{name}_": ref for name, ref in twist.named.items()}
     with draft.loop("i", tail.segments) as i, draft.loop("j", tail.links) as j:
@@ -129,7 +129,7 @@ def place_tail(draft: Draft, torso: Torso, samples: Segments, points: Points) ->
 def assemble_contact_points(draft: Draft, arrays: dict[str, Array]) -> None:
     """Places and velocities of all points."""
     state = State(arrays["q"], arrays["v"])
-    R = sweeps.attitude(draft, state)
+    R = attitude(draft, state)
     points = gather_points(draft, state, R, arrays)
     with draft.loop("k", draft.tail.points) as k:
         position = arrays["positions"].part(3 * k, 3)
@@ -195,7 +195,7 @@ def assemble_contact_dynamics(draft: Draft, arrays: dict[str, Array]) -> None:
     """v_dot from Eq. 1, H v_dot + C = [0; tau] + J^T f, with the ground's forces."""
     state = State(arrays["q"], arrays["v"])
     if draft.dynamics == "segments":
-        R = sweeps.attitude(draft, state)
+        R = attitude(draft, state)
         accelerate_by_segments(draft, arrays, *contact_load(draft, state, R, arrays))
         return
     factored = factored_dynamics(draft, arrays["q"], arrays["v"])

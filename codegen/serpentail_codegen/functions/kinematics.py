@@ -5,16 +5,15 @@ from ..mechanics import loads
 from .draft import Draft
 from .layout import OMEGA, TORSO_NV, coordinate
 from .scope import State
-from .sweeps import sweeps
-from .sweeps.sweeps import mechanism
+from .sweeps.pieces import attitude, mechanism, torso_pose
 
 
 def assemble_tail_points(draft: Draft, arrays: dict[str, Array]) -> None:
     """The joints and the tip (Eqs. 14, 15), or equally spaced samples of every segment."""
     points, tail, state = arrays["points"], draft.tail, State(arrays["q"])
-    R = sweeps.attitude(draft, state)
+    R = attitude(draft, state)
     samples = mechanism(draft).prepare_samples(draft, state, None)
-    pose = sweeps.torso_pose(draft, R, state.position)
+    pose = torso_pose(draft, R, state.position)
     draft.copy(points.part(0, 3), pose.P)
     with draft.loop("i", tail.segments) as i, draft.loop("j", tail.links) as j:
         draft.step(mechanism(draft).pose, pose, samples.at(i), **pose)
@@ -26,10 +25,10 @@ def assemble_tail_point_jacobians(draft: Draft, arrays: dict[str, Array]) -> Non
     origin costs no accuracy.
     """
     J, tail, state = arrays["J"], draft.tail, State(arrays["q"])
-    R = sweeps.attitude(draft, state)
+    R = attitude(draft, state)
     samples = mechanism(draft).prepare_samples(draft, state, None)
     S = draft.array("S", 12, tail.segments)
-    pose = sweeps.torso_pose(draft, R)
+    pose = torso_pose(draft, R)
 
     def rows(point: Index, first: Index | int, size: int) -> dict[str, Ref]:
         return {f"J_{name}": row(point, axis, first, size) for axis, name in enumerate("xyz")}

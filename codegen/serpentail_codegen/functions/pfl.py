@@ -7,8 +7,9 @@ from .draft import Draft
 from .function import Argument, Function
 from .layout import OMEGA, VELOCITY, block, coordinates, tail_v
 from .scope import Motion, State, Vectors
-from .sweeps import sweeps
-from .sweeps.sweeps import column_of, mechanism
+from .sweeps.inertia import column_of, forward_roots, gather_inertia, segment_roots
+from .sweeps.pieces import attitude, mechanism, torso_pose
+from .sweeps.wrenches import forward_wrenches, gather_wrenches
 from .tails.mechanism import Segments
 
 ACCELERATIONS = Argument(
@@ -29,9 +30,9 @@ def assemble_pfl(draft: Draft, arrays: dict[str, Array]) -> None:
 
     # composite inertia, and the momentum columns of the tail coordinates
     segments = mechanism(draft).prepare(draft, state, True)
-    columns, roots = draft.array("columns", 12, tail.segments), sweeps.segment_roots(draft)
-    sweeps.forward_roots(draft, segments, sweeps.torso_pose(draft), roots)
-    composite = sweeps.gather_inertia(draft, segments, roots, columns)
+    columns, roots = draft.array("columns", 12, tail.segments), segment_roots(draft)
+    forward_roots(draft, segments, torso_pose(draft), roots)
+    composite = gather_inertia(draft, segments, roots, columns)
 
     # torques of a torso that does not accelerate, then how it does, and what that adds
     with draft.loop("k", tail.nt) as k:
@@ -42,7 +43,7 @@ def assemble_pfl(draft: Draft, arrays: dict[str, Array]) -> None:
         column = {"column": column_of(columns, k)}
         draft.step(translation.coupling_torque, motion, column, torque_=tau.part(k, 1))
     if "v_dot" in arrays:
-        reads = {"R": sweeps.attitude(draft, state), "a": motion["a"]}
+        reads = {"R": attitude(draft, state), "a": motion["a"]}
         draft.step(rotations.world_acceleration, reads, p_ddot=block(v_dot, VELOCITY))
         draft.copy(block(v_dot, OMEGA), motion["w_dot"])
 
@@ -52,8 +53,8 @@ def tail_alone(draft: Draft, segments: Segments, v_dot: Array, tau: Array) -> Ve
     not accelerate.
     """
     motion = Motion(segments.state.omega, draft.zero(3), draft.zero(3))
-    wrenches = sweeps.forward_wrenches(draft, segments, motion, v_dot)
-    total = sweeps.gather_wrenches(draft, segments, wrenches, lambda i: coordinates(tau, i))
+    wrenches = forward_wrenches(draft, segments, motion, v_dot)
+    total = gather_wrenches(draft, segments, wrenches, lambda i: coordinates(tau, i))
     return draft.store(torso.torso_wrench, motion, total, force=3, moment=3)
 
 

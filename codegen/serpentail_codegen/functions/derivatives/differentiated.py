@@ -11,8 +11,8 @@ from ..dynamics import inertial_forces
 from ..function import Argument, Function
 from ..layout import OMEGA, VELOCITY, block
 from ..scope import Motion, State, Vectors
-from ..sweeps import sweeps
-from ..sweeps.sweeps import mechanism
+from ..sweeps.pieces import attitude, mechanism
+from ..sweeps.wrenches import virtual_power
 
 MULTIPLIER = Argument("multiplier", lambda t: (t.nv,), "weights lambda of the rows")
 POWER = Argument("power", lambda t: (1,), "lambda^T (H v_dot + C)")
@@ -43,7 +43,7 @@ def assemble_virtual_power(draft: Draft, arrays: dict[str, Array]) -> None:
     """lambda^T (H v_dot + C) as one sum over the links, from the torso to the tip."""
     v_dot, multiplier = arrays["v_dot"], arrays["multiplier"]
     state = State(arrays["q"], arrays["v"])
-    R = sweeps.attitude(draft, state)
+    R = attitude(draft, state)
     segments = mechanism(draft).prepare(draft, state, False)
 
     # the torso moves by v and v_dot, and virtually by the multiplier
@@ -54,7 +54,7 @@ def assemble_virtual_power(draft: Draft, arrays: dict[str, Array]) -> None:
     draft.step(torso.torso_velocity, p_dot, u=virtual["u_virtual"])
     motion = {"w": state.omega, "w_dot": block(v_dot, OMEGA)}
     start = Vectors({**motion, **a, **virtual})
-    sweeps.virtual_power(draft, segments, start, multiplier, v_dot, arrays["power"][0])
+    virtual_power(draft, segments, start, multiplier, v_dot, arrays["power"][0])
 
 
 CORE = Function("core", "H v_dot + C in torso axes", (Q, V, V_DOT), (FORCE,), assemble_core)

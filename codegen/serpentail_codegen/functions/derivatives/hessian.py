@@ -10,7 +10,7 @@ from ..draft import Draft
 from ..function import assemble
 from ..layout import OMEGA, QUATERNION, TORSO_NQ, TORSO_NV, VELOCITY, block, coordinate
 from ..scope import State
-from ..sweeps import sweeps
+from ..sweeps.pieces import attitude
 from .differentiated import INERTIA, VIRTUAL_POWER
 from .directions import TORSO, Directions
 from .jacobians import with_unit_quaternion
@@ -114,7 +114,7 @@ def mixed_block(draft: Draft, q: Array, multiplier: Array, aq: Array) -> None:
     inner = tangent_program(assemble(INERTIA, tail), ("q",), directions.count, directions.outward)
     rows = draft.wide("inertial_rows", nv, directions.count)
     body = draft.array("multiplier_in_torso_axes", nv)
-    R = {"R": sweeps.attitude(draft, State(q))}
+    R = {"R": attitude(draft, State(q))}
     p_dot = {"p_dot": block(multiplier, VELOCITY)}
     draft.step(torso.torso_velocity, R, p_dot, u=block(body, VELOCITY))
     rest = slice(OMEGA.start, nv)

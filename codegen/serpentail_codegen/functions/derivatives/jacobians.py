@@ -10,7 +10,8 @@ from ...autodiff.reverse import adjoint_program
 from ...ir.program import Array, Index, Ref
 from ...mechanics import rotations, torso, translation
 from ..draft import Draft
-from ..dynamics import FactoredDynamics, Loads, assemble_forward_dynamics
+from ..dynamics import assemble_forward_dynamics
+from ..factored import FactoredDynamics, Loads
 from ..function import Function, assemble, struct_parameters
 from ..layout import OMEGA, POSITION, QUATERNION, VELOCITY, block, tail_v
 from ..plain import FUNCTIONS

@@ -13,7 +13,9 @@ from ..draft import Draft
 from ..layout import OMEGA, VELOCITY, block, coordinate, tail_v
 from ..scope import Motion, State, Vectors
 from ..tails.mechanism import Segments, Wrenches
-from .sweeps import column_of, columns_of, each_piece, forward_wrenches, mechanism
+from .inertia import column_of, columns_of
+from .pieces import each_piece, mechanism
+from .wrenches import forward_wrenches
 
 
 def factored_dynamics_by_columns(

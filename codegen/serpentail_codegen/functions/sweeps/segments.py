@@ -16,7 +16,7 @@ from ..layout import OMEGA, PER_SEGMENT, VELOCITY, block, coordinates, segment_v
 from ..scope import State, Vectors
 from ..tails.articulated import link_properties
 from ..tails.mechanism import simplified
-from .sweeps import IDENTITY
+from .pieces import IDENTITY
 
 UNKNOWNS = 8  # motion of a segment's base, and two coordinates
 OWN_INERTIA = {"h": 3, "I": 6, "pitch": 6, "yaw": 6, "H_pp": 1, "H_py": 1, "H_yy": 1}

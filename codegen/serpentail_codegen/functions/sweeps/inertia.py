@@ -1,0 +1,122 @@
+"""Sweeps of inertia: composite bodies from the tip to the torso, and all that H is made of."""
+
+from collections.abc import Callable
+
+from ...ir.program import Array, Index, Ref, as_index
+from ...mechanics import torso
+from ..draft import Draft
+from ..layout import coordinate
+from ..scope import Pose, State, Vectors
+from ..tails.mechanism import Segments
+from .pieces import mechanism, torso_pose
+
+Block = Callable[..., Ref]  # entries of H, by the numbers of two tail coordinates and how many
+
+
+def gather_inertia(
+    draft: Draft,
+    segments: Segments,
+    roots: dict[str, Array],
+    columns: Array,
+    H_tail: Block | None = None,
+) -> Vectors:
+    """Composite inertia in ``mass, h, I`` at B; each segment's momentum columns at B and its own
+    block of H.
+    """
+    composite = draft.vectors(mass=1, h=3, I=6)
+    momenta = draft.vectors(pitch=6, yaw=6)
+    for ref in composite.named.values():
+        draft.fill(ref, 0)
+    with draft.loop("i", draft.tail.segments, downward=True) as i:
+        # the segment's own block of H and its columns start anew, what is beyond goes on
+        own = _own_block(H_tail, i) if H_tail else {}
+        for ref in (*momenta.named.values(), *own.values()):
+            draft.fill(ref, 0)
+        with draft.loop("j", mechanism(draft).pieces(draft.tail), downward=True):
+            step = mechanism(draft).gather
+            draft.step(step, segments.at(i), composite, momenta, **composite, **momenta, **own)
+        root = {name: array[i] for name, array in roots.items()}
+        draft.step(torso.column_at_torso, root, momenta, columns=columns_of(columns, i))
+    draft.step(torso.torso_composite, composite, **composite)
+    return composite
+
+
+def _own_block(H_tail: Block, i: Index) -> dict[str, Ref]:
+    """The lower triangle of H of one segment's two coordinates, to be added to."""
+    pitch, yaw = coordinate(i), coordinate(i, 1)
+    return {
+        "H_pp_": H_tail(pitch, pitch),
+        "H_py_": H_tail(yaw, pitch),
+        "H_yy_": H_tail(yaw, yaw),
+    }
+
+
+def segment_roots(draft: Draft) -> dict[str, Array]:
+    """Declare the pose of every segment's root."""
+    count = draft.tail.segments
+    return {"R": draft.array("R_root", 9, count), "P": draft.array("P_root", 3, count)}
+
+
+def forward_roots(
+    draft: Draft,
+    segments: Segments,
+    pose: Pose,
+    roots: dict[str, Array],
+    S: Array | None = None,
+) -> None:
+    """Pose of every segment's root, and spatial columns of all segments but the last, from a pose
+    on.
+    """
+    last, steps = draft.tail.segments - 1, mechanism(draft)
+
+    def copy_pose(i: Index) -> None:
+        for name, array in roots.items():
+            draft.copy(array[i], pose[name])
+
+    with draft.loop("i", last) as i:
+        copy_pose(i)
+        if S:
+            draft.fill(S[i], 0)
+        with draft.loop("j", steps.pieces(draft.tail)):
+            if S:
+                draft.step(steps.twist, pose, segments.at(i), S_=S[i])
+            draft.step(steps.pose, pose, segments.at(i), **pose)
+    copy_pose(as_index(last))
+
+
+def tail_inertia(
+    draft: Draft, state: State, H_tail: Block, columns: Array, R: Ref | None = None
+) -> tuple[Segments, Vectors]:
+    """All that H is made of (Eqs. 2, 16, 18): ``mass, h, I`` at B, momentum columns, H of the tail
+    (lower triangle).
+
+    The columns are in torso axes, or in world axes with the attitude R of the torso.  Returns the
+    segments, and ``mass, h, I``.
+    """
+    segments = mechanism(draft).prepare(draft, state, True)
+    pose = torso_pose(draft, R)
+    roots = segment_roots(draft)
+    S = draft.array("S", 12, max(draft.tail.segments - 1, 1))
+    forward_roots(draft, segments, pose, roots, S)
+    composite = gather_inertia(draft, segments, roots, columns, H_tail)
+
+    # blocks of two segments
+    with draft.loop("i", draft.tail.segments, start=1) as i, draft.loop("l", i) as other:
+        first = coordinate(other)
+        blocks = {
+            "H_pitch": H_tail(coordinate(i), first, 2),
+            "H_yaw": H_tail(coordinate(i, 1), first, 2),
+        }
+        reads = {"S": S[other], "columns": columns_of(columns, i)}
+        draft.step(torso.segment_coupling, reads, **blocks)
+    return segments, composite
+
+
+def column_of(columns: Array, k: Index) -> Ref:
+    """Momentum column of tail coordinate k."""
+    return columns.part(6 * k, 6)
+
+
+def columns_of(columns: Array, i: Index) -> Ref:
+    """Both momentum columns of segment i."""
+    return columns.part(12 * i, 12)

@@ -1,0 +1,48 @@
+"""Sweeps of loads: forces on the tail's points, as a load on the torso and torques."""
+
+from ...ir.program import Array, Index, Ref
+from ...mechanics import loads
+from ..draft import Draft
+from ..layout import coordinates
+from ..scope import State, Vectors
+from .pieces import mechanism, torso_pose
+
+
+def sample_joints(draft: Draft, state: State) -> tuple[Array, Array]:
+    """Spatial columns between tail points, and all tail points, in torso axes from B."""
+    tail, steps = draft.tail, mechanism(draft)
+    samples = steps.prepare_samples(draft, state, None)
+    S, points = draft.array("S_joint", 12, tail.total), draft.array("tail_point", 3, tail.total + 1)
+    pose = torso_pose(draft, name="joint")
+    draft.copy(points[0], pose.P)
+    with draft.loop("i", tail.segments) as i, draft.loop("j", tail.links) as j:
+        g = tail.links * i + j
+        draft.step(steps.twist, pose, samples.at(i), S=S[g])
+        draft.step(steps.pose, pose, samples.at(i), **pose)
+        draft.copy(points[g + 1], pose.P)
+    return S, points
+
+
+def gather_loads(draft: Draft, state: State, R: Ref, f_ext: Array, torques: Array) -> Vectors:
+    """J^T f (Eq. 10) of the loads in ``f_ext``: returns ``load_force, load_moment`` at B; the
+    joints' part is added to ``torques``.
+    """
+    S, points = sample_joints(draft, state)
+    beyond = draft.vectors(F_beyond=6)
+    draft.fill(beyond["F_beyond"], 0)
+
+    def add_load(point: Index) -> None:
+        force = f_ext.part(6 + 3 * point, 3)
+        reads = {"R": R, "P": points[point], "f_point": force}
+        draft.step(loads.load_at_point, reads, beyond, **beyond)
+
+    with (
+        draft.loop("i", draft.tail.segments, downward=True) as i,
+        draft.loop("j", draft.tail.links, downward=True) as j,
+    ):
+        g = draft.tail.links * i + j
+        add_load(g + 1)
+        draft.step(loads.joint_load, {"S": S[g]}, beyond, torque_=coordinates(torques, i))
+    add_load(Index())
+    at_torso = {"R": R, "f_torso": f_ext.part(0, 6)}
+    return draft.store(loads.load_at_torso, at_torso, beyond, load_force=3, load_moment=3)

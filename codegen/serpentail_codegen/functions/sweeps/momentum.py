@@ -1,0 +1,62 @@
+"""Sweeps of momentum: mass and first moment, momentum or kinetic energy."""
+
+from ...ir.program import Ref
+from ...mechanics import torso
+from ..draft import Draft
+from ..scope import State, Vectors
+from ..tails.mechanism import Segments, Wrenches
+from .pieces import each_piece, mechanism
+from .wrenches import gather_wrenches
+
+
+def gather_momentum(draft: Draft, state: State, R: Ref, p_dot: Ref) -> Vectors:
+    """``mass`` and first moment ``h`` of the animal, and its momentum ``force, moment``, at B,
+    which moves with p_dot.
+    """
+    segments, moment, velocity, u_torso = _begin_momentum(draft, state, R, p_dot)
+    tail = mechanism(draft)
+    momenta = Wrenches(draft.array("momenta", 6, draft.tail.segments * tail.pieces(draft.tail)))
+    with each_piece(draft) as (i, g):
+        tail.momentum(draft, segments, i, velocity, momenta.at(i, g).named)
+    total = gather_wrenches(draft, segments, momenta)
+    reads = u_torso, {"w": state.omega}, total
+    momentum = draft.store(torso.torso_momentum, *reads, force=3, moment=3)
+    return Vectors({**moment, **momentum})
+
+
+def gather_kinetic(draft: Draft, state: State, R: Ref, kinetic: Ref) -> Vectors:
+    """``mass`` and first moment ``h`` of the animal; sums its energy in ``kinetic``."""
+    segments, moment, velocity, u_torso = _begin_momentum(draft, state, R, state.velocity)
+    draft.fill(kinetic, 0)
+    with each_piece(draft) as (i, _):
+        mechanism(draft).momentum(draft, segments, i, velocity, {"kinetic_": kinetic})
+    draft.step(torso.torso_momentum, u_torso, {"w": state.omega}, kinetic_=kinetic)
+    return moment
+
+
+def _begin_momentum(
+    draft: Draft, state: State, R: Ref, p_dot: Ref
+) -> tuple[Segments, Vectors, Vectors, Vectors]:
+    """Return segments, mass and first moment, velocities of the tail mount, and of the torso."""
+    segments = mechanism(draft).prepare(draft, state, False)
+    moment = gather_moment(draft, segments)
+    velocity = draft.vectors(w=3, u=3)
+    draft.step(torso.torso_velocity, {"R": R, "p_dot": p_dot}, u=velocity["u"])
+    u_torso = draft.vectors(u_torso=3)
+    draft.copy(u_torso["u_torso"], velocity["u"])
+    draft.copy(velocity["w"], state.omega)
+    draft.step(torso.mount_velocity, velocity, u=velocity["u"])
+    return segments, moment, velocity, u_torso
+
+
+def gather_moment(draft: Draft, segments: Segments) -> Vectors:
+    """Mass and first moment of the tail at its mount, then with the torso at B, in ``mass`` and
+    ``h``.
+    """
+    moment = draft.vectors(mass=1, h=3)
+    for ref in moment.named.values():
+        draft.fill(ref, 0)
+    with each_piece(draft, downward=True) as (i, _):
+        draft.step(mechanism(draft).gather_moment, segments.at(i), moment, **moment)
+    draft.step(torso.torso_moment, moment, **moment)
+    return moment

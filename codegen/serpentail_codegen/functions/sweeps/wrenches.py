@@ -1,0 +1,110 @@
+"""Sweeps of wrenches: motion from the torso to the tip, forces back, and their power."""
+
+from collections.abc import Callable
+
+from ...ir.program import Array, Index, Ref
+from ...mechanics import torso
+from ..draft import Draft
+from ..layout import OMEGA, VELOCITY, block, segment_v
+from ..scope import Motion, Vectors
+from ..tails.mechanism import Segments, Wrenches
+from .pieces import each_piece, mechanism
+
+
+def forward_wrenches(
+    draft: Draft, segments: Segments, start: Motion, v_dot: Array | None
+) -> Wrenches:
+    """Velocities and accelerations to the tip, and the inertial wrench of every piece (Eqs. A1 to
+    A12, 17, 19).
+
+    ``start`` is the torso's motion; ``v_dot`` None means that the tail does not accelerate.
+    """
+    tail = mechanism(draft)
+    wrench = draft.array("wrench", 6, draft.tail.segments * tail.pieces(draft.tail))
+    motion = Motion(*(draft.vector(f"{name}_here", 3) for name in ("w", "w_dot", "a")))
+    draft.copy(motion.w, start.w)
+    draft.copy(motion.w_dot, start.w_dot)
+    draft.step(torso.mount_acceleration, start, a_mount=motion.a)
+    wrenches = Wrenches(wrench, tail.declare_torques(draft))
+    with each_piece(draft) as (i, g):
+        tail.move(draft, segments, i, motion, v_dot, wrenches.at(i, g))
+    return wrenches
+
+
+def gather_wrenches(
+    draft: Draft,
+    segments: Segments,
+    wrenches: Wrenches,
+    torque: Callable[[Index], Ref] | None = None,
+) -> Vectors:
+    """Sum wrenches (or momenta) from the tip to the tail mount, in ``F_next``; torques add up per
+    segment.
+
+    Of inertial wrenches this is the sum of Eq. 4.
+    """
+    total, pieces = draft.vectors(F_next=6), mechanism(draft).pieces(draft.tail)
+    draft.fill(total["F_next"], 0)
+    with draft.loop("i", draft.tail.segments, downward=True) as i:
+        writes = dict(total.named)
+        if torque:
+            draft.fill(torque(i), 0)
+            writes["torque_"] = torque(i)
+        with draft.loop("j", pieces, downward=True) as j:
+            wrench = wrenches.at(i, pieces * i + j)
+            step = mechanism(draft).gather_wrench
+            draft.step(step, segments.at(i), wrench, total, **writes)
+    return total
+
+
+def core_bias(draft: Draft, segments: Segments, bias: Array) -> None:
+    """C without gravity and translation: force and moment at B in torso axes, then the tail's
+    forces.
+    """
+    zero = draft.zero(3)
+    motion = Motion(segments.state.omega, zero, zero)
+    wrenches = forward_wrenches(draft, segments, motion, None)
+    total = gather_wrenches(draft, segments, wrenches, lambda i: segment_v(bias, i))
+    torso_wrench(draft, motion, total, bias)
+
+
+def torso_wrench(draft: Draft, motion: Motion, total: Vectors, force: Array) -> None:
+    """Store the inertial force and moment of torso and tail, from the tail's at its mount."""
+    draft.step(
+        torso.torso_wrench,
+        motion,
+        total,
+        force=block(force, VELOCITY),
+        moment=block(force, OMEGA),
+    )
+
+
+def virtual_power(
+    draft: Draft,
+    segments: Segments,
+    start: Vectors,
+    multiplier: Array,
+    v_dot: Array,
+    power: Ref,
+) -> None:
+    """Sum the power of all inertial wrenches when the animal moves with the velocity
+    ``multiplier``.
+
+    ``start``: ``w``, ``w_dot``, ``a`` of the torso and ``w_virtual``, ``u_virtual``, its virtual
+    velocities.
+    """
+    names = ("w", "w_dot", "a", "w_virtual", "u_virtual")
+    carried = Vectors({name: draft.vector(f"{name}_here", 3) for name in names})
+    draft.step(torso.torso_power, start, power=power)
+
+    # from B to the tail mount
+    draft.step(torso.mount_acceleration, start, a_mount=carried["a"])
+    virtual = {"w": start["w_virtual"], "u": start["u_virtual"]}
+    draft.step(torso.mount_velocity, virtual, u=carried["u_virtual"])
+    for name in ("w", "w_dot", "w_virtual"):
+        draft.copy(carried[name], start[name])
+
+    # from the mount to the tip
+    with each_piece(draft) as (i, _):
+        rates = segments.motion(i, v_dot), {"virtual_rates": segment_v(multiplier, i)}
+        step = mechanism(draft).power
+        draft.step(step, segments.at(i), *rates, carried, power_=power, **carried)
