@@ -17,6 +17,7 @@ def link_properties(let, tail_mass: V1, tail_length: V1, link_inertia: V3, share
     """Properties of one of N equal links, ``share`` = 1 / N: m_at = m_t / N, L_j2c = L_j2j / 2
     (Sect. 4).
     """
+    # Eqs. 13, 15: the COM is L_j2c = L_j2j / 2 from the joint, b = m L_j2c its first moment
     m, length = let("even", Matrix([tail_mass[0], tail_length[0]]) * share[0])
     half_moment = let("b", m * length / 2)
     steiner = let("steiner", half_moment * length / 2)
@@ -26,6 +27,7 @@ def link_properties(let, tail_mass: V1, tail_length: V1, link_inertia: V3, share
 
 def link_wrench(let, link: V6, w: V3, w_dot: V3, a_joint: V3, swing: V3) -> dict:
     """Inertial wrench of one link at its joint (Eq. 17), Newton and Euler in the link frame."""
+    # force = m v_dot_com (A10), v_dot_j2c being -(L / 2) swing (A12)
     m, _, b, Ix, Iy, Iz = link
     force = m * a_joint - b * swing
     euler = Matrix(
@@ -92,6 +94,7 @@ def gather_wrench(let, joint: V4, link: V6, F: V6, F_next: V6) -> dict:
 
 def turned_inertia(let, axes, turn, twice, I) -> Matrix:
     """R I R^T for a turn in the plane of axes (i, j), k normal to it, by the double angle."""
+    # A13 from link to link instead of from each link to the world
     i, j, k = axes
     c, s = turn[i, i], turn[j, i]
     sine_squared, product, double_product, cosine, cosine_squared = twice
@@ -115,6 +118,7 @@ def with_link(let, mass, link, h, I) -> tuple[Matrix, Matrix]:
     """First moment and inertia about this joint of one link and what hangs at its end, ``mass, h,
     I`` at that end.
     """
+    # the link's COM (Eq. 13) enters by its first moment b along -y
     _, length, b, Ix, Iy, Iz = link
     moment = let("moment", h[1] - mass[0] * length)
     steiner = let("steiner", length * (h[1] + moment))
@@ -140,6 +144,7 @@ def gather_links(
     alpha_dot and beta_dot of the segment's joints passed so far; ``H_pp, H_py, H_yy`` are what this
     joint adds to the segment's own block.
     """
+    # J_com (A6) is not formed: momentum columns sum m J_com over all links beyond
     turn_x, turn_z = joint_turns(joint)
     h, I = with_link(let, mass, link, h, I)
     pitch, yaw = along_link(let, link[1], pitch), along_link(let, link[1], yaw)
@@ -177,6 +182,7 @@ def link_momentum(let, link: V6, w: V3, u_joint: V3) -> dict:
     """Momentum of one link, its moment about the joint, and the kinetic energy (u . p + omega . L)
     / 2.
     """
+    # p = m v_com, v_com = v_jnt + v_j2c (A2)
     m, _, b, Ix, Iy, Iz = link
     p = let("p", m * u_joint + b * Matrix([w[2], 0, -w[0]]))
     L = let("L", Matrix([Ix * w[0] - b * u_joint[2], Iy * w[1], Iz * w[2] + b * u_joint[0]]))
@@ -184,7 +190,7 @@ def link_momentum(let, link: V6, w: V3, u_joint: V3) -> dict:
 
 
 def joint_turns(joint) -> tuple[Matrix, Matrix]:
-    """Return R_x(alpha) and R_z(beta) of one universal joint."""
+    """Return R_x(alpha) and R_z(beta) of one universal joint (Eq. 11)."""
     return rotation_x(joint[0], joint[1]), rotation_z(joint[2], joint[3])
 
 

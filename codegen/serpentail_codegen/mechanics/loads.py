@@ -39,6 +39,7 @@ def point_jacobian_base(let, R: M33, arm: V3) -> dict:
     """d(point)/d omega = -skew(arm) R_b for a point at ``arm`` from B, world axes (Eq. A7, the
     tilde restored).
     """
+    # the tilde that the text lacks is that of A8
     return rows(Matrix.hstack(*(R.col(k).cross(arm) for k in range(3))))
 
 
@@ -46,6 +47,7 @@ def point_jacobian_tail(let, S: V12, arm: V3) -> dict:
     """d(point)/d(alpha_i, beta_i) = S_v + S_omega x arm: velocity of the point under the columns of
     segment i.
     """
+    # A8 for the columns of one segment: both lines have a tilde
     columns = [S[3:6, :] + S[0:3, :].cross(arm), S[9:12, :] + S[6:9, :].cross(arm)]
     return rows(Matrix.hstack(*columns))
 

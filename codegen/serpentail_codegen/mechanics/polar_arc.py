@@ -56,7 +56,7 @@ def slice_integrals(let, angles: V2, trig: V4) -> dict:
 
 
 def matrix_E(E_v) -> Matrix:
-    """E_{i,v}, the integral of f_v f_v^T over x (Eq. 28)."""
+    """E_{i,v}, the integral of f_v f_v^T over x (Eq. 28), f_v as in Eq. 27."""
     E = zeros(5, 5)
     for (k, j), value in zip(UPPER, E_v, strict=True):
         E[k, j] = E[j, k] = value
@@ -81,6 +81,7 @@ def slice_jacobian(let, angles, a, b, b_phi) -> list:
     """J_v of Eq. 26, five blocks 3 x 8: columns for velocity and angular velocity of the root,
     phi_dot, theta_dot.
     """
+    # blocks times f_v(x) sum to Eq. 25, that times the rates is Eq. 24 (x c_x a theta_dot)
     a_theta, b_theta = let("a_theta", -a / angles[1]), let("b_theta", -b / angles[1])
     J_a = Matrix.hstack(zeros(3, 3), -skew(a), zeros(3, 1), a_theta)
     J_b = Matrix.hstack(zeros(3, 3), -skew(b), b_phi, b_theta)
@@ -170,6 +171,7 @@ def segment_tip(let, angles: V2, trig: V4, section: V2) -> dict:
     """Rotation to the tip (Eq. 33), its position (Eq. 34), and how both move with phi and theta, in
     the root frame.
     """
+    # r is Eq. 20 at x = 1, less the root
     a, b, b_phi = intermediate_vectors(let, angles, trig, section)
     (s_phi, c_phi, s, c), lift = trig, let("lift", 1 - trig[3])
     about = Matrix([[c_phi, 0, s_phi], [0, 1, 0], [-s_phi, 0, c_phi]])

@@ -6,7 +6,7 @@ from math import ceil, log2
 
 from ...ir.program import Array, Index, Ref
 from ...ir.step import Step
-from ...mechanics import arc, arc_shape
+from ...mechanics import arc, arc_inertia, arc_shape, arc_wrench
 from ...mechanics.lower import derive
 from ..draft import Draft
 from ..scope import Motion, State, Vectors
@@ -47,7 +47,7 @@ def prepare_arcs(draft: Draft, state: State, doubled: bool = False) -> Segments:
         draft.step(arc_shape.bend_margin, piece, limit, margin=margin)
         draft.guard(margin, "OUT_OF_RANGE", piece["tip"], piece["shape"])
         draft.step(arc.segment_tip, piece, **piece.only("E", "r", "bend"))
-        draft.step(arc.segment_inertia, piece, **piece.only(*OWN))
+        draft.step(arc_inertia.segment_inertia, piece, **piece.only(*OWN))
     return segments
 
 
@@ -109,7 +109,7 @@ def move_arc(
     """
     reads = segments.at(i), segments.motion(i, v_dot), motion
     forced = v_dot is not None
-    draft.step(simplified(arc.segment_wrench, segments.state, forced), *reads, **wrench)
+    draft.step(simplified(arc_wrench.segment_wrench, segments.state, forced), *reads, **wrench)
     draft.step(simplified(arc.segment_motion, segments.state, forced), *reads, **motion)
 
 
@@ -118,7 +118,7 @@ def arc_momentum(
 ) -> None:
     """Give the momentum or kinetic energy of one arc, then carry ``w, u`` to its tip."""
     reads = segments.at(i), segments.motion(i), velocity
-    draft.step(arc.segment_momentum, *reads, **writes)
+    draft.step(arc_inertia.segment_momentum, *reads, **writes)
     draft.step(arc.segment_velocity, *reads, **velocity)
 
 
@@ -131,8 +131,8 @@ CONTINUUM = Mechanism(
     momentum=arc_momentum,
     pose=arc.segment_pose,
     twist=arc.segment_twist,
-    gather=arc.gather_segment,
-    gather_wrench=arc.gather_segment_wrench,
-    gather_moment=arc.gather_segment_moment,
-    power=arc.segment_power,
+    gather=arc_inertia.gather_segment,
+    gather_wrench=arc_wrench.gather_segment_wrench,
+    gather_moment=arc_inertia.gather_segment_moment,
+    power=arc_wrench.segment_power,
 )
