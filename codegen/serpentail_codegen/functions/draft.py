@@ -41,12 +41,12 @@ class Draft(Builder):
         """
         step = function if isinstance(function, Step) else derive(function)
         declared = set(dict(step.inputs) if function is step else declared_shapes(function))
-        found = self._found(step.name, declared, reads)
+        refs = self._refs(step.name, declared, reads)
 
         # of what the step declares, its unwanted outputs may need some that is not there
         wanted = narrowed(step, {name.rstrip("_") for name in writes})
         for name, _ in wanted.inputs:
-            if name not in found:
+            if name not in refs:
                 raise ValueError(f"{step.name} in {self.name}: nothing gives {name}")
         for name, ref in writes.items():
             if ref.array.role == "parameters":
@@ -54,24 +54,29 @@ class Draft(Builder):
                     f"{step.name} in {self.name}: {name} would overwrite the parameter "
                     f"{ref.array.name}"
                 )
-        self.apply(step, found, **writes)
+        self.apply(step, refs, **writes)
 
-    def _found(self, step: str, declared: set[str], reads: Iterable[Reads]) -> dict[str, Ref]:
-        """Return what a step reads by name; refuse unknown and double names."""
-        found: dict[str, Ref] = {}
-        for given in reads:
-            scope = isinstance(given, Scope) and not isinstance(given, Instead)
-            for name in declared.intersection(given.keys()) if scope else given.keys():
+    def _refs(self, step: str, declared: set[str], reads: Iterable[Reads]) -> dict[str, Ref]:
+        """Return what a step reads by name; refuse unknown names, parameters' and double ones."""
+        refs: dict[str, Ref] = {}
+        for source in reads:
+            instead = isinstance(source, Instead)
+            offered = isinstance(source, Scope) and not instead
+            for name in declared.intersection(source.keys()) if offered else source.keys():
+                problem = ""
                 if name not in declared:
-                    raise ValueError(f"{step} in {self.name}: it does not read {name}")
-                if (name in self.parameters) != isinstance(given, Instead):
-                    not_one = "no parameter" if isinstance(given, Instead) else "a parameter"
-                    raise ValueError(f"{step} in {self.name}: {name} is {not_one}")
-                if name in found:
-                    raise ValueError(f"{step} in {self.name}: {name} is given twice")
-                found[name] = given[name]
+                    problem = f"it does not read {name}"
+                elif name in refs:
+                    problem = f"{name} is given twice"
+                elif instead and name not in self.parameters:
+                    problem = f"{name} is no parameter"
+                elif name in self.parameters and not instead:
+                    problem = f"{name} is a parameter"
+                if problem:
+                    raise ValueError(f"{step} in {self.name}: {problem}")
+                refs[name] = source[name]
         parameters = {name: ref for name, ref in self.parameters.items() if name in declared}
-        return parameters | found
+        return parameters | refs
 
     def store(self, function: Callable[..., dict] | Step, *reads: Reads, **sizes: int) -> Vectors:
         """Apply a step and return its outputs, new local vectors of the same names."""

@@ -63,12 +63,12 @@ def gather_segment(
     spread = let("spread", (h_tip + h_root).dot(r))
     I_root = entries(I_tip + spread * eye(3) - (h_tip * r.T + r * h_root.T))
     columns, twists = [], []
-    for k, own in ((0, pitch_own), (6, yaw_own)):
+    for k, column in ((0, pitch_own), (6, yaw_own)):
         turn, move = bend[k : k + 3, :], bend[k + 3 : k + 6, :]
         p = let("p", mass[0] * move + turn.cross(h_tip))
         L = let("L", I_tip * turn + h_tip.cross(move))
         twists.append((turn, move, p, L))
-        columns.append(Matrix([own[0:3, :] + p, own[3:6, :] + L + r.cross(p)]))
+        columns.append(Matrix([column[0:3, :] + p, column[3:6, :] + L + r.cross(p)]))
     beyond = [
         twists[i][0].dot(twists[j][3]) + twists[i][1].dot(twists[j][2])
         for i, j in ((0, 0), (1, 0), (1, 1))
@@ -104,8 +104,10 @@ def segment_momentum(
     relative = let("relative", rates[0] * pitch_own + rates[1] * yaw_own)
     p = let("p", section[0] * u + w.cross(h_own) + relative[0:3, :])
     L = let("L", symmetric(I_own) * w + h_own.cross(u) + relative[3:6, :])
-    own = rates[0] ** 2 * H_own[0] + 2 * rates[0] * rates[1] * H_own[1] + rates[1] ** 2 * H_own[2]
+    bending = (
+        rates[0] ** 2 * H_own[0] + 2 * rates[0] * rates[1] * H_own[1] + rates[1] ** 2 * H_own[2]
+    )
     twice = let(
-        "twice", u.dot(p) + w.dot(L) + u.dot(relative[0:3, :]) + w.dot(relative[3:6, :]) + own
+        "twice", u.dot(p) + w.dot(L) + u.dot(relative[0:3, :]) + w.dot(relative[3:6, :]) + bending
     )
     return {"F": Matrix([p, L]), "kinetic": [twice / 2]}

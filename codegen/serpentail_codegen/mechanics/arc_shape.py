@@ -1,14 +1,8 @@
-"""The continuum tail: bend components of constant-curvature segments in, poses, inertias and
-wrenches out (Sect. 2.3).
-
-A segment's bend is (a, b), its rotation Exp([a, 0, b]); z = a^2 + b^2 is the squared bend angle.
-Slice x in [0, 1] lies at ``L (-sigma y + gamma u)`` from the segment's root, with u = (b, 0, -a),
-sigma = x c1(x^2 z) and gamma = x^2 c2(x^2 z), c_k being Stumpff's functions.  These are entire
-functions of z: nothing is singular or lost where the segment is straight.
+"""What bend does to a segment of the continuum tail, by entire functions of the squared bend angle.
 
 The integrals over x of Eqs. 18, 19, which Appendix B writes in sines and powers of 1 / theta, are
-here seven form factors, exact rational combinations of c_k(z) and c_k(4 z), and their
-z-derivatives.
+here seven form factors, exact rational combinations of Stumpff's functions c_k(z) and c_k(4 z), and
+their z-derivatives; `arc` says what sigma, gamma and z are.
 """
 
 from math import factorial

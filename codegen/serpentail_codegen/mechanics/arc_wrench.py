@@ -60,8 +60,8 @@ def relative_loads(let, angles, rates, shape, w) -> list:
     w_u, wy = let("w_u", w.dot(u)), w[1]
     quadratic = f["ss_z"] * wy**2 - 2 * f["sg_z"] * wy * w_u + f["gg_z"] * w_u**2
     gyro = 2 * f["sz_g"] * (rates[0] * w[0] + rates[1] * w[2]) + f["gg_z"] * area * wy
-    own = f["along_z"] / 4 * z_dot**2 + (f["along"] - f["gg_z"]) / 2 * z_ddot
-    common = let("common", quadratic - 2 * f["g_z"] * let("ww", w.dot(w)) - 2 * gyro + own)
+    bending = f["along_z"] / 4 * z_dot**2 + (f["along"] - f["gg_z"]) / 2 * z_ddot
+    common = let("common", quadratic - 2 * f["g_z"] * let("ww", w.dot(w)) - 2 * gyro + bending)
     lever = let("lever", f["gg"] * w_u - f["sg"] * wy)
     tilt, turn = let("tilt", 2 * f["sz_g"] * z_dot), let("turn", f["gg_z"] * z_dot * wy)
     swing = let("swing", 2 * f["gg"] * wy)
@@ -110,15 +110,15 @@ def segment_wrench(
     )
     inertia = symmetric(I_own)
     torque = h_own.cross(a) + inertia * w_dot + w.cross(let("Iw", inertia * w)) + bending[3:6, :]
-    own = []
+    torques = []
     for k, column in enumerate((pitch_own, yaw_own)):
         inertial = (
             column[0:3, :].dot(a) + column[3:6, :].dot(w_dot) + spread * let("load", loads[k])
         )
-        own.append(inertial + H_own[k] * accelerations[0] + H_own[k + 1] * accelerations[1])
+        torques.append(inertial + H_own[k] * accelerations[0] + H_own[k + 1] * accelerations[1])
     return {
         "F": Matrix([force, torque + spread * let("moment", moment_r)]),
-        "torque_own": Matrix(own),
+        "torque_own": Matrix(torques),
     }
 
 
@@ -148,7 +148,7 @@ def segment_power(
     """Power of the inertial wrench of a segment and of its generalised forces (Eq. 19) under a
     virtual motion.
     """
-    own = segment_wrench(
+    wrench = segment_wrench(
         let,
         angles,
         rates,
@@ -164,7 +164,7 @@ def segment_power(
         w_dot,
         a,
     )
-    F, torque = let("F", own["F"]), let("torque", own["torque_own"])
+    F, torque = let("F", wrench["F"]), let("torque", wrench["torque_own"])
     power = F[0:3, :].dot(u_virtual) + F[3:6, :].dot(w_virtual) + torque.dot(virtual_rates)
     motion = segment_motion(
         let, angles, rates, accelerations, section, tip, E, r, bend, w, w_dot, a

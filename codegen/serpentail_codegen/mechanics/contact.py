@@ -1,5 +1,4 @@
-"""Contact with the ground: SymPy vectors of one point in, its motion, force and bristle rate out
-(Sect. 2.4).
+"""A point that can touch the ground: how it moves, what the ground does to it (Sect. 2.4).
 
 Points are given by ``arm``, from B in world axes, and ``velocity``, in the world.  The ground is z
 = 0.  A bristle is what the friction spring of a point is stretched by, in the world's x and y.

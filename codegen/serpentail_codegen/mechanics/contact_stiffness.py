@@ -1,5 +1,4 @@
-"""Contact linearised for implicit integrators: SymPy vectors of one point in, its stiffness and
-responses out.
+"""Contact linearised, for implicit integrators: the stiffness of a point, and its responses.
 
 A W-method solves with 1 - w J, J from contact, damping and gains alone.  Of one point that moves by
 dx and dv, the normal force changes by df_n = -k_n dx - d_n dv, friction by g df_n - P (K_f du + D_f

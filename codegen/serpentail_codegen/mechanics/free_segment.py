@@ -1,5 +1,4 @@
-"""Segments as articulated bodies: SymPy vectors in, the inertia and the loads that pass from
-segment to segment out.
+"""Segments as articulated bodies: the inertia and the loads that pass from segment to segment.
 
 The links of a segment move with its base and with its two coordinates.  A motion is (acceleration
 of the origin, angular acceleration), a wrench (force, moment), in the axes of the base they are

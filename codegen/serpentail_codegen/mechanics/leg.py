@@ -1,5 +1,4 @@
-"""The legs: SymPy vectors in, places and velocities of the foot's three points in torso axes out
-(Sect. 2.1).
+"""Where the points of a leg are, in torso axes (Sect. 2.1).
 
 A leg moves in a plane parallel to the torso's y and z axes; two angles, gamma and delta, place all
 its points.

@@ -1,10 +1,10 @@
-"""Dynamics of torso and links: SymPy vectors in, inertias, momenta and wrenches out (Sect. 2, Eqs.
-2, 3, 16, 17).
+"""The steps of one link: its motion, wrench and momentum, and the composite inertia beyond it.
 
 A link is given by ``link`` = (m, L, m L / 2, I_x, I_y, I_z), the moments of inertia taken about its
-joint.  A body set is given by its mass, first moment ``h`` = sum m r, and ``I`` = (xx, yy, zz, xy,
-xz, yz) about the frame's origin.  A wrench or momentum ``F`` = (force or momentum, its moment about
-the origin).
+joint; it lies along -y of its frame (Eq. 15), which a universal joint rotates about x, then about z
+(Eq. 11).  A body set is given by its mass, first moment ``h`` = sum m r, and ``I`` = (xx, yy, zz,
+xy, xz, yz) about the frame's origin.  A wrench or momentum ``F`` = (force or momentum, its moment
+about the origin).
 """
 
 from sympy import Matrix, cos, sin, zeros
@@ -174,8 +174,8 @@ def gather_links(
 def gather_moment(let, joint: V4, link: V6, mass: V1, h: V3) -> dict:
     """Mass and first moment of one link and all beyond, about its joint, in the parent's frame."""
     turn_x, turn_z = joint_turns(joint)
-    here = Matrix([h[0], h[1] - mass[0] * link[1] - link[2], h[2]])
-    return {"mass": mass + Matrix([link[0]]), "h": turn_x * let("mid", turn_z * here)}
+    moment = Matrix([h[0], h[1] - mass[0] * link[1] - link[2], h[2]])
+    return {"mass": mass + Matrix([link[0]]), "h": turn_x * let("mid", turn_z * moment)}
 
 
 def link_momentum(let, link: V6, w: V3, u_joint: V3) -> dict:
@@ -240,8 +240,8 @@ def link_linear_velocity(let, joint: V4, link: V6, w: V3, u: V3) -> dict:
     A3, A4).
     """
     turn_x, turn_z = joint_turns(joint)
-    here = let("here", turn_z.T * let("mid", turn_x.T * u))
-    return {"u_joint": here, "u": here - link[1] * w.cross(Y)}
+    u_joint = let("here", turn_z.T * let("mid", turn_x.T * u))
+    return {"u_joint": u_joint, "u": u_joint - link[1] * w.cross(Y)}
 
 
 def link_motion(

@@ -1,10 +1,9 @@
-"""Columns and bias of the articulated tail as lanes: one wrench of rows goes in, what a link makes
-of it comes out.
+"""The steps of one link where all columns of H and the bias are swept at once (Eqs. 16, 17).
 
-Eqs. 16 and 17, from the tip to the base.  Lane k of ``F_lanes`` is the momentum of all links beyond
-per unit rate of tail coordinate k, the last lane their inertial wrench.  A lane is addressed by a
-row that is 1 there and 0 elsewhere: ``at_pitch`` and ``at_yaw``, for the coordinates of the link's
-segment, and ``at_bias``.
+Column k of the wide wrench ``F_lanes`` is the momentum of all links beyond per unit rate of tail
+coordinate k, the last column their inertial wrench.  A column is addressed by a row that is 1 there
+and 0 elsewhere: ``at_pitch`` and ``at_yaw``, for the coordinates of the link's segment, and
+``at_bias``.
 """
 
 from sympy import Matrix

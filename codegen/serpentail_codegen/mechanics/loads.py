@@ -1,11 +1,4 @@
-"""Dynamics of torso and links: SymPy vectors in, inertias, momenta and wrenches out (Sect. 2, Eqs.
-2, 3, 16, 17).
-
-A link is given by ``link`` = (m, L, m L / 2, I_x, I_y, I_z), the moments of inertia taken about its
-joint.  A body set is given by its mass, first moment ``h`` = sum m r, and ``I`` = (xx, yy, zz, xy,
-xz, yz) about the frame's origin.  A wrench or momentum ``F`` = (force or momentum, its moment about
-the origin).
-"""
+"""What forces on the tail's points do to torso and joints, and the points' Jacobians."""
 
 from sympy import Matrix
 

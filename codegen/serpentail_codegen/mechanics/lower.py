@@ -1,4 +1,8 @@
-"""From SymPy to the tape: a function of SymPy vectors goes in, a straight-line step comes out."""
+"""Turns functions of SymPy vectors into steps of straight-line operations.
+
+A step function takes ``let``, which names intermediate results, and vectors whose annotations say
+their shapes; it returns a dictionary of vectors.
+"""
 
 import inspect
 from collections.abc import Callable

@@ -1,15 +1,11 @@
-"""The continuum tail as the paper writes it, for comparison only: polar angles in, inertias and
-wrenches out.
+"""The continuum tail as the paper writes it, in polar angles, for comparison only.
 
 Sect. 2.3 in the frame of a segment's root: slice x in [0, 1] lies at p_q + s_x a - c_x b with s_x =
-sin(theta x),
-c_x = cos(theta x), a = -r y, b = r (sin(phi) x + cos(phi) z) and r = L / theta (Eqs. 20 to 23).
-What depends on x is
-integrated once and for all, which leaves the matrices E and Q of Appendix B: sines, cosines and
-powers of 1 / theta.
-They are kept as printed, without series, switch or smoothing: digits cancel as theta tends to 0,
-and there is no value
-at theta = 0.  `continuum.py` is the same tail without these faults.
+sin(theta x), c_x = cos(theta x), a = -r y, b = r (sin(phi) x + cos(phi) z) and r = L / theta (Eqs.
+20 to 23).  What depends on x is integrated once and for all, which leaves the matrices E and Q of
+Appendix B: sines, cosines and powers of 1 / theta.  They are kept as printed, without series,
+switch or smoothing: digits cancel as theta tends to 0, and there is no value at theta = 0.  `arc`
+and its companions are the same tail without these faults.
 """
 
 from sympy import Matrix, Rational, cos, eye, sin, zeros

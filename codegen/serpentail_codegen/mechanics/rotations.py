@@ -1,14 +1,13 @@
-"""Kinematics of the torso and the articulated tail: SymPy vectors in, SymPy vectors out (Sect. 2.2,
-Appendix A).
+"""Rotation matrices, quaternions, and symmetric tensors by their six entries.
 
-Every link recursion is written in link-local frames: a universal joint is a turn about x, then a
-turn about z (Eq. 11), and a link lies along -y of its frame (Eq. 15).  ``let`` names an
-intermediate result, so that expressions stay small.
+``let`` names an intermediate result, so that expressions stay small.
 """
 
 from sympy import Matrix, eye, sqrt
 
 from .shapes import M33, V1, V3, V4, V6
+
+X, Y, Z = (Matrix(row) for row in eye(3).tolist())  # the axes
 
 
 def symmetric(I) -> Matrix:
@@ -41,9 +40,6 @@ def world_composite(let, R: M33, h: V3, I: V6) -> dict:
 def world_acceleration(let, R: M33, gravity: V1, a: V3) -> dict:
     """p_b_ddot = R_b a - g z."""
     return {"p_ddot": R * a - gravity[0] * Z}
-
-
-X, Y, Z = (Matrix(row) for row in eye(3).tolist())
 
 
 def rotation_x(c, s) -> Matrix:

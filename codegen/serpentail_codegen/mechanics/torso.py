@@ -1,10 +1,8 @@
-"""Dynamics of torso and links: SymPy vectors in, inertias, momenta and wrenches out (Sect. 2, Eqs.
-2, 3, 16, 17).
+"""The steps of the torso: what it adds to the tail's inertia, wrench and momentum, and how the tail
+mount moves with it (Eqs. 2, 3, 14, 16).
 
-A link is given by ``link`` = (m, L, m L / 2, I_x, I_y, I_z), the moments of inertia taken about its
-joint.  A body set is given by its mass, first moment ``h`` = sum m r, and ``I`` = (xx, yy, zz, xy,
-xz, yz) about the frame's origin.  A wrench or momentum ``F`` = (force or momentum, its moment about
-the origin).
+``mass``, ``h`` and ``I`` are mass, first moment and inertia about B; ``F_next`` is a wrench or a
+momentum at the tail mount.
 """
 
 from sympy import Matrix, eye

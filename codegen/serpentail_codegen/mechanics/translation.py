@@ -1,10 +1,7 @@
-"""Dynamics of torso and links: SymPy vectors in, inertias, momenta and wrenches out (Sect. 2, Eqs.
-2, 3, 16, 17).
+"""Eliminating translation from the equation of motion, and what follows for accelerations.
 
-A link is given by ``link`` = (m, L, m L / 2, I_x, I_y, I_z), the moments of inertia taken about its
-joint.  A body set is given by its mass, first moment ``h`` = sum m r, and ``I`` = (xx, yy, zz, xy,
-xz, yz) about the frame's origin.  A wrench or momentum ``F`` = (force or momentum, its moment about
-the origin).
+A column is the momentum of the animal, at rest of B, per unit rate of one tail coordinate: f_k, and
+its moment n_k about B.
 """
 
 from sympy import Matrix, eye

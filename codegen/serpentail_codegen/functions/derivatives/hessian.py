@@ -32,10 +32,10 @@ def assemble_inverse_dynamics_hessian(draft: Draft, arrays: dict[str, Array]) ->
     b_q, b_v = draft.wide("d_b_q", tail.nq, lanes), draft.wide("d_b_v", nv, lanes)
     b_v_dot = draft.wide("d_b_v_dot", nv, lanes)
     q = with_unit_quaternion(draft, arrays["q"])
-    given = {"q": q} | {name: arrays[name] for name in ("v", "v_dot", "multiplier")}
+    arguments = {"q": q} | {name: arrays[name] for name in ("v", "v_dot", "multiplier")}
     d_q = directions.tangents(draft, q)
     outputs = {"d_b_q": b_q, "d_b_v": b_v, "d_b_v_dot": b_v_dot}
-    draft.call(inner, b_power=draft.constant("one", [1]), **outputs, **given, **d_q)
+    draft.call(inner, b_power=draft.constant("one", [1]), **outputs, **arguments, **d_q)
     turn = draft.wide("d_b_turn", 3, lanes)[0]
     reads = {"quaternion": block(q, QUATERNION), "gradient": block(b_q, QUATERNION)}
     draft.step(rotations.turn_gradient, reads, turn=turn)

@@ -42,8 +42,8 @@ def assemble_inverse_dynamics_derivatives(draft: Draft, arrays: dict[str, Array]
     inner = tangent_program(function, ("q", "v"), directions.count, directions.outward)
     rows = draft.wide("rows", draft.tail.nv, directions.count)
     q = with_unit_quaternion(draft, arrays["q"])
-    given = {"q": q, "v": arrays["v"], "v_dot": arrays["v_dot"]}
-    draft.call(inner, d_force=rows, **given, **directions.tangents(draft, q))
+    arguments = {"q": q, "v": arrays["v"], "v_dot": arrays["v_dot"]}
+    draft.call(inner, d_force=rows, **arguments, **directions.tangents(draft, q))
     directions.spread(draft, rows, arrays["dq"], arrays["dv"])
 
 
@@ -92,9 +92,9 @@ def assemble_forward_dynamics_derivatives(draft: Draft, arrays: dict[str, Array]
     directions = Directions(tail, ("omega",))
     inner = tangent_program(assemble(CORE, tail), ("q", "v"), directions.count, directions.outward)
     rows, x = draft.wide("rows", nv, directions.count), draft.wide("x", nv, directions.count)
-    given = {name: arrays[name] for name in ("q", "v")}
+    arguments = {name: arrays[name] for name in ("q", "v")}
     tangents = directions.tangents(draft, arrays["q"])
-    draft.call(inner, d_force=rows, v_dot=body, **given, **tangents)
+    draft.call(inner, d_force=rows, v_dot=body, **arguments, **tangents)
     factored.solve(draft, minus(draft, rows), x)
     directions.spread(draft, x, arrays["dq"], arrays["dv"])
 
@@ -120,8 +120,8 @@ def torque_columns(draft: Draft, factored: FactoredDynamics, dtau: Array) -> Non
 
 def assemble_inverse_dynamics_parameter_derivatives(draft: Draft, arrays: dict[str, Array]) -> None:
     """Tangents of H v_dot + C with respect to every parameter."""
-    given = {name: arrays[name] for name in ("q", "v", "v_dot")}
-    rows = parameter_tangents(draft, FUNCTIONS["inverse_dynamics"], given)
+    arguments = {name: arrays[name] for name in ("q", "v", "v_dot")}
+    rows = parameter_tangents(draft, FUNCTIONS["inverse_dynamics"], arguments)
     spread_parameters(draft, rows, arrays["dparameters"])
 
 
@@ -129,8 +129,8 @@ def assemble_forward_dynamics_parameter_derivatives(draft: Draft, arrays: dict[s
     """-H^-1 times the tangents of H v_dot + C with respect to every parameter, at fixed v_dot."""
     count = parameter_count(draft.tail)
     factored, body = forward_dynamics_first(draft, arrays)
-    given = {"q": arrays["q"], "v": arrays["v"], "v_dot": body}
-    rows = parameter_tangents(draft, CORE, given)
+    arguments = {"q": arrays["q"], "v": arrays["v"], "v_dot": body}
+    rows = parameter_tangents(draft, CORE, arguments)
     x = draft.wide("x", draft.tail.nv, count)
     gravity = draft.wide("d_gravity_z", 1, count)[0]
     draft.unit(gravity, 0)  # it is the first parameter: p_b_ddot falls by as much
@@ -138,7 +138,7 @@ def assemble_forward_dynamics_parameter_derivatives(draft: Draft, arrays: dict[s
     spread_parameters(draft, x, arrays["dparameters"])
 
 
-def parameter_tangents(draft: Draft, function: Function, given: dict[str, Array]) -> Array:
+def parameter_tangents(draft: Draft, function: Function, arguments: dict[str, Array]) -> Array:
     """Return the tangents of a force with respect to every parameter, a lane for each number of the
     struct.
     """
@@ -151,7 +151,7 @@ def parameter_tangents(draft: Draft, function: Function, given: dict[str, Array]
             draft.unit(tangents[f"d_{p.name}"][0], lane)
         lane += p.size
     rows = draft.wide("rows", draft.tail.nv, count)
-    draft.call(inner, d_force=rows, **given, **tangents)
+    draft.call(inner, d_force=rows, **arguments, **tangents)
     return rows
 
 
@@ -177,8 +177,8 @@ def assemble_forward_dynamics_jvp(draft: Draft, arrays: dict[str, Array]) -> Non
     d_q, rows, x = draft.array("d_q", tail.nq), draft.array("rows", tail.nv), arrays["dv_dot"]
     draft.copy(tail.all_q(d_q), tail.all_v(arrays["dq"]))
     inner = tangent_program(assemble(CORE, tail), ("q", "v"))
-    given = {"q": arrays["q"], "v": arrays["v"], "v_dot": body}
-    draft.call(inner, **given, d_q=d_q, d_v=arrays["dv"], d_force=rows)
+    arguments = {"q": arrays["q"], "v": arrays["v"], "v_dot": body}
+    draft.call(inner, **arguments, d_q=d_q, d_v=arrays["dv"], d_force=rows)
     factored.solve(draft, minus(draft, rows, lambda k: arrays["dtau"].part(k, 1)), x)
 
     # how p_b_ddot moves with a rotation of the torso
@@ -192,9 +192,9 @@ def assemble_inverse_dynamics_vjp(draft: Draft, arrays: dict[str, Array]) -> Non
     inner = adjoint_program(assemble(VIRTUAL_POWER, draft.tail), ("q", "v", "v_dot"), ("power",))
     one, gradient = draft.constant("one", [1]), draft.array("gradient", draft.tail.nq)
     q = with_unit_quaternion(draft, arrays["q"])
-    given = {"q": q} | {name: arrays[name] for name in ("v", "v_dot", "multiplier")}
+    arguments = {"q": q} | {name: arrays[name] for name in ("v", "v_dot", "multiplier")}
     gradients = {"b_q": gradient, "b_v": arrays["dv"], "b_v_dot": arrays["dv_dot"]}
-    draft.call(inner, b_power=one, **gradients, **given)
+    draft.call(inner, b_power=one, **gradients, **arguments)
     in_tangent_space(draft, q, gradient, arrays["dq"])
 
 
@@ -226,8 +226,8 @@ def assemble_forward_dynamics_vjp(draft: Draft, arrays: dict[str, Array]) -> Non
     inner = adjoint_program(assemble(VIRTUAL_POWER, tail), ("q", "v"), ("power",))
     weight, gradient = draft.constant("minus", [-1]), draft.array("gradient", tail.nq)
     q = with_unit_quaternion(draft, arrays["q"])
-    given = {"q": q, "v": arrays["v"], "v_dot": v_dot, "multiplier": mu}
-    draft.call(inner, b_power=weight, b_q=gradient, b_v=arrays["dv"], **given)
+    arguments = {"q": q, "v": arrays["v"], "v_dot": v_dot, "multiplier": mu}
+    draft.call(inner, b_power=weight, b_q=gradient, b_v=arrays["dv"], **arguments)
     in_tangent_space(draft, q, gradient, arrays["dq"])
     draft.copy(arrays["dtau"].part(0, tail.nt), tail.all_v(mu))
 

@@ -33,7 +33,7 @@ def factored_dynamics_by_columns(
     # from the torso to the tip, and back with all columns
     wrenches = forward_wrenches(draft, segments, motion, None)
     F_columns, rows = draft.wide("F_lanes", 6, nt + 1)[0], draft.wide("H_rows", nt, nt + 1)
-    composite, own = _gather(draft, segments, wrenches, F_columns, rows)
+    composite, own_joints = _gather(draft, segments, wrenches, F_columns, rows)
     draft.step(torso.torso_composite, composite, **composite)
     draft.copy(arrays["first_moment"].part(0, 3), composite["h"])
     draft.step(link_columns.lanes_at_torso, {"F_lanes": F_columns}, F_lanes=F_columns)
@@ -56,7 +56,7 @@ def factored_dynamics_by_columns(
     base = {f"A_{r}": entry(r, 0, r + 1) for r in range(3)}
     draft.step(translation.without_translation, composite, **center, **base)
     _without_translation(draft, center, F_columns, rows, columns, entry)
-    _own_blocks(draft, center, own, rows, columns, entry)
+    _own_blocks(draft, center, own_joints, rows, columns, entry)
 
 
 def _gather(
@@ -66,9 +66,9 @@ def _gather(
     contribute to its block by themselves.
     """
     tail, lanes = draft.tail, rows.lanes
-    at, own = draft.wide("at", lanes, lanes), draft.array("own", 2, tail.segments)
+    at, own_joints = draft.wide("at", lanes, lanes), draft.array("own", 2, tail.segments)
     draft.unit(at.part(0, lanes), 0)
-    for ref in (F_columns, rows.part(0, tail.nt), own.part(0, tail.nt)):
+    for ref in (F_columns, rows.part(0, tail.nt), own_joints.part(0, tail.nt)):
         draft.fill(ref, 0)
     composite = draft.vectors(mass=1, h=3, I=6)
     for ref in composite.named.values():
@@ -83,7 +83,7 @@ def _gather(
         }
         piece, lanes_of = segments.at(i), {"F_lanes": F_columns}
         gather = link_columns.gather_composite
-        draft.step(gather, piece, composite, **composite, **joint, own_=own[i])
+        draft.step(gather, piece, composite, **composite, **joint, own_=own_joints[i])
         draft.step(
             link_columns.gather_lanes,
             *(piece, joint, places, wrenches.at(i, g), lanes_of),
@@ -91,7 +91,7 @@ def _gather(
             H_yaw_=rows.part(yaw, 1),
             **lanes_of,
         )
-    return composite, own
+    return composite, own_joints
 
 
 def _without_translation(
@@ -117,7 +117,7 @@ def _without_translation(
 def _own_blocks(
     draft: Draft,
     center: Vectors,
-    own: Array,
+    own_joints: Array,
     rows: Array,
     columns: Array,
     entry: Callable[..., Ref],
@@ -127,7 +127,7 @@ def _own_blocks(
     """
     with draft.loop("i", draft.tail.segments) as i:
         pitch, yaw = coordinate(i), coordinate(i, 1)
-        reads = {"own": own[i], "columns": columns_of(columns, i)}
+        reads = {"own": own_joints[i], "columns": columns_of(columns, i)}
         reads |= {"H_pp": rows.lane(pitch, pitch), "H_py": rows.lane(pitch, yaw)}
         reads |= {"H_yp": rows.lane(yaw, pitch), "H_yy": rows.lane(yaw, yaw)}
         writes = {
