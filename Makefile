@@ -49,7 +49,7 @@ help:
 	@echo "  make studies                               all; STARTS=200 random starts in the second"
 	@echo "  make lint                                  style and import rules"
 	@echo "  make golden                                accept what the generator emits now as the golden models"
-	@echo "  make clean                                 remove generated/ and output/"
+	@echo "  make clean                                 remove what was generated, and output/"
 
 setup: $(READY)
 
@@ -121,4 +121,5 @@ golden: $(READY)
 	$(PY) -m pytest tests/house/test_golden.py --update-golden
 
 clean:
-	rm -rf generated output
+	rm -rf output
+	test ! -d generated || find generated -mindepth 1 -maxdepth 1 ! -name README.md ! -name 'golden_*' -exec rm -rf {} +
