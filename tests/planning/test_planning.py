@@ -259,7 +259,8 @@ def test_goals_of_the_tail_and_of_a_whole_attitude():
 
 def test_effort_counts_rates_as_torques_of_a_damper():
     fine = {"tolerance": None, "intervals": 20}
-    for plan in (planned(**fine), planned(**fine, smoothing=0.0)):
+    # Of several optima, which one is found from afar hangs on rounding: compare two of one valley.
+    for plan in (planned(**fine), planned(**fine, smoothing=0.0, guess=planned(**fine))):
         flight, c = plan.trajectory, plan.problem.smoothing
         integrand = np.sum(flight.tau**2 + (c * flight.v[:, 6:]) ** 2, axis=1)
         assert plan.report["objective"] == pytest.approx(
