@@ -12,6 +12,9 @@ from ..ir.tape import BINARY, LEAVES, operands
 
 REGISTERS = 24  # of 32 vector registers; on 16 it still pays
 MOST_OPERATIONS = 2800  # beyond, spilled values cost more than latency
+MOST_ABREAST = (
+    7  # operations for each cycle of the longest path: beyond, there is enough to do in any order
+)
 LATENCY = {"div": 13, "sqrt": 15, "sin": 30, "cos": 30, "neg": 1}  # cycles; 4 for all others
 
 
@@ -20,8 +23,10 @@ def scheduled(nodes, live: list[int], results) -> list[int]:
     operations = [n for n in live if nodes[n][0] not in LEAVES]
     if sum(nodes[n][0] in BINARY for n in operations) > MOST_OPERATIONS:
         return live
-    leaves = [n for n in live if nodes[n][0] in LEAVES]
-    return leaves + _List(nodes, operations, set(results)).order()
+    line = _List(nodes, operations, set(results))
+    if len(operations) > MOST_ABREAST * max(line.height.values(), default=0):
+        return live
+    return [n for n in live if nodes[n][0] in LEAVES] + line.order()
 
 
 class _List:
