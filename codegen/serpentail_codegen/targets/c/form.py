@@ -14,9 +14,9 @@ from .straight import straight_line
 
 STRAIGHT_UP_TO = 7000  # nodes: beyond, the text leaves the instruction cache and compile time grows
 STRAIGHT_BESIDE_LANES = 3500  # nodes: where there is a sweep in lanes, too, that is faster beyond
-# columns of H times links, the work of a sweep in lanes: from here on segments are no slower
 # zeros and copies above all: loops are as fast, and quick to compile
 ALWAYS_IN_LOOPS = ("tail_point_jacobians",)
+# columns of H times links, the work of a sweep in lanes: from here on segments are no slower
 SEGMENTS_FROM = 128
 ELIMINATED = 12  # rows: smaller matrices are factored without loops
 
