@@ -269,8 +269,9 @@ def test_sources_are_compiled_at_the_same_time(model, script, tmp_path):
     other.write_text("double twice(double);\ndouble thrice(double x) { return twice(x) + x; }\n")
     begun = tmp_path / "begun"
     begun.mkdir()
-    wait = 'for i in $(seq 600); do [ "$(ls {0} | wc -l)" = 2 ] && break; sleep 0.1; done; [ $i != 600 ] || exit 9'
-    script(f'case "$*" in *" -c "*) touch {begun}/$$; {wait.format(begun)};; esac')
+    both = f'[ "$(ls {begun} | wc -l)" = 2 ]'
+    wait = f"for i in $(seq 600); do {both} && break; sleep 0.1; done; {both} || exit 9"
+    script(f'case "$*" in *" -c "*) touch {begun}/$$; {wait};; esac')
     library = compiler.compile_library([source, other], include)
     assert call_twice(library) == 42.0
     assert ctypes.CDLL(str(library)).thrice is not None

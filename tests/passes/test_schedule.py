@@ -46,7 +46,7 @@ def test_random_lines_keep_their_dependencies(seed):
 
 
 def scheduled_by_the_rule(nodes, live, results):
-    """The rule as it is stated: at every step, look at all that is ready; the reference for the heaps."""
+    """The rule as it is stated: at every step, look at all that is ready."""
     operations = [n for n in live if nodes[n][0] not in schedule.LEAVES]
     needs = {n: {a for a in nodes[n][1:] if a in operations} for n in operations}
     users = {n: {u for u in operations if n in needs[u]} for n in operations}
@@ -99,7 +99,7 @@ def test_long_lines_are_left_alone():
 
 @pytest.mark.parametrize(("more", "alone"), [(0, False), (1, True)])
 def test_lines_of_much_independent_work_are_left_alone(more, alone):
-    """Pairs of a sum and a product of it, 8 cycles, as many as a processor needs to be busy in any order."""
+    """Pairs of a sum and its product, 8 cycles: enough to be busy in any order, or one less."""
     tape, pairs = Tape(), 4 * schedule.MOST_ABREAST + more
     x = [tape.input(k) for k in range(pairs + 1)]
     results = [tape.mul(tape.add(a, b), a) for a, b in pairwise(x)]

@@ -32,9 +32,9 @@ def scheduled(nodes, live: list[int], results) -> list[int]:
 class _List:
     """List scheduling of one straight line.
 
-    The operations that are ready lie in two heaps, one for each rule of choice.  How many values an operation uses for
-    the last time can only grow while it waits: it then enters the heaps once more, ahead of its earlier entries, and
-    what was placed already is passed over.
+    The operations that are ready lie in two heaps, one for each rule of choice.  How many values an
+    operation uses for the last time can only grow while it waits: it then enters the heaps once
+    more, ahead of its earlier entries, and what was placed already is passed over.
     """
 
     def __init__(self, nodes, operations: list[int], results: set[int]):
@@ -52,7 +52,7 @@ class _List:
             tail = max((self.height[u] for u in self.users[n]), default=0)
             self.height[n] = tail + LATENCY.get(nodes[n][0], 4)
 
-        # operands that are still to come, uses that are still to come, and operands used here for the last time
+        # operands and uses that are still to come, and operands used here for the last time
         self.waiting = {n: len(needed) for n, needed in self.operands.items()}
         self.uses = {n: len(users) + (n in results) for n, users in self.users.items()}
         self.frees = {
