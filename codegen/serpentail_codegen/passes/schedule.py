@@ -12,9 +12,8 @@ from ..ir.tape import BINARY, LEAVES, operands
 
 REGISTERS = 24  # of 32 vector registers; on 16 it still pays
 MOST_OPERATIONS = 2800  # beyond, spilled values cost more than latency
-MOST_ABREAST = (
-    7  # operations for each cycle of the longest path: beyond, there is enough to do in any order
-)
+# operations for each cycle of the longest path: beyond, there is enough to do in any order
+MOST_ABREAST = 7
 LATENCY = {"div": 13, "sqrt": 15, "sin": 30, "cos": 30, "neg": 1}  # cycles; 4 for all others
 
 
