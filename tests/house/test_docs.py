@@ -163,7 +163,7 @@ for path in sorted(CODEGEN.rglob("[a-z]*.py")):
 def test_functions_exist(document):
     for span in code(document):
         for module, name in re.findall(
-            rf"(?<![\w./])({'|'.join(MODULES)})\.(?!py\b|toml\b|md\b|jinja\b|c\b|h\b)(\w+)", span
+            rf"(?<![\w./])({'|'.join(MODULES)})\.(?!py\b|toml\b|md\b|json\b|jinja\b|c\b|h\b)(\w+)", span
         ):
             assert any(hasattr(importlib.import_module(m), name) for m in MODULES[module]), span
         for name in re.findall(r"\b(?:st|serpentail)\.(?!cli\b)(\w+)", span):
