@@ -137,6 +137,21 @@ def assemble_contact_points(draft: Draft, arrays: dict[str, Array]) -> None:
         draft.copy(arrays["velocities"].part(3 * k, 3), points.velocities[k])
 
 
+def assemble_leg_points(draft: Draft, arrays: dict[str, Array]) -> None:
+    """Hip, D, knee, A, M and T of the right leg, then of the left, in the world (Eqs. 5 to 9)."""
+    state, legs = State(arrays["q"]), arrays["legs"]
+    R = attitude(draft, state)
+    sides, joints = draft.constant("sides", [1, -1]), draft.array("joints_of_leg", 3, 6)
+    with draft.loop("l", 2) as side:
+        reads = {"side": sides.part(side, 1), "leg": legs.part(2 * side, 2)}
+        draft.step(leg.leg_points, reads, joints=joints.part(0, 18))
+        with draft.loop("k", 6) as k:
+            position = arrays["joints"].part(18 * side + 3 * k, 3)
+            draft.step(contact.point_on_torso, {"R": R, "place": joints[k]}, arm=position)
+            reads = {"p": state.position, "arm": position}
+            draft.step(contact.position, reads, position=position)
+
+
 def press(draft: Draft, torso: Torso, points: Points, arrays: dict[str, Array]) -> None:
     """Forces and bristle rates of all points."""
     properties = draft.store(contact.bristle_properties, drag=1, mobility=1)

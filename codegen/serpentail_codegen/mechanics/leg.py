@@ -48,3 +48,27 @@ def foot_points(
         "foot": Matrix([ankle, middle, toe]),
         "foot_rate": Matrix([ankle_rate, middle_rate, toe_rate]),
     }
+
+
+def leg_points(
+    let,
+    hip: V3,
+    side: V1,
+    L_h2d: V1,
+    L_d2k: V1,
+    L_k2a: V1,
+    L_a2m: V1,
+    L_m2t: V1,
+    delta_m: V1,
+    leg: V2,
+) -> dict:
+    """Hip, D, knee, A, M and T of one leg from B (Eqs. 5 to 9); ``side`` is 1 on the right, -1 on
+    the left.
+    """
+    upper, _ = direction(let, leg[0], 0)
+    lower, _ = direction(let, leg[1], 0)
+    sole, _ = direction(let, let("sole", leg[0] - delta_m[0]), 0)
+    points = [Matrix([side[0] * hip[0], hip[1], hip[2]])]
+    for link in (L_h2d * upper.T, L_d2k * lower.T, L_k2a * upper.T, L_a2m * lower.T):
+        points.append(let("joint", points[-1] + link.T))
+    return {"joints": Matrix([*points, points[-1] - L_m2t[0] * sole])}
