@@ -34,6 +34,8 @@ def segment_tip(let, angles: V2, tip: V8, section: V2) -> dict:
     c1, c2, c3, c1_z, c2_z, _, _, _ = tip
     length = section[1]
     K_squared = k * k.T - (a * a + b * b) * eye(3)
+
+    # the rotation, and how the tip turns and moves with the bend
     E = eye(3) + c1 * Matrix([[0, -b, 0], [b, 0, -a], [0, a, 0]]) + c2 * K_squared
     turn = Matrix([[1 - c3 * b * b, c3 * a * b], [c2 * b, -c2 * a], [c3 * a * b, 1 - c3 * a * a]])
     move = [
@@ -80,9 +82,13 @@ def segment_motion(
     # a_tip is Eq. 29 at x = 1, in bend components
     alpha, beta, _, u, du = geometry(let, angles)
     _, _, c3, c1_z, c2_z, c3_z, c1_zz, c2_zz = tip
+
+    # derivatives of the squared bend angle
     z_dot = let("z_dot", 2 * (alpha * rates[0] + beta * rates[1]))
     z_ddot = let("z_ddot", 2 * (rates[0] ** 2 + rates[1] ** 2))
     area = let("area", beta * rates[0] - alpha * rates[1])
+
+    # how the tip's rotation and place change at fixed rates
     swing = let("swing", c3_z * z_dot * area)
     turn_rate = Matrix(
         [
@@ -96,6 +102,8 @@ def segment_motion(
     r_ddot = section[1] * let(
         "r_v", across * u - along * Y + 2 * c2_z * z_dot * (rates[0] * du[0] + rates[1] * du[1])
     )
+
+    # the tip in the root frame, then in its own
     turn, r_dot = velocity_columns(let, bend, rates)
     turn_q, move_q = velocity_columns(let, bend, accelerations)
     w_r = let("w_r", w.cross(r))

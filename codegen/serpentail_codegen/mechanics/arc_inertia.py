@@ -19,11 +19,15 @@ def segment_inertia(let, angles: V2, shape: V16, section: V2) -> dict:
     m, length = section
     f, (moment, spread) = factors(shape), let("mL", Matrix([m * length, m * length * length]))
     second = f["ss"] * Y * Y.T - f["sg"] * (Y * u.T + u * Y.T) + f["gg"] * u * u.T
+
+    # momentum of all slices per unit rate of a and of b
     columns = []
     for q, d in zip((a, b), du, strict=True):
         linear = 2 * q * (f["g_z"] * u - f["s_z"] * Y) + f["g"] * d
         angular = 2 * q * f["side"] * Y.cross(u) - f["sg"] * Y.cross(d) + f["gg"] * u.cross(d)
         columns.append(Matrix([moment * let("p", linear), spread * let("L", angular)]))
+
+    # kinetic energy of bending alone
     block = Matrix([f["gg"] + a * a * f["along"], a * b * f["along"], f["gg"] + b * b * f["along"]])
     return {
         "h_own": moment * let("h", f["g"] * u - f["s"] * Y),
@@ -58,10 +62,13 @@ def gather_segment(
     their block of H.
     """
     # the blocks that Eq. 18 has for this segment and for all beyond, which its bend moves, too
+    # what is beyond, from the tip to the root
     h_tip, I_tip = let("h_tip", E * h), symmetric(rotated_inertia(let, E, I))
     h_root = let("h_root", h_tip + mass[0] * r)
     spread = let("spread", (h_tip + h_root).dot(r))
     I_root = entries(I_tip + spread * eye(3) - (h_tip * r.T + r * h_root.T))
+
+    # momentum columns: of this segment, and of what its bend moves beyond
     columns, twists = [], []
     for k, column in ((0, pitch_own), (6, yaw_own)):
         turn, move = bend[k : k + 3, :], bend[k + 3 : k + 6, :]
@@ -69,6 +76,8 @@ def gather_segment(
         L = let("L", I_tip * turn + h_tip.cross(move))
         twists.append((turn, move, p, L))
         columns.append(Matrix([column[0:3, :] + p, column[3:6, :] + L + r.cross(p)]))
+
+    # this segment's block of H: what its bend does to all beyond
     beyond = [
         twists[i][0].dot(twists[j][3]) + twists[i][1].dot(twists[j][2])
         for i, j in ((0, 0), (1, 0), (1, 1))
@@ -101,9 +110,12 @@ def segment_momentum(
     u: V3,
 ) -> dict:
     """Momentum of a segment, its moment about the root, and its kinetic energy."""
+    # momentum of the frame's motion and of bending
     relative = let("relative", rates[0] * pitch_own + rates[1] * yaw_own)
     p = let("p", section[0] * u + w.cross(h_own) + relative[0:3, :])
     L = let("L", symmetric(I_own) * w + h_own.cross(u) + relative[3:6, :])
+
+    # twice the kinetic energy: the frame's, of both, of bending
     bending = (
         rates[0] ** 2 * H_own[0] + 2 * rates[0] * rates[1] * H_own[1] + rates[1] ** 2 * H_own[2]
     )

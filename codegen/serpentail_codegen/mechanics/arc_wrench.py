@@ -30,9 +30,13 @@ def relative_wrench(let, angles, rates, shape, w) -> tuple[Matrix, Matrix]:
     f = factors(shape)
     _, _, _, u, _ = geometry(let, angles)
     z_dot, z_ddot, area, u_dot = bending_rates(let, angles, rates)
+
+    # r_ddot, along y, u and u_dot
     square_rate, w_u, wy = let("square_rate", z_dot**2), let("w_u", w.dot(u)), w[1]
     on_y, on_u = (let("r_ddot", f[n + "_zz"] * square_rate + f[n + "_z"] * z_ddot) for n in "sg")
     force = on_u * u + 2 * let("lean", f["g_z"] * z_dot) * u_dot - on_y * Y
+
+    # the integral of r x (w x r_dot) by N
     N_y = let("N_y", z_dot * (f["ss_z"] / 2 * wy - f["sz_g"] * w_u))
     N_u = let("N_u", z_dot * (f["gg_z"] / 2 * w_u - f["s_gz"] * wy))
     coriolis = (
@@ -41,6 +45,8 @@ def relative_wrench(let, angles, rates, shape, w) -> tuple[Matrix, Matrix]:
         - N_u * u
         - let("N_d", f["gg"] * w_u - f["sg"] * wy) * u_dot
     )
+
+    # the integral of r x r_ddot
     moment = let("side", f["side_z"] * square_rate + f["side"] * z_ddot) * Y.cross(u)
     moment += f["gg_z"] * z_dot * area * Y - let("tilt", 2 * f["s_gz"] * z_dot) * Y.cross(u_dot)
     return force, 2 * coriolis + moment
@@ -58,10 +64,14 @@ def relative_loads(let, angles, rates, shape, w) -> list:
     a, b, _, u, du = geometry(let, angles)
     z_dot, z_ddot, area, _ = bending_rates(let, angles, rates)
     w_u, wy = let("w_u", w.dot(u)), w[1]
+
+    # what acts along the bend itself, whatever its direction
     quadratic = f["ss_z"] * wy**2 - 2 * f["sg_z"] * wy * w_u + f["gg_z"] * w_u**2
     gyro = 2 * f["sz_g"] * (rates[0] * w[0] + rates[1] * w[2]) + f["gg_z"] * area * wy
     bending = f["along_z"] / 4 * z_dot**2 + (f["along"] - f["gg_z"]) / 2 * z_ddot
     common = let("common", quadratic - 2 * f["g_z"] * let("ww", w.dot(w)) - 2 * gyro + bending)
+
+    # what acts along du/da, du/db, and across the bend
     lever = let("lever", f["gg"] * w_u - f["sg"] * wy)
     tilt, turn = let("tilt", 2 * f["sz_g"] * z_dot), let("turn", f["gg_z"] * z_dot * wy)
     swing = let("swing", 2 * f["gg"] * wy)
@@ -96,9 +106,13 @@ def segment_wrench(
     ``w, w_dot, a`` are of the root frame.
     """
     m, length = section
+
+    # by the rates of the bend alone
     moment, spread = let("mL", Matrix([m * length, m * length * length]))
     force_r, moment_r = relative_wrench(let, angles, rates, shape, w)
     loads = relative_loads(let, angles, rates, shape, w)
+
+    # force and moment at the root
     p = let("p", rates[0] * pitch_own[0:3, :] + rates[1] * yaw_own[0:3, :])
     bending = let("bending", accelerations[0] * pitch_own + accelerations[1] * yaw_own)
     force = (
@@ -110,6 +124,8 @@ def segment_wrench(
     )
     inertia = symmetric(I_own)
     torque = h_own.cross(a) + inertia * w_dot + w.cross(let("Iw", inertia * w)) + bending[3:6, :]
+
+    # generalised forces of a and b
     torques = []
     for k, column in enumerate((pitch_own, yaw_own)):
         inertial = (

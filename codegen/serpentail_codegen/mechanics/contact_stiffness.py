@@ -120,15 +120,21 @@ def linearised_contact(
     w, depth, rate = weight[0], let("z", -(p[2] + arm[2])), -velocity[2]
     f_n = normal_force(let, K_n, D_n, depth, rate)
     k_n, d_n = normal_slopes(let, K_n, D_n, depth, rate, f_n)
+
+    # how friction follows the trial force, and its bound
     trial = let("trial", -(K_f[0] * bristle + drag[0] * velocity[0:2, :]))
     limit = let("limit", mu[0] * f_n)
     P, g = SLOPE[friction](let, trial, limit), BOUND[friction](let, trial, limit)
     g = following_load(let, g, f_n, mu[0], bound_share[0])
     P = plane([let("P", Piecewise((e, f_n > 0), (0, True))) for e in plane_entries(P)])
+
+    # the bristle eliminated
     following = eye(2) if friction == "paper" else P
     M = let("M", inverted(let, eye(2) + let("relax", w / D_f[0]) * (eye(2) - following)))
     N = let("N", w * M * following)
     B = w * P * let("K_N", K_f[0] * N + drag[0] * eye(2))
+
+    # all that factoring and solving need
     spring = [w * k_n, w * (d_n + w * k_n)]
     for matrix in (B, let("w_K_f", w * K_f[0]) * P * M, M, N):
         spring += plane_entries(matrix)

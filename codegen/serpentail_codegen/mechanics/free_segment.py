@@ -94,11 +94,14 @@ def free_coordinates(
     ``shares`` tell each coordinate's second derivative: minus the sum of (the entries of x before
     it, 1) times them.
     """
+    # coefficients: yaw from its row, pitch from what is left of its own
     over_yaw = let("over_yaw", 1 / yaw_row[7])
     yaw_share = let("yaw_share", yaw_row[0:7, :] * over_yaw)
     left = let("left", pitch_row[0:7, :] - yaw_row[6] * yaw_share)
     over_pitch = let("over_pitch", 1 / left[6])
     pitch_share = let("pitch_share", left[0:6, :] * over_pitch)
+
+    # right-hand sides
     yaw_load = let("yaw_load", joint_load[1] - torques[1])
     pitch_load = let(
         "pitch_load", (joint_load[0] - torques[0] - yaw_share[6] * yaw_load) * over_pitch
@@ -141,6 +144,8 @@ def freed_inertia(
     torso axes.
     """
     A, swept = Matrix.hstack(A_0, A_1, A_2, A_3, A_4, A_5).T, swept_by(tail_mount)
+
+    # blocks of A moved from the mount to B, the torso added
     force, moment = A[0:3, 0:3], A[3:6, 0:3]
     coupling = let("coupling", moment + swept.T * force)
     turning = A[3:6, 3:6] + moment * swept + swept.T * coupling.T

@@ -56,6 +56,7 @@ def link_power(
     """Power of the inertial wrench of one link (Eq. 17) under a virtual motion; both motions
     carried on.
     """
+    # the motion of the link, and its wrench
     motion = {
         k: let(k, x)
         for k, x in link_motion(let, joint, rates, accelerations, link, w, w_dot, a).items()
@@ -66,6 +67,8 @@ def link_power(
             "F"
         ],
     )
+
+    # the virtual motion of the link
     turn = let("turn", link_angular_velocity(let, joint, virtual_rates, w_virtual)["w"])
     slide = {
         k: let(k, x) for k, x in link_linear_velocity(let, joint, link, turn, u_virtual).items()
@@ -254,6 +257,8 @@ def link_motion(
     it.
     """
     turn_x, turn_z = joint_turns(joint)
+
+    # angular velocity and its rate: between the joint's two axes, then beyond both
     w_mid = let("w_mid", turn_x.T * w + rates[0] * X)
     w_dot_mid = let(
         "w_dot_mid", turn_x.T * w_dot + accelerations[0] * X + rates[0] * w_mid.cross(X)
@@ -262,6 +267,8 @@ def link_motion(
     w_dot_here = let(
         "w_dot_here", turn_z.T * w_dot_mid + accelerations[1] * Z + rates[1] * w_here.cross(Z)
     )
+
+    # acceleration of this joint, and of the next along the link
     a_here = let("a_here", turn_z.T * let("a_mid", turn_x.T * a))
     products = let(
         "ww",

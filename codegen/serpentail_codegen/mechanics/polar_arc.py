@@ -123,15 +123,21 @@ def segment_loading(
     acceleration of p_q.
     """
     a_i, b_i, b_phi = intermediate_vectors(let, angles, trig, section)
+
+    # r = L / theta and its derivatives, over r
     theta_dot, theta_ddot = rates[1], accelerations[1]
     shrink = let("shrink", -theta_dot / angles[1])  # r_dot / r
     shrink_rate = let("shrink_rate", 2 * shrink * shrink - theta_ddot / angles[1])  # r_ddot / r
+
+    # derivatives of a and b: relative to the root, then with its rotation
     b_rate = shrink * b_i + rates[0] * b_phi
     b_bend = (
         shrink_rate * b_i - rates[0] ** 2 * b_i + (2 * shrink * rates[0] + accelerations[0]) * b_phi
     )
     a_dot, a_ddot = turning(let, a_i, shrink * a_i, shrink_rate * a_i, w, w_dot)
     b_dot, b_ddot = turning(let, b_i, b_rate, b_bend, w, w_dot)
+
+    # the nine vectors
     square = let("square", theta_dot**2)
     along = [a_ddot, a_dot * theta_dot, a_i * theta_ddot, a_i * square]
     across = [b_ddot, b_dot * theta_dot, b_i * theta_ddot, b_i * square]
