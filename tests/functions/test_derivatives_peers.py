@@ -9,7 +9,6 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from tests.functions.test_derivatives import PARAMS, ROUNDING, SOLVED, called
 from tests.references.metrics import equilibrated_condition
 from tests.references.parameters import TABLE_1
 from tests.references.pinocchio_chain import PinocchioChain
@@ -23,16 +22,12 @@ from tests.support.derivative_models import (
     tangent_of_q,
 )
 
+from .compared import PARAMS, ROUNDING, SOLVED, called
+
 SMALL = [
     (1, 3, "straight"),
     (1, None, "loops"),
 ]  # the Jacobian of the whole forward dynamics is long
-
-
-@pytest.fixture(scope="module", params=PARAMS)
-def model(request):
-    """A compiled model with all derivatives."""
-    return derivative_model(*request.param)
 
 
 @pytest.fixture(scope="module", params=SMALL, ids=["m1_n3", "arcs1"])
