@@ -16,6 +16,7 @@ from serpentail.verification import report as verify
 from serpentail.verification.law import fastest
 from serpentail_codegen.functions.catalogue import CATALOGUE
 from serpentail_codegen.functions.contact import CONTACT
+from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.functions.implicit.functions import IMPLICIT
 from serpentail_codegen.functions.pfl import FEEDBACK
 from serpentail_codegen.mechanics import link, loads, torso
@@ -435,6 +436,15 @@ DERIVATION_FAULTS = {
 }
 
 
+@pytest.fixture
+def own_programs():
+    """No program that was assembled before or is assembled here serves another test."""
+    assemble.cache_clear()
+    yield
+    assemble.cache_clear()
+
+
+@pytest.mark.usefixtures("own_programs")
 @pytest.mark.parametrize("fault", DERIVATION_FAULTS)
 def test_faults_of_the_derivation_break_a_law(fault, monkeypatch, tmp_path):
     module, name, wrong, expected = DERIVATION_FAULTS[fault]
