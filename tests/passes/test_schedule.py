@@ -57,7 +57,10 @@ def scheduled_by_the_rule(nodes, live, results):
     order, alive = [], 0
     while len(order) < len(operations):
         ready = [n for n in operations if n not in order and needs[n] <= set(order)]
-        frees = {n: sum(a not in results and users[a] - set(order) == {n} for a in needs[n]) for n in ready}
+        frees = {
+            n: sum(a not in results and users[a] - set(order) == {n} for a in needs[n])
+            for n in ready
+        }
         if alive >= schedule.REGISTERS:
             best = max(ready, key=lambda n: (frees[n], height[n], -n))
         else:

@@ -50,7 +50,9 @@ class _List:
         # operands that are still to come, uses that are still to come, and operands used here for the last time
         self.waiting = {n: len(needed) for n, needed in self.operands.items()}
         self.uses = {n: len(users) + (n in results) for n, users in self.users.items()}
-        self.frees = {n: sum(self.uses[a] == 1 for a in needed) for n, needed in self.operands.items()}
+        self.frees = {
+            n: sum(self.uses[a] == 1 for a in needed) for n, needed in self.operands.items()
+        }
 
         self.longest_first, self.freeing_first = [], []
         self.placed = set()
