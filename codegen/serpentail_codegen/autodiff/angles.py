@@ -13,7 +13,7 @@ from ..ir.step import Step
 
 
 @dataclass(frozen=True)
-class Turned:
+class SinesAndCosines:
     """Vectors of sines and cosines: for each scalar its angle, and the sign and place of its
     derivative.
     """
@@ -22,7 +22,7 @@ class Turned:
     scalars: tuple[tuple[int, int, int], ...]
 
 
-def turned_by(step: Step) -> Turned | None:
+def sines_and_cosines_of(step: Step) -> SinesAndCosines | None:
     """Return how the outputs of a step follow from angles; None if they are not their sines and
     cosines.
     """
@@ -35,14 +35,14 @@ def turned_by(step: Step) -> Turned | None:
         if partner not in kinds:
             return None
         scalars.append((step.nodes[args[0]][1], 1 if op == "sin" else -1, kinds.index(partner)))
-    return Turned(step.inputs[0][1], tuple(scalars))
+    return SinesAndCosines(step.inputs[0][1], tuple(scalars))
 
 
 @dataclass(frozen=True)
-class TurnedArray:
+class SinesAndCosinesArray:
     """An array of sines and cosines, and where it is written from which angles."""
 
-    turned: Turned
+    kind: SinesAndCosines
     target: Ref
     source: Ref
 
@@ -60,20 +60,20 @@ class TurnedArray:
         return replace(self.source, offset=turn * factor + self.source.offset.offset)
 
 
-def turned_arrays(program: Program) -> dict[str, TurnedArray]:
+def sines_and_cosines_arrays(program: Program) -> dict[str, SinesAndCosinesArray]:
     """Return the arrays of sines and cosines that are written once and read by steps, vector by
     vector.
     """
     out = {}
     for statement, _ in statements(program.body):
-        turned = turned_by(statement.step) if isinstance(statement, Apply) else None
-        if turned and not any(statement.adds):
+        kind = sines_and_cosines_of(statement.step) if isinstance(statement, Apply) else None
+        if kind and not any(statement.adds):
             (source,), (target,) = statement.reads, statement.writes
-            out[target.array.name] = TurnedArray(turned, target, source)
+            out[target.array.name] = SinesAndCosinesArray(kind, target, source)
     return {name: found for name, found in out.items() if _plain(program, found)}
 
 
-def _plain(program: Program, found: TurnedArray) -> bool:
+def _plain(program: Program, found: SinesAndCosinesArray) -> bool:
     """Tell if an array is local, written by one step in one loop, and read as it was written."""
     name, terms = found.target.array.name, found.target.offset.terms
     writers = sum(name in names(writes(s)) for s, _ in statements(program.body))

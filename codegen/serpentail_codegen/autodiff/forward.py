@@ -10,7 +10,7 @@ from dataclasses import replace
 
 from ..ir.dataflow import forward_slice, inner_arrays, pruned, writes
 from ..ir.program import Apply, Array, Copy, Fill, Guard, Index, Loop, Program, Ref, statements
-from .angles import TurnedArray, turned_arrays
+from .angles import SinesAndCosinesArray, sines_and_cosines_arrays
 from .step import tangent
 
 Bound = Callable[[tuple[Loop, ...]], Index | None]
@@ -28,11 +28,11 @@ def tangent_program(
 
     ``bound`` tells how many lanes are needed inside given loops.
     """
-    moving, turned = forward_slice(program.body, active), turned_arrays(program)
-    turned = {name: found for name, found in turned.items() if name in moving}
-    own = [a for a in program.arrays if a.name in moving - turned.keys()]
+    moving, by_angles = forward_slice(program.body, active), sines_and_cosines_arrays(program)
+    by_angles = {name: found for name, found in by_angles.items() if name in moving}
+    own = [a for a in program.arrays if a.name in moving - by_angles.keys()]
     companions = {a.name: Array(f"d_{a.name}", _role(a), a.size, a.count, lanes=lanes) for a in own}
-    transform = _Transform(companions, turned, bound)
+    transform = _Transform(companions, by_angles, bound)
     body = transform.body(program.body, ())
     fills = tuple(Fill(ref, (0,) * ref.size) for ref in _partly_written(body))
     arrays = (*inner_arrays(program), *companions.values())
@@ -58,11 +58,13 @@ def _partly_written(body: tuple) -> list[Ref]:
 class _Transform:
     """Rewrites statements; ``companions`` are the tangent arrays by the names of their arrays.
 
-    Arrays of sines and cosines, ``turned``, have none: the tangents of their angles serve.
+    Arrays of sines and cosines, ``by_angles``, have none: the tangents of their angles serve.
     """
 
-    def __init__(self, companions: dict[str, Array], turned: dict[str, TurnedArray], bound: Bound):
-        self.companions, self.turned, self.bound = companions, turned, bound
+    def __init__(
+        self, companions: dict[str, Array], by_angles: dict[str, SinesAndCosinesArray], bound: Bound
+    ):
+        self.companions, self.by_angles, self.bound = companions, by_angles, bound
 
     def moves(self, ref: Ref) -> bool:
         """Tell if the scalars of a reference have tangents."""
@@ -101,22 +103,26 @@ class _Transform:
     def apply(self, call: Apply, columns: Index | None):
         """Yield a step with its tangents."""
         values = call.inputs()
-        turns = {
-            name: self.turned[ref.array.name]
+        angle_inputs = {
+            name: self.by_angles[ref.array.name]
             for name, ref in values.items()
-            if ref.array.name in self.turned
+            if ref.array.name in self.by_angles
         }
         active = {name for name, ref in values.items() if self.moves(ref)}
-        if any(ref.array.name in self.turned for ref in call.writes) or not active | turns.keys():
+        if (
+            any(ref.array.name in self.by_angles for ref in call.writes)
+            or not active | angle_inputs.keys()
+        ):
             yield call
             for ref, adds in zip(call.writes, call.adds, strict=True):
                 if self.moves(ref) and not adds:
                     yield Fill(self.of(ref), (0,) * ref.size)
             return
-        kinds = frozenset((name, found.turned) for name, found in turns.items())
-        step = tangent(call.step, frozenset(active | turns.keys()), kinds)
+        kinds = frozenset((name, found.kind) for name, found in angle_inputs.items())
+        step = tangent(call.step, frozenset(active | angle_inputs.keys()), kinds)
         tangents = {
-            f"d_{name}_angles": self.of(found.angles(values[name])) for name, found in turns.items()
+            f"d_{name}_angles": self.of(found.angles(values[name]))
+            for name, found in angle_inputs.items()
         }
         values |= tangents | {f"d_{name}": self.of(values[name]) for name in active}
         yield Apply(

@@ -23,7 +23,7 @@ from ..ir.program import (
     as_index,
     statements,
 )
-from .angles import TurnedArray, turned_arrays
+from .angles import SinesAndCosinesArray, sines_and_cosines_arrays
 from .step import adjoint
 
 
@@ -32,8 +32,10 @@ def adjoint_program(program: Program, wanted: Collection[str], given: Collection
     wanted inputs.
     """
     matters = forward_slice(program.body, wanted) & backward_slice(program.body, given)
-    turned = {name: found for name, found in turned_arrays(program).items() if name in matters}
-    matters -= turned.keys()
+    by_angles = {
+        name: found for name, found in sines_and_cosines_arrays(program).items() if name in matters
+    }
+    matters -= by_angles.keys()
     ends = [a for a in program.arrays if a.name in (*wanted, *given)]
     companions = {
         a.name: Array(f"b_{a.name}", "local", a.size, a.count)
@@ -43,7 +45,7 @@ def adjoint_program(program: Program, wanted: Collection[str], given: Collection
     companions |= {a.name: Array(f"b_{a.name}_sum", "local", a.size, a.count) for a in ends}
     weights = [Array(f"b_{a.name}", "input", a.size, a.count) for a in ends if a.name in given]
     results = [Array(f"b_{a.name}", "output", a.size, a.count) for a in ends if a.name in wanted]
-    way = _WayBack(program, companions, turned)
+    way = _WayBack(program, companions, by_angles)
     start = [Fill(b.part(0, b.length), (0,) * b.length) for b in companions.values()]
     start += [Copy(_all(companions[w.name.removeprefix("b_")]), _all(w)) for w in weights]
     forward, backward = way.both(program.body, ())
@@ -92,12 +94,12 @@ def _overlap(ref: Ref, other: Ref) -> bool:
 class _WayBack:
     """Reverses statements; ``companions`` are the adjoint arrays by the names of their arrays.
 
-    Arrays of sines and cosines, ``turned``, have none: the adjoints of their angles serve.
+    Arrays of sines and cosines, ``by_angles``, have none: the adjoints of their angles serve.
     """
 
     program: Program
     companions: dict[str, Array]
-    turned: dict[str, TurnedArray]
+    by_angles: dict[str, SinesAndCosinesArray]
     kept: list[Array] = field(default_factory=list)
 
     def __post_init__(self):
@@ -164,15 +166,15 @@ class _WayBack:
         read, written = call.inputs(), call.outputs()
         stored = [ref for ref, adds in zip(call.writes, call.adds, strict=True) if not adds]
         given = frozenset(n for n, ref in written.items() if self.matters(ref))
-        turns = {
-            n: self.turned[ref.array.name]
+        angle_inputs = {
+            n: self.by_angles[ref.array.name]
             for n, ref in read.items()
-            if ref.array.name in self.turned
+            if ref.array.name in self.by_angles
         }
-        wanted = frozenset(n for n, ref in read.items() if self.matters(ref)) | turns.keys()
+        wanted = frozenset(n for n, ref in read.items() if self.matters(ref)) | angle_inputs.keys()
         if not given or not wanted:
             return [call], self.cleared(*stored)
-        kinds = frozenset((n, found.turned) for n, found in turns.items())
+        kinds = frozenset((n, found.kind) for n, found in angle_inputs.items())
         step = adjoint(call.step, frozenset(wanted), given, kinds)
         values = read | {f"b_{n}": self.of(ref) for n, ref in written.items() if n in given}
         keeps = []
@@ -181,7 +183,7 @@ class _WayBack:
                 keeps.append(self.keep(read[name], loops))
                 values[name] = keeps[-1].target
         places = {f"b_{n}": ref for n, ref in read.items()}
-        places |= {f"b_{n}_angles": found.angles(read[n]) for n, found in turns.items()}
+        places |= {f"b_{n}_angles": found.angles(read[n]) for n, found in angle_inputs.items()}
         targets = [places[name] for name, _ in step.outputs]
         in_place = [ref in stored for ref in targets]
         for ref in stored:

@@ -11,7 +11,7 @@ from functools import cache
 
 from ..ir.step import Step, compacted
 from ..ir.tape import LEAVES, Tape, live_nodes, operands, replay
-from .angles import Turned
+from .angles import SinesAndCosines
 
 
 def _quotient(tape: Tape, y: int, a: int, b: int) -> tuple[int, int]:
@@ -129,20 +129,20 @@ class Combinations:
         return self.one_row(total) if self.uses[node] > 1 else total
 
 
-Turns = frozenset[tuple[str, Turned]]
+AngleInputs = frozenset[tuple[str, SinesAndCosines]]
 
 
-def moved_inputs(rules: Rules, active: frozenset[str], turns: dict[str, Turned]):
+def moved_inputs(rules: Rules, active: frozenset[str], angle_inputs: dict[str, SinesAndCosines]):
     """Return the tangents that a step takes, and the tangent of each of its input scalars as a
     combination of them.
     """
     tape, count, moving, slopes = rules.tape, rules.count, [], {}
     for name, span in spans(rules.step.inputs).items():
-        if name in turns:
-            for k, (angle, sign, other) in zip(span, turns[name].scalars, strict=True):
+        if name in angle_inputs:
+            for k, (angle, sign, other) in zip(span, angle_inputs[name].scalars, strict=True):
                 partner = tape.input(span[other])
                 slopes[k] = {tape.input(count + angle): partner if sign > 0 else tape.neg(partner)}
-            moving.append((f"d_{name}_angles", turns[name].angles))
+            moving.append((f"d_{name}_angles", angle_inputs[name].angles))
         elif name in active:
             slopes |= {k: {tape.input(count + n): tape.const(1)} for n, k in enumerate(span)}
             moving.append((f"d_{name}", len(span)))
@@ -153,14 +153,14 @@ def moved_inputs(rules: Rules, active: frozenset[str], turns: dict[str, Turned])
 
 
 @cache
-def tangent(step: Step, active: frozenset[str], turns: Turns = frozenset()) -> Step:
+def tangent(step: Step, active: frozenset[str], angle_inputs: AngleInputs = frozenset()) -> Step:
     """Return the step with ``d_<output>`` for tangents ``d_<input>`` of the active inputs, and its
     own outputs.
 
-    Of the inputs in ``turns``, which are sines and cosines, it takes ``d_<input>_angles``.
+    Of the inputs in ``angle_inputs``, which are sines and cosines, it takes ``d_<input>_angles``.
     """
     rules = Rules(step)
-    moving, slopes = moved_inputs(rules, active, dict(turns))
+    moving, slopes = moved_inputs(rules, active, dict(angle_inputs))
     combinations, changes = Combinations(rules), []
     for node, (op, *args) in enumerate(step.nodes):
         if op in LEAVES:
@@ -182,14 +182,17 @@ def tangent(step: Step, active: frozenset[str], turns: Turns = frozenset()) -> S
 
 @cache
 def adjoint(
-    step: Step, wanted: frozenset[str], given: frozenset[str], turns: Turns = frozenset()
+    step: Step,
+    wanted: frozenset[str],
+    given: frozenset[str],
+    angle_inputs: AngleInputs = frozenset(),
 ) -> Step:
     """Return the step that takes ``b_<output>`` of the given outputs to ``b_<input>`` of the wanted
     inputs.
 
-    Of the inputs in ``turns``, which are sines and cosines, it gives ``b_<input>_angles``.
+    Of the inputs in ``angle_inputs``, which are sines and cosines, it gives ``b_<input>_angles``.
     """
-    rules, turned = Rules(step), dict(turns)
+    rules, angles_of = Rules(step), dict(angle_inputs)
     tape, count, incoming = rules.tape, rules.count, []
     weight = [tape.const(0)] * len(step.nodes)
     for name, span in spans(step.outputs).items():
@@ -207,8 +210,8 @@ def adjoint(
     for name, span in spans(step.inputs).items():
         if name in wanted:
             own = [weight[position[k]] if k in position else tape.const(0) for k in span]
-            own = by_angles(tape, span, turned[name], own) if name in turned else own
-            outputs.append((f"b_{name}_angles" if name in turned else f"b_{name}", len(own)))
+            own = angle_adjoints(tape, span, angles_of[name], own) if name in angles_of else own
+            outputs.append((f"b_{name}_angles" if name in angles_of else f"b_{name}", len(own)))
             results += own
     partly = some_of(step.inputs, wanted) + some_of(step.outputs, given, "_of")
     return rules.finish(
@@ -216,10 +219,10 @@ def adjoint(
     )
 
 
-def by_angles(tape: Tape, span: range, turned: Turned, weights: list[int]) -> list[int]:
+def angle_adjoints(tape: Tape, span: range, kind: SinesAndCosines, weights: list[int]) -> list[int]:
     """Return the adjoints of angles from those of their sines and cosines."""
-    out = [tape.const(0)] * turned.angles
-    for (angle, sign, other), weight in zip(turned.scalars, weights, strict=True):
+    out = [tape.const(0)] * kind.angles
+    for (angle, sign, other), weight in zip(kind.scalars, weights, strict=True):
         term = tape.mul(tape.input(span[other]), weight)
         out[angle] = tape.add(out[angle], term if sign > 0 else tape.neg(term))
     return out
