@@ -5,7 +5,7 @@ forward.
 import pytest
 
 from serpentail_codegen.autodiff.forward import tangent_program
-from serpentail_codegen.autodiff.reverse import adjoint_program, turns
+from serpentail_codegen.autodiff.reverse import adjoint_program, iterations
 from serpentail_codegen.ir.builder import Builder
 from serpentail_codegen.ir.interpret import Run
 from serpentail_codegen.ir.program import Factor, Index, Loop, as_index, statements
@@ -140,16 +140,16 @@ def test_only_what_is_overwritten_is_kept():
     assert kept == {"kept_0_s": (1, 3), "kept_1_s": (1, 1)}
 
 
-def test_each_turn_keeps_its_own_value():
-    """Turns of nested loops are numbered from 0 on, the innermost fastest."""
+def test_each_iteration_keeps_its_own_value():
+    """Iterations of nested loops are numbered from 0 on, the innermost fastest."""
     loops = tuple(
         Loop(var, as_index(0), as_index(n), down, ())
         for var, n, down in [("i", 2, False), ("j", 3, True)]
     )
-    number, count = turns(loops)
+    number, count = iterations(loops)
     assert count == 6
     assert [number.at({"i": i, "j": j}) for i in range(2) for j in range(3)] == list(range(6))
-    assert turns(()) == (Index(), 1)
+    assert iterations(()) == (Index(), 1)
 
 
 def test_loops_run_the_other_way_back():
@@ -179,7 +179,7 @@ def test_forward_part_is_left_out_where_it_is_not_needed():
 
 def test_values_kept_in_a_triangle_are_refused():
     with pytest.raises(
-        ValueError, match=r"^loop j is no rectangle from 0 on: its turns cannot be numbered$"
+        ValueError, match=r"^loop j is no rectangle from 0 on: its iterations cannot be numbered$"
     ):
         adjoint_program(PROGRAMS["triangle"], ("x",), ("u",))
 
@@ -246,11 +246,11 @@ def test_every_value_that_the_way_back_reads_is_there():
             known |= {statement.target.array.name} if hasattr(statement, "target") else set()
 
 
-# Aliases: places that several statements, turns or inputs share
+# Aliases: places that several statements, iterations or inputs share
 
 
-def shared_by_turns():
-    """Turns (i, j) of one statement write the same place where i + j is the same."""
+def shared_by_iterations():
+    """Iterations (i, j) of one statement write the same place where i + j is the same."""
     b, _, x, y, u, w = built()
     t = b.array("t", 1, 5)
     b.fill(w[0], 0)
@@ -262,7 +262,7 @@ def shared_by_turns():
 
 
 def shared_by_windows():
-    """Windows that overlap: the second scalar of one turn is the first of the next."""
+    """Windows that overlap: the second scalar of one iteration is the first of the next."""
     b, _, x, y, u, w = built()
     t = b.array("t", 1, 4)
     b.fill(w[0], 0)
@@ -297,7 +297,7 @@ def shared_by_inputs():
 
 
 @pytest.mark.parametrize(
-    "build", [shared_by_turns, shared_by_windows, shared_in_part, shared_by_inputs]
+    "build", [shared_by_iterations, shared_by_windows, shared_in_part, shared_by_inputs]
 )
 def test_shared_places_are_right_or_refused(build):
     program = build()

@@ -47,17 +47,17 @@ class SinesAndCosinesArray:
     source: Ref
 
     def angles(self, ref: Ref) -> Ref:
-        """Return the angles of what a reference reads: the writer's, in the turn in which it was
-        written.
+        """Return the angles of what a reference reads: the writer's, in the iteration that
+        wrote it.
         """
         (variable, step), *_ = self.target.offset.terms or (("", 0),)
         distance = ref.offset + self.target.offset.offset * -1
-        turn = Index(
+        iteration = Index(
             tuple((name, factor // step) for name, factor in distance.terms),
             distance.offset // step,
         )
         factor = dict(self.source.offset.terms)[variable]
-        return replace(self.source, offset=turn * factor + self.source.offset.offset)
+        return replace(self.source, offset=iteration * factor + self.source.offset.offset)
 
 
 def sines_and_cosines_arrays(program: Program) -> dict[str, SinesAndCosinesArray]:

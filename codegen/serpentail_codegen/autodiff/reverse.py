@@ -2,7 +2,7 @@
 comes out.
 
 Each array ``x`` that matters gets a companion ``b_x``, what the weighted outputs change by with x.
-A value that is overwritten before the way back needs it is kept, one copy for each turn of its
+A value that is overwritten before the way back needs it is kept, one copy for each iteration of its
 loops.
 """
 
@@ -60,20 +60,20 @@ def _all(array: Array) -> Ref:
     return array.part(0, array.length)
 
 
-def turns(loops: tuple[Loop, ...]) -> tuple[Index, int]:
-    """Return the number of the current turn of nested loops, and how many turns there are."""
+def iterations(loops: tuple[Loop, ...]) -> tuple[Index, int]:
+    """Return the number of the current iteration of nested loops, and how many there are."""
     number, count = as_index(0), 1
     for loop in reversed(loops):
         if loop.start.terms or loop.stop.terms or loop.start.offset:
             raise ValueError(
-                f"loop {loop.var} is no rectangle from 0 on: its turns cannot be numbered"
+                f"loop {loop.var} is no rectangle from 0 on: its iterations cannot be numbered"
             )
         number, count = number + count * Index(((loop.var, 1),)), count * loop.stop.offset
     return number, count
 
 
 def _apart(ref: Ref, loops: tuple[Loop, ...]) -> bool:
-    """Tell if a reference means another place in every turn of the loops."""
+    """Tell if a reference means another place in every iteration of the loops."""
     strides, reach = {var: abs(factor) for var, factor in ref.offset.terms}, ref.size * ref.stride
     for loop in sorted(loops, key=lambda loop: strides.get(loop.var, 0)):
         if strides.get(loop.var, 0) < reach or loop.start.terms or loop.stop.terms:
@@ -201,7 +201,7 @@ class _WayBack:
 
     def keep(self, ref: Ref, loops) -> Copy:
         """Return the copy of a value that will be overwritten."""
-        number, count = turns(loops)
+        number, count = iterations(loops)
         array = Array(f"kept_{len(self.kept)}_{ref.array.name}", "local", ref.size, count)
         self.kept.append(array)
         return Copy(array[number], ref)
