@@ -16,12 +16,12 @@ from .step import tangent
 Bound = Callable[[tuple[Loop, ...]], Index | None]
 
 
-def everywhere(loops: tuple[Loop, ...]) -> None:
+def all_lanes(loops: tuple[Loop, ...]) -> None:
     """Need all lanes in every loop."""
 
 
 def tangent_program(
-    program: Program, active: Collection[str], lanes: int = 0, bound: Bound = everywhere
+    program: Program, active: Collection[str], lanes: int = 0, bound: Bound = all_lanes
 ) -> Program:
     """Return the program that takes ``d_<input>`` of the active inputs along and gives
     ``d_<output>``.
