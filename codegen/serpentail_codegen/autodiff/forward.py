@@ -32,7 +32,7 @@ def tangent_program(
     by_angles = {name: found for name, found in by_angles.items() if name in moving}
     own = [a for a in program.arrays if a.name in moving - by_angles.keys()]
     companions = {a.name: Array(f"d_{a.name}", _role(a), a.size, a.count, lanes=lanes) for a in own}
-    transform = _Transform(companions, by_angles, bound)
+    transform = _Tangents(companions, by_angles, bound)
     body = transform.body(program.body, ())
     fills = tuple(Fill(ref, (0,) * ref.size) for ref in _partly_written(body))
     arrays = (*inner_arrays(program), *companions.values())
@@ -55,7 +55,7 @@ def _partly_written(body: tuple) -> list[Ref]:
     return [a.part(0, a.length) for a in found.values()]
 
 
-class _Transform:
+class _Tangents:
     """Rewrites statements; ``companions`` are the tangent arrays by the names of their arrays.
 
     Arrays of sines and cosines, ``by_angles``, have none: the tangents of their angles serve.

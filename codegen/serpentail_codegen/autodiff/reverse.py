@@ -45,12 +45,12 @@ def adjoint_program(program: Program, wanted: Collection[str], given: Collection
     companions |= {a.name: Array(f"b_{a.name}_sum", "local", a.size, a.count) for a in ends}
     weights = [Array(f"b_{a.name}", "input", a.size, a.count) for a in ends if a.name in given]
     results = [Array(f"b_{a.name}", "output", a.size, a.count) for a in ends if a.name in wanted]
-    way = _WayBack(program, companions, by_angles)
+    reversal = _Reversal(program, companions, by_angles)
     start = [Fill(b.part(0, b.length), (0,) * b.length) for b in companions.values()]
     start += [Copy(_all(companions[w.name.removeprefix("b_")]), _all(w)) for w in weights]
-    forward, backward = way.both(program.body, ())
+    forward, backward = reversal.both(program.body, ())
     end = tuple(Copy(_all(b), _all(companions[b.name.removeprefix("b_")])) for b in results)
-    arrays = (*inner_arrays(program), *companions.values(), *weights, *results, *way.kept)
+    arrays = (*inner_arrays(program), *companions.values(), *weights, *results, *reversal.kept)
     body = (*forward, *start, *backward, *end)
     name = "_".join(["b", *wanted, *given, program.name])
     return pruned(replace(program, name=name, arrays=arrays, body=body))
@@ -91,7 +91,7 @@ def _overlap(ref: Ref, other: Ref) -> bool:
 
 
 @dataclass
-class _WayBack:
+class _Reversal:
     """Reverses statements; ``companions`` are the adjoint arrays by the names of their arrays.
 
     Arrays of sines and cosines, ``by_angles``, have none: the adjoints of their angles serve.

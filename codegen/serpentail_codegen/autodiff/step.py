@@ -95,7 +95,7 @@ class Combinations:
     for d(b + c).
     """
 
-    MOST = 2  # terms that are scaled one by one; more are summed first
+    MOST_TERMS = 2  # terms that are scaled one by one; more are summed first
 
     def __init__(self, rules: Rules):
         self.rules, self.tape, self.step = rules, rules.tape, rules.step
@@ -119,7 +119,7 @@ class Combinations:
         tape, total = self.tape, {}
         for operand, partial in self.rules.partials(node).items():
             terms = changes[operand]
-            if len(terms) > self.MOST and tape.value(partial) not in (1, -1):
+            if len(terms) > self.MOST_TERMS and tape.value(partial) not in (1, -1):
                 terms = changes[operand] = self.one_row(terms)
             for row, coefficient in terms.items():
                 total[row] = tape.add(total.get(row, tape.const(0)), tape.mul(partial, coefficient))

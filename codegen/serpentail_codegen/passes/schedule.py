@@ -21,10 +21,10 @@ def scheduled(nodes, live: list[int], results) -> list[int]:
     if sum(nodes[n][0] in BINARY for n in operations) > MOST_OPERATIONS:
         return live
     leaves = [n for n in live if nodes[n][0] in LEAVES]
-    return leaves + _List(nodes, operations, set(results)).order()
+    return leaves + _ListScheduler(nodes, operations, set(results)).order()
 
 
-class _List:
+class _ListScheduler:
     """List scheduling of one straight line.
 
     The operations that are ready lie in two heaps, one for each rule of choice.  How many values an operation uses for
