@@ -200,8 +200,8 @@ def test_selection_folds_where_the_choice_is_known_or_makes_no_difference(tape):
     assert tape.max(a, a) == a and tape.value(tape.max(tape.const(2), tape.const(3))) == 3
 
 
-def test_selection_takes_no_rows(tape):
-    with pytest.raises(ValueError, match="select takes no rows"):
+def test_selection_takes_no_wide_operands(tape):
+    with pytest.raises(ValueError, match="select takes no wide operands"):
         tape.select(0, 1, tape.unit(0, 3))
 
 
