@@ -14,7 +14,8 @@ from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.functions.plain import FUNCTIONS
 from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.ir.builder import Builder, narrowed
-from serpentail_codegen.ir.interpret import Numbers, Run, branches, unroll
+from serpentail_codegen.ir.cost import branches
+from serpentail_codegen.ir.interpret import Numbers, Run, unroll
 from serpentail_codegen.ir.ldl import ldl_factor, ldl_solve, pair_factor, pair_solve
 from serpentail_codegen.ir.program import Apply, Array, Fill, Index, Loop, as_index, statements
 from serpentail_codegen.ir.step import Step
