@@ -45,7 +45,7 @@ def test_random_lines_keep_their_dependencies(seed):
 
 
 def scheduled_by_the_rule(nodes, live, results):
-    """The rule as it is stated: at every step, look at all that is ready; the reference for the heaps."""
+    """The rule as it is stated, which looks at all that is ready in every step."""
     operations = [n for n in live if nodes[n][0] not in schedule.LEAVES]
     needs = {n: {a for a in nodes[n][1:] if a in operations} for n in operations}
     users = {n: {u for u in operations if n in needs[u]} for n in operations}
