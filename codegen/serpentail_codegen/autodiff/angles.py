@@ -5,6 +5,7 @@ therefore take the tangents of the angles in place of those of the sines and cos
 and d(R x) = R dx + dalpha (e x R x) in place of four products.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from ..ir.dataflow import names, reads, writes
@@ -26,18 +27,21 @@ class SinesAndCosines:
     scalars: tuple[tuple[int, int, int], ...]
 
 
+AngleInputs = frozenset[tuple[str, SinesAndCosines]]  # the inputs of a step that are such
+
+
 def sines_and_cosines_of(step: Step) -> SinesAndCosines | None:
     """Return how a step's output follows from angles; None if it is not their sines and cosines."""
     if len(step.inputs) != 1 or len(step.outputs) != 1:
         return None
-    kinds = [step.nodes[r] for r in step.results]
+    operations = [step.nodes[r] for r in step.results]
     scalars = []
-    for op, *args in kinds:
+    for op, *args in operations:
         partner = (PARTNERS.get(op), *args)
-        if partner not in kinds:
+        if partner not in operations:
             return None
         angle = step.nodes[args[0]][1]
-        scalars.append((angle, 1 if op == "sin" else -1, kinds.index(partner)))
+        scalars.append((angle, 1 if op == "sin" else -1, operations.index(partner)))
     return SinesAndCosines(step.inputs[0][1], tuple(scalars))
 
 
@@ -81,6 +85,19 @@ def sines_and_cosines_arrays(program: Program) -> dict[str, SinesAndCosinesArray
         for name, array in candidates.items()
         if _written_once(program, array) and _read_as_written(program, array)
     }
+
+
+def angle_inputs(
+    by_angles: Mapping[str, SinesAndCosinesArray], inputs: Mapping[str, Ref]
+) -> dict[str, SinesAndCosinesArray]:
+    """Return the arrays that a step reads sines and cosines of, by the names of its inputs."""
+    arrays = {name: by_angles.get(ref.array.name) for name, ref in inputs.items()}
+    return {name: array for name, array in arrays.items() if array}
+
+
+def kinds(arrays: Mapping[str, SinesAndCosinesArray]) -> AngleInputs:
+    """Return how the inputs of a step follow from angles, for its derivatives."""
+    return frozenset((name, array.kind) for name, array in arrays.items())
 
 
 def _written_once(program: Program, array: SinesAndCosinesArray) -> bool:

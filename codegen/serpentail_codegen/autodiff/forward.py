@@ -22,7 +22,7 @@ from ..ir.program import (
     Statement,
     statements,
 )
-from .angles import SinesAndCosinesArray, sines_and_cosines_arrays
+from .angles import SinesAndCosinesArray, angle_inputs, kinds, sines_and_cosines_arrays
 from .step import tangent
 
 Bound = Callable[[tuple[Loop, ...]], Index | None]
@@ -75,7 +75,7 @@ def _partly_written(body: tuple[Statement, ...]) -> list[Ref]:
             for ref in writes(statement):
                 if ref.array.lanes:
                     arrays[ref.array.name] = ref.array
-    return [a.part(0, a.length) for a in arrays.values()]
+    return [a.whole() for a in arrays.values()]
 
 
 class _Tangents:
@@ -146,31 +146,21 @@ class _Tangents:
         """Yield a step with its tangents."""
         values = call.inputs()
         active = {name for name, ref in values.items() if self.moves(ref)}
-        angle_inputs = {
-            name: self.by_angles[ref.array.name]
-            for name, ref in values.items()
-            if ref.array.name in self.by_angles
-        }
+        angles = angle_inputs(self.by_angles, values)
 
         # sines and cosines need no tangents, and of constants they are zero
         makes_sines = any(ref.array.name in self.by_angles for ref in call.writes)
-        if makes_sines or not (active or angle_inputs):
+        if makes_sines or not (active or angles):
             yield call
-            pairs = zip(call.writes, call.adds, strict=True)
-            yield from self.cleared(*(ref for ref, adds in pairs if not adds))
+            yield from self.cleared(*call.stored())
             return
 
         # the step of values and tangents, and what it reads by the names of its inputs
-        kinds = frozenset((name, array.kind) for name, array in angle_inputs.items())
-        step = tangent(call.step, frozenset(active | angle_inputs.keys()), kinds)
-        for name, array in angle_inputs.items():
+        step = tangent(call.step, frozenset(active | angles.keys()), kinds(angles))
+        for name, array in angles.items():
             values[f"d_{name}_angles"] = self.of(array.angles(values[name]))
         for name in active:
             values[f"d_{name}"] = self.of(values[name])
-        yield Apply(
-            step,
-            tuple(values[name] for name, _ in step.inputs),
-            call.writes + tuple(self.of(ref) for ref in call.writes),
-            call.adds * 2,
-            self.bound(loops),
-        )
+        targets = (*call.writes, *map(self.of, call.writes))
+        both = Apply.named(step, values, targets, call.adds * 2)
+        yield replace(both, columns=self.bound(loops))

@@ -25,7 +25,7 @@ from ..ir.program import (
     as_index,
     statements,
 )
-from .angles import SinesAndCosinesArray, sines_and_cosines_arrays
+from .angles import SinesAndCosinesArray, angle_inputs, kinds, sines_and_cosines_arrays
 from .step import adjoint
 
 Loops = tuple[Loop, ...]
@@ -47,9 +47,9 @@ def adjoint_program(program: Program, wanted: Collection[str], given: Collection
     # adjoints start from the weights of the outputs, and end as those of the inputs
     weights = {a.name: _adjoints(a, "input") for a in ends if a.name in given}
     results = {a.name: _adjoints(a, "output") for a in ends if a.name in wanted}
-    zeros = [Fill(_all(b), (0,) * b.length) for b in companions.values()]
-    start = [Copy(_all(companions[name]), _all(weight)) for name, weight in weights.items()]
-    end = [Copy(_all(result), _all(companions[name])) for name, result in results.items()]
+    zeros = [Fill(b.whole(), (0,) * b.length) for b in companions.values()]
+    start = [Copy(companions[name].whole(), weight.whole()) for name, weight in weights.items()]
+    end = [Copy(result.whole(), companions[name].whole()) for name, result in results.items()]
 
     reversal = _Reversal(program, companions, by_angles)
     forward, backward = reversal.body(program.body, ())
@@ -71,10 +71,6 @@ def adjoint_program(program: Program, wanted: Collection[str], given: Collection
 
 def _adjoints(array: Array, role: str, suffix: str = "") -> Array:
     return Array(f"b_{array.name}{suffix}", role, array.size, array.count)
-
-
-def _all(array: Array) -> Ref:
-    return array.part(0, array.length)
 
 
 def iterations(loops: Loops) -> tuple[Index, int]:
@@ -203,47 +199,32 @@ class _Reversal:
 
     def apply(self, call: Apply, loops: Loops) -> BothWays:
         """Return a step, keeping what its reverse reads, and its reverse."""
-        inputs, outputs = call.inputs(), call.outputs()
-        stored = [ref for ref, adds in zip(call.writes, call.adds, strict=True) if not adds]
-
-        # the step of adjoints, from those of outputs to those of inputs or of their angles
-        angle_inputs = {
-            name: self.by_angles[ref.array.name]
-            for name, ref in inputs.items()
-            if ref.array.name in self.by_angles
-        }
-        given = {name for name, ref in outputs.items() if self.matters(ref)}
-        wanted = {name for name, ref in inputs.items() if self.matters(ref)} | angle_inputs.keys()
-        if not given or not wanted:
+        inputs, stored = call.inputs(), call.stored()
+        angles = angle_inputs(self.by_angles, inputs)
+        outputs = {name: ref for name, ref in call.outputs().items() if self.matters(ref)}
+        wanted = {name for name, ref in inputs.items() if self.matters(ref)} | angles.keys()
+        if not outputs or not wanted:
             return [call], self.cleared(*stored)
-        kinds = frozenset((name, array.kind) for name, array in angle_inputs.items())
-        step = adjoint(call.step, frozenset(wanted), frozenset(given), kinds)
+        step = adjoint(call.step, frozenset(wanted), frozenset(outputs), kinds(angles))
 
-        # what it reads: values as they were before the step, and the adjoints of outputs
-        values = dict(inputs)
+        # it reads the adjoints of outputs, and values as they were before the step
+        values = inputs | {f"b_{name}": self.of(ref) for name, ref in outputs.items()}
         keeps: list[Statement] = []
         for name, _ in step.inputs:
             if name in inputs and inputs[name].array.name in self.overwritten:
                 copy = self.keep(inputs[name], loops)
                 keeps.append(copy)
                 values[name] = copy.target
-        for name in given:
-            values[f"b_{name}"] = self.of(outputs[name])
 
-        # where its results belong: they are added, except to what the step itself overwrites
-        targets_of = {f"b_{name}": ref for name, ref in inputs.items()}
-        for name, array in angle_inputs.items():
-            targets_of[f"b_{name}_angles"] = array.angles(inputs[name])
-        targets = [targets_of[name] for name, _ in step.outputs]
+        # its results are added to the adjoints of inputs, but replace those of what it overwrites
+        sources = {f"b_{name}": ref for name, ref in inputs.items()}
+        for name, array in angles.items():
+            sources[f"b_{name}_angles"] = array.angles(inputs[name])
+        targets = [sources[name] for name, _ in step.outputs]
         _check_overlaps(call, stored, targets)
-        back = Apply(
-            step,
-            tuple(values[name] for name, _ in step.inputs),
-            tuple(self.of(ref) for ref in targets),
-            tuple(ref not in stored for ref in targets),
-        )
-        forgotten = self.cleared(*(ref for ref in stored if ref not in targets))
-        return [*keeps, call], [back, *forgotten]
+        adds = [ref not in stored for ref in targets]
+        back = Apply.named(step, values, map(self.of, targets), adds)
+        return [*keeps, call], [back, *self.cleared(*(ref for ref in stored if ref not in targets))]
 
     def keep(self, ref: Ref, loops: Loops) -> Copy:
         """Return the copy of a value that will be overwritten."""

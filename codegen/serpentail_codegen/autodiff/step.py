@@ -10,10 +10,9 @@ from functools import cache
 
 from ..ir.step import Step, compacted
 from ..ir.tape import LEAVES, Tape, live_nodes, operands, replay
-from .angles import SinesAndCosines
+from .angles import AngleInputs, SinesAndCosines
 
 Vectors = Sequence[tuple[str, int]]  # names and sizes
-AngleInputs = frozenset[tuple[str, SinesAndCosines]]
 Combination = dict[int, int]  # a sum of tangents: the coefficient of each
 
 

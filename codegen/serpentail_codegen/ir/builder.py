@@ -72,15 +72,16 @@ class Builder:
         """
         targets = {name.removesuffix("_"): (ref, name[-1] == "_") for name, ref in writes.items()}
         step = narrowed(step, set(targets))
-        read = tuple(reads[name] for name, _ in step.inputs)
-        written = tuple(targets[name][0] for name, _ in step.outputs)
+        outputs = [targets[name] for name, _ in step.outputs]
+        call = Apply.named(step, reads, [ref for ref, _ in outputs], [adds for _, adds in outputs])
 
-        for (name, size), ref in zip(step.inputs + step.outputs, read + written, strict=True):
+        vectors = (*step.inputs, *step.outputs)
+        for (name, size), ref in zip(vectors, call.reads + call.writes, strict=True):
             if ref.size != size:
                 raise ValueError(
                     f"{step.name} in {self.name}: {name} has {size} scalars, not {ref.size}"
                 )
-        self.emit(Apply(step, read, written, tuple(targets[name][1] for name, _ in step.outputs)))
+        self.emit(call)
 
     def fill(self, target: Ref, *values: Number) -> None:
         """Store constants; one value is repeated."""

@@ -166,14 +166,10 @@ def _with_outputs(statement: Statement, needed: Collection[str]) -> Statement:
     if len(kept) == len(statement.writes):
         return statement
     step = narrowed(statement.step, {statement.step.outputs[k][0] for k in kept})
-    inputs = statement.inputs()
-    return replace(
-        statement,
-        step=step,
-        reads=tuple(inputs[name] for name, _ in step.inputs),
-        writes=tuple(statement.writes[k] for k in kept),
-        adds=tuple(statement.adds[k] for k in kept),
-    )
+    outputs = [statement.writes[k] for k in kept]
+    sums = [statement.adds[k] for k in kept]
+    narrow = Apply.named(step, statement.inputs(), outputs, sums)
+    return replace(narrow, columns=statement.columns)
 
 
 def pruned(program: Program) -> Program:

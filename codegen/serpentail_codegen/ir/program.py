@@ -4,7 +4,7 @@ A ``Program`` is a list of arrays and a tree of statements; everything here is f
 the statements mean is defined by ``interpret.Run``.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import get_args
 
@@ -70,6 +70,10 @@ class Array:
     def __getitem__(self, index: Index | int) -> "Ref":
         return Ref(self, as_index(index) * self.size, self.size)
 
+    def whole(self) -> "Ref":
+        """Return all scalars."""
+        return Ref(self, as_index(0), self.length)
+
     def part(self, offset: Index | int, size: int, stride: int = 1) -> "Ref":
         """Return ``size`` scalars from a scalar offset on."""
         return Ref(self, as_index(offset), size, stride)
@@ -129,6 +133,14 @@ class Apply:
     adds: tuple[bool, ...]
     columns: Index | None = None
 
+    @classmethod
+    def named(
+        cls, step: Step, inputs: Mapping[str, Ref], writes: Iterable[Ref], adds: Iterable[bool] = ()
+    ) -> "Apply":
+        """Return a step applied to inputs by name; it stores, where ``adds`` is not given."""
+        reads, targets = tuple(inputs[name] for name, _ in step.inputs), tuple(writes)
+        return cls(step, reads, targets, tuple(adds) or (False,) * len(targets))
+
     def inputs(self) -> dict[str, Ref]:
         """Return what is read, by the names of the step's inputs."""
         return {name: ref for (name, _), ref in zip(self.step.inputs, self.reads, strict=True)}
@@ -136,6 +148,10 @@ class Apply:
     def outputs(self) -> dict[str, Ref]:
         """Return what is written, by the names of the step's outputs."""
         return {name: ref for (name, _), ref in zip(self.step.outputs, self.writes, strict=True)}
+
+    def stored(self) -> list[Ref]:
+        """Return what is overwritten, not added to."""
+        return [ref for ref, adds in zip(self.writes, self.adds, strict=True) if not adds]
 
 
 @dataclass(frozen=True)
@@ -244,20 +260,8 @@ class Call:
     arguments: tuple[tuple[str, Array], ...]
 
 
-Statement = (
-    Apply
-    | Fill
-    | Unit
-    | Copy
-    | Loop
-    | When
-    | Factor
-    | Solve
-    | FactorPair
-    | SolvePair
-    | Guard
-    | Call
-)
+LinearEquations = Factor | Solve | FactorPair | SolvePair
+Statement = Apply | Fill | Unit | Copy | Loop | When | LinearEquations | Guard | Call
 STATEMENTS: tuple[type, ...] = get_args(Statement)
 
 

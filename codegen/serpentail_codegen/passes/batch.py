@@ -60,13 +60,9 @@ def unrolled_step(program: Program, fixed: dict[str, list] | None = None) -> Pro
         )
     )
 
-    whole = {a.name: a.part(0, a.length) for a in (*inputs, *targets)}
-    call = Apply(
-        step,
-        tuple(whole[name] for name, _ in step.inputs),
-        tuple(whole[a.name] for a in targets),
-        (False,) * len(targets),
+    call = Apply.named(
+        step, {a.name: a.whole() for a in inputs}, [array.whole() for array in targets]
     )
-    protects = tuple(whole[a.name] for a in outputs)
-    tests = tuple(Guard(whole[a.name], status, protects) for status, a in tested.items())
+    protects = tuple(array.whole() for array in outputs)
+    tests = tuple(Guard(array.whole(), status, protects) for status, array in tested.items())
     return Program(program.name, program.doc, (*inputs, *targets), (call, *tests))

@@ -61,7 +61,7 @@ def _solved(solve: Solve | SolvePair) -> Apply:
     rows = _rows(solve.matrix, triangles * size, size)
     step = _solve_step(size, triangles)
     inputs = {f"row_{k}": row for k, row in enumerate(rows)} | {"x": solve.x}
-    return Apply(step, tuple(inputs[name] for name, _ in step.inputs), (solve.x,), (False,))
+    return Apply.named(step, inputs, (solve.x,))
 
 
 def _rows(matrix: Array, count: int, size: int) -> tuple[Ref, ...]:
