@@ -12,6 +12,8 @@ from ..ir.tape import BINARY, LEAVES, Node, operands
 
 REGISTERS = 24  # of 32 vector registers; on 16 it still pays
 MOST_OPERATIONS = 2800  # beyond, spilled values cost more than latency
+# operations for each cycle of the longest path: beyond, there is enough to do in any order
+MOST_ABREAST = 7
 LATENCY = {"div": 13, "sqrt": 15, "sin": 30, "cos": 30, "neg": 1}  # cycles; 4 for all others
 
 
@@ -20,8 +22,10 @@ def scheduled(nodes: Sequence[Node], live: list[int], results: Iterable[int]) ->
     operations = [n for n in live if nodes[n][0] not in LEAVES]
     if sum(nodes[n][0] in BINARY for n in operations) > MOST_OPERATIONS:
         return live
-    leaves = [n for n in live if nodes[n][0] in LEAVES]
-    return leaves + _ListScheduler(nodes, operations, set(results)).order()
+    scheduler = _ListScheduler(nodes, operations, set(results))
+    if len(operations) > MOST_ABREAST * max(scheduler.height.values(), default=0):
+        return live
+    return [n for n in live if nodes[n][0] in LEAVES] + scheduler.order()
 
 
 class _ListScheduler:
