@@ -44,6 +44,39 @@ def test_random_lines_keep_their_dependencies(seed):
     assert_valid(nodes, live, schedule.scheduled(nodes, live, results))
 
 
+def scheduled_by_the_rule(nodes, live, results):
+    """The rule as it is stated: at every step, look at all that is ready; the reference for the heaps."""
+    operations = [n for n in live if nodes[n][0] not in schedule.LEAVES]
+    needs = {n: {a for a in nodes[n][1:] if a in operations} for n in operations}
+    users = {n: {u for u in operations if n in needs[u]} for n in operations}
+    height = {}
+    for n in reversed(operations):
+        beyond = max((height[u] for u in users[n]), default=0)
+        height[n] = beyond + schedule.LATENCY.get(nodes[n][0], 4)
+
+    order, alive = [], 0
+    while len(order) < len(operations):
+        ready = [n for n in operations if n not in order and needs[n] <= set(order)]
+        frees = {n: sum(a not in results and users[a] - set(order) == {n} for a in needs[n]) for n in ready}
+        if alive >= schedule.REGISTERS:
+            best = max(ready, key=lambda n: (frees[n], height[n], -n))
+        else:
+            best = max(ready, key=lambda n: (height[n], frees[n], -n))
+        order.append(best)
+        alive += 1 - frees[best]
+    return [n for n in live if nodes[n][0] in schedule.LEAVES] + order
+
+
+@pytest.mark.parametrize("registers", [3, 8, 24])
+@pytest.mark.parametrize("seed", range(10))
+def test_the_order_is_that_of_the_rule(seed, registers, monkeypatch):
+    monkeypatch.setattr(schedule, "REGISTERS", registers)
+    nodes, results = random_line(seed, length=120)
+    results = [*results, *random.Random(seed).sample(range(3, len(nodes)), 20)]
+    live = live_nodes(nodes, results)
+    assert schedule.scheduled(nodes, live, results) == scheduled_by_the_rule(nodes, live, results)
+
+
 @pytest.mark.parametrize("size", [(1, 1), (1, 3), (3, 2)])
 def test_functions_keep_their_dependencies_and_change_their_order(size):
     nodes, results = straight(*size)
