@@ -2,8 +2,7 @@
 
 from dataclasses import dataclass
 
-from ...functions.function import Function, struct_parameters
-from ...functions.function import assemble
+from ...functions.function import Function, assemble, struct_parameters
 from ...functions.tail import Tail
 from ...ir.interpret import applied, branches
 from ...ir.program import Program
