@@ -88,7 +88,8 @@ class PythonPrinter:
         return [f"{slice_text(fill.target)} = [{values}]"]
 
     def _copy(self, copy: Copy) -> list[str]:
-        return [f"{slice_text(copy.target)} = {slice_text(copy.source)}"]
+        target, source = slice_text(copy.target), slice_text(copy.source)
+        return [f"{target} = added({target}, {source})" if copy.adds else f"{target} = {source}"]
 
     def _guard(self, guard: Guard) -> list[str]:
         return [
