@@ -19,13 +19,22 @@ def index_text(index: Index) -> str:
     return " + ".join([*terms, *([str(index.offset)] if index.offset or not terms else [])])
 
 
+def literal(value, real: str) -> str:
+    """Print a number by its shortest exact decimal; what a single-precision real cannot hold is
+    zero.
+    """
+    single = real == "float"
+    tiny = single and abs(value) < LEAST_SINGLE
+    return repr(0.0 if tiny else float(value)) + ("f" if single else "")
+
+
 @dataclass(frozen=True)
 class Dialect:
-    """How a language defines a name, ends a real constant and calls functions."""
+    """How a language defines a name, prints a number and calls functions."""
 
     definition: str
-    suffix: str
     functions: dict[str, str]
+    real: str = "double"
     select: str = "{c} > {zero} ? {a} : {b}"
     sincos: str = ""  # defines sine and cosine of one argument at once; empty: by two functions
     sincos_row: str = ""  # the same of a row
@@ -33,11 +42,8 @@ class Dialect:
     load: str = ""  # the lanes at an address that are in turn
 
     def literal(self, value) -> str:
-        """Print a number by its shortest exact decimal; what a single-precision real cannot hold is
-        zero.
-        """
-        tiny = self.suffix and abs(value) < LEAST_SINGLE
-        return repr(0.0 if tiny else float(value)) + self.suffix
+        """Print a number of the language's real type."""
+        return literal(value, self.real)
 
 
 EARLY, LATE = "early", "late"  # narrow nodes; LATE ones need a lane of some row

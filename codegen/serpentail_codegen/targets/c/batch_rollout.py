@@ -13,7 +13,7 @@ from ..templating import render
 from .batch import STATES, straight
 from .form import Emitted, baked_values
 from .loops import in_loops
-from .routine import CFunction, dialect
+from .routine import CFunction
 from .simulation import fields, typed
 from .views import callee_view, step_views
 
@@ -115,7 +115,6 @@ def _own(scene: Scene, found: Flights) -> dict:
         "parameter_count": found.parameters,
         "state": found.state,
         "inner": found.inner,
-        "sixth": dialect(scene.real).literal(1 / 6),
         "steps": step_views([found], scene.real, scene.name),
         "helpers": sorted(found.body.helpers | {"lanes", "everywhere"}),
     }

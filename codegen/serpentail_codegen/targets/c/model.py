@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-import math
 
 from ...functions.function import struct_parameters
 from ...functions.tail import Tail
@@ -48,16 +47,11 @@ def abi_hash(scene: Scene, tail: Tail, views: list[FunctionView]) -> str:
 def c_context(scene: Scene, tail: Tail, emitted: list[Emitted], version: str) -> dict:
     """Return everything that the C templates lay out."""
     views = [FunctionView(e, tail, scene.name) for e in emitted]
-    literal = dialect(scene.real).literal
-    numbers = {"zero": 0, "one": 1, "two": 2, "half": 0.5, "third": 1 / 3}
-    numbers |= {"stiffness": 400, "damping": 40}  # of the example's tail
-    numbers |= {"word": 2.0**-32, "quarter": math.pi / 2 * 2.0**-30}
     works = {f.name: f.work for f in views}
     rollout = {}
     if "rollout" in scene.functions:
         rollout = simulation_context(scene, tail, offered(tail, views), works)
     return joined(
-        {name: literal(value) for name, value in numbers.items()},
         {
             "title": (
                 f"{scene.kind} tail, {tail.segments} segments x {tail.links} {PIECES[scene.kind]}"
@@ -70,7 +64,7 @@ def c_context(scene: Scene, tail: Tail, emitted: list[Emitted], version: str) ->
             "real": scene.real,
             "reproducible": scene.profile == "reproducible",
             "least": "FLT_MIN" if scene.real == "float" else "DBL_MIN",
-            "most": "FLT_MAX" if scene.real == "float" else "DBL_MAX",
+            "largest": "FLT_MAX" if scene.real == "float" else "DBL_MAX",
             "sqrt": dialect(scene.real).functions["sqrt"],
             "version": version,
             "coordinates": COORDINATES[scene.coordinates],

@@ -62,8 +62,8 @@ def dialect(real: str, prefix: str = "") -> Dialect:
     row, load = "const lanes {name} = {text};", "LOAD({address} + c)"
     return Dialect(
         "const real {name} = {text};",
-        suffix,
         functions,
+        real,
         sincos=sincos,
         sincos_row=sincos_row,
         row=row,

@@ -3,14 +3,12 @@ out.
 """
 
 import re
-from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import accumulate
 
 from ...functions.tail import Tail
 from ...scene.scene import Scene
-from .routine import dialect
-from .tableaux import RK4, ROS34PW2, TSIT5, Explicit, Rosenbrock, transformed
+from .tableaux import RK4, ROS34PW2, TSIT5, transformed
 
 NAMES = r"\b(real|piecewise|controller|drive|parameters|torque)\b"
 SLOTS = 11  # states in the workspace: see simulation/workspace.c.jinja
@@ -29,17 +27,6 @@ MACROS = (
     "TAU",
 )
 MACROS += ("TABLE", "FORCES", "PRESSURES", "REACHED", "POINTS", "GROUPS", "FACTORS", "INNER")
-NUMBERS = {
-    "three": 3,
-    "four": 4,
-    "five": 5,
-    "hundred": 100,
-    "fifth": 0.2,
-    "nearly": 0.99,
-    "hundredth": 0.01,
-}
-NUMBERS |= {"milli": 1e-3, "millionth": 1e-6, "small": 1e-10, "tiny_error": 1e-6}
-NUMBERS |= {"safety": 0.9, "share": 0.85, "memory": 0.2}  # of the PI controller
 # The methods' numbers in C, in order; those with True need `implicit`.
 METHODS = {"rk4": False, "tsit5": False, "ros34pw2": True, "implicit_euler": True}
 
@@ -225,16 +212,13 @@ def simulation_context(scene: Scene, tail: Tail, has: Has, works: dict[str, int]
     """Return what the simulation's templates lay out; ``works`` is the workspace of every
     function.
     """
-    literal = dialect(scene.real).literal
     size, table = tail.nq + tail.nv + 2 * has.contacts, max(4 * tail.nt, 2 * tail.nv)
     own = SLOTS * size + tail.nt + table + 5 * has.contacts
     return {
-        **{name: literal(value) for name, value in NUMBERS.items()},
         **{name: name + ("f" if scene.real == "float" else "") for name in ("pow", "fabs", "ceil")},
         "eps": "FLT_EPSILON" if scene.real == "float" else "DBL_EPSILON",
-        "largest": "FLT_MAX" if scene.real == "float" else "DBL_MAX",
         "has": has,
-        "ground_damping": ground_damping(scene) if has.contacts else "",
+        "ground_damping": scene.parameters.get("D_n"),  # Eq. 36, where it is folded in
         "group_starts": [0, *accumulate(count for _, count in has.groups)],
         "bristles": 2 * has.contacts,
         "bisections": 40,
@@ -245,21 +229,10 @@ def simulation_context(scene: Scene, tail: Tail, has: Has, works: dict[str, int]
         "rollout_work": own + has.factors + max(works.values()),
         "descriptions": DESCRIPTIONS,
         "records": record_views(scene, has),
-        "tsit5": explicit(TSIT5, scene.real),
-        "rk4": explicit(RK4, scene.real),
-        "ros34pw2": rosenbrock(transformed(ROS34PW2), scene.real),
+        "tsit5": TSIT5,
+        "rk4": RK4,
+        "ros34pw2": transformed(ROS34PW2),
     }
-
-
-def ground_damping(scene: Scene) -> str:
-    """Return D_n of Eq. 36 as C text: a member of the parameters, or a number where these are
-    folded in.
-    """
-    return (
-        dialect(scene.real).literal(scene.parameters["D_n"])
-        if scene.baked
-        else "run->parameters->D_n"
-    )
 
 
 def record_views(scene: Scene, has: Has) -> dict[str, list[dict]]:
@@ -277,35 +250,3 @@ def typed(text: str, prefix: str) -> str:
     """Return a C type with the model's prefix, ready for a name to follow."""
     full = re.sub(NAMES, lambda found: f"{prefix}_{found.group()}", text)
     return full if full.endswith("*") else full + " "
-
-
-def explicit(method: Explicit, real: str) -> dict:
-    """Return a Runge-Kutta method's coefficients as C text, rows without their zeros above the
-    diagonal.
-    """
-    return {
-        "nodes": literals(method.nodes, real),
-        "rows": [literals(row, real) for row in method.rows[1:]],
-        "weights": literals(method.weights, real),
-        "error": literals(method.error, real),
-        "dense": [literals(row, real) for row in method.dense],
-        "stages": len(method.nodes),
-    }
-
-
-def rosenbrock(method: Rosenbrock, real: str) -> dict:
-    """Return a Rosenbrock method's coefficients as C text."""
-    return {
-        "gamma": dialect(real).literal(method.gamma),
-        "nodes": literals(method.nodes, real),
-        "rows": [literals(row, real) for row in method.rows[1:]],
-        "couplings": [literals(row, real) for row in method.couplings[1:]],
-        "weights": literals(method.weights, real),
-        "error": literals(method.error, real),
-        "stages": len(method.nodes),
-    }
-
-
-def literals(numbers: Iterable[float], real: str) -> str:
-    """Print numbers, separated by commas."""
-    return ", ".join(map(dialect(real).literal, numbers))

@@ -9,7 +9,7 @@ from ...ir.program import Program
 from ...ir.tape import operation_count
 from ...scene.scene import Scene
 from .form import Emitted, values
-from .routine import CFunction, Routine, dialect, routine_arguments, routine_lines
+from .routine import CFunction, Routine, routine_arguments, routine_lines
 
 # operations: a step that is written out wherever it is called; larger ones as the compiler sees fit
 LARGE = 100
@@ -57,7 +57,6 @@ def wrapped(head: str, arguments: list[str]) -> str:
 
 def parameter_views(scene: Scene) -> list[dict]:
     """Return the fields of the parameter struct."""
-    literal = dialect(scene.real).literal
     fields = struct_parameters(scene)
     return [
         {
@@ -65,7 +64,7 @@ def parameter_views(scene: Scene) -> list[dict]:
             "size": p.size,
             "unit": p.unit,
             "meaning": p.meaning,
-            "literals": list(map(literal, values(scene, p.name))),
+            "defaults": values(scene, p.name),
         }
         for p in fields
     ]

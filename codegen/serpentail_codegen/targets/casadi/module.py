@@ -15,9 +15,8 @@ from ..templating import render
 
 PYTHON = Dialect(
     "{name} = {text}",
-    "",
     {"sin": "sin", "cos": "cos", "sqrt": "sqrt"},
-    "if_else({c} > {zero}, {a}, {b})",
+    select="if_else({c} > {zero}, {a}, {b})",
 )
 
 
