@@ -1,17 +1,29 @@
-"""The CasADi target: a scene's programs go in, a Python module that builds ``casadi.Function``s
-comes out.
-"""
+"""Prints programs as Python: plain loops over lists, whose scalars CasADi's symbols may be."""
 
 import re
+from functools import singledispatchmethod
 
-from ...functions.function import assemble, struct_parameters
-from ...functions.tail import Tail
 from ...ir.dataflow import inlined
-from ...ir.program import Apply, Copy, Factor, Fill, Guard, Loop, Program, Ref, Solve, padded
+from ...ir.program import (
+    Apply,
+    Call,
+    Copy,
+    Factor,
+    FactorPair,
+    Fill,
+    Guard,
+    Loop,
+    Program,
+    Ref,
+    Solve,
+    SolvePair,
+    Unit,
+    When,
+    padded,
+)
 from ...ir.step import Step
-from ...scene.scene import Scene
 from ..expressions import Dialect, Scalars, index_text
-from ..templating import render
+from ..target import UnprintableStatement, body_lines, refused, unknown_statement
 
 PYTHON = Dialect(
     "{name} = {text}",
@@ -22,6 +34,8 @@ PYTHON = Dialect(
 
 def slice_text(ref: Ref) -> str:
     """Print the slice of a list that a reference means."""
+    if ref.array.lanes:
+        raise UnprintableStatement(f"{ref.array.name} has lanes: the module's lists hold numbers")
     name = f'parameters["{ref.array.name}"]' if ref.array.role == "parameters" else ref.array.name
     if ref.size == ref.array.length:
         return f"{name}[:]"
@@ -56,8 +70,10 @@ class PythonPrinter:
 
     def lines(self) -> list[str]:
         """Return the body of the function."""
-        body = self._body(self.program.body)
+        body = body_lines(self, self.program.body)
         used = set(re.findall(r"\w+", " ".join(body)))
+
+        # outputs and what the body uses are lists; constants come with their numbers
         arrays = [
             a
             for a in self.program.arrays
@@ -66,91 +82,71 @@ class PythonPrinter:
         lines = [f"{a.name} = [0.0] * {a.length}" for a in arrays]
         constants = [a for a in self.program.of_role("constant") if a.name in used]
         lines += [f"{a.name} = [{', '.join(map(PYTHON.literal, a.values))}]" for a in constants]
+
         outputs = ", ".join(f'"{a.name}": {a.name}' for a in self.program.of_role("output"))
         return [*lines, *body, f"return {{{outputs}}}"]
 
-    def _body(self, body) -> list[str]:
-        return [line for s in body for line in getattr(self, f"_{type(s).__name__.lower()}")(s)]
+    statement = singledispatchmethod(unknown_statement)
 
+    @statement.register
     def _loop(self, loop: Loop) -> list[str]:
         span = f"range({index_text(loop.start)}, {index_text(loop.stop)})"
         head = f"for {loop.var} in {f'reversed({span})' if loop.downward else span}:"
-        return [head, *("    " + line for line in self._body(loop.body))]
+        return [head, *("    " + line for line in body_lines(self, loop.body))]
 
+    @statement.register
     def _fill(self, fill: Fill) -> list[str]:
-        values = ", ".join(map(PYTHON.literal, fill.values))
+        target = slice_text(fill.target)
         if len(set(fill.values)) == 1:
-            return [
-                f"{slice_text(fill.target)} = [{PYTHON.literal(fill.values[0])}] * "
-                f"{fill.target.size}"
-            ]
-        return [f"{slice_text(fill.target)} = [{values}]"]
+            return [f"{target} = [{PYTHON.literal(fill.values[0])}] * {fill.target.size}"]
+        return [f"{target} = [{', '.join(map(PYTHON.literal, fill.values))}]"]
 
+    @statement.register
     def _copy(self, copy: Copy) -> list[str]:
         target, source = slice_text(copy.target), slice_text(copy.source)
         return [f"{target} = added({target}, {source})" if copy.adds else f"{target} = {source}"]
 
+    @statement.register
     def _guard(self, guard: Guard) -> list[str]:
+        if guard.scalar.size != 1:
+            raise refused(self, guard, "`where` of the module takes a single scalar")
         return [
             f"{slice_text(ref)} = where({slice_text(guard.scalar)}, {slice_text(ref)})"
             for ref in guard.protects
         ]
 
+    @statement.register
     def _factor(self, factor: Factor) -> list[str]:
-        return [
-            f"{factor.matrix.name} = ldl_factor({factor.matrix.name}, {factor.size}, "
-            f"{padded(factor.size)})"
-        ]
+        matrix, distance = factor.matrix.name, padded(factor.size)
+        return [f"{matrix} = ldl_factor({matrix}, {factor.size}, {distance})"]
 
+    @statement.register
     def _solve(self, solve: Solve) -> list[str]:
-        return [
-            f"{slice_text(solve.x)} = ldl_solve({solve.matrix.name}, {slice_text(solve.x)}, "
-            f"{padded(solve.x.size)})"
-        ]
+        x, distance = slice_text(solve.x), padded(solve.x.size)
+        return [f"{x} = ldl_solve({solve.matrix.name}, {x}, {distance})"]
 
-    def _apply(self, call: Apply) -> list[str]:
-        self.steps.setdefault(call.step.name, call.step)
-        call_text = f"{call.step.name}({', '.join(map(slice_text, call.reads))})"
-        targets = [
-            f"new_{k}" if adds else slice_text(w)
-            for k, (w, adds) in enumerate(zip(call.writes, call.adds, strict=True))
-        ]
-        sums = [
-            f"{slice_text(w)} = added({slice_text(w)}, new_{k})"
-            for k, (w, adds) in enumerate(zip(call.writes, call.adds, strict=True))
-            if adds
-        ]
-        return [f"({', '.join(targets)},) = {call_text}", *sums]
+    @statement.register
+    def _apply(self, apply: Apply) -> list[str]:
+        if self.steps.setdefault(apply.step.name, apply.step) != apply.step:
+            raise ValueError(f"two steps are called {apply.step.name}")
+        call = f"{apply.step.name}({', '.join(map(slice_text, apply.reads))})"
 
+        # an output that is added gets a name first
+        targets, sums = [], []
+        for k, (ref, adds) in enumerate(zip(apply.writes, apply.adds, strict=True)):
+            target = slice_text(ref)
+            targets.append(f"new_{k}" if adds else target)
+            sums += [f"{target} = added({target}, new_{k})"] if adds else []
+        return [f"({', '.join(targets)},) = {call}", *sums]
 
-def casadi_module(scene: Scene, tail: Tail, functions, version: str, content_hash: str) -> str:
-    """Render the module."""
-    views, steps = [], {}
-    for function in functions:
-        printer = PythonPrinter(assemble(function, tail))
-        shapes = {a.name: list(a.shape(tail)) for a in (*function.inputs, *function.outputs)}
-        views.append(
-            {
-                "name": function.name,
-                "doc": function.doc,
-                "inputs": [a.name for a in function.inputs],
-                "outputs": [a.name for a in function.outputs],
-                "shapes": shapes,
-                "lines": printer.lines(),
-            }
-        )
-        steps |= printer.steps
-    sizes = {p.name: p.size for p in struct_parameters(scene)}
-    data = {
-        "scene": scene,
-        "version": version,
-        "content_hash": content_hash,
-        "functions": views,
-        "sizes": sizes,
-    }
-    selects = any(op == "select" for s in steps.values() for op, *_ in s.nodes)
-    return render(
-        "casadi",
-        "module.py.jinja",
-        data | {"steps": [step_view(s) for s in steps.values()], "selects": selects},
-    )
+    @statement.register
+    def _when(self, statement: When) -> list[str]:
+        raise refused(self, statement, "a symbolic graph has no branches")
+
+    @statement.register
+    def _compiled_only(self, statement: Unit | FactorPair | SolvePair) -> list[str]:
+        raise refused(self, statement, "only functions that CasADi gets as compiled C have it")
+
+    @statement.register
+    def _call(self, statement: Call) -> list[str]:
+        raise refused(self, statement, "programs are inlined before they are printed")
