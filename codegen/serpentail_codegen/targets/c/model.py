@@ -10,7 +10,7 @@ from ...ir.program import VECTOR
 from ...scene.scene import Scene
 from ..target import SEAL
 from ..templating import render
-from .casadi_external import casadi_context
+from .casadi_external.functions import casadi_context
 from .form import PrintedFunction
 from .records import layouts
 from .routine import dialect
