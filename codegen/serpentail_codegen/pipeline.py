@@ -17,9 +17,7 @@ TARGETS = {target.name: target for target in (C, CASADI)}
 
 
 def generate(scene: Scene, output: Path) -> list[str]:
-    """Derive, lower, emit and write what the scene asks for into ``output/<scene>``; return the
-    changed files.
-    """
+    """Derive, emit and write what a scene asks for to ``output/<scene>``; return what changed."""
     tail = tail_of(scene)
     functions = [CATALOGUE[name].of(tail) for name in needed(scene.functions, bool(scene.contacts))]
     emissions = [TARGETS[name].emit(scene, tail, functions, __version__) for name in scene.targets]
@@ -52,9 +50,7 @@ def tail_of(scene: Scene) -> Tail:
 
 
 def needed(names: Collection[str], contacts: bool = False) -> list[str]:
-    """Return the functions to derive: those asked for, those that a rollout calls, the parts of an
-    implicit solve.
-    """
+    """Return the functions to derive: those asked for, and what rollouts and solves call."""
     flight = ("forward_dynamics", "tracked_dynamics") if "pfl" in names else ("forward_dynamics",)
     called = ("contact_points", "contact_dynamics") if contacts else flight
     parts = {"rollout": called, "implicit": ("implicit_factor", "implicit_solve")}

@@ -18,9 +18,7 @@ def index_text(index: Index) -> str:
 
 
 def literal(value, real: str) -> str:
-    """Print a number by its shortest exact decimal; what a single-precision real cannot hold is
-    zero.
-    """
+    """Print a number by its shortest exact decimal; 0 where a single-precision real has none."""
     single = real == "float"
     tiny = single and abs(value) < LEAST_SINGLE
     return repr(0.0 if tiny else float(value)) + ("f" if single else "")
@@ -49,11 +47,11 @@ Part = str | int  # one of these, or the lanes of a part of wide scalars
 
 
 class Scalars:
-    """Prints the nodes that the results need; a product or sign that is used once goes into its
-    use.
+    """Prints the nodes that the results need, part by part.
 
-    ``wide`` are the lanes of the wide inputs, by number.  Nodes are printed part by part: narrow
-    ones first, then those of so many lanes, then narrow ones that need a lane.
+    ``wide`` are the lanes of the wide inputs, by number.  Narrow nodes come first, then those of
+    so many lanes, then narrow ones that need a lane.  A product or sign that is used once goes
+    into its use.
     """
 
     def __init__(self, nodes, results, names, dialect: Dialect, wide: dict[int, int] | None = None):
@@ -87,9 +85,7 @@ class Scalars:
         return part, lanes
 
     def lines(self, part: Part = EARLY) -> list[str]:
-        """Return the definitions of a part in evaluation order; ``text`` then tells how to write
-        any node.
-        """
+        """Return the definitions of a part in order; ``text`` then tells how to write its nodes."""
         out = []
         for node in scheduled(
             self.nodes, [n for n in self.live if self.part[n] == part], self.results

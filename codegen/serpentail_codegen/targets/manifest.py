@@ -46,9 +46,7 @@ def manifest(
 
 
 def parameter_entry(scene: Scene, parameter: Parameter) -> dict[str, Any]:
-    """Return what a caller must know of a parameter; its default is the scene's value, null where
-    it is computed.
-    """
+    """Return what a caller must know of a parameter; the default is null where it is computed."""
     value = scene.parameters.get(parameter.name)
     return {
         "name": parameter.name,

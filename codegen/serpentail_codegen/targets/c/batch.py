@@ -56,22 +56,21 @@ def _batch(scene: Scene, tail: Tail, function: Function) -> Batch:
 
 
 def straight(scene: Scene, program: Program) -> bool:
-    """Return whether a batch has no loops; there are no sweeps in lanes here that would overtake
-    straight lines.
-    """
+    """Tell if a batch has no loops: it has no sweeps in lanes that would be faster than these."""
     if scene.emission == "auto":
         return applied(program) <= STRAIGHT_UP_TO and not branches(program)
     return scene.emission == "straight"
 
 
 class BatchView:
-    """A batch as the template sees it: its arguments, the function of their lanes, their
-    workspace.
-    """
+    """A batch as the template sees it: arguments, the function of their lanes, workspace."""
 
     def __init__(self, batch: Batch, tail: Tail, prefix: str):
         function = batch.function
-        self.name, self.rows = function.name, callee_view(batch.program, batch.body, prefix)
+        self.name, self.lanes_function = (
+            function.name,
+            callee_view(batch.program, batch.body, prefix),
+        )
         self.inputs = [ArgumentView(a, tail) for a in function.inputs]
         self.outputs = [ArgumentView(a, tail) for a in function.outputs]
         self.names = ", ".join(a.name for a in self.inputs + self.outputs)
@@ -96,7 +95,5 @@ def batch_file(
 
 
 def batch_entry(scene: Scene, batches: Sequence[Batch]) -> dict[str, Any]:
-    """Return what a loader must know of the batches: how many states side by side, and each one's
-    workspace.
-    """
+    """Return what a loader must know of batches: their states side by side, their workspace."""
     return {"states": STATES[scene.real], "work": {b.function.name: b.work for b in batches}}

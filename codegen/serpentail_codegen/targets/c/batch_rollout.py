@@ -115,7 +115,7 @@ def rollout_context(scene: Scene, rollout: BatchRollout) -> dict[str, Any]:
     return {
         "states": rollout.states,
         "widest": rollout.states,
-        "rows": callee_view(rollout.program, rollout.body, scene.name),
+        "lanes_function": callee_view(rollout.program, rollout.body, scene.name),
         "arguments": ", ".join(arguments),
         "record": record,
         "parameter_count": rollout.parameters,
@@ -127,9 +127,7 @@ def rollout_context(scene: Scene, rollout: BatchRollout) -> dict[str, Any]:
 
 
 def batch_rollout_entry(rollout: BatchRollout | None) -> dict[str, Any]:
-    """Return what a loader must know of a batch rollout: how many states side by side, their
-    workspace, the members of the record.
-    """
+    """Return what a loader must know of a batch rollout: states, workspace, record."""
     if rollout is None:
         return {}
     members = [[f.name, f.kind] for f in RECORD]

@@ -124,9 +124,9 @@ class LoopPrinter:
 
     @statement.register
     def _unit(self, unit: Unit) -> list[str]:
-        target, row = self._ref(unit.target), unit.target.array.row
-        zeros = f"{self._helper('clear_rows')}({target.size * row}, {pointer(target)});"
-        ones = [target.offset * row + k * row + unit.first + k for k in range(target.size)]
+        target, pitch = self._ref(unit.target), unit.target.array.row
+        zeros = f"{self._helper('clear_rows')}({target.size * pitch}, {pointer(target)});"
+        ones = [target.offset * pitch + k * pitch + unit.first + k for k in range(target.size)]
         return [
             zeros,
             *(f"{target.array.name}[{index_text(at)}] = {self.dialect.literal(1)};" for at in ones),

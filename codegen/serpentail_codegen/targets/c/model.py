@@ -27,9 +27,7 @@ PIECES = {"articulated": "links", "continuum": "samples"}
 
 
 def abi_hash(scene: Scene, views: list[FunctionView], simulation: SimulationFeatures | None) -> str:
-    """Digest of what a caller relies on: symbols, argument sizes, workspace, the parameter
-    struct.
-    """
+    """Digest of what a caller relies on: symbols, sizes, workspace, the parameter struct."""
     fields = [[p.name, p.size] for p in struct_parameters(scene)]
     interface: list[Any] = [scene.name, scene.real, fields]
     interface += [

@@ -58,9 +58,7 @@ DESCRIPTIONS = {
 
 
 def layouts(has: SimulationFeatures) -> dict[str, list[list[str]]]:
-    """Return the members of every record, name and kind, as a caller in another language needs
-    them.
-    """
+    """Return the members of every record, name and kind, for a caller in another language."""
     return {record: [[f.name, f.kind] for f in members] for record, members in records(has).items()}
 
 

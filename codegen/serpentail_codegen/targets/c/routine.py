@@ -32,19 +32,14 @@ class Routine:
 
 @dataclass(frozen=True)
 class CFunction:
-    """One C function body: its lines, the scalars of workspace, the routines and helpers it calls,
-    what it costs.
-
-    ``operations`` are executed, each lane counted; ``callees`` are the programs that it calls, with
-    their C functions.
-    """
+    """One C function body, the routines, helpers and programs that it calls, what it costs."""
 
     lines: tuple[str, ...]
-    work: int
+    work: int  # scalars of workspace
     routines: tuple[Routine, ...]
     helpers: frozenset[str]
-    operations: int
-    callees: "tuple[tuple[Program, CFunction], ...]" = ()
+    operations: int  # executed, each lane counted
+    callees: "tuple[tuple[Program, CFunction], ...]" = ()  # programs that it calls, with their C
 
 
 def dialect(real: str, prefix: str = "") -> Dialect:
@@ -106,9 +101,7 @@ def routine_arguments(routine: Routine) -> str:
 
 
 def routine_lines(routine: Routine, real: str, prefix: str) -> list[str]:
-    """Print the body of a step: inputs by their names, outputs as ``<name>_out``; what is wide in a
-    loop over lanes.
-    """
+    """Print the body of a step: inputs by their names, outputs as ``<name>_out``."""
     names, lanes = input_names(routine)
     step = routine.step
     scalars = Scalars(step.nodes, step.results, names, dialect(real, prefix), lanes)

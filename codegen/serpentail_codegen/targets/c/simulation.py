@@ -20,9 +20,7 @@ MACROS = (
 def simulation_context(
     scene: Scene, tail: Tail, has: SimulationFeatures, works: dict[str, int]
 ) -> dict[str, Any]:
-    """Return what the simulation's templates lay out; ``works`` is the workspace of every
-    function.
-    """
+    """Return what a simulation's templates lay out; ``works``: workspace of each function."""
     single = scene.real == "float"
     size, table = tail.nq + tail.nv + 2 * has.contacts, max(4 * tail.nt, 2 * tail.nv)
     states = SLOTS * size + tail.nt + table + 5 * has.contacts

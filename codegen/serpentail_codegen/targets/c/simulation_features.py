@@ -11,14 +11,12 @@ METHODS = {"rk4": False, "tsit5": False, "ros34pw2": True, "implicit_euler": Tru
 
 @dataclass(frozen=True)
 class SimulationFeatures:
-    """What a scene's simulation can do: feedback linearisation, W-methods, groups of contact
-    points, legs.
-    """
+    """What a scene's simulation can do."""
 
-    pfl: bool
+    pfl: bool  # partial feedback linearisation
     factors: int  # reals of implicit_factor's, 0 without
-    contacts: int
-    groups: tuple[tuple[str, int], ...]
+    contacts: int  # points that can touch the ground
+    groups: tuple[tuple[str, int], ...]  # of these points: name and count
     legs: bool
 
     @property

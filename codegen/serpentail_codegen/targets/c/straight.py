@@ -43,9 +43,7 @@ def scalar_names(arrays: Iterable[Array]) -> list[str]:
 
 
 def wide_lines(scalars: Scalars) -> tuple[list[str], int]:
-    """Print the wide scalars, those of equal lanes in one loop; where a lane of one is needed, it
-    goes to the workspace, whose size is returned.
-    """
+    """Print wide scalars, those of equal lanes in one loop; return the workspace they take, too."""
     lines: list[str] = []
     work = 0
     needed = sorted({scalars.nodes[n][1] for n in scalars.live if scalars.nodes[n][0] == "lane"})

@@ -1,6 +1,4 @@
-"""Which C functions the derivatives of inverse and forward dynamics are made of, and where these
-derivatives are zero.
-"""
+"""What derivatives of the dynamics are made of in C, and where they are zero."""
 
 from collections.abc import Collection
 from dataclasses import dataclass
@@ -17,9 +15,7 @@ def moves(name: str, k: int) -> bool:
 
 @dataclass(frozen=True)
 class DynamicsDerivatives:
-    """Inverse or forward dynamics: what it takes last and gives, and which C functions its
-    derivatives are made of.
-    """
+    """Inverse or forward dynamics, and the C functions that its derivatives are made of."""
 
     name: str
     last: str
@@ -55,9 +51,7 @@ class DynamicsDerivatives:
         return moves(on, column)
 
     def curved(self, a: str, b: str, row: int, column: int) -> bool:
-        """Tell if the derivative of the weighted outputs by number ``row`` of a depends on number
-        ``column`` of b.
-        """
+        """Tell if the weighted outputs have a second derivative by a[row] and b[column]."""
         if b == f"adj_{self.gives}":
             return self.depends(a, column, row)
         return moves(a, row) and moves(b, column)

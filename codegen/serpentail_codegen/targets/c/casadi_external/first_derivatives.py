@@ -27,9 +27,7 @@ def by_parameters(e: External, f: DynamicsDerivatives) -> dict[str, str]:
 
 
 def ports_in(f: DynamicsDerivatives, sizes: dict[str, int], known: bool, order: int) -> list[Port]:
-    """Return the inputs of f's Jacobian (order 1), of its adjoint (2), and of the adjoint's
-    Jacobian (3).
-    """
+    """Return the inputs of the Jacobian (order 1), the adjoint (2), and its Jacobian (3)."""
     names = (*f.inputs, "parameters")
     ports = [
         Port(

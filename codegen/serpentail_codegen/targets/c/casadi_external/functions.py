@@ -13,9 +13,7 @@ from .second_derivatives import hessian
 
 
 def externals(scene: Scene, tail: Tail, works: dict[str, int]) -> list[External]:
-    """Return every function that CasADi can call, derivatives after the function that they belong
-    to.
-    """
+    """Return every function that CasADi can call, derivatives after what they are of."""
     sizes = {"q": tail.nq, "v": tail.nv, "v_dot": tail.nv, "force": tail.nv, "tau": tail.nt}
     sizes["parameters"] = sum(p.size for p in struct_parameters(scene))
 
@@ -36,9 +34,7 @@ def externals(scene: Scene, tail: Tail, works: dict[str, int]) -> list[External]
 
 
 def callable_for(scene: Scene, name: str, works: dict[str, int]) -> dict[str, int]:
-    """Return the functions that one for CasADi may be made of: where the parameters are folded in,
-    there are no derivatives with respect to them.
-    """
+    """Return what a function may be made of: no derivatives by parameters that are folded in."""
     suffix = "_parameter_derivatives"
     return {
         other: work

@@ -21,8 +21,9 @@ def zero(row: int, column: int) -> bool:
 
 
 def pattern(rows: int, columns: int, nonzero: Nonzero = dense) -> tuple[int, ...]:
-    """Return a sparsity pattern as CasADi reads it: the size, then 1 if dense, else column starts
-    and rows.
+    """Return a sparsity pattern as CasADi reads it.
+
+    The size, then 1 if it is dense, else where the columns start, and the rows of nonzeros.
     """
     by_column = [[r for r in range(rows) if nonzero(r, c)] for c in range(columns)]
     if sum(map(len, by_column)) == rows * columns:
@@ -33,9 +34,7 @@ def pattern(rows: int, columns: int, nonzero: Nonzero = dense) -> tuple[int, ...
 
 @dataclass(frozen=True)
 class Port:
-    """An input or output of a CasADi function: where its numbers lie in a dense array, if
-    anywhere.
-    """
+    """An input or output of a CasADi function, and where its numbers lie in a dense array."""
 
     name: str
     pattern: tuple[int, ...]
@@ -47,9 +46,7 @@ class Port:
 
 @dataclass
 class External:
-    """One function for CasADi: its ports, and lines of C from arrays of its inputs to arrays of its
-    outputs.
-    """
+    """One function for CasADi: its ports, and C from arrays of inputs to arrays of outputs."""
 
     symbol: str
     doc: str

@@ -8,9 +8,7 @@ from .ports import External, Port, pattern, zero
 
 
 def tangent_hessian(e: External, f: DynamicsDerivatives) -> None:
-    """Second derivatives of the weighted outputs by velocities: ``qq``, ``qv``, ``vv``, ``aq`` or
-    ``tq``.
-    """
+    """Compute second derivatives by velocities: ``qq``, ``qv``, ``vv``, ``aq`` or ``tq``."""
     weights, blocks = f"adj_{f.gives}", ("qq", "qv", "vv", "aq")
     if f.name == "inverse_dynamics":
         e.call("inverse_dynamics_hessian", "q", "v", "v_dot", weights, *blocks)
@@ -26,9 +24,7 @@ def tangent_hessian(e: External, f: DynamicsDerivatives) -> None:
 def second_derivatives(
     e: External, f: DynamicsDerivatives
 ) -> dict[tuple[str, str], tuple[str, int, int]]:
-    """Compute second derivatives; return the array of each block with its strides, by row and
-    column.
-    """
+    """Compute second derivatives; return the array and strides of each block."""
     nq, nv, weights = e.tail.nq, e.tail.nv, f"adj_{f.gives}"
     last, rows = f.last, nv if f.last == "v_dot" else e.tail.nt
     first = first_derivatives(e, f)
@@ -58,9 +54,7 @@ def second_derivatives(
 
 
 def hessian(e: External, f: DynamicsDerivatives, sizes: dict[str, int]) -> None:
-    """Make ``jac_adj1_f``; no C function gives second derivatives with respect to parameters: they
-    are not a number.
-    """
+    """Make ``jac_adj1_f``; second derivatives by parameters, which no C gives, are NaN."""
     sources = second_derivatives(e, f)
     known = f.by_parameters(e.works)
     e.inputs = ports_in(f, sizes, known, 3)
