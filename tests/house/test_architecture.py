@@ -206,13 +206,13 @@ def public(tree):
                 )
 
 
-def one_line(docstring):
-    """The first line of a docstring, a sentence."""
-    return bool(docstring) and docstring.splitlines()[0].rstrip().endswith((".", ":"))
+def a_sentence(docstring):
+    """The first paragraph of a docstring is one sentence or more."""
+    return bool(docstring) and docstring.partition("\n\n")[0].rstrip().endswith((".", ":"))
 
 
 @every_source
 def test_public_names_have_docstrings(path):
     tree = ast.parse(path.read_text())
-    assert one_line(ast.get_docstring(tree))
-    assert [node.name for node in public(tree) if not one_line(ast.get_docstring(node))] == []
+    assert a_sentence(ast.get_docstring(tree))
+    assert [node.name for node in public(tree) if not a_sentence(ast.get_docstring(node))] == []

@@ -1,6 +1,7 @@
 """The schedule of straight lines: every value once, after what it needs, and the same results."""
 
 import random
+from itertools import pairwise
 
 import pytest
 
@@ -45,7 +46,7 @@ def test_random_lines_keep_their_dependencies(seed):
 
 
 def scheduled_by_the_rule(nodes, live, results):
-    """The rule as it is stated: at every step, look at all that is ready; the reference for the heaps."""
+    """The rule as it is stated: at every step, look at all that is ready."""
     operations = [n for n in live if nodes[n][0] not in schedule.LEAVES]
     needs = {n: {a for a in nodes[n][1:] if a in operations} for n in operations}
     users = {n: {u for u in operations if n in needs[u]} for n in operations}
@@ -57,7 +58,10 @@ def scheduled_by_the_rule(nodes, live, results):
     order, alive = [], 0
     while len(order) < len(operations):
         ready = [n for n in operations if n not in order and needs[n] <= set(order)]
-        frees = {n: sum(a not in results and users[a] - set(order) == {n} for a in needs[n]) for n in ready}
+        frees = {
+            n: sum(a not in results and users[a] - set(order) == {n} for a in needs[n])
+            for n in ready
+        }
         if alive >= schedule.REGISTERS:
             best = max(ready, key=lambda n: (frees[n], height[n], -n))
         else:
@@ -91,6 +95,16 @@ def test_long_lines_are_left_alone():
     nodes, results = straight(3, 4)
     live = live_nodes(nodes, results)
     assert schedule.scheduled(nodes, live, results) == live
+
+
+@pytest.mark.parametrize(("more", "alone"), [(0, False), (1, True)])
+def test_lines_of_much_independent_work_are_left_alone(more, alone):
+    """Pairs of a sum and its product, 8 cycles: enough to be busy in any order, or one less."""
+    tape, pairs = Tape(), 4 * schedule.MOST_ABREAST + more
+    x = [tape.input(k) for k in range(pairs + 1)]
+    results = [tape.mul(tape.add(a, b), a) for a, b in pairwise(x)]
+    live = live_nodes(tape.nodes, results)
+    assert (schedule.scheduled(tape.nodes, live, results) == live) == alone
 
 
 def test_the_longest_path_starts_first():

@@ -293,7 +293,7 @@ class Run:
 
 
 class Count(Run):
-    """A run that counts operations; a step costs the same whenever its inputs have equal lanes."""
+    """A run that counts operations; a step costs the same for inputs of the same lanes."""
 
     def __init__(self, program: Program, arguments: dict[str, list]):
         self.known: dict[tuple, tuple[int, list]] = {}

@@ -12,6 +12,8 @@ from ..ir.tape import BINARY, LEAVES, operands
 
 REGISTERS = 24  # of 32 vector registers; on 16 it still pays
 MOST_OPERATIONS = 2800  # beyond, spilled values cost more than latency
+# operations for each cycle of the longest path: beyond, there is enough to do in any order
+MOST_ABREAST = 7
 LATENCY = {"div": 13, "sqrt": 15, "sin": 30, "cos": 30, "neg": 1}  # cycles; 4 for all others
 
 
@@ -20,16 +22,18 @@ def scheduled(nodes, live: list[int], results) -> list[int]:
     operations = [n for n in live if nodes[n][0] not in LEAVES]
     if sum(nodes[n][0] in BINARY for n in operations) > MOST_OPERATIONS:
         return live
-    leaves = [n for n in live if nodes[n][0] in LEAVES]
-    return leaves + _List(nodes, operations, set(results)).order()
+    line = _List(nodes, operations, set(results))
+    if len(operations) > MOST_ABREAST * max(line.height.values(), default=0):
+        return live
+    return [n for n in live if nodes[n][0] in LEAVES] + line.order()
 
 
 class _List:
     """List scheduling of one straight line.
 
-    The operations that are ready lie in two heaps, one for each rule of choice.  How many values an operation uses for
-    the last time can only grow while it waits: it then enters the heaps once more, ahead of its earlier entries, and
-    what was placed already is passed over.
+    The operations that are ready lie in two heaps, one for each rule of choice.  How many values an
+    operation uses for the last time can only grow while it waits: it then enters the heaps once
+    more, ahead of its earlier entries, and what was placed already is passed over.
     """
 
     def __init__(self, nodes, operations: list[int], results: set[int]):
@@ -47,10 +51,12 @@ class _List:
             tail = max((self.height[u] for u in self.users[n]), default=0)
             self.height[n] = tail + LATENCY.get(nodes[n][0], 4)
 
-        # operands that are still to come, uses that are still to come, and operands used here for the last time
+        # operands and uses that are still to come, and operands used here for the last time
         self.waiting = {n: len(needed) for n, needed in self.operands.items()}
         self.uses = {n: len(users) + (n in results) for n, users in self.users.items()}
-        self.frees = {n: sum(self.uses[a] == 1 for a in needed) for n, needed in self.operands.items()}
+        self.frees = {
+            n: sum(self.uses[a] == 1 for a in needed) for n, needed in self.operands.items()
+        }
 
         self.longest_first, self.freeing_first = [], []
         self.placed = set()
