@@ -98,7 +98,7 @@ class Model(SimpleNamespace):
 @pytest.fixture(scope="module", params=TAILS)
 def model(request):
     """A generated model."""
-    return Model(*TAILS[request.param])
+    return Model(*TAILS[request.param], functions=[*SHAPES, "rollout", "forward_dynamics_derivatives"])
 
 
 def full(outputs):
