@@ -18,7 +18,7 @@ import serpentail as st
 from benchmarks.fixtures import Fixture, fixture
 from benchmarks.peers import pinocchio as peers
 from serpentail.model.compiler import compile_library
-from serpentail_codegen.scene.scene import DERIVATIVES
+from serpentail_codegen.scene.signatures.table import DERIVATIVES
 
 SIZES = ((1, 3), (3, 4), (6, 6))
 ROUNDS, CALLS = 200, 64

@@ -18,7 +18,7 @@ from serpentail_codegen.functions.plain import FUNCTIONS
 from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.pipeline import tail_of
 from serpentail_codegen.scene.parse import parse_scene
-from serpentail_codegen.scene.scene import DERIVATIVES
+from serpentail_codegen.scene.signatures.table import DERIVATIVES
 from tests.references.parameters import random_states
 from tests.support.models import model_folder
 
@@ -98,7 +98,9 @@ class Model(SimpleNamespace):
 @pytest.fixture(scope="module", params=TAILS)
 def model(request):
     """A generated model."""
-    return Model(*TAILS[request.param], functions=[*SHAPES, "rollout", "forward_dynamics_derivatives"])
+    return Model(
+        *TAILS[request.param], functions=[*SHAPES, "rollout", "forward_dynamics_derivatives"]
+    )
 
 
 def full(outputs):

@@ -16,7 +16,7 @@ import serpentail as st
 from serpentail.cli import parser
 from serpentail_codegen.scene.parameters import PARAMETERS
 from serpentail_codegen.scene.parse import parse_scene
-from serpentail_codegen.scene.scene import ALL
+from serpentail_codegen.scene.signatures.table import ALL
 
 ROOT = Path(__file__).parents[2]
 DOCUMENTS = [

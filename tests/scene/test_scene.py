@@ -16,7 +16,8 @@ from serpentail_codegen.scene.parameters import PARAMETERS
 from serpentail_codegen.scene.parse import load_scene, parse_scene, scene_for, scene_to_dict
 from serpentail_codegen.scene.problems import Problem, SceneError
 from serpentail_codegen.scene.resolve import resolve_parameters
-from serpentail_codegen.scene.scene import FUNCTIONS, GROUPS, KEYS, ONLY, TOUCHING, Scene
+from serpentail_codegen.scene.scene import GROUPS, KEYS, ONLY, Scene
+from serpentail_codegen.scene.signatures.table import ALL, DEFAULT, DEFAULT_ON_GROUND, NEED_CONTACTS
 
 SCENES = Path(__file__).parents[2] / "scenes"
 VALID = 'kind = "articulated"\nsegments = 2\nlinks = 3\n'
@@ -65,7 +66,7 @@ def test_defaults_are_table_1_in_si_units(read):
 
 def test_defaults_of_the_other_keys(read):
     scene = read(VALID)
-    assert scene == Scene("rat", "articulated", 2, 3, FUNCTIONS, resolve_parameters({}, 6))
+    assert scene == Scene("rat", "articulated", 2, 3, DEFAULT, resolve_parameters({}, 6))
     assert (scene.coordinates, scene.baked, scene.real, scene.emission) == (
         "joint",
         False,
@@ -175,7 +176,7 @@ def test_the_paper_rats(segments, links):
     scene = load_scene(SCENES / f"kangaroo_rat_m{segments}_n{links}.toml")
     assert (scene.segments, scene.links) == (segments, links)
     assert scene.name == f"kangaroo_rat_m{segments}_n{links}"
-    assert scene.functions == FUNCTIONS
+    assert scene.functions == DEFAULT
     assert scene.parameters == resolve_parameters({}, scene.segments * scene.links)
 
 
@@ -536,7 +537,7 @@ STANCE = VALID + 'contacts = ["torso", "feet"]\n'
 def test_contacts_bring_their_parameters_and_functions(read):
     scene = read(STANCE)
     assert scene.contacts == ("feet", "torso") and scene.friction == "cone"
-    assert scene.functions == (*FUNCTIONS, "pfl", "implicit", *TOUCHING)
+    assert scene.functions == tuple(name for name in ALL if name in DEFAULT + DEFAULT_ON_GROUND)
     assert dict(scene.parameters).keys() - dict(read(VALID).parameters) == {
         p.name for p in PARAMETERS if p.needs
     }
@@ -551,7 +552,7 @@ def test_contacts_bring_their_parameters_and_functions(read):
 def test_a_flight_says_nothing_of_contacts(read):
     scene = read(VALID)
     assert scene.contacts == () and not {"contacts", "friction"} & set(scene_to_dict(scene))
-    assert not set(TOUCHING) & set(read(VALID + 'functions = "all"\n').functions)
+    assert not set(NEED_CONTACTS) & set(read(VALID + 'functions = "all"\n').functions)
 
 
 @pytest.mark.parametrize("value", ['["foot"]', '["feet", "feet"]', '"feet"', "true", "[3]", "[[]]"])

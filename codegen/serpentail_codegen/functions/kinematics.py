@@ -55,3 +55,9 @@ def assemble_tail_point_jacobians(d: Draft, arrays: dict[str, Array]) -> None:
                     for axis, name in enumerate("xyz")
                 }
                 d.step(loads.point_jacobian_tail, {"S": S[segment], "arm": here["P"]}, **rows)
+
+
+ASSEMBLIES = {
+    "tail_points": assemble_tail_points,
+    "tail_point_jacobians": assemble_tail_point_jacobians,
+}

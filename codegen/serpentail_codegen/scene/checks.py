@@ -6,7 +6,8 @@ from typing import Any
 
 from .parameters import PARAMETERS, SINGLE, Parameter, Value
 from .problems import Problem, suggest
-from .scene import ALL, COUNT, DERIVATIVES, KEYS, MOST_LINKS, NAMES, ONLY, TOUCHING, Only, _is_whole
+from .scene import COUNT, KEYS, MOST_LINKS, NAMES, ONLY, Only, is_whole
+from .signatures.table import ALL, DERIVATIVES, NEED_CONTACTS
 
 
 def plain(value: Value) -> float | list[float]:
@@ -30,7 +31,7 @@ def fits(parameter: Parameter, value: Any) -> bool:
 
 def _is_finite(x: Any) -> bool:
     """Tell if x is a number that a float can hold."""
-    return (_is_whole(x) or isinstance(x, float)) and abs(x) <= sys.float_info.max
+    return (is_whole(x) or isinstance(x, float)) and abs(x) <= sys.float_info.max
 
 
 def number_problem(parameter: Parameter, value: object) -> Problem:
@@ -93,7 +94,9 @@ def contact_problems(
     if "friction" in table:
         problems.append(Problem("friction", table["friction"], remedy))
     wanted = values["functions"] if isinstance(values["functions"], list | tuple) else ()
-    return problems + [Problem("functions", name, remedy) for name in wanted if name in TOUCHING]
+    return problems + [
+        Problem("functions", name, remedy) for name in wanted if name in NEED_CONTACTS
+    ]
 
 
 def _derivatives_in(wanted: Any) -> list[str]:

@@ -19,18 +19,8 @@ from .checks import (
 )
 from .problems import Problem, SceneError
 from .resolve import resolve_parameters
-from .scene import (
-    ALL,
-    CONTACTS,
-    DERIVATIVES,
-    FUNCTIONS,
-    GROUPS,
-    KEYS,
-    MOST_LINKS,
-    ONLY,
-    TOUCHING,
-    Scene,
-)
+from .scene import CONTACTS, GROUPS, KEYS, MOST_LINKS, ONLY, Only, Scene
+from .signatures.table import ALL, DEFAULT, DEFAULT_ON_GROUND, DERIVATIVES, NEED_CONTACTS
 
 
 def load_scene(path: str | Path) -> Scene:
@@ -65,24 +55,19 @@ def parse_scene(table: Mapping[str, Any], name: str) -> Scene:
     """Return the Scene of a scene file's table, called `name` unless it has a name; raises
     SceneError.
     """
-    kind = (
-        table["kind"]
-        if isinstance(table.get("kind"), str) and table["kind"] in ONLY
-        else "articulated"
-    )
+    kind = _kind(table)
     own = ONLY[kind]
-    values = {key: default for key, (default, _) in KEYS.items()} | {
-        "name": name,
-        "coordinates": own.coordinates[0],
-    }
-    values |= dict.fromkeys(own.required) | dict(table)
+    values = _with_defaults(table, name, own)
     contacts = tuple(values["contacts"]) if CONTACTS.holds(values["contacts"]) else ()
-    values["functions"] = _usual_functions(values, contacts, "functions" in table)
+    values["functions"] = _chosen_functions(table, values["coordinates"], contacts)
+
+    # everything that is wrong with keys and functions
     problems = unknown_keys(table, "", KEYS) + key_problems(values) + kind_problems(table, own)
     problems += function_problems(values["functions"]) + contact_problems(table, values, contacts)
-    values["contacts"] = tuple(group for group in GROUPS if group in contacts)
+
+    # parameters: which there are follows from the kind and the contacts
+    links = min(tail_links(values), MOST_LINKS)
     try:
-        links = min(tail_links(values), MOST_LINKS)
         values["parameters"] = resolve_parameters(values["parameters"], links, kind, contacts)
     except SceneError as error:
         problems += error.problems
@@ -90,22 +75,35 @@ def parse_scene(table: Mapping[str, Any], name: str) -> Scene:
         problems += single_problems(values["parameters"])
     if problems:
         raise SceneError(problems)
+
+    # one order of names, so that equal scenes are equal
+    values["contacts"] = tuple(group for group in GROUPS if group in contacts)
     values["functions"] = tuple(function for function in ALL if function in values["functions"])
     return Scene(**{field.name: values[field.name] for field in fields(Scene)})
 
 
-def _usual_functions(values: Mapping[str, Any], contacts: Collection[str], chosen: bool) -> Any:
-    """Return the functions that a scene means by "all", or by not choosing any."""
-    touching = TOUCHING if contacts else ()
-    if values["functions"] == "all":
-        return tuple(name for name in ALL if name not in TOUCHING or contacts)
-    if chosen:
-        return values["functions"]
-    polar = values["coordinates"] == "polar"
-    usual = (
-        (*touching, "pfl", "implicit") if contacts else ()
-    )  # what simulations on the ground call
-    return (*(name for name in FUNCTIONS if not (polar and name in DERIVATIVES)), *usual)
+def _kind(table: Mapping[str, Any]) -> str:
+    """Return the kind of tail; where it is wrong the table is checked as an articulated one."""
+    kind = table.get("kind")
+    return kind if isinstance(kind, str) and kind in ONLY else "articulated"
+
+
+def _with_defaults(table: Mapping[str, Any], name: str, own: Only) -> dict[str, Any]:
+    """Return a table with the default of every key that it leaves out, None where it is needed."""
+    values = {key: default for key, (default, _) in KEYS.items()}
+    values |= {"name": name, "coordinates": own.coordinates[0]}
+    values |= dict.fromkeys(own.required)
+    return values | dict(table)
+
+
+def _chosen_functions(table: Mapping[str, Any], coordinates: str, contacts: Collection[str]) -> Any:
+    """Return the functions that a scene means by naming them, by "all", or by leaving them out."""
+    if table.get("functions") == "all":
+        return tuple(name for name in ALL if contacts or name not in NEED_CONTACTS)
+    if "functions" in table:
+        return table["functions"]
+    names = DEFAULT + DEFAULT_ON_GROUND if contacts else DEFAULT
+    return tuple(name for name in names if coordinates != "polar" or name not in DERIVATIVES)
 
 
 def scene_to_dict(scene: Scene) -> dict[str, Any]:

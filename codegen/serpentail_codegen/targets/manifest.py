@@ -4,9 +4,10 @@ from ..scene.parameters import ANY, BODY_INERTIA, NOT_NEGATIVE, POSITIVE
 from ..scene.parse import scene_to_dict
 from ..scene.resolve import parameters_of
 from ..scene.scene import Scene
+from ..scene.signatures.table import EXACT_DERIVATIVES, SIGNATURES
 from .c.simulation import layouts
 
-FORMAT = 1
+FORMAT = 2
 CHECKS = {
     ANY: "finite",
     POSITIVE: "positive",
@@ -84,6 +85,8 @@ def function_entry(emitted, tail) -> dict:
 
     return {
         "doc": function.doc,
+        "group": SIGNATURES[function.name].group,
+        "exact_derivatives": list(map(list, EXACT_DERIVATIVES.get(function.name, ()))),
         "inputs": entries(function.inputs),
         "outputs": entries(function.outputs),
         "emission": emitted.emission,

@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 from functools import partial
 
 from ...functions.catalogue import CATALOGUE
-from ...functions.function import struct_parameters
-from ...functions.tail import Tail
+from ...functions.tail import Tail, struct_parameters
 from ...scene.scene import Scene
+from ...scene.signatures.table import SIGNATURES
 
 VECTOR = 8  # doubles in a cache line
 # where the numbers begin that anything depends on: neither the position of B nor its velocity
@@ -192,22 +192,8 @@ class Dynamics:
 
 
 DYNAMICS = (
-    Dynamics(
-        "inverse_dynamics",
-        "v_dot",
-        "force",
-        ("inverse_dynamics_derivatives", "mass_matrix"),
-        ("inverse_dynamics_vjp",),
-        ("inverse_dynamics_hessian",),
-    ),
-    Dynamics(
-        "forward_dynamics",
-        "tau",
-        "v_dot",
-        ("forward_dynamics_derivatives",),
-        ("forward_dynamics_vjp",),
-        ("inverse_dynamics_hessian", "mass_matrix"),
-    ),
+    Dynamics("inverse_dynamics", "v_dot", "force", *SIGNATURES["inverse_dynamics"].exact),
+    Dynamics("forward_dynamics", "tau", "v_dot", *SIGNATURES["forward_dynamics"].exact),
 )
 
 

@@ -2,9 +2,8 @@
 
 from dataclasses import dataclass
 
-from ...functions.function import Function, struct_parameters
-from ...functions.function import assemble
-from ...functions.tail import Tail
+from ...functions.function import Function, assemble
+from ...functions.tail import Tail, struct_parameters
 from ...ir.interpret import applied, branches
 from ...ir.program import Program
 from ...passes.unrolled_ldl import unrolled_ldl

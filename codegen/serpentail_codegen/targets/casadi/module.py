@@ -5,8 +5,7 @@ comes out.
 import re
 
 from ...functions.function import assemble
-from ...functions.function import struct_parameters
-from ...functions.tail import Tail
+from ...functions.tail import Tail, struct_parameters
 from ...ir.dataflow import inlined
 from ...ir.program import Apply, Copy, Factor, Fill, Guard, Loop, Program, Ref, Solve, padded
 from ...ir.step import Step
