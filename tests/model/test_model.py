@@ -33,6 +33,7 @@ CALLS = {
     "forward_dynamics_external": (["q", "v", "tau", "f_ext"], [(NV,)]),
     "energy": (["q", "v"], [(), ()]),
     "momentum": (["q", "v"], [(3,), (3,)]),
+    "center_of_mass": (["q", "v"], [(3,), (3,), (3, NV)]),
     "tail_points": (["q"], [(POINTS, 3)]),
     "tail_point_jacobians": (["q"], [(POINTS, 3, NV)]),
     "mass_matrix_world": (["q"], [(NV, NV)]),

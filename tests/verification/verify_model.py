@@ -38,6 +38,7 @@ COMPARED = (
     "forward_dynamics",
     "energy",
     "momentum",
+    "center_of_mass",
 )
 POINTS = ("tail_points", "tail_point_jacobians")
 

@@ -11,9 +11,11 @@ from .arguments import (
     POTENTIAL,
     TAU,
     V_DOT,
+    Argument,
     H,
     Q,
     V,
+    three_by_nv,
 )
 from .signature import ALWAYS, NAMED, VALUE, Signature
 
@@ -60,6 +62,18 @@ SIGNATURES = (
     Signature("momentum", "linear and angular momentum", (Q, V), (LINEAR, ANGULAR), VALUE, ALWAYS),
     Signature("tail_points", "Eqs. 13 to 15", (Q,), (POINTS,), VALUE, ALWAYS),
     Signature("tail_point_jacobians", "Eqs. A5 to A8", (Q,), (JACOBIANS,), VALUE, ALWAYS),
+    Signature(
+        "center_of_mass",
+        "centre of mass of the whole animal",
+        (Q, V),
+        (
+            Argument("position", (3,), "its position (m, world)"),
+            Argument("velocity", (3,), "its velocity (m/s, world): J v"),
+            three_by_nv("J", "its Jacobian, world"),
+        ),
+        VALUE,
+        ALWAYS,
+    ),
     Signature(
         "mass_matrix_world",
         "H for (p_dot, omega in world axes, q_t_dot)",
