@@ -195,7 +195,7 @@ def test_header_is_cpp_and_links_from_it(models, tmp_path, name):
         f"int main() {{\n  {name}_parameters p;\n  {name}_default_parameters(&p);\n  x.q[3] = 1;\n"
         f"  static {real} work[{name.upper()}_WORK_MASS_MATRIX + 1];\n"
         f"  return {name}_mass_matrix(&p{inputs}, x.H, work) != {name.upper()}_OK || !(x.H[0] > "
-        "0);\n}}\n"
+        "0);\n}\n"
     )
     run(
         "g++",

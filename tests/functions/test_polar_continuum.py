@@ -21,6 +21,7 @@ from tests.references.metrics import block_error, equilibrated_condition, mass_m
 from tests.references.parameters import TABLE_1
 from tests.support.models import model_folder
 
+FUNCTIONS = [*VALUES, "rollout"]
 MODERATE = (0.5, 1.0, 2.0, np.pi)
 VANISHING = 10.0 ** np.arange(-1, -3.1, -0.5)
 EMISSIONS = {"straight": (1, "straight"), "loops": (2, "loops")}
@@ -29,15 +30,8 @@ EMISSIONS = {"straight": (1, "straight"), "loops": (2, "loops")}
 @cache
 def model(segments, coordinates="polar", emission="auto"):
     """The compiled continuum in one kind of coordinates."""
-    return st.load(
-        model_folder(
-            segments,
-            None,
-            coordinates=coordinates,
-            emission=emission,
-            functions=[*VALUES, "rollout"],
-        )
-    )
+    options = {"coordinates": coordinates, "emission": emission, "functions": FUNCTIONS}
+    return st.load(model_folder(segments, None, **options))
 
 
 @cache

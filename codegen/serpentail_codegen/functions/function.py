@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 
 from ..ir.program import Array, Program
 from ..scene.signatures.arguments import Argument
@@ -38,6 +39,7 @@ def signed(assemblies: Mapping[str, Assembly]) -> dict[str, Function]:
     return functions
 
 
+@cache
 def assemble(function: Function, tail: Tail, dynamics: str = "composite") -> Program:
     """Assemble one function for given sizes; other ``dynamics`` where vectors hold several numbers
     and tails are long.
