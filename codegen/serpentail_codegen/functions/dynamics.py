@@ -10,7 +10,7 @@ from ..ir.program import Array, Index, Ref, padded
 from ..mechanics import rotations, torso, translation
 from ..scene.signatures.arguments import TAU, V_DOT, Argument, Q, V
 from .draft import Draft
-from .function import Function, assemble
+from .function import Assembly, Function, assemble
 from .sweeps import sweeps
 from .sweeps.columns import balance_in_lanes
 from .sweeps.segments import accelerate
@@ -250,7 +250,7 @@ SEGMENT_DYNAMICS = Function(
     (V_DOT,),
     assemble_segment_dynamics,
 )
-ASSEMBLIES = {
+ASSEMBLIES: dict[str, Assembly] = {
     "mass_matrix": assemble_mass_matrix,
     "bias_force": assemble_inverse_dynamics,
     "inverse_dynamics": assemble_inverse_dynamics,

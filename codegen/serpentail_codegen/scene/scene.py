@@ -82,9 +82,7 @@ def _table(name: str) -> Rule:
 
 @dataclass(frozen=True)
 class Scene:
-    """What to generate: a tail of `segments` x `links`, its parameters, the functions, and in which
-    form.
-    """
+    """What to generate: a tail, its parameters, the functions, and in which form."""
 
     name: str  # prefix of every C symbol and generated file
     kind: str
