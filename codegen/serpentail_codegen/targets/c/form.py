@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from ...functions.function import Function, assemble
 from ...functions.tail import Tail, struct_parameters
-from ...ir.interpret import applied, branches
+from ...ir.cost import applied, branches
 from ...ir.program import Program
 from ...passes.unrolled_ldl import unrolled_ldl
 from ...scene.scene import Scene
