@@ -9,7 +9,8 @@ from typing import Any
 
 from .scene.parse import load_scene, parse_scene, scene_for, scene_to_dict
 from .scene.problems import SceneError
-from .scene.scene import ALL, KINDS, Scene
+from .scene.scene import KINDS, Scene
+from .scene.signatures.table import ALL
 
 
 def parser() -> argparse.ArgumentParser:

@@ -9,31 +9,11 @@ from ..mechanics import contact as con
 from ..mechanics import leg as legs
 from ..mechanics import loads, rotations
 from ..mechanics.lower import derive
-from .arguments import TAU, V_DOT, Q, V
 from .draft import Draft
 from .dynamics import Loads, accelerate_by_segments, balanced
-from .function import Argument, Function
 from .sweeps import sweeps
 from .sweeps.sweeps import mechanism
 from .tail import Tail
-
-LEGS = Argument(
-    "legs",
-    lambda t: (8 * ("feet" in t.contacts),),
-    "gamma_1, delta_1 of the right leg, gamma_2, delta_2 of the left (rad), then their rates "
-    "(rad/s)",
-)
-POSITIONS = Argument(
-    "positions", lambda t: (t.points, 3), "points that can touch the ground (m, world)"
-)
-VELOCITIES = Argument("velocities", lambda t: (t.points, 3), "their velocities (m/s, world)")
-BRISTLES = Argument(
-    "bristles", lambda t: (2 * t.points,), "stretch of the friction springs (m, world x and y)"
-)
-BRISTLE_RATES = Argument("bristle_rates", lambda t: (2 * t.points,), "their rates (m/s)")
-FORCES = Argument(
-    "forces", lambda t: (t.points, 3), "forces of the ground on the points (N, world)"
-)
 
 
 @dataclass(frozen=True)
@@ -194,21 +174,7 @@ def assemble_contact_dynamics(d: Draft, arrays: dict[str, Array]) -> None:
     balance.solve(d, loads, arrays["v_dot"])
 
 
-_TABLE = (
-    Function(
-        "contact_points",
-        "points that can touch the ground: A, M, T of the right foot, of the left; tail; the "
-        "torso's lowest",
-        (Q, V, LEGS),
-        (POSITIONS, VELOCITIES),
-        assemble_contact_points,
-    ),
-    Function(
-        "contact_dynamics",
-        "v_dot from Eq. 1 with the forces of the ground, Eqs. 35 to 37",
-        (Q, V, TAU, BRISTLES, LEGS),
-        (V_DOT, BRISTLE_RATES, FORCES),
-        assemble_contact_dynamics,
-    ),
-)
-CONTACT = {function.name: function for function in _TABLE}
+ASSEMBLIES = {
+    "contact_points": assemble_contact_points,
+    "contact_dynamics": assemble_contact_dynamics,
+}

@@ -4,12 +4,13 @@ out.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 from ..ir.program import Array, Index, Ref, padded
 from ..mechanics import rotations, torso, translation
-from .arguments import TAU, V_DOT, Q, V
+from ..scene.signatures.arguments import TAU, V_DOT, Argument, Q, V
 from .draft import Draft
-from .function import Argument, Function, assemble
+from .function import Assembly, Function, assemble
 from .sweeps import sweeps
 from .sweeps.columns import balance_in_lanes
 from .sweeps.segments import accelerate
@@ -227,13 +228,13 @@ BALANCE = Function(
     "H with translation eliminated, factored, and C without gravity",
     (Q, V),
     (
-        Argument("R", lambda t: (9,), "attitude"),
-        Argument("inverse_mass", lambda t: (1,), "1 / M"),
-        Argument("com", lambda t: (3,), "centre of mass from B, torso axes"),
-        Argument("first_moment", lambda t: (3,), "M times it"),
-        Argument("A", lambda t: (3 + t.nt, padded(3 + t.nt)), "L^T D L"),
-        Argument("columns", lambda t: (t.nt, 6), "momentum of each tail coordinate at B"),
-        Argument("bias", lambda t: (t.nv,), "force, moment, and the tail's forces"),
+        Argument("R", (9,), "attitude"),
+        Argument("inverse_mass", (1,), "1 / M"),
+        Argument("com", (3,), "centre of mass from B, torso axes"),
+        Argument("first_moment", (3,), "M times it"),
+        Argument("A", ("rotational", "rotational_row"), "L^T D L"),
+        Argument("columns", ("nt", 6), "momentum of each tail coordinate at B"),
+        Argument("bias", ("nv",), "force, moment, and the tail's forces"),
     ),
     assemble_balance,
 )
@@ -243,9 +244,20 @@ SEGMENT_DYNAMICS = Function(
     (
         Q,
         V,
-        Argument("at_torso", lambda t: (6,), "force and moment at B, torso axes"),
+        Argument("at_torso", (6,), "force and moment at B, torso axes"),
         replace(TAU, name="torques"),
     ),
     (V_DOT,),
     assemble_segment_dynamics,
 )
+ASSEMBLIES: dict[str, Assembly] = {
+    "mass_matrix": assemble_mass_matrix,
+    "bias_force": assemble_inverse_dynamics,
+    "inverse_dynamics": assemble_inverse_dynamics,
+    "forward_dynamics": assemble_acceleration,
+    "forward_dynamics_external": assemble_acceleration,
+    "energy": assemble_energy,
+    "momentum": assemble_momentum,
+    "mass_matrix_world": partial(assemble_mass_matrix, world=True),
+    "bias_force_world": partial(assemble_inverse_dynamics, world=True),
+}

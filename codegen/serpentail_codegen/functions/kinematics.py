@@ -3,7 +3,7 @@ out.
 """
 
 from ..ir.program import Array, Index
-from ..mechanics import loads, rotations
+from ..mechanics import loads, rotations, torso
 from .draft import Draft
 from .sweeps import sweeps
 from .sweeps.sweeps import mechanism
@@ -55,3 +55,31 @@ def assemble_tail_point_jacobians(d: Draft, arrays: dict[str, Array]) -> None:
                     for axis, name in enumerate("xyz")
                 }
                 d.step(loads.point_jacobian_tail, {"S": S[segment], "arm": here["P"]}, **rows)
+
+
+def assemble_center_of_mass(d: Draft, arrays: dict[str, Array]) -> None:
+    """Where the animal's centre of mass is, how fast it moves, and its Jacobian: momentum columns
+    over the mass.
+    """
+    tail, J, velocity = d.tail, arrays["J"], arrays["velocity"][0]
+    # mass, first moment, and the momentum that each tail coordinate gives, in torso axes
+    d.store(rotations.quaternion_rotation, R=9)
+    mechanism(d).prepare(d, True)
+    columns, roots = d.array("columns", 12, tail.segments), sweeps.segment_roots(d)
+    sweeps.forward_roots(d, sweeps.torso_pose(d, world=False), roots)
+    sweeps.gather_inertia(d, roots, columns)
+    # the torso's motion, then what the tail's adds to it
+    rows = {f"J_{name}": J.part(axis * tail.nv, 6) for axis, name in enumerate("xyz")}
+    motion = {"position": arrays["position"][0], "velocity": velocity}
+    d.step(torso.com_at_base, inverse_mass=d.vector("inverse_mass", 1), **motion, **rows)
+    with d.loop("k", tail.nt) as k:
+        reads = {"column": sweeps.column_of(columns, k), "rate": arrays["v"].part(6 + k, 1)}
+        J_column = J.part(6 + k, 3, stride=tail.nv)
+        d.step(torso.com_of_coordinate, reads, J_column=J_column, velocity_=velocity)
+
+
+ASSEMBLIES = {
+    "tail_points": assemble_tail_points,
+    "tail_point_jacobians": assemble_tail_point_jacobians,
+    "center_of_mass": assemble_center_of_mass,
+}

@@ -4,16 +4,9 @@ are added to it.
 
 from ..ir.program import Array, padded
 from ..mechanics import rotations, torso, translation
-from .arguments import V_DOT, Q, V
 from .draft import Draft
-from .function import Argument, Function
 from .sweeps import sweeps
 from .sweeps.sweeps import column_of, mechanism
-
-ACCELERATIONS = Argument(
-    "accelerations", lambda t: (t.nt,), "wanted accelerations of the tail coordinates (rad/s^2)"
-)
-TORQUES = Argument("tau", lambda t: (t.nt,), "torques (N m), conjugate to the tail coordinates")
 
 
 def assemble_pfl(d: Draft, arrays: dict[str, Array]) -> None:
@@ -72,20 +65,4 @@ def free_torso(d: Draft) -> None:
     d.store(translation.free_acceleration, a=3)
 
 
-WANTED = (Q, V, ACCELERATIONS)
-FEEDBACK = {
-    "pfl": Function(
-        "pfl",
-        "torques in flight that give the tail wanted accelerations, Eq. 46",
-        WANTED,
-        (TORQUES,),
-        assemble_pfl,
-    ),
-    "tracked_dynamics": Function(
-        "tracked_dynamics",
-        "torques in flight that give the tail wanted accelerations, Eq. 46, and v_dot under them",
-        WANTED,
-        (TORQUES, V_DOT),
-        assemble_pfl,
-    ),
-}
+ASSEMBLIES = {"pfl": assemble_pfl, "tracked_dynamics": assemble_pfl}

@@ -1,9 +1,14 @@
-"""Drafts: a tail's sizes go in; a builder comes out that finds the vectors its steps read by their
-names.
-"""
+"""The sizes of a tail, by which arrays are declared and the shapes of arguments are known."""
 
 from dataclasses import dataclass
 from math import pi
+
+from ..ir.program import padded
+from ..scene.parameters import Parameter
+from ..scene.resolve import parameters_of
+from ..scene.scene import Scene
+
+SPRING = 18  # numbers of a point's linearised contact
 
 
 @dataclass(frozen=True)
@@ -26,6 +31,11 @@ class Tail:
         return self.segments * self.links
 
     @property
+    def tail_points(self) -> int:
+        """N + 1 tail points."""
+        return self.total + 1
+
+    @property
     def nt(self) -> int:
         """Tail coordinates."""
         return 2 * self.segments
@@ -41,6 +51,16 @@ class Tail:
         return 6 + self.nt
 
     @property
+    def loads(self) -> int:
+        """Scalars of loads: a force and a moment at B, a force at each tail point."""
+        return 6 + 3 * self.tail_points
+
+    @property
+    def parameter_numbers(self) -> int:
+        """Numbers in the parameter struct."""
+        return sum(p.size for p in struct_parameters(self))
+
+    @property
     def groups(self) -> dict[str, int]:
         """How many points each group has that can touch the ground: A, M and T of both feet, tail,
         torso.
@@ -52,3 +72,54 @@ class Tail:
     def points(self) -> int:
         """Points that can touch the ground."""
         return sum(self.groups.values())
+
+    @property
+    def bristles(self) -> int:
+        """Stretches of the points' friction springs, along x and y."""
+        return 2 * self.points
+
+    @property
+    def leg_numbers(self) -> int:
+        """Angles and rates of both legs."""
+        return 8 if "feet" in self.contacts else 0
+
+    @property
+    def weights(self) -> int:
+        """Numbers that weight an implicit method's Jacobian: with contacts one more for friction's
+        bound.
+        """
+        return 2 if self.points else 1
+
+    @property
+    def factor_blocks(self) -> dict[str, tuple[int, int]]:
+        """Size and count of what factoring hands to solving, S first."""
+        found = {"S": (padded(self.nv), self.nv)}
+        if self.contacts:
+            found |= {"S_turned": (padded(self.nv), self.nv)}
+        found |= {"H_tail": (self.nt, self.nt), "damped": (1, self.nt)}
+        found |= dict.fromkeys(["gain_q", "gain_v", "weight"], (1, 1))
+        if self.contacts:
+            found |= {"R": (9, 1), "relax": (1, 1), "depth": (1, self.points)}
+            found |= {"arm": (3, self.points), "spring": (SPRING, self.points)}
+            found |= {"J": (3 * self.nt, self.groups.get("tail", 0))}
+        return found
+
+    @property
+    def factors(self) -> int:
+        """Numbers that factoring hands to solving."""
+        return sum(size * count for size, count in self.factor_blocks.values())
+
+    @property
+    def rotational(self) -> int:
+        """Rows of H without translation."""
+        return 3 + self.nt
+
+    @property
+    def rotational_row(self) -> int:
+        """Reals from one row of H without translation to the next."""
+        return padded(self.rotational)
+
+
+def struct_parameters(model: Tail | Scene) -> tuple[Parameter, ...]:
+    """Return the parameters that the functions of a model read: the fields of its struct."""
+    return tuple(p for p in parameters_of(model.kind, model.contacts) if p.name != "link_radius")

@@ -7,15 +7,17 @@ the workspace of C functions.
 from collections.abc import Sequence
 from typing import Any
 
-from ..functions.function import Argument, Function
+from ..functions.function import Function
 from ..functions.tail import Tail
 from ..scene.parameters import ANY, BODY_INERTIA, NOT_NEGATIVE, POSITIVE, Parameter
 from ..scene.parse import scene_to_dict
 from ..scene.resolve import parameters_of
 from ..scene.scene import Scene
+from ..scene.signatures.arguments import Argument
+from ..scene.signatures.table import EXACT_DERIVATIVES, SIGNATURES
 from .target import Emission
 
-FORMAT = 1
+FORMAT = 2
 CHECKS = {
     ANY: "finite",
     POSITIVE: "positive",
@@ -63,6 +65,8 @@ def function_entry(function: Function, tail: Tail, emissions: Sequence[Emission]
     """Return what a caller must know of a function."""
     entry = {
         "doc": function.doc,
+        "group": SIGNATURES[function.name].group,
+        "exact_derivatives": list(map(list, EXACT_DERIVATIVES.get(function.name, ()))),
         "inputs": [argument_entry(a, tail) for a in function.inputs],
         "outputs": [argument_entry(a, tail) for a in function.outputs],
     }

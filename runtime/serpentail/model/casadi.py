@@ -9,18 +9,6 @@ import casadi
 from ..errors import ModelError
 from .parameters import flat
 
-# compiled functions that first and second derivatives of an external one are made of
-DERIVATIVES = {
-    "inverse_dynamics": (
-        ("inverse_dynamics_derivatives", "mass_matrix"),
-        ("inverse_dynamics_vjp", "inverse_dynamics_hessian"),
-    ),
-    "forward_dynamics": (
-        ("forward_dynamics_derivatives",),
-        ("forward_dynamics_vjp", "inverse_dynamics_hessian", "mass_matrix"),
-    ),
-}
-
 
 class CasadiFunctions:
     """Attribute access builds a ``casadi.Function`` once; ``symbolic`` and ``external`` take
@@ -113,15 +101,12 @@ class CasadiFunctions:
 
     def _check(self, name: str, derivatives: int) -> None:
         """Raise ModelError where a scene lacks what derivatives of this order are made of."""
-        if derivatives and name not in DERIVATIVES:
-            has = " and ".join(DERIVATIVES)
-            raise ModelError(
-                f"{name}: only {has} have compiled derivatives for CasADi: use casadi.symbolic"
-            )
-        wanted = [part for order in DERIVATIVES.get(name, ())[:derivatives] for part in order]
-        lacking = [
-            part for part in dict.fromkeys(wanted) if part not in self._model.manifest["functions"]
-        ]
+        functions = self._model.manifest["functions"]
+        orders = functions[name]["exact_derivatives"]
+        if derivatives and not orders:
+            raise ModelError(f"{name} has no compiled derivatives for CasADi: use casadi.symbolic")
+        wanted = [part for order in orders[:derivatives] for part in order]
+        lacking = [part for part in dict.fromkeys(wanted) if part not in functions]
         if lacking:
             raise self._model.without(*lacking)
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from .. import __version__
 from ..errors import ModelError
 
-FORMAT = 1
+FORMAT = 2
 KEYS = [
     "prefix",
     "real",

@@ -212,6 +212,15 @@ class Model:
         """(linear (3,) (kg m/s), angular (3,) about the centre of mass (kg m^2/s)), world axes."""
         return self.kernel("momentum")(q, v)
 
+    def center_of_mass(self, q, v):
+        """(position (3,) (m), velocity (3,) (m/s), J (3, nv)) of the whole animal's centre of mass,
+        world axes: velocity = J v.
+
+        q (nq,), v (nv,) as the class describes them; the momentum is total mass times the velocity.
+        Exact for rigid links and for arcs alike.
+        """
+        return self.kernel("center_of_mass")(q, v)
+
     def tail_points(self, q):
         """Joint positions, then the tip (N + 1, 3), world (m), Eqs. 13 to 15; of a continuum,
         samples of its arcs.

@@ -98,3 +98,6 @@ def mixed_block(d: Draft, q: Array, multiplier: Array, aq: Array) -> None:
     d.call(inner, q=q, v_dot=body, d_force=rows, **directions.tangents(d))
     d.step(rotations.world_vector, {"vector": rows.part(0, 3)}, vector=rows.part(0, 3))
     directions.spread(d, rows, aq)
+
+
+ASSEMBLIES = {"inverse_dynamics_hessian": assemble_inverse_dynamics_hessian}

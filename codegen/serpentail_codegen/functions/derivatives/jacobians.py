@@ -10,18 +10,17 @@ from ...autodiff.forward import tangent_program
 from ...autodiff.reverse import adjoint_program
 from ...ir.program import Array, Index, Ref
 from ...mechanics import rotations, torso, translation
-from ..arguments import FORCE, V_DOT, Q, V
+from ...scene.signatures.arguments import FORCE, MULTIPLIER, V_DOT, Argument, Q, V
 from ..draft import Draft
 from ..dynamics import Balance, Loads, assemble_forward_dynamics
-from ..function import Argument, Function, assemble, struct_parameters
+from ..function import Function, assemble
 from ..plain import FUNCTIONS
 from ..sweeps import sweeps
 from ..sweeps.sweeps import mechanism
-from ..tail import Tail
+from ..tail import struct_parameters
 from .directions import Directions
 
-MULTIPLIER = Argument("multiplier", lambda t: (t.nv,), "weights lambda of the rows")
-POWER = Argument("power", lambda t: (1,), "lambda^T (H v_dot + C)")
+POWER = Argument("power", (1,), "lambda^T (H v_dot + C)")
 
 
 # ---- the functions that are differentiated -------------------------------------------------------
@@ -163,7 +162,7 @@ def assemble_inverse_dynamics_parameter_derivatives(d: Draft, arrays: dict[str, 
 
 def assemble_forward_dynamics_parameter_derivatives(d: Draft, arrays: dict[str, Array]) -> None:
     """-H^-1 times the tangents of H v_dot + C with respect to every parameter, at fixed v_dot."""
-    count = parameter_count(d.tail)
+    count = d.tail.parameter_numbers
     balance, body = forward_dynamics_first(d, arrays)
     rows, x = (
         parameter_tangents(d, CORE, {"q": arrays["q"], "v": arrays["v"], "v_dot": body}),
@@ -179,7 +178,7 @@ def parameter_tangents(d: Draft, function: Function, given: dict[str, Array]) ->
     """Return the tangents of a force with respect to every parameter, a lane for each number of the
     struct.
     """
-    count, lane, tangents = parameter_count(d.tail), 0, {}
+    count, lane, tangents = d.tail.parameter_numbers, 0, {}
     names = [p.name for p in struct_parameters(d.tail)]
     inner = tangent_program(assemble(function, d.tail), names, count)
     for p in struct_parameters(d.tail):
@@ -194,14 +193,9 @@ def parameter_tangents(d: Draft, function: Function, given: dict[str, Array]) ->
 
 def spread_parameters(d: Draft, source: Array, dparameters: Array) -> None:
     """Copy rows to a matrix with a column for each number of the parameter struct."""
-    count = parameter_count(d.tail)
+    count = d.tail.parameter_numbers
     with d.loop("row", d.tail.nv) as row:
         d.copy(dparameters.part(count * row, count), source.lane(row, 0, count))
-
-
-def parameter_count(tail: Tail) -> int:
-    """Numbers in the parameter struct."""
-    return sum(p.size for p in struct_parameters(tail))
 
 
 # ---- products with Jacobians ---------------------------------------------------------------------
@@ -288,3 +282,16 @@ def assemble_momentum_derivatives(d: Draft, arrays: dict[str, Array]) -> None:
     d.call(inner, q=q, v=arrays["v"], **outputs, **directions.tangents(d))
     for name, row in rows.items():
         directions.spread(d, row, arrays[f"{name}_dq"], arrays[f"{name}_dv"])
+
+
+ASSEMBLIES = {
+    "inverse_dynamics_derivatives": assemble_inverse_dynamics_derivatives,
+    "forward_dynamics_derivatives": assemble_forward_dynamics_derivatives,
+    "inverse_dynamics_parameter_derivatives": assemble_inverse_dynamics_parameter_derivatives,
+    "forward_dynamics_parameter_derivatives": assemble_forward_dynamics_parameter_derivatives,
+    "inverse_dynamics_vjp": assemble_inverse_dynamics_vjp,
+    "forward_dynamics_jvp": assemble_forward_dynamics_jvp,
+    "forward_dynamics_vjp": assemble_forward_dynamics_vjp,
+    "energy_derivatives": assemble_energy_derivatives,
+    "momentum_derivatives": assemble_momentum_derivatives,
+}

@@ -10,29 +10,9 @@ three pivots of S do.
 
 from dataclasses import dataclass
 
-from ...ir.program import Array, Index, Ref, padded
+from ...ir.program import Array, Index, Ref
 from ..draft import Draft
 from ..tail import Tail
-
-SPRING = 18  # numbers of a point's linearised contact
-
-
-def blocks(tail: Tail) -> dict[str, tuple[int, int]]:
-    """Size and count of what factoring hands to solving, S first."""
-    found = {"S": (padded(tail.nv), tail.nv)}
-    if tail.contacts:
-        found |= {"S_turned": (padded(tail.nv), tail.nv)}
-    found |= {"H_tail": (tail.nt, tail.nt), "damped": (1, tail.nt)}
-    found |= dict.fromkeys(["gain_q", "gain_v", "weight"], (1, 1))
-    if tail.contacts:
-        found |= {"R": (9, 1), "relax": (1, 1), "depth": (1, tail.points), "arm": (3, tail.points)}
-        found |= {"spring": (SPRING, tail.points), "J": (3 * tail.nt, tail.groups.get("tail", 0))}
-    return found
-
-
-def factors_size(tail: Tail) -> int:
-    """Numbers that factoring hands to solving."""
-    return sum(size * count for size, count in blocks(tail).values())
 
 
 @dataclass(frozen=True)
@@ -44,19 +24,22 @@ class Factors:
 
     def first(self, name: str) -> int:
         """Where a part begins."""
-        names = list(blocks(self.tail))
+        names = list(self.tail.factor_blocks)
         return sum(
-            size * count for size, count in list(blocks(self.tail).values())[: names.index(name)]
+            size * count
+            for size, count in list(self.tail.factor_blocks.values())[: names.index(name)]
         )
 
     def __call__(self, name: str, k: Index | int = 0) -> Ref:
         """Entry k of a part."""
-        size = blocks(self.tail)[name][0]
+        size = self.tail.factor_blocks[name][0]
         return self.array.part(self.first(name) + size * k, size)
 
     def entry(self, name: str, row: Index | int, column: Index | int, size: int = 1) -> Ref:
         """Numbers of a matrix."""
-        return self.array.part(self.first(name) + blocks(self.tail)[name][0] * row + column, size)
+        return self.array.part(
+            self.first(name) + self.tail.factor_blocks[name][0] * row + column, size
+        )
 
     def row(self, point: Index | int, axis: int, segment: Index | int) -> Ref:
         """How a tail point moves along an axis with the two coordinates of a segment."""

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from ...functions.function import Function, assemble, struct_parameters
-from ...functions.tail import Tail
+from ...functions.function import Function, assemble
+from ...functions.tail import Tail, struct_parameters
 from ...ir.cost import applied, branches
 from ...ir.program import Program
 from ...passes.unrolled_ldl import unrolled_ldl

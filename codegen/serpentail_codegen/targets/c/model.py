@@ -4,8 +4,7 @@ import hashlib
 import json
 from typing import Any
 
-from ...functions.function import struct_parameters
-from ...functions.tail import Tail
+from ...functions.tail import Tail, struct_parameters
 from ...ir.program import VECTOR
 from ...scene.scene import Scene
 from ..target import SEAL

@@ -4,11 +4,11 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import Any, Protocol
 
-from ...functions.function import Argument, struct_parameters
-from ...functions.tail import Tail
+from ...functions.tail import Tail, struct_parameters
 from ...ir.program import Program
 from ...ir.tape import operation_count
 from ...scene.scene import Scene
+from ...scene.signatures.arguments import Argument
 from .form import PrintedFunction, values
 from .routine import CFunction, Routine, routine_arguments, routine_lines
 

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from ...functions.catalogue import SYMBOLIC
-from ...functions.function import Function, assemble, struct_parameters
-from ...functions.tail import Tail
+from ...functions.function import Function, assemble
+from ...functions.tail import Tail, struct_parameters
 from ...ir.step import Step
 from ...scene.scene import Scene
 from ..target import SEAL, Emission, Target

@@ -3,6 +3,8 @@
 from collections.abc import Collection
 from dataclasses import dataclass
 
+from ....scene.signatures.table import SIGNATURES
+
 # where the numbers begin that anything depends on: neither the position of B nor its velocity
 # matters
 MOVING = {"q": 3, "v": 3}
@@ -59,19 +61,7 @@ class DynamicsDerivatives:
 
 DYNAMICS = (
     DynamicsDerivatives(
-        "inverse_dynamics",
-        "v_dot",
-        "force",
-        ("inverse_dynamics_derivatives", "mass_matrix"),
-        ("inverse_dynamics_vjp",),
-        ("inverse_dynamics_hessian",),
+        "inverse_dynamics", "v_dot", "force", *SIGNATURES["inverse_dynamics"].exact
     ),
-    DynamicsDerivatives(
-        "forward_dynamics",
-        "tau",
-        "v_dot",
-        ("forward_dynamics_derivatives",),
-        ("forward_dynamics_vjp",),
-        ("inverse_dynamics_hessian", "mass_matrix"),
-    ),
+    DynamicsDerivatives("forward_dynamics", "tau", "v_dot", *SIGNATURES["forward_dynamics"].exact),
 )

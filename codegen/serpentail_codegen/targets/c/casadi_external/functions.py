@@ -2,8 +2,7 @@
 
 from typing import Any
 
-from ....functions.function import struct_parameters
-from ....functions.tail import Tail
+from ....functions.tail import Tail, struct_parameters
 from ....scene.scene import Scene
 from .dynamics import DYNAMICS
 from .first_derivatives import adjoint, jacobian
