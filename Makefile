@@ -126,7 +126,7 @@ study-contact: $(READY)
 studies: study-models study-righting study-contact
 
 golden: $(READY)
-	$(PY) -m pytest tests/house/test_golden.py --update-golden
+	$(PY) -m pytest tests/house/test_golden.py tests/house/test_functions_document.py --update-golden
 
 clean:
 	rm -rf output

@@ -9,7 +9,7 @@ import numpy as np
 
 import serpentail as st
 from serpentail.model.compiler import compile_library
-from serpentail_codegen.scene.scene import DERIVATIVES
+from serpentail_codegen.scene.signatures.table import DERIVATIVES
 
 from .fixtures import Fixture, fixture
 from .peers import build, pinocchio, timing

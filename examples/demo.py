@@ -51,13 +51,6 @@ def start(model: st.Model) -> tuple[np.ndarray, np.ndarray]:
     return np.array(q), np.array([*VELOCITY, SPIN, 0, 0, *BEND_RATE * share])
 
 
-def centre_of_mass(model: st.Model, flight: st.Trajectory, points: np.ndarray) -> np.ndarray:
-    """Return the centre of mass (K, 3) in m: links are equal, each has its own half-way along."""
-    torso, tail = model.parameters["torso_mass"], model.parameters["tail_mass"]
-    links = (points[:, 1:] + points[:, :-1]) / 2
-    return (torso * flight.q[:, :3] + tail * links.mean(axis=1)) / (torso + tail)
-
-
 def drift(vectors: np.ndarray) -> float:
     """Return the largest change of a vector (K, 3), relative to its start."""
     return np.abs(vectors - vectors[0]).max() / np.linalg.norm(vectors[0])
@@ -114,9 +107,8 @@ def fly(scene: str, folder: Path) -> None:
         )
     with step("draw and save"):
         points = model.tail_points(flight.q)
-        st.filmstrip(
-            flight, points, folder / f"{scene}_film.png", com=centre_of_mass(model, flight, points)
-        )
+        com = model.center_of_mass(flight.q, flight.v)[0]
+        st.filmstrip(flight, points, folder / f"{scene}_film.png", com=com)
         st.time_plots(flight, folder / f"{scene}_time.png")
         flight.save(folder / f"{scene}.npz")
     print(report(model, flight, check), end="\n\n")

@@ -26,7 +26,7 @@ HEIGHT, VELOCITY, PITCH, SPIN, BEND, BEND_RATE = (
 FUNCTIONS = (
     "mass_matrix,bias_force,inverse_dynamics,forward_dynamics,energy,momentum,tail_points,rollout,"
     "forward_dynamics_derivatives,inverse_dynamics_derivatives,inverse_dynamics_vjp,forward_dynamics_vjp,"
-    "inverse_dynamics_hessian,pfl"
+    "inverse_dynamics_hessian,pfl,center_of_mass"
 )
 PAPER = {
     "formulation": "full",
@@ -107,27 +107,6 @@ def tracked(rat: st.Model, plan: st.Plan) -> st.Trajectory:
     start, law = (plan.problem.q0, plan.problem.v0), st.Pfl(rat, plan)
     end = np.nextafter(plan.duration, 0)
     return st.simulate(rat, *start, controller=law, t_span=end, method="dop853", rtol=1e-8)
-
-
-def centre_of_mass(rat: st.Model, flight: st.Trajectory) -> np.ndarray:
-    """Return the COM (K, 3), m: it falls freely."""
-    mass = rat.parameters["torso_mass"] + rat.parameters["tail_mass"]
-    points = rat.tail_points(flight.q[0])
-    start = (
-        rat.parameters["torso_mass"] * flight.q[0, :3]
-        + rat.parameters["tail_mass"] * _middle(points)
-    ) / mass
-    t = (flight.t - flight.t[0])[:, None]
-    return (
-        start
-        + flight.linear_momentum[0] / mass * t
-        - 0.5 * rat.parameters["gravity"] * t**2 * [0, 0, 1]
-    )
-
-
-def _middle(points: np.ndarray) -> np.ndarray:
-    """Mean of the links' centres; of an arc's samples, their trapezoidal mean."""
-    return ((points[1:] + points[:-1]) / 2).mean(axis=0)
 
 
 def row(plan: st.Plan) -> dict:

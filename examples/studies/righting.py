@@ -77,7 +77,7 @@ class Study:
     def film(self, size: tuple, flight: st.Trajectory, title: str) -> None:
         """Draw a strip of pictures of a flight."""
         rat = self.rats[size]
-        com = righting.centre_of_mass(rat, flight)
+        com = rat.center_of_mass(flight.q, flight.v)[0]
         st.filmstrip(flight, rat.tail_points(flight.q), self.folder / f"{title}.png", com=com)
 
 

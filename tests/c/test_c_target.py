@@ -21,13 +21,13 @@ from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.ir.step import Step
 from serpentail_codegen.pipeline import tail_of
 from serpentail_codegen.scene.parse import parse_scene
-from serpentail_codegen.scene.scene import DERIVATIVES, FUNCTIONS, WORLD
+from serpentail_codegen.scene.signatures.table import ALL, DEFAULT, DERIVATIVES, VALUES
 from serpentail_codegen.targets.c.form import in_form
 from serpentail_codegen.targets.c.routine import Routine, routine_lines
 from tests.references.parameters import random_states
 from tests.support.models import model_folder
 
-NAMES = (*FUNCTIONS, *WORLD)
+NAMES = tuple(name for name in ALL if name in (*DEFAULT, *VALUES))
 STRICT = (
     "-pedantic",
     "-Wall",

@@ -15,7 +15,7 @@ from serpentail.model.model import Model
 from serpentail.model.toolchain import candidates as _candidates
 from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.ir.program import Apply, statements
-from serpentail_codegen.scene.scene import DERIVATIVES
+from serpentail_codegen.scene.signatures.table import DERIVATIVES
 from tests.references.metrics import equilibrated_condition
 from tests.support.derivative_models import (
     derivative_model,

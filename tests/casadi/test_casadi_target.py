@@ -18,7 +18,7 @@ from serpentail_codegen.functions.plain import FUNCTIONS
 from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.pipeline import tail_of
 from serpentail_codegen.scene.parse import parse_scene
-from serpentail_codegen.scene.scene import DERIVATIVES
+from serpentail_codegen.scene.signatures.table import DERIVATIVES
 from tests.references.parameters import random_states
 from tests.support.models import model_folder
 
@@ -31,6 +31,7 @@ SHAPES = {
     "forward_dynamics_external": (["q", "v", "tau", "f_ext"], {"v_dot": "nv 1"}),
     "energy": (["q", "v"], {"kinetic": "1 1", "potential": "1 1"}),
     "momentum": (["q", "v"], {"linear": "3 1", "angular": "3 1"}),
+    "center_of_mass": (["q", "v"], {"position": "3 1", "velocity": "3 1", "J": "3 nv"}),
     "tail_points": (["q"], {"points": "points 3"}),
     "tail_point_jacobians": (["q"], {"J": "rows nv"}),
     "mass_matrix_world": (["q"], {"H": "nv nv"}),

@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from serpentail_codegen.scene.scene import DERIVATIVES
+from serpentail_codegen.scene.signatures.table import DERIVATIVES
 from tests.references.metrics import block_error
 from tests.support.derivative_models import (
     FIRST,

@@ -3,9 +3,8 @@
 import pytest
 
 from serpentail_codegen.functions.draft import Draft
-from serpentail_codegen.functions.function import struct_parameters
 from serpentail_codegen.functions.scope import Instead, State, Vectors
-from serpentail_codegen.functions.tail import Tail
+from serpentail_codegen.functions.tail import Tail, struct_parameters
 from serpentail_codegen.ir.program import Apply, statements
 from serpentail_codegen.mechanics import contact, rotations, torso
 from serpentail_codegen.mechanics.lower import derive

@@ -6,16 +6,16 @@ from types import SimpleNamespace
 import numpy as np
 
 from serpentail.pictures.skeleton import leg_joints
-from serpentail_codegen.functions.arguments import Q
-from serpentail_codegen.functions.contact import LEGS, assemble_leg_points
-from serpentail_codegen.functions.function import Argument, Function, assemble, struct_parameters
-from serpentail_codegen.functions.tail import Tail
+from serpentail_codegen.functions.contact import assemble_leg_points
+from serpentail_codegen.functions.function import Function, assemble
+from serpentail_codegen.functions.tail import Tail, struct_parameters
 from serpentail_codegen.ir.interpret import Numbers, Run
+from serpentail_codegen.scene.signatures.arguments import LEGS, Argument, Q
 from tests.references.contact import attitude, feet
 
 FLOATS = Numbers(math, float)
 TAIL = Tail(1, 1, contacts=("feet",))
-JOINTS = Argument("joints", lambda t: (2, 6, 3), "joints of both legs (m, world)")
+JOINTS = Argument("joints", (2, 6, 3), "joints of both legs (m, world)")
 FUNCTION = Function("leg_points", "Joints of both legs.", (Q, LEGS), (JOINTS,), assemble_leg_points)
 
 

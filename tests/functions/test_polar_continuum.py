@@ -12,7 +12,7 @@ import sympy
 
 import serpentail as st
 from serpentail_codegen.mechanics import polar_arc as polar_continuum
-from serpentail_codegen.scene.scene import DERIVATIVES, FUNCTIONS, WORLD
+from serpentail_codegen.scene.signatures.table import VALUES
 from tests.references.exact_polar import ExactPolar
 from tests.references.metrics import block_error, equilibrated_condition, mass_matrix_error
 from tests.references.parameters import TABLE_1
@@ -20,16 +20,15 @@ from tests.support.models import model_folder
 
 MODERATE = (0.5, 1.0, 2.0, np.pi)
 VANISHING = 10.0 ** np.arange(-1, -3.1, -0.5)
-VALUES = [*(name for name in FUNCTIONS if name not in DERIVATIVES), *WORLD]
+FUNCTIONS = [*VALUES, "rollout"]
 EMISSIONS = {"straight": (1, "straight"), "loops": (2, "loops")}
 
 
 @cache
 def model(segments, coordinates="polar", emission="auto"):
     """The compiled continuum in one kind of coordinates."""
-    return st.load(
-        model_folder(segments, None, coordinates=coordinates, emission=emission, functions=VALUES)
-    )
+    options = {"coordinates": coordinates, "emission": emission, "functions": FUNCTIONS}
+    return st.load(model_folder(segments, None, **options))
 
 
 @cache
@@ -261,7 +260,7 @@ def test_c_example_runs_at_a_bend(tmp_path):
     )
 
 
-@pytest.mark.parametrize("name", [name for name in VALUES if name != "rollout"])
+@pytest.mark.parametrize("name", VALUES)
 def test_casadi_and_c_agree(name):
     polar, (q, v, v_dot, tau) = model(2, emission="loops"), polar_state(2, 1.3)
     given = {

@@ -16,7 +16,7 @@ import serpentail as st
 from serpentail.cli import parser
 from serpentail_codegen.scene.parameters import PARAMETERS
 from serpentail_codegen.scene.parse import parse_scene
-from serpentail_codegen.scene.scene import ALL
+from serpentail_codegen.scene.signatures.table import ALL
 
 ROOT = Path(__file__).parents[2]
 DOCUMENTS = [
@@ -163,7 +163,8 @@ for path in sorted(CODEGEN.rglob("[a-z]*.py")):
 def test_functions_exist(document):
     for span in code(document):
         for module, name in re.findall(
-            rf"(?<![\w./])({'|'.join(MODULES)})\.(?!py\b|toml\b|md\b|json\b|jinja\b|c\b|h\b)(\w+)", span
+            rf"(?<![\w./])({'|'.join(MODULES)})\.(?!py\b|toml\b|md\b|json\b|jinja\b|c\b|h\b)(\w+)",
+            span,
         ):
             assert any(hasattr(importlib.import_module(m), name) for m in MODULES[module]), span
         for name in re.findall(r"\b(?:st|serpentail)\.(?!cli\b)(\w+)", span):

@@ -79,7 +79,7 @@ def test_folder_without_manifest_says_how_to_make_one(folder, tmp_path, place):
     assert "make model TAIL=articulated M=3 N=4" in message
 
 
-@pytest.mark.parametrize("text", ["", "{", "[]", "{}", "null", '{"format": 1}', "\xff"])
+@pytest.mark.parametrize("text", ["", "{", "[]", "{}", "null", '{"format": 2}', "\xff"])
 def test_damaged_manifest(folder, text):
     (folder / "manifest.json").write_text(text, encoding="latin-1")
     message = refusal(folder)
@@ -116,13 +116,13 @@ def test_manifest_without_an_entry(folder, key):
 
 
 @pytest.mark.parametrize(
-    "change", [{"generator": "0.0.9"}, {"format": 2}, {"generator": "0.0.9", "parameters": None}]
+    "change", [{"generator": "0.0.9"}, {"format": 1}, {"generator": "0.0.9", "parameters": None}]
 )
 def test_folder_of_another_generator_is_stale(folder, change):
     edit(folder, **change)
     message = refusal(folder)
-    assert f"{folder} is stale: made by format {change.get('format', 1)}, " in message
-    assert f"this is format 1, {st.__version__}" in message.replace(
+    assert f"{folder} is stale: made by format {change.get('format', 2)}, " in message
+    assert f"this is format 2, {st.__version__}" in message.replace(
         "generator ", ""
     ) and message.endswith(AGAIN)
 

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail_codegen.scene.scene import ALL, TOUCHING
+from serpentail_codegen.scene.signatures.table import ALL, NEED_CONTACTS
 from tests.support.models import model_folder
 
 SEGMENTS, LINKS = 2, 1
@@ -33,6 +33,7 @@ CALLS = {
     "forward_dynamics_external": (["q", "v", "tau", "f_ext"], [(NV,)]),
     "energy": (["q", "v"], [(), ()]),
     "momentum": (["q", "v"], [(3,), (3,)]),
+    "center_of_mass": (["q", "v"], [(3,), (3,), (3, NV)]),
     "tail_points": (["q"], [(POINTS, 3)]),
     "tail_point_jacobians": (["q"], [(POINTS, 3, NV)]),
     "mass_matrix_world": (["q"], [(NV, NV)]),
@@ -49,7 +50,7 @@ CALLS = {
     "momentum_derivatives": (["q", "v"], [(3, NV)] * 4),
     "pfl": (["q", "v", "accelerations"], [(NT,)]),
 }
-ELSEWHERE = {"rollout", "implicit", *TOUCHING}  # tested in files of their own
+ELSEWHERE = {"rollout", "implicit", *NEED_CONTACTS}  # tested in files of their own
 every_function = pytest.mark.parametrize("name", CALLS)
 
 

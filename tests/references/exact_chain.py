@@ -84,6 +84,20 @@ class ExactChain:
         center = _scaled(1 / sum(body.mass for body in bodies), first)
         return _rounded(linear), _rounded(_minus(angular, _cross(center, linear)))
 
+    def center_of_mass(self, q, v):
+        """(position, velocity, J) of the centre of mass, in world axes."""
+        bodies = self._bodies(q)
+        total, position, velocity = sum(body.mass for body in bodies), self.zero, self.zero
+        columns = self.nv * [self.zero]
+        motions = zip(bodies, self._velocities(bodies, v), self._jacobians(bodies), strict=True)
+        for body, (speed, _), (jacobian, _) in motions:
+            share = body.mass / total
+            position = _plus(position, _scaled(share, body.com))
+            velocity = _plus(velocity, _scaled(share, speed))
+            for k, column in enumerate(jacobian):
+                columns[k] = _plus(columns[k], _scaled(share, column))
+        return _rounded(position), _rounded(velocity), _rounded(columns).T
+
     def _exact(self, vector):
         """The float64 entries as numbers of this chain's context."""
         return [self.mp.mpf(entry) for entry in np.asarray(vector, dtype=float).tolist()]

@@ -77,6 +77,14 @@ class ExactContinuum:
         spin = self._torso_axes(q) @ (self.torso_inertia * self._exact(v[3:6]))
         return _rounded(linear), _rounded(angular + spin)
 
+    def center_of_mass(self, q, v):
+        """(position, velocity, J) of the centre of mass, in world axes."""
+        points, velocities = self._points(q, v)
+        shares = self.masses / sum(self.masses)
+        columns = self._jacobian(tuple(q)).reshape(self.nv, len(shares), 3)
+        J = np.array([shares @ column for column in columns]).T
+        return _rounded(shares @ points), _rounded(shares @ velocities), _rounded(J)
+
     def tail_points(self, q, samples):
         """World positions (m samples + 1, 3) of equally spaced slices, from the mount to the
         tip.

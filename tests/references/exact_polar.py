@@ -53,6 +53,11 @@ class ExactPolar:
         mass = self.bend.mass_matrix(self.state(q, np.zeros(self.nv))[0])
         return np.array(jacobian.T @ mass @ jacobian, dtype=float)
 
+    def center_of_mass(self, q, v):
+        """(position, velocity, J) of the centre of mass, J in the polar angles."""
+        position, velocity, J = self.bend.center_of_mass(*self.state(q, v))
+        return position, velocity, np.array(J @ self._jacobian(q), dtype=float)
+
     def _segments(self, q):
         """Yield (phi, theta, sin(phi), cos(phi)) of every segment."""
         for phi, theta in self._exact(q)[7:].reshape(-1, 2):

@@ -64,6 +64,15 @@ class MujocoChain:
         linear = self.model.body_subtreemass[torso] * self.data.subtree_linvel[torso]
         return linear, self.data.subtree_angmom[torso].copy()
 
+    def center_of_mass(self, q, v):
+        """(position, velocity, J) of the centre of mass, in world axes."""
+        self._evaluate(q, v)
+        mujoco.mj_subtreeVel(self.model, self.data)
+        torso, jacobian = self.model.body("torso").id, np.zeros((3, self.model.nv))
+        mujoco.mj_jacSubtreeCom(self.model, self.data, jacobian, torso)
+        position, velocity = self.data.subtree_com[torso], self.data.subtree_linvel[torso]
+        return position.copy(), velocity.copy(), jacobian @ self.reduction
+
     def tail_points(self, q):
         """World positions (N+1, 3) of the N joints and the tip."""
         self._evaluate(q)

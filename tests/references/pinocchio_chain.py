@@ -61,6 +61,17 @@ class PinocchioChain:
         centroidal = pin.computeCentroidalMomentum(self.model, self.data, full_q, transform @ v)
         return centroidal.linear.copy(), centroidal.angular.copy()
 
+    def center_of_mass(self, q, v):
+        """(position, velocity, J) of the centre of mass, in world axes."""
+        full_q, transform = self._full_configuration(q)
+        pin.centerOfMass(self.model, self.data, full_q, transform @ v)
+        position, velocity = self.data.com[0].copy(), self.data.vcom[0].copy()
+        return (
+            position,
+            velocity,
+            pin.jacobianCenterOfMass(self.model, self.data, full_q) @ transform,
+        )
+
     def tail_points(self, q):
         """World positions (N+1, 3) of the N joints and the tip."""
         pin.framesForwardKinematics(self.model, self.data, self._full_configuration(q)[0])

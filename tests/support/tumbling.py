@@ -7,11 +7,11 @@ from functools import cache
 import numpy as np
 
 import serpentail as st
-from serpentail.model.casadi import DERIVATIVES
+from serpentail_codegen.scene.signatures.table import EXACT_DERIVATIVES
 from tests.support.models import model_folder
 
 EXACT = sorted(
-    {part for name, orders in DERIVATIVES.items() for part in (name, *orders[0], *orders[1])}
+    {part for name, orders in EXACT_DERIVATIVES.items() for part in (name, *orders[0], *orders[1])}
 )
 FUNCTIONS = [*EXACT, "bias_force", "pfl", "energy", "momentum", "rollout", "tail_points"]
 DURATION = 0.4  # s

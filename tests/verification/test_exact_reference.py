@@ -93,6 +93,13 @@ def test_energy_agrees(exact, library, states):
         assert library.energy(q, v) == pytest.approx(exact.energy(q, v), rel=1e-13, abs=1e-14)
 
 
+def test_center_of_mass_agrees(exact, library, states):
+    for q, v, *_ in states:
+        pairs = zip(library.center_of_mass(q, v), exact.center_of_mass(q, v), strict=True)
+        for found, expected in pairs:
+            assert np.max(np.abs(found - expected)) <= 1e-13 * np.max(np.abs(expected))
+
+
 def test_momentum_agrees(exact, library, states):
     for q, v, *_ in states:
         for momentum, momentum_ref in zip(

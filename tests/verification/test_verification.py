@@ -15,15 +15,19 @@ from serpentail.verification import errors, law, states
 from serpentail.verification import report as verify
 from serpentail.verification.law import fastest
 from serpentail_codegen.functions.catalogue import CATALOGUE
-from serpentail_codegen.functions.contact import CONTACT
 from serpentail_codegen.functions.function import assemble
-from serpentail_codegen.functions.implicit.functions import IMPLICIT
-from serpentail_codegen.functions.pfl import FEEDBACK
 from serpentail_codegen.mechanics import link, loads, torso
 from serpentail_codegen.mechanics.shapes import M33, V1, V3, V6
 from serpentail_codegen.pipeline import generate
 from serpentail_codegen.scene.parse import scene_for
-from serpentail_codegen.scene.scene import ON_DEMAND
+from serpentail_codegen.scene.signatures.signature import IMPLICIT
+from serpentail_codegen.scene.signatures.table import (
+    DEFAULT,
+    DERIVATIVES,
+    NEED_CONTACTS,
+    SIGNATURES,
+    in_group,
+)
 from tests.references import metrics
 from tests.references.exact_chain import ExactChain
 from tests.references.exact_continuum import ExactContinuum
@@ -53,7 +57,7 @@ SOUND_SLOW = {
     "continuum float": (1, None, {"real": "float"}),
 }
 SLIGHT = 1e-9
-TAKING_MORE = (*CONTACT, *IMPLICIT)  # functions of more than a state
+TAKING_MORE = (*NEED_CONTACTS, *in_group(IMPLICIT))  # functions of more than a state
 
 
 @pytest.fixture(scope="module")
@@ -65,9 +69,9 @@ def model():
 @pytest.fixture(scope="module")
 def having(model):
     """Return a function from a function's name to a sound model that has it."""
-    names = ["mass_matrix", "bias_force", *CONTACT]
+    names = ["mass_matrix", "bias_force", *NEED_CONTACTS]
     touching = st.load(model_folder(1, 3, functions=names, contacts=["feet", "tail", "torso"]))
-    return lambda name: touching if name in CONTACT else model
+    return lambda name: touching if name in NEED_CONTACTS else model
 
 
 def failed(checks):
@@ -137,7 +141,7 @@ def on_demand(reason):
     them.
     """
     absent = set(reason.removeprefix("not generated: ").split(", "))
-    return absent <= {*ON_DEMAND, *FEEDBACK, *IMPLICIT}
+    return absent <= set(SIGNATURES) - {*DEFAULT, *NEED_CONTACTS}
 
 
 def test_all_laws_hold_without_peers(model):
@@ -255,6 +259,12 @@ def heavier_at_height(energy, *_):
     return energy[0], energy[1] * (1 + SLIGHT)
 
 
+def slower(center, *_):
+    """The velocity of the centre of mass alone is wrong."""
+    position, velocity, J = center
+    return position, velocity * (1 + SLIGHT), J
+
+
 def stretched(points, q):
     """Links that are too long."""
     mount = points[..., :1, :]
@@ -289,6 +299,17 @@ FAULTS = {
         "inverse dynamics is mass times acceleration plus bias",
     ),
     "refused": ("momentum", refused, "momentum is mass times velocity"),
+    "heavy center": (
+        "center_of_mass",
+        times(1 + SLIGHT),
+        "center of mass is that of the mass matrix",
+    ),
+    "slow center": ("center_of_mass", slower, "velocity of the center of mass is J v"),
+    "light center": (
+        "center_of_mass",
+        slower,
+        "momentum is mass times velocity of the center of mass",
+    ),
     "power": ("forward_dynamics", times(1 + SLIGHT), "energy changes by the power of the torques"),
     "torques": (
         "forward_dynamics",
@@ -483,14 +504,16 @@ def test_a_model_of_one_function_is_checked(name):
         name, [name.removesuffix("_factor").removesuffix("_solve")]
     )
     model = st.load(
-        model_folder(1, 1, functions=asked, **({"contacts": ["tail"]} if name in CONTACT else {}))
+        model_folder(
+            1, 1, functions=asked, **({"contacts": ["tail"]} if name in NEED_CONTACTS else {})
+        )
     )
     checks = verify.laws(model)
     assert failed(checks) == set()
     if name in TAKING_MORE:
         return
     expected = {"calls repeat", "batches are singles", "casadi externals are the compiled code"}
-    expected |= {"casadi functions agree"} if name not in errors.DERIVATIVES else set()
+    expected |= {"casadi functions agree"} if name not in DERIVATIVES else set()
     assert expected <= {c.name for c in checks if c.status == "passed"}
 
 

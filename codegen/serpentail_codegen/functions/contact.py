@@ -5,34 +5,14 @@ from dataclasses import dataclass
 from ..ir.program import Array, Index, Ref
 from ..mechanics import contact, leg, loads
 from ..mechanics.lower import derive
-from .arguments import TAU, V_DOT, Q, V
 from .draft import Draft
 from .dynamics import accelerate_by_segments, copied_torques
 from .factored import factored_dynamics
-from .function import Argument, Function
 from .layout import coordinates
 from .scope import State, Torso, Vectors
 from .sweeps.pieces import attitude, mechanism, torso_pose
 from .tail import Tail
 from .tails.mechanism import Segments
-
-LEGS = Argument(
-    "legs",
-    lambda t: (8 * ("feet" in t.contacts),),
-    "gamma_1, delta_1 of the right leg, gamma_2, delta_2 of the left (rad), then their rates "
-    "(rad/s)",
-)
-POSITIONS = Argument(
-    "positions", lambda t: (t.points, 3), "points that can touch the ground (m, world)"
-)
-VELOCITIES = Argument("velocities", lambda t: (t.points, 3), "their velocities (m/s, world)")
-BRISTLES = Argument(
-    "bristles", lambda t: (2 * t.points,), "stretch of the friction springs (m, world x and y)"
-)
-BRISTLE_RATES = Argument("bristle_rates", lambda t: (2 * t.points,), "their rates (m/s)")
-FORCES = Argument(
-    "forces", lambda t: (t.points, 3), "forces of the ground on the points (N, world)"
-)
 
 
 @dataclass(frozen=True)
@@ -218,21 +198,7 @@ def assemble_contact_dynamics(draft: Draft, arrays: dict[str, Array]) -> None:
     factored.solve(draft, factored.loads(applied, torques), arrays["v_dot"])
 
 
-_TABLE = (
-    Function(
-        "contact_points",
-        "points that can touch the ground: A, M, T of the right foot, of the left; tail; the "
-        "torso's lowest",
-        (Q, V, LEGS),
-        (POSITIONS, VELOCITIES),
-        assemble_contact_points,
-    ),
-    Function(
-        "contact_dynamics",
-        "v_dot from Eq. 1 with the forces of the ground, Eqs. 35 to 37",
-        (Q, V, TAU, BRISTLES, LEGS),
-        (V_DOT, BRISTLE_RATES, FORCES),
-        assemble_contact_dynamics,
-    ),
-)
-CONTACT = {function.name: function for function in _TABLE}
+ASSEMBLIES = {
+    "contact_points": assemble_contact_points,
+    "contact_dynamics": assemble_contact_dynamics,
+}

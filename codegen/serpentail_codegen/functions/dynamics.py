@@ -1,13 +1,14 @@
 """Mass matrix, inverse and forward dynamics, energy and momentum."""
 
 from dataclasses import replace
+from functools import partial
 
 from ..ir.program import Array, Index, Ref
 from ..mechanics import rotations, torso
-from .arguments import TAU, V_DOT, Q, V
+from ..scene.signatures.arguments import TAU, V_DOT, Argument, Q, V
 from .draft import Draft
 from .factored import FactoredDynamics, factored_dynamics
-from .function import Argument, Function, assemble
+from .function import Assembly, Function, assemble
 from .layout import OMEGA, TORSO_NV, VELOCITY, block, segment_v
 from .scope import Motion, State, Vectors
 from .sweeps.inertia import column_of, tail_inertia
@@ -177,9 +178,20 @@ SEGMENT_DYNAMICS = Function(
     (
         Q,
         V,
-        Argument("at_torso", lambda t: (6,), "force and moment at B, torso axes"),
+        Argument("at_torso", (6,), "force and moment at B, torso axes"),
         replace(TAU, name="torques"),
     ),
     (V_DOT,),
     assemble_segment_dynamics,
 )
+ASSEMBLIES: dict[str, Assembly] = {
+    "mass_matrix": assemble_mass_matrix,
+    "bias_force": assemble_inverse_dynamics,
+    "inverse_dynamics": assemble_inverse_dynamics,
+    "forward_dynamics": assemble_acceleration,
+    "forward_dynamics_external": assemble_acceleration,
+    "energy": assemble_energy,
+    "momentum": assemble_momentum,
+    "mass_matrix_world": partial(assemble_mass_matrix, world=True),
+    "bias_force_world": partial(assemble_inverse_dynamics, world=True),
+}

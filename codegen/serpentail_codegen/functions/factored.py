@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 from ..ir.program import Array, Index, Ref, padded
 from ..mechanics import rotations, translation
-from .arguments import Q, V
+from ..scene.signatures.arguments import Argument, Q, V
 from .draft import Draft
-from .function import Argument, Function, assemble
+from .function import Function, assemble
 from .layout import OMEGA, VELOCITY, block, tail_v
 from .scope import Instead, Scope, State, Vectors
 from .sweeps.columns import factored_dynamics_by_columns
@@ -63,13 +63,13 @@ FACTORED_DYNAMICS = Function(
     "H with translation eliminated, factored, and C without gravity",
     (Q, V),
     (
-        Argument("R", lambda t: (9,), "attitude"),
-        Argument("inverse_mass", lambda t: (1,), "1 / M"),
-        Argument("com", lambda t: (3,), "centre of mass from B, torso axes"),
-        Argument("first_moment", lambda t: (3,), "M times it"),
-        Argument("A", lambda t: (3 + t.nt, padded(3 + t.nt)), "L^T D L"),
-        Argument("columns", lambda t: (t.nt, 6), "momentum of each tail coordinate at B"),
-        Argument("bias", lambda t: (t.nv,), "force, moment, and the tail's forces"),
+        Argument("R", (9,), "attitude"),
+        Argument("inverse_mass", (1,), "1 / M"),
+        Argument("com", (3,), "centre of mass from B, torso axes"),
+        Argument("first_moment", (3,), "M times it"),
+        Argument("A", ("rotational", "rotational_row"), "L^T D L"),
+        Argument("columns", ("nt", 6), "momentum of each tail coordinate at B"),
+        Argument("bias", ("nv",), "force, moment, and the tail's forces"),
     ),
     assemble_factored_dynamics,
 )

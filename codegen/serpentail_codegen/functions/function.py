@@ -1,54 +1,42 @@
-"""The functions a scene can ask for: a tail's sizes go in, the loop nest of each function comes
-out.
-"""
+"""A function together with its assembly: the code that builds its program for a tail."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
-from math import prod
 
 from ..ir.program import Array, Program
-from ..scene.parameters import Parameter
-from ..scene.resolve import parameters_of
-from ..scene.scene import Scene
+from ..scene.signatures.arguments import Argument
+from ..scene.signatures.table import SIGNATURES
 from .draft import Draft
-from .tail import Tail
+from .tail import Tail, struct_parameters
 
-
-@dataclass(frozen=True)
-class Argument:
-    """One array argument of a function: its shape from the tail's sizes, and what it means."""
-
-    name: str
-    shape: Callable[[Tail], tuple[int, ...]]
-    meaning: str
-
-    def length(self, tail: Tail) -> int:
-        """Number of scalars."""
-        return prod(self.shape(tail))
+Assembly = Callable[[Draft, dict[str, Array]], None]
 
 
 @dataclass(frozen=True)
 class Function:
-    """A function that a scene can ask for: name, arguments, and how to assemble it."""
+    """A function of a model, or one that others call: name, arguments, and how to assemble it."""
 
     name: str
     doc: str
     inputs: tuple[Argument, ...]
     outputs: tuple[Argument, ...]
-    assemble: Callable[[Draft, dict[str, Array]], None]
+    assemble: Assembly
 
     def of(self, tail: Tail) -> "Function":
         """Return this function with the arguments that a tail has: those of a length."""
-        inputs, outputs = (
-            tuple(a for a in some if a.length(tail)) for some in (self.inputs, self.outputs)
-        )
+        inputs = tuple(a for a in self.inputs if a.length(tail))
+        outputs = tuple(a for a in self.outputs if a.length(tail))
         return replace(self, inputs=inputs, outputs=outputs)
 
 
-def struct_parameters(model: Tail | Scene) -> tuple[Parameter, ...]:
-    """Return the parameters that the functions of a model read: the fields of its struct."""
-    return tuple(p for p in parameters_of(model.kind, model.contacts) if p.name != "link_radius")
+def signed(assemblies: Mapping[str, Assembly]) -> dict[str, Function]:
+    """Join assemblies with the signatures of the same names."""
+    functions = {}
+    for name, assembly in assemblies.items():
+        s = SIGNATURES[name]
+        functions[name] = Function(name, s.doc, s.inputs, s.outputs, assembly)
+    return functions
 
 
 @cache
@@ -60,6 +48,7 @@ def assemble(function: Function, tail: Tail, dynamics: str = "composite") -> Pro
     """
     dynamics = dynamics if tail.kind == "articulated" else "composite"
     draft = Draft(function.name, function.doc, tail=tail, dynamics=dynamics)
+    # parameters first, then arguments: the program keeps the order of its arrays
     draft.declare_parameters(struct_parameters(tail))
     arrays = {a.name: draft.array(a.name, a.length(tail), role="input") for a in function.inputs}
     arrays |= {a.name: draft.array(a.name, a.length(tail), role="output") for a in function.outputs}

@@ -1,10 +1,11 @@
 """The tail's points and their Jacobians."""
 
 from ..ir.program import Array, Index, Ref
-from ..mechanics import loads
+from ..mechanics import loads, torso
 from .draft import Draft
-from .layout import OMEGA, TORSO_NV, coordinate
+from .layout import OMEGA, TORSO_NV, coordinate, tail_v
 from .scope import State
+from .sweeps.inertia import column_of, forward_roots, gather_inertia, segment_roots
 from .sweeps.pieces import attitude, mechanism, torso_pose
 
 
@@ -55,3 +56,35 @@ def assemble_tail_point_jacobians(draft: Draft, arrays: dict[str, Array]) -> Non
                 reads = {"S": S[segment], "arm": pose.P}
                 first = TORSO_NV + coordinate(segment)
                 draft.step(loads.point_jacobian_tail, reads, **rows(point, first, 2))
+
+
+def assemble_center_of_mass(draft: Draft, arrays: dict[str, Array]) -> None:
+    """Where the animal's centre of mass is, how fast it moves, and its Jacobian: momentum columns
+    over the mass.
+    """
+    tail, J, velocity = draft.tail, arrays["J"], arrays["velocity"][0]
+    state = State(arrays["q"], arrays["v"])
+
+    # mass, first moment, and the momentum that each tail coordinate gives, in torso axes
+    R = attitude(draft, state)
+    segments = mechanism(draft).prepare(draft, state, True)
+    columns, roots = draft.array("columns", 12, tail.segments), segment_roots(draft)
+    forward_roots(draft, segments, torso_pose(draft), roots)
+    composite = gather_inertia(draft, segments, roots, columns)
+
+    # the torso's motion, then what the tail's adds to it
+    rows = {f"J_{name}": J.part(axis * tail.nv, TORSO_NV) for axis, name in enumerate("xyz")}
+    motion = {"position": arrays["position"][0], "velocity": velocity}
+    mass = draft.vectors(inverse_mass=1)
+    draft.step(torso.com_at_base, state.torso(R), composite, **mass, **motion, **rows)
+    with draft.loop("k", tail.nt) as k:
+        reads = {"R": R, "column": column_of(columns, k), "rate": tail_v(arrays["v"], k)}
+        writes = {"J_column": J.part(TORSO_NV + k, 3, stride=tail.nv), "velocity_": velocity}
+        draft.step(torso.com_of_coordinate, mass, reads, **writes)
+
+
+ASSEMBLIES = {
+    "tail_points": assemble_tail_points,
+    "tail_point_jacobians": assemble_tail_point_jacobians,
+    "center_of_mass": assemble_center_of_mass,
+}

@@ -14,6 +14,7 @@ VELOCITY = slice(0, 3)  # of B in v, world (m/s); of forces in generalised force
 OMEGA = slice(3, 6)  # in v, body axes (rad/s); of moments in generalised forces (N m)
 TORSO_NQ, TORSO_NV = 7, 6  # numbers of the torso in q and in v
 PER_SEGMENT = 2  # coordinates of a segment
+LOAD = 6  # numbers of a load at B: force and moment; then a force at each tail point
 
 Number = TypeVar("Number", Index, int)
 

@@ -2,20 +2,13 @@
 
 from ..ir.program import Array, padded
 from ..mechanics import rotations, torso, translation
-from .arguments import V_DOT, Q, V
 from .draft import Draft
-from .function import Argument, Function
 from .layout import OMEGA, VELOCITY, block, coordinates, tail_v
 from .scope import Motion, State, Vectors
 from .sweeps.inertia import column_of, forward_roots, gather_inertia, segment_roots
 from .sweeps.pieces import attitude, mechanism, torso_pose
 from .sweeps.wrenches import forward_wrenches, gather_wrenches
 from .tails.mechanism import Segments
-
-ACCELERATIONS = Argument(
-    "accelerations", lambda t: (t.nt,), "wanted accelerations of the tail coordinates (rad/s^2)"
-)
-TORQUES = Argument("tau", lambda t: (t.nt,), "torques (N m), conjugate to the tail coordinates")
 
 
 def assemble_pfl(draft: Draft, arrays: dict[str, Array]) -> None:
@@ -76,20 +69,4 @@ def free_torso(draft: Draft, composite: Vectors, wrench: Vectors) -> Vectors:
     return Vectors({**w_dot, **free})
 
 
-WANTED = (Q, V, ACCELERATIONS)
-FEEDBACK = {
-    "pfl": Function(
-        "pfl",
-        "torques in flight that give the tail wanted accelerations, Eq. 46",
-        WANTED,
-        (TORQUES,),
-        assemble_pfl,
-    ),
-    "tracked_dynamics": Function(
-        "tracked_dynamics",
-        "torques in flight that give the tail wanted accelerations, Eq. 46, and v_dot under them",
-        WANTED,
-        (TORQUES, V_DOT),
-        assemble_pfl,
-    ),
-}
+ASSEMBLIES = {"pfl": assemble_pfl, "tracked_dynamics": assemble_pfl}

@@ -104,6 +104,24 @@ def momentum_at_com(let, R: M33, p_dot: V3, mass: V1, h: V3, force: V3, moment: 
     }
 
 
+def com_at_base(let, R: M33, p: V3, p_dot: V3, omega: V3, mass: V1, h: V3) -> dict:
+    """Position and velocity of the COM while the tail does not bend: p + R c, p_dot + R (omega x
+    c), c = h / M; and its Jacobian [1, -R skew(c)], row by row.
+    """
+    inverse = let("inverse", 1 / mass[0])
+    c = let("c", h * inverse)
+    skewed = let("skewed", R * Matrix([[0, c[2], -c[1]], [-c[2], 0, c[0]], [c[1], -c[0], 0]]))
+    rows = {f"J_{name}": Matrix([*eye(3).row(k), *skewed.row(k)]) for k, name in enumerate("xyz")}
+    motion = {"position": p + R * c, "velocity": p_dot + skewed * omega}
+    return motion | {"inverse_mass": [inverse]} | rows
+
+
+def com_of_coordinate(let, R: M33, inverse_mass: V1, column: V6, rate: V1) -> dict:
+    """Velocity of the COM per rate of one tail coordinate, R f_k / M; and what its rate adds."""
+    J = let("J", R * column[0:3, :] * inverse_mass[0])
+    return {"J_column": J, "velocity": J * rate[0]}
+
+
 def mass_matrix_base(let, R: M33, mass: V1, h: V3, I: V6) -> dict:
     """The 6 x 6 block of H for (p_dot world, omega body): M 1, -R skew(h), I."""
     skewed = R * Matrix([[0, h[2], -h[1]], [-h[2], 0, h[0]], [h[1], -h[0], 0]])

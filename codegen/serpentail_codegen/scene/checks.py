@@ -1,4 +1,4 @@
-"""What a scene may say: every rule that a file or table must keep, with its remedy."""
+"""The rules that a scene's table must keep; what breaks one becomes a problem with a remedy."""
 
 import sys
 from collections.abc import Collection, Mapping
@@ -6,7 +6,8 @@ from typing import Any
 
 from .parameters import PARAMETERS, SINGLE, Parameter, Value
 from .problems import Problem, suggest
-from .scene import ALL, COUNT, DERIVATIVES, KEYS, MOST_LINKS, NAMES, ONLY, TOUCHING, Only, _is_whole
+from .scene import COUNT, KEYS, MOST_LINKS, NAMES, ONLY, Only, is_whole
+from .signatures.table import ALL, DERIVATIVES, NEED_CONTACTS
 
 
 def plain(value: Value) -> float | list[float]:
@@ -15,9 +16,7 @@ def plain(value: Value) -> float | list[float]:
 
 
 def fits(parameter: Parameter, value: Any) -> bool:
-    """Tell if a value has the parameter's size, is made of finite numbers, and keeps the
-    parameter's rule.
-    """
+    """Tell if a value is as many finite numbers as the parameter has, and keeps its rule."""
     if (parameter.size > 1) != isinstance(value, list | tuple):
         return False
     numbers = value if parameter.size > 1 else [value]
@@ -30,7 +29,7 @@ def fits(parameter: Parameter, value: Any) -> bool:
 
 def _is_finite(x: Any) -> bool:
     """Tell if x is a number that a float can hold."""
-    return (_is_whole(x) or isinstance(x, float)) and abs(x) <= sys.float_info.max
+    return (is_whole(x) or isinstance(x, float)) and abs(x) <= sys.float_info.max
 
 
 def number_problem(parameter: Parameter, value: object) -> Problem:
@@ -53,22 +52,25 @@ def key_problems(values: Mapping[str, Any]) -> list[Problem]:
     return problems
 
 
-def kind_problems(table: Mapping[str, Any], own: Only) -> list[Problem]:
+def kind_problems(table: Mapping[str, Any], rules: Only) -> list[Problem]:
     """Return a problem for all that the tail's kind does not have."""
-    problems, given = [], table.get("parameters", {})
-    for only in (only for only in ONLY.values() if only is not own):
-        remedy = "this kind of tail has none; remove it, or choose another kind"
+    problems, parameters = [], _parameters_in(table)
+
+    # keys and parameters of the other kinds
+    remedy = "this kind of tail has none; remove it, or choose another kind"
+    for only in (only for only in ONLY.values() if only is not rules):
         problems += [Problem(key, table[key], remedy) for key in only.keys if key in table]
-        wrong = [key for key in only.parameters if isinstance(given, Mapping) and key in given]
-        problems += [Problem(f"parameters.{key}", given[key], remedy) for key in wrong]
-    if table.get("coordinates", own.coordinates[0]) not in own.coordinates:
-        choices = " or ".join(f'"{name}"' for name in own.coordinates)
+        wrong = [key for key in only.parameters if key in parameters]
+        problems += [Problem(f"parameters.{key}", parameters[key], remedy) for key in wrong]
+
+    # coordinates, and what polar ones do not have
+    derivatives = _derivatives_in(table.get("functions"))
+    if table.get("coordinates", rules.coordinates[0]) not in rules.coordinates:
+        choices = " or ".join(f'"{name}"' for name in rules.coordinates)
         remedy = f"needs {choices}; polar angles are singular at theta = 0, convert states"
         problems.append(Problem("coordinates", table["coordinates"], remedy))
-    elif table.get("coordinates") == "polar" and (
-        wanted := _derivatives_in(table.get("functions"))
-    ):
-        remedy = f'has no derivatives, such as {wanted[0]}: use "bend", which has'
+    elif table.get("coordinates") == "polar" and derivatives:
+        remedy = f'has no derivatives, such as {derivatives[0]}: use "bend", which has'
         problems.append(Problem("coordinates", "polar", remedy))
     return problems
 
@@ -77,23 +79,34 @@ def contact_problems(
     table: Mapping[str, Any], values: Mapping[str, Any], contacts: Collection[str]
 ) -> list[Problem]:
     """Return a problem for all that needs contacts which the scene does not have."""
-    problems, given = [], table.get("parameters", {})
+    problems, parameters = [], _parameters_in(table)
+
+    # parameters of groups that do not touch the ground
     needs = {p.name: p.needs for p in PARAMETERS if p.needs and p.needs not in contacts}
     needs = {name: group for name, group in needs.items() if group != "contacts" or not contacts}
-    for name in [name for name in needs if isinstance(given, Mapping) and name in given]:
+    for name in [name for name in needs if name in parameters]:
         group = "feet" if needs[name] == "contacts" else needs[name]
         remedy = f'nothing touches the ground by it; add "{group}" to `contacts`, or remove it'
-        problems.append(Problem(f"parameters.{name}", given[name], remedy))
+        problems.append(Problem(f"parameters.{name}", parameters[name], remedy))
     if contacts and values["coordinates"] == "polar":
         remedy = 'polar coordinates have no contacts: use "bend"'
         problems.append(Problem("contacts", list(contacts), remedy))
     if contacts:
         return problems
+
+    # what no flight has: friction, and functions of the ground
     remedy = 'needs points that touch the ground: add contacts = ["feet"]'
     if "friction" in table:
         problems.append(Problem("friction", table["friction"], remedy))
     wanted = values["functions"] if isinstance(values["functions"], list | tuple) else ()
-    return problems + [Problem("functions", name, remedy) for name in wanted if name in TOUCHING]
+    wrong = [name for name in wanted if name in NEED_CONTACTS]
+    return problems + [Problem("functions", name, remedy) for name in wrong]
+
+
+def _parameters_in(table: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return the table of parameters; an empty one where it is none, which another check tells."""
+    parameters = table.get("parameters", {})
+    return parameters if isinstance(parameters, Mapping) else {}
 
 
 def _derivatives_in(wanted: Any) -> list[str]:
@@ -104,14 +117,14 @@ def _derivatives_in(wanted: Any) -> list[str]:
 
 def single_problems(parameters: Mapping[str, Value]) -> list[Problem]:
     """Return a problem for each parameter that single precision cannot hold."""
-    flat = {
-        name: value if isinstance(value, tuple) else (value,) for name, value in parameters.items()
-    }
-    wrong = [
-        n for n, xs in flat.items() if any(x and not SINGLE[0] <= abs(x) <= SINGLE[1] for x in xs)
-    ]
+    least, largest = SINGLE
     remedy = 'beyond single precision, 1.2e-38 to 3.4e38; set real = "double"'
-    return [Problem(f"parameters.{name}", plain(parameters[name]), remedy) for name in wrong]
+    problems = []
+    for name, value in parameters.items():
+        numbers = value if isinstance(value, tuple) else (value,)
+        if any(x and not least <= abs(x) <= largest for x in numbers):
+            problems.append(Problem(f"parameters.{name}", plain(value), remedy))
+    return problems
 
 
 def tail_links(values: Mapping[str, Any]) -> int:
@@ -121,9 +134,7 @@ def tail_links(values: Mapping[str, Any]) -> int:
 
 
 def function_problems(wanted: Any) -> list[Problem]:
-    """Return a problem for each entry that is unknown or listed before, or one for what is no
-    array.
-    """
+    """Return a problem for each entry that is unknown or listed before, or for what is no array."""
     if not isinstance(wanted, list | tuple) or not wanted:
         remedy = (
             'needs an array of names, such as ["mass_matrix"]; leave it out for the usual ones, or '
@@ -141,11 +152,11 @@ def function_problems(wanted: Any) -> list[Problem]:
     return problems
 
 
-def unknown_keys(table: Mapping[str, Any], prefix: str, known: Collection[str]) -> list[Problem]:
-    """Return a problem for each key that is not known, with its likely place or spelling."""
+def unknown_keys(table: Mapping[str, Any], prefix: str, names: Collection[str]) -> list[Problem]:
+    """Return a problem for each key that is not among the names, with its place or spelling."""
     elsewhere, place = (KEYS, "above") if prefix else (NAMES, "below")
     problems = []
-    for key in [key for key in table if key not in known]:
-        hint = f"belongs {place} the line [parameters]" if key in elsewhere else suggest(key, known)
+    for key in [key for key in table if key not in names]:
+        hint = f"belongs {place} the line [parameters]" if key in elsewhere else suggest(key, names)
         problems.append(Problem(f"{prefix}{key}", table[key], f"unknown here; {hint}"))
     return problems

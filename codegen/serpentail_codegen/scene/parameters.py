@@ -1,6 +1,4 @@
-"""The physical parameters of a model: their names, sizes, units, defaults and rules, and a set of
-checked values.
-"""
+"""The physical parameters of a model: what each is, its default and its rule."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -32,8 +30,10 @@ BODY_INERTIA = Rule(
 
 @dataclass(frozen=True)
 class Parameter:
-    """One physical parameter: `size` numbers in `unit`; a default of None is computed from the
-    others.
+    """One physical parameter: `size` numbers in `unit`; no default: computed from the others.
+
+    ``needs`` is a group of contact points, or "contacts" for any of them; empty: every scene has
+    the parameter.
     """
 
     name: str
@@ -42,9 +42,7 @@ class Parameter:
     unit: str
     check: Rule
     meaning: str
-    needs: str = (
-        ""  # a group of contact points, or "contacts": any of them; empty: every scene has it
-    )
+    needs: str = ""
 
 
 # The defaults are the kangaroo rat of the paper's Table 1. B is the torso frame, at the torso COM.
@@ -55,7 +53,7 @@ PARAMETERS = (
         9.8,
         "m/s^2",
         NOT_NEGATIVE,
-        ("gravitational acceleration, along -z of the world"),
+        "gravitational acceleration, along -z of the world",
     ),
     Parameter("torso_mass", 1, 0.10572, "kg", POSITIVE, "mass of the torso"),
     Parameter(
@@ -72,7 +70,7 @@ PARAMETERS = (
         (0.0, -0.0405, 0.0045),
         "m",
         ANY,
-        ("root of the tail from the torso COM, in B"),
+        "root of the tail from the torso COM, in B",
     ),
     Parameter("tail_mass", 1, 0.00351, "kg", POSITIVE, "mass of the whole tail"),
     Parameter("tail_length", 1, 0.19466, "m", POSITIVE, "length of the whole tail"),
@@ -82,7 +80,7 @@ PARAMETERS = (
         0.0029,
         "m",
         NOT_NEGATIVE,
-        ("radius of the ellipsoid that gives link_inertia"),
+        "radius of the ellipsoid that gives link_inertia",
     ),
     Parameter(
         "link_inertia",
@@ -99,7 +97,7 @@ PARAMETERS = (
         0.75,
         "s/m",
         NOT_NEGATIVE,
-        ("damping of the ground, over its stiffness"),
+        "damping of the ground, over its stiffness",
         "contacts",
     ),
     Parameter("K_f", 1, 600.0, "N/m", POSITIVE, "stiffness of the friction spring", "contacts"),
@@ -109,7 +107,7 @@ PARAMETERS = (
         0.01,
         "s",
         POSITIVE,
-        ("damping of the friction spring, over its stiffness"),
+        "damping of the friction spring, over its stiffness",
         "contacts",
     ),
     Parameter("mu", 1, 1.0, "1", NOT_NEGATIVE, "coefficient of friction", "contacts"),
@@ -124,7 +122,7 @@ PARAMETERS = (
         0.035,
         "m",
         NOT_NEGATIVE,
-        ("leg linkage from the ankle A to the metatarsal M"),
+        "leg linkage from the ankle A to the metatarsal M",
         "feet",
     ),
     Parameter(
@@ -133,7 +131,7 @@ PARAMETERS = (
         0.016,
         "m",
         NOT_NEGATIVE,
-        ("leg linkage from the metatarsal M to the toe T"),
+        "leg linkage from the metatarsal M to the toe T",
         "feet",
     ),
     Parameter("delta_m", 1, pi / 6, "rad", ANY, "angle of the sole against the thigh", "feet"),
@@ -143,7 +141,7 @@ PARAMETERS = (
         (0.0225, -0.018, 0.01125),
         "m",
         ANY,
-        ("p_b2h of the right leg, in B; the left one mirrors x"),
+        "p_b2h of the right leg, in B; the left one mirrors x",
         "feet",
     ),
     Parameter(
@@ -160,8 +158,8 @@ PARAMETERS = (
 
 @dataclass(frozen=True, eq=False)
 class Parameters(Mapping[str, Value]):
-    """Resolved parameters by name, in PARAMETERS' order; no link_radius where link_inertia was
-    given.
+    """Parameters with values, in the order of PARAMETERS; no link_radius where a scene names
+    link_inertia.
     """
 
     entries: tuple[tuple[str, Value], ...]

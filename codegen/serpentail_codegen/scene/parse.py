@@ -1,4 +1,4 @@
-"""From a scene file or table to a checked, frozen Scene."""
+"""Reads scene files and tables; what comes back is a checked, frozen Scene."""
 
 import re
 import tomllib
@@ -19,18 +19,8 @@ from .checks import (
 )
 from .problems import Problem, SceneError
 from .resolve import resolve_parameters
-from .scene import (
-    ALL,
-    CONTACTS,
-    DERIVATIVES,
-    FUNCTIONS,
-    GROUPS,
-    KEYS,
-    MOST_LINKS,
-    ONLY,
-    TOUCHING,
-    Scene,
-)
+from .scene import CONTACTS, GROUPS, KEYS, MOST_LINKS, ONLY, TARGETS, Only, Scene
+from .signatures.table import ALL, DEFAULT, DEFAULT_ON_GROUND, DERIVATIVES, NEED_CONTACTS
 
 
 def load_scene(path: str | Path) -> Scene:
@@ -42,10 +32,7 @@ def load_scene(path: str | Path) -> Scene:
         remedy = f"{error.strerror}; give the path of a scene file (.toml)"
     except UnicodeDecodeError as error:
         remedy = f"not UTF-8 from byte {error.start} on; save it as UTF-8 text"
-    except (
-        ValueError,
-        RecursionError,
-    ) as error:  # all that the TOML parser raises, or a NUL in the path
+    except (ValueError, RecursionError) as error:  # of the TOML parser, or for a NUL in the path
         remedy = f"cannot be read as TOML: {error}"
     else:
         return parse_scene(table, path.stem)
@@ -53,36 +40,30 @@ def load_scene(path: str | Path) -> Scene:
 
 
 def scene_for(tail: str, segments: int, links: int | None = None, **overrides: object) -> Scene:
-    """Return the scene of `make model TAIL= M= N=` (no N for a continuum), with more keys; raises
-    SceneError.
-    """
-    size = f"_n{links}" if links is not None else ""
-    table = {"kind": tail, "segments": segments} | ({"links": links} if size else {}) | overrides
+    """Return the scene of `make model TAIL= M= N=`, with more keys; raises SceneError."""
+    table: dict[str, object] = {"kind": tail, "segments": segments}
+    size = ""
+    if links is not None:  # a continuum has none
+        table["links"], size = links, f"_n{links}"
+    table |= overrides
     return parse_scene(table, re.sub("[^a-z0-9_]", "_", f"{tail}_m{segments}{size}".lower()))
 
 
 def parse_scene(table: Mapping[str, Any], name: str) -> Scene:
-    """Return the Scene of a scene file's table, called `name` unless it has a name; raises
-    SceneError.
-    """
-    kind = (
-        table["kind"]
-        if isinstance(table.get("kind"), str) and table["kind"] in ONLY
-        else "articulated"
-    )
-    own = ONLY[kind]
-    values = {key: default for key, (default, _) in KEYS.items()} | {
-        "name": name,
-        "coordinates": own.coordinates[0],
-    }
-    values |= dict.fromkeys(own.required) | dict(table)
+    """Return the Scene of a table, called `name` unless it has a name; raises SceneError."""
+    kind = _kind(table)
+    rules = ONLY[kind]
+    values = _with_defaults(table, name, rules)
     contacts = tuple(values["contacts"]) if CONTACTS.holds(values["contacts"]) else ()
-    values["functions"] = _usual_functions(values, contacts, "functions" in table)
-    problems = unknown_keys(table, "", KEYS) + key_problems(values) + kind_problems(table, own)
+    values["functions"] = _chosen_functions(table, values["coordinates"], contacts)
+
+    # everything that is wrong with keys and functions
+    problems = unknown_keys(table, "", KEYS) + key_problems(values) + kind_problems(table, rules)
     problems += function_problems(values["functions"]) + contact_problems(table, values, contacts)
-    values["contacts"] = tuple(group for group in GROUPS if group in contacts)
+
+    # parameters: which there are follows from the kind and the contacts
+    links = min(tail_links(values), MOST_LINKS)
     try:
-        links = min(tail_links(values), MOST_LINKS)
         values["parameters"] = resolve_parameters(values["parameters"], links, kind, contacts)
     except SceneError as error:
         problems += error.problems
@@ -90,37 +71,48 @@ def parse_scene(table: Mapping[str, Any], name: str) -> Scene:
         problems += single_problems(values["parameters"])
     if problems:
         raise SceneError(problems)
+
+    # one order of names, so that equal scenes are equal
+    values["contacts"] = tuple(group for group in GROUPS if group in contacts)
+    values["targets"] = tuple(target for target in TARGETS if target in values["targets"])
     values["functions"] = tuple(function for function in ALL if function in values["functions"])
     return Scene(**{field.name: values[field.name] for field in fields(Scene)})
 
 
-def _usual_functions(values: Mapping[str, Any], contacts: Collection[str], chosen: bool) -> Any:
-    """Return the functions that a scene means by "all", or by not choosing any."""
-    touching = TOUCHING if contacts else ()
-    if values["functions"] == "all":
-        return tuple(name for name in ALL if name not in TOUCHING or contacts)
-    if chosen:
-        return values["functions"]
-    polar = values["coordinates"] == "polar"
-    usual = (
-        (*touching, "pfl", "implicit") if contacts else ()
-    )  # what simulations on the ground call
-    return (*(name for name in FUNCTIONS if not (polar and name in DERIVATIVES)), *usual)
+def _kind(table: Mapping[str, Any]) -> str:
+    """Return the kind of tail; where it is wrong the table is checked as an articulated one."""
+    kind = table.get("kind")
+    return kind if isinstance(kind, str) and kind in ONLY else "articulated"
+
+
+def _with_defaults(table: Mapping[str, Any], name: str, rules: Only) -> dict[str, Any]:
+    """Return a table with the default of every key that it leaves out, None where it is needed."""
+    values = {key: default for key, (default, _) in KEYS.items()}
+    values |= {"name": name, "coordinates": rules.coordinates[0]}
+    values |= dict.fromkeys(rules.required)
+    return values | dict(table)
+
+
+def _chosen_functions(table: Mapping[str, Any], coordinates: str, contacts: Collection[str]) -> Any:
+    """Return the functions that a scene means by naming them, by "all", or by leaving them out."""
+    if table.get("functions") == "all":
+        return tuple(name for name in ALL if contacts or name not in NEED_CONTACTS)
+    if "functions" in table:
+        return table["functions"]
+    names = DEFAULT + DEFAULT_ON_GROUND if contacts else DEFAULT
+    return tuple(name for name in names if coordinates != "polar" or name not in DERIVATIVES)
 
 
 def scene_to_dict(scene: Scene) -> dict[str, Any]:
-    """Return the table that parse_scene turns into this scene again: ordered, JSON-ready, floats
-    exact.
-    """
-    computed = "link_inertia" if "link_radius" in scene.parameters else ""
-    given = {name: value for name, value in scene.parameters.items() if name != computed}
+    """Return the table that parse_scene turns into this scene again: JSON-ready, floats exact."""
+    # keys that this kind of tail, or a flight, does not have
     foreign = {key for kind, only in ONLY.items() if kind != scene.kind for key in only.keys}
     foreign |= set() if scene.contacts else {"contacts", "friction"}
-    table = {
-        field.name: getattr(scene, field.name)
-        for field in fields(Scene)
-        if field.name not in foreign
-    }
-    table |= {key: list(table[key]) for key in ("functions", "contacts") if key in table}
-    table["parameters"] = {name: plain(value) for name, value in given.items()}
-    return table
+    names = [field.name for field in fields(Scene) if field.name not in foreign]
+    table = {name: getattr(scene, name) for name in names}
+    table |= {key: list(table[key]) for key in ("functions", "contacts", "targets") if key in table}
+
+    # an inertia that follows from link_radius is computed again
+    computed = "link_inertia" if "link_radius" in scene.parameters else ""
+    parameters = {n: plain(value) for n, value in scene.parameters.items() if n != computed}
+    return table | {"parameters": parameters}

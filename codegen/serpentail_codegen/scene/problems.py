@@ -1,6 +1,4 @@
-"""What is wrong with a scene: fields, values and remedies go in; an error with one line for each
-comes out.
-"""
+"""What is wrong with a scene, told so that its author can mend all of it at once."""
 
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
@@ -20,9 +18,7 @@ ALIASES = {
 
 @dataclass(frozen=True)
 class Problem:
-    """One thing that is wrong with a scene: where, the value found (None: nothing), and what to
-    do.
-    """
+    """One thing that is wrong: where, the value there (None: nothing), and what to do."""
 
     field: str
     value: object
@@ -33,9 +29,7 @@ class Problem:
 
 
 class SceneError(ValueError):
-    """A scene that cannot be used; `problems` has all that is wrong with it, str() one line for
-    each.
-    """
+    """A scene that cannot be used: its `problems`, one line of text for each."""
 
     def __init__(self, problems: Iterable[Problem]) -> None:
         self.problems = tuple(problems)
@@ -45,11 +39,11 @@ class SceneError(ValueError):
         return "\n".join(map(str, self.problems))
 
 
-def suggest(word: object, known: Collection[str]) -> str:
-    """Return "did you mean ...?", or all that is known."""
+def suggest(word: object, names: Collection[str]) -> str:
+    """Return "did you mean ...?", or all names that there are."""
     text = word[:64].lower() if isinstance(word, str) else ""
-    near = [ALIASES[text]] if ALIASES.get(text) in known else get_close_matches(text, known, 1)
-    return f"did you mean '{near[0]}'?" if near else f"known: {', '.join(known)}"
+    near = [ALIASES[text]] if ALIASES.get(text) in names else get_close_matches(text, names, 1)
+    return f"did you mean '{near[0]}'?" if near else f"known: {', '.join(names)}"
 
 
 def show(value: object) -> str:

@@ -1,4 +1,4 @@
-"""Parameters of a scene: those given are checked, the others filled in."""
+"""From the parameters that a scene names to a value for each that its model has."""
 
 import math
 from collections.abc import Collection, Mapping
@@ -18,38 +18,35 @@ def parameters_of(kind: str, contacts: Collection[str] = ()) -> tuple[Parameter,
 
 
 def resolve_parameters(
-    given: Mapping[str, Any],
+    named: Mapping[str, Any],
     tail_links: int,
     kind: str = "articulated",
     contacts: Collection[str] = (),
 ) -> Parameters:
-    """Check the given parameters and fill in the others, for N = m n links; raises SceneError."""
-    if not isinstance(given, Mapping):
-        raise SceneError(
-            [Problem("parameters", given, "needs to be a table, under a line [parameters]")]
-        )
-    unused = "link_radius" if "link_inertia" in given else "link_inertia"
-    values = {p.name: p.default for p in parameters_of(kind, contacts) if p.name != unused} | dict(
-        given
-    )
-    problems = unknown_keys(given, "parameters.", NAMES)
-    if "link_inertia" in given and "link_radius" in given:
+    """Check the named parameters and fill in the others, for N = m n links; raises SceneError."""
+    if not isinstance(named, Mapping):
+        remedy = "needs to be a table, under a line [parameters]"
+        raise SceneError([Problem("parameters", named, remedy)])
+    problems = unknown_keys(named, "parameters.", NAMES)
+    if "link_inertia" in named and "link_radius" in named:
         remedy = "given together with link_radius, which it overrides; remove one of the two"
-        problems.append(Problem("parameters.link_inertia", given["link_inertia"], remedy))
-    wrong = [p for p in PARAMETERS if p.name in given and not fits(p, given[p.name])]
-    problems += [number_problem(p, given[p.name]) for p in wrong]
+        problems.append(Problem("parameters.link_inertia", named["link_inertia"], remedy))
+    wrong = [p for p in PARAMETERS if p.name in named and not fits(p, named[p.name])]
+    problems += [number_problem(p, named[p.name]) for p in wrong]
     if problems:
         raise SceneError(problems)
-    resolved = {name: _floats(value) for name, value in values.items()}
+
+    # defaults for what is not named; the link's inertia follows from its radius, or replaces it
+    unused = "link_radius" if "link_inertia" in named else "link_inertia"
+    values = {p.name: p.default for p in parameters_of(kind, contacts) if p.name != unused}
+    resolved = {name: _floats(value) for name, value in (values | dict(named)).items()}
     if "link_radius" in resolved:
         resolved["link_inertia"] = _ellipsoid_inertia(resolved, tail_links)
     return Parameters(tuple((name, resolved[name]) for name in NAMES if name in resolved))
 
 
 def _ellipsoid_inertia(parameters: Mapping[str, Any], tail_links: int) -> tuple[float, ...]:
-    """I = m/5 [L^2/4 + r^2, 2 r^2, L^2/4 + r^2]: uniform ellipsoid of semi-axes (r, L/2, r), long
-    in y.
-    """
+    """I = m/5 [L^2/4 + r^2, 2 r^2, L^2/4 + r^2]: uniform ellipsoid, semi-axes (r, L/2, r)."""
     m, L = parameters["tail_mass"] / tail_links, parameters["tail_length"] / tail_links
     r = parameters["link_radius"]
     across, along = m / 5 * (L * L / 4 + r * r), m / 5 * (2 * r * r)
@@ -63,8 +60,6 @@ def _ellipsoid_inertia(parameters: Mapping[str, Any], tail_links: int) -> tuple[
 
 def _floats(value: Any) -> Value:
     """Return checked numbers as floats; + 0.0 turns -0.0 into 0.0."""
-    return (
-        tuple(float(x) + 0.0 for x in value)
-        if isinstance(value, list | tuple)
-        else float(value) + 0.0
-    )
+    if isinstance(value, list | tuple):
+        return tuple(float(x) + 0.0 for x in value)
+    return float(value) + 0.0

@@ -7,39 +7,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from .parameters import ANY, PARAMETERS, Parameters, Rule
+from .signatures.table import DEFAULT
 
 KINDS = ("articulated", "continuum")
-FUNCTIONS = (
-    "mass_matrix",
-    "bias_force",
-    "inverse_dynamics",
-    "forward_dynamics",
-    "forward_dynamics_external",
-    "energy",
-    "momentum",
-    "tail_points",
-    "tail_point_jacobians",
-    "rollout",
-    "forward_dynamics_derivatives",
-)
-EXACT = (
-    "inverse_dynamics_derivatives",
-    "inverse_dynamics_parameter_derivatives",
-    "forward_dynamics_parameter_derivatives",
-    "inverse_dynamics_vjp",
-    "forward_dynamics_jvp",
-    "forward_dynamics_vjp",
-    "inverse_dynamics_hessian",
-    "energy_derivatives",
-    "momentum_derivatives",
-)
-DERIVATIVES = (*EXACT, "forward_dynamics_derivatives")
-WORLD = ("mass_matrix_world", "bias_force_world")
-ON_DEMAND = (*WORLD, *EXACT, "pfl", "implicit")  # emitted where a scene names them
-TOUCHING = ("contact_points", "contact_dynamics")  # of scenes with contacts
-ALL = (*FUNCTIONS, *ON_DEMAND, *TOUCHING)
 GROUPS = ("feet", "tail", "torso")  # of contact points, in their order
 FRICTION = ("cone", "box", "smooth", "paper")
+TARGETS = ("c", "casadi")  # languages to emit, in their order
 C_HEADERS = frozenset(
     [
         "assert",
@@ -78,13 +51,13 @@ def _one_of(names: Sequence[str], remark: str = "") -> Rule:
     return Rule(text + remark, lambda x: isinstance(x, str) and x in names)
 
 
-def _is_whole(x: object) -> bool:
+def is_whole(x: object) -> bool:
     """Tell if x is an integer; true and false are none."""
     return isinstance(x, int) and not isinstance(x, bool)
 
 
 FLAG = Rule("true or false, without quotes", lambda x: isinstance(x, bool))
-COUNT = Rule("a whole number, 1 or above", lambda x: _is_whole(x) and x >= 1)
+COUNT = Rule("a whole number, 1 or above", lambda x: is_whole(x) and x >= 1)
 TEXT = Rule('a text, in "quotes"', lambda x: isinstance(x, str))
 NAME = Rule(
     "a text of a-z, 0-9 and _, a letter first, that names no C header: rename the file, or set "
@@ -101,6 +74,14 @@ CONTACTS = Rule(
     'an array of different names out of "feet", "tail" and "torso", such as ["feet"]',
     lambda x: isinstance(x, list | tuple) and all(n in GROUPS and x.count(n) == 1 for n in x),
 )
+TARGET_NAMES = Rule(
+    'an array of different names out of "c" and "casadi", at least one, such as ["c"]',
+    lambda x: (
+        isinstance(x, list | tuple)
+        and len(x) > 0
+        and all(n in TARGETS and x.count(n) == 1 for n in x)
+    ),
+)
 
 
 def _table(name: str) -> Rule:
@@ -110,15 +91,13 @@ def _table(name: str) -> Rule:
 
 @dataclass(frozen=True)
 class Scene:
-    """What to generate: a tail of `segments` x `links`, its parameters, the functions, and in which
-    form.
-    """
+    """What to generate: a tail, its parameters, the functions, and in which form."""
 
     name: str  # prefix of every C symbol and generated file
     kind: str
     segments: int  # m
     links: int  # n, in each segment; 1 for a continuum
-    functions: tuple[str, ...]  # in the order of FUNCTIONS
+    functions: tuple[str, ...]  # in the order of their table
     parameters: Parameters
     coordinates: str = (
         "joint"  # of q_t: joint angles alpha_i, beta_i; "bend": a_i, b_i; "polar": phi_i, theta_i
@@ -133,6 +112,7 @@ class Scene:
         str, ...
     ] = ()  # groups of points that can touch the ground, in the order of GROUPS
     friction: str = "cone"
+    targets: tuple[str, ...] = TARGETS  # in that order
 
 
 # The keys of a scene file: default (None: required) and rule; ANY where a function of its own
@@ -145,7 +125,7 @@ KEYS: dict[str, tuple[Any, Rule]] = {
     "links": (1, COUNT),
     "samples": (Scene.samples, COUNT),
     "bend_range": (Scene.bend_range, BEND),
-    "functions": (FUNCTIONS, ANY),
+    "functions": (DEFAULT, ANY),
     "parameters": ({}, ANY),
     "coordinates": (Scene.coordinates, ANY),
     "baked": (Scene.baked, FLAG),
@@ -154,6 +134,7 @@ KEYS: dict[str, tuple[Any, Rule]] = {
     "profile": (Scene.profile, _one_of(["fast", "reproducible"])),
     "contacts": ((), CONTACTS),
     "friction": (Scene.friction, _one_of(FRICTION)),
+    "targets": (Scene.targets, TARGET_NAMES),
     "plan": (
         {},
         _table("plan"),

@@ -1,23 +1,13 @@
 """CasADi functions of a model: built from its generated module, or wrapping its compiled C."""
 
 import importlib.util
+from functools import cached_property
+from types import ModuleType
 
 import casadi
 
 from ..errors import ModelError
 from .parameters import flat
-
-# compiled functions that first and second derivatives of an external one are made of
-DERIVATIVES = {
-    "inverse_dynamics": (
-        ("inverse_dynamics_derivatives", "mass_matrix"),
-        ("inverse_dynamics_vjp", "inverse_dynamics_hessian"),
-    ),
-    "forward_dynamics": (
-        ("forward_dynamics_derivatives",),
-        ("forward_dynamics_vjp", "inverse_dynamics_hessian", "mass_matrix"),
-    ),
-}
 
 
 class CasadiFunctions:
@@ -27,7 +17,21 @@ class CasadiFunctions:
 
     def __init__(self, model):
         self._model = model
-        self._module = _module(model)
+
+    @cached_property
+    def _module(self) -> ModuleType:
+        """The generated module; ModelError where the scene did not ask for it."""
+        if not self._has_module:
+            raise ModelError(
+                f'{self._model.name} was generated without CasADi functions: add "casadi" to '
+                "`targets` of the scene, then generate it again, or take compiled ones, "
+                "external(name)"
+            )
+        return _imported(self._model)
+
+    @property
+    def _has_module(self) -> bool:
+        return "casadi" in self._model.manifest["scene"]["targets"]
 
     def __getattr__(self, name: str) -> casadi.Function:
         if name.startswith("_"):
@@ -42,7 +46,8 @@ class CasadiFunctions:
         return function
 
     def __dir__(self) -> list[str]:
-        return [*self._module.SIGNATURES, "symbolic", "external", "parameter_vector"]
+        symbolic = self._module.SIGNATURES if self._has_module else ()
+        return [*symbolic, "symbolic", "external", "parameter_vector"]
 
     @property
     def parameter_vector(self) -> casadi.DM:
@@ -96,15 +101,12 @@ class CasadiFunctions:
 
     def _check(self, name: str, derivatives: int) -> None:
         """Raise ModelError where a scene lacks what derivatives of this order are made of."""
-        if derivatives and name not in DERIVATIVES:
-            has = " and ".join(DERIVATIVES)
-            raise ModelError(
-                f"{name}: only {has} have compiled derivatives for CasADi: use casadi.symbolic"
-            )
-        wanted = [part for order in DERIVATIVES.get(name, ())[:derivatives] for part in order]
-        lacking = [
-            part for part in dict.fromkeys(wanted) if part not in self._model.manifest["functions"]
-        ]
+        functions = self._model.manifest["functions"]
+        orders = functions[name]["exact_derivatives"]
+        if derivatives and not orders:
+            raise ModelError(f"{name} has no compiled derivatives for CasADi: use casadi.symbolic")
+        wanted = [part for order in orders[:derivatives] for part in order]
+        lacking = [part for part in dict.fromkeys(wanted) if part not in functions]
         if lacking:
             raise self._model.without(*lacking)
 
@@ -114,7 +116,7 @@ class CasadiFunctions:
         return name
 
 
-def _module(model):
+def _imported(model) -> ModuleType:
     name = f"{model.name}_casadi"
     spec = importlib.util.spec_from_file_location(name, model.folder / f"{name}.py")
     module = importlib.util.module_from_spec(spec)

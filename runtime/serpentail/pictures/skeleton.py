@@ -1,6 +1,4 @@
-"""Limbs: a model, a motion and its legs' angles go in; joints of both legs and the centre of mass
-come out, to draw.
-"""
+"""Where the joints of both legs are in a motion, to draw them."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -33,16 +31,6 @@ def leg_joints(model, motion: Trajectory, angles: ArrayLike) -> np.ndarray:
     )
     turned = np.einsum("kij,klnj->klni", rotation_matrix(motion.attitude), local)
     return motion.q[:, None, None, :3] + turned
-
-
-def centre_of_mass(model, motion: Trajectory) -> np.ndarray:
-    """Return the centre of mass (K, 3), m, world; of a continuum as if it were straight between its
-    tail points.
-    """
-    torso, tail = model.parameters["torso_mass"], model.parameters["tail_mass"]
-    points = model.tail_points(motion.q)
-    middle = ((points[:, 1:] + points[:, :-1]) / 2).mean(axis=1)
-    return (torso * motion.q[:, :3] + tail * middle) / (torso + tail)
 
 
 def _ray(angle: np.ndarray) -> np.ndarray:

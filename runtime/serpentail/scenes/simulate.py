@@ -14,7 +14,7 @@ from ..model.model import Model
 from ..motion.summary import summary
 from ..motion.trajectory import Trajectory
 from ..pictures.filmstrip import filmstrip
-from ..pictures.skeleton import centre_of_mass, leg_joints
+from ..pictures.skeleton import leg_joints
 from ..simulation.controllers import Controller, Damping, Phases, TorqueTable
 from ..simulation.methods import SETTINGS
 from ..simulation.pfl import KD, KP, Pfl
@@ -66,8 +66,14 @@ class Scenario:
     def film(self, motion: Trajectory, path: str | Path, frames: int | Sequence[float] = 8) -> Path:
         """Draw moments of a motion: torso, legs, tail and the ground's forces; frames: how many, or
         their times (s).
+
+        They are drawn about the centre of mass, or about the torso where the scene left out the
+        function ``center_of_mass``.
         """
         model, p = self.model, self.model.parameters
+        com = None
+        if "center_of_mass" in model.kernels:
+            com = model.center_of_mass(motion.q, motion.v)[0]
         look = {"tail_mount": p["tail_mount"]}
         look |= {"semi_axes": p["torso_semi_axes"]} if "torso_semi_axes" in p else {}
         look |= (
@@ -80,7 +86,7 @@ class Scenario:
             model.tail_points(motion.q),
             path,
             frames,
-            com=centre_of_mass(model, motion),
+            com=com,
             **look,
         )
 

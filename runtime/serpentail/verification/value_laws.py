@@ -11,12 +11,12 @@ from ..attitude import rotation_matrix
 from ..model.model import Model
 from ..simulation.simulate import simulate
 from .errors import (
-    DERIVATIVES,
     block_error,
     difference,
     differences,
     differing,
     differing_outputs,
+    is_derivative,
     matrix_error,
     relative,
     rounding,
@@ -30,7 +30,14 @@ from .states import State, arguments, casadi_outputs, judged, named, outputs, sc
 FLIGHT, STEPS = 0.2, 2000  # s
 WORLD = ("mass_matrix_world", "bias_force_world")
 # what position and velocity of B enter
-PLACED = ("energy", "energy_derivatives", "momentum", "tail_points", "contact_points")
+PLACED = (
+    "energy",
+    "energy_derivatives",
+    "momentum",
+    "center_of_mass",
+    "tail_points",
+    "contact_points",
+)
 LAWS: list[Law] = []
 law = registry(LAWS)
 
@@ -129,6 +136,35 @@ def center_of_mass(model: Model, q: np.ndarray) -> np.ndarray:
     return q[..., :3] + (R @ h[..., None])[..., 0] / H[..., :1, 0]
 
 
+@law("mass_matrix", "center_of_mass", units=NEAR)
+def center_of_mass_is_that_of_the_mass_matrix(model: Model, s: State):
+    """The centre of mass is where H puts it, and its Jacobian is the upper part of H over the
+    mass.
+    """
+    position, _, J = model.center_of_mass(s.q, s.v)
+    arm, upper = center_of_mass(model, s.q) - s.q[:3], model.mass_matrix(s.q)[:3]
+    return {
+        "position": relative(position, s.q[:3] + arm),
+        "J": relative(J, upper / upper[0, 0]),
+    }
+
+
+@law("momentum", "center_of_mass", units=NEAR)
+def momentum_is_mass_times_velocity_of_the_center_of_mass(model: Model, s: State):
+    """Momentum is the mass of the whole animal times the velocity of its centre of mass."""
+    velocity = model.center_of_mass(s.q, s.v)[1]
+    return relative(total_mass(model) * velocity, model.momentum(s.q, s.v)[0])
+
+
+@law("center_of_mass", units=NEAR)
+def velocity_of_the_center_of_mass_is_J_v(model: Model, s: State):
+    """The velocity of the centre of mass is its Jacobian times v, relative to the largest part of
+    that.
+    """
+    _, velocity, J = model.center_of_mass(s.q, s.v)
+    return relative(velocity, J @ s.v, abs(J) @ abs(s.v))
+
+
 @law("energy", "forward_dynamics", units=NEAR)
 def energy_changes_by_the_power_of_the_torques(model: Model, s: State):
     """Along forward dynamics dE/dt = tau . q_t_dot, relative to the energy times the links' fastest
@@ -210,7 +246,7 @@ def turned_outputs(model: Model, found: dict, X: np.ndarray, shift: np.ndarray) 
     Z, weight = X[:3, :3], total_mass(model) * model.parameters["gravity"]
     turn = {
         "potential": lambda V: V + weight * shift[2],
-        **dict.fromkeys(("points", "positions"), lambda p: p @ Z.T + shift),
+        **dict.fromkeys(("points", "positions", "position"), lambda p: p @ Z.T + shift),
         "velocities": lambda u: u @ Z.T,
         "J": lambda J: Z @ J @ X.T,
         "dparameters": lambda D: X @ D,
@@ -341,7 +377,7 @@ def casadi_functions_agree(model: Model, s: State):
             model, name, s, casadi_outputs(model, name, getattr(model.casadi, name), s)
         )
         for name in judged(model)
-        if name not in DERIVATIVES
+        if not is_derivative(model, name)
     }
 
 

@@ -5,17 +5,16 @@ In torso axes nothing depends on attitude or gravity: R^T (p_b_ddot + g z) stand
 
 from ...ir.program import Array, Ref
 from ...mechanics import torso
-from ..arguments import FORCE, V_DOT, Q, V
+from ...scene.signatures.arguments import FORCE, MULTIPLIER, V_DOT, Argument, Q, V
 from ..draft import Draft
 from ..dynamics import inertial_forces
-from ..function import Argument, Function
+from ..function import Function
 from ..layout import OMEGA, VELOCITY, block
 from ..scope import Motion, State, Vectors
 from ..sweeps.pieces import attitude, mechanism
 from ..sweeps.wrenches import virtual_power
 
-MULTIPLIER = Argument("multiplier", lambda t: (t.nv,), "weights lambda of the rows")
-POWER = Argument("power", lambda t: (1,), "lambda^T (H v_dot + C)")
+POWER = Argument("power", (1,), "lambda^T (H v_dot + C)")
 
 
 def assemble_core(draft: Draft, arrays: dict[str, Array]) -> None:

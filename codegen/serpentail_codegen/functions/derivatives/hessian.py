@@ -123,3 +123,6 @@ def mixed_block(draft: Draft, q: Array, multiplier: Array, aq: Array) -> None:
     force = block(rows, VELOCITY)
     draft.step(rotations.world_vector, R, {"vector": force}, vector=force)
     directions.spread(draft, rows, aq)
+
+
+ASSEMBLIES = {"inverse_dynamics_hessian": assemble_inverse_dynamics_hessian}

@@ -12,11 +12,11 @@ from ...mechanics import rotations, torso, translation
 from ..draft import Draft
 from ..dynamics import assemble_forward_dynamics
 from ..factored import FactoredDynamics, Loads
-from ..function import Function, assemble, struct_parameters
+from ..function import Function, assemble
 from ..layout import OMEGA, POSITION, QUATERNION, VELOCITY, block, tail_v
 from ..plain import FUNCTIONS
 from ..scope import Vectors
-from ..tail import Tail
+from ..tail import struct_parameters
 from .differentiated import CORE, VIRTUAL_POWER
 from .directions import Directions
 
@@ -127,7 +127,7 @@ def assemble_inverse_dynamics_parameter_derivatives(draft: Draft, arrays: dict[s
 
 def assemble_forward_dynamics_parameter_derivatives(draft: Draft, arrays: dict[str, Array]) -> None:
     """-H^-1 times the tangents of H v_dot + C with respect to every parameter, at fixed v_dot."""
-    count = parameter_count(draft.tail)
+    count = draft.tail.parameter_numbers
     factored, body = forward_dynamics_first(draft, arrays)
     arguments = {"q": arrays["q"], "v": arrays["v"], "v_dot": body}
     rows = parameter_tangents(draft, CORE, arguments)
@@ -142,7 +142,7 @@ def parameter_tangents(draft: Draft, function: Function, arguments: dict[str, Ar
     """Return the tangents of a force with respect to every parameter, a lane for each number of the
     struct.
     """
-    count, lane, tangents = parameter_count(draft.tail), 0, {}
+    count, lane, tangents = draft.tail.parameter_numbers, 0, {}
     names = [p.name for p in struct_parameters(draft.tail)]
     inner = tangent_program(assemble(function, draft.tail), names, count)
     for p in struct_parameters(draft.tail):
@@ -157,14 +157,9 @@ def parameter_tangents(draft: Draft, function: Function, arguments: dict[str, Ar
 
 def spread_parameters(draft: Draft, source: Array, dparameters: Array) -> None:
     """Copy rows to a matrix with a column for each number of the parameter struct."""
-    count = parameter_count(draft.tail)
+    count = draft.tail.parameter_numbers
     with draft.loop("row", draft.tail.nv) as row:
         draft.copy(dparameters.part(count * row, count), source.lane(row, 0, count))
-
-
-def parameter_count(tail: Tail) -> int:
-    """Numbers in the parameter struct."""
-    return sum(p.size for p in struct_parameters(tail))
 
 
 # ---- products with Jacobians ---------------------------------------------------------------------
@@ -260,3 +255,16 @@ def assemble_momentum_derivatives(draft: Draft, arrays: dict[str, Array]) -> Non
     draft.call(inner, q=q, v=arrays["v"], **outputs, **directions.tangents(draft, q))
     for name, row in rows.items():
         directions.spread(draft, row, arrays[f"{name}_dq"], arrays[f"{name}_dv"])
+
+
+ASSEMBLIES = {
+    "inverse_dynamics_derivatives": assemble_inverse_dynamics_derivatives,
+    "forward_dynamics_derivatives": assemble_forward_dynamics_derivatives,
+    "inverse_dynamics_parameter_derivatives": assemble_inverse_dynamics_parameter_derivatives,
+    "forward_dynamics_parameter_derivatives": assemble_forward_dynamics_parameter_derivatives,
+    "inverse_dynamics_vjp": assemble_inverse_dynamics_vjp,
+    "forward_dynamics_jvp": assemble_forward_dynamics_jvp,
+    "forward_dynamics_vjp": assemble_forward_dynamics_vjp,
+    "energy_derivatives": assemble_energy_derivatives,
+    "momentum_derivatives": assemble_momentum_derivatives,
+}

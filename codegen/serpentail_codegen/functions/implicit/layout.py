@@ -3,30 +3,10 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from ...ir.program import Array, Index, Ref, padded
+from ...ir.program import Array, Index, Ref
 from ..draft import Draft
 from ..layout import PER_SEGMENT, TORSO_NV
 from ..tail import Tail
-
-SPRING = 18  # numbers of a point's linearised contact
-
-
-def blocks(tail: Tail) -> dict[str, tuple[int, int]]:
-    """Size and count of what factoring hands to solving, S first."""
-    parts = {"S": (padded(tail.nv), tail.nv)}
-    if tail.contacts:
-        parts |= {"S_turned": (padded(tail.nv), tail.nv)}
-    parts |= {"H_tail": (tail.nt, tail.nt), "damped": (1, tail.nt)}
-    parts |= dict.fromkeys(["gain_q", "gain_v", "weight"], (1, 1))
-    if tail.contacts:
-        parts |= {"R": (9, 1), "relax": (1, 1), "depth": (1, tail.points), "arm": (3, tail.points)}
-        parts |= {"spring": (SPRING, tail.points), "J": (3 * tail.nt, tail.groups.get("tail", 0))}
-    return parts
-
-
-def factors_size(tail: Tail) -> int:
-    """Numbers that factoring hands to solving."""
-    return sum(size * count for size, count in blocks(tail).values())
 
 
 @dataclass(frozen=True)
@@ -38,18 +18,20 @@ class Factors:
 
     def first(self, name: str) -> int:
         """Where a part begins."""
-        parts = blocks(self.tail)
+        parts = self.tail.factor_blocks
         before = list(parts)[: list(parts).index(name)]
         return sum(size * count for size, count in map(parts.__getitem__, before))
 
     def __call__(self, name: str, k: Index | int = 0) -> Ref:
         """Entry k of a part."""
-        size = blocks(self.tail)[name][0]
+        size = self.tail.factor_blocks[name][0]
         return self.array.part(self.first(name) + size * k, size)
 
     def entry(self, name: str, row: Index | int, column: Index | int, size: int = 1) -> Ref:
         """Numbers of a matrix."""
-        return self.array.part(self.first(name) + blocks(self.tail)[name][0] * row + column, size)
+        return self.array.part(
+            self.first(name) + self.tail.factor_blocks[name][0] * row + column, size
+        )
 
     def tail_entry(self, k: Index, other: Index) -> Ref:
         """The number of S for two tail coordinates."""

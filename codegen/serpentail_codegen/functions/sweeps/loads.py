@@ -3,7 +3,7 @@
 from ...ir.program import Array, Index, Ref
 from ...mechanics import loads
 from ..draft import Draft
-from ..layout import coordinates
+from ..layout import LOAD, coordinates
 from ..scope import State, Vectors
 from .pieces import mechanism, torso_pose
 
@@ -32,7 +32,7 @@ def gather_loads(draft: Draft, state: State, R: Ref, f_ext: Array, torques: Arra
     draft.fill(beyond["F_beyond"], 0)
 
     def add_load(point: Index) -> None:
-        force = f_ext.part(6 + 3 * point, 3)
+        force = f_ext.part(LOAD + 3 * point, 3)
         reads = {"R": R, "P": points[point], "f_point": force}
         draft.step(loads.load_at_point, reads, beyond, **beyond)
 
@@ -44,5 +44,5 @@ def gather_loads(draft: Draft, state: State, R: Ref, f_ext: Array, torques: Arra
         add_load(g + 1)
         draft.step(loads.joint_load, {"S": S[g]}, beyond, torque_=coordinates(torques, i))
     add_load(Index())
-    at_torso = {"R": R, "f_torso": f_ext.part(0, 6)}
+    at_torso = {"R": R, "f_torso": f_ext.part(0, LOAD)}
     return draft.store(loads.load_at_torso, at_torso, beyond, load_force=3, load_moment=3)

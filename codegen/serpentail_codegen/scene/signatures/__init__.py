@@ -1,0 +1,1 @@
+"""Every function of a model: its name, arguments, meaning and group, in one place."""

@@ -1,0 +1,115 @@
+"""The arguments of functions: their names, shapes, and what their numbers mean.
+
+A shape is made of numbers and of names of sizes, such as ("nv", "nv"): what these are, a tail says
+(`functions.tail.Tail` has a property of each name).
+"""
+
+from dataclasses import dataclass
+from math import prod
+
+
+@dataclass(frozen=True)
+class Argument:
+    """One array argument of a function: its shape, and its meaning with unit and frame."""
+
+    name: str
+    sizes: tuple[int | str, ...]
+    meaning: str
+
+    def shape(self, tail: object) -> tuple[int, ...]:
+        """Return the shape that it has for a tail."""
+        return tuple(n if isinstance(n, int) else int(getattr(tail, n)) for n in self.sizes)
+
+    def length(self, tail: object) -> int:
+        """Return how many numbers it has for a tail."""
+        return prod(self.shape(tail))
+
+
+def nv_numbers(name: str, meaning: str) -> Argument:
+    """Return a vector argument (nv,)."""
+    return Argument(name, ("nv",), meaning)
+
+
+def nv_by_nv(name: str, meaning: str) -> Argument:
+    """Return a matrix argument (nv, nv)."""
+    return Argument(name, ("nv", "nv"), meaning)
+
+
+def three_by_nv(name: str, meaning: str) -> Argument:
+    """Return a matrix argument (3, nv)."""
+    return Argument(name, (3, "nv"), meaning)
+
+
+def bristle_numbers(name: str, meaning: str) -> Argument:
+    """Return a vector argument with two numbers for each point that can touch the ground."""
+    return Argument(name, ("bristles",), meaning)
+
+
+# States, accelerations and forces
+Q = Argument(
+    "q",
+    ("nq",),
+    "configuration: position of B (m, world), quaternion w x y z, tail coordinates (rad)",
+)
+V = nv_numbers(
+    "v", "velocity: of B (m/s, world), omega (rad/s, body), rates of the tail coordinates (rad/s)"
+)
+V_DOT = nv_numbers("v_dot", "time derivative of v")
+TAU = Argument("tau", ("nt",), "torques (N m), conjugate to the tail coordinates")
+F_EXT = Argument(
+    "f_ext",
+    ("loads",),
+    "force at B (N, world), moment (N m, body), then a force (N, world) at each of the N + 1 tail "
+    "points",
+)
+FORCE = nv_numbers(
+    "force",
+    "generalised force: on p_dot (N, world), on omega (N m, body), on the rates of the tail "
+    "coordinates (N m)",
+)
+ACCELERATIONS = Argument(
+    "accelerations", ("nt",), "wanted accelerations of the tail coordinates (rad/s^2)"
+)
+MULTIPLIER = nv_numbers("multiplier", "weights lambda of the rows")
+
+# What plain functions return
+H = nv_by_nv("H", "inertia matrix, symmetric positive definite (kg, kg m, kg m^2)")
+POINTS = Argument("points", ("tail_points", 3), "joint positions, then the tip (m, world)")
+JACOBIANS = Argument("J", ("tail_points", 3, "nv"), "d(point)/dt = J v")
+KINETIC = Argument("kinetic", (1,), "kinetic energy (J)")
+POTENTIAL = Argument(
+    "potential", (1,), "potential energy, zero at the height of the world's origin (J)"
+)
+LINEAR = Argument("linear", (3,), "momentum (kg m/s, world)")
+ANGULAR = Argument("angular", (3,), "angular momentum about the centre of mass (kg m^2/s, world)")
+
+# Derivatives
+DPARAMETERS = Argument(
+    "dparameters",
+    ("nv", "parameter_numbers"),
+    "derivative with respect to the parameter struct's numbers",
+)
+
+# Contact
+LEGS = Argument(
+    "legs",
+    ("leg_numbers",),
+    "gamma_1, delta_1 of the right leg, gamma_2, delta_2 of the left (rad), then their rates "
+    "(rad/s)",
+)
+POSITIONS = Argument("positions", ("points", 3), "points that can touch the ground (m, world)")
+VELOCITIES = Argument("velocities", ("points", 3), "their velocities (m/s, world)")
+BRISTLES = bristle_numbers("bristles", "stretch of the friction springs (m, world x and y)")
+BRISTLE_RATES = bristle_numbers("bristle_rates", "their rates (m/s)")
+FORCES = Argument("forces", ("points", 3), "forces of the ground on the points (N, world)")
+
+# Linear systems of implicit methods
+DAMPING = Argument("damping", ("nt",), "of the tail's joints (N m s): tau = -damping q_t_dot")
+GAINS = Argument("gains", (2,), "K_p (1/s^2), K_d (1/s) of tracking, through H_tt; zeros without")
+WEIGHT = Argument(
+    "weight",
+    ("weights",),
+    "w, weight of J: a method's coefficient times its step (s); with contacts then 1, or 0: "
+    "friction's bound stays",
+)
+FACTORS = Argument("factors", ("factors",), "what implicit_solve needs")

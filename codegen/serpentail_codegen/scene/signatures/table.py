@@ -1,0 +1,37 @@
+"""The table of all functions, and the lists of names that scenes are checked against.
+
+The rules for scenes, the catalogue of assemblies, the manifest, the runtime's lists and the
+documentation of functions are made of this table. Its order is that of emitted code.
+"""
+
+from . import derivatives, simulation, values
+from .signature import ALWAYS, CALLED, CONTACT, DERIVATIVE, GROUND, VALUE
+
+SIGNATURES = {
+    signature.name: signature
+    for signature in (*values.SIGNATURES, *derivatives.SIGNATURES, *simulation.SIGNATURES)
+}
+
+
+def in_group(group: str) -> tuple[str, ...]:
+    """Return the names of a group's functions."""
+    return tuple(name for name, signature in SIGNATURES.items() if signature.group == group)
+
+
+def emitted(when: str) -> tuple[str, ...]:
+    """Return the names of the functions that are emitted under a condition."""
+    return tuple(name for name, signature in SIGNATURES.items() if signature.emitted == when)
+
+
+ALL = tuple(name for name in SIGNATURES if name not in emitted(CALLED))  # what a scene may name
+DEFAULT = emitted(ALWAYS)
+DEFAULT_ON_GROUND = emitted(GROUND)
+VALUES = in_group(VALUE)
+DERIVATIVES = in_group(DERIVATIVE)
+NEED_CONTACTS = in_group(CONTACT)
+# functions that first, then second derivatives of a compiled function are made of
+EXACT_DERIVATIVES = {
+    name: (signature.exact[0], signature.exact[1] + signature.exact[2])
+    for name, signature in SIGNATURES.items()
+    if signature.exact
+}
