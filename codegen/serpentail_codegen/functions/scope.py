@@ -4,7 +4,7 @@ A sweep hands scopes on instead of single vectors; a step takes from a scope wha
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 from ..ir.program import Array, Index, Ref
 from .layout import OMEGA, POSITION, QUATERNION, VELOCITY, block, segment_q, segment_v
@@ -49,7 +49,7 @@ class Fields(Scope):
 
     def vectors(self) -> Mapping[str, Ref]:
         """Return the vectors by their names."""
-        return {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore
+        return vars(self)
 
 
 @dataclass(frozen=True)
