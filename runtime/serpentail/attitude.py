@@ -5,6 +5,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .checks import finite_array
 from .errors import StateError
+from .model.layout import QUATERNION, TORSO_NQ
 
 
 def product(a, b) -> list:
@@ -74,9 +75,9 @@ def pitch_roll_yaw(q: ArrayLike, unwrap: bool = False) -> Array:
     along time over whole turns and through phi_x = +-pi/2.
     """
     q = finite_array("q", q)
-    if q.ndim == 0 or q.shape[-1] < 7:
+    if q.ndim == 0 or q.shape[-1] < TORSO_NQ:
         raise StateError(f"q has shape {q.shape}, not (7 + 2m,) or (..., 7 + 2m)")
-    rotation = rotation_matrix(q[..., 3:7])
+    rotation = rotation_matrix(q[..., QUATERNION])
     first, second, third = (rotation[..., row, :] for row in range(3))
     yaw = np.arctan2(-first[..., 1], second[..., 1])
     c, s = np.cos(yaw)[..., None], np.sin(yaw)[..., None]

@@ -11,6 +11,7 @@ from numpy import ndarray
 from ..checks import real_array
 from ..errors import StateError
 from .batch import SideBySide
+from .layout import FIRST_Q, QUATERNION, SECOND_Q
 from .library import NOT_POSITIVE_DEFINITE, OUT_OF_RANGE
 from .workers import shared
 
@@ -218,7 +219,7 @@ class Kernel:
 
     def _check_attitude(self, q, state: str) -> None:
         """Refuse a quaternion that gives no attitude."""
-        limits, norm = np.finfo(self.dtype), math.hypot(*q[3:7])
+        limits, norm = np.finfo(self.dtype), math.hypot(*q[QUATERNION])
         if not limits.tiny <= norm * norm <= limits.max:
             words = f"has norm {norm:.3g}" if norm else "is zero"
             raise StateError(
@@ -227,7 +228,8 @@ class Kernel:
 
     def _out_of_range(self, q, state: str) -> str:
         """Say which segment has a bend that the model does not cover, and what to do."""
-        bends = abs(q[8::2]) if self.polar else np.hypot(q[7::2], q[8::2])
+        first, second = q[FIRST_Q], q[SECOND_Q]
+        bends = abs(second) if self.polar else np.hypot(first, second)
         least, worst = int(bends.argmin()), int(bends.argmax())
         if self.polar and bends[worst] <= self.bend_range:
             what = f"segment {least + 1}{state} has theta = {bends[least]:.6g} rad"

@@ -13,6 +13,7 @@ from ..checks import finite_array
 from ..errors import ModelError, StateError
 from .batch import SideBySide
 from .kernel import Kernel
+from .layout import Layout
 from .library import open_library
 from .manifest import read_manifest
 from .parameters import RunParameters, flat, resolve, warn_of_unlike, without_replaced
@@ -81,7 +82,8 @@ class Model:
         self.segments = sizes["segments"]
         pieces = sizes["links"]
         self.links, self.samples = (pieces, None) if self.kind == "articulated" else (None, pieces)
-        self.nq, self.nv = sizes["nq"], sizes["nv"]
+        self.layout = Layout(self.segments)
+        self.nq, self.nv = self.layout.nq, self.layout.nv
         self.contacts = {entry["group"]: entry["count"] for entry in manifest["contacts"]}
         dtype = np.float32 if manifest["real"] == "float" else np.float64
         self.parameter_vector = np.array(flat(manifest, parameters), dtype)

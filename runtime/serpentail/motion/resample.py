@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..attitude import Array, quaternion_rate, sign_continuous
+from ..model.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TAIL_V, VELOCITY
 
 
 def inside(times: Array, span: Array) -> Array:
@@ -57,11 +58,12 @@ class Rows:
 
 def hermite_q(rows: Rows, q: Array, v: Array) -> Array:
     """Configurations between the samples q with velocities v."""
-    attitude = sign_continuous(q[:, 3:7])
-    positions = np.hstack([q[:, :3], attitude, q[:, 7:]])
-    rates = np.hstack([v[:, :3], quaternion_rate(attitude, v[:, 3:6]), v[:, 6:]])
+    attitude = sign_continuous(q[:, QUATERNION])
+    turning = quaternion_rate(attitude, v[:, OMEGA])
+    positions = np.hstack([q[:, POSITION], attitude, q[:, TAIL_Q]])
+    rates = np.hstack([v[:, VELOCITY], turning, v[:, TAIL_V]])
     result = rows.hermite(positions, rates)
-    result[:, 3:7] /= np.linalg.norm(result[:, 3:7], axis=1, keepdims=True)
+    result[:, QUATERNION] /= np.linalg.norm(result[:, QUATERNION], axis=1, keepdims=True)
     return result
 
 

@@ -5,6 +5,7 @@ data, comes out.
 import numpy as np
 
 from ..attitude import pitch_roll_yaw, rotation_matrix
+from ..model.layout import QUATERNION, VELOCITY
 from .trajectory import Trajectory
 
 UPRIGHT, SLOW, CARRIED = (
@@ -94,7 +95,7 @@ def airborne(motion: Trajectory) -> list[tuple[float, float | None]]:
 
 def upright(motion: Trajectory) -> float:
     """How upright the torso ends: z of its z axis, 1 on its feet, -1 on its back."""
-    return float(rotation_matrix(motion.q[-1, 3:7])[2, 2])
+    return float(rotation_matrix(motion.q[-1, QUATERNION])[2, 2])
 
 
 def standing(model, motion: Trajectory) -> bool | None:
@@ -106,7 +107,7 @@ def standing(model, motion: Trajectory) -> bool | None:
     p = model.parameters
     weight = (p["torso_mass"] + p["tail_mass"]) * p["gravity"]
     carried = motion.contact.of("feet").forces[-1, :, 2].sum()
-    slow = np.linalg.norm(motion.v[-1, :3]) < SLOW
+    slow = np.linalg.norm(motion.v[-1, VELOCITY]) < SLOW
     return bool(upright(motion) > UPRIGHT and slow and carried > CARRIED * weight)
 
 

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from ..attitude import Array
 from ..files import replacing
+from ..model.layout import PER_SEGMENT, QUATERNION, TAIL_Q, TORSO_NQ, Layout
 from .contact import ARRAYS as TOUCHING
 from .contact import Contact
 from .resample import Rows, hermite_q, inside, monotone
@@ -75,17 +76,17 @@ class Trajectory:
     @property
     def segments(self) -> int:
         """Number of tail segments m."""
-        return int(self.q.shape[1] - 7) // 2
+        return (self.q.shape[1] - TORSO_NQ) // PER_SEGMENT
 
     @property
     def attitude(self) -> Array:
         """Torso quaternions (w, x, y, z), torso to world, (K, 4)."""
-        return self.q[:, 3:7]
+        return self.q[:, QUATERNION]
 
     @property
     def tail(self) -> Array:
         """Tail coordinates q_t, (K, 2m), rad."""
-        return self.q[:, 7:]
+        return self.q[:, TAIL_Q]
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write one npz file (suffix added if absent), whole or not at all, and return its path."""
@@ -172,15 +173,21 @@ def _shapes(t: Array, q: Array) -> dict[str, tuple[int, ...]]:
     samples = len(t) if t.ndim == 1 else 0
     if not samples:
         raise ValueError(f"t has shape {t.shape}: give one row of at least one time")
-    width = q.shape[1] if q.ndim == 2 else 0
-    if width < 7 or width % 2 == 0:
+    layout = Layout.of_width(q.shape[1]) if q.ndim == 2 else None
+    if layout is None:
         raise ValueError(
             f"q has shape {q.shape}: give ({samples}, 7 + 2m), position, quaternion and 2m tail "
             "coordinates"
         )
-    vectors = {"v": width - 1, "tau": width - 7, "linear_momentum": 3, "angular_momentum": 3}
-    columns = {name: (samples, count) for name, count in vectors.items()}
-    return {"q": (samples, width), **columns, "kinetic": (samples,), "potential": (samples,)}
+    return {
+        "q": (samples, layout.nq),
+        "v": (samples, layout.nv),
+        "tau": (samples, layout.nt),
+        "kinetic": (samples,),
+        "potential": (samples,),
+        "linear_momentum": (samples, 3),
+        "angular_momentum": (samples, 3),
+    }
 
 
 def _check_time(t: Array) -> None:

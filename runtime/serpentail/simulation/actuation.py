@@ -19,7 +19,7 @@ class Drive:
 
     def __init__(self, records: Records, controller: Controller, legs: Piecewise | None = None):
         self.records, self.model, self.error = records, records.model, None
-        self.nt = self.model.nv - 6
+        self.nt = self.model.layout.nt
         self.float_errors = np.geterr()  # the user's: SciPy's methods work with their own
         pairs = [
             (begin, self._own(parts_of(each, self.nt))) for begin, each in phases_of(controller)

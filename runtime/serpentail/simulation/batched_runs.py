@@ -9,6 +9,7 @@ from threading import Event
 import numpy as np
 
 from ..model.kernel import aligned
+from ..model.layout import TAIL_V
 from .actuation import Drive
 from .compiled_run import PAUSE, Memory
 from .methods import Method
@@ -155,5 +156,5 @@ class Abreast:
                 return None
             if self.function(ctypes.addressof(record)):
                 return False
-        out["tau"][rows] = self.torques - self.arrays["damping"] * out["v"][rows, :, 6:]
+        out["tau"][rows] = self.torques - self.arrays["damping"] * out["v"][rows, :, TAIL_V]
         return True

@@ -81,7 +81,12 @@ class Memory:
             "q": np.array(start.q0, dtype, order="C"),
             "v": np.array(start.v0, dtype, order="C"),
         }
-        sizes = {"q": model.nq, "v": model.nv, "tau": model.nv - 6, "bristles": 2 * ground.points}
+        sizes = {
+            "q": model.nq,
+            "v": model.nv,
+            "tau": model.layout.nt,
+            "bristles": 2 * ground.points,
+        }
         if ground.points:
             self.state["bristles"] = np.array(ground.bristles.reshape(start.runs, -1), dtype)
         self.out = {

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..checks import real_array
 from ..errors import SimulationError
+from ..model.layout import TAIL_Q, TAIL_V, TORSO_NV, TORSO_V
 from .piecewise import Piecewise, checked_nodes, spline
 from .schedules import Reference
 
@@ -34,7 +35,7 @@ class Pfl:
         self, model: "Model", reference, kp: float = KP, kd: float = KD, feedforward: bool = True
     ):
         self.model, self.kp, self.kd = model, _gain("kp", kp), _gain("kd", kd)
-        self.curve = _curve(reference, model.nv - 6)
+        self.curve = _curve(reference, model.layout.nt)
         self.feedforward = bool(feedforward)
 
     def reference(self, t: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -45,7 +46,7 @@ class Pfl:
     def __call__(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Return tau (2m,), N m: X^-1 (S H^-1 C + a), X = S H^-1 [0; I]."""
         angles, rates, accelerations = self.reference(t)
-        wanted = accelerations + self.kd * (rates - v[6:]) + self.kp * (angles - q[7:])
+        wanted = accelerations + self.kd * (rates - v[TAIL_V]) + self.kp * (angles - q[TAIL_Q])
         return (
             self.model.pfl(q, v, wanted)
             if "pfl" in self.model.kernels
@@ -56,10 +57,10 @@ class Pfl:
         """The same of H and C: the base's accelerations solve its rows of Eq. 1, inverse dynamics
         has the torques.
         """
-        v_dot = np.concatenate([np.zeros(6), wanted])
+        v_dot = np.concatenate([np.zeros(TORSO_NV), wanted])
         H, force = self.model.mass_matrix(q), self.model.inverse_dynamics(q, v, v_dot)
-        base = np.linalg.solve(H[:6, :6], -force[:6])
-        return force[6:] + H[6:, :6] @ base
+        base = np.linalg.solve(H[TORSO_V, TORSO_V], -force[TORSO_V])
+        return force[TAIL_V] + H[TAIL_V, TORSO_V] @ base
 
 
 def _gain(name: str, value) -> float:
@@ -82,7 +83,11 @@ def _curve(reference, size: int) -> Piecewise:
         return reference.curve
     motion = getattr(reference, "trajectory", reference)
     if hasattr(motion, "tail") and hasattr(motion, "t"):
-        times, angles, ends = motion.t, motion.tail, tuple((1, motion.v[k, 6:]) for k in (0, -1))
+        times, angles, ends = (
+            motion.t,
+            motion.tail,
+            tuple((1, motion.v[k, TAIL_V]) for k in (0, -1)),
+        )
         if (
             motion is not reference
         ):  # a plan: else its second derivative, fed forward, is least exact at the ends

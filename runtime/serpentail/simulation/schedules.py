@@ -65,7 +65,7 @@ def shared_among_links(model, bends: np.ndarray) -> np.ndarray:
             f"bends has shape {bends.shape}: give {shape}: pitch, or pitch and yaw, of each segment"
         )
     both = bends if bends.ndim == 3 else np.stack([bends, 0 * bends], axis=-1)
-    return both.reshape(len(bends), 2 * m) / (model.links or 1)
+    return both.reshape(len(bends), model.layout.nt) / (model.links or 1)
 
 
 @dataclass(frozen=True, eq=False)

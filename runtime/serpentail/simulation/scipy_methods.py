@@ -5,6 +5,7 @@ import ctypes
 import numpy as np
 
 from ..errors import SimulationError
+from ..model.layout import QUATERNION
 from ..model.library import NOT_FINITE
 from .compiled_run import CompiledRun, Samples, failed
 from .methods import Method
@@ -60,7 +61,7 @@ class Tape:
     def write(self, t: float, y: np.ndarray) -> None:
         """Write one sample, its quaternion normalised."""
         y = y.copy()
-        y[3:7] /= np.linalg.norm(y[3:7])
+        y[QUATERNION] /= np.linalg.norm(y[QUATERNION])
         self.torques.append(self.rate.torque(t, y))
         self.states.append(y)
 
@@ -117,8 +118,8 @@ def _smooth_part(rate: StateRate, method: Method, part, tape: Tape, counts: dict
         for at in tape.due(solver.t):
             tape.write(at, interpolant(at) if at < solver.t else solver.y)
         if method.name == "dop853":
-            norm = np.linalg.norm(solver.y[3:7])
-            solver.y[3:7] /= norm
-            solver.f[3:7] /= norm
+            norm = np.linalg.norm(solver.y[QUATERNION])
+            solver.y[QUATERNION] /= norm
+            solver.f[QUATERNION] /= norm
     counts["evaluations"] += solver.nfev
     return solver.y

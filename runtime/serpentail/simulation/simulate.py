@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import ModelError, SimulationError, StateError
 from ..model.kernel import Rows
+from ..model.layout import TAIL_V
 from ..model.parameters import RunParameters
 from ..motion.trajectory import Trajectory
 from .actuation import Drive
@@ -161,7 +162,8 @@ def fastest_decay(drive: Drive, start: Start, parameters: RunParameters) -> floa
     v, v_dot = (np.zeros((*shape, drive.model.nv), kernel.dtype) for _ in range(2))
     evaluate = Rows(kernel, parameters.vectors, (q, v, tau), (v_dot,))
     sound = [k for k in range(start.runs) if evaluated(evaluate, k, shape[1])]
-    columns = (v_dot[sound, 1:, 6:] - v_dot[sound, :1, 6:]) * np.sqrt(np.outer(damping, damping))
+    tail = v_dot[sound, :, TAIL_V]
+    columns = (tail[:, 1:] - tail[:, :1]) * np.sqrt(np.outer(damping, damping))
     return float(np.linalg.eigvalsh(columns).max(initial=0.0))
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..checks import positive, real_array
 from ..errors import SimulationError, StateError
+from ..model.layout import QUATERNION
 
 MOST_SAMPLES = 10_000_000  # of all runs: more are a slip, and fill the memory
 SHORTEST = 1e-100  # s: between samples; methods multiply times
@@ -36,11 +37,11 @@ class Start:
         ]
         many = any(array.ndim == 2 for array in given)
         q0, v0 = _paired(*given)
-        norms = np.array([math.hypot(*quaternion) for quaternion in q0[:, 3:7].tolist()])
+        norms = np.array([math.hypot(*quaternion) for quaternion in q0[:, QUATERNION].tolist()])
         if not norms.all():
             where = f" of run {int(norms.argmin())}" if many else ""
             raise StateError(f"q0[3:7]{where} is the zero quaternion: upright is (1, 0, 0, 0)")
-        q0[:, 3:7] /= norms[:, None]
+        q0[:, QUATERNION] /= norms[:, None]
         start, end = checked_span(t_span)
         step = positive("output_step", (end - start) / 200 if output_step is None else output_step)
         if len(q0) * (end - start) > MOST_SAMPLES * step:
