@@ -16,7 +16,7 @@ from .kernel import Kernel
 from .layout import Layout
 from .library import open_library
 from .manifest import read_manifest
-from .parameters import RunParameters, flat, resolve, warn_of_unlike, without_replaced
+from .parameters import RunParameters, flat, merged, resolve, warn_of_unlike
 
 
 def load(
@@ -99,7 +99,7 @@ class Model:
 
     def with_parameters(self, **changes) -> "Model":
         """Return this model with other parameters; nothing is compiled.  Warns as ``load`` does."""
-        values = resolve(self.manifest, without_replaced(self._given(), changes) | changes)
+        values = resolve(self.manifest, merged(self._given(), changes))
         warn_of_unlike(values)
         return Model(self.folder, self.manifest, values, self.library, self.profile, self.many)
 

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -29,7 +30,7 @@ def resolve(manifest: dict, changes: Mapping[str, object] | None) -> MappingProx
     """
     values = {p["name"]: p["default"] for p in manifest["parameters"] if p["default"] is not None}
     given = _given(manifest, changes, None)
-    values = completed(manifest, without_replaced(values, given) | given)
+    values = completed(manifest, merged(values, given))
     return MappingProxyType(
         {
             n: float(v) if np.ndim(v) == 0 else tuple(np.asarray(v, float).tolist())
@@ -58,7 +59,7 @@ class RunParameters:
         ModelError lists everything that is wrong, and the run.
         """
         given = _given(manifest, changes, runs)
-        values = completed(manifest, without_replaced(own, given) | given)
+        values = completed(manifest, merged(own, given))
         fields = [(p["name"], p["size"]) for p in manifest["parameters"] if p["in_struct"]]
         columns = (np.asarray(values[name], float).reshape(-1, size) for name, size in fields)
         vectors = np.hstack([np.broadcast_to(a, (runs, a.shape[1])) for a in columns])
@@ -73,13 +74,16 @@ class RunParameters:
         return {name: values[k] for name, values in self.changes.items()}
 
 
-def without_replaced(own: Mapping[str, Value], changes: Mapping[str, object]) -> dict[str, Value]:
-    """Return the values that stay: of link_radius and link_inertia the one that is given replaces
-    the other.
-    """
+def total_mass(values: Mapping[str, Any]) -> Any:
+    """Return the mass (kg) of torso and tail, or one of each run."""
+    return values["torso_mass"] + values["tail_mass"]
+
+
+def merged(values: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return values with changes; link_radius and link_inertia replace each other."""
     other = {"link_inertia": "link_radius", "link_radius": "link_inertia"}
-    gone = {other[name] for name in changes if name in other}
-    return {name: value for name, value in own.items() if name not in gone}
+    replaced = {other[name] for name in changes if name in other}
+    return {name: x for name, x in values.items() if name not in replaced} | dict(changes)
 
 
 def completed(manifest: dict, values: Mapping) -> dict:

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..attitude import pitch_roll_yaw, rotation_matrix
 from ..model.layout import QUATERNION, VELOCITY
+from ..model.parameters import total_mass
 from .trajectory import Trajectory
 
 UPRIGHT, SLOW, CARRIED = (
@@ -57,7 +58,7 @@ def com_rise(model, motion: Trajectory) -> float | None:
     without gravity.
     """
     p = model.parameters
-    weight = (p["torso_mass"] + p["tail_mass"]) * p["gravity"]
+    weight = total_mass(p) * p["gravity"]
     return float((motion.potential.max() - motion.potential[0]) / weight) if weight else None
 
 
@@ -105,7 +106,7 @@ def standing(model, motion: Trajectory) -> bool | None:
     if motion.contact is None or "feet" not in motion.contact.groups:
         return None
     p = model.parameters
-    weight = (p["torso_mass"] + p["tail_mass"]) * p["gravity"]
+    weight = total_mass(p) * p["gravity"]
     carried = motion.contact.of("feet").forces[-1, :, 2].sum()
     slow = np.linalg.norm(motion.v[-1, VELOCITY]) < SLOW
     return bool(upright(motion) > UPRIGHT and slow and carried > CARRIED * weight)

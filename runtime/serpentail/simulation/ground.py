@@ -9,7 +9,7 @@ import numpy as np
 from ..checks import real_array
 from ..errors import SimulationError
 from ..model.kernel import Rows
-from ..model.parameters import RunParameters
+from ..model.parameters import RunParameters, total_mass
 from ..motion.contact import Contact
 from .schedules import Legs
 from .start import Start
@@ -65,7 +65,7 @@ class Ground:
         there.
         """
         heights, p = self._heights(model, start, parameters), parameters.values
-        weight = (p["torso_mass"] + p["tail_mass"]) * p["gravity"]
+        weight = total_mass(p) * p["gravity"]
         limits = np.broadcast_to((DEEP * weight / p["K_n"]) ** (2 / 3), start.runs)
         wrong = np.flatnonzero(-heights.min(axis=1) > limits)
         if len(wrong):
