@@ -98,9 +98,9 @@ def c_times(model) -> tuple[float, float]:
     out = np.empty((STATES, model.nv), kernel.dtype)
     for function, size in (
         (kernel.function, kernel.work),
-        (kernel.many.entry(kernel.name, MANY), None),
+        (kernel.batch_library.entry(kernel.name, MANY), None),
     ):
-        keep.append(aligned(size or kernel.many.work[kernel.name], kernel.dtype))
+        keep.append(aligned(size or kernel.batch_library.work[kernel.name], kernel.dtype))
         record = call_record(kernel.parameters, STATES, keep[-1], (*states, out))
         calls.append(lambda function=function, record=record: function(ctypes.addressof(record)))
     times = [[best(call, 1) for call in calls] for _ in range(ROUNDS)]

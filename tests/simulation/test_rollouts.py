@@ -403,7 +403,9 @@ def test_ctrl_c_ends_all_threads_within_a_second(monkeypatch, many):
     monkeypatch.setattr(abreast, "MANY", many)
     monkeypatch.setattr(abreast, "LONG", 10**12)
     q, v = starts(tail(), 50)
-    tail().many.flights.function("tail_side_by_side_flights")  # compiled before the clock runs
+    tail().batch_library.rollouts.function(
+        "tail_side_by_side_flights"
+    )  # compiled before the clock runs
     before, asked = threading.active_count(), []
 
     def ask():

@@ -10,10 +10,10 @@ from .compiler import compile_library
 
 # states: from here on a batch pays for compiling the C of batches, which takes a second or two
 MANY = 1000
-LATE = ("batch", "flights")  # sources of a model that are compiled when they are needed
+LAZY_SOURCES = ("batch", "flights")  # sources of a model that are compiled when they are needed
 
 
-class Late:
+class LazyLibrary:
     """A source of one model that is compiled when it is first needed, not with the model."""
 
     def __init__(self, folder: Path, manifest: dict, profile: str, part: str):
@@ -33,7 +33,7 @@ class Late:
         return function
 
 
-class SideBySide:
+class BatchLibrary:
     """The C of one model that evaluates batches, or simulates flights, several states side by
     side.
     """
@@ -44,7 +44,9 @@ class SideBySide:
             manifest["batch"]["states"],
             manifest["batch"]["work"],
         )
-        self.batch, self.flights = (Late(folder, manifest, profile, part) for part in LATE)
+        self.batch, self.rollouts = (
+            LazyLibrary(folder, manifest, profile, part) for part in LAZY_SOURCES
+        )
 
     def entry(self, name: str, count: int):
         """Return the C function for a batch of so many states, or None where one state at a time is

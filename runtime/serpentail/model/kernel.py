@@ -10,7 +10,7 @@ from numpy import ndarray
 
 from ..checks import real_array
 from ..errors import StateError
-from .batch import SideBySide
+from .batch import BatchLibrary
 from .layout import FIRST_Q, QUATERNION, SECOND_Q
 from .library import NOT_POSITIVE_DEFINITE, OUT_OF_RANGE
 from .workers import shared
@@ -102,7 +102,7 @@ class Kernel:
     def __init__(
         self,
         library: ctypes.CDLL,
-        many: SideBySide,
+        batch_library: BatchLibrary,
         manifest: dict,
         name: str,
         parameters: np.ndarray,
@@ -114,7 +114,11 @@ class Kernel:
         self.out_shapes = [() if a["shape"] == [1] else tuple(a["shape"]) for a in entry["outputs"]]
         self.function = getattr(library, f"{manifest['prefix']}_batch_{name}")
         self.function.argtypes = [ctypes.c_void_p]
-        self.parameters, self.many, self.work = parameters, many, manifest["work"][name]
+        self.parameters, self.batch_library, self.work = (
+            parameters,
+            batch_library,
+            manifest["work"][name],
+        )
         self.bend_range = manifest["scene"].get("bend_range")
         self.polar = manifest["scene"]["coordinates"] == "polar"
         self.buffers = Buffers(self.dtype, self.shapes, self.out_shapes, self.work, parameters)
@@ -169,8 +173,8 @@ class Kernel:
             for a, shape in zip(arrays, self.shapes, strict=True)
         ]
         outputs = [np.empty((count, *shape), self.dtype) for shape in self.out_shapes]
-        many = self.many.entry(self.name, count)
-        run = self._each if many is None else partial(self._side_by_side, many)
+        function = self.batch_library.entry(self.name, count)
+        run = self._each if function is None else partial(self._side_by_side, function)
         shared(count, lambda first, last: run(whole, outputs, first, last))
         return outputs[0] if len(outputs) == 1 else tuple(outputs)
 
@@ -187,7 +191,7 @@ class Kernel:
         """Evaluate states [first, last) side by side; those among which one fails are taken again,
         one by one.
         """
-        work = aligned(self.many.work[self.name], self.dtype)
+        work = aligned(self.batch_library.work[self.name], self.dtype)
         while first < last:
             call = call_record(
                 self.parameters, last - first, work, [a[first:last] for a in (*inputs, *outputs)]
@@ -195,7 +199,7 @@ class Kernel:
             if not function(ctypes.addressof(call)):
                 return
             first += call.failed
-            after = min(first + self.many.states, last)
+            after = min(first + self.batch_library.states, last)
             self._each(inputs, outputs, first, after)
             first = after
 

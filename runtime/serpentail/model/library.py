@@ -4,7 +4,7 @@ import ctypes
 from pathlib import Path
 
 from ..errors import ModelError, SerpentailError
-from .batch import LATE
+from .batch import LAZY_SOURCES
 from .compiler import compile_library
 from .manifest import remedy
 
@@ -16,9 +16,9 @@ def open_library(folder: Path, manifest: dict, profile: str) -> ctypes.CDLL:
     manifest says.
     """
     prefix = manifest["prefix"]
-    late = {f"src/{prefix}_{part}.c" for part in LATE}
+    lazy = {f"src/{prefix}_{part}.c" for part in LAZY_SOURCES}
     sources = [
-        folder / name for name in manifest["files"] if name.startswith("src/") and name not in late
+        folder / name for name in manifest["files"] if name.startswith("src/") and name not in lazy
     ]
     path = compile_library(sources, folder / "include", profile)
     try:

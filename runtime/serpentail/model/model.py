@@ -11,7 +11,7 @@ import numpy as np
 
 from ..checks import finite_array
 from ..errors import ModelError, StateError
-from .batch import SideBySide
+from .batch import BatchLibrary
 from .kernel import Kernel
 from .layout import Layout
 from .library import open_library
@@ -72,7 +72,7 @@ class Model:
         parameters: Mapping,
         library,
         profile: str = "fast",
-        many=None,
+        batch_library=None,
     ):
         self.folder, self.manifest, self.parameters = folder, manifest, parameters
         self.library, self.profile = library, profile
@@ -88,9 +88,10 @@ class Model:
         dtype = np.float32 if manifest["real"] == "float" else np.float64
         self.parameter_vector = np.array(flat(manifest, parameters), dtype)
         made = manifest["functions"] if library else ()
-        self.many = many or SideBySide(folder, manifest, profile)
+        self.batch_library = batch_library or BatchLibrary(folder, manifest, profile)
         self.kernels = {
-            name: Kernel(library, self.many, manifest, name, self.parameter_vector) for name in made
+            name: Kernel(library, self.batch_library, manifest, name, self.parameter_vector)
+            for name in made
         }
 
     def __repr__(self) -> str:
@@ -101,7 +102,9 @@ class Model:
         """Return this model with other parameters; nothing is compiled.  Warns as ``load`` does."""
         values = resolve(self.manifest, merged(self._given(), changes))
         warn_of_unlike(values)
-        return Model(self.folder, self.manifest, values, self.library, self.profile, self.many)
+        return Model(
+            self.folder, self.manifest, values, self.library, self.profile, self.batch_library
+        )
 
     def parameters_of_runs(self, changes: Mapping[str, object] | None, runs: int) -> RunParameters:
         """Return the parameters of many runs; changes: name -> (runs,) or (runs, 3), SI, or

@@ -106,7 +106,7 @@ class Abreast:
         entry, dtype = model.manifest["flights"], memory.records.dtype
         self.states, self.work, self.dtype = entry["states"], entry["work"], dtype
         self.record = structure("flights", tuple(map(tuple, entry["record"])), memory.records.real)
-        self.function = model.many.flights.function(f"{model.name}_side_by_side_flights")
+        self.function = model.batch_library.rollouts.function(f"{model.name}_side_by_side_flights")
         self.steps = Steps.planned(memory.start, drive, method.settings["step"])
         damping, curve, times = drive.parts[0].damping, drive.parts[0].torques, memory.start.times
         sampled = (
