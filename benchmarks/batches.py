@@ -11,7 +11,7 @@ import numpy as np
 
 import serpentail as st
 from benchmarks.fixtures import generated, label
-from serpentail.model.batch import MANY
+from serpentail.model.batch import MIN_BATCH
 from serpentail.model.kernel import aligned, call_record
 from serpentail.simulation import batched_runs as abreast
 
@@ -98,7 +98,7 @@ def c_times(model) -> tuple[float, float]:
     out = np.empty((STATES, model.nv), kernel.dtype)
     for function, size in (
         (kernel.function, kernel.work),
-        (kernel.batch_library.entry(kernel.name, MANY), None),
+        (kernel.batch_library.entry(kernel.name, MIN_BATCH), None),
     ):
         keep.append(aligned(size or kernel.batch_library.work[kernel.name], kernel.dtype))
         record = call_record(kernel.parameters, STATES, keep[-1], (*states, out))

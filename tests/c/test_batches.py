@@ -52,7 +52,7 @@ def model(kind="articulated", segments=2, links=2, profile="fast", **options):
 
 @pytest.fixture(autouse=True)
 def any_batch_is_large(monkeypatch):
-    monkeypatch.setattr("serpentail.model.batch.MANY", 1)
+    monkeypatch.setattr("serpentail.model.batch.MIN_BATCH", 1)
 
 
 def states(model, count, seed=0):
@@ -225,7 +225,7 @@ void row(const real *x, real *sine, real *cosine) {{
 
 
 def test_a_few_states_compile_nothing_and_many_do_once(monkeypatch):
-    monkeypatch.setattr("serpentail.model.batch.MANY", 1000)
+    monkeypatch.setattr("serpentail.model.batch.MIN_BATCH", 1000)
     built = []
     monkeypatch.setattr(
         "serpentail.model.batch.compile_library", lambda *a: built.append(a) or compile_library(*a)

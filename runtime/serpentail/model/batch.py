@@ -9,7 +9,7 @@ from pathlib import Path
 from .compiler import compile_library
 
 # states: from here on a batch pays for compiling the C of batches, which takes a second or two
-MANY = 1000
+MIN_BATCH = 1000
 LAZY_SOURCES = ("batch", "flights")  # sources of a model that are compiled when they are needed
 
 
@@ -52,6 +52,8 @@ class BatchLibrary:
         """Return the C function for a batch of so many states, or None where one state at a time is
         better.
         """
-        if name not in self.work or count < (MANY if self.batch.library is None else self.states):
+        if name not in self.work or count < (
+            MIN_BATCH if self.batch.library is None else self.states
+        ):
             return None
         return self.batch.function(f"{self.prefix}_side_by_side_{name}")

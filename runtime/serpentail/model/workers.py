@@ -8,8 +8,8 @@ from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 from functools import cache
 from itertools import pairwise
 
-LOOK = 0.1  # s between looks at signals, such as Ctrl-C
-SHARE = 256  # states: the least that is worth a thread
+POLL_S = 0.1  # s between looks at signals, such as Ctrl-C
+MIN_STATES_PER_THREAD = 256  # states: the least that is worth a thread
 
 
 @cache
@@ -28,7 +28,7 @@ def shared(count: int, run: Callable[[int, int], None]) -> None:
     """Call ``run(first, last)`` for shares of a batch, on all cores where it is large; the first
     error is raised.
     """
-    shares = max(1, min(cores(), count // SHARE))
+    shares = max(1, min(cores(), count // MIN_STATES_PER_THREAD))
     ends = [count * k // shares for k in range(shares + 1)]
     if shares == 1:
         run(0, count)
@@ -54,7 +54,7 @@ def in_turn(
         try:
             waiting = {crew.submit(work, _taken(left), ended) for _ in range(threads)}
             while waiting:  # looks at signals now and then
-                done, waiting = wait(waiting, LOOK, FIRST_EXCEPTION)
+                done, waiting = wait(waiting, POLL_S, FIRST_EXCEPTION)
                 for future in done:
                     future.result()
         finally:
