@@ -13,7 +13,7 @@ import serpentail as st
 from benchmarks.fixtures import generated, label
 from serpentail.model.batch import MIN_BATCH
 from serpentail.model.kernel import aligned, call_record
-from serpentail.simulation import batched_runs as abreast
+from serpentail.simulation import batched_runs
 
 STATES, ROUNDS = 512, 300  # a batch that stays in the cache
 FLIGHTS = 64
@@ -77,7 +77,7 @@ def flight_times(model, q: np.ndarray, v: np.ndarray) -> list[float]:
     ways.append(lambda: st.simulate(model, q, v, parameters=own, **settings))
     found = []
     for way, many in zip((*ways, ways[1]), (np.inf, np.inf, 1), strict=True):
-        with mock.patch.object(abreast, "MANY", many):
+        with mock.patch.object(batched_runs, "MIN_BATCHED_STEPS", many):
             found.append(best(way, 1))
     step = settings | {"t_span": 1e-3, "output_step": 1e-3}
     return [*found, best(lambda: st.simulate(model, q, v, parameters=own, **step), 1)]

@@ -17,9 +17,9 @@ from .piecewise import Piecewise
 from .records import structure
 from .start import Start
 
-# steps of all runs: from here on compiling the C of flights pays, which takes a second or two
-MANY = 1_000_000
-LONG = 1_000_000  # steps of one run: beyond, what all runs share fills the memory
+# steps of all runs: from here on compiling the C of batched runs pays, which takes a second or two
+MIN_BATCHED_STEPS = 1_000_000
+MAX_SHARED_STEPS = 1_000_000  # steps of one run: beyond, what all runs share fills the memory
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,8 +83,8 @@ def before(curve: Piecewise, t: np.ndarray) -> np.ndarray:
     return curve.at(np.nextafter(t, -np.inf))[0]
 
 
-def pays(memory: Memory, drive: Drive, method: Method) -> bool:
-    """Tell whether runs can be made abreast, and are so many that it pays."""
+def worth_batching(memory: Memory, drive: Drive, method: Method) -> bool:
+    """Tell whether runs can be made in batches, and are so many that it pays."""
     start, parts = memory.start, drive.parts[0]
     if (
         method.name != "rk4"
@@ -95,10 +95,10 @@ def pays(memory: Memory, drive: Drive, method: Method) -> bool:
     if any(part is not None for part in (parts.pfl, parts.native, parts.user)):
         return False
     steps = int(_counts(_edges(start, drive), method.settings["step"]).sum())
-    return start.runs > 1 and steps <= LONG and steps * start.runs >= MANY
+    return start.runs > 1 and steps <= MAX_SHARED_STEPS and steps * start.runs >= MIN_BATCHED_STEPS
 
 
-class Abreast:
+class BatchedRuns:
     """Runs of a memory, several of which the C of flights makes at once."""
 
     def __init__(self, memory: Memory, drive: Drive, method: Method):

@@ -14,7 +14,7 @@ from ..model.parameters import RunParameters
 from ..model.workers import cores, in_turn
 from ..motion.trajectory import Trajectory
 from .actuation import Drive
-from .batched_runs import Abreast, pays
+from .batched_runs import BatchedRuns, worth_batching
 from .compiled_run import COUNTS, PAUSED, CompiledRun, Memory, Outcome, Samples, sampled
 from .ground import Ground
 from .measured import judged
@@ -96,8 +96,10 @@ class Flights:
     def __init__(self, memory: Memory, drive: Drive, method: Method):
         runs, samples = memory.start.runs, memory.start.intervals + 1
         self.memory, self.drive, self.method = memory, drive, method
-        self.abreast = Abreast(memory, drive, method) if pays(memory, drive, method) else None
-        self.tasks = self.abreast.groups if self.abreast else runs
+        self.batched = (
+            BatchedRuns(memory, drive, method) if worth_batching(memory, drive, method) else None
+        )
+        self.tasks = self.batched.groups if self.batched else runs
         of_python = method.name in SCIPY or any(parts.user is not None for parts in drive.parts)
         self.threads = 1 if of_python else min(cores(), self.tasks)
         self.model = memory.records.model
@@ -124,22 +126,22 @@ class Flights:
                 return
             self._keep(k, outcome, measures)
 
-    def fly_abreast(self, groups: Iterator[int], ended: Event) -> None:
+    def run_batches(self, groups: Iterator[int], ended: Event) -> None:
         """Take up groups of runs; those among which one cannot go on are made again, one by one."""
-        abreast, start, measures = (
-            self.abreast,
+        batched, start, measures = (
+            self.batched,
             self.memory.start,
             [self._rows(name) for name in MEASURES],
         )
-        steps = len(abreast.steps.lengths)
+        steps = len(batched.steps.lengths)
         info = dict.fromkeys(COUNTS, 0) | {"steps": steps, "evaluations": 4 * steps}
         for group in groups:
-            flown = abreast.go(group, ended)
+            flown = batched.go(group, ended)
             if flown is None:
                 return
             if not flown:
-                self.fly(iter(abreast.runs(group)), ended)
-            for k in abreast.runs(group) if flown else ():
+                self.fly(iter(batched.runs(group)), ended)
+            for k in batched.runs(group) if flown else ():
                 self._keep(k, Outcome(start.intervals + 1, start.end, dict(info)), measures)
 
     def _keep(self, k: int, outcome: Outcome, measures: list[Rows]) -> None:
@@ -189,7 +191,7 @@ class Flights:
         for array in arrays.values():
             array.setflags(write=False)
         counts = {name: sum(each.info.get(name, 0) for each in self.outcomes) for name in COUNTS}
-        shared = {"threads": self.threads, "abreast": self.abreast.states if self.abreast else 1}
+        shared = {"threads": self.threads, "abreast": self.batched.states if self.batched else 1}
         info = counts | self.method.told | {"model": self.model.name} | shared | info
         return Rollouts(**arrays, errors=errors, info=info, source=self.source)
 
@@ -221,5 +223,5 @@ def in_c(run: CompiledRun, ended: Event) -> Outcome | None:
 def flown(memory: Memory, drive: Drive, method: Method) -> Flights:
     """Make all runs, on all cores unless Python acts in them."""
     flights = Flights(memory, drive, method)
-    in_turn(flights.tasks, flights.threads, flights.fly_abreast if flights.abreast else flights.fly)
+    in_turn(flights.tasks, flights.threads, flights.run_batches if flights.batched else flights.fly)
     return flights
