@@ -90,7 +90,7 @@ class Rollouts:
         return self.source.trajectory(k, sampled(self.t, arrays, self.source.outcomes[k]))
 
 
-class Flights:
+class ParallelRuns:
     """Runs on their way: threads take them up in turn, and write samples, measures and outcomes."""
 
     def __init__(self, memory: Memory, drive: Drive, method: Method):
@@ -115,7 +115,7 @@ class Flights:
             }
         self.unmeasured: list[int] = []  # whose energy or momentum no number holds
 
-    def fly(self, numbers: Iterator[int], ended: Event) -> None:
+    def run_singly(self, numbers: Iterator[int], ended: Event) -> None:
         """Take up runs in one thread until none is left, or ``ended`` is set."""
         run = CompiledRun(self.memory, self.drive, self.method)
         measures = [self._rows(name) for name in MEASURES]
@@ -136,12 +136,12 @@ class Flights:
         steps = len(batched.steps.lengths)
         info = dict.fromkeys(COUNTS, 0) | {"steps": steps, "evaluations": 4 * steps}
         for group in groups:
-            flown = batched.go(group, ended)
-            if flown is None:
+            completed = batched.go(group, ended)
+            if completed is None:
                 return
-            if not flown:
-                self.fly(iter(batched.runs(group)), ended)
-            for k in batched.runs(group) if flown else ():
+            if not completed:
+                self.run_singly(iter(batched.runs(group)), ended)
+            for k in batched.runs(group) if completed else ():
                 self._keep(k, Outcome(start.intervals + 1, start.end, dict(info)), measures)
 
     def _keep(self, k: int, outcome: Outcome, measures: list[Rows]) -> None:
@@ -220,8 +220,8 @@ def in_c(run: CompiledRun, ended: Event) -> Outcome | None:
     return None if status == PAUSED else run.outcome(status)
 
 
-def flown(memory: Memory, drive: Drive, method: Method) -> Flights:
+def run_parallel(memory: Memory, drive: Drive, method: Method) -> ParallelRuns:
     """Make all runs, on all cores unless Python acts in them."""
-    flights = Flights(memory, drive, method)
-    in_turn(flights.tasks, flights.threads, flights.run_batches if flights.batched else flights.fly)
-    return flights
+    runs = ParallelRuns(memory, drive, method)
+    in_turn(runs.tasks, runs.threads, runs.run_batches if runs.batched else runs.run_singly)
+    return runs

@@ -20,7 +20,7 @@ from .ground import Ground
 from .measured import judged
 from .methods import SCIPY, Method, checked_method, chosen
 from .records import Records
-from .rollouts import Rollouts, flown
+from .rollouts import Rollouts, run_parallel
 from .start import Start
 
 
@@ -81,7 +81,7 @@ def simulate(
     start = Start.checked(model, (q0, v0), t_span, settings.pop("output_step", None))
     memory, drive, choice = prepared(model, start, controller, method, settings)
     begun = time.perf_counter(), time.process_time()
-    found = (flown if start.many else integrate)(memory, drive, choice)
+    found = (run_parallel if start.many else integrate)(memory, drive, choice)
     spent = {
         "seconds": time.perf_counter() - begun[0],
         "cpu_seconds": time.process_time() - begun[1],
