@@ -6,7 +6,7 @@ from .compiled_run import Samples
 from .ground import Ground
 
 
-def judged(model, found: Samples, ground: Ground) -> Trajectory:
+def trajectory_or_error(model, found: Samples, ground: Ground) -> Trajectory:
     """Return the trajectory of samples, or raise what ended the run, which keeps the trajectory up
     to there.
     """

@@ -17,7 +17,7 @@ from .actuation import Drive
 from .batched_runs import BatchedRuns, worth_batching
 from .compiled_run import COUNTS, PAUSED, CompiledRun, Memory, Outcome, Samples, sampled
 from .ground import Ground
-from .measured import judged
+from .measured import trajectory_or_error
 from .methods import SCIPY, Method
 
 MEASURES = {"energy": ("kinetic", "potential"), "momentum": ("linear_momentum", "angular_momentum")}
@@ -42,7 +42,7 @@ class Source:
 
     def trajectory(self, k: int, samples: Samples) -> Trajectory:
         """Return the trajectory of run k, or raise what ended it."""
-        return judged(
+        return trajectory_or_error(
             self.model_of(k), replace(samples, info=samples.info | self.told), self.ground
         )
 

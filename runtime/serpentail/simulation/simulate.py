@@ -17,7 +17,7 @@ from .actuation import Drive
 from .compiled_run import CompiledRun, Memory, Samples
 from .controllers import Controller
 from .ground import Ground
-from .measured import judged
+from .measured import trajectory_or_error
 from .methods import SCIPY, Method, checked_method, chosen
 from .records import Records
 from .rollouts import Rollouts, run_parallel
@@ -88,7 +88,9 @@ def simulate(
     }
     if start.many:
         return found.rollouts(spent)
-    return judged(model, replace(found, info=found.info | choice.told | spent), memory.ground)
+    return trajectory_or_error(
+        model, replace(found, info=found.info | choice.told | spent), memory.ground
+    )
 
 
 def end_state(
