@@ -34,7 +34,7 @@ class Method:
     settings: dict
 
     @property
-    def told(self) -> dict:
+    def info(self) -> dict:
         """What a trajectory's info says of it."""
         finite = {name: x for name, x in self.settings.items() if x is not np.inf}
         return finite | {"method": self.name, "reason": self.reason}

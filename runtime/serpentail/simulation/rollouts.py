@@ -33,7 +33,7 @@ class Source:
     parameters: RunParameters
     ground: Ground
     outcomes: list[Outcome]
-    told: dict
+    info: dict
 
     def model_of(self, k: int):
         """Return the model with the parameters of run k."""
@@ -43,7 +43,7 @@ class Source:
     def trajectory(self, k: int, samples: Samples) -> Trajectory:
         """Return the trajectory of run k, or raise what ended it."""
         return trajectory_or_error(
-            self.model_of(k), replace(samples, info=samples.info | self.told), self.ground
+            self.model_of(k), replace(samples, info=samples.info | self.info), self.ground
         )
 
 
@@ -105,7 +105,7 @@ class ParallelRuns:
         self.model = memory.records.model
         self.outcomes: list[Outcome] = [None] * runs
         self.source = Source(
-            self.model, memory.parameters, memory.ground, self.outcomes, method.told
+            self.model, memory.parameters, memory.ground, self.outcomes, method.info
         )
         self.measures = {}
         for kernel in map(self.model.kernel, MEASURES):
@@ -192,7 +192,7 @@ class ParallelRuns:
             array.setflags(write=False)
         counts = {name: sum(each.info.get(name, 0) for each in self.outcomes) for name in COUNTS}
         shared = {"threads": self.threads, "abreast": self.batched.states if self.batched else 1}
-        info = counts | self.method.told | {"model": self.model.name} | shared | info
+        info = counts | self.method.info | {"model": self.model.name} | shared | info
         return Rollouts(**arrays, errors=errors, info=info, source=self.source)
 
     def _judge(self, k: int) -> SimulationError | None:

@@ -89,7 +89,7 @@ def simulate(
     if start.many:
         return found.rollouts(spent)
     return trajectory_or_error(
-        model, replace(found, info=found.info | choice.told | spent), memory.ground
+        model, replace(found, info=found.info | choice.info | spent), memory.ground
     )
 
 
