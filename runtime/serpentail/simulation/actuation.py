@@ -12,7 +12,7 @@ from .piecewise import Piecewise
 from .records import Records
 
 
-class Drive:
+class Actuation:
     """Controllers and legs as the C interface takes them; ``error`` keeps what a function of the
     user's raised.
     """

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..model.kernel import aligned
 from ..model.layout import TAIL_V
-from .actuation import Drive
+from .actuation import Actuation
 from .compiled_run import PAUSE, Memory
 from .methods import Method
 from .piecewise import Piecewise
@@ -33,11 +33,11 @@ class Steps:
     due: np.ndarray
 
     @classmethod
-    def planned(cls, start: Start, drive: Drive, step: float) -> "Steps":
+    def planned(cls, start: Start, actuation: Actuation, step: float) -> "Steps":
         """Return the steps between samples and stops, all as long in between and about ``step``
         (s).
         """
-        edges = _edges(start, drive)
+        edges = _edges(start, actuation)
         left, slack = _parts(edges)
         counts = _counts(edges, step)
         part = np.repeat(np.arange(len(left)), counts)
@@ -46,7 +46,7 @@ class Steps:
         begin = edges[part] + within * lengths
         end = np.where(within + 1 == counts[part], edges[part + 1], begin + lengths)
         due = (within + 1 == counts[part]) & np.isin(edges[part + 1], start.times)
-        curve = drive.parts[0].torques
+        curve = actuation.parts[0].torques
         if curve is None:
             return cls(lengths, None, due.astype(np.intc))
         torques = np.stack(
@@ -55,9 +55,9 @@ class Steps:
         return cls(lengths, torques, due.astype(np.intc))
 
 
-def _edges(start: Start, drive: Drive) -> np.ndarray:
+def _edges(start: Start, actuation: Actuation) -> np.ndarray:
     """Times (s) at which steps end: start, samples, stops."""
-    stops = np.asarray(drive.stops, float)
+    stops = np.asarray(actuation.stops, float)
     return np.union1d(start.times, stops[(stops > start.start) & (stops < start.end)])
 
 
@@ -83,39 +83,43 @@ def before(curve: Piecewise, t: np.ndarray) -> np.ndarray:
     return curve.at(np.nextafter(t, -np.inf))[0]
 
 
-def worth_batching(memory: Memory, drive: Drive, method: Method) -> bool:
+def worth_batching(memory: Memory, actuation: Actuation, method: Method) -> bool:
     """Tell whether runs can be made in batches, and are so many that it pays."""
-    start, parts = memory.start, drive.parts[0]
+    start, parts = memory.start, actuation.parts[0]
     if (
         method.name != "rk4"
         or "flights" not in memory.records.model.manifest
-        or len(drive.parts) > 1
+        or len(actuation.parts) > 1
     ):
         return False
     if any(part is not None for part in (parts.pfl, parts.native, parts.user)):
         return False
-    steps = int(_counts(_edges(start, drive), method.settings["step"]).sum())
+    steps = int(_counts(_edges(start, actuation), method.settings["step"]).sum())
     return start.runs > 1 and steps <= MAX_SHARED_STEPS and steps * start.runs >= MIN_BATCHED_STEPS
 
 
 class BatchedRuns:
     """Runs of a memory, several of which the C of flights makes at once."""
 
-    def __init__(self, memory: Memory, drive: Drive, method: Method):
+    def __init__(self, memory: Memory, actuation: Actuation, method: Method):
         self.memory, model = memory, memory.records.model
         entry, dtype = model.manifest["flights"], memory.records.dtype
         self.states, self.work, self.dtype = entry["states"], entry["work"], dtype
         self.record = structure("flights", tuple(map(tuple, entry["record"])), memory.records.real)
         self.function = model.batch_library.rollouts.function(f"{model.name}_side_by_side_flights")
-        self.steps = Steps.planned(memory.start, drive, method.settings["step"])
-        damping, curve, times = drive.parts[0].damping, drive.parts[0].torques, memory.start.times
+        self.steps = Steps.planned(memory.start, actuation, method.settings["step"])
+        damping, curve, times = (
+            actuation.parts[0].damping,
+            actuation.parts[0].torques,
+            memory.start.times,
+        )
         sampled = (
             0.0 if curve is None else np.vstack([at(curve, times[:1]), before(curve, times[1:])])
         )
         self.torques = np.asarray(sampled, dtype)
         shared = {
             "lengths": self.steps.lengths,
-            "damping": np.zeros(drive.nt) if damping is None else damping,
+            "damping": np.zeros(actuation.nt) if damping is None else damping,
         }
         shared |= {} if self.steps.torques is None else {"torques": self.steps.torques}
         self.arrays = {name: np.ascontiguousarray(a, dtype) for name, a in shared.items()} | {

@@ -1,4 +1,4 @@
-"""Runs of the generated C: starts, a drive and a method go in; samples, and what ended each run,
+"""Runs of the generated C: starts, a actuation and a method go in; samples, and what ended each run,
 come out.
 """
 
@@ -12,7 +12,7 @@ from ..errors import SimulationError
 from ..model.kernel import aligned
 from ..model.library import NOT_FINITE, NOT_POSITIVE_DEFINITE, OUT_OF_RANGE
 from ..model.parameters import RunParameters
-from .actuation import Drive
+from .actuation import Actuation
 from .ground import MOST_EVENTS, Ground
 from .methods import Method
 from .records import Records
@@ -111,12 +111,12 @@ class CompiledRun:
     needs its own.
     """
 
-    def __init__(self, memory: Memory, drive: Drive, method: Method):
+    def __init__(self, memory: Memory, actuation: Actuation, method: Method):
         records, start, ground = memory.records, memory.start, memory.ground
-        self.memory, self.records, self.drive, self.start, self.ground = (
+        self.memory, self.records, self.actuation, self.start, self.ground = (
             memory,
             records,
-            drive,
+            actuation,
             start,
             ground,
         )
@@ -130,7 +130,7 @@ class CompiledRun:
             members |= {"most_events": MOST_EVENTS, "stop_at": ground.stop_at}
         members["work"] = aligned(self.model.manifest["work"]["rollout"], records.dtype)
         members["method"] = self.model.manifest["simulation"]["methods"].get(method.name, 0)
-        self.record = records.record("run", drive=drive.record, t=start.start, **members)
+        self.record = records.record("run", drive=actuation.record, t=start.start, **members)
         self.blank = bytes(self.record)
         self.address, self.rollout = ctypes.addressof(self.record), self.function("rollout")
         self.begin(0)
@@ -140,7 +140,7 @@ class CompiledRun:
         ctypes.memmove(self.address, self.blank, len(self.blank))
         for member, first, apart in self.memory.places:
             setattr(self.record, member, first + k * apart)
-        self.k, self.drive.error = k, None
+        self.k, self.actuation.error = k, None
 
     @property
     def state(self) -> dict[str, np.ndarray]:
@@ -172,7 +172,7 @@ class CompiledRun:
                 self.event_times[:count].tolist(), self.event_kinds[:count].tolist(), strict=True
             )
             info["events"] = [self.ground.event(t, number) for t, number in events]
-        failure = self.drive.error
+        failure = self.actuation.error
         if failure is None and status not in (0, STOPPED_AT_EVENT):
             failure = failed(status, record.t)
         return Outcome(

@@ -13,7 +13,7 @@ from ..model.kernel import Rows
 from ..model.parameters import RunParameters
 from ..model.workers import cores, in_turn
 from ..motion.trajectory import Trajectory
-from .actuation import Drive
+from .actuation import Actuation
 from .batched_runs import BatchedRuns, worth_batching
 from .compiled_run import COUNTS, PAUSED, CompiledRun, Memory, Outcome, Samples, sampled
 from .ground import Ground
@@ -93,14 +93,16 @@ class Rollouts:
 class ParallelRuns:
     """Runs on their way: threads take them up in turn, and write samples, measures and outcomes."""
 
-    def __init__(self, memory: Memory, drive: Drive, method: Method):
+    def __init__(self, memory: Memory, actuation: Actuation, method: Method):
         runs, samples = memory.start.runs, memory.start.intervals + 1
-        self.memory, self.drive, self.method = memory, drive, method
+        self.memory, self.actuation, self.method = memory, actuation, method
         self.batched = (
-            BatchedRuns(memory, drive, method) if worth_batching(memory, drive, method) else None
+            BatchedRuns(memory, actuation, method)
+            if worth_batching(memory, actuation, method)
+            else None
         )
         self.tasks = self.batched.groups if self.batched else runs
-        of_python = method.name in SCIPY or any(parts.user is not None for parts in drive.parts)
+        of_python = method.name in SCIPY or any(parts.user is not None for parts in actuation.parts)
         self.threads = 1 if of_python else min(cores(), self.tasks)
         self.model = memory.records.model
         self.outcomes: list[Outcome] = [None] * runs
@@ -117,7 +119,7 @@ class ParallelRuns:
 
     def run_singly(self, numbers: Iterator[int], ended: Event) -> None:
         """Take up runs in one thread until none is left, or ``ended`` is set."""
-        run = CompiledRun(self.memory, self.drive, self.method)
+        run = CompiledRun(self.memory, self.actuation, self.method)
         measures = [self._rows(name) for name in MEASURES]
         for k in numbers:
             run.begin(k)
@@ -220,8 +222,8 @@ def in_c(run: CompiledRun, ended: Event) -> Outcome | None:
     return None if status == PAUSED else run.outcome(status)
 
 
-def run_parallel(memory: Memory, drive: Drive, method: Method) -> ParallelRuns:
+def run_parallel(memory: Memory, actuation: Actuation, method: Method) -> ParallelRuns:
     """Make all runs, on all cores unless Python acts in them."""
-    runs = ParallelRuns(memory, drive, method)
+    runs = ParallelRuns(memory, actuation, method)
     in_turn(runs.tasks, runs.threads, runs.run_batches if runs.batched else runs.run_singly)
     return runs

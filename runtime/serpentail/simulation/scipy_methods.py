@@ -24,7 +24,7 @@ class StateRate:
         self.y, self.y_dot, self.tau = (
             np.zeros(size, dtype),
             np.zeros(size, dtype),
-            np.zeros(run.drive.nt, dtype),
+            np.zeros(run.actuation.nt, dtype),
         )
         self.addresses = [a.ctypes.data for a in (self.y, self.y_dot, self.tau)]
 
@@ -33,8 +33,8 @@ class StateRate:
         self.y[...] = y
         self.refused = None
         status = self.function(ctypes.addressof(self.run.record), t, *self.addresses)
-        if self.run.drive.error is not None:
-            raise self.run.drive.error
+        if self.run.actuation.error is not None:
+            raise self.run.actuation.error
         if not status and not np.isfinite(self.y_dot).all():
             status = NOT_FINITE
         if status:
@@ -77,7 +77,7 @@ def integrate_by_scipy(run: CompiledRun, method: Method) -> Samples:
     """
     rate = StateRate(run, method.name == "dop853")  # which takes a step with NaN again, shorter
     tape, counts = Tape(rate, run.start.times), {"steps": 0, "evaluations": 0}
-    ends = [*(t for t in run.drive.stops if run.start.start < t < run.start.end), run.start.end]
+    ends = [*(t for t in run.actuation.stops if run.start.start < t < run.start.end), run.start.end]
     y, t, failure = np.concatenate([*run.state.values()]).astype(float), run.start.start, None
     try:
         run.record.until = ends[0]

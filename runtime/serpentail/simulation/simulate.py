@@ -13,7 +13,7 @@ from ..model.kernel import Rows
 from ..model.layout import TAIL_V
 from ..model.parameters import RunParameters
 from ..motion.trajectory import Trajectory
-from .actuation import Drive
+from .actuation import Actuation
 from .compiled_run import CompiledRun, Memory, Samples
 from .controllers import Controller
 from .ground import Ground
@@ -79,9 +79,9 @@ def simulate(
     if missing:
         raise model.without(*missing)
     start = Start.checked(model, (q0, v0), t_span, settings.pop("output_step", None))
-    memory, drive, choice = prepared(model, start, controller, method, settings)
+    memory, actuation, choice = prepared(model, start, controller, method, settings)
     begun = time.perf_counter(), time.process_time()
-    found = (run_parallel if start.many else integrate)(memory, drive, choice)
+    found = (run_parallel if start.many else integrate)(memory, actuation, choice)
     spent = {
         "seconds": time.perf_counter() - begun[0],
         "cpu_seconds": time.process_time() - begun[1],
@@ -108,7 +108,7 @@ def end_state(
 
 def prepared(
     model, start: Start, controller: Controller, method, settings: dict
-) -> tuple[Memory, Drive, Method]:
+) -> tuple[Memory, Actuation, Method]:
     """Return what runs need to go; SimulationError or ModelError where a setting is wrong."""
     changes = settings.pop("parameters", None)
     if changes is not None and not start.many:
@@ -117,17 +117,19 @@ def prepared(
         )
     parameters = model.parameters_of_runs(changes, start.runs)
     ground = Ground.checked(model, start, parameters, settings)
-    drive = Drive(Records(model), controller, ground.legs.curve if ground.legs else None)
-    choice = choose(drive, start, parameters, method, settings)
-    return Memory(drive.records, start, ground, parameters), drive, choice
+    actuation = Actuation(Records(model), controller, ground.legs.curve if ground.legs else None)
+    choice = choose(actuation, start, parameters, method, settings)
+    return Memory(actuation.records, start, ground, parameters), actuation, choice
 
 
-def choose(drive: Drive, start: Start, parameters: RunParameters, name, settings: dict) -> Method:
+def choose(
+    actuation: Actuation, start: Start, parameters: RunParameters, name, settings: dict
+) -> Method:
     """Return the method that was asked for, or a choice and its reason."""
-    model, single = drive.model, drive.records.real is ctypes.c_float
+    model, single = actuation.model, actuation.records.real is ctypes.c_float
     available, reason = model.manifest["simulation"]["methods"], "asked for"
     if isinstance(name, str) and name == "auto":
-        decay = None if model.contacts else fastest_decay(drive, start, parameters)
+        decay = None if model.contacts else fastest_decay(actuation, start, parameters)
         name, reason = chosen(settings, available, decay)
     method = checked_method(name, settings, available, single)
     for each in ("step", "most_step"):
@@ -149,19 +151,20 @@ def refuse_vanishing(start: Start, name: str, step: float) -> None:
         )
 
 
-def fastest_decay(drive: Drive, start: Start, parameters: RunParameters) -> float:
+def fastest_decay(actuation: Actuation, start: Start, parameters: RunParameters) -> float:
     """Largest eigenvalue (1/s) of K (H^-1)_tt at the starts, K being joint damping; unit torques
     give H^-1.
     """
     damping = np.max(
-        [p.damping if p.damping is not None else np.zeros(drive.nt) for p in drive.parts], axis=0
+        [p.damping if p.damping is not None else np.zeros(actuation.nt) for p in actuation.parts],
+        axis=0,
     )
     if not damping.any():
         return 0.0
-    kernel, shape = drive.model.kernel("forward_dynamics"), (start.runs, drive.nt + 1)
+    kernel, shape = actuation.model.kernel("forward_dynamics"), (start.runs, actuation.nt + 1)
     q = np.repeat(start.q0[:, None], shape[1], axis=1).astype(kernel.dtype)
-    tau = np.tile(np.eye(drive.nt + 1, drive.nt, -1, kernel.dtype), (start.runs, 1, 1))
-    v, v_dot = (np.zeros((*shape, drive.model.nv), kernel.dtype) for _ in range(2))
+    tau = np.tile(np.eye(actuation.nt + 1, actuation.nt, -1, kernel.dtype), (start.runs, 1, 1))
+    v, v_dot = (np.zeros((*shape, actuation.model.nv), kernel.dtype) for _ in range(2))
     evaluate = Rows(kernel, parameters.vectors, (q, v, tau), (v_dot,))
     sound = [k for k in range(start.runs) if evaluated(evaluate, k, shape[1])]
     tail = v_dot[sound, :, TAIL_V]
@@ -178,9 +181,9 @@ def evaluated(rows: Rows, k: int, count: int) -> bool:
     return True
 
 
-def integrate(memory: Memory, drive: Drive, method: Method) -> Samples:
+def integrate(memory: Memory, actuation: Actuation, method: Method) -> Samples:
     """Return the samples of a single run."""
-    run = CompiledRun(memory, drive, method)
+    run = CompiledRun(memory, actuation, method)
     if method.name in SCIPY:
         from .scipy_methods import integrate_by_scipy
 
