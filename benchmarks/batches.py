@@ -12,7 +12,7 @@ import numpy as np
 import serpentail as st
 from benchmarks.fixtures import generated, label
 from serpentail.model.batch import MIN_BATCH
-from serpentail.model.kernel import aligned, call_record
+from serpentail.model.kernel import aligned, argument_record
 from serpentail.simulation import batched_runs
 
 STATES, ROUNDS = 512, 300  # a batch that stays in the cache
@@ -101,7 +101,7 @@ def c_times(model) -> tuple[float, float]:
         (kernel.batch_library.entry(kernel.name, MIN_BATCH), None),
     ):
         keep.append(aligned(size or kernel.batch_library.work[kernel.name], kernel.dtype))
-        record = call_record(kernel.parameters, STATES, keep[-1], (*states, out))
+        record = argument_record(kernel.parameters, STATES, keep[-1], (*states, out))
         calls.append(lambda function=function, record=record: function(ctypes.addressof(record)))
     times = [[best(call, 1) for call in calls] for _ in range(ROUNDS)]
     return tuple(np.min(times, axis=0) / STATES)

@@ -14,8 +14,7 @@ import pytest
 
 import serpentail as st
 from serpentail.model.compiler import compile_library
-from serpentail.simulation import batched_runs
-from serpentail.simulation import rollouts
+from serpentail.simulation import batched_runs, rollouts
 from tests.support.models import model_folder
 
 SEGMENTS, LINKS = 2, 2

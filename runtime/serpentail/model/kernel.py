@@ -18,7 +18,7 @@ from .workers import shared
 MOST_ARRAYS = 8
 
 
-class Call(ctypes.Structure):
+class ArgumentRecord(ctypes.Structure):
     """The generated C's argument record: parameters, batch size, the state that failed, workspace,
     arrays.
     """
@@ -32,10 +32,10 @@ class Call(ctypes.Structure):
     )
 
 
-def call_record(parameters: np.ndarray, count: int, work: np.ndarray, arrays) -> Call:
+def argument_record(parameters: np.ndarray, count: int, work: np.ndarray, arrays) -> ArgumentRecord:
     """Return a record of arrays, which the caller keeps alive."""
     addresses = (ctypes.c_void_p * MOST_ARRAYS)(*(a.ctypes.data for a in arrays))
-    return Call(parameters.ctypes.data, count, 0, work.ctypes.data, addresses)
+    return ArgumentRecord(parameters.ctypes.data, count, 0, work.ctypes.data, addresses)
 
 
 CACHE_LINE = 64  # bytes, and the widest vector
@@ -59,15 +59,15 @@ class Buffers(threading.local):
         self.slots = [(array.shape, array) for array in self.inputs]
         self.only = self.outputs[0] if len(self.outputs) == 1 else None
         self.work = aligned(work, dtype)
-        self.call = call_record(parameters, 1, self.work, (*self.inputs, *self.outputs))
-        self.address = ctypes.addressof(self.call)
+        self.record = argument_record(parameters, 1, self.work, (*self.inputs, *self.outputs))
+        self.address = ctypes.addressof(self.record)
 
     def results(self) -> tuple:
         """Return fresh copies of the outputs; a scalar as a number."""
         return tuple(o[()] if o.ndim == 0 else o.copy() for o in self.outputs)
 
 
-class Rows:
+class RunKernel:
     """A compiled function on rows of many runs, each with its own parameters; where they lie is
     looked up once.
 
@@ -80,20 +80,20 @@ class Rows:
         self.places = [(a.ctypes.data, a.strides[0]) for a in (*inputs, *outputs)]
         self.parameters = parameters.ctypes.data, parameters.strides[0]
         self.work = aligned(kernel.work, kernel.dtype)
-        self.call = call_record(parameters, 0, self.work, (*inputs, *outputs))
-        self.address = ctypes.addressof(self.call)
+        self.record = argument_record(parameters, 0, self.work, (*inputs, *outputs))
+        self.address = ctypes.addressof(self.record)
 
     def __call__(self, run: int, rows: int) -> None:
         """Evaluate the first rows of a run; StateError, which counts all rows from the first run's
         on.
         """
-        call = self.call
-        call.parameters, call.count = self.parameters[0] + run * self.parameters[1], rows
+        record = self.record
+        record.parameters, record.count = self.parameters[0] + run * self.parameters[1], rows
         for k, (first, apart) in enumerate(self.places):
-            call.arrays[k] = first + run * apart
+            record.arrays[k] = first + run * apart
         if status := self.kernel.function(self.address):
             whole = [a.reshape(-1, *a.shape[2:]) for a in self.inputs]
-            self.kernel.fail(status, run * self.inputs[0].shape[1] + call.failed, whole)
+            self.kernel.fail(status, run * self.inputs[0].shape[1] + record.failed, whole)
 
 
 class Kernel:
@@ -181,11 +181,11 @@ class Kernel:
     def _each(self, inputs, outputs, first: int, last: int) -> None:
         """Evaluate states [first, last) one by one."""
         work = aligned(self.work, self.dtype)
-        call = call_record(
+        record = argument_record(
             self.parameters, last - first, work, [a[first:last] for a in (*inputs, *outputs)]
         )
-        if status := self.function(ctypes.addressof(call)):
-            self.fail(status, first + call.failed, inputs)
+        if status := self.function(ctypes.addressof(record)):
+            self.fail(status, first + record.failed, inputs)
 
     def _side_by_side(self, function, inputs, outputs, first: int, last: int) -> None:
         """Evaluate states [first, last) side by side; those among which one fails are taken again,
@@ -193,12 +193,12 @@ class Kernel:
         """
         work = aligned(self.batch_library.work[self.name], self.dtype)
         while first < last:
-            call = call_record(
+            record = argument_record(
                 self.parameters, last - first, work, [a[first:last] for a in (*inputs, *outputs)]
             )
-            if not function(ctypes.addressof(call)):
+            if not function(ctypes.addressof(record)):
                 return
-            first += call.failed
+            first += record.failed
             after = min(first + self.batch_library.states, last)
             self._each(inputs, outputs, first, after)
             first = after

@@ -24,7 +24,7 @@ def inside(times: Array, span: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class Rows:
+class Interpolation:
     """Where n times lie among samples: the rows before and after, the fraction between, the step
     (n, 1).
     """
@@ -35,7 +35,7 @@ class Rows:
     step: Array
 
     @classmethod
-    def at(cls, times: Array, samples: Array) -> "Rows":
+    def at(cls, times: Array, samples: Array) -> "Interpolation":
         """Locate times inside the span of the samples."""
         before = np.clip(
             np.searchsorted(samples, times, side="right") - 1, 0, max(len(samples) - 2, 0)
@@ -56,7 +56,7 @@ class Rows:
         return start + s**2 * ((3 - 2 * s) * values[self.after] + (s - 1) * h * rates[self.after])
 
 
-def hermite_q(rows: Rows, q: Array, v: Array) -> Array:
+def hermite_q(rows: Interpolation, q: Array, v: Array) -> Array:
     """Configurations between the samples q with velocities v."""
     attitude = sign_continuous(q[:, QUATERNION])
     turning = quaternion_rate(attitude, v[:, OMEGA])

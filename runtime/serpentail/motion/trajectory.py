@@ -19,7 +19,7 @@ from ..files import replacing
 from ..model.layout import PER_SEGMENT, QUATERNION, TAIL_Q, TORSO_NQ, Layout
 from .contact import ARRAYS as TOUCHING
 from .contact import Contact
-from .resample import Rows, hermite_q, inside, monotone
+from .resample import Interpolation, hermite_q, inside, monotone
 
 SUFFIX = ".npz"
 UNIT_TOLERANCE = 1e-3  # how far a stored quaternion's norm may drift from 1
@@ -130,7 +130,7 @@ class Trajectory:
         monotone cubic, so no overshoot at impacts. tau and contact: linear, since they may jump.
         """
         times = inside(_real("t", t), self.t)
-        rows = Rows.at(times, self.t)
+        rows = Interpolation.at(times, self.t)
         smooth: dict[str, Any] = {
             name: monotone(self.t, getattr(self, name), times) for name in SMOOTH
         }

@@ -12,7 +12,7 @@ from ..model.kernel import aligned
 from ..model.layout import TAIL_V
 from .actuation import Actuation
 from .compiled_run import PAUSE, Memory
-from .methods import Method
+from .methods import IntegrationMethod
 from .piecewise import Piecewise
 from .records import structure
 from .start import Start
@@ -83,7 +83,7 @@ def before(curve: Piecewise, t: np.ndarray) -> np.ndarray:
     return curve.at(np.nextafter(t, -np.inf))[0]
 
 
-def worth_batching(memory: Memory, actuation: Actuation, method: Method) -> bool:
+def worth_batching(memory: Memory, actuation: Actuation, method: IntegrationMethod) -> bool:
     """Tell whether runs can be made in batches, and are so many that it pays."""
     start, parts = memory.start, actuation.parts[0]
     if (
@@ -101,7 +101,7 @@ def worth_batching(memory: Memory, actuation: Actuation, method: Method) -> bool
 class BatchedRuns:
     """Runs of a memory, several of which the C of flights makes at once."""
 
-    def __init__(self, memory: Memory, actuation: Actuation, method: Method):
+    def __init__(self, memory: Memory, actuation: Actuation, method: IntegrationMethod):
         self.memory, model = memory, memory.records.model
         entry, dtype = model.manifest["flights"], memory.records.dtype
         self.states, self.work, self.dtype = entry["states"], entry["work"], dtype

@@ -14,7 +14,7 @@ from ..model.library import NOT_FINITE, NOT_POSITIVE_DEFINITE, OUT_OF_RANGE
 from ..model.parameters import RunParameters
 from .actuation import Actuation
 from .ground import MOST_EVENTS, Ground
-from .methods import Method
+from .methods import IntegrationMethod
 from .records import Records
 from .start import Start
 
@@ -111,7 +111,7 @@ class CompiledRun:
     needs its own.
     """
 
-    def __init__(self, memory: Memory, actuation: Actuation, method: Method):
+    def __init__(self, memory: Memory, actuation: Actuation, method: IntegrationMethod):
         records, start, ground = memory.records, memory.start, memory.ground
         self.memory, self.records, self.actuation, self.start, self.ground = (
             memory,
@@ -214,7 +214,7 @@ def sampled(times: np.ndarray, arrays: dict[str, np.ndarray], outcome: Outcome) 
     return Samples(t, rows["q"], rows["v"], rows["tau"], bristles, outcome.info, outcome.failure)
 
 
-def start_members(method: Method) -> dict:
+def start_members(method: IntegrationMethod) -> dict:
     """Return a method's settings as members of the run's record."""
     own = {
         name: x for name, x in method.settings.items() if name not in ("first_step", "most_steps")

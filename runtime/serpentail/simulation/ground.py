@@ -8,7 +8,7 @@ import numpy as np
 
 from ..checks import real_array
 from ..errors import SimulationError
-from ..model.kernel import Rows
+from ..model.kernel import RunKernel
 from ..model.parameters import RunParameters, total_mass
 from ..motion.contact import Contact
 from .schedules import Legs
@@ -86,7 +86,7 @@ class Ground:
             for a in (start.q0[:, None], start.v0[:, None], *legs)
         ]
         outputs = [np.zeros((*one, self.points, 3), kernel.dtype) for _ in range(2)]
-        evaluate = Rows(kernel, parameters.vectors, inputs, outputs)
+        evaluate = RunKernel(kernel, parameters.vectors, inputs, outputs)
         for k in range(start.runs):
             evaluate(k, 1)
         return outputs[0][:, 0, :, 2]

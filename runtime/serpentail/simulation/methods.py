@@ -26,7 +26,7 @@ SINGLE = {"tsit5": 1e-4, "ros34pw2": 1e-3}  # tolerances in single precision
 
 
 @dataclass(frozen=True)
-class Method:
+class IntegrationMethod:
     """A method, why it was chosen, and its settings."""
 
     name: str
@@ -40,7 +40,7 @@ class Method:
         return finite | {"method": self.name, "reason": self.reason}
 
 
-def checked_method(name: str, settings: dict, available, single: bool) -> Method:
+def checked_method(name: str, settings: dict, available, single: bool) -> IntegrationMethod:
     """Return a method by its name with settings checked and filled in; SimulationError names what
     is wrong.
     """
@@ -59,7 +59,7 @@ def checked_method(name: str, settings: dict, available, single: bool) -> Method
         raise SimulationError(
             f"rtol {checked['rtol']:.3g}: too near to rounding: give {least:.2g} or more"
         )
-    return Method(name, "", _defaults(name, single, checked))
+    return IntegrationMethod(name, "", _defaults(name, single, checked))
 
 
 def _defaults(name: str, single: bool, given: dict) -> dict:

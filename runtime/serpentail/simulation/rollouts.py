@@ -9,7 +9,7 @@ from threading import Event
 import numpy as np
 
 from ..errors import SimulationError, StateError
-from ..model.kernel import Rows
+from ..model.kernel import RunKernel
 from ..model.parameters import RunParameters
 from ..model.workers import cores, in_turn
 from ..motion.trajectory import Trajectory
@@ -18,7 +18,7 @@ from .batched_runs import BatchedRuns, worth_batching
 from .compiled_run import COUNTS, PAUSED, CompiledRun, Memory, Outcome, Samples, sampled
 from .ground import Ground
 from .measured import trajectory_or_error
-from .methods import SCIPY, Method
+from .methods import SCIPY, IntegrationMethod
 
 MEASURES = {"energy": ("kinetic", "potential"), "momentum": ("linear_momentum", "angular_momentum")}
 
@@ -93,7 +93,7 @@ class Rollouts:
 class ParallelRuns:
     """Runs on their way: threads take them up in turn, and write samples, measures and outcomes."""
 
-    def __init__(self, memory: Memory, actuation: Actuation, method: Method):
+    def __init__(self, memory: Memory, actuation: Actuation, method: IntegrationMethod):
         runs, samples = memory.start.runs, memory.start.intervals + 1
         self.memory, self.actuation, self.method = memory, actuation, method
         self.batched = (
@@ -146,7 +146,7 @@ class ParallelRuns:
             for k in batched.runs(group) if completed else ():
                 self._keep(k, Outcome(start.intervals + 1, start.end, dict(info)), measures)
 
-    def _keep(self, k: int, outcome: Outcome, measures: list[Rows]) -> None:
+    def _keep(self, k: int, outcome: Outcome, measures: list[RunKernel]) -> None:
         """Keep and measure what run k came to; an error that is not its own ends all runs."""
         if not isinstance(outcome.failure, SimulationError | None):
             raise outcome.failure
@@ -210,10 +210,10 @@ class ParallelRuns:
             )
         return error
 
-    def _rows(self, name: str) -> Rows:
+    def _rows(self, name: str) -> RunKernel:
         inputs = [self.memory.out[argument] for argument in ("q", "v")]
         outputs = [self.measures[measure] for measure in MEASURES[name]]
-        return Rows(self.model.kernel(name), self.memory.parameters.vectors, inputs, outputs)
+        return RunKernel(self.model.kernel(name), self.memory.parameters.vectors, inputs, outputs)
 
 
 def in_c(run: CompiledRun, ended: Event) -> Outcome | None:
@@ -222,7 +222,7 @@ def in_c(run: CompiledRun, ended: Event) -> Outcome | None:
     return None if status == PAUSED else run.outcome(status)
 
 
-def run_parallel(memory: Memory, actuation: Actuation, method: Method) -> ParallelRuns:
+def run_parallel(memory: Memory, actuation: Actuation, method: IntegrationMethod) -> ParallelRuns:
     """Make all runs, on all cores unless Python acts in them."""
     runs = ParallelRuns(memory, actuation, method)
     in_turn(runs.tasks, runs.threads, runs.run_batches if runs.batched else runs.run_singly)

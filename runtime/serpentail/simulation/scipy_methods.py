@@ -8,7 +8,7 @@ from ..errors import SimulationError
 from ..model.layout import QUATERNION
 from ..model.library import NOT_FINITE
 from .compiled_run import CompiledRun, Samples, failed
-from .methods import Method
+from .methods import IntegrationMethod
 
 
 class StateRate:
@@ -52,7 +52,7 @@ class StateRate:
         return self.tau.astype(float)
 
 
-class Tape:
+class SampleWriter:
     """Samples written one after another as steps pass their times."""
 
     def __init__(self, rate: StateRate, times: np.ndarray):
@@ -71,33 +71,35 @@ class Tape:
 
 
 @np.errstate(all="ignore")  # a trial step may overflow, and is then taken again, shorter
-def integrate_by_scipy(run: CompiledRun, method: Method) -> Samples:
+def integrate_by_scipy(run: CompiledRun, method: IntegrationMethod) -> Samples:
     """Integrate from stop to stop; what ends the run before its end goes with the samples up to
     there.
     """
     rate = StateRate(run, method.name == "dop853")  # which takes a step with NaN again, shorter
-    tape, counts = Tape(rate, run.start.times), {"steps": 0, "evaluations": 0}
+    samples, counts = SampleWriter(rate, run.start.times), {"steps": 0, "evaluations": 0}
     ends = [*(t for t in run.actuation.stops if run.start.start < t < run.start.end), run.start.end]
     y, t, failure = np.concatenate([*run.state.values()]).astype(float), run.start.start, None
     try:
         run.record.until = ends[0]
-        tape.write(t, y)
+        samples.write(t, y)
         for end in ends:
             run.record.t, run.record.until = t, end
-            y, t = _smooth_part(rate, method, (t, y, end), tape, counts), end
+            y, t = _smooth_part(rate, method, (t, y, end), samples, counts), end
     except BaseException as error:
-        if not tape.states:
+        if not samples.states:
             raise
         failure = error
-    done = len(tape.states)
+    done = len(samples.states)
     q, v, bristles = np.split(
-        np.array(tape.states), [run.model.nq, run.model.nq + run.model.nv], axis=1
+        np.array(samples.states), [run.model.nq, run.model.nq + run.model.nv], axis=1
     )
     bristles = bristles.reshape(done, run.ground.points, 2)
-    return Samples(tape.times[:done], q, v, np.array(tape.torques), bristles, counts, failure)
+    return Samples(samples.times[:done], q, v, np.array(samples.torques), bristles, counts, failure)
 
 
-def _smooth_part(rate: StateRate, method: Method, part, tape: Tape, counts: dict) -> np.ndarray:
+def _smooth_part(
+    rate: StateRate, method: IntegrationMethod, part, samples: SampleWriter, counts: dict
+) -> np.ndarray:
     """Integrate over times without a break, (start, state, end), and return the last state."""
     from scipy.integrate import DOP853, LSODA
 
@@ -115,8 +117,8 @@ def _smooth_part(rate: StateRate, method: Method, part, tape: Tape, counts: dict
             )
         counts["steps"] += 1
         interpolant = solver.dense_output()
-        for at in tape.due(solver.t):
-            tape.write(at, interpolant(at) if at < solver.t else solver.y)
+        for at in samples.due(solver.t):
+            samples.write(at, interpolant(at) if at < solver.t else solver.y)
         if method.name == "dop853":
             norm = np.linalg.norm(solver.y[QUATERNION])
             solver.y[QUATERNION] /= norm

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import ModelError, SimulationError, StateError
-from ..model.kernel import Rows
+from ..model.kernel import RunKernel
 from ..model.layout import TAIL_V
 from ..model.parameters import RunParameters
 from ..motion.trajectory import Trajectory
@@ -18,7 +18,7 @@ from .compiled_run import CompiledRun, Memory, Samples
 from .controllers import Controller
 from .ground import Ground
 from .measured import trajectory_or_error
-from .methods import SCIPY, Method, checked_method, chosen
+from .methods import SCIPY, IntegrationMethod, checked_method, chosen
 from .records import Records
 from .rollouts import Rollouts, run_parallel
 from .start import Start
@@ -108,7 +108,7 @@ def end_state(
 
 def prepared(
     model, start: Start, controller: Controller, method, settings: dict
-) -> tuple[Memory, Actuation, Method]:
+) -> tuple[Memory, Actuation, IntegrationMethod]:
     """Return what runs need to go; SimulationError or ModelError where a setting is wrong."""
     changes = settings.pop("parameters", None)
     if changes is not None and not start.many:
@@ -124,7 +124,7 @@ def prepared(
 
 def choose(
     actuation: Actuation, start: Start, parameters: RunParameters, name, settings: dict
-) -> Method:
+) -> IntegrationMethod:
     """Return the method that was asked for, or a choice and its reason."""
     model, single = actuation.model, actuation.records.real is ctypes.c_float
     available, reason = model.manifest["simulation"]["methods"], "asked for"
@@ -165,14 +165,14 @@ def fastest_decay(actuation: Actuation, start: Start, parameters: RunParameters)
     q = np.repeat(start.q0[:, None], shape[1], axis=1).astype(kernel.dtype)
     tau = np.tile(np.eye(actuation.nt + 1, actuation.nt, -1, kernel.dtype), (start.runs, 1, 1))
     v, v_dot = (np.zeros((*shape, actuation.model.nv), kernel.dtype) for _ in range(2))
-    evaluate = Rows(kernel, parameters.vectors, (q, v, tau), (v_dot,))
+    evaluate = RunKernel(kernel, parameters.vectors, (q, v, tau), (v_dot,))
     sound = [k for k in range(start.runs) if evaluated(evaluate, k, shape[1])]
     tail = v_dot[sound, :, TAIL_V]
     columns = (tail[:, 1:] - tail[:, :1]) * np.sqrt(np.outer(damping, damping))
     return float(np.linalg.eigvalsh(columns).max(initial=0.0))
 
 
-def evaluated(rows: Rows, k: int, count: int) -> bool:
+def evaluated(rows: RunKernel, k: int, count: int) -> bool:
     """Evaluate rows of run k; tell whether it could be done."""
     try:
         rows(k, count)
@@ -181,7 +181,7 @@ def evaluated(rows: Rows, k: int, count: int) -> bool:
     return True
 
 
-def integrate(memory: Memory, actuation: Actuation, method: Method) -> Samples:
+def integrate(memory: Memory, actuation: Actuation, method: IntegrationMethod) -> Samples:
     """Return the samples of a single run."""
     run = CompiledRun(memory, actuation, method)
     if method.name in SCIPY:
