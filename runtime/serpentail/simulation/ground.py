@@ -15,7 +15,9 @@ from .schedules import Legs
 from .start import Start
 
 KINDS = ("touch_down", "take_off")
-DEEP = 5.0  # weights: a static force of one point beyond it means a start inside the ground
+MAX_STATIC_LOAD = (
+    5.0  # weights: a static force of one point beyond it means a start inside the ground
+)
 MOST_EVENTS = 10_000  # that are kept
 
 
@@ -66,7 +68,7 @@ class Ground:
         """
         heights, p = self._heights(model, start, parameters), parameters.values
         weight = total_mass(p) * p["gravity"]
-        limits = np.broadcast_to((DEEP * weight / p["K_n"]) ** (2 / 3), start.runs)
+        limits = np.broadcast_to((MAX_STATIC_LOAD * weight / p["K_n"]) ** (2 / 3), start.runs)
         wrong = np.flatnonzero(-heights.min(axis=1) > limits)
         if len(wrong):
             heights, limit, k = heights[wrong[0]], limits[wrong[0]], int(heights[wrong[0]].argmin())

@@ -9,7 +9,7 @@ import numpy as np
 from ..checks import real_array
 from ..errors import SimulationError
 
-SAME = 1e-9  # a jump that is smaller, over the largest value, is rounding
+JUMP_TOLERANCE = 1e-9  # a jump that is smaller, over the largest value, is rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +51,7 @@ class Piecewise:
             starts, ends, sizes = _horner(c, 0.0), _horner(c, widths), _horner(np.abs(c), widths)
             held = [starts[:1], ends[-1:]] if order == 0 else np.zeros((2, 1, self.channels))
             left, right = np.vstack([held[0], ends]), np.vstack([starts, held[1]])
-            jumps |= (np.abs(left - right) > SAME * sizes.max(initial=0)).any(axis=1)
+            jumps |= (np.abs(left - right) > JUMP_TOLERANCE * sizes.max(initial=0)).any(axis=1)
         return self.times[jumps]
 
 
