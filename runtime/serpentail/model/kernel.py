@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 from numpy import ndarray
 
-from ..checks import real_array
+from ..checks import real_array, refuse_not_finite
 from ..errors import StateError
 from .batch import BatchLibrary
 from .layout import FIRST_Q, QUATERNION, SECOND_Q
@@ -155,7 +155,7 @@ class Kernel:
         return self._batch(counts.pop(), arrays)
 
     def _checked(self, name: str, shape: tuple[int, ...], value) -> np.ndarray:
-        array = real_array(f"{self.name}: {name}", value, self.dtype)
+        array = real_array(f"{self.name}: {name}", value, StateError, self.dtype)
         if (
             array.shape[array.ndim - len(shape) :] != shape
             or array.ndim > len(shape) + 1
@@ -207,11 +207,7 @@ class Kernel:
         """Raise what a status means of one state among arrays."""
         state = f" of state {index}" if len(arrays[0]) > 1 else ""
         for name, array in zip(self.names, arrays, strict=True):
-            bad = np.argwhere(~np.isfinite(array[index]))
-            if len(bad):
-                where = f"[{', '.join(map(str, bad[0]))}]{state}"
-                value = array[index][tuple(bad[0])]
-                raise StateError(f"{self.name}: {name}{where} is {value}: give finite numbers")
+            refuse_not_finite(f"{self.name}: {name}", array[index], StateError, state)
         q = arrays[0][index].astype(float)
         if self.names[0] == "q":
             self._check_attitude(q, state)

@@ -3,12 +3,12 @@
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
-from difflib import get_close_matches
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
+from ..checks import did_you_mean, numbers_in
 from ..errors import ModelError, UnlikeBodies
 
 Value = float | tuple[float, ...]
@@ -182,18 +182,17 @@ def flat(manifest: dict, values: Mapping[str, Value]) -> list[float]:
 def _checked(fields: dict, name: str, value: object, runs: int | None) -> np.ndarray | str:
     """Return the value, of every run where there are many, or what is wrong with it."""
     if name not in fields:
-        near = get_close_matches(name, fields, 1)
-        return f"{name}: no such parameter; " + (
-            f"did you mean {near[0]!r}?" if near else f"there are {', '.join(fields)}"
-        )
+        remedy = did_you_mean(name, fields) or f"there are {', '.join(fields)}"
+        return f"{name}: no such parameter; {remedy}"
     size = fields[name]["size"]
-    numbers = _numbers(value, (() if runs is None else (runs,)) + ((size,) if size > 1 else ()))
+    shape = (() if runs is None else (runs,)) + ((size,) if size > 1 else ())
+    numbers = numbers_in(value)
     holds, words = CHECKS[fields[name]["check"]]
     kind = "a finite number" if size == 1 else f"{size} finite numbers"
     needs = f"needs {kind} ({fields[name]['unit']}), {words}" + (
         "" if runs is None else f", for each of {runs} runs"
     )
-    if numbers is None:
+    if numbers is None or numbers.shape != shape:
         return f"{name}: value {value!r:.200}: {needs}"
     rows = numbers.reshape(-1, size)
     with np.errstate(over="ignore"):
@@ -204,12 +203,3 @@ def _checked(fields: dict, name: str, value: object, runs: int | None) -> np.nda
         ("", value) if runs is None else (f" of run {wrong[0]}", numbers[wrong[0]].tolist())
     )
     return f"{name}{which}: value {found!r}: {needs}"
-
-
-def _numbers(value: object, shape: tuple[int, ...]) -> np.ndarray | None:
-    """Return the real numbers of an array of this shape; None where it is something else."""
-    try:
-        array = np.asarray(value)
-    except ValueError:
-        return None
-    return array.astype(float) if array.dtype.kind in "fiu" and array.shape == shape else None

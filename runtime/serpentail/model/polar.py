@@ -19,7 +19,7 @@ def polar_to_bend(phi, theta, phi_dot=0.0, theta_dot=0.0):
     c, s = np.cos(phi), np.sin(phi)
     with np.errstate(all="ignore"):
         rates = theta * phi_dot * s - theta_dot * c, theta * phi_dot * c + theta_dot * s
-    return _numbers(-theta * c, theta * s, *rates)
+    return _finite_results(-theta * c, theta * s, *rates)
 
 
 def bend_to_polar(a, b, a_dot=0.0, b_dot=0.0):
@@ -37,7 +37,7 @@ def bend_to_polar(a, b, a_dot=0.0, b_dot=0.0):
     with np.errstate(all="ignore"):
         phi_dot = (a_dot * (b / theta) - b_dot * (a / theta)) / theta
         theta_dot = (a / theta) * a_dot + (b / theta) * b_dot
-    return _numbers(np.arctan2(b, -a), theta, phi_dot, theta_dot)
+    return _finite_results(np.arctan2(b, -a), theta, phi_dot, theta_dot)
 
 
 def _alike(given: dict) -> list[np.ndarray]:
@@ -52,7 +52,7 @@ def _alike(given: dict) -> list[np.ndarray]:
         raise StateError(f"shapes differ: {shapes}: give equal ones") from None
 
 
-def _numbers(*results: np.ndarray) -> tuple[np.ndarray, ...]:
+def _finite_results(*results: np.ndarray) -> tuple[np.ndarray, ...]:
     """Return results, unless one is beyond numbers."""
     if not all(np.isfinite(x).all() for x in results):
         raise StateError(

@@ -15,6 +15,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from ..checks import one_of
 from ..errors import CompilerNotFound, SerpentailError
 from .cache import digest, temporary_file
 
@@ -56,10 +57,7 @@ class Toolchain:
 
 def check_profile(profile: str) -> None:
     """Raise SerpentailError unless `profile` is known."""
-    if not isinstance(profile, str) or profile not in PROFILES:
-        raise SerpentailError(
-            f"unknown build profile {profile!r}; choose one of {', '.join(PROFILES)}"
-        )
+    one_of("profile", profile, PROFILES, SerpentailError)
 
 
 # The compiler: which one, and what it resolves its flags to.

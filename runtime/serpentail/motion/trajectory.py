@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..attitude import Array
+from ..checks import finite_array
 from ..files import replacing
 from ..model.layout import PER_SEGMENT, QUATERNION, TAIL_Q, TORSO_NQ, Layout
 from .contact import ARRAYS as TOUCHING
@@ -150,20 +151,7 @@ SMOOTH = ("v", "kinetic", "potential", "linear_momentum", "angular_momentum")
 
 def _real(name: str, value: ArrayLike) -> Array:
     """A finite, read-only float64 copy of value."""
-    try:
-        array = np.asarray(value)
-    except ValueError as error:
-        raise ValueError(f"{name} is ragged: give rows of equal length") from error
-    if not np.can_cast(array.dtype, np.float64, "same_kind"):
-        raise ValueError(
-            f"{name} has shape {array.shape} and type {array.dtype}: give real numbers"
-        )
-    array = array.astype(np.float64, order="C")
-    if not np.isfinite(array).all():
-        first = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
-        raise ValueError(
-            f"{name}{list(first)} is {array[first]} (shape {array.shape}): give finite numbers only"
-        )
+    array = finite_array(name, value, ValueError).copy()
     array.setflags(write=False)
     return array
 

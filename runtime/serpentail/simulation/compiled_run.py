@@ -1,6 +1,4 @@
-"""Runs of the generated C: starts, a actuation and a method go in; samples, and what ended each run,
-come out.
-"""
+"""Runs of the generated C on arrays of ours, and what each run came to."""
 
 import ctypes
 from dataclasses import dataclass

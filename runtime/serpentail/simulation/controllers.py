@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..checks import real_array
+from ..checks import finite_array, numbers, refusal
 from ..errors import SimulationError
 from .pfl import Pfl
 from .piecewise import Piecewise, checked_nodes, linear
@@ -109,20 +109,11 @@ class Phases:
             raise SimulationError(
                 f"Phases: {self.phases!r}: give pairs (time, controller)"
             ) from None
-        begins = (
-            real_array("Phases: times", [begin for begin, _ in pairs], error=SimulationError)
-            if pairs
-            else np.ones(0)
-        )
-        if (
-            begins.ndim != 1
-            or not len(begins)
-            or not np.isfinite(begins).all()
-            or (np.diff(begins) <= 0).any()
-        ):
-            raise SimulationError(
-                f"Phases: times {begins.tolist()}: give one or more, finite and increasing, in s"
-            )
+        begins = [begin for begin, _ in pairs]
+        times = finite_array("Phases: times", begins or 0.0, SimulationError)
+        if times.ndim != 1 or (np.diff(times) <= 0).any():
+            needs = "one or more increasing times, in s"
+            raise refusal("Phases: times", begins, needs, SimulationError)
         if any(isinstance(controller, Phases) for _, controller in pairs):
             raise SimulationError(
                 "Phases: one of the controllers is Phases itself: put all pairs in one list"
@@ -154,9 +145,5 @@ def parts_of(controller: Controller, nt: int) -> Parts:
 
 
 def _damping(damping, nt: int) -> np.ndarray:
-    values = real_array("damping", damping, error=SimulationError)
-    if values.shape not in ((), (nt,)):
-        raise SimulationError(f"damping {damping!r}: give one number or {nt}, in N m s")
-    if not (np.isfinite(values).all() and (values >= 0).all()):
-        raise SimulationError(f"damping {damping!r}: give finite numbers, 0 or above, in N m s")
-    return np.broadcast_to(values, (nt,))
+    """Return joint damping (2m,), N m s."""
+    return numbers("damping", damping, nt, SimulationError, least=0)

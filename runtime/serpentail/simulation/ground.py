@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..checks import real_array
+from ..checks import finite_array
 from ..errors import SimulationError
 from ..model.kernel import RunKernel
 from ..model.parameters import RunParameters, total_mass
@@ -136,13 +136,10 @@ def _bristles(groups, start: Start, bristles) -> np.ndarray:
     found = (
         np.zeros(shape)
         if bristles is None
-        else real_array("bristles0", bristles, error=SimulationError)
+        else finite_array("bristles0", bristles, SimulationError)
     )
-    if (
-        found.shape not in ({shape, (start.runs, *shape)} if start.many else {shape})
-        or not np.isfinite(found).all()
-    ):
-        raise SimulationError(f"bristles0 has shape {found.shape}: give {shape}, finite, in m")
+    if found.shape not in ({shape, (start.runs, *shape)} if start.many else {shape}):
+        raise SimulationError(f"bristles0 has shape {found.shape}: give {shape}, in m")
     return np.array(np.broadcast_to(found, (start.runs, *shape)), order="C")
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..checks import positive
+from ..checks import number, one_of
 from ..errors import SimulationError
 
 FIXED = ("rk4", "implicit_euler")
@@ -45,15 +45,14 @@ def checked_method(name: str, settings: dict, available, single: bool) -> Integr
     is wrong.
     """
     known = [each for each in SETTINGS if each in available or each in SCIPY]
-    if not isinstance(name, str) or name not in known:
-        raise SimulationError(f"method {name!r}: choose one of auto, {', '.join(known)}")
+    one_of("method", name, ("auto", *known), SimulationError)
     unknown = [key for key in settings if key not in SETTINGS[name]]
     if unknown:
         has = ", ".join((*SETTINGS[name], "output_step"))
         raise SimulationError(
             f"{name} has no setting {', '.join(map(repr, unknown))}; it has {has}"
         )
-    checked = {key: positive(key, value) for key, value in settings.items()}
+    checked = {key: number(key, value, SimulationError, above=0) for key, value in settings.items()}
     least = LEAST * np.finfo(np.float32 if single and name not in SCIPY else float).eps
     if checked.get("rtol", 1.0) < least:
         raise SimulationError(

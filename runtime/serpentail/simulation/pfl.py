@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..checks import real_array
+from ..checks import number
 from ..errors import SimulationError
 from ..model.layout import TAIL_Q, TAIL_V, TORSO_NV, TORSO_V
 from .piecewise import Piecewise, checked_nodes, spline
@@ -34,7 +34,9 @@ class Pfl:
     def __init__(
         self, model: "Model", reference, kp: float = KP, kd: float = KD, feedforward: bool = True
     ):
-        self.model, self.kp, self.kd = model, _gain("kp", kp), _gain("kd", kd)
+        self.model = model
+        self.kp = number("Pfl: kp", kp, SimulationError, least=0)
+        self.kd = number("Pfl: kd", kd, SimulationError, least=0)
         self.curve = _curve(reference, model.layout.nt)
         self.feedforward = bool(feedforward)
 
@@ -61,14 +63,6 @@ class Pfl:
         H, force = self.model.mass_matrix(q), self.model.inverse_dynamics(q, v, v_dot)
         base = np.linalg.solve(H[TORSO_V, TORSO_V], -force[TORSO_V])
         return force[TAIL_V] + H[TAIL_V, TORSO_V] @ base
-
-
-def _gain(name: str, value) -> float:
-    """Return a gain; SimulationError where it is none."""
-    gain = real_array(f"Pfl: {name}", value, error=SimulationError)
-    if gain.shape != () or not 0 <= gain < np.inf:
-        raise SimulationError(f"Pfl: {name} is {value!r}: give a finite number from 0")
-    return float(gain)
 
 
 def _curve(reference, size: int) -> Piecewise:

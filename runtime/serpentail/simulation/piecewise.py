@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..checks import real_array
+from ..checks import finite_array, refusal
 from ..errors import SimulationError
 
 JUMP_TOLERANCE = 1e-9  # a jump that is smaller, over the largest value, is rounding
@@ -74,13 +74,13 @@ def checked_nodes(what: str, name: str, nodes: tuple, width: int) -> tuple[np.nd
     """Return increasing times (K,) and values (K, width), all finite; SimulationError names what is
     wrong.
     """
-    times = real_array(f"{what}: times", nodes[0], error=SimulationError)
-    values = real_array(f"{what}: {name}", nodes[1], error=SimulationError)
+    times = finite_array(f"{what}: times", nodes[0], SimulationError)
+    values = finite_array(f"{what}: {name}", nodes[1], SimulationError)
     if times.ndim != 1 or len(times) == 0 or values.shape != (len(times), width):
         shapes = f"times {times.shape} and {name} {values.shape}, not (K,) and (K, {width})"
         raise SimulationError(f"{what}: {shapes}")
-    if not (np.isfinite(times).all() and np.isfinite(values).all() and (np.diff(times) > 0).all()):
-        raise SimulationError(f"{what}: times must increase, and all entries be finite")
+    if not (np.diff(times) > 0).all():
+        raise refusal(f"{what}: times", times.tolist(), "increasing times, in s", SimulationError)
     return times, values
 
 

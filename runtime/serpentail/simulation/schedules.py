@@ -7,7 +7,7 @@ from typing import Self
 
 import numpy as np
 
-from ..checks import finite, known, positive, real_array
+from ..checks import finite_array, number, one_of, refusal
 from ..errors import SimulationError
 from .piecewise import Piecewise, blends, checked_nodes, linear, spline
 
@@ -29,11 +29,8 @@ class Reference:
 
     def __post_init__(self) -> None:
         """Refuse nodes that are no motion."""
-        if not isinstance(self.blend, str) or self.blend not in BLENDS:
-            raise SimulationError(
-                f"Reference: blend {self.blend!r}: give one of {', '.join(BLENDS)}"
-            )
-        angles = real_array("Reference: angles", self.angles, error=SimulationError)
+        one_of("Reference: blend", self.blend, BLENDS, SimulationError)
+        angles = finite_array("Reference: angles", self.angles, SimulationError)
         nodes = checked_nodes(
             "Reference", "angles", (self.times, angles), angles.shape[1] if angles.ndim == 2 else 0
         )
@@ -51,7 +48,7 @@ class Reference:
         """
         return cls(
             times,
-            shared_among_links(model, real_array("bends", bends, error=SimulationError)),
+            shared_among_links(model, finite_array("bends", bends, SimulationError)),
             blend,
         )
 
@@ -83,7 +80,7 @@ class Legs:
 
     def __post_init__(self) -> None:
         """Refuse nodes that are no motion."""
-        times = np.atleast_1d(real_array("Legs: times", self.times, error=SimulationError))
+        times = np.atleast_1d(finite_array("Legs: times", self.times, SimulationError))
         gamma, delta = (_both_legs(name, getattr(self, name), times) for name in ("gamma", "delta"))
         nodes = checked_nodes(
             "Legs", "angles", (times, np.stack([gamma, delta], axis=-1).reshape(len(times), 4)), 4
@@ -100,20 +97,14 @@ class Legs:
         """Legs whose delta goes from one angle to another at a rate (rad/s, of any sign) from a
         time (s) on: a kick.
         """
-        delta = real_array("Legs.ramp: delta", delta, error=SimulationError)
-        if delta.shape != (2,):
-            raise SimulationError(
-                f"Legs.ramp: delta has shape {delta.shape}: give two angles, from and to"
-            )
-        numbers = real_array(
-            "Legs.ramp: gamma, delta, at, rate", [gamma, *delta, at, rate], error=SimulationError
-        )
-        if not np.isfinite(numbers).all() or rate == 0 or delta[0] == delta[1]:
-            given = f"Legs.ramp: delta {tuple(delta.tolist())}, at {at!r}, rate {rate!r}"
-            raise SimulationError(
-                f"{given}: give finite numbers, two angles that differ, and a rate that is not 0"
-            )
-        return cls.moves(gamma, delta[0], [{"at": at, "delta": delta[1], "rate": math.fabs(rate)}])
+        angles = finite_array("Legs.ramp: delta", delta, SimulationError)
+        if angles.shape != (2,) or angles[0] == angles[1]:
+            raise refusal("Legs.ramp: delta", delta, "two angles that differ", SimulationError)
+        if number("Legs.ramp: rate", rate, SimulationError) == 0:
+            raise refusal("Legs.ramp: rate", rate, "a number that is not 0", SimulationError)
+        number("Legs.ramp: gamma", gamma, SimulationError)
+        move = {"at": number("Legs.ramp: at", at, SimulationError), "delta": angles[1]}
+        return cls.moves(gamma, angles[0], [move | {"rate": math.fabs(rate)}])
 
     @classmethod
     def moves(cls, gamma: float, delta: float, moves) -> Self:
@@ -124,15 +115,15 @@ class Legs:
         rate (rad/s, of the angle that goes farther).  Moves follow each other in time.
         """
         nodes = [(-math.inf, (gamma, delta))]
-        for number, move in enumerate(moves):
-            nodes += _move(f"legs.moves[{number}]", move, nodes[-1])
+        for index, move in enumerate(moves):
+            nodes += _move(f"legs.moves[{index}]", move, nodes[-1])
         times, angles = zip(*(nodes[1:] or [(0.0, nodes[0][1])]), strict=True)
         return cls(times, *np.array(angles, float).T)
 
 
 def _both_legs(name: str, value, times: np.ndarray) -> np.ndarray:
     """Return angles (K, 2)."""
-    angles = real_array(f"Legs: {name}", value, error=SimulationError)
+    angles = finite_array(f"Legs: {name}", value, SimulationError)
     if angles.shape not in ((), (len(times),), (len(times), 2)):
         shapes = f"not a number, ({len(times)},) or ({len(times)}, 2)"
         raise SimulationError(f"Legs: {name} has shape {angles.shape}, {shapes}")
@@ -149,8 +140,8 @@ def _move(field: str, move, last) -> list:
     if not isinstance(move, Mapping):
         raise SimulationError(f"{field}: value {move!r}: needs a table of {', '.join(MOVE)}")
     for name, value in move.items():
-        known(f"{field}: key", name, MOVE, SimulationError)
-        finite(f"{field}.{name}", value)
+        one_of(f"{field}: key", name, MOVE, SimulationError)
+        number(f"{field}.{name}", value, SimulationError)
     (end, angles), at = last, move.get("at")
     if at is None or not {"gamma", "delta"} & set(move) or ("rate" in move) == ("duration" in move):
         raise SimulationError(
@@ -159,7 +150,9 @@ def _move(field: str, move, last) -> list:
     goal = move.get("gamma", angles[0]), move.get("delta", angles[1])
     way = max(abs(float(x) - float(y)) for x, y in zip(goal, angles, strict=True))
     duration = (
-        move["duration"] if "duration" in move else way / positive(f"{field}.rate", move["rate"])
+        move["duration"]
+        if "duration" in move
+        else way / number(f"{field}.rate", move["rate"], SimulationError, above=0)
     )
     if not 0 < duration < math.inf:
         raise SimulationError(

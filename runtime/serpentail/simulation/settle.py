@@ -4,7 +4,7 @@ out.
 
 import numpy as np
 
-from ..checks import positive
+from ..checks import number
 from ..errors import SimulationError, StateError
 from .controllers import Controller
 from .simulate import simulate
@@ -33,9 +33,9 @@ def settle(
         raise StateError(
             f"q0 has shape {np.shape(q0)}, not ({model.nq},): settle one start state after another"
         )
-    positive("duration", duration)
+    number("duration", duration, SimulationError, above=0)
     if isinstance(rounds, bool) or not isinstance(rounds, int) or rounds < 1:
-        raise SimulationError(f"rounds {rounds!r}: give a whole number from 1")
+        raise SimulationError(f"rounds: value {rounds!r}: needs a whole number from 1")
     if not model.contacts:
         raise SimulationError(
             f"{model.name} touches nothing, so it cannot settle: add `contacts` to its scene"

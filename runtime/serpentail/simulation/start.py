@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..checks import positive, real_array
+from ..checks import finite_array, number, real_array, refusal, refuse_not_finite
 from ..errors import SimulationError, StateError
 from ..model.layout import QUATERNION
 
@@ -43,7 +43,8 @@ class Start:
             raise StateError(f"q0[3:7]{where} is the zero quaternion: upright is (1, 0, 0, 0)")
         q0[:, QUATERNION] /= norms[:, None]
         start, end = checked_span(t_span)
-        step = positive("output_step", (end - start) / 200 if output_step is None else output_step)
+        output_step = (end - start) / 200 if output_step is None else output_step
+        step = number("output_step", output_step, SimulationError, above=0)
         if len(q0) * (end - start) > MOST_SAMPLES * step:
             remedy = f"give {len(q0) * (end - start) / MOST_SAMPLES:.2g} s or more"
             whose = f" of {len(q0)} runs" if many else ""
@@ -76,12 +77,12 @@ class Start:
 
 def checked_span(t_span) -> tuple[float, float]:
     """Return start and end (s); SimulationError where they are none."""
-    span = real_array("t_span", t_span, error=SimulationError)
+    span = finite_array("t_span", t_span, SimulationError)
     if span.shape not in ((), (2,)):
-        raise SimulationError(f"t_span {t_span!r}: give (start, end) in s, or the end")
+        raise refusal("t_span", t_span, "(start, end) in s, or the end", SimulationError)
     start, end = span.tolist() if span.ndim else (0.0, float(span))
-    if not (np.isfinite([start, end]).all() and end > start):
-        raise SimulationError(f"t_span {t_span!r}: the end must be finite and after the start")
+    if not end > start:
+        raise refusal("t_span", t_span, "an end after the start", SimulationError)
     return start, end
 
 
@@ -93,10 +94,9 @@ def checked_states(name: str, value, size: int) -> np.ndarray:
             f"{name} has shape {array.shape}, not ({size},) of one start state, or (k, {size}) of "
             "k runs"
         )
-    wrong = np.argwhere(~np.isfinite(array))
-    if len(wrong):
-        where = f" of run {wrong[0][0]}" if array.ndim == 2 else ""
-        raise StateError(f"{name}[{wrong[0][-1]}]{where} is not finite")
+    rows = np.atleast_2d(array)
+    for run in np.flatnonzero(~np.isfinite(rows).all(axis=1))[:1]:
+        refuse_not_finite(name, rows[run], StateError, f" of run {run}" if array.ndim == 2 else "")
     return array
 
 
