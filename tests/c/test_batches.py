@@ -250,11 +250,11 @@ def test_parameters_count_in_batches():
 WRONG = {
     "a number that is none": (
         lambda q, v: v.__setitem__((13, 4), np.nan),
-        r"v\[4\] of state 13 is nan",
+        r"v\[4\] of state 13: value nan",
     ),
     "an infinite position": (
         lambda q, v: q.__setitem__((13, 0), np.inf),
-        r"q\[0\] of state 13 is inf",
+        r"q\[0\] of state 13: value inf",
     ),
     "no attitude": (
         lambda q, v: q.__setitem__((13, slice(3, 7)), 0),

@@ -358,9 +358,9 @@ def test_interrupt_ends_a_long_run():
         (lambda: st.NativeTorque("f"), "give a ctypes function or an address"),
         (
             lambda: st.Reference([0, 1], [[0] * 4] * 2, "cubic"),
-            "blend 'cubic': give one of linear, quintic, spline",
+            "blend: value 'cubic': needs 'linear' or 'quintic' or 'spline'",
         ),
-        (lambda: st.Reference([1, 0], [[0] * 4] * 2), "times must increase"),
+        (lambda: st.Reference([1, 0], [[0] * 4] * 2), "needs increasing times"),
         (lambda: st.Reference([0], [[0] * 4]), "one node only"),
         (lambda: st.Pfl(model(), st.Reference([0, 1], [[0] * 2] * 2)), "has 2 angles, the tail 4"),
     ],

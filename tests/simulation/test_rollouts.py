@@ -566,8 +566,14 @@ def row_with(array, where, value):
 
 Q, V = starts(tail(), 4)
 WRONG_STATES = {
-    "a number that is none": ((row_with(Q, (2, 1), np.nan), V), r"q0\[1\] of run 2 is not finite"),
-    "a velocity without end": ((Q, row_with(V, (3, 0), np.inf)), r"v0\[0\] of run 3 is not finite"),
+    "a number that is none": (
+        (row_with(Q, (2, 1), np.nan), V),
+        r"q0\[1\] of run 2: value nan: needs a finite number",
+    ),
+    "a velocity without end": (
+        (Q, row_with(V, (3, 0), np.inf)),
+        r"v0\[0\] of run 3: value inf: needs a finite number",
+    ),
     "no attitude": (
         (row_with(Q, (1, slice(3, 7)), 0), V),
         r"q0\[3:7\] of run 1 is the zero quaternion",

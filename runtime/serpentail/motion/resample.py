@@ -59,7 +59,7 @@ class Interpolation:
 def hermite_q(rows: Interpolation, q: Array, v: Array) -> Array:
     """Configurations between the samples q with velocities v."""
     attitude = sign_continuous(q[:, QUATERNION])
-    turning = quaternion_rate(attitude, v[:, OMEGA])
+    turning = np.stack(quaternion_rate(attitude.T, v[:, OMEGA].T), axis=-1)
     positions = np.hstack([q[:, POSITION], attitude, q[:, TAIL_Q]])
     rates = np.hstack([v[:, VELOCITY], turning, v[:, TAIL_V]])
     result = rows.hermite(positions, rates)
