@@ -1,6 +1,4 @@
-"""Command line of the runtime: a verb and a generated folder or a scene go in, a report comes
-out.
-"""
+"""The command `serpentail`: what a model is, whether it obeys its laws, its motions and plans."""
 
 import argparse
 import json

@@ -1,27 +1,30 @@
-"""Compiled functions that are called with NumPy arrays."""
+"""Compiled functions, called with NumPy arrays: one state, a batch, or the samples of runs."""
 
 import ctypes
 import math
 import threading
+from collections.abc import Sequence
 from functools import partial
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy import ndarray
+from numpy.typing import ArrayLike, DTypeLike
 
 from ..checks import real_array, refuse_not_finite
 from ..errors import StateError
-from .batch import BatchLibrary
+from .batch import BatchLibrary, RecordFunction
 from .layout import FIRST_Q, QUATERNION, SECOND_Q
 from .library import NOT_POSITIVE_DEFINITE, OUT_OF_RANGE
 from .workers import shared
 
 MOST_ARRAYS = 8
+Arrays = Sequence[ndarray]
+Shapes = Sequence[tuple[int, ...]]
 
 
 class ArgumentRecord(ctypes.Structure):
-    """The generated C's argument record: parameters, batch size, the state that failed, workspace,
-    arrays.
-    """
+    """The argument record of a function of the generated C."""
 
     _fields_ = (
         ("parameters", ctypes.c_void_p),
@@ -32,7 +35,9 @@ class ArgumentRecord(ctypes.Structure):
     )
 
 
-def argument_record(parameters: np.ndarray, count: int, work: np.ndarray, arrays) -> ArgumentRecord:
+def argument_record(
+    parameters: ndarray, count: int, work: ndarray, arrays: Arrays
+) -> ArgumentRecord:
     """Return a record of arrays, which the caller keeps alive."""
     addresses = (ctypes.c_void_p * MOST_ARRAYS)(*(a.ctypes.data for a in arrays))
     return ArgumentRecord(parameters.ctypes.data, count, 0, work.ctypes.data, addresses)
@@ -41,7 +46,7 @@ def argument_record(parameters: np.ndarray, count: int, work: np.ndarray, arrays
 CACHE_LINE = 64  # bytes, and the widest vector
 
 
-def aligned(count: int, dtype) -> np.ndarray:
+def aligned(count: int, dtype: DTypeLike) -> ndarray:
     """Return a workspace that begins at a cache line, so that no vector in it lies across two."""
     memory = np.zeros((count + 1) * np.dtype(dtype).itemsize + CACHE_LINE, np.uint8)
     first = -memory.ctypes.data % CACHE_LINE
@@ -49,11 +54,11 @@ def aligned(count: int, dtype) -> np.ndarray:
 
 
 class Buffers(threading.local):
-    """Arrays that one thread hands to C: their addresses are taken once, so a call on one state
-    costs little.
-    """
+    """Arrays that one thread hands to C; as they stay, a call on one state costs little."""
 
-    def __init__(self, dtype, inputs, outputs, work: int, parameters: np.ndarray):
+    def __init__(
+        self, dtype: DTypeLike, inputs: Shapes, outputs: Shapes, work: int, parameters: ndarray
+    ):
         self.inputs = [np.zeros(shape, dtype) for shape in inputs]
         self.outputs = [np.zeros(shape, dtype) for shape in outputs]
         self.slots = [(array.shape, array) for array in self.inputs]
@@ -62,20 +67,19 @@ class Buffers(threading.local):
         self.record = argument_record(parameters, 1, self.work, (*self.inputs, *self.outputs))
         self.address = ctypes.addressof(self.record)
 
-    def results(self) -> tuple:
+    def results(self) -> tuple[Any, ...]:
         """Return fresh copies of the outputs; a scalar as a number."""
         return tuple(o[()] if o.ndim == 0 else o.copy() for o in self.outputs)
 
 
 class RunKernel:
-    """A compiled function on rows of many runs, each with its own parameters; where they lie is
-    looked up once.
+    """A compiled function on the samples of many runs, each with its own parameters.
 
-    parameters (runs, scalars); inputs and outputs (runs, rows, ...), of the model's reals.  For one
-    thread.
+    parameters (runs, scalars); inputs and outputs (runs, samples, ...), of the model's reals, whose
+    addresses are looked up once.  For one thread.
     """
 
-    def __init__(self, kernel: "Kernel", parameters: np.ndarray, inputs, outputs):
+    def __init__(self, kernel: "Kernel", parameters: ndarray, inputs: Arrays, outputs: Arrays):
         self.kernel, self.inputs = kernel, inputs
         self.places = [(a.ctypes.data, a.strides[0]) for a in (*inputs, *outputs)]
         self.parameters = parameters.ctypes.data, parameters.strides[0]
@@ -84,9 +88,7 @@ class RunKernel:
         self.address = ctypes.addressof(self.record)
 
     def __call__(self, run: int, rows: int) -> None:
-        """Evaluate the first rows of a run; StateError, which counts all rows from the first run's
-        on.
-        """
+        """Evaluate the first rows of a run; StateError counts all rows from the first run's on."""
         record = self.record
         record.parameters, record.count = self.parameters[0] + run * self.parameters[1], rows
         for k, (first, apart) in enumerate(self.places):
@@ -101,12 +103,12 @@ class Kernel:
 
     def __init__(
         self,
-        library: ctypes.CDLL,
-        batch_library: BatchLibrary,
+        libraries: tuple[ctypes.CDLL, BatchLibrary],
         manifest: dict,
         name: str,
-        parameters: np.ndarray,
+        parameters: ndarray,
     ):
+        library, self.batch_library = libraries
         entry = manifest["functions"][name]
         self.name, self.dtype = name, parameters.dtype
         self.names = [a["name"] for a in entry["inputs"]]
@@ -114,19 +116,13 @@ class Kernel:
         self.out_shapes = [() if a["shape"] == [1] else tuple(a["shape"]) for a in entry["outputs"]]
         self.function = getattr(library, f"{manifest['prefix']}_batch_{name}")
         self.function.argtypes = [ctypes.c_void_p]
-        self.parameters, self.batch_library, self.work = (
-            parameters,
-            batch_library,
-            manifest["work"][name],
-        )
+        self.parameters, self.work = parameters, manifest["work"][name]
         self.bend_range = manifest["scene"].get("bend_range")
         self.polar = manifest["scene"]["coordinates"] == "polar"
         self.buffers = Buffers(self.dtype, self.shapes, self.out_shapes, self.work, parameters)
 
-    def __call__(self, *arrays):
-        """Evaluate; StateError names the argument that has a wrong shape or a value that is not
-        finite.
-        """
+    def __call__(self, *arrays: ArrayLike) -> Any:
+        """Return the output, or a tuple of outputs; StateError names an argument that is wrong."""
         buffers, dtype = self.buffers, self.dtype
         if len(arrays) != len(buffers.slots):
             raise TypeError(f"{self.name} takes {', '.join(self.names)}")
@@ -138,13 +134,13 @@ class Kernel:
             self.fail(status, 0, [b[None] for b in buffers.inputs])
         return buffers.only.copy() if buffers.only is not None else buffers.results()
 
-    def _any(self, arrays):
-        arrays = [
-            self._checked(*item) for item in zip(self.names, self.shapes, arrays, strict=True)
-        ]
-        counts = {
-            a.shape[0] for a, shape in zip(arrays, self.shapes, strict=True) if a.ndim > len(shape)
-        }
+    def _any(self, values: Sequence[ArrayLike]) -> Any:
+        """Return outputs for any arrays of numbers, of which some may have a batch axis."""
+        arguments = zip(self.names, self.shapes, values, strict=True)
+        arrays = [self._checked(name, shape, value) for name, shape, value in arguments]
+        # sizes of the batches among them
+        dimensions = zip(arrays, self.shapes, strict=True)
+        counts = {array.shape[0] for array, shape in dimensions if array.ndim > len(shape)}
         if not counts:
             outputs = self._batch(1, arrays)
             return tuple(o[0] for o in outputs) if isinstance(outputs, tuple) else outputs[0]
@@ -154,20 +150,18 @@ class Kernel:
             )
         return self._batch(counts.pop(), arrays)
 
-    def _checked(self, name: str, shape: tuple[int, ...], value) -> np.ndarray:
+    def _checked(self, name: str, shape: tuple[int, ...], value: ArrayLike) -> ndarray:
+        """Return an argument as an array of the shape, or with a batch axis before it."""
         array = real_array(f"{self.name}: {name}", value, StateError, self.dtype)
-        if (
-            array.shape[array.ndim - len(shape) :] != shape
-            or array.ndim > len(shape) + 1
-            or array.ndim < len(shape)
-        ):
+        if array.shape != shape and (array.ndim == 0 or array.shape[1:] != shape):
             size = ", ".join(map(str, shape))
             raise StateError(
                 f"{self.name}: {name} has shape {array.shape}, not ({size},) or (batch, {size})"
             )
         return array
 
-    def _batch(self, count: int, arrays):
+    def _batch(self, count: int, arrays: Arrays) -> Any:
+        """Return outputs for so many states; single ones are repeated."""
         whole = [
             np.ascontiguousarray(np.broadcast_to(a, (count, *shape)))
             for a, shape in zip(arrays, self.shapes, strict=True)
@@ -178,7 +172,7 @@ class Kernel:
         shared(count, lambda first, last: run(whole, outputs, first, last))
         return outputs[0] if len(outputs) == 1 else tuple(outputs)
 
-    def _each(self, inputs, outputs, first: int, last: int) -> None:
+    def _each(self, inputs: Arrays, outputs: Arrays, first: int, last: int) -> None:
         """Evaluate states [first, last) one by one."""
         work = aligned(self.work, self.dtype)
         record = argument_record(
@@ -187,10 +181,10 @@ class Kernel:
         if status := self.function(ctypes.addressof(record)):
             self.fail(status, first + record.failed, inputs)
 
-    def _side_by_side(self, function, inputs, outputs, first: int, last: int) -> None:
-        """Evaluate states [first, last) side by side; those among which one fails are taken again,
-        one by one.
-        """
+    def _side_by_side(
+        self, function: RecordFunction, inputs: Arrays, outputs: Arrays, first: int, last: int
+    ) -> None:
+        """Evaluate states [first, last) in lanes; lanes among which one fails again, one by one."""
         work = aligned(self.batch_library.work[self.name], self.dtype)
         while first < last:
             record = argument_record(
@@ -203,21 +197,23 @@ class Kernel:
             self._each(inputs, outputs, first, after)
             first = after
 
-    def fail(self, status: int, index: int, arrays):
+    def fail(self, status: int, index: int, arrays: Arrays) -> NoReturn:
         """Raise what a status means of one state among arrays."""
+        # an argument that is no number, or a quaternion that is none
         state = f" of state {index}" if len(arrays[0]) > 1 else ""
         for name, array in zip(self.names, arrays, strict=True):
             refuse_not_finite(f"{self.name}: {name}", array[index], StateError, state)
         q = arrays[0][index].astype(float)
         if self.names[0] == "q":
             self._check_attitude(q, state)
+        # else what the C function found
         if status == OUT_OF_RANGE:
             raise StateError(f"{self.name}: {self._out_of_range(q, state)}")
         indefinite = f"the inertia matrix{state} is not positive definite"
         what = indefinite if status == NOT_POSITIVE_DEFINITE else f"the result{state} is not finite"
         raise StateError(f"{self.name}: {what}: is a value too large, or a parameter unphysical?")
 
-    def _check_attitude(self, q, state: str) -> None:
+    def _check_attitude(self, q: ndarray, state: str) -> None:
         """Refuse a quaternion that gives no attitude."""
         limits, norm = np.finfo(self.dtype), math.hypot(*q[QUATERNION])
         if not limits.tiny <= norm * norm <= limits.max:
@@ -226,7 +222,7 @@ class Kernel:
                 f"{self.name}: the quaternion q[3:7]{state} {words}: upright is (1, 0, 0, 0)"
             )
 
-    def _out_of_range(self, q, state: str) -> str:
+    def _out_of_range(self, q: ndarray, state: str) -> str:
         """Say which segment has a bend that the model does not cover, and what to do."""
         first, second = q[FIRST_Q], q[SECOND_Q]
         bends = abs(second) if self.polar else np.hypot(first, second)

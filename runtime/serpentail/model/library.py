@@ -1,4 +1,4 @@
-"""Opens the compiled library of a model."""
+"""Opens the compiled C of a model, as ctypes has it, and names its status codes."""
 
 import ctypes
 from pathlib import Path
@@ -12,9 +12,7 @@ NOT_POSITIVE_DEFINITE, NOT_FINITE, OUT_OF_RANGE = 1, 2, 3
 
 
 def open_library(folder: Path, manifest: dict, profile: str) -> ctypes.CDLL:
-    """Compile (or find in the cache) and load a model's C; ModelError where it is not what the
-    manifest says.
-    """
+    """Load a model's C, compiled or from the cache; ModelError where it is another's interface."""
     prefix = manifest["prefix"]
     lazy = {f"src/{prefix}_{part}.c" for part in LAZY_SOURCES}
     sources = [
