@@ -1,4 +1,4 @@
-"""Motions between their samples: interpolation in time."""
+"""Interpolates motions between their samples."""
 
 from dataclasses import dataclass
 
@@ -25,9 +25,7 @@ def inside(times: Array, span: Array) -> Array:
 
 @dataclass(frozen=True)
 class Interpolation:
-    """Where n times lie among samples: the rows before and after, the fraction between, the step
-    (n, 1).
-    """
+    """Where n times lie among samples: rows before and after; fraction and step between (n, 1)."""
 
     before: NDArray[np.intp]
     after: NDArray[np.intp]
@@ -37,9 +35,8 @@ class Interpolation:
     @classmethod
     def at(cls, times: Array, samples: Array) -> "Interpolation":
         """Locate times inside the span of the samples."""
-        before = np.clip(
-            np.searchsorted(samples, times, side="right") - 1, 0, max(len(samples) - 2, 0)
-        )
+        last = max(len(samples) - 2, 0)
+        before = np.clip(np.searchsorted(samples, times, side="right") - 1, 0, last)
         after = np.minimum(before + 1, len(samples) - 1)
         step = samples[after] - samples[before]
         fraction = (times - samples[before]) / np.where(step > 0, step, 1)

@@ -1,6 +1,4 @@
-"""Sampled motions: states, torques, energies and momenta at given times in, files and new samplings
-out.
-"""
+"""Sampled motions: states, torques, energies and momenta at times, kept in files, sampled anew."""
 
 import dataclasses
 import json
@@ -28,8 +26,7 @@ UNIT_TOLERANCE = 1e-3  # how far a stored quaternion's norm may drift from 1
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """K samples of a motion with m tail segments, SI; the arrays are read-only copies, ValueError
-    if unsound.
+    """K samples of a motion with m tail segments, SI, in read-only arrays; ValueError if unsound.
 
     t (K,) s, increasing; q (K, 7+2m), v (K, 6+2m); tau (K, 2m) N m; kinetic, potential (K,) J; in
     the world linear_momentum (K, 3) kg m/s and, about the COM, angular_momentum (K, 3) kg m2/s;
@@ -53,10 +50,10 @@ class Trajectory:
         for name in ARRAYS:
             object.__setattr__(self, name, _real(name, getattr(self, name)))
         for name, shape in _shapes(self.t, self.q).items():
-            found = getattr(self, name).shape
-            if found != shape:
+            actual = getattr(self, name).shape
+            if actual != shape:
                 raise ValueError(
-                    f"{name} has shape {found}: give {shape}, to match the shapes of t and q"
+                    f"{name} has shape {actual}: give {shape}, to match the shapes of t and q"
                 )
         _check_time(self.t)
         _check_unit(self.attitude)
@@ -69,9 +66,7 @@ class Trajectory:
 
     @property
     def events(self) -> list[dict[str, Any]]:
-        """Touch-downs and take-offs in order: time (s), group, kind ("touch_down" or
-        "take_off").
-        """
+        """Touch-downs and take-offs in order: time (s), group, kind, such as "take_off"."""
         return self.info.get("events", [])
 
     @property
@@ -106,9 +101,7 @@ class Trajectory:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
-        """Read a saved file; FileNotFoundError if absent, ValueError if damaged or not a
-        trajectory.
-        """
+        """Read a saved file; FileNotFoundError if absent, ValueError if it is no trajectory."""
         source = _npz(path)
         if not source.is_file():
             raise FileNotFoundError(
@@ -121,19 +114,17 @@ class Trajectory:
             raise ValueError(f"{str(source)!r} holds no sound trajectory: {error}") from error
 
     def resample(self, t: ArrayLike) -> Self:
-        """The motion at the increasing times t (n,), s, inside its span; ValueError names the first
-        outside.
+        """The motion at the increasing times t (n,), s; ValueError names the first one outside.
 
         p and q_t: cubic Hermite through positions and velocities. Attitude: the same on the
-        quaternion with
-        q_dot = q (0, omega) / 2, normalised (samples less than half a turn apart). v, energies and
-        momenta:
-        monotone cubic, so no overshoot at impacts. tau and contact: linear, since they may jump.
+        quaternion with q_dot = q (0, omega) / 2, normalised (samples less than half a turn apart).
+        v, energies and momenta: monotone cubic, so no overshoot at impacts. tau and contact:
+        linear, since they may jump.
         """
         times = inside(_real("t", t), self.t)
         rows = Interpolation.at(times, self.t)
         smooth: dict[str, Any] = {
-            name: monotone(self.t, getattr(self, name), times) for name in SMOOTH
+            name: monotone(self.t, getattr(self, name), times) for name in MONOTONE
         }
         q = hermite_q(rows, self.q, self.v)
         contact = self.contact.mapped(rows.linear) if self.contact else None
@@ -146,7 +137,7 @@ ARRAYS = tuple(
     entry.name for entry in dataclasses.fields(Trajectory) if entry.name not in ("info", "contact")
 )
 CONTACT = "contact_"  # before the names of a contact's arrays in a file
-SMOOTH = ("v", "kinetic", "potential", "linear_momentum", "angular_momentum")
+MONOTONE = ("v", "kinetic", "potential", "linear_momentum", "angular_momentum")
 
 
 def _real(name: str, value: ArrayLike) -> Array:
@@ -180,9 +171,9 @@ def _shapes(t: Array, q: Array) -> dict[str, tuple[int, ...]]:
 
 def _check_time(t: Array) -> None:
     """ValueError unless t increases."""
-    late = np.flatnonzero(np.diff(t) <= 0)
-    if late.size:
-        k = int(late[0]) + 1
+    backward = np.flatnonzero(np.diff(t) <= 0)
+    if backward.size:
+        k = int(backward[0]) + 1
         raise ValueError(
             f"t has shape {t.shape} and t[{k}] = {t[k]} follows {t[k - 1]}: give strictly "
             "increasing times"
@@ -242,10 +233,13 @@ def _read(source: Path) -> dict[str, Any]:
 
 def _parsed(fields: dict[str, Any]) -> dict[str, Any]:
     """The arguments of a trajectory from the fields of a file."""
-    own = {name: value for name, value in fields.items() if not name.startswith(CONTACT)}
-    touching = {
-        name.removeprefix(CONTACT): value for name, value in fields.items() if name not in own
-    }
+    arguments, touching = {}, {}
+    for name, value in fields.items():
+        if name.startswith(CONTACT):
+            touching[name.removeprefix(CONTACT)] = value
+        else:
+            arguments[name] = value
     if touching:
-        own["contact"] = Contact(**touching | {"groups": json.loads(str(touching["groups"]))})
-    return own | {"info": json.loads(str(fields["info"]))}
+        groups = json.loads(str(touching.pop("groups")))
+        arguments["contact"] = Contact(**touching, groups=groups)
+    return arguments | {"info": json.loads(str(fields["info"]))}
