@@ -10,6 +10,7 @@ from .errors import SerpentailError
 def info(folder: str) -> dict:
     """Return what a model is: sizes, functions, how each was emitted, what it costs."""
     from .model.model import load
+    from .model.parameters import json_ready
 
     model = load(folder)
     functions = {
@@ -24,15 +25,11 @@ def info(folder: str) -> dict:
     sizes = {
         name: getattr(model, name) for name in ("kind", "segments", "links", "samples", "nq", "nv")
     }
-    parameters = {
-        name: list(value) if isinstance(value, tuple) else value
-        for name, value in model.parameters.items()
-    }
     return {
         "name": model.name,
         "real": model.manifest["real"],
         **sizes,
-        "parameters": parameters,
+        "parameters": json_ready(model.parameters),
         "functions": functions,
     }
 

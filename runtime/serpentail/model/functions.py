@@ -1,6 +1,7 @@
 """The functions of a model, which evaluate its equations of motion and what follows from them."""
 
 from abc import ABC, abstractmethod
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -9,7 +10,7 @@ from ..checks import finite_array
 from ..errors import StateError
 from .kernel import Kernel
 
-Array = NDArray[np.floating]
+Array = NDArray[Any]  # of doubles, or of floats where the scene asks for them
 
 
 class Functions(ABC):

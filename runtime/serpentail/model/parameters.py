@@ -39,6 +39,11 @@ def _plain(value: Any) -> Value:
     return tuple(numbers) if isinstance(numbers, list) else numbers
 
 
+def json_ready(values: Mapping[str, Value]) -> dict[str, float | list[float]]:
+    """Return parameters with lists in place of tuples."""
+    return {name: list(x) if isinstance(x, tuple) else x for name, x in values.items()}
+
+
 @dataclass(frozen=True, eq=False)
 class RunParameters:
     """Parameters of k runs: what is changed, all values by name, and the C structs (k, scalars)."""
