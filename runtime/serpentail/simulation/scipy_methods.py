@@ -12,20 +12,16 @@ from .methods import IntegrationMethod
 
 
 class StateRate:
-    """y = (q, v) -> y_dot by the compiled model; with ``trials``, a state that has none gives NaN,
-    not an error.
-    """
+    """y = (q, v) -> y_dot by the compiled model; nan or, without ``trials``, an error for none."""
 
     def __init__(self, run: CompiledRun, trials: bool):
-        self.trials, self.refused = trials, None
+        self.trials = trials
+        self.refused: SimulationError | None = None
         self.run, pointer, dtype = run, ctypes.c_void_p, run.records.dtype
         self.function = run.function("state_rate", run.records.real, pointer, pointer, pointer)
         size = sum(map(len, run.state.values()))
-        self.y, self.y_dot, self.tau = (
-            np.zeros(size, dtype),
-            np.zeros(size, dtype),
-            np.zeros(run.actuation.nt, dtype),
-        )
+        self.y, self.y_dot = np.zeros(size, dtype), np.zeros(size, dtype)
+        self.tau = np.zeros(run.actuation.nt, dtype)
         self.addresses = [a.ctypes.data for a in (self.y, self.y_dot, self.tau)]
 
     def __call__(self, t: float, y: np.ndarray) -> np.ndarray:
@@ -56,7 +52,9 @@ class SampleWriter:
     """Samples written one after another as steps pass their times."""
 
     def __init__(self, rate: StateRate, times: np.ndarray):
-        self.rate, self.times, self.states, self.torques = rate, times, [], []
+        self.rate, self.times = rate, times
+        self.states: list[np.ndarray] = []
+        self.torques: list[np.ndarray] = []
 
     def write(self, t: float, y: np.ndarray) -> None:
         """Write one sample, its quaternion normalised."""
@@ -72,13 +70,12 @@ class SampleWriter:
 
 @np.errstate(all="ignore")  # a trial step may overflow, and is then taken again, shorter
 def integrate_by_scipy(run: CompiledRun, method: IntegrationMethod) -> Samples:
-    """Integrate from stop to stop; what ends the run before its end goes with the samples up to
-    there.
-    """
+    """Return the samples of a run, made from stop to stop, and what ended it before its end."""
     rate = StateRate(run, method.name == "dop853")  # which takes a step with NaN again, shorter
     samples, counts = SampleWriter(rate, run.start.times), {"steps": 0, "evaluations": 0}
     ends = [*(t for t in run.actuation.stops if run.start.start < t < run.start.end), run.start.end]
-    y, t, failure = np.concatenate([*run.state.values()]).astype(float), run.start.start, None
+    y, t = np.concatenate([*run.state.values()]).astype(float), run.start.start
+    failure: BaseException | None = None
     try:
         run.record.until = ends[0]
         samples.write(t, y)
@@ -90,9 +87,8 @@ def integrate_by_scipy(run: CompiledRun, method: IntegrationMethod) -> Samples:
             raise
         failure = error
     done = len(samples.states)
-    q, v, bristles = np.split(
-        np.array(samples.states), [run.model.nq, run.model.nq + run.model.nv], axis=1
-    )
+    nq, nv = run.model.nq, run.model.nv
+    q, v, bristles = np.split(np.array(samples.states), [nq, nq + nv], axis=1)
     bristles = bristles.reshape(done, run.ground.points, 2)
     return Samples(samples.times[:done], q, v, np.array(samples.torques), bristles, counts, failure)
 
