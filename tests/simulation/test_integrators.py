@@ -348,14 +348,14 @@ def test_interrupt_ends_a_long_run():
 @pytest.mark.parametrize(
     ("controller", "words"),
     [
-        (lambda: st.Phases([]), "give one or more"),
-        (lambda: st.Phases([(0, None), (0, None)]), "finite and increasing"),
-        (lambda: st.Phases([(1, None), (0, None)]), "finite and increasing"),
+        (lambda: st.Phases([]), "needs one or more"),
+        (lambda: st.Phases([(0, None), (0, None)]), "needs one or more increasing times"),
+        (lambda: st.Phases([(1, None), (0, None)]), "needs one or more increasing times"),
         (lambda: st.Phases([(0, st.Phases([(0, None)]))]), "put all pairs in one list"),
-        (lambda: st.Phases(3), "give pairs"),
-        (lambda: st.Phases([(0, 3)]), "controller 3: give"),
+        (lambda: st.Phases(3), "needs pairs"),
+        (lambda: st.Phases([(0, 3)]), "controller: value 3: needs"),
         (lambda: st.TorqueCurve(3), "give a Piecewise of 4 channels"),
-        (lambda: st.NativeTorque("f"), "give a ctypes function or an address"),
+        (lambda: st.NativeTorque("f"), "needs a ctypes function or an address"),
         (
             lambda: st.Reference([0, 1], [[0] * 4] * 2, "cubic"),
             "blend: value 'cubic': needs 'linear' or 'quintic' or 'spline'",

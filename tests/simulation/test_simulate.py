@@ -338,7 +338,10 @@ def test_wrong_start_is_named(model, start, words):
             "dop853 has no setting 'step'; it has rtol, atol, output_step",
         ),
         ({"stp": 1}, "no setting 'stp'"),
-        ({"controller": 3.0}, "controller 3.0: give None, Damping, TorqueTable, .* or a function"),
+        (
+            {"controller": 3.0},
+            "controller: value 3.0: needs None, Damping, TorqueTable, .* or a function",
+        ),
         *[
             ({"controller": st.Damping(d)}, "damping")
             for d in (-1.0, np.nan, (1, 2), "1", None, [[0.0] * NT])

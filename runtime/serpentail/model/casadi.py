@@ -56,9 +56,9 @@ class CasadiFunctions:
         return self._module.function(self._symbolic(name))
 
     def external(self, name: str, derivatives: int = 0, folded: bool = False) -> casadi.Function:
-        """Return the compiled C as a function whose last input is the parameter vector (double
-        models only).
+        """Return the compiled C as a function whose last input is the parameter vector.
 
+        Only models of doubles have it.
         derivatives: 1 or 2 raises ModelError here where the scene lacks what exact derivatives
         of that order are made of; else CasADi raises when it differentiates.  Those with respect
         to parameters need ``<name>_parameter_derivatives`` in the scene, and are first ones.

@@ -24,8 +24,7 @@ REMEDY_FAILED = (
 def compile_library(
     sources: Sequence[Path], include: Path, profile: str = "fast", cache: Path | None = None
 ) -> Path:
-    """Return the shared library of `sources` and the headers in `include`, compiled unless the
-    cache has it.
+    """Return the shared library of sources and headers, compiled unless the cache has it.
 
     `profile` is "fast" or "reproducible"; `cache` defaults to $SERPENTAIL_CACHE, then the user's
     cache. Raises CompilerNotFound, CompileFailed, ModelError (unreadable sources), SerpentailError

@@ -76,9 +76,8 @@ class TorqueCurve:
     def parts(self, nt: int) -> Parts:
         """Return what it adds up for 2m tail coordinates."""
         if not isinstance(self.torques, Piecewise) or self.torques.channels != nt:
-            raise SimulationError(
-                f"TorqueCurve: torques {self.torques!r}: give a Piecewise of {nt} channels"
-            )
+            needs = f"a Piecewise of {nt} channels"
+            raise refusal("TorqueCurve: torques", self.torques, needs, SimulationError)
         return Parts(_damping(self.damping, nt), self.torques)
 
 

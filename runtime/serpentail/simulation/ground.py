@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import finite_array
+from ..checks import finite_array, refusal
 from ..errors import SimulationError
 from ..model.kernel import RunKernel
 from ..model.model import Model
@@ -148,6 +148,5 @@ def _stops(groups: dict[str, int], stop_at: Iterable[tuple[str, str]] | None) ->
         return sum(bits[pair] for pair in pairs)
     except (TypeError, KeyError):
         choices = ", ".join(map(repr, bits))
-        raise SimulationError(
-            f"stop_at {stop_at!r}: give a list of pairs out of {choices}"
-        ) from None
+        needs = f"a list of pairs out of {choices}"
+        raise refusal("stop_at", stop_at, needs, SimulationError) from None

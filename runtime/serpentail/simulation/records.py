@@ -25,10 +25,10 @@ class Records:
     @cached_property
     def types(self) -> dict[str, type[ctypes.Structure]]:
         """Structure types by name."""
-        found = {}
+        types = {}
         for name, members in self.members.items():
-            found[name] = structure(name, tuple(map(tuple, members)), self.real)
-        return found
+            types[name] = structure(name, tuple(map(tuple, members)), self.real)
+        return types
 
     def has(self, record: str, member: str) -> bool:
         """Tell if a record has a member."""

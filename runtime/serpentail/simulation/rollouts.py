@@ -171,7 +171,15 @@ class ParallelRuns:
         errors: list[SimulationError | None] = [None] * len(outcomes)
         for k in sorted(failed.union(self.unmeasured)):
             errors[k] = self._judge(k)
-        # samples and measures, nan after the end of a run
+        # counts of all runs together
+        counts = {name: sum(each.info.get(name, 0) for each in outcomes) for name in COUNTS}
+        abreast = 1 if self.batched is None else self.batched.states
+        shared = {"model": self.model.name, "threads": self.threads, "abreast": abreast}
+        info = counts | self.method.info | shared | info
+        return Rollouts(**self._arrays(outcomes), errors=errors, info=info, source=self.source)
+
+    def _arrays(self, outcomes: list[Outcome]) -> dict[str, np.ndarray]:
+        """Return samples and measures, nan after the end of a run, read-only."""
         arrays = self.memory.out | self.measures
         arrays = {name: np.asarray(array, float) for name, array in arrays.items()}
         for k, outcome in enumerate(outcomes):
@@ -184,12 +192,7 @@ class ParallelRuns:
         arrays["ends"] = np.array([outcome.end for outcome in outcomes])
         for array in arrays.values():
             array.setflags(write=False)
-        # counts of all runs together
-        counts = {name: sum(each.info.get(name, 0) for each in outcomes) for name in COUNTS}
-        abreast = 1 if self.batched is None else self.batched.states
-        shared = {"model": self.model.name, "threads": self.threads, "abreast": abreast}
-        info = counts | self.method.info | shared | info
-        return Rollouts(**arrays, errors=errors, info=info, source=self.source)
+        return arrays
 
     def _judge(self, k: int) -> SimulationError | None:
         """Return the error that ended run k; measure it up to there."""

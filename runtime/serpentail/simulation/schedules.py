@@ -108,8 +108,7 @@ class Legs:
 
     @classmethod
     def moves(cls, gamma: float, delta: float, moves: Iterable[Mapping[str, float]]) -> Self:
-        """Legs at gamma, delta (rad) that move from time to time, both legs alike, and are held in
-        between.
+        """Legs at gamma, delta (rad) that move from time to time, both alike, else are held.
 
         Each move is a mapping: at (s), its end's gamma, delta or both (rad), and duration (s) or
         rate (rad/s, of the angle that goes farther).  Moves follow each other in time.
@@ -136,8 +135,8 @@ Node = tuple[float, tuple[float, float]]  # time (s), gamma and delta (rad)
 MOVE = ("at", "gamma", "delta", "duration", "rate")
 
 
-def _move(field: str, move: object, last: Node) -> list[Node]:
-    """Return the nodes that a move adds after the last one; SimulationError where it cannot."""
+def _checked_move(field: str, move: object) -> Mapping[str, float]:
+    """Return a move with numbers and all keys that it needs; SimulationError where it has not."""
     if not isinstance(move, Mapping):
         raise refusal(field, move, f"a table of {', '.join(MOVE)}", SimulationError)
     for name, value in move.items():
@@ -147,6 +146,12 @@ def _move(field: str, move: object, last: Node) -> list[Node]:
     if "at" not in move or not goes or ("rate" in move) == ("duration" in move):
         needs = "at, gamma or delta, and one of rate, duration"
         raise refusal(field, dict(move), needs, SimulationError)
+    return move
+
+
+def _move(field: str, move: Mapping[str, float], last: Node) -> list[Node]:
+    """Return the nodes that a move adds after the last one; SimulationError where it cannot."""
+    move = _checked_move(field, move)
     # where it goes, and how long that takes
     (end, angles), at = last, move["at"]
     goal = move.get("gamma", angles[0]), move.get("delta", angles[1])

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import number
+from ..checks import number, refusal
 from ..errors import SimulationError, StateError
 from ..model.model import Model
 from ..motion.trajectory import Trajectory
@@ -36,7 +36,7 @@ def settle(
         )
     number("duration", duration, SimulationError, above=0)
     if isinstance(rounds, bool) or not isinstance(rounds, int) or rounds < 1:
-        raise SimulationError(f"rounds: value {rounds!r}: needs a whole number from 1")
+        raise refusal("rounds", rounds, "a whole number from 1", SimulationError)
     if not model.contacts:
         raise SimulationError(
             f"{model.name} touches nothing, so it cannot settle: add `contacts` to its scene"
