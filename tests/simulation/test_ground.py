@@ -166,9 +166,9 @@ def test_a_dropped_tail_and_torso_touch_down():
         ({"bristles0": np.full((6, 2), np.nan)}, "finite"),
         (
             {"stop_at": [("take_off", "tail")]},
-            r"give a list of pairs out of \('touch_down', 'feet'\)",
+            r"needs a list of pairs out of \('touch_down', 'feet'\)",
         ),
-        ({"stop_at": 3}, "give a list of pairs"),
+        ({"stop_at": 3}, "needs a list of pairs"),
     ],
 )
 def test_wrong_setting_is_named(settings, words):
