@@ -91,7 +91,7 @@ class Actuation:
         real, pointer = self.records.real, ctypes.POINTER(self.records.real)
         prototype = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, real, pointer, pointer, pointer)
 
-        def call(_context, t, q, v, tau):
+        def call(_context: Any, t: float, q: Any, v: Any, tau: Any) -> int:
             try:
                 np.ctypeslib.as_array(tau, (self.nt,))[:] = self._user_torque(user, t, q, v)
             except BaseException as error:

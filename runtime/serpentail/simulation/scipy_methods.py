@@ -10,6 +10,8 @@ from ..model.library import NOT_FINITE
 from .compiled_run import CompiledRun, Samples, failed
 from .methods import IntegrationMethod
 
+Part = tuple[float, np.ndarray, float]  # start (s), state there, end (s)
+
 
 class StateRate:
     """y = (q, v) -> y_dot by the compiled model; nan or, without ``trials``, an error for none."""
@@ -94,7 +96,7 @@ def integrate_by_scipy(run: CompiledRun, method: IntegrationMethod) -> Samples:
 
 
 def _smooth_part(
-    rate: StateRate, method: IntegrationMethod, part, samples: SampleWriter, counts: dict
+    rate: StateRate, method: IntegrationMethod, part: Part, samples: SampleWriter, counts: dict
 ) -> np.ndarray:
     """Integrate over times without a break, (start, state, end), and return the last state."""
     from scipy.integrate import DOP853, LSODA

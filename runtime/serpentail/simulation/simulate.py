@@ -89,7 +89,13 @@ def _spent(clocks: tuple[float, float]) -> dict[str, float]:
 
 
 def end_state(
-    model, q0, v0, *, controller: Controller, duration: float, step: float
+    model: Model,
+    q0: ArrayLike,
+    v0: ArrayLike,
+    *,
+    controller: Controller,
+    duration: float,
+    step: float,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return q (nq,), v (nv,) where "rk4" ends after a duration (s), with nothing measured."""
     start = Start.checked(model, (q0, v0), duration, duration)
@@ -100,7 +106,7 @@ def end_state(
 
 
 def prepared(
-    model, start: Start, controller: Controller, method, settings: dict
+    model: Model, start: Start, controller: Controller, method: str, settings: dict[str, Any]
 ) -> tuple[Memory, Actuation, IntegrationMethod]:
     """Return what runs need to go; SimulationError or ModelError where a setting is wrong."""
     changes = settings.pop("parameters", None)
@@ -116,7 +122,11 @@ def prepared(
 
 
 def choose(
-    actuation: Actuation, start: Start, parameters: RunParameters, name, settings: dict
+    actuation: Actuation,
+    start: Start,
+    parameters: RunParameters,
+    name: str,
+    settings: dict[str, Any],
 ) -> IntegrationMethod:
     """Return the method that was asked for, or a choice and its reason."""
     model, single = actuation.model, actuation.records.real is ctypes.c_float
