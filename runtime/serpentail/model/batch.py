@@ -12,6 +12,7 @@ from .compiler import compile_library
 
 MIN_BATCH = 1000  # states: from here on a batch pays for compiling
 LAZY_SOURCES = ("batch", "flights")  # sources of a model that are compiled when they are needed
+NO_BATCH: dict = {"states": 1, "work": {}}  # of models without C
 RecordFunction = Callable[[int], int]  # takes the address of a record, returns a status
 
 
@@ -40,8 +41,9 @@ class BatchLibrary:
 
     def __init__(self, folder: Path, manifest: dict, profile: str):
         self.prefix = manifest["prefix"]
-        self.states: int = manifest["batch"]["states"]
-        self.work: dict[str, int] = manifest["batch"]["work"]
+        batch = manifest.get("batch", NO_BATCH)
+        self.states: int = batch["states"]
+        self.work: dict[str, int] = batch["work"]
         self.batch, self.rollouts = (
             LazyLibrary(folder, manifest, profile, part) for part in LAZY_SOURCES
         )

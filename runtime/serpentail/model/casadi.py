@@ -1,7 +1,9 @@
 """A model as CasADi functions, of operations that CasADi knows or of the compiled C."""
 
 import importlib.util
-from typing import TYPE_CHECKING, Any
+from functools import cached_property
+from types import ModuleType
+from typing import TYPE_CHECKING
 
 import casadi
 
@@ -29,7 +31,22 @@ class CasadiFunctions:
 
     def __init__(self, model: "Model"):
         self._model = model
-        self._module = _module(model)
+
+    @cached_property
+    def _module(self) -> ModuleType:
+        """The generated module; ModelError where the scene did not ask for it."""
+        if not self._has_module:
+            raise ModelError(
+                f'{self._model.name} was generated without CasADi functions: add "casadi" to '
+                "`targets` of the scene, then generate it again, or take compiled ones, "
+                "external(name)"
+            )
+        return _imported(self._model)
+
+    @property
+    def _has_module(self) -> bool:
+        """Whether the scene asked for CasADi."""
+        return "casadi" in self._model.manifest["scene"]["targets"]
 
     def __getattr__(self, name: str) -> casadi.Function:
         if name.startswith("_"):
@@ -44,7 +61,8 @@ class CasadiFunctions:
         return function
 
     def __dir__(self) -> list[str]:
-        return [*self._module.SIGNATURES, "symbolic", "external", "parameter_vector"]
+        symbolic = self._module.SIGNATURES if self._has_module else ()
+        return [*symbolic, "symbolic", "external", "parameter_vector"]
 
     @property
     def parameter_vector(self) -> casadi.DM:
@@ -113,7 +131,7 @@ class CasadiFunctions:
         return name
 
 
-def _module(model: "Model") -> Any:
+def _imported(model: "Model") -> ModuleType:
     """Return the generated module of a model, loaded from its folder."""
     name = f"{model.name}_casadi"
     path = model.folder / f"{name}.py"

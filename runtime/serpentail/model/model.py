@@ -50,8 +50,18 @@ def load(
     profile = manifest["scene"]["profile"] if profile is None else profile
     if not isinstance(compiled, bool | np.bool_):
         raise ModelError(f"compiled: value {compiled!r:.60}: needs True or False")
+    if compiled and "c" not in manifest["scene"]["targets"]:
+        raise _without_c(manifest)
     library = open_library(folder, manifest, profile) if compiled else None
     return Model(folder, manifest, values, library, profile)
+
+
+def _without_c(manifest: Mapping[str, Any]) -> ModelError:
+    """Return the error that a model has no C."""
+    return ModelError(
+        f"{manifest['prefix']} was generated without C: load it with compiled=False for "
+        'model.casadi, or add "c" to `targets` of the scene, then generate it again'
+    )
 
 
 class Model(Functions):
@@ -134,6 +144,11 @@ class Model(Functions):
             self.library is not None,
         )
 
+    @property
+    def generated(self) -> tuple[str, ...]:
+        """Names of all functions that were generated, the rollout of simulations included."""
+        return tuple(self.manifest["functions"] | self.manifest.get("work", {}))
+
     def kernel(self, name: str) -> Kernel:
         """Return a compiled function; ModelError where the scene did not ask for it."""
         kernel = self.kernels.get(name)
@@ -148,7 +163,9 @@ class Model(Functions):
 
     def without(self, *names: str) -> ModelError:
         """Return the error that functions are not there."""
-        has = ", ".join(self.manifest["work"])
+        if set(names) & set(self.manifest["scene"]["functions"]):  # what only C can do
+            return _without_c(self.manifest)
+        has = ", ".join(self.generated)
         return ModelError(
             f"{self.name} was generated without {', '.join(map(repr, names))} (it has {has}): add "
             "it to `functions` of the scene, then generate it again"

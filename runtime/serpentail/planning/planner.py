@@ -53,7 +53,7 @@ def plan(model, *, start, goal=None, duration, bounds=None, **settings):
     missing = [
         name
         for name in ("mass_matrix", "inverse_dynamics", "rollout")
-        if name not in model.manifest["work"]
+        if name not in model.generated
     ]
     if missing:
         raise model.without(*missing)

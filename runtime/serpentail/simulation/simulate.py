@@ -67,8 +67,7 @@ def simulate(
     With a function of Python, or SciPy's methods, runs are made one after another in the calling
     thread, and what the function raises, unless it is a SimulationError, ends all.
     """
-    needed = ("rollout", "energy", "momentum")
-    missing = [name for name in needed if name not in model.manifest["work"]]
+    missing = [name for name in ("rollout", "energy", "momentum") if name not in model.generated]
     if missing:
         raise model.without(*missing)
     start = Start.checked(model, (q0, v0), t_span, settings.pop("output_step", None))

@@ -65,8 +65,7 @@ def check(entry: Law, model: Model, cases: list[State]) -> Check:
 
 def unchecked(entry: Law, model: Model) -> str:
     """Return why a law cannot be checked, or nothing."""
-    made = {*model.manifest["functions"], *model.manifest["work"]}
-    absent = ", ".join(name for name in entry.needs if name not in made)
+    absent = ", ".join(name for name in entry.needs if name not in model.generated)
     kinds = (
         "",
         model.manifest["real"],
