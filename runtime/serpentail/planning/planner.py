@@ -5,7 +5,7 @@ from dataclasses import fields
 
 import numpy as np
 
-from ..checks import choice, number
+from ..checks import number, one_of
 from ..errors import PlanningError
 from ..motion.trajectory import Trajectory
 from .method import Method
@@ -69,7 +69,7 @@ def plan(model, *, start, goal=None, duration, bounds=None, **settings):
 def _checked(model, start, goal, duration, bounds, settings) -> tuple[Problem, Method]:
     known = (*SETTINGS, *(entry.name for entry in fields(Method)))
     for name in settings:
-        choice("setting", name, known)
+        one_of("setting", name, known, PlanningError)
     own = {name: value for name, value in settings.items() if name in SETTINGS}
     goal, bounds = Goal() if goal is None else goal, Bounds() if bounds is None else bounds
     problem = checked_problem(model, start, goal, duration, bounds, **own)
@@ -86,14 +86,14 @@ def _checked(model, start, goal, duration, bounds, settings) -> tuple[Problem, M
             raise PlanningError(f"{name}: value {value!r}: needs a whole number from {least}")
     for name in ("tolerance", "time_limit"):
         if getattr(method, name) is not None:
-            number(name, getattr(method, name))
+            number(name, getattr(method, name), PlanningError, above=0)
     if not isinstance(method.options, dict):
         raise PlanningError(
             f"options: value {method.options!r}: needs a dict, such as {{'ipopt.max_iter': 500}}"
         )
     _check_guess(model, method.guess)
-    number("guess_damping", method.guess_damping, above=False)
-    choice("dynamics", method.dynamics, ("auto", "compiled", "symbolic"))
+    number("guess_damping", method.guess_damping, PlanningError, least=0)
+    one_of("dynamics", method.dynamics, ("auto", "compiled", "symbolic"), PlanningError)
     return problem, method
 
 

@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from ..checks import choice, number, numbers
+from ..checks import number, numbers, one_of
 from ..errors import PlanningError
 from .nlp.coordinates import KINDS
 from .nlp.node import FORMULATIONS
@@ -82,21 +82,24 @@ def checked_problem(model, start, goal, duration, bounds, **settings) -> Problem
     _start_inside(q0[7:], bounds.angle, "angle", "rad")
     _start_inside(v0[6:], bounds.rate, "rate", "rad/s")
     wrong = {"objective": _objective, "path": _path}
-    wrong |= {name: partial(number, name, above=False) for name in ("smoothing", "damping")}
+    wrong |= {
+        name: partial(number, name, error=PlanningError, least=0)
+        for name in ("smoothing", "damping")
+    }
     for name, bound in (("tail", bounds.angle), ("tail_rate", bounds.rate)):
         _goal_inside(name, getattr(goal, name), bound)
     settings = {
         name: wrong.get(name, lambda value: value)(value) for name, value in settings.items()
     }
-    choice("formulation", settings.get("formulation", "airborne"), FORMULATIONS)
-    choice("attitude", settings.get("attitude", "quaternion"), KINDS)
+    one_of("formulation", settings.get("formulation", "airborne"), FORMULATIONS, PlanningError)
+    one_of("attitude", settings.get("attitude", "quaternion"), KINDS, PlanningError)
     return Problem(q0, v0, goal, _duration(duration), bounds, **settings)
 
 
 def _vector(field: str, value, size: int) -> np.ndarray:
     if np.ndim(value) == 0:
         raise PlanningError(f"{field}: value {value!r}: needs {size} numbers")
-    return numbers(field, value, size)
+    return numbers(field, value, size, PlanningError)
 
 
 def _start(model, start) -> tuple[np.ndarray, np.ndarray]:
@@ -153,7 +156,9 @@ def _bounds(bounds, size: int) -> Bounds:
     found = {}
     for field in fields(Bounds):
         value = getattr(bounds, field.name)
-        found[field.name] = None if value is None else numbers(f"bounds.{field.name}", value, size)
+        found[field.name] = (
+            None if value is None else numbers(f"bounds.{field.name}", value, size, PlanningError)
+        )
         if value is not None and not (found[field.name] > 0).all():
             raise PlanningError(f"bounds.{field.name}: value {value!r}: needs magnitudes above 0")
     return Bounds(**found)
@@ -189,7 +194,7 @@ def _duration(duration) -> tuple[float, float]:
         raise PlanningError(
             f"duration: value {duration!r}: needs one number, or (least, most), in s"
         )
-    least, most = (number("duration", value) for value in pair)
+    least, most = (number("duration", value, PlanningError, above=0) for value in pair)
     if most < least:
         raise PlanningError(f"duration: value {duration!r}: needs least <= most, in s")
     return least, most
@@ -197,7 +202,7 @@ def _duration(duration) -> tuple[float, float]:
 
 def _objective(objective):
     if not callable(objective):
-        choice("objective", objective, OBJECTIVES)
+        one_of("objective", objective, OBJECTIVES, PlanningError)
     return objective
 
 

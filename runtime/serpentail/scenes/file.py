@@ -10,6 +10,7 @@ from pathlib import Path
 from ..errors import ModelError
 from ..model.manifest import read_manifest
 from ..model.model import Model, load
+from ..model.parameters import merged
 
 MADE_OF = (
     "kind",
@@ -66,7 +67,7 @@ def model_of(
         was, remedy = made.get(key), f"generate it again, `make model SCENE={path}`"
         raise ModelError(f"{folder} has {key} = {was!r}, {path} has {scene[key]!r}: {remedy}")
     return load(
-        folder, parameters if made["baked"] else _merged(scene.get("parameters", {}), parameters)
+        folder, parameters if made["baked"] else merged(scene.get("parameters", {}), parameters)
     )
 
 
@@ -103,12 +104,3 @@ def _in_order(value, made):
         and sorted(map(str, value)) == sorted(map(str, made))
     )
     return made if same else value
-
-
-def _merged(own: Mapping, changes: Mapping) -> dict:
-    """A scene's parameters and changes of them; one of link_radius and link_inertia takes the
-    other's place.
-    """
-    pair = {"link_radius": "link_inertia", "link_inertia": "link_radius"}
-    taken = {pair[name] for name in changes if name in pair}
-    return {name: value for name, value in own.items() if name not in taken} | dict(changes)

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import fields
 
-from ..checks import choice
+from ..checks import one_of
 from ..errors import PlanningError
 from ..planning.method import Method
 from ..planning.planner import plan
@@ -36,7 +36,7 @@ def plan_arguments(table: Mapping) -> dict:
                 f"plan.{name}: value {table[name]!r}: only programs can give it; call "
                 "serpentail.plan"
             )
-        choice("plan: key", name, [key for key in KEYS if key not in CODE])
+        one_of("plan: key", name, [key for key in KEYS if key not in CODE], PlanningError)
     for name in ("start", "duration"):
         if name not in table:
             raise PlanningError(
@@ -68,7 +68,7 @@ def _part(field: str, value, known) -> dict:
             f"plan.{field}: value {value!r}: needs a table, under a line [plan.{field}]"
         )
     for name in value:
-        choice(f"plan.{field}: key", name, known)
+        one_of(f"plan.{field}: key", name, known, PlanningError)
     return dict(value)
 
 

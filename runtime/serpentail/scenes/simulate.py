@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..checks import finite, known, positive, real_array
+from ..checks import finite_array, number, one_of, refusal
 from ..errors import SimulationError
 from ..model.model import Model
 from ..motion.summary import summary
@@ -141,7 +141,7 @@ def scenario_of(model: Model, table: Mapping, parent: Path) -> Scenario:
         model,
         q0,
         v0,
-        positive("simulate.duration", table["duration"]),
+        number("simulate.duration", table["duration"], SimulationError, above=0),
         settings=settings | still,
         **acting,
     )
@@ -155,7 +155,7 @@ def _checked(where: str, table, names) -> Mapping:
     if not isinstance(table, Mapping):
         raise SimulationError(f"{where}: value {table!r}: needs a table, under a line [{where}]")
     for name in table:
-        known(f"{where}: key", name, names, SimulationError)
+        one_of(f"{where}: key", name, names, SimulationError)
     return table
 
 
@@ -169,7 +169,9 @@ def _legs(table) -> Legs:
         )
     if "times" in table:
         return Legs(table["times"], table["gamma"], table["delta"])
-    start = [finite(f"simulate.legs.{name}", table[name]) for name in ("gamma", "delta")]
+    start = [
+        number(f"simulate.legs.{name}", table[name], SimulationError) for name in ("gamma", "delta")
+    ]
     return Legs.moves(*start, table.get("moves", []))
 
 
@@ -198,18 +200,19 @@ def _controller(model: Model, given, reference) -> Controller:
         remedy = "needs a table, or tables under lines [[simulate.controller]], with begin"
         raise SimulationError(f"simulate.controller: value {given!r}: {remedy}")
     pairs = []
-    for number, table in enumerate(given):
-        where = f"simulate.controller[{number}]"
+    for index, table in enumerate(given):
+        where = f"simulate.controller[{index}]"
         if not isinstance(table, Mapping) or "begin" not in table:
             raise SimulationError(f"{where}: value {table!r}: needs a table with begin (s)")
         law = {name: value for name, value in table.items() if name != "begin"}
-        pairs.append((finite(f"{where}.begin", table["begin"]), _law(model, where, law, reference)))
+        begin = number(f"{where}.begin", table["begin"], SimulationError)
+        pairs.append((begin, _law(model, where, law, reference)))
     return Phases(tuple(pairs))
 
 
 def _law(model: Model, where: str, table: Mapping, reference) -> Controller:
     kind = table.get("kind")
-    known(f"{where}.kind", kind, LAWS, SimulationError)
+    one_of(f"{where}.kind", kind, LAWS, SimulationError)
     own = {
         name: value
         for name, value in _checked(where, table, ("kind", *LAWS[kind])).items()
@@ -251,7 +254,8 @@ def _pose(table) -> np.ndarray:
     from scipy.spatial.transform import Rotation
 
     height, pitch, roll, yaw = (
-        finite(f"simulate.start.{name}", table.get(name, 0.0)) for name in ("height", *ANGLES)
+        number(f"simulate.start.{name}", table.get(name, 0.0), SimulationError)
+        for name in ("height", *ANGLES)
     )
     turn = Rotation.from_euler("ZXY", [yaw, pitch, roll])
     return np.array([0, 0, height, *np.roll(turn.as_quat(), 1)])
@@ -260,14 +264,14 @@ def _pose(table) -> np.ndarray:
 def _tail(model: Model, table, reference) -> np.ndarray:
     """Tail coordinates: of the bends given, else of the reference at t = 0, else straight."""
     if "bends" in table:
-        bends = real_array("simulate.start.bends", table["bends"], error=SimulationError)
+        bends = finite_array("simulate.start.bends", table["bends"], SimulationError)
         return shared_among_links(model, bends[None])[0]
     curve = getattr(reference, "curve", None)
     return np.zeros(model.nv - 6) if curve is None else curve.at(0.0)[0]
 
 
 def _three(name: str, value) -> np.ndarray:
-    array = real_array(name, value, error=SimulationError)
-    if array.shape != (3,) or not np.isfinite(array).all():
-        raise SimulationError(f"{name}: value {value!r}: needs three finite numbers")
+    array = finite_array(name, value, SimulationError)
+    if array.shape != (3,):
+        raise refusal(name, value, "three numbers", SimulationError)
     return array
