@@ -385,7 +385,7 @@ def test_planning_again_from_neighbouring_states_derives_nothing(monkeypatch):
 
 
 def test_other_problems_and_models_share_no_program():
-    """A kept program answers for its own problem only: damping, goal and model all matter."""
+    """A memoised program answers for its own problem only: damping, goal and model all matter."""
     model, coarse = rat(), {"intervals": 4}
     tilted = st.Goal(attitude=from_angles(np.array([0.1, 0, 0])))
     found = [

@@ -11,7 +11,7 @@ import numpy as np
 from ...errors import PlanningError
 from .blas_threads import one_thread
 from .bounds import Limits
-from .cache import kept
+from .cache import memoised
 from .interrupt import asked
 from .transcription import Transcription
 
@@ -75,7 +75,7 @@ def solver(
         given |= IPOPT | NEARNESS[near]
     given |= options or {}
     try:
-        return kept(
+        return memoised(
             (program.places, name, repr(sorted(given.items()))),
             partial(_engine, program, name, given),
         )

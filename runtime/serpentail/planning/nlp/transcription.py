@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 
 from ..problem import Problem
-from .cache import kept
+from .cache import memoised
 from .coordinates import Attitude, attitude
 from .derivatives import Assembly
 from .mesh import Mesh
@@ -103,9 +103,9 @@ def program_of(
     of += [model, equations.source]
     coordinates = attitude(problem.attitude)
     form = layout(problem.formulation, coordinates, model.nv - 6, torque_unit(problem))
-    one = kept(("node", *of), partial(node, model, problem, coordinates, form, equations))
+    one = memoised(("node", *of), partial(node, model, problem, coordinates, form, equations))
     make = partial(transcribe, problem, mesh, rule, equations, form, one)
-    return replace(kept((*of, tuple(mesh.ends), rule), make), problem=problem)
+    return replace(memoised((*of, tuple(mesh.ends), rule), make), problem=problem)
 
 
 def transcribe(
