@@ -409,7 +409,7 @@ ENDLESS = {"ipopt.tol": 1e-300, "ipopt.acceptable_iter": 0, "ipopt.max_iter": 10
 def test_interrupt_in_the_first_solve_returns_its_iterate():
     """Ctrl-C in a solve that would take a million iterations."""
     model, common = rat(), AGAIN | {"start": start(rat()), "intervals": 40, "options": ENDLESS}
-    st.plan(model, **common, time_limit=0.01)  # derives before signals are heeded
+    st.plan(model, **common, time_limit=0.01)  # derives before it can be stopped
     before = signal.getsignal(signal.SIGINT)
     timer = threading.Timer(0.3, signal.raise_signal, (signal.SIGINT,))
     timer.start()
@@ -456,7 +456,7 @@ def test_time_limit_ends_a_solve_inside_and_returns_its_iterate():
 def test_time_limit_ends_refinement_with_the_best_round(monkeypatch):
     """Between rounds: what was solved before is kept, and is good for all but the tolerance."""
     model, settings = rat(), AGAIN | {"intervals": 6, "tolerance": 1e-12}
-    monkeypatch.setattr(rounds, "asked", lambda: "time limit")
+    monkeypatch.setattr(rounds, "stop_reason", lambda: "time limit")
     cut = st.plan(model, start=start(model), **settings)
     assert not cut.success and cut.report["converged"]
     assert (cut.report["stopped"], cut.report["rounds"]) == ("time limit", 1)
@@ -466,20 +466,20 @@ def test_time_limits_are_of_one_thread():
     found = {}
 
     def other():
-        with interrupt.heeded(3600.0):
-            found["other"] = interrupt.asked()
+        with interrupt.stoppable(3600.0):
+            found["other"] = interrupt.stop_reason()
 
-    with interrupt.heeded(1e-9):
+    with interrupt.stoppable(1e-9):
         thread = threading.Thread(target=other)
         thread.start()
         thread.join()
-        assert (interrupt.asked(), found["other"]) == ("time limit", None)
+        assert (interrupt.stop_reason(), found["other"]) == ("time limit", None)
 
 
 def test_second_interrupt_is_the_usual_one():
-    with pytest.raises(KeyboardInterrupt), interrupt.heeded():
+    with pytest.raises(KeyboardInterrupt), interrupt.stoppable():
         signal.raise_signal(signal.SIGINT)
-        assert interrupt.asked()
+        assert interrupt.stop_reason()
         signal.raise_signal(signal.SIGINT)
-    with interrupt.heeded():
-        assert not interrupt.asked()
+    with interrupt.stoppable():
+        assert not interrupt.stop_reason()

@@ -9,7 +9,7 @@ from ..checks import choice, number
 from ..errors import PlanningError
 from ..motion.trajectory import Trajectory
 from .method import Method
-from .nlp.interrupt import heeded
+from .nlp.interrupt import stoppable
 from .nlp.node import dynamics
 from .nlp.rules import rule
 from .problem import SETTINGS, Bounds, Goal, Problem, checked_problem
@@ -61,7 +61,7 @@ def plan(model, *, start, goal=None, duration, bounds=None, **settings):
     scheme = rule(method.rule, method.degree)
     equations = dynamics(model, method.dynamics)
     run = Run(model, problem, method, equations, scheme)
-    with heeded(method.time_limit):
+    with stoppable(method.time_limit):
         rounds = run.refined(run.first())
     return run.plan(rounds, time.perf_counter() - begun)
 

@@ -11,7 +11,7 @@ from .method import Method
 from .nlp.bounds import limits
 from .nlp.coordinates import attitude
 from .nlp.guess import Motion, of_trajectory, passive, pushes, unknowns
-from .nlp.interrupt import asked
+from .nlp.interrupt import stop_reason
 from .nlp.mesh import Mesh, refined, uniform
 from .nlp.multipliers import carried
 from .nlp.node import Dynamics
@@ -125,7 +125,7 @@ class Run:
 
     def _stopped(self) -> bool:
         """Tell, and note why, whether the search should end that is not done."""
-        self.stopped = asked()
+        self.stopped = stop_reason()
         return self.stopped is not None
 
     def _transcribed(self, mesh: Mesh) -> Transcription:

@@ -12,7 +12,7 @@ from ...errors import PlanningError
 from .blas_threads import one_thread
 from .bounds import Limits
 from .cache import memoised
-from .interrupt import asked
+from .interrupt import stop_reason
 from .transcription import Transcription
 
 IPOPT = {
@@ -117,7 +117,7 @@ def _watch(unknowns: int, rows: int):
             return ca.Sparsity.dense(sizes[ca.nlpsol_out(k)], 1)
 
         def eval(self, _found):
-            return [int(asked() is not None)]
+            return [int(stop_reason() is not None)]
 
     watch = Watch()
     watch.construct("watch", {})
