@@ -128,7 +128,7 @@ def finite_differences(rat: st.Model, cap: float) -> tuple[float, str]:
     ended.
     """
     program, limits, w, h = captured(rat)
-    nlp, fixed = program.program["nlp"], limits.least == limits.most
+    nlp, fixed = program.program["nlp"], limits.lbg == limits.ubg
     begun = time.process_time()
 
     def both(x):
@@ -140,9 +140,9 @@ def finite_differences(rat: st.Model, cap: float) -> tuple[float, str]:
 
     constraint = {
         "type": "eq",
-        "fun": lambda x: (np.array(both(x)[1]).ravel() - limits.least)[fixed],
+        "fun": lambda x: (np.array(both(x)[1]).ravel() - limits.lbg)[fixed],
     }
-    box, most = Bounds(limits.lower, limits.upper), {"maxiter": 10000}
+    box, most = Bounds(limits.lbx, limits.ubx), {"maxiter": 10000}
     try:
         found = minimize(
             lambda x: float(both(x)[0]),
@@ -165,7 +165,7 @@ def captured(rat: st.Model) -> tuple:
     seen, solve = [], rounds.solve
 
     def note(engine, limits, w, h, multipliers=None):
-        seen.append((limits, np.clip(w, limits.lower, limits.upper), h))
+        seen.append((limits, np.clip(w, limits.lbx, limits.ubx), h))
         return solve(engine, limits, w, h, multipliers)
 
     rounds.solve = note

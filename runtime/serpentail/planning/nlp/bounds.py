@@ -14,10 +14,10 @@ from .transcription import Transcription, goal_matrix
 class Limits:
     """Bounds of w and of g, both in the program's units."""
 
-    lower: np.ndarray
-    upper: np.ndarray
-    least: np.ndarray
-    most: np.ndarray
+    lbx: np.ndarray
+    ubx: np.ndarray
+    lbg: np.ndarray
+    ubg: np.ndarray
 
 
 def limits(program: Transcription, start: dict[str, np.ndarray], angles: np.ndarray) -> Limits:

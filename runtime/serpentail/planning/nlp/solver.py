@@ -128,9 +128,9 @@ def solve(engine, limits: Limits, w: np.ndarray, h: np.ndarray, multipliers=None
     """Run a solver from the unknowns w (and multipliers of a like problem); h: angular momentum."""
     more = {} if multipliers is None else {"lam_x0": multipliers[0], "lam_g0": multipliers[1]}
     begun = time.process_time()
-    bounds = {"lbx": limits.lower, "ubx": limits.upper, "lbg": limits.least, "ubg": limits.most}
+    bounds = {"lbx": limits.lbx, "ubx": limits.ubx, "lbg": limits.lbg, "ubg": limits.ubg}
     with one_thread():
-        found = engine(x0=np.clip(w, limits.lower, limits.upper), p=h, **bounds, **more)
+        found = engine(x0=np.clip(w, limits.lbx, limits.ubx), p=h, **bounds, **more)
     spent, stats = time.process_time() - begun, engine.stats()
     x, lam_x, lam_g = (np.array(found[key]).ravel() for key in ("x", "lam_x", "lam_g"))
     finite = bool(np.isfinite(x).all())
