@@ -11,7 +11,7 @@ from ..motion.trajectory import Trajectory
 from .method import Method
 from .nlp.interrupt import stoppable
 from .nlp.node import dynamics
-from .nlp.rules import rule
+from .nlp.rules import collocation_rule
 from .problem import SETTINGS, Bounds, Goal, Problem, checked_problem
 from .rounds import Run
 
@@ -58,7 +58,7 @@ def plan(model, *, start, goal=None, duration, bounds=None, **settings):
     if missing:
         raise model.without(*missing)
     begun = time.perf_counter()
-    scheme = rule(method.rule, method.degree)
+    scheme = collocation_rule(method.rule, method.degree)
     equations = dynamics(model, method.dynamics)
     run = Run(model, problem, method, equations, scheme)
     with stoppable(method.time_limit):

@@ -15,7 +15,7 @@ from .nlp.interrupt import stop_reason
 from .nlp.mesh import Mesh, refined, uniform
 from .nlp.multipliers import carried
 from .nlp.node import Dynamics
-from .nlp.rules import Rule
+from .nlp.rules import CollocationRule
 from .nlp.solver import Solution, solve, solver
 from .nlp.transcription import Transcription, program_of, torque_unit
 from .problem import Problem
@@ -54,7 +54,7 @@ class Round:
 class Run:
     """One call of ``plan``: what stays the same in all its rounds, and what they have cost."""
 
-    def __init__(self, model, problem: Problem, method: Method, equations: Dynamics, scheme: Rule):
+    def __init__(self, model, problem: Problem, method: Method, equations: Dynamics, scheme: CollocationRule):
         self.model, self.problem, self.method, self.equations, self.rule = (
             model,
             problem,

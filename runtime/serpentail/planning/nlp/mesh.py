@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .rules import Rule
+from .rules import CollocationRule
 
 MOST_PIECES = 4  # an interval is split into at a time
 
@@ -27,7 +27,7 @@ class Mesh:
         """Widths (N,) of the intervals."""
         return np.diff(self.ends)
 
-    def points(self, rule: Rule) -> np.ndarray:
+    def points(self, rule: CollocationRule) -> np.ndarray:
         """Points (N S + 1,) at which states are unknowns."""
         inside = self.ends[:-1, None] + self.widths[:, None] * rule.supports[1:-1]
         rows = np.column_stack([self.ends[:-1], inside])

@@ -18,7 +18,7 @@ MOST_DEGREE = 5
 
 
 @dataclass(frozen=True, eq=False)
-class Rule:
+class CollocationRule:
     """One interval [0, 1] of a collocation Runge-Kutta method (Radau IIA, Lobatto IIIA).
 
     nodes (K,): where the equations hold; supports (S + 1,): where the states are unknowns, 0 first.
@@ -57,7 +57,7 @@ class Rule:
         return _at([polynomial.integ() for polynomial in _lagrange(tuple(self.nodes))], s)
 
 
-def rule(name: str, degree: int | None = None) -> Rule:
+def collocation_rule(name: str, degree: int | None = None) -> CollocationRule:
     """Return a rule; PlanningError where the name is unknown or the degree none that it has.
 
     "trapezoidal" (the paper's, Eqs. 41, 42), "hermite-simpson" (Lobatto of degree 2), "lobatto"
@@ -79,11 +79,11 @@ def rule(name: str, degree: int | None = None) -> Rule:
 
 
 @cache
-def _rule(name: str, degree: int) -> Rule:
+def _rule(name: str, degree: int) -> CollocationRule:
     return _radau(name, degree) if name == "radau" else _lobatto(name, degree)
 
 
-def _radau(name: str, degree: int) -> Rule:
+def _radau(name: str, degree: int) -> CollocationRule:
     """Radau IIA in derivative form: A^-1 (X - X_0) = h F, so that each rate is in one equation
     only.
     """
@@ -91,16 +91,16 @@ def _radau(name: str, degree: int) -> Rule:
     A = _integrals(nodes, nodes)
     inverse = np.linalg.inv(A)
     states = np.column_stack([-inverse.sum(axis=1), inverse])
-    return Rule(name, degree, nodes, np.concatenate([[0.0], nodes]), states, np.eye(degree), A[-1])
+    return CollocationRule(name, degree, nodes, np.concatenate([[0.0], nodes]), states, np.eye(degree), A[-1])
 
 
-def _lobatto(name: str, degree: int) -> Rule:
+def _lobatto(name: str, degree: int) -> CollocationRule:
     """Lobatto IIIA in integral form: X - X_0 = h A F."""
     inner = _roots(Legendre.basis(degree).deriv()) if degree > 1 else np.zeros(0)
     nodes = np.concatenate([[0.0], inner, [1.0]])
     A = _integrals(nodes, nodes)
     states = np.column_stack([-np.ones(degree), np.eye(degree)])
-    return Rule(name, degree, nodes, nodes, states, A[1:], A[-1])
+    return CollocationRule(name, degree, nodes, nodes, states, A[1:], A[-1])
 
 
 def _roots(series: Legendre) -> np.ndarray:

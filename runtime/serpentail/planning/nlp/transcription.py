@@ -17,7 +17,7 @@ from .coordinates import Attitude, attitude
 from .derivatives import Assembly
 from .mesh import Mesh
 from .node import Dynamics, Layout, Node, layout, node
-from .rules import Rule
+from .rules import CollocationRule
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +47,7 @@ class Places:
         return np.column_stack([duration, self.states[self.first :], self.others]).T
 
 
-def places(form: Layout, mesh: Mesh, rule: Rule) -> Places:
+def places(form: Layout, mesh: Mesh, rule: CollocationRule) -> Places:
     """Return the places, unknowns that meet in an equation being neighbours."""
     nx, na, nu = form.sizes()
     points = mesh.intervals * rule.steps + 1
@@ -69,7 +69,7 @@ class Transcription:
 
     problem: Problem
     mesh: Mesh
-    rule: Rule
+    rule: CollocationRule
     attitude: Attitude
     form: Layout
     equations: Dynamics
@@ -85,7 +85,7 @@ class Transcription:
 
 
 def program_of(
-    model, problem: Problem, mesh: Mesh, rule: Rule, equations: Dynamics
+    model, problem: Problem, mesh: Mesh, rule: CollocationRule, equations: Dynamics
 ) -> Transcription:
     """Return the program of a problem on a mesh; one that differs in start, duration or limits
     alone shares it.
@@ -109,7 +109,7 @@ def program_of(
 
 
 def transcribe(
-    problem: Problem, mesh: Mesh, rule: Rule, equations: Dynamics, form: Layout, one: Node
+    problem: Problem, mesh: Mesh, rule: CollocationRule, equations: Dynamics, form: Layout, one: Node
 ) -> Transcription:
     """Return the program of a problem on a mesh, of the function of one node."""
     coordinates = attitude(problem.attitude)
@@ -131,7 +131,7 @@ def transcribe(
 
 
 def collocate(
-    one: Node, where: Places, scheme: tuple[Mesh, Rule], direct, time: bool = False
+    one: Node, where: Places, scheme: tuple[Mesh, CollocationRule], direct, time: bool = False
 ) -> Assembly:
     """Return the defects of all intervals, residuals and path constraints of all nodes, then rows
     `direct` of w.
@@ -158,7 +158,7 @@ def torque_unit(problem: Problem) -> np.ndarray:
     return np.full(size, 1e-3) if problem.bounds.torque is None else 0.05 * problem.bounds.torque
 
 
-def _defect_rows(where: Places, mesh: Mesh, rule: Rule):
+def _defect_rows(where: Places, mesh: Mesh, rule: CollocationRule):
     """The part of the defects that is linear in the states."""
     from scipy.sparse import coo_matrix
 
@@ -169,7 +169,7 @@ def _defect_rows(where: Places, mesh: Mesh, rule: Rule):
     return coo_matrix((values.ravel(), (rows.ravel(), columns.ravel())), (N * S * nx, where.size))
 
 
-def _node_rows(one: Node, mesh: Mesh, rule: Rule, nodes: int):
+def _node_rows(one: Node, mesh: Mesh, rule: CollocationRule, nodes: int):
     """How the defects, residuals and path constraints are made of the nodes' values: rows (..,
     nodes * size).
     """
@@ -190,7 +190,7 @@ def _node_rows(one: Node, mesh: Mesh, rule: Rule, nodes: int):
     return vstack([defects, at_nodes]).tocsc()
 
 
-def _cost(one: Node, mesh: Mesh, rule: Rule, nodes: int) -> np.ndarray:
+def _cost(one: Node, mesh: Mesh, rule: CollocationRule, nodes: int) -> np.ndarray:
     """Quadrature weights of the objective, (nodes * size,)."""
     cost, K = np.zeros((nodes, one.size)), len(rule.nodes)
     for k, width in enumerate(mesh.widths):
@@ -199,7 +199,7 @@ def _cost(one: Node, mesh: Mesh, rule: Rule, nodes: int) -> np.ndarray:
 
 
 def _direct_rows(
-    problem: Problem, form: Layout, where: Places, mesh: Mesh, rule: Rule, coordinates: Attitude
+    problem: Problem, form: Layout, where: Places, mesh: Mesh, rule: CollocationRule, coordinates: Attitude
 ):
     """Rows of w alone: the attitude at the end, then the torques' steps within +- rate * time."""
     from scipy.sparse import coo_matrix, vstack

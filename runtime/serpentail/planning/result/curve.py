@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..nlp.rules import Rule
+from ..nlp.rules import CollocationRule
 from ..nlp.transcription import Transcription
 
 
@@ -18,7 +18,7 @@ class Curve:
     """
 
     ends: np.ndarray
-    rule: Rule
+    rule: CollocationRule
     starts: dict[str, np.ndarray]
     increments: dict[str, np.ndarray]
     nodes: dict[str, np.ndarray]
