@@ -12,7 +12,7 @@ from .method import Method
 from .nlp.interrupt import stoppable
 from .nlp.node import dynamics
 from .nlp.rules import collocation_rule
-from .problem import SETTINGS, Bounds, Goal, Problem, checked_problem
+from .problem import SETTINGS, Bounds, Goal, PlanningProblem, checked_problem
 from .rounds import Run
 
 
@@ -66,7 +66,7 @@ def plan(model, *, start, goal=None, duration, bounds=None, **settings):
     return run.plan(rounds, time.perf_counter() - begun)
 
 
-def _checked(model, start, goal, duration, bounds, settings) -> tuple[Problem, Method]:
+def _checked(model, start, goal, duration, bounds, settings) -> tuple[PlanningProblem, Method]:
     known = (*SETTINGS, *(entry.name for entry in fields(Method)))
     for name in settings:
         choice("setting", name, known)

@@ -1,4 +1,4 @@
-"""Planning problems: what a user asks for goes in, checked field by field; a frozen Problem comes
+"""Planning problems: what a user asks for goes in, checked field by field; a frozen PlanningProblem comes
 out.
 """
 
@@ -52,7 +52,7 @@ class Bounds:
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
+class PlanningProblem:
     """A checked problem: arrays have their shapes, values are finite, the start obeys its
     bounds.
     """
@@ -73,7 +73,7 @@ class Problem:
 SETTINGS = ("objective", "smoothing", "damping", "path", "formulation", "attitude")
 
 
-def checked_problem(model, start, goal, duration, bounds, **settings) -> Problem:
+def checked_problem(model, start, goal, duration, bounds, **settings) -> PlanningProblem:
     """Return the problem; PlanningError names the first field that is wrong, its value and the
     remedy.
     """
@@ -90,7 +90,7 @@ def checked_problem(model, start, goal, duration, bounds, **settings) -> Problem
     }
     choice("formulation", settings.get("formulation", "airborne"), FORMULATIONS)
     choice("attitude", settings.get("attitude", "quaternion"), KINDS)
-    return Problem(q0, v0, goal, _duration(duration), bounds, **settings)
+    return PlanningProblem(q0, v0, goal, _duration(duration), bounds, **settings)
 
 
 def _vector(field: str, value, size: int) -> np.ndarray:

@@ -18,7 +18,7 @@ from .nlp.node import Dynamics
 from .nlp.rules import CollocationRule
 from .nlp.solver import Solution, solve, solver
 from .nlp.transcription import Transcription, program_of, torque_unit
-from .problem import Problem
+from .problem import PlanningProblem
 from .result.curve import Curve, curve
 from .result.full_state import full_state
 from .result.plan import Plan, sampled
@@ -54,7 +54,7 @@ class Round:
 class Run:
     """One call of ``plan``: what stays the same in all its rounds, and what they have cost."""
 
-    def __init__(self, model, problem: Problem, method: Method, equations: Dynamics, scheme: CollocationRule):
+    def __init__(self, model, problem: PlanningProblem, method: Method, equations: Dynamics, scheme: CollocationRule):
         self.model, self.problem, self.method, self.equations, self.rule = (
             model,
             problem,

@@ -11,7 +11,7 @@ from functools import partial
 
 import numpy as np
 
-from ..problem import Problem
+from ..problem import PlanningProblem
 from .cache import memoised
 from .coordinates import Attitude, attitude
 from .derivatives import Assembly
@@ -67,7 +67,7 @@ def places(form: Layout, mesh: Mesh, rule: CollocationRule) -> Places:
 class Transcription:
     """A nonlinear program, and what its unknowns mean."""
 
-    problem: Problem
+    problem: PlanningProblem
     mesh: Mesh
     rule: CollocationRule
     attitude: Attitude
@@ -85,7 +85,7 @@ class Transcription:
 
 
 def program_of(
-    model, problem: Problem, mesh: Mesh, rule: CollocationRule, equations: Dynamics
+    model, problem: PlanningProblem, mesh: Mesh, rule: CollocationRule, equations: Dynamics
 ) -> Transcription:
     """Return the program of a problem on a mesh; one that differs in start, duration or limits
     alone shares it.
@@ -109,7 +109,7 @@ def program_of(
 
 
 def transcribe(
-    problem: Problem, mesh: Mesh, rule: CollocationRule, equations: Dynamics, form: Layout, one: Node
+    problem: PlanningProblem, mesh: Mesh, rule: CollocationRule, equations: Dynamics, form: Layout, one: Node
 ) -> Transcription:
     """Return the program of a problem on a mesh, of the function of one node."""
     coordinates = attitude(problem.attitude)
@@ -152,7 +152,7 @@ def collocate(
     )
 
 
-def torque_unit(problem: Problem) -> np.ndarray:
+def torque_unit(problem: PlanningProblem) -> np.ndarray:
     """Unit (2m,) of torques: a fraction of their bound, as plans of least effort are far inside."""
     size = len(problem.q0) - 7
     return np.full(size, 1e-3) if problem.bounds.torque is None else 0.05 * problem.bounds.torque
@@ -199,7 +199,7 @@ def _cost(one: Node, mesh: Mesh, rule: CollocationRule, nodes: int) -> np.ndarra
 
 
 def _direct_rows(
-    problem: Problem, form: Layout, where: Places, mesh: Mesh, rule: CollocationRule, coordinates: Attitude
+    problem: PlanningProblem, form: Layout, where: Places, mesh: Mesh, rule: CollocationRule, coordinates: Attitude
 ):
     """Rows of w alone: the attitude at the end, then the torques' steps within +- rate * time."""
     from scipy.sparse import coo_matrix, vstack
@@ -214,7 +214,7 @@ def _direct_rows(
     return vstack(rows).tocoo()
 
 
-def _torque_steps(problem: Problem, form: Layout, where: Places, times: np.ndarray) -> list:
+def _torque_steps(problem: PlanningProblem, form: Layout, where: Places, times: np.ndarray) -> list:
     """Rows u[n + 1] - u[n] - r T dt <= 0 and -(u[n + 1] - u[n]) - r T dt <= 0."""
     from scipy.sparse import coo_matrix
 

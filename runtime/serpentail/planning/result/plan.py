@@ -7,7 +7,7 @@ import numpy as np
 from ...motion.trajectory import Trajectory
 from ..nlp.coordinates import attitude
 from ..nlp.solver import Solution
-from ..problem import Problem
+from ..problem import PlanningProblem
 from .curve import Curve
 from .full_state import full_state
 
@@ -29,7 +29,7 @@ class Plan:
     success: bool
     trajectory: Trajectory
     report: dict
-    problem: Problem
+    problem: PlanningProblem
     curve: Curve
     mesh: object
     rule: object
@@ -59,7 +59,7 @@ def sample_times(ends: np.ndarray) -> np.ndarray:
     return np.append(np.concatenate(rows), ends[-1])
 
 
-def sampled(model, problem: Problem, curve: Curve) -> Trajectory:
+def sampled(model, problem: PlanningProblem, curve: Curve) -> Trajectory:
     """Return the planned motion as a trajectory."""
     times = sample_times(curve.ends)
     blocks = curve.at(times)

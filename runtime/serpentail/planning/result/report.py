@@ -7,7 +7,7 @@ from ...errors import SimulationError
 from ...motion.trajectory import Trajectory
 from ...simulation.pfl import Pfl
 from ...simulation.simulate import simulate
-from ..problem import Problem
+from ..problem import PlanningProblem
 from .curve import Curve
 
 TRACKED = 580  # samples of a tracked motion
@@ -88,7 +88,7 @@ def work(trajectory: Trajectory) -> tuple[float, float]:
 
 
 def attitude_errors(
-    problem: Problem, planned: np.ndarray, found: np.ndarray
+    problem: PlanningProblem, planned: np.ndarray, found: np.ndarray
 ) -> tuple[float, float]:
     """Angles (deg) between an attitude reached (4,) and that planned (4,), and between it and the
     goal.
@@ -99,7 +99,7 @@ def attitude_errors(
     return apart, float(tilt_deg(found) if isinstance(goal, str) else angle_deg(goal, found))
 
 
-def tracked(model, problem: Problem, planned: Trajectory) -> Trajectory:
+def tracked(model, problem: PlanningProblem, planned: Trajectory) -> Trajectory:
     """Return the simulated motion whose tail tracks the plan by PFL."""
     law = Pfl(model, planned)
     settings = {"method": "dop853", "rtol": 1e-8, "atol": 1e-10, "output_step": planned.t[-1] / 580}
