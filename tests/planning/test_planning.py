@@ -421,13 +421,13 @@ def test_interrupt_in_the_first_solve_returns_its_iterate():
 
 
 def test_interrupt_in_a_later_round_returns_the_round_before(monkeypatch):
-    split = rounds.Run._split
+    split = rounds.Search._split
 
     def interrupted(run, last):
         signal.raise_signal(signal.SIGINT)
         return split(run, last)
 
-    monkeypatch.setattr(rounds.Run, "_split", interrupted)
+    monkeypatch.setattr(rounds.Search, "_split", interrupted)
     plan = st.plan(
         rat(), start=start(rat()), intervals=6, **AGAIN | {"tolerance": 1e-9, "rounds": 30}
     )

@@ -70,7 +70,7 @@ class PlanningProblem:
     attitude: str = "quaternion"
 
 
-SETTINGS = ("objective", "smoothing", "damping", "path", "formulation", "attitude")
+PROBLEM_SETTINGS = ("objective", "smoothing", "damping", "path", "formulation", "attitude")
 
 
 def checked_problem(model, start, goal, duration, bounds, **settings) -> PlanningProblem:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .method import Method
+from .settings import PlanSettings
 from .nlp.bounds import limits
 from .nlp.coordinates import attitude
 from .nlp.guess import Motion, of_trajectory, passive, pushes, unknowns
@@ -51,11 +51,11 @@ class Round:
         return error if np.isfinite(error) else np.inf
 
 
-class Run:
+class Search:
     """One call of ``plan``: what stays the same in all its rounds, and what they have cost."""
 
-    def __init__(self, model, problem: PlanningProblem, method: Method, equations: Dynamics, scheme: CollocationRule):
-        self.model, self.problem, self.method, self.equations, self.rule = (
+    def __init__(self, model, problem: PlanningProblem, settings: PlanSettings, equations: Dynamics, scheme: CollocationRule):
+        self.model, self.problem, self.settings, self.equations, self.rule = (
             model,
             problem,
             method,
@@ -73,13 +73,13 @@ class Run:
         """Return the best solution on the first mesh, of as many guesses as asked for, and more if
         all fail.
         """
-        method, before = self.method, self.method.guess
+        settings, before = self.settings, self.settings.guess
         again = isinstance(before, Plan) and before.rule is self.rule
-        program = self._transcribed(before.mesh if again else uniform(method.intervals))
+        program = self._transcribed(before.mesh if again else uniform(settings.intervals))
         found: list[Solution] = []
-        for k in range(method.multi_start + method.retries):
+        for k in range(settings.multi_start + settings.retries):
             if found and (
-                (k >= method.multi_start and any(s.success for s in found)) or self._stopped()
+                (k >= settings.multi_start and any(s.success for s in found)) or self._stopped()
             ):
                 break
             found.append(self._given(program) if k == 0 else self._solved(program, self._pushed(k)))
@@ -87,10 +87,10 @@ class Run:
 
     def refined(self, first: Round) -> list[Round]:
         """Return the rounds: intervals that are wrong are split until the end is right."""
-        rounds, method = [first], self.method
-        for _ in range(method.rounds if method.tolerance is not None else 0):
+        rounds, settings = [first], self.settings
+        for _ in range(settings.rounds if settings.tolerance is not None else 0):
             last = rounds[-1]
-            if not last.solution.success or last.error <= method.tolerance or self._stopped():
+            if not last.solution.success or last.error <= settings.tolerance or self._stopped():
                 break
             mesh = self._split(last)
             if mesh.intervals == last.program.mesh.intervals:
@@ -104,7 +104,7 @@ class Run:
     def plan(self, rounds: list[Round], wall_s: float) -> Plan:
         """Return the plan of the best round."""
         best = min(rounds, key=lambda one: (not one.solution.success, one.error))
-        tolerance = self.method.tolerance
+        tolerance = self.settings.tolerance
         good = bool(best.solution.success and (tolerance is None or best.error <= tolerance))
         trajectory = sampled(self.model, self.problem, best.curve)
         own = {"rounds": len(rounds), "iterations": self.iterations, "guesses": self.attempts}
@@ -136,7 +136,7 @@ class Run:
 
     def _given(self, program: Transcription) -> Solution:
         """Solve from the user's guess, or from passive flight."""
-        guess = self.method.guess
+        guess = self.settings.guess
         if guess is None:
             return self._solved(program, self._pushed(0))
         if not isinstance(guess, Plan):
@@ -167,12 +167,12 @@ class Run:
         """Passive flight; the tail is pushed a little out of a plane of symmetry (k = 0), or about
         at random.
         """
-        method, (least, most) = self.method, self.problem.duration
+        settings, (least, most) = self.settings, self.problem.duration
         duration = least + (most - least) * (1.0, 0.5, 0.75, 0.25)[k % 4]
         size = float(torque_unit(self.problem).mean()) * (SLIGHT if k == 0 else 1.0)
-        push = pushes(np.random.default_rng([method.seed, k]), size, self.model.nv - 6)
+        push = pushes(np.random.default_rng([settings.seed, k]), size, self.model.nv - 6)
         return passive(
-            self.model, self.problem, self.attitude, method.guess_damping, duration, push
+            self.model, self.problem, self.attitude, settings.guess_damping, duration, push
         )
 
     def _solved(
@@ -182,7 +182,7 @@ class Run:
         program.
         """
         begun = time.perf_counter()
-        engine = solver(program, self.method.solver, self.method.options, near)
+        engine = solver(program, self.settings.solver, self.settings.options, near)
         self.spent["derive_s"] += time.perf_counter() - begun
         w = unknowns(motion, program, float(np.clip(motion.duration, *self.problem.duration)))
         angles = motion.at(np.array([motion.duration]))["attitude"][0]
@@ -219,7 +219,7 @@ class Run:
         begun = time.perf_counter()
         errors = local_errors(self.model, last.curve, self.problem.damping, *last.planned)
         self.spent["truth_s"] += time.perf_counter() - begun
-        factor = min(0.3 * self.method.tolerance / last.error, 0.3)
+        factor = min(0.3 * self.settings.tolerance / last.error, 0.3)
         return refined(
-            last.program.mesh, errors, factor, self.rule.order, self.method.most_intervals
+            last.program.mesh, errors, factor, self.rule.order, self.settings.most_intervals
         )

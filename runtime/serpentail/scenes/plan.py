@@ -5,15 +5,15 @@ from dataclasses import fields
 
 from ..checks import choice
 from ..errors import PlanningError
-from ..planning.method import Method
+from ..planning.settings import PlanSettings
 from ..planning.planner import plan
-from ..planning.problem import SETTINGS, Bounds, Goal
+from ..planning.problem import PROBLEM_SETTINGS, Bounds, Goal
 from ..planning.result.plan import Plan
 from .file import model_of, read_scene, subtable
 
 FREE = "free"  # TOML has no None
 CODE = ("guess", "path")  # what no file can hold
-KEYS = ("start", "goal", "duration", "bounds", *SETTINGS, *(entry.name for entry in fields(Method)))
+KEYS = ("start", "goal", "duration", "bounds", *PROBLEM_SETTINGS, *(entry.name for entry in fields(PlanSettings)))
 
 
 def planned(path: str, folder: str | None = None) -> Plan:

@@ -51,7 +51,7 @@ def truth(run, best, planned: Trajectory) -> dict:
     found = {"open_loop_attitude_error_deg": apart, "open_loop_goal_error_deg": from_goal}
     found |= {"open_loop_rate_error": float(rates)}
     found |= {"tracked_attitude_error_deg": None, "tracked_tail_error_rad": None, "dyn_err": None}
-    if not run.method.track:
+    if not run.settings.track:
         return found
     try:
         flight = tracked(run.model, run.problem, planned)
