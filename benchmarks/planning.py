@@ -15,7 +15,7 @@ import numpy as np
 import serpentail as st
 from examples import righting
 from serpentail.planning import rounds
-from serpentail.planning.nlp.node import dynamics
+from serpentail.planning.nlp.node import equations_of_motion
 from serpentail.planning.problem import SMOOTHING
 from serpentail_codegen.scene.parse import scene_for
 
@@ -127,8 +127,8 @@ def finite_differences(rat: st.Model, cap: float) -> tuple[float, str]:
     """CPU seconds of SLSQP without derivatives on the paper's program, at most `cap`, and how it
     ended.
     """
-    program, limits, w, h = captured(rat)
-    nlp, fixed = program.program["nlp"], limits.lbg == limits.ubg
+    transcription, limits, w, h = captured(rat)
+    nlp, fixed = transcription.functions["nlp"], limits.lbg == limits.ubg
     begun = time.process_time()
 
     def both(x):
@@ -173,8 +173,10 @@ def captured(rat: st.Model) -> tuple:
         found = plan(rat, **PAPER)
     finally:
         rounds.solve = solve
-    program = rounds.program_of(rat, found.problem, found.mesh, found.rule, dynamics(rat))
-    return program, *seen[0]
+    transcription = rounds.transcription_of(
+        rat, found.problem, found.mesh, found.rule, equations_of_motion(rat)
+    )
+    return transcription, *seen[0]
 
 
 def replanned(rat: st.Model) -> list[dict]:

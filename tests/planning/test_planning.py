@@ -21,8 +21,8 @@ from serpentail.planning.nlp import interrupt, solver, transcription
 from serpentail.planning.nlp.blas_threads import _blas, one_thread
 from serpentail.planning.nlp.coordinates import Attitude
 from serpentail.planning.nlp.multipliers import carried
-from serpentail.planning.nlp.node import dynamics
-from serpentail.planning.nlp.transcription import program_of
+from serpentail.planning.nlp.node import equations_of_motion
+from serpentail.planning.nlp.transcription import transcription_of
 from serpentail.planning.result.full_state import full_state
 from serpentail.planning.result.truth import local_errors, open_loop
 from serpentail_codegen.pipeline import generate
@@ -153,7 +153,9 @@ def test_multipliers_are_carried_to_another_mesh():
     programs, solutions = [], []
     for intervals in (24, 36):
         plan = st.plan(rat(), intervals=intervals, **settings)
-        programs.append(program_of(rat(), plan.problem, plan.mesh, plan.rule, dynamics(rat())))
+        programs.append(
+            transcription_of(rat(), plan.problem, plan.mesh, plan.rule, equations_of_motion(rat()))
+        )
         solutions.append(plan.solution.multipliers)
     assert np.abs(solutions[0][0]).max() > 1e-3  # a bound is active
     for kept, given in zip(
@@ -423,9 +425,9 @@ def test_interrupt_in_the_first_solve_returns_its_iterate():
 def test_interrupt_in_a_later_round_returns_the_round_before(monkeypatch):
     split = rounds.Search._split
 
-    def interrupted(run, last):
+    def interrupted(search, last, tolerance):
         signal.raise_signal(signal.SIGINT)
-        return split(run, last)
+        return split(search, last, tolerance)
 
     monkeypatch.setattr(rounds.Search, "_split", interrupted)
     plan = st.plan(

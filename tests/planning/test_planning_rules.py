@@ -10,9 +10,9 @@ from scipy.sparse import coo_matrix
 
 import serpentail as st
 from serpentail.planning.nlp.mesh import Mesh, refined, uniform
-from serpentail.planning.nlp.node import Layout, Node
+from serpentail.planning.nlp.node import Node, Variables
 from serpentail.planning.nlp.rules import MOST_DEGREE, collocation_rule
-from serpentail.planning.nlp.transcription import collocate, places
+from serpentail.planning.nlp.transcription import collocate, indices_of
 
 SCHEMES = [
     ("trapezoidal", None),
@@ -80,7 +80,7 @@ def least_effort() -> float:
     return float(np.linalg.solve(T / 2 * W, [1, 0])[0])
 
 
-def oscillator() -> tuple[Layout, Node]:
+def oscillator() -> tuple[Variables, Node]:
     """The oscillator as a node: zeta = (T, x, x_dot, u); its rate is a call, as dynamics is."""
     from serpentail.planning.nlp.node_calls import linear_call
 
@@ -90,20 +90,20 @@ def oscillator() -> tuple[Layout, Node]:
     call = linear_call(f, zeta, [zeta[1:3], zeta[3]])
     result = casadi.SX.sym("result", 2)
     y = casadi.vertcat(zeta[0] * result, zeta[0] * zeta[3] ** 2)
-    one = Node(casadi.Function("node", [zeta, h, result], [y]), (call,), 2, 0, 0)
-    return Layout((("x", 2),), (), {"x": np.ones(2), "torque": np.ones(1)}), one
+    node = Node(casadi.Function("node", [zeta, h, result], [y]), (call,), 2, 0, 0)
+    return Variables((("x", 2),), (), {"x": np.ones(2), "torque": np.ones(1)}), node
 
 
 def found_effort(name, degree, intervals) -> float:
     """The optimum of the program on a mesh."""
-    form, one = oscillator()
+    variables, node = oscillator()
     scheme = uniform(intervals), collocation_rule(name, degree)
-    where = places(form, *scheme)
-    functions = collocate(one, where, scheme, coo_matrix((0, where.size))).functions()
-    least, most = -np.full(where.size, np.inf), np.full(where.size, np.inf)
+    indices = indices_of(variables, *scheme)
+    functions = collocate(node, indices, scheme, coo_matrix((0, indices.size))).functions()
+    least, most = -np.full(indices.size, np.inf), np.full(indices.size, np.inf)
     least[0] = most[0] = T
-    least[where.states[0]] = most[where.states[0]] = 0
-    least[where.states[-1]] = most[where.states[-1]] = [1, 0]
+    least[indices.states[0]] = most[indices.states[0]] = 0
+    least[indices.states[-1]] = most[indices.states[-1]] = [1, 0]
     options = {"ipopt.print_level": 0, "print_time": False, "ipopt.sb": "yes", "ipopt.tol": 1e-12}
     options |= {key: functions[key] for key in ("grad_f", "jac_g", "hess_lag")}
     solver = casadi.nlpsol("solver", "ipopt", functions["nlp"], options)

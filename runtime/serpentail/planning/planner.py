@@ -10,7 +10,7 @@ from typing import Any
 from ..checks import choice
 from ..model.model import Model
 from .nlp.interrupt import stoppable
-from .nlp.node import dynamics
+from .nlp.node import equations_of_motion
 from .nlp.rules import collocation_rule
 from .problem import PROBLEM_SETTINGS, Bounds, Goal, PlanningProblem, checked_problem
 from .result.plan import Plan
@@ -70,7 +70,7 @@ def plan(
         raise model.without(*missing)
     begun = time.perf_counter()
     rule = collocation_rule(checked.rule, checked.degree)
-    search = Search(model, problem, checked, dynamics(model, checked.dynamics), rule)
+    search = Search(model, problem, checked, equations_of_motion(model, checked.dynamics), rule)
     with stoppable(checked.time_limit):
         rounds = search.refined(search.first())
     return search.plan(rounds, time.perf_counter() - begun)
