@@ -29,7 +29,7 @@ class Curve:
         return float(self.ends[-1])
 
     def at(self, times: np.ndarray) -> dict[str, np.ndarray]:
-        """Blocks (n, size) at times (n,) s from the start; at an interval's end those of the next."""
+        """Blocks (n, size) at times (n,) s from the start; at an interval's end the next one's."""
         return self.inside(*self._places(times))
 
     def slopes(self, times: np.ndarray) -> dict[str, np.ndarray]:
