@@ -21,13 +21,13 @@ from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.ir.step import Step
 from serpentail_codegen.pipeline import tail_of
 from serpentail_codegen.scene.parse import parse_scene
-from serpentail_codegen.scene.scene import DERIVATIVES
-from serpentail_codegen.scene.scene import FUNCTIONS as NAMES
+from serpentail_codegen.scene.scene import DERIVATIVES, FUNCTIONS, WORLD
 from serpentail_codegen.targets.c.form import in_form
 from serpentail_codegen.targets.c.routine import Routine, routine_lines
 from tests.references.parameters import random_states
 from tests.support.models import model_folder
 
+NAMES = (*FUNCTIONS, *WORLD)
 STRICT = (
     "-pedantic",
     "-Wall",
@@ -195,7 +195,7 @@ def test_header_is_cpp_and_links_from_it(models, tmp_path, name):
         f"int main() {{\n  {name}_parameters p;\n  {name}_default_parameters(&p);\n  x.q[3] = 1;\n"
         f"  static {real} work[{name.upper()}_WORK_MASS_MATRIX + 1];\n"
         f"  return {name}_mass_matrix(&p{inputs}, x.H, work) != {name.upper()}_OK || !(x.H[0] > "
-        "0);\n}}\n"
+        "0);\n}\n"
     )
     run(
         "g++",

@@ -1,11 +1,12 @@
-"""Golden models: two tiny models as text, so that a review shows what a change of the generator
-does to its output.
+"""The golden models of generated/: two tiny packages that are part of the checkout.
 
-``make golden`` accepts what the generator emits now.
+A review sees in them what a change of the generator does to its output.  ``make golden`` accepts
+what the generator emits now.
 """
 
 import difflib
 import shutil
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,7 @@ import pytest
 from serpentail_codegen.pipeline import generate
 from serpentail_codegen.scene.parse import scene_for
 
-GOLDEN = Path(__file__).parents[1] / "golden"
+GENERATED = Path(__file__).parents[2] / "generated"
 MODELS = {
     "golden_straight": {
         "size": (1, 1),
@@ -29,78 +30,92 @@ MODELS = {
 LONGEST_REPORT = 200  # lines of difference that a failure shows
 
 
-def emitted(name, root):
-    """The header, the model and the CasADi module that the generator emits, by their names in the
-    golden folder.
-
-    Python is stored as text, so that no tool formats or checks it.
-    """
+def emit(name, root):
+    """Generate a golden model; return its folder."""
     options = dict(MODELS[name])
     generate(scene_for("articulated", *options.pop("size"), name=name, **options), root)
-    files = (f"include/{name}.h", f"src/{name}.c", f"{name}_casadi.py")
-    names = [Path(file).name + ".txt" * file.endswith(".py") for file in files]
+    return root / name
+
+
+def texts(folder):
+    """Every file below a folder by its name there; none where the folder is missing."""
     return {
-        stored: (root / name / file).read_text() for stored, file in zip(names, files, strict=True)
+        path.relative_to(folder).as_posix(): path.read_bytes().decode()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file() and "build" not in path.relative_to(folder).parts
     }
 
 
-def differences(folder, texts):
-    """Unified differences from the golden files to the texts, files missing on either side
-    included.
-    """
-    stored = (
-        {path.name: path.read_text() for path in sorted(folder.glob("*"))}
-        if folder.is_dir()
-        else {}
-    )
+def differences(name, before, after):
+    """Unified differences of two folders' texts, files missing on either side included."""
     lines = []
-    for name in sorted(stored.keys() | texts.keys()):
-        before, after = (some.get(name, "").splitlines() for some in (stored, texts))
-        lines += difflib.unified_diff(
-            before, after, f"golden/{name}", f"emitted/{name}", lineterm=""
-        )
-    return lines
+    for file in sorted(before.keys() | after.keys()):
+        pair = (some.get(file, "").splitlines(keepends=True) for some in (before, after))
+        lines += difflib.unified_diff(*pair, f"generated/{name}/{file}", f"emitted/{name}/{file}")
+    return [line.rstrip("\n") for line in lines]
 
 
-def accept(folder, texts):
-    """Make the golden files those texts, and no others."""
+def accept(folder, emitted):
+    """Put an emitted folder in a golden one's place."""
     shutil.rmtree(folder, ignore_errors=True)
-    folder.mkdir(parents=True)
-    for name, text in texts.items():
-        (folder / name).write_text(text)
+    shutil.copytree(emitted, folder)
 
 
 def report(lines):
     """What a failure shows."""
-    more = [f"... {len(lines) - LONGEST_REPORT} lines more"] if len(lines) > LONGEST_REPORT else []
-    head = "the generator emits other text than tests/golden holds; `make golden` accepts it:"
-    return "\n".join([head, *lines[:LONGEST_REPORT], *more])
+    rest = len(lines) - LONGEST_REPORT
+    head = "the generator emits other text than generated/ holds; `make golden` accepts it:"
+    return "\n".join([head, *lines[:LONGEST_REPORT], *([f"... {rest} lines more"] * (rest > 0))])
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_generator_emits_the_golden_text(name, tmp_path, request):
-    texts = emitted(name, tmp_path)
+def test_generator_emits_the_golden_bytes(name, tmp_path, request):
+    emitted = emit(name, tmp_path)
     if request.config.getoption("--update-golden"):
-        accept(GOLDEN / name, texts)
-    lines = differences(GOLDEN / name, texts)
+        accept(GENERATED / name, emitted)
+    lines = differences(name, texts(GENERATED / name), texts(emitted))
     if lines:
         pytest.fail(report(lines), pytrace=False)
 
 
-def test_golden_folder_holds_the_golden_models_only():
-    assert {path.name for path in GOLDEN.iterdir()} == set(MODELS)
-    assert sum(path.stat().st_size for path in GOLDEN.rglob("*")) < 200_000
+def test_checkout_holds_a_readme_and_the_golden_models_only():
+    command = ["git", "ls-files", "--", "generated"]
+    listed = subprocess.run(
+        command, cwd=GENERATED.parent, capture_output=True, text=True, check=False
+    )
+    if listed.returncode:
+        pytest.skip(f"this is no checkout: {listed.stderr.strip()}")
+    files = [Path(name) for name in listed.stdout.split()]
+    assert {path.parts[1] for path in files} == {"README.md", *MODELS}
+    assert sum((GENERATED.parent / path).stat().st_size for path in files) < 400_000
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_golden_package_builds_without_python(name, tmp_path):
+    folder = tmp_path / name
+    shutil.copytree(GENERATED / name, folder)
+    bare = {"PATH": "/usr/bin:/bin", "LC_ALL": "C"}
+    command = ["make", "-s", "all", "example"]
+    done = subprocess.run(
+        command, cwd=folder, env=bare, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    printed = subprocess.run([folder / "build" / "example"], capture_output=True, check=False)
+    assert printed.returncode == 0
 
 
 def test_every_difference_is_shown(tmp_path):
-    texts = {"a.c": "one\ntwo\n", "b.h": "three\n"}
-    accept(tmp_path / "golden", texts)
-    assert differences(tmp_path / "golden", texts) == []
-    shown = report(differences(tmp_path / "golden", {"a.c": "one\n2\n", "c.py": "four\n"}))
-    assert all(
-        line in shown.splitlines() for line in ("--- golden/a.c", "-two", "+2", "-three", "+four")
-    )
-    accept(tmp_path / "golden", {"c.py": "four\n"})
-    assert [path.name for path in (tmp_path / "golden").iterdir()] == ["c.py"]
+    before, after = tmp_path / "before", tmp_path / "after"
+    for folder, files in (
+        (before, {"src/a.c": "one\ntwo\n", "b.h": "three\n"}),
+        (after, {"src/a.c": "one\n2\n", "c.py": "four\n"}),
+    ):
+        for file, text in files.items():
+            (folder / file).parent.mkdir(parents=True, exist_ok=True)
+            (folder / file).write_text(text)
+    shown = report(differences("a", texts(before), texts(after))).splitlines()
+    assert {"--- generated/a/src/a.c", "-two", "+2", "-three", "+four"} <= set(shown)
+    accept(before, after)
+    assert differences("a", texts(before), texts(after)) == []
     long = report([f"+{k}" for k in range(LONGEST_REPORT + 7)])
     assert long.endswith("... 7 lines more")

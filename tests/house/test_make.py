@@ -228,11 +228,14 @@ def test_failed_build_is_tried_again(tree, make):
 
 
 def test_clean_removes_what_was_made(tree, make):
-    for name in ("generated/x", "output"):
+    kept = ("generated/README.md", "generated/golden_loops/src")  # part of the checkout
+    for name in ("generated/x", "generated/.options", "output", *kept):
         (tree / name).mkdir(parents=True)
     sources = sorted((tree / "codegen").rglob("*.py"))
     assert make("clean").returncode == 0
-    assert not (tree / "generated").exists() and not (tree / "output").exists()
+    left = {path.name for path in (tree / "generated").iterdir()}
+    assert left == {"README.md", "golden_loops"} and not (tree / "output").exists()
+    assert (tree / "generated/golden_loops/src").is_dir()
     assert sorted((tree / "codegen").rglob("*.py")) == sources != []
 
 

@@ -146,13 +146,12 @@ def test_refinement_reduces_the_true_error():
 
 
 def test_multipliers_are_carried_to_another_mesh():
-    """The solver finds about the same ones there, from nothing; on the mesh itself they stay, to
-    rounding.
-    """
+    """The solver, given none, finds the same ones there; on the mesh itself they stay."""
     settings = AGAIN | {"start": start(rat()), "bounds": st.Bounds(angle=0.45)}
-    programs, solutions = [], []
+    programs, solutions, plan = [], [], None
     for intervals in (24, 36):
-        plan = st.plan(rat(), intervals=intervals, **settings)
+        # One of several optima: the other mesh begins at the first one's.
+        plan = st.plan(rat(), intervals=intervals, guess=plan, **settings)
         programs.append(
             transcription_of(rat(), plan.problem, plan.mesh, plan.rule, equations_of_motion(rat()))
         )
@@ -163,7 +162,7 @@ def test_multipliers_are_carried_to_another_mesh():
     ):
         np.testing.assert_allclose(kept, given, atol=1e-12)
     for found, wanted in zip(carried(solutions[0], *programs), solutions[1], strict=True):
-        assert np.linalg.norm(found - wanted) < 0.1 * np.linalg.norm(wanted)
+        assert np.linalg.norm(found - wanted) < 1e-3 * np.linalg.norm(wanted)
 
 
 def test_refinement_goes_on_from_the_multipliers(monkeypatch):
@@ -261,7 +260,8 @@ def test_goals_of_the_tail_and_of_a_whole_attitude():
 
 def test_effort_counts_rates_as_torques_of_a_damper():
     fine = {"tolerance": None, "intervals": 20}
-    for plan in (planned(**fine), planned(**fine, smoothing=0.0)):
+    # Of several optima, which one is found from afar hangs on rounding: compare two of one valley.
+    for plan in (planned(**fine), planned(**fine, smoothing=0.0, guess=planned(**fine))):
         flight, c = plan.trajectory, plan.problem.smoothing
         integrand = np.sum(flight.tau**2 + (c * flight.v[:, 6:]) ** 2, axis=1)
         assert plan.report["objective"] == pytest.approx(

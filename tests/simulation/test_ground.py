@@ -79,7 +79,9 @@ def test_the_kick_is_the_papers():
     [
         ({"method": "ros34pw2", "rtol": 1e-6}, 1e-4),
         ({"method": "ros34pw2"}, 3e-3),
-        ({"method": "tsit5"}, 1e-6),
+        # Rounding decides where steps end next to a change of contact, and so the error: of 300
+        # starts 1e-14 rad apart the median is 4e-8, the largest 1.1e-6; at rtol 1e-8: 7e-6.
+        ({"method": "tsit5", "rtol": 1e-9}, 1e-5),
         ({"method": "lsoda"}, 1e-6),
         ({"method": "implicit_euler", "step": 2e-5}, 6e-2),
     ],

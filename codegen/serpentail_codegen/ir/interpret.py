@@ -26,6 +26,7 @@ from .program import (
     padded,
     statements,
 )
+from .step import Step
 from .tape import Tape, replay
 
 
@@ -104,10 +105,8 @@ class Counter:
 
 def executed(program: Program) -> int:
     """Return the additions, multiplications and divisions of one run."""
-    counter = Counter()
     arguments = (*program.of_role("parameters"), *program.of_role("input"))
-    Run(program, counter, {a.name: [0] * a.length for a in arguments})
-    return counter.count
+    return Count(program, {a.name: [0] * a.length for a in arguments}).algebra.count
 
 
 def applied(program: Program) -> int:
@@ -216,8 +215,7 @@ class Run:
     def apply(self, call: Apply, at: dict[str, int]) -> None:
         """Run a step: read everything, then write everything."""
         scalars = [scalar for ref in call.reads for scalar in self.read(ref, at)]
-        nodes = replay(call.step.nodes, scalars, self.algebra)
-        results = iter([nodes[r] for r in call.step.results])
+        results = iter(self.results(call.step, scalars))
         for ref, adds in zip(call.writes, call.adds, strict=True):
             values = [next(results) for _ in range(ref.size)]
             if adds:
@@ -225,6 +223,11 @@ class Run:
                     self.algebra.add(a, b) for a, b in zip(self.read(ref, at), values, strict=True)
                 ]
             self.write(ref, at, values)
+
+    def results(self, step: Step, scalars: list) -> list:
+        """Return what a step makes of its inputs."""
+        nodes = replay(step.nodes, scalars, self.algebra)
+        return [nodes[r] for r in step.results]
 
     def fill(self, fill: Fill, at: dict[str, int]) -> None:
         """Store constants."""
@@ -287,6 +290,24 @@ class Run:
         """Solve with a factored matrix."""
         rows = self.rows(solve.matrix, solve.x.size)
         self.write(solve.x, at, ldl_solve(self.algebra, rows, self.read(solve.x, at)))
+
+
+class Count(Run):
+    """A run that counts operations; a step costs the same for inputs of the same lanes."""
+
+    def __init__(self, program: Program, arguments: dict[str, list]):
+        self.known: dict[tuple, tuple[int, list]] = {}
+        super().__init__(program, Counter(), arguments)
+
+    def results(self, step: Step, scalars: list) -> list:
+        """Return the lanes of a step's results, and count its operations."""
+        before, key = self.algebra.count, (id(step), *scalars)
+        if key not in self.known:
+            lanes = super().results(step, scalars)
+            self.known[key] = self.algebra.count - before, lanes
+        cost, lanes = self.known[key]
+        self.algebra.count = before + cost
+        return lanes
 
 
 def unroll(

@@ -13,10 +13,9 @@ LEAVES = ("input", "const", "unit")
 
 def operands(node: tuple) -> tuple[int, ...]:
     """Return the nodes that a node is computed from."""
-    op, *args = node
-    if op in LEAVES:
+    if node[0] in LEAVES:
         return ()
-    return (args[0],) if op == "lane" else tuple(args)
+    return node[1:2] if node[0] == "lane" else node[1:]
 
 
 class Tape:

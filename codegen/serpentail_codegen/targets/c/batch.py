@@ -4,8 +4,7 @@ states comes out.
 
 from dataclasses import dataclass
 
-from ...functions.function import Function
-from ...functions.function import assemble
+from ...functions.function import Function, assemble
 from ...functions.tail import Tail
 from ...ir.interpret import applied, branches
 from ...ir.program import Program

@@ -4,8 +4,7 @@ comes out.
 
 import re
 
-from ...functions.function import assemble
-from ...functions.function import struct_parameters
+from ...functions.function import assemble, struct_parameters
 from ...functions.tail import Tail
 from ...ir.dataflow import inlined
 from ...ir.program import Apply, Copy, Factor, Fill, Guard, Loop, Program, Ref, Solve, padded

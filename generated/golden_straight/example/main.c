@@ -1,0 +1,22 @@
+/* One forward dynamics call.  Build: cc -std=c99 -O2 -Iinclude example/main.c src/golden_straight.c -lm */
+#include <stdio.h>
+
+#include "golden_straight.h"
+
+int main(void)
+{
+  golden_straight_parameters parameters;
+  golden_straight_default_parameters(&parameters);
+  const golden_straight_real q[GOLDEN_STRAIGHT_NQ] = { [3] = 1.0, [7] = 0.5 }; /* upright, first joint angle 0.5 rad */
+  const golden_straight_real v[GOLDEN_STRAIGHT_NV] = { 0.0 };
+  const golden_straight_real tau[GOLDEN_STRAIGHT_NT] = { 0.0 };
+  golden_straight_real v_dot[GOLDEN_STRAIGHT_NV];
+  golden_straight_real work[GOLDEN_STRAIGHT_WORK_FORWARD_DYNAMICS + 1];
+  if (golden_straight_forward_dynamics(&parameters, q, v, tau, v_dot, work) != GOLDEN_STRAIGHT_OK) {
+    return 1;
+  }
+  for (int k = 0; k < GOLDEN_STRAIGHT_NV; ++k) {
+    printf("v_dot[%d] = %.9g\n", k, (double)v_dot[k]);
+  }
+  return 0;
+}

@@ -1,0 +1,29 @@
+"""Refuses Python files that are too long to read; `make lint` runs it."""
+
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+FOLDERS = ("codegen", "runtime", "tests", "benchmarks", "embedded", "examples", "stress")
+MOST_LINES = 300
+
+
+def too_long(folder: Path) -> list[str]:
+    """Return a complaint for each file below a folder that is longer than MOST_LINES."""
+    complaints = []
+    for path in sorted(folder.rglob("*.py")):
+        lines = len(path.read_text(encoding="utf-8").splitlines())
+        if lines > MOST_LINES:
+            complaints.append(f"{path}: {lines} lines, more than {MOST_LINES}: split it by concept")
+    return complaints
+
+
+def main() -> int:
+    """Print all complaints; return the exit status."""
+    complaints = [line for name in FOLDERS for line in too_long(ROOT / name)]
+    print("\n".join(complaints) or f"all files have {MOST_LINES} lines or less")
+    return 1 if complaints else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
