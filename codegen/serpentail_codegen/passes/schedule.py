@@ -1,14 +1,14 @@
-"""Scheduling: nodes of a straight line go in, an order that hides latency without losing registers
-comes out.
+"""The order of a straight line's operations: independent work fills the time that results take.
 
 Recursions leave a processor waiting for one result after another, while independent work stands
 further down the text than it can look ahead.  Longest remaining path first brings that work
 forward, until REGISTERS values are alive; then what frees registers goes first.
 """
 
+from collections.abc import Iterable, Sequence
 from heapq import heappop, heappush
 
-from ..ir.tape import BINARY, LEAVES, operands
+from ..ir.tape import BINARY, LEAVES, Node, operands
 
 REGISTERS = 24  # of 32 vector registers; on 16 it still pays
 MOST_OPERATIONS = 2800  # beyond, spilled values cost more than latency
@@ -17,18 +17,18 @@ MOST_ABREAST = 7
 LATENCY = {"div": 13, "sqrt": 15, "sin": 30, "cos": 30, "neg": 1}  # cycles; 4 for all others
 
 
-def scheduled(nodes, live: list[int], results) -> list[int]:
+def scheduled(nodes: Sequence[Node], live: list[int], results: Iterable[int]) -> list[int]:
     """Return the live nodes, leaves first, in an order that respects their dependencies."""
     operations = [n for n in live if nodes[n][0] not in LEAVES]
     if sum(nodes[n][0] in BINARY for n in operations) > MOST_OPERATIONS:
         return live
-    line = _List(nodes, operations, set(results))
-    if len(operations) > MOST_ABREAST * max(line.height.values(), default=0):
+    scheduler = _ListScheduler(nodes, operations, set(results))
+    if len(operations) > MOST_ABREAST * max(scheduler.height.values(), default=0):
         return live
-    return [n for n in live if nodes[n][0] in LEAVES] + line.order()
+    return [n for n in live if nodes[n][0] in LEAVES] + scheduler.order()
 
 
-class _List:
+class _ListScheduler:
     """List scheduling of one straight line.
 
     The operations that are ready lie in two heaps, one for each rule of choice.  How many values an
@@ -36,34 +36,38 @@ class _List:
     more, ahead of its earlier entries, and what was placed already is passed over.
     """
 
-    def __init__(self, nodes, operations: list[int], results: set[int]):
-        # who needs whom
-        known = set(operations)
-        self.operands = {n: {a for a in operands(nodes[n]) if a in known} for n in operations}
-        self.users = {n: [] for n in operations}
+    def __init__(self, nodes: Sequence[Node], operations: list[int], results: set[int]):
+        # which operation needs which
+        to_schedule = set(operations)
+        self.operands = {n: {a for a in operands(nodes[n]) if a in to_schedule} for n in operations}
+        self.users: dict[int, list[int]] = {n: [] for n in operations}
         for n, needed in self.operands.items():
             for a in needed:
                 self.users[a].append(n)
 
         # longest remaining path, in cycles
-        self.height = {}
+        self.height: dict[int, int] = {}
         for n in reversed(operations):
             tail = max((self.height[u] for u in self.users[n]), default=0)
             self.height[n] = tail + LATENCY.get(nodes[n][0], 4)
 
-        # operands and uses that are still to come, and operands used here for the last time
+        # operands that are still to come, and uses that are still to come
         self.waiting = {n: len(needed) for n, needed in self.operands.items()}
         self.uses = {n: len(users) + (n in results) for n, users in self.users.items()}
+
+        # operands that are used for the last time
         self.frees = {
             n: sum(self.uses[a] == 1 for a in needed) for n, needed in self.operands.items()
         }
 
-        self.longest_first, self.freeing_first = [], []
-        self.placed = set()
+        self.longest_first: list[tuple[int, int, int]] = []
+        self.freeing_first: list[tuple[int, int, int]] = []
+        self.placed: set[int] = set()
 
     def order(self) -> list[int]:
         """Return the operations in order."""
-        out, alive = [], 0
+        out: list[int] = []
+        alive = 0
         for n, count in self.waiting.items():
             if count == 0:
                 self._enter(n)
@@ -79,7 +83,7 @@ class _List:
         heappush(self.longest_first, (-self.height[n], -self.frees[n], n))
         heappush(self.freeing_first, (-self.frees[n], -self.height[n], n))
 
-    def _next(self, heap: list[tuple]) -> int:
+    def _next(self, heap: list[tuple[int, int, int]]) -> int:
         """Take the best operation that is not placed yet."""
         while True:
             n = heappop(heap)[-1]

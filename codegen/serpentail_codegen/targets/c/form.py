@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from ...functions.function import Function, assemble, struct_parameters
 from ...functions.tail import Tail
-from ...ir.interpret import applied, branches
+from ...ir.cost import applied, branches
 from ...ir.program import Program
 from ...passes.unrolled_ldl import unrolled_ldl
 from ...scene.scene import Scene
