@@ -55,8 +55,7 @@ TOP = View("top", "y", "\u2212x", np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]])
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """One moment of a film: time, torso position and rotation, root and tail (P + 1, 3), COM;
-    world, SI.
+    """One moment of a film, world, SI: time, torso, root and tail (P + 1, 3), COM.
 
     On the ground also legs (L, J, 3) and arrows (n, 2, 3) of its forces, from the point that is
     pushed to the tip.

@@ -83,11 +83,11 @@ class Search:
         nlp = self._transcribed(guess.mesh if same_rule else uniform(settings.intervals))
         solutions = [self._solved_given(nlp)]
         for k in range(1, settings.multi_start + settings.retries):
-            enough = k >= settings.multi_start and any(found.success for found in solutions)
+            enough = k >= settings.multi_start and any(entry.success for entry in solutions)
             if enough or self._stopped():
                 break
             solutions.append(self._solved(nlp, self._pushed(k)))
-        return self._round(nlp, min(solutions, key=lambda found: (not found.success, found.value)))
+        return self._round(nlp, min(solutions, key=lambda entry: (not entry.success, entry.value)))
 
     def refined(self, first: Round) -> list[Round]:
         """Return the rounds: intervals that are wrong are split until the end is right."""

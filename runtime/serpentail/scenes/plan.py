@@ -29,19 +29,9 @@ def planned(path: str, folder: str | None = None) -> Plan:
     return plan(model_of(scene, path, folder, {}), **arguments)
 
 
-def plan_arguments(table: Mapping) -> dict:
+def plan_arguments(table: Mapping) -> dict[str, Any]:
     """Return the arguments of ``plan`` that a table [plan] has."""
-    for name in table:
-        if name in CODE_ONLY:
-            raise PlanningError(
-                f"plan.{name}: value {table[name]!r}: only programs can give it; call "
-                "serpentail.plan"
-            )
-        choice("plan: key", name, KEYS)
-    for name in ("start", "duration"):
-        if name not in table:
-            needed = "q and v" if name == "start" else "seconds"
-            raise PlanningError(f"plan.{name}: no value: needs {needed}")
+    _check_keys(table)
 
     # tables of their own: start, goal and bounds
     start = _part("start", table["start"], ("q", "v"))
@@ -50,6 +40,7 @@ def plan_arguments(table: Mapping) -> dict:
     goal = _part("goal", table.get("goal", {}), _names(Goal))
     bounds = _part("bounds", table.get("bounds", {}), _names(Bounds))
 
+    # the others as they are, but for "free"
     arguments = dict(table) | {
         "start": (start["q"], start["v"]),
         "goal": Goal(**{key: _free(value) for key, value in goal.items()}),
@@ -58,6 +49,20 @@ def plan_arguments(table: Mapping) -> dict:
     if arguments.get("tolerance") == FREE:
         arguments["tolerance"] = None
     return arguments
+
+
+def _check_keys(table: Mapping) -> None:
+    """PlanningError where a table [plan] has a key that it cannot have, or lacks one."""
+    for name in table:
+        if name in CODE_ONLY:
+            raise PlanningError(
+                f"plan.{name}: value {table[name]!r}: only programs can give it; call "
+                "serpentail.plan"
+            )
+        choice("plan: key", name, KEYS)
+    for name, needed in (("start", "q and v"), ("duration", "seconds")):
+        if name not in table:
+            raise PlanningError(f"plan.{name}: no value: needs {needed}")
 
 
 def _names(kind: type[Goal] | type[Bounds]) -> list[str]:

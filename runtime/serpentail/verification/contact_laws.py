@@ -46,18 +46,14 @@ def raised(q: np.ndarray, height: float) -> np.ndarray:
 
 @law("pfl", "forward_dynamics", units=VALUE_LIMIT)
 def tail_gets_the_accelerations_that_torques_are_for(model: Model, s: State) -> Errors:
-    """The torques of partial feedback linearisation give the wanted accelerations, relative to
-    cond(H).
-    """
+    """Torques of partial feedback linearisation give wanted accelerations, relative to cond(H)."""
     v_dot = model.forward_dynamics(s.q, s.v, model.pfl(s.q, s.v, s.accelerations))
     return relative(v_dot[TAIL_V], s.accelerations, v_dot) / sensitivity(model, s.q)
 
 
 @law("tracked_dynamics", "pfl", "forward_dynamics", units=VALUE_LIMIT)
 def tracking_moves_as_its_torques_do(model: Model, s: State) -> Errors:
-    """What gives the torques of partial feedback linearisation gives v_dot under them, relative to
-    cond(H).
-    """
+    """Torques and v_dot of one call are those of two calls, relative to cond(H)."""
     tau, v_dot = model.kernel("tracked_dynamics")(s.q, s.v, s.accelerations)
     expected = model.forward_dynamics(s.q, s.v, tau)
     torques = model.pfl(s.q, s.v, s.accelerations)

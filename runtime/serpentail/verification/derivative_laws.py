@@ -158,9 +158,7 @@ def momentum_changes_by_its_jacobians(model: Model, s: State) -> Errors:
     units=SLOPE_LIMIT,
 )
 def parameters_move_both_dynamics_alike(model: Model, s: State) -> Errors:
-    """H times the change of v_dot with a parameter is minus that of H v_dot + C at the same
-    v_dot.
-    """
+    """H times a parameter's change of v_dot is minus that of H v_dot + C at the same v_dot."""
     v_dot, H = model.forward_dynamics(s.q, s.v, s.tau), model.mass_matrix(s.q).astype(float)
     forward = model.forward_dynamics_parameter_derivatives(s.q, s.v, s.tau).astype(float)
     inverse = model.inverse_dynamics_parameter_derivatives(s.q, s.v, v_dot).astype(float)

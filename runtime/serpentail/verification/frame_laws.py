@@ -31,9 +31,7 @@ law = registry(LAWS)
 
 
 def changed_axes(top: np.ndarray, middle: np.ndarray, size: int) -> np.ndarray:
-    """Return blkdiag(top, middle, 1): how a change of axes acts on velocities, forces and
-    accelerations.
-    """
+    """Return blkdiag(top, middle, 1), by which a change of axes acts on velocities and forces."""
     X = np.eye(size)
     X[VELOCITY, VELOCITY], X[OMEGA, OMEGA] = top, middle
     return X
@@ -77,9 +75,7 @@ def turned_outputs(model: Model, results: dict, X: np.ndarray, shift: np.ndarray
 
 @law()
 def position_and_speed_of_the_torso_do_not_matter(model: Model, s: State) -> Errors:
-    """Another position and velocity of B leave H, C, v_dot and Jacobians as they are, bit for
-    bit.
-    """
+    """H, C, v_dot and Jacobians do not change with B's position and velocity, bit for bit."""
     q, v = s.q.copy(), s.v.copy()
     q[POSITION] += 5.0
     v[VELOCITY] -= 3.0

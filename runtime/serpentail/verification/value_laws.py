@@ -79,9 +79,7 @@ def kinetic_energy_is_half_v_H_v(model: Model, s: State) -> Errors:
 
 @law("mass_matrix", "momentum", units=VALUE_LIMIT)
 def momentum_is_mass_times_velocity(model: Model, s: State) -> Errors:
-    """Momentum is the upper part of H v; angular momentum is the middle part, moved from B to the
-    COM.
-    """
+    """Momentum is the upper part of H v, angular momentum the middle part, moved to the COM."""
     linear, angular = model.momentum(s.q, s.v)
     impulse = model.mass_matrix(s.q) @ s.v
     force, moment = impulse[VELOCITY], impulse[OMEGA]
@@ -104,9 +102,7 @@ def center_of_mass(model: Model, q: np.ndarray) -> np.ndarray:
 
 @law("energy", "forward_dynamics", units=VALUE_LIMIT)
 def energy_changes_by_the_power_of_the_torques(model: Model, s: State) -> Errors:
-    """Along forward dynamics dE/dt = tau . q_t_dot, relative to the energy times the links' fastest
-    turn.
-    """
+    """Along forward dynamics dE/dt = tau . q_t_dot, relative to energy times the fastest turn."""
     v_dot = model.forward_dynamics(s.q, s.v, s.tau).astype(float)
     rate = 2 * fastest(model, s.v)  # energy has products of two sines
 
@@ -127,9 +123,7 @@ def flight(model: Model, s: State) -> Trajectory:
 
 @law("rollout", "energy", "momentum", units=4 * STEPS, floor=1e-10)
 def energy_is_constant_in_flight(model: Model, s: State) -> Errors:
-    """In 0.2 s of flight without torques (RK4, 0.1 ms) kinetic plus potential energy stays as it
-    is.
-    """
+    """In 0.2 s of flight without torques (RK4, 0.1 ms) the sum of both energies is constant."""
     motion = flight(model, s)
     return relative(motion.energy, motion.energy[0], abs(motion.kinetic) + abs(motion.potential))
 
