@@ -9,21 +9,21 @@ import serpentail as st
 # Errors.
 
 WRONG = [
-    ({"duration": "duration = -1.0"}, "", "simulate.duration -1.0: give a number above 0"),
+    ({"duration": "duration = -1.0"}, "", "simulate.duration: value -1.0: needs a number above 0"),
     ({"duration": ""}, "", "simulate.duration: no value: needs seconds"),
-    ({"duration": "duration = nan"}, "", "simulate.duration nan"),
+    ({"duration": "duration = nan"}, "", "simulate.duration: value nan"),
     (
         {"duration": "duratoin = 1.0"},
         "",
         "simulate: key: value 'duratoin': did you mean 'duration'?",
     ),
     ({"height": "height = -0.05"}, "", r"q0: point \d+ \((tail|feet)\) is .* mm deep at the start"),
-    ({"height": "height = nan"}, "", "simulate.start.height nan: give a finite number"),
+    ({"height": "height = nan"}, "", "simulate.start.height: value nan: needs a finite number"),
     ({"height": "heigth = 0.1"}, "", "simulate.start: key: value 'heigth': did you mean 'height'?"),
     (
         {"height": "velocity = [1, 2]"},
         "",
-        "simulate.start.velocity: value .*: needs three finite numbers",
+        "simulate.start.velocity: value .*: needs three numbers",
     ),
     (
         {"height": "height = 0.1\nvelocity = [0, 0, 1]\nsettle = {}"},
@@ -33,7 +33,7 @@ WRONG = [
     (
         {"height": "height = 0.1\nsettle = { rounds = 0 }"},
         "",
-        "rounds 0: give a whole number from 1",
+        "rounds: value 0: needs a whole number from 1",
     ),
     (
         {"height": "height = 0.1\nbends = [0.1, 0.2]"},
@@ -49,7 +49,7 @@ WRONG = [
     (
         {"delta": "delta = -0.26\nmoves = [{ at = 0.1, delta = -1.0, rate = -1 }]"},
         "",
-        r"moves\[0\].rate -1",
+        r"moves\[0\].rate: value -1",
     ),
     (
         {"delta": "delta = -0.26\nmoves = [{ at = 0.1, delta = -0.26, rate = 1 }]"},
@@ -71,13 +71,17 @@ WRONG = [
         "",
         r"legs.moves\[1\].at: value 0.2: the move before it ends at 0.3 s",
     ),
-    ({"delta": "delta = [0.0, 1.0]\ntimes = [1.0, 0.0]"}, "", "Legs: times must increase"),
+    (
+        {"delta": "delta = [0.0, 1.0]\ntimes = [1.0, 0.0]"},
+        "",
+        "Legs: times: value .*: needs increasing times",
+    ),
     ({}, '[simulate.controller]\nkind = "pfl"\n', "tracks a reference: add a table"),
     ({}, '[simulate.controller]\nkind = "pdf"\n', "did you mean 'pfl'?"),
     (
         {},
         '[simulate.controller]\nkind = "damping"\ndamping = -1.0\n',
-        "damping -1.0: give finite numbers, 0 or above",
+        "damping: value -1.0: needs one or .* numbers from 0",
     ),
     (
         {},
@@ -92,7 +96,7 @@ WRONG = [
     (
         {},
         "[simulate.reference]\ntimes = [0.0, 0.0]\nbends = [[0.1], [0.2]]\n",
-        "Reference: times must increase",
+        "Reference: times: value .*: needs increasing times",
     ),
     ({}, "[simulate.reference]\ntimes = [0.0]\n", "needs times and bends, or a file"),
     ({}, '[simulate.reference]\nfile = "none.npz"\n', "no trajectory file"),
@@ -115,7 +119,7 @@ def test_what_is_wrong_is_named(scene, replaced, added, words):
         ({"parameters.mu": 1}, "change 'parameters.mu': unknown"),
         ({"legs.moves.0.rate": 1}, "change 'legs.moves.0.rate': 'moves' is not in "),
         ({"duration.x": 1}, "change 'duration.x': 'x' is not in 0.02"),
-        ({"method": "euler"}, "method 'euler': choose one of"),
+        ({"method": "euler"}, "method: value 'euler': needs 'auto' or 'rk4'"),
         ({"step": 1e-3, "rtol": 1e-3}, "has no setting 'rtol'"),
     ],
 )

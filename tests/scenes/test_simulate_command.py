@@ -50,7 +50,7 @@ def test_simulate_prints_a_table_and_draws(scene, capsys):
     [
         ("mu=-1", "mu: value -1"),
         ("mu", "--set mu: needs NAME=VALUE"),
-        ("duration=0", "give a number above 0"),
+        ("duration=0", "needs a number above 0"),
     ],
 )
 def test_wrong_sets_are_status_2(scene, capsys, given, words):

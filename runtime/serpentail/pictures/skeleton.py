@@ -6,6 +6,7 @@ from numpy.typing import ArrayLike
 from ..attitude import rotation_matrix
 from ..model.layout import POSITION
 from ..model.model import Model
+from ..model.parameters import total_mass
 from ..motion.trajectory import Trajectory
 
 SIDES = (1.0, -1.0)  # the left hip mirrors the right one in x
@@ -38,10 +39,11 @@ def leg_joints(model: Model, motion: Trajectory, angles: ArrayLike) -> np.ndarra
 
 def centre_of_mass(model: Model, motion: Trajectory) -> np.ndarray:
     """Return the COM (K, 3), m, world, as if the tail were straight between its points."""
-    torso, tail = model.parameters["torso_mass"], model.parameters["tail_mass"]
+    parameters = model.parameters
+    torso, tail = parameters["torso_mass"], parameters["tail_mass"]
     points = model.tail_points(motion.q)
     middle = ((points[:, 1:] + points[:, :-1]) / 2).mean(axis=1)
-    return (torso * motion.q[:, POSITION] + tail * middle) / (torso + tail)
+    return (torso * motion.q[:, POSITION] + tail * middle) / total_mass(parameters)
 
 
 def _ray(angle: np.ndarray) -> np.ndarray:

@@ -7,7 +7,8 @@ import time
 from dataclasses import fields
 from typing import Any
 
-from ..checks import choice
+from ..checks import one_of
+from ..errors import PlanningError
 from ..model.model import Model
 from .nlp.interrupt import stoppable
 from .nlp.node import equations_of_motion
@@ -82,7 +83,7 @@ def _checked(
     """Return the problem, of (start, goal, duration, bounds), and the settings of its search."""
     names = (*PROBLEM_SETTINGS, *(entry.name for entry in fields(PlanSettings)))
     for name in settings:
-        choice("setting", name, names)
+        one_of("setting", name, names, PlanningError)
     start, goal, duration, bounds = task
     goal = Goal() if goal is None else goal
     bounds = Bounds() if bounds is None else bounds

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import choice, number, numbers
+from ..checks import number, numbers, one_of
 from ..errors import PlanningError
-from ..model.layout import QUATERNION, TAIL_Q, TAIL_V, Layout
+from ..model.layout import QUATERNION, TAIL_Q, TAIL_V
 from ..model.model import Model
 from .nlp.coordinates import KINDS
 from .nlp.node import FORMULATIONS
@@ -81,7 +81,7 @@ def checked_problem(
     """Return the problem; PlanningError names the first wrong field, its value and the remedy."""
     # start and goal, and whether the bounds allow them
     q0, v0 = _start(model, start)
-    tail = Layout(model.segments).nt
+    tail = model.layout.nt
     goal, bounds = _goal(goal, tail), _bounds(bounds, tail)
     _start_inside(q0[TAIL_Q], bounds.angle, "angle", "rad")
     _start_inside(v0[TAIL_V], bounds.rate, "rate", "rad/s")
@@ -90,12 +90,13 @@ def checked_problem(
 
     # settings, those that are names last
     checks: dict[str, Callable[[Any], Any]] = {"objective": _objective, "path": _path}
-    checks |= {name: partial(number, name, above=False) for name in ("smoothing", "damping")}
+    for name in ("smoothing", "damping"):
+        checks[name] = partial(number, name, error=PlanningError, least=0)
     checked = {
         name: checks[name](value) if name in checks else value for name, value in settings.items()
     }
-    choice("formulation", settings.get("formulation", "airborne"), FORMULATIONS)
-    choice("attitude", settings.get("attitude", "quaternion"), KINDS)
+    one_of("formulation", settings.get("formulation", "airborne"), FORMULATIONS, PlanningError)
+    one_of("attitude", settings.get("attitude", "quaternion"), KINDS, PlanningError)
     return PlanningProblem(q0, v0, goal, _duration(duration), bounds, **checked)
 
 
@@ -103,7 +104,7 @@ def _vector(field: str, value: Any, size: int) -> np.ndarray:
     """Return finite numbers (size,); PlanningError else, also of one number alone."""
     if np.ndim(value) == 0:
         raise PlanningError(f"{field}: value {value!r}: needs {size} numbers")
-    return numbers(field, value, size)
+    return numbers(field, value, size, PlanningError)
 
 
 def _unit_quaternion(field: str, quaternion: np.ndarray) -> np.ndarray:
@@ -171,7 +172,7 @@ def _magnitudes(name: str, value: Any, tail: int) -> np.ndarray | None:
     """Return one bound of every tail coordinate; None where there is none."""
     if value is None:
         return None
-    magnitudes = numbers(f"bounds.{name}", value, tail)
+    magnitudes = numbers(f"bounds.{name}", value, tail, PlanningError)
     if not (magnitudes > 0).all():
         raise PlanningError(f"bounds.{name}: value {value!r}: needs magnitudes above 0")
     return magnitudes
@@ -206,7 +207,7 @@ def _duration(duration: Any) -> tuple[float, float]:
         raise PlanningError(
             f"duration: value {duration!r}: needs one number, or (least, most), in s"
         )
-    least, most = (number("duration", value) for value in pair)
+    least, most = (number("duration", value, PlanningError, above=0) for value in pair)
     if most < least:
         raise PlanningError(f"duration: value {duration!r}: needs least <= most, in s")
     return least, most
@@ -214,7 +215,7 @@ def _duration(duration: Any) -> tuple[float, float]:
 
 def _objective(objective: Any) -> str | Callable[[Any], Any]:
     if not callable(objective):
-        choice("objective", objective, OBJECTIVES)
+        one_of("objective", objective, OBJECTIVES, PlanningError)
     return objective
 
 

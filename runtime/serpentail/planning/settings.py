@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import choice, number
+from ..checks import number, one_of
 from ..errors import PlanningError
 from ..motion.trajectory import Trajectory
 
@@ -49,14 +49,14 @@ def checked_settings(model, **settings) -> PlanSettings:
             raise PlanningError(f"{name}: value {value!r}: needs a whole number from {least}")
     for name in ("tolerance", "time_limit"):
         if getattr(checked, name) is not None:
-            number(name, getattr(checked, name))
+            number(name, getattr(checked, name), PlanningError, above=0)
     if not isinstance(checked.options, dict):
         raise PlanningError(
             f"options: value {checked.options!r}: needs a dict, such as {{'ipopt.max_iter': 500}}"
         )
     _check_guess(model, checked.guess)
-    number("guess_damping", checked.guess_damping, above=False)
-    choice("dynamics", checked.dynamics, ("auto", "compiled", "symbolic"))
+    number("guess_damping", checked.guess_damping, PlanningError, least=0)
+    one_of("dynamics", checked.dynamics, ("auto", "compiled", "symbolic"), PlanningError)
     return checked
 
 

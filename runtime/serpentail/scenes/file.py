@@ -11,6 +11,7 @@ from typing import Any
 from ..errors import ModelError
 from ..model.manifest import read_manifest
 from ..model.model import Model, load
+from ..model.parameters import merged
 
 # keys of a scene that its generated code depends on, and that a folder is compared by
 MADE_OF = (
@@ -23,7 +24,6 @@ MADE_OF = (
     "bend_range",
     "coordinates",
 )
-OTHER_WAY = {"link_radius": "link_inertia", "link_inertia": "link_radius"}  # to say the same
 
 
 def read_scene(path: str | Path, error: type[Exception]) -> dict:
@@ -67,7 +67,7 @@ def model_of(
             )
     if made["baked"]:
         return load(folder, parameters)
-    return load(folder, _merged(scene.get("parameters", {}), parameters))
+    return load(folder, merged(scene.get("parameters", {}), parameters))
 
 
 def _generate(path: Path, folder: Path) -> None:
@@ -95,10 +95,3 @@ def _same(value: Any, made: Any) -> bool:
     if isinstance(value, list) and isinstance(made, list):
         return sorted(map(str, value)) == sorted(map(str, made))
     return bool(value == made)
-
-
-def _merged(parameters: Mapping, changes: Mapping) -> dict:
-    """Parameters with changes; one of link_radius and link_inertia takes the other's place."""
-    replaced = {OTHER_WAY[name] for name in changes if name in OTHER_WAY}
-    kept = {name: value for name, value in parameters.items() if name not in replaced}
-    return kept | dict(changes)

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from typing import Any
 
-from ..checks import choice
+from ..checks import one_of
 from ..errors import PlanningError
 from ..planning.planner import plan
 from ..planning.problem import PROBLEM_SETTINGS, Bounds, Goal
@@ -59,7 +59,7 @@ def _check_keys(table: Mapping) -> None:
                 f"plan.{name}: value {table[name]!r}: only programs can give it; call "
                 "serpentail.plan"
             )
-        choice("plan: key", name, KEYS)
+        one_of("plan: key", name, KEYS, PlanningError)
     for name, needed in (("start", "q and v"), ("duration", "seconds")):
         if name not in table:
             raise PlanningError(f"plan.{name}: no value: needs {needed}")
@@ -76,7 +76,7 @@ def _part(field: str, value: Any, known: Sequence[str]) -> dict:
             f"plan.{field}: value {value!r}: needs a table, under a line [plan.{field}]"
         )
     for name in value:
-        choice(f"plan.{field}: key", name, known)
+        one_of(f"plan.{field}: key", name, known, PlanningError)
     return dict(value)
 
 

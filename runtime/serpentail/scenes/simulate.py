@@ -7,9 +7,9 @@ from typing import Any, overload
 
 import numpy as np
 
-from ..checks import finite, known, positive, real_array
+from ..checks import finite_array, number, one_of, refusal
 from ..errors import SimulationError
-from ..model.layout import OMEGA, VELOCITY, Layout
+from ..model.layout import OMEGA, VELOCITY
 from ..model.model import Model
 from ..motion.summary import summary
 from ..motion.trajectory import Trajectory
@@ -136,7 +136,7 @@ def scenario_of(model: Model, table: Mapping, parent: Path) -> Scenario:
     q0, v0, bristles = _start(model, table.get("start", {}), reference, settling)
     if bristles is not None:
         settings["bristles0"] = bristles
-    duration = positive("simulate.duration", table["duration"])
+    duration = number("simulate.duration", table["duration"], SimulationError, above=0)
     return Scenario(model, q0, v0, duration, controller, legs, settings)
 
 
@@ -145,7 +145,7 @@ def _checked(where: str, table: Any, names: Collection[str]) -> Mapping:
     if not isinstance(table, Mapping):
         raise SimulationError(f"{where}: value {table!r}: needs a table, under a line [{where}]")
     for name in table:
-        known(f"{where}: key", name, names, SimulationError)
+        one_of(f"{where}: key", name, names, SimulationError)
     return table
 
 
@@ -159,7 +159,9 @@ def _legs(table: Any) -> Legs:
         )
     if "times" in table:
         return Legs(table["times"], table["gamma"], table["delta"])
-    gamma, delta = (finite(f"simulate.legs.{name}", table[name]) for name in ("gamma", "delta"))
+    gamma, delta = (
+        number(f"simulate.legs.{name}", table[name], SimulationError) for name in ("gamma", "delta")
+    )
     return Legs.moves(gamma, delta, table.get("moves", []))
 
 
@@ -188,19 +190,19 @@ def _controller(model: Model, value: Any, reference: Any) -> Controller:
         remedy = "needs a table, or tables under lines [[simulate.controller]], with begin"
         raise SimulationError(f"simulate.controller: value {value!r}: {remedy}")
     pairs = []
-    for number, table in enumerate(value):
-        where = f"simulate.controller[{number}]"
+    for index, table in enumerate(value):
+        where = f"simulate.controller[{index}]"
         if not isinstance(table, Mapping) or "begin" not in table:
             raise SimulationError(f"{where}: value {table!r}: needs a table with begin (s)")
         law = {name: value for name, value in table.items() if name != "begin"}
-        pairs.append((finite(f"{where}.begin", table["begin"]), _law(model, where, law, reference)))
+        begin = number(f"{where}.begin", table["begin"], SimulationError)
+        pairs.append((begin, _law(model, where, law, reference)))
     return Phases(tuple(pairs))
 
 
 def _law(model: Model, where: str, table: Mapping, reference: Any) -> Controller:
     """The controller of a table, by its kind."""
-    kind: Any = table.get("kind")
-    known(f"{where}.kind", kind, LAWS, SimulationError)
+    kind = one_of(f"{where}.kind", table.get("kind"), LAWS, SimulationError)
     table = _checked(where, table, ("kind", *LAWS[kind]))
     values = {name: value for name, value in table.items() if name != "kind"}
     if kind == "none":
@@ -240,7 +242,8 @@ def _pose(table: Mapping) -> np.ndarray:
     from scipy.spatial.transform import Rotation
 
     height, pitch, roll, yaw = (
-        finite(f"simulate.start.{name}", table.get(name, 0.0)) for name in ("height", *ANGLES)
+        number(f"simulate.start.{name}", table.get(name, 0.0), SimulationError)
+        for name in ("height", *ANGLES)
     )
     rotation = Rotation.from_euler("ZXY", [yaw, pitch, roll])
     return np.array([0, 0, height, *np.roll(rotation.as_quat(), 1)])
@@ -249,14 +252,14 @@ def _pose(table: Mapping) -> np.ndarray:
 def _tail(model: Model, table: Mapping, reference: Any) -> np.ndarray:
     """Tail coordinates: of the bends given, else of the reference at t = 0, else straight."""
     if "bends" in table:
-        bends = real_array("simulate.start.bends", table["bends"], error=SimulationError)
+        bends = finite_array("simulate.start.bends", table["bends"], SimulationError)
         return shared_among_links(model, bends[None])[0]
     curve = getattr(reference, "curve", None)
-    return np.zeros(Layout(model.segments).nt) if curve is None else curve.at(0.0)[0]
+    return np.zeros(model.layout.nt) if curve is None else curve.at(0.0)[0]
 
 
 def _three(name: str, value: Any) -> np.ndarray:
-    array = real_array(name, value, error=SimulationError)
-    if array.shape != (3,) or not np.isfinite(array).all():
-        raise SimulationError(f"{name}: value {value!r}: needs three finite numbers")
+    array = finite_array(name, value, SimulationError)
+    if array.shape != (3,):
+        raise refusal(name, value, "three numbers", SimulationError)
     return array

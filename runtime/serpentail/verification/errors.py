@@ -6,9 +6,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..model.layout import OMEGA, TAIL_V, VELOCITY, Layout
+from ..model.layout import OMEGA, TAIL_V, VELOCITY
 from ..model.model import Model
-from .states import State, outputs, total_mass
+from ..model.parameters import total_mass
+from .states import State, outputs
 
 BLOCKS = (VELOCITY, OMEGA, TAIL_V)  # of forces and accelerations: B's translation, rotation, tail
 NEGLIGIBLE = 1e-6  # a block this much smaller than the largest is scaled by the largest
@@ -57,7 +58,7 @@ def cancelling_size(model: Model, output: str, state: State) -> float:
     speed, weights = (float(np.linalg.norm(x[VELOCITY])) for x in (state.v, state.multiplier))
     load = float(np.linalg.norm(state.v_dot[VELOCITY])) + model.parameters["gravity"]
     sizes = {"kinetic_dq": speed**2, "qq": load * weights, "aq": weights}
-    return total_mass(model) * sizes.get(output, 0.0)
+    return total_mass(model.parameters) * sizes.get(output, 0.0)
 
 
 def same_bits(model: Model, names: Iterable[str], state: State, other: State) -> dict[str, float]:
@@ -121,7 +122,7 @@ def sensitivity(model: Model, q: np.ndarray) -> float:
         return condition(model.mass_matrix(q))
     if not model.kernels.keys() & {"forward_dynamics", "forward_dynamics_external"}:
         return 1.0
-    tail = Layout(model.segments).nt
+    tail = model.layout.nt
     tau = np.eye(tail + 1, tail, -1)  # none, then each torque alone
     load = None if "forward_dynamics" in model.kernels else model.external_force()
     v_dot = model.forward_dynamics(q, np.zeros(model.nv), tau, load)
@@ -142,7 +143,9 @@ def difference(
     if output == "potential":
         mount = np.linalg.norm(model.parameters["tail_mount"])
         height = abs(q[2]) + model.parameters["tail_length"] + mount
-        return relative(x, reference, total_mass(model) * model.parameters["gravity"] * height)
+        return relative(
+            x, reference, total_mass(model.parameters) * model.parameters["gravity"] * height
+        )
     return relative(x, reference)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from ..attitude import product, rotation_matrix
 from ..model.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TORSO_NV, VELOCITY
 from ..model.model import Model
+from ..model.parameters import total_mass
 from .errors import (
     block_error,
     difference,
@@ -21,7 +22,7 @@ from .errors import (
     worst,
 )
 from .law import VALUE_LIMIT, Errors, Law, fastest, moved, registry, slope
-from .states import State, at_origin, outputs, state_functions, total_mass
+from .states import State, at_origin, outputs, state_functions
 
 WORLD = ("mass_matrix_world", "bias_force_world")
 # what position and velocity of B enter
@@ -62,7 +63,7 @@ def pose_in_the_world_turns_all_alike(model: Model, s: State) -> Errors:
 
 def turned_outputs(model: Model, results: dict, X: np.ndarray, shift: np.ndarray) -> dict:
     """Return what outputs become in a world turned by X's first block and shifted."""
-    Z, weight = X[VELOCITY, VELOCITY], total_mass(model) * model.parameters["gravity"]
+    Z, weight = X[VELOCITY, VELOCITY], total_mass(model.parameters) * model.parameters["gravity"]
     turn = {
         "potential": lambda V: V + weight * shift[2],
         **dict.fromkeys(("points", "positions"), lambda p: p @ Z.T + shift),

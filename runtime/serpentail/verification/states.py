@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 
 from ..errors import ModelError
-from ..model.layout import OMEGA, POSITION, QUATERNION, TAIL_V, Layout
+from ..model.layout import OMEGA, POSITION, QUATERNION, TAIL_V
 from ..model.model import Model
+from ..model.parameters import total_mass
 
 KINDS = ("random", "straight", "folded")
 
@@ -53,7 +54,7 @@ def states(model: Model, count: int = 4, seed: int = 1) -> Iterator[State]:
 
 def random_arrays(model: Model, rng: np.random.Generator, kind: str, k: int) -> list[np.ndarray]:
     """Return the numbers of state k of its kind, in the order of a State's."""
-    tail, length = Layout(model.segments).nt, model.parameters["tail_length"]
+    tail, length = model.layout.nt, model.parameters["tail_length"]
 
     # where it is, and how it moves
     place, attitude = rng.uniform(-1, 1, 3), direction(rng, 4)
@@ -64,16 +65,11 @@ def random_arrays(model: Model, rng: np.random.Generator, kind: str, k: int) -> 
     # torques for 10 rad/s^2, loads for 1 m/s^2
     torque = 10 * model.parameters["tail_mass"] * length**2
     tau = rng.uniform(-torque, torque, tail)
-    f_ext = total_mass(model) * rng.uniform(-1, 1, len(model.external_force()))
+    f_ext = total_mass(model.parameters) * rng.uniform(-1, 1, len(model.external_force()))
     f_ext[OMEGA] *= length
 
     # directions of derivatives
     return [q, v, v_dot, tau, f_ext, *(rng.uniform(-1, 1, len(x)) for x in (v, v, tau, v))]
-
-
-def total_mass(model: Model) -> float:
-    """Return the mass of torso and tail (kg)."""
-    return model.parameters["torso_mass"] + model.parameters["tail_mass"]
 
 
 def direction(rng: np.random.Generator, size: int) -> np.ndarray:
@@ -88,7 +84,7 @@ def tail_angles(model: Model, rng: np.random.Generator, kind: str, k: int) -> np
     Folded joints are, in turn, within 0.01 rad of +-pi and within two turns.  The bends of a
     continuum keep within its range, also where a law moves on from the state.
     """
-    size = Layout(model.segments).nt
+    size = model.layout.nt
     reach = model.manifest["scene"].get("bend_range", np.inf)
     if kind == "straight":
         return np.zeros(size)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...attitude import from_angles, pitch_roll_yaw, product, sign_continuous
+from ...attitude import from_angles, pitch_roll_yaw, product, quaternion_rate, sign_continuous
 from ...errors import PlanningError
 from ...model.layout import QUATERNION
 
@@ -50,7 +50,7 @@ class Attitude:
 
         w = [omega[k] for k in range(3)]
         if self.kind == "quaternion":
-            return ca.vertcat(*(entry / 2 for entry in product([c[k] for k in range(4)], [0, *w])))
+            return ca.vertcat(*quaternion_rate([c[k] for k in range(4)], w))
         # Ry(phi_y) omega is in the axes before the roll: (phi_x_dot, phi_y_dot +
         # sin(phi_x) phi_z_dot, cos(phi_x) ...)
         cy, sy = ca.cos(c[1]), ca.sin(c[1])

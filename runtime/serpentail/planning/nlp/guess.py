@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...attitude import rotation_matrix
-from ...model.layout import OMEGA, POSITION, TAIL_Q, TAIL_V, VELOCITY, Layout
+from ...model.layout import OMEGA, POSITION, TAIL_Q, TAIL_V, VELOCITY
 from ...model.model import Model
+from ...model.parameters import total_mass
 from ...motion.trajectory import Trajectory
 from ...simulation.controllers import TorqueTable
 from ...simulation.simulate import simulate
@@ -43,7 +44,7 @@ def passive(
 
 def pushes(random: np.random.Generator, size: float, model: Model) -> np.ndarray:
     """Return torques (33, 2m) of a few slow waves, of about a size (N m)."""
-    tail = Layout(model.segments).nt
+    tail = model.layout.nt
     s = np.linspace(0, 1, PUSH_SAMPLES)[:, None, None]
     phases = random.uniform(0, 2 * np.pi, (PUSH_WAVES, tail))
     waves = np.sin(np.pi * s * np.arange(1, PUSH_WAVES + 1)[:, None] + phases)
@@ -54,7 +55,7 @@ def of_trajectory(
     model: Model, flight: Trajectory, coordinates: Attitude, damping: float = 0.0
 ) -> Motion:
     """Return the motion of a trajectory; what damping gives is taken off its torques."""
-    mass = model.parameters["torso_mass"] + model.parameters["tail_mass"]
+    mass = total_mass(model.parameters)
     R, velocity, tail_rate = (
         rotation_matrix(flight.attitude),
         flight.v[:, VELOCITY],

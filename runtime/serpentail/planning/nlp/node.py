@@ -14,6 +14,7 @@ import numpy as np
 from ...errors import ModelError
 from ...model.layout import OMEGA, TAIL_V, VELOCITY
 from ...model.model import Model
+from ...model.parameters import total_mass
 from .coordinates import IDENTITY_POSE, Attitude, rotated
 from .node_calls import NodeCall, NodeDerivatives, linear_call
 
@@ -227,7 +228,7 @@ def _momentum(model: Model, point: SimpleNamespace, h: "ca.SX", momentum: "ca.SX
     """
     import casadi as ca
 
-    mass = model.parameters["torso_mass"] + model.parameters["tail_mass"]
+    mass = total_mass(model.parameters)
     inertia = float(np.mean(model.parameters["torso_inertia"]))
     angular = momentum[OMEGA] - rotated(point.quaternion, h, -1)
     return ca.vertcat(

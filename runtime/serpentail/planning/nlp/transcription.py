@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...model.layout import TAIL_Q, Layout
+from ...model.layout import TAIL_Q
 from ...model.model import Model
 from ..problem import PlanningProblem
 from .cache import memoised
@@ -98,7 +98,7 @@ def transcription_of(
     """Return the program of a problem on a mesh, made once for all starts, durations and limits."""
     coordinates = attitude(problem.attitude)
     variables = variables_of(
-        problem.formulation, coordinates, Layout(model.segments).nt, torque_unit(problem)
+        problem.formulation, coordinates, model.layout.nt, torque_unit(problem)
     )
 
     # what a node's function depends on, and what the whole program does
