@@ -82,7 +82,7 @@ class Model(Functions):
         self,
         folder: Path,
         manifest: dict,
-        parameters: Mapping[str, Value],
+        parameters: Mapping[str, Any],
         library: ctypes.CDLL | None,
         profile: str = "fast",
         batch_library: BatchLibrary | None = None,
