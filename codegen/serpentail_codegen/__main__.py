@@ -1,16 +1,15 @@
-"""Command line of the generator: a scene file, or a tail and its sizes, go in; a generated folder
-comes out.
-"""
+"""Generate a model from a scene file, or from a tail and its sizes."""
 
 import argparse
 import gc
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 from .scene.parse import load_scene, parse_scene, scene_for, scene_to_dict
 from .scene.problems import SceneError
-from .scene.scene import ALL, KINDS
+from .scene.scene import ALL, KINDS, Scene
 
 
 def parser() -> argparse.ArgumentParser:
@@ -36,9 +35,9 @@ def parser() -> argparse.ArgumentParser:
     return p
 
 
-def scene_of(arguments: argparse.Namespace):
+def scene_of(arguments: argparse.Namespace) -> Scene:
     """Return the scene that the arguments describe."""
-    chosen = {
+    chosen: dict[str, Any] = {
         name: getattr(arguments, name)
         for name in ("real", "emission", "profile")
         if getattr(arguments, name)

@@ -1,46 +1,43 @@
-"""The stages in order: a scene goes in, its generated folder comes out."""
+"""The stages of a generation in order, from a scene to its folder."""
 
+from collections.abc import Collection
 from pathlib import Path
 
 from . import __version__
-from .functions.catalogue import CATALOGUE, SYMBOLIC
+from .functions.catalogue import CATALOGUE
 from .functions.tail import Tail
 from .scene.scene import Scene
-from .targets.c.batch import batch_entry, batch_file, batches
-from .targets.c.batch_rollout import flights, flights_entry, flights_file
-from .targets.c.form import emit
-from .targets.c.model import c_context, c_files
-from .targets.c.package import package_files
-from .targets.casadi.module import casadi_module
-from .targets.manifest import manifest
+from .targets.c.target import C
+from .targets.casadi.target import CASADI
+from .targets.manifest import FORMAT, manifest
+from .targets.target import SEAL, Emission
 from .targets.write import digest, write_folder
+
+TARGETS = {target.name: target for target in (C, CASADI)}
 
 
 def generate(scene: Scene, output: Path) -> list[str]:
-    """Derive, lower, emit and write what the scene asks for into ``output/<scene>``; return the
-    changed files.
-    """
+    """Derive, emit and write what a scene asks for to ``output/<scene>``; return what changed."""
     tail = tail_of(scene)
-    wanted = [CATALOGUE[name].of(tail) for name in needed(scene.functions, bool(scene.contacts))]
-    emitted = [emit(scene, tail, function) for function in wanted]
-    context = c_context(scene, tail, emitted, __version__)
-    context["content_hash"] = digest("".join(c_files(scene, context).values()))[:16]
-    batched = batches(scene, tail, emitted)
-    together = flights(scene, tail, emitted)
-    files = (
-        c_files(scene, context) | batch_file(scene, tail, batched, context) | package_files(context)
-    )
-    files |= flights_file(scene, together, context)
-    module = casadi_module(
-        scene, tail, [f for f in wanted if f.name in SYMBOLIC], __version__, context["content_hash"]
-    )
-    files[f"{scene.name}_casadi.py"] = module
-    described = (
-        manifest(scene, context, emitted)
-        | {"batch": batch_entry(scene, batched)}
-        | flights_entry(together)
-    )
+    functions = [CATALOGUE[name].of(tail) for name in needed(scene.functions, bool(scene.contacts))]
+    emissions = [TARGETS[name].emit(scene, tail, functions, __version__) for name in scene.targets]
+
+    # the hash is of texts without it, and then put into them
+    content_hash = hash_of(emissions[0])
+    files = {
+        path: text.replace(SEAL, content_hash)
+        for emission in emissions
+        for path, text in emission.files.items()
+    }
+    head = {"format": FORMAT, "generator": __version__, "content_hash": content_hash}
+    described = head | manifest(scene, tail, functions, emissions)
     return write_folder(output / scene.name, files, described)
+
+
+def hash_of(emission: Emission) -> str:
+    """Return the hash by which a model is known: of what the first of its targets derived."""
+    texts = "".join(emission.files[path] for path in emission.derivation)
+    return digest(texts.replace(SEAL, ""))[:16]
 
 
 def tail_of(scene: Scene) -> Tail:
@@ -52,12 +49,10 @@ def tail_of(scene: Scene) -> Tail:
     )
 
 
-def needed(names: tuple[str, ...], contacts: bool = False) -> list[str]:
-    """Return the functions to derive: those asked for, those that a rollout calls, the parts of an
-    implicit solve.
-    """
+def needed(names: Collection[str], contacts: bool = False) -> list[str]:
+    """Return the functions to derive: those asked for, and what rollouts and solves call."""
     flight = ("forward_dynamics", "tracked_dynamics") if "pfl" in names else ("forward_dynamics",)
     called = ("contact_points", "contact_dynamics") if contacts else flight
     parts = {"rollout": called, "implicit": ("implicit_factor", "implicit_solve")}
-    names = {*names, *(part for name in names for part in parts.get(name, ()))}
-    return [name for name in CATALOGUE if name in names]
+    wanted = {*names, *(part for name in names for part in parts.get(name, ()))}
+    return [name for name in CATALOGUE if name in wanted]

@@ -15,7 +15,7 @@ import pytest
 
 import serpentail as st
 from serpentail.model.casadi import DERIVATIVES
-from serpentail_codegen.targets.c.casadi_external import DYNAMICS
+from serpentail_codegen.targets.c.casadi_external.dynamics import DYNAMICS
 from tests.casadi.test_casadi_target import Model
 from tests.references.parameters import random_states
 from tests.support import collocation

@@ -45,5 +45,5 @@ def test_c_steps_read_no_rows_that_lie_apart():
     b = Builder("apart", "A stride.")
     x, u = b.wide("x", 4, 3), b.wide("u", 2, 3)
     b.apply(SWAP, {"x": x.part(0, 2, 2)}, x=u[0])
-    with pytest.raises(ValueError, match="swap reads rows from places apart"):
+    with pytest.raises(ValueError, match="swap reads wide scalars that lie apart"):
         in_loops(b.finish(), "double", "rat")

@@ -363,6 +363,20 @@ def test_polar_coordinates_are_refused_with_the_reason(refuse):
     assert remedy == 'needs "joint"; polar angles are singular at theta = 0, convert states'
 
 
+@pytest.mark.parametrize("value", ["[]", '"c"', '["c", "c"]', '["rust"]', "[1]", "true"])
+def test_targets_are_different_names(refuse, value):
+    (problem,) = refuse(f"targets = {value}\n" + VALID).values()
+    assert problem.remedy == (
+        'needs an array of different names out of "c" and "casadi", at least one, such as ["c"]'
+    )
+
+
+def test_targets_have_an_order_and_are_all_by_default(read):
+    assert read(VALID).targets == ("c", "casadi")
+    scene = read('targets = ["casadi", "c"]\n' + VALID)
+    assert scene.targets == ("c", "casadi") and scene_to_dict(scene)["targets"] == ["c", "casadi"]
+
+
 @pytest.mark.parametrize("value", ["1", "0", '"true"', "[]"])
 def test_baked_is_true_or_false(refuse, value):
     assert set(refuse(f"baked = {value}\n" + VALID)) == {"baked"}

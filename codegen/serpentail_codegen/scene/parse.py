@@ -28,6 +28,7 @@ from .scene import (
     KEYS,
     MOST_LINKS,
     ONLY,
+    TARGETS,
     TOUCHING,
     Scene,
 )
@@ -90,6 +91,7 @@ def parse_scene(table: Mapping[str, Any], name: str) -> Scene:
         problems += single_problems(values["parameters"])
     if problems:
         raise SceneError(problems)
+    values["targets"] = tuple(target for target in TARGETS if target in values["targets"])
     values["functions"] = tuple(function for function in ALL if function in values["functions"])
     return Scene(**{field.name: values[field.name] for field in fields(Scene)})
 
@@ -121,6 +123,6 @@ def scene_to_dict(scene: Scene) -> dict[str, Any]:
         for field in fields(Scene)
         if field.name not in foreign
     }
-    table |= {key: list(table[key]) for key in ("functions", "contacts") if key in table}
+    table |= {key: list(table[key]) for key in ("functions", "contacts", "targets") if key in table}
     table["parameters"] = {name: plain(value) for name, value in given.items()}
     return table

@@ -40,6 +40,7 @@ TOUCHING = ("contact_points", "contact_dynamics")  # of scenes with contacts
 ALL = (*FUNCTIONS, *ON_DEMAND, *TOUCHING)
 GROUPS = ("feet", "tail", "torso")  # of contact points, in their order
 FRICTION = ("cone", "box", "smooth", "paper")
+TARGETS = ("c", "casadi")  # languages to emit, in their order
 C_HEADERS = frozenset(
     [
         "assert",
@@ -101,6 +102,14 @@ CONTACTS = Rule(
     'an array of different names out of "feet", "tail" and "torso", such as ["feet"]',
     lambda x: isinstance(x, list | tuple) and all(n in GROUPS and x.count(n) == 1 for n in x),
 )
+TARGET_NAMES = Rule(
+    'an array of different names out of "c" and "casadi", at least one, such as ["c"]',
+    lambda x: (
+        isinstance(x, list | tuple)
+        and len(x) > 0
+        and all(n in TARGETS and x.count(n) == 1 for n in x)
+    ),
+)
 
 
 def _table(name: str) -> Rule:
@@ -133,6 +142,7 @@ class Scene:
         str, ...
     ] = ()  # groups of points that can touch the ground, in the order of GROUPS
     friction: str = "cone"
+    targets: tuple[str, ...] = TARGETS  # in that order
 
 
 # The keys of a scene file: default (None: required) and rule; ANY where a function of its own
@@ -154,6 +164,7 @@ KEYS: dict[str, tuple[Any, Rule]] = {
     "profile": (Scene.profile, _one_of(["fast", "reproducible"])),
     "contacts": ((), CONTACTS),
     "friction": (Scene.friction, _one_of(FRICTION)),
+    "targets": (Scene.targets, TARGET_NAMES),
     "plan": (
         {},
         _table("plan"),

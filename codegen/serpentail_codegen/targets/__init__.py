@@ -1,1 +1,1 @@
-"""Output languages: programs go in, the text of one language comes out."""
+"""Targets: the languages that programs are printed in, each a package of its own."""

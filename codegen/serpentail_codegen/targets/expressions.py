@@ -1,6 +1,4 @@
-"""Text that all targets share: nodes of a tape and a dialect go in, one definition a line comes
-out.
-"""
+"""Prints the scalar expressions of steps: one definition a line, in the dialect of a language."""
 
 from collections import Counter, defaultdict
 from dataclasses import dataclass
@@ -19,88 +17,93 @@ def index_text(index: Index) -> str:
     return " + ".join([*terms, *([str(index.offset)] if index.offset or not terms else [])])
 
 
+def literal(value, real: str) -> str:
+    """Print a number by its shortest exact decimal; 0 where a single-precision real has none."""
+    single = real == "float"
+    tiny = single and abs(value) < LEAST_SINGLE
+    return repr(0.0 if tiny else float(value)) + ("f" if single else "")
+
+
 @dataclass(frozen=True)
 class Dialect:
-    """How a language defines a name, ends a real constant and calls functions."""
+    """How a language defines a name, prints a number and calls functions."""
 
     definition: str
-    suffix: str
     functions: dict[str, str]
+    real: str = "double"
     select: str = "{c} > {zero} ? {a} : {b}"
     sincos: str = ""  # defines sine and cosine of one argument at once; empty: by two functions
-    sincos_row: str = ""  # the same of a row
-    row: str = ""  # defines a row of lanes
+    wide_sincos: str = ""  # the same of a wide argument
+    wide: str = ""  # defines a wide scalar: one number in each lane
     load: str = ""  # the lanes at an address that are in turn
 
     def literal(self, value) -> str:
-        """Print a number by its shortest exact decimal; what a single-precision real cannot hold is
-        zero.
-        """
-        tiny = self.suffix and abs(value) < LEAST_SINGLE
-        return repr(0.0 if tiny else float(value)) + self.suffix
+        """Print a number of the language's real type."""
+        return literal(value, self.real)
 
 
-EARLY, LATE = "early", "late"  # narrow nodes; LATE ones need a lane of some row
+EARLY, LATE = "early", "late"  # parts of narrow scalars; LATE ones need a lane of some wide one
+Part = str | int  # one of these, or the lanes of a part of wide scalars
 
 
 class Scalars:
-    """Prints the nodes that the results need; a product or sign that is used once goes into its
-    use.
+    """Prints the nodes that the results need, part by part.
 
-    ``rows`` are the lanes of the inputs that are rows, by number.  Nodes are printed part by part:
-    narrow ones first, then those of so many lanes, then narrow ones that need a lane.
+    ``wide`` are the lanes of the wide inputs, by number.  Narrow nodes come first, then those of
+    so many lanes, then narrow ones that need a lane.  A product or sign that is used once goes
+    into its use.
     """
 
-    def __init__(self, nodes, results, names, dialect: Dialect, rows: dict[int, int] | None = None):
+    def __init__(self, nodes, results, names, dialect: Dialect, wide: dict[int, int] | None = None):
         self.nodes, self.names, self.dialect = nodes, names, dialect
         self.live = live_nodes(nodes, results)
         self.uses = Counter(a for n in self.live for a in operands(nodes[n]))
         self.uses.update(results)
         self.text: dict[object, str] = {}
-        self.stored: dict[
-            int, int
-        ] = {}  # rows of which a lane is needed: where they are in the workspace
+        self.stored: dict[int, int] = {}  # where the workspace has what a lane is needed of
         self.count = 0
-        self.part, self.lanes = self._parts(rows or {})
+        self.part, self.lanes = self._parts(wide or {})
         self.abroad = {
             a for n in self.live for a in operands(nodes[n]) if self.part[a] != self.part[n]
         }
         self.results = results
 
-    def _parts(self, rows: dict[int, int]) -> tuple[dict, dict]:
-        if not rows and not any(self.nodes[n][0] == "unit" for n in self.live):
+    def _parts(self, wide: dict[int, int]) -> tuple[dict[int, Part], dict[int, int]]:
+        if not wide and not any(self.nodes[n][0] == "unit" for n in self.live):
             return dict.fromkeys(self.live, EARLY), dict.fromkeys(self.live, 0)
-        inputs = defaultdict(int, rows)
-        lanes, part = {}, {}
+        inputs = defaultdict(int, wide)
+        lanes: dict[int, int] = {}
+        part: dict[int, Part] = {}
         for n in sorted(self.live):
             lanes[n] = lanes_of(self.nodes[n], lanes, inputs)
             late = self.nodes[n][0] == "lane" or any(
                 part[a] == LATE for a in operands(self.nodes[n])
             )
             if late and lanes[n]:
-                raise ValueError("a row that needs a lane of another row cannot be printed")
+                raise ValueError("a wide scalar that needs a lane of another cannot be printed")
             part[n] = LATE if late else lanes[n] or EARLY
         return part, lanes
 
-    def lines(self, part=EARLY) -> list[str]:
-        """Return the definitions of a part in evaluation order; ``text`` then tells how to write
-        any node.
-        """
+    def lines(self, part: Part = EARLY) -> list[str]:
+        """Return the definitions of a part in order; ``text`` then tells how to write its nodes."""
         out = []
         for node in scheduled(
             self.nodes, [n for n in self.live if self.part[n] == part], self.results
         ):
             op, *args = self.nodes[node]
+
+            # both functions of an angle at once, where the language has it
             if op in ("sin", "cos") and self.dialect.sincos:
                 out += self._sincos(args[0])
                 self.text[node] = self.text[op, args[0]]
                 continue
+
             text = self._expression(op, args)
             if self._goes_into_its_use(node):
                 self.text[node] = text
             else:
                 self.text[node] = name = self._name()
-                form = self.dialect.row if self.lanes[node] else self.dialect.definition
+                form = self.dialect.wide if self.lanes[node] else self.dialect.definition
                 out.append(form.format(name=name, text=text))
         return out
 
@@ -121,7 +124,7 @@ class Scalars:
         name = self._name()
         names = {"sine": name, "cosine": f"{name}c"}
         self.text["sin", argument], self.text["cos", argument] = names.values()
-        form = self.dialect.sincos_row if self.lanes[argument] else self.dialect.sincos
+        form = self.dialect.wide_sincos if self.lanes[argument] else self.dialect.sincos
         return [form.format(argument=self.text[argument], **names)]
 
     def _expression(self, op: str, args) -> str:
@@ -156,9 +159,10 @@ def called(nodes, inputs=()) -> set[str]:
     """Return the helpers that nodes call, from the lanes of their inputs."""
     if not any(node[0] in ("sin", "cos") for node in nodes):
         return set()
-    lanes, helpers = [], set()
+    lanes: list[int] = []
+    helpers = set()
     for op, *args in nodes:
         lanes.append(lanes_of((op, *args), lanes, inputs))
         if op in ("sin", "cos"):
-            helpers |= {"sincos", "sincos_row"} if lanes[args[0]] else {"sincos"}
+            helpers |= {"sincos", "wide_sincos"} if lanes[args[0]] else {"sincos"}
     return helpers

@@ -1,10 +1,19 @@
-"""The manifest: what was emitted goes in, what a loader needs to know comes out as plain data."""
+"""The manifest: what the loader of a generated folder needs to know, as plain data.
 
-from ..scene.parameters import ANY, BODY_INERTIA, NOT_NEGATIVE, POSITIVE
+The scene and its functions give what holds for every target; each target reports the rest, such as
+the workspace of C functions.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+from ..functions.function import Argument, Function
+from ..functions.tail import Tail
+from ..scene.parameters import ANY, BODY_INERTIA, NOT_NEGATIVE, POSITIVE, Parameter
 from ..scene.parse import scene_to_dict
 from ..scene.resolve import parameters_of
 from ..scene.scene import Scene
-from .c.simulation import layouts
+from .target import Emission
 
 FORMAT = 1
 CHECKS = {
@@ -15,52 +24,29 @@ CHECKS = {
 }
 
 
-def manifest(scene: Scene, context: dict, emitted: list) -> dict:
-    """Return the manifest of a generated folder, without its files."""
-    work = {f["name"]: f["work"] for f in context["works"]}
-    simulation = {}
-    if "has" in context:
-        work |= {"rollout": context["rollout_work"]}
-        simulation = {"simulation": simulation_entry(context)}
-    return {
-        "format": FORMAT,
-        "generator": context["version"],
-        "content_hash": context["content_hash"],
-        "abi_hash": context["abi_hash"],
-        "prefix": context["prefix"],
-        "real": context["real"],
+def manifest(
+    scene: Scene, tail: Tail, functions: Sequence[Function], emissions: Sequence[Emission]
+) -> dict[str, Any]:
+    """Return the manifest of a generated folder, but for its versions, hashes and files."""
+    sizes = ("segments", "links", "total", "nq", "nv", "nt")
+    described = {
+        "prefix": scene.name,
+        "real": scene.real,
         "scene": scene_to_dict(scene),
-        "dimensions": {
-            name: getattr(context["tail"], name)
-            for name in ("segments", "links", "total", "nq", "nv", "nt")
-        },
-        "contacts": [
-            {"group": name, "count": count} for name, count in context["tail"].groups.items()
-        ],
+        "dimensions": {name: getattr(tail, name) for name in sizes},
+        "contacts": [{"group": name, "count": count} for name, count in tail.groups.items()],
         "parameters": [
             parameter_entry(scene, p) for p in parameters_of(scene.kind, scene.contacts)
         ],
-        "functions": {e.function.name: function_entry(e, context["tail"]) for e in emitted},
-        "work": work,
-        **simulation,
+        "functions": {f.name: function_entry(f, tail, emissions) for f in functions},
     }
+    for emission in emissions:
+        described |= emission.entries
+    return described
 
 
-def simulation_entry(context: dict) -> dict:
-    """Return what a caller must know of simulations: methods by their numbers, the members of
-    records.
-    """
-    has = context["has"]
-    methods = {
-        name: number for number, name in enumerate(context["methods"]) if name in has.methods
-    }
-    return {"methods": methods, "records": layouts(has)}
-
-
-def parameter_entry(scene: Scene, parameter) -> dict:
-    """Return what a caller must know of a parameter; its default is the scene's value, null where
-    it is computed.
-    """
+def parameter_entry(scene: Scene, parameter: Parameter) -> dict[str, Any]:
+    """Return what a caller must know of a parameter; the default is null where it is computed."""
     value = scene.parameters.get(parameter.name)
     return {
         "name": parameter.name,
@@ -73,19 +59,19 @@ def parameter_entry(scene: Scene, parameter) -> dict:
     }
 
 
-def function_entry(emitted, tail) -> dict:
+def function_entry(function: Function, tail: Tail, emissions: Sequence[Emission]) -> dict[str, Any]:
     """Return what a caller must know of a function."""
-    function = emitted.function
-
-    def entries(arguments):
-        return [
-            {"name": a.name, "shape": list(a.shape(tail)), "meaning": a.meaning} for a in arguments
-        ]
-
-    return {
+    entry = {
         "doc": function.doc,
-        "inputs": entries(function.inputs),
-        "outputs": entries(function.outputs),
-        "emission": emitted.emission,
-        "operations": emitted.body.operations,
+        "inputs": [argument_entry(a, tail) for a in function.inputs],
+        "outputs": [argument_entry(a, tail) for a in function.outputs],
     }
+    for emission in emissions:
+        entry |= emission.functions.get(function.name, {})
+    return entry
+
+
+def argument_entry(argument: Argument, tail: Tail) -> dict[str, Any]:
+    """Return what a caller must know of an argument."""
+    shape = list(argument.shape(tail))
+    return {"name": argument.name, "shape": shape, "meaning": argument.meaning}

@@ -1,16 +1,16 @@
-"""Jinja2, set up once for each target: renders the templates in the target's own folder."""
+"""Renders templates by Jinja2; a target keeps its own in the folder `templates` of its package."""
 
 from functools import cache
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import Environment, PackageLoader, StrictUndefined, pass_context
+
+from .expressions import literal
 
 
 @cache
 def environment(target: str) -> Environment:
-    """Return the environment of a target's templates; an undefined name in a template is an
-    error.
-    """
-    return Environment(
+    """Return the environment of a target's templates; an undefined name in one is an error."""
+    made = Environment(
         loader=PackageLoader(f"serpentail_codegen.targets.{target}"),
         undefined=StrictUndefined,
         trim_blocks=True,
@@ -18,6 +18,14 @@ def environment(target: str) -> Environment:
         keep_trailing_newline=True,
         autoescape=False,
     )
+    made.filters["number"] = number
+    return made
+
+
+@pass_context
+def number(context, value) -> str:
+    """Print a number as a literal of the scene's real type: ``{{ 0.5 | number }}``."""
+    return literal(value, context["real"])
 
 
 def render(target: str, template: str, data: dict) -> str:

@@ -1,6 +1,4 @@
-"""Files: their texts go in, files and a manifest come out; a file whose text did not change is not
-touched.
-"""
+"""Writes a generated folder: only files whose text changed, the manifest with its hashes last."""
 
 import hashlib
 import json
@@ -14,9 +12,7 @@ def digest(text: str) -> str:
 
 
 def signed(manifest: dict) -> dict:
-    """Return a manifest with the SHA-256 of all its other entries, so that a loader sees a change
-    by hand.
-    """
+    """Return a manifest with the SHA-256 of its other entries, which shows a change by hand."""
     entries = {key: value for key, value in manifest.items() if key != "manifest_hash"}
     return entries | {"manifest_hash": digest(json.dumps(entries, sort_keys=True))}
 
@@ -33,9 +29,7 @@ def write_if_changed(path: Path, text: str) -> bool:
 
 
 def write_folder(folder: Path, files: dict[str, str], manifest: dict) -> list[str]:
-    """Write all files, the manifest last, and drop what an earlier generation left; return the
-    changed names.
-    """
+    """Write all files, the manifest last; drop earlier ones; return the changed names."""
     manifest = signed(
         manifest | {"files": {name: digest(text) for name, text in sorted(files.items())}}
     )

@@ -1,6 +1,8 @@
 """CasADi functions of a model: built from its generated module, or wrapping its compiled C."""
 
 import importlib.util
+from functools import cached_property
+from types import ModuleType
 
 import casadi
 
@@ -27,7 +29,21 @@ class CasadiFunctions:
 
     def __init__(self, model):
         self._model = model
-        self._module = _module(model)
+
+    @cached_property
+    def _module(self) -> ModuleType:
+        """The generated module; ModelError where the scene did not ask for it."""
+        if not self._has_module:
+            raise ModelError(
+                f'{self._model.name} was generated without CasADi functions: add "casadi" to '
+                "`targets` of the scene, then generate it again, or take compiled ones, "
+                "external(name)"
+            )
+        return _imported(self._model)
+
+    @property
+    def _has_module(self) -> bool:
+        return "casadi" in self._model.manifest["scene"]["targets"]
 
     def __getattr__(self, name: str) -> casadi.Function:
         if name.startswith("_"):
@@ -42,7 +58,8 @@ class CasadiFunctions:
         return function
 
     def __dir__(self) -> list[str]:
-        return [*self._module.SIGNATURES, "symbolic", "external", "parameter_vector"]
+        symbolic = self._module.SIGNATURES if self._has_module else ()
+        return [*symbolic, "symbolic", "external", "parameter_vector"]
 
     @property
     def parameter_vector(self) -> casadi.DM:
@@ -114,7 +131,7 @@ class CasadiFunctions:
         return name
 
 
-def _module(model):
+def _imported(model) -> ModuleType:
     name = f"{model.name}_casadi"
     spec = importlib.util.spec_from_file_location(name, model.folder / f"{name}.py")
     module = importlib.util.module_from_spec(spec)

@@ -11,18 +11,16 @@ from ..errors import ModelError
 
 FORMAT = 1
 KEYS = [
-    "abi_hash",
     "prefix",
     "real",
     "scene",
     "dimensions",
     "parameters",
     "functions",
-    "work",
-    "batch",
     "files",
     "manifest_hash",
 ]
+C_KEYS = ["abi_hash", "work", "batch"]  # of models with C
 
 
 def read_manifest(folder: Path) -> dict:
@@ -59,7 +57,8 @@ def _check(folder: Path, manifest: dict) -> None:
             f"{folder} is stale: made by {made}, this is format {FORMAT}, {__version__}: "
             f"{remedy(folder)}"
         )
-    absent = [key for key in KEYS if key not in manifest]
+    needed = KEYS + (C_KEYS if "c" in manifest["scene"]["targets"] else [])
+    absent = [key for key in needed if key not in manifest]
     if absent:
         raise ValueError(f"it lacks {', '.join(absent)}")
     entries = {key: value for key, value in manifest.items() if key != "manifest_hash"}

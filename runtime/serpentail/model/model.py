@@ -46,8 +46,17 @@ def load(
     profile = manifest["scene"]["profile"] if profile is None else profile
     if not isinstance(compiled, bool | np.bool_):
         raise ModelError(f"compiled: value {compiled!r:.60}: needs True or False")
+    if compiled and "c" not in manifest["scene"]["targets"]:
+        raise _without_c(manifest)
     library = open_library(folder, manifest, profile) if compiled else None
     return Model(folder, manifest, values, library, profile)
+
+
+def _without_c(manifest: Mapping) -> ModelError:
+    return ModelError(
+        f"{manifest['prefix']} was generated without C: load it with compiled=False for "
+        'model.casadi, or add "c" to `targets` of the scene, then generate it again'
+    )
 
 
 class Model:
@@ -86,7 +95,7 @@ class Model:
         dtype = np.float32 if manifest["real"] == "float" else np.float64
         self.parameter_vector = np.array(flat(manifest, parameters), dtype)
         made = manifest["functions"] if library else ()
-        self.many = many or SideBySide(folder, manifest, profile)
+        self.many = many or (SideBySide(folder, manifest, profile) if library else None)
         self.kernels = {
             name: Kernel(library, self.many, manifest, name, self.parameter_vector) for name in made
         }
@@ -122,6 +131,11 @@ class Model:
     def __reduce__(self):
         return load, (self.folder.absolute(), self._given(), self.profile, self.library is not None)
 
+    @property
+    def generated(self) -> tuple[str, ...]:
+        """Names of all functions that were generated, the rollout of simulations included."""
+        return tuple(self.manifest["functions"] | self.manifest.get("work", {}))
+
     def kernel(self, name: str) -> Kernel:
         """Return a compiled function; ModelError where the scene did not ask for it."""
         found = self.kernels.get(name)
@@ -136,7 +150,9 @@ class Model:
 
     def without(self, *names: str) -> ModelError:
         """Return the error that functions are not there."""
-        has = ", ".join(self.manifest["work"])
+        if set(names) & set(self.manifest["scene"]["functions"]):  # what only C can do
+            return _without_c(self.manifest)
+        has = ", ".join(self.generated)
         return ModelError(
             f"{self.name} was generated without {', '.join(map(repr, names))} (it has {has}): add "
             "it to `functions` of "

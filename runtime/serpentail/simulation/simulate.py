@@ -72,9 +72,7 @@ def simulate(
     unless it is a
     SimulationError, ends all.
     """
-    missing = [
-        name for name in ("rollout", "energy", "momentum") if name not in model.manifest["work"]
-    ]
+    missing = [name for name in ("rollout", "energy", "momentum") if name not in model.generated]
     if missing:
         raise model.without(*missing)
     start = Start.checked(model, (q0, v0), t_span, settings.pop("output_step", None))

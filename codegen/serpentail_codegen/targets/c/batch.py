@@ -1,8 +1,8 @@
-"""The C of batches: emitted functions of a scene go in, the text of the file that evaluates many
-states comes out.
-"""
+"""The C of batches: functions that a host evaluates for many states, a lane for each state."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from ...functions.function import Function, assemble
 from ...functions.tail import Tail
@@ -11,21 +11,20 @@ from ...ir.program import Program
 from ...passes.batch import batched, unrolled_step
 from ...scene.scene import Scene
 from ..templating import render
-from .form import Emitted, baked_values
+from .form import PrintedFunction, baked_values
 from .loops import in_loops
 from .routine import CFunction
 from .views import ArgumentView, callee_view, step_views
 
 STATES = {"double": 8, "float": 16}  # side by side: lanes of the widest vector
-STRAIGHT_UP_TO = (
-    10000  # nodes: beyond, loops are hardly slower, and compile in a quarter of the time
-)
+# nodes: beyond, loops are hardly slower, and compile in a quarter of the time
+STRAIGHT_UP_TO = 10000
 BATCHED = ("mass_matrix", "bias_force", "inverse_dynamics", "forward_dynamics")
 
 
 @dataclass(frozen=True)
 class Batch:
-    """One function over rows of states: its program, and the C of that."""
+    """One function over lanes of states: its program, and the C of that."""
 
     function: Function
     states: int
@@ -33,70 +32,68 @@ class Batch:
     body: CFunction
 
     @property
-    def own(self) -> int:
-        """Reals of workspace for the rows of its arguments."""
+    def arguments_work(self) -> int:
+        """Reals of workspace for its arguments."""
         arguments = (*self.program.of_role("input"), *self.program.of_role("output"))
         return self.states * sum(a.length for a in arguments)
 
     @property
     def work(self) -> int:
         """Reals of workspace in all."""
-        return self.own + self.body.work
+        return self.arguments_work + self.body.work
 
 
-def batches(scene: Scene, tail: Tail, emitted: list[Emitted]) -> list[Batch]:
+def batches(scene: Scene, tail: Tail, printed: Sequence[PrintedFunction]) -> list[Batch]:
     """Return the functions that a host evaluates for many states."""
-    return [_batch(scene, tail, e.function) for e in emitted if e.function.name in BATCHED]
+    return [_batch(scene, tail, f.function) for f in printed if f.function.name in BATCHED]
 
 
 def _batch(scene: Scene, tail: Tail, function: Function) -> Batch:
     fixed, single, states = baked_values(scene), assemble(function, tail), STATES[scene.real]
     single = unrolled_step(single, fixed) if straight(scene, single) else single
-    rows = batched(single, states)
-    return Batch(function, states, rows, in_loops(rows, scene.real, scene.name, fixed))
+    lanes = batched(single, states)
+    return Batch(function, states, lanes, in_loops(lanes, scene.real, scene.name, fixed))
 
 
 def straight(scene: Scene, program: Program) -> bool:
-    """Return whether a batch has no loops; there are no sweeps in lanes here that would overtake
-    straight lines.
-    """
+    """Tell if a batch has no loops: it has no sweeps in lanes that would be faster than these."""
     if scene.emission == "auto":
         return applied(program) <= STRAIGHT_UP_TO and not branches(program)
     return scene.emission == "straight"
 
 
 class BatchView:
-    """A batch as the template sees it: its arguments, the function of their rows, their
-    workspace.
-    """
+    """A batch as the template sees it: arguments, the function of their lanes, workspace."""
 
     def __init__(self, batch: Batch, tail: Tail, prefix: str):
         function = batch.function
-        self.name, self.rows = function.name, callee_view(batch.program, batch.body, prefix)
+        self.name, self.lanes_function = (
+            function.name,
+            callee_view(batch.program, batch.body, prefix),
+        )
         self.inputs = [ArgumentView(a, tail) for a in function.inputs]
         self.outputs = [ArgumentView(a, tail) for a in function.outputs]
         self.names = ", ".join(a.name for a in self.inputs + self.outputs)
-        self.own = batch.own
+        self.arguments_work = batch.arguments_work
 
 
-def batch_file(scene: Scene, tail: Tail, found: list[Batch], context: dict) -> dict[str, str]:
+def batch_file(
+    scene: Scene, tail: Tail, batches: Sequence[Batch], context: dict[str, Any]
+) -> dict[str, str]:
     """Render the file of batches, if there are any."""
-    own = {
+    if not batches:
+        return {}
+    helpers = set().union(*(batch.body.helpers for batch in batches))
+    differing = {
         "states": STATES[scene.real],
         "widest": STATES[scene.real],
-        "functions": [BatchView(b, tail, scene.name) for b in found],
-        "steps": step_views(found, scene.real, scene.name),
-        "helpers": sorted(set().union(*(b.body.helpers for b in found)) | {"lanes", "everywhere"}),
+        "functions": [BatchView(batch, tail, scene.name) for batch in batches],
+        "steps": step_views(batches, scene.real, scene.name),
+        "helpers": sorted(helpers | {"lanes", "all_lanes"}),
     }
-    return (
-        {f"src/{scene.name}_batch.c": render("c", "batch/batch.c.jinja", context | own)}
-        if found
-        else {}
-    )
+    return {f"src/{scene.name}_batch.c": render("c", "batch/batch.c.jinja", context | differing)}
 
 
-def batch_entry(scene: Scene, found: list[Batch]) -> dict:
-    """Return what a loader must know of the batches: how many states side by side, and each one's
-    workspace.
-    """
-    return {"states": STATES[scene.real], "work": {b.function.name: b.work for b in found}}
+def batch_entry(scene: Scene, batches: Sequence[Batch]) -> dict[str, Any]:
+    """Return what a loader must know of batches: their states side by side, their workspace."""
+    return {"states": STATES[scene.real], "work": {b.function.name: b.work for b in batches}}

@@ -1,8 +1,8 @@
-"""The C of flights: a scene's forward dynamics go in, the text of the file that simulates many
-states comes out.
-"""
+"""The C of batch rollouts: many states simulated by the same steps, a lane for each state."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from ...functions.function import assemble
 from ...functions.tail import Tail
@@ -11,10 +11,10 @@ from ...passes.batch import batched, unrolled_step, with_own_parameters
 from ...scene.scene import Scene
 from ..templating import render
 from .batch import STATES, straight
-from .form import Emitted, baked_values
+from .form import PrintedFunction, baked_values
 from .loops import in_loops
-from .routine import CFunction, dialect
-from .simulation import fields, typed
+from .records import fields, typed
+from .routine import CFunction
 from .views import callee_view, step_views
 
 RECORD = fields(
@@ -42,10 +42,8 @@ RECORD = fields(
 
 
 @dataclass(frozen=True)
-class Flights:
-    """Forward dynamics over rows of states and of their parameters: its program, and the C of
-    that.
-    """
+class BatchRollout:
+    """Forward dynamics over lanes of states and of their parameters: its program, and its C."""
 
     states: int
     program: Program
@@ -70,64 +68,67 @@ class Flights:
         return self.inner + self.body.work
 
 
-def flights(scene: Scene, tail: Tail, emitted: list[Emitted]) -> Flights | None:
-    """Return the flights of a scene that has a rollout and touches nothing."""
+def batch_rollout(
+    scene: Scene, tail: Tail, printed: Sequence[PrintedFunction]
+) -> BatchRollout | None:
+    """Return the batch rollout of a scene that has a rollout and touches nothing."""
     if "rollout" not in scene.functions or scene.contacts:
         return None
-    (single,) = (e for e in emitted if e.function.name == "forward_dynamics")
-    fixed, states, single = baked_values(scene), STATES[scene.real], assemble(single.function, tail)
-    single = unrolled_step(single, fixed) if straight(scene, single) else single
-    own = single if scene.baked else with_own_parameters(single, "forward_dynamics_of_flights")
-    rows = batched(own, states)
+    (dynamics,) = (f.function for f in printed if f.function.name == "forward_dynamics")
+    fixed, states = baked_values(scene), STATES[scene.real]
+
+    # one state, with parameters of its own; then a lane for each state
+    single = assemble(dynamics, tail)
     count = 0 if scene.baked else sum(a.length for a in single.of_role("parameters"))
-    return Flights(
-        states,
-        rows,
-        in_loops(rows, scene.real, scene.name, fixed),
-        count,
-        tail.nq + tail.nv,
-        tail.nt,
-    )
+    single = unrolled_step(single, fixed) if straight(scene, single) else single
+    if not scene.baked:
+        single = with_own_parameters(single, "forward_dynamics_of_flights")
+    lanes = batched(single, states)
+    body = in_loops(lanes, scene.real, scene.name, fixed)
+    return BatchRollout(states, lanes, body, count, tail.nq + tail.nv, tail.nt)
 
 
-def flights_file(scene: Scene, found: Flights | None, context: dict) -> dict[str, str]:
-    """Render the file of flights, if there are any."""
-    own = {} if found is None else context | _own(scene, found)
-    return {f"src/{scene.name}_flights.c": render("c", "batch/rollout.c.jinja", own)} if own else {}
+def batch_rollout_file(
+    scene: Scene, rollout: BatchRollout | None, context: dict[str, Any]
+) -> dict[str, str]:
+    """Render the file of a batch rollout, if there is one."""
+    if rollout is None:
+        return {}
+    differing = context | rollout_context(scene, rollout)
+    return {f"src/{scene.name}_flights.c": render("c", "batch/rollout.c.jinja", differing)}
 
 
-def _own(scene: Scene, found: Flights) -> dict:
-    """Return what the template lays out."""
-    rows = {"q": "q", "v": "v", "tau": "tau"}
-    names, place = [], 0
-    for a in found.program.of_role("input"):
-        names.append(rows.get(a.name, f"own + STATES * {place}"))
-        place += 0 if a.name in rows else a.length
+def rollout_context(scene: Scene, rollout: BatchRollout) -> dict[str, Any]:
+    """Return what the template lays out other than the model's does."""
+    # states and torques have names of their own; parameters lie at the begin of the workspace
+    arguments, place = [], 0
+    for array in rollout.program.of_role("input"):
+        if array.name in ("q", "v", "tau"):
+            arguments.append(array.name)
+        else:
+            arguments.append(f"own + STATES * {place}")
+            place += array.length
+
+    record = [
+        {"type": typed(f.type, scene.name), "name": f.name, "meaning": f.meaning} for f in RECORD
+    ]
     return {
-        "states": found.states,
-        "widest": found.states,
-        "rows": callee_view(found.program, found.body, scene.name),
-        "arguments": ", ".join(names),
-        "record": [
-            {"type": typed(f.type, scene.name), "name": f.name, "meaning": f.meaning}
-            for f in RECORD
-        ],
-        "parameter_count": found.parameters,
-        "state": found.state,
-        "inner": found.inner,
-        "sixth": dialect(scene.real).literal(1 / 6),
-        "steps": step_views([found], scene.real, scene.name),
-        "helpers": sorted(found.body.helpers | {"lanes", "everywhere"}),
+        "states": rollout.states,
+        "widest": rollout.states,
+        "lanes_function": callee_view(rollout.program, rollout.body, scene.name),
+        "arguments": ", ".join(arguments),
+        "record": record,
+        "parameter_count": rollout.parameters,
+        "state": rollout.state,
+        "inner": rollout.inner,
+        "steps": step_views([rollout], scene.real, scene.name),
+        "helpers": sorted(rollout.body.helpers | {"lanes", "all_lanes"}),
     }
 
 
-def flights_entry(found: Flights | None) -> dict:
-    """Return what a loader must know of flights: how many side by side, their workspace, the
-    members of the record.
-    """
+def batch_rollout_entry(rollout: BatchRollout | None) -> dict[str, Any]:
+    """Return what a loader must know of a batch rollout: states, workspace, record."""
+    if rollout is None:
+        return {}
     members = [[f.name, f.kind] for f in RECORD]
-    return (
-        {"flights": {"states": found.states, "work": found.work, "record": members}}
-        if found
-        else {}
-    )
+    return {"flights": {"states": rollout.states, "work": rollout.work, "record": members}}

@@ -1,4 +1,4 @@
-"""The C target: a scene's programs go in, the text of every C file comes out."""
+"""Chooses the form of each C function: straight lines, loops, or sweeps by lanes or segments."""
 
 from dataclasses import dataclass
 
@@ -18,19 +18,19 @@ STRAIGHT_BESIDE_LANES = 3500  # nodes: where there is a sweep in lanes, too, tha
 ALWAYS_IN_LOOPS = ("tail_point_jacobians",)
 # columns of H times links, the work of a sweep in lanes: from here on segments are no slower
 SEGMENTS_FROM = 128
-ELIMINATED = 12  # rows: smaller matrices are factored without loops
+UNROLLED_ROWS = 12  # smaller matrices are factored without loops
 
 
 @dataclass(frozen=True)
-class Emitted:
-    """One emitted function: what it computes, its C body, and how it was emitted."""
+class PrintedFunction:
+    """A function with its C body, and the form in which it was printed."""
 
     function: Function
     body: CFunction
     emission: str
 
 
-def emit(scene: Scene, tail: Tail, function: Function) -> Emitted:
+def printed_function(scene: Scene, tail: Tail, function: Function) -> PrintedFunction:
     """Print one function in the form that the scene asks for."""
     fixed = baked_values(scene)
     form, program = (
@@ -39,7 +39,7 @@ def emit(scene: Scene, tail: Tail, function: Function) -> Emitted:
         else in_form(scene.emission, function, tail)
     )
     printer = straight_line if form == "straight" else in_loops
-    return Emitted(function, printer(program, scene.real, scene.name, fixed), form)
+    return PrintedFunction(function, printer(program, scene.real, scene.name, fixed), form)
 
 
 def fastest(function: Function, tail: Tail) -> tuple[str, Program]:
@@ -48,14 +48,16 @@ def fastest(function: Function, tail: Tail) -> tuple[str, Program]:
     Straight lines are fastest until their text crowds the instruction cache, if all of them are
     always run; sweeps in lanes overtake them before that, and sweeps by segments overtake both.
     """
+    # sweeps by segments, where the tail is long
     long = tail.segments > 1 and tail.nt * tail.total >= SEGMENTS_FROM
     form, swept = in_form("segments" if long else "lanes", function, tail)
     if form == "segments" or function.name in ALWAYS_IN_LOOPS:
         return form, swept
+
+    # straight lines, where they are short and all of them are always run
     program = assemble(function, tail)
-    if applied(program) <= (
-        STRAIGHT_BESIDE_LANES if form == "lanes" else STRAIGHT_UP_TO
-    ) and not branches(program):
+    longest = STRAIGHT_BESIDE_LANES if form == "lanes" else STRAIGHT_UP_TO
+    if applied(program) <= longest and not branches(program):
         return "straight", program
     return form, swept
 
@@ -71,8 +73,8 @@ def in_form(form: str, function: Function, tail: Tail) -> tuple[str, Program]:
     lanes = assemble(function, tail, "lanes")
     segments = assemble(function, tail, "segments") if form == "segments" else lanes
     if segments != lanes:
-        return "segments", unrolled_ldl(segments, ELIMINATED)
-    return "loops" if lanes == program else "lanes", unrolled_ldl(lanes, ELIMINATED)
+        return "segments", unrolled_ldl(segments, UNROLLED_ROWS)
+    return "loops" if lanes == program else "lanes", unrolled_ldl(lanes, UNROLLED_ROWS)
 
 
 def baked_values(scene: Scene) -> dict[str, list]:

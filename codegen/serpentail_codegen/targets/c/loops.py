@@ -1,6 +1,7 @@
-"""C function bodies: programs go in, the lines of their C functions come out, straight or as loops
-over steps.
-"""
+"""Prints a program as C loops that call its steps, each a function of its own."""
+
+from dataclasses import replace
+from functools import singledispatchmethod
 
 from ...ir.cost import executed
 from ...ir.program import (
@@ -22,10 +23,11 @@ from ...ir.program import (
     padded,
 )
 from ..expressions import called, index_text
-from .routine import CFunction, Routine, dialect, pointer, scalar
+from ..target import UnprintableStatement, body_lines, unknown_statement
+from .routine import CFunction, Routine, dialect, pointer, scalar, singles
 
-FEW = 3  # scalars are written one by one, more by a helper
-ON_STACK = 12  # scalars: larger local arrays go to the caller's workspace
+INLINE_SCALARS = 3  # are written one by one, more by a helper
+STACK_SCALARS = 12  # larger local arrays go to the caller's workspace
 CALLEES_WORK = "<work>"  # stands for where the workspace of what is called begins
 
 
@@ -42,17 +44,16 @@ class LoopPrinter:
 
     def function(self) -> CFunction:
         """Return the printed function."""
-        body = self._body(self.program.body)
+        body = body_lines(self, self.program.body)
         declarations, work = self._declarations()
-        own = padded(work)  # what is called begins at a whole vector, too
+        inner = padded(work)  # what is called begins at a whole vector, too
         lines = (
             *declarations,
-            *(line.replace(CALLEES_WORK, str(own)) for line in body),
+            *(line.replace(CALLEES_WORK, str(inner)) for line in body),
             "return STATUS_OK;",
         )
-        work = max(
-            [work, *(own + function.work for _, function in self.callees.values() if function.work)]
-        )
+        behind = [inner + body.work for _, body in self.callees.values() if body.work]
+        work = max([work, *behind])
         routines, callees = tuple(self.routines.values()), tuple(self.callees.values())
         return CFunction(
             lines, work, routines, frozenset(self.helpers), executed(self.program), callees
@@ -60,14 +61,13 @@ class LoopPrinter:
 
     def _declarations(self) -> tuple[list[str], int]:
         lines, work = [], 0
-        for array in sorted(
-            self.used.values(), key=lambda a: not a.lanes
-        ):  # rows first, where vectors are aligned
+        # wide arrays first, where vectors are aligned
+        for array in sorted(self.used.values(), key=lambda a: not a.lanes):
             values = self.fixed.get(array.name, array.values)
             if array.role == "constant" or array.name in self.fixed:
                 text = ", ".join(self.dialect.literal(v) for v in values)
                 lines.append(f"static const real {array.name}[{array.length}] = {{{text}}};")
-            elif array.role == "local" and array.length * array.row <= ON_STACK:
+            elif array.role == "local" and array.length * array.row <= STACK_SCALARS:
                 lines.append(f"real {array.name}[{array.length * array.row}];")
             elif array.role == "local":
                 lines.append(f"real *const {array.name} = work + {work};")
@@ -77,106 +77,118 @@ class LoopPrinter:
     def _ref(self, ref: Ref) -> Ref:
         if ref.array.name in self.fixed:
             values = tuple(self.fixed[ref.array.name])
-            ref = Ref(
-                Array(ref.array.name, "constant", ref.array.size, 1, values), ref.offset, ref.size
-            )
+            ref = replace(ref, array=replace(ref.array, role="constant", values=values))
         self.used.setdefault(ref.array.name, ref.array)
         return ref
 
-    def _body(self, body) -> list[str]:
-        return [line for s in body for line in getattr(self, f"_{type(s).__name__.lower()}")(s)]
+    statement = singledispatchmethod(unknown_statement)
 
+    @statement.register
     def _loop(self, loop: Loop) -> list[str]:
         start, stop, var = index_text(loop.start), index_text(loop.stop), loop.var
         head = f"for (int {var} = {start}; {var} < {stop}; ++{var}) {{"
         if loop.downward:
             head = f"for (int {var} = {index_text(loop.stop + -1)}; {var} >= {start}; --{var}) {{"
-        return [head, *("  " + line for line in self._body(loop.body)), "}"]
+        return [head, *("  " + line for line in body_lines(self, loop.body)), "}"]
 
+    @statement.register
     def _when(self, when: When) -> list[str]:
         head = f"if ({scalar(self._ref(when.scalar), 0)} > {self.dialect.literal(0)}) {{"
-        return [head, *("  " + line for line in self._body(when.body)), "}"]
+        return [head, *("  " + line for line in body_lines(self, when.body)), "}"]
 
+    @statement.register
     def _fill(self, fill: Fill) -> list[str]:
         target = self._ref(fill.target)
         if target.lanes:
-            return self._fill_rows(target, fill.values)
-        if target.size > FEW and len(set(fill.values)) == 1:
+            return self._fill_wide(target, fill.values)
+        alike = target.stride == 1 and len(set(fill.values)) == 1
+        if target.size > INLINE_SCALARS and alike:
             value = self.dialect.literal(fill.values[0])
             return [f"{self._helper('fill')}({target.size}, {value}, {pointer(target)});"]
         return [
             f"{scalar(target, k)} = {self.dialect.literal(v)};" for k, v in enumerate(fill.values)
         ]
 
-    def _fill_rows(self, target: Ref, values) -> list[str]:
+    def _fill_wide(self, target: Ref, values) -> list[str]:
         if not any(values):
             return [
                 f"{self._helper('clear_rows')}({target.size * target.array.row}, "
                 f"{pointer(target)});"
             ]
-        fill, row = self._helper("fill_rows"), target.array.row
+        fill, pitch = self._helper("fill_rows"), target.array.row
         texts = [self.dialect.literal(v) for v in values]
         return [
-            f"{fill}({row}, {text}, {pointer(one)});"
+            f"{fill}({pitch}, {text}, {pointer(one)});"
             for text, one in zip(texts, singles(target), strict=True)
         ]
 
+    @statement.register
     def _unit(self, unit: Unit) -> list[str]:
-        target, row = self._ref(unit.target), unit.target.array.row
-        zeros = f"{self._helper('clear_rows')}({target.size * row}, {pointer(target)});"
-        ones = [target.offset * row + k * row + unit.first + k for k in range(target.size)]
+        target, pitch = self._ref(unit.target), unit.target.array.row
+        zeros = f"{self._helper('clear_rows')}({target.size * pitch}, {pointer(target)});"
+        ones = [target.offset * pitch + k * pitch + unit.first + k for k in range(target.size)]
         return [
             zeros,
             *(f"{target.array.name}[{index_text(at)}] = {self.dialect.literal(1)};" for at in ones),
         ]
 
+    @statement.register
     def _copy(self, copy: Copy) -> list[str]:
         target, source = self._ref(copy.target), self._ref(copy.source)
         if target.lanes:
-            return self._copy_rows(target, source, "add_rows" if copy.adds else "copy_rows")
-        if target.size > FEW and target.stride == source.stride == 1:
+            return self._copy_wide(target, source, copy.adds)
+        if target.size > INLINE_SCALARS and target.stride == source.stride == 1:
             helper = self._helper("add" if copy.adds else "copy")
             return [f"{helper}({target.size}, {pointer(source)}, {pointer(target)});"]
         sign = "+=" if copy.adds else "="
         return [f"{scalar(target, k)} {sign} {scalar(source, k)};" for k in range(target.size)]
 
-    def _copy_rows(self, target: Ref, source: Ref, how: str) -> list[str]:
-        row = target.array.row
-        if not source.lanes:
-            fill, pairs = self._helper("fill_rows"), enumerate(singles(target))
-            return [f"{fill}({row}, {scalar(source, k)}, {pointer(one)});" for k, one in pairs]
-        copy = self._helper(how)
-        if target.stride == source.stride == 1:
-            return [f"{copy}({target.size * row}, {pointer(source)}, {pointer(target)});"]
-        pairs = zip(singles(source), singles(target), strict=True)
-        return [f"{copy}({row}, {pointer(one)}, {pointer(other)});" for one, other in pairs]
+    def _copy_wide(self, target: Ref, source: Ref, adds: bool) -> list[str]:
+        pitch = target.array.row
+        if source.lanes:
+            copy = self._helper("add_rows" if adds else "copy_rows")
+            if target.stride == source.stride == 1:
+                return [f"{copy}({target.size * pitch}, {pointer(source)}, {pointer(target)});"]
+            pairs = zip(singles(source), singles(target), strict=True)
+            return [f"{copy}({pitch}, {pointer(one)}, {pointer(other)});" for one, other in pairs]
+
+        # a number goes to all lanes
+        if adds:
+            raise UnprintableStatement(
+                f"numbers cannot be added to the lanes of {target.array.name}"
+            )
+        fill = self._helper("fill_rows")
+        return [
+            f"{fill}({pitch}, {scalar(source, k)}, {pointer(one)});"
+            for k, one in enumerate(singles(target))
+        ]
 
     def _helper(self, name: str) -> str:
         self.helpers.add(name)
         return f"{self.prefix}_{name}"
 
+    @statement.register
     def _guard(self, guard: Guard) -> list[str]:
-        given = self._ref(guard.scalar)
-        test = f"!({' && '.join(f'{scalar(given, k)} > {self.dialect.literal(0)}' for k in range(given.size))})"
-        if given.lanes:
-            test = (
-                f"!{self._helper('all_positive')}({given.size * given.array.row}, {pointer(given)})"
-            )
-        return [f"if ({test}) {{", f"  return STATUS_{guard.status};", "}"]
+        scalars, zero = self._ref(guard.scalar), self.dialect.literal(0)
+        if scalars.lanes:
+            length = scalars.size * scalars.array.row
+            holds = f"{self._helper('all_positive')}({length}, {pointer(scalars)})"
+        else:
+            tests = [f"{scalar(scalars, k)} > {zero}" for k in range(scalars.size)]
+            holds = f"({' && '.join(tests)})"
+        return [f"if (!{holds}) {{", f"  return STATUS_{guard.status};", "}"]
 
+    @statement.register
     def _factor(self, factor: Factor) -> list[str]:
         matrix = self._ref(factor.matrix[0])
+        helper, arguments = "ldl_factor", f"{factor.size}, {pointer(matrix)}"
         if matrix.lanes:
-            self.helpers |= {"all_positive"}
-            call = (
-                f"{self._helper('ldl_factor_side_by_side')}({factor.size}, {matrix.array.row}, "
-                f"{pointer(matrix)})"
-            )
-        else:
-            self.helpers |= {"lanes"}
-            call = f"{self._helper('ldl_factor')}({factor.size}, {pointer(matrix)})"
-        return [f"if ({call} != STATUS_OK) {{", "  return STATUS_NOT_POSITIVE_DEFINITE;", "}"]
+            helper = "ldl_factor_side_by_side"
+            arguments = f"{factor.size}, {matrix.array.row}, {pointer(matrix)}"
+        self.helpers.add("all_positive" if matrix.lanes else "lanes")
+        return unless_definite(f"{self._helper(helper)}({arguments})")
 
+    @statement.register
     def _solve(self, solve: Solve) -> list[str]:
         matrix, x = self._ref(solve.matrix[0]), self._ref(solve.x)
         if not x.lanes:
@@ -188,16 +200,18 @@ class LoopPrinter:
         helper = self._helper("ldl_solve_rows")
         return [f"{helper}({x.size}, {x.lanes}, {x.array.row}, {pointer(matrix)}, {pointer(x)});"]
 
-    def _factorpair(self, factor: FactorPair) -> list[str]:
+    @statement.register
+    def _factor_pair(self, factor: FactorPair) -> list[str]:
         self.helpers |= {"lanes"}
         matrix = pointer(self._ref(factor.matrix[0]))
-        call = f"{self._helper('pair_factor')}({factor.size}, {matrix})"
-        return [f"if ({call} != STATUS_OK) {{", "  return STATUS_NOT_POSITIVE_DEFINITE;", "}"]
+        return unless_definite(f"{self._helper('pair_factor')}({factor.size}, {matrix})")
 
-    def _solvepair(self, solve: SolvePair) -> list[str]:
+    @statement.register
+    def _solve_pair(self, solve: SolvePair) -> list[str]:
         matrix, x = pointer(self._ref(solve.matrix[0])), pointer(self._ref(solve.x))
         return [f"{self._helper('pair_solve')}({solve.x.size}, {matrix}, {x});"]
 
+    @statement.register
     def _call(self, call: Call) -> list[str]:
         inner = in_loops(call.program, self.real, self.prefix, self.fixed)
         name = call.program.name
@@ -205,9 +219,11 @@ class LoopPrinter:
             raise ValueError(f"two programs are called {name}")
         self.callees |= {program.name: (program, function) for program, function in inner.callees}
         self.helpers |= inner.helpers
-        arguments, given = ["parameters"], dict(call.arguments)
+
+        # arrays are passed by their addresses, and the callee's workspace lies behind ours
+        arguments, arrays = ["parameters"], dict(call.arguments)
         for array in (*call.program.of_role("input"), *call.program.of_role("output")):
-            arguments.append(pointer(self._ref(given[array.name].part(0, 1))))
+            arguments.append(pointer(self._ref(arrays[array.name].part(0, 1))))
         text = f"{self.prefix}_{name}({', '.join(arguments)}, work + {CALLEES_WORK})"
         return [
             "{",
@@ -218,18 +234,21 @@ class LoopPrinter:
             "}",
         ]
 
+    @statement.register
     def _apply(self, call: Apply) -> list[str]:
         outputs = list(zip(call.step.outputs, map(self._ref, call.writes), call.adds, strict=True))
         routine, lanes = self._routine(call)
         arguments = [pointer(self._ref(ref)) for ref in call.reads]
+
+        # an output whose scalars lie apart is made beside its place, then goes there
         before, after = [], []
         for (name, size), target, adds in outputs:
             if target.stride == 1:
                 arguments.append(pointer(target))
-                continue
-            before.append(f"real {name}_new[{size * target.array.row}];")
-            after += self._scattered(name, target, adds)
-            arguments.append(f"{name}_new")
+            else:
+                before.append(f"real {name}_new[{size * target.array.row}];")
+                after += self._scattered(name, target, adds)
+                arguments.append(f"{name}_new")
         if lanes:
             arguments.append(index_text(call.columns) if call.columns else str(lanes))
         line = f"{self.prefix}_{routine.name}({', '.join(arguments)});"
@@ -238,43 +257,39 @@ class LoopPrinter:
     def _scattered(self, name: str, target: Ref, adds: bool) -> list[str]:
         if target.lanes:
             source = Array(f"{name}_new", "local", target.size, lanes=target.lanes)[0]
-            return self._copy_rows(target, source, "add_rows" if adds else "copy_rows")
+            return self._copy_wide(target, source, adds)
         return [
             f"{scalar(target, k)} {'+=' if adds else '='} {name}_new[{k}];"
             for k in range(target.size)
         ]
 
     def _routine(self, call: Apply) -> tuple[Routine, int]:
-        """Return what to call, and the lanes of its rows."""
-        wide = {
-            n: ref
-            for named in (call.inputs(), call.outputs())
-            for n, ref in named.items()
-            if ref.lanes
-        }
-        written = zip(call.outputs().items(), call.adds, strict=True)
-        adds = {name for (name, ref), adds in written if adds and ref.stride == 1}
-        row = next((ref.array.row for ref in wide.values()), 1)
-        apart = tuple((name, ref.stride) for name, ref in call.inputs().items() if ref.stride > 1)
+        """Return what to call, and the lanes of what is wide."""
+        inputs, outputs = call.inputs(), call.outputs()
+        refs = (*inputs.items(), *outputs.items())
+        wide = {name: ref for name, ref in refs if ref.lanes}
+        pitch = next((ref.array.row for ref in wide.values()), 1)
+
+        written = zip(outputs.items(), call.adds, strict=True)
+        adds = {name for (name, ref), added in written if added and ref.stride == 1}
+        apart = tuple((name, ref.stride) for name, ref in inputs.items() if ref.stride > 1)
         if any(name in wide for name, _ in apart):
-            raise ValueError(
-                f"{call.step.name} reads rows from places apart, which a pointer cannot show"
+            raise UnprintableStatement(
+                f"{call.step.name} reads wide scalars that lie apart, which a pointer cannot show"
             )
-        routine = Routine(call.step, frozenset(wide), row, frozenset(adds), apart)
+
+        routine = Routine(call.step, frozenset(wide), pitch, frozenset(adds), apart)
         if self.routines.setdefault(routine.name, routine) != routine:
             raise ValueError(f"two steps are called {routine.name}")
-        given = [
-            padded(wide[name].lanes) if name in wide else 0
-            for name, size in call.step.inputs
-            for _ in range(size)
-        ]
-        self.helpers |= called(call.step.nodes, given) | ({"lanes"} if wide else set())
+        lanes = {name: padded(ref.lanes) for name, ref in wide.items()}
+        input_lanes = [lanes.get(name, 0) for name, size in call.step.inputs for _ in range(size)]
+        self.helpers |= called(call.step.nodes, input_lanes) | ({"lanes"} if wide else set())
         return routine, next((ref.lanes for ref in wide.values()), 0)
 
 
-def singles(ref: Ref) -> list[Ref]:
-    """Return a reference to each scalar of a reference."""
-    return [Ref(ref.array, ref.offset + k * ref.stride, 1) for k in range(ref.size)]
+def unless_definite(call: str) -> list[str]:
+    """Print a call that gives up where a matrix is not positive definite."""
+    return [f"if ({call} != STATUS_OK) {{", "  return STATUS_NOT_POSITIVE_DEFINITE;", "}"]
 
 
 def in_loops(program: Program, real: str, prefix: str, fixed=None) -> CFunction:

@@ -1,6 +1,4 @@
-"""The package around a model's C: the templates' data go in, the files that build, explain and
-license it come out.
-"""
+"""The package around a model's C: the files that build, explain and license it."""
 
 from ..templating import render
 

@@ -1,6 +1,4 @@
-"""C function bodies: programs go in, the lines of their C functions come out, straight or as loops
-over steps.
-"""
+"""Steps as C functions, and what all C function bodies are made of: addresses, loops over lanes."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -12,23 +10,21 @@ from ..expressions import Dialect, Scalars, index_text
 
 @dataclass(frozen=True)
 class Routine:
-    """A step as one C function: its rows and how far apart, the outputs that are added, inputs that
-    lie apart.
-    """
+    """A step as one C function."""
 
     step: Step
-    rows: frozenset[str] = frozenset()
-    row: int = 1
-    adds: frozenset[str] = frozenset()
-    apart: tuple[tuple[str, int], ...] = ()
+    wide: frozenset[str] = frozenset()  # inputs and outputs whose scalars have lanes
+    pitch: int = 1  # numbers from one wide scalar to the next
+    adds: frozenset[str] = frozenset()  # outputs that are added, not stored
+    apart: tuple[tuple[str, int], ...] = ()  # strides of inputs whose scalars lie apart
 
     @property
     def name(self) -> str:
         """Name that tells routines of one step apart."""
         names = {n for n, _ in (*self.step.inputs, *self.step.outputs)}
         usual = {n for n in names if n.startswith("d_")} or names
-        odd = sorted(self.rows ^ usual) if self.rows else []
-        lanes = [f"rows_of_{self.row}", *odd] if self.rows else []
+        odd = sorted(self.wide ^ usual) if self.wide else []
+        lanes = [f"rows_of_{self.pitch}", *odd] if self.wide else []
         adds = ["add", *sorted(self.adds)] if self.adds else []
         apart = [f"{name}_apart_{stride}" for name, stride in self.apart]
         return "_".join([self.step.name, *lanes, *adds, *apart])
@@ -36,38 +32,27 @@ class Routine:
 
 @dataclass(frozen=True)
 class CFunction:
-    """One C function body: its lines, the scalars of workspace, the routines and helpers it calls,
-    what it costs.
-
-    ``operations`` are executed, each lane counted; ``callees`` are the programs that it calls, with
-    their C functions.
-    """
+    """One C function body, the routines, helpers and programs that it calls, what it costs."""
 
     lines: tuple[str, ...]
-    work: int
+    work: int  # scalars of workspace
     routines: tuple[Routine, ...]
     helpers: frozenset[str]
-    operations: int
-    callees: "tuple[tuple[Program, CFunction], ...]" = ()
+    operations: int  # executed, each lane counted
+    callees: "tuple[tuple[Program, CFunction], ...]" = ()  # programs that it calls, with their C
 
 
 def dialect(real: str, prefix: str = "") -> Dialect:
     """Return how C writes scalars of a real type."""
-    suffix = "f" if real == "float" else ""
-    sincos = f"real {{sine}}, {{cosine}}; {prefix}_sincos({{argument}}, &{{sine}}, &{{cosine}});"
-    functions = {"sqrt": "sqrt" + suffix}
-    sincos_row = (
-        f"lanes {{sine}}, {{cosine}}; {prefix}_sincos_row({{argument}}, &{{sine}}, &{{cosine}});"
-    )
-    row, load = "const lanes {name} = {text};", "LOAD({address} + c)"
+    both = "({argument}, &{sine}, &{cosine});"
     return Dialect(
         "const real {name} = {text};",
-        suffix,
-        functions,
-        sincos=sincos,
-        sincos_row=sincos_row,
-        row=row,
-        load=load,
+        {"sqrt": "sqrtf" if real == "float" else "sqrt"},
+        real,
+        sincos=f"real {{sine}}, {{cosine}}; {prefix}_sincos{both}",
+        wide_sincos=f"lanes {{sine}}, {{cosine}}; {prefix}_sincos_row{both}",
+        wide="const lanes {name} = {text};",
+        load="LOAD({address} + c)",
     )
 
 
@@ -93,6 +78,11 @@ def scalar(ref: Ref, k: int) -> str:
     return f"{name}[{index_text(begin(ref) + k * ref.stride)}]"
 
 
+def singles(ref: Ref) -> list[Ref]:
+    """Return a reference to each scalar of a reference."""
+    return [Ref(ref.array, ref.offset + k * ref.stride, 1) for k in range(ref.size)]
+
+
 def argument_name(array: Array) -> str:
     """Print what a C function calls an array."""
     return f"parameters->{array.name}" if array.role == "parameters" else array.name
@@ -107,43 +97,53 @@ def routine_arguments(routine: Routine) -> str:
     """Print the arguments of a step."""
     inputs = [f"const real *{name}" for name, _ in routine.step.inputs]
     outputs = [f"real *{name}_out" for name, _ in routine.step.outputs]
-    return ", ".join([*inputs, *outputs, *(["int count"] if routine.rows else [])])
+    return ", ".join([*inputs, *outputs, *(["int count"] if routine.wide else [])])
 
 
 def routine_lines(routine: Routine, real: str, prefix: str) -> list[str]:
-    """Print the body of a step: inputs by their names, outputs as ``<name>_out``; rows in a loop
-    over lanes.
-    """
-    step, row = routine.step, routine.row
-    names, rows = [], {}
-    for name, size in step.inputs:
-        if name in routine.rows:
-            rows |= {len(names) + k: row for k in range(size)}
-            names += [f"&{name}[{k * row}]" for k in range(size)]
-        else:
-            names += [f"{name}[{k * dict(routine.apart).get(name, 1)}]" for k in range(size)]
-    scalars = Scalars(step.nodes, step.results, names, dialect(real, prefix), rows)
+    """Print the body of a step: inputs by their names, outputs as ``<name>_out``."""
+    names, lanes = input_names(routine)
+    step = routine.step
+    scalars = Scalars(step.nodes, step.results, names, dialect(real, prefix), lanes)
     lines = scalars.lines()
-    wide, narrow, results = scalars.lines(row) if routine.rows else [], [], iter(step.results)
-    stores = []
+    wide_lines = scalars.lines(routine.pitch) if routine.wide else []
+
+    # wide outputs are stored lane by lane, narrow ones at the end
+    stores, narrow, results = [], [], iter(step.results)
     for name, size in step.outputs:
         for k in range(size):
             node = next(results)
-            if name in routine.rows:
-                text = scalars.text[node] if scalars.lanes[node] else f"WIDE({scalars.text[node]})"
-                address = f"&{name}_out[{k * row}] + c"
-                stores.append(
-                    f"STORE({address}, "
-                    f"{f'LOAD({address}) + {text}' if name in routine.adds else text});"
-                )
+            if name in routine.wide:
+                stores.append(store(routine, name, k, scalars, node))
             else:
                 narrow.append((name, k, scalars.text[node]))
+
     # every input is read before an output is written: outputs may overwrite inputs
-    late = {text: f"r{k}" for k, (_, _, text) in enumerate(narrow) if "[" in text}
-    lines += [f"const real {name} = {text};" for text, name in late.items()]
-    lines += each_lane("count", wide + stores) if stores else []
+    read_before = {text: f"r{k}" for k, (_, _, text) in enumerate(narrow) if "[" in text}
+    lines += [f"const real {name} = {text};" for text, name in read_before.items()]
+    lines += each_lane("count", wide_lines + stores) if stores else []
     for name, k, text in narrow:
-        lines.append(
-            f"{name}_out[{k}] {'+=' if name in routine.adds else '='} {late.get(text, text)};"
-        )
+        sign = "+=" if name in routine.adds else "="
+        lines.append(f"{name}_out[{k}] {sign} {read_before.get(text, text)};")
     return lines
+
+
+def input_names(routine: Routine) -> tuple[list[str], dict[int, int]]:
+    """Return how a step's scalar inputs are written, and the lanes of the wide ones by number."""
+    names: list[str] = []
+    lanes: dict[int, int] = {}
+    strides = dict(routine.apart)
+    for name, size in routine.step.inputs:
+        if name in routine.wide:
+            lanes |= {len(names) + k: routine.pitch for k in range(size)}
+            names += [f"&{name}[{k * routine.pitch}]" for k in range(size)]
+        else:
+            names += [f"{name}[{k * strides.get(name, 1)}]" for k in range(size)]
+    return names, lanes
+
+
+def store(routine: Routine, name: str, k: int, scalars: Scalars, node: int) -> str:
+    """Print how scalar number k of a wide output is stored, in a loop over lanes."""
+    text = scalars.text[node] if scalars.lanes[node] else f"WIDE({scalars.text[node]})"
+    address = f"&{name}_out[{k * routine.pitch}] + c"
+    return f"STORE({address}, {f'LOAD({address}) + {text}' if name in routine.adds else text});"

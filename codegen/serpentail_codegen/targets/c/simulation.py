@@ -1,240 +1,34 @@
-"""The simulation's C files: what a scene has goes in; records, coefficients and workspace come
-out.
-"""
+"""What the templates of a simulation lay out: its workspace, its methods and its records."""
 
-import re
-from collections.abc import Iterable
-from dataclasses import dataclass
 from itertools import accumulate
+from typing import Any
 
 from ...functions.tail import Tail
 from ...scene.scene import Scene
-from .routine import dialect
-from .tableaux import RK4, ROS34PW2, TSIT5, Explicit, Rosenbrock, transformed
+from .records import DESCRIPTIONS, record_views
+from .simulation_features import METHODS, SimulationFeatures
+from .tableaux import RK4, ROS34PW2, TSIT5, transformed
 
-NAMES = r"\b(real|piecewise|controller|drive|parameters|torque)\b"
 SLOTS = 11  # states in the workspace: see simulation/workspace.c.jinja
+# of simulation/workspace.c.jinja, undefined again where the file ends
 MACROS = (
-    "NQ",
-    "NV",
-    "NT",
-    "SIZE",
-    "SLOT",
-    "START",
-    "END",
-    "STAGES",
-    "END_RATE",
-    "TRIAL",
-    "RIGHT",
-    "TAU",
-)
-MACROS += ("TABLE", "FORCES", "PRESSURES", "REACHED", "POINTS", "GROUPS", "FACTORS", "INNER")
-NUMBERS = {
-    "three": 3,
-    "four": 4,
-    "five": 5,
-    "hundred": 100,
-    "fifth": 0.2,
-    "nearly": 0.99,
-    "hundredth": 0.01,
-}
-NUMBERS |= {"milli": 1e-3, "millionth": 1e-6, "small": 1e-10, "tiny_error": 1e-6}
-NUMBERS |= {"safety": 0.9, "share": 0.85, "memory": 0.2}  # of the PI controller
-# The methods' numbers in C, in order; those with True need `implicit`.
-METHODS = {"rk4": False, "tsit5": False, "ros34pw2": True, "implicit_euler": True}
-
-
-@dataclass(frozen=True)
-class Field:
-    """One member of a C record: its name, type and meaning."""
-
-    name: str
-    type: str
-    meaning: str
-
-    @property
-    def kind(self) -> str:
-        """What a caller in another language stores there."""
-        return "pointer" if "*" in self.type or self.type == "torque" else self.type
-
-
-@dataclass(frozen=True)
-class Has:
-    """What a scene's simulation can do: feedback linearisation, W-methods, groups of contact
-    points, legs.
-    """
-
-    pfl: bool
-    factors: int  # reals of implicit_factor's, 0 without
-    contacts: int
-    groups: tuple[tuple[str, int], ...]
-    legs: bool
-
-    @property
-    def implicit(self) -> bool:
-        """Whether it can take implicit steps."""
-        return self.factors > 0
-
-    @property
-    def tracked(self) -> bool:
-        """Whether feedback linearisation gives v_dot, too: where the ground adds nothing to it."""
-        return self.pfl and not self.contacts
-
-    @property
-    def methods(self) -> list[str]:
-        """The methods it has."""
-        return [name for name, implicit in METHODS.items() if self.implicit or not implicit]
-
-
-def fields(*rows: tuple[str, str, str]) -> list[Field]:
-    """Return the members of a record."""
-    return [Field(*row) for row in rows]
-
-
-def records(has: Has) -> dict[str, list[Field]]:
-    """Return the C records by name."""
-    return {
-        "piecewise": PIECEWISE,
-        "controller": CONTROLLER[:2] + (PFL if has.pfl else []) + CONTROLLER[2:],
-        "drive": DRIVE + (LEGS if has.legs else []),
-        "run": START
-        + (BRISTLES[:1] if has.contacts else [])
-        + SETTINGS
-        + SAMPLES
-        + (contact_samples(has))
-        + KEPT,
-    }
-
-
-DESCRIPTIONS = {
-    "piecewise": (
-        "Functions of time, polynomials piece by piece: torques, reference motions, leg angles."
-    ),
-    "controller": "Torques of the tail: the sum of the parts that are there.",
-    "drive": "What acts in a run: controllers, one after another, and where they are not smooth.",
-    "run": "A run, zero but for what its caller sets: all up to `work`.",
-}
-
-
-def layouts(has: Has) -> dict[str, list[list[str]]]:
-    """Return the members of every record, name and kind, as a caller in another language needs
-    them.
-    """
-    return {record: [[f.name, f.kind] for f in members] for record, members in records(has).items()}
-
-
-PIECEWISE = fields(
-    ("pieces", "int", "number of polynomials"),
-    ("channels", "int", "functions of time in the table"),
-    ("degree", "int", "of the polynomials"),
-    ("times", "const real *", "[pieces + 1] increasing (s)"),
-    (
-        "coefficients",
-        "const real *",
-        "[pieces][channels][degree + 1] of powers of t - times[piece], constants first",
-    ),
-)
-CONTROLLER = fields(
-    ("damping", "const real *", "[NT] N m s: tau = -damping q_t_dot (Eq. 47); NULL: none"),
-    ("torques", "const piecewise *", "of NT channels (N m), added; NULL: none"),
-    ("function", "torque", "added; NULL: none"),
-    ("context", "void *", "its first argument"),
-)
-PFL = fields(
-    (
-        "reference",
-        "const piecewise *",
-        "of NT channels (rad) that Eq. 46 tracks, added; NULL: none",
-    ),
-    ("kp", "real", "1/s^2"),
-    ("kd", "real", "1/s"),
-    ("feedforward", "int", "whether the reference's acceleration is asked for"),
-)
-DRIVE = fields(
-    ("phases", "int", "number of controllers"),
-    ("begins", "const real *", "[phases] increasing (s); the first acts before its time, too"),
-    ("controllers", "const controller *", "[phases]"),
-    ("stops", "int", "number of times where what acts jumps or has a kink"),
-    ("stop_times", "const real *", "[stops] increasing (s): steps end there"),
-)
-LEGS = fields(
-    ("legs", "const piecewise *", "of 4 channels: gamma_1, delta_1, gamma_2, delta_2 (rad)")
-)
-START = fields(
-    ("parameters", "const parameters *", "of the model"),
-    ("drive", "const drive *", "what acts"),
-    ("t", "real", "start, then where it is (s)"),
-    ("q", "real *", "[NQ] likewise"),
-    ("v", "real *", "[NV] likewise"),
-)
-BRISTLES = fields(
-    ("bristles", "real *", "[2 CONTACTS] likewise (m)"),
-    ("bristles_out", "real *", "[samples][2 CONTACTS]"),
-)
-SETTINGS = fields(
-    ("method", "int", "one of the methods"),
-    ("rtol", "real", "error of a step over a state's size"),
-    ("atol", "real", "added to it (m, rad, m/s, rad/s; mm of bristles)"),
-    ("step", "real", "fixed step; else the first, 0: chosen (s)"),
-    ("least_step", "real", "(s)"),
-    ("most_step", "real", "(s)"),
-    ("most_steps", "long", "accepted and rejected"),
-    ("pause", "long", "steps of one call"),
-)
-SAMPLES = fields(
-    ("samples", "long", "wanted"),
-    ("times", "const real *", "[samples] increasing (s); the run ends at the last"),
-    ("q_out", "real *", "[samples][NQ]"),
-    ("v_out", "real *", "[samples][NV]"),
-    ("tau_out", "real *", "[samples][NT]"),
-    ("work", "real *", "[WORK_ROLLOUT]; holds the run between calls"),
-)
-EVENT_FIELDS = fields(
-    (
-        "stop_at",
-        "int",
-        "sum of 1 << event: the run ends at the first of these; event = 2 group + (0: down, 1: "
-        "off)",
-    ),
-    ("most_events", "long", "that fit"),
-    ("event_times", "real *", "[most_events] (s)"),
-    ("event_kinds", "int *", "[most_events]"),
-    ("events", "long", "that happened"),
-)
-KEPT = fields(
-    ("begun", "int", "0 at first"),
-    ("done", "long", "samples written"),
-    ("steps", "long", "accepted"),
-    ("rejected", "long", ""),
-    ("evaluations", "long", "of forward dynamics"),
-    ("factorisations", "long", ""),
-    ("stop", "int", "next of the drive's stops"),
-    ("until", "real", "where the steps' smooth part ends (s)"),
-    ("next_step", "real", "(s)"),
-    ("error_before", "real", "of the last step over what is allowed"),
-    ("known", "int", "whether the rate at t is in the workspace"),
+    *("NQ", "NV", "NT", "SIZE", "SLOT", "START", "END", "STAGES", "END_RATE", "TRIAL", "RIGHT"),
+    *("TAU", "TABLE", "FORCES", "PRESSURES", "REACHED", "POINTS", "GROUPS", "FACTORS", "INNER"),
 )
 
 
-def contact_samples(has: Has) -> list[Field]:
-    """Return the members that a run with contact has."""
-    return BRISTLES[1:] + EVENT_FIELDS if has.contacts else []
-
-
-def simulation_context(scene: Scene, tail: Tail, has: Has, works: dict[str, int]) -> dict:
-    """Return what the simulation's templates lay out; ``works`` is the workspace of every
-    function.
-    """
-    literal = dialect(scene.real).literal
+def simulation_context(
+    scene: Scene, tail: Tail, has: SimulationFeatures, works: dict[str, int]
+) -> dict[str, Any]:
+    """Return what a simulation's templates lay out; ``works``: workspace of each function."""
+    single = scene.real == "float"
     size, table = tail.nq + tail.nv + 2 * has.contacts, max(4 * tail.nt, 2 * tail.nv)
-    own = SLOTS * size + tail.nt + table + 5 * has.contacts
+    states = SLOTS * size + tail.nt + table + 5 * has.contacts
     return {
-        **{name: literal(value) for name, value in NUMBERS.items()},
-        **{name: name + ("f" if scene.real == "float" else "") for name in ("pow", "fabs", "ceil")},
-        "eps": "FLT_EPSILON" if scene.real == "float" else "DBL_EPSILON",
-        "largest": "FLT_MAX" if scene.real == "float" else "DBL_MAX",
+        **{name: name + ("f" if single else "") for name in ("pow", "fabs", "ceil")},
+        "eps": "FLT_EPSILON" if single else "DBL_EPSILON",
         "has": has,
-        "ground_damping": ground_damping(scene) if has.contacts else "",
+        "ground_damping": scene.parameters.get("D_n"),  # Eq. 36, where it is folded in
         "group_starts": [0, *accumulate(count for _, count in has.groups)],
         "bristles": 2 * has.contacts,
         "bisections": 40,
@@ -242,70 +36,10 @@ def simulation_context(scene: Scene, tail: Tail, has: Has, works: dict[str, int]
         "macros": MACROS,
         "slots": SLOTS,
         "table": table,
-        "rollout_work": own + has.factors + max(works.values()),
+        "rollout_work": states + has.factors + max(works.values()),
         "descriptions": DESCRIPTIONS,
-        "records": record_views(scene, has),
-        "tsit5": explicit(TSIT5, scene.real),
-        "rk4": explicit(RK4, scene.real),
-        "ros34pw2": rosenbrock(transformed(ROS34PW2), scene.real),
+        "records": record_views(scene.name, has),
+        "tsit5": TSIT5,
+        "rk4": RK4,
+        "ros34pw2": transformed(ROS34PW2),
     }
-
-
-def ground_damping(scene: Scene) -> str:
-    """Return D_n of Eq. 36 as C text: a member of the parameters, or a number where these are
-    folded in.
-    """
-    return (
-        dialect(scene.real).literal(scene.parameters["D_n"])
-        if scene.baked
-        else "run->parameters->D_n"
-    )
-
-
-def record_views(scene: Scene, has: Has) -> dict[str, list[dict]]:
-    """Return the records with the C types that this model's header gives them."""
-    return {
-        record: [
-            {"type": typed(f.type, scene.name), "name": f.name, "meaning": f.meaning}
-            for f in members
-        ]
-        for record, members in records(has).items()
-    }
-
-
-def typed(text: str, prefix: str) -> str:
-    """Return a C type with the model's prefix, ready for a name to follow."""
-    full = re.sub(NAMES, lambda found: f"{prefix}_{found.group()}", text)
-    return full if full.endswith("*") else full + " "
-
-
-def explicit(method: Explicit, real: str) -> dict:
-    """Return a Runge-Kutta method's coefficients as C text, rows without their zeros above the
-    diagonal.
-    """
-    return {
-        "nodes": literals(method.nodes, real),
-        "rows": [literals(row, real) for row in method.rows[1:]],
-        "weights": literals(method.weights, real),
-        "error": literals(method.error, real),
-        "dense": [literals(row, real) for row in method.dense],
-        "stages": len(method.nodes),
-    }
-
-
-def rosenbrock(method: Rosenbrock, real: str) -> dict:
-    """Return a Rosenbrock method's coefficients as C text."""
-    return {
-        "gamma": dialect(real).literal(method.gamma),
-        "nodes": literals(method.nodes, real),
-        "rows": [literals(row, real) for row in method.rows[1:]],
-        "couplings": [literals(row, real) for row in method.couplings[1:]],
-        "weights": literals(method.weights, real),
-        "error": literals(method.error, real),
-        "stages": len(method.nodes),
-    }
-
-
-def literals(numbers: Iterable[float], real: str) -> str:
-    """Print numbers, separated by commas."""
-    return ", ".join(map(dialect(real).literal, numbers))

@@ -1,6 +1,4 @@
-"""Integration methods: literature's coefficients go in, as exact literals; what the C templates
-print comes out.
-"""
+"""Integration methods: their coefficients, as their authors give them and as C needs them."""
 
 from dataclasses import dataclass
 from fractions import Fraction
@@ -10,25 +8,25 @@ Row = tuple[float, ...]
 
 @dataclass(frozen=True)
 class Explicit:
-    """A Runge-Kutta method: stage s at t + nodes[s] h from rows[s]; weights of the result and of
-    its error.
+    """A Runge-Kutta method.
+
+    Stage s is at t + nodes[s] h, made of rows[s]; weights are those of the result and of its error.
     """
 
     nodes: Row
     rows: tuple[Row, ...]
     weights: Row
     error: Row = ()
-    dense: tuple[
-        Row, ...
-    ] = ()  # of stage i: weight at the part x of a step, x dense[i][0] + x^2 dense[i][1] + ...
+    # of stage i: weight at the part x of a step, x dense[i][0] + x^2 dense[i][1] + ...
+    dense: tuple[Row, ...] = ()
 
 
 @dataclass(frozen=True)
 class Rosenbrock:
-    """A Rosenbrock method as it is computed, free of products with J, any approximation of the
-    rate's Jacobian.
+    """A Rosenbrock method as it is computed, free of products with J.
 
-    (1 - h gamma J) u_s = h gamma f(t + nodes[s] h, y + sum rows[s] u) + gamma sum couplings[s] u.
+    (1 - h gamma J) u_s = h gamma f(t + nodes[s] h, y + sum rows[s] u) + gamma sum couplings[s] u, J
+    being any approximation of the rate's Jacobian.
     """
 
     gamma: float
@@ -43,9 +41,8 @@ RK4 = Explicit(
     (0.0, 0.5, 0.5, 1.0), ((), (0.5,), (0.0, 0.5), (0.0, 0.0, 1.0)), (1 / 6, 1 / 3, 1 / 3, 1 / 6)
 )
 # Ch. Tsitouras, Runge-Kutta pairs of order 5(4) satisfying only the first column simplifying
-# assumption, Comput.
-# Math. Appl. 62 (2011) 770-775; the last stage is the first of the next step, the interpolant has
-# order 4.
+# assumption, Comput. Math. Appl. 62 (2011) 770-775; the last stage is the first of the next step,
+# the interpolant has order 4.
 TSIT5 = Explicit(
     nodes=(0.0, 0.161, 0.327, 0.9, 0.9800255409045097, 1.0, 1.0),
     rows=(
@@ -102,9 +99,7 @@ TSIT5 = Explicit(
 
 @dataclass(frozen=True)
 class Classical:
-    """A Rosenbrock method as papers state it: alpha and gamma below their diagonals, the diagonal
-    of gamma.
-    """
+    """A Rosenbrock method as papers state it: alpha, gamma below its diagonal, its diagonal."""
 
     gamma: float
     alpha: tuple[Row, ...]
@@ -114,8 +109,7 @@ class Classical:
 
 
 # J. Rang, L. Angermann, New Rosenbrock W-methods of order 3 for PDAEs of index 1, BIT 45 (2005)
-# 761-787: order 3 with
-# any J, order 2 embedded, L-stable and stiffly accurate with the exact J.
+# 761-787: order 3 with any J, order 2 embedded, L-stable and stiffly accurate with the exact J.
 ROS34PW2 = Classical(
     gamma=0.435866521508459,
     alpha=(
@@ -136,9 +130,7 @@ ROS34PW2 = Classical(
 
 
 def transformed(method: Classical) -> Rosenbrock:
-    """Return a method in the unknowns u = Gamma k (Hairer and Wanner, Eq. IV.7.25), computed
-    without rounding.
-    """
+    """Return a method in u = Gamma k (Hairer and Wanner, Eq. IV.7.25), made without rounding."""
     size, gamma = len(method.weights), Fraction(method.gamma)
     lower = [[*map(Fraction, row), gamma] for row in method.below]
     inverse = _inverse(lower)

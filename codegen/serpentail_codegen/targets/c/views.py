@@ -1,18 +1,27 @@
-"""The C target: a scene's programs go in, the text of every C file comes out."""
+"""Views: arguments, functions, steps and parameters as the C templates see them."""
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from typing import Any, Protocol
 
 from ...functions.function import Argument, struct_parameters
 from ...functions.tail import Tail
 from ...ir.program import Program
 from ...ir.tape import operation_count
 from ...scene.scene import Scene
-from .form import Emitted, values
-from .routine import CFunction, Routine, dialect, routine_arguments, routine_lines
+from .form import PrintedFunction, values
+from .routine import CFunction, Routine, routine_arguments, routine_lines
 
-# operations: a step that is written out wherever it is called; larger ones as the compiler sees fit
-LARGE = 100
+# operations: smaller steps are written out where they are called, others as the compiler sees fit
+INLINED_OPERATIONS = 100
+
+
+class HasBody(Protocol):
+    """What has a C function body: a printed function, a batch, a batch rollout."""
+
+    @property
+    def body(self) -> CFunction:
+        """The C function body."""
 
 
 class ArgumentView:
@@ -27,10 +36,11 @@ class ArgumentView:
 class FunctionView:
     """A function as the templates see it: prototypes, call texts, lines."""
 
-    def __init__(self, emitted: Emitted, tail: Tail, prefix: str):
-        function, self.lines, self.work = emitted.function, emitted.body.lines, emitted.body.work
+    def __init__(self, printed: PrintedFunction, tail: Tail, prefix: str):
+        function, body = printed.function, printed.body
         self.name, self.doc = function.name, function.doc
-        self.emission, self.operations = emitted.emission, emitted.body.operations
+        self.lines, self.work = body.lines, body.work
+        self.emission, self.operations = printed.emission, body.operations
         views = [ArgumentView(a, tail) for a in (*function.inputs, *function.outputs)]
         self.inputs, self.outputs = views[: len(function.inputs)], views[len(function.inputs) :]
         real = f"{prefix}_real"
@@ -55,26 +65,24 @@ def wrapped(head: str, arguments: list[str]) -> str:
     return "\n".join(lines) + ")"
 
 
-def parameter_views(scene: Scene) -> list[dict]:
+def parameter_views(scene: Scene) -> list[dict[str, Any]]:
     """Return the fields of the parameter struct."""
-    literal = dialect(scene.real).literal
-    fields = struct_parameters(scene)
     return [
         {
             "name": p.name,
             "size": p.size,
             "unit": p.unit,
             "meaning": p.meaning,
-            "literals": list(map(literal, values(scene, p.name))),
+            "defaults": values(scene, p.name),
         }
-        for p in fields
+        for p in struct_parameters(scene)
     ]
 
 
-def step_views(emitted, real: str, prefix: str) -> list[dict]:
+def step_views(printed: Sequence[HasBody], real: str, prefix: str) -> list[dict[str, Any]]:
     """Return every step that some loop calls, once."""
     routines: dict[str, Routine] = {}
-    bodies = [e.body for e in emitted] + [body for _, body in callees_of(emitted)]
+    bodies = [p.body for p in printed] + [body for _, body in callees_of(printed)]
     for routine in (r for body in bodies for r in body.routines):
         if routines.setdefault(routine.name, routine) != routine:
             raise ValueError(f"two steps are called {routine.name}")
@@ -82,7 +90,7 @@ def step_views(emitted, real: str, prefix: str) -> list[dict]:
         {
             "name": routine.name,
             "kind": "STEP"
-            if operation_count(routine.step.nodes, routine.step.results) < LARGE
+            if operation_count(routine.step.nodes, routine.step.results) < INLINED_OPERATIONS
             else "static void",
             "doc": routine.step.doc,
             "lines": routine_lines(routine, real, prefix),
@@ -92,17 +100,17 @@ def step_views(emitted, real: str, prefix: str) -> list[dict]:
     ]
 
 
-def callees_of(emitted) -> list[tuple[Program, CFunction]]:
+def callees_of(printed: Sequence[HasBody]) -> list[tuple[Program, CFunction]]:
     """Return the programs that functions call, once, those first that others call."""
-    found: dict[str, tuple[Program, CFunction]] = {}
-    for program, body in (callee for e in emitted for callee in e.body.callees):
+    callees: dict[str, tuple[Program, CFunction]] = {}
+    for program, body in (callee for p in printed for callee in p.body.callees):
         for inner in (*body.callees, (program, body)):
-            if found.setdefault(inner[0].name, inner) != inner:
+            if callees.setdefault(inner[0].name, inner) != inner:
                 raise ValueError(f"two programs are called {inner[0].name}")
-    return list(found.values())
+    return list(callees.values())
 
 
-def callee_view(program: Program, body: CFunction, prefix: str) -> dict:
+def callee_view(program: Program, body: CFunction, prefix: str) -> dict[str, Any]:
     """Return a called program as a function of the C file."""
     arguments = [f"const {prefix}_parameters *parameters"]
     arguments += [f"const real *{a.name}" for a in program.of_role("input")]

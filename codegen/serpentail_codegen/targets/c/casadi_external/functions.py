@@ -1,0 +1,56 @@
+"""All functions of a scene for CasADi, and what the templates lay out of them."""
+
+from typing import Any
+
+from ....functions.function import struct_parameters
+from ....functions.tail import Tail
+from ....scene.scene import Scene
+from .dynamics import DYNAMICS
+from .first_derivatives import adjoint, jacobian
+from .plain import plain
+from .ports import External
+from .second_derivatives import hessian
+
+
+def externals(scene: Scene, tail: Tail, works: dict[str, int]) -> list[External]:
+    """Return every function that CasADi can call, derivatives after what they are of."""
+    sizes = {"q": tail.nq, "v": tail.nv, "v_dot": tail.nv, "force": tail.nv, "tau": tail.nt}
+    sizes["parameters"] = sum(p.size for p in struct_parameters(scene))
+
+    made: list[External] = []
+
+    def begin(name: str, kind: str = "") -> External:
+        symbol, doc = f"{kind}{scene.name}_casadi_{name}", f"{kind}{name}"
+        made.append(External(symbol, doc, tail, scene.name, callable_for(scene, name, works)))
+        return made[-1]
+
+    for name in works:
+        plain(begin(name), name, sizes)
+    for f in DYNAMICS:
+        for kind, make in (("jac_", jacobian), ("adj1_", adjoint), ("jac_adj1_", hessian)):
+            if f.has(works, kind):
+                make(begin(f.name, kind), f, sizes)
+    return made
+
+
+def callable_for(scene: Scene, name: str, works: dict[str, int]) -> dict[str, int]:
+    """Return what a function may be made of: no derivatives by parameters that are folded in."""
+    suffix = "_parameter_derivatives"
+    return {
+        other: work
+        for other, work in works.items()
+        if not (scene.baked and other.endswith(suffix) and other != name)
+    }
+
+
+def casadi_context(scene: Scene, tail: Tail, works: dict[str, int]) -> dict[str, Any]:
+    """Return what the templates of ``casadi.external`` lay out."""
+    made = externals(scene, tail, works) if scene.real == "double" else []
+    ports = [port for e in made for port in (*e.inputs, *e.outputs)]
+    patterns = sorted({port.pattern for port in ports})
+    return {
+        "externals": made,
+        "patterns": patterns,
+        "pattern_of": {pattern: k for k, pattern in enumerate(patterns)},
+        "casadi_helpers": set().union(*(e.helpers for e in made)),
+    }

@@ -1,0 +1,77 @@
+"""The recipe for a target: the NumPy target that follows it means what the programs mean."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from serpentail_codegen import pipeline
+from serpentail_codegen.functions.catalogue import CATALOGUE
+from serpentail_codegen.functions.function import assemble
+from serpentail_codegen.ir.interpret import Numbers, Run
+from serpentail_codegen.scene.parse import scene_for
+from tests.references.parameters import random_states
+from tests.targets.numpy_target import TARGET, NumpyPrinter
+from tests.targets.test_targets import STATEMENTS, printed_kinds
+
+VALUES = ["mass_matrix", "forward_dynamics", "energy", "tail_points"]
+DERIVATIVES = ["forward_dynamics_derivatives", "inverse_dynamics_hessian", "inverse_dynamics_vjp"]
+SCENES = {
+    "one_link": scene_for("articulated", 1, 1, functions=[*VALUES, *DERIVATIVES]),
+    "links": scene_for("articulated", 2, 3, functions=[*VALUES, *DERIVATIVES, "implicit"]),
+    "arcs": scene_for("continuum", 2, functions=[*VALUES, "inverse_dynamics_derivatives", "pfl"]),
+    "feet": scene_for(
+        "articulated", 1, 2, contacts=["feet", "tail"], functions=["contact_dynamics", "implicit"]
+    ),
+}
+
+
+@pytest.fixture(scope="module", params=SCENES)
+def model(request, tmp_path_factory):
+    """A scene, and the names that its emitted module defines."""
+    scene, root = replace(SCENES[request.param], targets=("numpy",)), tmp_path_factory.mktemp("m")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(pipeline.TARGETS, "numpy", TARGET)
+        pipeline.generate(scene, root)
+    folder, names = root / scene.name, {}
+    exec((folder / f"{scene.name}_numpy.py").read_text(), names)
+    return scene, json.loads((folder / "manifest.json").read_text()), names
+
+
+def arguments_of(scene, function, tail):
+    """A random state; positive numbers for all other arguments."""
+    q, v, v_dot, tau = (rows[0] for rows in random_states(scene.segments, 5, 1, "random"))
+    known, rng = {"q": q, "v": v, "v_dot": v_dot, "tau": tau}, np.random.default_rng(7)
+    return {
+        a.name: known[a.name] if a.name in known else rng.uniform(0.1, 0.3, a.length(tail))
+        for a in function.inputs
+    }
+
+
+def test_emitted_module_computes_what_the_programs_mean(model):
+    scene, manifest, names = model
+    tail = pipeline.tail_of(scene)
+    for name in manifest["functions"]:
+        function = CATALOGUE[name].of(tail)
+        program, arguments = assemble(function, tail), arguments_of(scene, function, tail)
+        parameters = {key: np.ravel(value).tolist() for key, value in scene.parameters.items()}
+        arrays = (*program.of_role("parameters"), *program.of_role("input"))
+        given = {a.name: (parameters | arguments)[a.name] for a in arrays}
+        expected = Run(program, Numbers(), given).values
+        found = names[name](parameters, **arguments)
+        assert list(found) == [a.name for a in function.outputs]
+        for key, values in found.items():
+            wanted = np.array(expected[key], float)
+            scale = np.max(np.abs(wanted))
+            np.testing.assert_allclose(values, wanted, rtol=0, atol=1e-10 * scale, err_msg=name)
+
+
+def test_manifest_names_the_hash_of_the_only_target(model):
+    _, manifest, names = model
+    assert names["__doc__"].endswith(f"derivation {manifest['content_hash']}.")
+    assert manifest["scene"]["targets"] == ["numpy"] and "work" not in manifest
+
+
+def test_numpy_prints_every_statement():
+    assert printed_kinds(NumpyPrinter) == set(STATEMENTS)
