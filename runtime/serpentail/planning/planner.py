@@ -64,17 +64,8 @@ def plan(
     Returns a Plan; look at its ``success`` and ``report``.  Raises PlanningError (a field, its
     value, the remedy), ModelError (the scene lacks functions).
     """
-<<<<<<< HEAD
     problem, checked = _checked(model, (start, goal, duration, bounds), settings)
-    missing = [name for name in NEEDED if name not in model.manifest["work"]]
-=======
-    problem, method = _checked(model, start, goal, duration, bounds, settings)
-    missing = [
-        name
-        for name in ("mass_matrix", "inverse_dynamics", "rollout")
-        if name not in model.generated
-    ]
->>>>>>> origin/main
+    missing = [name for name in NEEDED if name not in model.generated]
     if missing:
         raise model.without(*missing)
     begun = time.perf_counter()
