@@ -4,6 +4,7 @@ import pytest
 from sympy import Matrix
 
 import serpentail as st
+from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.mechanics import link, loads, torso
 from serpentail_codegen.pipeline import generate
 from serpentail_codegen.scene.parse import scene_for
@@ -75,6 +76,14 @@ DERIVATION_FAULTS = {
         "loads accelerate by their generalised force",
     ),
 }
+
+
+@pytest.fixture(autouse=True)
+def _derived_anew():
+    """The generator assembles a function once a process; here each time, and again afterwards."""
+    assemble.cache_clear()
+    yield
+    assemble.cache_clear()
 
 
 @pytest.mark.parametrize("fault", DERIVATION_FAULTS)

@@ -66,7 +66,7 @@ def plan(
     value, the remedy), ModelError (the scene lacks functions).
     """
     problem, checked = _checked(model, (start, goal, duration, bounds), settings)
-    missing = [name for name in NEEDED if name not in model.manifest["work"]]
+    missing = [name for name in NEEDED if name not in model.generated]
     if missing:
         raise model.without(*missing)
     begun = time.perf_counter()

@@ -85,8 +85,7 @@ def unchecked(entry: Law, model: Model) -> str:
     kinds += ["contact"] if model.contacts else []
     if entry.only not in kinds:
         return f"only for {entry.only} models"
-    made = {*model.manifest["functions"], *model.manifest["work"]}
-    absent = ", ".join(name for name in entry.needs if name not in made)
+    absent = ", ".join(name for name in entry.needs if name not in model.generated)
     return f"not generated: {absent}" if absent else ""
 
 
