@@ -6,11 +6,11 @@ import numpy as np
 
 from serpentail.verification import report as verify
 from serpentail.verification import states
-from serpentail_codegen.functions.contact import CONTACT
-from serpentail_codegen.functions.implicit.functions import IMPLICIT
+from serpentail_codegen.scene.signatures.signature import IMPLICIT
+from serpentail_codegen.scene.signatures.table import NEED_CONTACTS, in_group
 
 SLIGHT_FAULT = 1e-9
-TAKING_MORE = (*CONTACT, *IMPLICIT)  # functions of more than a state
+TAKING_MORE = (*NEED_CONTACTS, *in_group(IMPLICIT))  # functions of more than a state
 
 
 def failed(checks):

@@ -123,6 +123,12 @@ def heavier_at_height(energy, *_):
     return energy[0], energy[1] * (1 + SLIGHT_FAULT)
 
 
+def slower(center, *_):
+    """The velocity of the centre of mass alone is wrong."""
+    position, velocity, J = center
+    return position, velocity * (1 + SLIGHT_FAULT), J
+
+
 def stretched(points, q):
     """Links that are too long."""
     mount = points[..., :1, :]
@@ -157,6 +163,17 @@ FAULTS = {
         "inverse dynamics is mass times acceleration plus bias",
     ),
     "refused": ("momentum", refused, "momentum is mass times velocity"),
+    "heavy center": (
+        "center_of_mass",
+        times(1 + SLIGHT_FAULT),
+        "center of mass is that of the mass matrix",
+    ),
+    "slow center": ("center_of_mass", slower, "velocity of the center of mass is J v"),
+    "light center": (
+        "center_of_mass",
+        slower,
+        "momentum is mass times velocity of the center of mass",
+    ),
     "power": (
         "forward_dynamics",
         times(1 + SLIGHT_FAULT),

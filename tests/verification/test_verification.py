@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.verification import errors
 from serpentail.verification import report as verify
 from serpentail_codegen.functions.catalogue import CATALOGUE
-from serpentail_codegen.functions.contact import CONTACT
-from serpentail_codegen.functions.implicit.functions import IMPLICIT
-from serpentail_codegen.functions.pfl import FEEDBACK
-from serpentail_codegen.scene.scene import ON_DEMAND
+from serpentail_codegen.scene.signatures.table import (
+    DEFAULT,
+    DERIVATIVES,
+    NEED_CONTACTS,
+    SIGNATURES,
+)
 from tests.support.faults import TAKING_MORE, broken, failed, not_a_number
 from tests.support.models import model_folder
 from tests.verification import verify_model
@@ -79,7 +80,7 @@ def on_demand(reason):
     them.
     """
     absent = set(reason.removeprefix("not generated: ").split(", "))
-    return absent <= {*ON_DEMAND, *FEEDBACK, *IMPLICIT}
+    return absent <= set(SIGNATURES) - {*DEFAULT, *NEED_CONTACTS}
 
 
 def test_all_laws_hold_without_peers(model):
@@ -118,14 +119,16 @@ def test_a_model_of_one_function_is_checked(name):
         name, [name.removesuffix("_factor").removesuffix("_solve")]
     )
     model = st.load(
-        model_folder(1, 1, functions=asked, **({"contacts": ["tail"]} if name in CONTACT else {}))
+        model_folder(
+            1, 1, functions=asked, **({"contacts": ["tail"]} if name in NEED_CONTACTS else {})
+        )
     )
     checks = verify.laws(model)
     assert failed(checks) == set()
     if name in TAKING_MORE:
         return
     expected = {"calls repeat", "batches are singles", "casadi externals are the compiled code"}
-    expected |= {"casadi functions agree"} if name not in errors.DERIVATIVES else set()
+    expected |= {"casadi functions agree"} if name not in DERIVATIVES else set()
     assert expected <= {c.name for c in checks if c.status == "passed"}
 
 

@@ -1,4 +1,4 @@
-"""What of the animal pictures need besides its state: joints of the legs, and the COM."""
+"""Where the joints of both legs are in a motion, to draw them."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -6,7 +6,6 @@ from numpy.typing import ArrayLike
 from ..attitude import rotation_matrix
 from ..model.layout import POSITION
 from ..model.model import Model
-from ..model.parameters import total_mass
 from ..motion.trajectory import Trajectory
 
 SIDES = (1.0, -1.0)  # the left hip mirrors the right one in x
@@ -35,15 +34,6 @@ def leg_joints(model: Model, motion: Trajectory, angles: ArrayLike) -> np.ndarra
     local = hips[None, :, None] + np.concatenate([np.zeros_like(reach[:, :, :1]), reach], axis=2)
     rotated = np.einsum("kij,klnj->klni", rotation_matrix(motion.attitude), local)
     return motion.q[:, None, None, POSITION] + rotated
-
-
-def centre_of_mass(model: Model, motion: Trajectory) -> np.ndarray:
-    """Return the COM (K, 3), m, world, as if the tail were straight between its points."""
-    parameters = model.parameters
-    torso, tail = parameters["torso_mass"], parameters["tail_mass"]
-    points = model.tail_points(motion.q)
-    middle = ((points[:, 1:] + points[:, :-1]) / 2).mean(axis=1)
-    return (torso * motion.q[:, POSITION] + tail * middle) / total_mass(parameters)
 
 
 def _ray(angle: np.ndarray) -> np.ndarray:

@@ -14,7 +14,7 @@ from ..model.model import Model
 from ..motion.summary import summary
 from ..motion.trajectory import Trajectory
 from ..pictures.filmstrip import filmstrip
-from ..pictures.skeleton import centre_of_mass, leg_joints
+from ..pictures.skeleton import leg_joints
 from ..simulation.controllers import Controller, Damping, Phases, TorqueTable
 from ..simulation.methods import SETTINGS
 from ..simulation.pfl import KD, KP, Pfl
@@ -75,7 +75,8 @@ class Scenario:
     def film(self, motion: Trajectory, path: str | Path, frames: int | Sequence[float] = 8) -> Path:
         """Draw moments of a motion: torso, legs, tail and the ground's forces; return the path.
 
-        frames: how many, or their times (s).
+        frames: how many, or their times (s).  They are drawn about the centre of mass, or about the
+        torso where the scene left out the function ``center_of_mass``.
         """
         model, parameters = self.model, self.model.parameters
         look: dict[str, Any] = {"tail_mount": parameters["tail_mount"]}
@@ -83,8 +84,9 @@ class Scenario:
             look["semi_axes"] = parameters["torso_semi_axes"]
         if self.legs is not None:
             look["legs"] = leg_joints(model, motion, self.legs.curve.at(motion.t)[0])
-        com, tail = centre_of_mass(model, motion), model.tail_points(motion.q)
-        return filmstrip(motion, tail, path, frames, com=com, **look)
+        if "center_of_mass" in model.kernels:
+            look["com"] = model.center_of_mass(motion.q, motion.v)[0]
+        return filmstrip(motion, model.tail_points(motion.q), path, frames, **look)
 
     def summary(self, motion: Trajectory) -> dict[str, Any]:
         """Return take-off, apex, how a motion ends, peak forces, steps and time; SI."""

@@ -5,7 +5,7 @@ from itertools import starmap
 import numpy as np
 
 from ..model.model import Model
-from .errors import DERIVATIVES, differences, differing, differing_outputs
+from .errors import differences, differing, differing_outputs, is_derivative
 from .law import VALUE_LIMIT, Errors, Law, registry
 from .states import State, arguments, casadi_outputs, named, outputs, scaled, state_functions
 
@@ -45,7 +45,7 @@ def casadi_functions_agree(model: Model, s: State) -> Errors:
             model, name, s, casadi_outputs(model, name, getattr(model.casadi, name), s)
         )
         for name in state_functions(model)
-        if name not in DERIVATIVES
+        if not is_derivative(model, name)
     }
 
 

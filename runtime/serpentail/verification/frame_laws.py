@@ -26,7 +26,14 @@ from .states import State, at_origin, outputs, state_functions
 
 WORLD = ("mass_matrix_world", "bias_force_world")
 # what position and velocity of B enter
-PLACED = ("energy", "energy_derivatives", "momentum", "tail_points", "contact_points")
+PLACED = (
+    "energy",
+    "energy_derivatives",
+    "momentum",
+    "center_of_mass",
+    "tail_points",
+    "contact_points",
+)
 LAWS: list[Law] = []
 law = registry(LAWS)
 
@@ -66,7 +73,7 @@ def turned_outputs(model: Model, results: dict, X: np.ndarray, shift: np.ndarray
     Z, weight = X[VELOCITY, VELOCITY], total_mass(model.parameters) * model.parameters["gravity"]
     turn = {
         "potential": lambda V: V + weight * shift[2],
-        **dict.fromkeys(("points", "positions"), lambda p: p @ Z.T + shift),
+        **dict.fromkeys(("points", "positions", "position"), lambda p: p @ Z.T + shift),
         "velocities": lambda u: u @ Z.T,
         "J": lambda J: Z @ J @ X.T,
         "dparameters": lambda D: X @ D,

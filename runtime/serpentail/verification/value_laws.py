@@ -103,6 +103,31 @@ def center_of_mass(model: Model, q: np.ndarray) -> np.ndarray:
     return q[..., POSITION] + (R @ h[..., None])[..., 0] / H[..., :1, 0]
 
 
+@law("mass_matrix", "center_of_mass", units=VALUE_LIMIT)
+def center_of_mass_is_that_of_the_mass_matrix(model: Model, s: State) -> Errors:
+    """The COM is where H puts it, and its Jacobian is the upper part of H over the mass."""
+    position, _, J = model.center_of_mass(s.q, s.v)
+    upper = model.mass_matrix(s.q)[VELOCITY]
+    return {
+        "position": relative(position, center_of_mass(model, s.q)),
+        "J": relative(J, upper / upper[0, 0]),
+    }
+
+
+@law("momentum", "center_of_mass", units=VALUE_LIMIT)
+def momentum_is_mass_times_velocity_of_the_center_of_mass(model: Model, s: State) -> Errors:
+    """Momentum is the mass of the whole animal times the velocity of its centre of mass."""
+    velocity = model.center_of_mass(s.q, s.v)[1]
+    return relative(total_mass(model.parameters) * velocity, model.momentum(s.q, s.v)[0])
+
+
+@law("center_of_mass", units=VALUE_LIMIT)
+def velocity_of_the_center_of_mass_is_J_v(model: Model, s: State) -> Errors:
+    """The velocity of the COM is its Jacobian times v, relative to the largest part of that."""
+    _, velocity, J = model.center_of_mass(s.q, s.v)
+    return relative(velocity, J @ s.v, abs(J) @ abs(s.v))
+
+
 @law("energy", "forward_dynamics", units=VALUE_LIMIT)
 def energy_changes_by_the_power_of_the_torques(model: Model, s: State) -> Errors:
     """Along forward dynamics dE/dt = tau . q_t_dot, relative to energy times the fastest turn."""
