@@ -9,9 +9,9 @@ import numpy as np
 
 import serpentail as st
 from benchmarks.fixtures import generated, label
-from serpentail.model.batch import MANY
-from serpentail.model.kernel import aligned, call_record
-from serpentail.simulation import batched_runs as abreast
+from serpentail.model.batch import MIN_BATCH
+from serpentail.model.kernel import aligned, argument_record
+from serpentail.simulation import batched_runs
 
 STATES, ROUNDS = 512, 300  # a batch that stays in the cache
 FLIGHTS = 64
@@ -75,7 +75,7 @@ def flight_times(model, q: np.ndarray, v: np.ndarray) -> list[float]:
     ways.append(lambda: st.simulate(model, q, v, parameters=own, **settings))
     found = []
     for way, many in zip((*ways, ways[1]), (np.inf, np.inf, 1), strict=True):
-        with mock.patch.object(abreast, "MANY", many):
+        with mock.patch.object(batched_runs, "MIN_BATCHED_STEPS", many):
             found.append(best(way, 1))
     step = settings | {"t_span": 1e-3, "output_step": 1e-3}
     return [*found, best(lambda: st.simulate(model, q, v, parameters=own, **step), 1)]
@@ -96,10 +96,10 @@ def c_times(model) -> tuple[float, float]:
     out = np.empty((STATES, model.nv), kernel.dtype)
     for function, size in (
         (kernel.function, kernel.work),
-        (kernel.many.entry(kernel.name, MANY), None),
+        (kernel.batch_library.entry(kernel.name, MIN_BATCH), None),
     ):
-        keep.append(aligned(size or kernel.many.work[kernel.name], kernel.dtype))
-        record = call_record(kernel.parameters, STATES, keep[-1], (*states, out))
+        keep.append(aligned(size or kernel.batch_library.work[kernel.name], kernel.dtype))
+        record = argument_record(kernel.parameters, STATES, keep[-1], (*states, out))
         calls.append(lambda function=function, record=record: function(ctypes.addressof(record)))
     times = [[best(call, 1) for call in calls] for _ in range(ROUNDS)]
     return tuple(np.min(times, axis=0) / STATES)

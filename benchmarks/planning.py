@@ -14,7 +14,7 @@ import numpy as np
 import serpentail as st
 from examples import righting
 from serpentail.planning import rounds
-from serpentail.planning.nlp.node import dynamics
+from serpentail.planning.nlp.node import equations_of_motion
 from serpentail.planning.problem import SMOOTHING
 from serpentail_codegen.scene.parse import scene_for
 
@@ -126,8 +126,8 @@ def finite_differences(rat: st.Model, cap: float) -> tuple[float, str]:
     """CPU seconds of SLSQP without derivatives on the paper's program, at most `cap`, and how it
     ended.
     """
-    program, limits, w, h = captured(rat)
-    nlp, fixed = program.program["nlp"], limits.least == limits.most
+    transcription, limits, w, h = captured(rat)
+    nlp, fixed = transcription.functions["nlp"], limits.lbg == limits.ubg
     begun = time.process_time()
 
     def both(x):
@@ -139,9 +139,9 @@ def finite_differences(rat: st.Model, cap: float) -> tuple[float, str]:
 
     constraint = {
         "type": "eq",
-        "fun": lambda x: (np.array(both(x)[1]).ravel() - limits.least)[fixed],
+        "fun": lambda x: (np.array(both(x)[1]).ravel() - limits.lbg)[fixed],
     }
-    box, most = Bounds(limits.lower, limits.upper), {"maxiter": 10000}
+    box, most = Bounds(limits.lbx, limits.ubx), {"maxiter": 10000}
     try:
         found = minimize(
             lambda x: float(both(x)[0]),
@@ -164,7 +164,7 @@ def captured(rat: st.Model) -> tuple:
     seen, solve = [], rounds.solve
 
     def note(engine, limits, w, h, multipliers=None):
-        seen.append((limits, np.clip(w, limits.lower, limits.upper), h))
+        seen.append((limits, np.clip(w, limits.lbx, limits.ubx), h))
         return solve(engine, limits, w, h, multipliers)
 
     rounds.solve = note
@@ -172,8 +172,10 @@ def captured(rat: st.Model) -> tuple:
         found = plan(rat, **PAPER)
     finally:
         rounds.solve = solve
-    program = rounds.program_of(rat, found.problem, found.mesh, found.rule, dynamics(rat))
-    return program, *seen[0]
+    transcription = rounds.transcription_of(
+        rat, found.problem, found.mesh, found.rule, equations_of_motion(rat)
+    )
+    return transcription, *seen[0]
 
 
 def replanned(rat: st.Model) -> list[dict]:

@@ -1,6 +1,7 @@
-"""Runtime: generated folders go in; dynamics, simulations and plots of their models come out."""
+"""Dynamics, simulations, plans and pictures of the models in generated folders."""
 
 from importlib import import_module
+from typing import Any
 
 __version__ = "0.1.0"
 _HOME = {
@@ -43,7 +44,7 @@ _HOME = {
 __all__ = list(_HOME)
 
 
-def __getattr__(name: str):
+def __getattr__(name: str) -> Any:
     """Import a public name when it is first used: importing the package loads nothing else."""
     if name not in _HOME:
         raise AttributeError(

@@ -1,14 +1,21 @@
-"""Rotations: quaternions, rotation matrices and angles, as NumPy arrays."""
+"""Rotations: quaternions, rotation matrices and angles, and how they become each other."""
+
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .checks import finite_array
 from .errors import StateError
+from .model.layout import QUATERNION, TORSO_NQ
+
+Array = NDArray[np.float64]
+Entries = Sequence[Any] | Array  # numbers, arrays or CasADi expressions, one after another
 
 
-def product(a, b) -> list:
-    """Return the entries of the quaternion product a b."""
+def product(a: Entries, b: Entries) -> list[Any]:
+    """Return the four entries of the quaternion product a b, the quaternions given by entries."""
     return [
         a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
         a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
@@ -17,49 +24,48 @@ def product(a, b) -> list:
     ]
 
 
-def from_angles(angles: np.ndarray) -> np.ndarray:
-    """Return quaternions (..., 4) of pitch, roll and yaw (..., 3), rad, R = Rz(phi_z) Rx(phi_x)
-    Ry(phi_y).
-    """
+def quaternion_rate(quaternion: Entries, omega: Entries) -> list[Any]:
+    """Return the four entries of q_dot = q (0, omega) / 2, omega (rad/s) in body axes."""
+    return [entry / 2 for entry in product(quaternion, [0, omega[0], omega[1], omega[2]])]
+
+
+def from_angles(angles: Array) -> Array:
+    """Return quaternions (..., 4) of pitch, roll and yaw (..., 3), rad, as `pitch_roll_yaw`."""
     c, s = np.cos(angles / 2), np.sin(angles / 2)
     zero = np.zeros_like(c[..., 0])
-    pitch, roll = [c[..., 0], s[..., 0], zero, zero], [c[..., 1], zero, s[..., 1], zero]
+    pitch = [c[..., 0], s[..., 0], zero, zero]
+    roll = [c[..., 1], zero, s[..., 1], zero]
     yaw = [c[..., 2], zero, zero, s[..., 2]]
     return np.stack(product(product(yaw, pitch), roll), axis=-1)
 
 
-def angle_deg(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return the angle (...) in degrees between attitudes given as unit quaternions (..., 4)."""
+def angle_deg(a: ArrayLike, b: ArrayLike) -> Array:
+    """Return angles (...) in degrees between attitudes given as unit quaternions (..., 4)."""
     conjugate = np.asarray(a) * (1, -1, -1, -1)
-    entries = product(list(np.moveaxis(conjugate, -1, 0)), list(np.moveaxis(np.asarray(b), -1, 0)))
+    entries = product(np.moveaxis(conjugate, -1, 0), np.moveaxis(np.asarray(b), -1, 0))
     vector = np.sqrt(entries[1] ** 2 + entries[2] ** 2 + entries[3] ** 2)
     return np.degrees(2 * np.arctan2(vector, np.abs(entries[0])))
 
 
-def tilt_deg(quaternion: np.ndarray) -> np.ndarray:
-    """Return the angle (...) in degrees between the torso's z axis and the world's, of unit
-    quaternions (..., 4).
-    """
+def tilt_deg(quaternion: ArrayLike) -> Array:
+    """Return angles (...) in degrees of the torso's z axis off the world's; unit quaternions."""
     q = np.asarray(quaternion)
     level = np.hypot(q[..., 1], q[..., 2])
     return np.degrees(2 * np.arctan2(level, np.hypot(q[..., 0], q[..., 3])))
 
 
-Array = NDArray[np.float64]
-
-
 def rotation_matrix(quaternion: ArrayLike) -> Array:
-    """R, torso to world, (..., 3, 3), of quaternions (w, x, y, z), (..., 4), of any norm but
-    zero.
-    """
+    """R, torso to world, (..., 3, 3), of quaternions (w, x, y, z), (..., 4), of any norm but 0."""
     quaternion = finite_array("quaternion", quaternion)
     if quaternion.shape[-1:] != (4,):
         raise StateError(f"quaternion has shape {quaternion.shape}, not (4,) or (..., 4)")
+    # scaled by the largest entry first, so that no square overflows
     size = np.max(np.abs(quaternion), axis=-1, keepdims=True)
     if not (size >= np.finfo(float).tiny).all():
         raise StateError("a quaternion is zero: upright is (1, 0, 0, 0)")
-    quaternion = quaternion / size  # whose squares are numbers
-    w, x, y, z = np.moveaxis(quaternion / np.linalg.norm(quaternion, axis=-1, keepdims=True), -1, 0)
+    quaternion = quaternion / size
+    unit = quaternion / np.linalg.norm(quaternion, axis=-1, keepdims=True)
+    w, x, y, z = np.moveaxis(unit, -1, 0)
     first = np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)], axis=-1)
     second = np.stack([2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)], axis=-1)
     third = np.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)], axis=-1)
@@ -67,23 +73,20 @@ def rotation_matrix(quaternion: ArrayLike) -> Array:
 
 
 def pitch_roll_yaw(q: ArrayLike, unwrap: bool = False) -> Array:
-    """Angles (phi_x, phi_y, phi_z), (..., 3), rad, R = Rz(phi_z) Rx(phi_x) Ry(phi_y), of q (...,
-    7+2m).
+    """Angles (phi_x, phi_y, phi_z), (..., 3), rad, R = Rz(phi_z) Rx(phi_x) Ry(phi_y).
 
-    |phi_x| <= pi/2; at pi/2 itself one of the valid answers. unwrap, for q (K, 7+2m): continued
-    along time over whole turns and through phi_x = +-pi/2.
+    q: (..., 7 + 2m).  |phi_x| <= pi/2; at pi/2 itself one of the valid answers.  unwrap, for
+    q (K, 7 + 2m): continued along time over whole turns and through phi_x = +-pi/2.
     """
     q = finite_array("q", q)
-    if q.ndim == 0 or q.shape[-1] < 7:
+    if q.ndim == 0 or q.shape[-1] < TORSO_NQ:
         raise StateError(f"q has shape {q.shape}, not (7 + 2m,) or (..., 7 + 2m)")
-    rotation = rotation_matrix(q[..., 3:7])
+    rotation = rotation_matrix(q[..., QUATERNION])
     first, second, third = (rotation[..., row, :] for row in range(3))
     yaw = np.arctan2(-first[..., 1], second[..., 1])
+    # Rz(-phi_z) R = Rx(phi_x) Ry(phi_y)
     c, s = np.cos(yaw)[..., None], np.sin(yaw)[..., None]
-    first, second = (
-        c * first + s * second,
-        c * second - s * first,
-    )  # Rz(-phi_z) R = Rx(phi_x) Ry(phi_y)
+    first, second = c * first + s * second, c * second - s * first
     pitch = np.arctan2(third[..., 1], second[..., 1])
     angles = np.stack([pitch, np.arctan2(first[..., 2], first[..., 0]), yaw], axis=-1)
     return _continued(angles) if unwrap else angles
@@ -91,17 +94,9 @@ def pitch_roll_yaw(q: ArrayLike, unwrap: bool = False) -> Array:
 
 def sign_continuous(quaternion: Array) -> Array:
     """The same rotations, each quaternion in the half-space of the one before it."""
-    turned = np.sum(quaternion[1:] * quaternion[:-1], axis=1) < 0
-    signs = np.cumprod(np.where(turned, -1.0, 1.0), dtype=np.float64)
+    flips = np.sum(quaternion[1:] * quaternion[:-1], axis=1) < 0
+    signs = np.cumprod(np.where(flips, -1.0, 1.0), dtype=np.float64)
     return np.vstack([quaternion[:1], signs[:, None] * quaternion[1:]])
-
-
-def quaternion_rate(quaternion: Array, omega: Array) -> Array:
-    """q_dot = q (0, omega) / 2 with omega in the body frame."""
-    w, u = quaternion[:, :1], quaternion[:, 1:]
-    return (
-        np.hstack([-np.sum(u * omega, axis=1, keepdims=True), w * omega + np.cross(u, omega)]) / 2
-    )
 
 
 def _continued(angles: Array) -> Array:
@@ -123,18 +118,14 @@ def _branches(angles: Array) -> Array:
 
 
 def _upright(angles: Array) -> Array:
-    """The angles of one attitude with the least roll and yaw, which are within half a turn: a
-    somersault is pitch.
-    """
+    """Angles of one attitude with the least roll and yaw, so that a somersault is pitch."""
     branches = _branches(angles)
     branches[:, 1:] -= 2 * np.pi * np.round(branches[:, 1:] / (2 * np.pi))
     return np.asarray(branches[np.argmin(np.abs(branches[:, 1:]).sum(axis=1))])
 
 
 def _nearest(angles: Array, reference: Array) -> Array:
-    """The angles of one attitude, (x, y, z) or (pi - x, y + pi, z + pi) plus turns, closest to
-    reference.
-    """
+    """Angles of one attitude, of both branches and plus whole turns, closest to a reference."""
     branches = _branches(angles)
     branches += 2 * np.pi * np.round((reference - branches) / (2 * np.pi))
     return np.asarray(branches[np.argmin(np.abs(branches - reference).sum(axis=1))])

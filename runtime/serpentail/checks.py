@@ -1,82 +1,105 @@
-"""Checks of what users give: numbers, arrays and names, each with an error that says what to do."""
+"""Checks of what users give. Each returns the value in a form to work with, or raises the given
+error, which names the field, the value and what the field needs.
+"""
 
 from collections.abc import Collection
 from difflib import get_close_matches
+from typing import Any
 
 import numpy as np
+from numpy.typing import DTypeLike, NDArray
 
-from .errors import PlanningError, SimulationError, StateError
+from .errors import StateError
 
-
-def finite_array(what: str, value) -> np.ndarray:
-    """Return a value as a contiguous array; StateError where it is none of finite real numbers."""
-    array = real_array(what, value)
-    if not np.isfinite(array).all():
-        raise StateError(f"{what} is not finite: give finite numbers")
-    return array
+Error = type[Exception]
 
 
-def real_array(what: str, value, dtype=np.float64, error=StateError) -> np.ndarray:
-    """Return a value as a contiguous array; raise ``error`` where it is none of real numbers."""
+def refusal(field: str, value: object, needs: str, error: Error) -> Exception:
+    """Return the error about a value that a field cannot have."""
+    return error(f"{field}: value {value!r:.200}: needs {needs}")
+
+
+def real_array(
+    field: str, value: object, error: Error = StateError, dtype: DTypeLike = np.float64
+) -> NDArray[Any]:
+    """Return real numbers of any shape as a contiguous array; they may be nan or infinite."""
     try:
         array = np.asarray(value)
     except Exception as reason:  # whatever the __array__ of a foreign type raises
-        raise error(f"{what} is not made of real numbers: {reason}") from reason
+        raise error(
+            f"{field}: type {type(value).__name__}: needs real numbers ({reason})"
+        ) from reason
     if array.dtype.kind not in "fiu":
-        raise error(f"{what} is not made of real numbers: its type is {array.dtype}")
+        raise error(f"{field}: type {array.dtype}: needs real numbers")
     with np.errstate(over="ignore"):  # what float cannot hold becomes inf, which is refused later
         return np.asarray(array, dtype, order="C")
 
 
-def known(field: str, value, names: Collection[str], error: type[Exception]) -> None:
-    """Raise ``error``, with the nearest of the names, where a value is none of them."""
-    if not isinstance(value, str) or value not in names:
-        near = get_close_matches(value, names, 1) if isinstance(value, str) else []
-        remedy = f"did you mean {near[0]!r}?" if near else f"needs {' or '.join(map(repr, names))}"
-        raise error(f"{field}: value {value!r}: {remedy}")
+def finite_array(field: str, value: object, error: Error = StateError) -> NDArray[np.float64]:
+    """Return finite real numbers of any shape as a contiguous array."""
+    array = real_array(field, value, error)
+    refuse_not_finite(field, array, error)
+    return array
 
 
-def choice(field: str, value, names: Collection[str]) -> None:
-    """PlanningError unless the value is a known name."""
-    known(field, value, names, PlanningError)
+def refuse_not_finite(field: str, array: NDArray[Any], error: Error, whose: str = "") -> None:
+    """Raise the error about the first entry that is nan or infinite, and whose it is."""
+    wrong = np.argwhere(~np.isfinite(array))
+    if len(wrong):
+        index = wrong[0].tolist()
+        place = f"{field}{index or ''}{whose}"
+        raise error(f"{place}: value {array[tuple(index)]}: needs a finite number")
 
 
-def number(field: str, value, least: float = 0.0, above: bool = True) -> float:
-    """Return a finite number above (or from) the least one; PlanningError else."""
-    good = (
-        isinstance(value, int | float | np.number)
-        and not isinstance(value, bool)
-        and np.isfinite(value)
-    )
-    if not good or value < least or (above and value == least):
-        raise PlanningError(
-            f"{field}: value {value!r}: needs a number {'above' if above else 'from'} {least:g}"
-        )
-    return float(value)
+def number(
+    field: str, value: object, error: Error, *, above: float = -np.inf, least: float = -np.inf
+) -> float:
+    """Return a finite number above one bound and not below the other."""
+    numbers = numbers_in(value)
+    if numbers is None or numbers.shape != () or not _within(numbers, above, least):
+        raise refusal(field, value, f"a {_words('number', above, least)}", error)
+    return float(numbers)
 
 
-def numbers(field: str, value, size: int) -> np.ndarray:
-    """Return finite numbers (size,), one given number repeated; PlanningError else."""
+def numbers(
+    field: str, value: object, size: int, error: Error, *, least: float = -np.inf
+) -> NDArray[np.float64]:
+    """Return finite numbers (size,), not below a bound; a single one is repeated."""
+    numbers = numbers_in(value)
+    if numbers is None or numbers.shape not in ((), (size,)) or not _within(numbers, least=least):
+        raise refusal(field, value, f"one or {size} {_words('numbers', least=least)}", error)
+    return np.broadcast_to(numbers, (size,)).copy()
+
+
+def numbers_in(value: object) -> NDArray[np.float64] | None:
+    """Return real numbers of any shape as an array, or None where the value is something else."""
     try:
-        array = np.asarray(value, float)
-    except (TypeError, ValueError):
-        raise PlanningError(f"{field}: value {value!r}: needs {size} numbers") from None
-    if array.shape not in ((), (size,)) or not np.isfinite(array).all():
-        raise PlanningError(f"{field}: value {value!r}: needs {size} finite numbers")
-    return np.broadcast_to(array, (size,)).copy()
+        return real_array("", value, ValueError)
+    except ValueError:
+        return None
 
 
-def positive(name: str, value) -> float:
-    """Return a number above 0; SimulationError where it is none."""
-    number = real_array(name, value, error=SimulationError)
-    if number.shape != () or not 0 < number < np.inf:
-        raise SimulationError(f"{name} {value!r}: give a number above 0")
-    return float(number)
+def _within(numbers: NDArray[np.float64], above: float = -np.inf, least: float = -np.inf) -> bool:
+    """Tell whether numbers are finite and within bounds."""
+    return bool((np.isfinite(numbers) & (numbers > above) & (numbers >= least)).all())
 
 
-def finite(name: str, value) -> float:
-    """Return a finite number; SimulationError where it is none."""
-    number = real_array(name, value, error=SimulationError)
-    if number.shape != () or not np.isfinite(number):
-        raise SimulationError(f"{name} {value!r}: give a finite number")
-    return float(number)
+def _words(noun: str, above: float = -np.inf, least: float = -np.inf) -> str:
+    """Return what `_within` demands, in words."""
+    if above > -np.inf:
+        return f"{noun} above {above:g}"
+    return f"{noun} from {least:g}" if least > -np.inf else f"finite {noun}"
+
+
+def one_of(field: str, value: object, names: Collection[str], error: Error) -> str:
+    """Return a value that is one of the names; the error has the nearest one."""
+    if isinstance(value, str) and value in names:
+        return value
+    remedy = did_you_mean(value, names) or f"needs {' or '.join(map(repr, names))}"
+    raise error(f"{field}: value {value!r:.200}: {remedy}")
+
+
+def did_you_mean(value: object, names: Collection[str]) -> str:
+    """Return the question whether one of the names was meant; "" where none is near."""
+    near = get_close_matches(value, names, 1) if isinstance(value, str) else []
+    return f"did you mean {near[0]!r}?" if near else ""

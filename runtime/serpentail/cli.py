@@ -1,80 +1,68 @@
-"""Command line of the runtime: a verb and a generated folder or a scene go in, a report comes
-out.
-"""
+"""The command `serpentail`: what a model is, whether it obeys its laws, its motions and plans."""
 
 import argparse
 import json
 import sys
+from typing import Any
 
 from .errors import SerpentailError
 
 
-def info(folder: str) -> dict:
+def info(folder: str) -> dict[str, Any]:
     """Return what a model is: sizes, functions, how each was emitted, what it costs."""
     from .model.model import load
+    from .model.parameters import json_ready
 
     model = load(folder)
-    functions = {
-        name: {
-            "inputs": {a["name"]: a["shape"] for a in f["inputs"]},
-            "outputs": {a["name"]: a["shape"] for a in f["outputs"]},
-            "emission": f["emission"],
-            "operations": f["operations"],
+    functions = {}
+    for name, entry in model.manifest["functions"].items():
+        functions[name] = {
+            "inputs": {port["name"]: port["shape"] for port in entry["inputs"]},
+            "outputs": {port["name"]: port["shape"] for port in entry["outputs"]},
+            "emission": entry["emission"],
+            "operations": entry["operations"],
         }
-        for name, f in model.manifest["functions"].items()
-    }
-    sizes = {
-        name: getattr(model, name) for name in ("kind", "segments", "links", "samples", "nq", "nv")
-    }
-    parameters = {
-        name: list(value) if isinstance(value, tuple) else value
-        for name, value in model.parameters.items()
-    }
     return {
         "name": model.name,
         "real": model.manifest["real"],
-        **sizes,
-        "parameters": parameters,
+        "kind": model.kind,
+        "segments": model.segments,
+        "links": model.links,
+        "samples": model.samples,
+        "nq": model.nq,
+        "nv": model.nv,
+        "parameters": json_ready(model.parameters),
         "functions": functions,
     }
 
 
-def describe(report: dict) -> str:
+def describe(report: dict[str, Any]) -> str:
     """Return an info report as text."""
-    shape = (
-        "{segments} segments x {links} links"
-        if report["links"]
-        else "{segments} continuum segments"
-    )
+    shape = "{segments} continuum segments"
+    if report["links"]:
+        shape = "{segments} segments x {links} links"
     head = ("{name}: " + shape + ", nq {nq}, nv {nv}, {real}").format(**report)
     rows = [
-        f"  {name:<28}{f['emission']:<10}{f['operations']:>8} operations"
-        for name, f in report["functions"].items()
+        f"  {name:<28}{entry['emission']:<10}{entry['operations']:>8} operations"
+        for name, entry in report["functions"].items()
     ]
     return "\n".join([head, *rows])
 
 
 def parser() -> argparse.ArgumentParser:
     """Return the argument parser."""
-    p = argparse.ArgumentParser(
-        prog="serpentail", description="Work with generated models of tailed animals and robots."
+    about = "Work with generated models of tailed animals and robots."
+    root = argparse.ArgumentParser(prog="serpentail", description=about)
+    verbs = root.add_subparsers(dest="verb", required=True)
+    # of a scene
+    plan = verbs.add_parser("plan", help="plan the motion of a scene's table [plan]")
+    _add_scene(plan, "scenes/righting_m1_n3.toml")
+    plan.add_argument("--save", help="write the planned motion to this .npz file")
+    simulate = verbs.add_parser(
+        "simulate", help="simulate the motion of a scene's table [simulate]"
     )
-    verbs = p.add_subparsers(dest="verb", required=True)
-    verb = verbs.add_parser("plan", help="plan the motion of a scene's table [plan]")
-    verb.add_argument("scene", help="a scene file, such as scenes/righting_m1_n3.toml")
-    verb.add_argument(
-        "--folder", help="its generated folder, by default generated/ and the scene's name"
-    )
-    verb.add_argument("--save", help="write the planned motion to this .npz file")
-    verb.add_argument(
-        "--json", choices=["-"], help="print one JSON object on stdout instead of text"
-    )
-    verb = verbs.add_parser("simulate", help="simulate the motion of a scene's table [simulate]")
-    verb.add_argument("scene", help="a scene file, such as scenes/kick.toml")
-    verb.add_argument(
-        "--folder", help="its generated folder, by default generated/ and the scene's name"
-    )
-    verb.add_argument(
+    _add_scene(simulate, "scenes/kick.toml")
+    simulate.add_argument(
         "--set",
         action="append",
         default=[],
@@ -85,21 +73,24 @@ def parser() -> argparse.ArgumentParser:
             "[simulate] (duration=2, start.height=0.1)"
         ),
     )
-    verb.add_argument("--save", help="write the motion to this .npz file")
-    verb.add_argument("--film", help="draw it as a filmstrip, to this .png, .svg or .pdf file")
-    verb.add_argument(
-        "--json", choices=["-"], help="print one JSON object on stdout instead of text"
-    )
-    for name, words in (
-        ("info", "what a generated model is"),
-        ("verify", "check the laws that a model must obey"),
-    ):
-        verb = verbs.add_parser(name, help=words)
+    simulate.add_argument("--save", help="write the motion to this .npz file")
+    simulate.add_argument("--film", help="draw it as a filmstrip, to this .png, .svg or .pdf file")
+    # of a generated folder
+    about_model = verbs.add_parser("info", help="what a generated model is")
+    verify = verbs.add_parser("verify", help="check the laws that a model must obey")
+    for verb in (about_model, verify):
         verb.add_argument("folder", help="a generated folder, such as generated/articulated_m3_n4")
-        verb.add_argument(
-            "--json", choices=["-"], help="print one JSON object on stdout instead of text"
-        )
-    return p
+    for verb in (plan, simulate, about_model, verify):
+        text = "print one JSON object on stdout instead of text"
+        verb.add_argument("--json", choices=["-"], help=text)
+    return root
+
+
+def _add_scene(verb: argparse.ArgumentParser, example: str) -> None:
+    """Let a verb take a scene and its folder."""
+    verb.add_argument("scene", help=f"a scene file, such as {example}")
+    folder = "its generated folder, by default generated/ and the scene's name"
+    verb.add_argument("--folder", help=folder)
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -114,30 +105,29 @@ def main(argv: list[str] | None = None) -> int:
     return 0 if good else 1
 
 
-def run(arguments: argparse.Namespace) -> tuple[dict, str, bool]:
+def run(arguments: argparse.Namespace) -> tuple[dict[str, Any], str, bool]:
     """Return the report of a verb, as data and as text, and whether all is well."""
-    if arguments.verb == "info":
-        report = info(arguments.folder)
-        return report, describe(report), True
-    if arguments.verb == "plan":
-        from .scenes.plan import planned
-
-        plan = planned(arguments.scene, arguments.folder)
-        if arguments.save:
-            plan.trajectory.save(arguments.save)
-        text = "\n".join(f"{name:<30}{value}" for name, value in plan.report.items())
-        return plan.report, text, plan.success
-    if arguments.verb == "simulate":
-        return simulated(arguments)
-    from .model.model import load
-    from .verification.report import as_text, laws, summary
-
-    model = load(arguments.folder)
-    checks = laws(model)
-    return summary(model, checks), as_text(model, checks), all(c.passed for c in checks)
+    verbs = {"info": informed, "plan": planned, "simulate": simulated, "verify": verified}
+    return verbs[arguments.verb](arguments)
 
 
-def simulated(arguments: argparse.Namespace) -> tuple[dict, str, bool]:
+def informed(arguments: argparse.Namespace) -> tuple[dict[str, Any], str, bool]:
+    """Return what a model is."""
+    report = info(arguments.folder)
+    return report, describe(report), True
+
+
+def planned(arguments: argparse.Namespace) -> tuple[dict[str, Any], str, bool]:
+    """Return the report of a scene's plan, and whether it converged."""
+    from .scenes import plan as scenes
+
+    plan = scenes.planned(arguments.scene, arguments.folder)
+    if arguments.save:
+        plan.trajectory.save(arguments.save)
+    return plan.report, _rows(plan.report), plan.success
+
+
+def simulated(arguments: argparse.Namespace) -> tuple[dict[str, Any], str, bool]:
     """Return the report of a scene's motion."""
     from .scenes.overrides import parsed
     from .scenes.simulate import scenario
@@ -149,7 +139,22 @@ def simulated(arguments: argparse.Namespace) -> tuple[dict, str, bool]:
     if arguments.film:
         scene.film(motion, arguments.film)
     report = scene.summary(motion)
-    return report, "\n".join(f"{name:<30}{value}" for name, value in report.items()), True
+    return report, _rows(report), True
+
+
+def verified(arguments: argparse.Namespace) -> tuple[dict[str, Any], str, bool]:
+    """Return which laws a model obeys, and whether it obeys all of them."""
+    from .model.model import load
+    from .verification.report import as_text, laws, summary
+
+    model = load(arguments.folder)
+    checks = laws(model)
+    return summary(model, checks), as_text(model, checks), all(c.passed for c in checks)
+
+
+def _rows(report: dict[str, Any]) -> str:
+    """Return a report as lines of names and values."""
+    return "\n".join(f"{name:<30}{value}" for name, value in report.items())
 
 
 if __name__ == "__main__":

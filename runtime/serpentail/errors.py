@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 
 class SerpentailError(Exception):
     """Anything that the runtime refuses; the base of all its exceptions."""
@@ -28,20 +30,14 @@ class StateError(SerpentailError, ValueError):
 
 
 class SimulationError(SerpentailError):
-    """A simulation cannot go on; `trajectory` is the motion up to where it failed, None if it never
-    began.
-    """
+    """A simulation cannot go on; `trajectory` is the motion until then, None if it never began."""
 
-    trajectory = None
+    trajectory: Any = None  # a Trajectory
 
 
 class PlanningError(SerpentailError, ValueError):
-    """A planning problem that cannot be posed: a wrong field, its value, and what to give
-    instead.
-    """
+    """A planning problem that cannot be posed."""
 
 
 class UnlikeBodies(UserWarning):
-    """Torso and tail so unlike in size that H loses digits: what is left of moments that cancel has
-    their rounding.
-    """
+    """Torso and tail are so unlike in size that moments cancel in H, which loses digits."""

@@ -52,7 +52,7 @@ def model(kind="articulated", segments=2, links=2, profile="fast", **options):
 
 @pytest.fixture(autouse=True)
 def any_batch_is_large(monkeypatch):
-    monkeypatch.setattr("serpentail.model.batch.MANY", 1)
+    monkeypatch.setattr("serpentail.model.batch.MIN_BATCH", 1)
 
 
 def states(model, count, seed=0):
@@ -225,7 +225,7 @@ void row(const real *x, real *sine, real *cosine) {{
 
 
 def test_a_few_states_compile_nothing_and_many_do_once(monkeypatch):
-    monkeypatch.setattr("serpentail.model.batch.MANY", 1000)
+    monkeypatch.setattr("serpentail.model.batch.MIN_BATCH", 1000)
     built = []
     monkeypatch.setattr(
         "serpentail.model.batch.compile_library", lambda *a: built.append(a) or compile_library(*a)
@@ -250,11 +250,11 @@ def test_parameters_count_in_batches():
 WRONG = {
     "a number that is none": (
         lambda q, v: v.__setitem__((13, 4), np.nan),
-        r"v\[4\] of state 13 is nan",
+        r"v\[4\] of state 13: value nan",
     ),
     "an infinite position": (
         lambda q, v: q.__setitem__((13, 0), np.inf),
-        r"q\[0\] of state 13 is inf",
+        r"q\[0\] of state 13: value inf",
     ),
     "no attitude": (
         lambda q, v: q.__setitem__((13, slice(3, 7)), 0),

@@ -219,20 +219,20 @@ def test_simulations_that_cannot_be_are_refused(standing, settings, words):
         (lambda model: st.Legs.ramp(3.6, (-0.3, -1.0), 0.4, 1e-320), "takes inf s"),
         (
             lambda model: st.Reference([0.0, 1.0], [1, [2, 3]]),
-            "Reference: angles is not made of real numbers",
+            "Reference: angles: type list: needs real numbers",
         ),
         (
             lambda model: st.Pfl(model, ([0.0, 1.0], np.zeros((2, 2))), 10**60),
-            "Pfl: kp is not made of real numbers",
+            "Pfl: kp: value 10{60}: needs a number from 0",
         ),
         (
             lambda model: st.Pfl(model, np.zeros((2, 3), complex)),
-            "Pfl: times is not made of real numbers",
+            "Pfl: times: type complex128: needs real numbers",
         ),
         (lambda model: st.Pfl(model, ([0.0], np.zeros((1, 2)))), "Pfl: one node only"),
         (
             lambda model: model.external_force(moment=(0, np.nan, 0)),
-            "external_force: moment is not finite",
+            r"external_force: moment\[1\]: value nan: needs a finite number",
         ),
     ],
 )

@@ -399,7 +399,7 @@ def test_missing_files_are_a_model_error(model, tmp_path):
 
 def test_profile_names_are_checked(model):
     with pytest.raises(
-        SerpentailError, match="unknown build profile 'quick'; choose one of fast, reproducible"
+        SerpentailError, match="profile: value 'quick': needs 'fast' or 'reproducible'"
     ):
         compiler.compile_library(*model, profile="quick")
     with pytest.raises(SerpentailError, match="'quick'"):

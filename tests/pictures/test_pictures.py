@@ -11,79 +11,16 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
-from serpentail.attitude import rotation_matrix
-from serpentail.motion.trajectory import Trajectory
 from serpentail.pictures import filmstrip as film
 from serpentail.pictures import time_plots as plots
-from serpentail.pictures.animal import SIDE, TOP, Body, silhouette
+from serpentail.pictures.animal import SIDE, TOP, Body
 from serpentail.pictures.filmstrip import filmstrip
 from serpentail.pictures.style import STYLE
 from serpentail.pictures.time_plots import time_plots
+from tests.support.drawn_flight import SPEEDS, flight, tail_points
 
-SEMI_AXES = np.array([0.0315, 0.0495, 0.027])
-MOUNT = np.array([0, -0.0405, 0.0045])
-SPEEDS = {
-    "up": (0.5, 2.8),
-    "far": (2.6, 2.8),
-    "still": (0.0, 0.0),
-}  # forward and up at the start, m/s
 STARTS = {".pdf": b"%PDF-", ".png": b"\x89PNG", ".svg": b"<?xml"}
-
-
-def flight(speed=SPEEDS["up"], segments=2, samples=59):
-    """A tumbling torso on a parabola (or at rest) with a decaying tail swing."""
-    t = np.linspace(0, 0.58, samples)
-    forward, up = speed
-    gravity = 9.8 * (up > 0)
-    position = np.stack([0 * t, forward * t, 0.06 + up * t - gravity * t**2 / 2], axis=1)
-    omega = np.array([-9.0, 3.0, 2.0])
-    attitude = Rotation.from_rotvec(t[:, None] * omega).as_quat()[:, [3, 0, 1, 2]]
-    phase = 18 * t[:, None] + 1.5 * np.arange(2 * segments)
-    tail, rate = 0.3 * np.exp(-2 * t)[:, None] * np.stack([np.cos(phase), -18 * np.sin(phase)])
-    momentum = 0.109 * np.stack([0 * t, forward + 0 * t, up - gravity * t], axis=1)
-    return Trajectory(
-        t=t,
-        q=np.hstack([position, attitude, tail]),
-        v=np.hstack([momentum / 0.109, np.tile(omega, (samples, 1)), rate]),
-        tau=-1e-3 * rate,
-        kinetic=np.sum(momentum**2, axis=1) / 0.218 + 2e-3,
-        potential=0.109 * gravity * position[:, 2],
-        linear_momentum=momentum,
-        angular_momentum=np.array([-6e-4, 1e-4, 1.5e-4]) + 1e-18 * np.cos(t)[:, None],
-    )
-
-
-def tail_points(trajectory, links=4, length=0.19466):
-    """Joints (K, m links + 1, 3) of an articulated tail: R_j = R_{j-1} Rx(alpha) Rz(beta), links
-    along -y.
-    """
-    rotation = rotation_matrix(trajectory.attitude)
-    points = [trajectory.q[:, :3] + rotation @ MOUNT]
-    for i in range(trajectory.segments):
-        bend = Rotation.from_euler("XZ", trajectory.tail[:, 2 * i : 2 * i + 2]).as_matrix()
-        for _ in range(links):
-            rotation = rotation @ bend
-            points.append(points[-1] - rotation[:, :, 1] * length / (links * trajectory.segments))
-    return np.stack(points, axis=1)
-
-
-def surface(count=300):
-    """Points on the torso's ellipsoid, in its frame."""
-    polar, around = np.meshgrid(np.linspace(0, np.pi, count), np.linspace(0, 2 * np.pi, 2 * count))
-    sphere = [np.sin(polar) * np.cos(around), np.sin(polar) * np.sin(around), np.cos(polar)]
-    return np.stack(sphere, axis=-1).reshape(-1, 3) * SEMI_AXES
-
-
-def film_frame(seed):
-    """One frame of a film in a random attitude."""
-    trajectory = flight(samples=1)
-    q = trajectory.q.copy()
-    q[:, 3:7] = Rotation.random(rng=seed).as_quat()
-    trajectory = dataclasses.replace(trajectory, q=q)
-    points = tail_points(trajectory)
-    return film._frame(trajectory, points, q[:, :3], Body(), 0)
 
 
 def drawn_film(trajectory, frames=8, com=None):
@@ -93,45 +30,6 @@ def drawn_film(trajectory, frames=8, com=None):
     body = Body()
     frames = [film._frame(trajectory, points, com, body, k) for k in moments]
     return film._draw_film(frames, com), frames
-
-
-@pytest.mark.parametrize("view", [SIDE, TOP], ids=lambda view: view.name)
-def test_views_are_right_handed(view):
-    np.testing.assert_array_equal(np.cross(view.matrix[0], view.matrix[1]), view.matrix[2])
-
-
-@pytest.mark.parametrize("view", [SIDE, TOP], ids=lambda view: view.name)
-@pytest.mark.parametrize("seed", range(5))
-def test_silhouette_is_the_outline_of_the_projected_surface(view, seed):
-    rotation = Rotation.random(rng=seed).as_matrix()
-    shadow = view.of(surface() @ rotation.T)[:, :2]
-    outline = silhouette(rotation, SEMI_AXES, view, count=721)
-    angle = np.linspace(0, 2 * np.pi, 90)
-    directions = np.stack([np.cos(angle), np.sin(angle)])
-    widths = (outline @ directions).max(axis=0), (shadow @ directions).max(axis=0)
-    np.testing.assert_allclose(*widths, rtol=2e-4)
-    np.testing.assert_allclose(outline[0], outline[-1], atol=1e-15)
-
-
-@pytest.mark.parametrize("view", [SIDE, TOP], ids=lambda view: view.name)
-@pytest.mark.parametrize("seed", range(3))
-def test_the_torso_hides_exactly_what_a_ray_to_the_viewer_hits(view, seed):
-    frame = film_frame(seed)
-    points = frame.torso + np.random.default_rng(seed).uniform(-0.06, 0.06, (400, 3))
-    outside = np.linalg.norm((points - frame.torso) @ frame.rotation / SEMI_AXES, axis=1) > 1
-    steps = np.linspace(0, 0.2, 2001)[:, None, None] * view.matrix[2]
-    ray = np.linalg.norm((points + steps - frame.torso) @ frame.rotation / SEMI_AXES, axis=-1)
-    clear = ray.min(axis=0) > 1
-    grazing = np.abs(ray.min(axis=0) - 1) < 1e-3
-    over = frame.in_front(points, view)
-    under_but_clear = (
-        outside & ~over & clear
-    )  # beside the torso: drawn under it, nothing covers it there
-    spread = view.matrix[:2] @ frame.rotation * SEMI_AXES
-    flat = view.of(points - frame.torso)[:, :2]
-    covered = np.einsum("ni,ij,nj->n", flat, np.linalg.inv(spread @ spread.T), flat) < 1
-    assert not (over & ~clear & ~grazing).any()
-    assert not (under_but_clear & covered & ~grazing).any()
 
 
 @pytest.mark.parametrize("suffix", STARTS)
@@ -166,7 +64,7 @@ def test_drawing_leaves_pyplot_alone_and_importing_leaves_matplotlib_alone(tmp_p
         "import sys, serpentail.pictures.filmstrip, serpentail.pictures.time_plots, "
         "serpentail.motion.trajectory\n"
         "assert 'matplotlib' not in sys.modules and 'scipy' not in sys.modules\n"
-        "from tests.pictures.test_pictures import flight, tail_points\n"
+        "from tests.support.drawn_flight import flight, tail_points\n"
         "serpentail.pictures.filmstrip.filmstrip(flight(), tail_points(flight()), 'film.svg')\n"
         "serpentail.pictures.time_plots.time_plots(flight(), 'times.svg')\n"
         "assert 'matplotlib.pyplot' not in sys.modules\n"

@@ -10,9 +10,9 @@ from scipy.sparse import coo_matrix
 
 import serpentail as st
 from serpentail.planning.nlp.mesh import Mesh, refined, uniform
-from serpentail.planning.nlp.node import Layout, Node
-from serpentail.planning.nlp.rules import MOST_DEGREE, rule
-from serpentail.planning.nlp.transcription import collocate, places
+from serpentail.planning.nlp.node import Node, Variables
+from serpentail.planning.nlp.rules import MOST_DEGREE, collocation_rule
+from serpentail.planning.nlp.transcription import collocate, indices_of
 
 SCHEMES = [
     ("trapezoidal", None),
@@ -25,7 +25,7 @@ every_rule = pytest.mark.parametrize(("name", "degree"), SCHEMES)
 
 @every_rule
 def test_quadrature_is_exact_up_to_the_order_and_no_further(name, degree):
-    found = rule(name, degree)
+    found = collocation_rule(name, degree)
     for power in range(found.order):
         assert found.weights @ found.nodes**power == pytest.approx(1 / (power + 1), abs=1e-13)
     assert abs(found.weights @ found.nodes**found.order - 1 / (found.order + 1)) > 1e-10
@@ -34,7 +34,7 @@ def test_quadrature_is_exact_up_to_the_order_and_no_further(name, degree):
 @every_rule
 def test_defects_vanish_for_polynomials(name, degree):
     """The states of x = s^p, its rates at the nodes: p up to the number of nodes."""
-    found = rule(name, degree)
+    found = collocation_rule(name, degree)
     for power in range(1, len(found.nodes) + 1):
         states, rates = found.supports**power, power * found.nodes ** (power - 1)
         np.testing.assert_allclose(found.states @ states, found.slopes @ rates, atol=2e-12)
@@ -44,12 +44,12 @@ def test_defects_vanish_for_polynomials(name, degree):
 
 
 def test_known_rules():
-    np.testing.assert_allclose(rule("trapezoidal").slopes, [[0.5, 0.5]], atol=1e-15)
-    simpson = rule("hermite-simpson")
+    np.testing.assert_allclose(collocation_rule("trapezoidal").slopes, [[0.5, 0.5]], atol=1e-15)
+    simpson = collocation_rule("hermite-simpson")
     np.testing.assert_allclose(
         simpson.slopes, [[5 / 24, 1 / 3, -1 / 24], [1 / 6, 2 / 3, 1 / 6]], atol=1e-15
     )
-    np.testing.assert_allclose(rule("radau", 2).nodes, [1 / 3, 1], atol=1e-15)
+    np.testing.assert_allclose(collocation_rule("radau", 2).nodes, [1 / 3, 1], atol=1e-15)
 
 
 @pytest.mark.parametrize(
@@ -60,7 +60,7 @@ def test_unknown_rules_are_refused(name, degree):
     with pytest.raises(
         st.PlanningError, match="rule: value 'midpoint'" if name == "midpoint" else "degree: value"
     ):
-        rule(name, degree)
+        collocation_rule(name, degree)
 
 
 # A harmonic oscillator x_ddot = u - x, brought from rest at 0 to rest at 1 within T with the
@@ -80,7 +80,7 @@ def least_effort() -> float:
     return float(np.linalg.solve(T / 2 * W, [1, 0])[0])
 
 
-def oscillator() -> tuple[Layout, Node]:
+def oscillator() -> tuple[Variables, Node]:
     """The oscillator as a node: zeta = (T, x, x_dot, u); its rate is a call, as dynamics is."""
     from serpentail.planning.nlp.node_calls import linear_call
 
@@ -90,20 +90,20 @@ def oscillator() -> tuple[Layout, Node]:
     call = linear_call(f, zeta, [zeta[1:3], zeta[3]])
     result = casadi.SX.sym("result", 2)
     y = casadi.vertcat(zeta[0] * result, zeta[0] * zeta[3] ** 2)
-    one = Node(casadi.Function("node", [zeta, h, result], [y]), (call,), 2, 0, 0)
-    return Layout((("x", 2),), (), {"x": np.ones(2), "torque": np.ones(1)}), one
+    node = Node(casadi.Function("node", [zeta, h, result], [y]), (call,), 2, 0, 0)
+    return Variables((("x", 2),), (), {"x": np.ones(2), "torque": np.ones(1)}), node
 
 
 def found_effort(name, degree, intervals) -> float:
     """The optimum of the program on a mesh."""
-    form, one = oscillator()
-    scheme = uniform(intervals), rule(name, degree)
-    where = places(form, *scheme)
-    functions = collocate(one, where, scheme, coo_matrix((0, where.size))).functions()
-    least, most = -np.full(where.size, np.inf), np.full(where.size, np.inf)
+    variables, node = oscillator()
+    scheme = uniform(intervals), collocation_rule(name, degree)
+    indices = indices_of(variables, *scheme)
+    functions = collocate(node, indices, scheme, coo_matrix((0, indices.size))).functions()
+    least, most = -np.full(indices.size, np.inf), np.full(indices.size, np.inf)
     least[0] = most[0] = T
-    least[where.states[0]] = most[where.states[0]] = 0
-    least[where.states[-1]] = most[where.states[-1]] = [1, 0]
+    least[indices.states[0]] = most[indices.states[0]] = 0
+    least[indices.states[-1]] = most[indices.states[-1]] = [1, 0]
     options = {"ipopt.print_level": 0, "print_time": False, "ipopt.sb": "yes", "ipopt.tol": 1e-12}
     options |= {key: functions[key] for key in ("grad_f", "jac_g", "hess_lag")}
     solver = casadi.nlpsol("solver", "ipopt", functions["nlp"], options)
@@ -133,7 +133,7 @@ def test_optimum_converges_at_the_order_of_the_rule(name, degree, coarse, order)
 def test_split_meshes_keep_their_ends():
     mesh = Mesh(np.array([0.0, 0.2, 1.0])).split(np.array([2, 1]))
     np.testing.assert_allclose(mesh.ends, [0, 0.1, 0.2, 1])
-    points = mesh.points(rule("hermite-simpson"))
+    points = mesh.points(collocation_rule("hermite-simpson"))
     np.testing.assert_allclose(points, [0, 0.05, 0.1, 0.15, 0.2, 0.6, 1])
 
 

@@ -59,9 +59,9 @@ def test_after_the_reference_the_tail_is_held():
     [
         (3, {}, "reference is a int"),
         (([0, 1], np.zeros((2, 3))), {}, "times (2,) and angles (2, 3)"),
-        (([1, 0], np.zeros((2, 2))), {}, "times must increase"),
-        (([0, 1], np.full((2, 2), np.nan)), {}, "be finite"),
-        (([0, 1], np.zeros((2, 2))), {"kp": -1}, "kp is -1"),
+        (([1, 0], np.zeros((2, 2))), {}, "needs increasing times"),
+        (([0, 1], np.full((2, 2), np.nan)), {}, "]: value nan: needs a finite number"),
+        (([0, 1], np.zeros((2, 2))), {"kp": -1}, "kp: value -1: needs a number from 0"),
     ],
 )
 def test_misuse(reference, gains, words):

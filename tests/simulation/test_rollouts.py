@@ -14,8 +14,7 @@ import pytest
 
 import serpentail as st
 from serpentail.model.compiler import compile_library
-from serpentail.simulation import batched_runs as abreast
-from serpentail.simulation import rollouts
+from serpentail.simulation import batched_runs, rollouts
 from tests.support.models import model_folder
 
 SEGMENTS, LINKS = 2, 2
@@ -400,10 +399,12 @@ def test_a_compiled_torque_that_refuses_ends_its_run(monkeypatch, threads):
 @pytest.mark.parametrize("many", [1, 10**12], ids=["abreast", "alone"])
 def test_ctrl_c_ends_all_threads_within_a_second(monkeypatch, many):
     monkeypatch.setattr(rollouts, "cores", lambda: 2)
-    monkeypatch.setattr(abreast, "MANY", many)
-    monkeypatch.setattr(abreast, "LONG", 10**12)
+    monkeypatch.setattr(batched_runs, "MIN_BATCHED_STEPS", many)
+    monkeypatch.setattr(batched_runs, "MAX_SHARED_STEPS", 10**12)
     q, v = starts(tail(), 50)
-    tail().many.flights.function("tail_side_by_side_flights")  # compiled before the clock runs
+    tail().batch_library.rollouts.function(
+        "tail_side_by_side_flights"
+    )  # compiled before the clock runs
     before, asked = threading.active_count(), []
 
     def ask():
@@ -424,7 +425,7 @@ def test_ctrl_c_ends_all_threads_within_a_second(monkeypatch, many):
 
 @pytest.fixture
 def any_number_is_many(monkeypatch):
-    monkeypatch.setattr(abreast, "MANY", 1)
+    monkeypatch.setattr(batched_runs, "MIN_BATCHED_STEPS", 1)
 
 
 LAWS = {
@@ -535,7 +536,7 @@ def test_few_steps_compile_nothing_and_other_laws_fly_alone(monkeypatch):
     model = st.load(tail().folder)
     q, v = starts(model, 9)
     assert st.simulate(model, q, v, **FLIGHT).info["abreast"] == 1 and not built
-    monkeypatch.setattr(abreast, "MANY", 1)
+    monkeypatch.setattr(batched_runs, "MIN_BATCHED_STEPS", 1)
     laws = [st.Phases([(0.0, None), (0.02, DAMPING)]), lambda t, q, v: [0.0] * NT]
     laws.append(st.Pfl(model, st.Reference([0.0, 0.05], [[0.0] * NT, [0.3] * NT])))
     for settings in ({"method": "tsit5", "step": None}, *({"controller": law} for law in laws)):
@@ -565,8 +566,14 @@ def row_with(array, where, value):
 
 Q, V = starts(tail(), 4)
 WRONG_STATES = {
-    "a number that is none": ((row_with(Q, (2, 1), np.nan), V), r"q0\[1\] of run 2 is not finite"),
-    "a velocity without end": ((Q, row_with(V, (3, 0), np.inf)), r"v0\[0\] of run 3 is not finite"),
+    "a number that is none": (
+        (row_with(Q, (2, 1), np.nan), V),
+        r"q0\[1\] of run 2: value nan: needs a finite number",
+    ),
+    "a velocity without end": (
+        (Q, row_with(V, (3, 0), np.inf)),
+        r"v0\[0\] of run 3: value inf: needs a finite number",
+    ),
     "no attitude": (
         (row_with(Q, (1, slice(3, 7)), 0), V),
         r"q0\[3:7\] of run 1 is the zero quaternion",

@@ -1,10 +1,9 @@
-"""Tumbling kangaroo rats for tests of planning: a tail's sizes and a seed go in; a model and starts
-come out.
-"""
+"""Tumbling kangaroo rats for tests of planning: models, starts, plans and their true motions."""
 
 from functools import cache
 
 import numpy as np
+from scipy.integrate import solve_ivp
 
 import serpentail as st
 from serpentail_codegen.scene.signatures.table import EXACT_DERIVATIVES
@@ -15,6 +14,12 @@ EXACT = sorted(
 )
 FUNCTIONS = [*EXACT, "bias_force", "pfl", "energy", "momentum", "rollout", "tail_points"]
 DURATION = 0.4  # s
+AGAIN = {
+    "duration": DURATION,
+    "bounds": st.Bounds(angle=np.pi / 3),
+    "tolerance": None,
+    "track": False,
+}
 
 
 @cache
@@ -50,3 +55,31 @@ def planned(**settings) -> st.Plan:
     return st.plan(
         model, start=start(model), duration=DURATION, bounds=bounds, track=False, **settings
     )
+
+
+def rate(model, plan):
+    """y -> y_dot of (q, v) under the plan's torques, by NumPy."""
+
+    def y_dot(t, y):
+        q, v = y[: model.nq], y[model.nq :]
+        w, x, y_, z = q[3:7]
+        a, b, c = v[3:6]
+        turn = [
+            -x * a - y_ * b - z * c,
+            w * a + y_ * c - z * b,
+            w * b - x * c + z * a,
+            w * c + x * b - y_ * a,
+        ]
+        tau = plan.torque(t)[0] - plan.problem.damping * v[6:]
+        return np.concatenate([v[:3], np.array(turn) / 2, v[6:], model.forward_dynamics(q, v, tau)])
+
+    return y_dot
+
+
+def integrated(model, plan):
+    """The state at the end, by SciPy's DOP853 from interval to interval."""
+    y = np.concatenate([plan.problem.q0, plan.problem.v0])
+    for a, b in zip(plan.curve.ends[:-1], plan.curve.ends[1:], strict=True):
+        inside = np.nextafter(b, a)  # torques may jump at the ends
+        y = solve_ivp(rate(model, plan), (a, inside), y, "DOP853", rtol=1e-11, atol=1e-12).y[:, -1]
+    return y[: model.nq], y[model.nq :]

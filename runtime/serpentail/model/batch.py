@@ -1,55 +1,57 @@
-"""Many states at once: the C that evaluates several states side by side, compiled when first
-needed.
+"""The C that evaluates several states or runs side by side, in lanes of vectors.
+
+It takes a second or two to compile, so it is compiled when it is first worth that.
 """
 
 import ctypes
 import threading
+from collections.abc import Callable
 from pathlib import Path
 
 from .compiler import compile_library
 
-# states: from here on a batch pays for compiling the C of batches, which takes a second or two
-MANY = 1000
-LATE = ("batch", "flights")  # sources of a model that are compiled when they are needed
+MIN_BATCH = 1000  # states: from here on a batch pays for compiling
+LAZY_SOURCES = ("batch", "flights")  # sources of a model that are compiled when they are needed
+NO_BATCH: dict = {"states": 1, "work": {}}  # of models without C
+RecordFunction = Callable[[int], int]  # takes the address of a record, returns a status
 
 
-class Late:
+class LazyLibrary:
     """A source of one model that is compiled when it is first needed, not with the model."""
 
     def __init__(self, folder: Path, manifest: dict, profile: str, part: str):
         self.folder, self.source, self.profile = folder, f"{manifest['prefix']}_{part}.c", profile
-        self.library, self.lock = None, threading.Lock()
+        self.library: ctypes.CDLL | None = None
+        self.lock = threading.Lock()
 
-    def function(self, name: str):
-        """Return a function that takes a record."""
+    def function(self, name: str) -> RecordFunction:
+        """Return a function that takes the address of a record and returns a status."""
         with self.lock:
             if self.library is None:
                 source = self.folder / "src" / self.source
-                self.library = ctypes.CDLL(
-                    str(compile_library([source], self.folder / "include", self.profile))
-                )
+                path = compile_library([source], self.folder / "include", self.profile)
+                self.library = ctypes.CDLL(str(path))
         function = getattr(self.library, name)
         function.argtypes = [ctypes.c_void_p]
         return function
 
 
-class SideBySide:
-    """The C of one model that evaluates batches, or simulates flights, several states side by
-    side.
-    """
+class BatchLibrary:
+    """The C of one model that evaluates batches, and that simulates batches of flights."""
 
     def __init__(self, folder: Path, manifest: dict, profile: str):
-        self.prefix, self.states, self.work = (
-            manifest["prefix"],
-            manifest["batch"]["states"],
-            manifest["batch"]["work"],
+        self.prefix = manifest["prefix"]
+        batch = manifest.get("batch", NO_BATCH)
+        self.states: int = batch["states"]
+        self.work: dict[str, int] = batch["work"]
+        self.batch, self.rollouts = (
+            LazyLibrary(folder, manifest, profile, part) for part in LAZY_SOURCES
         )
-        self.batch, self.flights = (Late(folder, manifest, profile, part) for part in LATE)
 
-    def entry(self, name: str, count: int):
-        """Return the C function for a batch of so many states, or None where one state at a time is
-        better.
-        """
-        if name not in self.work or count < (MANY if self.batch.library is None else self.states):
+    def entry(self, name: str, count: int) -> RecordFunction | None:
+        """Return the C function for a batch of so many states, None where it is not worth it."""
+        if name not in self.work or count < (
+            MIN_BATCH if self.batch.library is None else self.states
+        ):
             return None
         return self.batch.function(f"{self.prefix}_side_by_side_{name}")

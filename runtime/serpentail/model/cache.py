@@ -20,15 +20,13 @@ REMEDY_CACHE = "set SERPENTAIL_CACHE to a folder you can write"
 
 
 def cache_folder(cache: Path | None) -> Path:
-    """Return the cache: the argument, else $SERPENTAIL_CACHE, else $XDG_CACHE_HOME or ~/.cache,
-    absolute.
-    """
-    own = cache or os.environ.get("SERPENTAIL_CACHE")
+    """Return the cache: as asked, else $SERPENTAIL_CACHE, else in $XDG_CACHE_HOME or ~/.cache."""
+    chosen = cache or os.environ.get("SERPENTAIL_CACHE")
     shared = os.environ.get("XDG_CACHE_HOME", "")
     if not os.path.isabs(shared):  # the XDG specification has relative paths ignored
         shared = "~/.cache"
     try:
-        return (Path(own) if own else Path(shared) / "serpentail").expanduser().absolute()
+        return (Path(chosen) if chosen else Path(shared) / "serpentail").expanduser().absolute()
     except RuntimeError as error:
         raise SerpentailError(f"no cache of compiled models: {error}; {REMEDY_CACHE}") from error
 

@@ -1,21 +1,23 @@
-"""CasADi functions of a model: built from its generated module, or wrapping its compiled C."""
+"""A model as CasADi functions, of operations that CasADi knows or of the compiled C."""
 
 import importlib.util
 from functools import cached_property
 from types import ModuleType
+from typing import TYPE_CHECKING
 
 import casadi
 
 from ..errors import ModelError
 from .parameters import flat
 
+if TYPE_CHECKING:
+    from .model import Model
+
 
 class CasadiFunctions:
-    """Attribute access builds a ``casadi.Function`` once; ``symbolic`` and ``external`` take
-    parameters as an input.
-    """
+    """Attributes are ``casadi.Function``s, each built once; others take parameters as an input."""
 
-    def __init__(self, model):
+    def __init__(self, model: "Model"):
         self._model = model
 
     @cached_property
@@ -31,6 +33,7 @@ class CasadiFunctions:
 
     @property
     def _has_module(self) -> bool:
+        """Whether the scene asked for CasADi."""
         return "casadi" in self._model.manifest["scene"]["targets"]
 
     def __getattr__(self, name: str) -> casadi.Function:
@@ -51,9 +54,7 @@ class CasadiFunctions:
 
     @property
     def parameter_vector(self) -> casadi.DM:
-        """The model's parameters, in the order that ``symbolic`` and ``external`` functions take
-        them.
-        """
+        """The model's parameters, as ``symbolic`` and ``external`` functions take them."""
         return casadi.DM(flat(self._model.manifest, self._model.parameters))
 
     def symbolic(self, name: str) -> casadi.Function:
@@ -61,13 +62,12 @@ class CasadiFunctions:
         return self._module.function(self._symbolic(name))
 
     def external(self, name: str, derivatives: int = 0, folded: bool = False) -> casadi.Function:
-        """Return the compiled C as a function whose last input is the parameter vector (double
-        models only).
+        """Return the compiled C as a function whose last input is the parameter vector.
 
-        derivatives: 1 or 2 raises ModelError here where the scene lacks what exact derivatives of
-        that order are made
-        of; else CasADi raises when it differentiates.  Those with respect to parameters need
-        ``<name>_parameter_derivatives`` in the scene, and are first ones.
+        Only models of doubles have it.
+        derivatives: 1 or 2 raises ModelError here where the scene lacks what exact derivatives
+        of that order are made of; else CasADi raises when it differentiates.  Those with respect
+        to parameters need ``<name>_parameter_derivatives`` in the scene, and are first ones.
         folded: take the model's parameters instead of an input.
         """
         prefix = self._model.manifest["prefix"]
@@ -82,15 +82,14 @@ class CasadiFunctions:
         function = casadi.external(f"{prefix}_casadi_{name}", self._model.library._name)
         if not folded:
             return function
-        inputs = [casadi.MX.sym(key, function.size1_in(key)) for key in function.name_in()[:-1]]
-        outputs = function(*inputs, self.parameter_vector)
-        outputs = outputs if isinstance(outputs, tuple) else (outputs,)
-        ports = (function.name_in()[:-1], function.name_out())
-        return casadi.Function(
-            name, inputs, outputs, *ports, {"always_inline": True}
-        )  # graphs then see the blocks
+        names = function.name_in()[:-1]
+        inputs = [casadi.MX.sym(key, function.size1_in(key)) for key in names]
+        outputs = list(function.call([*inputs, casadi.MX(self.parameter_vector)]))
+        options = {"always_inline": True}  # graphs then see the blocks
+        return casadi.Function(name, inputs, outputs, names, function.name_out(), options)
 
     def _symbolic(self, name: str) -> str:
+        """Return the name of a function that exists in SX operations."""
         if self._known(name) not in self._module.SIGNATURES:
             remedy = (
                 "differentiate the function by CasADi, or take the compiled one, "
@@ -111,14 +110,19 @@ class CasadiFunctions:
             raise self._model.without(*lacking)
 
     def _known(self, name: str) -> str:
+        """Return the name of a function that the scene has."""
         if name not in self._model.manifest["functions"]:
             raise self._model.without(name)
         return name
 
 
-def _imported(model) -> ModuleType:
+def _imported(model: "Model") -> ModuleType:
+    """Return the generated module of a model, loaded from its folder."""
     name = f"{model.name}_casadi"
-    spec = importlib.util.spec_from_file_location(name, model.folder / f"{name}.py")
+    path = model.folder / f"{name}.py"
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise ModelError(f"{path} cannot be loaded: generate the model again")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module

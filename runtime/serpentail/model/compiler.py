@@ -25,8 +25,7 @@ REMEDY_FAILED = (
 def compile_library(
     sources: Sequence[Path], include: Path, profile: str = "fast", cache: Path | None = None
 ) -> Path:
-    """Return the shared library of `sources` and the headers in `include`, compiled unless the
-    cache has it.
+    """Return the shared library of sources and headers, compiled unless the cache has it.
 
     `profile` is "fast" or "reproducible"; `cache` defaults to $SERPENTAIL_CACHE, then the user's
     cache. Raises CompilerNotFound, CompileFailed, ModelError (unreadable sources), SerpentailError
@@ -59,9 +58,7 @@ def describe_compiler(profile: str = "fast") -> dict[str, object]:
 
 
 def _text_digest(sources: Sequence[Path], include: Path) -> str:
-    """Return the digest of names and contents of the sources, in order, and of the headers they can
-    reach.
-    """
+    """Return the digest of the sources, in order, and of the headers that they can reach."""
     if not sources or not include.is_dir():
         raise ModelError(f"no sources, or no header folder {include}; generate the model again")
     try:
@@ -76,9 +73,7 @@ def _text_digest(sources: Sequence[Path], include: Path) -> str:
 
 
 def _headers(sources: Sequence[Path], include: Path) -> Iterator[tuple[str, Path]]:
-    """Yield the headers below `include` and beside the sources, each with its name there,
-    sorted.
-    """
+    """Yield name and path of the headers below `include` and beside the sources, sorted."""
     for path in sorted(include.rglob("*.h")):
         yield path.relative_to(include).as_posix(), path
     for folder in dict.fromkeys(path.parent for path in sources):
@@ -87,9 +82,7 @@ def _headers(sources: Sequence[Path], include: Path) -> Iterator[tuple[str, Path
 
 
 def _key(text: str, toolchain: Toolchain) -> str:
-    """Return the name of the library's place: the C text and all that its machine code depends
-    on.
-    """
+    """Return the digest of the C text and of all that its machine code depends on."""
     command = _public_command((os.path.realpath(toolchain.command[0]), *toolchain.command[1:]))
     flags = (*toolchain.flags, *SHARED_FLAGS)
     return digest([text, command, toolchain.version, flags, toolchain.target, _c_library()])
@@ -101,9 +94,7 @@ def _public_command(command: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def _c_library() -> str:
-    """Return the C library's version: code linked against a newer one need not load with an older
-    one.
-    """
+    """Return the C library's version: what is linked to a newer one may not load with an older."""
     with contextlib.suppress(AttributeError, ValueError, OSError):
         return os.confstr("CS_GNU_LIBC_VERSION") or ""
     return ""
@@ -112,9 +103,7 @@ def _c_library() -> str:
 def _build(
     sources: Sequence[Path], include: Path, text: str, toolchain: Toolchain, folder: Path
 ) -> Path:
-    """Compile into a file of our own and publish it by one rename: others see the whole library or
-    none.
-    """
+    """Compile into a file of our own; one rename then shows others the whole library."""
     place = folder / _key(text, toolchain)
     try:
         with temporary_file(folder) as part:

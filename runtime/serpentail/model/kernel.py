@@ -1,26 +1,30 @@
-"""Compiled functions that are called with NumPy arrays."""
+"""Compiled functions, called with NumPy arrays: one state, a batch, or the samples of runs."""
 
 import ctypes
 import math
 import threading
+from collections.abc import Sequence
 from functools import partial
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy import ndarray
+from numpy.typing import ArrayLike, DTypeLike
 
-from ..checks import real_array
+from ..checks import real_array, refuse_not_finite
 from ..errors import StateError
-from .batch import SideBySide
+from .batch import BatchLibrary, RecordFunction
+from .layout import FIRST_Q, QUATERNION, SECOND_Q
 from .library import NOT_POSITIVE_DEFINITE, OUT_OF_RANGE
 from .workers import shared
 
 MOST_ARRAYS = 8
+Arrays = Sequence[ndarray]
+Shapes = Sequence[tuple[int, ...]]
 
 
-class Call(ctypes.Structure):
-    """The generated C's argument record: parameters, batch size, the state that failed, workspace,
-    arrays.
-    """
+class ArgumentRecord(ctypes.Structure):
+    """The argument record of a function of the generated C."""
 
     _fields_ = (
         ("parameters", ctypes.c_void_p),
@@ -31,16 +35,18 @@ class Call(ctypes.Structure):
     )
 
 
-def call_record(parameters: np.ndarray, count: int, work: np.ndarray, arrays) -> Call:
+def argument_record(
+    parameters: ndarray, count: int, work: ndarray, arrays: Arrays
+) -> ArgumentRecord:
     """Return a record of arrays, which the caller keeps alive."""
     addresses = (ctypes.c_void_p * MOST_ARRAYS)(*(a.ctypes.data for a in arrays))
-    return Call(parameters.ctypes.data, count, 0, work.ctypes.data, addresses)
+    return ArgumentRecord(parameters.ctypes.data, count, 0, work.ctypes.data, addresses)
 
 
 CACHE_LINE = 64  # bytes, and the widest vector
 
 
-def aligned(count: int, dtype) -> np.ndarray:
+def aligned(count: int, dtype: DTypeLike) -> ndarray:
     """Return a workspace that begins at a cache line, so that no vector in it lies across two."""
     memory = np.zeros((count + 1) * np.dtype(dtype).itemsize + CACHE_LINE, np.uint8)
     first = -memory.ctypes.data % CACHE_LINE
@@ -48,51 +54,48 @@ def aligned(count: int, dtype) -> np.ndarray:
 
 
 class Buffers(threading.local):
-    """Arrays that one thread hands to C: their addresses are taken once, so a call on one state
-    costs little.
-    """
+    """Arrays that one thread hands to C; as they stay, a call on one state costs little."""
 
-    def __init__(self, dtype, inputs, outputs, work: int, parameters: np.ndarray):
+    def __init__(
+        self, dtype: DTypeLike, inputs: Shapes, outputs: Shapes, work: int, parameters: ndarray
+    ):
         self.inputs = [np.zeros(shape, dtype) for shape in inputs]
         self.outputs = [np.zeros(shape, dtype) for shape in outputs]
         self.slots = [(array.shape, array) for array in self.inputs]
         self.only = self.outputs[0] if len(self.outputs) == 1 else None
         self.work = aligned(work, dtype)
-        self.call = call_record(parameters, 1, self.work, (*self.inputs, *self.outputs))
-        self.address = ctypes.addressof(self.call)
+        self.record = argument_record(parameters, 1, self.work, (*self.inputs, *self.outputs))
+        self.address = ctypes.addressof(self.record)
 
-    def results(self) -> tuple:
+    def results(self) -> tuple[Any, ...]:
         """Return fresh copies of the outputs; a scalar as a number."""
         return tuple(o[()] if o.ndim == 0 else o.copy() for o in self.outputs)
 
 
-class Rows:
-    """A compiled function on rows of many runs, each with its own parameters; where they lie is
-    looked up once.
+class RunKernel:
+    """A compiled function on the samples of many runs, each with its own parameters.
 
-    parameters (runs, scalars); inputs and outputs (runs, rows, ...), of the model's reals.  For one
-    thread.
+    parameters (runs, scalars); inputs and outputs (runs, samples, ...), of the model's reals, whose
+    addresses are looked up once.  For one thread.
     """
 
-    def __init__(self, kernel: "Kernel", parameters: np.ndarray, inputs, outputs):
+    def __init__(self, kernel: "Kernel", parameters: ndarray, inputs: Arrays, outputs: Arrays):
         self.kernel, self.inputs = kernel, inputs
         self.places = [(a.ctypes.data, a.strides[0]) for a in (*inputs, *outputs)]
         self.parameters = parameters.ctypes.data, parameters.strides[0]
         self.work = aligned(kernel.work, kernel.dtype)
-        self.call = call_record(parameters, 0, self.work, (*inputs, *outputs))
-        self.address = ctypes.addressof(self.call)
+        self.record = argument_record(parameters, 0, self.work, (*inputs, *outputs))
+        self.address = ctypes.addressof(self.record)
 
     def __call__(self, run: int, rows: int) -> None:
-        """Evaluate the first rows of a run; StateError, which counts all rows from the first run's
-        on.
-        """
-        call = self.call
-        call.parameters, call.count = self.parameters[0] + run * self.parameters[1], rows
+        """Evaluate the first rows of a run; StateError counts all rows from the first run's on."""
+        record = self.record
+        record.parameters, record.count = self.parameters[0] + run * self.parameters[1], rows
         for k, (first, apart) in enumerate(self.places):
-            call.arrays[k] = first + run * apart
+            record.arrays[k] = first + run * apart
         if status := self.kernel.function(self.address):
             whole = [a.reshape(-1, *a.shape[2:]) for a in self.inputs]
-            self.kernel.fail(status, run * self.inputs[0].shape[1] + call.failed, whole)
+            self.kernel.fail(status, run * self.inputs[0].shape[1] + record.failed, whole)
 
 
 class Kernel:
@@ -100,12 +103,12 @@ class Kernel:
 
     def __init__(
         self,
-        library: ctypes.CDLL,
-        many: SideBySide,
+        libraries: tuple[ctypes.CDLL, BatchLibrary],
         manifest: dict,
         name: str,
-        parameters: np.ndarray,
+        parameters: ndarray,
     ):
+        library, self.batch_library = libraries
         entry = manifest["functions"][name]
         self.name, self.dtype = name, parameters.dtype
         self.names = [a["name"] for a in entry["inputs"]]
@@ -113,15 +116,13 @@ class Kernel:
         self.out_shapes = [() if a["shape"] == [1] else tuple(a["shape"]) for a in entry["outputs"]]
         self.function = getattr(library, f"{manifest['prefix']}_batch_{name}")
         self.function.argtypes = [ctypes.c_void_p]
-        self.parameters, self.many, self.work = parameters, many, manifest["work"][name]
+        self.parameters, self.work = parameters, manifest["work"][name]
         self.bend_range = manifest["scene"].get("bend_range")
         self.polar = manifest["scene"]["coordinates"] == "polar"
         self.buffers = Buffers(self.dtype, self.shapes, self.out_shapes, self.work, parameters)
 
-    def __call__(self, *arrays):
-        """Evaluate; StateError names the argument that has a wrong shape or a value that is not
-        finite.
-        """
+    def __call__(self, *arrays: ArrayLike) -> Any:
+        """Return the output, or a tuple of outputs; StateError names an argument that is wrong."""
         buffers, dtype = self.buffers, self.dtype
         if len(arrays) != len(buffers.slots):
             raise TypeError(f"{self.name} takes {', '.join(self.names)}")
@@ -133,13 +134,13 @@ class Kernel:
             self.fail(status, 0, [b[None] for b in buffers.inputs])
         return buffers.only.copy() if buffers.only is not None else buffers.results()
 
-    def _any(self, arrays):
-        arrays = [
-            self._checked(*item) for item in zip(self.names, self.shapes, arrays, strict=True)
-        ]
-        counts = {
-            a.shape[0] for a, shape in zip(arrays, self.shapes, strict=True) if a.ndim > len(shape)
-        }
+    def _any(self, values: Sequence[ArrayLike]) -> Any:
+        """Return outputs for any arrays of numbers, of which some may have a batch axis."""
+        arguments = zip(self.names, self.shapes, values, strict=True)
+        arrays = [self._checked(name, shape, value) for name, shape, value in arguments]
+        # sizes of the batches among them
+        dimensions = zip(arrays, self.shapes, strict=True)
+        counts = {array.shape[0] for array, shape in dimensions if array.ndim > len(shape)}
         if not counts:
             outputs = self._batch(1, arrays)
             return tuple(o[0] for o in outputs) if isinstance(outputs, tuple) else outputs[0]
@@ -149,85 +150,82 @@ class Kernel:
             )
         return self._batch(counts.pop(), arrays)
 
-    def _checked(self, name: str, shape: tuple[int, ...], value) -> np.ndarray:
-        array = real_array(f"{self.name}: {name}", value, self.dtype)
-        if (
-            array.shape[array.ndim - len(shape) :] != shape
-            or array.ndim > len(shape) + 1
-            or array.ndim < len(shape)
-        ):
+    def _checked(self, name: str, shape: tuple[int, ...], value: ArrayLike) -> ndarray:
+        """Return an argument as an array of the shape, or with a batch axis before it."""
+        array = real_array(f"{self.name}: {name}", value, StateError, self.dtype)
+        if array.shape != shape and (array.ndim == 0 or array.shape[1:] != shape):
             size = ", ".join(map(str, shape))
             raise StateError(
                 f"{self.name}: {name} has shape {array.shape}, not ({size},) or (batch, {size})"
             )
         return array
 
-    def _batch(self, count: int, arrays):
+    def _batch(self, count: int, arrays: Arrays) -> Any:
+        """Return outputs for so many states; single ones are repeated."""
         whole = [
             np.ascontiguousarray(np.broadcast_to(a, (count, *shape)))
             for a, shape in zip(arrays, self.shapes, strict=True)
         ]
         outputs = [np.empty((count, *shape), self.dtype) for shape in self.out_shapes]
-        many = self.many.entry(self.name, count)
-        run = self._each if many is None else partial(self._side_by_side, many)
+        function = self.batch_library.entry(self.name, count)
+        run = self._each if function is None else partial(self._side_by_side, function)
         shared(count, lambda first, last: run(whole, outputs, first, last))
         return outputs[0] if len(outputs) == 1 else tuple(outputs)
 
-    def _each(self, inputs, outputs, first: int, last: int) -> None:
+    def _each(self, inputs: Arrays, outputs: Arrays, first: int, last: int) -> None:
         """Evaluate states [first, last) one by one."""
         work = aligned(self.work, self.dtype)
-        call = call_record(
+        record = argument_record(
             self.parameters, last - first, work, [a[first:last] for a in (*inputs, *outputs)]
         )
-        if status := self.function(ctypes.addressof(call)):
-            self.fail(status, first + call.failed, inputs)
+        if status := self.function(ctypes.addressof(record)):
+            self.fail(status, first + record.failed, inputs)
 
-    def _side_by_side(self, function, inputs, outputs, first: int, last: int) -> None:
-        """Evaluate states [first, last) side by side; those among which one fails are taken again,
-        one by one.
-        """
-        work = aligned(self.many.work[self.name], self.dtype)
+    def _side_by_side(
+        self, function: RecordFunction, inputs: Arrays, outputs: Arrays, first: int, last: int
+    ) -> None:
+        """Evaluate states [first, last) in lanes; lanes among which one fails again, one by one."""
+        work = aligned(self.batch_library.work[self.name], self.dtype)
         while first < last:
-            call = call_record(
+            record = argument_record(
                 self.parameters, last - first, work, [a[first:last] for a in (*inputs, *outputs)]
             )
-            if not function(ctypes.addressof(call)):
+            if not function(ctypes.addressof(record)):
                 return
-            first += call.failed
-            after = min(first + self.many.states, last)
+            first += record.failed
+            after = min(first + self.batch_library.states, last)
             self._each(inputs, outputs, first, after)
             first = after
 
-    def fail(self, status: int, index: int, arrays):
+    def fail(self, status: int, index: int, arrays: Arrays) -> NoReturn:
         """Raise what a status means of one state among arrays."""
+        # an argument that is no number, or a quaternion that is none
         state = f" of state {index}" if len(arrays[0]) > 1 else ""
         for name, array in zip(self.names, arrays, strict=True):
-            bad = np.argwhere(~np.isfinite(array[index]))
-            if len(bad):
-                where = f"[{', '.join(map(str, bad[0]))}]{state}"
-                value = array[index][tuple(bad[0])]
-                raise StateError(f"{self.name}: {name}{where} is {value}: give finite numbers")
+            refuse_not_finite(f"{self.name}: {name}", array[index], StateError, state)
         q = arrays[0][index].astype(float)
         if self.names[0] == "q":
             self._check_attitude(q, state)
+        # else what the C function found
         if status == OUT_OF_RANGE:
             raise StateError(f"{self.name}: {self._out_of_range(q, state)}")
         indefinite = f"the inertia matrix{state} is not positive definite"
         what = indefinite if status == NOT_POSITIVE_DEFINITE else f"the result{state} is not finite"
         raise StateError(f"{self.name}: {what}: is a value too large, or a parameter unphysical?")
 
-    def _check_attitude(self, q, state: str) -> None:
+    def _check_attitude(self, q: ndarray, state: str) -> None:
         """Refuse a quaternion that gives no attitude."""
-        limits, norm = np.finfo(self.dtype), math.hypot(*q[3:7])
+        limits, norm = np.finfo(self.dtype), math.hypot(*q[QUATERNION])
         if not limits.tiny <= norm * norm <= limits.max:
             words = f"has norm {norm:.3g}" if norm else "is zero"
             raise StateError(
                 f"{self.name}: the quaternion q[3:7]{state} {words}: upright is (1, 0, 0, 0)"
             )
 
-    def _out_of_range(self, q, state: str) -> str:
+    def _out_of_range(self, q: ndarray, state: str) -> str:
         """Say which segment has a bend that the model does not cover, and what to do."""
-        bends = abs(q[8::2]) if self.polar else np.hypot(q[7::2], q[8::2])
+        first, second = q[FIRST_Q], q[SECOND_Q]
+        bends = abs(second) if self.polar else np.hypot(first, second)
         least, worst = int(bends.argmin()), int(bends.argmax())
         if self.polar and bends[worst] <= self.bend_range:
             what = f"segment {least + 1}{state} has theta = {bends[least]:.6g} rad"

@@ -7,8 +7,11 @@ QUATERNION = slice(3, 7)  # in q, (w, x, y, z)
 VELOCITY = slice(0, 3)  # of B in v, world (m/s); of forces in generalised forces (N)
 OMEGA = slice(3, 6)  # in v, body axes (rad/s); of moments in generalised forces (N m)
 TORSO_NQ, TORSO_NV = 7, 6  # numbers of the torso in q and in v
+TORSO_V = slice(0, TORSO_NV)  # in v and in generalised forces
 TAIL_Q, TAIL_V = slice(TORSO_NQ, None), slice(TORSO_NV, None)  # tail coordinates, and their rates
 PER_SEGMENT = 2  # coordinates of a segment
+# in q, of all segments: alpha, a or phi; and beta, b or theta
+FIRST_Q, SECOND_Q = slice(TORSO_NQ, None, PER_SEGMENT), slice(TORSO_NQ + 1, None, PER_SEGMENT)
 
 
 @dataclass(frozen=True)
@@ -16,6 +19,12 @@ class Layout:
     """The layout of a model of m segments: q (nq,), v (nv,), tau (nt,)."""
 
     segments: int
+
+    @classmethod
+    def of_width(cls, nq: int) -> "Layout | None":
+        """Return the layout in which q has so many numbers, None where there is none."""
+        segments, rest = divmod(nq - TORSO_NQ, PER_SEGMENT)
+        return cls(segments) if segments >= 0 and rest == 0 else None
 
     @property
     def nt(self) -> int:

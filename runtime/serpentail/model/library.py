@@ -1,10 +1,10 @@
-"""Opens the compiled library of a model."""
+"""Opens the compiled C of a model, as ctypes has it, and names its status codes."""
 
 import ctypes
 from pathlib import Path
 
 from ..errors import ModelError, SerpentailError
-from .batch import LATE
+from .batch import LAZY_SOURCES
 from .compiler import compile_library
 from .manifest import remedy
 
@@ -12,13 +12,11 @@ NOT_POSITIVE_DEFINITE, NOT_FINITE, OUT_OF_RANGE = 1, 2, 3
 
 
 def open_library(folder: Path, manifest: dict, profile: str) -> ctypes.CDLL:
-    """Compile (or find in the cache) and load a model's C; ModelError where it is not what the
-    manifest says.
-    """
+    """Load a model's C, compiled or from the cache; ModelError where it is another's interface."""
     prefix = manifest["prefix"]
-    late = {f"src/{prefix}_{part}.c" for part in LATE}
+    lazy = {f"src/{prefix}_{part}.c" for part in LAZY_SOURCES}
     sources = [
-        folder / name for name in manifest["files"] if name.startswith("src/") and name not in late
+        folder / name for name in manifest["files"] if name.startswith("src/") and name not in lazy
     ]
     path = compile_library(sources, folder / "include", profile)
     try:

@@ -1,6 +1,4 @@
-"""Generated folders: a folder goes in, its manifest comes out, checked against the files beside
-it.
-"""
+"""Reads the manifest of a generated folder, and checks it against the files beside it."""
 
 import hashlib
 import json
@@ -24,9 +22,7 @@ C_KEYS = ["abi_hash", "work", "batch"]  # of models with C
 
 
 def read_manifest(folder: Path) -> dict:
-    """Return the manifest of a generated folder; ModelError where it is missing, stale or does not
-    fit its files.
-    """
+    """Return a folder's manifest; ModelError where it is missing, stale or unlike the files."""
     path = folder / "manifest.json"
     if not path.is_file():
         raise ModelError(
@@ -51,6 +47,7 @@ def remedy(folder: Path) -> str:
 
 
 def _check(folder: Path, manifest: dict) -> None:
+    """Refuse a manifest of another version, one that lacks keys, and one or files that changed."""
     if (manifest["format"], manifest["generator"]) != (FORMAT, __version__):
         made = f"format {manifest['format']}, generator {manifest['generator']}"
         raise ModelError(
@@ -69,16 +66,14 @@ def _check(folder: Path, manifest: dict) -> None:
             "by st.load(folder, parameters=...), sizes by another scene"
         )
     for name, digest in manifest["files"].items():
+        path = folder / name
         try:
-            found = _sha256((folder / name).read_bytes())
+            content = path.read_bytes()
         except OSError as error:
-            raise ModelError(
-                f"{folder / name} cannot be read ({error.strerror}): {remedy(folder)}"
-            ) from error
-        if found != digest:
-            raise ModelError(
-                f"{folder / name} was changed after it was generated: {remedy(folder)}"
-            )
+            reason = error.strerror
+            raise ModelError(f"{path} cannot be read ({reason}): {remedy(folder)}") from error
+        if _sha256(content) != digest:
+            raise ModelError(f"{path} was changed after it was generated: {remedy(folder)}")
 
 
 def _sha256(content: bytes) -> str:

@@ -1,30 +1,38 @@
-"""Polar coordinates of continuum segments: the paper's (phi, theta) in, bend components (a, b) out,
-and back.
-"""
+"""Converts the paper's polar angles (phi, theta) of continuum segments to bends (a, b) and back."""
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from ..checks import finite_array
 from ..errors import StateError
 
+Array = NDArray[np.float64]
+Four = tuple[Array, Array, Array, Array]
 
-def polar_to_bend(phi, theta, phi_dot=0.0, theta_dot=0.0):
-    """Return (a, b, a_dot, b_dot) of a = -theta cos(phi), b = theta sin(phi); rad and rad/s, any
-    equal shapes.
 
-    Raises StateError where a value is no finite number, or the results are beyond numbers.
+def polar_to_bend(
+    phi: ArrayLike, theta: ArrayLike, phi_dot: ArrayLike = 0.0, theta_dot: ArrayLike = 0.0
+) -> Four:
+    """Return (a, b, a_dot, b_dot) of a = -theta cos(phi), b = theta sin(phi).
+
+    rad and rad/s, in any equal shapes.  Raises StateError where a value is no finite number, or
+    the results are beyond numbers.
     """
-    given = {"phi": phi, "theta": theta, "phi_dot": phi_dot, "theta_dot": theta_dot}
-    phi, theta, phi_dot, theta_dot = _alike(given)
+    values = {"phi": phi, "theta": theta, "phi_dot": phi_dot, "theta_dot": theta_dot}
+    phi, theta, phi_dot, theta_dot = _alike(values)
     c, s = np.cos(phi), np.sin(phi)
     with np.errstate(all="ignore"):
-        rates = theta * phi_dot * s - theta_dot * c, theta * phi_dot * c + theta_dot * s
-    return _numbers(-theta * c, theta * s, *rates)
+        a_dot = theta * phi_dot * s - theta_dot * c
+        b_dot = theta * phi_dot * c + theta_dot * s
+    return _finite_results(-theta * c, theta * s, a_dot, b_dot)
 
 
-def bend_to_polar(a, b, a_dot=0.0, b_dot=0.0):
-    """Return (phi, theta, phi_dot, theta_dot), theta > 0; StateError where a segment is straight:
-    phi has no value.
+def bend_to_polar(
+    a: ArrayLike, b: ArrayLike, a_dot: ArrayLike = 0.0, b_dot: ArrayLike = 0.0
+) -> Four:
+    """Return (phi, theta, phi_dot, theta_dot), theta > 0; rad and rad/s, in any equal shapes.
+
+    Raises StateError as ``polar_to_bend``, and where a segment is straight: phi has no value.
     """
     a, b, a_dot, b_dot = _alike({"a": a, "b": b, "a_dot": a_dot, "b_dot": b_dot})
     with np.errstate(over="ignore"):
@@ -37,26 +45,25 @@ def bend_to_polar(a, b, a_dot=0.0, b_dot=0.0):
     with np.errstate(all="ignore"):
         phi_dot = (a_dot * (b / theta) - b_dot * (a / theta)) / theta
         theta_dot = (a / theta) * a_dot + (b / theta) * b_dot
-    return _numbers(np.arctan2(b, -a), theta, phi_dot, theta_dot)
+    return _finite_results(np.arctan2(b, -a), theta, phi_dot, theta_dot)
 
 
-def _alike(given: dict) -> list[np.ndarray]:
+def _alike(values: dict[str, ArrayLike]) -> list[Array]:
     """Return finite arrays of one shape."""
-    arrays = [finite_array(name, value) for name, value in given.items()]
+    arrays = {name: finite_array(name, value) for name, value in values.items()}
     try:
-        return np.broadcast_arrays(*arrays)
+        return [*np.broadcast_arrays(*arrays.values())]
     except ValueError:
-        shapes = ", ".join(
-            f"{name} {array.shape}" for name, array in zip(given, arrays, strict=True)
-        )
+        shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
         raise StateError(f"shapes differ: {shapes}: give equal ones") from None
 
 
-def _numbers(*results: np.ndarray) -> tuple[np.ndarray, ...]:
+def _finite_results(*results: Array) -> Four:
     """Return results, unless one is beyond numbers."""
     if not all(np.isfinite(x).all() for x in results):
         raise StateError(
             "the converted state is beyond numbers: is an angle or a rate too large, or theta too "
             "small?"
         )
-    return results
+    first, second, third, fourth = results
+    return first, second, third, fourth

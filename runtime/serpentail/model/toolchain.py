@@ -15,6 +15,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from ..checks import one_of
 from ..errors import CompilerNotFound, SerpentailError
 from .cache import digest, temporary_file
 
@@ -30,9 +31,8 @@ PROFILES = {
     ),
     "reproducible": ("-std=c99", "-O2", "-ffp-contract=off"),
 }
-# The first of these that the compiler takes joins the profile. Only zig takes `baseline`:
-# unasked, it builds
-# for the processor at hand, where gcc and clang build for any processor of its family.
+# The first of these that the compiler takes joins the profile. Only zig takes `baseline`: unasked,
+# it builds for the processor at hand, where gcc and clang build for any processor of its family.
 CPU_FLAGS = {"fast": ("-march=native", "-mcpu=native"), "reproducible": ("-mcpu=baseline",)}
 PROGRAMS = ("cc", "gcc", "clang")
 REMEDY_NOT_FOUND = (
@@ -49,26 +49,19 @@ class Toolchain:
     command: tuple[str, ...]
     flags: tuple[str, ...]
     version: str
-    target: (
-        str  # digest of the processor and instruction set that the flags stand for on this machine
-    )
+    target: str  # digest of what the flags stand for on this machine: processor, instruction set
 
 
 def check_profile(profile: str) -> None:
     """Raise SerpentailError unless `profile` is known."""
-    if not isinstance(profile, str) or profile not in PROFILES:
-        raise SerpentailError(
-            f"unknown build profile {profile!r}; choose one of {', '.join(PROFILES)}"
-        )
+    one_of("profile", profile, PROFILES, SerpentailError)
 
 
 # The compiler: which one, and what it resolves its flags to.
 
 
 def candidates() -> Iterator[tuple[str, ...]]:
-    """Yield the commands to try: $CC alone if it is set, else what is on PATH, then the ziglang
-    wheel.
-    """
+    """Yield the commands to try: $CC alone if set, else what is on PATH, then the ziglang wheel."""
     chosen = os.environ.get("CC", "").strip()
     if chosen:
         yield _split(chosen)
@@ -90,9 +83,7 @@ def _split(chosen: str) -> tuple[str, ...]:
 
 
 def examine(profile: str, folder: Path) -> Toolchain:
-    """Return the first candidate that answers, asking it afresh, and leave notes on all that were
-    asked.
-    """
+    """Return the first candidate that answers when asked; leave notes on all that were."""
     refusals = []
     for command in candidates():
         try:
@@ -130,9 +121,7 @@ def _ask(command: tuple[str, ...], profile: str) -> Toolchain:
 
 
 def _cpu_flag(command: tuple[str, ...], profile: str) -> tuple[str, ...]:
-    """Return the first of the profile's processor flags that the compiler takes in silence, or
-    none.
-    """
+    """Return the first of the profile's processor flags that the compiler takes in silence."""
     nothing = ("-E", "-x", "c", os.devnull)
     usual = run_command((*command, *nothing)).stderr
     for flag in CPU_FLAGS[profile]:
@@ -143,9 +132,7 @@ def _cpu_flag(command: tuple[str, ...], profile: str) -> tuple[str, ...]:
 
 
 def _target(command: tuple[str, ...], flags: tuple[str, ...]) -> str:
-    """Return a digest of what `flags` resolve to: gcc's list of them, else the macros they
-    define.
-    """
+    """Return a digest of what flags resolve to: gcc's list of them, else the macros they define."""
     questions = (("-Q", "--help=target"), ("-dM", "-E", "-x", "c", os.devnull))
     answers = (run_command((*command, *flags, *question)) for question in questions)
     listings = (answer.stdout for answer in answers if answer.returncode == 0 and answer.stdout)
@@ -153,9 +140,7 @@ def _target(command: tuple[str, ...], flags: tuple[str, ...]) -> str:
 
 
 def run_command(command: Sequence[str]) -> subprocess.CompletedProcess[str]:
-    """Return the finished `command`, run in the C locale; one that cannot start counts as exit code
-    127.
-    """
+    """Return the finished command, run in the C locale; 127 where it could not be started."""
     surroundings = {**os.environ, "LC_ALL": "C"}
     try:
         return subprocess.run(
@@ -175,9 +160,7 @@ def run_command(command: Sequence[str]) -> subprocess.CompletedProcess[str]:
 
 
 def recall(profile: str, folder: Path) -> Toolchain | None:
-    """Return the first working candidate as noted earlier on such a processor, or None to ask
-    afresh.
-    """
+    """Return the first working candidate by notes of such a processor, None to ask afresh."""
     for command in candidates():
         note = _read_note(_note_path(folder, command, profile))
         if note is None:
@@ -188,9 +171,7 @@ def recall(profile: str, folder: Path) -> Toolchain | None:
 
 
 def _note_path(folder: Path, command: tuple[str, ...], profile: str) -> Path:
-    """Return the note's place, named by the programs' files, the flags to choose from and the
-    processor.
-    """
+    """Return the place of a note, named after programs, flags to choose from and processor."""
     programs = [_file_identity(path) for path in map(shutil.which, command) if path]
     choices = (PROFILES[profile], CPU_FLAGS[profile])
     return folder / "compilers" / f"{digest([command, programs, choices, _processor()])}.json"
@@ -208,11 +189,8 @@ def _read_note(path: Path) -> dict[str, Any] | None:
         note = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
-    return (
-        note
-        if isinstance(note, dict) and {"works", "flags", "version", "target"} <= note.keys()
-        else None
-    )
+    whole = isinstance(note, dict) and {"works", "flags", "version", "target"} <= note.keys()
+    return note if whole else None
 
 
 def _write_note(
@@ -228,9 +206,7 @@ def _write_note(
 
 
 def _processor() -> str:
-    """Return the processor's model and features, read without a new process, else the machine's
-    name.
-    """
+    """Return the processor's model and features, else the machine's name; starts no process."""
     with contextlib.suppress(OSError):
         return Path("/sys/devices/system/cpu/modalias").read_text()
     with contextlib.suppress(OSError):

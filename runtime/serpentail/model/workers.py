@@ -1,4 +1,4 @@
-"""Threads that share a batch or a set of runs."""
+"""Threads that share the states of a batch, or take up runs one after another."""
 
 import os
 import threading
@@ -8,8 +8,8 @@ from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 from functools import cache
 from itertools import pairwise
 
-LOOK = 0.1  # s between looks at signals, such as Ctrl-C
-SHARE = 256  # states: the least that is worth a thread
+POLL_S = 0.1  # s between looks at signals, such as Ctrl-C
+MIN_STATES_PER_THREAD = 256  # states: the least that is worth a thread
 
 
 @cache
@@ -25,10 +25,8 @@ def pool() -> ThreadPoolExecutor:
 
 
 def shared(count: int, run: Callable[[int, int], None]) -> None:
-    """Call ``run(first, last)`` for shares of a batch, on all cores where it is large; the first
-    error is raised.
-    """
-    shares = max(1, min(cores(), count // SHARE))
+    """Call ``run(first, last)`` for shares of a batch, on all cores where it is large."""
+    shares = max(1, min(cores(), count // MIN_STATES_PER_THREAD))
     ends = [count * k // shares for k in range(shares + 1)]
     if shares == 1:
         run(0, count)
@@ -41,31 +39,30 @@ def shared(count: int, run: Callable[[int, int], None]) -> None:
 def in_turn(
     count: int, threads: int, work: Callable[[Iterator[int], threading.Event], None]
 ) -> None:
-    """Call ``work(numbers, ended)`` in so many threads, which take the numbers below ``count`` in
-    turn.
+    """Call ``work(numbers, ended)`` in threads, which take the numbers below ``count`` in turn.
 
     The first error, Ctrl-C among them, sets ``ended`` and is raised when all threads have returned.
     """
-    left, ended = deque(range(count)), threading.Event()
+    numbers, ended = deque(range(count)), threading.Event()
     if threads == 1:
-        work(_taken(left), ended)
+        work(_taken(numbers), ended)
         return
     with ThreadPoolExecutor(threads, thread_name_prefix="serpentail") as crew:
         try:
-            waiting = {crew.submit(work, _taken(left), ended) for _ in range(threads)}
+            waiting = {crew.submit(work, _taken(numbers), ended) for _ in range(threads)}
             while waiting:  # looks at signals now and then
-                done, waiting = wait(waiting, LOOK, FIRST_EXCEPTION)
+                done, waiting = wait(waiting, POLL_S, FIRST_EXCEPTION)
                 for future in done:
                     future.result()
         finally:
-            left.clear()
+            numbers.clear()
             ended.set()
 
 
-def _taken(left: deque) -> Iterator[int]:
+def _taken(numbers: deque[int]) -> Iterator[int]:
     """Numbers that no other thread has taken."""
     while True:
         try:
-            yield left.popleft()
+            yield numbers.popleft()
         except IndexError:
             return

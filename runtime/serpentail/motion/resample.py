@@ -1,4 +1,4 @@
-"""Motions between their samples: interpolation in time."""
+"""Interpolates motions between their samples."""
 
 from dataclasses import dataclass
 
@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..attitude import Array, quaternion_rate, sign_continuous
+from ..model.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TAIL_V, VELOCITY
 
 
 def inside(times: Array, span: Array) -> Array:
@@ -23,10 +24,8 @@ def inside(times: Array, span: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class Rows:
-    """Where n times lie among samples: the rows before and after, the fraction between, the step
-    (n, 1).
-    """
+class Interpolation:
+    """Where n times lie among samples: rows before and after; fraction and step between (n, 1)."""
 
     before: NDArray[np.intp]
     after: NDArray[np.intp]
@@ -34,11 +33,10 @@ class Rows:
     step: Array
 
     @classmethod
-    def at(cls, times: Array, samples: Array) -> "Rows":
+    def at(cls, times: Array, samples: Array) -> "Interpolation":
         """Locate times inside the span of the samples."""
-        before = np.clip(
-            np.searchsorted(samples, times, side="right") - 1, 0, max(len(samples) - 2, 0)
-        )
+        last = max(len(samples) - 2, 0)
+        before = np.clip(np.searchsorted(samples, times, side="right") - 1, 0, last)
         after = np.minimum(before + 1, len(samples) - 1)
         step = samples[after] - samples[before]
         fraction = (times - samples[before]) / np.where(step > 0, step, 1)
@@ -55,13 +53,14 @@ class Rows:
         return start + s**2 * ((3 - 2 * s) * values[self.after] + (s - 1) * h * rates[self.after])
 
 
-def hermite_q(rows: Rows, q: Array, v: Array) -> Array:
+def hermite_q(rows: Interpolation, q: Array, v: Array) -> Array:
     """Configurations between the samples q with velocities v."""
-    attitude = sign_continuous(q[:, 3:7])
-    positions = np.hstack([q[:, :3], attitude, q[:, 7:]])
-    rates = np.hstack([v[:, :3], quaternion_rate(attitude, v[:, 3:6]), v[:, 6:]])
+    attitude = sign_continuous(q[:, QUATERNION])
+    turning = np.stack(quaternion_rate(attitude.T, v[:, OMEGA].T), axis=-1)
+    positions = np.hstack([q[:, POSITION], attitude, q[:, TAIL_Q]])
+    rates = np.hstack([v[:, VELOCITY], turning, v[:, TAIL_V]])
     result = rows.hermite(positions, rates)
-    result[:, 3:7] /= np.linalg.norm(result[:, 3:7], axis=1, keepdims=True)
+    result[:, QUATERNION] /= np.linalg.norm(result[:, QUATERNION], axis=1, keepdims=True)
     return result
 
 

@@ -1,6 +1,4 @@
-"""Sampled motions: states, torques, energies and momenta at given times in, files and new samplings
-out.
-"""
+"""Sampled motions: states, torques, energies and momenta at times, kept in files, sampled anew."""
 
 import dataclasses
 import json
@@ -15,10 +13,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..attitude import Array
+from ..checks import finite_array
 from ..files import replacing
+from ..model.layout import PER_SEGMENT, QUATERNION, TAIL_Q, TORSO_NQ, Layout
 from .contact import ARRAYS as TOUCHING
 from .contact import Contact
-from .resample import Rows, hermite_q, inside, monotone
+from .resample import Interpolation, hermite_q, inside, monotone
 
 SUFFIX = ".npz"
 UNIT_TOLERANCE = 1e-3  # how far a stored quaternion's norm may drift from 1
@@ -26,8 +26,7 @@ UNIT_TOLERANCE = 1e-3  # how far a stored quaternion's norm may drift from 1
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """K samples of a motion with m tail segments, SI; the arrays are read-only copies, ValueError
-    if unsound.
+    """K samples of a motion with m tail segments, SI, in read-only arrays; ValueError if unsound.
 
     t (K,) s, increasing; q (K, 7+2m), v (K, 6+2m); tau (K, 2m) N m; kinetic, potential (K,) J; in
     the world linear_momentum (K, 3) kg m/s and, about the COM, angular_momentum (K, 3) kg m2/s;
@@ -51,10 +50,10 @@ class Trajectory:
         for name in ARRAYS:
             object.__setattr__(self, name, _real(name, getattr(self, name)))
         for name, shape in _shapes(self.t, self.q).items():
-            found = getattr(self, name).shape
-            if found != shape:
+            actual = getattr(self, name).shape
+            if actual != shape:
                 raise ValueError(
-                    f"{name} has shape {found}: give {shape}, to match the shapes of t and q"
+                    f"{name} has shape {actual}: give {shape}, to match the shapes of t and q"
                 )
         _check_time(self.t)
         _check_unit(self.attitude)
@@ -67,25 +66,23 @@ class Trajectory:
 
     @property
     def events(self) -> list[dict[str, Any]]:
-        """Touch-downs and take-offs in order: time (s), group, kind ("touch_down" or
-        "take_off").
-        """
+        """Touch-downs and take-offs in order: time (s), group, kind, such as "take_off"."""
         return self.info.get("events", [])
 
     @property
     def segments(self) -> int:
         """Number of tail segments m."""
-        return int(self.q.shape[1] - 7) // 2
+        return (self.q.shape[1] - TORSO_NQ) // PER_SEGMENT
 
     @property
     def attitude(self) -> Array:
         """Torso quaternions (w, x, y, z), torso to world, (K, 4)."""
-        return self.q[:, 3:7]
+        return self.q[:, QUATERNION]
 
     @property
     def tail(self) -> Array:
         """Tail coordinates q_t, (K, 2m), rad."""
-        return self.q[:, 7:]
+        return self.q[:, TAIL_Q]
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write one npz file (suffix added if absent), whole or not at all, and return its path."""
@@ -104,9 +101,7 @@ class Trajectory:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
-        """Read a saved file; FileNotFoundError if absent, ValueError if damaged or not a
-        trajectory.
-        """
+        """Read a saved file; FileNotFoundError if absent, ValueError if it is no trajectory."""
         source = _npz(path)
         if not source.is_file():
             raise FileNotFoundError(
@@ -119,19 +114,17 @@ class Trajectory:
             raise ValueError(f"{str(source)!r} holds no sound trajectory: {error}") from error
 
     def resample(self, t: ArrayLike) -> Self:
-        """The motion at the increasing times t (n,), s, inside its span; ValueError names the first
-        outside.
+        """The motion at the increasing times t (n,), s; ValueError names the first one outside.
 
         p and q_t: cubic Hermite through positions and velocities. Attitude: the same on the
-        quaternion with
-        q_dot = q (0, omega) / 2, normalised (samples less than half a turn apart). v, energies and
-        momenta:
-        monotone cubic, so no overshoot at impacts. tau and contact: linear, since they may jump.
+        quaternion with q_dot = q (0, omega) / 2, normalised (samples less than half a turn apart).
+        v, energies and momenta: monotone cubic, so no overshoot at impacts. tau and contact:
+        linear, since they may jump.
         """
         times = inside(_real("t", t), self.t)
-        rows = Rows.at(times, self.t)
+        rows = Interpolation.at(times, self.t)
         smooth: dict[str, Any] = {
-            name: monotone(self.t, getattr(self, name), times) for name in SMOOTH
+            name: monotone(self.t, getattr(self, name), times) for name in MONOTONE
         }
         q = hermite_q(rows, self.q, self.v)
         contact = self.contact.mapped(rows.linear) if self.contact else None
@@ -144,25 +137,12 @@ ARRAYS = tuple(
     entry.name for entry in dataclasses.fields(Trajectory) if entry.name not in ("info", "contact")
 )
 CONTACT = "contact_"  # before the names of a contact's arrays in a file
-SMOOTH = ("v", "kinetic", "potential", "linear_momentum", "angular_momentum")
+MONOTONE = ("v", "kinetic", "potential", "linear_momentum", "angular_momentum")
 
 
 def _real(name: str, value: ArrayLike) -> Array:
     """A finite, read-only float64 copy of value."""
-    try:
-        array = np.asarray(value)
-    except ValueError as error:
-        raise ValueError(f"{name} is ragged: give rows of equal length") from error
-    if not np.can_cast(array.dtype, np.float64, "same_kind"):
-        raise ValueError(
-            f"{name} has shape {array.shape} and type {array.dtype}: give real numbers"
-        )
-    array = array.astype(np.float64, order="C")
-    if not np.isfinite(array).all():
-        first = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
-        raise ValueError(
-            f"{name}{list(first)} is {array[first]} (shape {array.shape}): give finite numbers only"
-        )
+    array = finite_array(name, value, ValueError).copy()
     array.setflags(write=False)
     return array
 
@@ -172,22 +152,28 @@ def _shapes(t: Array, q: Array) -> dict[str, tuple[int, ...]]:
     samples = len(t) if t.ndim == 1 else 0
     if not samples:
         raise ValueError(f"t has shape {t.shape}: give one row of at least one time")
-    width = q.shape[1] if q.ndim == 2 else 0
-    if width < 7 or width % 2 == 0:
+    layout = Layout.of_width(q.shape[1]) if q.ndim == 2 else None
+    if layout is None:
         raise ValueError(
             f"q has shape {q.shape}: give ({samples}, 7 + 2m), position, quaternion and 2m tail "
             "coordinates"
         )
-    vectors = {"v": width - 1, "tau": width - 7, "linear_momentum": 3, "angular_momentum": 3}
-    columns = {name: (samples, count) for name, count in vectors.items()}
-    return {"q": (samples, width), **columns, "kinetic": (samples,), "potential": (samples,)}
+    return {
+        "q": (samples, layout.nq),
+        "v": (samples, layout.nv),
+        "tau": (samples, layout.nt),
+        "kinetic": (samples,),
+        "potential": (samples,),
+        "linear_momentum": (samples, 3),
+        "angular_momentum": (samples, 3),
+    }
 
 
 def _check_time(t: Array) -> None:
     """ValueError unless t increases."""
-    late = np.flatnonzero(np.diff(t) <= 0)
-    if late.size:
-        k = int(late[0]) + 1
+    backward = np.flatnonzero(np.diff(t) <= 0)
+    if backward.size:
+        k = int(backward[0]) + 1
         raise ValueError(
             f"t has shape {t.shape} and t[{k}] = {t[k]} follows {t[k - 1]}: give strictly "
             "increasing times"
@@ -247,10 +233,13 @@ def _read(source: Path) -> dict[str, Any]:
 
 def _parsed(fields: dict[str, Any]) -> dict[str, Any]:
     """The arguments of a trajectory from the fields of a file."""
-    own = {name: value for name, value in fields.items() if not name.startswith(CONTACT)}
-    touching = {
-        name.removeprefix(CONTACT): value for name, value in fields.items() if name not in own
-    }
+    arguments, touching = {}, {}
+    for name, value in fields.items():
+        if name.startswith(CONTACT):
+            touching[name.removeprefix(CONTACT)] = value
+        else:
+            arguments[name] = value
     if touching:
-        own["contact"] = Contact(**touching | {"groups": json.loads(str(touching["groups"]))})
-    return own | {"info": json.loads(str(fields["info"]))}
+        groups = json.loads(str(touching.pop("groups")))
+        arguments["contact"] = Contact(**touching, groups=groups)
+    return arguments | {"info": json.loads(str(fields["info"]))}

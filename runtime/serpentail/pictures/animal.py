@@ -1,6 +1,4 @@
-"""Animals: a moment of a motion and a view go in; torso, tail, legs and forces of the ground are
-drawn on axes.
-"""
+"""How the animal looks at one moment in a view: torso, tail, legs and forces of the ground."""
 
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -12,6 +10,7 @@ from .style import HEAD, INK, TAIL, TORSO, Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
 MOST_DOTS = 20  # more tail points than this are drawn without dots
 LEG, FORCE = "#009e73", "#cc79a7"  # Okabe and Ito
 LONGEST = 0.06  # m, the arrow of the largest force of a film
@@ -19,9 +18,7 @@ LONGEST = 0.06  # m, the arrow of the largest force of a film
 
 @dataclass(frozen=True)
 class Body:
-    """The drawn torso: its ellipsoid's semi-axes and the tail's root, both in the torso frame,
-    m.
-    """
+    """The drawn torso: its ellipsoid's semi-axes and the tail's root, in the torso frame, m."""
 
     semi_axes: tuple[float, float, float] = (0.0315, 0.0495, 0.027)
     tail_mount: tuple[float, float, float] = (0.0, -0.0405, 0.0045)
@@ -37,8 +34,9 @@ class Body:
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """An orthographic view; the rows of its matrix are the world directions right, up, towards the
-    viewer.
+    """An orthographic view.
+
+    The rows of its matrix are the world directions right, up and towards the viewer.
     """
 
     name: str
@@ -57,8 +55,7 @@ TOP = View("top", "y", "\u2212x", np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]])
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """One moment of a film: time, torso position and rotation, root and tail (P + 1, 3), COM;
-    world, SI.
+    """One moment of a film, world, SI: time, torso, root and tail (P + 1, 3), COM.
 
     On the ground also legs (L, J, 3) and arrows (n, 2, 3) of its forces, from the point that is
     pushed to the tip.
@@ -83,8 +80,9 @@ class Frame:
         return view.of(self.torso)[:2] + silhouette(self.rotation, self.body.semi_axes, view)
 
     def in_front(self, world: Array, view: View) -> NDArray[np.bool_]:
-        """Which world points x (n, 3) it cannot hide: |u| >= 1, near side, u = diag(a)^-1 R^T (x -
-        p).
+        """Which world points x (n, 3) it cannot hide: |u| >= 1 on the near side.
+
+        u = diag(a)^-1 R^T (x - p).
         """
         u = (world - self.torso) @ self.rotation / self.body.semi_axes
         towards = view.matrix[2] @ self.rotation / self.body.semi_axes
@@ -92,26 +90,26 @@ class Frame:
 
 
 def silhouette(rotation: Array, semi_axes: ArrayLike, view: View = SIDE, count: int = 121) -> Array:
-    """Outline (count, 2), m, about the centre, of an ellipsoid turned by R: ellipse P R diag(a^2)
-    R^T P^T.
+    """Outline (count, 2), m, about the centre, of an ellipsoid rotated by R.
+
+    It is the ellipse P R diag(a^2) R^T P^T.
     """
     spread = view.matrix[:2] @ rotation * np.asarray(semi_axes, dtype=float)
     angle = np.linspace(0, 2 * np.pi, count)
-    return (
-        np.stack([np.cos(angle), np.sin(angle)], axis=1) @ np.linalg.cholesky(spread @ spread.T).T
-    )
+    circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    return circle @ np.linalg.cholesky(spread @ spread.T).T
 
 
 def arrows(points: Array, forces: Array, largest: float) -> Array:
-    """Arrows (n, 2, 3) of forces at points (P, 3): as long as the root of force over the largest,
-    which has LONGEST.
+    """Arrows (n, 2, 3) of forces at points (P, 3), as long as the roots of the forces.
+
+    The largest force has an arrow of LONGEST.
     """
     sizes = np.linalg.norm(forces, axis=1)
     acting = sizes > 1e-4 * largest
     shown, sizes = forces[acting], sizes[acting, None]
-    return np.stack(
-        [points[acting], points[acting] + LONGEST * shown / np.sqrt(sizes * largest)], axis=1
-    )
+    tips = points[acting] + LONGEST * shown / np.sqrt(sizes * largest)
+    return np.stack([points[acting], tips], axis=1)
 
 
 def tick(body: Body) -> Array:
@@ -177,9 +175,7 @@ class Pen:
 
 
 def draw_animal(pen: Pen) -> None:
-    """Torso, legs, tail, a dot at every tail point if they are few enough to be told apart, and the
-    ground's forces.
-    """
+    """Torso, legs, tail with a dot at every point if they are few, and the ground's forces."""
     pen.torso()
     for leg in pen.frame.legs:
         pen.line(leg, color=LEG, linewidth=1.4)
@@ -191,9 +187,7 @@ def draw_animal(pen: Pen) -> None:
 
 
 def draw_marks(pen: Pen) -> None:
-    """The back's midline and tick, and the head end: a full dot on the near side, a ring on the far
-    side.
-    """
+    """The back's midline and tick, and the head: a dot on the near side, a ring on the far one."""
     _, length, height = pen.frame.body.semi_axes
     angle = np.linspace(0, np.pi, 61)
     back = pen.frame.world(

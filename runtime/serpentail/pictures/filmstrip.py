@@ -1,12 +1,9 @@
-"""Filmstrips: a trajectory and its tail points in, SVG, PDF or PNG files of the moving animal
-out.
-"""
+"""Films on paper: moments of a motion side by side, seen from the side and from above."""
 
 import dataclasses
 import math
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..attitude import rotation_matrix
+from ..model.layout import POSITION
 from ..motion.trajectory import Trajectory
 from .animal import (
     FORCE,
@@ -28,8 +26,8 @@ from .animal import (
     arrows,
     draw_animal,
     draw_marks,
-    tick,
 )
+from .page import LEFT, Page, drawn_points, page_of, path_window, window_around
 from .style import HEAD, INK, QUIET, TAIL, Array, writable, write
 
 if TYPE_CHECKING:
@@ -43,71 +41,6 @@ KEY: dict[str, dict[str, Any]] = {
     "tail": {"color": TAIL, "linewidth": 1.4},
     "path of the COM": {"color": QUIET, "linestyle": ":"},
 }
-GAP, LEFT, TITLES, FOOT, RULER = 0.06, 0.62, 0.26, 0.5, 0.62  # page margins, inches
-LEAST, TALLEST = (
-    6.1,
-    3.2,
-)  # the page's least width (for the key) and the tallest path panel below a film, inches
-PER_LINE = 6  # most frames on a line
-
-
-@dataclass(frozen=True)
-class Page:
-    """A film's page, inches: frames, panel width, heights of two rows, path panel (width, height)
-    if any.
-    """
-
-    frames: int
-    column: float
-    rows: tuple[float, float]
-    path: tuple[float, float] | None
-    beside: bool
-
-    @property
-    def per_line(self) -> int:
-        """Frames on a line."""
-        return math.ceil(self.frames / math.ceil(self.frames / PER_LINE))
-
-    @property
-    def film(self) -> tuple[float, float]:
-        """Width and height of all lines."""
-        lines = math.ceil(self.frames / self.per_line)
-        return self.per_line * (self.column + GAP) - GAP, lines * (TITLES + GAP + sum(self.rows))
-
-    @property
-    def base(self) -> float:
-        """Height of the film's lower edge on the page."""
-        return FOOT + (0 if self.path is None or self.beside else self.path[1] + FOOT)
-
-    @property
-    def size(self) -> tuple[float, float]:
-        """Width and height of the page."""
-        reach = RULER + self.path[0] if self.path is not None and self.beside else 0
-        width = LEFT + max(self.film[0] + reach, LEAST)
-        return width + 3 * GAP, self.base + self.film[1] + GAP
-
-    def add(self, figure: "Figure", place: Sequence[float]) -> "Axes":
-        """Axes at (x, y, w, h) inches."""
-        (width, height), (x, y, w, h) = self.size, place
-        return figure.add_axes((x / width, y / height, w / width, h / height))
-
-    def panel(self, k: int, row: int) -> tuple[float, float, float, float]:
-        """Place of frame k's panel in the upper (0) or lower (1) row of its line."""
-        line, column = divmod(k, self.per_line)
-        top = (
-            self.base
-            + self.film[1]
-            - line * (TITLES + GAP + sum(self.rows))
-            - TITLES
-            - self.rows[0]
-        )
-        x, y = LEFT + column * (self.column + GAP), top - row * (GAP + self.rows[1])
-        return x, y, self.column, self.rows[row]
-
-    def path_panel(self) -> tuple[float, float, float, float]:
-        """Place of the path panel."""
-        width, height = self.path or (0, 0)
-        return (LEFT + self.film[0] + RULER if self.beside else LEFT), FOOT, width, height
 
 
 def filmstrip(
@@ -118,22 +51,26 @@ def filmstrip(
     com: ArrayLike | None = None,
     **look: Any,
 ) -> Path:
-    """Draw moments of a motion, side (y, z) over top (y, -x) view at one scale, and the COM path;
-    return path.
+    """Draw moments of a motion, side (y, z) over top (y, -x) view at one scale, and the COM's path.
 
-    points (K, P, 3): the tail in the world at every sample, m; frames: how many, or their times
-    (s); com (K, 3), m, by default the torso's.  look: legs (K, L, J, 3), their joints in the world,
-    m (see ``leg_joints``); semi_axes and tail_mount, m (see Body).  On the ground, arrows are its
-    forces.  No path panel when the COM stays within half a torso's length.
+    points (K, P, 3): the tail in the world at every sample, m.  frames: how many, or their times
+    (s).  com (K, 3): m, by default the torso's.  look: legs (K, L, J, 3), their joints in the
+    world, m (see ``leg_joints``); semi_axes and tail_mount, m (see Body).
+    On the ground, arrows are its forces.  The path has no panel when the COM stays within half a
+    torso's length.  Returns the path of the file; ValueError where an array has another shape.
     """
     path, legs = writable(path), look.pop("legs", None)
-    body = Body(**look)
-    count = len(trajectory.t)
+    body, count = Body(**look), len(trajectory.t)
+
+    # the motion, sample by sample
     points = _checked("points", points, (count, -1, 3))
-    com = trajectory.q[:, :3] if com is None else _checked("com", com, (count, 3))
-    legs = (
-        np.zeros((count, 0, 2, 3)) if legs is None else _checked("legs", legs, (count, -1, -1, 3))
-    )
+    com = trajectory.q[:, POSITION] if com is None else _checked("com", com, (count, 3))
+    if legs is None:
+        legs = np.zeros((count, 0, 2, 3))
+    else:
+        legs = _checked("legs", legs, (count, -1, -1, 3))
+
+    # the samples to draw
     moments = _moments(trajectory.t, frames)
     film = [_frame(trajectory, points, com, body, k) for k in moments]
     film = [
@@ -152,9 +89,10 @@ def _with_forces(
     points, forces = trajectory.contact.points[moments], trajectory.contact.forces[moments]
     largest = float(np.linalg.norm(forces, axis=-1).max())
     shown = [arrows(x, f, largest) for x, f in zip(points, forces, strict=True)]
-    return [
+    grounded = [
         dataclasses.replace(f, arrows=a, grounded=True) for f, a in zip(film, shown, strict=True)
-    ], largest
+    ]
+    return grounded, largest
 
 
 def _checked(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Array:
@@ -175,7 +113,7 @@ def _checked(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Array:
 
 def _moments(t: Array, wanted: int | Sequence[float]) -> list[int]:
     """The samples nearest to the wanted times, or to so many evenly spaced ones."""
-    if np.ndim(wanted) == 1 and len(wanted) and np.isfinite(wanted).all():
+    if np.ndim(wanted) == 1 and np.size(wanted) and np.isfinite(wanted).all():
         times = np.asarray(wanted, float)
     elif isinstance(wanted, bool) or not isinstance(wanted, int | np.integer) or wanted < 1:
         raise ValueError(f"frames is {wanted!r}: give a whole number of at least 1, or times in s")
@@ -186,11 +124,9 @@ def _moments(t: Array, wanted: int | Sequence[float]) -> list[int]:
 
 def _frame(trajectory: Trajectory, points: Array, com: Array, body: Body, k: int) -> Frame:
     """Sample k of the film."""
-    torso, rotation = trajectory.q[k, :3], rotation_matrix(trajectory.attitude[k])
-    root = torso + rotation @ body.tail_mount
-    return Frame(
-        float(trajectory.t[k]), torso, rotation, np.vstack([root, points[k]]), com[k], body
-    )
+    torso, rotation = trajectory.q[k, POSITION], rotation_matrix(trajectory.attitude[k])
+    tail = np.vstack([torso + rotation @ body.tail_mount, points[k]])
+    return Frame(float(trajectory.t[k]), torso, rotation, tail, com[k], body)
 
 
 def _draw_film(film: list[Frame], com: Array, largest: float = 0.0) -> "Figure":
@@ -198,9 +134,10 @@ def _draw_film(film: list[Frame], com: Array, largest: float = 0.0) -> "Figure":
     from matplotlib.figure import Figure
 
     windows = [
-        _window([_drawn(f, view) - view.of(f.com)[:2] for f in film]) for view in (SIDE, TOP)
+        window_around([drawn_points(f, view) - view.of(f.com)[:2] for f in film])
+        for view in (SIDE, TOP)
     ]
-    page = _page(film, windows, com)
+    page = page_of(film, windows, com)
     figure = Figure(figsize=page.size)
     for row in range(2):
         _draw_row(figure, page, row, film, windows[row], com)
@@ -210,45 +147,10 @@ def _draw_film(film: list[Frame], com: Array, largest: float = 0.0) -> "Figure":
     return figure
 
 
-def _drawn(frame: Frame, view: View) -> Array:
-    """Everything a frame shows, as points (n, 2) in a view."""
-    lines = np.vstack([frame.tail, frame.world(tick(frame.body)), *frame.legs])
-    return np.vstack([frame.outline(view), view.of(lines)[:, :2]])
-
-
-def _window(shapes: list[Array], margin: float = 0.012) -> Array:
-    """Lower and upper corner (2, 2) of a box around all shapes."""
-    every = np.vstack(shapes)
-    return np.array([every.min(axis=0) - margin, every.max(axis=0) + margin])
-
-
-def _page(film: list[Frame], windows: list[Array], com: Array) -> Page:
-    """Sizes from the windows; the path panel beside the film where it fits, else below it, or
-    nowhere.
-    """
-    (wide, high), (_, deep) = (window[1] - window[0] for window in windows)
-    column = min(max(1.4 * math.sqrt(wide / high), 1.35), 1.9)
-    alone = Page(len(film), column, (column * high / wide, column * deep / wide), None, False)
-    if np.ptp(com[:, 1:], axis=0).max() < max(film[0].body.semi_axes):
-        return alone
-    low, up = _path_window(film, com)
-    aspect = float((up - low)[0] / (up - low)[1])
-    beside = aspect < 1.6 and alone.per_line >= 4
-    tall = alone.film[1] - TITLES if beside else min(TALLEST, max(alone.film[0], 4.0) / aspect)
-    return dataclasses.replace(alone, path=(tall * aspect, tall), beside=beside)
-
-
-def _path_window(film: list[Frame], com: Array) -> Array:
-    """The corners (2, 2) of the path panel."""
-    return _window([*(_drawn(frame, SIDE) for frame in film), SIDE.of(com)[:, :2]])
-
-
 def _draw_row(
     figure: "Figure", page: Page, row: int, film: list[Frame], window: Array, com: Array
 ) -> None:
-    """One view of every frame, each about its own COM, with the view's name and directions at the
-    left.
-    """
+    """One view of every frame, each about its own COM; its name and directions at the left."""
     view = (SIDE, TOP)[row]
     for k, frame in enumerate(film):
         x, y, width, height = page.panel(k, row)
@@ -318,7 +220,7 @@ def _draw_key(figure: "Figure", page: Page, window: Array, key: dict[str, dict[s
 
 def _draw_path(axes: "Axes", film: list[Frame], com: Array) -> None:
     """The flight from the side in true scale, every frame in its place, numbered at its COM."""
-    low, high = _path_window(film, com)
+    low, high = path_window(film, com)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel="$y$ [m]", ylabel="$z$ [m]")
     pens = [Pen(axes, frame, SIDE, np.zeros(3), k) for k, frame in enumerate(film)]
     pens[0].ground()

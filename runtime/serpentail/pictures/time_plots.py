@@ -1,6 +1,4 @@
-"""Figures over time: a trajectory in, SVG, PDF or PNG files out; and how every figure is
-written.
-"""
+"""Plots over time: attitude, tail, rates, energies and momenta of a motion on one time axis."""
 
 import os
 from collections.abc import Sequence
@@ -11,37 +9,32 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..attitude import pitch_roll_yaw
+from ..model.layout import OMEGA
 from ..motion.trajectory import Trajectory
 from .style import INK, TAIL, Array, writable, write
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-TRIPLE = (
-    ("#0072b2", "-"),
-    ("#d55e00", "--"),
-    ("#009e73", "-."),
-)  # Okabe and Ito, dashed for grey prints
+
+# Okabe and Ito, dashed for grey prints
+TRIPLE = (("#0072b2", "-"), ("#d55e00", "--"), ("#009e73", "-."))
 
 
 @dataclass(frozen=True, eq=False)
 class Panel:
-    """One axis of the time plots: label, curves (K, n), their names, (colour, dash) styles, least
-    span.
-    """
+    """One axis of the time plots, and the curves on it."""
 
     label: str
-    curves: Array
+    curves: Array  # (K, n)
     names: Sequence[str]
-    styles: Sequence[tuple[Any, str]]
-    span: float
+    styles: Sequence[tuple[Any, str]]  # (colour, dash)
+    span: float  # the least
     roots: bool = False  # a scale on which blows and weights are both seen
 
 
 def time_plots(trajectory: Trajectory, path: str | os.PathLike[str]) -> Path:
-    """Draw attitude, tail, rates, torques, energies and momenta over one time axis; return the
-    path.
-    """
+    """Draw attitude, tail, rates, torques, energies and momenta over time; return the path."""
     if len(trajectory.t) < 2:
         raise ValueError("the trajectory has one sample: give at least two to draw over time")
     return write(writable(path), lambda: _draw_times(trajectory))
@@ -65,8 +58,11 @@ def _draw_panel(axes: "Axes", t: Array, panel: Panel) -> None:
     """Curves, grid and a legend outside, at the right."""
     from matplotlib.ticker import MaxNLocator
 
+    # curves
     for curve, name, (colour, dash) in zip(panel.curves.T, panel.names, panel.styles, strict=True):
         axes.plot(t, curve, dash, color=colour, label=name)
+
+    # the axis
     low, high = float(panel.curves.min()), float(panel.curves.max())
     margin = 0.06 * (high - low) + max(0.0, panel.span - (high - low)) / 2
     axes.set(ylabel=panel.label, ylim=(low - margin, high + margin))
@@ -80,11 +76,11 @@ def _draw_panel(axes: "Axes", t: Array, panel: Panel) -> None:
     axes.set_axisbelow(True)
     if "[deg]" in panel.label:
         axes.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 1.5, 3, 4.5, 9, 10]))
-    many = {
-        "ncols": 2 if len(panel.names) > 3 else 1,
-        "fontsize": 7 if len(panel.names) < 10 else 6,
-    }
-    axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), labelspacing=0.3, **many)
+
+    # the legend
+    columns, size = 2 if len(panel.names) > 3 else 1, 7 if len(panel.names) < 10 else 6
+    look = {"ncols": columns, "fontsize": size, "labelspacing": 0.3}
+    axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), **look)
 
 
 def _panels(trajectory: Trajectory) -> list[Panel]:
@@ -98,7 +94,7 @@ def _panels(trajectory: Trajectory) -> list[Panel]:
         Panel("attitude [deg]", angles, attitude, TRIPLE, 1.0),
         *_tail_panels(trajectory),
         *_ground_panels(trajectory),
-        Panel("torso rate\n[rad/s]", trajectory.v[:, 3:6], rates, TRIPLE, 0.1),
+        Panel("torso rate\n[rad/s]", trajectory.v[:, OMEGA], rates, TRIPLE, 0.1),
         Panel(
             "energy [mJ]",
             energies,
@@ -134,9 +130,7 @@ def _ground_panels(trajectory: Trajectory) -> list[Panel]:
 
 
 def _tail_panels(trajectory: Trajectory) -> list[Panel]:
-    """Tail coordinates and torques, a colour per segment, pitch drawn and yaw dashed; none without
-    a tail.
-    """
+    """Tail coordinates and torques, a colour a segment, yaw dashed; none without a tail."""
     from matplotlib import colormaps
 
     segments = trajectory.segments

@@ -1,3 +1,1 @@
-"""Motion planning by direct collocation: a model and a problem go in, a plan and its truth come
-out.
-"""
+"""Motion planning by direct collocation: torques of the tail that right the animal in the air."""

@@ -1,110 +1,93 @@
-"""Planning: a model, a start and a goal go in; a plan comes out, refined until it is true."""
+"""``plan``: motions of the tail that bring the animal where it should be, found by collocation.
+
+The search refines its mesh until the planned torques, applied to the model, do what was planned.
+"""
 
 import time
 from dataclasses import fields
+from typing import Any
 
-import numpy as np
-
-from ..checks import choice, number
+from ..checks import one_of
 from ..errors import PlanningError
-from ..motion.trajectory import Trajectory
-from .method import Method
-from .nlp.interrupt import heeded
-from .nlp.node import dynamics
-from .nlp.rules import rule
-from .problem import SETTINGS, Bounds, Goal, Problem, checked_problem
-from .rounds import Run
+from ..model.model import Model
+from .nlp.interrupt import stoppable
+from .nlp.node import equations_of_motion
+from .nlp.rules import collocation_rule
+from .problem import PROBLEM_SETTINGS, Bounds, Goal, PlanningProblem, checked_problem
+from .result.plan import Plan
+from .rounds import Search
+from .settings import PlanSettings, checked_settings
+
+NEEDED = ("mass_matrix", "inverse_dynamics", "rollout")  # functions of the model
 
 
-def plan(model, *, start, goal=None, duration, bounds=None, **settings):
-    """Plan a motion of the tail by direct collocation (Sect. 3), and tell what its torques really
-    do.
+def plan(
+    model: Model,
+    *,
+    start: Any,
+    goal: Goal | None = None,
+    duration: float | tuple[float, float],
+    bounds: Bounds | None = None,
+    **settings: Any,
+) -> Plan:
+    """Plan a motion of the tail by direct collocation (Sect. 3), and tell what its torques do.
 
-    start: (q0 (nq,), v0 (nv,)).  goal: Goal (default: upright, torso at rest).  duration: s, or
-    (least, most) where it
-    is free.  bounds: Bounds (default: |tau| <= 0.02 N m).
-    The problem: objective "effort" (integral of tau^2 + (smoothing q_t_dot)^2), "energy" (of sum
-    |tau q_t_dot|),
-    "time", or a function of a point; smoothing (N m s), without which plans whirl a light tail;
-    damping (N m s, Eq. 47,
-    in addition to the planned torques); path, rows (function of a point, least, most); a point has
-    the CasADi blocks
-    tail, tail_rate, torso_rate, torque, attitude, quaternion in SI; formulation "airborne" (angular
-    momentum conserved
-    by construction), "translation-free", "full"; attitude "quaternion", "euler".
-    The method: rule "radau" (default), "lobatto", "hermite-simpson", "trapezoidal"; degree;
-    intervals; tolerance (deg)
-    of the true attitude at the end, None for no demand; rounds of refinement; most_intervals;
-    solver, options of
-    ``casadi.nlpsol``; guess: a Plan or a Trajectory (default: passive flight); guess_damping (N m
-    s); multi_start:
-    guesses solved, the best is kept; retries: more guesses after failures; seed; dynamics "auto",
-    "compiled",
-    "symbolic"; time_limit (s) of the search; track: simulate with PFL, too.
-    Programs and solvers are kept: planning again on a plan's mesh, from another start, derives
-    nothing.  Ctrl-C ends
-    the search, as the time limit does, and the best so far is returned; a second one raises
-    KeyboardInterrupt.
+    start: (q0 (nq,), v0 (nv,)).
+    goal: a Goal; by default upright, the torso at rest.
+    duration: s, or (least, most) where it is free.
+    bounds: a Bounds; by default |tau| <= 0.02 N m.
+
+    Settings of the problem:
+    objective: "effort" (integral of tau^2 + (smoothing q_t_dot)^2), "energy" (of sum
+    |tau q_t_dot|), "time", or a function of a point.
+    smoothing: N m s; without it plans whirl a light tail.
+    damping: N m s (Eq. 47), in addition to the planned torques.
+    path: rows (function of a point, least, most).  A point has the CasADi blocks tail, tail_rate,
+    torso_rate, torque, attitude, quaternion in SI.
+    formulation: "airborne" (angular momentum conserved by construction), "translation-free",
+    "full".
+    attitude: "quaternion", "euler".
+
+    Settings of the search:
+    rule: "radau" (default), "lobatto", "hermite-simpson", "trapezoidal"; degree: of the rule.
+    intervals: of the first mesh; most_intervals: of the last.
+    tolerance: deg, of the true attitude at the end, None for no demand; rounds: of refinement.
+    solver, options: of ``casadi.nlpsol``.
+    guess: a Plan or a Trajectory; by default passive flight, with guess_damping (N m s).
+    multi_start: guesses solved, the best is kept; retries: more guesses after failures; seed.
+    dynamics: "auto", "compiled", "symbolic".
+    time_limit: s, of the search.
+    track: simulate with PFL, too.
+
+    Programs and solvers are remembered: planning again on a plan's mesh, from another start,
+    derives nothing.  Ctrl-C ends the search, as the time limit does, and the best so far is
+    returned; a second one raises KeyboardInterrupt.
     Returns a Plan; look at its ``success`` and ``report``.  Raises PlanningError (a field, its
-    value, the remedy),
-    ModelError (the scene lacks functions).
+    value, the remedy), ModelError (the scene lacks functions).
     """
-    problem, method = _checked(model, start, goal, duration, bounds, settings)
-    missing = [
-        name
-        for name in ("mass_matrix", "inverse_dynamics", "rollout")
-        if name not in model.generated
-    ]
+    problem, checked = _checked(model, (start, goal, duration, bounds), settings)
+    missing = [name for name in NEEDED if name not in model.generated]
     if missing:
         raise model.without(*missing)
     begun = time.perf_counter()
-    scheme = rule(method.rule, method.degree)
-    equations = dynamics(model, method.dynamics)
-    run = Run(model, problem, method, equations, scheme)
-    with heeded(method.time_limit):
-        rounds = run.refined(run.first())
-    return run.plan(rounds, time.perf_counter() - begun)
+    rule = collocation_rule(checked.rule, checked.degree)
+    search = Search(model, problem, checked, equations_of_motion(model, checked.dynamics), rule)
+    with stoppable(checked.time_limit):
+        rounds = search.refined(search.first())
+    return search.plan(rounds, time.perf_counter() - begun)
 
 
-def _checked(model, start, goal, duration, bounds, settings) -> tuple[Problem, Method]:
-    known = (*SETTINGS, *(entry.name for entry in fields(Method)))
+def _checked(
+    model: Model, task: tuple, settings: dict[str, Any]
+) -> tuple[PlanningProblem, PlanSettings]:
+    """Return the problem, of (start, goal, duration, bounds), and the settings of its search."""
+    names = (*PROBLEM_SETTINGS, *(entry.name for entry in fields(PlanSettings)))
     for name in settings:
-        choice("setting", name, known)
-    own = {name: value for name, value in settings.items() if name in SETTINGS}
-    goal, bounds = Goal() if goal is None else goal, Bounds() if bounds is None else bounds
-    problem = checked_problem(model, start, goal, duration, bounds, **own)
-    method = Method(**{name: value for name, value in settings.items() if name not in SETTINGS})
-    for name, least in (
-        ("intervals", 1),
-        ("rounds", 0),
-        ("most_intervals", 1),
-        ("multi_start", 1),
-        ("retries", 0),
-    ):
-        value = getattr(method, name)
-        if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
-            raise PlanningError(f"{name}: value {value!r}: needs a whole number from {least}")
-    for name in ("tolerance", "time_limit"):
-        if getattr(method, name) is not None:
-            number(name, getattr(method, name))
-    if not isinstance(method.options, dict):
-        raise PlanningError(
-            f"options: value {method.options!r}: needs a dict, such as {{'ipopt.max_iter': 500}}"
-        )
-    _check_guess(model, method.guess)
-    number("guess_damping", method.guess_damping, above=False)
-    choice("dynamics", method.dynamics, ("auto", "compiled", "symbolic"))
-    return problem, method
-
-
-def _check_guess(model, guess) -> None:
-    """PlanningError unless a guess is None, or a motion of such a model."""
-    if guess is None:
-        return
-    motion = getattr(guess, "trajectory", guess)
-    if not isinstance(motion, Trajectory):
-        raise PlanningError(f"guess: value {guess!r}: needs a Plan or a Trajectory")
-    if motion.q.shape[1] != model.nq or len(motion.t) < 2:
-        raise PlanningError(
-            f"guess: q has shape {motion.q.shape}: needs at least two samples of {model.nq}"
-        )
+        one_of("setting", name, names, PlanningError)
+    start, goal, duration, bounds = task
+    goal = Goal() if goal is None else goal
+    bounds = Bounds() if bounds is None else bounds
+    of_problem = {name: value for name, value in settings.items() if name in PROBLEM_SETTINGS}
+    of_search = {name: value for name, value in settings.items() if name not in PROBLEM_SETTINGS}
+    problem = checked_problem(model, start, goal, duration, bounds, **of_problem)
+    return problem, checked_settings(model, **of_search)

@@ -1,135 +1,148 @@
-"""Planning problems: what a user asks for goes in, checked field by field; a frozen Problem comes
-out.
-"""
+"""What a user asks of a plan, checked field by field before anything is derived."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from functools import partial
+from typing import Any
 
 import numpy as np
 
-from ..checks import choice, number, numbers
+from ..checks import number, numbers, one_of
 from ..errors import PlanningError
+from ..model.layout import QUATERNION, TAIL_Q, TAIL_V
+from ..model.model import Model
 from .nlp.coordinates import KINDS
 from .nlp.node import FORMULATIONS
 
 OBJECTIVES = ("effort", "energy", "time")
 # N m s: the effort counts a tail's rates as torques, or a plan whirls a light tail at no cost
 SMOOTHING = 3e-4
-SLACK = 1e-6  # rad, rad/s: how far a start may be beyond its bounds
+START_SLACK = 1e-6  # rad, rad/s: how far a start may be beyond its bounds
 
 
 @dataclass(frozen=True)
 class Goal:
-    """What holds at the end; None leaves a part free, and so does a None among the tail's numbers.
+    """What holds at the end (f_bc of Eq. 43); None leaves a part free.
 
-    attitude: "upright" (any yaw) or a quaternion (w, x, y, z), torso to world.  torso_rate (3,):
-    rad/s in body axes.
-    tail (2m,): rad.  tail_rate (2m,): rad/s.  turns (2,): whole turns of pitch and roll at an
-    upright end, for the
-    attitude "euler" alone; by default those nearest to the guess, as in Sect. 3.2.
+    So does a None among the tail's numbers.
+    attitude: "upright" (any yaw) or a quaternion (w, x, y, z), torso to world.
+    torso_rate (3,): rad/s in body axes.  tail (2m,): rad.  tail_rate (2m,): rad/s.
+    turns (2,): whole turns of pitch and roll at an upright end, for the attitude "euler" alone; by
+    default those nearest to the guess, as in Sect. 3.2.
     """
 
-    attitude: object = "upright"
-    torso_rate: object = (0.0, 0.0, 0.0)
-    tail: object = None
-    tail_rate: object = None
-    turns: object = None
+    attitude: Any = "upright"
+    torso_rate: Any = (0.0, 0.0, 0.0)
+    tail: Any = None
+    tail_rate: Any = None
+    turns: Any = None
 
 
 @dataclass(frozen=True)
 class Bounds:
-    """Largest magnitudes along the motion, each one number or one a tail coordinate; None: no
-    bound.
+    """Largest magnitudes along the motion (g_pc of Eq. 43); None: no bound.
 
-    angle (rad), rate (rad/s), torque (N m), torque_rate (N m/s, from node to node).
+    Each is one number, or one a tail coordinate: angle (rad), rate (rad/s), torque (N m),
+    torque_rate (N m/s, from node to node).
     """
 
-    angle: object = None
-    rate: object = None
-    torque: object = 0.02
-    torque_rate: object = None
+    angle: Any = None
+    rate: Any = None
+    torque: Any = 0.02
+    torque_rate: Any = None
+
+
+PathConstraint = tuple[Callable[[Any], Any], float, float]  # function of a point, least, most
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
-    """A checked problem: arrays have their shapes, values are finite, the start obeys its
-    bounds.
-    """
+class PlanningProblem:
+    """A checked problem: arrays have their shapes, values are finite, bounds hold at the start."""
 
     q0: np.ndarray
     v0: np.ndarray
     goal: Goal
     duration: tuple[float, float]
     bounds: Bounds
-    objective: str | Callable = "effort"
+    objective: str | Callable[[Any], Any] = "effort"
     smoothing: float = SMOOTHING
     damping: float = 0.0
-    path: tuple[tuple[Callable, float, float], ...] = ()
+    path: tuple[PathConstraint, ...] = ()
     formulation: str = "airborne"
     attitude: str = "quaternion"
 
 
-SETTINGS = ("objective", "smoothing", "damping", "path", "formulation", "attitude")
+PROBLEM_SETTINGS = ("objective", "smoothing", "damping", "path", "formulation", "attitude")
 
 
-def checked_problem(model, start, goal, duration, bounds, **settings) -> Problem:
-    """Return the problem; PlanningError names the first field that is wrong, its value and the
-    remedy.
-    """
+def checked_problem(
+    model: Model, start: Any, goal: Any, duration: Any, bounds: Any, **settings: Any
+) -> PlanningProblem:
+    """Return the problem; PlanningError names the first wrong field, its value and the remedy."""
+    # start and goal, and whether the bounds allow them
     q0, v0 = _start(model, start)
-    goal, bounds = _goal(goal, q0.size - 7), _bounds(bounds, q0.size - 7)
-    _start_inside(q0[7:], bounds.angle, "angle", "rad")
-    _start_inside(v0[6:], bounds.rate, "rate", "rad/s")
-    wrong = {"objective": _objective, "path": _path}
-    wrong |= {name: partial(number, name, above=False) for name in ("smoothing", "damping")}
-    for name, bound in (("tail", bounds.angle), ("tail_rate", bounds.rate)):
-        _goal_inside(name, getattr(goal, name), bound)
-    settings = {
-        name: wrong.get(name, lambda value: value)(value) for name, value in settings.items()
+    tail = model.layout.nt
+    goal, bounds = _goal(goal, tail), _bounds(bounds, tail)
+    _start_inside(q0[TAIL_Q], bounds.angle, "angle", "rad")
+    _start_inside(v0[TAIL_V], bounds.rate, "rate", "rad/s")
+    _goal_inside("tail", goal.tail, bounds.angle)
+    _goal_inside("tail_rate", goal.tail_rate, bounds.rate)
+
+    # settings, those that are names last
+    checks: dict[str, Callable[[Any], Any]] = {"objective": _objective, "path": _path}
+    for name in ("smoothing", "damping"):
+        checks[name] = partial(number, name, error=PlanningError, least=0)
+    checked = {
+        name: checks[name](value) if name in checks else value for name, value in settings.items()
     }
-    choice("formulation", settings.get("formulation", "airborne"), FORMULATIONS)
-    choice("attitude", settings.get("attitude", "quaternion"), KINDS)
-    return Problem(q0, v0, goal, _duration(duration), bounds, **settings)
+    one_of("formulation", settings.get("formulation", "airborne"), FORMULATIONS, PlanningError)
+    one_of("attitude", settings.get("attitude", "quaternion"), KINDS, PlanningError)
+    return PlanningProblem(q0, v0, goal, _duration(duration), bounds, **checked)
 
 
-def _vector(field: str, value, size: int) -> np.ndarray:
+def _vector(field: str, value: Any, size: int) -> np.ndarray:
+    """Return finite numbers (size,); PlanningError else, also of one number alone."""
     if np.ndim(value) == 0:
         raise PlanningError(f"{field}: value {value!r}: needs {size} numbers")
-    return numbers(field, value, size)
+    return numbers(field, value, size, PlanningError)
 
 
-def _start(model, start) -> tuple[np.ndarray, np.ndarray]:
+def _unit_quaternion(field: str, quaternion: np.ndarray) -> np.ndarray:
+    """Return the quaternion, of norm 1; PlanningError where it is zero."""
+    norm = np.linalg.norm(quaternion)
+    if norm == 0:
+        raise PlanningError(f"{field}: the zero quaternion: upright is (1, 0, 0, 0)")
+    return quaternion / norm
+
+
+def _start(model: Model, start: Any) -> tuple[np.ndarray, np.ndarray]:
     if not isinstance(start, tuple | list) or len(start) != 2:
         raise PlanningError(f"start: value {start!r}: needs (q0, v0), two arrays")
     q0, v0 = _vector("start[0]", start[0], model.nq), _vector("start[1]", start[1], model.nv)
-    norm = np.linalg.norm(q0[3:7])
-    if norm == 0:
-        raise PlanningError("start[0][3:7]: the zero quaternion: upright is (1, 0, 0, 0)")
-    q0[3:7] /= norm
+    q0[QUATERNION] = _unit_quaternion("start[0][3:7]", q0[QUATERNION])
     return q0, v0
 
 
-def _goal(goal, size: int) -> Goal:
+def _goal(goal: Any, tail: int) -> Goal:
     if not isinstance(goal, Goal):
         raise PlanningError(f"goal: value {goal!r}: needs a serpentail.Goal")
     attitude = goal.attitude
-    if (
-        attitude is not None and attitude != "upright"
-        if isinstance(attitude, str)
-        else attitude is not None
-    ):
-        attitude = _vector("goal.attitude", attitude, 4)
-        if np.linalg.norm(attitude) == 0:
-            raise PlanningError("goal.attitude: the zero quaternion: upright is (1, 0, 0, 0)")
-        attitude = attitude / np.linalg.norm(attitude)
+    upright = isinstance(attitude, str) and attitude == "upright"
+    if attitude is not None and not upright:
+        quaternion = _vector("goal.attitude", attitude, 4)
+        attitude = _unit_quaternion("goal.attitude", quaternion)
     rate = None if goal.torso_rate is None else _vector("goal.torso_rate", goal.torso_rate, 3)
-    tails = [_some(f"goal.{name}", getattr(goal, name), size) for name in ("tail", "tail_rate")]
     turns = None if goal.turns is None else np.round(_vector("goal.turns", goal.turns, 2))
-    return Goal(attitude, rate, *tails, turns)
+    return Goal(
+        attitude,
+        rate,
+        _partly_free("goal.tail", goal.tail, tail),
+        _partly_free("goal.tail_rate", goal.tail_rate, tail),
+        turns,
+    )
 
 
-def _some(field: str, value, size: int) -> np.ndarray | None:
+def _partly_free(field: str, value: Any, size: int) -> np.ndarray | None:
     """Return numbers (size,), nan where they are free; None where all are."""
     if value is None:
         return None
@@ -147,27 +160,32 @@ def _some(field: str, value, size: int) -> np.ndarray | None:
     return array
 
 
-def _bounds(bounds, size: int) -> Bounds:
+def _bounds(bounds: Any, tail: int) -> Bounds:
     if not isinstance(bounds, Bounds):
         raise PlanningError(f"bounds: value {bounds!r}: needs a serpentail.Bounds")
-    found = {}
-    for field in fields(Bounds):
-        value = getattr(bounds, field.name)
-        found[field.name] = None if value is None else numbers(f"bounds.{field.name}", value, size)
-        if value is not None and not (found[field.name] > 0).all():
-            raise PlanningError(f"bounds.{field.name}: value {value!r}: needs magnitudes above 0")
-    return Bounds(**found)
+    return Bounds(
+        *(_magnitudes(entry.name, getattr(bounds, entry.name), tail) for entry in fields(Bounds))
+    )
+
+
+def _magnitudes(name: str, value: Any, tail: int) -> np.ndarray | None:
+    """Return one bound of every tail coordinate; None where there is none."""
+    if value is None:
+        return None
+    magnitudes = numbers(f"bounds.{name}", value, tail, PlanningError)
+    if not (magnitudes > 0).all():
+        raise PlanningError(f"bounds.{name}: value {value!r}: needs magnitudes above 0")
+    return magnitudes
 
 
 def _start_inside(values: np.ndarray, bound: np.ndarray | None, name: str, unit: str) -> None:
     if bound is None:
         return
     k = int(np.argmax(np.abs(values) - bound))
-    if abs(values[k]) > bound[k] + SLACK:
+    if abs(values[k]) > bound[k] + START_SLACK:
         raise PlanningError(
             f"bounds.{name}: the start's tail coordinate {k} has {values[k]:.6g} {unit}, beyond "
-            f"{bound[k]:.6g}: "
-            "widen the bound, or start inside it"
+            f"{bound[k]:.6g}: widen the bound, or start inside it"
         )
 
 
@@ -183,26 +201,26 @@ def _goal_inside(name: str, values: np.ndarray | None, bound: np.ndarray | None)
         )
 
 
-def _duration(duration) -> tuple[float, float]:
+def _duration(duration: Any) -> tuple[float, float]:
     pair = duration if isinstance(duration, tuple | list) else (duration, duration)
     if len(pair) != 2:
         raise PlanningError(
             f"duration: value {duration!r}: needs one number, or (least, most), in s"
         )
-    least, most = (number("duration", value) for value in pair)
+    least, most = (number("duration", value, PlanningError, above=0) for value in pair)
     if most < least:
         raise PlanningError(f"duration: value {duration!r}: needs least <= most, in s")
     return least, most
 
 
-def _objective(objective):
+def _objective(objective: Any) -> str | Callable[[Any], Any]:
     if not callable(objective):
-        choice("objective", objective, OBJECTIVES)
+        one_of("objective", objective, OBJECTIVES, PlanningError)
     return objective
 
 
-def _path(path) -> tuple:
-    rows = []
+def _path(path: Sequence[Any]) -> tuple[PathConstraint, ...]:
+    constraints = []
     for k, row in enumerate(path):
         if not isinstance(row, tuple | list) or len(row) != 3 or not callable(row[0]):
             raise PlanningError(
@@ -211,5 +229,5 @@ def _path(path) -> tuple:
         least, most = float(row[1]), float(row[2])
         if not least <= most:
             raise PlanningError(f"path[{k}]: bounds ({least}, {most}): needs least <= most")
-        rows.append((row[0], least, most))
-    return tuple(rows)
+        constraints.append((row[0], least, most))
+    return tuple(constraints)

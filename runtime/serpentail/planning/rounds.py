@@ -1,40 +1,45 @@
-"""Rounds: a problem and a method go in; solutions on finer and finer meshes, and the best one's
-plan, come out.
+"""The search for a plan: a first solution, then rounds on finer meshes until it is true.
+
+A round is one solved program.  Its torques are applied to the model; intervals where the model
+does something else than planned are split for the next round.
 """
 
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
 
-from .method import Method
+from ..model.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TAIL_V, VELOCITY
+from ..model.model import Model
 from .nlp.bounds import limits
 from .nlp.coordinates import attitude
 from .nlp.guess import Motion, of_trajectory, passive, pushes, unknowns
-from .nlp.interrupt import asked
+from .nlp.interrupt import stop_reason
 from .nlp.mesh import Mesh, refined, uniform
-from .nlp.multipliers import carried
-from .nlp.node import Dynamics
-from .nlp.rules import Rule
+from .nlp.multipliers import Multipliers, carried
+from .nlp.node import Equations
+from .nlp.rules import CollocationRule
 from .nlp.solver import Solution, solve, solver
-from .nlp.transcription import Transcription, program_of, torque_unit
-from .problem import Problem
+from .nlp.transcription import Transcription, torque_unit, transcription_of
+from .problem import PlanningProblem
 from .result.curve import Curve, curve
 from .result.full_state import full_state
 from .result.plan import Plan, sampled
 from .result.report import attitude_errors, report
 from .result.truth import local_errors, open_loop
+from .settings import PlanSettings
 
-SLIGHT = 0.05  # of the torques' unit: what pushes the first guess out of a plane of symmetry
+FIRST_PUSH = 0.05  # of the torques' unit: takes the first guess out of a plane of symmetry
+DURATIONS = (1.0, 0.5, 0.75, 0.25)  # of guesses, in turn, from the least (0) to the most (1)
 
 
 @dataclass(frozen=True, eq=False)
 class Round:
-    """One solution on one mesh: q, v planned at the ends of intervals, and true at the end of
-    all.
-    """
+    """One solution on one mesh: q, v planned at the ends of intervals, and true at the last end."""
 
-    program: Transcription
+    nlp: Transcription
     solution: Solution
     curve: Curve
     planned: tuple[np.ndarray, np.ndarray]
@@ -42,26 +47,28 @@ class Round:
 
     @property
     def error(self) -> float:
-        """True error (deg) of the attitude at the end, against the plan or the goal, the larger
-        one; inf if lost.
+        """True error (deg) of the attitude at the end, to the plan or the goal, the larger one.
+
+        inf if the motion is lost.
         """
-        error = max(
-            attitude_errors(self.program.problem, self.planned[0][-1, 3:7], self.true[0][3:7])
-        )
+        planned, true = self.planned[0][-1, QUATERNION], self.true[0][QUATERNION]
+        error = max(attitude_errors(self.nlp.problem, planned, true))
         return error if np.isfinite(error) else np.inf
 
 
-class Run:
+class Search:
     """One call of ``plan``: what stays the same in all its rounds, and what they have cost."""
 
-    def __init__(self, model, problem: Problem, method: Method, equations: Dynamics, scheme: Rule):
-        self.model, self.problem, self.method, self.equations, self.rule = (
-            model,
-            problem,
-            method,
-            equations,
-            scheme,
-        )
+    def __init__(
+        self,
+        model: Model,
+        problem: PlanningProblem,
+        settings: PlanSettings,
+        equations: Equations,
+        rule: CollocationRule,
+    ):
+        self.model, self.problem, self.settings = model, problem, settings
+        self.equations, self.rule = equations, rule
         self.start = (problem.q0, problem.v0)
         self.h = model.momentum(*self.start)[1]
         self.attitude = attitude(problem.attitude)
@@ -70,156 +77,159 @@ class Run:
         self.stopped: str | None = None
 
     def first(self) -> Round:
-        """Return the best solution on the first mesh, of as many guesses as asked for, and more if
-        all fail.
-        """
-        method, before = self.method, self.method.guess
-        again = isinstance(before, Plan) and before.rule is self.rule
-        program = self._transcribed(before.mesh if again else uniform(method.intervals))
-        found: list[Solution] = []
-        for k in range(method.multi_start + method.retries):
-            if found and (
-                (k >= method.multi_start and any(s.success for s in found)) or self._stopped()
-            ):
+        """Return the best solution on the first mesh, from all guesses, and more if these fail."""
+        settings, guess = self.settings, self.settings.guess
+        same_rule = isinstance(guess, Plan) and guess.rule is self.rule
+        nlp = self._transcribed(guess.mesh if same_rule else uniform(settings.intervals))
+        solutions = [self._solved_given(nlp)]
+        for k in range(1, settings.multi_start + settings.retries):
+            enough = k >= settings.multi_start and any(entry.success for entry in solutions)
+            if enough or self._stopped():
                 break
-            found.append(self._given(program) if k == 0 else self._solved(program, self._pushed(k)))
-        return self._round(program, min(found, key=lambda s: (not s.success, s.value)))
+            solutions.append(self._solved(nlp, self._pushed(k)))
+        return self._round(nlp, min(solutions, key=lambda entry: (not entry.success, entry.value)))
 
     def refined(self, first: Round) -> list[Round]:
         """Return the rounds: intervals that are wrong are split until the end is right."""
-        rounds, method = [first], self.method
-        for _ in range(method.rounds if method.tolerance is not None else 0):
+        rounds, tolerance = [first], self.settings.tolerance
+        if tolerance is None:
+            return rounds
+        for _ in range(self.settings.rounds):
             last = rounds[-1]
-            if not last.solution.success or last.error <= method.tolerance or self._stopped():
+            if not last.solution.success or last.error <= tolerance or self._stopped():
                 break
-            mesh = self._split(last)
-            if mesh.intervals == last.program.mesh.intervals:
+            mesh = self._split(last, tolerance)
+            if mesh.intervals == last.nlp.mesh.intervals:
                 break
-            program = self._transcribed(mesh)
+            nlp = self._transcribed(mesh)
             motion = Motion(last.curve.duration, last.curve.at)
-            multipliers = carried(last.solution.multipliers, last.program, program)
-            rounds.append(self._round(program, self._near(program, motion, multipliers)))
+            multipliers = carried(last.solution.multipliers, last.nlp, nlp)
+            rounds.append(self._round(nlp, self._solved_near(nlp, motion, multipliers)))
         return rounds
 
     def plan(self, rounds: list[Round], wall_s: float) -> Plan:
         """Return the plan of the best round."""
-        best = min(rounds, key=lambda one: (not one.solution.success, one.error))
-        tolerance = self.method.tolerance
-        good = bool(best.solution.success and (tolerance is None or best.error <= tolerance))
+        best = min(rounds, key=lambda entry: (not entry.solution.success, entry.error))
+        tolerance = self.settings.tolerance
+        true = tolerance is None or best.error <= tolerance
+        success = bool(best.solution.success and true)
         trajectory = sampled(self.model, self.problem, best.curve)
-        own = {"rounds": len(rounds), "iterations": self.iterations, "guesses": self.attempts}
-        own |= {"stopped": self.stopped}
-        own |= self.spent | {"wall_s": wall_s}
-        summary = {"success": good} | report(self, best, trajectory) | own
-        program = best.program
+        counts = {
+            "rounds": len(rounds),
+            "iterations": self.iterations,
+            "guesses": self.attempts,
+            "stopped": self.stopped,
+        }
+        summary = {"success": success} | report(self, best, trajectory) | counts
         return Plan(
-            good,
-            trajectory,
-            summary,
-            self.problem,
-            best.curve,
-            program.mesh,
-            self.rule,
-            best.solution,
+            success=success,
+            trajectory=trajectory,
+            report=summary | self.spent | {"wall_s": wall_s},
+            problem=self.problem,
+            curve=best.curve,
+            mesh=best.nlp.mesh,
+            rule=self.rule,
+            solution=best.solution,
         )
 
     def _stopped(self) -> bool:
         """Tell, and note why, whether the search should end that is not done."""
-        self.stopped = asked()
+        self.stopped = stop_reason()
         return self.stopped is not None
 
-    def _transcribed(self, mesh: Mesh) -> Transcription:
+    @contextmanager
+    def _timed(self, name: str) -> Iterator[None]:
+        """Add the time that a part takes to what was spent on it."""
         begun = time.perf_counter()
-        program = program_of(self.model, self.problem, mesh, self.rule, self.equations)
-        self.spent["derive_s"] += time.perf_counter() - begun
-        return program
+        yield
+        self.spent[name] += time.perf_counter() - begun
 
-    def _given(self, program: Transcription) -> Solution:
+    def _transcribed(self, mesh: Mesh) -> Transcription:
+        with self._timed("derive_s"):
+            return transcription_of(self.model, self.problem, mesh, self.rule, self.equations)
+
+    def _solved_given(self, nlp: Transcription) -> Solution:
         """Solve from the user's guess, or from passive flight."""
-        guess = self.method.guess
+        guess = self.settings.guess
         if guess is None:
-            return self._solved(program, self._pushed(0))
+            return self._solved(nlp, self._pushed(0))
         if not isinstance(guess, Plan):
-            return self._solved(
-                program, of_trajectory(self.model, guess, self.attitude, self.problem.damping)
-            )
-        form = (guess.problem.formulation, guess.problem.attitude)
-        if form != (self.problem.formulation, self.problem.attitude):
-            return self._solved(
-                program, of_trajectory(self.model, guess.trajectory, self.attitude), "close"
-            )
-        multipliers, sizes = guess.solution.multipliers, (program.places.size, program.rows)
-        same = tuple(part.size for part in multipliers) == sizes
-        return self._near(
-            program, Motion(guess.duration, guess.curve.at), multipliers if same else None
-        )
+            motion = of_trajectory(self.model, guess, self.attitude, self.problem.damping)
+            return self._solved(nlp, motion)
 
-    def _near(self, program: Transcription, motion: Motion, multipliers) -> Solution:
-        """Solve from a motion that is close to a solution, with multipliers or without; as from
-        afar if that fails.
-        """
-        found = self._solved(
-            program, motion, "close" if multipliers is None else "same", multipliers
-        )
-        return found if found.success or self.stopped else self._solved(program, motion)
+        # a plan in other variables is a motion, too
+        variables = (guess.problem.formulation, guess.problem.attitude)
+        if variables != (self.problem.formulation, self.problem.attitude):
+            motion = of_trajectory(self.model, guess.trajectory, self.attitude)
+            return self._solved(nlp, motion, "close")
+
+        # a plan of the same size has multipliers for this one
+        multipliers = guess.solution.multipliers
+        same_size = [part.size for part in multipliers] == [nlp.indices.size, nlp.rows]
+        motion = Motion(guess.duration, guess.curve.at)
+        return self._solved_near(nlp, motion, multipliers if same_size else None)
+
+    def _solved_near(
+        self, nlp: Transcription, motion: Motion, multipliers: Multipliers | None
+    ) -> Solution:
+        """Solve from a motion that is close to a solution; as from afar if that fails."""
+        guess = "close" if multipliers is None else "warm"
+        solution = self._solved(nlp, motion, guess, multipliers)
+        return solution if solution.success or self.stopped else self._solved(nlp, motion)
 
     def _pushed(self, k: int) -> Motion:
-        """Passive flight; the tail is pushed a little out of a plane of symmetry (k = 0), or about
-        at random.
-        """
-        method, (least, most) = self.method, self.problem.duration
-        duration = least + (most - least) * (1.0, 0.5, 0.75, 0.25)[k % 4]
-        size = float(torque_unit(self.problem).mean()) * (SLIGHT if k == 0 else 1.0)
-        push = pushes(np.random.default_rng([method.seed, k]), size, self.model.nv - 6)
-        return passive(
-            self.model, self.problem, self.attitude, method.guess_damping, duration, push
-        )
+        """Passive flight; the tail is pushed a little for k = 0, or about at random."""
+        settings, (least, most) = self.settings, self.problem.duration
+        duration = least + (most - least) * DURATIONS[k % len(DURATIONS)]
+        size = float(torque_unit(self.problem).mean()) * (FIRST_PUSH if k == 0 else 1.0)
+        push = pushes(np.random.default_rng([settings.seed, k]), size, self.model)
+        return passive(self.model, self.problem, settings.guess_damping, duration, push)
 
     def _solved(
-        self, program: Transcription, motion: Motion, near: str = "far", multipliers=None
+        self,
+        nlp: Transcription,
+        motion: Motion,
+        guess: str = "far",
+        multipliers: Multipliers | None = None,
     ) -> Solution:
-        """Solve from a motion that is far from a solution, close to one, or one of the same
-        program.
-        """
-        begun = time.perf_counter()
-        engine = solver(program, self.method.solver, self.method.options, near)
-        self.spent["derive_s"] += time.perf_counter() - begun
-        w = unknowns(motion, program, float(np.clip(motion.duration, *self.problem.duration)))
+        """Solve from a motion that is far from a solution, close to one, or has multipliers."""
+        with self._timed("derive_s"):
+            engine = solver(nlp, self.settings.solver, self.settings.options, guess)
+        w = unknowns(motion, nlp, float(np.clip(motion.duration, *self.problem.duration)))
         angles = motion.at(np.array([motion.duration]))["attitude"][0]
-        found = solve(engine, limits(program, self._start_blocks(), angles), w, self.h, multipliers)
-        self.spent["solve_cpu_s"] += found.cpu_s
-        self.iterations += found.iterations
+        bounds = limits(nlp, self._start_blocks(), angles)
+        solution = solve(engine, bounds, w, self.h, multipliers)
+        self.spent["solve_cpu_s"] += solution.cpu_s
+        self.iterations += solution.iterations
         self.attempts += 1
-        if not found.success:
+        if not solution.success:
             self._stopped()
-        return found
+        return solution
 
     def _start_blocks(self) -> dict[str, np.ndarray]:
         q, v = self.start
-        blocks = {
-            "position": q[:3],
+        return {
+            "position": q[POSITION],
             "attitude": self.attitude.coordinates(q[None])[0],
-            "tail": q[7:],
+            "tail": q[TAIL_Q],
+            "velocity": v[VELOCITY],
+            "torso_rate": v[OMEGA],
+            "tail_rate": v[TAIL_V],
         }
-        return blocks | {"velocity": v[:3], "torso_rate": v[3:6], "tail_rate": v[6:]}
 
-    def _round(self, program: Transcription, solution: Solution) -> Round:
+    def _round(self, nlp: Transcription, solution: Solution) -> Round:
         """Return a round: the solution's curve, and its truth."""
-        found = curve(program, solution.w, self.h)
-        begun = time.perf_counter()
-        planned = full_state(
-            self.model, self.start, self.attitude, found.ends, found.at(found.ends)
-        )
-        true = open_loop(self.model, found, self.problem.damping, self.start)
-        self.spent["truth_s"] += time.perf_counter() - begun
-        return Round(program, solution, found, planned, true)
+        motion = curve(nlp, solution.w, self.h)
+        with self._timed("truth_s"):
+            blocks = motion.at(motion.ends)
+            planned = full_state(self.model, self.start, self.attitude, motion.ends, blocks)
+            true = open_loop(self.model, motion, self.problem.damping, self.start)
+        return Round(nlp, solution, motion, planned, true)
 
-    def _split(self, last: Round) -> Mesh:
+    def _split(self, last: Round, tolerance: float) -> Mesh:
         """Return a finer mesh, by the local errors."""
-        begun = time.perf_counter()
-        errors = local_errors(self.model, last.curve, self.problem.damping, *last.planned)
-        self.spent["truth_s"] += time.perf_counter() - begun
-        factor = min(0.3 * self.method.tolerance / last.error, 0.3)
-        return refined(
-            last.program.mesh, errors, factor, self.rule.order, self.method.most_intervals
-        )
+        with self._timed("truth_s"):
+            errors = local_errors(self.model, last.curve, self.problem.damping, *last.planned)
+        factor = min(0.3 * tolerance / last.error, 0.3)
+        most = self.settings.most_intervals
+        return refined(last.nlp.mesh, errors, factor, self.rule.order, most)

@@ -1,1 +1,1 @@
-"""Scene files: the model, simulation and plan that they describe."""
+"""Scene files, and the models, simulations and plans that they describe."""

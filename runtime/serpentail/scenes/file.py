@@ -1,4 +1,4 @@
-"""Scene files: a path goes in; its tables, and the model that was generated from it, come out."""
+"""Reading a scene file, and loading the model that belongs to it, generated first where needed."""
 
 import subprocess
 import sys
@@ -6,11 +6,14 @@ import tomllib
 from collections.abc import Mapping
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 from ..errors import ModelError
 from ..model.manifest import read_manifest
 from ..model.model import Model, load
+from ..model.parameters import merged
 
+# keys of a scene that its generated code depends on, and that a folder is compared by
 MADE_OF = (
     "kind",
     "segments",
@@ -28,10 +31,9 @@ def read_scene(path: str | Path, error: type[Exception]) -> dict:
     try:
         return tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
     except (OSError, ValueError, RecursionError) as reason:
-        words = (
+        raise error(
             f"scene file: value {str(path)!r}: cannot be read ({reason}); give a scene file (.toml)"
-        )
-        raise error(words) from reason
+        ) from reason
 
 
 def subtable(scene: Mapping, name: str, path: str | Path, error: type[Exception]) -> dict:
@@ -48,45 +50,38 @@ def subtable(scene: Mapping, name: str, path: str | Path, error: type[Exception]
 def model_of(
     scene: Mapping, path: str | Path, folder: str | Path | None, parameters: Mapping
 ) -> Model:
-    """Return the model of a scene, generated first where its folder, by default generated/<name>,
-    is missing.
+    """Return the model of a scene, with the scene's parameters, then those given here.
 
-    Its parameters are the scene's, then those given here.  ModelError where the folder is of
-    another scene.
+    folder: by default generated/<name>; it is generated where it is missing.  ModelError where it
+    is of another scene.
     """
     folder = Path(folder or Path("generated") / str(scene.get("name", Path(path).stem)))
     if not folder.exists():
         _generate(Path(path), folder)
     made = read_manifest(folder)["scene"]
-    for key in [
-        key
-        for key in MADE_OF
-        if key in scene and made.get(key) != _in_order(scene[key], made.get(key))
-    ]:
-        was, remedy = made.get(key), f"generate it again, `make model SCENE={path}`"
-        raise ModelError(f"{folder} has {key} = {was!r}, {path} has {scene[key]!r}: {remedy}")
-    return load(
-        folder, parameters if made["baked"] else _merged(scene.get("parameters", {}), parameters)
-    )
+    for key in MADE_OF:
+        if key in scene and not _same(scene[key], made.get(key)):
+            raise ModelError(
+                f"{folder} has {key} = {made.get(key)!r}, {path} has {scene[key]!r}: generate it "
+                f"again, `make model SCENE={path}`"
+            )
+    if made["baked"]:
+        return load(folder, parameters)
+    return load(folder, merged(scene.get("parameters", {}), parameters))
 
 
 def _generate(path: Path, folder: Path) -> None:
-    """Run the generator, where it is installed, in a process of its own; it tells on stderr what it
-    did.
+    """Run the generator, where it is installed, in a process of its own; what it says is printed.
+
+    On stderr: stdout may be for JSON alone.
     """
     if find_spec("serpentail_codegen") is None:
         raise ModelError(
             f"{folder} is no generated folder: make it where the generator is, `make model "
             f"SCENE={path}`"
         )
-    command = [
-        sys.executable,
-        "-m",
-        "serpentail_codegen",
-        str(path),
-        "--output",
-        str(folder.parent),
-    ]
+    generator = [sys.executable, "-m", "serpentail_codegen"]
+    command = [*generator, str(path), "--output", str(folder.parent)]
     done = subprocess.run(
         command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False
     )
@@ -95,20 +90,8 @@ def _generate(path: Path, folder: Path) -> None:
     print(done.stdout.strip(), file=sys.stderr)
 
 
-def _in_order(value, made):
-    """A list as the manifest has it, whose order means nothing."""
-    same = (
-        isinstance(value, list)
-        and isinstance(made, list)
-        and sorted(map(str, value)) == sorted(map(str, made))
-    )
-    return made if same else value
-
-
-def _merged(own: Mapping, changes: Mapping) -> dict:
-    """A scene's parameters and changes of them; one of link_radius and link_inertia takes the
-    other's place.
-    """
-    pair = {"link_radius": "link_inertia", "link_inertia": "link_radius"}
-    taken = {pair[name] for name in changes if name in pair}
-    return {name: value for name, value in own.items() if name not in taken} | dict(changes)
+def _same(value: Any, made: Any) -> bool:
+    """Tell whether a scene's value is that of a manifest; the order of a list means nothing."""
+    if isinstance(value, list) and isinstance(made, list):
+        return sorted(map(str, value)) == sorted(map(str, made))
+    return bool(value == made)

@@ -1,17 +1,14 @@
-"""Changes: texts such as "mu=0.5", or values by dotted names, and nested tables go in; changed
-tables come out.
-"""
+"""Changes of a scene's values by their names, such as "mu=0.5" on the command line."""
 
 import tomllib
 from collections.abc import Iterable, Mapping
+from typing import Any
 
 from ..errors import SimulationError
 
 
 def parsed(texts: Iterable[str]) -> dict:
-    """Return name -> value of texts NAME=VALUE, values as in a scene file; a plain word stands for
-    a text.
-    """
+    """Return name -> value of texts NAME=VALUE, values as in a scene file; a word is a text."""
     values = {}
     for text in texts:
         name, sign, value = text.partition("=")
@@ -25,22 +22,26 @@ def parsed(texts: Iterable[str]) -> dict:
 
 
 def changed(table: Mapping, changes: Mapping) -> dict:
-    """Return a copy of a table with new values: "start.pitch", or "legs.moves.0.rate" in an array
-    of tables.
+    """Return a copy of a table with new values by name.
+
+    Names are such as "start.pitch", or "legs.moves.0.rate" in an array of tables.
     """
     for name, value in changes.items():
         table = _with(table, name.split("."), value, name)
     return dict(table)
 
 
-def _with(part, path: list[str], value, name: str):
+def _with(part: Any, path: list[str], value: Any, name: str) -> Any:
+    """Return a copy of a table or an array with a new value at a path; missing tables are made."""
+    if not path:
+        return value
     first, *rest = path
-    if isinstance(part, Mapping) and (first in part or not (rest and rest[0].isdigit())):
-        inner = _with(part.get(first, {}), rest, value, name) if rest else value
-        return dict(part) | {first: inner}
+    in_missing_array = rest and rest[0].isdigit()
+    if isinstance(part, Mapping) and (first in part or not in_missing_array):
+        return dict(part) | {first: _with(part.get(first, {}), rest, value, name)}
     if isinstance(part, list) and first.isdigit() and int(first) < len(part):
         k = int(first)
-        return [*part[:k], _with(part[k], rest, value, name) if rest else value, *part[k + 1 :]]
+        return [*part[:k], _with(part[k], rest, value, name), *part[k + 1 :]]
     raise SimulationError(
         f"change {name!r}: {first!r} is not in {part!r}: name a key, or a place from 0"
     )

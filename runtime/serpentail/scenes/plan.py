@@ -1,78 +1,86 @@
-"""Scenes: a scene file with a table [plan] goes in; the plan of its motion comes out."""
+"""The plan that a scene file's table [plan] asks for."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
+from typing import Any
 
-from ..checks import choice
+from ..checks import one_of
 from ..errors import PlanningError
-from ..planning.method import Method
 from ..planning.planner import plan
-from ..planning.problem import SETTINGS, Bounds, Goal
+from ..planning.problem import PROBLEM_SETTINGS, Bounds, Goal
 from ..planning.result.plan import Plan
+from ..planning.settings import PlanSettings
 from .file import model_of, read_scene, subtable
 
 FREE = "free"  # TOML has no None
-CODE = ("guess", "path")  # what no file can hold
-KEYS = ("start", "goal", "duration", "bounds", *SETTINGS, *(entry.name for entry in fields(Method)))
+CODE_ONLY = ("guess", "path")  # what no file can hold
+SETTINGS = (*PROBLEM_SETTINGS, *(entry.name for entry in fields(PlanSettings)))
+KEYS = ("start", "goal", "duration", "bounds", *(key for key in SETTINGS if key not in CODE_ONLY))
 
 
 def planned(path: str, folder: str | None = None) -> Plan:
-    """Return the plan that a scene file asks for; its model is in `folder`, by default
-    generated/<scene>.
+    """Return the plan that a scene file asks for.
 
-    Raises PlanningError with field, value and remedy, ModelError where the folder is of another
-    scene.
+    folder: of its model, by default generated/<scene>.  Raises PlanningError with field, value and
+    remedy, ModelError where the folder is of another scene.
     """
     scene = read_scene(path, PlanningError)
     arguments = plan_arguments(subtable(scene, "plan", path, PlanningError))
     return plan(model_of(scene, path, folder, {}), **arguments)
 
 
-def plan_arguments(table: Mapping) -> dict:
+def plan_arguments(table: Mapping) -> dict[str, Any]:
     """Return the arguments of ``plan`` that a table [plan] has."""
+    _check_keys(table)
+
+    # tables of their own: start, goal and bounds
+    start = _part("start", table["start"], ("q", "v"))
+    if set(start) != {"q", "v"}:
+        raise PlanningError(f"plan.start: value {start!r}: needs q and v")
+    goal = _part("goal", table.get("goal", {}), _names(Goal))
+    bounds = _part("bounds", table.get("bounds", {}), _names(Bounds))
+
+    # the others as they are, but for "free"
+    arguments = dict(table) | {
+        "start": (start["q"], start["v"]),
+        "goal": Goal(**{key: _free(value) for key, value in goal.items()}),
+        "bounds": Bounds(**bounds),
+    }
+    if arguments.get("tolerance") == FREE:
+        arguments["tolerance"] = None
+    return arguments
+
+
+def _check_keys(table: Mapping) -> None:
+    """PlanningError where a table [plan] has a key that it cannot have, or lacks one."""
     for name in table:
-        if name in CODE:
+        if name in CODE_ONLY:
             raise PlanningError(
                 f"plan.{name}: value {table[name]!r}: only programs can give it; call "
                 "serpentail.plan"
             )
-        choice("plan: key", name, [key for key in KEYS if key not in CODE])
-    for name in ("start", "duration"):
+        one_of("plan: key", name, KEYS, PlanningError)
+    for name, needed in (("start", "q and v"), ("duration", "seconds")):
         if name not in table:
-            raise PlanningError(
-                f"plan.{name}: no value: needs {'q and v' if name == 'start' else 'seconds'}"
-            )
-    start = _part("start", table["start"], ("q", "v"))
-    if set(start) != {"q", "v"}:
-        raise PlanningError(f"plan.start: value {start!r}: needs q and v")
-    goal = {
-        key: _free(value)
-        for key, value in _part("goal", table.get("goal", {}), _names(Goal)).items()
-    }
-    bounds = _part("bounds", table.get("bounds", {}), _names(Bounds))
-    rest = {key: value for key, value in table.items() if key not in ("start", "goal", "bounds")}
-    own = {"start": (start["q"], start["v"]), "goal": Goal(**goal), "bounds": Bounds(**bounds)}
-    return own | {
-        key: None if key == "tolerance" and value == FREE else value for key, value in rest.items()
-    }
+            raise PlanningError(f"plan.{name}: no value: needs {needed}")
 
 
-def _names(kind) -> list[str]:
+def _names(kind: type[Goal] | type[Bounds]) -> list[str]:
     return [entry.name for entry in fields(kind)]
 
 
-def _part(field: str, value, known) -> dict:
+def _part(field: str, value: Any, known: Sequence[str]) -> dict:
     """A table in [plan] with known keys."""
     if not isinstance(value, Mapping):
         raise PlanningError(
             f"plan.{field}: value {value!r}: needs a table, under a line [plan.{field}]"
         )
     for name in value:
-        choice(f"plan.{field}: key", name, known)
+        one_of(f"plan.{field}: key", name, known, PlanningError)
     return dict(value)
 
 
-def _free(value):
+def _free(value: Any) -> Any:
     """None for "free", in arrays too."""
     if isinstance(value, list):
         return tuple(None if entry == FREE else entry for entry in value)

@@ -1,15 +1,15 @@
-"""Scenarios: a scene file with a table [simulate] goes in; its model, start, schedules and settings
-come out.
-"""
+"""The motion that a scene file's table [simulate] asks for: start, legs, controller, settings."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any, overload
 
 import numpy as np
 
-from ..checks import finite, known, positive, real_array
+from ..checks import finite_array, number, one_of, refusal
 from ..errors import SimulationError
+from ..model.layout import OMEGA, VELOCITY
 from ..model.model import Model
 from ..motion.summary import summary
 from ..motion.trajectory import Trajectory
@@ -18,13 +18,15 @@ from ..pictures.skeleton import leg_joints
 from ..simulation.controllers import Controller, Damping, Phases, TorqueTable
 from ..simulation.methods import SETTINGS
 from ..simulation.pfl import KD, KP, Pfl
+from ..simulation.rollouts import Rollouts
 from ..simulation.schedules import Legs, Reference, shared_among_links
 from ..simulation.settle import settle
 from ..simulation.simulate import simulate
 from .file import model_of, read_scene, subtable
 from .overrides import changed
 
-NUMBERS = (*dict.fromkeys(name for own in SETTINGS.values() for name in own), "output_step")
+# settings of all methods, each once
+NUMBERS = (*dict.fromkeys(name for names in SETTINGS.values() for name in names), "output_step")
 KEYS = ("duration", "method", *NUMBERS, "start", "legs", "reference", "controller")
 ANGLES = ("pitch", "roll", "yaw")
 START = ("height", *ANGLES, "bends", "velocity", "rate", "settle")
@@ -40,8 +42,7 @@ LAWS = {  # kinds of controllers and what each has
 
 @dataclass(frozen=True, eq=False)
 class Scenario:
-    """A motion to simulate: a model, its start (q0, v0), and what ``st.simulate`` takes besides, as
-    data.
+    """A motion to simulate: a model, its start (q0, v0), and what else ``st.simulate`` takes.
 
     duration (s) from t = 0 on; controller, legs as in ``simulate``; settings: the rest of its
     arguments.
@@ -53,47 +54,42 @@ class Scenario:
     duration: float
     controller: Controller = None
     legs: Legs | None = None
-    settings: dict = field(default_factory=dict)
+    settings: dict[str, Any] = field(default_factory=dict)
 
-    def simulate(self, **changes) -> Trajectory:
-        """Return the motion; changes are arguments of ``st.simulate`` that take the place of the
-        scenario's.
+    @overload
+    def simulate(self) -> Trajectory: ...
+
+    @overload
+    def simulate(self, **changes: Any) -> Trajectory | Rollouts: ...
+
+    def simulate(self, **changes: Any) -> Trajectory | Rollouts:
+        """Return the motion; changes replace arguments of ``st.simulate``.
+
+        They may give parameters of many runs, whose motions are Rollouts.
         """
-        own = {"controller": self.controller, "t_span": self.duration} | self.settings
-        own |= {} if self.legs is None else {"legs": self.legs}
-        return simulate(self.model, self.q0, self.v0, **own | changes)
+        arguments = {"controller": self.controller, "t_span": self.duration} | self.settings
+        if self.legs is not None:
+            arguments["legs"] = self.legs
+        return simulate(self.model, self.q0, self.v0, **arguments | changes)
 
     def film(self, motion: Trajectory, path: str | Path, frames: int | Sequence[float] = 8) -> Path:
-        """Draw moments of a motion: torso, legs, tail and the ground's forces; frames: how many, or
-        their times (s).
+        """Draw moments of a motion: torso, legs, tail and the ground's forces; return the path.
 
-        They are drawn about the centre of mass, or about the torso where the scene left out the
-        function ``center_of_mass``.
+        frames: how many, or their times (s).  They are drawn about the centre of mass, or about the
+        torso where the scene left out the function ``center_of_mass``.
         """
-        model, p = self.model, self.model.parameters
-        com = None
+        model, parameters = self.model, self.model.parameters
+        look: dict[str, Any] = {"tail_mount": parameters["tail_mount"]}
+        if "torso_semi_axes" in parameters:
+            look["semi_axes"] = parameters["torso_semi_axes"]
+        if self.legs is not None:
+            look["legs"] = leg_joints(model, motion, self.legs.curve.at(motion.t)[0])
         if "center_of_mass" in model.kernels:
-            com = model.center_of_mass(motion.q, motion.v)[0]
-        look = {"tail_mount": p["tail_mount"]}
-        look |= {"semi_axes": p["torso_semi_axes"]} if "torso_semi_axes" in p else {}
-        look |= (
-            {}
-            if self.legs is None
-            else {"legs": leg_joints(model, motion, self.legs.curve.at(motion.t)[0])}
-        )
-        return filmstrip(
-            motion,
-            model.tail_points(motion.q),
-            path,
-            frames,
-            com=com,
-            **look,
-        )
+            look["com"] = model.center_of_mass(motion.q, motion.v)[0]
+        return filmstrip(motion, model.tail_points(motion.q), path, frames, **look)
 
-    def summary(self, motion: Trajectory) -> dict:
-        """Return what a motion came to: take-off, apex, how it ends, peak forces, steps and time;
-        SI.
-        """
+    def summary(self, motion: Trajectory) -> dict[str, Any]:
+        """Return take-off, apex, how a motion ends, peak forces, steps and time; SI."""
         return summary(self.model, motion)
 
 
@@ -104,23 +100,24 @@ def scenario(
 
     folder: the generated one, by default generated/<scene>, made first where it is missing.
     changes: new values by name, of parameters of the model, or of keys below [simulate], such as
-    "duration",
-    "start.pitch" or "legs.moves.0.rate".
+    "duration", "start.pitch" or "legs.moves.0.rate".
     Raises SimulationError with field, value and remedy, ModelError where parameters are wrong or
-    the folder is of
-    another scene.
+    the folder is of another scene.
     """
     scene = read_scene(path, SimulationError)
     table = subtable(scene, "simulate", path, SimulationError)
-    own = {name: value for name, value in (changes or {}).items() if name.split(".")[0] in KEYS}
-    parameters = {name: value for name, value in (changes or {}).items() if name not in own}
+
+    # a change is of a key below [simulate], or of a parameter
+    values = dict(changes or {})
+    of_table = {name: value for name, value in values.items() if name.split(".")[0] in KEYS}
+    parameters = {name: value for name, value in values.items() if name not in of_table}
     for name in parameters:
         if "." in name:
             raise SimulationError(
                 f"change {name!r}: unknown; needs a parameter, or a key below [simulate]"
             )
     model = model_of(scene, path, folder, parameters)
-    return scenario_of(model, changed(table, own), Path(path).parent)
+    return scenario_of(model, changed(table, of_table), Path(path).parent)
 
 
 def scenario_of(model: Model, table: Mapping, parent: Path) -> Scenario:
@@ -130,36 +127,31 @@ def scenario_of(model: Model, table: Mapping, parent: Path) -> Scenario:
         raise SimulationError("simulate.duration: no value: needs seconds")
     legs = _legs(table["legs"]) if "legs" in table else None
     reference = _reference(model, table["reference"], parent) if "reference" in table else None
-    acting = {
-        "controller": _controller(model, table.get("controller", {"kind": "none"}), reference)
-    }
-    acting |= {} if legs is None else {"legs": legs}
+    controller = _controller(model, table.get("controller", {"kind": "none"}), reference)
     settings = {name: table[name] for name in ("method", *NUMBERS) if name in table}
-    start = _start(model, table.get("start", {}), reference, acting | _of_settling(settings))
-    q0, v0, still = start
-    return Scenario(
-        model,
-        q0,
-        v0,
-        positive("simulate.duration", table["duration"]),
-        settings=settings | still,
-        **acting,
-    )
+
+    # what acts while a start settles
+    settling = {name: value for name, value in settings.items() if name != "output_step"}
+    settling["controller"] = controller
+    if legs is not None:
+        settling["legs"] = legs
+    q0, v0, bristles = _start(model, table.get("start", {}), reference, settling)
+    if bristles is not None:
+        settings["bristles0"] = bristles
+    duration = number("simulate.duration", table["duration"], SimulationError, above=0)
+    return Scenario(model, q0, v0, duration, controller, legs, settings)
 
 
-def _of_settling(settings: dict) -> dict:
-    return {name: value for name, value in settings.items() if name != "output_step"}
-
-
-def _checked(where: str, table, names) -> Mapping:
+def _checked(where: str, table: Any, names: Collection[str]) -> Mapping:
+    """Return a table; SimulationError where it is none, or has another key."""
     if not isinstance(table, Mapping):
         raise SimulationError(f"{where}: value {table!r}: needs a table, under a line [{where}]")
     for name in table:
-        known(f"{where}: key", name, names, SimulationError)
+        one_of(f"{where}: key", name, names, SimulationError)
     return table
 
 
-def _legs(table) -> Legs:
+def _legs(table: Any) -> Legs:
     table = _checked("simulate.legs", table, LEGS)
     missing = [name for name in ("gamma", "delta") if name not in table]
     if missing or {"moves", "times"} <= set(table):
@@ -169,11 +161,13 @@ def _legs(table) -> Legs:
         )
     if "times" in table:
         return Legs(table["times"], table["gamma"], table["delta"])
-    start = [finite(f"simulate.legs.{name}", table[name]) for name in ("gamma", "delta")]
-    return Legs.moves(*start, table.get("moves", []))
+    gamma, delta = (
+        number(f"simulate.legs.{name}", table[name], SimulationError) for name in ("gamma", "delta")
+    )
+    return Legs.moves(gamma, delta, table.get("moves", []))
 
 
-def _reference(model: Model, table, parent: Path):
+def _reference(model: Model, table: Any, parent: Path) -> Reference | Trajectory:
     """A Reference, or the Trajectory that `serpentail plan --save` wrote."""
     table = _checked("simulate.reference", table, REFERENCE)
     if set(table) == {"file"}:
@@ -190,84 +184,84 @@ def _reference(model: Model, table, parent: Path):
     return Reference.of_bends(model, table["times"], table["bends"], table.get("blend", "quintic"))
 
 
-def _controller(model: Model, given, reference) -> Controller:
+def _controller(model: Model, value: Any, reference: Any) -> Controller:
     """One controller of a table, or of an array of tables with `begin` one after another."""
-    if isinstance(given, Mapping):
-        return _law(model, "simulate.controller", given, reference)
-    if not isinstance(given, list) or not given:
+    if isinstance(value, Mapping):
+        return _law(model, "simulate.controller", value, reference)
+    if not isinstance(value, list) or not value:
         remedy = "needs a table, or tables under lines [[simulate.controller]], with begin"
-        raise SimulationError(f"simulate.controller: value {given!r}: {remedy}")
+        raise SimulationError(f"simulate.controller: value {value!r}: {remedy}")
     pairs = []
-    for number, table in enumerate(given):
-        where = f"simulate.controller[{number}]"
+    for index, table in enumerate(value):
+        where = f"simulate.controller[{index}]"
         if not isinstance(table, Mapping) or "begin" not in table:
             raise SimulationError(f"{where}: value {table!r}: needs a table with begin (s)")
         law = {name: value for name, value in table.items() if name != "begin"}
-        pairs.append((finite(f"{where}.begin", table["begin"]), _law(model, where, law, reference)))
+        begin = number(f"{where}.begin", table["begin"], SimulationError)
+        pairs.append((begin, _law(model, where, law, reference)))
     return Phases(tuple(pairs))
 
 
-def _law(model: Model, where: str, table: Mapping, reference) -> Controller:
-    kind = table.get("kind")
-    known(f"{where}.kind", kind, LAWS, SimulationError)
-    own = {
-        name: value
-        for name, value in _checked(where, table, ("kind", *LAWS[kind])).items()
-        if name != "kind"
-    }
+def _law(model: Model, where: str, table: Mapping, reference: Any) -> Controller:
+    """The controller of a table, by its kind."""
+    kind = one_of(f"{where}.kind", table.get("kind"), LAWS, SimulationError)
+    table = _checked(where, table, ("kind", *LAWS[kind]))
+    values = {name: value for name, value in table.items() if name != "kind"}
     if kind == "none":
         return None
     if kind == "damping":
-        return Damping(**own)
+        return Damping(**values)
     if kind == "torques":
-        return TorqueTable(**{"times": None, "torques": None} | own)
+        return TorqueTable(**{"times": None, "torques": None} | values)
     if reference is None:
         raise SimulationError(
             f"{where}: kind 'pfl' tracks a reference: add a table [simulate.reference]"
         )
-    return Pfl(model, reference, **{"kp": KP, "kd": KD} | own)
+    return Pfl(model, reference, **{"kp": KP, "kd": KD} | values)
 
 
-def _start(model: Model, table, reference, acting: dict) -> tuple[np.ndarray, np.ndarray, dict]:
-    """Return q0, v0 and the bristles, where it settled."""
+def _start(
+    model: Model, table: Any, reference: Any, settling: dict[str, Any]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+    """Return q0, v0 and, where it settled, the bristles."""
     table = _checked("simulate.start", table, START)
     q = np.concatenate([_pose(table), _tail(model, table, reference)])
     v = np.zeros(model.nv)
-    for name, rows in (("velocity", slice(0, 3)), ("rate", slice(3, 6))):
-        v[rows] = _three(f"simulate.start.{name}", table.get(name, (0, 0, 0)))
+    v[VELOCITY] = _three("simulate.start.velocity", table.get("velocity", (0, 0, 0)))
+    v[OMEGA] = _three("simulate.start.rate", table.get("rate", (0, 0, 0)))
     if "settle" not in table:
-        return q, v, {}
+        return q, v, None
     if v.any():
         raise SimulationError(
             "simulate.start.settle: a start that settles has no velocity and no rate: remove them"
         )
     rest = _checked("simulate.start.settle", table["settle"], ("rounds", "duration"))
-    q, v, bristles = settle(model, q, **acting | dict(rest))
-    return q, v, {"bristles0": bristles}
+    return settle(model, q, **settling | dict(rest))
 
 
-def _pose(table) -> np.ndarray:
+def _pose(table: Mapping) -> np.ndarray:
     """Position and quaternion of R = Rz(yaw) Rx(pitch) Ry(roll)."""
     from scipy.spatial.transform import Rotation
 
     height, pitch, roll, yaw = (
-        finite(f"simulate.start.{name}", table.get(name, 0.0)) for name in ("height", *ANGLES)
+        number(f"simulate.start.{name}", table.get(name, 0.0), SimulationError)
+        for name in ("height", *ANGLES)
     )
-    turn = Rotation.from_euler("ZXY", [yaw, pitch, roll])
-    return np.array([0, 0, height, *np.roll(turn.as_quat(), 1)])
+    rotation = Rotation.from_euler("ZXY", [yaw, pitch, roll])
+    return np.array([0, 0, height, *np.roll(rotation.as_quat(), 1)])
 
 
-def _tail(model: Model, table, reference) -> np.ndarray:
+def _tail(model: Model, table: Mapping, reference: Any) -> np.ndarray:
     """Tail coordinates: of the bends given, else of the reference at t = 0, else straight."""
     if "bends" in table:
-        bends = real_array("simulate.start.bends", table["bends"], error=SimulationError)
+        bends = finite_array("simulate.start.bends", table["bends"], SimulationError)
         return shared_among_links(model, bends[None])[0]
     curve = getattr(reference, "curve", None)
-    return np.zeros(model.nv - 6) if curve is None else curve.at(0.0)[0]
+    return np.zeros(model.layout.nt) if curve is None else curve.at(0.0)[0]
 
 
-def _three(name: str, value) -> np.ndarray:
-    array = real_array(name, value, error=SimulationError)
-    if array.shape != (3,) or not np.isfinite(array).all():
-        raise SimulationError(f"{name}: value {value!r}: needs three finite numbers")
+def _three(name: str, value: Any) -> np.ndarray:
+    array = finite_array(name, value, SimulationError)
+    if array.shape != (3,):
+        raise refusal(name, value, "three numbers", SimulationError)
     return array

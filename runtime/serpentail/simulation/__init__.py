@@ -1,1 +1,1 @@
-"""Simulation: a model, a state and what acts on it go in, a trajectory comes out."""
+"""Simulations: a motion, or many at once, under controllers and on the ground."""

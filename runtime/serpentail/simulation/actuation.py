@@ -1,66 +1,65 @@
-"""What acts in a run: controllers and legs go in; the C interface's record of them and times to
-stop at come out.
-"""
+"""What acts in a run, controllers and legs, as the generated C takes it."""
 
 import ctypes
+from typing import Any
 
 import numpy as np
 
+from ..checks import refusal
 from ..errors import SimulationError
-from .controllers import Controller, NativeTorque, Parts, parts_of, phases_of
+from .controllers import Controller, NativeTorque, Parts, TorqueFunction, parts_of, phases_of
 from .piecewise import Piecewise
-from .records import Records
+from .records import CFunction, Records
 
 
-class Drive:
-    """Controllers and legs as the C interface takes them; ``error`` keeps what a function of the
-    user's raised.
-    """
+class Actuation:
+    """Controllers and legs as a C record, times to stop at, and what a user's function raised."""
 
     def __init__(self, records: Records, controller: Controller, legs: Piecewise | None = None):
-        self.records, self.model, self.error = records, records.model, None
-        self.nt = self.model.nv - 6
+        self.records, self.model = records, records.model
+        self.error: BaseException | None = None
+        self.nt = self.model.layout.nt
         self.float_errors = np.geterr()  # the user's: SciPy's methods work with their own
-        pairs = [
-            (begin, self._own(parts_of(each, self.nt))) for begin, each in phases_of(controller)
-        ]
-        self.parts = [parts for _, parts in pairs]
+        # phases, each by its parts
+        phases = phases_of(controller)
+        begins = [begin for begin, _ in phases]
+        self.parts = [self._available(parts_of(each, self.nt)) for _, each in phases]
         self.legs = legs
-        stops = {*self._kinks(pairs), *([] if legs is None else legs.kinks(2).tolist())}
+        # times at which something is not smooth, where steps end
+        stops = {*self._kinks(begins)}
+        members = {}
+        if legs is not None:
+            stops |= {*legs.kinks(2).tolist()}
+            members["legs"] = self._table(legs)
         self.stops = records.array(sorted(stops))
-        begins = records.array([begin for begin, _ in pairs])
-        own = {"legs": self._table(legs)} if legs is not None else {}
         self.record = records.record(
             "drive",
-            phases=len(pairs),
-            begins=begins,
-            controllers=records.records(
-                "controller", [self._controller(parts) for parts in self.parts]
-            ),
+            phases=len(phases),
+            begins=records.array(begins),
+            controllers=records.records("controller", [*map(self._controller, self.parts)]),
             stops=len(self.stops),
             stop_times=self.stops,
-            **own,
+            **members,
         )
 
-    def _own(self, parts: Parts) -> Parts:
-        """Return the parts as this model has them: PFL as a function of Python where its C is
-        missing.
-        """
+    def _available(self, parts: Parts) -> Parts:
+        """Return the parts as this model has them: PFL in Python where its C is missing."""
         if parts.pfl is None or self.records.has("controller", "reference"):
             return parts
         return Parts(user=parts.pfl)
 
-    @staticmethod
-    def _kinks(pairs) -> list[float]:
+    def _kinks(self, begins: list[float]) -> list[float]:
         """Times at which phases begin, and at which what acts in them is not smooth."""
-        begins = [begin for begin, _ in pairs]
-        found = begins[1:]
-        for (begin, parts), end in zip(pairs, [*begins[1:], np.inf], strict=True):
-            found += [t for t in parts.kinks() if t < end and (t > begin or begin == begins[0])]
-        return found
+        later = begins[1:]
+        times = [*later]
+        # the first phase acts before its begin, too
+        for begin, end, parts in zip([-np.inf, *later], [*later, np.inf], self.parts, strict=True):
+            times += [t for t in parts.kinks() if begin < t < end]
+        return times
 
     def _controller(self, parts: Parts) -> ctypes.Structure:
-        members = {}
+        """Return the record of one phase's controller."""
+        members: dict[str, Any] = {}
         if parts.damping is not None:
             members["damping"] = self.records.array(parts.damping)
         if parts.torques is not None:
@@ -76,20 +75,23 @@ class Drive:
         return self.records.record("controller", **members)
 
     def _table(self, curve: Piecewise) -> ctypes.Structure:
+        """Return the record of a function of time."""
         pieces, channels, powers = curve.coefficients.shape
-        arrays = {
-            name: self.records.array(getattr(curve, name)) for name in ("times", "coefficients")
-        }
         return self.records.record(
-            "piecewise", pieces=pieces, channels=channels, degree=powers - 1, **arrays
+            "piecewise",
+            pieces=pieces,
+            channels=channels,
+            degree=powers - 1,
+            times=self.records.array(curve.times),
+            coefficients=self.records.array(curve.coefficients),
         )
 
-    def _callback(self, user):
+    def _callback(self, user: TorqueFunction) -> Any:
         """Return a C function that calls the user's; what that raises is kept, and ends the run."""
         real, pointer = self.records.real, ctypes.POINTER(self.records.real)
         prototype = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, real, pointer, pointer, pointer)
 
-        def call(_context, t, q, v, tau):
+        def call(_context: Any, t: float, q: Any, v: Any, tau: Any) -> int:
             try:
                 np.ctypeslib.as_array(tau, (self.nt,))[:] = self._user_torque(user, t, q, v)
             except BaseException as error:
@@ -101,14 +103,10 @@ class Drive:
         self.records.kept.append(function)
         return function
 
-    def _user_torque(self, user, t: float, q, v) -> np.ndarray:
-        """Torques of the user's function; what is no state any more gives none, which ends the
-        step.
-        """
-        q, v = (
-            np.ctypeslib.as_array(a, (n,)).copy()
-            for a, n in ((q, self.model.nq), (v, self.model.nv))
-        )
+    def _user_torque(self, user: TorqueFunction, t: float, q: Any, v: Any) -> np.ndarray:
+        """Torques of the user's function; nan, which ends the step, where there is no state."""
+        q = np.ctypeslib.as_array(q, (self.model.nq,)).copy()
+        v = np.ctypeslib.as_array(v, (self.model.nv,)).copy()
         if not (np.isfinite(q).all() and np.isfinite(v).all()):
             return np.full(self.nt, np.nan)
         with np.errstate(**self.float_errors):
@@ -120,12 +118,12 @@ class Drive:
         return result
 
 
-def _native(law: NativeTorque) -> dict:
+def _native(law: NativeTorque) -> dict[str, int | None]:
     """Return the members of a compiled function and its context."""
-    native = isinstance(law.function, ctypes._CFuncPtr)
-    function = ctypes.cast(law.function, ctypes.c_void_p).value if native else law.function
+    function = law.function
+    if isinstance(function, CFunction):
+        function = ctypes.cast(function, ctypes.c_void_p).value
     if not isinstance(function, int) or function <= 0 or not isinstance(law.context, int | None):
-        raise SimulationError(
-            f"NativeTorque: {law!r}: give a ctypes function or an address, and an address or None"
-        )
+        needs = "a ctypes function or an address, and an address or None"
+        raise refusal("NativeTorque", law, needs, SimulationError)
     return {"function": function, "context": law.context}

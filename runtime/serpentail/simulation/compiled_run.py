@@ -1,10 +1,10 @@
-"""Runs of the generated C: starts, a drive and a method go in; samples, and what ended each run,
-come out.
-"""
+"""Runs of the generated C on arrays of ours, and what each run came to."""
 
 import ctypes
+from collections.abc import Callable
 from dataclasses import dataclass
 from threading import Event
+from typing import Any
 
 import numpy as np
 
@@ -12,9 +12,9 @@ from ..errors import SimulationError
 from ..model.kernel import aligned
 from ..model.library import NOT_FINITE, NOT_POSITIVE_DEFINITE, OUT_OF_RANGE
 from ..model.parameters import RunParameters
-from .actuation import Drive
+from .actuation import Actuation
 from .ground import MOST_EVENTS, Ground
-from .methods import Method
+from .methods import IntegrationMethod
 from .records import Records
 from .start import Start
 
@@ -43,36 +43,30 @@ WHY = {
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """What a method gives: samples of the motion up to where it came, and what ended it before its
-    end.
-    """
+    """Samples of a motion up to where it came, and what ended it before its end."""
 
     t: np.ndarray
     q: np.ndarray
     v: np.ndarray
     tau: np.ndarray
     bristles: np.ndarray
-    info: dict
+    info: dict[str, Any]
     failure: BaseException | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What a run came to: samples written, its end (s), counts and events, what failed, a stop
-    between samples.
-    """
+    """What a run came to: samples written, its end (s), counts and events, what failed, a stop."""
 
     done: int
     end: float
-    info: dict
+    info: dict[str, Any]
     failure: BaseException | None = None
-    stop: dict | None = None  # t (s) and a row of every array
+    stop: dict[str, Any] | None = None  # between samples: t (s) and a row of every array
 
 
 class Memory:
-    """Arrays of k runs: parameters; states (k, size), from start to end; samples (k, intervals + 1,
-    size).
-    """
+    """Arrays of k runs: parameters; states (k, size) as they go; samples (k, times, size)."""
 
     def __init__(self, records: Records, start: Start, ground: Ground, parameters: RunParameters):
         model, dtype = records.model, records.dtype
@@ -81,20 +75,25 @@ class Memory:
             "q": np.array(start.q0, dtype, order="C"),
             "v": np.array(start.v0, dtype, order="C"),
         }
-        sizes = {"q": model.nq, "v": model.nv, "tau": model.nv - 6, "bristles": 2 * ground.points}
+        sizes = {
+            "q": model.nq,
+            "v": model.nv,
+            "tau": model.layout.nt,
+            "bristles": 2 * ground.points,
+        }
         if ground.points:
             self.state["bristles"] = np.array(ground.bristles.reshape(start.runs, -1), dtype)
         self.out = {
             name: np.zeros((start.runs, start.intervals + 1, size), dtype)
             for name, size in sizes.items()
         }
-        arrays = (
-            {"parameters": parameters.vectors}
-            | self.state
-            | {f"{name}_out": a for name, a in self.out.items()}
-        )
-        places = [(member, a.ctypes.data, a.strides[0]) for member, a in arrays.items()]
-        self.places = [place for place in places if records.has("run", place[0])]
+        # where the arrays of the first run lie, and how far apart those of two runs are
+        arrays = {"parameters": parameters.vectors} | self.state
+        arrays |= {f"{name}_out": array for name, array in self.out.items()}
+        self.places = []
+        for member, array in arrays.items():
+            if records.has("run", member):
+                self.places.append((member, array.ctypes.data, array.strides[0]))
 
     def samples(self, k: int, outcome: Outcome) -> Samples:
         """Return what run k wrote."""
@@ -102,20 +101,13 @@ class Memory:
 
 
 class CompiledRun:
-    """A record of the generated C that takes up one run of a memory after another; each thread
-    needs its own.
-    """
+    """A record of the generated C that takes up runs one after another; for one thread."""
 
-    def __init__(self, memory: Memory, drive: Drive, method: Method):
+    def __init__(self, memory: Memory, actuation: Actuation, method: IntegrationMethod):
         records, start, ground = memory.records, memory.start, memory.ground
-        self.memory, self.records, self.drive, self.start, self.ground = (
-            memory,
-            records,
-            drive,
-            start,
-            ground,
-        )
-        self.model = records.model
+        self.memory, self.records, self.actuation = memory, records, actuation
+        self.start, self.ground, self.model = start, ground, records.model
+        # what all runs share
         members = dict(start_members(method), pause=PAUSE, samples=start.intervals + 1)
         members["times"] = records.array(start.times)
         if ground.points:
@@ -125,7 +117,7 @@ class CompiledRun:
             members |= {"most_events": MOST_EVENTS, "stop_at": ground.stop_at}
         members["work"] = aligned(self.model.manifest["work"]["rollout"], records.dtype)
         members["method"] = self.model.manifest["simulation"]["methods"].get(method.name, 0)
-        self.record = records.record("run", drive=drive.record, t=start.start, **members)
+        self.record: Any = records.record("run", drive=actuation.record, t=start.start, **members)
         self.blank = bytes(self.record)
         self.address, self.rollout = ctypes.addressof(self.record), self.function("rollout")
         self.begin(0)
@@ -135,23 +127,21 @@ class CompiledRun:
         ctypes.memmove(self.address, self.blank, len(self.blank))
         for member, first, apart in self.memory.places:
             setattr(self.record, member, first + k * apart)
-        self.k, self.drive.error = k, None
+        self.k, self.actuation.error = k, None
 
     @property
     def state(self) -> dict[str, np.ndarray]:
         """Where the run is: q, v and, with contacts, bristles."""
         return {name: array[self.k] for name, array in self.memory.state.items()}
 
-    def function(self, name: str, *arguments):
+    def function(self, name: str, *arguments: type) -> Callable[..., int]:
         """Return a function of the compiled model that takes a run."""
-        found = getattr(self.model.library, f"{self.model.name}_{name}")
-        found.argtypes = (ctypes.c_void_p, *arguments)
-        return found
+        function = getattr(self.model.library, f"{self.model.name}_{name}")
+        function.argtypes = (ctypes.c_void_p, *arguments)
+        return function
 
     def go(self, ended: Event | None = None) -> int:
-        """Advance to the end, to what ends the run before, or till ``ended`` is set; return the
-        status.
-        """
+        """Advance until the run or something ends it, or ``ended`` is set; return the status."""
         status = PAUSED
         while status == PAUSED and not (ended and ended.is_set()):
             status = self.rollout(self.address)
@@ -163,26 +153,19 @@ class CompiledRun:
         info = {name: getattr(record, name) for name in COUNTS}
         if self.ground.points:
             count = min(record.events, MOST_EVENTS)
-            events = zip(
-                self.event_times[:count].tolist(), self.event_kinds[:count].tolist(), strict=True
-            )
-            info["events"] = [self.ground.event(t, number) for t, number in events]
-        failure = self.drive.error
+            times, kinds = self.event_times[:count].tolist(), self.event_kinds[:count].tolist()
+            info["events"] = [*map(self.ground.event, times, kinds)]
+        failure = self.actuation.error
         if failure is None and status not in (0, STOPPED_AT_EVENT):
             failure = failed(status, record.t)
-        return Outcome(
-            record.done,
-            record.t,
-            info,
-            failure,
-            self._stop() if status == STOPPED_AT_EVENT else None,
-        )
+        stop = self._stop() if status == STOPPED_AT_EVENT else None
+        return Outcome(record.done, record.t, info, failure, stop)
 
     def samples(self, status: int) -> Samples:
         """Return the samples written, and what a status means."""
         return self.memory.samples(self.k, self.outcome(status))
 
-    def _stop(self) -> dict | None:
+    def _stop(self) -> dict[str, Any] | None:
         """The state at which the run stopped, where it is no sample."""
         if self.start.times[self.record.done - 1] >= self.record.t:
             return None
@@ -192,10 +175,8 @@ class CompiledRun:
         pointer = ctypes.c_void_p
         state_rate = self.function("state_rate", self.records.real, pointer, pointer, pointer)
         state_rate(self.address, self.record.t, *(a.ctypes.data for a in (y, y_dot, tau)))
-        return {name: array.copy() for name, array in state.items()} | {
-            "t": self.record.t,
-            "tau": tau,
-        }
+        row = {name: array.copy() for name, array in state.items()}
+        return row | {"t": self.record.t, "tau": tau}
 
 
 def sampled(times: np.ndarray, arrays: dict[str, np.ndarray], outcome: Outcome) -> Samples:
@@ -209,13 +190,12 @@ def sampled(times: np.ndarray, arrays: dict[str, np.ndarray], outcome: Outcome) 
     return Samples(t, rows["q"], rows["v"], rows["tau"], bristles, outcome.info, outcome.failure)
 
 
-def start_members(method: Method) -> dict:
+def start_members(method: IntegrationMethod) -> dict[str, Any]:
     """Return a method's settings as members of the run's record."""
-    own = {
-        name: x for name, x in method.settings.items() if name not in ("first_step", "most_steps")
-    }
-    own["step"] = method.settings.get("step", method.settings.get("first_step", 0))
-    return own | {"most_steps": int(min(method.settings.get("most_steps", np.inf), MOST_STEPS))}
+    members: dict[str, Any] = dict(method.settings)
+    members.setdefault("step", members.pop("first_step", 0))
+    members["most_steps"] = int(min(members.get("most_steps", np.inf), MOST_STEPS))
+    return members
 
 
 def failed(status: int, t: float) -> SimulationError:

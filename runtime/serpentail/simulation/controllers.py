@@ -1,15 +1,18 @@
-"""Controllers: numbers, tables and functions go in; checked torque laws of the tail come out."""
+"""Torque laws of the tail that a user can give, checked and split into what each adds up."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from ..checks import real_array
+from ..checks import finite_array, numbers, refusal
 from ..errors import SimulationError
 from .pfl import Pfl
 from .piecewise import Piecewise, checked_nodes, linear
 
+TorqueFunction = Callable[[float, np.ndarray, np.ndarray], ArrayLike]  # (t, q, v) -> tau
 CHOICES = (
     "None, Damping, TorqueTable, TorqueCurve, Pfl, Phases, NativeTorque or a function (t, q, v)"
 )
@@ -17,20 +20,22 @@ CHOICES = (
 
 @dataclass(frozen=True, eq=False)
 class Parts:
-    """What one controller adds up: damping (2m,), torques, a tracked reference, a function of C or
-    of Python.
-    """
+    """What one controller adds up; damping (2m,) in N m s, functions of C and of Python."""
 
     damping: np.ndarray | None = None
     torques: Piecewise | None = None
     pfl: Pfl | None = None
-    native: object | None = None
-    user: Callable | None = None
+    native: "NativeTorque | None" = None
+    user: TorqueFunction | None = None
 
     def kinks(self) -> list[float]:
         """Times at which these torques jump or have a kink."""
-        found = [] if self.torques is None else self.torques.kinks(2).tolist()
-        return found + ([] if self.pfl is None else self.pfl.curve.kinks(3).tolist())
+        times: list[float] = []
+        if self.torques is not None:
+            times += self.torques.kinks(2).tolist()
+        if self.pfl is not None:
+            times += self.pfl.curve.kinks(3).tolist()
+        return times
 
 
 @dataclass(frozen=True)
@@ -46,12 +51,13 @@ class Damping:
 
 @dataclass(frozen=True)
 class TorqueTable:
-    """Torques (K, 2m) in N m at increasing times (K,) in s: linear in between, held outside; less
-    damping q_t_dot.
+    """Torques (K, 2m) in N m at increasing times (K,) in s, less damping q_t_dot.
+
+    They are linear in between, and held outside.
     """
 
-    times: object
-    torques: object
+    times: ArrayLike
+    torques: ArrayLike
     damping: float | tuple[float, ...] = 0.0
 
     def parts(self, nt: int) -> Parts:
@@ -70,22 +76,20 @@ class TorqueCurve:
     def parts(self, nt: int) -> Parts:
         """Return what it adds up for 2m tail coordinates."""
         if not isinstance(self.torques, Piecewise) or self.torques.channels != nt:
-            raise SimulationError(
-                f"TorqueCurve: torques {self.torques!r}: give a Piecewise of {nt} channels"
-            )
+            needs = f"a Piecewise of {nt} channels"
+            raise refusal("TorqueCurve: torques", self.torques, needs, SimulationError)
         return Parts(_damping(self.damping, nt), self.torques)
 
 
 @dataclass(frozen=True)
 class NativeTorque:
-    """A compiled function, ``int f(void *context, real t, const real *q, const real *v, real
-    *tau)``, 0 for success.
+    """A compiled function, which returns 0 for success.
 
-    function: a ctypes function, or an address; context: an address, or None.  The caller keeps both
-    alive.
+    ``int f(void *context, real t, const real *q, const real *v, real *tau)``.  function: a ctypes
+    function, or an address; context: an address, or None.  The caller keeps both alive.
     """
 
-    function: object
+    function: Any
     context: int | None = None
 
     def parts(self, nt: int) -> Parts:
@@ -95,34 +99,22 @@ class NativeTorque:
 
 @dataclass(frozen=True, eq=False)
 class Phases:
-    """Controllers one after another: pairs of a time (s), increasing, and the controller that acts
-    from then on.
-    """
+    """Controllers one after another: pairs of an increasing time (s) and what acts from then on."""
 
-    phases: tuple
+    phases: Iterable[tuple[float, "Controller"]]
 
     def __post_init__(self) -> None:
         """Refuse what is no list of pairs in the order of time."""
         try:
             pairs = tuple((begin, controller) for begin, controller in self.phases)
         except (TypeError, ValueError):
-            raise SimulationError(
-                f"Phases: {self.phases!r}: give pairs (time, controller)"
-            ) from None
-        begins = (
-            real_array("Phases: times", [begin for begin, _ in pairs], error=SimulationError)
-            if pairs
-            else np.ones(0)
-        )
-        if (
-            begins.ndim != 1
-            or not len(begins)
-            or not np.isfinite(begins).all()
-            or (np.diff(begins) <= 0).any()
-        ):
-            raise SimulationError(
-                f"Phases: times {begins.tolist()}: give one or more, finite and increasing, in s"
-            )
+            needs = "pairs (time, controller)"
+            raise refusal("Phases", self.phases, needs, SimulationError) from None
+        begins = [begin for begin, _ in pairs]
+        times = finite_array("Phases: times", begins or 0.0, SimulationError)
+        if times.ndim != 1 or (np.diff(times) <= 0).any():
+            needs = "one or more increasing times, in s"
+            raise refusal("Phases: times", begins, needs, SimulationError)
         if any(isinstance(controller, Phases) for _, controller in pairs):
             raise SimulationError(
                 "Phases: one of the controllers is Phases itself: put all pairs in one list"
@@ -130,18 +122,17 @@ class Phases:
         object.__setattr__(self, "phases", pairs)
 
 
-Controller = Damping | TorqueTable | TorqueCurve | Pfl | Phases | NativeTorque | Callable | None
+Single = Damping | TorqueTable | TorqueCurve | Pfl | NativeTorque | TorqueFunction
+Controller = Single | Phases | None
 
 
-def phases_of(controller: Controller) -> tuple[tuple[float, object], ...]:
+def phases_of(controller: Controller) -> list[tuple[float, Controller]]:
     """Return pairs of time and controller."""
-    return controller.phases if isinstance(controller, Phases) else ((0.0, controller),)
+    return [*controller.phases] if isinstance(controller, Phases) else [(0.0, controller)]
 
 
 def parts_of(controller: Controller, nt: int) -> Parts:
-    """Return the parts of one controller for 2m tail coordinates; SimulationError where it cannot
-    be one.
-    """
+    """Return the parts of one controller for 2m tail coordinates; SimulationError if it is none."""
     if controller is None:
         return Parts()
     if isinstance(controller, Pfl):
@@ -150,13 +141,9 @@ def parts_of(controller: Controller, nt: int) -> Parts:
         return controller.parts(nt)
     if callable(controller):
         return Parts(user=controller)
-    raise SimulationError(f"controller {controller!r}: give {CHOICES}")
+    raise refusal("controller", controller, CHOICES, SimulationError)
 
 
-def _damping(damping, nt: int) -> np.ndarray:
-    values = real_array("damping", damping, error=SimulationError)
-    if values.shape not in ((), (nt,)):
-        raise SimulationError(f"damping {damping!r}: give one number or {nt}, in N m s")
-    if not (np.isfinite(values).all() and (values >= 0).all()):
-        raise SimulationError(f"damping {damping!r}: give finite numbers, 0 or above, in N m s")
-    return np.broadcast_to(values, (nt,))
+def _damping(damping: float | tuple[float, ...], nt: int) -> np.ndarray:
+    """Return joint damping (2m,), N m s."""
+    return numbers("damping", damping, nt, SimulationError, least=0)

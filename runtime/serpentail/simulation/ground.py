@@ -1,51 +1,55 @@
-"""Ground: a model with contacts, legs and a start go in; what a run on the ground needs, and what
-it met, come out.
-"""
+"""What a run on the ground needs: legs, friction springs, events to stop at; and what it met."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from ..checks import real_array
+from ..checks import finite_array, refusal
 from ..errors import SimulationError
-from ..model.kernel import Rows
-from ..model.parameters import RunParameters
+from ..model.kernel import RunKernel
+from ..model.model import Model
+from ..model.parameters import RunParameters, total_mass
 from ..motion.contact import Contact
 from .schedules import Legs
 from .start import Start
 
 KINDS = ("touch_down", "take_off")
-DEEP = 5.0  # weights: a static force of one point beyond it means a start inside the ground
+MAX_STATIC_LOAD = (
+    5.0  # weights: a static force of one point beyond it means a start inside the ground
+)
 MOST_EVENTS = 10_000  # that are kept
 
 
 @dataclass(frozen=True, eq=False)
 class Ground:
-    """The checked settings of runs on the ground, bristles (k, points, 2); without contacts there
-    is nothing to set.
-    """
+    """Checked settings of runs on the ground, bristles (k, points, 2); without contacts none."""
 
     groups: dict[str, int] = field(default_factory=dict)
     legs: Legs | None = None
-    bristles: np.ndarray | None = None
+    bristles: np.ndarray = field(default_factory=lambda: np.zeros((1, 0, 2)))
     stop_at: int = 0
 
     @classmethod
-    def checked(cls, model, start: Start, parameters: RunParameters, settings: dict) -> "Ground":
-        """Take legs, bristles0 and stop_at out of settings; SimulationError where they are wrong,
-        or missing.
-        """
-        given = {name: settings.pop(name, None) for name in ("legs", "bristles0", "stop_at")}
+    def checked(
+        cls, model: Model, start: Start, parameters: RunParameters, settings: dict
+    ) -> "Ground":
+        """Take legs, bristles0 and stop_at out of settings; SimulationError where one is wrong."""
+        choices = {name: settings.pop(name, None) for name in ("legs", "bristles0", "stop_at")}
         groups = model.contacts
         if not groups:
-            for name in [name for name in given if given[name] is not None]:
-                remedy = "leave it out, or add `contacts` to the scene"
-                raise SimulationError(
-                    f"{name} {given[name]!r}: {model.name} touches nothing: {remedy}"
-                )
+            for name, value in choices.items():
+                if value is not None:
+                    remedy = "leave it out, or add `contacts` to the scene"
+                    raise SimulationError(
+                        f"{name} {value!r}: {model.name} touches nothing: {remedy}"
+                    )
             return cls()
-        legs, bristles = _legs(groups, given["legs"]), _bristles(groups, start, given["bristles0"])
-        ground = cls(groups, legs, bristles, _stops(groups, given["stop_at"]))
+        legs = _legs(groups, choices["legs"])
+        bristles = _bristles(groups, start, choices["bristles0"])
+        ground = cls(groups, legs, bristles, _stops(groups, choices["stop_at"]))
         ground.refuse_deep(model, start, parameters)
         return ground
 
@@ -54,19 +58,15 @@ class Ground:
         """Number of points that can touch the ground."""
         return sum(self.groups.values())
 
-    def legs_at(self, t) -> tuple[np.ndarray, ...]:
-        """Return the argument ``legs`` (8,) or (K, 8) at t (s), angles and rates, where there are
-        feet.
-        """
+    def legs_at(self, t: ArrayLike) -> tuple[np.ndarray, ...]:
+        """Return the argument ``legs`` (8,) or (K, 8) at t (s), where there are feet."""
         return () if self.legs is None else (np.concatenate(self.legs.curve.at(t)[:2], axis=-1),)
 
-    def refuse_deep(self, model, start: Start, parameters: RunParameters) -> None:
-        """SimulationError where a point begins so deep that only a blow could have brought it
-        there.
-        """
+    def refuse_deep(self, model: Model, start: Start, parameters: RunParameters) -> None:
+        """SimulationError where a point begins deeper than a static force could press it."""
         heights, p = self._heights(model, start, parameters), parameters.values
-        weight = (p["torso_mass"] + p["tail_mass"]) * p["gravity"]
-        limits = np.broadcast_to((DEEP * weight / p["K_n"]) ** (2 / 3), start.runs)
+        weight = total_mass(p) * p["gravity"]
+        limits = np.broadcast_to((MAX_STATIC_LOAD * weight / p["K_n"]) ** (2 / 3), start.runs)
         wrong = np.flatnonzero(-heights.min(axis=1) > limits)
         if len(wrong):
             heights, limit, k = heights[wrong[0]], limits[wrong[0]], int(heights[wrong[0]].argmin())
@@ -77,28 +77,25 @@ class Ground:
                 "m"
             )
 
-    def _heights(self, model, start: Start, parameters: RunParameters) -> np.ndarray:
+    def _heights(self, model: Model, start: Start, parameters: RunParameters) -> np.ndarray:
         """Heights (k, points) in m of the points at the starts."""
         kernel, one = model.kernel("contact_points"), (start.runs, 1)
         legs = (np.broadcast_to(each, (*one, 8)) for each in self.legs_at(start.start))
-        inputs = [
-            np.array(a, kernel.dtype, order="C")
-            for a in (start.q0[:, None], start.v0[:, None], *legs)
-        ]
+        states = (start.q0[:, None], start.v0[:, None], *legs)
+        inputs = [np.array(array, kernel.dtype, order="C") for array in states]
         outputs = [np.zeros((*one, self.points, 3), kernel.dtype) for _ in range(2)]
-        evaluate = Rows(kernel, parameters.vectors, inputs, outputs)
+        evaluate = RunKernel(kernel, parameters.vectors, inputs, outputs)
         for k in range(start.runs):
             evaluate(k, 1)
         return outputs[0][:, 0, :, 2]
 
     def _group_of(self, k: int) -> str:
+        """Return the group of point k."""
         ends = np.cumsum(list(self.groups.values()))
         return list(self.groups)[int(np.searchsorted(ends, k, "right"))]
 
-    def contact(self, model, t, state) -> Contact | None:
-        """Return what touches the ground in samples: times (K,), (q, v, tau, bristles); None in
-        flight.
-        """
+    def contact(self, model: Model, t: np.ndarray, state: tuple[np.ndarray, ...]) -> Contact | None:
+        """Return the contact at times (K,) of (q, v, tau, bristles); None without contacts."""
         if not self.groups:
             return None
         q, v, tau, bristles = state
@@ -116,7 +113,8 @@ class Ground:
         }
 
 
-def _legs(groups, legs) -> Legs | None:
+def _legs(groups: dict[str, int], legs: Any) -> Legs | None:
+    """Return the legs, which a model with feet must have, and no other."""
     if "feet" in groups and not isinstance(legs, Legs):
         raise SimulationError(
             f"legs {legs!r}: this model has feet: give Legs, such as Legs.fixed(gamma, delta)"
@@ -128,32 +126,27 @@ def _legs(groups, legs) -> Legs | None:
     return legs
 
 
-def _bristles(groups, start: Start, bristles) -> np.ndarray:
+def _bristles(groups: dict[str, int], start: Start, bristles: ArrayLike | None) -> np.ndarray:
     """Return the stretch of every run, (k, points, 2); one is repeated."""
     shape = (sum(groups.values()), 2)
-    found = (
-        np.zeros(shape)
-        if bristles is None
-        else real_array("bristles0", bristles, error=SimulationError)
-    )
-    if (
-        found.shape not in ({shape, (start.runs, *shape)} if start.many else {shape})
-        or not np.isfinite(found).all()
-    ):
-        raise SimulationError(f"bristles0 has shape {found.shape}: give {shape}, finite, in m")
-    return np.array(np.broadcast_to(found, (start.runs, *shape)), order="C")
+    if bristles is None:
+        return np.zeros((start.runs, *shape))
+    stretch = finite_array("bristles0", bristles, SimulationError)
+    if stretch.shape != shape and not (start.many and stretch.shape == (start.runs, *shape)):
+        raise SimulationError(f"bristles0 has shape {stretch.shape}: give {shape}, in m")
+    return np.array(np.broadcast_to(stretch, (start.runs, *shape)), order="C")
 
 
-def _stops(groups, stop_at) -> int:
+def _stops(groups: dict[str, int], stop_at: Iterable[tuple[str, str]] | None) -> int:
     """Return the bits of the events to stop at: pairs (kind, group)."""
-    known = {
-        (kind, group): 2 * g + k for g, group in enumerate(groups) for k, kind in enumerate(KINDS)
-    }
+    bits: dict[tuple[str, ...], int] = {}
+    for group in groups:
+        for kind in KINDS:
+            bits[kind, group] = 1 << len(bits)
     try:
-        pairs = [] if stop_at is None else [tuple(pair) for pair in stop_at]
-        return sum(1 << known[pair] for pair in set(pairs))
+        pairs = {tuple(pair) for pair in (() if stop_at is None else stop_at)}
+        return sum(bits[pair] for pair in pairs)
     except (TypeError, KeyError):
-        choices = ", ".join(map(repr, known))
-        raise SimulationError(
-            f"stop_at {stop_at!r}: give a list of pairs out of {choices}"
-        ) from None
+        choices = ", ".join(map(repr, bits))
+        needs = f"a list of pairs out of {choices}"
+        raise refusal("stop_at", stop_at, needs, SimulationError) from None

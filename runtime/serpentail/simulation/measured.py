@@ -1,37 +1,48 @@
-"""Measures: samples of a run go in; its trajectory, or the error that ended it, comes out."""
+"""Makes a trajectory of the samples of a run, or raises the error that ended the run."""
 
 from ..errors import SimulationError, StateError
+from ..model.model import Model
+from ..model.parameters import json_ready
 from ..motion.trajectory import Trajectory
 from .compiled_run import Samples
 from .ground import Ground
 
 
-def judged(model, found: Samples, ground: Ground) -> Trajectory:
-    """Return the trajectory of samples, or raise what ended the run, which keeps the trajectory up
-    to there.
-    """
-    if not len(found.t):
-        raise found.failure
+def trajectory_or_error(model: Model, samples: Samples, ground: Ground) -> Trajectory:
+    """Return the trajectory of samples, or raise what ended the run; that keeps the trajectory."""
+    t, failure = samples.t, samples.failure
+    if failure is not None and not len(t):
+        raise failure
     try:
-        trajectory = measured(model, found, ground)
+        trajectory = measured(model, samples, ground)
     except StateError as error:
-        words = f"from t = {found.t[0]:.6g} s to {found.t[-1]:.6g} s, by sample: {error}"
-        raise found.failure or SimulationError(words) from (None if found.failure else error)
-    if found.failure is None:
+        if failure is not None:
+            raise failure from None
+        words = f"from t = {t[0]:.6g} s to {t[-1]:.6g} s, by sample: {error}"
+        raise SimulationError(words) from error
+    if failure is None:
         return trajectory
-    if isinstance(found.failure, SimulationError):
-        found.failure.trajectory = trajectory
-    raise found.failure
+    if isinstance(failure, SimulationError):
+        failure.trajectory = trajectory
+    raise failure
 
 
-def measured(model, found: Samples, ground: Ground) -> Trajectory:
-    """Return samples with energies, momenta and forces; StateError where these are beyond
-    numbers.
-    """
-    info = found.info | {"model": model.name}
-    info["parameters"] = {
-        name: list(x) if isinstance(x, tuple) else x for name, x in model.parameters.items()
-    }
-    measures = *model.energy(found.q, found.v), *model.momentum(found.q, found.v)
-    contact = ground.contact(model, found.t, (found.q, found.v, found.tau, found.bristles))
-    return Trajectory(found.t, found.q, found.v, found.tau, *measures, info, contact)
+def measured(model: Model, samples: Samples, ground: Ground) -> Trajectory:
+    """Return samples with energies, momenta and forces; StateError where no number holds these."""
+    t, q, v, tau = samples.t, samples.q, samples.v, samples.tau
+    info = samples.info | {"model": model.name, "parameters": json_ready(model.parameters)}
+    kinetic, potential = model.energy(q, v)
+    linear_momentum, angular_momentum = model.momentum(q, v)
+    contact = ground.contact(model, t, (q, v, tau, samples.bristles))
+    return Trajectory(
+        t=t,
+        q=q,
+        v=v,
+        tau=tau,
+        kinetic=kinetic,
+        potential=potential,
+        linear_momentum=linear_momentum,
+        angular_momentum=angular_momentum,
+        info=info,
+        contact=contact,
+    )

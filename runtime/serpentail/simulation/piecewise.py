@@ -1,23 +1,22 @@
-"""Functions of time: nodes go in; polynomials piece by piece, which the generated C evaluates, come
-out.
-"""
+"""Functions of time as polynomials piece by piece, which the generated C can evaluate, too."""
 
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from ..checks import real_array
+from ..checks import finite_array, refusal
 from ..errors import SimulationError
 
-SAME = 1e-9  # a jump that is smaller, over the largest value, is rounding
+JUMP_TOLERANCE = 1e-9  # a jump that is smaller, over the largest value, is rounding
 
 
 @dataclass(frozen=True, eq=False)
 class Piecewise:
-    """Polynomials of t - times[k]: coefficients (pieces, channels, degree + 1), constants first;
-    times (pieces + 1,) s.
+    """Polynomials of t - times[k] between times (pieces + 1,), s.
 
-    Before the first time and after the last the values there are held.
+    coefficients (pieces, channels, degree + 1), constants first.  Before the first time and after
+    the last the values there are held.
     """
 
     times: np.ndarray
@@ -28,9 +27,10 @@ class Piecewise:
         """Number of functions."""
         return self.coefficients.shape[1]
 
-    def at(self, t) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Values, rates and accelerations, (channels,) or (K, channels), at t or t (K,), s; of two
-        pieces the later.
+    def at(self, t: ArrayLike) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Values, rates, accelerations at t or t (K,), s: (channels,) or (K, channels) each.
+
+        Where two pieces meet they are those of the later.
         """
         t = np.asarray(t, float)
         inside = np.clip(t, self.times[0], self.times[-1])
@@ -41,17 +41,16 @@ class Piecewise:
         return value, np.where(held, 0.0, rate), np.where(held, 0.0, acceleration)
 
     def kinks(self, orders: int) -> np.ndarray:
-        """Times at which a derivative below this order jumps, beginning and end of what is held
-        among them.
-        """
+        """Times at which a derivative below this order jumps, both ends among them."""
         jumps = np.zeros(len(self.times), bool)
         for order in range(orders):
             c = _derived(self.coefficients, order)
             widths = np.diff(self.times)[:, None]
+            # each piece at both its ends, beside what is held outside
             starts, ends, sizes = _horner(c, 0.0), _horner(c, widths), _horner(np.abs(c), widths)
             held = [starts[:1], ends[-1:]] if order == 0 else np.zeros((2, 1, self.channels))
             left, right = np.vstack([held[0], ends]), np.vstack([starts, held[1]])
-            jumps |= (np.abs(left - right) > SAME * sizes.max(initial=0)).any(axis=1)
+            jumps |= (np.abs(left - right) > JUMP_TOLERANCE * sizes.max(initial=0)).any(axis=1)
         return self.times[jumps]
 
 
@@ -63,24 +62,25 @@ def _derived(coefficients: np.ndarray, order: int) -> np.ndarray:
     return coefficients
 
 
-def _horner(coefficients: np.ndarray, x) -> np.ndarray:
+def _horner(coefficients: np.ndarray, x: np.ndarray | float) -> np.ndarray:
+    """Values of polynomials at x."""
     value = np.zeros(coefficients.shape[:-1])
     for k in reversed(range(coefficients.shape[-1])):
         value = value * x + coefficients[..., k]
     return value
 
 
-def checked_nodes(what: str, name: str, nodes: tuple, width: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return increasing times (K,) and values (K, width), all finite; SimulationError names what is
-    wrong.
-    """
-    times = real_array(f"{what}: times", nodes[0], error=SimulationError)
-    values = real_array(f"{what}: {name}", nodes[1], error=SimulationError)
+def checked_nodes(
+    what: str, name: str, nodes: tuple[ArrayLike, ArrayLike], width: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return increasing times (K,) and values (K, width); SimulationError names what is wrong."""
+    times = finite_array(f"{what}: times", nodes[0], SimulationError)
+    values = finite_array(f"{what}: {name}", nodes[1], SimulationError)
     if times.ndim != 1 or len(times) == 0 or values.shape != (len(times), width):
         shapes = f"times {times.shape} and {name} {values.shape}, not (K,) and (K, {width})"
         raise SimulationError(f"{what}: {shapes}")
-    if not (np.isfinite(times).all() and np.isfinite(values).all() and (np.diff(times) > 0).all()):
-        raise SimulationError(f"{what}: times must increase, and all entries be finite")
+    if not (np.diff(times) > 0).all():
+        raise refusal(f"{what}: times", times.tolist(), "increasing times, in s", SimulationError)
     return times, values
 
 
@@ -101,14 +101,12 @@ def spline(times: np.ndarray, values: np.ndarray, ends: object = "not-a-knot") -
     """Cubic spline through nodes; ``ends`` as SciPy's CubicSpline has it."""
     from scipy.interpolate import CubicSpline
 
-    found = CubicSpline(times, values, bc_type=ends)
-    return Piecewise(times, np.moveaxis(found.c[::-1], 0, -1))
+    coefficients = CubicSpline(times, values, bc_type=ends).c  # highest powers first
+    return Piecewise(times, np.moveaxis(coefficients[::-1], 0, -1))
 
 
 def blends(times: np.ndarray, values: np.ndarray) -> Piecewise:
-    """From rest to rest: quintics 10 s^3 - 15 s^4 + 6 s^5 between nodes, at which rate and
-    acceleration are zero.
-    """
+    """From rest to rest: quintics 10 s^3 - 15 s^4 + 6 s^5 between nodes."""
     if len(times) == 1:
         return constant(times[0], values[0])
     rise, width = np.diff(values, axis=0), np.diff(times)[:, None]

@@ -1,14 +1,16 @@
-"""Schedules: nodes of leg angles and of tail angles go in; checked functions of time come out."""
+"""Angles of the legs, and wanted angles of the tail, as functions of time."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from ..checks import finite, known, positive, real_array
+from ..checks import finite_array, number, one_of, refusal
 from ..errors import SimulationError
+from ..model.model import Model
 from .piecewise import Piecewise, blends, checked_nodes, linear, spline
 
 BLENDS = {"linear": linear, "quintic": blends, "spline": spline}
@@ -22,41 +24,35 @@ class Reference:
     through all nodes; "linear", whose rate jumps.  ``curve`` is the function of time.
     """
 
-    times: object
-    angles: object
+    times: ArrayLike
+    angles: ArrayLike
     blend: str = "quintic"
     curve: Piecewise = field(init=False)
 
     def __post_init__(self) -> None:
         """Refuse nodes that are no motion."""
-        if not isinstance(self.blend, str) or self.blend not in BLENDS:
-            raise SimulationError(
-                f"Reference: blend {self.blend!r}: give one of {', '.join(BLENDS)}"
-            )
-        angles = real_array("Reference: angles", self.angles, error=SimulationError)
-        nodes = checked_nodes(
-            "Reference", "angles", (self.times, angles), angles.shape[1] if angles.ndim == 2 else 0
-        )
+        one_of("Reference: blend", self.blend, BLENDS, SimulationError)
+        angles = finite_array("Reference: angles", self.angles, SimulationError)
+        width = angles.shape[1] if angles.ndim == 2 else 0
+        nodes = checked_nodes("Reference", "angles", (self.times, angles), width)
         if len(nodes[0]) < 2:
             raise SimulationError("Reference: one node only: give two or more")
         object.__setattr__(self, "curve", BLENDS[self.blend](*nodes))
 
     @classmethod
-    def of_bends(cls, model, times, bends, blend: str = "quintic") -> Self:
-        """Return the reference of either tail whose segments bend by (K, m, 2) rad, pitch and yaw;
-        (K, m): pitch alone.
+    def of_bends(
+        cls, model: Model, times: ArrayLike, bends: ArrayLike, blend: str = "quintic"
+    ) -> Self:
+        """Return the reference of a tail whose segments bend by (K, m, 2) rad, pitch and yaw.
 
-        A segment's bend is what its links turn in all: each of n takes 1/n of it, a continuum all
-        of it.
+        bends (K, m): pitch alone.  A segment's bend is what its links turn in all: each of n takes
+        1/n of it, a continuum all of it.
         """
-        return cls(
-            times,
-            shared_among_links(model, real_array("bends", bends, error=SimulationError)),
-            blend,
-        )
+        angles = shared_among_links(model, finite_array("bends", bends, SimulationError))
+        return cls(times, angles, blend)
 
 
-def shared_among_links(model, bends: np.ndarray) -> np.ndarray:
+def shared_among_links(model: Model, bends: np.ndarray) -> np.ndarray:
     """Return tail coordinates (K, 2m) of bends of the segments, (K, m, 2) or (K, m), rad."""
     m = model.segments
     if bends.shape[1:] not in ((m,), (m, 2)):
@@ -65,7 +61,7 @@ def shared_among_links(model, bends: np.ndarray) -> np.ndarray:
             f"bends has shape {bends.shape}: give {shape}: pitch, or pitch and yaw, of each segment"
         )
     both = bends if bends.ndim == 3 else np.stack([bends, 0 * bends], axis=-1)
-    return both.reshape(len(bends), 2 * m) / (model.links or 1)
+    return both.reshape(len(bends), model.layout.nt) / (model.links or 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,14 +72,14 @@ class Legs:
     left leg.
     """
 
-    times: object
-    gamma: object
-    delta: object
+    times: ArrayLike
+    gamma: ArrayLike
+    delta: ArrayLike
     curve: Piecewise = field(init=False)
 
     def __post_init__(self) -> None:
         """Refuse nodes that are no motion."""
-        times = np.atleast_1d(real_array("Legs: times", self.times, error=SimulationError))
+        times = np.atleast_1d(finite_array("Legs: times", self.times, SimulationError))
         gamma, delta = (_both_legs(name, getattr(self, name), times) for name in ("gamma", "delta"))
         nodes = checked_nodes(
             "Legs", "angles", (times, np.stack([gamma, delta], axis=-1).reshape(len(times), 4)), 4
@@ -97,77 +93,80 @@ class Legs:
 
     @classmethod
     def ramp(cls, gamma: float, delta: tuple[float, float], at: float, rate: float) -> Self:
-        """Legs whose delta goes from one angle to another at a rate (rad/s, of any sign) from a
-        time (s) on: a kick.
+        """Legs whose delta goes from one angle to another: a kick (Eq. 48).
+
+        rate: rad/s, of any sign; at: s, when it begins.
         """
-        delta = real_array("Legs.ramp: delta", delta, error=SimulationError)
-        if delta.shape != (2,):
-            raise SimulationError(
-                f"Legs.ramp: delta has shape {delta.shape}: give two angles, from and to"
-            )
-        numbers = real_array(
-            "Legs.ramp: gamma, delta, at, rate", [gamma, *delta, at, rate], error=SimulationError
-        )
-        if not np.isfinite(numbers).all() or rate == 0 or delta[0] == delta[1]:
-            given = f"Legs.ramp: delta {tuple(delta.tolist())}, at {at!r}, rate {rate!r}"
-            raise SimulationError(
-                f"{given}: give finite numbers, two angles that differ, and a rate that is not 0"
-            )
-        return cls.moves(gamma, delta[0], [{"at": at, "delta": delta[1], "rate": math.fabs(rate)}])
+        angles = finite_array("Legs.ramp: delta", delta, SimulationError)
+        if angles.shape != (2,) or angles[0] == angles[1]:
+            raise refusal("Legs.ramp: delta", delta, "two angles that differ", SimulationError)
+        if number("Legs.ramp: rate", rate, SimulationError) == 0:
+            raise refusal("Legs.ramp: rate", rate, "a number that is not 0", SimulationError)
+        number("Legs.ramp: gamma", gamma, SimulationError)
+        move = {"at": number("Legs.ramp: at", at, SimulationError), "delta": angles[1]}
+        return cls.moves(gamma, angles[0], [move | {"rate": math.fabs(rate)}])
 
     @classmethod
-    def moves(cls, gamma: float, delta: float, moves) -> Self:
-        """Legs at gamma, delta (rad) that move from time to time, both legs alike, and are held in
-        between.
+    def moves(cls, gamma: float, delta: float, moves: Iterable[Mapping[str, float]]) -> Self:
+        """Legs at gamma, delta (rad) that move from time to time, both alike, else are held.
 
         Each move is a mapping: at (s), its end's gamma, delta or both (rad), and duration (s) or
         rate (rad/s, of the angle that goes farther).  Moves follow each other in time.
         """
-        nodes = [(-math.inf, (gamma, delta))]
-        for number, move in enumerate(moves):
-            nodes += _move(f"legs.moves[{number}]", move, nodes[-1])
+        nodes: list[Node] = [(-math.inf, (gamma, delta))]
+        for index, move in enumerate(moves):
+            nodes += _move(f"legs.moves[{index}]", move, nodes[-1])
         times, angles = zip(*(nodes[1:] or [(0.0, nodes[0][1])]), strict=True)
         return cls(times, *np.array(angles, float).T)
 
 
-def _both_legs(name: str, value, times: np.ndarray) -> np.ndarray:
+def _both_legs(name: str, value: ArrayLike, times: np.ndarray) -> np.ndarray:
     """Return angles (K, 2)."""
-    angles = real_array(f"Legs: {name}", value, error=SimulationError)
+    angles = finite_array(f"Legs: {name}", value, SimulationError)
     if angles.shape not in ((), (len(times),), (len(times), 2)):
         shapes = f"not a number, ({len(times)},) or ({len(times)}, 2)"
         raise SimulationError(f"Legs: {name} has shape {angles.shape}, {shapes}")
-    return np.broadcast_to(angles[:, None] if angles.ndim == 1 else angles, (len(times), 2))
+    if angles.ndim == 1:
+        angles = angles[:, None]
+    return np.broadcast_to(angles, (len(times), 2))
 
 
+Node = tuple[float, tuple[float, float]]  # time (s), gamma and delta (rad)
 MOVE = ("at", "gamma", "delta", "duration", "rate")
 
 
-def _move(field: str, move, last) -> list:
-    """Return the nodes (time, (gamma, delta)) that a move adds after the last one; SimulationError
-    where it cannot.
-    """
+def _checked_move(field: str, move: object) -> Mapping[str, float]:
+    """Return a move with numbers and all keys that it needs; SimulationError where it has not."""
     if not isinstance(move, Mapping):
-        raise SimulationError(f"{field}: value {move!r}: needs a table of {', '.join(MOVE)}")
+        raise refusal(field, move, f"a table of {', '.join(MOVE)}", SimulationError)
     for name, value in move.items():
-        known(f"{field}: key", name, MOVE, SimulationError)
-        finite(f"{field}.{name}", value)
-    (end, angles), at = last, move.get("at")
-    if at is None or not {"gamma", "delta"} & set(move) or ("rate" in move) == ("duration" in move):
-        raise SimulationError(
-            f"{field}: value {dict(move)!r}: needs at, gamma or delta, and one of rate, duration"
-        )
+        one_of(f"{field}: key", name, MOVE, SimulationError)
+        number(f"{field}.{name}", value, SimulationError)
+    goes = "gamma" in move or "delta" in move
+    if "at" not in move or not goes or ("rate" in move) == ("duration" in move):
+        needs = "at, gamma or delta, and one of rate, duration"
+        raise refusal(field, dict(move), needs, SimulationError)
+    return move
+
+
+def _move(field: str, move: Mapping[str, float], last: Node) -> list[Node]:
+    """Return the nodes that a move adds after the last one; SimulationError where it cannot."""
+    move = _checked_move(field, move)
+    # where it goes, and how long that takes
+    (end, angles), at = last, move["at"]
     goal = move.get("gamma", angles[0]), move.get("delta", angles[1])
-    way = max(abs(float(x) - float(y)) for x, y in zip(goal, angles, strict=True))
-    duration = (
-        move["duration"] if "duration" in move else way / positive(f"{field}.rate", move["rate"])
-    )
+    if "duration" in move:
+        duration = move["duration"]
+    else:
+        way = max(abs(float(x) - float(y)) for x, y in zip(goal, angles, strict=True))
+        duration = way / number(f"{field}.rate", move["rate"], SimulationError, above=0)
     if not 0 < duration < math.inf:
-        raise SimulationError(
-            f"{field}: takes {duration!r} s: needs a duration above 0, and another angle than "
-            "before"
-        )
+        needs = "a duration above 0, and another angle than before"
+        raise SimulationError(f"{field}: takes {duration!r} s: needs {needs}")
     if at < end:
-        raise SimulationError(
-            f"{field}.at: value {at!r}: the move before it ends at {end:.6g} s: move it after that"
-        )
-    return [(at + duration, goal)] if at == end else [(at, angles), (at + duration, goal)]
+        remedy = f"the move before it ends at {end:.6g} s: move it after that"
+        raise SimulationError(f"{field}.at: value {at!r}: {remedy}")
+    # a move that follows at once begins at the last node
+    if at == end:
+        return [(at + duration, goal)]
+    return [(at, angles), (at + duration, goal)]

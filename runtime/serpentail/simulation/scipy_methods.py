@@ -5,26 +5,25 @@ import ctypes
 import numpy as np
 
 from ..errors import SimulationError
+from ..model.layout import QUATERNION
 from ..model.library import NOT_FINITE
 from .compiled_run import CompiledRun, Samples, failed
-from .methods import Method
+from .methods import IntegrationMethod
+
+Part = tuple[float, np.ndarray, float]  # start (s), state there, end (s)
 
 
 class StateRate:
-    """y = (q, v) -> y_dot by the compiled model; with ``trials``, a state that has none gives NaN,
-    not an error.
-    """
+    """y = (q, v) -> y_dot by the compiled model; nan or, without ``trials``, an error for none."""
 
     def __init__(self, run: CompiledRun, trials: bool):
-        self.trials, self.refused = trials, None
+        self.trials = trials
+        self.refused: SimulationError | None = None
         self.run, pointer, dtype = run, ctypes.c_void_p, run.records.dtype
         self.function = run.function("state_rate", run.records.real, pointer, pointer, pointer)
         size = sum(map(len, run.state.values()))
-        self.y, self.y_dot, self.tau = (
-            np.zeros(size, dtype),
-            np.zeros(size, dtype),
-            np.zeros(run.drive.nt, dtype),
-        )
+        self.y, self.y_dot = np.zeros(size, dtype), np.zeros(size, dtype)
+        self.tau = np.zeros(run.actuation.nt, dtype)
         self.addresses = [a.ctypes.data for a in (self.y, self.y_dot, self.tau)]
 
     def __call__(self, t: float, y: np.ndarray) -> np.ndarray:
@@ -32,8 +31,8 @@ class StateRate:
         self.y[...] = y
         self.refused = None
         status = self.function(ctypes.addressof(self.run.record), t, *self.addresses)
-        if self.run.drive.error is not None:
-            raise self.run.drive.error
+        if self.run.actuation.error is not None:
+            raise self.run.actuation.error
         if not status and not np.isfinite(self.y_dot).all():
             status = NOT_FINITE
         if status:
@@ -51,16 +50,18 @@ class StateRate:
         return self.tau.astype(float)
 
 
-class Tape:
+class SampleWriter:
     """Samples written one after another as steps pass their times."""
 
     def __init__(self, rate: StateRate, times: np.ndarray):
-        self.rate, self.times, self.states, self.torques = rate, times, [], []
+        self.rate, self.times = rate, times
+        self.states: list[np.ndarray] = []
+        self.torques: list[np.ndarray] = []
 
     def write(self, t: float, y: np.ndarray) -> None:
         """Write one sample, its quaternion normalised."""
         y = y.copy()
-        y[3:7] /= np.linalg.norm(y[3:7])
+        y[QUATERNION] /= np.linalg.norm(y[QUATERNION])
         self.torques.append(self.rate.torque(t, y))
         self.states.append(y)
 
@@ -70,33 +71,33 @@ class Tape:
 
 
 @np.errstate(all="ignore")  # a trial step may overflow, and is then taken again, shorter
-def integrate_by_scipy(run: CompiledRun, method: Method) -> Samples:
-    """Integrate from stop to stop; what ends the run before its end goes with the samples up to
-    there.
-    """
+def integrate_by_scipy(run: CompiledRun, method: IntegrationMethod) -> Samples:
+    """Return the samples of a run, made from stop to stop, and what ended it before its end."""
     rate = StateRate(run, method.name == "dop853")  # which takes a step with NaN again, shorter
-    tape, counts = Tape(rate, run.start.times), {"steps": 0, "evaluations": 0}
-    ends = [*(t for t in run.drive.stops if run.start.start < t < run.start.end), run.start.end]
-    y, t, failure = np.concatenate([*run.state.values()]).astype(float), run.start.start, None
+    samples, counts = SampleWriter(rate, run.start.times), {"steps": 0, "evaluations": 0}
+    ends = [*(t for t in run.actuation.stops if run.start.start < t < run.start.end), run.start.end]
+    y, t = np.concatenate([*run.state.values()]).astype(float), run.start.start
+    failure: BaseException | None = None
     try:
         run.record.until = ends[0]
-        tape.write(t, y)
+        samples.write(t, y)
         for end in ends:
             run.record.t, run.record.until = t, end
-            y, t = _smooth_part(rate, method, (t, y, end), tape, counts), end
+            y, t = _smooth_part(rate, method, (t, y, end), samples, counts), end
     except BaseException as error:
-        if not tape.states:
+        if not samples.states:
             raise
         failure = error
-    done = len(tape.states)
-    q, v, bristles = np.split(
-        np.array(tape.states), [run.model.nq, run.model.nq + run.model.nv], axis=1
-    )
+    done = len(samples.states)
+    nq, nv = run.model.nq, run.model.nv
+    q, v, bristles = np.split(np.array(samples.states), [nq, nq + nv], axis=1)
     bristles = bristles.reshape(done, run.ground.points, 2)
-    return Samples(tape.times[:done], q, v, np.array(tape.torques), bristles, counts, failure)
+    return Samples(samples.times[:done], q, v, np.array(samples.torques), bristles, counts, failure)
 
 
-def _smooth_part(rate: StateRate, method: Method, part, tape: Tape, counts: dict) -> np.ndarray:
+def _smooth_part(
+    rate: StateRate, method: IntegrationMethod, part: Part, samples: SampleWriter, counts: dict
+) -> np.ndarray:
     """Integrate over times without a break, (start, state, end), and return the last state."""
     from scipy.integrate import DOP853, LSODA
 
@@ -114,11 +115,11 @@ def _smooth_part(rate: StateRate, method: Method, part, tape: Tape, counts: dict
             )
         counts["steps"] += 1
         interpolant = solver.dense_output()
-        for at in tape.due(solver.t):
-            tape.write(at, interpolant(at) if at < solver.t else solver.y)
+        for at in samples.due(solver.t):
+            samples.write(at, interpolant(at) if at < solver.t else solver.y)
         if method.name == "dop853":
-            norm = np.linalg.norm(solver.y[3:7])
-            solver.y[3:7] /= norm
-            solver.f[3:7] /= norm
+            norm = np.linalg.norm(solver.y[QUATERNION])
+            solver.y[QUATERNION] /= norm
+            solver.f[QUATERNION] /= norm
     counts["evaluations"] += solver.nfev
     return solver.y

@@ -1,109 +1,112 @@
-"""Simulations: a model, states and what acts on them go in; a trajectory, or rollouts of many
-states, come out.
-"""
+"""Simulates a motion, or many of one model at once: `simulate` checks, prepares and runs."""
 
 import ctypes
 import time
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..errors import ModelError, SimulationError, StateError
-from ..model.kernel import Rows
+from ..model.kernel import RunKernel
+from ..model.layout import TAIL_V
+from ..model.model import Model
 from ..model.parameters import RunParameters
 from ..motion.trajectory import Trajectory
-from .actuation import Drive
+from .actuation import Actuation
 from .compiled_run import CompiledRun, Memory, Samples
 from .controllers import Controller
 from .ground import Ground
-from .measured import judged
-from .methods import SCIPY, Method, checked_method, chosen
+from .measured import trajectory_or_error
+from .methods import SCIPY, IntegrationMethod, checked_method, chosen, step_counts
 from .records import Records
-from .rollouts import Rollouts, flown
+from .rollouts import Rollouts, run_parallel
 from .start import Start
 
 
 def simulate(
-    model,
-    q0,
-    v0,
+    model: Model,
+    q0: ArrayLike,
+    v0: ArrayLike,
     *,
     controller: Controller = None,
-    t_span=(0.0, 1.0),
+    t_span: ArrayLike = (0.0, 1.0),
     method: str = "auto",
-    **settings,
+    **settings: Any,
 ) -> Trajectory | Rollouts:
     """Simulate a motion: H v_dot + C = [0; tau], the quaternion kept on the unit sphere.
 
     q0 (nq,), v0 (nv,): start; its quaternion is normalised; (k, nq), (k, nv), or one of both: k
     starts, see below.
     controller: None (no torque), Damping, TorqueTable, TorqueCurve, Pfl, Phases of these,
-    NativeTorque, or a function
-    (t (s), q, v) -> tau (2m,) in N m.
+    NativeTorque, or a function (t (s), q, v) -> tau (2m,) in N m.
     legs, bristles0, stop_at (models with contacts): Legs, where there are feet; stretch (points, 2)
-    of the friction
-    springs in m, zero by default; events to stop at, pairs such as ("take_off", "feet").
+    of the friction springs in m, zero by default; events to stop at, pairs such as ("take_off",
+    "feet").
     t_span: (start, end) in s, or the end alone.
     method: "tsit5", "ros34pw2" (adaptive, in C), "rk4", "implicit_euler" (steps of a fixed length,
-    in C),
-    "dop853", "lsoda" (SciPy's, as a check), or "auto", whose choice and reason ``info`` tells.
+    in C), "dop853", "lsoda" (SciPy's, as a check), or "auto", whose choice and reason ``info``
+    tells.
     settings: output_step (s, default 1/200 of the span, rounded to divide it); adaptive methods:
-    rtol, atol (defaults
-    1e-8, 1e-4 for ros34pw2), first_step, least_step, most_step (s), most_steps; fixed steps: step
-    (s, default 1e-4,
-    shortened to divide output_step); SciPy's: rtol, atol (defaults 1e-10, 1e-12; 1e-6 both for a
-    float model).
+    rtol, atol (defaults 1e-8, 1e-4 for ros34pw2), first_step, least_step, most_step (s),
+    most_steps; fixed steps: step (s, default 1e-4, shortened to divide output_step); SciPy's: rtol,
+    atol (defaults 1e-10, 1e-12; 1e-6 both for a float model).
+
     Raises StateError (shapes, values), SimulationError (settings; the state left what numbers can
-    hold; its
-    ``trajectory`` is the motion up to there), ModelError (the scene left out rollout, energy or
-    momentum).
+    hold; its ``trajectory`` is the motion up to there), ModelError (the scene left out rollout,
+    energy or momentum).
 
     Many starts give Rollouts, which keep the SimulationErrors of single runs: the other runs go on.
-    One method is
-    chosen for all.  parameters: name -> (k,) or (k, 3), SI, what the runs have of their own;
-    bristles0 may be
-    (k, points, 2).  Runs are shared among all cores, so a NativeTorque must bear calls from several
-    threads at once.
+    One method is chosen for all.  parameters: name -> (k,) or (k, 3), SI, what the runs have of
+    their own; bristles0 may be (k, points, 2).  Runs are shared among all cores, so a NativeTorque
+    must bear calls from several threads at once.
+
     Flights by "rk4" whose torques are None, Damping, a TorqueTable or a TorqueCurve fly as lanes of
-    vectors where they
-    take 1e6 steps or more in all: several times as fast, other last digits.  With a function of
-    Python, or SciPy's
-    methods, runs are made one after another in the calling thread, and what the function raises,
-    unless it is a
-    SimulationError, ends all.
+    vectors where they take 1e6 steps or more in all: several times as fast, other last digits.
+    With a function of Python, or SciPy's methods, runs are made one after another in the calling
+    thread, and what the function raises, unless it is a SimulationError, ends all.
     """
     missing = [name for name in ("rollout", "energy", "momentum") if name not in model.generated]
     if missing:
         raise model.without(*missing)
     start = Start.checked(model, (q0, v0), t_span, settings.pop("output_step", None))
-    memory, drive, choice = prepared(model, start, controller, method, settings)
-    begun = time.perf_counter(), time.process_time()
-    found = (flown if start.many else integrate)(memory, drive, choice)
-    spent = {
-        "seconds": time.perf_counter() - begun[0],
-        "cpu_seconds": time.process_time() - begun[1],
-    }
+    memory, actuation, choice = prepared(model, start, controller, method, settings)
+    clocks = time.perf_counter(), time.process_time()
     if start.many:
-        return found.rollouts(spent)
-    return judged(model, replace(found, info=found.info | choice.told | spent), memory.ground)
+        runs = run_parallel(memory, actuation, choice)
+        return runs.rollouts(_spent(clocks))
+    samples = integrate(memory, actuation, choice)
+    info = samples.info | choice.info | _spent(clocks)
+    return trajectory_or_error(model, replace(samples, info=info), memory.ground)
+
+
+def _spent(clocks: tuple[float, float]) -> dict[str, float]:
+    """Return the times (s) that passed since clocks were read."""
+    seconds, cpu_seconds = time.perf_counter() - clocks[0], time.process_time() - clocks[1]
+    return {"seconds": seconds, "cpu_seconds": cpu_seconds}
 
 
 def end_state(
-    model, q0, v0, *, controller: Controller, duration: float, step: float
+    model: Model,
+    q0: ArrayLike,
+    v0: ArrayLike,
+    *,
+    controller: Controller,
+    duration: float,
+    step: float,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return q (nq,), v (nv,) where simulate's "rk4" ends after a duration (s), and measure nothing
-    on the way.
-    """
+    """Return q (nq,), v (nv,) where "rk4" ends after a duration (s), with nothing measured."""
     start = Start.checked(model, (q0, v0), duration, duration)
-    found = integrate(*prepared(model, start, controller, "rk4", {"step": step}))
-    if found.failure is not None:
-        raise found.failure
-    return found.q[-1], found.v[-1]
+    samples = integrate(*prepared(model, start, controller, "rk4", {"step": step}))
+    if samples.failure is not None:
+        raise samples.failure
+    return samples.q[-1], samples.v[-1]
 
 
 def prepared(
-    model, start: Start, controller: Controller, method, settings: dict
-) -> tuple[Memory, Drive, Method]:
+    model: Model, start: Start, controller: Controller, method: str, settings: dict[str, Any]
+) -> tuple[Memory, Actuation, IntegrationMethod]:
     """Return what runs need to go; SimulationError or ModelError where a setting is wrong."""
     changes = settings.pop("parameters", None)
     if changes is not None and not start.many:
@@ -112,31 +115,36 @@ def prepared(
         )
     parameters = model.parameters_of_runs(changes, start.runs)
     ground = Ground.checked(model, start, parameters, settings)
-    drive = Drive(Records(model), controller, ground.legs.curve if ground.legs else None)
-    choice = choose(drive, start, parameters, method, settings)
-    return Memory(drive.records, start, ground, parameters), drive, choice
+    actuation = Actuation(Records(model), controller, ground.legs.curve if ground.legs else None)
+    choice = choose(actuation, start, parameters, method, settings)
+    return Memory(actuation.records, start, ground, parameters), actuation, choice
 
 
-def choose(drive: Drive, start: Start, parameters: RunParameters, name, settings: dict) -> Method:
+def choose(
+    actuation: Actuation,
+    start: Start,
+    parameters: RunParameters,
+    name: str,
+    settings: dict[str, Any],
+) -> IntegrationMethod:
     """Return the method that was asked for, or a choice and its reason."""
-    model, single = drive.model, drive.records.real is ctypes.c_float
+    model, single = actuation.model, actuation.records.real is ctypes.c_float
     available, reason = model.manifest["simulation"]["methods"], "asked for"
     if isinstance(name, str) and name == "auto":
-        decay = None if model.contacts else fastest_decay(drive, start, parameters)
+        decay = None if model.contacts else fastest_decay(actuation, start, parameters)
         name, reason = chosen(settings, available, decay)
     method = checked_method(name, settings, available, single)
     for each in ("step", "most_step"):
         refuse_vanishing(start, each, method.settings.get(each, np.inf))
     if name == "rk4":  # steps divide the output's
-        steps = max(1, int(np.ceil(start.interval / method.settings["step"] * (1 - 1e-12))))
-        return replace(method, reason=reason, settings={"step": start.interval / steps})
+        interval = np.array([start.interval])
+        steps = step_counts(interval, 1e-12 * interval, method.settings["step"])
+        return replace(method, reason=reason, settings={"step": start.interval / int(steps[0])})
     return replace(method, reason=reason)
 
 
 def refuse_vanishing(start: Start, name: str, step: float) -> None:
-    """SimulationError where steps of at most this length (s) are too short to be seen in the
-    time.
-    """
+    """SimulationError where steps of at most this length (s) are too short to move the time."""
     least = np.finfo(float).eps * max(abs(start.start), abs(start.end))
     if step < least:
         raise SimulationError(
@@ -144,26 +152,27 @@ def refuse_vanishing(start: Start, name: str, step: float) -> None:
         )
 
 
-def fastest_decay(drive: Drive, start: Start, parameters: RunParameters) -> float:
-    """Largest eigenvalue (1/s) of K (H^-1)_tt at the starts, K being joint damping; unit torques
-    give H^-1.
-    """
-    damping = np.max(
-        [p.damping if p.damping is not None else np.zeros(drive.nt) for p in drive.parts], axis=0
-    )
+def fastest_decay(actuation: Actuation, start: Start, parameters: RunParameters) -> float:
+    """Largest eigenvalue (1/s) of K (H^-1)_tt at the starts, K being joint damping."""
+    laws = [np.zeros(actuation.nt)]
+    laws += [parts.damping for parts in actuation.parts if parts.damping is not None]
+    damping = np.max(laws, axis=0)
     if not damping.any():
         return 0.0
-    kernel, shape = drive.model.kernel("forward_dynamics"), (start.runs, drive.nt + 1)
+    # without torque and with unit torques: the differences are columns of H^-1
+    kernel, shape = actuation.model.kernel("forward_dynamics"), (start.runs, actuation.nt + 1)
     q = np.repeat(start.q0[:, None], shape[1], axis=1).astype(kernel.dtype)
-    tau = np.tile(np.eye(drive.nt + 1, drive.nt, -1, kernel.dtype), (start.runs, 1, 1))
-    v, v_dot = (np.zeros((*shape, drive.model.nv), kernel.dtype) for _ in range(2))
-    evaluate = Rows(kernel, parameters.vectors, (q, v, tau), (v_dot,))
+    torques = np.eye(actuation.nt + 1, actuation.nt, -1, kernel.dtype)
+    tau = np.tile(torques, (start.runs, 1, 1))
+    v, v_dot = (np.zeros((*shape, actuation.model.nv), kernel.dtype) for _ in range(2))
+    evaluate = RunKernel(kernel, parameters.vectors, (q, v, tau), (v_dot,))
     sound = [k for k in range(start.runs) if evaluated(evaluate, k, shape[1])]
-    columns = (v_dot[sound, 1:, 6:] - v_dot[sound, :1, 6:]) * np.sqrt(np.outer(damping, damping))
+    tail = v_dot[sound, :, TAIL_V]
+    columns = (tail[:, 1:] - tail[:, :1]) * np.sqrt(np.outer(damping, damping))
     return float(np.linalg.eigvalsh(columns).max(initial=0.0))
 
 
-def evaluated(rows: Rows, k: int, count: int) -> bool:
+def evaluated(rows: RunKernel, k: int, count: int) -> bool:
     """Evaluate rows of run k; tell whether it could be done."""
     try:
         rows(k, count)
@@ -172,9 +181,9 @@ def evaluated(rows: Rows, k: int, count: int) -> bool:
     return True
 
 
-def integrate(memory: Memory, drive: Drive, method: Method) -> Samples:
+def integrate(memory: Memory, actuation: Actuation, method: IntegrationMethod) -> Samples:
     """Return the samples of a single run."""
-    run = CompiledRun(memory, drive, method)
+    run = CompiledRun(memory, actuation, method)
     if method.name in SCIPY:
         from .scipy_methods import integrate_by_scipy
 

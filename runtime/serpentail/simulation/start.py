@@ -1,13 +1,16 @@
-"""Starts: a user's states, span and step go in; checked starts and output times come out."""
+"""Where and when runs start and end, and the times of their samples, checked."""
 
 import math
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from ..checks import positive, real_array
+from ..checks import finite_array, number, real_array, refusal, refuse_not_finite
 from ..errors import SimulationError, StateError
+from ..model.layout import QUATERNION
+from ..model.model import Model
 
 MOST_SAMPLES = 10_000_000  # of all runs: more are a slip, and fill the memory
 SHORTEST = 1e-100  # s: between samples; methods multiply times
@@ -16,9 +19,7 @@ EPS = float(np.finfo(float).eps)
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """Checked starts q0 (k, nq), v0 (k, nv) and their output grid; ``many`` tells k runs from a
-    single one.
-    """
+    """Checked starts q0 (k, nq), v0 (k, nv) and output times; ``many`` tells k runs from one."""
 
     q0: np.ndarray
     v0: np.ndarray
@@ -28,21 +29,28 @@ class Start:
     many: bool
 
     @classmethod
-    def checked(cls, model, state, t_span, output_step) -> "Start":
+    def checked(
+        cls,
+        model: Model,
+        state: tuple[ArrayLike, ArrayLike],
+        t_span: ArrayLike,
+        output_step: object,
+    ) -> "Start":
         """Return starts; StateError or SimulationError where an argument is wrong."""
-        given = [
-            checked_states(*item)
-            for item in zip(("q0", "v0"), state, (model.nq, model.nv), strict=True)
-        ]
-        many = any(array.ndim == 2 for array in given)
-        q0, v0 = _paired(*given)
-        norms = np.array([math.hypot(*quaternion) for quaternion in q0[:, 3:7].tolist()])
+        q0 = checked_states("q0", state[0], model.nq)
+        v0 = checked_states("v0", state[1], model.nv)
+        many = q0.ndim == 2 or v0.ndim == 2
+        q0, v0 = _paired(q0, v0)
+        # unit quaternions
+        norms = np.array([math.hypot(*quaternion) for quaternion in q0[:, QUATERNION].tolist()])
         if not norms.all():
             where = f" of run {int(norms.argmin())}" if many else ""
             raise StateError(f"q0[3:7]{where} is the zero quaternion: upright is (1, 0, 0, 0)")
-        q0[:, 3:7] /= norms[:, None]
+        q0[:, QUATERNION] /= norms[:, None]
+        # the grid of output times, the end among them
         start, end = checked_span(t_span)
-        step = positive("output_step", (end - start) / 200 if output_step is None else output_step)
+        output_step = (end - start) / 200 if output_step is None else output_step
+        step = number("output_step", output_step, SimulationError, above=0)
         if len(q0) * (end - start) > MOST_SAMPLES * step:
             remedy = f"give {len(q0) * (end - start) / MOST_SAMPLES:.2g} s or more"
             whose = f" of {len(q0)} runs" if many else ""
@@ -73,18 +81,18 @@ class Start:
         return np.linspace(self.start, self.end, self.intervals + 1)
 
 
-def checked_span(t_span) -> tuple[float, float]:
+def checked_span(t_span: ArrayLike) -> tuple[float, float]:
     """Return start and end (s); SimulationError where they are none."""
-    span = real_array("t_span", t_span, error=SimulationError)
+    span = finite_array("t_span", t_span, SimulationError)
     if span.shape not in ((), (2,)):
-        raise SimulationError(f"t_span {t_span!r}: give (start, end) in s, or the end")
+        raise refusal("t_span", t_span, "(start, end) in s, or the end", SimulationError)
     start, end = span.tolist() if span.ndim else (0.0, float(span))
-    if not (np.isfinite([start, end]).all() and end > start):
-        raise SimulationError(f"t_span {t_span!r}: the end must be finite and after the start")
+    if not end > start:
+        raise refusal("t_span", t_span, "an end after the start", SimulationError)
     return start, end
 
 
-def checked_states(name: str, value, size: int) -> np.ndarray:
+def checked_states(name: str, value: ArrayLike, size: int) -> np.ndarray:
     """Return finite vectors (size,) or (k, size); StateError names what is wrong."""
     array = real_array(name, value)
     if array.shape[-1:] != (size,) or array.ndim > 2 or not array.size:
@@ -92,23 +100,20 @@ def checked_states(name: str, value, size: int) -> np.ndarray:
             f"{name} has shape {array.shape}, not ({size},) of one start state, or (k, {size}) of "
             "k runs"
         )
-    wrong = np.argwhere(~np.isfinite(array))
-    if len(wrong):
-        where = f" of run {wrong[0][0]}" if array.ndim == 2 else ""
-        raise StateError(f"{name}[{wrong[0][-1]}]{where} is not finite")
+    rows = np.atleast_2d(array)
+    for run in np.flatnonzero(~np.isfinite(rows).all(axis=1))[:1]:
+        refuse_not_finite(name, rows[run], StateError, f" of run {run}" if array.ndim == 2 else "")
     return array
 
 
 def _paired(q0: np.ndarray, v0: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return copies (k, size), a single one being repeated; StateError where the numbers of runs
-    differ.
-    """
+    """Return copies (k, size), a single one repeated; StateError where numbers of runs differ."""
     counts = {len(array) for array in (q0, v0) if array.ndim == 2}
     if len(counts) > 1:
         raise StateError(
             f"q0 has {len(q0)} runs, v0 {len(v0)}: give as many of both, or one of either"
         )
     runs = counts.pop() if counts else 1
-    return tuple(
-        np.array(np.broadcast_to(array, (runs, array.shape[-1])), order="C") for array in (q0, v0)
-    )
+    q0 = np.broadcast_to(q0, (runs, q0.shape[-1]))
+    v0 = np.broadcast_to(v0, (runs, v0.shape[-1]))
+    return np.array(q0, order="C"), np.array(v0, order="C")

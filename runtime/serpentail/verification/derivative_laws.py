@@ -1,18 +1,16 @@
-"""Laws of derivatives: a model and a state go in; how far exact derivatives are from slopes along
-motions comes out.
-"""
+"""Laws of derivatives: exact ones are the slopes of what they are derivatives of."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 import numpy as np
 
+from ..model.layout import OMEGA, TAIL_V
 from ..model.model import Model
 from .errors import block_error, relative, worst
-from .law import NEAR, Law, fastest, moved, registry, slope
-from .states import State
+from .law import SLOPE_LIMIT, Errors, Law, fastest, moved, registry, slope
+from .states import State, at_origin
 
-FAR = 10 * NEAR  # a slope divides rounding by its step
 LAWS: list[Law] = []
 law = registry(LAWS)
 
@@ -25,23 +23,24 @@ def along(s: State, time: float) -> State:
 def slopes(
     model: Model, s: State, f: Callable[[State], np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return how fast a function changes along the state's directions, and the size that its
-    rounding scales with.
+    """Return how fast a function changes along the state's directions, and the size of that.
+
+    Its rounding scales with the size.
     """
-    s = replace(s, q=np.concatenate([0 * s.q[:3], s.q[3:]]))
+    s = at_origin(s)
     rate = max(1.0, fastest(model, s.dq))
     change, largest = slope(lambda t: np.asarray(f(along(s, t)), float), rate)
     return change, rate * largest
 
 
-def block_slope_error(x, found: tuple[np.ndarray, np.ndarray]) -> float:
+def block_slope_error(x: np.ndarray, expected: tuple[np.ndarray, np.ndarray]) -> float:
     """Return the error of a generalised force's derivative against a slope, block by block."""
-    change, largest = found
+    change, largest = expected
     return block_error(x, change, np.abs(change) + largest)
 
 
-@law("inverse_dynamics", "inverse_dynamics_derivatives", units=FAR)
-def inverse_dynamics_changes_by_its_jacobians(model: Model, s: State):
+@law("inverse_dynamics", "inverse_dynamics_derivatives", units=SLOPE_LIMIT)
+def inverse_dynamics_changes_by_its_jacobians(model: Model, s: State) -> Errors:
     """dq, dv times a direction are the slope of H v_dot + C along it."""
     dq, dv = model.inverse_dynamics_derivatives(s.q, s.v, s.v_dot)
     return block_slope_error(
@@ -51,54 +50,63 @@ def inverse_dynamics_changes_by_its_jacobians(model: Model, s: State):
 
 
 @law(
-    "mass_matrix", "inverse_dynamics", "forward_dynamics", "forward_dynamics_derivatives", units=FAR
+    "mass_matrix",
+    "inverse_dynamics",
+    "forward_dynamics",
+    "forward_dynamics_derivatives",
+    units=SLOPE_LIMIT,
 )
-def forward_dynamics_changes_by_its_jacobians(model: Model, s: State):
+def forward_dynamics_changes_by_its_jacobians(model: Model, s: State) -> Errors:
     """H times the change of v_dot is that of tau less the slope of H v_dot + C at fixed v_dot; H
     dtau = [0; 1].
     """
     v_dot, H = model.forward_dynamics(s.q, s.v, s.tau), model.mass_matrix(s.q).astype(float)
     dq, dv, dtau = (x.astype(float) for x in model.forward_dynamics_derivatives(s.q, s.v, s.tau))
     change, largest = slopes(model, s, lambda at: model.inverse_dynamics(at.q, at.v, v_dot))
-    unit = np.eye(model.nv)[:, 6:]
-    terms = np.abs(H) @ (
-        np.abs(dq) @ np.abs(s.dq) + np.abs(dv) @ np.abs(s.dv)
-    )  # what H times the change sums up
+    unit = np.eye(model.nv)[:, TAIL_V]
+    # what H times the change sums up
+    terms = np.abs(H) @ (np.abs(dq) @ np.abs(s.dq) + np.abs(dv) @ np.abs(s.dv))
     return {
         "dq, dv": block_slope_error(-H @ (dq @ s.dq + dv @ s.dv), (change, largest + terms)),
         "dtau": relative(H @ dtau, unit, np.abs(H) @ np.abs(dtau)),
     }
 
 
-@law("forward_dynamics_derivatives", "forward_dynamics_jvp", "forward_dynamics_vjp", units=FAR)
-def products_are_those_with_the_jacobians(model: Model, s: State):
+@law(
+    "forward_dynamics_derivatives",
+    "forward_dynamics_jvp",
+    "forward_dynamics_vjp",
+    units=SLOPE_LIMIT,
+)
+def products_are_those_with_the_jacobians(model: Model, s: State) -> Errors:
     """jvp is J d, vjp is lambda^T J, relative to the sum of |terms|."""
     J = [x.astype(float) for x in model.forward_dynamics_derivatives(s.q, s.v, s.tau)]
     directions = (s.dq, s.dv, s.dtau)
     jvp = model.forward_dynamics_jvp(s.q, s.v, s.tau, *directions)
     vjp = model.forward_dynamics_vjp(s.q, s.v, s.tau, s.multiplier)
-    terms = [np.abs(j) @ np.abs(d) for j, d in zip(J, directions, strict=True)]
-    there = block_error(jvp, sum(j @ d for j, d in zip(J, directions, strict=True)), sum(terms))
-    back = [
-        relative(x, s.multiplier @ j, np.abs(s.multiplier) @ np.abs(j))
-        for x, j in zip(vjp, J, strict=True)
-    ]
-    return {"jvp": there, "vjp": worst(back)}
+    products = sum(j @ d for j, d in zip(J, directions, strict=True))
+    terms = sum(np.abs(j) @ np.abs(d) for j, d in zip(J, directions, strict=True))
+    return {"jvp": block_error(jvp, products, terms), "vjp": product_error(vjp, s.multiplier, J)}
 
 
-@law("mass_matrix", "inverse_dynamics_derivatives", "inverse_dynamics_vjp", units=FAR)
-def gradient_is_the_product_with_the_jacobians(model: Model, s: State):
-    """The gradient of lambda^T (H v_dot + C) is lambda^T times dq, dv and H."""
-    J = [*model.inverse_dynamics_derivatives(s.q, s.v, s.v_dot), model.mass_matrix(s.q)]
-    found = model.inverse_dynamics_vjp(s.q, s.v, s.v_dot, s.multiplier)
-    sizes = [np.abs(s.multiplier) @ np.abs(j.astype(float)) for j in J]
+def product_error(vjp: Iterable, multiplier: np.ndarray, jacobians: Iterable) -> float:
+    """Return the largest error of lambda^T J, relative to the sum of |terms|."""
     return worst(
-        relative(x, s.multiplier @ j, size) for x, j, size in zip(found, J, sizes, strict=True)
+        relative(x, multiplier @ j, np.abs(multiplier) @ np.abs(j))
+        for x, j in zip(vjp, jacobians, strict=True)
     )
 
 
-@law("inverse_dynamics_vjp", "inverse_dynamics_hessian", units=FAR)
-def gradient_changes_by_the_hessian(model: Model, s: State):
+@law("mass_matrix", "inverse_dynamics_derivatives", "inverse_dynamics_vjp", units=SLOPE_LIMIT)
+def gradient_is_the_product_with_the_jacobians(model: Model, s: State) -> Errors:
+    """The gradient of lambda^T (H v_dot + C) is lambda^T times dq, dv and H."""
+    J = [*model.inverse_dynamics_derivatives(s.q, s.v, s.v_dot), model.mass_matrix(s.q)]
+    vjp = model.inverse_dynamics_vjp(s.q, s.v, s.v_dot, s.multiplier)
+    return product_error(vjp, s.multiplier, [j.astype(float) for j in J])
+
+
+@law("inverse_dynamics_vjp", "inverse_dynamics_hessian", units=SLOPE_LIMIT)
+def gradient_changes_by_the_hessian(model: Model, s: State) -> Errors:
     """The Hessian times a direction is the slope of the gradient along it; turns in q commute by
     half a bracket.
     """
@@ -109,40 +117,37 @@ def gradient_changes_by_the_hessian(model: Model, s: State):
 
     change, largest = slopes(model, s, gradient)
     bracket = np.zeros(model.nv)
-    bracket[3:6] = np.cross(gradient(s)[3:6], s.dq[3:6]) / 2
-    found = np.concatenate([qq @ s.dq + qv @ s.dv + bracket, qv.T @ s.dq + vv @ s.dv, aq @ s.dq])
-    parts = [slice(k * model.nv, (k + 1) * model.nv) for k in range(3)]
+    bracket[OMEGA] = np.cross(gradient(s)[OMEGA], s.dq[OMEGA]) / 2
+    products = (qq @ s.dq + qv @ s.dv + bracket, qv.T @ s.dq + vv @ s.dv, aq @ s.dq)
     errors = {"symmetry": worst(relative(x, x.T) for x in (qq, vv))}
-    for name, part in zip(("q", "v", "v_dot"), parts, strict=True):
-        errors[name] = relative(found[part], change[part], largest[part])
+    for k, name in enumerate(("q", "v", "v_dot")):
+        part = slice(k * model.nv, (k + 1) * model.nv)
+        errors[name] = relative(products[k], change[part], largest[part])
     return errors
 
 
-@law("energy", "energy_derivatives", "mass_matrix", units=FAR)
-def energies_change_by_their_gradients(model: Model, s: State):
+@law("energy", "energy_derivatives", "mass_matrix", units=SLOPE_LIMIT)
+def energies_change_by_their_gradients(model: Model, s: State) -> Errors:
     """The gradients of both energies times a direction are their slopes; that of kinetic energy in
     v is H v.
     """
     kinetic_dq, kinetic_dv, potential_dq = model.energy_derivatives(s.q, s.v)
     change, largest = slopes(model, s, lambda at: np.hstack(model.energy(at.q, at.v)))
-    found = np.array([kinetic_dq @ s.dq + kinetic_dv @ s.dv, potential_dq @ s.dq])
-    size = largest + np.abs(change)
-    momentum = block_error(kinetic_dv, model.mass_matrix(s.q).astype(float) @ s.v)
+    products = np.array([kinetic_dq @ s.dq + kinetic_dv @ s.dv, potential_dq @ s.dq])
+    momentum = model.mass_matrix(s.q).astype(float) @ s.v
     return {
-        "slopes": worst(relative(f, c, n) for f, c, n in zip(found, change, size, strict=True)),
-        "H v": momentum,
+        "slopes": worst(map(relative, products, change, largest + np.abs(change))),
+        "H v": block_error(kinetic_dv, momentum),
     }
 
 
-@law("momentum", "momentum_derivatives", units=FAR)
-def momentum_changes_by_its_jacobians(model: Model, s: State):
+@law("momentum", "momentum_derivatives", units=SLOPE_LIMIT)
+def momentum_changes_by_its_jacobians(model: Model, s: State) -> Errors:
     """The Jacobians of both momenta times a direction are their slopes."""
     linear_dq, linear_dv, angular_dq, angular_dv = model.momentum_derivatives(s.q, s.v)
     change, largest = slopes(model, s, lambda at: np.stack(model.momentum(at.q, at.v)))
-    found = np.stack([linear_dq @ s.dq + linear_dv @ s.dv, angular_dq @ s.dq + angular_dv @ s.dv])
-    return worst(
-        relative(f, c, n + np.abs(c)) for f, c, n in zip(found, change, largest, strict=True)
-    )
+    linear, angular = linear_dq @ s.dq + linear_dv @ s.dv, angular_dq @ s.dq + angular_dv @ s.dv
+    return worst(map(relative, (linear, angular), change, largest + np.abs(change)))
 
 
 @law(
@@ -150,18 +155,12 @@ def momentum_changes_by_its_jacobians(model: Model, s: State):
     "forward_dynamics",
     "inverse_dynamics_parameter_derivatives",
     "forward_dynamics_parameter_derivatives",
-    units=FAR,
+    units=SLOPE_LIMIT,
 )
-def parameters_move_both_dynamics_alike(model: Model, s: State):
-    """H times the change of v_dot with a parameter is minus that of H v_dot + C at the same
-    v_dot.
-    """
+def parameters_move_both_dynamics_alike(model: Model, s: State) -> Errors:
+    """H times a parameter's change of v_dot is minus that of H v_dot + C at the same v_dot."""
     v_dot, H = model.forward_dynamics(s.q, s.v, s.tau), model.mass_matrix(s.q).astype(float)
     forward = model.forward_dynamics_parameter_derivatives(s.q, s.v, s.tau).astype(float)
     inverse = model.inverse_dynamics_parameter_derivatives(s.q, s.v, v_dot).astype(float)
-    return worst(
-        relative(row, -other, size)
-        for row, other, size in zip(
-            H @ forward, inverse, np.abs(H) @ np.abs(forward) + np.abs(inverse), strict=True
-        )
-    )
+    sizes = np.abs(H) @ np.abs(forward) + np.abs(inverse)
+    return worst(map(relative, H @ forward, -inverse, sizes))

@@ -1,27 +1,34 @@
-"""Verification: a loaded model goes in; the checks of its laws, each with its error and limit, come
-out as a report.
+"""The verification report: every law checked on seeded states of a model, its error and its limit.
+
+`serpentail verify` checks the laws; `make verify` adds checks against other derivations of the
+model and reports them in the same form.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 
 from ..errors import SerpentailError
 from ..model.model import Model
-from . import contact_laws, derivative_laws
+from . import call_laws, contact_laws, derivative_laws, frame_laws, value_laws
 from .law import Law
 from .states import State, states
-from .value_laws import LAWS as VALUE_LAWS
 
-LAWS = (*VALUE_LAWS, *derivative_laws.LAWS, *contact_laws.LAWS)
+LAWS = (
+    *value_laws.LAWS,
+    *frame_laws.LAWS,
+    *call_laws.LAWS,
+    *derivative_laws.LAWS,
+    *contact_laws.LAWS,
+)
+STATUSES = ("passed", "failed", "not checked")
 
 
 @dataclass(frozen=True)
 class Check:
-    """A law in one sentence, the largest error found, and its limit; or why the law was not
-    checked.
-    """
+    """A law in one sentence, its largest error and its limit; or why it was not checked."""
 
     name: str
     law: str
@@ -38,7 +45,21 @@ class Check:
     @property
     def status(self) -> str:
         """Return "passed", "failed", or "not checked"."""
-        return "not checked" if self.omitted else "passed" if self.passed else "failed"
+        if self.omitted:
+            return "not checked"
+        return "passed" if self.passed else "failed"
+
+    @property
+    def ratio(self) -> float:
+        """Error over limit: inf where it is not a number, 0 where nothing is checked or allowed."""
+        if self.omitted or not self.limit:
+            return 0.0
+        return float(np.nan_to_num(self.error / self.limit, nan=np.inf))
+
+    @property
+    def group(self) -> str:
+        """What comes before the colon of its name, such as another derivation; else "laws"."""
+        return self.name.partition(": ")[0] if ": " in self.name else "laws"
 
 
 def laws(model: Model) -> list[Check]:
@@ -48,39 +69,28 @@ def laws(model: Model) -> list[Check]:
 
 
 def check(entry: Law, model: Model, cases: list[State]) -> Check:
-    """Check one law; one that speaks of functions the scene left out is not checked, and says
-    so.
-    """
+    """Check one law; one that speaks of functions the scene left out says so."""
     limit, reason = entry.limit(model), unchecked(entry, model)
-    if reason:
-        return Check(entry.name, entry.text, 0.0, limit, omitted=reason)
-    found = [item for case in cases for item in errors_at(entry, model, case)]
-    if not found:
-        return Check(
-            entry.name, entry.text, 0.0, limit, omitted="not generated: any function it speaks of"
-        )
-    where, error = max(found, key=lambda item: (np.isnan(item[1]), item[1]))
+    errors = [] if reason else [pair for case in cases for pair in errors_at(entry, model, case)]
+    if not errors:
+        omitted = reason or "not generated: any function it speaks of"
+        return Check(entry.name, entry.text, 0.0, limit, omitted=omitted)
+    where, error = max(errors, key=lambda pair: (np.isnan(pair[1]), pair[1]))
     return Check(entry.name, entry.text, float(error), limit, "" if error == 0 else where)
 
 
 def unchecked(entry: Law, model: Model) -> str:
     """Return why a law cannot be checked, or nothing."""
-    absent = ", ".join(name for name in entry.needs if name not in model.generated)
-    kinds = (
-        "",
-        model.manifest["real"],
-        model.manifest["scene"]["kind"],
-        *(["contact"] if model.contacts else []),
-    )
+    kinds = ["", model.manifest["real"], model.manifest["scene"]["kind"]]
+    kinds += ["contact"] if model.contacts else []
     if entry.only not in kinds:
         return f"only for {entry.only} models"
+    absent = ", ".join(name for name in entry.needs if name not in model.generated)
     return f"not generated: {absent}" if absent else ""
 
 
 def errors_at(entry: Law, model: Model, state: State) -> Iterator[tuple[str, float]]:
-    """Yield (place, error) of one state; what the model refuses to compute is an error that is not
-    a number.
-    """
+    """Yield (place, error) of one state; nan where the model refuses to compute."""
     try:
         with np.errstate(all="ignore"):  # what is no number fails
             errors = entry.error(model, state)
@@ -90,39 +100,68 @@ def errors_at(entry: Law, model: Model, state: State) -> Iterator[tuple[str, flo
         yield f"{state.kind}: {place}" if place else state.kind, error
 
 
-def summary(model: Model, checks: list[Check]) -> dict:
+def counts(checks: list[Check]) -> dict[str, int]:
+    """Return how many checks have each status."""
+    return {status: sum(c.status == status for c in checks) for status in STATUSES}
+
+
+def summary(model: Model, checks: list[Check]) -> dict[str, Any]:
     """Return the checks as plain data for JSON; an error that is no finite number is null."""
     rows = []
     for entry in checks:
         error = entry.error if np.isfinite(entry.error) and not entry.omitted else None
         rows.append(asdict(entry) | {"error": error, "status": entry.status})
-    counts = {
-        status: sum(c.status == status for c in checks)
-        for status in ("passed", "failed", "not checked")
-    }
-    head = {
+    return {
         "name": model.name,
         "real": model.manifest["real"],
         "segments": model.segments,
         "links": model.links,
+        "passed": all(c.passed for c in checks),
+        "counts": counts(checks),
+        "checks": rows,
     }
-    return head | {"passed": all(c.passed for c in checks), "counts": counts, "checks": rows}
 
 
 def as_text(model: Model, checks: list[Check]) -> str:
-    """Return the checks as a table, what failed with its law."""
-    counts = summary(model, checks)["counts"]
-    lines = [f"{model.name}: " + ", ".join(f"{count} {status}" for status, count in counts.items())]
-    width = max(len(c.name) for c in checks)
-    lines.append(f"  {'check':<{width}}  {'error':>9}  {'limit':>9}  ")
-    for c in checks:
+    """Return the report: an overview, then every check."""
+    return "\n".join([*_overview(model, checks), "", *_table(checks, lambda _: True)])
+
+
+def as_short_text(model: Model, checks: list[Check]) -> str:
+    """Return the overview, then the checks that failed."""
+    return "\n".join([*_overview(model, checks), *_table(checks, lambda c: not c.passed)])
+
+
+def _overview(model: Model, checks: list[Check]) -> list[str]:
+    """Lines: how many checks passed, and of every group also which came nearest to its limit."""
+    total = ", ".join(f"{count} {status}" for status, count in counts(checks).items())
+    lines = [f"{model.name}: {total}", f"  {'':<12}" + "".join(f"{s:>13}" for s in STATUSES)]
+    lines[-1] += "   largest error / limit"
+    groups: dict[str, list[Check]] = {}
+    for entry in checks:
+        groups.setdefault(entry.group, []).append(entry)
+    for name, members in groups.items():
+        numbers = "".join(f"{count:>13}" for count in counts(members).values())
+        nearest = max(members, key=lambda c: c.ratio)
+        about = f"{nearest.ratio:.2g}  {nearest.name.rpartition(': ')[2]}" if nearest.ratio else ""
+        lines.append(f"  {name:<12}{numbers}   {about}")
+    return lines
+
+
+def _table(checks: list[Check], shown: Callable[[Check], bool]) -> list[str]:
+    """Lines: name, error, limit and place of the checks to show, what failed with its law."""
+    rows = [c for c in checks if shown(c)]
+    if not rows:
+        return []
+    width = max(len(c.name) for c in rows)
+    lines = [f"  {'check':<{width}}  {'error':>9}  {'limit':>9}  largest at"]
+    for c in rows:
+        name = f"  {c.name:<{width}}  "
         if c.omitted:
-            lines.append(f"  {c.name:<{width}}  not checked: {c.omitted}")
+            lines.append(f"{name}not checked: {c.omitted}")
             continue
-        lines.append(
-            f"  {c.name:<{width}}  {c.error:>9.2g}  {c.limit:>9.2g}  "
-            f"{'' if c.passed else 'FAILED '}{c.where}"
-        )
+        verdict = "" if c.passed else "FAILED "
+        lines.append(f"{name}{c.error:>9.2g}  {c.limit:>9.2g}  {verdict}{c.where}".rstrip())
         if not c.passed:
             lines.append(f"  {'':<{width}}  {c.law}")
-    return "\n".join(lines)
+    return lines

@@ -1,7 +1,7 @@
-"""Threads: a solver's run goes in; that its BLAS uses one thread meanwhile comes out.
+"""Keeps the linear algebra of CasADi's solvers to one thread while a program is solved.
 
-Blocks of a plan's matrices are small: threads that share one wait for each other, and on busy cores
-for long.
+The blocks of a plan's matrices are small: threads that share one wait for each other, and on busy
+cores for long.
 """
 
 import ctypes
@@ -12,7 +12,7 @@ from pathlib import Path
 
 
 @cache
-def _blas():
+def _blas() -> ctypes.CDLL | None:
     """The BLAS that CasADi brings for its solvers; None where it brings another, or none."""
     import casadi as ca
 

@@ -1,25 +1,29 @@
-"""What is kept: how to make a thing, and what it depends on, go in; the thing, made only once,
-comes out.
+"""A small memory of what takes long to make: nonlinear programs, their nodes and solvers.
+
+Planning again on the same mesh from another start then derives nothing.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import lru_cache
+from typing import Any
 
-MOST = 16  # programs and solvers
+CAPACITY = 16  # programs, nodes and solvers; the one that was not used for longest goes
 
 
 @dataclass(frozen=True)
-class _Wish:
-    of: tuple
-    make: Callable = field(compare=False)
+class _Entry:
+    """A key, and how to make what belongs to it; entries of one key are equal."""
+
+    key: tuple
+    make: Callable[[], Any] = field(compare=False)
 
 
-@lru_cache(maxsize=MOST)
-def _made(wish: _Wish):
-    return wish.make()
+@lru_cache(maxsize=CAPACITY)
+def _made(entry: _Entry) -> Any:
+    return entry.make()
 
 
-def kept(of: tuple, make: Callable):
-    """Return make(), or what it returned for the same `of` (hashable) not long ago."""
-    return _made(_Wish(of, make))
+def memoised(key: tuple, make: Callable[[], Any]) -> Any:
+    """Return make(), or what it returned for the same key (hashable) not long ago."""
+    return _made(_Entry(key, make))

@@ -1,23 +1,29 @@
-"""Attitude coordinates: a name goes in; conversions and rates come out, for numbers and for
-CasADi.
+"""Coordinates of the torso's attitude, their rates and rotations, for numbers and for CasADi.
+
+A plan describes the attitude by a quaternion or, as the paper does, by Euler angles.
 """
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...attitude import from_angles, pitch_roll_yaw, product, sign_continuous
+from ...attitude import from_angles, pitch_roll_yaw, product, quaternion_rate, sign_continuous
 from ...errors import PlanningError
+from ...model.layout import QUATERNION
 
-KINDS = {"quaternion": 4, "euler": 3}
+if TYPE_CHECKING:
+    import casadi as ca
+
+KINDS = {"quaternion": 4, "euler": 3}  # name -> number of coordinates
+IDENTITY_POSE = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])  # in q: at the origin, not rotated
 
 
 @dataclass(frozen=True)
 class Attitude:
-    """Coordinates of the torso's attitude: "quaternion" (w, x, y, z), or "euler" (phi_x, phi_y,
-    phi_z) in rad.
+    """Coordinates of the torso's attitude: "quaternion" (w, x, y, z), or "euler", three angles.
 
-    R = Rz(phi_z) Rx(phi_x) Ry(phi_y) as in reports.
+    The angles (phi_x, phi_y, phi_z), rad, give R = Rz(phi_z) Rx(phi_x) Ry(phi_y) as in reports.
     """
 
     kind: str
@@ -27,7 +33,7 @@ class Attitude:
         """Number of coordinates."""
         return KINDS[self.kind]
 
-    def quaternion(self, c):
+    def quaternion(self, c: "ca.SX") -> "ca.SX":
         """Return the quaternion (CasADi) of coordinates c."""
         import casadi as ca
 
@@ -38,13 +44,13 @@ class Attitude:
         pitch, roll, yaw = [x[0], x[1], 0, 0], [y[0], 0, y[1], 0], [z[0], 0, 0, z[1]]
         return ca.vertcat(*product(product(yaw, pitch), roll))
 
-    def rate(self, c, omega):
+    def rate(self, c: "ca.SX", omega: "ca.SX") -> "ca.SX":
         """Return the rate (CasADi) of coordinates c at the angular velocity omega in body axes."""
         import casadi as ca
 
         w = [omega[k] for k in range(3)]
         if self.kind == "quaternion":
-            return ca.vertcat(*(entry / 2 for entry in product([c[k] for k in range(4)], [0, *w])))
+            return ca.vertcat(*quaternion_rate([c[k] for k in range(4)], w))
         # Ry(phi_y) omega is in the axes before the roll: (phi_x_dot, phi_y_dot +
         # sin(phi_x) phi_z_dot, cos(phi_x) ...)
         cy, sy = ca.cos(c[1]), ca.sin(c[1])
@@ -56,7 +62,7 @@ class Attitude:
         """Return coordinates (K, size) of a motion's q (K, nq), continuous in time."""
         if self.kind == "euler":
             return pitch_roll_yaw(q, unwrap=True)
-        return sign_continuous(q[:, 3:7])
+        return sign_continuous(q[:, QUATERNION])
 
     def as_quaternion(self, c: np.ndarray) -> np.ndarray:
         """Return unit quaternions (K, 4) of coordinates c (K, size)."""
@@ -70,3 +76,12 @@ def attitude(kind: str) -> Attitude:
     if kind not in KINDS:
         raise PlanningError(f"attitude: value {kind!r}: needs {' or '.join(map(repr, KINDS))}")
     return Attitude(kind)
+
+
+def rotated(quaternion: "ca.SX", x: "ca.SX", sense: int = 1) -> "ca.SX":
+    """R x, or R^T x for the sense -1, of a quaternion of any norm but zero (CasADi)."""
+    import casadi as ca
+
+    w, u = sense * quaternion[0], quaternion[1:]
+    twice = (w**2 - ca.dot(u, u)) * x + 2 * ca.dot(u, x) * u + 2 * w * ca.cross(u, x)
+    return twice / ca.sumsqr(quaternion)

@@ -1,49 +1,59 @@
-"""Assembly: a node's function and linear maps go in; a program's functions and exact derivatives
-come out.
+"""The program's objective, constraints and exact derivatives, assembled from those of its nodes.
+
+Everything outside the nodes is linear, so that each derivative is a sparse matrix times the
+entries of the nodes' derivatives.
 """
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .node import Node
 from .node_calls import MappedNode
 
+if TYPE_CHECKING:
+    import casadi as ca
+
 
 @dataclass(frozen=True, eq=False)
 class Assembly:
-    """f = cost Y + direct w, g = linear w + weights Y, Y (nodes * size) being the node's function
-    at w[places].
+    """f = cost Y + direct w, g = linear w + weights Y.
+
+    Y (nodes * size): values of the node's function at w[indices] of every node.
     """
 
     node: Node
-    places: np.ndarray  # (unknowns of a node, nodes)
-    linear: object  # sparse (rows, w)
-    weights: object  # sparse (rows, nodes * size)
+    indices: np.ndarray  # (unknowns of a node, nodes)
+    linear: Any  # SciPy's sparse matrix (rows, w)
+    weights: Any  # SciPy's sparse matrix (rows, nodes * size)
     cost: np.ndarray
     direct: np.ndarray
 
-    def functions(self) -> dict:
-        """Return nlp, grad_f, jac_g and hess_lag, with CasADi's names and inputs, and values: Y
-        (size, nodes).
+    def functions(self) -> "dict[str, ca.Function]":
+        """Return nlp, grad_f, jac_g, hess_lag, with CasADi's names and inputs, and values.
+
+        values: Y (size, nodes).
         """
         import casadi as ca
 
+        # symbols, and what all nodes give
         w, h = ca.MX.sym("x", len(self.direct)), ca.MX.sym("p", 3)
         lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", self.linear.shape[0])
-        one = self.node.derivatives
-        mapped = MappedNode(one, self.places.shape[1])
-        Z = ca.reshape(w[self.places.T.ravel().tolist()], self.places.shape)
+        derivatives, count = self.node.derivatives, self.indices.shape[1]
+        mapped = MappedNode(derivatives, count)
+        Z = ca.reshape(w[self.indices.T.ravel().tolist()], self.indices.shape)
         mu = lam_f * ca.DM(self.cost) + ca.mtimes(_dm(self.weights.T.tocsc()), lam_g)
         Y, J = ca.vec(mapped.values(Z, h)), mapped.jacobians(Z, h)
-        S = mapped.hessians(Z, h, ca.reshape(mu, self.node.size, self.places.shape[1]))
-        f, g = (
-            self._objective(mapped, Z, h, w),
-            ca.mtimes(_dm(self.linear), w) + ca.mtimes(_dm(self.weights), Y),
-        )
-        rows, columns = _pattern(one.jacobian.sparsity_out(0))
-        pattern, matrix, constant = self._jacobian(rows, columns)
-        triangle, gather = self._hessian(*_pattern(one.hessian.sparsity_out(0)))
+        S = mapped.hessians(Z, h, ca.reshape(mu, self.node.size, count))
+
+        # objective and constraints
+        f = self._objective(mapped, Z, h, w)
+        g = ca.mtimes(_dm(self.linear), w) + ca.mtimes(_dm(self.weights), Y)
+
+        # their derivatives
+        pattern, matrix, constant = self._jacobian(*_triplet(derivatives.jacobian.sparsity_out(0)))
+        triangle, gather = self._hessian(*_triplet(derivatives.hessian.sparsity_out(0)))
         jac = ca.MX(pattern, ca.mtimes(matrix, J) + constant)
         hess, grad = ca.MX(triangle, ca.mtimes(gather, S)), self._gradient(mapped, Z, h)
         return {
@@ -60,66 +70,70 @@ class Assembly:
             ),
         }
 
-    def _objective(self, mapped: MappedNode, Z, h, w):
+    def _objective(self, mapped: MappedNode, Z: "ca.MX", h: "ca.MX", w: "ca.MX") -> "ca.MX":
         import casadi as ca
 
         weights = ca.DM(self.cost.reshape(-1, self.node.size)[:, -1])
         return ca.dot(weights, ca.vec(mapped.costs(Z, h))) + ca.dot(ca.DM(self.direct), w)
 
-    def _gradient(self, mapped: MappedNode, Z, h):
+    def _gradient(self, mapped: MappedNode, Z: "ca.MX", h: "ca.MX") -> "ca.MX":
         """The objective's gradient: the dynamics has no part in it."""
         import casadi as ca
 
-        _, columns = _pattern(self.node.derivatives.slope.sparsity_out(0))
-        place, cost = self.places[columns].T.ravel(), self.cost.reshape(-1, self.node.size)[:, -1]
+        _, columns = _triplet(self.node.derivatives.slope.sparsity_out(0))
+        index, cost = self.indices[columns].T.ravel(), self.cost.reshape(-1, self.node.size)[:, -1]
         weights = np.repeat(cost, len(columns))
-        gather = _sparse(weights, place, np.arange(place.size), (len(self.direct), place.size))
+        gather = _sparse(weights, index, np.arange(index.size), (len(self.direct), index.size))
         return ca.mtimes(gather, mapped.slopes(Z, h)) + ca.DM(self.direct)
 
-    def _jacobian(self, rows, columns):
-        """Pattern of the constraints' Jacobian, the map from the nodes' Jacobians to its entries,
-        the constant part.
-        """
-        count, size = self.places.shape[1], self.node.size
-        value_row = (np.arange(count)[:, None] * size + rows).ravel()
-        place = self.places[columns].T.ravel()
-        start, length = self.weights.indptr[value_row], np.diff(self.weights.indptr)[value_row]
-        entry = np.repeat(np.arange(place.size), length)
+    def _jacobian(
+        self, rows: np.ndarray, columns: np.ndarray
+    ) -> "tuple[ca.Sparsity, ca.DM, np.ndarray]":
+        """Pattern of the constraints' Jacobian, its map from the nodes' ones, its constant part."""
+        count, size = self.indices.shape[1], self.node.size
+
+        # entries of the nodes' Jacobians: to which value of Y they belong, and to which unknown
+        value = (np.arange(count)[:, None] * size + rows).ravel()
+        unknown = self.indices[columns].T.ravel()
+
+        # each enters once for every constraint that has a weight on that value
+        start, length = self.weights.indptr[value], np.diff(self.weights.indptr)[value]
+        entry = np.repeat(np.arange(unknown.size), length)
         inside = np.arange(length.sum()) - np.repeat(np.cumsum(length) - length, length)
         k = start[entry] + inside
-        constant = self.linear.tocoo()
-        row, column = (
-            np.concatenate(x)
-            for x in ((self.weights.indices[k], constant.row), (place[entry], constant.col))
-        )
-        key, position = np.unique(
-            column.astype(np.int64) * self.linear.shape[0] + row, return_inverse=True
-        )
-        pattern = _sparsity(key, self.linear.shape)
-        moving = position[: len(k)]
-        fixed = np.bincount(position[len(k) :], constant.data, len(key))
-        return pattern, _sparse(self.weights.data[k], moving, entry, (len(key), place.size)), fixed
 
-    def _hessian(self, rows, columns):
-        """Pattern of the upper triangle of the Lagrangian's Hessian, and the map from the nodes'
-        ones to it.
-        """
-        row, column = self.places[rows].T.ravel(), self.places[columns].T.ravel()
+        # places of all entries, column by column, those of the linear part with them
+        constant = self.linear.tocoo()
+        row = np.concatenate([self.weights.indices[k], constant.row])
+        column = np.concatenate([unknown[entry], constant.col])
+        places = column.astype(np.int64) * self.linear.shape[0] + row
+        key, position = np.unique(places, return_inverse=True)
+        moving, fixed = position[: len(k)], position[len(k) :]
+        matrix = _sparse(self.weights.data[k], moving, entry, (len(key), unknown.size))
+        return (
+            _sparsity(key, self.linear.shape),
+            matrix,
+            np.bincount(fixed, constant.data, len(key)),
+        )
+
+    def _hessian(self, rows: np.ndarray, columns: np.ndarray) -> "tuple[ca.Sparsity, ca.DM]":
+        """Pattern of the Lagrangian's Hessian, upper triangle, and its map from the nodes' ones."""
+        row, column = self.indices[rows].T.ravel(), self.indices[columns].T.ravel()
         upper = np.flatnonzero(row <= column)
         n = len(self.direct)
-        key, position = np.unique(
-            column[upper].astype(np.int64) * n + row[upper], return_inverse=True
-        )
-        return _sparsity(key, (n, n)), _sparse(
-            np.ones(len(upper)), position, upper, (len(key), row.size)
-        )
+        places = column[upper].astype(np.int64) * n + row[upper]
+        key, position = np.unique(places, return_inverse=True)
+        gather = _sparse(np.ones(len(upper)), position, upper, (len(key), row.size))
+        return _sparsity(key, (n, n)), gather
 
 
-def _pattern(sparsity) -> tuple[np.ndarray, np.ndarray]:
-    return tuple(np.array(entry, int) for entry in sparsity.get_triplet())
+def _triplet(sparsity: "ca.Sparsity") -> tuple[np.ndarray, np.ndarray]:
+    """Rows and columns of a pattern's entries."""
+    rows, columns = sparsity.get_triplet()
+    return np.array(rows, int), np.array(columns, int)
 
 
-def _sparsity(key: np.ndarray, shape: tuple[int, int]):
+def _sparsity(key: np.ndarray, shape: tuple[int, int]) -> "ca.Sparsity":
     """The pattern whose entries are column * rows + row, increasing."""
     import casadi as ca
 
@@ -128,17 +142,20 @@ def _sparsity(key: np.ndarray, shape: tuple[int, int]):
     return ca.Sparsity(*shape, ends.tolist(), rows.tolist())
 
 
-def _sparse(values: np.ndarray, rows: np.ndarray, columns: np.ndarray, shape: tuple[int, int]):
+def _sparse(
+    values: np.ndarray, rows: np.ndarray, columns: np.ndarray, shape: tuple[int, int]
+) -> "ca.DM":
     from scipy.sparse import csc_matrix
 
     return _dm(csc_matrix((values, (rows, columns)), shape))
 
 
-def _dm(matrix):
+def _dm(matrix: Any) -> "ca.DM":
     """A SciPy matrix as CasADi's."""
     import casadi as ca
 
     matrix = matrix.tocsc()
     matrix.sort_indices()
-    pattern = ca.Sparsity(*matrix.shape, matrix.indptr.tolist(), matrix.indices.tolist())
+    rows, columns = matrix.shape
+    pattern = ca.Sparsity(rows, columns, matrix.indptr.tolist(), matrix.indices.tolist())
     return ca.DM(pattern, matrix.data)

@@ -1,6 +1,4 @@
-"""Guesses: a motion (passive, planned before, or on a coarser mesh) goes in; where the solver
-starts comes out.
-"""
+"""Where the solver starts: a motion, such as passive flight or an earlier plan, put on a mesh."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -8,63 +6,75 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...attitude import rotation_matrix
+from ...model.layout import OMEGA, POSITION, TAIL_Q, TAIL_V, VELOCITY
+from ...model.model import Model
+from ...model.parameters import total_mass
+from ...motion.trajectory import Trajectory
+from ...simulation.controllers import TorqueTable
+from ...simulation.simulate import simulate
+from ..problem import PlanningProblem
+from .coordinates import Attitude, attitude
 from .transcription import Transcription
+
+PUSH_SAMPLES = 33  # of a random push
+PUSH_WAVES = 3  # sines that it sums
 
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """A motion at times of one's choice: t (K,) s -> blocks (K, size) in SI by name; its duration
-    in s.
-    """
+    """A motion of a duration (s): at times (K,), s, blocks (K, size) in SI by name."""
 
     duration: float
     at: Callable[[np.ndarray], dict[str, np.ndarray]]
 
 
-def passive(model, problem, coordinates, damping: float, duration: float, push=None) -> Motion:
-    """Return the motion whose tail only damps (Eq. 47), the paper's guess (Sect. 3.2), pushed by
-    torques (n, 2m).
+def passive(
+    model: Model, problem: PlanningProblem, damping: float, duration: float, push: np.ndarray
+) -> Motion:
+    """Return the motion whose tail only damps (Eq. 47), the paper's guess (Sect. 3.2), and a push.
+
+    push (n, 2m): torques, N m.
     """
-    from ...simulation.controllers import TorqueTable
-    from ...simulation.simulate import simulate
-
-    push = np.zeros((1, model.nv - 6)) if push is None else push
-    law = TorqueTable(np.linspace(0, duration, len(push)), push, max(damping, problem.damping))
+    times = np.linspace(0, duration, len(push))
+    law = TorqueTable(times, push, max(damping, problem.damping))
     flight = simulate(model, problem.q0, problem.v0, controller=law, t_span=duration)
-    return of_trajectory(model, flight, coordinates, problem.damping)
+    assert isinstance(flight, Trajectory)  # one start, one motion
+    return of_trajectory(model, flight, attitude(problem.attitude), problem.damping)
 
 
-def pushes(random: np.random.Generator, size: float, tail: int) -> np.ndarray:
+def pushes(random: np.random.Generator, size: float, model: Model) -> np.ndarray:
     """Return torques (33, 2m) of a few slow waves, of about a size (N m)."""
-    s = np.linspace(0, 1, 33)[:, None, None]
-    waves = np.sin(np.pi * s * np.arange(1, 4)[:, None] + random.uniform(0, 2 * np.pi, (3, tail)))
-    return size * (waves * random.normal(size=(3, tail))).sum(axis=1)
+    tail = model.layout.nt
+    s = np.linspace(0, 1, PUSH_SAMPLES)[:, None, None]
+    phases = random.uniform(0, 2 * np.pi, (PUSH_WAVES, tail))
+    waves = np.sin(np.pi * s * np.arange(1, PUSH_WAVES + 1)[:, None] + phases)
+    return size * (waves * random.normal(size=(PUSH_WAVES, tail))).sum(axis=1)
 
 
-def of_trajectory(model, flight, coordinates, damping: float = 0.0) -> Motion:
+def of_trajectory(
+    model: Model, flight: Trajectory, coordinates: Attitude, damping: float = 0.0
+) -> Motion:
     """Return the motion of a trajectory; what damping gives is taken off its torques."""
-    mass = model.parameters["torso_mass"] + model.parameters["tail_mass"]
-    drift = np.einsum(
-        "kji,kj->ki",
+    mass = total_mass(model.parameters)
+    R, velocity, tail_rate = (
         rotation_matrix(flight.attitude),
-        flight.v[:, :3] - flight.linear_momentum / mass,
+        flight.v[:, VELOCITY],
+        flight.v[:, TAIL_V],
     )
-    torque = flight.tau + damping * flight.v[:, 6:]
-    rows = {
-        "position": flight.q[:, :3],
+    samples = {
+        "position": flight.q[:, POSITION],
         "attitude": coordinates.coordinates(flight.q),
-        "tail": flight.q[:, 7:],
+        "tail": flight.q[:, TAIL_Q],
+        "velocity": velocity,
+        "torso_rate": flight.v[:, OMEGA],
+        "tail_rate": tail_rate,
+        "drift": np.einsum("kji,kj->ki", R, velocity - flight.linear_momentum / mass),
+        "torque": flight.tau + damping * tail_rate,
     }
-    rows |= {
-        "velocity": flight.v[:, :3],
-        "torso_rate": flight.v[:, 3:6],
-        "tail_rate": flight.v[:, 6:],
-    }
-    rows |= {"drift": drift, "torque": torque}
     t = flight.t - flight.t[0]
 
     def at(times: np.ndarray) -> dict[str, np.ndarray]:
-        return {name: _linear(t, values, times) for name, values in rows.items()}
+        return {name: _linear(t, values, times) for name, values in samples.items()}
 
     return Motion(t[-1], at)
 
@@ -73,16 +83,16 @@ def _linear(t: np.ndarray, values: np.ndarray, times: np.ndarray) -> np.ndarray:
     return np.column_stack([np.interp(times, t, column) for column in values.T])
 
 
-def unknowns(motion: Motion, program: Transcription, duration: float) -> np.ndarray:
-    """Return w: the motion, stretched to a duration, at the points of a mesh."""
-    form, where = program.form, program.places
-    blocks = motion.at(program.fractions * motion.duration)
-    w = np.zeros(where.size)
+def unknowns(motion: Motion, nlp: Transcription, duration: float) -> np.ndarray:
+    """Return w: the motion, stretched to a duration (s), at the points of a mesh."""
+    variables, indices = nlp.variables, nlp.indices
+    blocks = motion.at(nlp.fractions * motion.duration)
+    scaled = {name: blocks[name] / unit for name, unit in variables.units.items()}
+    states = [scaled[name] for name, _ in variables.states]
+    others = [scaled[name][indices.first :] for name, _ in (*variables.algebraic, ("torque", 0))]
+
+    w = np.zeros(indices.size)
     w[0] = duration
-    w[where.states] = np.column_stack([blocks[name] / form.units[name] for name, _ in form.states])
-    others = [
-        blocks[name][where.first :] / form.units[name]
-        for name in (*(n for n, _ in form.algebraic), "torque")
-    ]
-    w[where.others] = np.column_stack(others)
+    w[indices.states] = np.column_stack(states)
+    w[indices.others] = np.column_stack(others)
     return w

@@ -1,12 +1,10 @@
-"""Meshes: how many intervals, or errors of a solution on them, go in; where the intervals end comes
-out.
-"""
+"""How the duration is divided into intervals, and how these are split where a solution is wrong."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from .rules import Rule
+from .rules import CollocationRule
 
 MOST_PIECES = 4  # an interval is split into at a time
 
@@ -27,7 +25,7 @@ class Mesh:
         """Widths (N,) of the intervals."""
         return np.diff(self.ends)
 
-    def points(self, rule: Rule) -> np.ndarray:
+    def points(self, rule: CollocationRule) -> np.ndarray:
         """Points (N S + 1,) at which states are unknowns."""
         inside = self.ends[:-1, None] + self.widths[:, None] * rule.supports[1:-1]
         rows = np.column_stack([self.ends[:-1], inside])
@@ -48,18 +46,22 @@ def uniform(intervals: int) -> Mesh:
 
 
 def refined(mesh: Mesh, errors: np.ndarray, factor: float, order: int, most: int) -> Mesh:
-    """Return a mesh on which errors (N,) of the intervals should sum to `factor` of what they do,
-    at most `most` long.
+    """Return a mesh of at most `most` intervals whose errors should sum to `factor` of those (N,).
 
     Errors are spread evenly; one of an interval of width h falls like h^(order + 1).
     """
+    # how many pieces each interval needs for its part of the error
     order = min(order, 4)  # what an optimiser's controls leave of it
     target = max(factor * errors.sum(), 1e-300) / mesh.intervals
     wanted = np.ceil((errors / target) ** (1 / (order + 1)))
     pieces = np.clip(np.nan_to_num(wanted, nan=2, posinf=MOST_PIECES), 1, MOST_PIECES).astype(int)
+
+    # a mesh that would stay as it is gets finer where it is worst
     if pieces.sum() == mesh.intervals:
         pieces[np.argsort(errors)[-max(1, mesh.intervals // 4) :]] = 2
-    for k in np.argsort(errors):  # the least important ones wait
+
+    # if these are too many, the least important ones wait
+    for k in np.argsort(errors):
         if pieces.sum() <= most:
             break
         pieces[k] = 1

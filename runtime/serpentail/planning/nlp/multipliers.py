@@ -1,20 +1,20 @@
-"""Multipliers: those of a solved program go in; those of the same problem on another mesh come out.
+"""Multipliers of a solved program, carried to another mesh, so that the solver starts warm.
 
 Along the motion they are weights of the quadrature times functions of time, which are carried from
-mesh to mesh: the
-costate for the defects, others for what holds at every node and for bounds.  What the goal fixes
-adds to those of the
-last node what no weight has a part in: these are taken as they are.
+mesh to mesh: the costate for the defects, others for what holds at every node and for bounds.  What
+the goal fixes adds to those of the last node what no weight has a part in: these are taken as they
+are.
 """
 
 import numpy as np
 
 from .transcription import Transcription
 
+Multipliers = tuple[np.ndarray, np.ndarray]  # of the unknowns' bounds, and of the constraints
 
-def carried(multipliers: tuple[np.ndarray, np.ndarray], old: Transcription, new: Transcription):
-    """Return multipliers of the unknowns and of the constraints of `new`; None for other rules than
-    Radau's.
+
+def carried(multipliers: Multipliers, old: Transcription, new: Transcription) -> Multipliers | None:
+    """Return the multipliers of `new`; None for other rules than Radau's.
 
     Those of the attitude at the end stay; those of torque rates begin at zero.
     """
@@ -25,52 +25,54 @@ def carried(multipliers: tuple[np.ndarray, np.ndarray], old: Transcription, new:
 
 def _of_unknowns(lam: np.ndarray, old: Transcription, new: Transcription) -> np.ndarray:
     """Those of bounds: of the duration, of the start, and of all nodes."""
-    found, one, other = np.zeros(new.places.size), old.places, new.places
-    found[0], found[other.states[0]] = lam[0], lam[one.states[0]]
-    found[other.states[1:]] = _along(lam[one.states[1:]], old, new)
-    found[other.others] = _along(lam[one.others], old, new)
-    return found
+    carried, before, after = np.zeros(new.indices.size), old.indices, new.indices
+    carried[0], carried[after.states[0]] = lam[0], lam[before.states[0]]
+    carried[after.states[1:]] = _along(lam[before.states[1:]], old, new)
+    carried[after.others] = _along(lam[before.others], old, new)
+    return carried
 
 
 def _of_rows(lam: np.ndarray, old: Transcription, new: Transcription) -> np.ndarray:
-    """Those of defects, whose rows have the width of their interval in them, of what holds at
-    nodes, and the rest.
-    """
-    node, count, K = old.node, len(old.places.others), old.rule.steps
-    defects, held, rest = np.split(
-        lam, np.cumsum([count * node.rates, count * (node.residuals + node.path)])
-    )
-    costate = defects.reshape(count, -1) * np.repeat(old.mesh.widths, K)[:, None] / _weights(old)
-    defects = _between(costate, old, new) * _weights(new) / np.repeat(new.mesh.widths, K)[:, None]
-    held = _along(held.reshape(count, -1), old, new)
+    """Those of constraints: defects, what holds at nodes, and the rest."""
+    node, nodes, steps = old.node, len(old.indices.others), old.rule.steps
+    sizes = np.array([nodes * node.rates, nodes * (node.residuals + node.path)])
+    defects, held, rest = np.split(lam, np.cumsum(sizes))
+
+    # rows of defects have the width of their interval in them, the costate has not
+    before = np.repeat(old.mesh.widths, steps)[:, None]
+    after = np.repeat(new.mesh.widths, steps)[:, None]
+    costate = defects.reshape(nodes, -1) * before / _weights(old)
+    defects = _between(costate, old, new) * _weights(new) / after
+
+    held = _along(held.reshape(nodes, -1), old, new)
     left = new.rows - defects.size - held.size
-    return np.concatenate(
-        [defects.ravel(), held.ravel(), rest if len(rest) == left else np.zeros(left)]
-    )
+    rest = rest if len(rest) == left else np.zeros(left)
+    return np.concatenate([defects.ravel(), held.ravel(), rest])
 
 
 def _along(rows: np.ndarray, old: Transcription, new: Transcription) -> np.ndarray:
-    """Multipliers (N, c) of the nodes, as functions that are straight between them; those of the
-    last one stay.
-    """
-    values, (times, other) = (
-        rows / _weights(old),
-        (p.fractions[p.places.first :] for p in (old, new)),
-    )
-    columns = [np.interp(other, times[:-1], column) for column in values[:-1].T]
-    found = np.reshape(columns, (-1, len(other))).T * _weights(new)
-    found[-1] = rows[-1]
-    return found
+    """Multipliers (N, c) of the nodes, straight between them; those of the last node stay."""
+    before, after = _node_times(old), _node_times(new)
+    values = rows / _weights(old)
+    columns = [np.interp(after, before[:-1], column) for column in values[:-1].T]
+    carried = np.reshape(columns, (-1, len(after))).T * _weights(new)
+    carried[-1] = rows[-1]
+    return carried
 
 
 def _between(values: np.ndarray, old: Transcription, new: Transcription) -> np.ndarray:
     """Values (N, c) at the old nodes, at the new ones, by the polynomials of the old intervals."""
-    times, mesh, rule = new.fractions[new.places.first :], old.mesh, old.rule
+    times, mesh, rule = _node_times(new), old.mesh, old.rule
     k = np.clip(np.searchsorted(mesh.ends, times - 1e-12) - 1, 0, mesh.intervals - 1)
     basis = rule.basis((times - mesh.ends[k]) / mesh.widths[k])
     return np.einsum("nj,njc->nc", basis, values.reshape(mesh.intervals, rule.steps, -1)[k])
 
 
-def _weights(program: Transcription) -> np.ndarray:
+def _node_times(nlp: Transcription) -> np.ndarray:
+    """Times (N,) of the nodes as fractions of the duration."""
+    return nlp.fractions[nlp.indices.first :]
+
+
+def _weights(nlp: Transcription) -> np.ndarray:
     """Weights (N, 1) of the quadrature over the nodes."""
-    return np.outer(program.mesh.widths, program.rule.weights).reshape(-1, 1)
+    return np.outer(nlp.mesh.widths, nlp.rule.weights).reshape(-1, 1)

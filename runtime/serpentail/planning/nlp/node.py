@@ -1,18 +1,31 @@
-"""Formulations: a model's dynamics and a problem go in; a CasADi function of one node comes out."""
+"""One node of the nonlinear program: the equations of motion at one instant, in the plan's units.
 
+Every node of every mesh evaluates the same CasADi function, of which the program is then built.
+"""
+
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...errors import ModelError
-from .coordinates import Attitude
-from .node_calls import Call, NodeDerivatives, linear_call
+from ...model.layout import OMEGA, TAIL_V, VELOCITY
+from ...model.model import Model
+from ...model.parameters import total_mass
+from .coordinates import IDENTITY_POSE, Attitude, rotated
+from .node_calls import NodeCall, NodeDerivatives, linear_call
+
+if TYPE_CHECKING:
+    import casadi as ca
+
+    from ..problem import PlanningProblem
 
 # name -> blocks of the state, which has a rate, and of the algebraic unknowns, which a node's
 # equations determine
-FORMULATIONS = {
+FORMULATIONS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "airborne": (("attitude", "tail", "tail_rate"), ("drift", "torso_rate")),
     "translation-free": (("attitude", "tail", "torso_rate", "tail_rate"), ()),
     "full": (("position", "attitude", "tail", "velocity", "torso_rate", "tail_rate"), ()),
@@ -25,42 +38,40 @@ UNITS = {
     "velocity": 1.0,
     "torso_rate": 10.0,
     "tail_rate": 10.0,
+    "drift": 0.1,
 }
-UNITS |= {"drift": 0.1}
-SMOOTH = 1e-4  # W, below which |power| is rounded off
+SMALL_POWER = 1e-4  # W, below which |power| is rounded off
 
 
 @dataclass(frozen=True, eq=False)
-class Dynamics:
-    """Equations of motion as CasADi functions, and where they come from: "compiled" or
-    "symbolic".
-    """
+class Equations:
+    """Equations of motion as CasADi functions, and their source: "compiled" or "symbolic"."""
 
-    forward: object
-    inverse: object
-    more: tuple  # what they take after their usual inputs
+    forward: "ca.Function"
+    inverse: "ca.Function"
+    parameters: tuple  # what they take after their usual inputs
     source: str
 
 
-def dynamics(model, source: str = "auto") -> Dynamics:
-    """Return the compiled functions where the scene has their exact second derivatives, else the SX
-    ones.
-    """
+def equations_of_motion(model: Model, source: str = "auto") -> Equations:
+    """Return the compiled functions where the scene has their second derivatives, else SX ones."""
     names = ("forward_dynamics", "inverse_dynamics")
     if source != "symbolic":
         try:
-            compiled = [model.casadi.external(name, derivatives=2) for name in names]
-            return Dynamics(*compiled, (model.casadi.parameter_vector,), "compiled")
+            forward, inverse = (model.casadi.external(name, derivatives=2) for name in names)
+            return Equations(forward, inverse, (model.casadi.parameter_vector,), "compiled")
         except ModelError:
             if source == "compiled":
                 raise
-    return Dynamics(*(getattr(model.casadi, name) for name in names), (), "symbolic")
+    forward, inverse = (getattr(model.casadi, name) for name in names)
+    return Equations(forward, inverse, (), "symbolic")
 
 
 @dataclass(frozen=True, eq=False)
-class Layout:
-    """The unknowns of a node: names and sizes of the blocks of state, algebraic unknowns and
-    controls, with units.
+class Variables:
+    """The unknowns of a node: blocks (name, size) of states and algebraic unknowns; all units.
+
+    The units also have those of the torques, the node's controls.
     """
 
     states: tuple[tuple[str, int], ...]
@@ -69,43 +80,39 @@ class Layout:
 
     def sizes(self) -> tuple[int, int, int]:
         """Numbers of states, algebraic unknowns and controls."""
-        return (
-            sum(n for _, n in self.states),
-            sum(n for _, n in self.algebraic),
-            self.units["torque"].size,
-        )
+        states = sum(size for _, size in self.states)
+        algebraic = sum(size for _, size in self.algebraic)
+        return states, algebraic, self.units["torque"].size
 
-    def scale(self, blocks) -> np.ndarray:
+    def scale(self, blocks: Iterable[tuple[str, int]]) -> np.ndarray:
         """Units of the unknowns of some blocks, in a row."""
         return np.concatenate([np.zeros(0), *(self.units[name] for name, _ in blocks)])
 
 
-def layout(formulation: str, attitude: Attitude, tail: int, torque: np.ndarray) -> Layout:
-    """Return the layout of a formulation for 2m tail coordinates and the unit (2m,) of torques."""
+def variables_of(
+    formulation: str, attitude: Attitude, tail: int, torque_unit: np.ndarray
+) -> Variables:
+    """Return a formulation's variables for 2m tail coordinates and the unit (2m,) of torques."""
     sizes = {"attitude": attitude.size, "tail": tail, "tail_rate": tail}
     states, algebraic = (
-        [(name, sizes.get(name, 3)) for name in part] for part in FORMULATIONS[formulation]
+        tuple((name, sizes.get(name, 3)) for name in names) for names in FORMULATIONS[formulation]
     )
-    units = {name: np.full(size, UNITS[name]) for name, size in (*states, *algebraic)} | {
-        "torque": torque
-    }
-    return Layout(tuple(states), tuple(algebraic), units)
+    units = {name: np.full(size, UNITS[name]) for name, size in (*states, *algebraic)}
+    return Variables(states, algebraic, units | {"torque": torque_unit})
 
 
 @dataclass(frozen=True, eq=False)
 class Node:
-    """A node's function y(zeta, h, results of calls), calls of inputs linear in zeta, and the sizes
-    in y.
+    """A node's function y(zeta, h, results of calls), the calls, whose inputs are linear in zeta.
 
     zeta: [duration, states, algebraic unknowns, torques] in units.  h (3,): angular momentum about
-    the COM (kg m^2/s,
-    world), which the airborne formulation conserves.  y: duration * rates of the states, algebraic
-    residuals, path
-    constraints, duration * objective, all in units.
+    the COM (kg m^2/s, world), which the airborne formulation conserves.  y: duration * rates of the
+    states, algebraic residuals, path constraints, duration * objective, all in units; rates,
+    residuals and path are the numbers of them.
     """
 
-    function: object
-    calls: tuple[Call, ...]
+    function: "ca.Function"
+    calls: tuple[NodeCall, ...]
     rates: int
     residuals: int
     path: int
@@ -121,68 +128,85 @@ class Node:
         return self.rates + self.residuals + self.path + 1
 
 
-def node(model, problem, attitude: Attitude, form: Layout, equations: Dynamics) -> Node:
-    """Return the function of one node.
+def node_function(
+    model: Model,
+    problem: "PlanningProblem",
+    attitude: Attitude,
+    variables: Variables,
+    equations: Equations,
+) -> Node:
+    """Return the function of one node; its rates are those in Eqs. 41, 42.
 
     The dynamics is evaluated at the identity attitude: in body axes only gravity depends on the
     attitude.
     """
     import casadi as ca
 
-    nx, na, nu = form.sizes()
-    zeta, h = ca.SX.sym("zeta", 1 + nx + na + nu), ca.SX.sym("h", 3)
-    point = _point(zeta, form, attitude, nu)
-    calls = _calls(model, problem, point, zeta, equations)[: 2 if na else 1]
+    # symbols of the unknowns, and of what the calls give
+    states, algebraic, controls = variables.sizes()
+    zeta, h = ca.SX.sym("zeta", 1 + states + algebraic + controls), ca.SX.sym("h", 3)
+    point = _point(zeta, variables, attitude, controls)
+    calls = _calls(model, problem, point, zeta, equations)[: 2 if algebraic else 1]
     results = [ca.SX.sym("result", call.function.size1_out(0)) for call in calls]
-    rates = _rates(model, point, attitude, results[0])
-    parts = [
-        zeta[0] * ca.vertcat(*(rates[name] for name, _ in form.states)) / form.scale(form.states)
-    ]
-    parts.append(_momentum(model, point, h, results[1]) if na else ca.SX.zeros(0))
-    parts.append(
-        ca.vertcat(
-            ca.SX.zeros(0), *(ca.vec(ca.SX(function(point))) for function, _, _ in problem.path)
-        )
+
+    # the parts of y
+    duration, rates = zeta[0], _rates(model, point, attitude, results[0])
+    state_rates = ca.vertcat(*(rates[name] for name, _ in variables.states))
+    residuals = _momentum(model, point, h, results[1]) if algebraic else ca.SX.zeros(0)
+    constraints = [ca.vec(ca.SX(function(point))) for function, _, _ in problem.path]
+    path = ca.vertcat(ca.SX.zeros(0), *constraints)
+    y = ca.vertcat(
+        duration * state_rates / variables.scale(variables.states),
+        residuals,
+        path,
+        duration * cost(problem, point, variables.units["torque"]),
     )
-    parts.append(zeta[0] * cost(problem, point, form.units["torque"]))
-    function = ca.Function("node", [zeta, h, *results], [ca.vertcat(*parts)])
-    return Node(function, tuple(calls), nx, parts[1].size1(), parts[2].size1())
+    function = ca.Function("node", [zeta, h, *results], [y])
+    return Node(function, tuple(calls), states, residuals.size1(), path.size1())
 
 
-def _calls(model, problem, point, zeta, equations: Dynamics) -> list[Call]:
-    """Forward dynamics with the tail's damping, and H v of the motion relative to the COM, at the
-    identity attitude.
+def _calls(
+    model: Model,
+    problem: "PlanningProblem",
+    point: SimpleNamespace,
+    zeta: "ca.SX",
+    equations: Equations,
+) -> list[NodeCall]:
+    """Forward dynamics with the tail's damping, and H v of the motion relative to the COM.
 
     H v is inverse dynamics at rest with v_dot = v, gravity's H (g z, 0) taken off.
     """
     import casadi as ca
 
-    q = ca.vertcat(ca.DM([0, 0, 0, 1, 0, 0, 0]), point.tail)
+    more = equations.parameters
+    q = ca.vertcat(ca.DM(IDENTITY_POSE), point.tail)
     v = ca.vertcat(ca.DM.zeros(3), point.torso_rate, point.tail_rate)
     applied = point.torque - problem.damping * point.tail_rate
-    calls = [linear_call(equations.forward, zeta, [q, v, applied, *equations.more])]
+    calls = [linear_call(equations.forward, zeta, [q, v, applied, *more])]
     if hasattr(point, "drift"):
         gravity = ca.DM([0, 0, model.parameters["gravity"]])
         motion = ca.vertcat(point.drift - gravity, point.torso_rate, point.tail_rate)
-        calls.append(
-            linear_call(
-                equations.inverse, zeta, [q, ca.DM.zeros(model.nv), motion, *equations.more]
-            )
-        )
+        rest = ca.DM.zeros(model.nv)
+        calls.append(linear_call(equations.inverse, zeta, [q, rest, motion, *more]))
     return calls
 
 
-def _point(zeta, form: Layout, attitude: Attitude, nu: int) -> SimpleNamespace:
+def _point(
+    zeta: "ca.SX", variables: Variables, attitude: Attitude, controls: int
+) -> SimpleNamespace:
     """Return the blocks of a node in SI units, which objectives and path constraints see."""
-    blocks, start = {}, 1
-    for name, size in (*form.states, *form.algebraic, ("torque", nu)):
-        blocks[name] = form.units[name] * zeta[start : start + size]
+    blocks: dict[str, Any] = {}
+    start = 1
+    for name, size in (*variables.states, *variables.algebraic, ("torque", controls)):
+        blocks[name] = variables.units[name] * zeta[start : start + size]
         start += size
     blocks["quaternion"] = attitude.quaternion(blocks["attitude"])
     return SimpleNamespace(**blocks)
 
 
-def _rates(model, point, attitude: Attitude, v_dot) -> dict:
+def _rates(
+    model: Model, point: SimpleNamespace, attitude: Attitude, v_dot: "ca.SX"
+) -> dict[str, Any]:
     """Return the rates of state blocks; p_ddot = R (p_ddot(identity) + g z) - g z."""
     import casadi as ca
 
@@ -191,50 +215,38 @@ def _rates(model, point, attitude: Attitude, v_dot) -> dict:
         "position": getattr(point, "velocity", None),
         "attitude": attitude.rate(point.attitude, point.torso_rate),
         "tail": point.tail_rate,
-        "velocity": turned(point.quaternion, v_dot[:3] + gravity) - gravity,
-        "torso_rate": v_dot[3:6],
-        "tail_rate": v_dot[6:],
+        "velocity": rotated(point.quaternion, v_dot[VELOCITY] + gravity) - gravity,
+        "torso_rate": v_dot[OMEGA],
+        "tail_rate": v_dot[TAIL_V],
     }
 
 
-def _momentum(model, point, h, found):
-    """Momentum H v of the motion relative to the COM less (0, R^T h), in units: where it is zero,
-    omega carries h.
+def _momentum(model: Model, point: SimpleNamespace, h: "ca.SX", momentum: "ca.SX") -> "ca.SX":
+    """H v of the motion relative to the COM less (0, R^T h), in units: zero where omega carries h.
 
     Where the linear momentum is zero, the angular momentum about B is that about the COM.
     """
     import casadi as ca
 
-    mass = model.parameters["torso_mass"] + model.parameters["tail_mass"]
+    mass = total_mass(model.parameters)
     inertia = float(np.mean(model.parameters["torso_inertia"]))
-    body = turned(point.quaternion, h, -1)
+    angular = momentum[OMEGA] - rotated(point.quaternion, h, -1)
     return ca.vertcat(
-        found[:3] / (mass * UNITS["drift"]), (found[3:6] - body) / (inertia * UNITS["torso_rate"])
+        momentum[VELOCITY] / (mass * UNITS["drift"]), angular / (inertia * UNITS["torso_rate"])
     )
 
 
-def turned(quaternion, x, sense: int = 1):
-    """R x, or R^T x for the sense -1, of a quaternion of any norm but zero."""
+def cost(problem: "PlanningProblem", point: SimpleNamespace, torque_unit: np.ndarray) -> "ca.SX":
+    """Return the objective's integrand (Eq. 40; CasADi), in units of the torques."""
     import casadi as ca
 
-    w, u = sense * quaternion[0], quaternion[1:]
-    return ((w**2 - ca.dot(u, u)) * x + 2 * ca.dot(u, x) * u + 2 * w * ca.cross(u, x)) / ca.sumsqr(
-        quaternion
-    )
-
-
-def cost(problem, point, unit: np.ndarray):
-    """Return the objective's integrand (CasADi), in units of the torques."""
-    import casadi as ca
-
+    unit = torque_unit.mean()
     if callable(problem.objective):
         return problem.objective(point)
     if problem.objective == "effort":
-        return (
-            ca.sumsqr(point.torque) + problem.smoothing**2 * ca.sumsqr(point.tail_rate)
-        ) / unit.mean() ** 2
+        rates = problem.smoothing**2 * ca.sumsqr(point.tail_rate)
+        return (ca.sumsqr(point.torque) + rates) / unit**2
     if problem.objective == "energy":
-        return ca.sum1(ca.sqrt((point.torque * point.tail_rate) ** 2 + SMOOTH**2) - SMOOTH) / (
-            unit.mean() * 10
-        )
+        power = point.torque * point.tail_rate
+        return ca.sum1(ca.sqrt(power**2 + SMALL_POWER**2) - SMALL_POWER) / (unit * 10)
     return ca.SX(0)

@@ -1,21 +1,28 @@
-"""Calls: functions inside a node's function go in; values and exact derivatives at all nodes come
-out.
+"""The calls of compiled dynamics inside a node's function, with their exact derivatives.
 
-A node's function is y(zeta, h, e), e being results of calls e = c(L zeta + l).  With E = c' L, its
-Jacobian is y_zeta + y_e E, and the Hessian of mu^T y is [I; E]^T (mu^T y)'' [I; E] + L^T (nu^T c)''
-L with nu = y_e^T mu.
+CasADi cannot look into compiled C, so that the chain rule through a call is written out here.  A
+node's function is y(zeta, h, e), e being results of calls e = c(L zeta + l).  With E = c' L, its
+Jacobian is y_zeta + y_e E, and the Hessian of mu^T y is
+[I; E]^T (mu^T y)'' [I; E] + L^T (nu^T c)'' L with nu = y_e^T mu.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import chain
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import casadi as ca
+
+    from .node import Node
 
 
 @dataclass(frozen=True, eq=False)
-class Call:
+class NodeCall:
     """A CasADi function of one output, and its inputs as (matrix, offset) of zeta."""
 
-    function: object
-    inputs: tuple
+    function: "ca.Function"
+    inputs: "tuple[tuple[ca.DM, ca.DM], ...]"
 
     @property
     def moving(self) -> list[int]:
@@ -23,41 +30,40 @@ class Call:
         return [k for k, (matrix, _) in enumerate(self.inputs) if matrix.nnz()]
 
 
-def linear_call(function, zeta, arguments) -> Call:
-    """Return the call of arguments (SX) that are linear in zeta."""
+def linear_call(function: "ca.Function", zeta: "ca.SX", arguments: Iterable[Any]) -> NodeCall:
+    """Return the call of arguments (SX, DM) that are linear in zeta."""
     import casadi as ca
 
     inputs = []
     for argument in map(ca.SX, arguments):
-        matrix = ca.jacobian(argument, zeta)
-        parts = ca.Function("parts", [zeta], [matrix, argument])
+        parts = ca.Function("parts", [zeta], [ca.jacobian(argument, zeta), argument])
         matrix, offset = parts(0)
         inputs.append((ca.sparsify(matrix), offset))
-    return Call(function, tuple(inputs))
+    return NodeCall(function, tuple(inputs))
 
 
 class NodeDerivatives:
-    """A node's function and its exact derivatives as CasADi functions of zeta, h and what its calls
-    give.
-    """
+    """Exact derivatives of a node's function, as functions of zeta, h and what its calls give."""
 
-    def __init__(self, node):
+    def __init__(self, node: "Node"):
         import casadi as ca
 
         self.node, self.calls, self.function = node, node.calls, node.function
+
+        # symbols of the inputs, and y
         self.zeta, self.h, *self.results = node.function.sx_in()
         self.y = node.function.call([self.zeta, self.h, *self.results])[0]
+
+        # derivatives of the calls, of the objective, which is the last of y, and of all y
         self.jacobians_of_calls = [call.function.jacobian() for call in node.calls]
         self.hessians_of_calls = [call.function.reverse(1).jacobian() for call in node.calls]
         self.cost = ca.Function("cost", [self.zeta, self.h], [self.y[-1]])
         self.slope = ca.Function("slope", [self.zeta, self.h], [ca.jacobian(self.y[-1], self.zeta)])
-        self.jacobian, self.weights, self.hessian = (
-            self._jacobian(),
-            self._weights(),
-            self._hessian(),
-        )
+        self.jacobian = self._jacobian()
+        self.weights = self._weights()
+        self.hessian = self._hessian()
 
-    def _blocks(self):
+    def _blocks(self) -> "list[list[ca.SX]]":
         """Symbols of the calls' Jacobians by their moving inputs."""
         import casadi as ca
 
@@ -66,7 +72,7 @@ class NodeDerivatives:
             for call, jacobian in zip(self.calls, self.jacobians_of_calls, strict=True)
         ]
 
-    def _by_zeta(self, blocks):
+    def _by_zeta(self, blocks: "list[list[ca.SX]]") -> "ca.SX":
         """E: derivatives of all results by zeta."""
         import casadi as ca
 
@@ -79,17 +85,19 @@ class NodeDerivatives:
             rows.append(sum(terms[1:], terms[0]))
         return ca.vertcat(*rows)
 
-    def _jacobian(self):
+    def _jacobian(self) -> "ca.Function":
+        """y_zeta + y_e E."""
         import casadi as ca
 
         blocks = self._blocks()
-        direct, through = ca.jacobian(self.y, self.zeta), _jacobian_of_parts(self.y, self.results)
+        direct = ca.jacobian(self.y, self.zeta)
+        through = ca.horzcat(*(ca.jacobian(self.y, result) for result in self.results))
         total = direct + ca.mtimes(through, self._by_zeta(blocks))
         return ca.Function(
             "jacobian", [self.zeta, self.h, *self.results, *chain.from_iterable(blocks)], [total]
         )
 
-    def _weights(self):
+    def _weights(self) -> "ca.Function":
         """nu of every call."""
         import casadi as ca
 
@@ -101,32 +109,35 @@ class NodeDerivatives:
             [ca.gradient(total, r) for r in self.results],
         )
 
-    def _hessian(self):
+    def _hessian(self) -> "ca.Function":
+        """The Hessian of mu^T y by zeta."""
         import casadi as ca
 
+        # [I; E]^T (mu^T y)'' [I; E]
         mu, blocks = ca.SX.sym("mu", self.node.size), self._blocks()
         everything = ca.vertcat(self.zeta, *self.results)
         inner = ca.hessian(ca.dot(mu, self.y), everything)[0]
         rows = ca.vertcat(ca.SX.eye(self.zeta.size1()), self._by_zeta(blocks))
         total = ca.mtimes([rows.T, inner, rows])
-        seconds = []
+
+        # L^T (nu^T c)'' L of every call
+        seconds: list[ca.SX] = []
         for call, hessian in zip(self.calls, self.hessians_of_calls, strict=True):
             for i, j, place in _pairs(call):
                 seconds.append(ca.SX.sym("S", hessian.sparsity_out(place)))
                 total += ca.mtimes([call.inputs[i][0].T, seconds[-1], call.inputs[j][0]])
+
         symbols = [self.zeta, self.h, *self.results, mu, *chain.from_iterable(blocks), *seconds]
         return ca.Function("hessian", symbols, [total])
 
 
 class MappedNode:
-    """A node's function at all of `count` nodes: unknowns Z (n, count) and h (3) go in, rows of
-    values come out.
-    """
+    """A node's function at all of `count` nodes, of their unknowns Z (n, count) and of h (3)."""
 
-    def __init__(self, one: NodeDerivatives, count: int):
-        self.one, self.count = one, count
+    def __init__(self, node: NodeDerivatives, count: int):
+        self.node, self.count = node, count
 
-    def _inputs(self, call: Call, Z):
+    def _inputs(self, call: NodeCall, Z: "ca.MX") -> "list[ca.MX]":
         import casadi as ca
 
         return [
@@ -134,78 +145,76 @@ class MappedNode:
             for matrix, offset in call.inputs
         ]
 
-    def _first(self, Z):
+    def _first(self, Z: "ca.MX") -> "tuple[list[ca.MX], list[ca.MX]]":
         """Results of all calls, and their Jacobians by the moving inputs."""
         results, blocks = [], []
-        for call, jacobian in zip(self.one.calls, self.one.jacobians_of_calls, strict=True):
+        for call, jacobian in zip(self.node.calls, self.node.jacobians_of_calls, strict=True):
             inputs = self._inputs(call, Z)
             results.append(call.function.map(self.count)(*inputs))
-            found = jacobian.map(self.count).call([*inputs, results[-1]])
-            blocks += [found[k] for k in call.moving]
+            outputs = jacobian.map(self.count).call([*inputs, results[-1]])
+            blocks += [outputs[k] for k in call.moving]
         return results, blocks
 
-    def _repeated(self, h):
+    def _repeated(self, h: "ca.MX") -> "ca.MX":
         import casadi as ca
 
         return ca.repmat(h, 1, self.count)
 
-    def values(self, Z, h):
+    def values(self, Z: "ca.MX", h: "ca.MX") -> "ca.MX":
         """Y (size, count)."""
-        results = [call.function.map(self.count)(*self._inputs(call, Z)) for call in self.one.calls]
-        return self.one.function.map(self.count)(Z, self._repeated(h), *results)
+        results = [
+            call.function.map(self.count)(*self._inputs(call, Z)) for call in self.node.calls
+        ]
+        return self.node.function.map(self.count)(Z, self._repeated(h), *results)
 
-    def costs(self, Z, h):
+    def costs(self, Z: "ca.MX", h: "ca.MX") -> "ca.MX":
         """The last row of Y."""
-        return self.one.cost.map(self.count)(Z, self._repeated(h))
+        return self.node.cost.map(self.count)(Z, self._repeated(h))
 
-    def slopes(self, Z, h):
+    def slopes(self, Z: "ca.MX", h: "ca.MX") -> "ca.MX":
         """Entries of the costs' gradients, node after node."""
-        return _entries(self.one.slope.map(self.count)(Z, self._repeated(h)))
+        return _entries(self.node.slope.map(self.count)(Z, self._repeated(h)))
 
-    def jacobians(self, Z, h):
+    def jacobians(self, Z: "ca.MX", h: "ca.MX") -> "ca.MX":
         """Entries of the Jacobians, node after node."""
         results, blocks = self._first(Z)
-        return _entries(self.one.jacobian.map(self.count)(Z, self._repeated(h), *results, *blocks))
+        return _entries(self.node.jacobian.map(self.count)(Z, self._repeated(h), *results, *blocks))
 
-    def hessians(self, Z, h, mu):
+    def hessians(self, Z: "ca.MX", h: "ca.MX", mu: "ca.MX") -> "ca.MX":
         """Entries of the Hessians of mu^T y, node after node; mu (size, count)."""
         import casadi as ca
 
+        # results and Jacobians of the calls, and the weights nu of their second derivatives
         results, blocks = self._first(Z)
-        nus = self.one.weights.map(self.count).call([Z, self._repeated(h), *results, mu])
-        seconds = []
+        nus = self.node.weights.map(self.count).call([Z, self._repeated(h), *results, mu])
+
+        # second derivatives of the calls; of the adjoint's inputs the last ones do not matter
+        seconds: list[ca.MX] = []
         for call, hessian, result, nu in zip(
-            self.one.calls, self.one.hessians_of_calls, results, nus, strict=True
+            self.node.calls, self.node.hessians_of_calls, results, nus, strict=True
         ):
             unused = [
                 ca.MX(hessian.size1_in(k), self.count)
                 for k in range(len(call.inputs) + 2, hessian.n_in())
             ]
-            found = hessian.map(self.count).call([*self._inputs(call, Z), result, nu, *unused])
-            seconds += [found[place] for _, _, place in _pairs(call)]
+            outputs = hessian.map(self.count).call([*self._inputs(call, Z), result, nu, *unused])
+            seconds += [outputs[place] for _, _, place in _pairs(call)]
         return _entries(
-            self.one.hessian.map(self.count)(Z, self._repeated(h), *results, mu, *blocks, *seconds)
+            self.node.hessian.map(self.count)(Z, self._repeated(h), *results, mu, *blocks, *seconds)
         )
 
 
-def _pairs(call: Call) -> list[tuple[int, int, int]]:
-    """Moving inputs i, j and the output of the adjoint's Jacobian that has their second
-    derivatives.
+def _pairs(call: NodeCall) -> list[tuple[int, int, int]]:
+    """Moving inputs i, j, and which output of the adjoint's Jacobian has the derivative by both.
 
-    The adjoint's outputs are those by input 0, 1, ..; its inputs the call's, its result and the
-    weights of that.
+    The adjoint's outputs are those by input 0, 1, ..; its inputs are the call's inputs, its result
+    and the weights of that.
     """
     count = len(call.inputs) + 2
     return [(i, j, i * count + j) for i in call.moving for j in call.moving]
 
 
-def _jacobian_of_parts(y, parts):
-    import casadi as ca
-
-    return ca.horzcat(*(ca.jacobian(y, part) for part in parts))
-
-
-def _entries(matrix):
+def _entries(matrix: "ca.MX") -> "ca.MX":
     """Entries of a sparse matrix in a column."""
     import casadi as ca
 

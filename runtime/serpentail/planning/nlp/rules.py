@@ -1,24 +1,23 @@
-"""Collocation rules: a name and a degree go in; nodes and weights of one interval come out."""
+"""Collocation rules: where the equations hold in an interval, and how states are integrated."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 from numpy.polynomial import Legendre, Polynomial
+from numpy.typing import ArrayLike
 
 from ...errors import PlanningError
 
-FAMILIES = {
-    "trapezoidal": 1,
-    "hermite-simpson": 2,
-    "lobatto": 3,
-    "radau": 3,
-}  # name -> default degree
+# name -> default degree
+FAMILIES = {"trapezoidal": 1, "hermite-simpson": 2, "lobatto": 3, "radau": 3}
+FIXED = ("trapezoidal", "hermite-simpson")  # those that have no other degree
 MOST_DEGREE = 5
 
 
 @dataclass(frozen=True, eq=False)
-class Rule:
+class CollocationRule:
     """One interval [0, 1] of a collocation Runge-Kutta method (Radau IIA, Lobatto IIIA).
 
     nodes (K,): where the equations hold; supports (S + 1,): where the states are unknowns, 0 first.
@@ -44,7 +43,7 @@ class Rule:
         """Order of the state's error at the ends of intervals."""
         return 2 * self.degree - 1 if self.name == "radau" else 2 * self.degree
 
-    def basis(self, s) -> np.ndarray:
+    def basis(self, s: ArrayLike) -> np.ndarray:
         """Lagrange polynomials of the nodes (..., K) at s (...) in [0, 1]."""
         return _at(_lagrange(tuple(self.nodes)), s)
 
@@ -52,12 +51,12 @@ class Rule:
         """Coefficients of these, (K, degree + 1), of the powers of s, constants first."""
         return np.array([polynomial.coef for polynomial in _lagrange(tuple(self.nodes))])
 
-    def integrals(self, s) -> np.ndarray:
+    def integrals(self, s: ArrayLike) -> np.ndarray:
         """Integrals of these from 0 to s (..., K)."""
-        return _at([polynomial.integ() for polynomial in _lagrange(tuple(self.nodes))], s)
+        return _integrals(self.nodes, s)
 
 
-def rule(name: str, degree: int | None = None) -> Rule:
+def collocation_rule(name: str, degree: int | None = None) -> CollocationRule:
     """Return a rule; PlanningError where the name is unknown or the degree none that it has.
 
     "trapezoidal" (the paper's, Eqs. 41, 42), "hermite-simpson" (Lobatto of degree 2), "lobatto"
@@ -65,13 +64,12 @@ def rule(name: str, degree: int | None = None) -> Rule:
     """
     if name not in FAMILIES:
         raise PlanningError(f"rule: value {name!r}: needs {' or '.join(map(repr, FAMILIES))}")
-    fixed = name in ("trapezoidal", "hermite-simpson")
     degree = FAMILIES[name] if degree is None else degree
     if isinstance(degree, bool) or not isinstance(degree, int) or not 1 <= degree <= MOST_DEGREE:
         raise PlanningError(
             f"degree: value {degree!r}: needs a whole number from 1 to {MOST_DEGREE}"
         )
-    if fixed and degree != FAMILIES[name]:
+    if name in FIXED and degree != FAMILIES[name]:
         raise PlanningError(
             f"degree: value {degree!r}: {name} has {FAMILIES[name]}; leave it out, or use 'radau'"
         )
@@ -79,28 +77,28 @@ def rule(name: str, degree: int | None = None) -> Rule:
 
 
 @cache
-def _rule(name: str, degree: int) -> Rule:
+def _rule(name: str, degree: int) -> CollocationRule:
     return _radau(name, degree) if name == "radau" else _lobatto(name, degree)
 
 
-def _radau(name: str, degree: int) -> Rule:
-    """Radau IIA in derivative form: A^-1 (X - X_0) = h F, so that each rate is in one equation
-    only.
-    """
+def _radau(name: str, degree: int) -> CollocationRule:
+    """Radau IIA in derivative form, A^-1 (X - X_0) = h F: each rate is in one equation only."""
     nodes = _roots(Legendre.basis(degree) - Legendre.basis(degree - 1))
     A = _integrals(nodes, nodes)
     inverse = np.linalg.inv(A)
     states = np.column_stack([-inverse.sum(axis=1), inverse])
-    return Rule(name, degree, nodes, np.concatenate([[0.0], nodes]), states, np.eye(degree), A[-1])
+    return CollocationRule(
+        name, degree, nodes, np.concatenate([[0.0], nodes]), states, np.eye(degree), A[-1]
+    )
 
 
-def _lobatto(name: str, degree: int) -> Rule:
+def _lobatto(name: str, degree: int) -> CollocationRule:
     """Lobatto IIIA in integral form: X - X_0 = h A F."""
     inner = _roots(Legendre.basis(degree).deriv()) if degree > 1 else np.zeros(0)
     nodes = np.concatenate([[0.0], inner, [1.0]])
     A = _integrals(nodes, nodes)
     states = np.column_stack([-np.ones(degree), np.eye(degree)])
-    return Rule(name, degree, nodes, nodes, states, A[1:], A[-1])
+    return CollocationRule(name, degree, nodes, nodes, states, A[1:], A[-1])
 
 
 def _roots(series: Legendre) -> np.ndarray:
@@ -114,18 +112,19 @@ def _roots(series: Legendre) -> np.ndarray:
 @cache
 def _lagrange(nodes: tuple[float, ...]) -> tuple[Polynomial, ...]:
     """Lagrange polynomials of the nodes."""
-    found = []
+    polynomials = []
     for k, node in enumerate(nodes):
         others = [other for j, other in enumerate(nodes) if j != k]
         basis = Polynomial.fromroots(others) if others else Polynomial([1.0])
-        found.append(basis / np.prod([node - other for other in others]))
-    return tuple(found)
+        polynomials.append(basis / np.prod([node - other for other in others]))
+    return tuple(polynomials)
 
 
-def _integrals(nodes: np.ndarray, s: np.ndarray) -> np.ndarray:
+def _integrals(nodes: np.ndarray, s: ArrayLike) -> np.ndarray:
+    """Integrals of the nodes' Lagrange polynomials from 0 to s (..., K)."""
     return _at([polynomial.integ() for polynomial in _lagrange(tuple(nodes))], s)
 
 
-def _at(polynomials, s) -> np.ndarray:
+def _at(polynomials: Sequence[Polynomial], s: ArrayLike) -> np.ndarray:
     """Values (..., K) of polynomials at s (...)."""
     return np.stack([polynomial(np.asarray(s, float)) for polynomial in polynomials], axis=-1)

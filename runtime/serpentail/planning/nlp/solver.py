@@ -1,56 +1,65 @@
-"""Solvers: a program, limits and a guess go in; the unknowns that CasADi's nlpsol finds come
-out.
-"""
+"""Solving a nonlinear program by CasADi's ``nlpsol``, as a rule with IPOPT."""
 
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...errors import PlanningError
 from .blas_threads import one_thread
 from .bounds import Limits
-from .cache import kept
-from .interrupt import asked
+from .cache import memoised
+from .interrupt import stop_reason
+from .multipliers import Multipliers
 from .transcription import Transcription
 
-IPOPT = {
+if TYPE_CHECKING:
+    import casadi as ca
+
+IPOPT_OPTIONS: dict[str, Any] = {
     "ipopt.print_level": 0,
     "ipopt.sb": "yes",
     "ipopt.max_iter": 300,
     "ipopt.nlp_scaling_method": "none",
-}
-IPOPT |= {"ipopt.mu_strategy": "adaptive"}  # half the iterations
-IPOPT |= {
+    # half the iterations
+    "ipopt.mu_strategy": "adaptive",
+    # a tenth of the usual: a quarter fewer iterations
     "ipopt.bound_push": 1e-3,
     "ipopt.bound_frac": 1e-3,
-}  # a tenth of the usual: a quarter fewer iterations
-IPOPT |= {
-    "ipopt.watchdog_shortened_iter_trigger": 0
-}  # else multipliers may grow without bound, and steps shrink
-IPOPT |= {
+    # else multipliers may grow without bound, and steps shrink
+    "ipopt.watchdog_shortened_iter_trigger": 0,
+    # else pivots are delayed: up to 20 times slower
     "ipopt.mumps_pivtol": 1e-8,
     "ipopt.mumps_pivtolmax": 1e-6,
-}  # else pivots are delayed: up to 20 times slower
-CLOSE = {"ipopt.mu_strategy": "monotone", "ipopt.mu_init": 1e-5}  # to a solution
-CLOSE |= {"ipopt.bound_push": 1e-6, "ipopt.bound_frac": 1e-6}
-SAME = CLOSE | {"ipopt.mu_init": 1e-7, "ipopt.warm_start_init_point": "yes"}  # with its multipliers
-SAME |= {
-    f"ipopt.warm_start_{part}": 1e-8 for part in ("bound_push", "bound_frac", "mult_bound_push")
 }
-NEARNESS = {"far": {}, "close": CLOSE, "same": SAME}
-EXACT = ("grad_f", "jac_g", "hess_lag")
+# for guesses that are close to a solution
+CLOSE_OPTIONS: dict[str, Any] = {
+    "ipopt.mu_strategy": "monotone",
+    "ipopt.mu_init": 1e-5,
+    "ipopt.bound_push": 1e-6,
+    "ipopt.bound_frac": 1e-6,
+}
+# for guesses that come with multipliers
+WARM_OPTIONS: dict[str, Any] = CLOSE_OPTIONS | {
+    "ipopt.mu_init": 1e-7,
+    "ipopt.warm_start_init_point": "yes",
+    "ipopt.warm_start_bound_push": 1e-8,
+    "ipopt.warm_start_bound_frac": 1e-8,
+    "ipopt.warm_start_mult_bound_push": 1e-8,
+}
+GUESS_OPTIONS = {"far": {}, "close": CLOSE_OPTIONS, "warm": WARM_OPTIONS}
+DERIVATIVES = ("grad_f", "jac_g", "hess_lag")  # which a transcription brings
 
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """What a solver found: unknowns and multipliers, whether it says that they solve the problem,
-    and its cost.
-    """
+    """What a solver found: unknowns and multipliers, whether it calls them solved, and the cost."""
 
     w: np.ndarray
-    multipliers: tuple[np.ndarray, np.ndarray]
+    multipliers: Multipliers
     value: float
     success: bool
     status: str
@@ -59,10 +68,14 @@ class Solution:
 
 
 def solver(
-    program: Transcription, name: str = "ipopt", options: dict | None = None, near: str = "far"
-):
-    """Return CasADi's solver of a program; PlanningError where there is none of that name, or an
-    option is unknown.
+    nlp: Transcription,
+    name: str = "ipopt",
+    options: Mapping[str, Any] | None = None,
+    guess: str = "far",
+) -> "ca.Function":
+    """Return CasADi's solver of a program, for a guess that is "far", "close" or "warm".
+
+    PlanningError where there is no solver of that name, or an option is unknown.
     """
     import casadi as ca
 
@@ -70,38 +83,33 @@ def solver(
         raise PlanningError(
             f"solver: value {name!r}: CasADi has no such solver here; 'ipopt' comes with it"
         )
-    given = {"print_time": False, "error_on_fail": False}
+    settings: dict[str, Any] = {"print_time": False, "error_on_fail": False}
     if name == "ipopt":
-        given |= IPOPT | NEARNESS[near]
-    given |= options or {}
+        settings |= IPOPT_OPTIONS | GUESS_OPTIONS[guess]
+    settings |= options or {}
+    key = (nlp.indices, name, repr(sorted(settings.items())))
     try:
-        return kept(
-            (program.places, name, repr(sorted(given.items()))),
-            partial(_engine, program, name, given),
-        )
+        return memoised(key, partial(_engine, nlp, name, settings))
     except RuntimeError as error:
         raise PlanningError(
             f"options: value {options!r}: {name} refuses them: {_reason(error)}"
         ) from error
 
 
-def _engine(program: Transcription, name: str, options: dict):
+def _engine(nlp: Transcription, name: str, options: dict[str, Any]) -> "ca.Function":
     import casadi as ca
 
+    program = nlp.functions["nlp"]
     if name != "ipopt":
-        return ca.nlpsol("plan", name, program.program["nlp"], options)
-    exact, watch = (
-        {key: program.program[key] for key in EXACT},
-        _watch(program.places.size, program.rows),
-    )
-    engine = ca.nlpsol(
-        "plan", name, program.program["nlp"], exact | {"iteration_callback": watch} | options
-    )
-    engine.watch = watch  # CasADi keeps no callback alive
+        return ca.nlpsol("plan", name, program, options)
+    watch = _watch(nlp.indices.size, nlp.rows)
+    exact = {key: nlp.functions[key] for key in DERIVATIVES}
+    engine = ca.nlpsol("plan", name, program, exact | {"iteration_callback": watch} | options)
+    vars(engine)["watch"] = watch  # CasADi keeps no callback alive
     return engine
 
 
-def _watch(unknowns: int, rows: int):
+def _watch(unknowns: int, rows: int) -> "ca.Callback":
     """A callback of every iteration, through which Ctrl-C or a time limit ends the search."""
     import casadi as ca
 
@@ -116,28 +124,38 @@ def _watch(unknowns: int, rows: int):
             sizes = {"f": 1, "x": unknowns, "lam_x": unknowns, "g": rows, "lam_g": rows, "lam_p": 3}
             return ca.Sparsity.dense(sizes[ca.nlpsol_out(k)], 1)
 
-        def eval(self, _found):
-            return [int(asked() is not None)]
+        def eval(self, _iterate):
+            return [int(stop_reason() is not None)]
 
     watch = Watch()
     watch.construct("watch", {})
     return watch
 
 
-def solve(engine, limits: Limits, w: np.ndarray, h: np.ndarray, multipliers=None) -> Solution:
+def solve(
+    engine: "ca.Function",
+    limits: Limits,
+    w: np.ndarray,
+    h: np.ndarray,
+    multipliers: Multipliers | None = None,
+) -> Solution:
     """Run a solver from the unknowns w (and multipliers of a like problem); h: angular momentum."""
-    more = {} if multipliers is None else {"lam_x0": multipliers[0], "lam_g0": multipliers[1]}
+    arguments = vars(limits) | {"x0": np.clip(w, limits.lbx, limits.ubx), "p": h}
+    if multipliers is not None:
+        arguments |= {"lam_x0": multipliers[0], "lam_g0": multipliers[1]}
     begun = time.process_time()
-    bounds = {"lbx": limits.lower, "ubx": limits.upper, "lbg": limits.least, "ubg": limits.most}
     with one_thread():
-        found = engine(x0=np.clip(w, limits.lower, limits.upper), p=h, **bounds, **more)
+        results = engine(**arguments)
     spent, stats = time.process_time() - begun, engine.stats()
-    x, lam_x, lam_g = (np.array(found[key]).ravel() for key in ("x", "lam_x", "lam_g"))
-    finite = bool(np.isfinite(x).all())
-    status = str(stats.get("return_status", "unknown"))
-    good = bool(stats.get("success", False)) and finite
+    x, lam_x, lam_g = (np.array(results[key]).ravel() for key in ("x", "lam_x", "lam_g"))
     return Solution(
-        x, (lam_x, lam_g), float(found["f"]), good, status, int(stats.get("iter_count", -1)), spent
+        w=x,
+        multipliers=(lam_x, lam_g),
+        value=float(results["f"]),
+        success=bool(stats.get("success", False)) and bool(np.isfinite(x).all()),
+        status=str(stats.get("return_status", "unknown")),
+        iterations=int(stats.get("iter_count", -1)),
+        cpu_s=spent,
     )
 
 

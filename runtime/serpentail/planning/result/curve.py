@@ -1,10 +1,10 @@
-"""Curves: unknowns of a solved program go in; the motion that they mean, at any time, comes out."""
+"""The motion that the unknowns of a solved program mean, at any time."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..nlp.rules import Rule
+from ..nlp.rules import CollocationRule
 from ..nlp.transcription import Transcription
 
 
@@ -18,7 +18,7 @@ class Curve:
     """
 
     ends: np.ndarray
-    rule: Rule
+    rule: CollocationRule
     starts: dict[str, np.ndarray]
     increments: dict[str, np.ndarray]
     nodes: dict[str, np.ndarray]
@@ -29,15 +29,11 @@ class Curve:
         return float(self.ends[-1])
 
     def at(self, times: np.ndarray) -> dict[str, np.ndarray]:
-        """Blocks (n, size) at times (n,) s from the start; between intervals those of the later
-        one.
-        """
+        """Blocks (n, size) at times (n,) s from the start; at an interval's end the next one's."""
         return self.inside(*self._places(times))
 
     def slopes(self, times: np.ndarray) -> dict[str, np.ndarray]:
-        """Rates (n, size) of the states' blocks, per s, at times (n,) s; between intervals those of
-        the later one.
-        """
+        """Rates (n, size) of the states' blocks, per s, at times (n,) s; as ``at``."""
         k, s = self._places(times)
         basis, width = self.rule.basis(s), np.diff(self.ends)[k, None]
         return {
@@ -62,29 +58,31 @@ class Curve:
         }
 
 
-def curve(program: Transcription, w: np.ndarray, h: np.ndarray) -> Curve:
-    """Return the curve of the unknowns w."""
-    where, rule, form, mesh = program.places, program.rule, program.form, program.mesh
-    count, S, K = mesh.intervals, rule.steps, len(rule.nodes)
-    at_nodes = np.arange(count)[:, None] * S + np.arange(K)
-    rates = np.array(program.program["values"](w, h)).T[:, : program.node.rates] * form.scale(
-        form.states
-    )
+def curve(nlp: Transcription, w: np.ndarray, h: np.ndarray) -> Curve:
+    """Return the curve of the unknowns w; h (3,): angular momentum."""
+    indices, rule, variables, mesh = nlp.indices, nlp.rule, nlp.variables, nlp.mesh
+    scale = variables.scale(variables.states)
+    at_nodes = np.arange(mesh.intervals)[:, None] * rule.steps + np.arange(len(rule.nodes))
+
+    # states where intervals start, and what their rates at the nodes add
+    states = w[indices.states[: -1 : rule.steps]] * scale
+    values = np.array(nlp.functions["values"](w, h)).T
+    rates = values[:, : nlp.node.rates] * scale
     increments = rates[at_nodes] * mesh.widths[:, None, None]
-    states = w[where.states[:-1:S]] * form.scale(form.states)
-    blocks = (*form.algebraic, ("torque", form.units["torque"].size))
-    others = (w[where.others] * form.scale(blocks))[at_nodes]
-    ends = mesh.ends * w[0]
+
+    # torques and algebraic unknowns at the nodes
+    blocks = (*variables.algebraic, ("torque", variables.units["torque"].size))
+    others = (w[indices.others] * variables.scale(blocks))[at_nodes]
     return Curve(
-        ends,
+        mesh.ends * w[0],
         rule,
-        _split(states, form.states),
-        _split(increments, form.states),
+        _split(states, variables.states),
+        _split(increments, variables.states),
         _split(others, blocks),
     )
 
 
-def _split(rows: np.ndarray, blocks) -> dict[str, np.ndarray]:
+def _split(rows: np.ndarray, blocks: tuple[tuple[str, int], ...]) -> dict[str, np.ndarray]:
     """Columns of the last axis by block."""
     ends = np.cumsum([size for _, size in blocks])[:-1]
     return dict(zip((name for name, _ in blocks), np.split(rows, ends, axis=-1), strict=True))

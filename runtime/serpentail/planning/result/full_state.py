@@ -1,72 +1,88 @@
-"""Recovery: blocks of a planned motion go in; the model's q and v come out, with what a formulation
-left out.
+"""The model's q and v of a planned motion, with what the formulation left out of the unknowns.
+
+Without the angular velocity, the conserved angular momentum tells it; without the position, the COM
+falls freely.
 """
 
 import numpy as np
 
 from ...attitude import rotation_matrix
-from ..nlp.coordinates import Attitude
+from ...model.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TAIL_V, TORSO_NV, VELOCITY
+from ...model.model import Model
+from ..nlp.coordinates import IDENTITY_POSE, Attitude
+
+State = tuple[np.ndarray, np.ndarray]  # q, v
 
 
-def full_state(model, start, coordinates: Attitude, times, blocks) -> tuple[np.ndarray, np.ndarray]:
-    """Return q (K, nq), v (K, nv) at times (K,) s from the start (q0, v0); without f_ext the COM
-    falls freely.
-    """
-    quaternion, tail, tail_rate = (
-        coordinates.as_quaternion(blocks["attitude"]),
-        blocks["tail"],
-        blocks["tail_rate"],
-    )
-    R = rotation_matrix(quaternion)
-    H = model.mass_matrix(_at_identity(tail))
-    omega = blocks["torso_rate"]
+def full_state(
+    model: Model,
+    start: State,
+    coordinates: Attitude,
+    times: np.ndarray,
+    blocks: dict[str, np.ndarray],
+) -> State:
+    """Return q (K, nq), v (K, nv) at times (K,) s from the start (q0, v0)."""
+    quaternion = coordinates.as_quaternion(blocks["attitude"])
+    tail, tail_rate, omega = blocks["tail"], blocks["tail_rate"], blocks["torso_rate"]
+    R, H = rotation_matrix(quaternion), model.mass_matrix(_at_identity(tail))
     if "drift" in blocks:
-        h = model.momentum(*start)[1]
-        omega = _carrying(H, np.einsum("kji,j->ki", R, h), tail_rate)
+        h = np.einsum("kji,j->ki", R, model.momentum(*start)[1])
+        omega = _carrying(H, h, tail_rate)
     if "position" in blocks:
         position, velocity = blocks["position"], blocks["velocity"]
     else:
-        position, velocity = _falling(
-            model, start, times, (R, H), np.column_stack([omega, tail_rate])
-        )
-    return np.column_stack([position, quaternion, tail]), np.column_stack(
-        [velocity, omega, tail_rate]
-    )
+        rates = np.column_stack([omega, tail_rate])
+        position, velocity = _falling(model, start, times, (R, H), rates)
+    q = np.column_stack([position, quaternion, tail])
+    return q, np.column_stack([velocity, omega, tail_rate])
 
 
 def _at_identity(tail: np.ndarray) -> np.ndarray:
-    q = np.zeros((len(tail), 7 + tail.shape[1]))
-    q[:, 3], q[:, 7:] = 1.0, tail
-    return q
+    """q (K, nq) of tails (K, 2m) on a torso at the origin that is not rotated."""
+    return np.column_stack([np.tile(IDENTITY_POSE, (len(tail), 1)), tail])
 
 
 def _carrying(H: np.ndarray, h: np.ndarray, tail_rate: np.ndarray) -> np.ndarray:
-    """Angular velocity (K, 3) at which the momentum about the COM is h (K, 3), body axes, at no
-    linear momentum.
+    """Angular velocity (K, 3) at which the momentum about the COM is h (K, 3), body axes.
+
+    The linear momentum is zero.
     """
-    momentum = np.column_stack([np.zeros_like(h), h]) - np.einsum(
-        "kij,kj->ki", H[:, :6, 6:], tail_rate
-    )
-    return np.linalg.solve(H[:, :6, :6], momentum[..., None])[:, 3:, 0]
+    torso = slice(TORSO_NV)
+    momentum = np.column_stack([np.zeros_like(h), h])
+    momentum -= np.einsum("kij,kj->ki", H[:, torso, TAIL_V], tail_rate)
+    return np.linalg.solve(H[:, torso, torso], momentum[..., None])[:, OMEGA, 0]
 
 
-def _falling(model, start, times, turned, rates) -> tuple[np.ndarray, np.ndarray]:
-    """Position and velocity (K, 3) of B: the COM's, less those of the COM from B; rates (omega,
-    q_t_dot).
+def _falling(
+    model: Model,
+    start: State,
+    times: np.ndarray,
+    body: tuple[np.ndarray, np.ndarray],
+    rates: np.ndarray,
+) -> State:
+    """Position and velocity (K, 3) of B: the COM's, less those of the COM from B.
+
+    body: rotations (K, 3, 3) and mass matrices.  rates: (omega, q_t_dot).
     """
-    (R, H), (q0, v0) = turned, start
+    (R, H), (q0, v0) = body, start
     mass = H[:, 0, 0][:, None]
+
+    # the COM from B, world: where it is, how fast, and where it was at the start
     offset = np.einsum("kij,kj->ki", R, _com(H))
-    drift = -np.einsum("kij,kjl,kl->ki", R, H[:, :3, 3:], rates)
-    first = rotation_matrix(q0[3:7]) @ _com(model.mass_matrix(_at_identity(q0[None, 7:])))[0]
+    drift = -np.einsum("kij,kjl,kl->ki", R, H[:, VELOCITY, OMEGA.start :], rates)
+    H0 = model.mass_matrix(_at_identity(q0[None, TAIL_Q]))
+    first = rotation_matrix(q0[QUATERNION]) @ _com(H0)[0]
+
+    # the COM in the world
+    t, fall = np.asarray(times)[:, None], np.array([0, 0, -model.parameters["gravity"]])
     v_com = model.momentum(q0, v0)[0] / mass[0]
-    fall = np.array([0, 0, -model.parameters["gravity"]])
-    t = np.asarray(times)[:, None]
-    return q0[:3] + first + v_com * t + fall * t**2 / 2 - offset, v_com + fall * t + drift / mass
+    position = q0[POSITION] + first + v_com * t + fall * t**2 / 2 - offset
+    return position, v_com + fall * t + drift / mass
 
 
 def _com(H: np.ndarray) -> np.ndarray:
-    """COM (K, 3) from B in body axes: the block of H (K, nv, nv) for (p_ddot, omega_dot) is -mass
-    skew(COM).
+    """COM (K, 3) from B in body axes.
+
+    The block of H (K, nv, nv) for (p_ddot, omega_dot) is -mass skew(COM).
     """
     return np.column_stack([H[:, 1, 5], H[:, 2, 3], H[:, 0, 4]]) / H[:, 0, 0][:, None]

@@ -1,13 +1,19 @@
-"""Plans: a solved curve and what is true of it go in; what the user gets comes out."""
+"""``Plan``: what the user gets, a motion with its torques and the report of its truth."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from ...model.layout import TAIL_V
+from ...model.model import Model
 from ...motion.trajectory import Trajectory
 from ..nlp.coordinates import attitude
+from ..nlp.mesh import Mesh
+from ..nlp.rules import CollocationRule
 from ..nlp.solver import Solution
-from ..problem import Problem
+from ..problem import PlanningProblem
 from .curve import Curve
 from .full_state import full_state
 
@@ -19,20 +25,20 @@ class Plan:
     """A planned motion and its truth.
 
     success: the solver converged, and the torques, applied open loop, end within the tolerance.
-    trajectory: the planned motion, torques included (before damping), sampled at all ends of
-    intervals and between.
+    trajectory: the planned motion and its torques (before damping), at and between all ends of
+    intervals.
     report: JSON-ready summary; errors in degrees, times in s, energy in J, power in W.
-    problem, mesh, rule, solution: what was asked and solved; ``torque`` and ``curve`` give values
-    at any time.
+    problem, mesh, rule, solution: what was asked and solved.
+    ``torque`` and ``curve`` give values at any time.
     """
 
     success: bool
     trajectory: Trajectory
-    report: dict
-    problem: Problem
+    report: dict[str, Any]
+    problem: PlanningProblem
     curve: Curve
-    mesh: object
-    rule: object
+    mesh: Mesh
+    rule: CollocationRule
     solution: Solution
 
     @property
@@ -40,13 +46,13 @@ class Plan:
         """Duration in s."""
         return self.curve.duration
 
-    def torque(self, times) -> np.ndarray:
+    def torque(self, times: ArrayLike) -> np.ndarray:
         """Planned torques (n, 2m), N m, at times (n,) s from the start."""
         return self.curve.at(np.atleast_1d(np.asarray(times, float)))["torque"]
 
-    def controller(self, t: float, _q, v) -> np.ndarray:
+    def controller(self, t: float, _q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Open-loop torque law for ``st.simulate``: planned torques less the problem's damping."""
-        return self.torque(min(max(t, 0.0), self.duration))[0] - self.problem.damping * v[6:]
+        return self.torque(min(max(t, 0.0), self.duration))[0] - self.problem.damping * v[TAIL_V]
 
 
 def sample_times(ends: np.ndarray) -> np.ndarray:
@@ -59,12 +65,12 @@ def sample_times(ends: np.ndarray) -> np.ndarray:
     return np.append(np.concatenate(rows), ends[-1])
 
 
-def sampled(model, problem: Problem, curve: Curve) -> Trajectory:
+def sampled(model: Model, problem: PlanningProblem, curve: Curve) -> Trajectory:
     """Return the planned motion as a trajectory."""
     times = sample_times(curve.ends)
     blocks = curve.at(times)
     q, v = full_state(model, (problem.q0, problem.v0), attitude(problem.attitude), times, blocks)
     info = {"model": model.name, "kind": "plan"}
-    return Trajectory(
-        times, q, v, blocks["torque"], *model.energy(q, v), *model.momentum(q, v), info
-    )
+    kinetic, potential = model.energy(q, v)
+    linear, angular = model.momentum(q, v)
+    return Trajectory(times, q, v, blocks["torque"], kinetic, potential, linear, angular, info)

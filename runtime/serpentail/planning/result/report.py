@@ -1,78 +1,91 @@
-"""Reports: a solved round goes in; what a plan costs and how true it is comes out, JSON-ready."""
+"""What a plan costs, and how true it is: the numbers of ``Plan.report``, ready for JSON."""
+
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...attitude import angle_deg, pitch_roll_yaw, tilt_deg
 from ...errors import SimulationError
+from ...model.layout import OMEGA, POSITION, QUATERNION, TAIL_V
+from ...model.model import Model
 from ...motion.trajectory import Trajectory
 from ...simulation.pfl import Pfl
 from ...simulation.simulate import simulate
-from ..problem import Problem
+from ..problem import PlanningProblem
 from .curve import Curve
 
-TRACKED = 580  # samples of a tracked motion
+if TYPE_CHECKING:
+    from ..rounds import Round, Search
+
+TRACKED_SAMPLES = 580  # of a tracked motion
 
 
-def report(run, best, trajectory: Trajectory) -> dict:
-    """Return the summary of a run's best round, whose planned trajectory is given; None for what is
-    not finite.
+def report(search: "Search", best: "Round", planned: Trajectory) -> dict[str, Any]:
+    """Return the summary of a search's best round; None for what is not finite.
+
+    planned: the round's trajectory.
     """
-    problem, solution, mesh = run.problem, best.solution, best.program.mesh
-    energy, power = work(trajectory)
-    found = {
+    problem, solution, nlp = search.problem, best.solution, best.nlp
+    energy, power = work(planned)
+    values = {
         "converged": solution.success,
         "status": solution.status,
         "formulation": problem.formulation,
-    }
-    found |= {"attitude": problem.attitude, "rule": run.rule.name, "degree": run.rule.degree}
-    found |= {
-        "intervals": mesh.intervals,
-        "nodes": len(best.program.places.others),
-        "dynamics": run.equations.source,
-    }
-    found |= {
+        "attitude": problem.attitude,
+        "rule": search.rule.name,
+        "degree": search.rule.degree,
+        "intervals": nlp.mesh.intervals,
+        "nodes": len(nlp.indices.others),
+        "dynamics": search.equations.source,
         "duration_s": best.curve.duration,
         "objective": objective(best),
         "effort": effort(best.curve),
+        "energy_J": energy,
+        "peak_power_W": power,
     }
-    found |= {"energy_J": energy, "peak_power_W": power} | truth(run, best, trajectory)
-    return {
-        name: None if isinstance(x, float) and not np.isfinite(x) else x
-        for name, x in found.items()
-    }
+    values |= truth(search, best, planned)
+    lost = [name for name, x in values.items() if isinstance(x, float) and not np.isfinite(x)]
+    return values | dict.fromkeys(lost)
 
 
-def truth(run, best, planned: Trajectory) -> dict:
-    """Return the errors of the plan at its end: torques applied open loop, and the tail tracked by
-    PFL.
-    """
-    apart, from_goal = attitude_errors(run.problem, best.planned[0][-1, 3:7], best.true[0][3:7])
-    rates = np.abs(best.true[1][3:] - best.planned[1][-1, 3:]).max()
-    found = {"open_loop_attitude_error_deg": apart, "open_loop_goal_error_deg": from_goal}
-    found |= {"open_loop_rate_error": float(rates)}
-    found |= {"tracked_attitude_error_deg": None, "tracked_tail_error_rad": None, "dyn_err": None}
-    if not run.method.track:
-        return found
+def truth(search: "Search", best: "Round", planned: Trajectory) -> dict[str, float | None]:
+    """Return the plan's errors at its end: torques applied open loop, the tail tracked by PFL."""
+    problem, after_position = search.problem, slice(OMEGA.start, None)
+    (planned_q, planned_v), (true_q, true_v) = best.planned, best.true
+    to_plan, to_goal = attitude_errors(problem, planned_q[-1, QUATERNION], true_q[QUATERNION])
+    rates = np.abs(true_v[after_position] - planned_v[-1, after_position]).max()
+    errors: dict[str, float | None] = {
+        "open_loop_attitude_error_deg": to_plan,
+        "open_loop_goal_error_deg": to_goal,
+        "open_loop_rate_error": float(rates),
+        "tracked_attitude_error_deg": None,
+        "tracked_tail_error_rad": None,
+        "dyn_err": None,
+    }
+    if not search.settings.track:
+        return errors
     try:
-        flight = tracked(run.model, run.problem, planned)
+        flight = tracked(search.model, problem, planned)
     except SimulationError:  # a plan that did not converge may ask for anything
-        return found
+        return errors
     deviation = flight.resample(np.clip(planned.t, 0, flight.t[-1])).tail - planned.tail
-    return found | {
-        "tracked_attitude_error_deg": max(
-            attitude_errors(run.problem, planned.attitude[-1], flight.attitude[-1])
-        ),
+    ends = attitude_errors(problem, planned.attitude[-1], flight.attitude[-1])
+    return errors | {
+        "tracked_attitude_error_deg": max(ends),
         "tracked_tail_error_rad": float(np.abs(deviation).max()),
         "dyn_err": dynamics_error(planned, flight),
     }
 
 
-def objective(best) -> float:
+def objective(best: "Round") -> float:
     """The objective's value in SI units."""
-    problem, value = best.program.problem, best.solution.value
-    unit = best.program.form.units["torque"].mean()
-    scales = {"effort": unit**2, "energy": 10 * unit}
-    return value if callable(problem.objective) else value * scales.get(problem.objective, 1.0)
+    problem, value = best.nlp.problem, best.solution.value
+    unit = best.nlp.variables.units["torque"].mean()
+    if problem.objective == "effort":
+        return value * unit**2
+    if problem.objective == "energy":
+        return value * (10 * unit)
+    return value
 
 
 def effort(curve: Curve) -> float:
@@ -83,39 +96,52 @@ def effort(curve: Curve) -> float:
 
 def work(trajectory: Trajectory) -> tuple[float, float]:
     """Energy (J), the integral of sum |tau q_t_dot|, and the largest such power (W)."""
-    power = np.abs(trajectory.tau * trajectory.v[:, 6:]).sum(axis=1)
+    power = np.abs(trajectory.tau * trajectory.v[:, TAIL_V]).sum(axis=1)
     return float(np.trapezoid(power, trajectory.t)), float(power.max())
 
 
 def attitude_errors(
-    problem: Problem, planned: np.ndarray, found: np.ndarray
+    problem: PlanningProblem, planned: np.ndarray, reached: np.ndarray
 ) -> tuple[float, float]:
-    """Angles (deg) between an attitude reached (4,) and that planned (4,), and between it and the
-    goal.
-    """
-    apart, goal = float(angle_deg(planned, found)), problem.goal.attitude
+    """Angles (deg) of the attitude that was reached to the planned one, and to the goal; (4,)."""
+    to_plan, goal = float(angle_deg(planned, reached)), problem.goal.attitude
     if goal is None:
-        return apart, apart
-    return apart, float(tilt_deg(found) if isinstance(goal, str) else angle_deg(goal, found))
+        return to_plan, to_plan
+    if isinstance(goal, str):
+        return to_plan, float(tilt_deg(reached))
+    return to_plan, float(angle_deg(goal, reached))
 
 
-def tracked(model, problem: Problem, planned: Trajectory) -> Trajectory:
+def tracked(model: Model, problem: PlanningProblem, planned: Trajectory) -> Trajectory:
     """Return the simulated motion whose tail tracks the plan by PFL."""
-    law = Pfl(model, planned)
-    settings = {"method": "dop853", "rtol": 1e-8, "atol": 1e-10, "output_step": planned.t[-1] / 580}
-    return simulate(model, problem.q0, problem.v0, controller=law, t_span=planned.t[-1], **settings)
+    flight = simulate(
+        model,
+        problem.q0,
+        problem.v0,
+        controller=Pfl(model, planned),
+        t_span=planned.t[-1],
+        method="dop853",
+        rtol=1e-8,
+        atol=1e-10,
+        output_step=planned.t[-1] / TRACKED_SAMPLES,
+    )
+    assert isinstance(flight, Trajectory)  # one start, one motion
+    return flight
 
 
-def dynamics_error(planned: Trajectory, found: Trajectory) -> float:
-    """L2 distance over time of x = (p, phi, q_t, p_dot, omega, q_t_dot), SI, between two motions
-    (Eq. 50).
+def dynamics_error(planned: Trajectory, tracked: Trajectory) -> float:
+    """L2 distance over time of x between two motions (Eq. 50).
+
+    x = (p, phi, q_t, p_dot, omega, q_t_dot), SI.
     """
-    at = found.resample(np.clip(planned.t, found.t[0], found.t[-1]))
-    difference = _states(planned) - _states(at)
-    difference[:, 3:6] -= 2 * np.pi * np.round(difference[0, 3:6] / (2 * np.pi))
+    at_planned = tracked.resample(np.clip(planned.t, tracked.t[0], tracked.t[-1]))
+    difference = _states(planned) - _states(at_planned)
+    angles = difference[:, 3:6]
+    angles -= 2 * np.pi * np.round(angles[0] / (2 * np.pi))
     return float(np.sqrt(np.trapezoid(np.sum(difference**2, axis=1), planned.t)))
 
 
 def _states(trajectory: Trajectory) -> np.ndarray:
+    """x (K, 6 + 2m + nv) of a motion."""
     angles = pitch_roll_yaw(trajectory.q, unwrap=True)
-    return np.column_stack([trajectory.q[:, :3], angles, trajectory.tail, trajectory.v])
+    return np.column_stack([trajectory.q[:, POSITION], angles, trajectory.tail, trajectory.v])

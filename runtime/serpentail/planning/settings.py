@@ -1,0 +1,73 @@
+"""How to search for a plan: the settings of rule, mesh, solver and guesses, and their checks."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..checks import number, one_of
+from ..errors import PlanningError
+from ..motion.trajectory import Trajectory
+
+WHOLE_NUMBERS = {  # settings that count something -> the least of each
+    "intervals": 1,
+    "rounds": 0,
+    "most_intervals": 1,
+    "multi_start": 1,
+    "retries": 0,
+}
+
+
+@dataclass(frozen=True)
+class PlanSettings:
+    """How to find a plan: collocation rule, mesh, tolerance of the truth, solver, guesses."""
+
+    rule: str = "radau"
+    degree: int | None = None
+    intervals: int = 12
+    tolerance: float | None = 0.01  # deg; None: no demand
+    rounds: int = 6
+    most_intervals: int = 200
+    solver: str = "ipopt"
+    options: dict[str, Any] = field(default_factory=dict)
+    guess: Any = None  # a Plan or a Trajectory
+    guess_damping: float = 1e-3  # N m s
+    multi_start: int = 1
+    retries: int = 4
+    seed: int = 0
+    dynamics: str = "auto"
+    time_limit: float | None = None  # s
+    track: bool = True
+
+
+def checked_settings(model, **settings) -> PlanSettings:
+    """Return the settings; PlanningError names the first that is wrong, and the remedy."""
+    checked = PlanSettings(**settings)
+    for name, least in WHOLE_NUMBERS.items():
+        value = getattr(checked, name)
+        if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+            raise PlanningError(f"{name}: value {value!r}: needs a whole number from {least}")
+    for name in ("tolerance", "time_limit"):
+        if getattr(checked, name) is not None:
+            number(name, getattr(checked, name), PlanningError, above=0)
+    if not isinstance(checked.options, dict):
+        raise PlanningError(
+            f"options: value {checked.options!r}: needs a dict, such as {{'ipopt.max_iter': 500}}"
+        )
+    _check_guess(model, checked.guess)
+    number("guess_damping", checked.guess_damping, PlanningError, least=0)
+    one_of("dynamics", checked.dynamics, ("auto", "compiled", "symbolic"), PlanningError)
+    return checked
+
+
+def _check_guess(model, guess) -> None:
+    """PlanningError unless a guess is None, or a motion of such a model."""
+    if guess is None:
+        return
+    motion = getattr(guess, "trajectory", guess)
+    if not isinstance(motion, Trajectory):
+        raise PlanningError(f"guess: value {guess!r}: needs a Plan or a Trajectory")
+    if motion.q.shape[1] != model.nq or len(motion.t) < 2:
+        raise PlanningError(
+            f"guess: q has shape {motion.q.shape}: needs at least two samples of {model.nq}"
+        )

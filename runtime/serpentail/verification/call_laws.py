@@ -1,0 +1,63 @@
+"""Laws of calls: repeated, in batches and through CasADi, a function gives the same."""
+
+from itertools import starmap
+
+import numpy as np
+
+from ..model.model import Model
+from .errors import differences, differing, differing_outputs, is_derivative
+from .law import VALUE_LIMIT, Errors, Law, registry
+from .states import State, arguments, casadi_outputs, named, outputs, scaled, state_functions
+
+LAWS: list[Law] = []
+law = registry(LAWS)
+
+
+@law()
+def calls_repeat(model: Model, s: State) -> Errors:
+    """The same call gives the same bits, at once and after another call."""
+    errors = {}
+    for name in state_functions(model):
+        first, second, _, last = (outputs(model, name, case) for case in (s, s, scaled(s, 0.5), s))
+        errors[name] = differing_outputs(first, second) + differing_outputs(first, last)
+    return errors
+
+
+@law()
+def batches_are_singles(model: Model, s: State) -> Errors:
+    """A batch of nine states gives the bits of nine calls."""
+    cases = [scaled(s, 1 - k / 16) for k in range(9)]
+    errors = {}
+    for name in state_functions(model):
+        batches = zip(*(arguments(model, name, case) for case in cases), strict=True)
+        whole = named(model, name, model.kernel(name)(*map(np.stack, batches)))
+        singles = [outputs(model, name, case) for case in cases]
+        stacked = {key: np.stack([single[key] for single in singles]) for key in whole}
+        errors[name] = differing_outputs(whole, stacked)
+    return errors
+
+
+@law(units=VALUE_LIMIT)
+def casadi_functions_agree(model: Model, s: State) -> Errors:
+    """The CasADi functions of SX operations give what the C gives, v_dot relative to cond(H)."""
+    return {
+        name: differences(
+            model, name, s, casadi_outputs(model, name, getattr(model.casadi, name), s)
+        )
+        for name in state_functions(model)
+        if not is_derivative(model, name)
+    }
+
+
+@law(only="double")
+def casadi_externals_are_the_compiled_code(model: Model, s: State) -> Errors:
+    """casadi.external on the compiled C gives the bits of the model's own call."""
+    errors = {}
+    for name in state_functions(model):
+        results = casadi_outputs(
+            model, name, model.casadi.external(name), s, model.casadi.parameter_vector
+        )
+        errors[name] = sum(
+            starmap(differing, zip(outputs(model, name, s).values(), results, strict=True))
+        )
+    return errors

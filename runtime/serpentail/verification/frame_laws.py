@@ -1,0 +1,170 @@
+"""Laws of place and axes: results do not depend on where the world's origin and axes are.
+
+Also where the tail's points are, and how loads on them act.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..attitude import product, rotation_matrix
+from ..model.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TORSO_NV, VELOCITY
+from ..model.model import Model
+from ..model.parameters import total_mass
+from .errors import (
+    block_error,
+    difference,
+    differences,
+    matrix_error,
+    relative,
+    same_bits,
+    turned_array,
+    worst,
+)
+from .law import VALUE_LIMIT, Errors, Law, fastest, moved, registry, slope
+from .states import State, at_origin, outputs, state_functions
+
+WORLD = ("mass_matrix_world", "bias_force_world")
+# what position and velocity of B enter
+PLACED = (
+    "energy",
+    "energy_derivatives",
+    "momentum",
+    "center_of_mass",
+    "tail_points",
+    "contact_points",
+)
+LAWS: list[Law] = []
+law = registry(LAWS)
+
+
+def changed_axes(top: np.ndarray, middle: np.ndarray, size: int) -> np.ndarray:
+    """Return blkdiag(top, middle, 1), by which a change of axes acts on velocities and forces."""
+    X = np.eye(size)
+    X[VELOCITY, VELOCITY], X[OMEGA, OMEGA] = top, middle
+    return X
+
+
+@law(units=VALUE_LIMIT)
+def pose_in_the_world_turns_all_alike(model: Model, s: State) -> Errors:
+    """Turning the world about z and shifting it turns and shifts every result."""
+    angle, shift = 1.1, np.array([0.3, -0.7, 0.5])
+    c, n = np.cos(angle), np.sin(angle)
+    Z = np.array([[c, -n, 0], [n, c, 0], [0, 0, 1]])
+    half = np.array([np.cos(angle / 2), 0, 0, np.sin(angle / 2)])
+    q = np.concatenate([Z @ s.q[POSITION] + shift, product(half, s.q[QUATERNION]), s.q[TAIL_Q]])
+    X = changed_axes(Z, np.eye(3), model.nv)
+    loads = s.f_ext.reshape(-1, 3) @ Z.T
+    loads[1:2] = s.f_ext[OMEGA]  # the moment, in body axes
+    turned = replace(s, q=q, f_ext=loads.ravel())
+    turned = replace(
+        turned, **{name: X @ getattr(s, name) for name in ("v", "v_dot", "dq", "dv", "multiplier")}
+    )
+    errors = {}
+    for name in state_functions(model):
+        axes = changed_axes(Z, Z if name in WORLD else np.eye(3), model.nv)
+        expected = turned_outputs(model, outputs(model, name, s), axes, shift)
+        errors[name] = differences(model, name, turned, expected.values())
+    return errors
+
+
+def turned_outputs(model: Model, results: dict, X: np.ndarray, shift: np.ndarray) -> dict:
+    """Return what outputs become in a world turned by X's first block and shifted."""
+    Z, weight = X[VELOCITY, VELOCITY], total_mass(model.parameters) * model.parameters["gravity"]
+    turn = {
+        "potential": lambda V: V + weight * shift[2],
+        **dict.fromkeys(("points", "positions", "position"), lambda p: p @ Z.T + shift),
+        "velocities": lambda u: u @ Z.T,
+        "J": lambda J: Z @ J @ X.T,
+        "dparameters": lambda D: X @ D,
+    }
+    return {key: turn[key](x) if key in turn else turned_array(x, X) for key, x in results.items()}
+
+
+@law()
+def position_and_speed_of_the_torso_do_not_matter(model: Model, s: State) -> Errors:
+    """H, C, v_dot and Jacobians do not change with B's position and velocity, bit for bit."""
+    q, v = s.q.copy(), s.v.copy()
+    q[POSITION] += 5.0
+    v[VELOCITY] -= 3.0
+    names = [name for name in state_functions(model) if name not in PLACED]
+    return same_bits(model, names, s, replace(s, q=q, v=v))
+
+
+@law()
+def quaternion_has_no_norm_and_no_sign(model: Model, s: State) -> Errors:
+    """The quaternion times -2 is the same attitude: the same results, bit for bit."""
+    q = s.q.copy()
+    q[QUATERNION] *= -2
+    return same_bits(model, state_functions(model), s, replace(s, q=q))
+
+
+@law("tail_points", units=VALUE_LIMIT, only="articulated")
+def links_have_equal_length(model: Model, s: State) -> Errors:
+    """The first tail point is the mount, and each is L_t / N from the next."""
+    points = model.tail_points(s.q).astype(float)
+    mount = s.q[POSITION] + rotation_matrix(s.q[QUATERNION]) @ model.parameters["tail_mount"]
+    lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    length = model.parameters["tail_length"] / len(lengths)
+    return {
+        "mount": relative(points[0], mount, points),
+        "lengths": relative(lengths, np.full(len(lengths), length), points),
+    }
+
+
+@law("tail_points", "tail_point_jacobians", units=VALUE_LIMIT)
+def jacobians_are_the_derivatives_of_the_points(model: Model, s: State) -> Errors:
+    """J v is the derivative of the tail points along each unit velocity, relative to |points| times
+    the links' turn.
+    """
+    q = at_origin(s).q
+    J, errors = model.tail_point_jacobians(q), []
+    for k, unit in enumerate(np.eye(model.nv)):
+        rate = max(1.0, fastest(model, unit))
+
+        def points(time: float, v: np.ndarray = unit) -> np.ndarray:
+            return model.tail_points(moved(q, v, time)).astype(float)
+
+        column, largest = slope(points, rate)
+        errors.append(relative(J[:, :, k], column, rate * largest))
+    return worst(errors)
+
+
+@law(
+    "mass_matrix",
+    "forward_dynamics",
+    "forward_dynamics_external",
+    "tail_point_jacobians",
+    units=VALUE_LIMIT,
+)
+def loads_accelerate_by_their_generalised_force(model: Model, s: State) -> Errors:
+    """H (v_dot under loads - v_dot without) = [f; n; 0] + sum J_k^T f_k, relative to cond(H)."""
+    H, J = model.mass_matrix(s.q).astype(float), model.tail_point_jacobians(s.q)
+    force = np.einsum("kxi,kx->i", J, s.f_ext[TORSO_NV:].reshape(-1, 3))
+    force[:TORSO_NV] += s.f_ext[:TORSO_NV]
+    free = model.forward_dynamics(s.q, s.v, s.tau)
+    loaded = model.forward_dynamics(s.q, s.v, s.tau, s.f_ext)
+    return difference(model, s.q, "v_dot", loaded, free + np.linalg.solve(H, force))
+
+
+@law("forward_dynamics", "forward_dynamics_external", units=VALUE_LIMIT)
+def no_load_is_no_change(model: Model, s: State) -> Errors:
+    """Forward dynamics under zero loads is forward dynamics, relative to cond(H)."""
+    free = model.forward_dynamics(s.q, s.v, s.tau)
+    return difference(
+        model, s.q, "v_dot", model.forward_dynamics(s.q, s.v, s.tau, 0 * s.f_ext), free
+    )
+
+
+@law("mass_matrix", "mass_matrix_world", units=VALUE_LIMIT)
+def mass_matrix_in_world_axes(model: Model, s: State) -> Errors:
+    """The world-frame H is X^-T H X^-1 with X = blkdiag(1, R, 1)."""
+    X = changed_axes(np.eye(3), rotation_matrix(s.q[QUATERNION]), model.nv)
+    return matrix_error(model.mass_matrix_world(s.q), X @ model.mass_matrix(s.q) @ X.T)
+
+
+@law("bias_force", "bias_force_world", units=VALUE_LIMIT)
+def bias_force_in_world_axes(model: Model, s: State) -> Errors:
+    """The world-frame C is X^-T C: d(R omega)/dt = R omega_dot, so that X_dot adds nothing."""
+    X = changed_axes(np.eye(3), rotation_matrix(s.q[QUATERNION]), model.nv)
+    return block_error(model.bias_force_world(s.q, s.v), X @ model.bias_force(s.q, s.v))

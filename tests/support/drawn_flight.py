@@ -1,0 +1,56 @@
+"""A flight to draw: its trajectory and the points of its tail."""
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from serpentail.attitude import rotation_matrix
+from serpentail.motion.trajectory import Trajectory
+
+SEMI_AXES = np.array([0.0315, 0.0495, 0.027])
+
+
+MOUNT = np.array([0, -0.0405, 0.0045])
+
+
+SPEEDS = {
+    "up": (0.5, 2.8),
+    "far": (2.6, 2.8),
+    "still": (0.0, 0.0),
+}  # forward and up at the start, m/s
+
+
+def flight(speed=SPEEDS["up"], segments=2, samples=59):
+    """A tumbling torso on a parabola (or at rest) with a decaying tail swing."""
+    t = np.linspace(0, 0.58, samples)
+    forward, up = speed
+    gravity = 9.8 * (up > 0)
+    position = np.stack([0 * t, forward * t, 0.06 + up * t - gravity * t**2 / 2], axis=1)
+    omega = np.array([-9.0, 3.0, 2.0])
+    attitude = Rotation.from_rotvec(t[:, None] * omega).as_quat()[:, [3, 0, 1, 2]]
+    phase = 18 * t[:, None] + 1.5 * np.arange(2 * segments)
+    tail, rate = 0.3 * np.exp(-2 * t)[:, None] * np.stack([np.cos(phase), -18 * np.sin(phase)])
+    momentum = 0.109 * np.stack([0 * t, forward + 0 * t, up - gravity * t], axis=1)
+    return Trajectory(
+        t=t,
+        q=np.hstack([position, attitude, tail]),
+        v=np.hstack([momentum / 0.109, np.tile(omega, (samples, 1)), rate]),
+        tau=-1e-3 * rate,
+        kinetic=np.sum(momentum**2, axis=1) / 0.218 + 2e-3,
+        potential=0.109 * gravity * position[:, 2],
+        linear_momentum=momentum,
+        angular_momentum=np.array([-6e-4, 1e-4, 1.5e-4]) + 1e-18 * np.cos(t)[:, None],
+    )
+
+
+def tail_points(trajectory, links=4, length=0.19466):
+    """Joints (K, m links + 1, 3) of an articulated tail: R_j = R_{j-1} Rx(alpha) Rz(beta), links
+    along -y.
+    """
+    rotation = rotation_matrix(trajectory.attitude)
+    points = [trajectory.q[:, :3] + rotation @ MOUNT]
+    for i in range(trajectory.segments):
+        bend = Rotation.from_euler("XZ", trajectory.tail[:, 2 * i : 2 * i + 2]).as_matrix()
+        for _ in range(links):
+            rotation = rotation @ bend
+            points.append(points[-1] - rotation[:, :, 1] * length / (links * trajectory.segments))
+    return np.stack(points, axis=1)

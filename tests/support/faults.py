@@ -1,0 +1,52 @@
+"""Faulty models, and the laws that they break."""
+
+import copy
+
+import numpy as np
+
+from serpentail.verification import report as verify
+from serpentail.verification import states
+from serpentail_codegen.scene.signatures.signature import IMPLICIT
+from serpentail_codegen.scene.signatures.table import NEED_CONTACTS, in_group
+
+SLIGHT_FAULT = 1e-9
+TAKING_MORE = (*NEED_CONTACTS, *in_group(IMPLICIT))  # functions of more than a state
+
+
+def failed(checks):
+    """Names of the checks that failed."""
+    return {c.name for c in checks if not c.passed}
+
+
+def laws_broken(model, count=2):
+    """Names of the laws that a model breaks, CasADi's left out: they compare with the C, which is
+    at fault here.
+    """
+    cases = list(states.states(model, count))
+    entries = [entry for entry in verify.LAWS if "casadi" not in entry.name]
+    return failed(verify.check(entry, model, cases) for entry in entries)
+
+
+def broken(model, name, change):
+    """The model with one function whose result, and arguments, go through a change."""
+    faulty, kernel = copy.copy(model), model.kernel(name)
+
+    def call(*arrays):
+        return change(kernel(*arrays), *arrays)
+
+    faulty.kernels = model.kernels | {name: call}
+    return faulty
+
+
+def times(factor):
+    """A change that multiplies every output."""
+    return lambda result, *_: (
+        tuple(factor * x for x in result) if isinstance(result, tuple) else factor * result
+    )
+
+
+def not_a_number(result, *_):
+    """The last entry of the last output is lost."""
+    outputs = [np.array(x) for x in (result if isinstance(result, tuple) else (result,))]
+    outputs[-1][(..., *(-1,) * min(1, outputs[-1].ndim))] = np.nan
+    return tuple(outputs) if isinstance(result, tuple) else outputs[0]
