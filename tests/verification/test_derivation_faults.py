@@ -87,15 +87,6 @@ def _derived_anew():
     assemble.cache_clear()
 
 
-@pytest.fixture
-def own_programs():
-    """No program that was assembled before or is assembled here serves another test."""
-    assemble.cache_clear()
-    yield
-    assemble.cache_clear()
-
-
-@pytest.mark.usefixtures("own_programs")
 @pytest.mark.parametrize("fault", DERIVATION_FAULTS)
 def test_faults_of_the_derivation_break_a_law(fault, monkeypatch, tmp_path):
     module, name, wrong, expected = DERIVATION_FAULTS[fault]
