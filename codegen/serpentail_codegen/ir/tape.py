@@ -5,13 +5,14 @@ scheduled, printed or evaluated.  Looking up an operation before it is stored fi
 subexpressions; folding constants keeps what is stored small.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
 from .algebra import Algebra, Number
 
 Node = tuple  # an operation's name and what it works on: nodes, or the numbers of a leaf
+Lanes = Sequence[int] | Mapping[int, int]  # lanes by number of a node, or of an input
 UNARY = ("neg", "sin", "cos", "sqrt")
 BINARY = ("add", "sub", "mul", "div")
 TERNARY = ("select",)
@@ -230,7 +231,7 @@ class Tape:
         return self.select(self.sub(a, b), a, b)
 
 
-def lanes_of(node: Node, lanes: Sequence[int], inputs: Sequence[int] = ()) -> int:
+def lanes_of(node: Node, lanes: Lanes, inputs: Lanes = ()) -> int:
     """Return how many lanes a node has, 0 if it is narrow; ``lanes`` are those of earlier nodes.
 
     ``inputs`` are the lanes of the inputs; where they are not given, inputs are narrow.
