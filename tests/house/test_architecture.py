@@ -198,12 +198,10 @@ def public(tree):
     for node in tree.body:
         if isinstance(node, kinds) and not node.name.startswith("_"):
             yield node
-            if isinstance(node, ast.ClassDef):
-                yield from (
-                    item
-                    for item in node.body
-                    if isinstance(item, kinds) and not item.name.startswith("_")
-                )
+            for item in node.body if isinstance(node, ast.ClassDef) else ():
+                if isinstance(item, kinds) and not item.name.startswith("_"):
+                    if "overload" not in map(ast.unparse, item.decorator_list):
+                        yield item
 
 
 def a_sentence(docstring):
