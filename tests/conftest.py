@@ -1,4 +1,11 @@
-"""Options of the test run."""
+"""Options of the test run, and where its compiled models are kept."""
+
+import os
+
+from tests.support.models import BUILD
+
+# One cache for all processes and runs, which is not the developer's own.
+os.environ["SERPENTAIL_CACHE"] = str(BUILD / "cache")
 
 
 def pytest_addoption(parser):

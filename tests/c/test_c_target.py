@@ -26,6 +26,7 @@ from serpentail_codegen.scene.scene import FUNCTIONS as NAMES
 from serpentail_codegen.targets.c.form import in_form
 from serpentail_codegen.targets.c.routine import Routine, routine_lines
 from tests.references.parameters import random_states
+from tests.support.compile_once import compile_once
 from tests.support.models import model_folder
 
 STRICT = (
@@ -116,8 +117,8 @@ class Model(SimpleNamespace):
     @cached_property
     def objects(self):
         """Plain object files of the model, its host entries, its batches and its simulation."""
-        (self.folder / "objects").mkdir()
-        return [compiled(self.folder / "objects", source, *PLAIN) for source in self.sources]
+        command = ("gcc", *PLAIN, "-c")
+        return [compile_once(f"{s.stem}.o", command, [s], self.include) for s in self.sources]
 
 
 @pytest.fixture(scope="module")

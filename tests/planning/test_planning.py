@@ -3,6 +3,7 @@ integration.
 """
 
 import re
+import shutil
 import signal
 import threading
 import time
@@ -25,9 +26,8 @@ from serpentail.planning.nlp.node import dynamics
 from serpentail.planning.nlp.transcription import program_of
 from serpentail.planning.result.full_state import full_state
 from serpentail.planning.result.truth import local_errors, open_loop
-from serpentail_codegen.pipeline import generate
 from serpentail_codegen.scene.parse import load_scene
-from tests.support.models import model_folder
+from tests.support.models import folder_of, model_folder
 from tests.support.tumbling import DURATION, FUNCTIONS, planned, rat, start
 
 FORMS = [
@@ -355,7 +355,8 @@ def test_torques_that_no_model_survives_are_an_infinite_error():
 
 def test_example_of_the_document_runs(tmp_path, monkeypatch, capsys):
     root = Path(__file__).parents[2]
-    generate(load_scene(root / "scenes" / "righting_m1_n3.toml"), tmp_path / "generated")
+    folder = folder_of(load_scene(root / "scenes" / "righting_m1_n3.toml"))
+    shutil.copytree(folder, tmp_path / "generated" / folder.name)
     monkeypatch.chdir(tmp_path)
     text = (root / "docs" / "planning.md").read_text()
     exec(re.search(r"```python\n(.*?)```", text, re.DOTALL)[1], {})

@@ -13,9 +13,8 @@ import pytest
 import serpentail as st
 from serpentail import cli
 from serpentail.pictures.skeleton import leg_joints
-from serpentail_codegen.pipeline import generate
 from serpentail_codegen.scene.parse import load_scene
-from tests.support.models import parent
+from tests.support.models import folder_of
 
 SCENES = Path(__file__).parents[2] / "scenes"
 SIMPLE = """kind = "articulated"
@@ -36,8 +35,7 @@ delta = -0.26
 @cache
 def made(name):
     """The generated folder of a scene of the repository."""
-    generate(load_scene(SCENES / f"{name}.toml"), parent() / "scenes")
-    return parent() / "scenes" / name
+    return folder_of(load_scene(SCENES / f"{name}.toml"))
 
 
 def told(name, **changes):
@@ -54,7 +52,8 @@ def scene(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     text = SIMPLE.replace('kind = "art', 'name = "simple"\nkind = "art')
     Path("generated").mkdir()
-    Path("generated/simple").symlink_to(_simple(text))
+    Path("simple.toml").write_text(text)
+    Path("generated/simple").symlink_to(folder_of(load_scene("simple.toml")))
 
     def write(added="", **replaced):
         own = text
@@ -64,14 +63,6 @@ def scene(tmp_path, monkeypatch):
         return "simple.toml"
 
     return write
-
-
-@cache
-def _simple(text):
-    source = parent() / "simple.toml"
-    source.write_text(text)
-    generate(load_scene(source), parent() / "simple_scenes")
-    return parent() / "simple_scenes" / "simple"
 
 
 # The paper's motions; figures of docs/contact.md.
@@ -133,12 +124,11 @@ def test_self_recovery_stands(name):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["tail_support_jump", "self_recovery", "self_recovery_continuum"])
-def test_without_tail_contact_none_stands(name):
+def test_without_tail_contact_none_stands(tmp_path, name):
     text = (SCENES / f"{name}.toml").read_text()
-    source = parent() / f"{name}_without.toml"
+    source = tmp_path / f"{name}_without.toml"
     source.write_text(text.replace('"feet", "tail"', '"feet"'))
-    generate(load_scene(source), parent() / "scenes")
-    scene = st.scenario(source, parent() / "scenes" / source.stem)
+    scene = st.scenario(source, folder_of(load_scene(source)))
     summary = scene.summary(scene.simulate())
     assert summary["standing_end"] is False and summary["upright_end"] < 0
 
