@@ -93,7 +93,9 @@ class Model(SimpleNamespace):
         return compile_once("model.so", command, sources, self.folder / "include")
 
 
-@pytest.fixture(scope="module", params=TAILS)
+@pytest.fixture(
+    scope="module", params=["m1_n1", pytest.param("m2_n2", marks=pytest.mark.slow), "arcs2"]
+)
 def model(request):
     """A generated model."""
     return Model(*TAILS[request.param])

@@ -135,7 +135,9 @@ def test_the_torso_hides_exactly_what_a_ray_to_the_viewer_hits(view, seed):
 
 
 @pytest.mark.parametrize("suffix", STARTS)
-@pytest.mark.parametrize("speed", SPEEDS)
+@pytest.mark.parametrize(
+    "speed", ["up", *(pytest.param(name, marks=pytest.mark.slow) for name in ("far", "still"))]
+)
 def test_figures_are_written_in_every_format(tmp_path, suffix, speed):
     trajectory = flight(SPEEDS[speed])
     path = tmp_path / "new" / f"film{suffix}"
