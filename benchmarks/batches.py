@@ -1,6 +1,4 @@
-"""Batches: generated folders go in, times of batched calls and rollouts beside those of single ones
-come out.
-"""
+"""Times batches and rollouts beside single calls."""
 
 import ctypes
 import time

@@ -25,8 +25,8 @@ from benchmarks import (
     simulations,
 )
 from benchmarks.fixtures import Fixture, fixture, generated, label
+from benchmarks.peers import build, pinocchio, timing
 from benchmarks.peers import mujoco_casadi as more_peers
-from benchmarks.peers import pinocchio as peers
 from benchmarks.peers import soromox as continuum_peer
 from benchmarks.report import written
 
@@ -102,15 +102,15 @@ def speed(folder: Path) -> list[dict]:
     rows = []
     for size in ((1, 3), (3, 4), (6, 6), (8, 16)):
         ours = fixture(generated(folder / "speed", *size), folder / "speed")
-        plain_library = peers.build_library(peers.PLAIN, peers.CACHE)
+        plain_library = build.build_library(build.PLAIN, build.CACHE)
         with (
-            peers.PinocchioBench(*size, ours.parameters) as tuned,
-            peers.PinocchioBench(*size, ours.parameters, plain_library) as plain,
+            pinocchio.PinocchioBench(*size, ours.parameters) as tuned,
+            pinocchio.PinocchioBench(*size, ours.parameters, plain_library) as plain,
         ):
-            states = peers.random_states(size[0])
+            states = timing.random_states(size[0])
             error = max(difference(ours, tuned, states), difference(ours, plain, states))
             closures = [ours.closure, plain.closure, tuned.crba_closure, tuned.closure]
-            times = peers.time_rounds(closures, states, ROUNDS, CALLS)
+            times = timing.time_rounds(closures, states, ROUNDS, CALLS)
         row = {
             "model": label(*size),
             "ns": times[0][0],
@@ -144,8 +144,8 @@ def tails(folder: Path) -> list[dict]:
         pair = [
             fixture(generated(folder / "speed", m, links), folder / "speed") for links in (None, 3)
         ]
-        states = peers.random_states(m)
-        (arcs, _), (links, _) = peers.time_rounds(
+        states = timing.random_states(m)
+        (arcs, _), (links, _) = timing.time_rounds(
             [entry.closure for entry in pair], states, ROUNDS, CALLS
         )
         rows.append(
@@ -159,9 +159,9 @@ def python_overhead(folder: Path) -> list[dict]:
     rows = []
     for size in ((1, 3), (3, 4)):
         ours = fixture(generated(folder / "speed", *size), folder / "speed")
-        q, v, tau = (x[0] for x in peers.random_states(size[0]))
+        q, v, tau = (x[0] for x in timing.random_states(size[0]))
         inside = (
-            peers.time_rounds([ours.closure], peers.random_states(size[0]), ROUNDS, CALLS)[0][0]
+            timing.time_rounds([ours.closure], timing.random_states(size[0]), ROUNDS, CALLS)[0][0]
             / 1e3
         )
         for name, arguments in (("forward_dynamics", (q, v, tau)), ("mass_matrix", (q,))):

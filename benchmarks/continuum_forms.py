@@ -10,7 +10,7 @@ import numpy as np
 
 import serpentail as st
 from benchmarks.fixtures import fixture
-from benchmarks.peers import pinocchio as peers
+from benchmarks.peers import timing
 
 THETAS = (*(10.0 ** (np.arange(-24, 2) / 3)), np.pi, 2 * np.pi)
 STATES = 6  # at each theta; the worst error counts
@@ -104,11 +104,11 @@ def form_times(folder: Path) -> list[dict]:
     rows = []
     for m in (1, 3):
         pair = {name: fixture(form(folder, name, m), folder) for name in COLOURS}
-        q, v, tau = peers.random_states(m)
+        q, v, tau = timing.random_states(m)
         q[:, 8::2] = (
             np.abs(q[:, 8::2]) + 0.5
         )  # polar: theta; bend: b, to which its run time is indifferent
-        times = peers.time_rounds(
+        times = timing.time_rounds(
             [entry.closure for entry in pair.values()], (q, v, tau), ROUNDS, CALLS
         )
         row = {"segments": m} | {

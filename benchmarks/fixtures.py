@@ -1,6 +1,4 @@
-"""Models to measure: a generated folder goes in, the model and a closure of its C forward dynamics
-come out.
-"""
+"""Generates and compiles the models that benchmarks measure, and wraps their C to be timed."""
 
 import ctypes
 import math
@@ -12,18 +10,19 @@ from pathlib import Path
 import numpy as np
 
 import serpentail as st
-from benchmarks.peers.pinocchio import Closure
+from benchmarks.peers.timing import Closure
 from serpentail.model.compiler import compile_library
 from serpentail.model.kernel import aligned
 
 ADAPTER = """
 #include "{prefix}.h"
-struct context {{ {prefix}_real work[{work}]; {prefix}_parameters parameters; {prefix}_real out[{out}]; }};
-int measured(void *c, const {prefix}_real *q, const {prefix}_real *v, const {prefix}_real *rest, {prefix}_real *seen);
-int measured(void *c, const {prefix}_real *q, const {prefix}_real *v, const {prefix}_real *rest, {prefix}_real *seen)
+typedef {prefix}_real real;
+struct context {{ real work[{work}]; {prefix}_parameters parameters; real out[{out}]; }};
+int measured(void *c, const real *q, const real *v, const real *rest, real *seen);
+int measured(void *c, const real *q, const real *v, const real *rest, real *seen)
 {{
   struct context *context = c;
-  {prefix}_real *out = {target};
+  real *out = {target};
   int status = {prefix}_{function}(&context->parameters, {arguments}, context->work);
   seen[0] = out[0];
   return status;

@@ -1,5 +1,4 @@
-"""Planning, measured: a folder for models goes in; rows of figures, each beside its target, come
-out.
+"""Measures planning against its targets and against other ways to solve the same problem.
 
 All times are CPU seconds of this process.  The problem of one plan is that of Sect. 4.2 from a
 random tumbling start, 59 nodes (Hermite-Simpson, 29 intervals), the guess passive flight for all

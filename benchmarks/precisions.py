@@ -1,6 +1,4 @@
-"""Precisions: tails go in; time of forward dynamics against its error in float and double comes
-out.
-"""
+"""What float costs and gives: time of forward dynamics against its error, beside double."""
 
 from pathlib import Path
 

@@ -1,6 +1,4 @@
-"""Reports: tables of figures go in, Markdown and HTML come out, with what changed since the last
-run.
-"""
+"""Writes the benchmark's report as Markdown and HTML, with what changed since the last run."""
 
 import html
 import inspect

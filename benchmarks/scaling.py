@@ -1,6 +1,4 @@
-"""Scaling: sizes go in; nanoseconds of forward dynamics, and its share of the core's peak, come
-out.
-"""
+"""How forward dynamics grows with the tail, and what share of the core's peak it reaches."""
 
 import ctypes
 from pathlib import Path
@@ -11,7 +9,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
 from benchmarks.fixtures import fixture, generated, label
-from benchmarks.peers import pinocchio as peers
+from benchmarks.peers import build, timing
 
 SWEEPS = {
     "links of one segment": [(1, n) for n in (1, 2, 4, 8, 16, 32, 64)],
@@ -37,8 +35,8 @@ def scaling(folder: Path) -> list[dict]:
                 generated(folder / "scaling", *size, functions="forward_dynamics"),
                 folder / "scaling",
             )
-            least, _ = peers.time_rounds(
-                [ours.closure], peers.random_states(size[0]), ROUNDS, CALLS
+            least, _ = timing.time_rounds(
+                [ours.closure], timing.random_states(size[0]), ROUNDS, CALLS
             )[0]
             entry = ours.model.manifest["functions"]["forward_dynamics"]
             share = (
@@ -59,7 +57,7 @@ def peak(folder: Path) -> tuple[float, float]:
     """Flops per nanosecond of this core: scalars, vectors, which take the same time."""
     flags = ("-std=gnu11", "-O2", "-march=native", "-ffp-contract=fast", "-fPIC", "-shared")
     target, width = folder / "peak.so", ctypes.c_int()
-    peers.run(["gcc", *flags, str(Path(__file__).parent / "native" / "peak.c"), "-o", str(target)])
+    build.run(["gcc", *flags, str(Path(__file__).parent / "native" / "peak.c"), "-o", str(target)])
     measure = ctypes.CDLL(str(target)).measure_peak
     measure.restype = ctypes.c_double
     vector = measure(ctypes.byref(width))

@@ -1,6 +1,4 @@
-"""Simulations: scenes in flight and on the ground go in; run time against error of every method
-comes out.
-"""
+"""Run time against error of every integration method, in flight and on the ground."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""Targets: a report goes in; which of the project's targets it meets comes out."""
+"""The project's performance targets, and which of them a report meets."""
 
 from typing import NamedTuple
 

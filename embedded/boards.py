@@ -1,6 +1,4 @@
-"""Machines that run the check: a name goes in, how to build for it and how to run what was built
-come out.
-"""
+"""The boards of the check: how to build for each and how to run what was built."""
 
 import shutil
 from dataclasses import dataclass

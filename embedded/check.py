@@ -1,6 +1,4 @@
-"""A generated folder and a board go in; the board's results beside the host's come out as a table,
-and a verdict.
-"""
+"""Runs a model on an emulated board and compares every result with the host's."""
 
 import argparse
 import sys
@@ -85,7 +83,8 @@ def _difference(some: np.ndarray, others: np.ndarray) -> float:
 
 def table(rows: list[Comparison]) -> list[str]:
     """Return the comparison as lines of text."""
-    head = f"{'function':<28}{'bits':>10}{'units':>10}{'instructions':>14}{'stack, bytes':>14}{'painted':>9}"
+    head = f"{'function':<28}{'bits':>10}{'units':>10}{'instructions':>14}"
+    head += f"{'stack, bytes':>14}{'painted':>9}"
     lines = [
         f"{r.name:<28}{'same' if r.same_bits else 'differ':>10}{r.units:>10.3g}{r.instructions:>14}"
         f"{r.stack:>14}{r.painted:>9}"

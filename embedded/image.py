@@ -1,4 +1,4 @@
-"""Images of the check: a generated folder and a board go in, a program for that board comes out."""
+"""Builds the program that checks a model on a board."""
 
 import json
 import math
@@ -23,7 +23,8 @@ HEAD = """/* Stored states of {prefix}, and its functions by one signature. */
 
 typedef {prefix}_real real;
 #define REAL_IS_FLOAT {single}
-enum {{ STATES = {states}, INPUTS = {inputs}, OUTPUTS = {outputs}, WORK = {work}, CASES = {cases} }};
+enum {{ STATES = {states}, INPUTS = {inputs}, OUTPUTS = {outputs} }};
+enum {{ WORK = {work}, CASES = {cases} }};
 
 struct a_case {{
   const char *name;

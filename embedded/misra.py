@@ -1,6 +1,4 @@
-"""cppcheck: a generated folder goes in; its faults come out, and how often each rule of MISRA
-C:2012 is hit.
-"""
+"""Runs cppcheck over a model: its faults, and how often each MISRA C:2012 rule is hit."""
 
 import re
 import shutil

@@ -1,4 +1,4 @@
-"""Runs of the check: an image goes in, its outputs, instructions and stack by function come out."""
+"""Runs an image and reads its outputs, instruction counts and stack by function."""
 
 import subprocess
 from dataclasses import dataclass

@@ -1,6 +1,4 @@
-"""Tails, forms of code and boards go in; flash, RAM, stack, instructions and float's error come out
-as tables.
-"""
+"""Measures flash, RAM, stack and instructions of tails on boards; writes docs/embedded.md."""
 
 import re
 import sys

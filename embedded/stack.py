@@ -1,6 +1,4 @@
-"""Stack of a call: gcc's call graphs (-fcallgraph-info=su) go in, the deepest chain of each
-function comes out.
-"""
+"""The deepest chain of calls of each function, from gcc's call graphs."""
 
 import re
 from collections import defaultdict

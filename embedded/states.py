@@ -1,6 +1,4 @@
-"""States to call functions on: a manifest goes in, rows of numbers, one entry for each named input,
-come out.
-"""
+"""The states that the check on a board calls every function with."""
 
 import math
 

@@ -1,5 +1,4 @@
-"""The kangaroo rat kicking, and in flight after it: scenes go in; trajectories, pictures and a
-report come out.
+"""The main job on the paper's rat: it kicks, tumbles, and is drawn.
 
 Usage: python examples/demo.py [FOLDER], by default output/demo
 """

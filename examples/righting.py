@@ -1,6 +1,4 @@
-"""Airborne righting, for the studies: sizes and settings go in; models, starts and plans come
-out.
-"""
+"""Models, starts and plans that the righting study and the planning benchmark share."""
 
 import subprocess
 import sys

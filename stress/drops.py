@@ -1,6 +1,4 @@
-"""Drops: random falls on the ground by every method go in; gains of energy and refusals come
-out.
-"""
+"""Drops animals on the ground by every method: none may gain energy."""
 
 from collections import Counter
 from functools import cache

@@ -1,6 +1,4 @@
-"""Extremes: parameters far from an animal's go in; errors against 40 digits, and what is refused,
-come out.
-"""
+"""Errors where parameters are far from an animal's, and what is refused."""
 
 import numpy as np
 

@@ -1,6 +1,4 @@
-"""Figures: what was found and what it may be at most go in; rows of a report that can fail come
-out.
-"""
+"""A figure of the stress report: what was found, and what it may be at most."""
 
 from dataclasses import asdict, dataclass
 

@@ -1,6 +1,4 @@
-"""Flights: 1000 s of undamped and of damped flight go in; drifts of energy, momentum and attitude
-come out.
-"""
+"""Flies for 1000 s and measures how far energy, momentum and attitude drift."""
 
 from functools import cache
 

@@ -1,6 +1,4 @@
-"""Memory: a model and states far from ordinary go in; what sanitizers and valgrind say of its C at
-them comes out.
-"""
+"""Runs emitted C under sanitizers and valgrind at states far from ordinary."""
 
 import subprocess
 from collections.abc import Iterator
@@ -77,9 +75,9 @@ def driver(model: st.Model) -> str:
             f"*work)\n{{\n  (void)work;\n"
             f"  return @_{name}(p, {pointers}, work);\n}}\n"
         )
+        batch = f"@_side_by_side_{name}" if name in many else "NULL"
         entries.append(
-            "  "
-            f"{{ bare_{name}, @_batch_{name}, {f'@_side_by_side_{name}' if name in many else 'NULL'}, {inputs}, "
+            f"  {{ bare_{name}, @_batch_{name}, {batch}, {inputs}, "
             f"{len(lengths) - inputs}, {work[name]}, {many.get(name, 0)}, "
             f"{{ {', '.join(map(str, lengths))} }} }},"
         )

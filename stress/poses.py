@@ -1,6 +1,4 @@
-"""Poses: bends from 1e-300 rad to the declared range, folds and coils go in; errors against 40
-digits come out.
-"""
+"""Errors at extreme poses: bends from 1e-300 rad to the declared range, folds and coils."""
 
 from dataclasses import dataclass
 

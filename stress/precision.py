@@ -1,6 +1,4 @@
-"""Precision: models of float and of double go in; how far they differ per quantity and along
-flights comes out.
-"""
+"""How far float models are from double ones, per quantity and along flights."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Mutated scene files: good files and dice go in; what was neither read nor refused comes out."""
+"""Mutates scene files at random: each must be read, or refused with a reason."""
 
 import contextlib
 import io

@@ -1,6 +1,4 @@
-"""Sharing: one model and many threads go in; how many of their results differ from those of one
-thread comes out.
-"""
+"""Many threads share one model: each result must be that of a single thread."""
 
 from concurrent.futures import ThreadPoolExecutor
 

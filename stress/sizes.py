@@ -1,4 +1,4 @@
-"""Sizes: tails up to (20, 4) and (1, 512) go in; errors against 40 digits come out."""
+"""Errors of long tails, up to (20, 4) and (1, 512), against 40 digits."""
 
 import numpy as np
 

@@ -1,6 +1,4 @@
-"""Slopes: folded, coiled, straight and fast poses go in; errors of exact derivatives against
-differences come out.
-"""
+"""Errors of exact derivatives against differences, at folded, straight and fast poses."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Plots: figures and a sweep over bends go in; PNG files come out."""
+"""Draws the stress report's figures, and errors over the bend of a continuum."""
 
 from pathlib import Path
 

@@ -1,6 +1,4 @@
-"""Subjects: a tail's sizes and parameters go in; a generated model beside its exact reference comes
-out.
-"""
+"""The models under stress, each beside its exact reference."""
 
 import warnings
 from dataclasses import dataclass

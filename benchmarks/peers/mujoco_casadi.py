@@ -1,6 +1,4 @@
-"""MuJoCo and CasADi beside the generated forward dynamics: models go in, nanoseconds and ratios
-come out.
-"""
+"""Times MuJoCo and CasADi on the same forward dynamics as the generated C."""
 
 import ctypes
 import importlib.util
@@ -12,7 +10,7 @@ import numpy as np
 
 from benchmarks import derivatives
 from benchmarks.fixtures import fixture, generated, label
-from benchmarks.peers import pinocchio as peers
+from benchmarks.peers import build, casadi_derivatives, timing
 
 SIZES = ((1, 3), (3, 4), (6, 6))
 IN_CASADI = ((1, 3), (3, 4))  # gcc takes minutes for longer tails
@@ -36,14 +34,14 @@ def other_peers(folder: Path) -> list[dict]:
 def row(folder: Path, size: tuple[int, int], library: ctypes.CDLL) -> dict:
     """Return the figures of one tail."""
     ours = fixture(generated(folder / "speed", *size), folder / "speed")
-    states = peers.random_states(size[0])
+    states = timing.random_states(size[0])
     chain = library.mujoco_chain_new(str(chain_xml(folder, ours.model)).encode(), *size)
     if not chain:
-        raise peers.PeerUnavailable("MuJoCo could not read the chain")
+        raise build.PeerUnavailable("MuJoCo could not read the chain")
     pointer = ctypes.cast(library.mujoco_forward_dynamics, ctypes.c_void_p).value
-    others = {"mujoco": peers.Closure(pointer, chain)}
+    others = {"mujoco": timing.Closure(pointer, chain)}
     if size in IN_CASADI:
-        others["casadi"] = derivatives.in_casadi(
+        others["casadi"] = casadi_derivatives.in_casadi(
             "fd", acceleration(ours.model), ours.model, folder
         ).closure
     found = derivatives.compared(ours, others, states)
@@ -57,7 +55,7 @@ def acceleration(model) -> ca.Function:
     """Return v_dot of (q, v, tau, parameters), and nothing second, as the timer's adapter wants two
     outputs.
     """
-    graph = derivatives.Graph(model)
+    graph = casadi_derivatives.Graph(model)
     tau = ca.SX.sym("tau", graph.nt)
     arguments = {
         name: ca.vertsplit(x) for name, x in (("q", graph.q), ("v", graph.v), ("tau", tau))
@@ -72,7 +70,7 @@ def mujoco_library(folder: Path) -> ctypes.CDLL:
     """
     found = importlib.util.find_spec("mujoco")
     if found is None:
-        raise peers.PeerUnavailable("MuJoCo is not installed: pip install mujoco")
+        raise build.PeerUnavailable("MuJoCo is not installed: pip install mujoco")
     home = Path(found.origin).parent
     shared = next(home.glob("libmujoco.so.*"))
     target = folder / "mujoco_chain.so"
@@ -124,7 +122,7 @@ def words(numbers) -> str:
     return " ".join(map(repr, numbers))
 
 
-def difference(library: ctypes.CDLL, chain: int, model, states: peers.States) -> float:
+def difference(library: ctypes.CDLL, chain: int, model, states: timing.States) -> float:
     """Largest relative difference of MuJoCo's v_dot from the model's."""
     errors, v_dot = [], np.zeros(model.nv)
     for q, v, tau in zip(*states, strict=True):

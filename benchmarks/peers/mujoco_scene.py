@@ -1,5 +1,4 @@
-"""A model on the ground for MuJoCo: an articulated model and foot points go in, MJCF and its run
-time come out.
+"""Times MuJoCo on an articulated model that stands on the ground.
 
 Not the same physics: contacts are MuJoCo's soft constraints with an elliptic cone, and the joints
 that share an angle are tied by soft equalities.  For the run time of a like scene alone.

@@ -1,5 +1,4 @@
-"""opty on the righting problem: a model, a start and a guess go in; seconds and how it ended come
-out.
+"""Solves the righting problem with opty, to compare planning times.
 
 Needs opty and cyipopt, which ``make setup`` does not install.  cyipopt builds against the IPOPT
 that CasADi brings, given an ipopt.pc that names its folder; it finds that library at run time once

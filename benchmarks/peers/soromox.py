@@ -1,6 +1,4 @@
-"""SoRoMoX (JAX) beside the continuum's forward dynamics: sizes go in, nanoseconds and ratios come
-out.
-"""
+"""Times SoRoMoX (JAX) beside the continuum's forward dynamics."""
 
 import importlib.util
 import math
@@ -12,7 +10,7 @@ import numpy as np
 
 from benchmarks.batches import best
 from benchmarks.fixtures import Fixture, fixture, generated, label
-from benchmarks.peers import pinocchio as peers
+from benchmarks.peers import timing
 
 SIZES = (1, 3, 6)
 ROUNDS, CALLS, REPEATS, LOOP = 15, 256, 20, 64
@@ -40,12 +38,12 @@ def row(folder: Path, segments: int) -> dict:
     """Return the figures of one tail."""
     ours, states = (
         fixture(generated(folder / "speed", segments), folder / "speed"),
-        peers.random_states(segments),
+        timing.random_states(segments),
     )
     call, loop = compiled(robot(ours), states)
     times = []
     for _ in range(ROUNDS):
-        single = peers.time_rounds([ours.closure], states, 1, CALLS)[0][0]
+        single = timing.time_rounds([ours.closure], states, 1, CALLS)[0][0]
         times.append((single, best(call, REPEATS), best(loop, REPEATS) / LOOP))
     least, median = np.min(times, axis=0), np.median(times, axis=0)
     found = {"model": label(segments, None), "ns": least[0]}
@@ -83,7 +81,7 @@ def robot(ours: Fixture):
     )
 
 
-def compiled(rod, states: peers.States) -> tuple[Callable, Callable]:
+def compiled(rod, states: timing.States) -> tuple[Callable, Callable]:
     """Return calls of the rod's compiled dynamics: of one state; of LOOP states, one after the
     other.
     """

@@ -3,6 +3,7 @@ comes out.
 """
 
 import argparse
+import gc
 import sys
 import time
 from pathlib import Path
@@ -78,4 +79,5 @@ def main(argv: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
+    gc.disable()  # expressions hold no cycles worth a search, which takes a tenth of a short run
     sys.exit(main())

@@ -1,5 +1,4 @@
-"""The paper's motions on the ground (Sects. 4 and 4.4): scenes go in; films, plots, trajectories
-and a table come out.
+"""The paper's motions on the ground (Sects. 4 and 4.4): films, plots and a table.
 
 Usage: python -m examples.studies.contact [FOLDER], by default output/studies/contact
 """

@@ -1,5 +1,4 @@
-"""The paper's comparison of tail models (Sect. 4.1): one motion by both tails goes in; Fig. 8 and
-its cost come out.
+"""The paper's comparison of tail models (Sect. 4.1): one motion by both tails, Fig. 8 and its cost.
 
 Usage: python -m examples.studies.models [FOLDER], by default output/studies/models
 """
@@ -15,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 import serpentail as st
 from benchmarks.fixtures import Fixture, fixture
-from benchmarks.peers import pinocchio as peers
+from benchmarks.peers import build, timing
 from examples.studies.models_figures import draw_cost, draw_figure_8
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -29,9 +28,14 @@ ROUNDS, CALLS = 300, 256
 WORDS = {
     "yaw": "deg, torso's final yaw in the motion of Sect. 4.1, starting at 0",
     "ns": "least time of one forward dynamics call from C",
-    "difference": "deg, articulated less continuum; links have the inertia of their ellipsoids, as in the paper: "
-    "with many links it tends to -0.003, as these keep their thickness and a continuum has none",
-    "thin_difference": "deg, the same for links without inertia of their own: it tends to 0 like 1/n",
+    "difference": (
+        "deg, articulated less continuum; links have the inertia of their ellipsoids, as in the "
+        "paper: with many links it tends to -0.003, as these keep their thickness and a continuum "
+        "has none"
+    ),
+    "thin_difference": (
+        "deg, the same for links without inertia of their own: it tends to 0 like 1/n"
+    ),
     "motion": "deg, yaw at the times of `time`, which is t/T: the duration T changes nothing",
 }
 
@@ -143,8 +147,8 @@ def measure(tails: dict[int | None, Fixture]) -> dict:
     holds.
     """
     print("  move and time", file=sys.stderr, flush=True)
-    times = peers.time_rounds(
-        [tail.closure for tail in tails.values()], peers.random_states(1), ROUNDS, CALLS
+    times = timing.time_rounds(
+        [tail.closure for tail in tails.values()], timing.random_states(1), ROUNDS, CALLS
     )
     nanoseconds = {links: least for links, (least, _) in zip(tails, times, strict=True)}
     continuum = yaw_motion(tails[None].model)
@@ -201,5 +205,5 @@ if __name__ == "__main__":
         main(
             Path(sys.argv[1]).absolute() if sys.argv[1:] else ROOT / "output" / "studies" / "models"
         )
-    except (st.SerpentailError, peers.PeerUnavailable) as error:
+    except (st.SerpentailError, build.PeerUnavailable) as error:
         sys.exit(str(error))

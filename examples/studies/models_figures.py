@@ -1,6 +1,4 @@
-"""Figures of the comparison of tail models: its summary goes in, Fig. 8 and a diagram of cost go
-out as files.
-"""
+"""Draws the comparison of tail models: Fig. 8, and cost against difference."""
 
 import math
 from pathlib import Path

@@ -1,6 +1,4 @@
-"""Parts of a study: what a part depends on and how to make it go in; what was made, kept as a JSON
-file, comes out.
-"""
+"""Parts of long studies: each is kept as a file and made anew only where its sources changed."""
 
 import hashlib
 import json

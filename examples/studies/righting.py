@@ -1,5 +1,4 @@
-"""Airborne righting (Sects. 4.2, 4.3): paper's problem and tails go in; Figs. 9 to 13, Table 2 and
-rates come out.
+"""Airborne righting (Sects. 4.2, 4.3): the paper's Figs. 9 to 13 and Table 2, and ours.
 
 Parts that were made once are kept in FOLDER/parts: a second run draws at once, one that was stopped
 goes on.
@@ -240,7 +239,8 @@ def rate_lines(rates: dict[str, list[dict]]) -> list[str]:
 
 def table(study: dict) -> str:
     """Return the study as text."""
-    line = "{0:<22}{1[converged]!s:>6}{1[iterations]:>6}{1[duration_s]:>7.3f}{1[objective]:>11.2e}{1[solve_cpu_s]:>9.2f}"
+    line = "{0:<22}{1[converged]!s:>6}{1[iterations]:>6}{1[duration_s]:>7.3f}"
+    line += "{1[objective]:>11.2e}{1[solve_cpu_s]:>9.2f}"
     line += "{1[open_loop_attitude_error_deg]:>10.4f}{1[energy_J]:>9.4f}{1[peak_power_W]:>8.3f}"
     head = (
         "plan                   conv.    it  T [s]  objective  cpu [s]  err [deg]    E [J]   P [W]"

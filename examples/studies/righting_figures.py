@@ -1,4 +1,4 @@
-"""Figures of the righting study: flights and rows of numbers go in; PNG files come out."""
+"""Draws the figures of the righting study."""
 
 from pathlib import Path
 

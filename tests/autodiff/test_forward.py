@@ -108,15 +108,14 @@ def test_values_go_along_unchanged(name):
 
 
 def of_x(loops):
-    """Turn i of an upward loop depends on the first i + 1 entries of x alone."""
+    """Iteration i of an upward loop depends on the first i + 1 entries of x alone."""
     outward = [loop for loop in loops if loop.var == "i" and not loop.downward]
     return Index((("i", 1),), 1) if outward else None
 
 
 @pytest.mark.parametrize("name", ["carry_up", "accumulators", "chain_up", "triangle"])
 def test_lanes_left_out_are_zero(name):
-    """In turn i nothing depends on what comes later: a run that leaves those lanes out gives the
-    same.
+    """In iteration i nothing depends on what comes later: leaving those lanes out changes nothing.
 
     The outputs u are written within the loop: their lanes that are left out mean nothing.
     """
@@ -214,8 +213,8 @@ def test_solvers_are_refused(statement):
         tangent_program(b.finish(), ("a",))
 
 
-def read_in_later_turns():
-    """A row that is written in one turn and read in later ones, where more lanes are needed."""
+def read_in_later_iterations():
+    """An array written in one iteration and read in later ones, where more lanes are needed."""
     b, _, x, y, u, w = built()
     a = b.array("a", 1, 3)
     b.fill(w[0], 0)
@@ -227,7 +226,7 @@ def read_in_later_turns():
     return b.finish()
 
 
-@pytest.mark.parametrize("build", [read_in_later_turns, lambda: PROGRAMS["temporaries"]])
+@pytest.mark.parametrize("build", [read_in_later_iterations, lambda: PROGRAMS["temporaries"]])
 def test_lanes_left_out_are_zero_wherever_they_are_read(build):
     program = build()
     arguments = numbers(program)

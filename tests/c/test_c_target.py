@@ -22,14 +22,14 @@ from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.ir.step import Step
 from serpentail_codegen.pipeline import tail_of
 from serpentail_codegen.scene.parse import parse_scene
-from serpentail_codegen.scene.scene import DERIVATIVES
-from serpentail_codegen.scene.scene import FUNCTIONS as NAMES
+from serpentail_codegen.scene.scene import DERIVATIVES, FUNCTIONS, WORLD
 from serpentail_codegen.targets.c.form import in_form
 from serpentail_codegen.targets.c.routine import Routine, routine_lines
 from tests.references.parameters import random_states
 from tests.support.compile_once import compile_once
 from tests.support.models import model_folder
 
+NAMES = (*FUNCTIONS, *WORLD)
 STRICT = (
     "-pedantic",
     "-Wall",

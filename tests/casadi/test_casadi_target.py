@@ -98,7 +98,8 @@ class Model(SimpleNamespace):
 )
 def model(request):
     """A generated model."""
-    return Model(*TAILS[request.param])
+    functions = [*SHAPES, "rollout", "forward_dynamics_derivatives"]
+    return Model(*TAILS[request.param], functions=functions)
 
 
 def full(outputs):

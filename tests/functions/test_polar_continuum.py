@@ -15,7 +15,7 @@ from serpentail.verification.report import laws
 from serpentail_codegen.mechanics import polar_arc as polar_continuum
 from serpentail_codegen.scene.parse import parse_scene, scene_for, scene_to_dict
 from serpentail_codegen.scene.problems import SceneError
-from serpentail_codegen.scene.scene import DERIVATIVES, FUNCTIONS
+from serpentail_codegen.scene.scene import DERIVATIVES, FUNCTIONS, WORLD
 from tests.references.exact_polar import ExactPolar
 from tests.references.metrics import block_error, equilibrated_condition, mass_matrix_error
 from tests.references.parameters import TABLE_1
@@ -23,13 +23,16 @@ from tests.support.models import model_folder
 
 MODERATE = (0.5, 1.0, 2.0, np.pi)
 VANISHING = 10.0 ** np.arange(-1, -3.1, -0.5)
+VALUES = [*(name for name in FUNCTIONS if name not in DERIVATIVES), *WORLD]
 EMISSIONS = {"straight": (1, "straight"), "loops": (2, "loops")}
 
 
 @cache
 def model(segments, coordinates="polar", emission="auto"):
     """The compiled continuum in one kind of coordinates."""
-    return st.load(model_folder(segments, None, coordinates=coordinates, emission=emission))
+    return st.load(
+        model_folder(segments, None, coordinates=coordinates, emission=emission, functions=VALUES)
+    )
 
 
 @cache
@@ -261,9 +264,7 @@ def test_c_example_runs_at_a_bend(tmp_path):
     )
 
 
-@pytest.mark.parametrize(
-    "name", [name for name in FUNCTIONS if name not in ("rollout", *DERIVATIVES)]
-)
+@pytest.mark.parametrize("name", [name for name in VALUES if name != "rollout"])
 def test_casadi_and_c_agree(name):
     polar, (q, v, v_dot, tau) = model(2, emission="loops"), polar_state(2, 1.3)
     given = {

@@ -216,7 +216,7 @@ def test_called_names_carry_the_programs_name():
     )
 
 
-def test_called_in_a_loop_it_runs_in_every_turn():
+def test_called_in_a_loop_it_runs_in_every_iteration():
     b, a, y, z = outer()
     w, total = b.array("w", 1), b.array("total", 1, role="output")
     b.fill(total[0], 0)

@@ -1,50 +1,15 @@
-"""The tape: each distinct operation once, folded by identities that hold exactly and round
-alike.
-"""
+"""The tape: each distinct operation once, folded by identities that hold and round alike."""
 
-import math
 import random
 from fractions import Fraction
-from types import SimpleNamespace
 
 import mpmath
 import pytest
 
 from serpentail_codegen.ir.interpret import Numbers
-from serpentail_codegen.ir.step import Step, compacted, specialised
-from serpentail_codegen.ir.tape import (
-    BINARY,
-    TERNARY,
-    UNARY,
-    Tape,
-    exact_quotient,
-    live_nodes,
-    operation_count,
-    replay,
-)
-
-INPUTS = 4
-SEEDS = range(40)
-CONSTANTS = (
-    0,
-    1,
-    -1,
-    2,
-    -2,
-    0.5,
-    -1.0,
-    Fraction(1, 4),
-)  # their sums and products are exact in float64
-
-# Exact stand-ins with the only laws that folding may use: sin is odd, cos even, and their values
-# at 0 and 1.
-RATIONAL = Numbers(
-    SimpleNamespace(
-        sin=lambda x: x / (1 + x * x), cos=lambda x: 1 / (1 + x * x), sqrt=lambda x: x * x
-    ),
-    Fraction,
-)
-FLOATS = Numbers(math, float)
+from serpentail_codegen.ir.tape import BINARY, UNARY, Tape, exact_quotient, replay
+from tests.support.algebras import FLOATS, RATIONAL
+from tests.support.random_tapes import INPUTS, SEEDS, grow
 
 
 @pytest.fixture
@@ -54,34 +19,6 @@ def tape():
     for index in range(INPUTS):
         tape.input(index)
     return tape
-
-
-def grow(rng, algebra, tape, leaves, length=80):
-    """Record random operations; return pairs (node, the value computed directly)."""
-    pool = [(tape.input(k), leaf) for k, leaf in enumerate(leaves)]
-    while len(pool) < length:
-        op = rng.choice(BINARY * 2 + UNARY + TERNARY)
-        count = next(k for k, ops in enumerate((UNARY, BINARY, TERNARY), 1) if op in ops)
-        nodes, values = zip(
-            *(_operand(rng, algebra, tape, pool) for _ in range(count)), strict=True
-        )
-        if op == "div" and (
-            values[1] == 0 or (algebra is FLOATS and None not in map(tape.value, nodes))
-        ):
-            continue
-        if op == "sqrt" and values[0] < 0:
-            continue
-        value = getattr(algebra, op)(*values)
-        if abs(value) < 1e60 and (algebra is FLOATS or value.denominator < 10**60):
-            pool.append((getattr(tape, op)(*nodes), value))
-    return pool
-
-
-def _operand(rng, algebra, tape, pool):
-    constant = rng.choice(CONSTANTS)
-    return (
-        (tape.const(constant), algebra.const(constant)) if rng.random() < 0.2 else rng.choice(pool)
-    )
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -200,8 +137,8 @@ def test_selection_folds_where_the_choice_is_known_or_makes_no_difference(tape):
     assert tape.max(a, a) == a and tape.value(tape.max(tape.const(2), tape.const(3))) == 3
 
 
-def test_selection_takes_no_rows(tape):
-    with pytest.raises(ValueError, match="select takes no rows"):
+def test_selection_takes_no_wide_operands(tape):
+    with pytest.raises(ValueError, match="select takes no wide operands"):
         tape.select(0, 1, tape.unit(0, 3))
 
 
@@ -249,83 +186,3 @@ def test_division_by_the_constant_zero_is_an_error(tape):
     for numerator in (0, tape.const(0), tape.const(1)):
         with pytest.raises(ZeroDivisionError, match="divides by the constant zero"):
             tape.div(numerator, tape.const(0))
-
-
-def reachable(nodes, node, found):
-    """Collect a node and all below it."""
-    if node not in found:
-        found.add(node)
-        if nodes[node][0] not in ("input", "const"):
-            for arg in nodes[node][1:]:
-                reachable(nodes, arg, found)
-    return found
-
-
-def random_step(seed):
-    """A step of two 2-vectors with three scalars of output, most of its nodes dead."""
-    rng, tape = random.Random(seed), Tape()
-    pool = grow(rng, FLOATS, tape, [rng.uniform(-3, 3) for _ in range(INPUTS)], 25)
-    results = tuple(node for node, _ in rng.sample(pool, 3))
-    return Step(
-        "step", "Random.", (("x", 2), ("y", 2)), (("u", 1), ("w", 2)), tuple(tape.nodes), results
-    )
-
-
-def evaluated(step, **vectors):
-    """Return the scalars of a step's outputs."""
-    nodes = replay(
-        step.nodes, [scalar for name, _ in step.inputs for scalar in vectors[name]], FLOATS
-    )
-    return [nodes[result] for result in step.results]
-
-
-@pytest.mark.parametrize("seed", SEEDS)
-def test_live_nodes_are_what_the_results_reach(seed):
-    step = random_step(seed)
-    live = set()
-    for result in step.results:
-        reachable(step.nodes, result, live)
-    assert live_nodes(step.nodes, step.results) == sorted(live)
-    assert operation_count(step.nodes, step.results) == sum(
-        step.nodes[node][0] in BINARY for node in live
-    )
-
-
-@pytest.mark.parametrize("seed", SEEDS)
-def test_compacted_step_keeps_meaning_and_drops_the_rest(seed):
-    step = random_step(seed)
-    small = compacted(step)
-    rng = random.Random(
-        seed
-    )  # the scalars with which the step grew: none of its square roots is of a negative
-    vectors = {name: [rng.uniform(-3, 3) for _ in range(size)] for name, size in step.inputs}
-    assert evaluated(small, **vectors) == evaluated(step, **vectors)
-    assert live_nodes(small.nodes, small.results) == list(range(len(small.nodes)))
-    assert small.outputs == step.outputs
-    assert set(small.inputs) <= set(step.inputs)
-    read = {index for op, index, *_ in small.nodes if op == "input"}
-    spans, first = [], 0
-    for _, size in small.inputs:
-        spans.append(set(range(first, first + size)))
-        first += size
-    assert all(span & read for span in spans) and read <= set().union(*spans)
-    assert compacted(small) == small
-
-
-def test_specialised_step_is_the_step_at_these_values():
-    tape = Tape()
-    x, y, z, w = (tape.input(k) for k in range(4))
-    results = (tape.add(tape.mul(x, y), z), tape.div(w, y))
-    step = Step(
-        "step", "Two vectors.", (("a", 2), ("b", 2)), (("u", 2),), tuple(tape.nodes), results
-    )
-    still = specialised(step, "still", a=(0, 2))
-    assert (still.name, still.doc, still.inputs, still.outputs) == (
-        "still",
-        step.doc,
-        (("b", 2),),
-        step.outputs,
-    )
-    assert evaluated(still, b=(3.0, 5.0)) == evaluated(step, a=(0, 2), b=(3.0, 5.0)) == [3.0, 2.5]
-    assert operation_count(still.nodes, still.results) == 1
-    assert specialised(step, "step") == step

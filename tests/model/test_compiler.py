@@ -262,6 +262,32 @@ def test_failing_source_shows_the_compilers_words(model, cache):
     assert not libraries(cache)
 
 
+def test_sources_are_compiled_at_the_same_time(model, script, tmp_path):
+    """Each compiler waits until the other one has begun, and the library has what both made."""
+    (source,), include = model
+    other = source.with_name("thrice.c")
+    other.write_text("double twice(double);\ndouble thrice(double x) { return twice(x) + x; }\n")
+    begun = tmp_path / "begun"
+    begun.mkdir()
+    both = f'[ "$(ls {begun} | wc -l)" = 2 ]'
+    wait = f"for i in $(seq 600); do {both} && break; sleep 0.1; done; {both} || exit 9"
+    script(f'case "$*" in *" -c "*) touch {begun}/$$; {wait};; esac')
+    library = compiler.compile_library([source, other], include)
+    assert call_twice(library) == 42.0
+    assert ctypes.CDLL(str(library)).thrice is not None
+    assert len(list(begun.iterdir())) == 2
+
+
+def test_failure_of_one_source_names_it(model, cache):
+    (source,), include = model
+    wrong = source.with_name("wrong.c")
+    wrong.write_text("#error mistake\n")
+    with pytest.raises(CompileFailed, match="mistake") as caught:
+        compiler.compile_library([source, wrong], include)
+    assert str(wrong) in caught.value.command and str(source) not in caught.value.command
+    assert not libraries(cache) and not list(cache.glob(".*.o"))
+
+
 def test_long_report_loses_its_middle(model):
     (source,), include = model
     source.write_text("".join(f"#error mistake_{n}_ {'x' * 2000}\n" for n in range(10)))

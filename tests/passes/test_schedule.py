@@ -1,6 +1,7 @@
 """The schedule of straight lines: every value once, after what it needs, and the same results."""
 
 import random
+from itertools import pairwise
 
 import pytest
 
@@ -44,6 +45,42 @@ def test_random_lines_keep_their_dependencies(seed):
     assert_valid(nodes, live, schedule.scheduled(nodes, live, results))
 
 
+def scheduled_by_the_rule(nodes, live, results):
+    """The rule as it is stated: at every step, look at all that is ready."""
+    operations = [n for n in live if nodes[n][0] not in schedule.LEAVES]
+    needs = {n: {a for a in nodes[n][1:] if a in operations} for n in operations}
+    users = {n: {u for u in operations if n in needs[u]} for n in operations}
+    height = {}
+    for n in reversed(operations):
+        beyond = max((height[u] for u in users[n]), default=0)
+        height[n] = beyond + schedule.LATENCY.get(nodes[n][0], 4)
+
+    order, alive = [], 0
+    while len(order) < len(operations):
+        ready = [n for n in operations if n not in order and needs[n] <= set(order)]
+        frees = {
+            n: sum(a not in results and users[a] - set(order) == {n} for a in needs[n])
+            for n in ready
+        }
+        if alive >= schedule.REGISTERS:
+            best = max(ready, key=lambda n: (frees[n], height[n], -n))
+        else:
+            best = max(ready, key=lambda n: (height[n], frees[n], -n))
+        order.append(best)
+        alive += 1 - frees[best]
+    return [n for n in live if nodes[n][0] in schedule.LEAVES] + order
+
+
+@pytest.mark.parametrize("registers", [3, 8, 24])
+@pytest.mark.parametrize("seed", range(10))
+def test_the_order_is_that_of_the_rule(seed, registers, monkeypatch):
+    monkeypatch.setattr(schedule, "REGISTERS", registers)
+    nodes, results = random_line(seed, length=120)
+    results = [*results, *random.Random(seed).sample(range(3, len(nodes)), 20)]
+    live = live_nodes(nodes, results)
+    assert schedule.scheduled(nodes, live, results) == scheduled_by_the_rule(nodes, live, results)
+
+
 @pytest.mark.parametrize("size", [(1, 1), (1, 3), (3, 2)])
 def test_functions_keep_their_dependencies_and_change_their_order(size):
     nodes, results = straight(*size)
@@ -58,6 +95,16 @@ def test_long_lines_are_left_alone():
     nodes, results = straight(3, 4)
     live = live_nodes(nodes, results)
     assert schedule.scheduled(nodes, live, results) == live
+
+
+@pytest.mark.parametrize(("more", "alone"), [(0, False), (1, True)])
+def test_lines_of_much_independent_work_are_left_alone(more, alone):
+    """Pairs of a sum and its product, 8 cycles: enough to be busy in any order, or one less."""
+    tape, pairs = Tape(), 4 * schedule.MOST_ABREAST + more
+    x = [tape.input(k) for k in range(pairs + 1)]
+    results = [tape.mul(tape.add(a, b), a) for a, b in pairwise(x)]
+    live = live_nodes(tape.nodes, results)
+    assert (schedule.scheduled(tape.nodes, live, results) == live) == alone
 
 
 def test_the_longest_path_starts_first():

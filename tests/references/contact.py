@@ -1,5 +1,4 @@
-"""Contact in plain NumPy: a state and parameters go in, points, velocities, Jacobians, forces and
-stiffness come out.
+"""Contact in plain NumPy: points, velocities, Jacobians, forces and stiffness.
 
 Every formula also takes complex numbers: velocities and Jacobians are complex steps of the points'
 places.

@@ -21,7 +21,10 @@ SIMPLE = """kind = "articulated"
 segments = 1
 links = 2
 contacts = ["feet", "tail"]
-functions = ["energy", "momentum", "rollout", "implicit", "pfl", "tail_points", "contact_points", "contact_dynamics"]
+functions = [
+  "energy", "momentum", "rollout", "implicit", "pfl", "tail_points",
+  "contact_points", "contact_dynamics",
+]
 [simulate]
 duration = 0.02
 [simulate.start]

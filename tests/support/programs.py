@@ -128,7 +128,7 @@ def built(count=3):
 
 
 def carry(downward=False):
-    """A state overwritten in every turn, kept as it goes by; the sum of all."""
+    """A state overwritten in every iteration, kept as it goes by; the sum of all."""
     b, mass, x, y, u, w = built()
     s = b.array("s", 1)
     b.copy(s[0], mass[0])
@@ -157,7 +157,7 @@ def accumulators():
 
 
 def temporaries():
-    """A temporary that starts anew in every turn and is squared and doubled in place."""
+    """A temporary that starts anew in every iteration and is squared and doubled in place."""
     b, mass, x, y, u, w = built()
     t = b.array("t", 1)
     b.fill(w[0], 0)
@@ -250,7 +250,7 @@ def guarded():
 
 
 def scratch():
-    """A temporary that one statement alone writes, in every turn."""
+    """A temporary that one statement alone writes, in every iteration."""
     b, mass, x, y, u, w = built()
     t = b.array("t", 1)
     b.fill(w[0], 0)

@@ -1,105 +1,133 @@
-"""Sines and cosines: a step goes in; whether its outputs are those of its inputs comes out.
+"""Arrays of sines and cosines: they are differentiated with respect to their angles.
 
-The derivative of a cosine is minus its sine, which stands beside it.  So what reads sines and
-cosines can be differentiated with respect to the angles: half the rows, and d(R x) = R dx + dalpha
-(e x R x) instead of four products.
+The derivative of a cosine is minus the sine that stands beside it.  A step that reads both can
+therefore take the tangents of the angles in place of those of the sines and cosines: half as many,
+and d(R x) = R dx + dalpha (e x R x) in place of four products.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from ..ir.dataflow import names, reads, writes
 from ..ir.program import Apply, Index, Program, Ref, statements
 from ..ir.step import Step
 
+PARTNERS = {"sin": "cos", "cos": "sin"}
+
 
 @dataclass(frozen=True)
-class Turned:
-    """Vectors of sines and cosines: for each scalar its angle, and the sign and place of its
-    derivative.
+class SinesAndCosines:
+    """How the scalars of a vector follow from angles.
+
+    angles: the number of angles.
+    scalars: of each scalar its angle, and the sign and the position of its derivative.
     """
 
     angles: int
     scalars: tuple[tuple[int, int, int], ...]
 
 
-def turned_by(step: Step) -> Turned | None:
-    """Return how the outputs of a step follow from angles; None if they are not their sines and
-    cosines.
-    """
+AngleInputs = frozenset[tuple[str, SinesAndCosines]]  # the inputs of a step that are such
+
+
+def sines_and_cosines_of(step: Step) -> SinesAndCosines | None:
+    """Return how a step's output follows from angles; None if it is not their sines and cosines."""
     if len(step.inputs) != 1 or len(step.outputs) != 1:
         return None
-    kinds = [step.nodes[r] for r in step.results]
+    operations = [step.nodes[r] for r in step.results]
     scalars = []
-    for op, *args in kinds:
-        partner = ({"sin": "cos", "cos": "sin"}.get(op), *args)
-        if partner not in kinds:
+    for op, *args in operations:
+        partner = (PARTNERS.get(op), *args)
+        if partner not in operations:
             return None
-        scalars.append((step.nodes[args[0]][1], 1 if op == "sin" else -1, kinds.index(partner)))
-    return Turned(step.inputs[0][1], tuple(scalars))
+        angle = step.nodes[args[0]][1]
+        scalars.append((angle, 1 if op == "sin" else -1, operations.index(partner)))
+    return SinesAndCosines(step.inputs[0][1], tuple(scalars))
 
 
 @dataclass(frozen=True)
-class TurnedArray:
-    """An array of sines and cosines, and where it is written from which angles."""
+class SinesAndCosinesArray:
+    """An array of sines and cosines that one statement writes, in a loop or alone.
 
-    turned: Turned
+    kind: how they follow from angles.
+    target: where the statement writes them.
+    source: where it reads the angles.
+    """
+
+    kind: SinesAndCosines
     target: Ref
     source: Ref
 
     def angles(self, ref: Ref) -> Ref:
-        """Return the angles of what a reference reads: the writer's, in the turn in which it was
-        written.
-        """
-        (variable, step), *_ = self.target.offset.terms or (("", 0),)
+        """Return the angles that belong to the sines and cosines which a reference reads."""
+        # the iteration of the writing loop in which these were written
+        (variable, step), *_ = self.target.offset.terms
         distance = ref.offset + self.target.offset.offset * -1
-        turn = Index(
-            tuple((name, factor // step) for name, factor in distance.terms),
-            distance.offset // step,
-        )
+        terms = tuple((name, factor // step) for name, factor in distance.terms)
+        iteration = Index(terms, distance.offset // step)
+
+        # what that iteration read
         factor = dict(self.source.offset.terms)[variable]
-        return replace(self.source, offset=turn * factor + self.source.offset.offset)
+        return replace(self.source, offset=iteration * factor + self.source.offset.offset)
 
 
-def turned_arrays(program: Program) -> dict[str, TurnedArray]:
-    """Return the arrays of sines and cosines that are written once and read by steps, vector by
-    vector.
-    """
-    out = {}
+def sines_and_cosines_arrays(program: Program) -> dict[str, SinesAndCosinesArray]:
+    """Return the arrays that hold nothing but the sines and cosines of one loop, by name."""
+    candidates = {}
     for statement, _ in statements(program.body):
-        turned = turned_by(statement.step) if isinstance(statement, Apply) else None
-        if turned and not any(statement.adds):
-            (source,), (target,) = statement.reads, statement.writes
-            out[target.array.name] = TurnedArray(turned, target, source)
-    return {name: found for name, found in out.items() if _plain(program, found)}
+        if isinstance(statement, Apply) and not any(statement.adds):
+            kind = sines_and_cosines_of(statement.step)
+            if kind:
+                (source,), (target,) = statement.reads, statement.writes
+                candidates[target.array.name] = SinesAndCosinesArray(kind, target, source)
+    return {
+        name: array
+        for name, array in candidates.items()
+        if _written_once(program, array) and _read_as_written(program, array)
+    }
 
 
-def _plain(program: Program, found: TurnedArray) -> bool:
-    """Tell if an array is local, written by one step in one loop, and read as it was written."""
-    name, terms = found.target.array.name, found.target.offset.terms
-    writers = sum(name in names(writes(s)) for s, _ in statements(program.body))
-    if (
-        found.target.array.role != "local"
-        or writers != 1
-        or len(terms) > 1
-        or len(found.source.offset.terms) > 1
-    ):
+def angle_inputs(
+    by_angles: Mapping[str, SinesAndCosinesArray], inputs: Mapping[str, Ref]
+) -> dict[str, SinesAndCosinesArray]:
+    """Return the arrays that a step reads sines and cosines of, by the names of its inputs."""
+    arrays = {name: by_angles.get(ref.array.name) for name, ref in inputs.items()}
+    return {name: array for name, array in arrays.items() if array}
+
+
+def kinds(arrays: Mapping[str, SinesAndCosinesArray]) -> AngleInputs:
+    """Return how the inputs of a step follow from angles, for its derivatives."""
+    return frozenset((name, array.kind) for name, array in arrays.items())
+
+
+def _written_once(program: Program, array: SinesAndCosinesArray) -> bool:
+    """Tell if an array is local, and written by one statement in one loop over the angles."""
+    name = array.target.array.name
+    if array.target.array.role != "local":
         return False
-    step = dict(terms).get(terms[0][0] if terms else "", 0)
+    writers = sum(name in names(writes(s)) for s, _ in statements(program.body))
+    if writers != 1:
+        return False
+    variables = [variable for variable, _ in array.target.offset.terms]
+    return len(variables) == 1 and variables == [v for v, _ in array.source.offset.terms]
+
+
+def _read_as_written(program: Program, array: SinesAndCosinesArray) -> bool:
+    """Tell if all that reads an array are steps, which take the vectors that were written."""
     for statement, _ in statements(program.body):
         for ref in reads(statement):
-            if ref.array.name == name and not (
-                isinstance(statement, Apply)
-                and ref.size == found.target.size
-                and _multiple(ref, found.target, step)
-            ):
+            if ref.array.name != array.target.array.name:
+                continue
+            if not isinstance(statement, Apply) or not _is_a_written_vector(ref, array.target):
                 return False
-    return bool(terms) and dict(found.source.offset.terms).keys() == dict(terms).keys()
+    return True
 
 
-def _multiple(ref: Ref, target: Ref, step: int) -> bool:
-    distance = [factor for _, factor in ref.offset.terms] + [
-        ref.offset.offset - target.offset.offset
-    ]
-    return (
-        step != 0 and ref.stride == target.stride and all(number % step == 0 for number in distance)
-    )
+def _is_a_written_vector(ref: Ref, target: Ref) -> bool:
+    """Tell if a reference always means what one iteration writes to the target."""
+    if ref.size != target.size or ref.stride != target.stride:
+        return False
+    ((_, step),) = target.offset.terms
+    distances = [factor for _, factor in ref.offset.terms]
+    distances.append(ref.offset.offset - target.offset.offset)
+    return step != 0 and all(distance % step == 0 for distance in distances)

@@ -1,68 +1,101 @@
-"""Tangents of programs: a loop nest goes in, the loop nest that carries its derivatives along comes
-out.
+"""Forward mode: a program that carries the derivatives of its values along.
 
-Each active array ``x`` gets a companion ``d_x``.  With lanes, every scalar of it is a row with one
-number for each direction; without, it holds the derivative in one direction.
+Each array ``x`` that depends on the inputs of interest gets a companion ``d_x``.  With lanes, every
+scalar of ``d_x`` has one number for each direction; without, it is the derivative in one direction.
 """
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import replace
+from typing import Any
 
 from ..ir.dataflow import forward_slice, inner_arrays, pruned, writes
-from ..ir.program import Apply, Array, Copy, Fill, Guard, Index, Loop, Program, Ref, statements
-from .angles import TurnedArray, turned_arrays
+from ..ir.program import (
+    Apply,
+    Array,
+    Copy,
+    Fill,
+    Guard,
+    Index,
+    Loop,
+    Program,
+    Ref,
+    Statement,
+    statements,
+)
+from .angles import SinesAndCosinesArray, angle_inputs, kinds, sines_and_cosines_arrays
 from .step import tangent
 
 Bound = Callable[[tuple[Loop, ...]], Index | None]
 
 
-def everywhere(loops: tuple[Loop, ...]) -> None:
-    """Need all lanes in every loop."""
+def all_lanes(loops: tuple[Loop, ...]) -> None:
+    """Set no bound: every lane is needed, whatever the loops are."""
 
 
 def tangent_program(
-    program: Program, active: Collection[str], lanes: int = 0, bound: Bound = everywhere
+    program: Program, active: Collection[str], lanes: int = 0, bound: Bound = all_lanes
 ) -> Program:
-    """Return the program that takes ``d_<input>`` of the active inputs along and gives
-    ``d_<output>``.
+    """Return the program that takes ``d_<input>`` of the active inputs to ``d_<output>``.
 
-    ``bound`` tells how many lanes are needed inside given loops.
+    ``lanes`` is the number of directions, 0 for one direction in narrow scalars; ``bound`` tells
+    how many of the lanes are needed inside given loops.
     """
-    moving, turned = forward_slice(program.body, active), turned_arrays(program)
-    turned = {name: found for name, found in turned.items() if name in moving}
-    own = [a for a in program.arrays if a.name in moving - turned.keys()]
-    companions = {a.name: Array(f"d_{a.name}", _role(a), a.size, a.count, lanes=lanes) for a in own}
-    transform = _Transform(companions, turned, bound)
-    body = transform.body(program.body, ())
+    # every array that depends on the active ones has tangents, or its angles have
+    moving = forward_slice(program.body, active)
+    by_angles = {
+        name: array for name, array in sines_and_cosines_arrays(program).items() if name in moving
+    }
+    companions = {
+        a.name: Array(f"d_{a.name}", _role(a), a.size, a.count, lanes=lanes)
+        for a in program.arrays
+        if a.name in moving - by_angles.keys()
+    }
+
+    # lanes that a statement leaves out are zero from the start
+    body = _Tangents(companions, by_angles, bound).body(program.body, ())
     fills = tuple(Fill(ref, (0,) * ref.size) for ref in _partly_written(body))
+
     arrays = (*inner_arrays(program), *companions.values())
-    name = "_".join(["d", *active, program.name, *(["rows_of", str(lanes)] if lanes else [])])
+    name = "_".join(["d", *active, program.name])
+    if lanes:
+        name = f"{name}_rows_of_{lanes}"
     return pruned(replace(program, name=name, arrays=arrays, body=fills + body))
 
 
 def _role(array: Array) -> str:
+    """Return the role of an array's tangents: those of parameters are inputs."""
     return "input" if array.role == "parameters" else array.role
 
 
-def _partly_written(body: tuple) -> list[Ref]:
-    """Return the rows that some statement writes in part of their lanes: the others must be
-    zero.
-    """
-    found = {}
+def _partly_written(body: tuple[Statement, ...]) -> list[Ref]:
+    """Return the wide arrays of which some statement writes only a part of the lanes."""
+    arrays: dict[str, Array] = {}
     for statement, _ in statements(body):
-        if getattr(statement, "columns", None):
-            found |= {ref.array.name: ref.array for ref in writes(statement) if ref.array.lanes}
-    return [a.part(0, a.length) for a in found.values()]
+        if isinstance(statement, Apply) and statement.columns:
+            for ref in writes(statement):
+                if ref.array.lanes:
+                    arrays[ref.array.name] = ref.array
+    return [a.whole() for a in arrays.values()]
 
 
-class _Transform:
-    """Rewrites statements; ``companions`` are the tangent arrays by the names of their arrays.
+class _Tangents:
+    """Rewrites statements so that they compute tangents as well.
 
-    Arrays of sines and cosines, ``turned``, have none: the tangents of their angles serve.
+    companions: the tangents of arrays, by the names of the arrays.
+    by_angles: arrays of sines and cosines; they have no tangents, those of their angles serve.
     """
 
-    def __init__(self, companions: dict[str, Array], turned: dict[str, TurnedArray], bound: Bound):
-        self.companions, self.turned, self.bound = companions, turned, bound
+    def __init__(
+        self, companions: dict[str, Array], by_angles: dict[str, SinesAndCosinesArray], bound: Bound
+    ):
+        self.companions, self.by_angles, self.bound = companions, by_angles, bound
+        self.rules: dict[type, Callable[[Any, tuple[Loop, ...]], Iterator[Statement]]] = {
+            Apply: self.apply,
+            Copy: self.copy,
+            Fill: self.fill,
+            Guard: self.guard,
+            Loop: self.loop,
+        }
 
     def moves(self, ref: Ref) -> bool:
         """Tell if the scalars of a reference have tangents."""
@@ -72,57 +105,62 @@ class _Transform:
         """Return the tangents of a reference."""
         return replace(ref, array=self.companions[ref.array.name])
 
-    def body(self, body: tuple, loops: tuple[Loop, ...]) -> tuple:
+    def body(self, body: tuple[Statement, ...], loops: tuple[Loop, ...]) -> tuple[Statement, ...]:
         """Return the transformed loop nest."""
-        out = []
+        out: list[Statement] = []
         for statement in body:
-            if isinstance(statement, Loop):
-                out.append(replace(statement, body=self.body(statement.body, (*loops, statement))))
-            elif isinstance(statement, Apply):
-                out += self.apply(statement, self.bound(loops))
-            elif isinstance(statement, Copy | Fill):
-                out += self.store(statement)
-            elif isinstance(statement, Guard):
-                out.append(statement)
-            else:
+            rule = self.rules.get(type(statement))
+            if rule is None:
                 raise TypeError(f"no rule differentiates {type(statement).__name__}")
+            out += rule(statement, loops)
         return tuple(out)
 
-    def store(self, statement: Copy | Fill):
-        """Yield a copy or fill and what it does to tangents."""
-        yield statement
-        if self.moves(statement.target):
-            target = self.of(statement.target)
-            if isinstance(statement, Copy) and self.moves(statement.source):
-                yield replace(statement, target=target, source=self.of(statement.source))
-            elif not getattr(statement, "adds", False):
-                yield Fill(target, (0,) * target.size)
+    def loop(self, loop: Loop, loops: tuple[Loop, ...]) -> Iterator[Statement]:
+        """Yield a loop over the transformed body."""
+        yield replace(loop, body=self.body(loop.body, (*loops, loop)))
 
-    def apply(self, call: Apply, columns: Index | None):
+    def guard(self, guard: Guard, loops: tuple[Loop, ...]) -> Iterator[Statement]:
+        """Yield a guard as it is."""
+        yield guard
+
+    def fill(self, fill: Fill, loops: tuple[Loop, ...]) -> Iterator[Statement]:
+        """Yield a fill, and forget the tangents of what it overwrites."""
+        yield fill
+        yield from self.cleared(fill.target)
+
+    def cleared(self, *targets: Ref) -> Iterator[Statement]:
+        """Yield what sets the tangents of overwritten scalars to zero."""
+        for target in targets:
+            if self.moves(target):
+                yield Fill(self.of(target), (0,) * target.size)
+
+    def copy(self, copy: Copy, loops: tuple[Loop, ...]) -> Iterator[Statement]:
+        """Yield a copy, and that of the tangents."""
+        yield copy
+        if self.moves(copy.target) and self.moves(copy.source):
+            yield replace(copy, target=self.of(copy.target), source=self.of(copy.source))
+        elif not copy.adds:
+            yield from self.cleared(copy.target)
+
+    def apply(self, call: Apply, loops: tuple[Loop, ...]) -> Iterator[Statement]:
         """Yield a step with its tangents."""
         values = call.inputs()
-        turns = {
-            name: self.turned[ref.array.name]
-            for name, ref in values.items()
-            if ref.array.name in self.turned
-        }
         active = {name for name, ref in values.items() if self.moves(ref)}
-        if any(ref.array.name in self.turned for ref in call.writes) or not active | turns.keys():
+        angles = angle_inputs(self.by_angles, values)
+
+        # sines and cosines need no tangents, and of constants they are zero
+        makes_sines = any(ref.array.name in self.by_angles for ref in call.writes)
+        if makes_sines or not (active or angles):
             yield call
-            for ref, adds in zip(call.writes, call.adds, strict=True):
-                if self.moves(ref) and not adds:
-                    yield Fill(self.of(ref), (0,) * ref.size)
+            yield from self.cleared(*call.stored())
             return
-        kinds = frozenset((name, found.turned) for name, found in turns.items())
-        step = tangent(call.step, frozenset(active | turns.keys()), kinds)
-        tangents = {
-            f"d_{name}_angles": self.of(found.angles(values[name])) for name, found in turns.items()
-        }
-        values |= tangents | {f"d_{name}": self.of(values[name]) for name in active}
-        yield Apply(
-            step,
-            tuple(values[name] for name, _ in step.inputs),
-            call.writes + tuple(map(self.of, call.writes)),
-            call.adds * 2,
-            columns,
-        )
+
+        # the step of values and tangents, and what it reads by the names of its inputs
+        step = tangent(call.step, frozenset(active | angles.keys()), kinds(angles))
+        for name, array in angles.items():
+            values[f"d_{name}_angles"] = self.of(array.angles(values[name]))
+        for name in active:
+            values[f"d_{name}"] = self.of(values[name])
+        targets = (*call.writes, *map(self.of, call.writes))
+        both = Apply.named(step, values, targets, call.adds * 2)
+        yield replace(both, columns=self.bound(loops))

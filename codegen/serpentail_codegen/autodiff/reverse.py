@@ -1,13 +1,13 @@
-"""Adjoints of programs: a loop nest goes in, the loop nest that runs it, then runs it backward,
-comes out.
+"""Reverse mode: a program that runs another one, then runs it backward for its gradients.
 
-Each array ``x`` that matters gets a companion ``b_x``, what the weighted outputs change by with x.
-A value that is overwritten before the way back needs it is kept, one copy for each turn of its
-loops.
+Each array ``x`` that matters gets a companion ``b_x``: how much a weighted sum of the outputs
+changes with x.  A value that is overwritten before the backward run needs it is kept, one copy for
+each iteration of its loops.
 """
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from ..ir.dataflow import backward_slice, forward_slice, inner_arrays, pruned, writes
 from ..ir.program import (
@@ -20,87 +20,120 @@ from ..ir.program import (
     Loop,
     Program,
     Ref,
+    Statement,
+    When,
     as_index,
     statements,
 )
-from .angles import TurnedArray, turned_arrays
+from .angles import SinesAndCosinesArray, angle_inputs, kinds, sines_and_cosines_arrays
 from .step import adjoint
+
+Loops = tuple[Loop, ...]
+BothWays = tuple[list[Statement], list[Statement]]  # what runs forward, and what runs backward
 
 
 def adjoint_program(program: Program, wanted: Collection[str], given: Collection[str]) -> Program:
-    """Return the program that takes ``b_<output>`` of the given outputs to ``b_<input>`` of the
-    wanted inputs.
-    """
+    """Return the program from ``b_<output>`` of given outputs to ``b_<input>`` of wanted inputs."""
+    # what lies between the wanted inputs and the given outputs has adjoints, or its angles have
     matters = forward_slice(program.body, wanted) & backward_slice(program.body, given)
-    turned = {name: found for name, found in turned_arrays(program).items() if name in matters}
-    matters -= turned.keys()
-    ends = [a for a in program.arrays if a.name in (*wanted, *given)]
-    companions = {
-        a.name: Array(f"b_{a.name}", "local", a.size, a.count)
-        for a in program.arrays
-        if a.name in matters
+    by_angles = {
+        name: array for name, array in sines_and_cosines_arrays(program).items() if name in matters
     }
-    companions |= {a.name: Array(f"b_{a.name}_sum", "local", a.size, a.count) for a in ends}
-    weights = [Array(f"b_{a.name}", "input", a.size, a.count) for a in ends if a.name in given]
-    results = [Array(f"b_{a.name}", "output", a.size, a.count) for a in ends if a.name in wanted]
-    way = _WayBack(program, companions, turned)
-    start = [Fill(b.part(0, b.length), (0,) * b.length) for b in companions.values()]
-    start += [Copy(_all(companions[w.name.removeprefix("b_")]), _all(w)) for w in weights]
-    forward, backward = way.both(program.body, ())
-    end = tuple(Copy(_all(b), _all(companions[b.name.removeprefix("b_")])) for b in results)
-    arrays = (*inner_arrays(program), *companions.values(), *weights, *results, *way.kept)
-    body = (*forward, *start, *backward, *end)
-    name = "_".join(["b", *wanted, *given, program.name])
-    return pruned(replace(program, name=name, arrays=arrays, body=body))
+    matters -= by_angles.keys()
+    ends = [a for a in program.arrays if a.name in (*wanted, *given)]
+    companions = {a.name: _adjoints(a, "local") for a in program.arrays if a.name in matters}
+    companions |= {a.name: _adjoints(a, "local", "_sum") for a in ends}
+
+    # adjoints start from the weights of the outputs, and end as those of the inputs
+    weights = {a.name: _adjoints(a, "input") for a in ends if a.name in given}
+    results = {a.name: _adjoints(a, "output") for a in ends if a.name in wanted}
+    zeros = [Fill(b.whole(), (0,) * b.length) for b in companions.values()]
+    start = [Copy(companions[name].whole(), weight.whole()) for name, weight in weights.items()]
+    end = [Copy(result.whole(), companions[name].whole()) for name, result in results.items()]
+
+    reversal = _Reversal(program, companions, by_angles)
+    forward, backward = reversal.body(program.body, ())
+    return pruned(
+        replace(
+            program,
+            name="_".join(["b", *wanted, *given, program.name]),
+            arrays=(
+                *inner_arrays(program),
+                *companions.values(),
+                *weights.values(),
+                *results.values(),
+                *reversal.kept,
+            ),
+            body=(*forward, *zeros, *start, *backward, *end),
+        )
+    )
 
 
-def _all(array: Array) -> Ref:
-    return array.part(0, array.length)
+def _adjoints(array: Array, role: str, suffix: str = "") -> Array:
+    return Array(f"b_{array.name}{suffix}", role, array.size, array.count)
 
 
-def turns(loops: tuple[Loop, ...]) -> tuple[Index, int]:
-    """Return the number of the current turn of nested loops, and how many turns there are."""
+def iterations(loops: Loops) -> tuple[Index, int]:
+    """Return the number of the current iteration of nested loops, and how many there are."""
     number, count = as_index(0), 1
     for loop in reversed(loops):
         if loop.start.terms or loop.stop.terms or loop.start.offset:
             raise ValueError(
-                f"loop {loop.var} is no rectangle from 0 on: its turns cannot be numbered"
+                f"loop {loop.var} is no rectangle from 0 on: its iterations cannot be numbered"
             )
         number, count = number + count * Index(((loop.var, 1),)), count * loop.stop.offset
     return number, count
 
 
-def _apart(ref: Ref, loops: tuple[Loop, ...]) -> bool:
-    """Tell if a reference means another place in every turn of the loops."""
-    strides, reach = {var: abs(factor) for var, factor in ref.offset.terms}, ref.size * ref.stride
-    for loop in sorted(loops, key=lambda loop: strides.get(loop.var, 0)):
-        if strides.get(loop.var, 0) < reach or loop.start.terms or loop.stop.terms:
+def _apart(ref: Ref, loops: tuple[Loop | When, ...]) -> bool:
+    """Tell if a reference means another place in every iteration of the loops."""
+    strides = {var: abs(factor) for var, factor in ref.offset.terms}
+    span = ref.size * ref.stride  # of the places meant in all iterations of the inner loops
+    rectangles = [loop for loop in loops if isinstance(loop, Loop)]
+    for loop in sorted(rectangles, key=lambda loop: strides.get(loop.var, 0)):
+        stride = strides.get(loop.var, 0)
+        if stride < span or loop.start.terms or loop.stop.terms:
             return False
-        reach += strides[loop.var] * (loop.stop.offset - loop.start.offset - 1)
+        span += stride * (loop.stop.offset - loop.start.offset - 1)
     return True
 
 
 def _overlap(ref: Ref, other: Ref) -> bool:
     """Tell if two references may share a scalar."""
-    if ref.array.name != other.array.name or ref.offset.terms != other.offset.terms:
-        return ref.array.name == other.array.name
-    ends = [(r.offset.offset, r.offset.offset + (r.size - 1) * r.stride) for r in (ref, other)]
-    return ends[0][0] <= ends[1][1] and ends[1][0] <= ends[0][1]
+    if ref.array.name != other.array.name:
+        return False
+    if ref.offset.terms != other.offset.terms:
+        return True
+    first, other_first = ref.offset.offset, other.offset.offset
+    last = first + (ref.size - 1) * ref.stride
+    other_last = other_first + (other.size - 1) * other.stride
+    return first <= other_last and other_first <= last
 
 
 @dataclass
-class _WayBack:
-    """Reverses statements; ``companions`` are the adjoint arrays by the names of their arrays.
+class _Reversal:
+    """Reverses statements.
 
-    Arrays of sines and cosines, ``turned``, have none: the adjoints of their angles serve.
+    companions: the adjoints of arrays, by the names of the arrays.
+    by_angles: arrays of sines and cosines; they have no adjoints, those of their angles serve.
+    kept: copies of values that are overwritten before the backward run needs them.
     """
 
     program: Program
     companions: dict[str, Array]
-    turned: dict[str, TurnedArray]
+    by_angles: dict[str, SinesAndCosinesArray]
     kept: list[Array] = field(default_factory=list)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
+        self.rules: dict[type, Callable[[Any, Loops], BothWays]] = {
+            Apply: self.apply,
+            Copy: self.copy,
+            Fill: self.fill,
+            Guard: self.guard,
+            Loop: self.loop,
+        }
+
+        # arrays that hold different values at different times
         writers: dict[str, int] = {}
         self.overwritten: set[str] = set()
         for statement, loops in statements(self.program.body):
@@ -118,88 +151,94 @@ class _WayBack:
         """Tell if the scalars of a reference have adjoints."""
         return ref.array.name in self.companions
 
-    def both(self, body: tuple, loops: tuple[Loop, ...]) -> tuple[tuple, tuple]:
-        """Return a loop nest with what it keeps, and the way back."""
-        forward, backward = [], []
+    def body(self, body: tuple[Statement, ...], loops: Loops) -> BothWays:
+        """Return statements with what they keep, and their reverse, the last one first."""
+        forward: list[Statement] = []
+        backward: list[Statement] = []
         for statement in body:
-            if isinstance(statement, Loop):
-                there, back = self.both(statement.body, (*loops, statement))
-                forward.append(replace(statement, body=there))
-                if back:
-                    backward.insert(
-                        0, replace(statement, body=back, downward=not statement.downward)
-                    )
-                continue
-            there, back = self.statement(statement, loops)
+            rule = self.rules.get(type(statement))
+            if rule is None:
+                raise TypeError(f"no rule reverses {type(statement).__name__}")
+            there, back = rule(statement, loops)
             forward += there
             backward = [*back, *backward]
-        return tuple(forward), tuple(backward)
+        return forward, backward
 
-    def statement(self, statement, loops) -> tuple[list, list]:
-        """Return a statement with what it keeps, and its reverse."""
-        if isinstance(statement, Apply):
-            return self.apply(statement, loops)
-        if isinstance(statement, Copy):
-            return [statement], self.copy(statement)
-        if isinstance(statement, Fill):
-            return [statement], self.cleared(statement.target)
-        if isinstance(statement, Guard):
-            return [statement], []
-        raise TypeError(f"no rule reverses {type(statement).__name__}")
+    def loop(self, loop: Loop, loops: Loops) -> BothWays:
+        """Return a loop, and one that runs the other way."""
+        there, back = self.body(loop.body, (*loops, loop))
+        forward = replace(loop, body=tuple(there))
+        if not back:
+            return [forward], []
+        return [forward], [replace(loop, body=tuple(back), downward=not loop.downward)]
 
-    def cleared(self, *targets: Ref) -> list:
+    def guard(self, guard: Guard, loops: Loops) -> BothWays:
+        """Return a guard, which has no reverse."""
+        return [guard], []
+
+    def fill(self, fill: Fill, loops: Loops) -> BothWays:
+        """Return a fill and its reverse."""
+        return [fill], self.cleared(fill.target)
+
+    def cleared(self, *targets: Ref) -> list[Statement]:
         """Return the statements that forget the adjoints of what was overwritten."""
-        found = [ref for ref in targets if self.matters(ref) and ref.array.name in self.overwritten]
-        return [Fill(self.of(ref), (0,) * ref.size) for ref in found]
+        return [
+            Fill(self.of(ref), (0,) * ref.size)
+            for ref in targets
+            if self.matters(ref) and ref.array.name in self.overwritten
+        ]
 
-    def copy(self, copy: Copy) -> list:
-        """Return the reverse of a copy."""
-        back = []
+    def copy(self, copy: Copy, loops: Loops) -> BothWays:
+        """Return a copy and its reverse."""
+        back: list[Statement] = []
         if self.matters(copy.target) and self.matters(copy.source):
             back.append(Copy(self.of(copy.source), self.of(copy.target), adds=True))
-        return back if copy.adds else back + self.cleared(copy.target)
+        if not copy.adds:
+            back += self.cleared(copy.target)
+        return [copy], back
 
-    def apply(self, call: Apply, loops) -> tuple[list, list]:
+    def apply(self, call: Apply, loops: Loops) -> BothWays:
         """Return a step, keeping what its reverse reads, and its reverse."""
-        read, written = call.inputs(), call.outputs()
-        stored = [ref for ref, adds in zip(call.writes, call.adds, strict=True) if not adds]
-        given = frozenset(n for n, ref in written.items() if self.matters(ref))
-        turns = {
-            n: self.turned[ref.array.name]
-            for n, ref in read.items()
-            if ref.array.name in self.turned
-        }
-        wanted = frozenset(n for n, ref in read.items() if self.matters(ref)) | turns.keys()
-        if not given or not wanted:
+        inputs, stored = call.inputs(), call.stored()
+        angles = angle_inputs(self.by_angles, inputs)
+        outputs = {name: ref for name, ref in call.outputs().items() if self.matters(ref)}
+        wanted = {name for name, ref in inputs.items() if self.matters(ref)} | angles.keys()
+        if not outputs or not wanted:
             return [call], self.cleared(*stored)
-        kinds = frozenset((n, found.turned) for n, found in turns.items())
-        step = adjoint(call.step, frozenset(wanted), given, kinds)
-        values = read | {f"b_{n}": self.of(ref) for n, ref in written.items() if n in given}
-        keeps = []
+        step = adjoint(call.step, frozenset(wanted), frozenset(outputs), kinds(angles))
+
+        # it reads the adjoints of outputs, and values as they were before the step
+        values = inputs | {f"b_{name}": self.of(ref) for name, ref in outputs.items()}
+        keeps: list[Statement] = []
         for name, _ in step.inputs:
-            if name in read and read[name].array.name in self.overwritten:
-                keeps.append(self.keep(read[name], loops))
-                values[name] = keeps[-1].target
-        places = {f"b_{n}": ref for n, ref in read.items()}
-        places |= {f"b_{n}_angles": found.angles(read[n]) for n, found in turns.items()}
-        targets = [places[name] for name, _ in step.outputs]
-        in_place = [ref in stored for ref in targets]
-        for ref in stored:
-            if sum(_overlap(ref, other) for other in targets) > (ref in targets):
-                raise ValueError(
-                    f"{call.step.name} overwrites part of what it reads in {ref.array.name}"
-                )
-        back = Apply(
-            step,
-            tuple(values[name] for name, _ in step.inputs),
-            tuple(map(self.of, targets)),
-            tuple(not here for here in in_place),
-        )
+            if name in inputs and inputs[name].array.name in self.overwritten:
+                copy = self.keep(inputs[name], loops)
+                keeps.append(copy)
+                values[name] = copy.target
+
+        # its results are added to the adjoints of inputs, but replace those of what it overwrites
+        sources = {f"b_{name}": ref for name, ref in inputs.items()}
+        for name, array in angles.items():
+            sources[f"b_{name}_angles"] = array.angles(inputs[name])
+        targets = [sources[name] for name, _ in step.outputs]
+        _check_overlaps(call, stored, targets)
+        adds = [ref not in stored for ref in targets]
+        back = Apply.named(step, values, map(self.of, targets), adds)
         return [*keeps, call], [back, *self.cleared(*(ref for ref in stored if ref not in targets))]
 
-    def keep(self, ref: Ref, loops) -> Copy:
+    def keep(self, ref: Ref, loops: Loops) -> Copy:
         """Return the copy of a value that will be overwritten."""
-        number, count = turns(loops)
+        number, count = iterations(loops)
         array = Array(f"kept_{len(self.kept)}_{ref.array.name}", "local", ref.size, count)
         self.kept.append(array)
         return Copy(array[number], ref)
+
+
+def _check_overlaps(call: Apply, stored: list[Ref], targets: list[Ref]) -> None:
+    """Refuse a step that overwrites a part of what it reads, or what it reads under two names."""
+    for ref in stored:
+        overlaps = sum(_overlap(ref, target) for target in targets)
+        if overlaps > (ref in targets):
+            raise ValueError(
+                f"{call.step.name} overwrites part of what it reads in {ref.array.name}"
+            )

@@ -1,34 +1,34 @@
-"""Derivatives of steps: a straight-line step goes in, the step of its tangents or of its adjoints
-comes out.
+"""Derivatives of steps: the step of a step's tangents, and that of its adjoints.
 
-Both walk the tape once and differentiate each operation by its rule.  Tangents are called
-``d_<vector>``, adjoints ``b_<vector>``; where a tangent is wide it stands for all directions at
-once.
+Both walk the operations once and differentiate each by its rule.  Tangents are called
+``d_<vector>``, adjoints ``b_<vector>``; where a tangent is wide, its lanes are the directions.
 """
 
 from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
 from functools import cache
 
 from ..ir.step import Step, compacted
 from ..ir.tape import LEAVES, Tape, live_nodes, operands, replay
-from .angles import Turned
+from .angles import AngleInputs, SinesAndCosines
+
+Vectors = Sequence[tuple[str, int]]  # names and sizes
+Combination = dict[int, int]  # a sum of tangents: the coefficient of each
 
 
-def _quotient(tape: Tape, y: int, a: int, b: int) -> tuple[int, int]:
+def _quotient(tape: Tape, y: int, a: int, b: int) -> tuple[int, ...]:
     inverse = tape.div(tape.const(1), b)
     return inverse, tape.neg(tape.mul(y, inverse))
 
 
-def _chosen(tape: Tape, c: int) -> tuple[int, int]:
-    """1 for the operand that counts, 0 for the other; what does not count must have a derivative
-    all the same.
-    """
+def _selection(tape: Tape, y: int, c: int, a: int, b: int) -> tuple[int, ...]:
+    """1 for the operand that is selected, 0 for the other, which must have a derivative as well."""
     one, zero = tape.const(1), tape.const(0)
-    return tape.select(c, one, zero), tape.select(c, zero, one)
+    return zero, tape.select(c, one, zero), tape.select(c, zero, one)
 
 
 # partial derivatives of y = op(operands) with respect to each operand
-PARTIALS = {
+PARTIALS: dict[str, Callable[..., tuple[int, ...]]] = {
     "add": lambda tape, y, a, b: (tape.const(1), tape.const(1)),
     "sub": lambda tape, y, a, b: (tape.const(1), tape.const(-1)),
     "mul": lambda tape, y, a, b: (b, a),
@@ -37,12 +37,12 @@ PARTIALS = {
     "sin": lambda tape, y, a: (tape.cos(a),),
     "cos": lambda tape, y, a: (tape.neg(tape.sin(a)),),
     "sqrt": lambda tape, y, a: (tape.div(tape.const(0.5), y),),
-    "select": lambda tape, y, c, a, b: (tape.const(0), *_chosen(tape, c)),
+    "select": _selection,
 }
 
 
 class Rules:
-    """Partial derivatives of the operations, recorded on a tape beside the values."""
+    """A tape on which a step's values are recorded, and the partial derivatives beside them."""
 
     def __init__(self, step: Step):
         self.tape, self.step = Tape(), step
@@ -52,33 +52,31 @@ class Rules:
     def partials(self, node: int) -> dict[int, int]:
         """Return the node of the partial derivative for each operand of an operation."""
         op, *args = self.step.nodes[node]
+        partials = PARTIALS[op](self.tape, self.values[node], *(self.values[a] for a in args))
         out: dict[int, int] = {}
-        for operand, partial in zip(
-            args,
-            PARTIALS[op](self.tape, self.values[node], *(self.values[a] for a in args)),
-            strict=True,
-        ):
-            out[operand] = self.tape.add(out[operand], partial) if operand in out else partial
+        for operand, partial in zip(args, partials, strict=True):
+            if operand in out:  # the same node twice, as in a * a
+                out[operand] = self.tape.add(out[operand], partial)
+            else:
+                out[operand] = partial
         return out
 
-    def finish(self, prefix: str, doc: str, inputs, outputs, results) -> Step:
+    def finish(
+        self, name: str, doc: str, inputs: Vectors, outputs: Vectors, results: Iterable[int]
+    ) -> Step:
         """Return what was recorded as a step."""
-        name = f"{prefix}_{self.step.name}"
-        return compacted(
-            Step(name, doc, tuple(inputs), tuple(outputs), tuple(self.tape.nodes), tuple(results))
-        )
+        nodes = tuple(self.tape.nodes)
+        return compacted(Step(name, doc, tuple(inputs), tuple(outputs), nodes, tuple(results)))
 
 
-def some_of(vectors, chosen: frozenset[str], word: str = "") -> str:
+def some_of(vectors: Vectors, chosen: frozenset[str], word: str = "") -> str:
     """Return the chosen vectors as a part of a name, nothing where all are."""
-    return (
-        ""
-        if len(chosen) == len(vectors)
-        else "_".join([word, *(name for name, _ in vectors if name in chosen)])
-    )
+    if len(chosen) == len(vectors):
+        return ""
+    return "_".join([word, *(name for name, _ in vectors if name in chosen)])
 
 
-def spans(vectors) -> dict[str, range]:
+def spans(vectors: Vectors) -> dict[str, range]:
     """Return the positions of named vectors that follow each other."""
     out, first = {}, 0
     for name, size in vectors:
@@ -88,14 +86,13 @@ def spans(vectors) -> dict[str, range]:
 
 
 class Combinations:
-    """Tangents as combinations of rows with narrow coefficients, summed up only where that saves
-    work on rows.
+    """Tangents as sums of wide nodes with narrow coefficients, added up only where that pays.
 
-    A node that is used once goes into its use: d(a (b + c)) = a db + a dc + (b + c) da needs no row
-    for d(b + c).
+    A node that is used once goes into its use: d(a (b + c)) = a db + a dc + (b + c) da needs no
+    wide node for d(b + c).
     """
 
-    MOST = 2  # terms that are scaled one by one; more are summed first
+    MOST_TERMS = 2  # that are scaled one by one; more are summed first
 
     def __init__(self, rules: Rules):
         self.rules, self.tape, self.step = rules, rules.tape, rules.step
@@ -103,123 +100,159 @@ class Combinations:
         self.uses = Counter(a for n in live for a in operands(self.step.nodes[n]))
         self.uses.update(self.step.results)
 
-    def summed(self, terms: dict[int, int]) -> int:
+    def summed(self, terms: Combination) -> int:
         """Return one node for a combination."""
         total = self.tape.const(0)
-        for row, coefficient in terms.items():
-            total = self.tape.add(total, self.tape.mul(coefficient, row))
+        for tangent_node, coefficient in terms.items():
+            total = self.tape.add(total, self.tape.mul(coefficient, tangent_node))
         return total
 
-    def one_row(self, terms: dict[int, int]) -> dict[int, int]:
-        """Return a combination of several rows as one row."""
-        return {self.summed(terms): self.tape.const(1)} if len(terms) > 1 else terms
+    def as_one_term(self, terms: Combination) -> Combination:
+        """Return a combination of several terms as one term."""
+        if len(terms) <= 1:
+            return terms
+        return {self.summed(terms): self.tape.const(1)}
 
-    def of(self, node: int, changes: list[dict[int, int]]) -> dict[int, int]:
+    def of(self, node: int, changes: list[Combination]) -> Combination:
         """Return the tangent of an operation from those of earlier nodes."""
-        tape, total = self.tape, {}
+        tape = self.tape
+        total: Combination = {}
         for operand, partial in self.rules.partials(node).items():
+            # a long sum that is to be scaled is added up first, for whatever else reads it as well
             terms = changes[operand]
-            if len(terms) > self.MOST and tape.value(partial) not in (1, -1):
-                terms = changes[operand] = self.one_row(terms)
-            for row, coefficient in terms.items():
-                total[row] = tape.add(total.get(row, tape.const(0)), tape.mul(partial, coefficient))
-        total = {
-            row: coefficient for row, coefficient in total.items() if tape.value(coefficient) != 0
-        }
-        return self.one_row(total) if self.uses[node] > 1 else total
+            if len(terms) > self.MOST_TERMS and tape.value(partial) not in (1, -1):
+                terms = changes[operand] = self.as_one_term(terms)
+            for tangent_node, coefficient in terms.items():
+                before = total.get(tangent_node, tape.const(0))
+                total[tangent_node] = tape.add(before, tape.mul(partial, coefficient))
+
+        # what cancels goes; what is used more than once is added up here
+        total = {term: factor for term, factor in total.items() if tape.value(factor) != 0}
+        return self.as_one_term(total) if self.uses[node] > 1 else total
 
 
-Turns = frozenset[tuple[str, Turned]]
-
-
-def moved_inputs(rules: Rules, active: frozenset[str], turns: dict[str, Turned]):
-    """Return the tangents that a step takes, and the tangent of each of its input scalars as a
-    combination of them.
-    """
-    tape, count, moving, slopes = rules.tape, rules.count, [], {}
+def moved_inputs(
+    rules: Rules, active: frozenset[str], angle_inputs: dict[str, SinesAndCosines]
+) -> tuple[list[tuple[str, int]], dict[int, Combination]]:
+    """Return the tangents that a step takes, and that of each input scalar as a sum of them."""
+    tape, first = rules.tape, rules.count
+    moving: list[tuple[str, int]] = []
+    slopes: dict[int, Combination] = {}
     for name, span in spans(rules.step.inputs).items():
-        if name in turns:
-            for k, (angle, sign, other) in zip(span, turns[name].scalars, strict=True):
+        if name in angle_inputs:
+            # d sin = cos dalpha, d cos = -sin dalpha
+            for k, (angle, sign, other) in zip(span, angle_inputs[name].scalars, strict=True):
                 partner = tape.input(span[other])
-                slopes[k] = {tape.input(count + angle): partner if sign > 0 else tape.neg(partner)}
-            moving.append((f"d_{name}_angles", turns[name].angles))
+                slopes[k] = {tape.input(first + angle): partner if sign > 0 else tape.neg(partner)}
+            moving.append((f"d_{name}_angles", angle_inputs[name].angles))
         elif name in active:
-            slopes |= {k: {tape.input(count + n): tape.const(1)} for n, k in enumerate(span)}
+            slopes |= {k: {tape.input(first + n): tape.const(1)} for n, k in enumerate(span)}
             moving.append((f"d_{name}", len(span)))
         else:
             continue
-        count += moving[-1][1]
+        first += moving[-1][1]
     return moving, slopes
 
 
 @cache
-def tangent(step: Step, active: frozenset[str], turns: Turns = frozenset()) -> Step:
-    """Return the step with ``d_<output>`` for tangents ``d_<input>`` of the active inputs, and its
-    own outputs.
+def tangent(step: Step, active: frozenset[str], angle_inputs: AngleInputs = frozenset()) -> Step:
+    """Return the step that gives ``d_<output>`` beside its outputs, from ``d_<input>`` of some.
 
-    Of the inputs in ``turns``, which are sines and cosines, it takes ``d_<input>_angles``.
+    Of the inputs in ``angle_inputs``, which are sines and cosines, it takes ``d_<input>_angles``.
     """
     rules = Rules(step)
-    moving, slopes = moved_inputs(rules, active, dict(turns))
-    combinations, changes = Combinations(rules), []
+    moving, slopes = moved_inputs(rules, active, dict(angle_inputs))
+    combinations = Combinations(rules)
+
+    # the tangent of each node; constants and inputs that are not active have none
+    changes: list[Combination] = []
     for node, (op, *args) in enumerate(step.nodes):
-        if op in LEAVES:
-            changes.append(slopes.get(args[0], {}) if op == "input" else {})
+        if op == "input":
+            changes.append(slopes.get(args[0], {}))
+        elif op in LEAVES:
+            changes.append({})
         else:
             changes.append(combinations.of(node, changes))
-    outputs = (*step.outputs, *((f"d_{name}", size) for name, size in step.outputs))
-    results = [rules.values[r] for r in step.results] + [
-        combinations.summed(changes[r]) for r in step.results
-    ]
+
+    results = [rules.values[r] for r in step.results]
+    results += [combinations.summed(changes[r]) for r in step.results]
     return rules.finish(
-        f"d{some_of(step.inputs, active)}",
+        f"d{some_of(step.inputs, active)}_{step.name}",
         f"Tangents of {step.name}.",
         (*step.inputs, *moving),
-        outputs,
+        (*step.outputs, *((f"d_{name}", size) for name, size in step.outputs)),
         results,
     )
 
 
 @cache
 def adjoint(
-    step: Step, wanted: frozenset[str], given: frozenset[str], turns: Turns = frozenset()
+    step: Step,
+    wanted: frozenset[str],
+    given: frozenset[str],
+    angle_inputs: AngleInputs = frozenset(),
 ) -> Step:
-    """Return the step that takes ``b_<output>`` of the given outputs to ``b_<input>`` of the wanted
-    inputs.
+    """Return the step from ``b_<output>`` of given outputs to ``b_<input>`` of wanted inputs.
 
-    Of the inputs in ``turns``, which are sines and cosines, it gives ``b_<input>_angles``.
+    Of the inputs in ``angle_inputs``, which are sines and cosines, it gives ``b_<input>_angles``.
     """
-    rules, turned = Rules(step), dict(turns)
-    tape, count, incoming = rules.tape, rules.count, []
-    weight = [tape.const(0)] * len(step.nodes)
+    rules, kinds = Rules(step), dict(angle_inputs)
+    tape = rules.tape
+    incoming, adjoints = _output_adjoints(rules, given)
+
+    # each operation passes its adjoint on to its operands
+    for node in reversed(live_nodes(step.nodes, step.results)):
+        if step.nodes[node][0] not in LEAVES:
+            for operand, partial in rules.partials(node).items():
+                passed_on = tape.mul(partial, adjoints[node])
+                adjoints[operand] = tape.add(adjoints[operand], passed_on)
+
+    # those of the inputs, zero where no node reads a scalar
+    position = {args[0]: node for node, (op, *args) in enumerate(step.nodes) if op == "input"}
+    outputs: list[tuple[str, int]] = []
+    results: list[int] = []
+    for name, span in spans(step.inputs).items():
+        if name in wanted:
+            vector = [adjoints[position[k]] if k in position else tape.const(0) for k in span]
+            suffix = ""
+            if name in kinds:
+                vector, suffix = angle_adjoints(tape, span, kinds[name], vector), "_angles"
+            outputs.append((f"b_{name}{suffix}", len(vector)))
+            results += vector
+
+    chosen = some_of(step.inputs, wanted) + some_of(step.outputs, given, "_of")
+    return rules.finish(
+        f"b{chosen}_{step.name}",
+        f"Adjoints of {step.name}.",
+        (*step.inputs, *incoming),
+        outputs,
+        results,
+    )
+
+
+def _output_adjoints(
+    rules: Rules, given: frozenset[str]
+) -> tuple[list[tuple[str, int]], list[int]]:
+    """Return the adjoints that a step takes, and those of all nodes before any is passed on."""
+    tape, step, first = rules.tape, rules.step, rules.count
+    incoming: list[tuple[str, int]] = []
+    adjoints = [tape.const(0)] * len(step.nodes)
     for name, span in spans(step.outputs).items():
         if name in given:
             incoming.append((f"b_{name}", len(span)))
             for n, k in enumerate(span):
-                weight[step.results[k]] = tape.add(weight[step.results[k]], tape.input(count + n))
-            count += len(span)
-    for node in reversed(live_nodes(step.nodes, step.results)):
-        if step.nodes[node][0] not in LEAVES:
-            for operand, partial in rules.partials(node).items():
-                weight[operand] = tape.add(weight[operand], tape.mul(partial, weight[node]))
-    position = {args[0]: node for node, (op, *args) in enumerate(step.nodes) if op == "input"}
-    outputs, results = [], []
-    for name, span in spans(step.inputs).items():
-        if name in wanted:
-            own = [weight[position[k]] if k in position else tape.const(0) for k in span]
-            own = by_angles(tape, span, turned[name], own) if name in turned else own
-            outputs.append((f"b_{name}_angles" if name in turned else f"b_{name}", len(own)))
-            results += own
-    partly = some_of(step.inputs, wanted) + some_of(step.outputs, given, "_of")
-    return rules.finish(
-        f"b{partly}", f"Adjoints of {step.name}.", (*step.inputs, *incoming), outputs, results
-    )
+                node = step.results[k]
+                adjoints[node] = tape.add(adjoints[node], tape.input(first + n))
+            first += len(span)
+    return incoming, adjoints
 
 
-def by_angles(tape: Tape, span: range, turned: Turned, weights: list[int]) -> list[int]:
+def angle_adjoints(
+    tape: Tape, span: range, kind: SinesAndCosines, adjoints: Iterable[int]
+) -> list[int]:
     """Return the adjoints of angles from those of their sines and cosines."""
-    out = [tape.const(0)] * turned.angles
-    for (angle, sign, other), weight in zip(turned.scalars, weights, strict=True):
-        term = tape.mul(tape.input(span[other]), weight)
+    out = [tape.const(0)] * kind.angles
+    for (angle, sign, other), adjoint_node in zip(kind.scalars, adjoints, strict=True):
+        term = tape.mul(tape.input(span[other]), adjoint_node)
         out[angle] = tape.add(out[angle], term if sign > 0 else tape.neg(term))
     return out

@@ -4,6 +4,7 @@ out.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache
 from math import prod
 
 from ..ir.program import Array, Program
@@ -50,6 +51,7 @@ def struct_parameters(model: Tail | Scene) -> tuple[Parameter, ...]:
     return tuple(p for p in parameters_of(model.kind, model.contacts) if p.name != "link_radius")
 
 
+@cache
 def assemble(function: Function, tail: Tail, dynamics: str = "composite") -> Program:
     """Assemble one function for given sizes; other ``dynamics`` where vectors hold several numbers
     and tails are long.

@@ -1,11 +1,11 @@
-"""Loop nests over steps: the order in which steps are applied to flat arrays, for one emitted
-function.
-"""
+"""Writing programs: a builder with a method for each statement, and checks of names and sizes."""
 
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cache
 
+from .algebra import Number
 from .program import (
     Apply,
     Array,
@@ -21,22 +21,25 @@ from .program import (
     Ref,
     Solve,
     SolvePair,
+    Statement,
     Unit,
     When,
     as_index,
 )
 from .step import Step, compacted
-from .tape import Number
 
 
 @dataclass
 class Builder:
-    """Records a program: declare arrays, open loops, apply steps."""
+    """Records a program: declare arrays, open loops, apply steps.
+
+    ``_bodies`` are the statements of the loops that are open, the innermost last.
+    """
 
     name: str
     doc: str
     arrays: list[Array] = field(default_factory=list)
-    _bodies: list[list] = field(default_factory=lambda: [[]])
+    _bodies: list[list[Statement]] = field(default_factory=lambda: [[]])
 
     def declare(self, array: Array) -> Array:
         """Declare an array; local names are unique within a program."""
@@ -50,32 +53,35 @@ class Builder:
         return self.declare(Array(name, role, size, count))
 
     def wide(self, name: str, size: int, lanes: int) -> Array:
-        """Declare a local array of rows of so many lanes, of scalars where they are 0."""
+        """Declare a local array whose scalars have so many lanes; narrow ones where they are 0."""
         return self.declare(Array(name, "local", size, lanes=lanes))
 
-    def constant(self, name: str, values) -> Array:
+    def constant(self, name: str, values: Iterable[Number]) -> Array:
         """Declare an array whose values are known at generation."""
-        return self.declare(Array(name, "constant", len(values), values=tuple(values)))
+        numbers = tuple(values)
+        return self.declare(Array(name, "constant", len(numbers), values=numbers))
 
-    def emit(self, statement) -> None:
+    def emit(self, statement: Statement) -> None:
         """Append a statement to the innermost open loop."""
         self._bodies[-1].append(statement)
 
     def apply(self, step: Step, reads: dict[str, Ref], **writes: Ref) -> None:
-        """Apply a step to named vectors; outputs not named are dropped, a trailing ``_`` adds
-        instead of storing.
+        """Apply a step to named vectors; outputs that are not named are dropped.
+
+        A trailing underscore of an output's name adds to the target instead of storing.
         """
-        step = narrowed(step, {name.rstrip("_") for name in writes})
-        inputs = tuple(reads[name] for name, _ in step.inputs)
-        targets = tuple(writes.get(name, writes.get(name + "_")) for name, _ in step.outputs)
-        for (name, size), ref in zip(step.inputs + step.outputs, inputs + targets, strict=True):
+        targets = {name.removesuffix("_"): (ref, name[-1] == "_") for name, ref in writes.items()}
+        step = narrowed(step, set(targets))
+        outputs = [targets[name] for name, _ in step.outputs]
+        call = Apply.named(step, reads, [ref for ref, _ in outputs], [adds for _, adds in outputs])
+
+        vectors = (*step.inputs, *step.outputs)
+        for (name, size), ref in zip(vectors, call.reads + call.writes, strict=True):
             if ref.size != size:
                 raise ValueError(
                     f"{step.name} in {self.name}: {name} has {size} scalars, not {ref.size}"
                 )
-        self.emit(
-            Apply(step, inputs, targets, tuple(name + "_" in writes for name, _ in step.outputs))
-        )
+        self.emit(call)
 
     def fill(self, target: Ref, *values: Number) -> None:
         """Store constants; one value is repeated."""
@@ -91,7 +97,7 @@ class Builder:
         self.emit(Copy(target, source, adds))
 
     def unit(self, target: Ref, first: Index | int) -> None:
-        """Store unit rows."""
+        """Store unit vectors, the first of them 1 in lane ``first``."""
         self.emit(Unit(target, as_index(first)))
 
     def factor(self, matrix: Array, size: int) -> None:
@@ -114,7 +120,7 @@ class Builder:
         """Give up with a status unless all scalars of a vector are positive."""
         self.emit(Guard(scalar, status, protects))
 
-    def call(self, program: "Program", **arguments: Array) -> None:
+    def call(self, program: Program, **arguments: Array) -> None:
         """Run another program on arrays of this one."""
         for array in program.of_role("input") + program.of_role("output"):
             if array.name not in arguments:
@@ -124,8 +130,10 @@ class Builder:
         self.emit(Call(program, tuple(arguments.items())))
 
     @contextmanager
-    def loop(self, var: str, count: Index | int, downward: bool = False, start: Index | int = 0):
-        """Open a loop; yields its variable as an index."""
+    def loop(
+        self, var: str, count: Index | int, downward: bool = False, start: Index | int = 0
+    ) -> Iterator[Index]:
+        """Open a loop from ``start`` to ``count``; yields its variable as an index."""
         self._bodies.append([])
         yield Index(((var, 1),))
         body = tuple(self._bodies.pop())
@@ -133,10 +141,8 @@ class Builder:
             self.emit(Loop(var, as_index(start), as_index(count), downward, body))
 
     @contextmanager
-    def when(self, scalar: Ref):
-        """Open what is run only where a scalar is positive; the body must not change that
-        scalar.
-        """
+    def when(self, scalar: Ref) -> Iterator[None]:
+        """Open what is run only where a scalar is positive; the body must not change it."""
         self._bodies.append([])
         yield
         self.emit(When(scalar, tuple(self._bodies.pop())))
@@ -148,17 +154,20 @@ class Builder:
 
 @cache
 def _narrowed(step: Step, wanted: frozenset[str]) -> Step:
-    outputs, results, first = [], [], 0
+    # the outputs that are wanted, and their part of the results
+    outputs: list[tuple[str, int]] = []
+    results: list[int] = []
+    first = 0
     for name, size in step.outputs:
         if name in wanted:
             outputs.append((name, size))
             results += step.results[first : first + size]
         first += size
-    name = (
-        step.name
-        if len(outputs) == len(step.outputs)
-        else "_".join([step.name, *(n for n, _ in outputs)])
-    )
+
+    # a step that lost outputs is named by those that it still has
+    name = step.name
+    if len(outputs) < len(step.outputs):
+        name = "_".join([name, *(output for output, _ in outputs)])
     return compacted(replace(step, name=name, outputs=tuple(outputs), results=tuple(results)))
 
 

@@ -1,9 +1,9 @@
-"""Programs in parts: rewriting a loop nest, dropping what nothing needs, writing out what a program
-calls.
-"""
+"""What depends on what in a program, and programs rewritten: pruned, inlined, on other arrays."""
 
-from collections.abc import Callable, Collection, Iterator, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from dataclasses import fields, replace
+from functools import singledispatch
+from typing import Any
 
 from .builder import narrowed
 from .program import (
@@ -20,90 +20,145 @@ from .program import (
     Ref,
     Solve,
     SolvePair,
+    Statement,
     Unit,
     When,
     statements,
 )
 
+Body = tuple[Statement, ...]
 
-def reads(statement) -> tuple[Ref, ...]:
+
+@singledispatch
+def reads(statement: Statement) -> tuple[Ref, ...]:
     """Return what a statement reads; sums and what is overwritten in place are read too."""
-    if isinstance(statement, Apply):
-        return statement.reads + tuple(
-            w for w, adds in zip(statement.writes, statement.adds, strict=True) if adds
-        )
-    if isinstance(statement, Copy):
-        return (statement.source, statement.target) if statement.adds else (statement.source,)
-    if isinstance(statement, Factor | FactorPair):
-        return (statement.matrix[0],)
-    if isinstance(statement, Solve | SolvePair):
-        return (statement.matrix[0], statement.x)
-    return (statement.scalar,) if isinstance(statement, Guard) else ()
+    raise TypeError(f"no rule says what {type(statement).__name__} reads")
 
 
-def writes(statement) -> tuple[Ref, ...]:
+@reads.register
+def _(statement: Apply) -> tuple[Ref, ...]:
+    sums = [ref for ref, adds in zip(statement.writes, statement.adds, strict=True) if adds]
+    return (*statement.reads, *sums)
+
+
+@reads.register
+def _(statement: Copy) -> tuple[Ref, ...]:
+    if statement.adds:
+        return (statement.source, statement.target)
+    return (statement.source,)
+
+
+@reads.register
+def _(statement: Fill | Unit) -> tuple[Ref, ...]:
+    return ()
+
+
+@reads.register
+def _(statement: Factor | FactorPair) -> tuple[Ref, ...]:
+    return (statement.matrix[0],)
+
+
+@reads.register
+def _(statement: Solve | SolvePair) -> tuple[Ref, ...]:
+    return (statement.matrix[0], statement.x)
+
+
+@reads.register
+def _(statement: Guard) -> tuple[Ref, ...]:
+    return (statement.scalar,)
+
+
+@singledispatch
+def writes(statement: Statement) -> tuple[Ref, ...]:
     """Return what a statement writes."""
-    if isinstance(statement, Apply):
-        return statement.writes
-    if isinstance(statement, Copy | Fill | Unit):
-        return (statement.target,)
-    if isinstance(statement, Factor | FactorPair):
-        return (statement.matrix[0],)
-    return (statement.x,) if isinstance(statement, Solve | SolvePair) else ()
+    raise TypeError(f"no rule says what {type(statement).__name__} writes")
 
 
-def names(refs) -> set[str]:
+@writes.register
+def _(statement: Apply) -> tuple[Ref, ...]:
+    return statement.writes
+
+
+@writes.register
+def _(statement: Copy | Fill | Unit) -> tuple[Ref, ...]:
+    return (statement.target,)
+
+
+@writes.register
+def _(statement: Factor | FactorPair) -> tuple[Ref, ...]:
+    return (statement.matrix[0],)
+
+
+@writes.register
+def _(statement: Solve | SolvePair) -> tuple[Ref, ...]:
+    return (statement.x,)
+
+
+@writes.register
+def _(statement: Guard) -> tuple[Ref, ...]:
+    return ()
+
+
+def names(refs: Iterable[Ref]) -> set[str]:
     """Return the names of the arrays that references point into."""
     return {ref.array.name for ref in refs}
 
 
-def rewritten(body: tuple, rewrite: Callable[[object], Iterator]) -> tuple:
-    """Return a loop nest with each statement replaced by those that ``rewrite`` yields; empty loops
-    vanish.
+def rewritten(body: Body, rewrite: Callable[[Statement], Iterable[Statement]]) -> Body:
+    """Return a loop nest with each statement replaced by those that ``rewrite`` returns.
+
+    A condition is rewritten without its body; loops that are empty then vanish.
     """
-    out = []
+    out: list[Statement] = []
     for statement in body:
         if isinstance(statement, Loop):
             inner = rewritten(statement.body, rewrite)
-            out += [replace(statement, body=inner)] if inner else []
+            if inner:
+                out.append(replace(statement, body=inner))
         elif isinstance(statement, When):
             inner = rewritten(statement.body, rewrite)
-            out += [replace(head, body=inner) for head in rewrite(replace(statement, body=()))]
+            for head in rewrite(replace(statement, body=())):
+                assert isinstance(head, When), "a condition is rewritten as a condition"
+                out.append(replace(head, body=inner))
         else:
             out += rewrite(statement)
     return tuple(out)
 
 
 def _fixpoint(
-    body: tuple, start: Collection[str], more: Callable[[object, set[str]], set[str]]
+    body: Body, start: Collection[str], more: Callable[[Statement, set[str]], set[str]]
 ) -> set[str]:
     """Return names with what each statement adds to them, until none adds any."""
-    found, before = set(start), -1
-    while before < len(found):
-        before = len(found)
+    reached, before = set(start), -1
+    while before < len(reached):
+        before = len(reached)
         for statement, _ in statements(body):
-            found |= more(statement, found)
-    return found
+            reached |= more(statement, reached)
+    return reached
 
 
-def forward_slice(body: tuple, start: Collection[str]) -> set[str]:
+def forward_slice(body: Body, start: Collection[str]) -> set[str]:
     """Return the arrays that may depend on the arrays ``start``, by name."""
-    return _fixpoint(
-        body, start, lambda s, found: names(writes(s)) if names(reads(s)) & found else set()
-    )
+
+    def more(statement: Statement, reached: set[str]) -> set[str]:
+        return names(writes(statement)) if names(reads(statement)) & reached else set()
+
+    return _fixpoint(body, start, more)
 
 
-def backward_slice(body: tuple, end: Collection[str]) -> set[str]:
+def backward_slice(body: Body, end: Collection[str]) -> set[str]:
     """Return the arrays that the arrays ``end`` may depend on, by name."""
 
-    def more(statement, found: set[str]) -> set[str]:
+    def more(statement: Statement, reached: set[str]) -> set[str]:
         targets = statement.protects if isinstance(statement, Guard) else writes(statement)
-        return names(reads(_with_outputs(statement, found))) if names(targets) & found else set()
+        if not names(targets) & reached:
+            return set()
+        return names(reads(_with_outputs(statement, reached)))
 
     return _fixpoint(body, end, more)
 
 
-def _with_outputs(statement, needed: Collection[str]):
+def _with_outputs(statement: Statement, needed: Collection[str]) -> Statement:
     """Return an Apply without the outputs that go to unneeded arrays."""
     if not isinstance(statement, Apply):
         return statement
@@ -111,32 +166,29 @@ def _with_outputs(statement, needed: Collection[str]):
     if len(kept) == len(statement.writes):
         return statement
     step = narrowed(statement.step, {statement.step.outputs[k][0] for k in kept})
-    given = statement.inputs()
-    return replace(
-        statement,
-        step=step,
-        reads=tuple(given[name] for name, _ in step.inputs),
-        writes=tuple(statement.writes[k] for k in kept),
-        adds=tuple(statement.adds[k] for k in kept),
-    )
+    outputs = [statement.writes[k] for k in kept]
+    sums = [statement.adds[k] for k in kept]
+    narrow = Apply.named(step, statement.inputs(), outputs, sums)
+    return replace(narrow, columns=statement.columns)
 
 
 def pruned(program: Program) -> Program:
-    """Return a program without the statements and arrays that no output needs; arrays are what is
-    declared by name.
+    """Return a program without the statements and arrays that no output needs.
+
+    Statements are moved onto the arrays that are declared by the names of theirs.
     """
     array = {a.name: a for a in program.arrays}
     needed = backward_slice(program.body, {a.name for a in program.of_role("output")})
 
-    def rewrite(statement):
+    def rewrite(statement: Statement) -> Iterator[Statement]:
         if isinstance(statement, Guard):
             protects = tuple(ref for ref in statement.protects if ref.array.name in needed)
             if protects:
-                yield replace(statement, protects=protects)
+                yield with_arrays(replace(statement, protects=protects), array)
         elif names(writes(statement)) & needed:
-            yield _with_outputs(statement, needed)
+            yield with_arrays(_with_outputs(statement, needed), array)
 
-    body = rewritten(program.body, lambda s: (with_arrays(kept, array) for kept in rewrite(s)))
+    body = rewritten(program.body, rewrite)
     kept = {a.name for a in program.arrays if a.role in ("input", "output", "parameters")} | needed
     return replace(program, arrays=tuple(a for a in program.arrays if a.name in kept), body=body)
 
@@ -146,47 +198,52 @@ def inner_arrays(program: Program) -> tuple[Array, ...]:
     return tuple(replace(a, role="local") if a.role == "output" else a for a in program.arrays)
 
 
-def with_arrays(statement, array: Mapping[str, Array]):
-    """Return a statement on other arrays."""
+def with_arrays(statement: Statement, array: Mapping[str, Array]) -> Statement:
+    """Return a statement on other arrays, given by the names of its own."""
 
     def moved(ref: Ref) -> Ref:
         return replace(ref, array=array[ref.array.name])
 
-    changes = {}
-    for name in ("target", "source", "scalar", "x"):
-        if hasattr(statement, name):
-            changes[name] = moved(getattr(statement, name))
-    for name in ("reads", "writes", "protects"):
-        if hasattr(statement, name):
-            changes[name] = tuple(map(moved, getattr(statement, name)))
-    if hasattr(statement, "matrix"):
-        changes["matrix"] = array[statement.matrix.name]
+    changes: dict[str, Any] = {}
+    for field in fields(statement):
+        value = getattr(statement, field.name)
+        if isinstance(value, Ref):
+            changes[field.name] = moved(value)
+        elif isinstance(value, Array):
+            changes[field.name] = array[value.name]
+        elif field.name in ("reads", "writes", "protects"):
+            changes[field.name] = tuple(moved(ref) for ref in value)
     return replace(statement, **changes)
 
 
+def on_arrays(body: Body, array: Mapping[str, Array]) -> Body:
+    """Return a loop nest on other arrays, given by the names of its own."""
+    return rewritten(body, lambda statement: (with_arrays(statement, array),))
+
+
 def inlined(program: Program) -> Program:
-    """Return a program with the programs that it calls written out; their own arrays are
-    renamed.
-    """
+    """Return a program with the programs that it calls written out, their own arrays renamed."""
     arrays = {a.name: a for a in program.arrays}
 
-    def rewrite(statement):
+    def rewrite(statement: Statement) -> Iterable[Statement]:
         if not isinstance(statement, Call):
             return (statement,)
         inner, arguments = inlined(statement.program), dict(statement.arguments)
-        array = {a.name: arguments.get(a.name) or _own(a, inner.name, arrays) for a in inner.arrays}
-        return rewritten(inner.body, lambda s: (with_arrays(s, array),))
+        array = {}
+        for a in inner.arrays:
+            array[a.name] = arguments.get(a.name) or _adopted(a, inner.name, arrays)
+        return on_arrays(inner.body, array)
 
     body = rewritten(program.body, rewrite)
     return replace(program, arrays=tuple(arrays.values()), body=body)
 
 
-def _own(array: Array, owner: str, arrays: dict[str, Array]) -> Array:
+def _adopted(array: Array, program: str, arrays: dict[str, Array]) -> Array:
     """Return an array of a called program: the shared parameter, or a new one of a new name."""
     if array.role == "parameters":
         return arrays[array.name]
-    name = number = f"{owner}_{array.name}"
+    name = prefixed = f"{program}_{array.name}"
     while name in arrays:
-        name = f"{number}_{len(arrays)}"
+        name = f"{prefixed}_{len(arrays)}"
     arrays[name] = replace(array, name=name)
     return arrays[name]

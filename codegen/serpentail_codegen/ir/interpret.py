@@ -1,11 +1,15 @@
-"""The meaning of a program: arrays and an algebra go in, the program runs statement by statement.
+"""What a program means: run it statement by statement.
 
-With numbers as the algebra this is the reference for every emitted text; with a tape it unrolls the
-loops.
+Over numbers, a run is the reference that every emitted text is compared with.  Over a tape, it
+unrolls the loops into one straight line.
 """
 
 import math
+from collections.abc import Callable, Iterable
+from fractions import Fraction
+from typing import Any
 
+from .algebra import Algebra, Number
 from .dataflow import inlined
 from .ldl import ldl_factor, ldl_solve, pair_factor, pair_solve
 from .program import (
@@ -21,52 +25,54 @@ from .program import (
     Ref,
     Solve,
     SolvePair,
+    Statement,
     Unit,
     When,
     padded,
-    statements,
 )
+from .step import Step
 from .tape import Tape, replay
 
 
 class Numbers:
-    """The algebra of numbers that ``functions`` knows sin, cos and sqrt of; ``convert`` rounds an
-    exact constant.
+    """The algebra of numbers of one kind, such as floats, fractions or NumPy arrays.
+
+    functions: what has ``sin``, ``cos`` and ``sqrt`` of them.
+    convert: turns an exact constant into such a number.
     """
 
-    def __init__(self, functions=math, convert=float):
-        self.sin, self.cos, self.sqrt, self.convert = (
-            functions.sin,
-            functions.cos,
-            functions.sqrt,
-            convert,
-        )
+    def __init__(self, functions: Any = math, convert: Callable = float):
+        self.sin = functions.sin
+        self.cos = functions.cos
+        self.sqrt = functions.sqrt
+        self.convert = convert
 
-    def const(self, value):
+    def const(self, value: Number) -> Any:
         """Return an exact constant as a number; what cannot take a fraction divides it."""
         try:
             return self.convert(value)
         except TypeError:
-            return self.convert(value.numerator) / self.convert(value.denominator)
+            exact = Fraction(value)
+            return self.convert(exact.numerator) / self.convert(exact.denominator)
 
-    def unit(self, lane: int, lanes: int):
-        """Return a unit row."""
+    def unit(self, lane: int, lanes: int) -> Any:
+        """Return an array that is 1 in one lane and 0 elsewhere."""
         import numpy as np  # the generator's own algebras have no use for it
 
         return np.array([self.const(int(k == lane)) for k in range(lanes)])
 
     @staticmethod
-    def lane(row, lane: int):
-        """Return one lane of a row; a number is the same in all."""
-        return row[lane] if getattr(row, "ndim", 0) else row
+    def lane(a: Any, lane: int) -> Any:
+        """Return one lane of an array; a number is the same in all."""
+        return a[lane] if getattr(a, "ndim", 0) else a
 
-    def placed(self, row, lane: int, lanes: int, value):
-        """Return a row with one lane replaced; a number is the same in all."""
+    def placed(self, a: Any, lane: int, lanes: int, value: Any) -> Any:
+        """Return an array with one lane replaced; a number is the same in all."""
         import numpy as np  # as in ``unit``
 
-        row = np.array(row) if getattr(row, "ndim", 0) else np.array([row] * lanes)
-        row[lane] = value
-        return row
+        a = np.array(a) if getattr(a, "ndim", 0) else np.array([a] * lanes)
+        a[lane] = value
+        return a
 
     add = staticmethod(lambda a, b: a + b)
     sub = staticmethod(lambda a, b: a - b)
@@ -77,86 +83,62 @@ class Numbers:
     decide = staticmethod(lambda c: c > 0)
 
 
-class Counter:
-    """The algebra that counts operations; its values are the numbers of lanes, 0 for a narrow
-    scalar.
-    """
-
-    def __init__(self):
-        self.count = 0
-
-    def _binary(self, a: int, b: int) -> int:
-        self.count += max(a, b, 1)
-        return max(a, b)
-
-    def _same(self, a: int) -> int:
-        return a
-
-    add = sub = mul = div = _binary
-    neg = sin = cos = sqrt = _same
-    select = staticmethod(max)
-    decide = staticmethod(lambda c: True)  # the dearer case
-    const = staticmethod(lambda value: 0)
-    lane = staticmethod(lambda row, lane: 0)
-    unit = staticmethod(lambda lane, lanes: lanes)
-    placed = staticmethod(lambda row, lane, lanes, value: lanes)
-
-
-def executed(program: Program) -> int:
-    """Return the additions, multiplications and divisions of one run."""
-    counter = Counter()
-    arguments = (*program.of_role("parameters"), *program.of_role("input"))
-    Run(program, counter, {a.name: [0] * a.length for a in arguments})
-    return counter.count
-
-
-def applied(program: Program) -> int:
-    """Return how many nodes of steps one run evaluates, each row once: what unrolling has to write
-    out or fold.
-    """
-    return _applied(inlined(program).body, {})
-
-
-def _applied(body: tuple, at: dict[str, int]) -> int:
-    count = 0
-    for statement in body:
-        if isinstance(statement, Loop):
-            span = range(statement.start.at(at), statement.stop.at(at))
-            count += sum(_applied(statement.body, at | {statement.var: value}) for value in span)
-        elif isinstance(statement, When):
-            count += _applied(statement.body, at)
-        elif isinstance(statement, Apply):
-            count += len(statement.step.nodes)
-    return count
-
-
-def branches(program: Program) -> bool:
-    """Tell if some statements of a program are run only under a condition."""
-    return any(
-        isinstance(outer, When)
-        for _, around in statements(inlined(program).body)
-        for outer in around
-    )
-
-
 class Run:
-    """One run of a program over an algebra: ``values`` are arrays by name, ``guards`` what must be
-    positive.
+    """One run of a program over an algebra.
+
+    values: the scalars of each array, by its name.
+    guards: what must be positive, each with the status that is reported if it is not.
+    rules: what runs each type of statement, under given values of the loop variables.
     """
 
-    def __init__(self, program: Program, algebra, arguments: dict[str, list]):
-        program, self.algebra, self.guards = inlined(program), algebra, []
-        self.values = {a.name: [None] * a.length for a in program.arrays}
-        self.values |= {
-            a.name: [algebra.const(v) for v in a.values] for a in program.of_role("constant")
+    def __init__(self, program: Program, algebra: Algebra, arguments: dict[str, list]):
+        program = inlined(program)
+        self.algebra = algebra
+        self.guards: list[tuple[str, Any]] = []
+        self.rules: dict[type, Callable[[Any, dict[str, int]], None]] = {
+            Apply: self.apply,
+            Copy: self.copy,
+            Factor: self.factor,
+            FactorPair: self.factor_pair,
+            Fill: self.fill,
+            Guard: self.guard,
+            Loop: self.loop,
+            Solve: self.solve,
+            SolvePair: self.solve_pair,
+            Unit: self.unit,
+            When: self.when,
         }
-        self.values |= {name: list(scalars) for name, scalars in arguments.items()}
+
+        self.values: dict[str, list] = {a.name: [None] * a.length for a in program.arrays}
+        for array in program.of_role("constant"):
+            self.values[array.name] = [algebra.const(value) for value in array.values]
+        for name, scalars in arguments.items():
+            self.values[name] = list(scalars)
         self.body(program.body, {})
 
+    def body(self, body: tuple[Statement, ...], at: dict[str, int]) -> None:
+        """Run statements in order."""
+        for statement in body:
+            rule = self.rules.get(type(statement))
+            if rule is None:
+                raise TypeError(f"no rule runs {type(statement).__name__}")
+            rule(statement, at)
+
+    # What references mean
+
     def slots(self, ref: Ref, at: dict[str, int]) -> range:
-        """Return the positions that a reference means."""
+        """Return the positions of the scalars that a reference means."""
         first = ref.offset.at(at)
         return range(first, first + ref.size * ref.stride, ref.stride)
+
+    def places(self, ref: Ref, at: dict[str, int]) -> list[tuple[int, int]]:
+        """Return the scalars and lanes that a reference to lanes means."""
+        if ref.lane is None:
+            raise ValueError(f"a reference to scalars of {ref.array.name} means no lanes")
+        first, lane = ref.offset.at(at), ref.lane.at(at)
+        if ref.stride > 1:
+            return [(first + k, lane) for k in range(ref.size)]
+        return [(first, lane + k) for k in range(ref.size)]
 
     def read(self, ref: Ref, at: dict[str, int]) -> list:
         """Return the scalars of a reference."""
@@ -165,12 +147,7 @@ class Run:
             return [self.algebra.lane(array[k], lane) for k, lane in self.places(ref, at)]
         return [array[k] for k in self.slots(ref, at)]
 
-    def places(self, ref: Ref, at: dict[str, int]) -> list[tuple[int, int]]:
-        """Return the scalars and lanes that a reference to lanes means."""
-        first, lane = ref.offset.at(at), ref.lane.at(at)
-        return [(first + k, lane) if ref.stride > 1 else (first, lane + k) for k in range(ref.size)]
-
-    def write(self, ref: Ref, at: dict[str, int], scalars) -> None:
+    def write(self, ref: Ref, at: dict[str, int], scalars: Iterable) -> None:
         """Store scalars."""
         array = self.values[ref.array.name]
         if ref.lane:
@@ -180,10 +157,14 @@ class Run:
         for k, value in zip(self.slots(ref, at), scalars, strict=True):
             array[k] = value
 
-    def body(self, body, at: dict[str, int]) -> None:
-        """Run statements in order."""
-        for statement in body:
-            getattr(self, type(statement).__name__.lower())(statement, at)
+    def store(self, ref: Ref, at: dict[str, int], scalars: list, adds: bool) -> None:
+        """Store scalars, or add them to what is there."""
+        if adds:
+            pairs = zip(self.read(ref, at), scalars, strict=True)
+            scalars = [self.algebra.add(a, b) for a, b in pairs]
+        self.write(ref, at, scalars)
+
+    # Loops and conditions
 
     def loop(self, loop: Loop, at: dict[str, int]) -> None:
         """Run a loop."""
@@ -192,118 +173,123 @@ class Run:
             self.body(loop.body, at | {loop.var: value})
 
     def when(self, when: When, at: dict[str, int]) -> None:
-        """Run what a condition asks for; where the algebra cannot tell, choose between new and old
-        values.
-        """
+        """Run what a condition asks for."""
         condition = self.read(when.scalar, at)[0]
-        known = self.algebra.decide(condition)
-        if known is not None:
-            self.body(when.body if known else (), at)
-            return
-        before, guards = (
-            {name: list(scalars) for name, scalars in self.values.items()},
-            len(self.guards),
-        )
+        positive = self.algebra.decide(condition)
+        if positive is None:
+            self.choose(when, at, condition)
+        elif positive:
+            self.body(when.body, at)
+
+    def choose(self, when: When, at: dict[str, int], condition: Any) -> None:
+        """Run a conditional body, and select new or old values; the algebra cannot tell which."""
+        before = {name: list(scalars) for name, scalars in self.values.items()}
+        guards = len(self.guards)
         self.body(when.body, at)
         if len(self.guards) > guards:
             raise ValueError("a guard under a condition cannot be unrolled")
-        for name, old in before.items():
-            pairs = zip(self.values[name], old, strict=True)
-            self.values[name] = [
-                a if a == b or b is None else self.algebra.select(condition, a, b) for a, b in pairs
-            ]
+
+        # what had no value before is not read where the condition fails
+        for name, old_scalars in before.items():
+            scalars = self.values[name]
+            for k, old in enumerate(old_scalars):
+                if old is not None and old != scalars[k]:
+                    scalars[k] = self.algebra.select(condition, scalars[k], old)
+
+    # Statements that store
 
     def apply(self, call: Apply, at: dict[str, int]) -> None:
         """Run a step: read everything, then write everything."""
         scalars = [scalar for ref in call.reads for scalar in self.read(ref, at)]
-        nodes = replay(call.step.nodes, scalars, self.algebra)
-        results = iter([nodes[r] for r in call.step.results])
+        results = self.results(call.step, scalars)
+        first = 0
         for ref, adds in zip(call.writes, call.adds, strict=True):
-            values = [next(results) for _ in range(ref.size)]
-            if adds:
-                values = [
-                    self.algebra.add(a, b) for a, b in zip(self.read(ref, at), values, strict=True)
-                ]
-            self.write(ref, at, values)
+            self.store(ref, at, results[first : first + ref.size], adds)
+            first += ref.size
+
+    def results(self, step: Step, scalars: list) -> list:
+        """Return what a step makes of its inputs."""
+        nodes = replay(step.nodes, scalars, self.algebra)
+        return [nodes[r] for r in step.results]
 
     def fill(self, fill: Fill, at: dict[str, int]) -> None:
         """Store constants."""
-        self.write(fill.target, at, [self.algebra.const(v) for v in fill.values])
+        self.write(fill.target, at, [self.algebra.const(value) for value in fill.values])
 
     def unit(self, unit: Unit, at: dict[str, int]) -> None:
-        """Store unit rows."""
+        """Store unit vectors."""
         first, lanes = unit.first.at(at), unit.target.lanes
-        self.write(
-            unit.target, at, [self.algebra.unit(first + k, lanes) for k in range(unit.target.size)]
-        )
+        vectors = [self.algebra.unit(first + k, lanes) for k in range(unit.target.size)]
+        self.write(unit.target, at, vectors)
 
     def copy(self, copy: Copy, at: dict[str, int]) -> None:
         """Copy or add scalars."""
-        values = self.read(copy.source, at)
-        if copy.adds:
-            values = [
-                self.algebra.add(a, b)
-                for a, b in zip(self.read(copy.target, at), values, strict=True)
-            ]
-        self.write(copy.target, at, values)
+        self.store(copy.target, at, self.read(copy.source, at), copy.adds)
 
     def guard(self, guard: Guard, at: dict[str, int]) -> None:
         """Note what must be positive."""
         self.guards += [(guard.status, value) for value in self.read(guard.scalar, at)]
 
-    def rows(self, matrix: Array, size: int, first: int = 0) -> list[list]:
-        """Return the lower triangle of a matrix that begins at row ``first``, row by row."""
-        flat, row = self.values[matrix.name], padded(size)
-        return [flat[(first + k) * row : (first + k) * row + k + 1] for k in range(size)]
+    # Linear equations
 
-    def write_rows(self, matrix: Array, rows: list[list], first: int = 0) -> None:
+    def triangle(self, matrix: Array, size: int, first: int = 0) -> list[list]:
+        """Return the lower triangle that begins at row ``first`` of a matrix, row by row."""
+        scalars, stored = self.values[matrix.name], padded(size)
+        starts = [(first + k) * stored for k in range(size)]
+        return [scalars[start : start + k + 1] for k, start in enumerate(starts)]
+
+    def store_triangle(self, matrix: Array, rows: list[list], first: int = 0) -> None:
         """Store a lower triangle."""
+        stored = padded(len(rows))
         for k, row in enumerate(rows):
-            start = (first + k) * padded(len(rows))
+            start = (first + k) * stored
             self.values[matrix.name][start : start + k + 1] = row
 
     def factor(self, factor: Factor, at: dict[str, int]) -> None:
         """Factor a symmetric matrix."""
-        rows, pivots = ldl_factor(self.algebra, self.rows(factor.matrix, factor.size))
+        rows, pivots = ldl_factor(self.algebra, self.triangle(factor.matrix, factor.size))
         self.guards += [("NOT_POSITIVE_DEFINITE", pivot) for pivot in pivots]
-        self.write_rows(factor.matrix, rows)
-
-    def factorpair(self, factor: FactorPair, at: dict[str, int]) -> None:
-        """Factor a pair of triangles."""
-        size = factor.size
-        *pair, pivots = pair_factor(
-            self.algebra, *(self.rows(factor.matrix, size, first) for first in (0, size))
-        )
-        self.guards += [("NOT_POSITIVE_DEFINITE", pivot) for pivot in pivots]
-        for first, rows in zip((0, size), pair, strict=True):
-            self.write_rows(factor.matrix, rows, first)
-
-    def solvepair(self, solve: SolvePair, at: dict[str, int]) -> None:
-        """Solve with a factored pair."""
-        pair = (self.rows(solve.matrix, solve.x.size, first) for first in (0, solve.x.size))
-        self.write(solve.x, at, pair_solve(self.algebra, *pair, self.read(solve.x, at)))
+        self.store_triangle(factor.matrix, rows)
 
     def solve(self, solve: Solve, at: dict[str, int]) -> None:
         """Solve with a factored matrix."""
-        rows = self.rows(solve.matrix, solve.x.size)
+        rows = self.triangle(solve.matrix, solve.x.size)
         self.write(solve.x, at, ldl_solve(self.algebra, rows, self.read(solve.x, at)))
+
+    def factor_pair(self, factor: FactorPair, at: dict[str, int]) -> None:
+        """Factor a pair of triangles."""
+        size = factor.size
+        lower, upper = (self.triangle(factor.matrix, size, first) for first in (0, size))
+        lower, upper, pivots = pair_factor(self.algebra, lower, upper)
+        self.guards += [("NOT_POSITIVE_DEFINITE", pivot) for pivot in pivots]
+        self.store_triangle(factor.matrix, lower)
+        self.store_triangle(factor.matrix, upper, size)
+
+    def solve_pair(self, solve: SolvePair, at: dict[str, int]) -> None:
+        """Solve with a factored pair."""
+        size = solve.x.size
+        lower, upper = (self.triangle(solve.matrix, size, first) for first in (0, size))
+        self.write(solve.x, at, pair_solve(self.algebra, lower, upper, self.read(solve.x, at)))
 
 
 def unroll(
     program: Program, fixed: dict[str, list] | None = None
-) -> tuple[Tape, dict, list[tuple[str, int]]]:
+) -> tuple[Tape, dict[str, list[int]], list[tuple[str, int]]]:
     """Record a program as one straight line.
 
     Inputs are numbered array by array in the order of declaration; ``fixed`` arrays are constants.
     Returns the tape, the nodes of every output array, and what must be positive: pairs of status
     and node.
     """
-    tape, arguments, first = Tape(), {}, 0
+    tape, fixed = Tape(), fixed or {}
+    arguments: dict[str, list[int]] = {}
+    first = 0
     for array in (*program.of_role("parameters"), *program.of_role("input")):
-        if fixed and array.name in fixed:
-            arguments[array.name] = [tape.const(v) for v in fixed[array.name]]
+        if array.name in fixed:
+            arguments[array.name] = [tape.const(value) for value in fixed[array.name]]
         else:
             arguments[array.name] = [tape.input(first + k) for k in range(array.length)]
         first += array.length
     run = Run(program, tape, arguments)
-    return tape, {a.name: run.values[a.name] for a in program.of_role("output")}, run.guards
+    outputs = {array.name: run.values[array.name] for array in program.of_role("output")}
+    return tape, outputs, run.guards

@@ -1,13 +1,18 @@
-"""The meaning of a program: arrays and an algebra go in, the program runs statement by statement.
+"""Factoring and solving linear equations over any algebra, without pivoting.
 
-With numbers as the algebra this is the reference for every emitted text; with a tape it unrolls the
-loops.
+The interpreter solves with these functions, and recorded on a tape they are the steps that factor
+small matrices.  A matrix is given by its lower triangle, row by row.
 """
 
+from typing import Any
 
-def ldl_factor(algebra, A: list[list]) -> tuple[list[list], list]:
-    """Factor A = L^T D L without pivoting, of its lower triangle; L below 1 / D on the diagonal,
-    and the pivots D.
+from .algebra import Algebra
+
+Triangle = list[list[Any]]
+
+
+def ldl_factor(algebra: Algebra, A: Triangle) -> tuple[Triangle, list]:
+    """Factor A = L^T D L; return L below 1 / D on the diagonal, and the pivots D.
 
     From the last row up, because then all that a row takes from another one lies side by side.
     """
@@ -18,21 +23,24 @@ def ldl_factor(algebra, A: list[list]) -> tuple[list[list], list]:
         inverse = algebra.div(algebra.const(1), last[k])
         for i in reversed(range(k)):
             factor = algebra.mul(last[i], inverse)
-            A[i] = [
-                algebra.sub(entry, algebra.mul(factor, other))
-                for entry, other in zip(A[i], last, strict=False)
-            ]
+            A[i] = _reduced(algebra, A[i], factor, last)
         A[k] = [algebra.mul(entry, inverse) for entry in last[:k]] + [inverse]
     return A, pivots
 
 
-def ldl_solve(algebra, A: list[list], b: list) -> list:
+def _reduced(algebra: Algebra, row: list, factor: Any, other: list) -> list:
+    """Return row - factor * other, as far as the row goes."""
+    pairs = zip(row, other, strict=False)
+    return [algebra.sub(entry, algebra.mul(factor, taken)) for entry, taken in pairs]
+
+
+def ldl_solve(algebra: Algebra, A: Triangle, b: list) -> list:
     """Solve L^T D L x = b with what ``ldl_factor`` returns."""
     return pair_solve(algebra, A, A, b)
 
 
-def pair_factor(algebra, A: list[list], B: list[list]) -> tuple[list[list], list[list], list]:
-    """Factor A = U D L without pivoting, of the lower triangles A of it and B of its transpose.
+def pair_factor(algebra: Algebra, A: Triangle, B: Triangle) -> tuple[Triangle, Triangle, list]:
+    """Factor A = U D L, not symmetric, of the lower triangles A of it and B of its transpose.
 
     From the last row up, as ``ldl_factor``.  Return L below 1 / D, the transpose of U below it, and
     the pivots D.
@@ -44,17 +52,13 @@ def pair_factor(algebra, A: list[list], B: list[list]) -> tuple[list[list], list
         for one, other in ((A, B), (B, A)):
             for i in range(k):
                 factor = algebra.mul(other[k][i], inverse)
-                one[i] = [
-                    algebra.sub(e, algebra.mul(factor, r))
-                    for e, r in zip(one[i], one[k], strict=False)
-                ]
-        A[k], B[k] = (
-            [algebra.mul(entry, inverse) for entry in row[k][:k]] + [inverse] for row in (A, B)
-        )
+                one[i] = _reduced(algebra, one[i], factor, one[k])
+        A[k] = [algebra.mul(entry, inverse) for entry in A[k][:k]] + [inverse]
+        B[k] = [algebra.mul(entry, inverse) for entry in B[k][:k]] + [inverse]
     return A, B, pivots
 
 
-def pair_solve(algebra, A: list[list], B: list[list], b: list) -> list:
+def pair_solve(algebra: Algebra, A: Triangle, B: Triangle, b: list) -> list:
     """Solve U D L x = b with what ``pair_factor`` returns."""
     size, b = len(b), list(b)
     for k in reversed(range(size)):

@@ -1,17 +1,21 @@
-"""Loop nests over steps: the order in which steps are applied to flat arrays, for one emitted
-function.
+"""What one emitted function does, before it is text: loops that apply steps to flat arrays.
+
+A ``Program`` is a list of arrays and a tree of statements; everything here is frozen data.  What
+the statements mean is defined by ``interpret.Run``.
 """
 
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from typing import get_args
 
+from .algebra import Number
 from .step import Step
-from .tape import Number
 
 VECTOR = 8  # lanes of the widest vector
 
 
 def padded(lanes: int) -> int:
-    """Return how many numbers store a row: whole vectors."""
+    """Return how many numbers store so many lanes: those of whole vectors."""
     return -(-lanes // VECTOR) * VECTOR
 
 
@@ -51,10 +55,9 @@ class Array:
     """A flat array of ``count`` vectors of ``size`` scalars.
 
     role: ``input`` and ``output`` are the function's arguments, ``parameters`` the parameter
-    struct, ``constant`` has
-    values known at generation, ``local`` lives during one call.
-    lanes: each scalar of a wide array is a row of so many numbers, stored ``row`` apart; 0 for
-    ordinary scalars.
+    struct, ``constant`` has values known at generation, ``local`` lives during one call.
+    lanes: each scalar of a wide array holds so many numbers, and ``row`` numbers are stored for
+    it; 0 for ordinary scalars.
     """
 
     name: str
@@ -66,6 +69,10 @@ class Array:
 
     def __getitem__(self, index: Index | int) -> "Ref":
         return Ref(self, as_index(index) * self.size, self.size)
+
+    def whole(self) -> "Ref":
+        """Return all scalars."""
+        return Ref(self, as_index(0), self.length)
 
     def part(self, offset: Index | int, size: int, stride: int = 1) -> "Ref":
         """Return ``size`` scalars from a scalar offset on."""
@@ -92,10 +99,11 @@ class Array:
 
 @dataclass(frozen=True)
 class Ref:
-    """``size`` scalars of an array from an offset on, ``stride`` apart; with ``lane``, lanes of the
-    first.
+    """A part of an array: what a statement reads or writes.
 
-    With ``lane`` and a stride of the array's row it is one lane of ``size`` scalars.
+    Without ``lane``: ``size`` scalars from an offset on, ``stride`` apart.  With ``lane``: as many
+    lanes of the scalar at the offset, from that lane on; or, with the stride of the array's
+    ``row``, that lane of ``size`` scalars.
     """
 
     array: Array
@@ -112,11 +120,11 @@ class Ref:
 
 @dataclass(frozen=True)
 class Apply:
-    """Apply a step: read vectors, then write its outputs; ``adds`` are the outputs that are added,
-    not stored.
+    """Apply a step: read vectors, then write its outputs.
 
-    ``columns``: of wide vectors only so many lanes are needed, the others are zero or not looked
-    at; None: all.
+    adds: which outputs are added to what is there, not stored.
+    columns: how many lanes of wide vectors are needed, the others being zero or not looked at;
+    None for all.
     """
 
     step: Step
@@ -125,6 +133,14 @@ class Apply:
     adds: tuple[bool, ...]
     columns: Index | None = None
 
+    @classmethod
+    def named(
+        cls, step: Step, inputs: Mapping[str, Ref], writes: Iterable[Ref], adds: Iterable[bool] = ()
+    ) -> "Apply":
+        """Return a step applied to inputs by name; it stores, where ``adds`` is not given."""
+        reads, targets = tuple(inputs[name] for name, _ in step.inputs), tuple(writes)
+        return cls(step, reads, targets, tuple(adds) or (False,) * len(targets))
+
     def inputs(self) -> dict[str, Ref]:
         """Return what is read, by the names of the step's inputs."""
         return {name: ref for (name, _), ref in zip(self.step.inputs, self.reads, strict=True)}
@@ -132,6 +148,10 @@ class Apply:
     def outputs(self) -> dict[str, Ref]:
         """Return what is written, by the names of the step's outputs."""
         return {name: ref for (name, _), ref in zip(self.step.outputs, self.writes, strict=True)}
+
+    def stored(self) -> list[Ref]:
+        """Return what is overwritten, not added to."""
+        return [ref for ref, adds in zip(self.writes, self.adds, strict=True) if not adds]
 
 
 @dataclass(frozen=True)
@@ -144,7 +164,7 @@ class Fill:
 
 @dataclass(frozen=True)
 class Unit:
-    """Store unit rows: scalar k of the target is 1 in lane ``first`` + k and 0 elsewhere."""
+    """Store unit vectors: scalar k of a wide target is 1 in lane ``first`` + k and 0 elsewhere."""
 
     target: Ref
     first: Index
@@ -161,15 +181,13 @@ class Copy:
 
 @dataclass(frozen=True)
 class Loop:
-    """Run the body for ``var`` in [start, stop), upward or downward; ``start`` and ``stop`` are
-    affine.
-    """
+    """Run the body for ``var`` in [start, stop), upward or downward."""
 
     var: str
     start: Index
     stop: Index
     downward: bool
-    body: tuple
+    body: tuple["Statement", ...]
 
 
 @dataclass(frozen=True)
@@ -177,7 +195,7 @@ class When:
     """Run the body where a scalar is positive."""
 
     scalar: Ref
-    body: tuple
+    body: tuple["Statement", ...]
 
 
 @dataclass(frozen=True)
@@ -201,11 +219,10 @@ class Solve:
 
 @dataclass(frozen=True)
 class FactorPair:
-    """Factor A = U D L in place, A not symmetric but with positive pivots: as ``Factor``, for a
-    pair of triangles.
+    """Factor A = U D L in place, A not symmetric but with positive pivots.
 
-    The matrix holds the lower triangle of A, then that of its transpose, each as ``Factor`` takes
-    it.
+    The matrix holds the lower triangle of A, then that of its transpose, each stored as ``Factor``
+    takes it.
     """
 
     matrix: Array
@@ -222,8 +239,9 @@ class SolvePair:
 
 @dataclass(frozen=True)
 class Guard:
-    """Give up with a status unless all scalars of a vector are positive; ``protects`` must not be
-    used then.
+    """Give up with a status unless all scalars of a vector are positive.
+
+    protects: what is not to be used in that case.
     """
 
     scalar: Ref
@@ -233,12 +251,18 @@ class Guard:
 
 @dataclass(frozen=True)
 class Call:
-    """Run another program: its inputs and outputs are arrays of this one, by name; parameters are
-    shared.
+    """Run another program on arrays of this one.
+
+    arguments: the array for each input and output, by its name; parameters are shared.
     """
 
     program: "Program"
     arguments: tuple[tuple[str, Array], ...]
+
+
+LinearEquations = Factor | Solve | FactorPair | SolvePair
+Statement = Apply | Fill | Unit | Copy | Loop | When | LinearEquations | Guard | Call
+STATEMENTS: tuple[type, ...] = get_args(Statement)
 
 
 @dataclass(frozen=True)
@@ -248,20 +272,20 @@ class Program:
     name: str
     doc: str
     arrays: tuple[Array, ...]
-    body: tuple
+    body: tuple["Statement", ...]
 
     def of_role(self, role: str) -> tuple[Array, ...]:
         """Return the arrays of a role, in the order in which they were declared."""
         return tuple(a for a in self.arrays if a.role == role)
 
 
-def statements(body):
-    """Yield every statement of a loop nest with the loops and conditions around it, outermost
-    first.
-    """
+def statements(
+    body: tuple[Statement, ...],
+) -> Iterator[tuple[Statement, tuple[Loop | When, ...]]]:
+    """Yield every innermost statement with the loops and conditions around it, outermost first."""
     for statement in body:
         if isinstance(statement, Loop | When):
-            for inner, loops in statements(statement.body):
-                yield inner, (statement, *loops)
+            for inner, around in statements(statement.body):
+                yield inner, (statement, *around)
         else:
             yield statement, ()

@@ -1,10 +1,12 @@
-"""A hash-consed tape: scalar operations go in, each distinct one is stored once, in evaluation
-order.
+"""A step: a straight-line function of a few named vectors, such as the motion of one link.
+
+Steps are what SymPy derives, what is differentiated, and what the loops of a program apply.
 """
 
 from dataclasses import dataclass
 
-from .tape import LEAVES, Number, Tape, live_nodes, operands, replay
+from .algebra import Number
+from .tape import LEAVES, Node, Tape, live_nodes, operands, replay
 
 
 @dataclass(frozen=True)
@@ -19,43 +21,54 @@ class Step:
     doc: str
     inputs: tuple[tuple[str, int], ...]
     outputs: tuple[tuple[str, int], ...]
-    nodes: tuple[tuple, ...]
+    nodes: tuple[Node, ...]
     results: tuple[int, ...]
 
 
 def compacted(step: Step) -> Step:
     """Drop nodes and input vectors that no output needs."""
     live = live_nodes(step.nodes, step.results)
+
+    # inputs: vectors of which at least one scalar is used, and the new number of each scalar
     used = {step.nodes[n][1] for n in live if step.nodes[n][0] == "input"}
-    inputs, slot, first = [], {}, 0
+    inputs: list[tuple[str, int]] = []
+    new_scalar: dict[int, int] = {}
+    first = 0
     for name, size in step.inputs:
         span = range(first, first + size)
         if used.intersection(span):
-            slot |= {k: len(slot) + k - first for k in span}
+            new_scalar |= {k: len(new_scalar) + k - first for k in span}
             inputs.append((name, size))
         first += size
-    position = {node: k for k, node in enumerate(live)}
-    nodes = tuple(_moved(step.nodes[n], slot, position) for n in live)
-    results = tuple(position[r] for r in step.results)
+
+    # nodes: those alive, at their new positions
+    new_node = {node: k for k, node in enumerate(live)}
+    nodes = tuple(_renumbered(step.nodes[n], new_scalar, new_node) for n in live)
+    results = tuple(new_node[r] for r in step.results)
     return Step(step.name, step.doc, tuple(inputs), step.outputs, nodes, results)
 
 
-def _moved(node: tuple, slot: dict[int, int], position: dict[int, int]) -> tuple:
-    op, *args = node
+def _renumbered(node: Node, new_scalar: dict[int, int], new_node: dict[int, int]) -> Node:
+    """Return a node that works on renumbered inputs and nodes."""
+    op = node[0]
+    if op == "input":
+        return (op, new_scalar[node[1]])
     if op in LEAVES:
-        return (op, slot[args[0]]) if op == "input" else node
-    return (op, *(position[a] for a in operands(node)), *args[len(operands(node)) :])
+        return node
+    moved = tuple(new_node[a] for a in operands(node))
+    return (op, *moved, *node[1 + len(moved) :])
 
 
 def specialised(step: Step, name: str, **constants: tuple[Number, ...]) -> Step:
     """Return the step with some input vectors held constant, folded and compacted."""
-    tape, scalars, first = Tape(), [], 0
+    tape = Tape()
+    scalars: list[int] = []
     for vector, size in step.inputs:
         values = constants.get(vector)
-        scalars += [
-            tape.input(first + k) if values is None else tape.const(values[k]) for k in range(size)
-        ]
-        first += size
+        if values is None:
+            scalars += [tape.input(len(scalars) + k) for k in range(size)]
+        else:
+            scalars += [tape.const(value) for value in values]
     nodes = replay(step.nodes, scalars, tape)
     results = tuple(nodes[r] for r in step.results)
     return compacted(Step(name, step.doc, step.inputs, step.outputs, tuple(tape.nodes), results))

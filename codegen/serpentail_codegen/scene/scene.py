@@ -19,8 +19,6 @@ FUNCTIONS = (
     "momentum",
     "tail_points",
     "tail_point_jacobians",
-    "mass_matrix_world",
-    "bias_force_world",
     "rollout",
     "forward_dynamics_derivatives",
 )
@@ -36,7 +34,8 @@ EXACT = (
     "momentum_derivatives",
 )
 DERIVATIVES = (*EXACT, "forward_dynamics_derivatives")
-ON_DEMAND = (*EXACT, "pfl", "implicit")  # emitted where a scene names them
+WORLD = ("mass_matrix_world", "bias_force_world")
+ON_DEMAND = (*WORLD, *EXACT, "pfl", "implicit")  # emitted where a scene names them
 TOUCHING = ("contact_points", "contact_dynamics")  # of scenes with contacts
 ALL = (*FUNCTIONS, *ON_DEMAND, *TOUCHING)
 GROUPS = ("feet", "tail", "torso")  # of contact points, in their order

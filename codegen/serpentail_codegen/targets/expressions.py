@@ -154,6 +154,8 @@ class Scalars:
 
 def called(nodes, inputs=()) -> set[str]:
     """Return the helpers that nodes call, from the lanes of their inputs."""
+    if not any(node[0] in ("sin", "cos") for node in nodes):
+        return set()
     lanes, helpers = [], set()
     for op, *args in nodes:
         lanes.append(lanes_of((op, *args), lanes, inputs))

@@ -53,10 +53,10 @@ def library_name(path: Path) -> str:
 
 
 @contextlib.contextmanager
-def temporary_file(folder: Path) -> Iterator[Path]:
+def temporary_file(folder: Path, suffix: str = ".part") -> Iterator[Path]:
     """Lend an empty file in `folder` under a name that no other process has, gone at the end."""
     folder.mkdir(parents=True, exist_ok=True)
-    part = folder / f".{os.urandom(12).hex()}.part"
+    part = folder / f".{os.urandom(12).hex()}{suffix}"
     part.touch(exist_ok=False)
     try:
         yield part

@@ -8,6 +8,7 @@ import os
 import shlex
 import subprocess
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from ..errors import CompileFailed, ModelError, SerpentailError
@@ -130,13 +131,25 @@ def _build(
 
 
 def _compile(sources: Sequence[Path], include: Path, toolchain: Toolchain, part: Path) -> None:
-    """Run the compiler with its output in `part`, or raise CompileFailed."""
-    files = [str(path.absolute()) for path in sources]
-    flags = (*toolchain.flags, *SHARED_FLAGS, "-I", str(include.absolute()))
-    command = (*toolchain.command, *flags, *files, "-o", str(part), "-lm")
-    finished = run_command(command)
-    if finished.returncode or not part.is_file() or part.stat().st_size == 0:
-        raise _failure(command, finished)
+    """Compile the sources at the same time and link them into `part`, or raise CompileFailed."""
+    compiler = (*toolchain.command, *toolchain.flags)
+    with contextlib.ExitStack() as objects, ThreadPoolExecutor(len(sources)) as pool:
+        # one object for each source
+        files = [str(objects.enter_context(temporary_file(part.parent, ".o"))) for _ in sources]
+        headers = ("-fPIC", "-I", str(include.absolute()))
+        commands = [
+            (*compiler, *headers, "-c", str(source.absolute()), "-o", file)
+            for source, file in zip(sources, files, strict=True)
+        ]
+        for command, finished in zip(commands, pool.map(run_command, commands), strict=True):
+            if finished.returncode:
+                raise _failure(command, finished)
+
+        # the library
+        command = (*compiler, *SHARED_FLAGS, *files, "-o", str(part), "-lm")
+        finished = run_command(command)
+        if finished.returncode or not part.is_file() or part.stat().st_size == 0:
+            raise _failure(command, finished)
 
 
 def _failure(command: tuple[str, ...], finished: subprocess.CompletedProcess[str]) -> CompileFailed:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from ...functions.function import Function, assemble
 from ...functions.tail import Tail
-from ...ir.interpret import applied, branches
+from ...ir.cost import applied, branches
 from ...ir.program import Program
 from ...passes.batch import batched, unrolled_step
 from ...scene.scene import Scene

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from ...functions.function import Function, assemble, struct_parameters
 from ...functions.tail import Tail
-from ...ir.interpret import applied, branches
+from ...ir.cost import applied, branches
 from ...ir.program import Program
 from ...passes.unrolled_ldl import unrolled_ldl
 from ...scene.scene import Scene
@@ -14,6 +14,8 @@ from .straight import straight_line
 
 STRAIGHT_UP_TO = 7000  # nodes: beyond, the text leaves the instruction cache and compile time grows
 STRAIGHT_BESIDE_LANES = 3500  # nodes: where there is a sweep in lanes, too, that is faster beyond
+# zeros and copies above all: loops are as fast, and quick to compile
+ALWAYS_IN_LOOPS = ("tail_point_jacobians",)
 # columns of H times links, the work of a sweep in lanes: from here on segments are no slower
 SEGMENTS_FROM = 128
 ELIMINATED = 12  # rows: smaller matrices are factored without loops
@@ -48,7 +50,7 @@ def fastest(function: Function, tail: Tail) -> tuple[str, Program]:
     """
     long = tail.segments > 1 and tail.nt * tail.total >= SEGMENTS_FROM
     form, swept = in_form("segments" if long else "lanes", function, tail)
-    if form == "segments":
+    if form == "segments" or function.name in ALWAYS_IN_LOOPS:
         return form, swept
     program = assemble(function, tail)
     if applied(program) <= (

@@ -2,7 +2,7 @@
 over steps.
 """
 
-from ...ir.interpret import executed
+from ...ir.cost import executed
 from ...ir.program import (
     Apply,
     Array,

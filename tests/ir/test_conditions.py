@@ -1,0 +1,94 @@
+"""Conditions: what they run, and what they become where a tape cannot tell."""
+
+import random
+from fractions import Fraction
+
+import pytest
+
+from serpentail_codegen.functions.function import assemble
+from serpentail_codegen.functions.plain import FUNCTIONS
+from serpentail_codegen.functions.tail import Tail
+from serpentail_codegen.ir.builder import Builder
+from serpentail_codegen.ir.cost import branches
+from serpentail_codegen.ir.interpret import Run, unroll
+from tests.support.algebras import RATIONAL
+from tests.support.program_runs import unrolled_values
+from tests.support.programs import step_of
+
+COUNT = step_of(
+    "count", (("x", 1), ("y", 1)), (("z", 1),), lambda t, x, y: [t.add(t.mul(x, y), t.const(1))]
+)
+
+
+def conditional():
+    """Conditions in a loop and in each other: what is written under one is read, summed up and
+    overwritten after it.
+    """
+    b = Builder("choosy", "Conditions.")
+    x, y, u = b.array("x", 1, 4, "input"), b.array("y", 1, 4, "input"), b.array("u", 1, 4, "output")
+    w, t = b.array("w", 1, role="output"), b.array("t", 1)
+    b.fill(w[0], 1)
+    with b.loop("i", 4) as i:
+        b.fill(u[i], 7)
+        with b.when(x[i]):
+            b.apply(COUNT, {"x": x[i], "y": y[i]}, z=t[0])
+            b.apply(COUNT, {"x": t[0], "y": w[0]}, z_=w[0])
+            with b.when(y[i]):
+                b.copy(u[i], t[0])
+                b.copy(w[0], y[i], adds=True)
+        with b.when(w[0]), b.loop("j", i + 1) as j:
+            b.copy(u[j], x[i], adds=True)
+    return b.finish()
+
+
+def plainly(x, y):
+    """The same in Python."""
+    u, w = [], 1
+    for i, (a, b) in enumerate(zip(x, y, strict=True)):
+        u.append(7)
+        if a > 0:
+            t = a * b + 1
+            w += t * w + 1
+            if b > 0:
+                u[i], w = t, w + b
+        if w > 0:
+            u = [value + a for value in u]
+    return u, w
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_conditions_run_what_they_ask_for_and_unroll_to_choices(seed):
+    rng, p = random.Random(seed), conditional()
+    given = {
+        name: [Fraction(rng.randint(-3, 3), rng.randint(1, 2)) for _ in range(4)] for name in "xy"
+    }
+    values = Run(p, RATIONAL, given).values
+    assert (values["u"], values["w"][0]) == plainly(given["x"], given["y"])
+    assert unrolled_values(p, given, RATIONAL) == {"u": values["u"], "w": values["w"]}
+    assert unrolled_values(p, given, RATIONAL, fixed=["x", "y"]) == {
+        "u": values["u"],
+        "w": values["w"],
+    }
+
+
+def test_a_condition_survives_being_called():
+    b = Builder("outer", "Calls.")
+    arrays = {
+        name: b.array(name, 1, 4, role)
+        for name, role in (("x", "input"), ("y", "input"), ("u", "output"))
+    }
+    b.call(conditional(), **arrays, w=b.array("w", 1, role="output"))
+    p, given = b.finish(), {"x": [1, -1, 2, 0], "y": [1, 2, -3, 4]}
+    assert branches(p) and not branches(assemble(FUNCTIONS["mass_matrix"], Tail(1, 1)))
+    values = Run(p, RATIONAL, given).values
+    assert (values["u"], values["w"][0]) == plainly(**given)
+
+
+def test_a_guard_under_a_condition_cannot_be_unrolled():
+    b = Builder("guarded", "A guard.")
+    x, u = b.array("x", 1, role="input"), b.array("u", 1, role="output")
+    with b.when(x[0]):
+        b.guard(x[0], "OUT_OF_RANGE", u[0])
+        b.copy(u[0], x[0])
+    with pytest.raises(ValueError, match="a guard under a condition"):
+        unroll(b.finish())
