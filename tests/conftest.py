@@ -4,6 +4,8 @@ import os
 import shlex
 from pathlib import Path
 
+import pytest
+
 from tests.support.models import BUILD
 
 QUICK = shlex.quote(str(Path(__file__).parent / "support" / "cc_quick"))
@@ -26,3 +28,10 @@ def pytest_configure(config):
     """Choose the compiler of all processes."""
     if config.getoption("--quick"):
         os.environ.setdefault("CC", QUICK)
+
+
+@pytest.fixture
+def users_compiler(monkeypatch):
+    """Compile models as for a user, however quickly other tests do."""
+    if os.environ.get("CC") == QUICK:
+        monkeypatch.delenv("CC")
