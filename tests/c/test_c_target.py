@@ -201,7 +201,7 @@ def alone():
         yield pytest.param(*case, marks=() if quick else pytest.mark.slow)
 
 
-@pytest.mark.parametrize(("function", "emission", "baked"), alone())
+@pytest.mark.parametrize(("function", "emission", "baked"), list(alone()))
 def test_every_function_alone_compiles_without_a_warning(tmp_path, function, emission, baked):
     model = Model("alone", 2, 2, functions=[function], emission=emission, baked=baked == "baked")
     for source in (*model.sources, model.example):
