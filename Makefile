@@ -8,6 +8,7 @@ TAIL ?= articulated
 M    ?= 1
 N    ?= 3
 STARTS ?= 200
+WORKERS ?= -n auto --dist worksteal
 CALLS ?= 2000
 CPU    ?= m4
 ifneq ($(filter embedded,$(MAKECMDGOALS)),)
@@ -32,7 +33,7 @@ help:
 	@echo
 	@echo "  make setup                                 .venv with everything"
 	@echo "  make demo                                  the paper's rat: generate, compile, simulate, draw"
-	@echo "  make test                                  the tests;  make test-all: the slow suites too"
+	@echo "  make test                                  the quick tests;  make test-all: every test, models optimised"
 	@echo "  make test   ROOM=simulation                the tests of one room, a folder of tests/"
 	@echo "  make test-portable                         motions and plans, as on a processor with AVX2, without AVX-512"
 	@echo "  make model  TAIL=articulated M=3 N=4       -> generated/articulated_m3_n4"
@@ -65,16 +66,21 @@ $(READY): pyproject.toml
 demo: $(READY)
 	$(PY) examples/demo.py
 
+# What pytest and Python compile is kept, away from the sources; seconds of every process.
+test test-portable test-all: export PYTHONDONTWRITEBYTECODE :=
+test test-portable test-all: export PYTHONPYCACHEPREFIX := $(CURDIR)/.build/bytecode
+
 test: $(READY)
-	$(PY) -m pytest -m "not slow" -n auto --dist loadfile $(if $(ROOM),tests/$(ROOM))
+	$(PY) -m pytest --quick -m "not slow" $(WORKERS) $(if $(ROOM),tests/$(ROOM))
 
 # The rooms whose numbers hang most on how sums round, as on a processor with AVX2 and no AVX-512.
 test-portable: $(READY)
 	$(PY) tests/support/as_on.py x86-64-v3 \
-	  $(PY) -m pytest -m "not slow" -n auto --dist loadfile tests/simulation tests/planning tests/scenes
+	  $(PY) -m pytest -m "not slow" $(WORKERS) tests/simulation tests/planning tests/scenes
 
-test-all: test test-portable
-	$(PY) -m pytest -m slow -n auto --dist loadfile
+# Every test, with models compiled as a user's are.
+test-all: test-portable
+	$(PY) -m pytest $(WORKERS)
 
 lint: $(READY)
 	$(VENV)/bin/ruff check .
@@ -129,5 +135,5 @@ golden: $(READY)
 	$(PY) -m pytest tests/house/test_golden.py tests/house/test_functions_document.py --update-golden
 
 clean:
-	rm -rf output
+	rm -rf output .build
 	test ! -d generated || find generated -mindepth 1 -maxdepth 1 ! -name README.md ! -name 'golden_*' -exec rm -rf {} +

@@ -1,8 +1,37 @@
-"""Options of the test run."""
+"""Options of the test run, and where and how it compiles its models."""
+
+import os
+import shlex
+from pathlib import Path
+
+import pytest
+
+from tests.support.models import BUILD
+
+QUICK = shlex.quote(str(Path(__file__).parent / "support" / "cc_quick"))
+
+# One cache for all processes and runs, which is not the developer's own.
+os.environ["SERPENTAIL_CACHE"] = str(BUILD / "cache")
 
 
 def pytest_addoption(parser):
-    """Add the switch that accepts what the generator emits now as the golden models."""
+    """Add the switches that accept new golden models, and that compile models in less time."""
     parser.addoption(
         "--update-golden", action="store_true", help="rewrite generated/golden_* from the generator"
     )
+    parser.addoption(
+        "--quick", action="store_true", help="compile models without optimisation, unless CC is set"
+    )
+
+
+def pytest_configure(config):
+    """Choose the compiler of all processes."""
+    if config.getoption("--quick"):
+        os.environ.setdefault("CC", QUICK)
+
+
+@pytest.fixture
+def users_compiler(monkeypatch):
+    """Compile models as for a user, however quickly other tests do."""
+    if os.environ.get("CC") == QUICK:
+        monkeypatch.delenv("CC")

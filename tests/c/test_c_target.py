@@ -10,6 +10,7 @@ import shlex
 import shutil
 import subprocess
 from functools import cache, cached_property
+from itertools import product
 from types import SimpleNamespace
 
 import mpmath
@@ -25,6 +26,7 @@ from serpentail_codegen.scene.signatures.table import ALL, DEFAULT, DERIVATIVES,
 from serpentail_codegen.targets.c.form import in_form
 from serpentail_codegen.targets.c.routine import Routine, routine_lines
 from tests.references.parameters import random_states
+from tests.support.compile_once import compile_once
 from tests.support.models import model_folder
 
 NAMES = tuple(name for name in ALL if name in (*DEFAULT, *VALUES))
@@ -72,7 +74,14 @@ HARDEST = {
     "float": 16367173.0 * 2.0**72,
 }  # nearest to a multiple of pi/2
 del MODELS["arcs2_float_straight"]  # its text is long, and what it shows others show
-every_model = pytest.mark.parametrize("name", MODELS)
+FEW = {
+    "m1_n1_double_straight",
+    "m1_n1_float_loops",
+    "m1_n1_baked_straight",
+    "m2_n2_double_segments",
+    "arcs2_double_loops",
+    *REPRODUCIBLE,
+}  # of every tail, form, real type and option one
 some_models = pytest.mark.parametrize(
     "name", ["m1_n1_double_straight", "m1_n1_float_loops", "m1_n1_baked_straight"]
 )
@@ -84,6 +93,12 @@ def slow_but(*names):
         name if name in names else pytest.param(name, marks=pytest.mark.slow) for name in MODELS
     ]
     return pytest.mark.parametrize("name", marked)
+
+
+every_model = slow_but(*FEW)
+few_of_the_reproducible = pytest.mark.parametrize(
+    "name", [REPRODUCIBLE[0], *(pytest.param(n, marks=pytest.mark.slow) for n in REPRODUCIBLE[1:])]
+)
 
 
 class Model(SimpleNamespace):
@@ -116,8 +131,8 @@ class Model(SimpleNamespace):
     @cached_property
     def objects(self):
         """Plain object files of the model, its host entries, its batches and its simulation."""
-        (self.folder / "objects").mkdir()
-        return [compiled(self.folder / "objects", source, *PLAIN) for source in self.sources]
+        command = ("gcc", *PLAIN, "-c")
+        return [compile_once(f"{s.stem}.o", command, [s], self.include) for s in self.sources]
 
 
 @pytest.fixture(scope="module")
@@ -161,7 +176,14 @@ def test_compiles_without_a_warning(models, tmp_path, compiler, name):
         compiled(tmp_path, source, *C99, "-fsyntax-only", compiler=compiler)
 
 
-@pytest.mark.parametrize("name", ["m2_n2_double_loops", "m2_n2_float_straight"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "m1_n1_double_straight",
+        pytest.param("m2_n2_double_loops", marks=pytest.mark.slow),
+        pytest.param("m2_n2_float_straight", marks=pytest.mark.slow),
+    ],
+)
 def test_optimiser_finds_nothing_to_warn_about(models, tmp_path, name):
     for source in (
         models(name).source,
@@ -172,11 +194,16 @@ def test_optimiser_finds_nothing_to_warn_about(models, tmp_path, name):
         compiled(tmp_path, source, *C99, "-O2")
 
 
-@pytest.mark.parametrize("function", NAMES)
-@pytest.mark.parametrize("emission", ["straight", "loops"])
-@pytest.mark.parametrize("baked", [False, True], ids=["free", "baked"])
+def alone():
+    """Every function, baked or not, in every form: of most functions one case is quick."""
+    for case in product(NAMES, ["straight", "loops"], ["free", "baked"]):
+        quick = case[0] == "forward_dynamics" or case[1:] == ("loops", "free")
+        yield pytest.param(*case, marks=() if quick else pytest.mark.slow)
+
+
+@pytest.mark.parametrize(("function", "emission", "baked"), list(alone()))
 def test_every_function_alone_compiles_without_a_warning(tmp_path, function, emission, baked):
-    model = Model("alone", 2, 2, functions=[function], emission=emission, baked=baked)
+    model = Model("alone", 2, 2, functions=[function], emission=emission, baked=baked == "baked")
     for source in (*model.sources, model.example):
         compiled(tmp_path, source, *C99, "-fsyntax-only")
 
@@ -252,7 +279,7 @@ def test_every_symbol_has_the_prefix_and_libc_gives_the_rest(models, name):
     assert_own_symbols(models(name), models(name).objects)
 
 
-@slow_but("m1_n1_double_straight", "m1_n1_float_loops")
+@slow_but("m1_n1_float_loops")
 def test_optimiser_asks_for_no_more_than_sincos(models, tmp_path, name):
     model = models(name)
     objects = [compiled(tmp_path, source, *PLAIN, "-O2") for source in model.sources]
@@ -529,7 +556,7 @@ def test_sine_and_cosine_are_good_to_the_last_digit(models, name):
 
 
 @mpmath.workdps(1000)
-@pytest.mark.parametrize("name", REPRODUCIBLE)
+@few_of_the_reproducible
 def test_reproducible_sine_and_cosine_reduce_any_angle(models, name):
     """Within 3 units of the last place as far as numbers go, without libm, and optimised or not to
     the same bits.
@@ -570,7 +597,7 @@ def test_reproducible_models_refuse_what_would_change_their_bits(models, tmp_pat
 
 @needs("objdump")
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="looks for x86's fused instructions")
-@pytest.mark.parametrize("name", REPRODUCIBLE)
+@few_of_the_reproducible
 def test_reproducible_models_fuse_nothing_even_where_the_compiler_would(models, tmp_path, name):
     """The control is a model of the fast profile, compiled alike."""
     fused = []
@@ -864,7 +891,7 @@ def driver(model):
     return text.replace("@@", model.name.upper()).replace("@", model.name)
 
 
-@slow_but("m1_n1_double_straight", "m1_n1_double_loops")
+@slow_but("m1_n1_double_loops")
 def test_sanitizers_find_nothing(models, tmp_path, name):
     model, main = models(name), tmp_path / "main.c"
     main.write_text(driver(model))
@@ -883,6 +910,7 @@ def test_sanitizers_find_nothing(models, tmp_path, name):
     assert run(tmp_path / "main", env={"ASAN_OPTIONS": "detect_leaks=1"}) == "0 bad\n"
 
 
+@pytest.mark.slow
 def test_sanitizers_find_nothing_on_the_ground(tmp_path):
     functions = ["energy", "rollout", "implicit", "pfl"]
     model = Model(

@@ -4,8 +4,9 @@ programs mean.
 
 import ctypes
 import re
-import subprocess
 from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.ir.program import Apply, statements
 from serpentail_codegen.scene.signatures.table import DERIVATIVES
 from tests.references.metrics import equilibrated_condition
+from tests.support.compile_once import compile_once
 from tests.support.derivative_models import (
     derivative_model,
     jacobian_error,
@@ -106,28 +108,13 @@ def built(model, build):
     if build == "one lane":
         text, widths = re.subn(r"^#define LANES \d+$", "#define LANES 1", text, flags=re.MULTILINE)
         assert widths >= 2
-    copy = folder / f"{build}.c".replace(" ", "_")
-    copy.write_text(text)
-    library = copy.with_suffix(".so")
-    command = [
-        *next(iter(_candidates())),
-        "-std=c99",
-        *BUILDS[build],
-        "-Wall",
-        "-Wextra",
-        "-Werror",
-        "-fPIC",
-        "-shared",
-    ]
-    files = [
-        f"-I{folder / 'include'}",
-        copy,
-        folder / "src" / f"{model.name}_host.c",
-        "-o",
-        library,
-        "-lm",
-    ]
-    subprocess.run([*command, *files], check=True)
+    flags = ("-std=c99", *BUILDS[build], "-Wall", "-Wextra", "-Werror", "-fPIC", "-shared")
+    command = (*next(iter(_candidates())), *flags)
+    with TemporaryDirectory() as temporary:
+        copy = Path(temporary) / "copy.c"
+        copy.write_text(text)
+        sources = [copy, folder / "src" / f"{model.name}_host.c"]
+        library = compile_once("model.so", command, sources, folder / "include")
     return Model(folder, model.manifest, model.parameters, ctypes.CDLL(str(library)))
 
 

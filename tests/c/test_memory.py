@@ -77,7 +77,7 @@ def test_nothing_is_found(tmp_path, request, name, tool):
         pytest.param("sanitized", "overflow", "signed integer overflow", marks=pytest.mark.slow),
         pytest.param("sanitized", "bounds", "heap-buffer-overflow", marks=pytest.mark.slow),
         pytest.param("watched", "bounds", "Invalid read of size 8", marks=pytest.mark.slow),
-        ("watched", "unwritten", "depends on uninitialised value"),
+        pytest.param("watched", "unwritten", "depends on uninitialised", marks=pytest.mark.slow),
     ],
 )
 def test_what_is_put_in_is_found(tmp_path, request, tool, fault, words):

@@ -32,7 +32,13 @@ every_function = pytest.mark.parametrize("name", EXACT_DERIVATIVES)
 every_kind = pytest.mark.parametrize("kind", ROUNDING)
 
 
-@pytest.fixture(scope="module", params=TAILS)
+@pytest.fixture(
+    scope="module",
+    params=[
+        pytest.param(name, marks=() if name in ("m1_n3", "arcs1") else pytest.mark.slow)
+        for name in TAILS
+    ],
+)
 def model(request):
     """A model with all derivatives but those with respect to parameters."""
     return Model(*TAILS[request.param], functions=PARTS)

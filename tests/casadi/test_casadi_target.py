@@ -20,6 +20,7 @@ from serpentail_codegen.pipeline import tail_of
 from serpentail_codegen.scene.parse import parse_scene
 from serpentail_codegen.scene.signatures.table import DERIVATIVES
 from tests.references.parameters import random_states
+from tests.support.compile_once import compile_once
 from tests.support.models import model_folder
 
 TAILS = {"m1_n1": (1, 1), "m2_n2": (2, 2), "arcs2": (2, None)}
@@ -88,15 +89,14 @@ class Model(SimpleNamespace):
     @property
     def library(self):
         """The shared library of the model and its host entries, compiled once."""
-        path = self.folder / "model.so"
-        if not path.exists():
-            sources = [self.folder / "src" / f"{self.name}{part}.c" for part in ("", "_host")]
-            flags = ["-std=c99", "-fPIC", "-shared", "-I", self.folder / "include"]
-            subprocess.run(["gcc", *flags, *sources, "-o", path, "-lm"], check=True)
-        return path
+        sources = [self.folder / "src" / f"{self.name}{part}.c" for part in ("", "_host")]
+        command = ("gcc", "-std=c99", "-fPIC", "-shared")
+        return compile_once("model.so", command, sources, self.folder / "include")
 
 
-@pytest.fixture(scope="module", params=TAILS)
+@pytest.fixture(
+    scope="module", params=["m1_n1", pytest.param("m2_n2", marks=pytest.mark.slow), "arcs2"]
+)
 def model(request):
     """A generated model."""
     functions = [*SHAPES, "rollout", "forward_dynamics_derivatives"]

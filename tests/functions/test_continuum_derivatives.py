@@ -26,7 +26,7 @@ BENDS = (
     pi,
     6.28,
 )  # rad, of every segment; the range ends at 2 pi
-QUICK = {1: (0.0, 6.28), 2: (0.0,)}  # by segments; the others are in the slow suite
+QUICK = {1: (0.0, 6.28), 2: ()}  # by segments; the others are in the slow suite
 INPUTS = {
     "bias_force": ("q", "v"),
     "inverse_dynamics": ("q", "v", "v_dot"),

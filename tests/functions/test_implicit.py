@@ -44,9 +44,14 @@ def pivots(S):
     return minors[1:] / minors[:-1]
 
 
-@pytest.mark.parametrize("gains", GAINS)
-@pytest.mark.parametrize("friction", FRICTION)
-@pytest.mark.parametrize("case", CASES)
+def systems():
+    """All cases, laws of friction and gains; all laws and gains of one case are quick."""
+    for case, friction, gains in product(CASES, FRICTION, GAINS):
+        quick = case == "straight" or (friction, gains) == ("cone", "tracked")
+        yield pytest.param(case, friction, gains, marks=() if quick else pytest.mark.slow)
+
+
+@pytest.mark.parametrize(("case", "friction", "gains"), list(systems()))
 def test_solution_is_that_of_the_dense_system(case, friction, gains):
     """With friction that follows the load wherever pivots are positive; without it always."""
     segments, links, options = CASES[case]

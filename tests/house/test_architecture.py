@@ -199,9 +199,9 @@ def public(tree):
         if isinstance(node, kinds) and not node.name.startswith("_"):
             yield node
             for item in node.body if isinstance(node, ast.ClassDef) else ():
-                if isinstance(item, kinds) and not item.name.startswith("_"):
-                    if "overload" not in map(ast.unparse, item.decorator_list):
-                        yield item
+                named = isinstance(item, kinds) and not item.name.startswith("_")
+                if named and "overload" not in map(ast.unparse, item.decorator_list):
+                    yield item
 
 
 def a_sentence(docstring):

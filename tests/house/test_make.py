@@ -137,6 +137,7 @@ def test_second_make_rebuilds_nothing(tree, make):
     assert built(tree) == before
 
 
+@pytest.mark.slow
 def test_changed_options_rebuild(tree, make):
     assert make("model", *ORDER).returncode == 0
     for options, key, value in [
@@ -175,6 +176,7 @@ def test_changed_generator_looks_again_and_writes_only_what_differs(tree, make):
     assert source.read_text().startswith("/* another start */\n")
 
 
+@pytest.mark.slow
 def test_changed_scene_rebuilds(tree, make):
     scene = tree / "scenes" / "own.toml"
     scene.write_text('kind = "articulated"\nsegments = 1\nlinks = 1\nfunctions = ["mass_matrix"]\n')
@@ -218,6 +220,7 @@ def test_unknown_target(make):
     assert done.returncode == 2 and "No rule to make target 'modle'" in done.stderr
 
 
+@pytest.mark.slow
 def test_failed_build_is_tried_again(tree, make):
     failed = make("model", *ORDER, CC="no-such-cc", SERPENTAIL_CACHE=str(tree / "cache"))
     assert (

@@ -3,6 +3,7 @@ limiting cases.
 """
 
 from functools import cache
+from itertools import product
 
 import casadi
 import numpy as np
@@ -103,8 +104,14 @@ def test_the_torso_touches_by_its_lowest_point():
         assert np.sum((place / axes) ** 2) == pytest.approx(1, rel=1e-12)
 
 
-@pytest.mark.parametrize("friction", FRICTION)
-@pytest.mark.parametrize("case", CASES)
+def models_of_contact():
+    """All cases and laws of friction; all laws of one case are quick."""
+    for case, friction in product(CASES, FRICTION):
+        quick = case == "straight" or friction == "cone"
+        yield pytest.param(case, friction, marks=() if quick else pytest.mark.slow)
+
+
+@pytest.mark.parametrize(("case", "friction"), list(models_of_contact()))
 def test_forces_and_accelerations_are_the_references(case, friction):
     """Eqs. 35 to 37, and the residual of H v_dot + C = [0; tau] + J^T f."""
     segments, links, options = CASES[case]

@@ -33,7 +33,9 @@ def drawn_film(trajectory, frames=8, com=None):
 
 
 @pytest.mark.parametrize("suffix", STARTS)
-@pytest.mark.parametrize("speed", SPEEDS)
+@pytest.mark.parametrize(
+    "speed", ["up", *(pytest.param(name, marks=pytest.mark.slow) for name in ("far", "still"))]
+)
 def test_figures_are_written_in_every_format(tmp_path, suffix, speed):
     trajectory = flight(SPEEDS[speed])
     path = tmp_path / "new" / f"film{suffix}"
@@ -44,7 +46,9 @@ def test_figures_are_written_in_every_format(tmp_path, suffix, speed):
     assert sorted(p.name for p in tmp_path.rglob("*.*")) == [f"film{suffix}", f"times{suffix}"]
 
 
-@pytest.mark.parametrize("suffix", STARTS)
+@pytest.mark.parametrize(
+    "suffix", [".svg", *(pytest.param(s, marks=pytest.mark.slow) for s in (".pdf", ".png"))]
+)
 def test_the_same_bytes_twice_whatever_the_user_has_set(tmp_path, suffix):
     trajectory = flight()
     points = tail_points(trajectory)

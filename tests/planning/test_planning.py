@@ -1,6 +1,7 @@
 """Plans: formulations agree, laws hold, and what reports say is true is so by other means."""
 
 import re
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,8 +19,8 @@ from serpentail.planning.nlp.node import equations_of_motion
 from serpentail.planning.nlp.transcription import transcription_of
 from serpentail.planning.result.full_state import full_state
 from serpentail.planning.result.truth import local_errors, open_loop
-from serpentail_codegen.pipeline import generate
 from serpentail_codegen.scene.parse import load_scene
+from tests.support.models import folder_of
 from tests.support.tumbling import AGAIN, DURATION, integrated, planned, rat, start
 
 FORMS = [
@@ -223,7 +224,8 @@ def test_torques_that_no_model_survives_are_an_infinite_error():
 
 def test_example_of_the_document_runs(tmp_path, monkeypatch, capsys):
     root = Path(__file__).parents[2]
-    generate(load_scene(root / "scenes" / "righting_m1_n3.toml"), tmp_path / "generated")
+    folder = folder_of(load_scene(root / "scenes" / "righting_m1_n3.toml"))
+    shutil.copytree(folder, tmp_path / "generated" / folder.name)
     monkeypatch.chdir(tmp_path)
     text = (root / "docs" / "planning.md").read_text()
     exec(re.search(r"```python\n(.*?)```", text, re.DOTALL)[1], {})

@@ -1,14 +1,12 @@
 """A simple scene, to which tests add and of which they replace text."""
 
 import re
-from functools import cache
 from pathlib import Path
 
 import pytest
 
-from serpentail_codegen.pipeline import generate
 from serpentail_codegen.scene.parse import load_scene
-from tests.support.models import parent
+from tests.support.models import folder_of
 
 SIMPLE = """kind = "articulated"
 segments = 1
@@ -34,7 +32,8 @@ def scene(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     text = SIMPLE.replace('kind = "art', 'name = "simple"\nkind = "art')
     Path("generated").mkdir()
-    Path("generated/simple").symlink_to(_simple(text))
+    Path("simple.toml").write_text(text)
+    Path("generated/simple").symlink_to(folder_of(load_scene("simple.toml")))
 
     def write(added="", **replaced):
         own = text
@@ -44,11 +43,3 @@ def scene(tmp_path, monkeypatch):
         return "simple.toml"
 
     return write
-
-
-@cache
-def _simple(text):
-    source = parent() / "simple.toml"
-    source.write_text(text)
-    generate(load_scene(source), parent() / "simple_scenes")
-    return parent() / "simple_scenes" / "simple"

@@ -8,9 +8,8 @@ import pytest
 
 import serpentail as st
 from serpentail.pictures.skeleton import leg_joints
-from serpentail_codegen.pipeline import generate
 from serpentail_codegen.scene.parse import load_scene
-from tests.support.models import parent
+from tests.support.models import folder_of
 
 SCENES = Path(__file__).parents[2] / "scenes"
 
@@ -18,8 +17,7 @@ SCENES = Path(__file__).parents[2] / "scenes"
 @cache
 def made(name):
     """The generated folder of a scene of the repository."""
-    generate(load_scene(SCENES / f"{name}.toml"), parent() / "scenes")
-    return parent() / "scenes" / name
+    return folder_of(load_scene(SCENES / f"{name}.toml"))
 
 
 def simulated(name, **changes):
@@ -89,12 +87,11 @@ def test_self_recovery_stands(name):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["tail_support_jump", "self_recovery", "self_recovery_continuum"])
-def test_without_tail_contact_none_stands(name):
+def test_without_tail_contact_none_stands(tmp_path, name):
     text = (SCENES / f"{name}.toml").read_text()
-    source = parent() / f"{name}_without.toml"
+    source = tmp_path / f"{name}_without.toml"
     source.write_text(text.replace('"feet", "tail"', '"feet"'))
-    generate(load_scene(source), parent() / "scenes")
-    scene = st.scenario(source, parent() / "scenes" / source.stem)
+    scene = st.scenario(source, folder_of(load_scene(source)))
     summary = scene.summary(scene.simulate())
     assert summary["standing_end"] is False and summary["upright_end"] < 0
 

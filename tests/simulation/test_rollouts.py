@@ -8,6 +8,7 @@ import signal
 import threading
 import time
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -564,7 +565,7 @@ def row_with(array, where, value):
     return changed
 
 
-Q, V = starts(tail(), 4)
+Q, V = starts(SimpleNamespace(nq=NQ, nv=NV, contacts={}), 4)
 WRONG_STATES = {
     "a number that is none": (
         (row_with(Q, (2, 1), np.nan), V),

@@ -1,37 +1,75 @@
-"""Generated models for tests: a tail's sizes and a scene's options go in, a folder comes out, made
-once a process.
+"""Generated models for tests, each generated once for all tests, processes and runs.
+
+They lie in ``.build/models/<digest of the generator>/<digest of the scene>``, so that a change of
+the generator makes all of them anew. No test writes into them: one that must takes a copy.
 """
 
-import atexit
+import hashlib
 import json
+import os
+import shutil
+import sys
+import time
 from functools import cache
+from importlib.metadata import version
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import serpentail_codegen
 from serpentail_codegen.pipeline import generate
 from serpentail_codegen.scene.parse import scene_for
+from serpentail_codegen.scene.scene import Scene
 
-
-@cache
-def parent() -> Path:
-    """Return a temporary folder that is deleted when the process ends."""
-    folder = TemporaryDirectory(prefix="serpentail_models_")
-    atexit.register(folder.cleanup)
-    return Path(folder.name)
+BUILD = Path(__file__).parents[2] / ".build"
+KEPT = 3600.0  # s: what another generator made stays that long, since its tests may still run
 
 
 def model_folder(segments: int, links: int | None, **options) -> Path:
-    """Return the generated folder of an articulated tail, or of a continuum where ``links`` is
-    None.
-    """
-    return _made(segments, links, json.dumps(options, sort_keys=True))
+    """Return the generated folder of an articulated tail, or of a continuum without ``links``."""
+    return _of_options(segments, links, json.dumps(options, sort_keys=True))
 
 
 @cache
-def _made(segments: int, links: int | None, options: str) -> Path:
-    scene = scene_for(
-        "articulated" if links else "continuum", segments, links, **json.loads(options)
-    )
-    folder = parent() / str(sum(1 for _ in parent().iterdir()))
-    generate(scene, folder)
-    return folder / scene.name
+def _of_options(segments: int, links: int | None, options: str) -> Path:
+    kind = "articulated" if links else "continuum"
+    return folder_of(scene_for(kind, segments, links, **json.loads(options)))
+
+
+def folder_of(scene: Scene) -> Path:
+    """Return the generated folder of a scene."""
+    place = shelf() / digest(repr(scene))
+    if not place.exists():
+        # One rename publishes the whole folder; who comes second throws his own away.
+        with TemporaryDirectory(dir=shelf(), prefix=".") as temporary:
+            own = Path(temporary) / "made"
+            generate(scene, own)
+            try:
+                own.rename(place)
+            except OSError:
+                if not place.exists():
+                    raise
+    return place / scene.name
+
+
+@cache
+def shelf() -> Path:
+    """Return the folder of all that this generator makes, and delete those of earlier ones."""
+    sources = Path(serpentail_codegen.__file__).parent
+    texts = [
+        (str(path.relative_to(sources)), digest(path.read_text()))
+        for path in sorted(sources.rglob("*"))
+        if path.suffix in (".py", ".jinja")
+    ]
+    tools = [sys.version, *(version(name) for name in ("sympy", "jinja2"))]
+    own = BUILD / "models" / digest(json.dumps([texts, tools]))
+    own.mkdir(parents=True, exist_ok=True)
+    os.utime(own)
+    for other in own.parent.iterdir():
+        if time.time() - other.stat().st_mtime > KEPT:
+            shutil.rmtree(other, ignore_errors=True)
+    return own
+
+
+def digest(text: str) -> str:
+    """Return a name for a text."""
+    return hashlib.sha256(text.encode()).hexdigest()[:32]
