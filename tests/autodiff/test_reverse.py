@@ -7,15 +7,7 @@ from serpentail_codegen.autodiff.reverse import adjoint_program, iterations
 from serpentail_codegen.ir.interpret import Run
 from serpentail_codegen.ir.program import Index, Loop, as_index, statements
 from tests.autodiff.test_forward import arguments_of, subsets
-from tests.support.programs import (
-    EXACT,
-    NEXT,
-    RECTANGULAR,
-    SQUARE,
-    built,
-    jacobian,
-    numbers,
-)
+from tests.support.programs import EXACT, NEXT, RECTANGULAR, SQUARE, built, jacobian, numbers
 
 every_program = pytest.mark.parametrize("name", RECTANGULAR)
 

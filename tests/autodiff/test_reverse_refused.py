@@ -6,14 +6,7 @@ from serpentail_codegen.autodiff.reverse import adjoint_program
 from serpentail_codegen.ir.builder import Builder
 from serpentail_codegen.ir.program import Factor
 from tests.autodiff.test_reverse import gradients
-from tests.support.programs import (
-    NEXT,
-    PROGRAMS,
-    SQUARE,
-    TURN,
-    built,
-    numbers,
-)
+from tests.support.programs import NEXT, PROGRAMS, SQUARE, TURN, built, numbers
 
 # What is refused
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from embedded import misra
-from tests.c.test_c_target import C99, Library, Model, bits, needs, run, states_of
+from tests.c.target.emitted import C99, Library, Model, bits, needs, run, states_of
 from tests.support.models import model_folder
 from tests.support.toolchains import board, cppcheck
 

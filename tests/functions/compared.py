@@ -5,9 +5,7 @@ import inspect
 import pytest
 
 from tests.references.metrics import equilibrated_condition
-from tests.support.derivative_models import (
-    tail_name,
-)
+from tests.support.derivative_models import tail_name
 
 QUICK = [(1, 3, "straight"), (2, 2, "loops"), (2, None, "loops")]
 SLOW = [(1, 3, "loops"), (2, 2, "straight"), (3, 4, "straight"), (3, 4, "loops")]

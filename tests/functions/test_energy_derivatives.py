@@ -2,9 +2,7 @@
 
 import numpy as np
 
-from tests.support.derivative_models import (
-    tangent_of_q,
-)
+from tests.support.derivative_models import tangent_of_q
 
 from .compared import ROUNDING, called, limit
 

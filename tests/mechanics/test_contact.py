@@ -11,7 +11,7 @@ import pytest
 
 import serpentail as st
 from serpentail.verification.report import laws
-from tests.c.test_c_target import C99, compiled
+from tests.c.target.emitted import C99, compiled
 from tests.references.contact import Contacts, attitude
 from tests.references.parameters import random_states
 from tests.support.models import model_folder

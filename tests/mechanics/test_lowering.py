@@ -15,9 +15,7 @@ from serpentail_codegen.ir.tape import operation_count, replay
 from serpentail_codegen.mechanics import link
 from serpentail_codegen.mechanics.lower import Recorder, derive
 
-from .exact import (
-    EXACT,
-)
+from .exact import EXACT
 
 # Lowering.
 

@@ -1,0 +1,45 @@
+"""Batches: states side by side give what each of them gives alone, in any number, from any thread,
+errors included.
+"""
+
+from functools import cache
+
+import numpy as np
+
+import serpentail as st
+from serpentail_codegen.targets.c.batch import BATCHED
+
+from ...support.models import model_folder
+
+ARGUMENTS = {
+    "mass_matrix": ("q",),
+    "bias_force": ("q", "v"),
+    "inverse_dynamics": ("q", "v", "v_dot"),
+    "forward_dynamics": ("q", "v", "tau"),
+}
+
+
+@cache
+def model(kind="articulated", segments=2, links=2, profile="fast", **options):
+    """A model with all functions that have batches."""
+    folder = model_folder(segments, links, name=f"{kind}_batch", functions=list(BATCHED), **options)
+    return st.load(folder, profile=profile)
+
+
+def states(model, count, seed=0):
+    """Random states, one argument a name."""
+    rng = np.random.default_rng(seed)
+    sizes = {"q": model.nq, "v": model.nv, "v_dot": model.nv, "tau": model.nv - 6}
+    return {name: rng.normal(size=(count, size)) for name, size in sizes.items()}
+
+
+def given(arguments, name):
+    """The arguments of one function."""
+    return [arguments[a] for a in ARGUMENTS[name]]
+
+
+def alone(model, name, arguments):
+    """Every state by a call of its own."""
+    return np.array(
+        [getattr(model, name)(*state) for state in zip(*given(arguments, name), strict=True)]
+    )

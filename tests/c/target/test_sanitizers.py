@@ -1,0 +1,229 @@
+"""The C text: it compiles without a warning, means what its program means bit for bit, and keeps to
+itself.
+"""
+
+import re
+import subprocess
+
+import numpy as np
+import pytest
+
+from .emitted import C99, Model, compiled, run, slow_but
+
+SANITIZED = (
+    "-std=c99",
+    "-g",
+    "-O0",
+    "-fsanitize=address,undefined,float-divide-by-zero",
+    "-fno-sanitize-recover=all",
+)
+# Memory.
+
+DRIVER = """#include "@_host.c"
+
+#include <stdio.h>
+#include <stdlib.h>
+
+#define real @_real
+
+static unsigned seed = 1u;
+
+static real *heap(long long size, int random)
+{
+  real *block = size ? malloc((size_t)size * sizeof *block) : NULL;
+  for (long long k = 0; k < size; ++k) {
+    seed = seed * 1664525u + 1013904223u;
+    block[k] = random ? (real)((int)(seed >> 8) % 2000 - 1000) / 1000 : 0;
+  }
+  return block;
+}
+
+static int call(int (*batch)(@_call *), int inputs, int outputs, const int *length, int work)
+{
+  @_parameters *parameters = malloc(sizeof *parameters);
+  @_call it = { parameters, 3, 0, heap(work, 1), { NULL } };
+  @_default_parameters(parameters);
+  for (int k = 0; k < inputs + outputs; ++k) {
+    it.arrays[k] = heap(3 * length[k], k < inputs);
+  }
+  const int status = batch(&it);
+  for (int k = 0; k < inputs + outputs; ++k) {
+    free(it.arrays[k]);
+  }
+  free(it.work);
+  free(parameters);
+  return status;
+}
+"""
+CASADI_DRIVER = """
+typedef const long long *sizes(long long);
+typedef const char *names(long long);
+
+static int external(int (*f)(const real **, real **, long long *, real *, int),
+                    int (*work)(long long *, long long *, long long *, long long *), sizes *in, names *name,
+                    sizes *out)
+{
+  long long n_in, n_out, n_iw, n_w;
+  work(&n_in, &n_out, &n_iw, &n_w);
+  real **arg = malloc((size_t)n_in * sizeof *arg), **res = malloc((size_t)n_out * sizeof *res);
+  for (long long k = 0; k < n_in; ++k) {
+    arg[k] = heap(in(k)[0] * in(k)[1], 1);
+    if (!strcmp(name(k), "parameters")) {
+      @_parameters parameters;
+      @_default_parameters(&parameters);
+      memcpy(arg[k], &parameters, sizeof parameters);
+    }
+  }
+  for (long long k = 0; k < n_out; ++k) {
+    res[k] = heap(out(k)[0] * out(k)[1], 1);
+  }
+  real *w = heap(n_w, 1);
+  const int status = f((const real **)arg, res, NULL, w, 0);
+  for (long long k = 0; k < n_in + n_out; ++k) {
+    free(k < n_in ? arg[k] : res[k - n_in]);
+  }
+  free(arg);
+  free(res);
+  free(w);
+  return status;
+}
+"""
+ROLLOUT = """  for (int method = @@_RK4; method <= @@_TSIT5; ++method) {
+    enum { NQ = @@_NQ, NV = @@_NV, NT = @@_NT, SAMPLES = 3 };
+    @_parameters parameters;
+    @_default_parameters(&parameters);
+    real *q = heap(NQ, 1), *v = heap(NV, 1), *q_out = heap(SAMPLES * NQ, 0), *v_out = heap(SAMPLES * NV, 0);
+    real *tau_out = heap(SAMPLES * NT, 0), *times = heap(SAMPLES, 0), *stop = heap(1, 0), *damping = heap(NT, 0);
+    real *table_times = heap(2, 0), *coefficients = heap(2 * NT, 1), *work = heap(@@_WORK_ROLLOUT, 1);
+    times[1] = (real)0.0003;
+    times[2] = (real)0.001;
+    stop[0] = table_times[1] = (real)0.0005;
+    @_piecewise table = { 1, NT, 1, table_times, coefficients };
+    @_controller controller = { 0 };
+    controller.damping = damping;
+    controller.torques = &table;
+    real *begins = heap(1, 0);
+    @_drive drive = { 1, begins, &controller, 1, stop };
+    @_run run = { 0 };
+    run.parameters = &parameters;
+    run.drive = &drive;
+    run.q = q;
+    run.v = v;
+    run.method = method;
+    run.rtol = run.atol = (real)0.001;
+    run.step = (real)0.0001;
+    run.most_step = 1;
+    run.most_steps = run.pause = 1000;
+    run.samples = SAMPLES;
+    run.times = times;
+    run.q_out = q_out;
+    run.v_out = v_out;
+    run.tau_out = tau_out;
+    run.work = work;
+    //ground
+    bad += @_rollout(&run) != 0 || run.done != SAMPLES || run.steps < 2;
+    real *all[] = { q, v, q_out, v_out, tau_out, times, stop, damping, table_times, coefficients, work, begins };
+    for (size_t k = 0; k < sizeof all / sizeof *all; ++k) {
+      free(all[k]);
+    }
+  }
+"""
+GROUND = """q[2] = 0;
+    real *legs = heap(4, 1), *event_times = heap(3, 0);
+    int *event_kinds = malloc(3 * sizeof *event_kinds);
+    @_piecewise stance = { 1, 4, 0, table_times, legs };
+    drive.legs = &stance;
+    run.bristles = heap(2 * @@_CONTACTS, 0);
+    run.bristles_out = heap(SAMPLES * 2 * @@_CONTACTS, 0);
+    run.event_times = event_times;
+    run.event_kinds = event_kinds;
+    run.most_events = 3;
+"""
+
+
+def driver(model):
+    """C text that calls every function of a model on exact-sized heap blocks."""
+    double = model.manifest["real"] == "double"
+    calls = ""
+    for name, entry in model.manifest["functions"].items():
+        lengths = [int(np.prod(a["shape"])) for a in (*entry["inputs"], *entry["outputs"])]
+        counts = f"{len(entry['inputs'])}, {len(entry['outputs'])}"
+        calls += (
+            f"  bad += call(@_batch_{name}, {counts}, (const "
+            f"int[]){{ {', '.join(map(str, lengths))} }}, "
+        )
+        calls += f"@@_WORK_{name.upper()}) != 0;\n"
+    for c in re.findall(r"^int (\w+)\(const real \*\*arg.*;$", model.host.read_text(), re.M):
+        calls += (
+            f"  bad += external({c}, {c}_work, {c}_sparsity_in, "
+            f"{c}_name_in, {c}_sparsity_out) != 0;\n"
+        )
+    text = DRIVER + (CASADI_DRIVER if double else "")
+    if "rollout" in model.scene.functions:
+        text = '#include "@_simulation.h"\n' + text
+    text += (
+        f"\nint "
+        f"main(void)\n{{\n  int bad = 0;\n{calls}{ROLLOUT if 'rollout' in model.scene.functions else ''}"
+    )
+    text += '  printf("%d bad\\n", bad);\n  return bad;\n}\n'
+    text = text.replace("//ground", GROUND if model.scene.contacts else "")
+    if model.scene.contacts:
+        text = text.replace("method <= @@_TSIT5", "method <= @@_IMPLICIT_EULER")
+    return text.replace("@@", model.name.upper()).replace("@", model.name)
+
+
+@slow_but("m1_n1_double_loops")
+def test_sanitizers_find_nothing(models, tmp_path, name):
+    model, main = models(name), tmp_path / "main.c"
+    main.write_text(driver(model))
+    folders = ("-I", model.include, "-I", model.host.parent)
+    run(
+        "gcc",
+        *SANITIZED,
+        *folders,
+        main,
+        model.source,
+        model.simulation,
+        "-o",
+        tmp_path / "main",
+        "-lm",
+    )
+    assert run(tmp_path / "main", env={"ASAN_OPTIONS": "detect_leaks=1"}) == "0 bad\n"
+
+
+@pytest.mark.slow
+def test_sanitizers_find_nothing_on_the_ground(tmp_path):
+    functions = ["energy", "rollout", "implicit", "pfl"]
+    model = Model(
+        "ground", 1, 2, contacts=["feet", "tail", "torso"], functions=functions, emission="loops"
+    )
+    for source in model.sources:
+        compiled(tmp_path, source, *C99, "-O2")
+    main, any_damping = tmp_path / "main.c", "call(@_batch_implicit_factor".replace("@", model.name)
+    # damping at random is below zero, too, and its matrix then not positive definite
+    main.write_text(driver(model).replace(f"bad += {any_damping}", f"bad += 0 * {any_damping}"))
+    folders = ("-I", model.include, "-I", model.host.parent)
+    run(
+        "gcc",
+        *SANITIZED,
+        *folders,
+        main,
+        model.source,
+        model.simulation,
+        "-o",
+        tmp_path / "main",
+        "-lm",
+    )
+    assert run(tmp_path / "main", env={"ASAN_OPTIONS": "detect_leaks=0"}) == "0 bad\n"
+
+
+def test_sanitizers_would_find_a_short_workspace(tmp_path):
+    model = Model("short", 1, 1, functions=["forward_dynamics"], emission="loops")
+    main = tmp_path / "main.c"
+    needed = f"{model.name.upper()}_WORK_FORWARD_DYNAMICS"
+    # less a vector: that much of the last row of a matrix to factor is room
+    main.write_text(driver(model).replace(f"{needed})", f"{needed} - 8)"))
+    folders = ("-I", model.include, "-I", model.host.parent)
+    run("gcc", *SANITIZED, *folders, main, model.source, "-o", tmp_path / "main", "-lm")
+    done = subprocess.run([tmp_path / "main"], capture_output=True, text=True, check=False)
+    assert done.returncode != 0 and "heap-buffer-overflow" in done.stderr

@@ -1,0 +1,45 @@
+"""The compiler cache: one text gives one working library, and whatever goes wrong is named."""
+
+from __future__ import annotations
+
+import shutil
+
+import pytest
+
+from .sources import TWICE
+
+
+@pytest.fixture(autouse=True)
+def cache(tmp_path, monkeypatch):
+    """An empty cache and no $CC."""
+    monkeypatch.delenv("CC", raising=False)
+    monkeypatch.setenv("SERPENTAIL_CACHE", str(tmp_path / "cache"))
+    return tmp_path / "cache"
+
+
+@pytest.fixture
+def model(tmp_path):
+    """The sources and the header folder of a library with one function, twice."""
+    include = tmp_path / "model" / "include"
+    source = tmp_path / "model" / "src" / "twice.c"
+    include.mkdir(parents=True)
+    source.parent.mkdir()
+    (include / "scale.h").write_text("#define SCALE 2.0\n")
+    source.write_text(TWICE)
+    return [source], include
+
+
+@pytest.fixture
+def script(tmp_path, monkeypatch):
+    """Make $CC a shell script that logs its arguments, does `body` and then what cc does."""
+    real = shutil.which("cc") or shutil.which("gcc")
+    log = tmp_path / "calls"
+
+    def install(body=""):
+        path = tmp_path / "mycc"
+        path.write_text(f'#!/bin/sh\necho "$@" >> {log}\n{body}\nexec {real} "$@"\n')
+        path.chmod(0o755)
+        monkeypatch.setenv("CC", str(path))
+        return log
+
+    return install
