@@ -60,7 +60,8 @@ typedef const long long *sizes(long long);
 typedef const char *names(long long);
 
 static int external(int (*f)(const real **, real **, long long *, real *, int),
-                    int (*work)(long long *, long long *, long long *, long long *), sizes *in, names *name,
+                    int (*work)(long long *, long long *, long long *, long long *),
+                    sizes *in, names *name,
                     sizes *out)
 {
   long long n_in, n_out, n_iw, n_w;
@@ -92,9 +93,12 @@ ROLLOUT = """  for (int method = @@_RK4; method <= @@_TSIT5; ++method) {
     enum { NQ = @@_NQ, NV = @@_NV, NT = @@_NT, SAMPLES = 3 };
     @_parameters parameters;
     @_default_parameters(&parameters);
-    real *q = heap(NQ, 1), *v = heap(NV, 1), *q_out = heap(SAMPLES * NQ, 0), *v_out = heap(SAMPLES * NV, 0);
-    real *tau_out = heap(SAMPLES * NT, 0), *times = heap(SAMPLES, 0), *stop = heap(1, 0), *damping = heap(NT, 0);
-    real *table_times = heap(2, 0), *coefficients = heap(2 * NT, 1), *work = heap(@@_WORK_ROLLOUT, 1);
+    real *q = heap(NQ, 1), *v = heap(NV, 1);
+    real *q_out = heap(SAMPLES * NQ, 0), *v_out = heap(SAMPLES * NV, 0);
+    real *tau_out = heap(SAMPLES * NT, 0), *times = heap(SAMPLES, 0);
+    real *stop = heap(1, 0), *damping = heap(NT, 0);
+    real *table_times = heap(2, 0), *coefficients = heap(2 * NT, 1);
+    real *work = heap(@@_WORK_ROLLOUT, 1);
     times[1] = (real)0.0003;
     times[2] = (real)0.001;
     stop[0] = table_times[1] = (real)0.0005;
@@ -122,7 +126,8 @@ ROLLOUT = """  for (int method = @@_RK4; method <= @@_TSIT5; ++method) {
     run.work = work;
     //ground
     bad += @_rollout(&run) != 0 || run.done != SAMPLES || run.steps < 2;
-    real *all[] = { q, v, q_out, v_out, tau_out, times, stop, damping, table_times, coefficients, work, begins };
+    real *all[] = { q, v, q_out, v_out, tau_out, times,
+                    stop, damping, table_times, coefficients, work, begins };
     for (size_t k = 0; k < sizeof all / sizeof *all; ++k) {
       free(all[k]);
     }
@@ -161,10 +166,8 @@ def driver(model):
     text = DRIVER + (CASADI_DRIVER if double else "")
     if "rollout" in model.scene.functions:
         text = '#include "@_simulation.h"\n' + text
-    text += (
-        f"\nint "
-        f"main(void)\n{{\n  int bad = 0;\n{calls}{ROLLOUT if 'rollout' in model.scene.functions else ''}"
-    )
+    rollout = ROLLOUT if "rollout" in model.scene.functions else ""
+    text += f"\nint main(void)\n{{\n  int bad = 0;\n{calls}{rollout}"
     text += '  printf("%d bad\\n", bad);\n  return bad;\n}\n'
     text = text.replace("//ground", GROUND if model.scene.contacts else "")
     if model.scene.contacts:
