@@ -248,7 +248,7 @@ def test_wrong_arguments_are_named(name):
             spoiled = state[argument].copy()
             spoiled[size - 1] = bad
             with pytest.raises(
-                st.StateError, match=re.escape(f"{name}: {argument}[{size - 1}] is {bad}")
+                st.StateError, match=re.escape(f"{name}: {argument}[{size - 1}]: value {bad}")
             ):
                 getattr(model, name)(
                     *(spoiled if j == k else x for j, x in enumerate(arguments(model, name, state)))

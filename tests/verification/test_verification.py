@@ -162,7 +162,7 @@ def test_command_writes_reports_and_returns_one_where_a_check_failed(tmp_path, c
     assert report["passed"] and report["counts"]["failed"] == 0
     text, printed = (output / "articulated_m1_n2.txt").read_text(), capsys.readouterr().out
     assert re.search(r"^  mass matrix is symmetric +0 +0$", text, re.MULTILINE)
-    assert re.search(r"^  Pinocchio +8 +0 +0   ", printed, re.MULTILINE)
+    assert re.search(r"^  Pinocchio +9 +0 +0   ", printed, re.MULTILINE)
     assert len(printed.splitlines()) < 12 and text.startswith(printed.partition("  report")[0])
     monkeypatch.setattr(
         verify_model, "verify", lambda folder: [verify.Check("name", "Law.", 2.0, 1.0)]
