@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail_codegen.scene.signatures.table import ALL, NEED_CONTACTS
+from serpentail_codegen.scene.signatures.table import ALL, NEEDS
 from tests.support.models import model_folder
 
 SEGMENTS, LINKS = 2, 1
@@ -50,7 +50,7 @@ CALLS = {
     "momentum_derivatives": (["q", "v"], [(3, NV)] * 4),
     "pfl": (["q", "v", "accelerations"], [(NT,)]),
 }
-ELSEWHERE = {"rollout", "implicit", *NEED_CONTACTS}  # tested in files of their own
+ELSEWHERE = {"rollout", "implicit", *NEEDS}  # tested in files of their own
 every_function = pytest.mark.parametrize("name", CALLS)
 
 
