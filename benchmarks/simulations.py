@@ -35,7 +35,7 @@ def generated(folder: Path, name: str, contacts: str) -> st.Model:
     functions = (
         '"energy", "momentum", "rollout", "implicit", "pfl", "tail_points", "forward_dynamics"'
     )
-    functions += ', "contact_points", "contact_dynamics"' if contacts else ""
+    functions += ', "contact_points", "leg_points", "contact_dynamics"' if contacts else ""
     text = f'kind = "articulated"\nsegments = 3\nlinks = 4\n{touching}functions = [{functions}]\n'
     path.write_text(text, encoding="utf-8")
     command = [sys.executable, "-m", "serpentail_codegen", str(path), "--output", str(folder)]

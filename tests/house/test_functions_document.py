@@ -40,7 +40,9 @@ def section(group: str) -> str:
     for name in ALL:
         signature = SIGNATURES[name]
         if signature.group == group:
-            lines += [f"### `{name}`", "", f"{signature.doc} (emitted {signature.emitted})", ""]
+            needs = f"; needs {signature.needs}" if signature.needs else ""
+            emitted = f"(emitted {signature.emitted}{needs})"
+            lines += [f"### `{name}`", "", f"{signature.doc} {emitted}", ""]
             lines += [row("in", a) for a in signature.inputs]
             lines += [row("out", a) for a in signature.outputs]
             lines += [""] if signature.outputs else []

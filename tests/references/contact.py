@@ -37,16 +37,25 @@ def ray(angle):
     return np.array([0 * angle, np.cos(angle), np.sin(angle)])
 
 
-def feet(parameters, legs):
-    """A, M, T of the right foot, then of the left, in the torso frame (Eqs. 5 to 8, corrected)."""
+def joints(parameters, angles):
+    """Hip, D, knee, A, M, T of the right leg, then of the left, in the torso frame (Eqs. 5 to 8,
+    corrected).
+    """
     P, out = parameters, []
-    for side, (gamma, delta) in zip(SIDES, np.reshape(legs[:4], (2, 2)), strict=True):
+    for side, (gamma, delta) in zip(SIDES, np.reshape(angles, (2, 2)), strict=True):
         hip = np.array(P["hip"]) * [side, 1, 1]
-        knee = hip + P["L_h2d"] * ray(gamma) + P["L_d2k"] * ray(delta)
+        D = hip + P["L_h2d"] * ray(gamma)
+        knee = D + P["L_d2k"] * ray(delta)
         ankle = knee + P["L_k2a"] * ray(gamma)
         middle = ankle + P["L_a2m"] * ray(delta)
-        out += [ankle, middle, middle - P["L_m2t"] * ray(gamma - P["delta_m"])]
+        toe = middle - P["L_m2t"] * ray(gamma - P["delta_m"])
+        out.append([hip, D, knee, ankle, middle, toe])
     return out
+
+
+def feet(parameters, legs):
+    """A, M, T of the right foot, then of the left, in the torso frame."""
+    return [point for leg in joints(parameters, legs[:4]) for point in leg[3:]]
 
 
 def articulated(parameters, q_t, links):

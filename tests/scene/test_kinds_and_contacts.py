@@ -6,7 +6,7 @@ import pytest
 
 from serpentail_codegen.scene.parameters import PARAMETERS
 from serpentail_codegen.scene.parse import parse_scene, scene_for, scene_to_dict
-from serpentail_codegen.scene.signatures.table import ALL, DEFAULT, DEFAULT_ON_GROUND, NEED_CONTACTS
+from serpentail_codegen.scene.signatures.table import ALL, DEFAULT, DEFAULT_ON_GROUND, NEEDS
 from tests.support.scenes import VALID
 
 CONTINUUM = 'kind = "continuum"\nsegments = 3\n'
@@ -60,7 +60,15 @@ def test_contacts_bring_their_parameters_and_functions(read):
 def test_a_flight_says_nothing_of_contacts(read):
     scene = read(VALID)
     assert scene.contacts == () and not {"contacts", "friction"} & set(scene_to_dict(scene))
-    assert not set(NEED_CONTACTS) & set(read(VALID + 'functions = "all"\n').functions)
+    assert not set(NEEDS) & set(read(VALID + 'functions = "all"\n').functions)
+
+
+def test_legs_have_joints_where_there_are_feet(read):
+    tail = VALID + 'contacts = ["tail", "torso"]\n'
+    for scene in (tail, tail + 'functions = "all"\n'):
+        assert {"contact_points", "leg_points"} & set(read(scene).functions) == {"contact_points"}
+    for scene in (STANCE, STANCE + 'functions = "all"\n'):
+        assert {"contact_points", "leg_points"} <= set(read(scene).functions)
 
 
 @pytest.mark.parametrize("value", ['["foot"]', '["feet", "feet"]', '"feet"', "true", "[3]", "[[]]"])
@@ -75,6 +83,12 @@ def test_contacts_are_different_groups(refuse, value):
     [
         (VALID + 'friction = "box"\n', "friction", 'add contacts = ["feet"]'),
         (VALID + 'functions = ["contact_points"]\n', "functions", 'add contacts = ["feet"]'),
+        (VALID + 'functions = ["leg_points"]\n', "functions", 'add contacts = ["feet"]'),
+        (
+            VALID + 'contacts = ["tail"]\nfunctions = ["leg_points"]\n',
+            "functions",
+            'needs feet: add "feet" to `contacts`',
+        ),
         (VALID + "[parameters]\nmu = 0.5\n", "parameters.mu", 'add "feet" to `contacts`'),
         (
             VALID + 'contacts = ["tail"]\n[parameters]\nL_m2t = 0.5\n',

@@ -14,7 +14,7 @@ links = 2
 contacts = ["feet", "tail"]
 functions = [
   "energy", "momentum", "rollout", "implicit", "pfl", "tail_points",
-  "contact_points", "contact_dynamics",
+  "contact_points", "leg_points", "contact_dynamics",
 ]
 [simulate]
 duration = 0.02

@@ -177,3 +177,17 @@ def test_drawn_feet_are_where_the_model_has_them(scene):
     joints = leg_joints(found.model, motion, found.legs.curve.at(motion.t)[0])
     feet = motion.contact.of("feet").points.reshape(-1, 2, 3, 3)
     np.testing.assert_allclose(joints[:, :, 3:], feet, atol=1e-15)
+
+
+def test_films_have_legs_where_the_model_has_their_joints(scene, monkeypatch):
+    looks = []
+    monkeypatch.setattr(
+        "serpentail.scenes.simulate.filmstrip", lambda *_, **look: looks.append(look)
+    )
+    found = st.scenario(scene())
+    motion = found.simulate()
+    found.film(motion, "legs.svg")
+    assert looks[0]["legs"].shape == (len(motion.t), 2, 6, 3)
+    del found.model.kernels["leg_points"]
+    found.film(motion, "none.svg")
+    assert "legs" not in looks[1]

@@ -7,10 +7,10 @@ import numpy as np
 from serpentail.verification import report as verify
 from serpentail.verification import states
 from serpentail_codegen.scene.signatures.signature import IMPLICIT
-from serpentail_codegen.scene.signatures.table import NEED_CONTACTS, in_group
+from serpentail_codegen.scene.signatures.table import NEEDS, in_group
 
 SLIGHT_FAULT = 1e-9
-TAKING_MORE = (*NEED_CONTACTS, *in_group(IMPLICIT))  # functions of more than a state
+TAKING_MORE = (*NEEDS, *in_group(IMPLICIT))  # functions of more than a state
 
 
 def failed(checks):

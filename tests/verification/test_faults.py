@@ -146,6 +146,12 @@ def unloaded(v_dot, *arguments):
     return v_dot - SLIGHT_FAULT * np.sum(np.abs(arguments[3]))
 
 
+def bent(joints, *_):
+    """The knees alone are in the wrong place."""
+    joints[..., 2, :] *= 1 + SLIGHT_FAULT
+    return joints
+
+
 FAULTS = {
     "asymmetric": ("mass_matrix", asymmetric, "mass matrix is symmetric"),
     "indefinite": ("mass_matrix", indefinite, "mass matrix is positive definite"),
@@ -196,14 +202,16 @@ FAULTS = {
         "forward dynamics inverts inverse dynamics",
     ),
     "world mass": ("mass_matrix_world", times(1 + SLIGHT_FAULT), "mass matrix in world axes"),
+    "feet": ("leg_points", times(1 + SLIGHT_FAULT), "legs end in their feet"),
+    "knees": ("leg_points", bent, "legs have their lengths"),
     "world bias": ("bias_force_world", times(1 + SLIGHT_FAULT), "bias force in world axes"),
 }
 
 
 @pytest.mark.parametrize("fault", FAULTS)
-def test_faults_break_the_law_that_is_there_for_them(model, fault):
+def test_faults_break_the_law_that_is_there_for_them(having, fault):
     name, change, expected = FAULTS[fault]
-    assert expected in laws_broken(broken(model, name, change))
+    assert expected in laws_broken(broken(having(name), name, change))
 
 
 @pytest.mark.parametrize(

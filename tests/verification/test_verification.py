@@ -12,7 +12,7 @@ from serpentail_codegen.functions.catalogue import CATALOGUE
 from serpentail_codegen.scene.signatures.table import (
     DEFAULT,
     DERIVATIVES,
-    NEED_CONTACTS,
+    NEEDS,
     SIGNATURES,
 )
 from tests.support.faults import TAKING_MORE, broken, failed, not_a_number
@@ -80,7 +80,7 @@ def on_demand(reason):
     them.
     """
     absent = set(reason.removeprefix("not generated: ").split(", "))
-    return absent <= set(SIGNATURES) - {*DEFAULT, *NEED_CONTACTS}
+    return absent <= set(SIGNATURES) - {*DEFAULT, *NEEDS}
 
 
 def test_all_laws_hold_without_peers(model):
@@ -118,9 +118,10 @@ def test_a_model_of_one_function_is_checked(name):
     asked = {"tracked_dynamics": ["pfl", "rollout"]}.get(
         name, [name.removesuffix("_factor").removesuffix("_solve")]
     )
+    touching = {"contacts": ["tail"], "feet": ["feet"]}
     model = st.load(
         model_folder(
-            1, 1, functions=asked, **({"contacts": ["tail"]} if name in NEED_CONTACTS else {})
+            1, 1, functions=asked, **({"contacts": touching[NEEDS[name]]} if name in NEEDS else {})
         )
     )
     checks = verify.laws(model)

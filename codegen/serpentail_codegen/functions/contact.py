@@ -119,12 +119,12 @@ def assemble_contact_points(draft: Draft, arrays: dict[str, Array]) -> None:
 
 def assemble_leg_points(draft: Draft, arrays: dict[str, Array]) -> None:
     """Hip, D, knee, A, M and T of the right leg, then of the left, in the world (Eqs. 5 to 9)."""
-    state, legs = State(arrays["q"]), arrays["legs"]
+    state, angles = State(arrays["q"]), arrays["angles"]
     R = attitude(draft, state)
     sides, joints = draft.constant("sides", [1, -1]), draft.array("joints_of_leg", 3, 6)
     with draft.loop("l", 2) as side:
-        reads = {"side": sides.part(side, 1), "leg": legs.part(2 * side, 2)}
-        draft.step(leg.leg_points, reads, joints=joints.part(0, 18))
+        reads = {"side": sides.part(side, 1), "leg": angles.part(2 * side, 2)}
+        draft.step(leg.leg_joints, reads, joints=joints.part(0, 18))
         with draft.loop("k", 6) as k:
             position = arrays["joints"].part(18 * side + 3 * k, 3)
             draft.step(contact.point_on_torso, {"R": R, "place": joints[k]}, arm=position)
@@ -200,5 +200,6 @@ def assemble_contact_dynamics(draft: Draft, arrays: dict[str, Array]) -> None:
 
 ASSEMBLIES = {
     "contact_points": assemble_contact_points,
+    "leg_points": assemble_leg_points,
     "contact_dynamics": assemble_contact_dynamics,
 }

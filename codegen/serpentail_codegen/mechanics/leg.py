@@ -4,15 +4,27 @@ A leg moves in a plane parallel to the torso's y and z axes; two angles, gamma a
 its points.
 """
 
-from sympy import Matrix, cos, sin
+from sympy import Matrix, cos, sin, zeros
 
 from .shapes import V1, V2, V3
 
 
-def direction(let, angle, rate) -> tuple[Matrix, Matrix]:
-    """u_h of Eq. 9 and its rate."""
+def direction(let, angle, rate) -> Matrix:
+    """u_h of Eq. 9; the second column is its rate."""
     c, s = let("c", cos(angle)), let("s", sin(angle))
-    return Matrix([0, c, s]), let("u_dot", Matrix([0, -s * rate, c * rate]))
+    return Matrix.hstack(Matrix([0, c, s]), let("u_dot", Matrix([0, -s * rate, c * rate])))
+
+
+def chain(let, hip, directions, lengths) -> Matrix:
+    """A, M and T, one below the other (Eqs. 5 to 8); linear, so that columns of rates give rates.
+
+    The directions are those of the thigh, the shank and the sole.
+    """
+    upper, lower, sole = directions
+    thigh, L_d2k, L_a2m, L_m2t = lengths
+    A = let("A", (hip + thigh * upper + L_d2k * lower).T).T  # one column after the other
+    M = let("M", (A + L_a2m * lower).T).T
+    return Matrix([A, M, M - L_m2t * sole])
 
 
 def foot_points(
@@ -33,24 +45,17 @@ def foot_points(
 
     The sole keeps the angle delta_m to the thigh: Eq. 8's gamma - delta is gamma - delta_m.
     """
-    upper, upper_rate = direction(let, leg[0], leg_rates[0])
-    lower, lower_rate = direction(let, leg[1], leg_rates[1])
-    sole, sole_rate = direction(let, let("sole", leg[0] - delta_m[0]), leg_rates[0])
+    upper = direction(let, leg[0], leg_rates[0])
+    lower = direction(let, leg[1], leg_rates[1])
+    sole = direction(let, let("sole", leg[0] - delta_m[0]), leg_rates[0])
     thigh = let("thigh", L_h2d[0] + L_k2a[0])
-    ankle = let("A", Matrix([side[0] * hip[0], hip[1], hip[2]]) + thigh * upper + L_d2k[0] * lower)
-    ankle_rate = let("A_dot", thigh * upper_rate + L_d2k[0] * lower_rate)
-    middle, middle_rate = (
-        let("M", ankle + L_a2m[0] * lower),
-        let("M_dot", ankle_rate + L_a2m[0] * lower_rate),
-    )
-    toe, toe_rate = middle - L_m2t[0] * sole, middle_rate - L_m2t[0] * sole_rate
-    return {
-        "foot": Matrix([ankle, middle, toe]),
-        "foot_rate": Matrix([ankle_rate, middle_rate, toe_rate]),
-    }
+    start = Matrix([side[0] * hip[0], hip[1], hip[2]]).row_join(zeros(3, 1))
+    lengths = thigh, L_d2k[0], L_a2m[0], L_m2t[0]
+    points = chain(let, start, (upper, lower, sole), lengths)
+    return {"foot": points[:, 0], "foot_rate": points[:, 1]}
 
 
-def leg_points(
+def leg_joints(
     let,
     hip: V3,
     side: V1,
@@ -65,10 +70,11 @@ def leg_points(
     """Hip, D, knee, A, M and T of one leg from B (Eqs. 5 to 9); ``side`` is 1 on the right, -1 on
     the left.
     """
-    upper, _ = direction(let, leg[0], 0)
-    lower, _ = direction(let, leg[1], 0)
-    sole, _ = direction(let, let("sole", leg[0] - delta_m[0]), 0)
-    points = [Matrix([side[0] * hip[0], hip[1], hip[2]])]
-    for link in (L_h2d * upper.T, L_d2k * lower.T, L_k2a * upper.T, L_a2m * lower.T):
-        points.append(let("joint", points[-1] + link.T))
-    return {"joints": Matrix([*points, points[-1] - L_m2t[0] * sole])}
+    upper, lower = (direction(let, angle, 0)[:, 0] for angle in leg)
+    sole = direction(let, let("sole", leg[0] - delta_m[0]), 0)[:, 0]
+    thigh = let("thigh", L_h2d[0] + L_k2a[0])
+    start = Matrix([side[0] * hip[0], hip[1], hip[2]])
+    D = let("D", start + L_h2d[0] * upper)
+    lengths = thigh, L_d2k[0], L_a2m[0], L_m2t[0]
+    foot = chain(let, start, (upper, lower, sole), lengths)
+    return {"joints": Matrix([start, D, D + L_d2k[0] * lower, foot])}

@@ -7,7 +7,7 @@ from typing import Any
 from .parameters import PARAMETERS, SINGLE, Parameter, Value
 from .problems import Problem, suggest
 from .scene import COUNT, KEYS, MOST_LINKS, NAMES, ONLY, Only, is_whole
-from .signatures.table import ALL, DERIVATIVES, NEED_CONTACTS
+from .signatures.table import ALL, DERIVATIVES, NEEDS
 
 
 def plain(value: Value) -> float | list[float]:
@@ -75,6 +75,13 @@ def kind_problems(table: Mapping[str, Any], rules: Only) -> list[Problem]:
     return problems
 
 
+def lacking(needs: str, contacts: Collection[str]) -> str:
+    """Return the group of points to add where a need is not met, feet where any would do."""
+    if not needs or needs in contacts or (needs == "contacts" and contacts):
+        return ""
+    return "feet" if needs == "contacts" else needs
+
+
 def contact_problems(
     table: Mapping[str, Any], values: Mapping[str, Any], contacts: Collection[str]
 ) -> list[Problem]:
@@ -82,25 +89,24 @@ def contact_problems(
     problems, parameters = [], _parameters_in(table)
 
     # parameters of groups that do not touch the ground
-    needs = {p.name: p.needs for p in PARAMETERS if p.needs and p.needs not in contacts}
-    needs = {name: group for name, group in needs.items() if group != "contacts" or not contacts}
-    for name in [name for name in needs if name in parameters]:
-        group = "feet" if needs[name] == "contacts" else needs[name]
+    lacks = {p.name: lacking(p.needs, contacts) for p in PARAMETERS if p.name in parameters}
+    for name, group in [(name, group) for name, group in lacks.items() if group]:
         remedy = f'nothing touches the ground by it; add "{group}" to `contacts`, or remove it'
         problems.append(Problem(f"parameters.{name}", parameters[name], remedy))
     if contacts and values["coordinates"] == "polar":
         remedy = 'polar coordinates have no contacts: use "bend"'
         problems.append(Problem("contacts", list(contacts), remedy))
-    if contacts:
-        return problems
 
-    # what no flight has: friction, and functions of the ground
+    # what no flight has: friction, and functions of the ground; some need one group of points
     remedy = 'needs points that touch the ground: add contacts = ["feet"]'
-    if "friction" in table:
+    if "friction" in table and not contacts:
         problems.append(Problem("friction", table["friction"], remedy))
     wanted = values["functions"] if isinstance(values["functions"], list | tuple) else ()
-    wrong = [name for name in wanted if name in NEED_CONTACTS]
-    return problems + [Problem("functions", name, remedy) for name in wrong]
+    lacks = {name: lacking(needs, contacts) for name, needs in NEEDS.items() if name in wanted}
+    for name, group in [(name, group) for name, group in lacks.items() if group]:
+        other = f'needs {group}: add "{group}" to `contacts`'
+        problems.append(Problem("functions", name, other if contacts else remedy))
+    return problems
 
 
 def _parameters_in(table: Mapping[str, Any]) -> Mapping[str, Any]:

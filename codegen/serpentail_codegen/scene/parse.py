@@ -12,6 +12,7 @@ from .checks import (
     function_problems,
     key_problems,
     kind_problems,
+    lacking,
     plain,
     single_problems,
     tail_links,
@@ -20,7 +21,7 @@ from .checks import (
 from .problems import Problem, SceneError
 from .resolve import resolve_parameters
 from .scene import CONTACTS, GROUPS, KEYS, MOST_LINKS, ONLY, TARGETS, Only, Scene
-from .signatures.table import ALL, DEFAULT, DEFAULT_ON_GROUND, DERIVATIVES, NEED_CONTACTS
+from .signatures.table import ALL, DEFAULT, DEFAULT_ON_GROUND, DERIVATIVES, NEEDS
 
 
 def load_scene(path: str | Path) -> Scene:
@@ -95,12 +96,17 @@ def _with_defaults(table: Mapping[str, Any], name: str, rules: Only) -> dict[str
 
 def _chosen_functions(table: Mapping[str, Any], coordinates: str, contacts: Collection[str]) -> Any:
     """Return the functions that a scene means by naming them, by "all", or by leaving them out."""
-    if table.get("functions") == "all":
-        return tuple(name for name in ALL if contacts or name not in NEED_CONTACTS)
-    if "functions" in table:
-        return table["functions"]
+    chosen = table.get("functions")
+    if "functions" in table and chosen != "all":
+        return chosen
+
+    # all that the scene can have, or the usual ones
     names = DEFAULT + DEFAULT_ON_GROUND if contacts else DEFAULT
-    return tuple(name for name in names if coordinates != "polar" or name not in DERIVATIVES)
+    if chosen == "all":
+        names = ALL
+    elif coordinates == "polar":
+        names = tuple(name for name in names if name not in DERIVATIVES)
+    return tuple(name for name in names if not lacking(NEEDS.get(name, ""), contacts))
 
 
 def scene_to_dict(scene: Scene) -> dict[str, Any]:

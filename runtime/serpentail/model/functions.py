@@ -119,6 +119,15 @@ class Functions(ABC):
         """
         return self.kernel("contact_points")(*self._with_legs((q, v), legs))
 
+    def leg_points(self, q: ArrayLike, angles: ArrayLike) -> Array:
+        """Hip, D, knee, A, M and T (2, 6, 3) of the right leg, then of the left, world (m).
+
+        angles (4,): gamma_1, delta_1 (right), gamma_2, delta_2 (rad), the first half of what
+        ``contact_points`` takes; Eqs. 5 to 9.  Only where there are feet: else, and where the scene
+        left the function out, ModelError.
+        """
+        return self.kernel("leg_points")(q, angles)
+
     def contact_dynamics(
         self,
         q: ArrayLike,

@@ -76,13 +76,14 @@ class Scenario:
         """Draw moments of a motion: torso, legs, tail and the ground's forces; return the path.
 
         frames: how many, or their times (s).  They are drawn about the centre of mass, or about the
-        torso where the scene left out the function ``center_of_mass``.
+        torso where the scene left out the function ``center_of_mass``; without legs where it left
+        out ``leg_points``.
         """
         model, parameters = self.model, self.model.parameters
         look: dict[str, Any] = {"tail_mount": parameters["tail_mount"]}
         if "torso_semi_axes" in parameters:
             look["semi_axes"] = parameters["torso_semi_axes"]
-        if self.legs is not None:
+        if self.legs is not None and "leg_points" in model.kernels:
             look["legs"] = leg_joints(model, motion, self.legs.curve.at(motion.t)[0])
         if "center_of_mass" in model.kernels:
             look["com"] = model.center_of_mass(motion.q, motion.v)[0]

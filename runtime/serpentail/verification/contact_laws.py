@@ -118,6 +118,24 @@ def points_are_carried_by_the_torso(model: Model, s: State) -> Errors:
     return worst(relative(b, a + move, np.abs(a) + 1) for a, b in zip(first, second, strict=True))
 
 
+@law("leg_points", "contact_points", units=VALUE_LIMIT, only="contact")
+def legs_end_in_their_feet(model: Model, s: State) -> Errors:
+    """A, M and T of the legs' joints are the feet's points."""
+    joints = model.leg_points(s.q, LEGS[:4])
+    feet = model.contact_points(s.q, s.v, *legs(model))[0][:6]
+    return relative(joints[:, 3:].reshape(feet.shape), feet)
+
+
+@law("leg_points", units=VALUE_LIMIT, only="contact")
+def legs_have_their_lengths(model: Model, s: State) -> Errors:
+    """Hips are as far from B, and each joint from the next, as the parameters say."""
+    P, joints = model.parameters, model.leg_points(s.q, LEGS[:4]).astype(float)
+    B = np.broadcast_to(s.q[POSITION], (2, 1, 3))
+    lengths = np.linalg.norm(np.diff(np.concatenate([B, joints], axis=1), axis=1), axis=2)
+    links = [P[name] for name in ("L_h2d", "L_d2k", "L_k2a", "L_a2m", "L_m2t")]
+    return relative(lengths, [np.linalg.norm(P["hip"]), *links], np.abs(joints) + lengths.max())
+
+
 @law(
     "contact_points",
     "contact_dynamics",

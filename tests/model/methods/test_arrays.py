@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail_codegen.scene.signatures.table import ALL, NEED_CONTACTS
+from serpentail_codegen.scene.signatures.table import ALL, NEEDS
 
 from .calls import (
     CALLS,
@@ -25,7 +25,7 @@ from .calls import (
     states,
 )
 
-ELSEWHERE = {"rollout", "implicit", *NEED_CONTACTS}  # tested in files of their own
+ELSEWHERE = {"rollout", "implicit", *NEEDS}  # tested in files of their own
 
 
 def test_every_function_is_called_here():

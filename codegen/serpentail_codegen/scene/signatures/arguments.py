@@ -97,6 +97,12 @@ LEGS = Argument(
     "gamma_1, delta_1 of the right leg, gamma_2, delta_2 of the left (rad), then their rates "
     "(rad/s)",
 )
+ANGLES = Argument(
+    "angles", (4,), "gamma_1, delta_1 of the right leg, gamma_2, delta_2 of the left (rad)"
+)
+JOINTS = Argument(
+    "joints", (2, 6, 3), "hip, D, knee, A, M and T of the right leg, then of the left (m, world)"
+)
 POSITIONS = Argument("positions", ("points", 3), "points that can touch the ground (m, world)")
 VELOCITIES = Argument("velocities", ("points", 3), "their velocities (m/s, world)")
 BRISTLES = bristle_numbers("bristles", "stretch of the friction springs (m, world x and y)")

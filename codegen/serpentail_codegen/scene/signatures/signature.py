@@ -26,6 +26,8 @@ class Signature:
     One without outputs stands for others that it is made of: a scene names it, nobody calls it.
     ``exact`` are the functions that its Jacobians are made of, then those that gradients are, then
     what second derivatives need beside them: so CasADi differentiates calls of the compiled code.
+    ``needs`` is a group of contact points, or "contacts" for any of them; empty: every scene may
+    have it.
     """
 
     name: str
@@ -35,6 +37,7 @@ class Signature:
     group: str
     emitted: str
     exact: tuple[tuple[str, ...], ...] = ()
+    needs: str = ""
 
     @property
     def symbolic(self) -> bool:

@@ -2,12 +2,14 @@
 
 from .arguments import (
     ACCELERATIONS,
+    ANGLES,
     BRISTLE_RATES,
     BRISTLES,
     DAMPING,
     FACTORS,
     FORCES,
     GAINS,
+    JOINTS,
     LEGS,
     POSITIONS,
     TAU,
@@ -30,6 +32,16 @@ SIGNATURES = (
         (POSITIONS, VELOCITIES),
         CONTACT,
         GROUND,
+        needs="contacts",
+    ),
+    Signature(
+        "leg_points",
+        "joints of both legs, from the hips to the toes, Eqs. 5 to 9",
+        (Q, ANGLES),
+        (JOINTS,),
+        CONTACT,
+        GROUND,
+        needs="feet",
     ),
     Signature(
         "contact_dynamics",
@@ -38,6 +50,7 @@ SIGNATURES = (
         (V_DOT, BRISTLE_RATES, FORCES),
         CONTACT,
         GROUND,
+        needs="contacts",
     ),
     Signature(
         "pfl",

@@ -5,7 +5,7 @@ documentation of functions are made of this table. Its order is that of emitted 
 """
 
 from . import derivatives, simulation, values
-from .signature import ALWAYS, CALLED, CONTACT, DERIVATIVE, GROUND, VALUE
+from .signature import ALWAYS, CALLED, DERIVATIVE, GROUND, VALUE
 
 SIGNATURES = {
     signature.name: signature
@@ -28,7 +28,7 @@ DEFAULT = emitted(ALWAYS)
 DEFAULT_ON_GROUND = emitted(GROUND)
 VALUES = in_group(VALUE)
 DERIVATIVES = in_group(DERIVATIVE)
-NEED_CONTACTS = in_group(CONTACT)
+NEEDS = {name: signature.needs for name, signature in SIGNATURES.items() if signature.needs}
 # functions that first, then second derivatives of a compiled function are made of
 EXACT_DERIVATIVES = {
     name: (signature.exact[0], signature.exact[1] + signature.exact[2])
