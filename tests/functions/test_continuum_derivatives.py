@@ -245,6 +245,7 @@ def equal_weights(force):
     return weights
 
 
+@pytest.mark.slow
 def test_the_references_have_25_digits():
     more, (q, v, v_dot, tau) = Unrounded(1, 80, 66, 24), state(1, 6.28).values()
     few, many = (each.jacobian(each.forward_dynamics, q, v, tau) for each in (exact(1), more))

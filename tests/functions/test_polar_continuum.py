@@ -158,6 +158,7 @@ def test_moderate_bends_are_right_up_to_cancellation(theta, emission):
         )
 
 
+@pytest.mark.slow
 def test_error_grows_as_theta_to_the_minus_four_and_that_of_the_bend_form_does_not():
     polar, bend = model(1), model(1, "bend")
     worst = []
@@ -199,6 +200,7 @@ def test_energy_momentum_and_points_are_the_reference_s():
     np.testing.assert_allclose(polar.tail_points(q), exact.bend.tail_points(q_bend, 5), atol=1e-15)
 
 
+@pytest.mark.slow
 def test_jacobians_and_world_axes_follow_from_the_bend_form():
     polar, bend = model(2), model(2, "bend")
     q, v, *_ = polar_state(2, 1.3)
@@ -226,6 +228,7 @@ def test_external_loads_balance():
     assert np.abs(residual).max() <= 1e-12 * np.abs(load).max()
 
 
+@pytest.mark.slow
 def test_a_flight_far_from_straight_is_that_of_the_bend_form():
     polar, bend = model(1), model(1, "bend")
     q, v = np.array([0, 0, 0, 1.0, 0, 0, 0, 0.4, 1.5]), np.array([0, 0, 2.0, 6, 1, -2, 3.0, 1.0])
@@ -238,6 +241,7 @@ def test_a_flight_far_from_straight_is_that_of_the_bend_form():
     np.testing.assert_allclose(end[1], flights[1].v[-1], atol=1e-8)
 
 
+@pytest.mark.slow
 def test_c_example_runs_at_a_bend(tmp_path):
     polar = model(2)
     sources = [polar.folder / "example" / "main.c", polar.folder / "src" / f"{polar.name}.c"]

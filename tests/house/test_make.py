@@ -150,6 +150,7 @@ def test_changed_options_rebuild(tree, make):
         assert make("model", *ORDER, *options).stdout == UP_TO_DATE
 
 
+@pytest.mark.slow
 def test_changed_generator_looks_again_and_writes_only_what_differs(tree, make):
     assert make("model", *ORDER).returncode == 0
     age(tree)

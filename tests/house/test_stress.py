@@ -129,6 +129,7 @@ def test_bodies_of_unlike_size_are_told(lying, change):
     assert other.parameters["tail_mass"] == lying.parameters["tail_mass"]
 
 
+@pytest.mark.slow
 def test_the_warning_is_true(lying):
     """It comes where H is off by more than 1e-12, and an error is never more than it says."""
     off = {}
@@ -144,6 +145,7 @@ def test_the_warning_is_true(lying):
     assert off[worst] * disparity(lying.parameters | UNLIKE[worst]) > 1e-12
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["standing", "lying"])
 def test_bodies_without_the_warning_keep_their_digits(request, name):
     """Random bodies as unlike as may be without it."""

@@ -152,7 +152,7 @@ def test_frames_are_the_samples_nearest_to_even_times(frames):
 
 
 @pytest.mark.parametrize("speed", SPEEDS)
-@pytest.mark.parametrize("frames", [1, 3, 13])
+@pytest.mark.parametrize("frames", [1, 3, pytest.param(13, marks=pytest.mark.slow)])
 def test_panels_have_one_scale_and_show_everything(speed, frames):
     figure, film = drawn_film(flight(SPEEDS[speed]), frames)
     width, height = figure.get_size_inches()
@@ -176,7 +176,7 @@ def test_panels_have_one_scale_and_show_everything(speed, frames):
             assert (shown < [axes.get_xlim()[1], axes.get_ylim()[1]]).all()
 
 
-@pytest.mark.parametrize("frames", [1, 4, 8])
+@pytest.mark.parametrize("frames", [1, 4, pytest.param(8, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("speed", SPEEDS)
 def test_panels_key_and_labels_do_not_overlap(speed, frames):
     with matplotlib.rc_context(STYLE):
@@ -201,7 +201,9 @@ def test_centre_of_mass_given_moves_the_windows():
     )
 
 
-@pytest.mark.parametrize("segments", [0, 1, 3, 8])
+@pytest.mark.parametrize(
+    "segments", [0, 3, *(pytest.param(n, marks=pytest.mark.slow) for n in (1, 8))]
+)
 def test_time_plots_label_everything_and_legends_cover_nothing(segments):
     with matplotlib.rc_context(STYLE):
         figure = plots._draw_times(flight(segments=segments))

@@ -44,6 +44,7 @@ def test_inverse_dynamics_is_mass_times_acceleration_plus_bias(exact, states):
         assert np.all(error <= exact.nv * ROUNDING * (np.abs(mass) @ np.abs(v_dot) + np.abs(bias)))
 
 
+@pytest.mark.slow
 def test_forward_dynamics_inverts_inverse_dynamics(exact, states):
     for q, v, v_dot, tau in states:
         external = exact.inverse_dynamics(q, v, v_dot) - at_rest(tau)
@@ -72,6 +73,7 @@ def test_momentum_is_the_upper_rows_of_mass_times_velocity(exact, states):
         np.testing.assert_allclose(axes @ momentum[3:6], about_torso, atol=1e-15)
 
 
+@pytest.mark.slow
 def test_power_is_the_rate_of_energy(exact, states):
     for q, v, v_dot, _ in states:
         after, before = (
@@ -94,12 +96,14 @@ def test_translational_mass_is_the_nearest_float64_of_the_total(exact, states):
     assert_same_float64(exact.mass_matrix(states[0][0])[:3, :3], total * np.eye(3))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_more_digits_and_nodes_give_the_same_float64(kind):
     few, many = ExactContinuum(TABLE_1, 3, 30, 24), ExactContinuum(TABLE_1, 3, 50, 32)
     assert_same_quantities(few, many, states_of(3, kind)[1])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bend", [0.0, *BENDS])
 def test_every_bend_is_the_same_float64_with_more_digits_and_nodes(bend):
     q, v, v_dot, tau = states_of(1, "random")[0]
@@ -117,6 +121,7 @@ def test_nodes_integrate_polynomials(count):
         assert abs(np.dot(shares, continuum.nodes**power) * (power + 1) - 1) <= 1e-37
 
 
+@pytest.mark.slow
 def test_internal_dynamics_do_not_depend_on_the_pose_to_the_last_bit(exact, states):
     continuum = ExactContinuum({**TABLE_1, "gravity": 0.0}, exact.segments)
     q, v, *_ = states[0]

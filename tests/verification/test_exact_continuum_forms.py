@@ -39,6 +39,7 @@ def test_straight_tail_is_rational_to_the_last_bit():
     assert_same_float64(bias[6:], [float(-mass * gravity * length / 6), 0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gravity", [0.0, 9.8])
 @pytest.mark.parametrize("bend", BENDS)
 def test_planar_bend_is_the_closed_form_to_the_last_bit(bend, gravity):
@@ -78,6 +79,7 @@ def arc(parameters, bend, rates):
     return inertia, np.array(bias, dtype=float), float(potential)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bend", BENDS[:4])
 def test_small_bend_tends_to_the_straight_tail(exact, bend):
     q, v, v_dot, _ = states_of(exact.segments, "random")[0]
@@ -89,6 +91,7 @@ def test_small_bend_tends_to_the_straight_tail(exact, bend):
     assert block_error(exact.inverse_dynamics(bent, v, v_dot), force) <= ROUNDING + 10 * bend
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_two_halves_are_one_segment(kind):
     whole, halves = (ExactContinuum(TABLE_1, segments) for segments in (1, 2))
@@ -103,6 +106,7 @@ def test_two_halves_are_one_segment(kind):
         assert_same_float64(halves.tail_points(q_halves, 3), whole.tail_points(q, 6))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("segments", "counts"), [(1, (16, 32, 64)), (2, (16, 32))])
 def test_chain_of_massive_points_converges_at_first_order(segments, counts):
     q, v, v_dot, _ = states_of(segments, "random")[0]
@@ -193,6 +197,7 @@ def about_y(angle):
     return ca.vertcat(ca.horzcat(c, 0, s), ca.horzcat(0, 1, 0), ca.horzcat(-s, 0, c))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["random", "folded"])
 def test_lagrange_s_equations_of_the_paper_s_polar_form_agree(exact, lagrange, kind):
     for q, v, *_ in states_of(exact.segments, kind):

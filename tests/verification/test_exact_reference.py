@@ -156,12 +156,14 @@ def test_translational_mass_is_the_nearest_float64_of_the_total(exact, states):
     np.testing.assert_array_equal(exact.mass_matrix(states[0][0])[:3, :3], total * np.eye(3))
 
 
+@pytest.mark.slow
 def test_more_digits_give_the_same_float64(exact, states):
     few, many = (ExactChain(TABLE_1, exact.segments, exact.links, digits) for digits in (30, 50))
     assert_same_quantities(few, many, states[0])
     assert_same_quantities(exact, many, states[1])
 
 
+@pytest.mark.slow
 def test_internal_dynamics_do_not_depend_on_the_pose_to_the_last_bit(exact, states):
     chain = ExactChain({**TABLE_1, "gravity": 0.0}, exact.segments, exact.links)
     for q, v, *_ in states:
@@ -171,6 +173,7 @@ def test_internal_dynamics_do_not_depend_on_the_pose_to_the_last_bit(exact, stat
         assert_same_float64(chain.bias_force(q, v)[3:], chain.bias_force(upright, internal)[3:])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_one_link_is_the_universal_pendulum_to_the_last_bit(kind):
     chain = ExactChain(TABLE_1, 1, 1)
