@@ -52,7 +52,7 @@ def tail_of(scene: Scene) -> Tail:
 def needed(names: Collection[str], contacts: bool = False) -> list[str]:
     """Return the functions to derive: those asked for, and what rollouts and solves call."""
     flight = ("forward_dynamics", "tracked_dynamics") if "pfl" in names else ("forward_dynamics",)
-    called = ("contact_points", "contact_dynamics") if contacts else flight
+    called = ("contact_points", "contact_rates") if contacts else flight
     parts = {"rollout": called, "implicit": ("implicit_factor", "implicit_solve")}
     wanted = {*names, *(part for name in names for part in parts.get(name, ()))}
     return [name for name in CATALOGUE if name in wanted]

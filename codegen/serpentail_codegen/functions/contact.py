@@ -18,17 +18,25 @@ from .tails.mechanism import Segments
 @dataclass(frozen=True)
 class Points:
     """Arms and velocities of all points; where each group begins; columns of the tail's joints, one
-    for a point.
+    for a point; how fast the feet's points drift in the torso.
     """
 
     arms: Array
     velocities: Array
     first: dict[str, int]
     S: Array | None = None
+    drifts: Array | None = None
 
     def motion(self, k: Index | int) -> Vectors:
         """Arm and velocity of point k."""
         return Vectors({"arm": self.arms[k], "velocity": self.velocities[k]})
+
+    @property
+    def foot_drifts(self) -> Array:
+        """Drifts of the feet's points, torso axes."""
+        if self.drifts is None:
+            raise ValueError("no feet touch the ground")
+        return self.drifts
 
     @property
     def columns(self) -> Array:
@@ -57,7 +65,8 @@ def gather_points(
     tail, torso = draft.tail, state.torso(R)
     S = draft.array("S_point", 12, tail.total) if "tail" in tail.contacts else None
     arms, velocities = draft.array("arm", 3, tail.points), draft.array("velocity", 3, tail.points)
-    points = Points(arms, velocities, first_points(tail), S)
+    drifts = draft.array("foot_rate", 3, 6) if "feet" in tail.contacts else None
+    points = Points(arms, velocities, first_points(tail), S, drifts)
     if "feet" in tail.contacts:
         place_feet(draft, torso, points, arrays["legs"])
     if "tail" in tail.contacts:
@@ -73,17 +82,17 @@ def gather_points(
 def place_feet(draft: Draft, torso: Torso, points: Points, angles: Array) -> None:
     """A, M and T of the right foot, then of the left (Eqs. 5 to 9)."""
     sides = draft.constant("sides", [1, -1])
-    foot, rate = draft.array("foot", 3, 3), draft.array("foot_rate", 3, 3)
+    foot, rate = draft.array("foot", 3, 3), points.foot_drifts
     with draft.loop("l", 2) as side:
         reads = {
             "side": sides.part(side, 1),
             "leg": angles.part(2 * side, 2),
             "leg_rates": angles.part(4 + 2 * side, 2),
         }
-        writes = {"foot": foot.part(0, 9), "foot_rate": rate.part(0, 9)}
+        writes = {"foot": foot.part(0, 9), "foot_rate": rate.part(9 * side, 9)}
         draft.step(leg.foot_points, reads, **writes)
         with draft.loop("k", 3) as k:
-            place = {"place": foot[k], "drift": rate[k]}
+            place = {"place": foot[k], "drift": rate[3 * side + k]}
             motion = points.motion(3 * side + k + points.first["feet"])
             draft.step(contact.point_on_torso, torso, place, **motion)
 
@@ -182,8 +191,29 @@ def contact_load(
     """
     points = gather_points(draft, state, R, arrays)
     press(draft, state.torso(R), points, arrays)
+    if "powers" in arrays:
+        balance_powers(draft, state.torso(R), points, arrays)
     torques = copied_torques(draft, arrays["tau"])
     return gather_contact_loads(draft, R, points, arrays["forces"], torques), torques
+
+
+def balance_powers(
+    draft: Draft, torso: Torso, points: Points, arrays: dict[str, Array]
+) -> None:
+    """Heights of all points; the power of the ground on them, and that of the legs' drives."""
+    powers = arrays["powers"]
+    draft.fill(powers.part(0, 2), 0)
+    with draft.loop("k", draft.tail.points) as k:
+        force = {"force": arrays["forces"].part(3 * k, 3)}
+        height = arrays["heights"].part(k, 1)
+        draft.step(contact.height, torso, points.motion(k), height=height)
+        draft.step(contact.ground_power, points.motion(k), force, power_=powers.part(0, 1))
+    if "feet" in draft.tail.contacts:
+        first = points.first["feet"]
+        with draft.loop("k", draft.tail.groups["feet"]) as k:
+            drift = {"drift": points.foot_drifts[k]}
+            force = {"force": arrays["forces"].part(3 * (k + first), 3)}
+            draft.step(contact.leg_power, torso, drift, force, power_=powers.part(1, 1))
 
 
 def assemble_contact_dynamics(draft: Draft, arrays: dict[str, Array]) -> None:
@@ -202,4 +232,5 @@ ASSEMBLIES = {
     "contact_points": assemble_contact_points,
     "leg_points": assemble_leg_points,
     "contact_dynamics": assemble_contact_dynamics,
+    "contact_rates": assemble_contact_dynamics,
 }

@@ -48,6 +48,21 @@ def position(let, p: V3, arm: V3) -> dict:
     return {"position": p + arm}
 
 
+def height(let, p: V3, arm: V3) -> dict:
+    """How high a point is above the ground."""
+    return {"height": [p[2] + arm[2]]}
+
+
+def ground_power(let, velocity: V3, force: V3) -> dict:
+    """Power of the ground on a point that moves in the world."""
+    return {"power": [velocity.dot(force)]}
+
+
+def leg_power(let, R: M33, drift: V3, force: V3) -> dict:
+    """Power of the drive that moves a point in the torso at ``drift`` against a force on it."""
+    return {"power": [-(R * drift).dot(force)]}
+
+
 def bristle_properties(let, K_f: V1, D_f: V1) -> dict:
     """Damping D_f K_f of a bristle, and 1 over it."""
     return {"drag": D_f * K_f[0], "mobility": [let("mobility", 1 / (D_f[0] * K_f[0]))]}

@@ -18,7 +18,7 @@ from .layout import FIRST_Q, QUATERNION, SECOND_Q
 from .library import NOT_POSITIVE_DEFINITE, OUT_OF_RANGE
 from .workers import shared
 
-MOST_ARRAYS = 8
+MOST_ARRAYS = 10
 Arrays = Sequence[ndarray]
 Shapes = Sequence[tuple[int, ...]]
 

@@ -19,6 +19,7 @@ from .records import Records
 from .start import Start
 
 PAUSED, STEP_TOO_SMALL, TOO_MANY_STEPS, STOPPED_AT_EVENT, TORQUE_FAILED = range(32, 37)
+STEP_TOO_LONG = 38
 MOST_STEPS = 2**31 - 1  # that the C interface counts
 PAUSE = 2000  # steps between looks at signals, such as Ctrl-C
 COUNTS = ("steps", "rejected", "evaluations", "factorisations")
@@ -37,6 +38,9 @@ WHY = {
         "the tolerance would need steps that are too short: is the motion stiff, or rtol too small?"
     ),
     TOO_MANY_STEPS: "most_steps were not enough: is the motion stiff, or rtol too small?",
+    STEP_TOO_LONG: (
+        "a step turns the torso too far to tell what it touches: is it too long, or omega too large?"
+    ),
     TORQUE_FAILED: "the compiled torque function did not return 0: what has it refused?",
 }
 
@@ -83,6 +87,8 @@ class Memory:
         }
         if ground.points:
             self.state["bristles"] = np.array(ground.bristles.reshape(start.runs, -1), dtype)
+        entries = model.manifest["simulation"]["ledger"]
+        self.state["ledger"] = np.zeros((start.runs, sum(size for _, size in entries)), dtype)
         self.out = {
             name: np.zeros((start.runs, start.intervals + 1, size), dtype)
             for name, size in sizes.items()

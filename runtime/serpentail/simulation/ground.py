@@ -101,7 +101,8 @@ class Ground:
         q, v, tau, bristles = state
         legs = self.legs_at(t)
         positions, _ = model.contact_points(q, v, *legs)
-        _, _, forces = model.contact_dynamics(q, v, tau, bristles.reshape(len(bristles), -1), *legs)
+        stretch = bristles.reshape(len(bristles), -1)
+        forces = model.kernel("contact_rates")(q, v, tau, stretch, *legs)[2]
         return Contact(positions, forces, bristles, self.groups)
 
     def event(self, t: float, number: int) -> dict:

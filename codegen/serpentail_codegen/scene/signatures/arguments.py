@@ -108,6 +108,8 @@ VELOCITIES = Argument("velocities", ("points", 3), "their velocities (m/s, world
 BRISTLES = bristle_numbers("bristles", "stretch of the friction springs (m, world x and y)")
 BRISTLE_RATES = bristle_numbers("bristle_rates", "their rates (m/s)")
 FORCES = Argument("forces", ("points", 3), "forces of the ground on the points (N, world)")
+HEIGHTS = Argument("heights", ("points",), "heights of the points above the ground (m)")
+POWERS = Argument("powers", (2,), "of the ground on the points, and of the legs' drives (W)")
 
 # Linear systems of implicit methods
 DAMPING = Argument("damping", ("nt",), "of the tail's joints (N m s): tau = -damping q_t_dot")

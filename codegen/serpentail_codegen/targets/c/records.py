@@ -39,6 +39,7 @@ def records(has: SimulationFeatures) -> dict[str, list[Field]]:
         "controller": CONTROLLER[:2] + (PFL if has.pfl else []) + CONTROLLER[2:],
         "drive": DRIVE + (LEGS if has.legs else []),
         "run": START
+        + LEDGER
         + (BRISTLES[:1] if has.contacts else [])
         + SETTINGS
         + SAMPLES
@@ -106,6 +107,13 @@ START = fields(
     ("q", "real *", "[NQ] likewise"),
     ("v", "real *", "[NV] likewise"),
 )
+LEDGER = fields(
+    (
+        "ledger",
+        "real *",
+        "work (J) of torques, damping, ground, legs, and impulses (N s) of groups: so far",
+    )
+)
 BRISTLES = fields(
     ("bristles", "real *", "[2 CONTACTS] likewise (m)"),
     ("bristles_out", "real *", "[samples][2 CONTACTS]"),
@@ -139,6 +147,7 @@ EVENT_FIELDS = fields(
     ("event_times", "real *", "[most_events] (s)"),
     ("event_kinds", "int *", "[most_events]"),
     ("events", "long", "that happened"),
+    ("unfelt", "long", "touches shorter than a step, which no stage may have felt"),
 )
 KEPT = fields(
     ("begun", "int", "0 at first"),

@@ -9,11 +9,16 @@ from .records import DESCRIPTIONS, record_views
 from .simulation_features import METHODS, SimulationFeatures
 from .tableaux import RK4, ROS34PW2, TSIT5, transformed
 
+LOOKS = 24  # parts of parts of a step in which contacts are looked for: up to 2^-23 of it
+# heights (m): how exactly the sides of the ground are told apart; touches that are looked for; those
+# that a step must not overlook
+RESOLUTION = {"double": (1e-7, 1e-6, 2e-6), "float": (2e-6, 1e-5, 2e-5)}
 SLOTS = 11  # states in the workspace: see simulation/workspace.c.jinja
 # of simulation/workspace.c.jinja, undefined again where the file ends
 MACROS = (
     *("NQ", "NV", "NT", "SIZE", "SLOT", "START", "END", "STAGES", "END_RATE", "TRIAL", "RIGHT"),
-    *("TAU", "TABLE", "FORCES", "PRESSURES", "REACHED", "POINTS", "GROUPS", "FACTORS", "INNER"),
+    *("TAU", "TABLE", "FORCES", "HEIGHTS", "REACHED", "LOOKS", "POINTS", "GROUPS", "FACTORS"),
+    *("INNER", "CORE", "LEDGER"),
 )
 
 
@@ -22,13 +27,22 @@ def simulation_context(
 ) -> dict[str, Any]:
     """Return what a simulation's templates lay out; ``works``: workspace of each function."""
     single = scene.real == "float"
-    size, table = tail.nq + tail.nv + 2 * has.contacts, max(4 * tail.nt, 2 * tail.nv)
-    states = SLOTS * size + tail.nt + table + 5 * has.contacts
+    ledger, table = sum(size for _, size in has.ledger), max(4 * tail.nt, 2 * tail.nv)
+    size = tail.nq + tail.nv + 2 * has.contacts + ledger
+    states = SLOTS * size + tail.nt + table + (7 + LOOKS) * has.contacts
+    resolution, level, felt = RESOLUTION[scene.real]
     return {
         **{name: name + ("f" if single else "") for name in ("pow", "fabs", "ceil")},
         "eps": "FLT_EPSILON" if single else "DBL_EPSILON",
         "has": has,
-        "ground_damping": scene.parameters.get("D_n"),  # Eq. 36, where it is folded in
+        "values": scene.parameters,  # where they are folded in
+        "articulated": tail.kind == "articulated",
+        "part": 1.0 if tail.kind == "articulated" else 1 / tail.links,  # of a segment's turn, a piece
+        "ledger": ledger,
+        "looks": LOOKS,
+        "resolution": resolution,
+        "level": level,
+        "felt": felt,
         "group_starts": [0, *accumulate(count for _, count in has.groups)],
         "bristles": 2 * has.contacts,
         "bisections": 40,

@@ -20,6 +20,12 @@ class SimulationFeatures:
     legs: bool
 
     @property
+    def ledger(self) -> tuple[tuple[str, int], ...]:
+        """What a run adds up, and in how many numbers: works (J), impulses of groups (N s)."""
+        works = ["torques", "damping"] + ["ground"] * bool(self.contacts) + ["legs"] * self.legs
+        return tuple((name, 1) for name in works) + tuple((name, 3) for name, _ in self.groups)
+
+    @property
     def implicit(self) -> bool:
         """Whether it can take implicit steps."""
         return self.factors > 0

@@ -45,7 +45,11 @@ def c_entries(context: dict[str, Any]) -> dict[str, Any]:
         numbers = {name: number for number, name in enumerate(context["methods"])}
         methods = {name: numbers[name] for name in has.methods}
         work["rollout"] = context["rollout_work"]
-        entries["simulation"] = {"methods": methods, "records": layouts(has)}
+        entries["simulation"] = {
+            "methods": methods,
+            "ledger": list(map(list, has.ledger)),
+            "records": layouts(has),
+        }
     return entries
 
 
