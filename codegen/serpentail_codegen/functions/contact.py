@@ -205,7 +205,7 @@ def balance_powers(
     draft.fill(powers.part(0, 2), 0)
     with draft.loop("k", draft.tail.points) as k:
         force = {"force": arrays["forces"].part(3 * k, 3)}
-        height = arrays["heights"].part(k, 1)
+        height = arrays["heights"].part(2 * k, 2)
         draft.step(contact.height, torso, points.motion(k), height=height)
         draft.step(contact.ground_power, points.motion(k), force, power_=powers.part(0, 1))
     if "feet" in draft.tail.contacts:

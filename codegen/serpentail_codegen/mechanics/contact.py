@@ -48,9 +48,9 @@ def position(let, p: V3, arm: V3) -> dict:
     return {"position": p + arm}
 
 
-def height(let, p: V3, arm: V3) -> dict:
-    """How high a point is above the ground."""
-    return {"height": [p[2] + arm[2]]}
+def height(let, p: V3, arm: V3, velocity: V3) -> dict:
+    """How high a point is above the ground, and how fast it rises."""
+    return {"height": [p[2] + arm[2], velocity[2]]}
 
 
 def ground_power(let, velocity: V3, force: V3) -> dict:

@@ -22,7 +22,8 @@ def summary(model: Model, motion: Trajectory) -> dict[str, Any]:
     take_off_s, recontact_s: the flight about the apex, with nothing on the ground; apex_m: highest
     B; com_rise_m: highest centre of mass over its start; pitch_at_end_rad: turns counted;
     upright_end: z of the torso's z axis; standing_end: upright, at rest, on its feet; peaks:
-    largest force on one point, A, M or T of both feet together, in the samples.
+    largest force on one point, A, M or T of both feet together, in the samples; work_J, impulse_N_s,
+    imbalance, warnings: the run's audit.
     """
     take_off, recontact = flight(motion)
     figures = {
@@ -47,6 +48,8 @@ def _effort(motion: Trajectory) -> dict[str, Any]:
     info, span = motion.info, float(motion.t[-1] - motion.t[0])
     names = ("method", "reason", "steps", "rejected", "evaluations")
     counts = {name: info.get(name) for name in names}
+    names = ("work_J", "impulse_N_s", "imbalance", "warnings")
+    counts |= {name: info.get(name) for name in names}
     return counts | {"cpu_s": info["cpu_seconds"], "real_time_factor": span / info["cpu_seconds"]}
 
 
@@ -59,7 +62,7 @@ def com_rise(model: Model, motion: Trajectory) -> float | None:
 
 def flight(motion: Trajectory) -> tuple[float | None, float | None]:
     """Times (s) at which the flight about the apex begins and ends; None: not in the motion."""
-    if motion.contact is None:
+    if motion.contact is None or "events" not in motion.info:
         return None, None
     apex = motion.t[motion.q[:, 2].argmax()]
     for begin, end in airborne(motion):

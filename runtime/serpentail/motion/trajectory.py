@@ -66,8 +66,22 @@ class Trajectory:
 
     @property
     def events(self) -> list[dict[str, Any]]:
-        """Touch-downs and take-offs in order: time (s), group, kind, such as "take_off"."""
+        """Touch-downs and take-offs in order: time (s), group, kind, such as "take_off".
+
+        ValueError where nobody looked for them: SciPy's methods on the ground.
+        """
+        if self.contact is not None and "events" not in self.info:
+            method = self.info.get("method", "how it was made")
+            raise ValueError(
+                f"events: {method} looks for none: simulate by one of the compiled methods, such as "
+                "ros34pw2"
+            )
         return self.info.get("events", [])
+
+    @property
+    def warnings(self) -> list[str]:
+        """What to mind about the run: energy or momentum that does not balance, unfelt touches."""
+        return self.info.get("warnings", [])
 
     @property
     def segments(self) -> int:

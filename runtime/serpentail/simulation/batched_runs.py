@@ -135,6 +135,7 @@ class BatchedRuns:
             "v": state["v"][rows],
             "q_out": out["q"][rows],
             "v_out": out["v"][rows],
+            "ledger": state["ledger"][rows],
             "work": aligned(self.work, self.dtype),
         }
         record: Any = self.record(

@@ -47,23 +47,27 @@ WHY = {
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Samples of a motion up to where it came, and what ended it before its end."""
+    """Samples of a motion up to where it came, its ledger, and what ended it before its end."""
 
     t: np.ndarray
     q: np.ndarray
     v: np.ndarray
     tau: np.ndarray
     bristles: np.ndarray
+    ledger: np.ndarray
     info: dict[str, Any]
     failure: BaseException | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What a run came to: samples written, its end (s), counts and events, what failed, a stop."""
+    """What a run came to: samples written, its end (s), its ledger, counts and events, what failed,
+    a stop.
+    """
 
     done: int
     end: float
+    ledger: np.ndarray
     info: dict[str, Any]
     failure: BaseException | None = None
     stop: dict[str, Any] | None = None  # between samples: t (s) and a row of every array
@@ -160,12 +164,14 @@ class CompiledRun:
         if self.ground.points:
             count = min(record.events, MOST_EVENTS)
             times, kinds = self.event_times[:count].tolist(), self.event_kinds[:count].tolist()
-            info["events"] = [*map(self.ground.event, times, kinds)]
+            info["events"] = self.ground.events(times, kinds)
+            info["unfelt"] = record.unfelt
         failure = self.actuation.error
         if failure is None and status not in (0, STOPPED_AT_EVENT):
             failure = failed(status, record.t)
         stop = self._stop() if status == STOPPED_AT_EVENT else None
-        return Outcome(record.done, record.t, info, failure, stop)
+        ledger = self.state["ledger"].copy()
+        return Outcome(record.done, record.t, ledger, info, failure, stop)
 
     def samples(self, status: int) -> Samples:
         """Return the samples written, and what a status means."""
@@ -193,7 +199,16 @@ def sampled(times: np.ndarray, arrays: dict[str, np.ndarray], outcome: Outcome) 
         t = np.append(t, stop["t"])
         rows = {name: np.vstack([a, stop[name]]).astype(float) for name, a in rows.items()}
     bristles = rows["bristles"].reshape(len(t), rows["bristles"].shape[1] // 2, 2)
-    return Samples(t, rows["q"], rows["v"], rows["tau"], bristles, outcome.info, outcome.failure)
+    return Samples(
+        t,
+        rows["q"],
+        rows["v"],
+        rows["tau"],
+        bristles,
+        outcome.ledger,
+        outcome.info,
+        outcome.failure,
+    )
 
 
 def start_members(method: IntegrationMethod) -> dict[str, Any]:

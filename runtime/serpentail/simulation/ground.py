@@ -105,13 +105,27 @@ class Ground:
         forces = model.kernel("contact_rates")(q, v, tau, stretch, *legs)[2]
         return Contact(positions, forces, bristles, self.groups)
 
-    def event(self, t: float, number: int) -> dict:
-        """Return an event of the C interface as plain data."""
-        return {
-            "time": float(t),
-            "group": list(self.groups)[number // 2],
-            "kind": KINDS[number % 2],
-        }
+    def events(self, times: list[float], numbers: list[int]) -> list[dict[str, Any]]:
+        """Return events of the C interface as plain data.
+
+        A group whose force ceases and comes again while a point of it is still in the ground has
+        not taken off.
+        """
+        groups, events = list(self.groups), []
+        left: dict[int, dict] = {}  # groups without force that are still in the ground
+        for time, number in zip(times, numbers, strict=True):
+            group, kind = divmod(number, len(KINDS))
+            if group >= len(groups):
+                left.pop(number - len(KINDS) * len(groups), None)
+                continue
+            event = {"time": float(time), "group": groups[group], "kind": KINDS[kind]}
+            if KINDS[kind] == "take_off":
+                left[group] = event
+            elif group in left:
+                events.remove(left.pop(group))
+                continue
+            events.append(event)
+        return events
 
 
 def _legs(groups: dict[str, int], legs: Any) -> Legs | None:

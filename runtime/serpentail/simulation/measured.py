@@ -1,9 +1,12 @@
 """Makes a trajectory of the samples of a run, or raises the error that ended the run."""
 
+import numpy as np
+
 from ..errors import SimulationError, StateError
 from ..model.model import Model
 from ..model.parameters import json_ready
 from ..motion.trajectory import Trajectory
+from .audit import BALANCED, audited, warnings_of
 from .compiled_run import Samples
 from .ground import Ground
 
@@ -34,6 +37,12 @@ def measured(model: Model, samples: Samples, ground: Ground) -> Trajectory:
     kinetic, potential = model.energy(q, v)
     linear_momentum, angular_momentum = model.momentum(q, v)
     contact = ground.contact(model, t, (q, v, tau, samples.bristles))
+    if samples.failure is None:
+        measures = kinetic, potential, linear_momentum
+        ends = {name: each[[0, -1]] for name, each in zip(BALANCED, measures, strict=True)}
+        books = audited(model, model.parameters, samples.ledger, t[-1] - t[0], ends)
+        eps = float(np.finfo(model.parameter_vector.dtype).eps)
+        info |= books.info() | {"warnings": warnings_of(books, info, eps)}
     return Trajectory(
         t=t,
         q=q,

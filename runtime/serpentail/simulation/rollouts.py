@@ -15,6 +15,7 @@ from ..model.parameters import RunParameters
 from ..model.workers import cores, in_turn
 from ..motion.trajectory import Trajectory
 from .actuation import Actuation
+from .audit import BALANCED, Audit, audited, warnings_of
 from .batched_runs import BatchedRuns, worth_batching
 from .compiled_run import COUNTS, PAUSED, CompiledRun, Memory, Outcome, Samples, sampled
 from .ground import Ground
@@ -53,7 +54,8 @@ class Rollouts:
     linear_momentum, angular_momentum (k, s, 3); bristles (k, s, points, 2) m: as Trajectory has
     them.  ends (k,) s: when each run ended: at the last time, at an event of ``stop_at``, or where
     it failed.  errors: None or the SimulationError of each run, which keeps the trajectory up to
-    there.  info: what all have in common, JSON-ready; steps, rejected, evaluations and
+    there.  audit: work, impulses and what they do not account for, (k,); warnings: of each run, what
+    does not balance.  info: what all have in common, JSON-ready; steps, rejected, evaluations and
     factorisations are those of all.  ``rollouts[k]`` is the Trajectory of run k, with its own
     parameters, counts and contact, or raises its error.
     """
@@ -69,6 +71,8 @@ class Rollouts:
     bristles: np.ndarray
     ends: np.ndarray
     errors: list[SimulationError | None]
+    audit: Audit
+    warnings: list[list[str]]
     info: dict[str, Any]
     source: "Source" = field(repr=False)
 
@@ -135,7 +139,8 @@ class ParallelRuns:
                 self.run_singly(iter(runs), ended)
                 continue
             for k in runs:
-                self._keep(k, Outcome(start.intervals + 1, start.end, dict(info)), measures)
+                ledger = self.memory.state["ledger"][k]
+                self._keep(k, Outcome(start.intervals + 1, start.end, ledger, dict(info)), measures)
 
     def _keep(self, k: int, outcome: Outcome, measures: list[RunKernel]) -> None:
         """Keep and measure what run k came to; an error that is not its own ends all runs."""
@@ -157,11 +162,11 @@ class ParallelRuns:
         try:
             samples = integrate_by_scipy(run, self.method)
         except SimulationError as error:
-            return Outcome(0, self.memory.start.start, {}, error)
+            return Outcome(0, self.memory.start.start, run.state["ledger"], {}, error)
         done = len(samples.t)
         for name, array in self.memory.out.items():
             array[run.k, :done] = getattr(samples, name).reshape(done, array.shape[2])
-        return Outcome(done, samples.t[-1], samples.info, samples.failure)
+        return Outcome(done, samples.t[-1], samples.ledger, samples.info, samples.failure)
 
     def rollouts(self, info: dict[str, Any]) -> Rollouts:
         """Return what all runs came to; info: what else is to be told of them."""
@@ -176,7 +181,33 @@ class ParallelRuns:
         abreast = 1 if self.batched is None else self.batched.states
         shared = {"model": self.model.name, "threads": self.threads, "abreast": abreast}
         info = counts | self.method.info | shared | info
-        return Rollouts(**self._arrays(outcomes), errors=errors, info=info, source=self.source)
+        arrays = self._arrays(outcomes)
+        books = self._audit(arrays, outcomes)
+        eps = float(np.finfo(self.memory.records.dtype).eps)
+        warnings = [
+            [] if errors[k] else warnings_of(books.of(k), self.method.info | outcome.info, eps)
+            for k, outcome in enumerate(outcomes)
+        ]
+        return Rollouts(
+            **arrays, errors=errors, audit=books, warnings=warnings, info=info, source=self.source
+        )
+
+    def _audit(self, arrays: dict[str, np.ndarray], outcomes: list[Outcome]) -> Audit:
+        """Return the books of all runs, from their starts to their ends; nan of those that failed."""
+        last = np.array([max(outcome.done, 1) - 1 for outcome in outcomes])
+        each, ends = np.arange(len(outcomes)), {}
+        for name in BALANCED:
+            ends[name] = np.stack([arrays[name][:, 0], arrays[name][each, last]], axis=1)
+        for k, outcome in enumerate(outcomes):
+            if outcome.failure is not None:
+                ends["kinetic"][k] = np.nan
+            elif outcome.stop is not None:  # between samples
+                model, state = self.source.model_of(k), (outcome.stop["q"], outcome.stop["v"])
+                ends["kinetic"][k, 1], ends["potential"][k, 1] = model.energy(*state)
+                ends["linear_momentum"][k, 1] = model.momentum(*state)[0]
+        span = arrays["ends"] - self.memory.start.start
+        ledger = np.array([outcome.ledger for outcome in outcomes])
+        return audited(self.model, self.memory.parameters.values, ledger, span, ends)
 
     def _arrays(self, outcomes: list[Outcome]) -> dict[str, np.ndarray]:
         """Return samples and measures, nan after the end of a run, read-only."""

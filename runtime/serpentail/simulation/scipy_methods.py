@@ -90,9 +90,11 @@ def integrate_by_scipy(run: CompiledRun, method: IntegrationMethod) -> Samples:
         failure = error
     done = len(samples.states)
     nq, nv = run.model.nq, run.model.nv
-    q, v, bristles = np.split(np.array(samples.states), [nq, nq + nv], axis=1)
+    ends = np.cumsum([nq, nv, 2 * run.ground.points])
+    q, v, bristles, ledger = np.split(np.array(samples.states), ends, axis=1)
     bristles = bristles.reshape(done, run.ground.points, 2)
-    return Samples(samples.times[:done], q, v, np.array(samples.torques), bristles, counts, failure)
+    tau, times = np.array(samples.torques), samples.times[:done]
+    return Samples(times, q, v, tau, bristles, ledger[-1], counts, failure)
 
 
 def _smooth_part(

@@ -117,6 +117,10 @@ def prepared(
     ground = Ground.checked(model, start, parameters, settings)
     actuation = Actuation(Records(model), controller, ground.legs.curve if ground.legs else None)
     choice = choose(actuation, start, parameters, method, settings)
+    if ground.stop_at and choice.name in SCIPY:
+        raise SimulationError(
+            f"stop_at: {choice.name} does not look for events: take tsit5 or ros34pw2"
+        )
     return Memory(actuation.records, start, ground, parameters), actuation, choice
 
 

@@ -108,7 +108,9 @@ VELOCITIES = Argument("velocities", ("points", 3), "their velocities (m/s, world
 BRISTLES = bristle_numbers("bristles", "stretch of the friction springs (m, world x and y)")
 BRISTLE_RATES = bristle_numbers("bristle_rates", "their rates (m/s)")
 FORCES = Argument("forces", ("points", 3), "forces of the ground on the points (N, world)")
-HEIGHTS = Argument("heights", ("points",), "heights of the points above the ground (m)")
+HEIGHTS = Argument(
+    "heights", ("points", 2), "of the points above the ground (m), and how fast they rise (m/s)"
+)
 POWERS = Argument("powers", (2,), "of the ground on the points, and of the legs' drives (W)")
 
 # Linear systems of implicit methods

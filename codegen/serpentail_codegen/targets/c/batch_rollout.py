@@ -23,6 +23,7 @@ RECORD = fields(
     ("v", "const real *", "[count][NV] start"),
     ("q_out", "real *", "[count][samples][NQ], the start first"),
     ("v_out", "real *", "[count][samples][NV]"),
+    ("ledger", "real *", "[count][2] work (J) of torques and of damping, at the end"),
     ("count", "size_t", "flights, at most STATES"),
     ("samples", "long", "of each"),
     ("damping", "const real *", "[NT] N m s"),
@@ -39,6 +40,9 @@ RECORD = fields(
     ("step", "long", "steps done"),
     ("done", "long", "samples written"),
 )
+
+
+LEDGER = 2  # numbers that a flight adds up behind its state
 
 
 @dataclass(frozen=True)
@@ -85,7 +89,7 @@ def batch_rollout(
         single = with_own_parameters(single, "forward_dynamics_of_flights")
     lanes = batched(single, states)
     body = in_loops(lanes, scene.real, scene.name, fixed)
-    return BatchRollout(states, lanes, body, count, tail.nq + tail.nv, tail.nt)
+    return BatchRollout(states, lanes, body, count, tail.nq + tail.nv + LEDGER, tail.nt)
 
 
 def batch_rollout_file(

@@ -140,12 +140,16 @@ EVENT_FIELDS = fields(
     (
         "stop_at",
         "int",
-        "sum of 1 << event: the run ends at the first of these; event = 2 group + (0: down, 1: "
-        "off)",
+        "sum of 1 << event: the run ends at the first of these; event = 2 group + (0: it begins to "
+        "press, 1: it ceases to)",
     ),
     ("most_events", "long", "that fit"),
     ("event_times", "real *", "[most_events] (s)"),
-    ("event_kinds", "int *", "[most_events]"),
+    (
+        "event_kinds",
+        "int *",
+        "[most_events] of events; 2 GROUPS + group: all its points are out of the ground again",
+    ),
     ("events", "long", "that happened"),
     ("unfelt", "long", "touches shorter than a step, which no stage may have felt"),
 )

@@ -29,12 +29,13 @@ def simulation_context(
     single = scene.real == "float"
     ledger, table = sum(size for _, size in has.ledger), max(4 * tail.nt, 2 * tail.nv)
     size = tail.nq + tail.nv + 2 * has.contacts + ledger
-    states = SLOTS * size + tail.nt + table + (7 + LOOKS) * has.contacts
+    states = SLOTS * size + tail.nt + table + (11 + 2 * LOOKS) * has.contacts
     resolution, level, felt = RESOLUTION[scene.real]
     return {
         **{name: name + ("f" if single else "") for name in ("pow", "fabs", "ceil")},
         "eps": "FLT_EPSILON" if single else "DBL_EPSILON",
         "has": has,
+        "ground_damping": scene.parameters.get("D_n"),  # Eq. 36, where it is folded in
         "values": scene.parameters,  # where they are folded in
         "articulated": tail.kind == "articulated",
         "part": 1.0 if tail.kind == "articulated" else 1 / tail.links,  # of a segment's turn, a piece
