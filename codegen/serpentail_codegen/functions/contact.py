@@ -197,9 +197,7 @@ def contact_load(
     return gather_contact_loads(draft, R, points, arrays["forces"], torques), torques
 
 
-def balance_powers(
-    draft: Draft, torso: Torso, points: Points, arrays: dict[str, Array]
-) -> None:
+def balance_powers(draft: Draft, torso: Torso, points: Points, arrays: dict[str, Array]) -> None:
     """Heights of all points; the power of the ground on them, and that of the legs' drives."""
     powers = arrays["powers"]
     draft.fill(powers.part(0, 2), 0)

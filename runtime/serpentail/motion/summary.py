@@ -22,8 +22,8 @@ def summary(model: Model, motion: Trajectory) -> dict[str, Any]:
     take_off_s, recontact_s: the flight about the apex, with nothing on the ground; apex_m: highest
     B; com_rise_m: highest centre of mass over its start; pitch_at_end_rad: turns counted;
     upright_end: z of the torso's z axis; standing_end: upright, at rest, on its feet; peaks:
-    largest force on one point, A, M or T of both feet together, in the samples; work_J, impulse_N_s,
-    imbalance, warnings: the run's audit.
+    largest force on one point, A, M or T of both feet together, in the samples; work_J,
+    impulse_N_s, imbalance, warnings: the run's audit.
     """
     take_off, recontact = flight(motion)
     figures = {
@@ -48,8 +48,8 @@ def _effort(motion: Trajectory) -> dict[str, Any]:
     info, span = motion.info, float(motion.t[-1] - motion.t[0])
     names = ("method", "reason", "steps", "rejected", "evaluations")
     counts = {name: info.get(name) for name in names}
-    names = ("work_J", "impulse_N_s", "imbalance", "warnings")
-    counts |= {name: info.get(name) for name in names}
+    books = ("work_J", "impulse_N_s", "imbalance", "warnings")
+    counts |= {name: info.get(name) for name in books}
     return counts | {"cpu_s": info["cpu_seconds"], "real_time_factor": span / info["cpu_seconds"]}
 
 

@@ -73,8 +73,7 @@ class Trajectory:
         if self.contact is not None and "events" not in self.info:
             method = self.info.get("method", "how it was made")
             raise ValueError(
-                f"events: {method} looks for none: simulate by one of the compiled methods, such as "
-                "ros34pw2"
+                f"events: {method} looks for none: simulate by a compiled method, such as ros34pw2"
             )
         return self.info.get("events", [])
 

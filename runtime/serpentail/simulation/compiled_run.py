@@ -39,7 +39,8 @@ WHY = {
     ),
     TOO_MANY_STEPS: "most_steps were not enough: is the motion stiff, or rtol too small?",
     STEP_TOO_LONG: (
-        "a step turns the torso too far to tell what it touches: is it too long, or omega too large?"
+        "a step turns the torso too far to tell what it touches: is it too long, or omega too "
+        "large?"
     ),
     TORQUE_FAILED: "the compiled torque function did not return 0: what has it refused?",
 }

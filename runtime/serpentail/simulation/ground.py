@@ -111,7 +111,8 @@ class Ground:
         A group whose force ceases and comes again while a point of it is still in the ground has
         not taken off.
         """
-        groups, events = list(self.groups), []
+        groups = list(self.groups)
+        events: list[dict[str, Any]] = []
         left: dict[int, dict] = {}  # groups without force that are still in the ground
         for time, number in zip(times, numbers, strict=True):
             group, kind = divmod(number, len(KINDS))

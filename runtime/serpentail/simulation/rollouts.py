@@ -54,8 +54,8 @@ class Rollouts:
     linear_momentum, angular_momentum (k, s, 3); bristles (k, s, points, 2) m: as Trajectory has
     them.  ends (k,) s: when each run ended: at the last time, at an event of ``stop_at``, or where
     it failed.  errors: None or the SimulationError of each run, which keeps the trajectory up to
-    there.  audit: work, impulses and what they do not account for, (k,); warnings: of each run, what
-    does not balance.  info: what all have in common, JSON-ready; steps, rejected, evaluations and
+    there.  audit: work, impulses and what they do not account for, (k,); warnings: of each run,
+    what does not balance.  info: what all have in common, JSON-ready; steps, rejected, evaluations and
     factorisations are those of all.  ``rollouts[k]`` is the Trajectory of run k, with its own
     parameters, counts and contact, or raises its error.
     """
@@ -193,7 +193,7 @@ class ParallelRuns:
         )
 
     def _audit(self, arrays: dict[str, np.ndarray], outcomes: list[Outcome]) -> Audit:
-        """Return the books of all runs, from their starts to their ends; nan of those that failed."""
+        """Return the books of all runs, from start to end; nan of those that failed."""
         last = np.array([max(outcome.done, 1) - 1 for outcome in outcomes])
         each, ends = np.arange(len(outcomes)), {}
         for name in BALANCED:

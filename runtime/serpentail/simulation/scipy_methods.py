@@ -90,8 +90,8 @@ def integrate_by_scipy(run: CompiledRun, method: IntegrationMethod) -> Samples:
         failure = error
     done = len(samples.states)
     nq, nv = run.model.nq, run.model.nv
-    ends = np.cumsum([nq, nv, 2 * run.ground.points])
-    q, v, bristles, ledger = np.split(np.array(samples.states), ends, axis=1)
+    parts = np.cumsum([nq, nv, 2 * run.ground.points])
+    q, v, bristles, ledger = np.split(np.array(samples.states), parts, axis=1)
     bristles = bristles.reshape(done, run.ground.points, 2)
     tau, times = np.array(samples.torques), samples.times[:done]
     return Samples(times, q, v, tau, bristles, ledger[-1], counts, failure)

@@ -10,8 +10,8 @@ from .simulation_features import METHODS, SimulationFeatures
 from .tableaux import RK4, ROS34PW2, TSIT5, transformed
 
 LOOKS = 24  # parts of parts of a step in which contacts are looked for: up to 2^-23 of it
-# heights (m): how exactly the sides of the ground are told apart; touches that are looked for; those
-# that a step must not overlook
+# heights (m): how exactly the sides of the ground are told apart; depths from which a point counts
+# as having entered it; from which on a step must not overlook that
 RESOLUTION = {"double": (1e-7, 1e-6, 2e-6), "float": (2e-6, 1e-5, 2e-5)}
 SLOTS = 11  # states in the workspace: see simulation/workspace.c.jinja
 # of simulation/workspace.c.jinja, undefined again where the file ends
@@ -38,7 +38,9 @@ def simulation_context(
         "ground_damping": scene.parameters.get("D_n"),  # Eq. 36, where it is folded in
         "values": scene.parameters,  # where they are folded in
         "articulated": tail.kind == "articulated",
-        "part": 1.0 if tail.kind == "articulated" else 1 / tail.links,  # of a segment's turn, a piece
+        "part": 1.0
+        if tail.kind == "articulated"
+        else 1 / tail.links,  # of a segment's turn, a piece
         "ledger": ledger,
         "looks": LOOKS,
         "resolution": resolution,

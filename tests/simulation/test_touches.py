@@ -1,0 +1,148 @@
+"""No touch is missed, however short and however loose the tolerance: grazing tails, feet and
+torsos, against where free flights come to lie below the ground.
+"""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+import serpentail as st
+from serpentail.motion.summary import summary
+from tests.support.models import model_folder
+
+FUNCTIONS = ["energy", "momentum", "rollout", "implicit"]
+SPAN = 0.12  # s
+CLOCK = 1e-4  # s between the samples of the free flights that tell the truth
+LEGS = st.Legs.fixed(np.radians(210), np.radians(-15))
+PASSIVE = st.Damping(1e-3)
+METHODS = [
+    {"method": method, "rtol": rtol}
+    for method in ("ros34pw2", "tsit5")
+    for rtol in (1e-3, 1e-4, 1e-6)
+] + [{"method": "rk4"}, {"method": "implicit_euler"}]
+QUICK, MANY = 25, 1000
+
+
+@cache
+def animal(kind="articulated", segments=2, links=3):
+    contacts = ["feet", "tail", "torso"]
+    links = links if kind == "articulated" else None
+    folder = model_folder(segments, links, contacts=contacts, functions=FUNCTIONS)
+    return st.load(folder)
+
+
+def flown(model, q, v, **how):
+    return st.simulate(model, q, v, t_span=SPAN, controller=PASSIVE, legs=LEGS, **how)
+
+
+def grazing(model, rng):
+    """Return a start that dips 0.1 to 5 mm into the ground for a moment, and when; or None."""
+    q, v = np.zeros(model.nq), np.zeros(model.nv)
+    attitude, axis = rng.normal(size=4), rng.normal(size=3)
+    q[3:7], q[7:] = attitude / np.linalg.norm(attitude), rng.uniform(-0.3, 0.3, model.nq - 7)
+    v[:3], v[3:6] = 0.3 * rng.normal(size=3), axis / np.linalg.norm(axis) * rng.uniform(10, 30)
+    # far above the ground, then lowered: a flight does not know its height
+    q[2] = 10
+    free = flown(model, q, v, method="tsit5", rtol=1e-9, output_step=CLOCK)
+    height = free.contact.points[..., 2].min(axis=1)
+    lowest, depth = int(height.argmin()), 10 ** rng.uniform(-4, np.log10(5e-3))
+    under = np.flatnonzero(height < height[lowest] + depth)
+    if height[0] < height[lowest] + depth + 1e-3 or not 20 < lowest < len(height) - 20:
+        return None
+    q[2] -= height[lowest] + depth
+    return q, v, free.t[under[0]]
+
+
+@cache
+def grazes(kind, count):
+    rng, model = np.random.default_rng(5), animal(kind)
+    found = []
+    while len(found) < count:
+        found += filter(None, [grazing(model, rng)])
+    return found
+
+
+def missed(kind, count, how):
+    """Return the starts whose first touch is no event within 3 ms of its time, or is not felt where
+    the run's own samples lie in the ground.
+    """
+    model, misses = animal(kind), []
+    for q, v, time in grazes(kind, count):
+        run = flown(model, q, v, output_step=CLOCK, **how)
+        downs = [event["time"] for event in run.events if event["kind"] == "touch_down"]
+        pushed = sum(np.abs(each[2]) for each in map(np.array, run.info["impulse_N_s"].values()))
+        felt = pushed > 0 or run.contact.depth.max() < 1e-5
+        if min((abs(down - time) for down in downs), default=1) > 3e-3 or not felt:
+            misses.append((time, downs))
+    return misses
+
+
+@pytest.mark.parametrize("kind", ["articulated", "continuum"])
+@pytest.mark.parametrize("how", METHODS, ids=lambda how: "-".join(map(str, how.values())))
+def test_no_grazing_touch_is_missed(how, kind):
+    assert missed(kind, QUICK, how) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("how", METHODS, ids=lambda how: "-".join(map(str, how.values())))
+def test_none_of_a_thousand_is_missed(how):
+    assert missed("articulated", MANY, how) == []
+
+
+@pytest.mark.parametrize("rtol", [1e-3, 1e-4, 1e-5, 1e-6])
+def test_a_tail_that_dips_in_between_stages_is_felt(rtol):
+    """4 ms in the ground: two events and 5.95 mN s."""
+    q, v = np.zeros(11), np.zeros(10)
+    q[2:5] = 0.243967, -0.455276, 0.890351
+    v[2:4] = 0.27784, -29.6167
+    run = flown(animal(), q, v, rtol=rtol)
+    assert [(event["group"], event["kind"]) for event in run.events] == [
+        ("tail", "touch_down"),
+        ("tail", "take_off"),
+    ]
+    assert run.events[0]["time"] == pytest.approx(0.081858, abs=1e-4)
+    assert run.info["impulse_N_s"]["tail"][2] == pytest.approx(5.95e-3, rel=0.15)
+    assert run.warnings == []
+
+
+def test_a_touch_that_fixed_steps_jump_over_is_told():
+    """Steps of a fixed length are not cut; the touch is an event, and the result says so."""
+    q, v, _ = grazes("articulated", QUICK)[0]
+    run = flown(animal(), q, v, method="implicit_euler", step=0.005, output_step=SPAN)
+    if run.info["unfelt"] == 0:  # another path: what it met must then have been felt
+        assert sum(abs(each[2]) for each in run.info["impulse_N_s"].values()) > 0
+    else:
+        assert "shorter than a step" in " ".join(run.warnings)
+
+
+def test_a_force_that_comes_again_in_the_ground_is_no_new_touch():
+    """A group takes off where its force ceases for the last time before it is out of the ground."""
+    from serpentail.simulation.ground import Ground
+
+    ground = Ground({"feet": 6, "tail": 3})
+    down, off, clear = 0, 1, 4  # of the feet, as C numbers them
+    times, numbers = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0], [down, off, down, off, clear, down]
+    kinds = [(event["time"], event["kind"]) for event in ground.events(times, numbers)]
+    assert kinds == [(1.0, "touch_down"), (4.0, "take_off"), (6.0, "touch_down")]
+
+
+@pytest.mark.parametrize("method", ["dop853", "lsoda"])
+def test_methods_that_look_for_no_events_say_so(method):
+    q, v, _ = grazes("articulated", QUICK)[0]
+    with pytest.raises(st.SimulationError, match=f"stop_at: {method} does not look for events"):
+        flown(animal(), q, v, method=method, stop_at=[("touch_down", "tail")])
+    run = flown(animal(), q, v, method=method, rtol=1e-6, atol=1e-6)
+    with pytest.raises(ValueError, match=f"events: {method} looks for none"):
+        _ = run.events
+    assert summary(animal(), run)["take_off_s"] is None
+
+
+def test_a_step_that_turns_too_far_is_taken_shorter_or_refused():
+    """No bound holds for a step that turns the torso by more than 2 rad."""
+    q, v = np.zeros(11), np.zeros(10)
+    q[2:4], v[5] = (5, 1), 300.0
+    run = flown(animal(), q, v, method="tsit5", rtol=1e-2)
+    assert run.info["steps"] * 2 > 300 * SPAN
+    with pytest.raises(st.SimulationError, match="turns the torso too far"):
+        flown(animal(), q, v, method="implicit_euler", step=0.02, output_step=0.06)
