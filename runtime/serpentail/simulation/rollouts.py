@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from ..errors import SimulationError, StateError
+from ..model.cores import threads as allowed
 from ..model.kernel import RunKernel
 from ..model.model import Model
 from ..model.parameters import RunParameters
-from ..model.workers import cores, in_turn
+from ..model.workers import in_turn
 from ..motion.trajectory import Trajectory
 from .actuation import Actuation
 from .batched_runs import BatchedRuns, worth_batching
@@ -88,7 +89,9 @@ class Rollouts:
 class ParallelRuns:
     """Runs on their way: threads take them up in turn, and write samples, measures and outcomes."""
 
-    def __init__(self, memory: Memory, actuation: Actuation, method: IntegrationMethod):
+    def __init__(
+        self, memory: Memory, actuation: Actuation, method: IntegrationMethod, threads: int | None
+    ):
         runs, samples = memory.start.runs, memory.start.intervals + 1
         self.memory, self.actuation, self.method = memory, actuation, method
         # tasks of the threads: runs, or groups of them
@@ -98,7 +101,7 @@ class ParallelRuns:
             self.batched = BatchedRuns(memory, actuation, method)
             self.tasks = self.batched.groups
         of_python = method.name in SCIPY or any(parts.user is not None for parts in actuation.parts)
-        self.threads = 1 if of_python else min(cores(), self.tasks)
+        self.threads = 1 if of_python else min(allowed(threads), self.tasks)
         # what they come to
         self.model = memory.records.model
         self.outcomes: dict[int, Outcome] = {}
@@ -221,9 +224,11 @@ def in_c(run: CompiledRun, ended: Event) -> Outcome | None:
     return None if status == PAUSED else run.outcome(status)
 
 
-def run_parallel(memory: Memory, actuation: Actuation, method: IntegrationMethod) -> ParallelRuns:
-    """Make all runs, on all cores unless Python acts in them."""
-    runs = ParallelRuns(memory, actuation, method)
+def run_parallel(
+    memory: Memory, actuation: Actuation, method: IntegrationMethod, threads: int | None
+) -> ParallelRuns:
+    """Make all runs, in so many threads unless Python acts in them."""
+    runs = ParallelRuns(memory, actuation, method, threads)
     work = partial(runs.run_batches, runs.batched) if runs.batched else runs.run_singly
     in_turn(runs.tasks, runs.threads, work)
     return runs
