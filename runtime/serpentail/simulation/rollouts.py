@@ -100,7 +100,7 @@ class ParallelRuns:
         if worth_batching(memory, actuation, method):
             self.batched = BatchedRuns(memory, actuation, method)
             self.tasks = self.batched.groups
-        of_python = method.name in SCIPY or any(parts.user is not None for parts in actuation.parts)
+        of_python = method.name in SCIPY or actuation.of_python
         self.threads = 1 if of_python else min(allowed(threads), self.tasks)
         # what they come to
         self.model = memory.records.model
@@ -113,6 +113,7 @@ class ParallelRuns:
             for name, shape in zip(MEASURES[kernel.name], kernel.out_shapes, strict=True):
                 self.measures[name] = np.zeros((runs, samples, *shape), kernel.dtype)
         self.unmeasured: list[int] = []  # whose energy or momentum no number holds
+        self.stop: KeyboardInterrupt | None = None  # what ended all before their end
 
     def run_singly(self, numbers: Iterator[int], ended: Event) -> None:
         """Take up runs in one thread until none is left, or ``ended`` is set."""
@@ -167,7 +168,10 @@ class ParallelRuns:
         return Outcome(done, samples.t[-1], samples.info, samples.failure)
 
     def rollouts(self, info: dict[str, Any]) -> Rollouts:
-        """Return what all runs came to; info: what else is to be told of them."""
+        """Return what all runs came to, or raise Ctrl-C, which keeps it as ``motion``.
+
+        info: what else is to be told of them.
+        """
         outcomes = [self.outcomes[k] for k in range(len(self.outcomes))]
         # the error of each run that failed, or whose measures no number holds
         failed = {k for k, outcome in self.outcomes.items() if outcome.failure is not None}
@@ -179,7 +183,12 @@ class ParallelRuns:
         abreast = 1 if self.batched is None else self.batched.states
         shared = {"model": self.model.name, "threads": self.threads, "abreast": abreast}
         info = counts | self.method.info | shared | info
-        return Rollouts(**self._arrays(outcomes), errors=errors, info=info, source=self.source)
+        arrays = self._arrays(outcomes)
+        found = Rollouts(**arrays, errors=errors, info=info, source=self.source)
+        if self.stop is not None:
+            vars(self.stop)["motion"] = found
+            raise self.stop
+        return found
 
     def _arrays(self, outcomes: list[Outcome]) -> dict[str, np.ndarray]:
         """Return samples and measures, nan after the end of a run, read-only."""
@@ -200,6 +209,8 @@ class ParallelRuns:
     def _judge(self, k: int) -> SimulationError | None:
         """Return the error that ended run k; measure it up to there."""
         outcome = self.outcomes[k]
+        if not outcome.done and isinstance(outcome.failure, SimulationError):
+            return outcome.failure  # it never began
         error: SimulationError | None = None
         trajectory: Trajectory | None
         try:
@@ -221,14 +232,20 @@ class ParallelRuns:
 def in_c(run: CompiledRun, ended: Event) -> Outcome | None:
     """Return what a run came to, None where it was given up."""
     status = run.go(ended)
-    return None if status == PAUSED else run.outcome(status)
+    return None if status == PAUSED and run.actuation.error is None else run.outcome(status)
 
 
 def run_parallel(
     memory: Memory, actuation: Actuation, method: IntegrationMethod, threads: int | None
 ) -> ParallelRuns:
-    """Make all runs, in so many threads unless Python acts in them."""
+    """Make all runs, in so many threads unless Python acts in them; Ctrl-C ends all."""
     runs = ParallelRuns(memory, actuation, method, threads)
     work = partial(runs.run_batches, runs.batched) if runs.batched else runs.run_singly
-    in_turn(runs.tasks, runs.threads, work)
+    try:
+        in_turn(runs.tasks, runs.threads, work)
+    except KeyboardInterrupt as stop:
+        runs.stop = stop
+        for k in set(range(memory.start.runs)) - runs.outcomes.keys():
+            error = SimulationError("Ctrl-C came before its end: simulate it again")
+            runs.outcomes[k] = Outcome(0, memory.start.start, {}, error)
     return runs

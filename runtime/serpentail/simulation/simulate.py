@@ -56,7 +56,8 @@ def simulate(
 
     Raises StateError (shapes, values), SimulationError (settings; the state left what numbers can
     hold; its ``trajectory`` is the motion up to there), ModelError (the scene left out rollout,
-    energy or momentum).
+    energy or momentum).  Ctrl-C raises KeyboardInterrupt, whose ``motion`` is what there was: the
+    Trajectory, or Rollouts in which runs without an end have errors.
 
     Many starts give Rollouts, which keep the SimulationErrors of single runs: the other runs go on.
     One method is chosen for all.  parameters: name -> (k,) or (k, 3), SI, what the runs have of
