@@ -172,6 +172,7 @@ def test_a_compile_leaves_no_compiler_and_no_half_file(tmp_path, number, status)
     process = child(COMMAND, "info", rat().folder, env=environment)
     assert process.stderr.readline() == "ready\n"
     until(lambda: pids.exists() and len(pids.read_text().split()) >= 2)
+    time.sleep(1.0)  # all sources are being compiled
     process.send_signal(number)
     begun = time.monotonic()
     said, errors = process.communicate(timeout=PATIENCE)

@@ -16,8 +16,8 @@ from .cores import threads as allowed
 
 POLL_S = 0.1  # s between looks at signals, such as Ctrl-C
 MIN_STATES_PER_THREAD = 256  # states: the least that is worth a thread
-FIRST_PIECE = 512  # states that are evaluated before the first look at signals
-PIECE_S = 0.02  # s: pieces grow to that
+FIRST_PIECE, LEAST_PIECE = 2048, 64  # states between looks at signals: at first, and at least
+PIECE_S = 0.05  # s between looks: pieces grow or shrink to that
 
 
 def after_fork(renew: Callable[[], object]) -> None:
@@ -41,7 +41,7 @@ def shared(count: int, threads: int | None, run: Callable[[int, int], None]) -> 
     threads: at most so many, None for as many as this process may use.  Of states that fail the
     first one raises.  Ctrl-C ends all after the pieces in work.
     """
-    if count <= FIRST_PIECE:
+    if count < 2 * MIN_STATES_PER_THREAD:
         run(0, count)
         return
     most, ended = allowed(threads), threading.Event()
@@ -70,8 +70,8 @@ def _in_pieces(
         begun, after = time.perf_counter(), min(first + size, last)
         run(first, after)
         first = after
-        if time.perf_counter() - begun < PIECE_S:
-            size *= 2
+        quick = time.perf_counter() - begun < PIECE_S
+        size = 2 * size if quick else max(size // 2, LEAST_PIECE)
 
 
 def in_turn(
