@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 import serpentail as st
+from examples.studies.parts import run
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENES = {  # the moments (s) that films show
@@ -134,11 +135,5 @@ def main(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    try:
-        main(
-            Path(sys.argv[1]).absolute()
-            if sys.argv[1:]
-            else ROOT / "output" / "studies" / "contact"
-        )
-    except st.SerpentailError as error:
-        sys.exit(str(error))
+    given = sys.argv[1:] or [ROOT / "output" / "studies" / "contact"]
+    run(main, Path(given[0]).absolute())

@@ -16,6 +16,7 @@ import serpentail as st
 from benchmarks.fixtures import Fixture, fixture
 from benchmarks.peers import build, timing
 from examples.studies.models_figures import draw_cost, draw_figure_8
+from examples.studies.parts import run
 
 ROOT = Path(__file__).resolve().parents[2]
 LINKS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 16, 24, 32, 64, 128, 256)
@@ -202,8 +203,7 @@ def main(folder: Path) -> None:
 
 if __name__ == "__main__":
     try:
-        main(
-            Path(sys.argv[1]).absolute() if sys.argv[1:] else ROOT / "output" / "studies" / "models"
-        )
-    except (st.SerpentailError, build.PeerUnavailable) as error:
+        given = sys.argv[1:] or [ROOT / "output" / "studies" / "models"]
+        run(main, Path(given[0]).absolute())
+    except build.PeerUnavailable as error:
         sys.exit(str(error))

@@ -18,6 +18,25 @@ def say(words: str) -> None:
     print(f"  {words}", file=sys.stderr, flush=True)
 
 
+def run(main: Callable[..., None], *arguments: object) -> None:
+    """Run a study, and tell in one line what ends it: an error, or Ctrl-C (status 130)."""
+    try:
+        main(*arguments)
+    except st.SerpentailError as error:
+        sys.exit(str(error))
+    except KeyboardInterrupt:
+        say("interrupted; what is finished is kept")
+        sys.exit(130)
+
+
+def planned(model: st.Model, **settings) -> st.Plan:
+    """Return a plan; KeyboardInterrupt where Ctrl-C ended its search: a part is whole or none."""
+    plan = st.plan(model, **settings)
+    if plan.report["stopped"] == "interrupt":
+        raise KeyboardInterrupt
+    return plan
+
+
 def part(path: Path, of: dict, make: Callable[[], dict | list]) -> dict | list:
     """Return what the JSON file has if it was made of the same `of`, else make() and write it,
     whole or not at all.

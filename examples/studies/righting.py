@@ -8,7 +8,6 @@ output/studies/righting
 
 import argparse
 import json
-import sys
 import time
 from functools import partial
 from pathlib import Path
@@ -17,7 +16,7 @@ import numpy as np
 
 import serpentail as st
 from examples import righting
-from examples.studies.parts import as_flight, as_lists, digest, part, say
+from examples.studies.parts import as_flight, as_lists, digest, part, planned, run, say
 from examples.studies.righting_figures import (
     draw_figure_10,
     draw_figure_11,
@@ -93,7 +92,7 @@ def righted(study: Study) -> dict:
 
 def _righted(rat: st.Model) -> dict:
     start, limits = righting.kicked(rat), righting.bounds(rat)
-    plan = st.plan(
+    plan = planned(
         rat,
         start=start,
         duration=(0.3, righting.FLIGHT),
@@ -131,7 +130,7 @@ def frequencies(study: Study) -> dict:
 def _example(rat: st.Model, settings: dict) -> dict:
     common = {"start": righting.tumbling(rat, EXAMPLE), "bounds": righting.bounds(rat)}
     return righting.row(
-        st.plan(rat, duration=righting.FLIGHT, time_limit=LIMIT, **common, **settings)
+        planned(rat, duration=righting.FLIGHT, time_limit=LIMIT, **common, **settings)
     )
 
 
@@ -156,7 +155,7 @@ def segments(study: Study) -> dict:
 
 def _true(rat: st.Model) -> dict:
     start, limits = righting.kicked(rat), righting.bounds(rat, 2 * np.pi)
-    plan = st.plan(
+    plan = planned(
         rat,
         start=start,
         bounds=limits,
@@ -169,7 +168,7 @@ def _true(rat: st.Model) -> dict:
 
 def _paper(rat: st.Model) -> dict:
     start, limits = righting.kicked(rat), righting.bounds(rat, 2 * np.pi)
-    plan = st.plan(
+    plan = planned(
         rat,
         start=start,
         bounds=limits,
@@ -215,7 +214,7 @@ def _block(rat: st.Model, starts: range, settings: dict) -> list[dict]:
     rows = []
     for k in starts:
         begun = time.process_time()
-        plan = st.plan(rat, start=righting.tumbling(rat, k), **settings)
+        plan = planned(rat, start=righting.tumbling(rat, k), **settings)
         rows.append(righting.row(plan) | {"start": k, "cpu_s": time.process_time() - begun})
     return rows
 
@@ -279,7 +278,4 @@ if __name__ == "__main__":
     )
     parser.add_argument("--starts", type=int, default=200)
     given = parser.parse_args()
-    try:
-        main(given.folder.absolute(), given.starts)
-    except st.SerpentailError as error:
-        sys.exit(str(error))
+    run(main, given.folder.absolute(), given.starts)

@@ -3,9 +3,15 @@
 import argparse
 import json
 import sys
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .errors import SerpentailError
+
+if TYPE_CHECKING:
+    from .motion.trajectory import Trajectory
+    from .scenes.simulate import Scenario
+
+INTERRUPTED = 130  # status of a command that Ctrl-C ended: 128 and the signal's number
 
 
 def info(folder: str) -> dict[str, Any]:
@@ -94,14 +100,22 @@ def _add_scene(verb: argparse.ArgumentParser, example: str) -> None:
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Run a verb; 0 if it went well, 1 if a check failed, 2 if the input was refused."""
+    """Run a verb; 0 if it went well, 1 if a check failed, 2 if the input was refused, 130 after
+    Ctrl-C.
+    """
     arguments = parser().parse_args(argv)
     try:
         report, text, good = run(arguments)
     except SerpentailError as error:
         print(error, file=sys.stderr)
         return 2
+    except KeyboardInterrupt:
+        print("serpentail: interrupted", file=sys.stderr)
+        return INTERRUPTED
     print(json.dumps(report) if arguments.json else text)
+    if report.get("stopped") == "interrupt":
+        print("serpentail: interrupted; this is what there was until then", file=sys.stderr)
+        return INTERRUPTED
     return 0 if good else 1
 
 
@@ -133,13 +147,24 @@ def simulated(arguments: argparse.Namespace) -> tuple[dict[str, Any], str, bool]
     from .scenes.simulate import scenario
 
     scene = scenario(arguments.scene, arguments.folder, parsed(arguments.changes))
-    motion = scene.simulate()
+    motion, stopped = _motion(scene)
     if arguments.save:
         motion.save(arguments.save)
     if arguments.film:
         scene.film(motion, arguments.film)
-    report = scene.summary(motion)
+    report = scene.summary(motion) | stopped
     return report, _rows(report), True
+
+
+def _motion(scene: "Scenario") -> tuple["Trajectory", dict[str, str]]:
+    """Return a motion, after Ctrl-C as far as it came, and whether that stopped it."""
+    try:
+        return scene.simulate(), {}
+    except KeyboardInterrupt as stop:
+        motion = getattr(stop, "motion", None)
+        if motion is None or len(motion.t) < 2:
+            raise
+        return motion, {"stopped": "interrupt"}
 
 
 def verified(arguments: argparse.Namespace) -> tuple[dict[str, Any], str, bool]:

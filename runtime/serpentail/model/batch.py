@@ -7,8 +7,10 @@ import ctypes
 import threading
 from collections.abc import Callable
 from pathlib import Path
+from weakref import WeakSet
 
 from .compiler import compile_library
+from .workers import after_fork
 
 MIN_BATCH = 1000  # states: from here on a batch pays for compiling
 LAZY_SOURCES = ("batch", "flights")  # sources of a model that are compiled when they are needed
@@ -23,6 +25,7 @@ class LazyLibrary:
         self.folder, self.source, self.profile = folder, f"{manifest['prefix']}_{part}.c", profile
         self.library: ctypes.CDLL | None = None
         self.lock = threading.Lock()
+        _lazy.add(self)
 
     def function(self, name: str) -> RecordFunction:
         """Return a function that takes the address of a record and returns a status."""
@@ -36,11 +39,26 @@ class LazyLibrary:
         return function
 
 
-class BatchLibrary:
-    """The C of one model that evaluates batches, and that simulates batches of flights."""
+_lazy: WeakSet[LazyLibrary] = WeakSet()
 
-    def __init__(self, folder: Path, manifest: dict, profile: str):
-        self.prefix = manifest["prefix"]
+
+def _open_locks() -> None:
+    """Renew the locks in a forked child: the thread that held one is not there to release it."""
+    for library in _lazy:
+        library.lock = threading.Lock()
+
+
+after_fork(_open_locks)
+
+
+class BatchLibrary:
+    """The C of one model that evaluates batches, and that simulates batches of flights.
+
+    threads: at most so many evaluate a batch; None: as many as the process may use.
+    """
+
+    def __init__(self, folder: Path, manifest: dict, profile: str, threads: int | None = None):
+        self.prefix, self.threads = manifest["prefix"], threads
         batch = manifest.get("batch", NO_BATCH)
         self.states: int = batch["states"]
         self.work: dict[str, int] = batch["work"]

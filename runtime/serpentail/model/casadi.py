@@ -1,13 +1,13 @@
 """A model as CasADi functions, of operations that CasADi knows or of the compiled C."""
 
 import importlib.util
-from functools import cached_property
 from types import ModuleType
 from typing import TYPE_CHECKING
 
 import casadi
 
 from ..errors import ModelError
+from .kept import kept
 from .parameters import flat
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ class CasadiFunctions:
     def __init__(self, model: "Model"):
         self._model = model
 
-    @cached_property
+    @kept
     def _module(self) -> ModuleType:
         """The generated module; ModelError where the scene did not ask for it."""
         if not self._has_module:

@@ -8,12 +8,11 @@ import os
 import shlex
 import subprocess
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from ..errors import CompileFailed, ModelError, SerpentailError
 from .cache import REMEDY_CACHE, cache_folder, digest, library_name, temporary_file, trusted
-from .toolchain import Toolchain, check_profile, examine, recall, run_command
+from .toolchain import Toolchain, check_profile, examine, recall, run_command, run_commands
 
 SHARED_FLAGS = ("-fPIC", "-shared")
 LONGEST_REPORT = 6000  # characters of a compiler's output that an error shows
@@ -122,7 +121,7 @@ def _build(
 def _compile(sources: Sequence[Path], include: Path, toolchain: Toolchain, part: Path) -> None:
     """Compile the sources at the same time and link them into `part`, or raise CompileFailed."""
     compiler = (*toolchain.command, *toolchain.flags)
-    with contextlib.ExitStack() as objects, ThreadPoolExecutor(len(sources)) as pool:
+    with contextlib.ExitStack() as objects:
         # one object for each source
         files = [str(objects.enter_context(temporary_file(part.parent, ".o"))) for _ in sources]
         headers = ("-fPIC", "-I", str(include.absolute()))
@@ -130,7 +129,7 @@ def _compile(sources: Sequence[Path], include: Path, toolchain: Toolchain, part:
             (*compiler, *headers, "-c", str(source.absolute()), "-o", file)
             for source, file in zip(sources, files, strict=True)
         ]
-        for command, finished in zip(commands, pool.map(run_command, commands), strict=True):
+        for command, finished in zip(commands, run_commands(commands), strict=True):
             if finished.returncode:
                 raise _failure(command, finished)
 

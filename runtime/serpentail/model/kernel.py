@@ -169,7 +169,7 @@ class Kernel:
         outputs = [np.empty((count, *shape), self.dtype) for shape in self.out_shapes]
         function = self.batch_library.entry(self.name, count)
         run = self._each if function is None else partial(self._side_by_side, function)
-        shared(count, lambda first, last: run(whole, outputs, first, last))
+        shared(count, self.batch_library.threads, partial(run, whole, outputs))
         return outputs[0] if len(outputs) == 1 else tuple(outputs)
 
     def _each(self, inputs: Arrays, outputs: Arrays, first: int, last: int) -> None:

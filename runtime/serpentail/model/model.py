@@ -2,7 +2,6 @@
 
 import ctypes
 from collections.abc import Mapping
-from functools import cached_property
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +11,9 @@ from numpy.typing import ArrayLike
 
 from ..errors import ModelError
 from .batch import BatchLibrary
+from .cores import checked
 from .functions import Functions
+from .kept import kept
 from .kernel import Kernel
 from .layout import Layout
 from .library import open_library
@@ -28,12 +29,15 @@ def load(
     parameters: Mapping[str, object] | None = None,
     profile: str | None = None,
     compiled: bool = True,
+    threads: int | None = None,
 ) -> "Model":
     """Return the model of a generated folder, its C compiled (or taken from the cache) and loaded.
 
     parameters: name -> number or 3 numbers, SI; override the scene's, without recompiling.
     profile: "fast" (this CPU, FMA) or "reproducible" (same bits everywhere); None: the scene's.
     compiled: False needs no C compiler; then only ``model.casadi`` evaluates.
+    threads: most that its batches and many runs use; None: $SERPENTAIL_THREADS, else one a core
+    that this process may use, one in workers of process pools.
     Raises ModelError (folder missing, stale or changed; parameter unknown or unphysical),
     CompilerNotFound, CompileFailed.  Warns UnlikeBodies where torso and tail are so unlike in size
     that H loses digits.
@@ -52,8 +56,10 @@ def load(
         raise ModelError(f"compiled: value {compiled!r:.60}: needs True or False")
     if compiled and "c" not in manifest["scene"]["targets"]:
         raise _without_c(manifest)
+    threads = None if threads is None else checked("threads", threads, ModelError)
     library = open_library(folder, manifest, profile) if compiled else None
-    return Model(folder, manifest, values, library, profile)
+    batches = BatchLibrary(folder, manifest, profile, threads)
+    return Model(folder, manifest, values, library, profile, batches)
 
 
 def _without_c(manifest: Mapping[str, Any]) -> ModelError:
@@ -142,6 +148,7 @@ class Model(Functions):
             self._independent(),
             self.profile,
             self.library is not None,
+            self.batch_library.threads,
         )
 
     @property
@@ -171,7 +178,7 @@ class Model(Functions):
             "it to `functions` of the scene, then generate it again"
         )
 
-    @cached_property
+    @kept
     def casadi(self) -> "CasadiFunctions":
         """``casadi.Function``s by name, parameters folded in: ``model.casadi.energy(q, v)``."""
         from .casadi import CasadiFunctions

@@ -18,6 +18,7 @@ from typing import Any
 from ..checks import one_of
 from ..errors import CompilerNotFound, SerpentailError
 from .cache import digest, temporary_file
+from .commands import run_all
 
 # -std=c99 alone turns contraction off, so the fast profile asks for it by name.
 PROFILES = {
@@ -141,19 +142,17 @@ def _target(command: tuple[str, ...], flags: tuple[str, ...]) -> str:
 
 def run_command(command: Sequence[str]) -> subprocess.CompletedProcess[str]:
     """Return the finished command, run in the C locale; 127 where it could not be started."""
+    return run_commands([command])[0]
+
+
+def run_commands(commands: Sequence[Sequence[str]]) -> list[subprocess.CompletedProcess[str]]:
+    """Return the finished commands, run at the same time; 127 where one could not be started."""
     surroundings = {**os.environ, "LC_ALL": "C"}
     try:
-        return subprocess.run(
-            command,
-            env=surroundings,
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            encoding="utf-8",
-            errors="replace",
-            check=False,
-        )
+        return run_all(commands, surroundings)
     except OSError as error:
-        return subprocess.CompletedProcess(command, 127, "", error.strerror or str(error))
+        reason = error.strerror or str(error)
+        return [subprocess.CompletedProcess(each, 127, "", reason) for each in commands]
 
 
 # Notes: what a compiler said, kept so that a warm call starts no process.

@@ -1,39 +1,77 @@
-"""Threads that share the states of a batch, or take up runs one after another."""
+"""Threads that share the states of a batch, or take up runs one after another.
+
+A forked child has none of its parent's threads: it starts its own, and its locks are open.
+"""
 
 import os
 import threading
+import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 from functools import cache
 from itertools import pairwise
 
+from .cores import threads as allowed
+
 POLL_S = 0.1  # s between looks at signals, such as Ctrl-C
 MIN_STATES_PER_THREAD = 256  # states: the least that is worth a thread
+FIRST_PIECE, LEAST_PIECE = 2048, 64  # states between looks at signals: at first, and at least
+PIECE_S = 0.05  # s between looks: pieces grow or shrink to that
+
+
+def after_fork(renew: Callable[[], object]) -> None:
+    """Have every forked child call a function first."""
+    if hasattr(os, "register_at_fork"):
+        os.register_at_fork(after_in_child=renew)
 
 
 @cache
-def cores() -> int:
-    """Return how many cores this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-@cache
-def pool() -> ThreadPoolExecutor:
+def pool(size: int) -> ThreadPoolExecutor:
     """Return the threads that share batches; C runs in them without Python's lock."""
-    return ThreadPoolExecutor(cores(), thread_name_prefix="serpentail")
+    return ThreadPoolExecutor(size, thread_name_prefix="serpentail")
 
 
-def shared(count: int, run: Callable[[int, int], None]) -> None:
-    """Call ``run(first, last)`` for shares of a batch, on all cores where it is large."""
-    shares = max(1, min(cores(), count // MIN_STATES_PER_THREAD))
-    ends = [count * k // shares for k in range(shares + 1)]
-    if shares == 1:
+after_fork(pool.cache_clear)
+
+
+def shared(count: int, threads: int | None, run: Callable[[int, int], None]) -> None:
+    """Call ``run(first, last)`` for pieces of a batch, in several threads where it is large.
+
+    threads: at most so many, None for as many as this process may use.  Of states that fail the
+    first one raises.  Ctrl-C ends all after the pieces in work.
+    """
+    if count < 2 * MIN_STATES_PER_THREAD:
         run(0, count)
         return
-    waiting = [pool().submit(run, first, last) for first, last in pairwise(ends)]
-    for future in waiting:
-        future.result()
+    most, ended = allowed(threads), threading.Event()
+    shares = min(most, count // MIN_STATES_PER_THREAD)
+    if shares == 1:
+        _in_pieces(run, 0, count, ended)
+        return
+    ends = [count * k // shares for k in range(shares + 1)]
+    waiting = [
+        pool(most).submit(_in_pieces, run, first, last, ended) for first, last in pairwise(ends)
+    ]
+    try:
+        for future in waiting:
+            future.result()
+    finally:
+        ended.set()
+        wait(waiting)
+
+
+def _in_pieces(
+    run: Callable[[int, int], None], first: int, last: int, ended: threading.Event
+) -> None:
+    """Call ``run`` for pieces that take a moment each, until ``ended`` is set."""
+    size = FIRST_PIECE
+    while first < last and not ended.is_set():
+        begun, after = time.perf_counter(), min(first + size, last)
+        run(first, after)
+        first = after
+        quick = time.perf_counter() - begun < PIECE_S
+        size = 2 * size if quick else max(size // 2, LEAST_PIECE)
 
 
 def in_turn(

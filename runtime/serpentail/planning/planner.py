@@ -10,6 +10,7 @@ from typing import Any
 from ..checks import one_of
 from ..errors import PlanningError
 from ..model.model import Model
+from .nlp.fork_gate import forks_wait
 from .nlp.interrupt import stoppable
 from .nlp.node import equations_of_motion
 from .nlp.rules import collocation_rule
@@ -71,10 +72,12 @@ def plan(
         raise model.without(*missing)
     begun = time.perf_counter()
     rule = collocation_rule(checked.rule, checked.degree)
-    search = Search(model, problem, checked, equations_of_motion(model, checked.dynamics), rule)
-    with stoppable(checked.time_limit):
-        rounds = search.refined(search.first())
-    return search.plan(rounds, time.perf_counter() - begun)
+    with forks_wait():
+        equations = equations_of_motion(model, checked.dynamics)
+        search = Search(model, problem, checked, equations, rule)
+        with stoppable(checked.time_limit):
+            rounds = search.refined(search.first())
+        return search.plan(rounds, time.perf_counter() - begun)
 
 
 def _checked(

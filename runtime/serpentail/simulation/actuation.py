@@ -8,6 +8,7 @@ import numpy as np
 from ..checks import refusal
 from ..errors import SimulationError
 from .controllers import Controller, NativeTorque, Parts, TorqueFunction, parts_of, phases_of
+from .ctrl_c import CtrlC
 from .piecewise import Piecewise
 from .records import CFunction, Records
 
@@ -18,6 +19,7 @@ class Actuation:
     def __init__(self, records: Records, controller: Controller, legs: Piecewise | None = None):
         self.records, self.model = records, records.model
         self.error: BaseException | None = None
+        self.ctrl_c = CtrlC()
         self.nt = self.model.layout.nt
         self.float_errors = np.geterr()  # the user's: SciPy's methods work with their own
         # phases, each by its parts
@@ -41,6 +43,11 @@ class Actuation:
             stop_times=self.stops,
             **members,
         )
+
+    @property
+    def of_python(self) -> bool:
+        """Whether a function of Python acts."""
+        return any(parts.user is not None for parts in self.parts)
 
     def _available(self, parts: Parts) -> Parts:
         """Return the parts as this model has them: PFL in Python where its C is missing."""
@@ -93,8 +100,11 @@ class Actuation:
 
         def call(_context: Any, t: float, q: Any, v: Any, tau: Any) -> int:
             try:
+                self.ctrl_c.enter()
                 np.ctypeslib.as_array(tau, (self.nt,))[:] = self._user_torque(user, t, q, v)
+                self.ctrl_c.leave()
             except BaseException as error:
+                self.ctrl_c.leave()
                 self.error = error
                 return 1
             return 0

@@ -1,6 +1,7 @@
 """Many runs with the same steps, of which the generated C makes several at once, in lanes."""
 
 import ctypes
+import time
 from dataclasses import dataclass
 from threading import Event
 from typing import Any
@@ -10,7 +11,7 @@ import numpy as np
 from ..model.kernel import aligned
 from ..model.layout import TAIL_V
 from .actuation import Actuation
-from .compiled_run import PAUSE, Memory
+from .compiled_run import PAUSE, PAUSE_S, Memory
 from .methods import IntegrationMethod, step_counts
 from .piecewise import Piecewise
 from .records import structure
@@ -149,7 +150,10 @@ class BatchedRuns:
         while record.step < record.steps:
             if ended.is_set():
                 return None
+            begun = time.perf_counter()
             if self.function(ctypes.addressof(record)):
                 return False
+            if time.perf_counter() - begun < PAUSE_S:
+                record.pause *= 2
         out["tau"][rows] = self.torques - self.arrays["damping"] * out["v"][rows, :, TAIL_V]
         return True

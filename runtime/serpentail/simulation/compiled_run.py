@@ -1,6 +1,7 @@
 """Runs of the generated C on arrays of ours, and what each run came to."""
 
 import ctypes
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from threading import Event
@@ -21,7 +22,8 @@ from .start import Start
 PAUSED, STEP_TOO_SMALL, TOO_MANY_STEPS, STOPPED_AT_EVENT, TORQUE_FAILED = range(32, 37)
 STEP_TOO_LONG = 38
 MOST_STEPS = 2**31 - 1  # that the C interface counts
-PAUSE = 2000  # steps between looks at signals, such as Ctrl-C
+PAUSE = 100  # steps before the first look at signals, such as Ctrl-C
+PAUSE_S = 0.05  # s between looks: pauses grow to that
 COUNTS = ("steps", "rejected", "evaluations", "factorisations")
 WHY = {
     NOT_FINITE: (
@@ -154,8 +156,15 @@ class CompiledRun:
     def go(self, ended: Event | None = None) -> int:
         """Advance until the run or something ends it, or ``ended`` is set; return the status."""
         status = PAUSED
-        while status == PAUSED and not (ended and ended.is_set()):
-            status = self.rollout(self.address)
+        try:
+            with self.actuation.ctrl_c.waits(self.actuation.of_python):
+                while status == PAUSED and not (ended and ended.is_set()):
+                    begun = time.perf_counter()
+                    status = self.rollout(self.address)
+                    if time.perf_counter() - begun < PAUSE_S:
+                        self.record.pause *= 2
+        except KeyboardInterrupt as stop:  # ends the run, whose motion until then is kept
+            self.actuation.error = stop
         return status
 
     def outcome(self, status: int) -> Outcome:

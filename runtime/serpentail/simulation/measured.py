@@ -27,6 +27,8 @@ def trajectory_or_error(model: Model, samples: Samples, ground: Ground) -> Traje
         return trajectory
     if isinstance(failure, SimulationError):
         failure.trajectory = trajectory
+    if isinstance(failure, KeyboardInterrupt):
+        vars(failure)["motion"] = trajectory
     raise failure
 
 

@@ -1,12 +1,13 @@
 """The structures that the generated C takes, as ctypes has them, with all that they point to."""
 
 import ctypes
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..model.kept import kept
 from ..model.model import Model
 
 CFunction: Any = type(ctypes.CFUNCTYPE(None)()).__mro__[1]  # of all functions that ctypes makes
@@ -22,7 +23,7 @@ class Records:
         self.real = np.ctypeslib.as_ctypes_type(self.dtype)
         self.members = model.manifest["simulation"]["records"]
 
-    @cached_property
+    @kept
     def types(self) -> dict[str, type[ctypes.Structure]]:
         """Structure types by name."""
         types = {}

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from ..errors import SimulationError, StateError
+from ..model.cores import threads as allowed
 from ..model.kernel import RunKernel
 from ..model.model import Model
 from ..model.parameters import RunParameters
-from ..model.workers import cores, in_turn
+from ..model.workers import in_turn
 from ..motion.trajectory import Trajectory
 from .actuation import Actuation
 from .audit import BALANCED, Audit, audited, warnings_of
@@ -92,7 +93,9 @@ class Rollouts:
 class ParallelRuns:
     """Runs on their way: threads take them up in turn, and write samples, measures and outcomes."""
 
-    def __init__(self, memory: Memory, actuation: Actuation, method: IntegrationMethod):
+    def __init__(
+        self, memory: Memory, actuation: Actuation, method: IntegrationMethod, threads: int | None
+    ):
         runs, samples = memory.start.runs, memory.start.intervals + 1
         self.memory, self.actuation, self.method = memory, actuation, method
         # tasks of the threads: runs, or groups of them
@@ -101,8 +104,8 @@ class ParallelRuns:
         if worth_batching(memory, actuation, method):
             self.batched = BatchedRuns(memory, actuation, method)
             self.tasks = self.batched.groups
-        of_python = method.name in SCIPY or any(parts.user is not None for parts in actuation.parts)
-        self.threads = 1 if of_python else min(cores(), self.tasks)
+        of_python = method.name in SCIPY or actuation.of_python
+        self.threads = 1 if of_python else min(allowed(threads), self.tasks)
         # what they come to
         self.model = memory.records.model
         self.outcomes: dict[int, Outcome] = {}
@@ -114,6 +117,7 @@ class ParallelRuns:
             for name, shape in zip(MEASURES[kernel.name], kernel.out_shapes, strict=True):
                 self.measures[name] = np.zeros((runs, samples, *shape), kernel.dtype)
         self.unmeasured: list[int] = []  # whose energy or momentum no number holds
+        self.stop: KeyboardInterrupt | None = None  # what ended all before their end
 
     def run_singly(self, numbers: Iterator[int], ended: Event) -> None:
         """Take up runs in one thread until none is left, or ``ended`` is set."""
@@ -169,7 +173,10 @@ class ParallelRuns:
         return Outcome(done, samples.t[-1], samples.ledger, samples.info, samples.failure)
 
     def rollouts(self, info: dict[str, Any]) -> Rollouts:
-        """Return what all runs came to; info: what else is to be told of them."""
+        """Return what all runs came to, or raise Ctrl-C, which keeps it as ``motion``.
+
+        info: what else is to be told of them.
+        """
         outcomes = [self.outcomes[k] for k in range(len(self.outcomes))]
         # the error of each run that failed, or whose measures no number holds
         failed = {k for k, outcome in self.outcomes.items() if outcome.failure is not None}
@@ -188,9 +195,13 @@ class ParallelRuns:
             [] if errors[k] else warnings_of(books.of(k), self.method.info | outcome.info, eps)
             for k, outcome in enumerate(outcomes)
         ]
-        return Rollouts(
+        found = Rollouts(
             **arrays, errors=errors, audit=books, warnings=warnings, info=info, source=self.source
         )
+        if self.stop is not None:
+            vars(self.stop)["motion"] = found
+            raise self.stop
+        return found
 
     def _audit(self, arrays: dict[str, np.ndarray], outcomes: list[Outcome]) -> Audit:
         """Return the books of all runs, from start to end; nan of those that failed."""
@@ -228,6 +239,8 @@ class ParallelRuns:
     def _judge(self, k: int) -> SimulationError | None:
         """Return the error that ended run k; measure it up to there."""
         outcome = self.outcomes[k]
+        if not outcome.done and isinstance(outcome.failure, SimulationError):
+            return outcome.failure  # it never began
         error: SimulationError | None = None
         trajectory: Trajectory | None
         try:
@@ -249,12 +262,20 @@ class ParallelRuns:
 def in_c(run: CompiledRun, ended: Event) -> Outcome | None:
     """Return what a run came to, None where it was given up."""
     status = run.go(ended)
-    return None if status == PAUSED else run.outcome(status)
+    return None if status == PAUSED and run.actuation.error is None else run.outcome(status)
 
 
-def run_parallel(memory: Memory, actuation: Actuation, method: IntegrationMethod) -> ParallelRuns:
-    """Make all runs, on all cores unless Python acts in them."""
-    runs = ParallelRuns(memory, actuation, method)
+def run_parallel(
+    memory: Memory, actuation: Actuation, method: IntegrationMethod, threads: int | None
+) -> ParallelRuns:
+    """Make all runs, in so many threads unless Python acts in them; Ctrl-C ends all."""
+    runs = ParallelRuns(memory, actuation, method, threads)
     work = partial(runs.run_batches, runs.batched) if runs.batched else runs.run_singly
-    in_turn(runs.tasks, runs.threads, work)
+    try:
+        in_turn(runs.tasks, runs.threads, work)
+    except KeyboardInterrupt as stop:
+        runs.stop = stop
+        for k in set(range(memory.start.runs)) - runs.outcomes.keys():
+            error = SimulationError("Ctrl-C came before its end: simulate it again")
+            runs.outcomes[k] = Outcome(0, memory.start.start, memory.state["ledger"][k], {}, error)
     return runs

@@ -79,11 +79,12 @@ def integrate_by_scipy(run: CompiledRun, method: IntegrationMethod) -> Samples:
     y, t = np.concatenate([*run.state.values()]).astype(float), run.start.start
     failure: BaseException | None = None
     try:
-        run.record.until = ends[0]
-        samples.write(t, y)
-        for end in ends:
-            run.record.t, run.record.until = t, end
-            y, t = _smooth_part(rate, method, (t, y, end), samples, counts), end
+        with run.actuation.ctrl_c.waits(run.actuation.of_python):
+            run.record.until = ends[0]
+            samples.write(t, y)
+            for end in ends:
+                run.record.t, run.record.until = t, end
+                y, t = _smooth_part(rate, method, (t, y, end), samples, counts), end
     except BaseException as error:
         if not samples.states:
             raise

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import ModelError, SimulationError, StateError
+from ..model.cores import checked
 from ..model.kernel import RunKernel
 from ..model.layout import TAIL_V
 from ..model.model import Model
@@ -55,12 +56,13 @@ def simulate(
 
     Raises StateError (shapes, values), SimulationError (settings; the state left what numbers can
     hold; its ``trajectory`` is the motion up to there), ModelError (the scene left out rollout,
-    energy or momentum).
+    energy or momentum).  Ctrl-C raises KeyboardInterrupt, whose ``motion`` is what there was: the
+    Trajectory, or Rollouts in which runs without an end have errors.
 
     Many starts give Rollouts, which keep the SimulationErrors of single runs: the other runs go on.
     One method is chosen for all.  parameters: name -> (k,) or (k, 3), SI, what the runs have of
-    their own; bristles0 may be (k, points, 2).  Runs are shared among all cores, so a NativeTorque
-    must bear calls from several threads at once.
+    their own; bristles0 may be (k, points, 2).  threads: that take up the runs; None: the model's,
+    see ``load``.  A NativeTorque must bear calls from several threads at once.
 
     Flights by "rk4" whose torques are None, Damping, a TorqueTable or a TorqueCurve fly as lanes of
     vectors where they take 1e6 steps or more in all: several times as fast, other last digits.
@@ -71,14 +73,27 @@ def simulate(
     if missing:
         raise model.without(*missing)
     start = Start.checked(model, (q0, v0), t_span, settings.pop("output_step", None))
+    threads = _threads(model, start, settings.pop("threads", None))
     memory, actuation, choice = prepared(model, start, controller, method, settings)
     clocks = time.perf_counter(), time.process_time()
     if start.many:
-        runs = run_parallel(memory, actuation, choice)
+        runs = run_parallel(memory, actuation, choice, threads)
         return runs.rollouts(_spent(clocks))
     samples = integrate(memory, actuation, choice)
     info = samples.info | choice.info | _spent(clocks)
     return trajectory_or_error(model, replace(samples, info=info), memory.ground)
+
+
+def _threads(model: Model, start: Start, asked: int | None) -> int | None:
+    """Return how many threads many runs may take up, as asked here, or else of the model."""
+    if asked is None:
+        return model.batch_library.threads
+    if not start.many:
+        raise SimulationError(
+            f"threads: value {asked!r:.60}: one start only, which takes one: leave it out, or give "
+            "q0 or v0 a row a run"
+        )
+    return checked("threads", asked, SimulationError)
 
 
 def _spent(clocks: tuple[float, float]) -> dict[str, float]:

@@ -2,13 +2,13 @@
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..checks import finite_array, number, real_array, refusal, refuse_not_finite
 from ..errors import SimulationError, StateError
+from ..model.kept import kept
 from ..model.layout import QUATERNION
 from ..model.model import Model
 
@@ -75,7 +75,7 @@ class Start:
         """Time between outputs."""
         return (self.end - self.start) / self.intervals
 
-    @cached_property
+    @kept
     def times(self) -> np.ndarray:
         """Output times (intervals + 1,)."""
         return np.linspace(self.start, self.end, self.intervals + 1)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.simulation import batched_runs, rollouts
+from serpentail.simulation import batched_runs
 
 from .many import NT, NV, PER_RUN, starts, tail
 
@@ -26,13 +26,12 @@ PUSHED = {
 
 
 @pytest.mark.parametrize("threads", [1, 3])
-def test_a_run_that_fails_loses_no_other(monkeypatch, threads):
-    monkeypatch.setattr(rollouts, "cores", lambda: threads)
+def test_a_run_that_fails_loses_no_other(threads):
     q, v = starts(tail(), 5)
     v[2] *= 1e160  # overflows at once
     v[4] *= 100  # takes too many steps
     settings = PUSHED | {"most_steps": 600}
-    found = st.simulate(tail(), q, v, **settings)
+    found = st.simulate(tail(), q, v, threads=threads, **settings)
     for k in range(5):
         try:
             flight = st.simulate(tail(), q[k], v[k], **settings)
@@ -103,8 +102,7 @@ def test_what_a_function_raises_ends_all_but_a_simulation_error_its_run(method):
 
 
 @pytest.mark.parametrize("threads", [1, 2])
-def test_a_compiled_torque_that_refuses_ends_its_run(monkeypatch, threads):
-    monkeypatch.setattr(rollouts, "cores", lambda: threads)
+def test_a_compiled_torque_that_refuses_ends_its_run(threads):
     real = ctypes.POINTER(ctypes.c_double)
 
     @ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_double, real, real, real)
@@ -113,16 +111,14 @@ def test_a_compiled_torque_that_refuses_ends_its_run(monkeypatch, threads):
 
     q, v = starts(tail(), 3)
     q[1, 0] = 50.0
-    found = st.simulate(
-        tail(), q, v, t_span=0.01, controller=st.NativeTorque(torque), method="tsit5"
-    )
+    law = st.NativeTorque(torque)
+    found = st.simulate(tail(), q, v, t_span=0.01, controller=law, method="tsit5", threads=threads)
     assert [error is None for error in found.errors] == [True, False, True]
     assert "the compiled torque function did not return 0" in str(found.errors[1])
 
 
 @pytest.mark.parametrize("many", [1, 10**12], ids=["abreast", "alone"])
 def test_ctrl_c_ends_all_threads_within_a_second(monkeypatch, many):
-    monkeypatch.setattr(rollouts, "cores", lambda: 2)
     monkeypatch.setattr(batched_runs, "MIN_BATCHED_STEPS", many)
     monkeypatch.setattr(batched_runs, "MAX_SHARED_STEPS", 10**12)
     q, v = starts(tail(), 50)
@@ -138,7 +134,7 @@ def test_ctrl_c_ends_all_threads_within_a_second(monkeypatch, many):
     timer = threading.Timer(1.5, ask)
     timer.start()
     with pytest.raises(KeyboardInterrupt):
-        st.simulate(tail(), q, v, t_span=20, step=1e-5, method="rk4", output_step=20)
+        st.simulate(tail(), q, v, t_span=20, step=1e-5, method="rk4", output_step=20, threads=2)
     assert time.monotonic() - asked[0] < 1
     timer.join()
     assert threading.active_count() == before

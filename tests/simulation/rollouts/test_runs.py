@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.simulation import rollouts
 
 from .many import ARRAYS, DAMPING, LEGS, NQ, NT, PER_RUN, alone, rat, same, starts, tail
 
@@ -184,14 +183,14 @@ def test_the_stiffest_run_chooses_the_method():
 # Order and sharing.
 
 
-def test_runs_do_not_depend_on_their_order_or_on_threads(monkeypatch):
+def test_runs_do_not_depend_on_their_order_or_on_threads():
     q, v = starts(tail(), 40)
     settings = {"t_span": 0.02, "controller": DAMPING, "method": "tsit5"}
     own = np.random.default_rng(2).uniform(0.002, 0.005, 40)
     order = np.random.default_rng(3).permutation(40)
     found = []
     for threads in (1, 7):
-        monkeypatch.setattr(rollouts, "cores", lambda threads=threads: threads)
+        settings["threads"] = threads
         found.append(st.simulate(tail(), q, v, parameters={"tail_mass": own}, **settings))
         found.append(
             st.simulate(

@@ -10,37 +10,68 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from types import SimpleNamespace
 
-_ctrl_c = threading.Event()  # one for all threads: so is the signal
-_search = threading.local()  # a search and its solver's iterations run in one thread
+from ...model.workers import after_fork
+from .fork_gate import let_forks_pass
+
+# Ctrl-C as all threads see it: how often it was noted, by which thread, and who heard it before
+_ctrl_c = SimpleNamespace(noted=0, listener=None, before=None)
+
+
+class _Search(threading.local):
+    """The search of one thread: when it is to end (s), and what had been noted when it began."""
+
+    deadline = math.inf
+    noted = 0
+
+
+_search = _Search()
 
 
 def stop_reason() -> str | None:
     """Return why the search of this thread should end: "interrupt", "time limit", or None."""
-    if _ctrl_c.is_set():
+    let_forks_pass()
+    if _ctrl_c.noted > _search.noted:
         return "interrupt"
-    return "time limit" if time.monotonic() >= getattr(_search, "deadline", math.inf) else None
+    return "time limit" if time.monotonic() >= _search.deadline else None
 
 
 @contextmanager
 def stoppable(time_limit: float | None = None) -> Iterator[None]:
     """Let Ctrl-C stop the search, once, a second one acting as usual; and so a limit (s) from now.
 
-    Only the main thread gets signals: in another one the time limit alone counts.
+    The search of the main thread hears it, for all threads: without one, the time limit alone
+    counts.
     """
-    _ctrl_c.clear()
+    _search.noted = _ctrl_c.noted
     _search.deadline = math.inf if time_limit is None else time.monotonic() + time_limit
-    if threading.current_thread() is not threading.main_thread():
+    before = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or before is None:
         yield
         return
-    before = signal.getsignal(signal.SIGINT)
-
-    def note(_number, _frame) -> None:
-        _ctrl_c.set()
-        signal.signal(signal.SIGINT, before)
-
-    signal.signal(signal.SIGINT, note)
+    _ctrl_c.listener, _ctrl_c.before = threading.get_ident(), before
+    signal.signal(signal.SIGINT, _note)
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        _hear_no_more()
+
+
+def _note(_number: int, _frame: object) -> None:
+    _ctrl_c.noted += 1
+    _hear_no_more()
+
+
+def _hear_no_more() -> None:
+    _ctrl_c.listener = None
+    signal.signal(signal.SIGINT, _ctrl_c.before)
+
+
+def _hear_as_before() -> None:
+    """In a forked child without the thread that listened, let Ctrl-C act as usual."""
+    if _ctrl_c.listener not in (None, threading.get_ident()):
+        _hear_no_more()
+
+
+after_fork(_hear_as_before)

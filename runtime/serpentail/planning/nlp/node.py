@@ -5,13 +5,13 @@ Every node of every mesh evaluates the same CasADi function, of which the progra
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cached_property
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...errors import ModelError
+from ...model.kept import kept
 from ...model.layout import OMEGA, TAIL_V, VELOCITY
 from ...model.model import Model
 from ...model.parameters import total_mass
@@ -117,7 +117,7 @@ class Node:
     residuals: int
     path: int
 
-    @cached_property
+    @kept
     def derivatives(self) -> NodeDerivatives:
         """Exact derivatives, which programs on all meshes share."""
         return NodeDerivatives(self)

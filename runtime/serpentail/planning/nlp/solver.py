@@ -1,5 +1,6 @@
 """Solving a nonlinear program by CasADi's ``nlpsol``, as a rule with IPOPT."""
 
+import threading
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -75,6 +76,7 @@ def solver(
 ) -> "ca.Function":
     """Return CasADi's solver of a program, for a guess that is "far", "close" or "warm".
 
+    Every thread has solvers of its own: two threads in one crash.
     PlanningError where there is no solver of that name, or an option is unknown.
     """
     import casadi as ca
@@ -87,7 +89,7 @@ def solver(
     if name == "ipopt":
         settings |= IPOPT_OPTIONS | GUESS_OPTIONS[guess]
     settings |= options or {}
-    key = (nlp.indices, name, repr(sorted(settings.items())))
+    key = (nlp.indices, name, repr(sorted(settings.items())), threading.get_ident())
     try:
         return memoised(key, partial(_engine, nlp, name, settings))
     except RuntimeError as error:

@@ -1,0 +1,58 @@
+"""Runs commands side by side, and leaves none of them behind."""
+
+import os
+import signal
+import subprocess
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
+
+GRACE_S = 0.5  # s that a command has to remove its temporary files
+
+
+def run_all(
+    commands: Sequence[Sequence[str]], surroundings: Mapping[str, str]
+) -> list[subprocess.CompletedProcess[str]]:
+    """Return the finished commands; OSError where one cannot be started.
+
+    Where Ctrl-C or an error comes before their end, they are ended, and what they have started.
+    """
+    with ExitStack() as running:
+        started = [running.enter_context(_running(each, surroundings)) for each in commands]
+        return [_finished(each) for each in started]
+
+
+@contextmanager
+def _running(
+    command: Sequence[str], surroundings: Mapping[str, str]
+) -> Iterator[subprocess.Popen[str]]:
+    """Lend a command, in a process group of its own, of which nothing is left at the end."""
+    with subprocess.Popen(
+        command,
+        env=surroundings,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        encoding="utf-8",
+        errors="replace",
+        process_group=0,
+    ) as process:
+        try:
+            yield process
+        finally:
+            if process.returncode is None:
+                _end(process)
+
+
+def _end(process: subprocess.Popen[str]) -> None:
+    """End a process and what it has started: a compiler's driver leaves the compiler to itself."""
+    os.killpg(process.pid, signal.SIGTERM)
+    with suppress(subprocess.TimeoutExpired):
+        process.wait(GRACE_S)
+    with suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)
+
+
+def _finished(process: subprocess.Popen[str]) -> subprocess.CompletedProcess[str]:
+    """Wait for a command, and return what it said."""
+    said, errors = process.communicate()
+    return subprocess.CompletedProcess(process.args, process.returncode, said, errors)

@@ -1,0 +1,104 @@
+"""How many threads this process may use: as asked for, as the machine and its container allow."""
+
+import math
+import os
+import sys
+from functools import cache
+from operator import index
+from pathlib import Path
+from typing import SupportsIndex
+
+from ..checks import refusal
+from ..errors import SerpentailError
+
+VARIABLE = "SERPENTAIL_THREADS"  # of the environment
+MOST_THREADS = 1024  # of which a number beyond is a mistake
+
+
+def threads(asked: int | None = None) -> int:
+    """Return how many threads to use: as asked, as $SERPENTAIL_THREADS says, else one a core.
+
+    A worker of a pool of processes (multiprocessing, concurrent.futures, joblib) uses one where
+    nothing is asked for, as its siblings use the other cores.  SerpentailError where
+    $SERPENTAIL_THREADS is no such number.
+    """
+    if asked is not None:
+        return asked
+    chosen = os.environ.get(VARIABLE, "").strip()
+    if chosen:
+        return checked(VARIABLE, int(chosen) if chosen.isdecimal() else chosen)
+    return 1 if _is_worker() else cores()
+
+
+def checked(field: str, value: object, error: type[Exception] = SerpentailError) -> int:
+    """Return a number of threads; the error names the field and what it needs."""
+    whole = index(value) if isinstance(value, SupportsIndex) else 0
+    if 1 <= whole <= MOST_THREADS and not isinstance(value, bool):
+        return whole
+    raise refusal(field, value, f"a whole number of threads from 1 to {MOST_THREADS}", error)
+
+
+def _is_worker() -> bool:
+    """Tell whether multiprocessing, or who builds on it, started this process."""
+    multiprocessing = sys.modules.get("multiprocessing.process")
+    return multiprocessing is not None and multiprocessing.parent_process() is not None
+
+
+def cores() -> int:
+    """Return how many cores this process may use: by its affinity, and by its container's quota."""
+    affinity = hasattr(os, "sched_getaffinity")
+    own = len(os.sched_getaffinity(0)) if affinity else os.cpu_count() or 1
+    return math.ceil(min(own, _own_quota()))
+
+
+@cache
+def _own_quota() -> float:
+    return quota(Path("/"))
+
+
+def quota(root: Path) -> float:
+    """Return the cores' worth of time that control groups grant this process; inf without a limit.
+
+    root: of the file system, in which proc/self and sys/fs/cgroup lie.  The least limit counts, of
+    the process's own group and of those around it.
+    """
+    least = math.inf
+    for line in _lines(root / "proc/self/cgroup"):
+        number, controllers, own = line.split(":", 2)
+        if number == "0" and not controllers:
+            mounts, limit = ("sys/fs/cgroup", "sys/fs/cgroup/unified"), _limit_v2
+        elif "cpu" in controllers.split(","):
+            mounts, limit = ("sys/fs/cgroup/cpu", f"sys/fs/cgroup/{controllers}"), _limit_v1
+        else:
+            continue
+        # in a container the path may be the host's: then the mount itself is the group
+        groups = [own, *map(str, Path(own).parents)]
+        folders = [root / mount / group.strip("/") for mount in mounts for group in groups]
+        least = min([least, *map(limit, dict.fromkeys(folders))])
+    return least
+
+
+def _limit_v2(folder: Path) -> float:
+    """Limit of a group of version 2: cpu.max has quota, or "max", and period in us."""
+    words = " ".join(_lines(folder / "cpu.max")).split()
+    return _ratio(*words) if len(words) == 2 else math.inf
+
+
+def _limit_v1(folder: Path) -> float:
+    """Limit of a group of version 1: a file for each of quota, -1 for none, and period in us."""
+    words = [" ".join(_lines(folder / f"cpu.cfs_{name}_us")) for name in ("quota", "period")]
+    return _ratio(*words)
+
+
+def _ratio(granted: str, period: str) -> float:
+    if granted.isdecimal() and period.isdecimal() and int(granted) and int(period):
+        return int(granted) / int(period)
+    return math.inf
+
+
+def _lines(path: Path) -> list[str]:
+    """Lines of a file; none where it cannot be read."""
+    try:
+        return path.read_text().splitlines()
+    except (OSError, ValueError):
+        return []

@@ -1,0 +1,57 @@
+"""Ctrl-C in runs in which a function of Python acts.
+
+What it raises at the moment when C enters Python would be lost, and the run would go on: it waits
+until the function is entered.
+"""
+
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+
+class CtrlC:
+    """Whether a signal came, and whether it may raise where Python is."""
+
+    def __init__(self) -> None:
+        self.noted = self.inside = False
+
+    @contextmanager
+    def waits(self, wanted: bool) -> Iterator[None]:
+        """Let signals wait for the next `enter`, or the end; where wanted, and in the main thread,
+        which alone gets them.
+        """
+        before = signal.getsignal(signal.SIGINT)
+        main = threading.current_thread() is threading.main_thread()
+        if not (wanted and main and callable(before)):
+            yield
+            return
+
+        def note(number: int, frame: FrameType | None) -> None:
+            if self.inside:
+                before(number, frame)
+            else:
+                self.noted = True
+
+        signal.signal(signal.SIGINT, note)
+        try:
+            yield
+        finally:
+            signal.signal(signal.SIGINT, before)
+            self.inside = False
+            self._raise_noted()
+
+    def enter(self) -> None:
+        """Let signals raise, those that came before, too."""
+        self.inside = True
+        self._raise_noted()
+
+    def leave(self) -> None:
+        """Let signals wait again."""
+        self.inside = False
+
+    def _raise_noted(self) -> None:
+        if self.noted:
+            self.noted = False
+            signal.raise_signal(signal.SIGINT)

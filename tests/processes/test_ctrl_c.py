@@ -1,0 +1,235 @@
+"""Ctrl-C: each thing that takes long ends within a second, in one line from the command line, with
+what is finished kept and nothing else left behind.
+"""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import serpentail as st
+from tests.support.tumbling import rat
+
+PROMPT = 1.0  # s
+PATIENCE = 60.0  # s to begin, and to end at the latest
+HEAR = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+BEGIN = (
+    "import sys, time, numpy as np, serpentail as st\n"
+    "from tests.support.tumbling import start\n"
+    "model = st.load(sys.argv[1], threads=int(sys.argv[2]))\n"
+    "q, v = start(model)\n"
+    "many = np.tile(q, (10**6, 1)), np.tile(v, (10**6, 1))\n"
+    "say = lambda word: print(word, time.monotonic(), flush=True)\n"
+)
+REPORT = (
+    "except KeyboardInterrupt as stop:\n"
+    "    say('ended')\n"
+    "    motion = getattr(stop, 'motion', None)\n"
+    "    print('motion', *([] if motion is None else told(motion)), flush=True)\n"
+)
+# what takes long, and what is told of what is kept
+LONG = {
+    "simulate": (
+        "st.simulate(model, q, v, t_span=1e5, output_step=1.0, method='rk4', step=1e-4)",
+        "lambda m: (float(m.t[-1]) > 0, bool(np.isfinite(m.q).all()))",
+    ),
+    "simulate by a function": (
+        "st.simulate(model, q, v, t_span=1e4, output_step=0.01, controller=lambda t, q, v: [0, 0])",
+        "lambda m: (float(m.t[-1]) > 0, bool(np.isfinite(m.q).all()))",
+    ),
+    "simulate by scipy": (
+        "st.simulate(model, q, v, t_span=1e4, output_step=0.01, method='dop853')",
+        "lambda m: (float(m.t[-1]) > 0, bool(np.isfinite(m.q).all()))",
+    ),
+    "rollouts": (
+        "st.simulate(model, np.tile(q, (10**4, 1)), v, t_span=10, output_step=1.0, rtol=1e-12)",
+        "lambda m: (any(e is None for e in m.errors), sum(e is not None for e in m.errors) > 1)",
+    ),
+    "a batch": (
+        "model.forward_dynamics(*many, [0, 0])",
+        "None",
+    ),
+}
+
+
+def child(program, *arguments, **settings) -> subprocess.Popen:
+    """Start a program of Python; it hears Ctrl-C, though a shell's background may not."""
+    return subprocess.Popen(
+        [sys.executable, "-c", HEAR + program, *map(str, arguments)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        **settings,
+    )
+
+
+def ended(process, after: float) -> tuple[str, str, float]:
+    """Return stdout, stderr of a process, and when it was sent Ctrl-C (s)."""
+    time.sleep(after)
+    asked = time.monotonic()
+    process.send_signal(signal.SIGINT)
+    try:
+        return *process.communicate(timeout=PATIENCE), asked
+    finally:
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.parametrize("what", LONG)
+def test_what_takes_long_ends_and_keeps_what_there_is(what, threads):
+    call, told = LONG[what]
+    program = f"{BEGIN}told = {told}\nsay('ready')\ntry:\n    while True:\n        {call}\n{REPORT}"
+    process = child(program, rat().folder, threads)
+    assert process.stdout.readline().startswith("ready")
+    said, errors, asked = ended(process, after=1.0)
+    words, kept = said.splitlines()
+    assert (process.returncode, errors) == (0, "")
+    assert float(words.split()[1]) - asked < PROMPT
+    assert kept == ("motion" if told == "None" else "motion True True")
+
+
+# The command line.
+
+COMMAND = (
+    "import sys; from serpentail.cli import main; print('ready', file=sys.stderr, flush=True); "
+)
+COMMAND += "sys.exit(main(sys.argv[1:]))"
+LASTING = """
+name = "{name}"
+kind = "articulated"
+segments = 1
+links = 3
+{tables}
+"""
+FLIGHT = """
+[simulate]
+duration = 1e4
+output_step = 0.01
+method = "rk4"
+step = 1e-4
+[simulate.start]
+height = 1.0
+rate = [0.1, 0.2, 0.3]
+"""
+PLAN = """
+[plan]
+duration = 0.4
+intervals = 60
+retries = 50
+multi_start = 50
+tolerance = 1e-9
+[plan.start]
+q = [0, 0, 0.3, 0.9, 0.43, 0, 0, 0.1, 0]
+v = [0, -0.3, 2.4, 1, 2, 1, 0, 0]
+"""
+
+
+def command(tmp_path, verb, tables, *options, **settings) -> subprocess.Popen:
+    """Start a verb on a scene of the rat."""
+    scene = tmp_path / "scene.toml"
+    scene.write_text(LASTING.format(name=rat().name, tables=tables))
+    words = [verb, scene, "--folder", rat().folder, "--json", "-", *options]
+    process = child(COMMAND, *words, **settings)
+    assert process.stderr.readline() == "ready\n"
+    return process
+
+
+@pytest.mark.parametrize(("verb", "tables"), [("simulate", FLIGHT), ("plan", PLAN)])
+def test_a_command_ends_in_one_line_and_writes_what_there_is(tmp_path, verb, tables):
+    process = command(tmp_path, verb, tables, "--save", tmp_path / "motion.npz")
+    said, errors, _ = ended(process, after=4.0)
+    assert process.returncode == 130
+    assert errors == "serpentail: interrupted; this is what there was until then\n"
+    assert json.loads(said)["stopped"] == "interrupt"
+    motion = st.Trajectory.load(tmp_path / "motion.npz")
+    assert len(motion.t) > 1 and np.isfinite(motion.q).all()
+    assert {path.name for path in tmp_path.iterdir()} == {"scene.toml", "motion.npz"}
+
+
+SLOW_CC = """#!/bin/sh
+for last; do :; done
+case " $* " in *" -c "*) echo "$$" >> {pids}; sleep 60 & echo "$!" >> {pids}; wait;; esac
+exec cc "$@"
+"""
+
+
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, -15)])
+def test_a_compile_leaves_no_compiler_and_no_half_file(tmp_path, number, status):
+    compiler, pids, cache = tmp_path / "cc", tmp_path / "pids", tmp_path / "cache"
+    compiler.write_text(SLOW_CC.format(pids=pids))
+    compiler.chmod(0o755)
+    environment = os.environ | {"CC": str(compiler), "SERPENTAIL_CACHE": str(cache)}
+    process = child(COMMAND, "info", rat().folder, env=environment)
+    assert process.stderr.readline() == "ready\n"
+    until(lambda: pids.exists() and len(pids.read_text().split()) >= 2)
+    time.sleep(1.0)  # all sources are being compiled
+    process.send_signal(number)
+    begun = time.monotonic()
+    said, errors = process.communicate(timeout=PATIENCE)
+    assert (process.returncode, said) == (status, "")
+    if number == signal.SIGINT:
+        assert time.monotonic() - begun < PROMPT and errors == "serpentail: interrupted\n"
+        until(lambda: not any(alive(int(pid)) for pid in pids.read_text().split()))
+        assert not [path for path in cache.rglob("*") if path.suffix in (".part", ".o", ".so")]
+    else:
+        for pid in filter(alive, map(int, pids.read_text().split())):
+            os.kill(pid, signal.SIGKILL)
+    # what comes next finds nothing broken
+    environment |= {"CC": os.environ.get("CC", "cc")}
+    again = child(COMMAND, "info", rat().folder, env=environment)
+    assert again.communicate(timeout=PATIENCE)[1] == "ready\n" and again.returncode == 0
+
+
+def until(condition) -> None:
+    """Wait for a condition."""
+    end = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+def alive(pid: int) -> bool:
+    """Tell whether a process runs, and is no mere entry of the system's table."""
+    with suppress(OSError):
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    return False
+
+
+# Studies.
+
+STUDY = """
+import sys
+from pathlib import Path
+from examples.studies.parts import part, planned, run
+from tests.support.tumbling import rat, start, AGAIN
+
+def main(folder):
+    part(folder / "first.json", {}, lambda: [1])
+    print("ready", flush=True)
+    endless = {"ipopt.tol": 1e-300, "ipopt.acceptable_iter": 0, "ipopt.max_iter": 10**6}
+    part(folder / "second.json", {}, lambda: [planned(
+        rat(), start=start(rat()), intervals=30, options=endless, **AGAIN).duration])
+
+run(main, Path(sys.argv[1]))
+"""
+
+
+def test_a_study_keeps_its_parts_and_no_plan_that_was_stopped(tmp_path):
+    rat()
+    process = child(STUDY, tmp_path)
+    assert process.stdout.readline() == "ready\n"
+    _, errors, _ = ended(process, after=3.0)
+    assert process.returncode == 130
+    assert errors.splitlines()[-1] == "  interrupted; what is finished is kept"
+    assert "Traceback" not in errors
+    assert [path.name for path in tmp_path.iterdir()] == ["first.json"]
