@@ -156,7 +156,7 @@ def test_workspace_may_begin_anywhere_and_hold_anything(model, name, offset):
     not-a-numbers.
     """
     state = state_of(model)
-    other = Model(model.folder, model.manifest, model.parameters, model.library)
+    other = Model(model.checked, model.parameters, model.library)
     kernel = other.kernel(name)
     size = len(kernel.buffers.work)
     memory = np.full(size + 16 + offset, np.nan)
