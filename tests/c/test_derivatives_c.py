@@ -115,7 +115,7 @@ def built(model, build):
         copy.write_text(text)
         sources = [copy, folder / "src" / f"{model.name}_host.c"]
         library = compile_once("model.so", command, sources, folder / "include")
-    return Model(folder, model.manifest, model.parameters, ctypes.CDLL(str(library)))
+    return Model(model.checked, model.parameters, ctypes.CDLL(str(library)))
 
 
 @every_function
