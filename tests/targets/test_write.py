@@ -59,9 +59,10 @@ def is_whole(folder, files, name):
 
 def test_what_is_the_user_s_comes_along(folder):
     kept = (folder / "build/deep/mine.o").stat(), (folder / "src/same.c").stat()
+    folder.chmod(0o2770)
     write_folder(folder, NEW, {"name": "new"})
     assert is_whole(folder, NEW, "new")
-    assert not (folder / "gone").exists()
+    assert not (folder / "gone").exists() and folder.stat().st_mode & 0o7777 == 0o2770
     assert (folder / "build" / "empty").is_dir()
     assert os.readlink(folder / "build" / "link") == "deep"
     after = (folder / "build/deep/mine.o").stat(), (folder / "src/same.c").stat()

@@ -37,9 +37,17 @@ def pinned(folder: Path) -> Iterator[Callable[[], bool]]:
         yield lambda: not os.path.lexists(folder)
         return
     try:
-        yield lambda: folder.exists() and os.path.samestat(folder.stat(), os.fstat(handle))
+        yield lambda: _leads_to(folder, handle)
     finally:
         os.close(handle)
+
+
+def _leads_to(path: Path, handle: int) -> bool:
+    """Tell whether a path still leads to the folder of a handle."""
+    try:
+        return os.path.samestat(path.stat(), os.fstat(handle))
+    except FileNotFoundError:
+        return False
 
 
 def replace_folder(
@@ -57,6 +65,8 @@ def replace_folder(
         beside.mkdir()
         _fill(beside, folder, contents)
         _bring_along(beside, folder, {*contents, *old})
+        with suppress(FileNotFoundError):
+            shutil.copymode(folder, beside)
         for place in {beside, *(path.parent for path in beside.rglob("*"))}:
             _synchronise(place)
         if not same():
