@@ -176,6 +176,14 @@ def test_damaged_snapshot_is_not_unpickled(folder, cache):
     assert pickle.loads(pickled).checked.files == model.checked.files
 
 
+def test_snapshot_of_another_model_is_not_unpickled(folder, cache):
+    model = st.load(put(folder, model_of(1)))
+    pickled = pickle.dumps(model)
+    (snapshot,) = (cache / "models").iterdir()
+    put(snapshot, model_of(2))
+    assert pickle.loads(pickled).checked.files == model.checked.files
+
+
 def test_models_without_c_need_no_cache(folder, monkeypatch, tmp_path):
     (tmp_path / "file").touch()
     monkeypatch.setenv("SERPENTAIL_CACHE", str(tmp_path / "file" / "cache"))

@@ -40,7 +40,7 @@ def size(entry):
 
 def test_what_was_not_used_for_longest_goes(model, cache, monkeypatch):
     entries = [built(model, number).parent for number in range(4)]
-    for hours, entry in zip((3, 9, 2, 5), entries, strict=True):
+    for hours, entry in zip((20, 9, 2, 5), entries, strict=True):
         used(entry, hours)
     built(model, 0)  # used now
     monkeypatch.setenv("SERPENTAIL_CACHE_SIZE", str(int(4.5 * size(entries[0]))))
