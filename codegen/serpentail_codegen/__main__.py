@@ -67,7 +67,11 @@ def main(argv: list[str] | None = None) -> int:
     from .pipeline import generate  # sympy is imported only now
 
     start = time.perf_counter()
-    changed = generate(scene, arguments.output)
+    try:
+        changed = generate(scene, arguments.output)
+    except SceneError as error:  # its folder cannot be written
+        print(error, file=sys.stderr)
+        return 2
     seconds = time.perf_counter() - start
     folder = arguments.output / scene.name
     print(

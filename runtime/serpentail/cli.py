@@ -86,7 +86,10 @@ def parser() -> argparse.ArgumentParser:
     verify = verbs.add_parser("verify", help="check the laws that a model must obey")
     for verb in (about_model, verify):
         verb.add_argument("folder", help="a generated folder, such as generated/articulated_m3_n4")
-    for verb in (plan, simulate, about_model, verify):
+    # of this machine
+    cache = verbs.add_parser("cache", help="what the cache of compiled models holds, and where")
+    cache.add_argument("--clean", action="store_true", help="empty it")
+    for verb in (plan, simulate, about_model, verify, cache):
         text = "print one JSON object on stdout instead of text"
         verb.add_argument("--json", choices=["-"], help=text)
     return root
@@ -121,7 +124,13 @@ def main(argv: list[str] | None = None) -> int:
 
 def run(arguments: argparse.Namespace) -> tuple[dict[str, Any], str, bool]:
     """Return the report of a verb, as data and as text, and whether all is well."""
-    verbs = {"info": informed, "plan": planned, "simulate": simulated, "verify": verified}
+    verbs = {
+        "info": informed,
+        "plan": planned,
+        "simulate": simulated,
+        "verify": verified,
+        "cache": cached,
+    }
     return verbs[arguments.verb](arguments)
 
 
@@ -175,6 +184,18 @@ def verified(arguments: argparse.Namespace) -> tuple[dict[str, Any], str, bool]:
     model = load(arguments.folder)
     checks = laws(model)
     return summary(model, checks), as_text(model, checks), all(c.passed for c in checks)
+
+
+def cached(arguments: argparse.Namespace) -> tuple[dict[str, Any], str, bool]:
+    """Return what the cache of compiled models holds, emptied before where that is asked for."""
+    from .model.bound import contents, empty
+    from .model.cache import cache_folder
+
+    folder = cache_folder(None)
+    if arguments.clean:
+        empty(folder)
+    report = contents(folder)
+    return report, _rows(report), True
 
 
 def _rows(report: dict[str, Any]) -> str:

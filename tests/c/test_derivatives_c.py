@@ -115,7 +115,7 @@ def built(model, build):
         copy.write_text(text)
         sources = [copy, folder / "src" / f"{model.name}_host.c"]
         library = compile_once("model.so", command, sources, folder / "include")
-    return Model(folder, model.manifest, model.parameters, ctypes.CDLL(str(library)))
+    return Model(model.checked, model.parameters, ctypes.CDLL(str(library)))
 
 
 @every_function
@@ -156,7 +156,7 @@ def test_workspace_may_begin_anywhere_and_hold_anything(model, name, offset):
     not-a-numbers.
     """
     state = state_of(model)
-    other = Model(model.folder, model.manifest, model.parameters, model.library)
+    other = Model(model.checked, model.parameters, model.library)
     kernel = other.kernel(name)
     size = len(kernel.buffers.work)
     memory = np.full(size + 16 + offset, np.nan)

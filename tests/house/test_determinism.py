@@ -14,7 +14,7 @@ import pytest
 from serpentail_codegen.pipeline import generate
 from serpentail_codegen.scene.parse import scene_for
 from serpentail_codegen.targets import write
-from serpentail_codegen.targets.write import digest, write_folder, write_if_changed
+from serpentail_codegen.targets.write import digest, write_folder
 
 OPTIONS = {"functions": ["forward_dynamics", "tail_points", "rollout"], "emission": "loops"}
 NAME = "articulated_m2_n2"
@@ -194,49 +194,11 @@ def test_damaged_manifest_does_no_harm(tmp_path, manifest):
 
 
 def test_text_is_compared_byte_by_byte(tmp_path):
-    path = tmp_path / "text"
+    write_folder(tmp_path / "folder", {"text": "a\n"}, {})
+    path = tmp_path / "folder" / "text"
     path.write_bytes(b"a\r\n")
-    assert write_if_changed(path, "a\n")
+    assert write_folder(path.parent, {"text": "a\n"}, {}) == ["text"]
     assert path.read_bytes() == b"a\n"
-    assert not write_if_changed(path, "a\n")
-    assert write_if_changed(path, "\u00e4")
+    assert not write_folder(path.parent, {"text": "a\n"}, {})
+    assert write_folder(path.parent, {"text": "\u00e4"}, {}) == ["text", "manifest.json"]
     assert path.read_bytes() == "\u00e4".encode()
-
-
-class Interrupted(Exception):
-    """Stands for a stop at any moment."""
-
-
-@pytest.mark.parametrize("moment", range(6))
-@pytest.mark.parametrize("where", ["rename", "write"])
-def test_interrupted_generation_leaves_whole_files(expected, tmp_path, monkeypatch, moment, where):
-    """Each file is the old or the new one, the manifest never newer than the rest; the next run
-    completes.
-    """
-    old_root, new_scene = tmp_path / "expected", scene(real="float")
-    folder = old_root / NAME
-    generate(new_scene, tmp_path / "new")
-    new = texts(tmp_path / "new" / NAME)
-    owner, name = (os, "replace") if where == "rename" else (Path, "write_bytes")
-    original, left = getattr(owner, name), [moment]
-
-    def stopped(*arguments):
-        left[0] -= 1
-        if left[0] < 0:
-            if where == "write":
-                original(arguments[0], arguments[1][: len(arguments[1]) // 2])
-            raise Interrupted
-        return original(*arguments)
-
-    with monkeypatch.context() as patch:
-        patch.setattr(owner, name, stopped)
-        with pytest.raises(Interrupted):
-            generate(new_scene, old_root)
-    found = {key: text for key, text in texts(folder).items() if not Path(key).name.startswith(".")}
-    assert all(text in (expected[key], new[key]) for key, text in found.items())
-    assert found.keys() == expected.keys() and found[MANIFEST] == expected[MANIFEST]
-    assert generate(new_scene, old_root)
-    visible = {
-        key: text for key, text in texts(folder).items() if not Path(key).name.startswith(".")
-    }
-    assert visible == new

@@ -1,9 +1,14 @@
-"""Writes a generated folder: only files whose text changed, the manifest with its hashes last."""
+"""Writes a generated folder, whole or not at all, with a manifest of the files' hashes."""
 
 import hashlib
 import json
 import os
 from pathlib import Path
+
+from ..scene.problems import Problem, SceneError
+from .exchange import holds, pinned, replace_folder, sweep
+
+MANIFEST = "manifest.json"
 
 
 def digest(text: str) -> str:
@@ -17,34 +22,36 @@ def signed(manifest: dict) -> dict:
     return entries | {"manifest_hash": digest(json.dumps(entries, sort_keys=True))}
 
 
-def write_if_changed(path: Path, text: str) -> bool:
-    """Write a file atomically unless it holds the text already; return whether it was written."""
-    if path.is_file() and path.read_bytes() == text.encode():
-        return False
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    temporary.write_bytes(text.encode())
-    os.replace(temporary, path)
-    return True
-
-
 def write_folder(folder: Path, files: dict[str, str], manifest: dict) -> list[str]:
-    """Write all files, the manifest last; drop earlier ones; return the changed names."""
-    manifest = signed(
-        manifest | {"files": {name: digest(text) for name, text in sorted(files.items())}}
-    )
-    changed = [name for name, text in files.items() if write_if_changed(folder / name, text)]
-    _remove_stale(folder, set(files))
-    text = json.dumps(manifest, indent=1, ensure_ascii=False) + "\n"
-    return changed + (["manifest.json"] if write_if_changed(folder / "manifest.json", text) else [])
+    """Write all files and the manifest; drop earlier ones; return the changed names.
 
-
-def _remove_stale(folder: Path, names: set[str]) -> None:
+    Nothing is written where nothing changed.  Files that no manifest names stay.  SceneError where
+    the folder cannot be written; then it is as it was.
+    """
+    listed = {"files": {name: digest(text) for name, text in sorted(files.items())}}
+    described = json.dumps(signed(manifest | listed), indent=1, ensure_ascii=False) + "\n"
+    contents = {name: text.encode() for name, text in {**files, MANIFEST: described}.items()}
+    place = Path(os.path.realpath(folder))  # what a link leads to is exchanged, not the link
     try:
-        earlier = set(json.loads((folder / "manifest.json").read_text())["files"])
-    except (OSError, ValueError, KeyError, TypeError):
-        return
-    for name in earlier - names:
-        target = (folder / name).resolve()
-        if folder.resolve() in target.parents:
-            target.unlink(missing_ok=True)
+        sweep(place.parent)
+        return _written(place, contents)
+    except OSError as error:
+        reason = f"cannot be written ({error.strerror or error}); choose a folder that can"
+        raise SceneError([Problem("generated folder", str(folder), reason)]) from error
+
+
+def _written(folder: Path, contents: dict[str, bytes]) -> list[str]:
+    """Return the names of files that differed, all of them written by now."""
+    while True:  # until no other process is quicker
+        with pinned(folder) as same:
+            changed = [name for name in contents if not holds(folder / name, contents[name])]
+            if not changed or replace_folder(folder, contents, _named(folder), same):
+                return changed
+
+
+def _named(folder: Path) -> set[str]:
+    """Return the names in the folder's manifest; none where it is damaged."""
+    try:
+        return {MANIFEST, *json.loads((folder / MANIFEST).read_text(encoding="utf-8"))["files"]}
+    except (FileNotFoundError, ValueError, KeyError, TypeError, RecursionError):
+        return set()

@@ -6,10 +6,10 @@ It takes a second or two to compile, so it is compiled when it is first worth th
 import ctypes
 import threading
 from collections.abc import Callable
-from pathlib import Path
 from weakref import WeakSet
 
-from .compiler import compile_library
+from .manifest import CheckedFolder
+from .snapshot import model_library
 from .workers import after_fork
 
 MIN_BATCH = 1000  # states: from here on a batch pays for compiling
@@ -21,8 +21,9 @@ RecordFunction = Callable[[int], int]  # takes the address of a record, returns 
 class LazyLibrary:
     """A source of one model that is compiled when it is first needed, not with the model."""
 
-    def __init__(self, folder: Path, manifest: dict, profile: str, part: str):
-        self.folder, self.source, self.profile = folder, f"{manifest['prefix']}_{part}.c", profile
+    def __init__(self, checked: CheckedFolder, profile: str, part: str):
+        self.checked, self.profile = checked, profile
+        self.source = f"src/{checked.manifest['prefix']}_{part}.c"
         self.library: ctypes.CDLL | None = None
         self.lock = threading.Lock()
         _lazy.add(self)
@@ -31,8 +32,7 @@ class LazyLibrary:
         """Return a function that takes the address of a record and returns a status."""
         with self.lock:
             if self.library is None:
-                source = self.folder / "src" / self.source
-                path = compile_library([source], self.folder / "include", self.profile)
+                path = model_library(self.checked, [self.source], self.profile)
                 self.library = ctypes.CDLL(str(path))
         function = getattr(self.library, name)
         function.argtypes = [ctypes.c_void_p]
@@ -57,14 +57,12 @@ class BatchLibrary:
     threads: at most so many evaluate a batch; None: as many as the process may use.
     """
 
-    def __init__(self, folder: Path, manifest: dict, profile: str, threads: int | None = None):
-        self.prefix, self.threads = manifest["prefix"], threads
-        batch = manifest.get("batch", NO_BATCH)
+    def __init__(self, checked: CheckedFolder, profile: str, threads: int | None = None):
+        self.prefix, self.threads = checked.manifest["prefix"], threads
+        batch = checked.manifest.get("batch", NO_BATCH)
         self.states: int = batch["states"]
         self.work: dict[str, int] = batch["work"]
-        self.batch, self.rollouts = (
-            LazyLibrary(folder, manifest, profile, part) for part in LAZY_SOURCES
-        )
+        self.batch, self.rollouts = (LazyLibrary(checked, profile, part) for part in LAZY_SOURCES)
 
     def entry(self, name: str, count: int) -> RecordFunction | None:
         """Return the C function for a batch of so many states, None where it is not worth it."""

@@ -1,4 +1,4 @@
-"""The cache of compiled models: where it is, and how a library gets in whole."""
+"""The cache of compiled models: where it is, whose it is, and how an entry gets in whole."""
 
 from __future__ import annotations
 
@@ -6,17 +6,24 @@ import contextlib
 import hashlib
 import json
 import os
-from collections.abc import Iterator
+import shutil
+import stat
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from ..errors import SerpentailError
+from .reading import regular_bytes
 
-CACHE_FORMAT = 1  # part of every name in the cache: raise it when the meaning of a name changes
+CACHE_FORMAT = 2  # part of every name in the cache: raise it when the meaning of a name changes
 REMEDY_CACHE = "set SERPENTAIL_CACHE to a folder you can write"
+ROOT = 0  # user id of whom nothing can be kept from
 
-
-# The cache: <folder>/<key>/<digest of the library>.so, so one rename publishes a library with its
-# proof.
+# Folders of the cache. An entry is made in PARTS, and one rename puts it in its place.
+LIBRARIES = "libraries"  # <key>/<digest of the library>.so: each has the proof of its content
+MODELS = "models"  # <manifest hash>/: generated folders as they were checked
+COMPILERS = "compilers"  # <key>.json: what a compiler said of itself
+LOCKS = "locks"
+PARTS = "parts"
 
 
 def cache_folder(cache: Path | None) -> Path:
@@ -36,27 +43,96 @@ def digest(data: object) -> str:
     return hashlib.sha256(json.dumps([CACHE_FORMAT, data]).encode()).hexdigest()
 
 
-def trusted(place: Path) -> Path | None:
+# Whose it is.  A library in the cache is run, so nobody else may have put it there.
+
+
+def refuse_others(*paths: Path) -> None:
+    """Raise SerpentailError where others than the user and root own or may write what is there."""
+    for path in paths:
+        with contextlib.suppress(OSError):
+            status = os.stat(path)
+            if status.st_uid not in (os.geteuid(), ROOT):
+                raise _unsafe(path, f"belongs to user {status.st_uid}", "")
+            if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+                private = not status.st_mode & stat.S_ISVTX  # no folder for all, as /tmp is
+                mend = f"`chmod -R go-w {path}` if all in it is yours, or " if private else ""
+                raise _unsafe(path, "is writable by others", mend)
+
+
+def _unsafe(path: Path, fault: str, remedy: str) -> SerpentailError:
+    """Return the error that others could have put libraries into the cache."""
+    return SerpentailError(
+        f"the cache of compiled models: {path} {fault}, who could have you run what they like: "
+        f"{remedy}set SERPENTAIL_CACHE to a folder of your own"
+    )
+
+
+def unwritable(cache: Path, error: OSError) -> SerpentailError:
+    """Return the error that the cache cannot be written."""
+    reason = error.strerror or str(error)
+    return SerpentailError(
+        f"cannot write to the cache of compiled models {cache}: {reason}; {REMEDY_CACHE}"
+    )
+
+
+def own_folder(cache: Path, kind: str) -> Path:
+    """Return a folder of the cache, for the user alone, made where it is missing."""
+    for path in (cache, cache / kind):
+        path.mkdir(0o700, parents=True, exist_ok=True)
+    refuse_others(cache, cache / kind)
+    return cache / kind
+
+
+# Entries.
+
+
+def library_in(place: Path) -> Path | None:
     """Return a library at `place` that has the content it is named after, so no damaged one."""
     with contextlib.suppress(OSError):
-        for path in sorted(place.iterdir()):
-            if path.name == library_name(path):
+        for name in sorted(os.listdir(place)):
+            path = place / name
+            if name == library_name(path):
+                refuse_others(place.parent, place, path)
+                mark_used(place)
                 return path
     return None
 
 
 def library_name(path: Path) -> str:
     """Return the name that the content of `path` deserves."""
-    return f"{hashlib.sha256(path.read_bytes()).hexdigest()}.so"
+    return f"{hashlib.sha256(regular_bytes(path)).hexdigest()}.so"
+
+
+def mark_used(place: Path) -> None:
+    """Note the time, by which entries that nobody uses are told."""
+    with contextlib.suppress(OSError):
+        os.utime(place)
 
 
 @contextlib.contextmanager
-def temporary_file(folder: Path, suffix: str = ".part") -> Iterator[Path]:
-    """Lend an empty file in `folder` under a name that no other process has, gone at the end."""
-    folder.mkdir(parents=True, exist_ok=True)
-    part = folder / f".{os.urandom(12).hex()}{suffix}"
-    part.touch(exist_ok=False)
+def workshop(cache: Path) -> Iterator[Path]:
+    """Lend a new folder of the cache that no other process has, gone at the end."""
+    part = own_folder(cache, PARTS) / os.urandom(12).hex()
+    part.mkdir(0o700)
     try:
         yield part
     finally:
-        part.unlink(missing_ok=True)
+        shutil.rmtree(part, ignore_errors=True)
+
+
+def publish(part: Path, place: Path, whole: Callable[[Path], object]) -> None:
+    """Put an entry in its place by one rename; a whole one that is there stays, another goes."""
+    own_folder(place.parents[1], place.parent.name)
+    try:
+        part.rename(place)
+    except OSError:
+        if whole(place):  # another process was first
+            return
+        discard(place, place.parents[1])
+        part.rename(place)
+
+
+def discard(place: Path, cache: Path) -> None:
+    """Delete an entry, so that nobody sees half of it."""
+    with workshop(cache) as part, contextlib.suppress(FileNotFoundError):
+        place.rename(part / place.name)

@@ -1,6 +1,5 @@
 """A model as CasADi functions, of operations that CasADi knows or of the compiled C."""
 
-import importlib.util
 from types import ModuleType
 from typing import TYPE_CHECKING
 
@@ -29,7 +28,7 @@ class CasadiFunctions:
                 "`targets` of the scene, then generate it again, or take compiled ones, "
                 "external(name)"
             )
-        return _imported(self._model)
+        return self._model.checked.casadi_module
 
     @property
     def _has_module(self) -> bool:
@@ -114,15 +113,3 @@ class CasadiFunctions:
         if name not in self._model.manifest["functions"]:
             raise self._model.without(name)
         return name
-
-
-def _imported(model: "Model") -> ModuleType:
-    """Return the generated module of a model, loaded from its folder."""
-    name = f"{model.name}_casadi"
-    path = model.folder / f"{name}.py"
-    spec = importlib.util.spec_from_file_location(name, path)
-    if spec is None or spec.loader is None:
-        raise ModelError(f"{path} cannot be loaded: generate the model again")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module

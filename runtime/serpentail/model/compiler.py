@@ -7,12 +7,35 @@ import hashlib
 import os
 import shlex
 import subprocess
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
-from ..errors import CompileFailed, ModelError, SerpentailError
-from .cache import REMEDY_CACHE, cache_folder, digest, library_name, temporary_file, trusted
-from .toolchain import Toolchain, check_profile, examine, recall, run_command, run_commands
+from ..errors import CompileFailed, ModelError
+from .bound import bound, limit
+from .cache import (
+    LIBRARIES,
+    cache_folder,
+    digest,
+    library_in,
+    library_name,
+    publish,
+    refuse_others,
+    unwritable,
+    workshop,
+)
+from .locks import alone
+from .reading import regular_bytes
+from .toolchain import (
+    Toolchain,
+    check_profile,
+    examine,
+    kept_surroundings,
+    recall,
+    run_command,
+    run_commands,
+)
+
+Places = tuple[Sequence[Path], Path]  # sources, and the folder of their headers
 
 SHARED_FLAGS = ("-fPIC", "-shared")
 LONGEST_REPORT = 6000  # characters of a compiler's output that an error shows
@@ -30,19 +53,34 @@ def compile_library(
     cache. Raises CompilerNotFound, CompileFailed, ModelError (unreadable sources), SerpentailError
     (profile, cache).
     """
+    text = _text_of(sources, include)
+    return library_of(text, lambda: (sources, include), profile, cache_folder(cache))
+
+
+def library_of(text: str, places: Callable[[], Places], profile: str, cache: Path) -> Path:
+    """Return the library of texts that have this digest; where they lie is asked to compile them.
+
+    One process compiles while others wait for it.  Errors as of ``compile_library``.
+    """
     check_profile(profile)
-    folder = cache_folder(cache)
-    text = _text_digest(sources, include)
-    noted = recall(profile, folder)
-    library = trusted(folder / _key(text, noted)) if noted else None
+    refuse_others(cache)
+    library = _noted(text, profile, cache)
     if library:
         return library
-    # A note may describe a compiler since upgraded behind a wrapper, so nothing is built on
-    # its word.
-    toolchain = examine(profile, folder)
-    return trusted(folder / _key(text, toolchain)) or _build(
-        sources, include, text, toolchain, folder
-    )
+    with alone(cache, digest([text, profile])):
+        library = _noted(text, profile, cache)
+        if library:
+            return library
+        # A note may describe a compiler since upgraded behind a wrapper, so nothing is built on
+        # its word.
+        toolchain = examine(profile, cache)
+        return library_in(_place(text, toolchain, cache)) or _build(text, places, toolchain, cache)
+
+
+def _noted(text: str, profile: str, cache: Path) -> Path | None:
+    """Return the library that the compiler made which notes tell of; no process is started."""
+    toolchain = recall(profile, cache)
+    return library_in(_place(text, toolchain, cache)) if toolchain else None
 
 
 def describe_compiler(profile: str = "fast") -> dict[str, object]:
@@ -56,14 +94,22 @@ def describe_compiler(profile: str = "fast") -> dict[str, object]:
     }
 
 
-def _text_digest(sources: Sequence[Path], include: Path) -> str:
-    """Return the digest of the sources, in order, and of the headers that they can reach."""
+def text_digest(sources: Sequence[tuple[str, str]], headers: Iterable[tuple[str, str]]) -> str:
+    """Return the digest of sources, in order, and of the headers that they can reach.
+
+    Of each its name, for headers as it is included, and the SHA-256 of its content.
+    """
+    return digest([*sources, *sorted(headers)])
+
+
+def _text_of(sources: Sequence[Path], include: Path) -> str:
+    """Return the digest of the texts in folders."""
     if not sources or not include.is_dir():
         raise ModelError(f"no sources, or no header folder {include}; generate the model again")
     try:
-        named = [(path.name, path) for path in sources] + list(_headers(sources, include))
-        return digest(
-            [(name, hashlib.sha256(path.read_bytes()).hexdigest()) for name, path in named]
+        return text_digest(
+            [(path.name, _sha256(path)) for path in sources],
+            [(name, _sha256(path)) for name, path in _headers(sources, include)],
         )
     except OSError as error:
         raise ModelError(
@@ -71,20 +117,25 @@ def _text_digest(sources: Sequence[Path], include: Path) -> str:
         ) from error
 
 
+def _sha256(path: Path) -> str:
+    return hashlib.sha256(regular_bytes(path)).hexdigest()
+
+
 def _headers(sources: Sequence[Path], include: Path) -> Iterator[tuple[str, Path]]:
-    """Yield name and path of the headers below `include` and beside the sources, sorted."""
-    for path in sorted(include.rglob("*.h")):
+    """Yield name and path of the headers below `include` and beside the sources."""
+    for path in include.rglob("*.h"):
         yield path.relative_to(include).as_posix(), path
     for folder in dict.fromkeys(path.parent for path in sources):
-        for path in sorted(folder.glob("*.h")):
+        for path in folder.glob("*.h"):
             yield f"./{path.name}", path
 
 
-def _key(text: str, toolchain: Toolchain) -> str:
-    """Return the digest of the C text and of all that its machine code depends on."""
+def _place(text: str, toolchain: Toolchain, cache: Path) -> Path:
+    """Return where the library is, named after the C text and all that machine code depends on."""
     command = _public_command((os.path.realpath(toolchain.command[0]), *toolchain.command[1:]))
     flags = (*toolchain.flags, *SHARED_FLAGS)
-    return digest([text, command, toolchain.version, flags, toolchain.target, _c_library()])
+    machine = (toolchain.version, flags, toolchain.target, kept_surroundings(), _c_library())
+    return cache / LIBRARIES / digest([text, command, *machine])
 
 
 def _public_command(command: tuple[str, ...]) -> tuple[str, ...]:
@@ -99,45 +150,44 @@ def _c_library() -> str:
     return ""
 
 
-def _build(
-    sources: Sequence[Path], include: Path, text: str, toolchain: Toolchain, folder: Path
-) -> Path:
-    """Compile into a file of our own; one rename then shows others the whole library."""
-    place = folder / _key(text, toolchain)
+def _build(text: str, places: Callable[[], Places], toolchain: Toolchain, cache: Path) -> Path:
+    """Compile in a folder of our own; one rename then shows others the whole library."""
+    place, most = _place(text, toolchain, cache), limit()
+    sources, include = places()
     try:
-        with temporary_file(folder) as part:
-            _compile(sources, include, toolchain, part)
-            if _text_digest(sources, include) != text:
+        with workshop(cache) as part:
+            made, entry = part / "library.part", part / "entry"
+            _compile(sources, include, toolchain, made)
+            if _text_of(sources, include) != text:
                 raise ModelError(f"{sources[0].parent} changed while it was compiled; run again")
-            library = place / library_name(part)
-            place.mkdir(exist_ok=True)
-            return part.replace(library)
+            entry.mkdir(0o700)
+            made.chmod(0o700)
+            name = library_name(made)
+            made.rename(entry / name)
+            publish(entry, place, library_in)
+        bound(cache, most)
+        return library_in(place) or place / name
     except OSError as error:
-        reason = error.strerror or str(error)
-        message = f"cannot write to the cache of compiled models {folder}: {reason}; {REMEDY_CACHE}"
-        raise SerpentailError(message) from error
+        raise unwritable(cache, error) from error
 
 
-def _compile(sources: Sequence[Path], include: Path, toolchain: Toolchain, part: Path) -> None:
-    """Compile the sources at the same time and link them into `part`, or raise CompileFailed."""
+def _compile(sources: Sequence[Path], include: Path, toolchain: Toolchain, made: Path) -> None:
+    """Compile the sources at the same time and link them into `made`, or raise CompileFailed."""
     compiler = (*toolchain.command, *toolchain.flags)
-    with contextlib.ExitStack() as objects:
-        # one object for each source
-        files = [str(objects.enter_context(temporary_file(part.parent, ".o"))) for _ in sources]
-        headers = ("-fPIC", "-I", str(include.absolute()))
-        commands = [
-            (*compiler, *headers, "-c", str(source.absolute()), "-o", file)
-            for source, file in zip(sources, files, strict=True)
-        ]
-        for command, finished in zip(commands, run_commands(commands), strict=True):
-            if finished.returncode:
-                raise _failure(command, finished)
-
-        # the library
-        command = (*compiler, *SHARED_FLAGS, *files, "-o", str(part), "-lm")
-        finished = run_command(command)
-        if finished.returncode or not part.is_file() or part.stat().st_size == 0:
+    headers = ("-fPIC", "-I", str(include.absolute()))
+    files = [str(made.with_name(f"{k}.o")) for k in range(len(sources))]
+    commands = [
+        (*compiler, *headers, "-c", str(source.absolute()), "-o", file)
+        for source, file in zip(sources, files, strict=True)
+    ]
+    for command, finished in zip(commands, run_commands(commands), strict=True):
+        if finished.returncode:
             raise _failure(command, finished)
+
+    command = (*compiler, *SHARED_FLAGS, *files, "-o", str(made), "-lm")
+    finished = run_command(command)
+    if finished.returncode or not made.is_file() or made.stat().st_size == 0:
+        raise _failure(command, finished)
 
 
 def _failure(command: tuple[str, ...], finished: subprocess.CompletedProcess[str]) -> CompileFailed:

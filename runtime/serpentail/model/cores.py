@@ -26,11 +26,11 @@ def threads(asked: int | None = None) -> int:
         return asked
     chosen = os.environ.get(VARIABLE, "").strip()
     if chosen:
-        return checked(VARIABLE, int(chosen) if chosen.isdecimal() else chosen)
+        return checked_threads(VARIABLE, int(chosen) if chosen.isdecimal() else chosen)
     return 1 if _is_worker() else cores()
 
 
-def checked(field: str, value: object, error: type[Exception] = SerpentailError) -> int:
+def checked_threads(field: str, value: object, error: type[Exception] = SerpentailError) -> int:
     """Return a number of threads; the error names the field and what it needs."""
     whole = index(value) if isinstance(value, SupportsIndex) else 0
     if 1 <= whole <= MOST_THREADS and not isinstance(value, bool):

@@ -1,11 +1,17 @@
-"""Reads the manifest of a generated folder, and checks it against the files beside it."""
+"""Reads a generated folder whole, and checks its files against the manifest among them."""
 
 import hashlib
 import json
-from pathlib import Path
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from types import ModuleType
 
 from .. import __version__
 from ..errors import ModelError
+from .kept import kept
+from .reading import handle_of, leads_to, regular_bytes
 
 FORMAT = 2
 KEYS = [
@@ -19,23 +25,49 @@ KEYS = [
     "manifest_hash",
 ]
 C_KEYS = ["abi_hash", "work", "batch"]  # of models with C
+MOST_READS = 100  # of a folder that is exchanged again and again while it is read
+
+
+@dataclass(frozen=True, eq=False)
+class CheckedFolder:
+    """A generated folder as it was when it was checked, whatever becomes of the folder.
+
+    files: the content of each file that the manifest names, by that name.
+    """
+
+    folder: Path
+    manifest: dict
+    files: Mapping[str, bytes]
+
+    @property
+    def manifest_hash(self) -> str:
+        """The digest of the manifest, and with it of all files."""
+        return str(self.manifest["manifest_hash"])
+
+    @kept
+    def casadi_module(self) -> ModuleType:
+        """The generated module of CasADi functions, executed from the text that was checked."""
+        name = f"{self.manifest['prefix']}_casadi"
+        module = ModuleType(name)
+        exec(compile(self.files[f"{name}.py"], f"<{name}.py>", "exec"), module.__dict__)
+        return module
+
+
+class Exchanged(ModelError):
+    """Another folder came in a folder's place while it was read."""
+
+
+def read_folder(folder: Path) -> CheckedFolder:
+    """Return a folder's manifest and files; ModelError where one is missing, stale or changed."""
+    for _ in range(MOST_READS - 1):
+        with suppress(Exchanged):
+            return _read(folder)
+    return _read(folder)
 
 
 def read_manifest(folder: Path) -> dict:
-    """Return a folder's manifest; ModelError where it is missing, stale or unlike the files."""
-    path = folder / "manifest.json"
-    if not path.is_file():
-        raise ModelError(
-            f"{folder} is no generated folder (it has no manifest.json): make one, as by `make "
-            "model TAIL=articulated "
-            "M=3 N=4`, or python -m serpentail_codegen SCENE.toml"
-        )
-    try:
-        manifest = json.loads(path.read_text(encoding="utf-8"))
-        _check(folder, manifest)
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
-        raise ModelError(f"{path} is damaged ({error}): {remedy(folder)}") from error
-    return manifest
+    """Return a folder's manifest, checked as ``read_folder`` does."""
+    return read_folder(folder).manifest
 
 
 def remedy(folder: Path) -> str:
@@ -46,8 +78,76 @@ def remedy(folder: Path) -> str:
     )
 
 
+def _read(folder: Path) -> CheckedFolder:
+    """Return what one handle of the folder shows; Exchanged where the folder is another by then."""
+    try:
+        with handle_of(folder) as handle:
+            try:
+                return _checked(folder, handle)
+            except ModelError as error:
+                if leads_to(folder, handle):
+                    raise
+                raise Exchanged(f"{folder} is exchanged all the time: load it later") from error
+    except (FileNotFoundError, NotADirectoryError, ValueError) as error:
+        raise _no_folder(folder) from error
+    except OSError as error:
+        raise ModelError(
+            f"{folder} cannot be read ({error.strerror}): give the path of a generated folder"
+        ) from error
+
+
+def _no_folder(folder: Path) -> ModelError:
+    return ModelError(
+        f"{folder} is no generated folder (it has no manifest.json): make one, as by `make "
+        "model TAIL=articulated "
+        "M=3 N=4`, or python -m serpentail_codegen SCENE.toml"
+    )
+
+
+def _unreadable(folder: Path, path: Path, error: OSError) -> ModelError:
+    return ModelError(f"{path} cannot be read ({error.strerror}): {remedy(folder)}")
+
+
+def _checked(folder: Path, handle: int) -> CheckedFolder:
+    """Return the manifest and the files that it names, each read once."""
+    path = folder / "manifest.json"
+    try:
+        text = regular_bytes(path.name, handle)
+    except FileNotFoundError as error:
+        raise _no_folder(folder) from error
+    except OSError as error:
+        raise _unreadable(folder, path, error) from error
+    try:
+        manifest = json.loads(text.decode())
+        _check(folder, manifest)
+        names = {name: digest for name, digest in manifest["files"].items() if _inside(name)}
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        raise ModelError(f"{path} is damaged ({error}): {remedy(folder)}") from error
+    return CheckedFolder(folder, manifest, {n: _file(folder, handle, n, names[n]) for n in names})
+
+
+def _inside(name: str) -> bool:
+    """Refuse a name of a file that leads out of its folder."""
+    path = PurePosixPath(name)
+    if path.is_absolute() or ".." in path.parts or "\0" in name:
+        raise ValueError(f"the file name {name!r} leads out of the folder")
+    return True
+
+
+def _file(folder: Path, handle: int, name: str, digest: str) -> bytes:
+    """Return a file's content, which must have this digest."""
+    path = folder / name
+    try:
+        content = regular_bytes(name, handle)
+    except OSError as error:
+        raise _unreadable(folder, path, error) from error
+    if _sha256(content) != digest:
+        raise ModelError(f"{path} was changed after it was generated: {remedy(folder)}")
+    return content
+
+
 def _check(folder: Path, manifest: dict) -> None:
-    """Refuse a manifest of another version, one that lacks keys, and one or files that changed."""
+    """Refuse a manifest of another version, one that lacks keys, and one that was changed."""
     if (manifest["format"], manifest["generator"]) != (FORMAT, __version__):
         made = f"format {manifest['format']}, generator {manifest['generator']}"
         raise ModelError(
@@ -65,15 +165,6 @@ def _check(folder: Path, manifest: dict) -> None:
             "parameters are changed "
             "by st.load(folder, parameters=...), sizes by another scene"
         )
-    for name, digest in manifest["files"].items():
-        path = folder / name
-        try:
-            content = path.read_bytes()
-        except OSError as error:
-            reason = error.strerror
-            raise ModelError(f"{path} cannot be read ({reason}): {remedy(folder)}") from error
-        if _sha256(content) != digest:
-            raise ModelError(f"{path} was changed after it was generated: {remedy(folder)}")
 
 
 def _sha256(content: bytes) -> str:

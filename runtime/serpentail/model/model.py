@@ -2,6 +2,7 @@
 
 import ctypes
 from collections.abc import Mapping
+from contextlib import suppress
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,16 +10,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import ModelError
+from ..errors import ModelError, SerpentailError
 from .batch import BatchLibrary
-from .cores import checked
+from .cache import cache_folder
+from .cores import checked_threads
 from .functions import Functions
 from .kept import kept
 from .kernel import Kernel
 from .layout import Layout
 from .library import open_library
-from .manifest import read_manifest
+from .manifest import CheckedFolder, read_folder
 from .parameters import RunParameters, Value, flat, merged, real_type, resolve, warn_of_unlike
+from .snapshot import restored, snapshot
 
 if TYPE_CHECKING:
     from .casadi import CasadiFunctions
@@ -48,18 +51,40 @@ def load(
         raise ModelError(
             f"folder: value {folder!r:.60}: needs the path of a generated folder"
         ) from None
-    manifest = read_manifest(folder)
+    return _loaded(read_folder(folder), parameters, profile, compiled, threads)
+
+
+def _loaded(
+    checked: CheckedFolder,
+    parameters: Mapping[str, object] | None,
+    profile: str | None,
+    compiled: bool,
+    threads: int | None,
+) -> "Model":
+    """Return the model of a folder that was checked."""
+    manifest = checked.manifest
     values = resolve(manifest, parameters)
-    warn_of_unlike(values)
+    warn_of_unlike(values, 3)  # who calls st.load
     profile = manifest["scene"]["profile"] if profile is None else profile
     if not isinstance(compiled, bool | np.bool_):
         raise ModelError(f"compiled: value {compiled!r:.60}: needs True or False")
     if compiled and "c" not in manifest["scene"]["targets"]:
         raise _without_c(manifest)
-    threads = None if threads is None else checked("threads", threads, ModelError)
-    library = open_library(folder, manifest, profile) if compiled else None
-    batches = BatchLibrary(folder, manifest, profile, threads)
-    return Model(folder, manifest, values, library, profile, batches)
+    threads = None if threads is None else checked_threads("threads", threads, ModelError)
+    library = open_library(checked, profile) if compiled else None
+    batches = BatchLibrary(checked, profile, threads)
+    return Model(checked, values, library, profile, batches)
+
+
+def _unpickled(
+    manifest_hash: str,
+    folder: Path,
+    parameters: Mapping[str, object],
+    profile: str,
+    options: tuple[bool, int | None],
+) -> "Model":
+    """Return a pickled model, of the manifest that it was pickled with."""
+    return _loaded(restored(manifest_hash, folder), parameters, profile, *options)
 
 
 def _without_c(manifest: Mapping[str, Any]) -> ModelError:
@@ -81,20 +106,20 @@ class Model(Functions):
     batch axis; a single state is repeated over a batch.  All raise StateError on a wrong shape or a
     value that is not finite, ModelError where the scene left the function out. With the profile
     "fast" the last digits of a state may depend on the size of its batch. Threads may share a
-    model; a pickled one is loaded anew from its folder.
+    model. Whatever becomes of its folder, it goes on as it was checked, and so does a pickled one.
     """
 
     def __init__(
         self,
-        folder: Path,
-        manifest: dict,
+        checked: CheckedFolder,
         parameters: Mapping[str, Any],
         library: ctypes.CDLL | None,
         profile: str = "fast",
         batch_library: BatchLibrary | None = None,
     ):
-        self.folder, self.manifest, self.parameters = folder, manifest, parameters
-        self.library, self.profile = library, profile
+        manifest = checked.manifest
+        self.checked, self.folder, self.manifest = checked, checked.folder, manifest
+        self.parameters, self.library, self.profile = parameters, library, profile
         # what the tail is made of
         self.name: str = manifest["prefix"]
         self.kind: str = manifest["scene"]["kind"]
@@ -107,7 +132,7 @@ class Model(Functions):
         self.contacts = {entry["group"]: entry["count"] for entry in manifest["contacts"]}
         # its functions, as compiled
         self.parameter_vector = np.array(flat(manifest, parameters), real_type(manifest))
-        self.batch_library = batch_library or BatchLibrary(folder, manifest, profile)
+        self.batch_library = batch_library or BatchLibrary(checked, profile)
         self.kernels: dict[str, Kernel] = {}
         if library is not None:
             libraries = library, self.batch_library
@@ -122,9 +147,17 @@ class Model(Functions):
         """Return this model with other parameters; nothing is compiled.  Warns as ``load`` does."""
         values = resolve(self.manifest, merged(self._independent(), changes))
         warn_of_unlike(values)
-        return Model(
-            self.folder, self.manifest, values, self.library, self.profile, self.batch_library
-        )
+        return self._twin(values)
+
+    def _twin(self, parameters: Mapping[str, Any]) -> "Model":
+        """Return a model of the same code."""
+        return Model(self.checked, parameters, self.library, self.profile, self.batch_library)
+
+    def __copy__(self) -> "Model":
+        return self._twin(self.parameters)
+
+    def __deepcopy__(self, _: dict[int, Any]) -> "Model":
+        return self._twin(self.parameters)  # nothing in it changes
 
     def parameters_of_runs(self, changes: Mapping[str, object] | None, runs: int) -> RunParameters:
         """Return the parameters of many runs; changes: name -> (runs,) or (runs, 3), SI."""
@@ -143,12 +176,14 @@ class Model(Functions):
         return {name: value for name, value in self.parameters.items() if name != computed}
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return load, (
+        with suppress(SerpentailError):  # a folder that is as it was serves too
+            snapshot(self.checked, cache_folder(None))
+        return _unpickled, (
+            self.checked.manifest_hash,
             self.folder.absolute(),
             self._independent(),
             self.profile,
-            self.library is not None,
-            self.batch_library.threads,
+            (self.library is not None, self.batch_library.threads),
         )
 
     @property

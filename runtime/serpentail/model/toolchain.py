@@ -17,8 +17,9 @@ from typing import Any
 
 from ..checks import one_of
 from ..errors import CompilerNotFound, SerpentailError
-from .cache import digest, temporary_file
+from .cache import COMPILERS, digest, publish, refuse_others, workshop
 from .commands import run_all
+from .reading import regular_bytes
 
 # -std=c99 alone turns contraction off, so the fast profile asks for it by name.
 PROFILES = {
@@ -41,6 +42,11 @@ REMEDY_NOT_FOUND = (
     "`pip install ziglang`) or set CC to the command of a C compiler. "
     "Without a compiler the CasADi functions of a model still evaluate."
 )
+# What a compiler is given of the environment: much else that it reads, such as CPATH, changes what
+# it makes.  Of these the places do not, and the rest is part of every key.
+PLACES = ("PATH", "HOME", "TMPDIR", "XDG_CACHE_HOME", "XDG_CONFIG_HOME", "PYTHONPATH")
+KEPT = ("LD_LIBRARY_PATH", "SDKROOT", "DEVELOPER_DIR", "MACOSX_DEPLOYMENT_TARGET")
+KEPT_OF = ("CCACHE_", "SCCACHE_", "ZIG_", "NIX_")  # wrappers of compilers
 
 
 @dataclass(frozen=True)
@@ -147,12 +153,22 @@ def run_command(command: Sequence[str]) -> subprocess.CompletedProcess[str]:
 
 def run_commands(commands: Sequence[Sequence[str]]) -> list[subprocess.CompletedProcess[str]]:
     """Return the finished commands, run at the same time; 127 where one could not be started."""
-    surroundings = {**os.environ, "LC_ALL": "C"}
+    places = {name: os.environ[name] for name in PLACES if name in os.environ}
+    surroundings = {**places, **kept_surroundings(), "LC_ALL": "C"}
     try:
         return run_all(commands, surroundings)
     except OSError as error:
         reason = error.strerror or str(error)
         return [subprocess.CompletedProcess(each, 127, "", reason) for each in commands]
+
+
+def kept_surroundings() -> dict[str, str]:
+    """Return what a compiler is given of the environment that may change what it makes."""
+    return {
+        name: value
+        for name, value in sorted(os.environ.items())
+        if name in KEPT or name.startswith(KEPT_OF)
+    }
 
 
 # Notes: what a compiler said, kept so that a warm call starts no process.
@@ -173,23 +189,35 @@ def _note_path(folder: Path, command: tuple[str, ...], profile: str) -> Path:
     """Return the place of a note, named after programs, flags to choose from and processor."""
     programs = [_file_identity(path) for path in map(shutil.which, command) if path]
     choices = (PROFILES[profile], CPU_FLAGS[profile])
-    return folder / "compilers" / f"{digest([command, programs, choices, _processor()])}.json"
+    machine = (_processor(), kept_surroundings())
+    return folder / COMPILERS / f"{digest([command, programs, choices, *machine])}.json"
 
 
 def _file_identity(path: str) -> tuple[str, int, int]:
     """Return what changes when the program at `path` is replaced."""
-    status = os.stat(path)
-    return os.path.realpath(path), status.st_mtime_ns, status.st_size
+    with contextlib.suppress(OSError):
+        status = os.stat(path)
+        return os.path.realpath(path), status.st_mtime_ns, status.st_size
+    return path, 0, 0
 
 
 def _read_note(path: Path) -> dict[str, Any] | None:
     """Return a whole note, or None."""
     try:
-        note = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        note = json.loads(regular_bytes(path).decode())
+    except (OSError, ValueError, RecursionError):
         return None
-    whole = isinstance(note, dict) and {"works", "flags", "version", "target"} <= note.keys()
-    return note if whole else None
+    refuse_others(path.parent, path)
+    return note if _is_whole(note) else None
+
+
+def _is_whole(note: object) -> bool:
+    """Tell whether a note has all that is looked up in it, of the right types."""
+    if not isinstance(note, dict) or not isinstance(note.get("works"), bool):
+        return False
+    texts = (note.get("version"), note.get("target"))
+    flags = note.get("flags")
+    return isinstance(flags, list) and all(isinstance(text, str) for text in (*texts, *flags))
 
 
 def _write_note(
@@ -199,9 +227,11 @@ def _write_note(
     blank = Toolchain(command, (), "", "")
     note = {"works": toolchain is not None, **asdict(toolchain or blank)}
     path = _note_path(folder, command, profile)
-    with contextlib.suppress(OSError), temporary_file(path.parent) as part:
-        part.write_text(json.dumps(note), encoding="utf-8")
-        part.replace(path)
+    with contextlib.suppress(OSError), workshop(folder) as part:
+        made = part / path.name
+        made.write_text(json.dumps(note), encoding="utf-8")
+        made.chmod(0o600)
+        publish(made, path, lambda _: False)
 
 
 def _processor() -> str:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import ModelError, SimulationError, StateError
-from ..model.cores import checked
+from ..model.cores import checked_threads
 from ..model.kernel import RunKernel
 from ..model.layout import TAIL_V
 from ..model.model import Model
@@ -93,7 +93,7 @@ def _threads(model: Model, start: Start, asked: int | None) -> int | None:
             f"threads: value {asked!r:.60}: one start only, which takes one: leave it out, or give "
             "q0 or v0 a row a run"
         )
-    return checked("threads", asked, SimulationError)
+    return checked_threads("threads", asked, SimulationError)
 
 
 def _spent(clocks: tuple[float, float]) -> dict[str, float]:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.model.compiler import compile_library
+from serpentail.model.snapshot import model_library
 
 from .tails import alone, given, model, states
 
@@ -19,7 +19,7 @@ def test_a_few_states_compile_nothing_and_many_do_once(monkeypatch):
     monkeypatch.setattr("serpentail.model.batch.MIN_BATCH", 1000)
     built = []
     monkeypatch.setattr(
-        "serpentail.model.batch.compile_library", lambda *a: built.append(a) or compile_library(*a)
+        "serpentail.model.batch.model_library", lambda *a: built.append(a) or model_library(*a)
     )
     found = st.load(model().folder)
     found.mass_matrix(states(found, 999)["q"])

@@ -63,11 +63,11 @@ def test_arguments_of_cc_reach_the_key_and_the_compiler(model, monkeypatch):
     assert built == [63.0, 84.0]
 
 
-def test_another_processor_gets_another_library(model, monkeypatch, script):
-    script('case "$*" in *help=target*) echo "-march= $PROCESSOR"; exit 0;; esac')
+def test_another_processor_gets_another_library(model, monkeypatch, script, tmp_path):
+    script(f'case "$*" in *help=target*) cat {tmp_path}/processor; exit 0;; esac')
     built = []
     for processor in ("zen", "lake"):
-        monkeypatch.setenv("PROCESSOR", processor)
+        (tmp_path / "processor").write_text(f"-march= {processor}\n")
         monkeypatch.setattr(
             "serpentail.model.toolchain._processor", lambda processor=processor: processor
         )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.model.compiler import compile_library
+from serpentail.model.snapshot import model_library
 from serpentail.simulation import batched_runs
 
 from ...support.models import model_folder
@@ -113,9 +113,9 @@ def test_a_flight_that_fails_abreast_loses_no_other():
 
 def test_few_steps_compile_nothing_and_other_laws_fly_alone(monkeypatch):
     built = []
-    compiled = compile_library
+    compiled = model_library
     monkeypatch.setattr(
-        "serpentail.model.batch.compile_library", lambda *a: built.append(a) or compiled(*a)
+        "serpentail.model.batch.model_library", lambda *a: built.append(a) or compiled(*a)
     )
     model = st.load(tail().folder)
     q, v = starts(model, 9)

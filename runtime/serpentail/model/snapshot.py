@@ -1,0 +1,112 @@
+"""Private copies of generated folders in the cache, from which alone models are compiled."""
+
+import json
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path, PurePosixPath
+
+from ..errors import ModelError, SerpentailError
+from .cache import (
+    MODELS,
+    cache_folder,
+    mark_used,
+    publish,
+    refuse_others,
+    unwritable,
+    workshop,
+)
+from .compiler import library_of, text_digest
+from .manifest import CheckedFolder, read_folder
+from .reading import regular_bytes
+
+
+def model_library(checked: CheckedFolder, sources: Sequence[str], profile: str) -> Path:
+    """Return the library of some of a model's sources; errors as of ``compile_library``."""
+    cache = cache_folder(None)
+
+    def places() -> tuple[list[Path], Path]:
+        folder = snapshot(checked, cache)
+        return [folder / name for name in sources], folder / "include"
+
+    return library_of(_text(checked, sources), places, profile, cache)
+
+
+def _text(checked: CheckedFolder, sources: Sequence[str]) -> str:
+    """Return the digest of sources, and of the headers that they can reach."""
+    digests = checked.manifest["files"]
+    paths = [PurePosixPath(name) for name in digests]
+    headers = [path for path in paths if path.suffix == ".h"]
+    beside = {PurePosixPath(name).parent for name in sources}
+    return text_digest(
+        [(PurePosixPath(name).name, digests[name]) for name in sources],
+        [
+            *(
+                (p.relative_to("include").as_posix(), digests[str(p)])
+                for p in headers
+                if p.parts[0] == "include"
+            ),
+            *((f"./{p.name}", digests[str(p)]) for p in headers if p.parent in beside),
+        ],
+    )
+
+
+def snapshot(checked: CheckedFolder, cache: Path) -> Path:
+    """Return the folder in the cache that has a model's files and no others, made where needed.
+
+    SerpentailError where it cannot be written.
+    """
+    place = cache / MODELS / checked.manifest_hash
+    content = _content(checked)
+    try:
+        if not _holds(place, content):
+            with workshop(cache) as part:
+                (part / "model").mkdir(0o700)
+                for name, text in content.items():
+                    path = part / "model" / name
+                    path.parent.mkdir(parents=True, exist_ok=True)
+                    path.write_bytes(text)
+                publish(part / "model", place, lambda place: _holds(place, content))
+    except OSError as error:
+        raise unwritable(cache, error) from error
+    mark_used(place)
+    return place
+
+
+def restored(manifest_hash: str, folder: Path) -> CheckedFolder:
+    """Return the model of a manifest's hash, from the cache or else from its folder.
+
+    ModelError where neither has it.
+    """
+    with suppress(SerpentailError):
+        place = cache_folder(None) / MODELS / manifest_hash
+        refuse_others(place.parents[1], place.parent, place)
+        found = read_folder(place)
+        if found.manifest_hash == manifest_hash:
+            mark_used(place)
+            return replace(found, folder=folder)
+    found = read_folder(folder)
+    if found.manifest_hash != manifest_hash:
+        raise ModelError(
+            f"{folder} was generated again since the model was pickled (its manifest was "
+            f"{manifest_hash:.12}, now {found.manifest_hash:.12}), and the cache has the pickled "
+            "one no longer: generate it again as it was, or load and pickle the model anew"
+        )
+    return found
+
+
+def _content(checked: CheckedFolder) -> dict[str, bytes]:
+    """Return the files of a snapshot; equal manifests, however laid out, give the same text."""
+    return {**checked.files, "manifest.json": json.dumps(checked.manifest, sort_keys=True).encode()}
+
+
+def _holds(place: Path, content: dict[str, bytes]) -> bool:
+    """Tell whether a folder has these files and no others."""
+    refuse_others(place)
+    try:
+        names = {p.relative_to(place).as_posix() for p in place.rglob("*") if not p.is_dir()}
+        return names == content.keys() and all(
+            regular_bytes(place / name) == text for name, text in content.items()
+        )
+    except OSError:
+        return False

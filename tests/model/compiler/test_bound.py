@@ -1,0 +1,133 @@
+"""The cache has a size, by which what nobody uses goes; a command tells what is in it."""
+
+import ctypes
+import json
+import os
+import pickle
+import shutil
+import time
+
+import numpy as np
+import pytest
+
+import serpentail as st
+from serpentail import cli
+from serpentail.model import bound, compiler
+from tests.support.file_faults import HOUR, age
+from tests.support.models import model_folder
+
+from .sources import TWICE, call_twice
+
+Q = [0, 0, 0, 1, 0, 0, 0, 0.3, -0.2]
+
+
+def built(model, number):
+    """The library of a text of its own."""
+    (source,), include = model
+    source.write_text(f"{TWICE}int number = {number};\n")
+    return compiler.compile_library([source], include)
+
+
+def used(path, hours):
+    """Let an entry be used last so many hours ago."""
+    then = time.time() - hours * HOUR
+    os.utime(path, (then, then))
+
+
+def size(entry):
+    return sum(path.stat().st_size for path in entry.iterdir())
+
+
+def test_what_was_not_used_for_longest_goes(model, cache, monkeypatch):
+    entries = [built(model, number).parent for number in range(4)]
+    for hours, entry in zip((20, 9, 2, 5), entries, strict=True):
+        used(entry, hours)
+    built(model, 0)  # used now
+    monkeypatch.setenv("SERPENTAIL_CACHE_SIZE", str(int(4.5 * size(entries[0]))))
+    last = built(model, 4).parent
+    assert [entry.exists() for entry in entries] == [True, False, True, True] and last.exists()
+    assert not list((cache / "parts").iterdir())
+
+
+def test_what_is_in_use_stays(model, monkeypatch):
+    monkeypatch.setenv("SERPENTAIL_CACHE_SIZE", "1")
+    libraries = [built(model, number) for number in range(3)]
+    assert [call_twice(library) for library in libraries] == [42.0] * 3
+    for library in libraries:
+        used(library.parent, 1)
+    assert built(model, 4).exists() and not any(library.exists() for library in libraries)
+
+
+def test_a_loaded_model_outlives_its_entries(cache, tmp_path):
+    """On POSIX a library that is mapped stays; what comes late is made again."""
+    options = {"functions": ["mass_matrix", "forward_dynamics"], "name": "tail"}
+    model = st.load(model_folder(1, 1, **options))
+    expected = model.mass_matrix(Q)
+    shutil.rmtree(cache)
+    np.testing.assert_array_equal(model.mass_matrix(Q), expected)
+    batch = np.tile(Q, (2000, 1))
+    np.testing.assert_allclose(model.mass_matrix(batch)[7], expected, rtol=1e-9, atol=1e-15)
+    external = model.casadi.external("mass_matrix", folded=True)
+    np.testing.assert_allclose(external(Q), expected, rtol=1e-12)
+    shutil.rmtree(cache)
+    np.testing.assert_array_equal(pickle.loads(pickle.dumps(model)).mass_matrix(Q), expected)
+
+
+def test_parts_of_killed_builds_go(model, cache):
+    built(model, 0)
+    lost, mine = cache / "parts" / ("0" * 24), cache / "parts" / "mine"
+    for path in (lost, mine):
+        path.mkdir()
+        (path / "library.part").write_text("half")
+    built(model, 1)
+    assert lost.exists()
+    age(cache / "parts")
+    built(model, 2)
+    assert not lost.exists() and mine.exists()
+
+
+@pytest.mark.parametrize("text", ["much", "-1", "1.5G", "1 G B", "\u0663"])
+def test_size_that_is_none_is_refused(model, monkeypatch, text):
+    monkeypatch.setenv("SERPENTAIL_CACHE_SIZE", text)
+    with pytest.raises(st.SerpentailError, match=r"SERPENTAIL_CACHE_SIZE: value .*such as 500M"):
+        built(model, 0)
+
+
+@pytest.mark.parametrize(
+    ("text", "size"), [("", 2**30), ("17", 17), ("500M", 500 * 2**20), ("2g", 2**31)]
+)
+def test_sizes(monkeypatch, text, size):
+    monkeypatch.setenv("SERPENTAIL_CACHE_SIZE", text)
+    assert bound.limit() == size
+
+
+# The command
+
+
+def test_command_tells_and_empties(model, cache, capsys):
+    libraries = [built(model, number) for number in range(2)]
+    loaded = ctypes.CDLL(str(libraries[0]))
+    assert cli.main(["cache", "--json", "-"]) == 0
+    report = json.loads(capsys.readouterr().out)
+    assert report.pop("bytes") > sum(library.stat().st_size for library in libraries)
+    counts = {"libraries": 2, "models": 0, "compilers": 1}
+    assert report == {"folder": str(cache), **counts, "limit": 2**30}
+    (cache / "mine.txt").touch()
+    (cache / "libraries" / "mine").mkdir()
+
+    assert cli.main(["cache", "--clean"]) == 0
+    rows = dict(line.split(None, 1) for line in capsys.readouterr().out.splitlines())
+    none = dict.fromkeys(counts, "0")
+    assert rows == {"folder": str(cache), **none, "bytes": "0", "limit": str(2**30)}
+    left = {path.relative_to(cache).as_posix() for path in cache.rglob("*")}
+    folders = {"libraries", "compilers", "locks", "parts"}
+    assert left == {*folders, "mine.txt", "libraries/mine"}
+    loaded.twice.restype, loaded.twice.argtypes = ctypes.c_double, [ctypes.c_double]
+    assert loaded.twice(21.0) == 42.0
+
+
+def test_command_where_there_is_no_cache(cache, capsys):
+    for arguments in (["cache"], ["cache", "--clean"]):
+        assert cli.main(arguments) == 0
+        assert capsys.readouterr().out.startswith(f"folder {' ' * 23}{cache}\n")
+    assert not cache.exists()
