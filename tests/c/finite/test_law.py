@@ -5,11 +5,14 @@ from itertools import product
 
 import pytest
 
+from serpentail_codegen.scene.signatures.table import VALUES
+
 from ...support.models import model_folder
 from ...support.toolchains import clang
 from .hostile import NOT_FINITE, NOT_POSITIVE_DEFINITE, OK, OUT_OF_RANGE, attacked
 
 GROUND = {"functions": "all", "contacts": ["feet", "tail", "torso"]}
+POLAR = {"coordinates": "polar", "functions": list(VALUES), "contacts": []}  # all that it has
 MODELS = {
     "straight": ((1, 1), {"emission": "straight"}),
     "loops": ((1, 2), {"emission": "loops", "real": "float"}),
@@ -25,8 +28,8 @@ MODELS = {
     "continuum_loops": ((2, None), {"emission": "loops"}),
     "continuum_float": ((2, None), {"real": "float"}),
     "continuum_baked": ((2, None), {"baked": True, "emission": "lanes"}),
-    "polar": ((2, None), {"coordinates": "polar"}),
-    "polar_loops": ((1, None), {"coordinates": "polar", "emission": "loops", "real": "float"}),
+    "polar": ((2, None), POLAR),
+    "polar_loops": ((1, None), {**POLAR, "emission": "loops", "real": "float"}),
 }
 FAST = ("-ffp-contract=fast", "-fno-math-errno", "-fno-trapping-math", "-march=native")
 LEVELS = (("-O0",), ("-O1",), ("-O2",), ("-O3",), ("-O2", *FAST))
@@ -48,7 +51,7 @@ QUICK = [("straight", "gcc", ("-O0",)), ("loops", "gcc", ("-O1",))]
 def folder(name):
     """The generated folder of a model with every function."""
     size, options = MODELS[name]
-    return model_folder(*size, name=f"{name}_law", **GROUND, **options)
+    return model_folder(*size, name=f"{name}_law", **(GROUND | options))
 
 
 @pytest.mark.parametrize(("name", "compiler", "level"), list(cases()))
