@@ -258,8 +258,9 @@ def test_size_report_names_missing_tools(tmp_path):
     assert (ROOT / "docs" / "embedded.md").read_bytes() == before
 
 
-def test_ci_installs_what_the_boards_need():
+def test_ci_installs_what_tests_of_c_need():
     script = (ROOT / ".ci" / "run").read_text()
-    wanted = {package for name in CROSS for package in boards.BOARDS[name].packages} | {"cppcheck"}
+    wanted = {package for name in CROSS for package in boards.BOARDS[name].packages}
+    wanted |= {"cppcheck", "valgrind", "clang", "libclang-rt-14-dev"}
     assert [package for package in sorted(wanted) if package not in script.split()] == []
     assert "export CI=" in script

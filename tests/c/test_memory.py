@@ -16,6 +16,7 @@ GROUND = {"contacts": ["feet", "tail", "torso"]}
 MODELS = {
     "articulated": ((1, 3), {"functions": "all"}),
     "continuum": ((2, None), {"functions": "all"}),
+    "segments": ((2, 2), {"functions": "all", "emission": "segments"}),
     "single": (
         (2, 2),
         {"functions": "all", "real": "float", "profile": "reproducible", "emission": "loops"},
@@ -47,23 +48,30 @@ def model(name):
 
 @pytest.fixture
 def sanitized():
-    """Return flags and what a program runs under."""
+    """Return a compiler and what a program runs under."""
     return memory.SANITIZED, ()
 
 
 @pytest.fixture
 def watched():
-    """Return flags and what a program runs under; skip, or fail in CI, without valgrind."""
+    """Return a compiler and what a program runs under; skip, or fail in CI, without valgrind."""
     toolchains.valgrind()
-    return ("-O1",), memory.WATCHED
+    return memory.PLAIN, memory.WATCHED
+
+
+@pytest.fixture
+def followed():
+    """Return a compiler that follows what was never written; skip, or fail in CI, without it."""
+    toolchains.clang()
+    return memory.FOLLOWED, ()
 
 
 @every_model
-@pytest.mark.parametrize("tool", ["sanitized", "watched"])
+@pytest.mark.parametrize("tool", ["sanitized", "watched", "followed"])
 def test_nothing_is_found(tmp_path, request, name, tool):
-    (flags, under), of = request.getfixturevalue(tool), model(name)
+    (compiler, under), of = request.getfixturevalue(tool), model(name)
     found = memory.every(of, 1)
-    told, report = memory.answers(memory.built(of, tmp_path, *flags), found, *under)
+    told, report = memory.answers(memory.built(of, tmp_path, *compiler), found, *under)
     assert report == "" and memory.insane(found, told) == []
     assert (
         len({answer.status for answer in told}) >= 4
@@ -78,6 +86,7 @@ def test_nothing_is_found(tmp_path, request, name, tool):
         pytest.param("sanitized", "bounds", "heap-buffer-overflow", marks=pytest.mark.slow),
         pytest.param("watched", "bounds", "Invalid read of size 8", marks=pytest.mark.slow),
         pytest.param("watched", "unwritten", "depends on uninitialised", marks=pytest.mark.slow),
+        ("followed", "unwritten", "use-of-uninitialized-value"),
     ],
 )
 def test_what_is_put_in_is_found(tmp_path, request, tool, fault, words):
@@ -89,8 +98,8 @@ def test_what_is_put_in_is_found(tmp_path, request, tool, fault, words):
     head, put = rf"(int {of.name}_energy\([^)]*\)\n{{\n)", FAULTS[fault].replace("NQ", str(of.nq))
     text, count = re.subn(head, rf"\1  {put}\n", source.read_text())
     source.write_text(text)
-    (flags, under), found = request.getfixturevalue(tool), memory.every(of, 1)
-    _, report = memory.answers(memory.built(of, tmp_path, *flags), found, *under)
+    (compiler, under), found = request.getfixturevalue(tool), memory.every(of, 1)
+    _, report = memory.answers(memory.built(of, tmp_path, *compiler), found, *under)
     assert count == 1 and words in report
 
 

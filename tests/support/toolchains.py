@@ -40,3 +40,14 @@ def _need_valgrind() -> None:
     if shutil.which("valgrind") is None:
         remedy = "Debian, Ubuntu: apt-get install --no-install-recommends valgrind"
         raise ToolchainMissing(f"valgrind is not on PATH; {remedy}")
+
+
+def clang() -> None:
+    """Ask for clang, which brings its sanitizers."""
+    _required(_need_clang)
+
+
+def _need_clang() -> None:
+    if shutil.which("clang") is None:
+        remedy = "Debian, Ubuntu: apt-get install --no-install-recommends clang libclang-rt-14-dev"
+        raise ToolchainMissing(f"clang is not on PATH; {remedy}")

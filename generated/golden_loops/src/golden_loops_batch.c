@@ -8,6 +8,11 @@
 #include <math.h>
 #include <stddef.h>
 
+/* Statuses tell what is no finite number: compilers must not take for granted that there is none such. */
+#if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__)
+#error "golden_loops tells numbers from what is none: compile it without -ffast-math, -Ofast and -ffinite-math-only"
+#endif
+
 #define real golden_loops_real
 #define STATES 8
 #define STATUS_OK GOLDEN_LOOPS_OK

@@ -12,6 +12,7 @@ import pytest
 
 from serpentail_codegen.ir.interpret import Numbers
 
+from ...support.toolchains import clang
 from .emitted import (
     C99,
     NAMES,
@@ -21,7 +22,6 @@ from .emitted import (
     compiled,
     every_model,
     interpreted,
-    needs,
     run,
     slow_but,
     symbols,
@@ -36,9 +36,11 @@ some_models = pytest.mark.parametrize(
 
 
 @every_model
-@pytest.mark.parametrize("compiler", ["gcc", pytest.param("clang", marks=needs("clang"))])
+@pytest.mark.parametrize("compiler", ["gcc", "clang"])
 def test_compiles_without_a_warning(models, tmp_path, compiler, name):
     model = models(name)
+    if compiler == "clang":
+        clang()
     for source in (*model.sources, model.example):
         compiled(tmp_path, source, *C99, "-fsyntax-only", compiler=compiler)
 
@@ -126,9 +128,10 @@ def assert_own_symbols(model, objects, *merged):
         wanted
         <= {f"{name}{suffix}" for name in ("sin", "cos", "sqrt", "pow", "ceil", *merged)} | MEMORY
     )
-    header = model.include / f"{model.name}_simulation.h"
-    for found, path in ((own, model.header), (simulation, header)):
-        assert found == set(re.findall(r"^(?:int|void) (\w+)\(", path.read_text(), re.M))
+    unchecked, header = (model.include / f"{model.name}_{k}.h" for k in ("unchecked", "simulation"))
+    for found, paths in ((own, (model.header, unchecked)), (simulation, (header,))):
+        text = "".join(path.read_text() for path in paths)
+        assert found == set(re.findall(r"^(?:int|void) (\w+)\(", text, re.M))
     names = f"{model.name}_(batch_|abi_hash$)|(jac_|adj1_|jac_adj1_)?{model.name}_casadi_"
     assert all(re.match(names, symbol) for symbol in host)
     assert batch and all(symbol.startswith(f"{model.name}_side_by_side_") for symbol in batch)

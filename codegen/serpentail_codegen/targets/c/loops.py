@@ -50,7 +50,6 @@ class LoopPrinter:
         lines = (
             *declarations,
             *(line.replace(CALLEES_WORK, str(inner)) for line in body),
-            "return STATUS_OK;",
         )
         behind = [inner + body.work for _, body in self.callees.values() if body.work]
         work = max([work, *behind])

@@ -15,7 +15,14 @@ from .records import layouts
 from .routine import dialect
 from .simulation import simulation_context
 from .simulation_features import SimulationFeatures, simulation_features
-from .views import FunctionView, callee_view, callees_of, parameter_views, step_views
+from .views import (
+    FunctionView,
+    UncheckedView,
+    callee_view,
+    callees_of,
+    parameter_views,
+    step_views,
+)
 
 COORDINATES = {
     "joint": "alpha_1, beta_1, ... of the joints",
@@ -94,6 +101,10 @@ def function_context(
     outputs = [a for f in views for a in f.outputs]
     return {
         "functions": views,
+        "unchecked": [
+            UncheckedView(view, function.body, scene.name)
+            for view, function in zip(views, printed, strict=True)
+        ],
         "names": [f.name for f in views],
         "works": [{"name": f.name, "work": f.work} for f in views],
         "most_arrays": max(len(f.inputs) + len(f.outputs) for f in views),
@@ -120,6 +131,7 @@ def model_files(scene: Scene, context: dict[str, Any]) -> dict[str, str]:
     name = scene.name
     templates = {
         f"include/{name}.h": "model/header.h.jinja",
+        f"include/{name}_unchecked.h": "model/unchecked.h.jinja",
         f"src/{name}.c": "model/model.c.jinja",
         f"src/{name}_host.c": "model/host.c.jinja",
         "example/main.c": "model/example.c.jinja",

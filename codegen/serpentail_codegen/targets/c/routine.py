@@ -32,7 +32,10 @@ class Routine:
 
 @dataclass(frozen=True)
 class CFunction:
-    """One C function body, the routines, helpers and programs that it calls, what it costs."""
+    """One C function body but for its end: what it calls, what it costs.
+
+    It calls routines, helpers and other programs.
+    """
 
     lines: tuple[str, ...]
     work: int  # scalars of workspace

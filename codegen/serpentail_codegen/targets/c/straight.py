@@ -30,7 +30,6 @@ def straight_line(program: Program, real: str, prefix: str, fixed=None) -> CFunc
     for status in dict.fromkeys(status for status, _ in guards):
         tests = [f"{scalars.text[node]} > {zero}" for name, node in guards if name == status]
         lines += [f"if (!({' && '.join(tests)})) {{", f"  return STATUS_{status};", "}"]
-    lines.append("return STATUS_OK;")
 
     operations = sum((tape.lanes[n] or 1) for n in scalars.live if tape.nodes[n][0] in BINARY)
     helpers = called(tape.nodes) | ({"lanes"} if wide else set())

@@ -8,12 +8,14 @@ from ...functions.tail import Tail, struct_parameters
 from ...ir.program import Program
 from ...ir.tape import operation_count
 from ...scene.scene import Scene
-from ...scene.signatures.arguments import Argument
+from ...scene.signatures.arguments import FACTORS, Argument
 from .form import PrintedFunction, values
 from .routine import CFunction, Routine, routine_arguments, routine_lines
 
 # operations: smaller steps are written out where they are called, others as the compiler sees fit
 INLINED_OPERATIONS = 100
+# results: vectors of fewer would be loaded before all that they hold is stored
+STORED_ONE_BY_ONE = 16
 
 
 class HasBody(Protocol):
@@ -34,23 +36,47 @@ class ArgumentView:
 
 
 class FunctionView:
-    """A function as the templates see it: prototypes, call texts, lines."""
+    """A function as the templates see it: its prototype, what is checked before and after."""
 
     def __init__(self, printed: PrintedFunction, tail: Tail, prefix: str):
-        function, body = printed.function, printed.body
-        self.name, self.doc = function.name, function.doc
-        self.lines, self.work = body.lines, body.work
-        self.emission, self.operations = printed.emission, body.operations
+        function = printed.function
+        self.name, self.doc, self.work = function.name, function.doc, printed.body.work
+        self.emission, self.operations = printed.emission, printed.body.operations
         views = [ArgumentView(a, tail) for a in (*function.inputs, *function.outputs)]
         self.inputs, self.outputs = views[: len(function.inputs)], views[len(function.inputs) :]
-        real = f"{prefix}_real"
-        arguments = [f"const {real} *{a.name}" for a in self.inputs] + [
-            f"{real} *{a.name}" for a in self.outputs
-        ]
-        head = f"const {prefix}_parameters *parameters"
-        self.prototype = wrapped(f"int {prefix}_{self.name}(", [head, *arguments, f"{real} *work"])
+        self.prototype = self.prototype_of(f"{prefix}_{self.name}", prefix)
         self.names = ", ".join(a.name for a in views)
-        self.unused = unused(self.lines)
+        self.unchecked = f"{prefix}_unchecked_{self.name}(parameters, {self.names}, work)"
+
+        # factors are many, and what solves with them reads them: its results tell
+        self.has_attitude = self.inputs[0].name == "q"
+        read = [a for a in self.inputs if a.name != FACTORS.name]
+        self.arguments = zero_where_finite(f"{prefix}_zero_times", read)
+        few = sum(a.length for a in self.outputs) < STORED_ONE_BY_ONE
+        each = "_each" if few else ""
+        self.results = zero_where_finite(f"{prefix}_zero_times{each}", self.outputs)
+
+    def prototype_of(self, symbol: str, prefix: str) -> str:
+        """Print the prototype of a function with these arguments."""
+        real = f"{prefix}_real"
+        arguments = [f"const {real} *{a.name}" for a in self.inputs]
+        arguments += [f"{real} *{a.name}" for a in self.outputs]
+        head = f"const {prefix}_parameters *parameters"
+        return wrapped(f"int {symbol}(", [head, *arguments, f"{real} *work"])
+
+
+class UncheckedView:
+    """A function that checks nothing, as the templates see it: its prototype and its lines."""
+
+    def __init__(self, view: FunctionView, body: CFunction, prefix: str):
+        self.doc, self.lines = view.doc, body.lines
+        self.prototype = view.prototype_of(f"{prefix}_unchecked_{view.name}", prefix)
+        self.unused = unused(body.lines)
+
+
+def zero_where_finite(helper: str, arguments: Sequence[ArgumentView]) -> str:
+    """Print a sum that is zero where all numbers of some arguments are finite."""
+    return " + ".join(f"{helper}({a.length}, {a.name})" for a in arguments)
 
 
 def wrapped(head: str, arguments: list[str]) -> str:

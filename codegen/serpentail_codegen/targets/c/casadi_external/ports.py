@@ -66,7 +66,7 @@ class External:
         for a, array in zip((*function.inputs, *function.outputs), arguments, strict=True):
             self.arrays.setdefault(array, a.length(self.tail))
         self.inner_work = max(self.inner_work, self.works[name])
-        text = f"{self.prefix}_{name}(&parameters, {', '.join(arguments)}, work)"
+        text = f"{self.prefix}_unchecked_{name}(&parameters, {', '.join(arguments)}, work)"
         self.lines += [f"if ({text} != {self.prefix.upper()}_OK) {{", "  return 1;", "}"]
 
     def use(self, helper: str, *arguments, **made: int) -> None:

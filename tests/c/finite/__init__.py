@@ -1,0 +1,1 @@
+"""Tests of what the emitted C says of numbers that are none."""
