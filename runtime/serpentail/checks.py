@@ -16,7 +16,17 @@ Error = type[Exception]
 
 def refusal(field: str, value: object, needs: str, error: Error) -> Exception:
     """Return the error about a value that a field cannot have."""
-    return error(f"{field}: value {value!r:.200}: needs {needs}")
+    return error(f"{field}: value {shown(value)}: needs {needs}")
+
+
+def shown(value: object) -> str:
+    """Return a value as Python writes it, on one line and shortened where it is long."""
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError):  # repr refuses integers of more than 4300 digits
+        return f"of type {type(value).__name__}, too long to show"
+    line = text if text.isprintable() else " ".join(text.split())
+    return line if len(line) <= 200 else line[:197] + "..."
 
 
 def real_array(
@@ -96,7 +106,7 @@ def one_of(field: str, value: object, names: Collection[str], error: Error) -> s
     if isinstance(value, str) and value in names:
         return value
     remedy = did_you_mean(value, names) or f"needs {' or '.join(map(repr, names))}"
-    raise error(f"{field}: value {value!r:.200}: {remedy}")
+    raise error(f"{field}: value {shown(value)}: {remedy}")
 
 
 def did_you_mean(value: object, names: Collection[str]) -> str:

@@ -13,35 +13,11 @@ KINDS = ("articulated", "continuum")
 GROUPS = ("feet", "tail", "torso")  # of contact points, in their order
 FRICTION = ("cone", "box", "smooth", "paper")
 TARGETS = ("c", "casadi")  # languages to emit, in their order
-C_HEADERS = frozenset(
-    [
-        "assert",
-        "complex",
-        "ctype",
-        "errno",
-        "features",
-        "fenv",
-        "float",
-        "inttypes",
-        "iso646",
-        "limits",
-        "locale",
-        "math",
-        "setjmp",
-        "signal",
-        "stdarg",
-        "stdbool",
-        "stddef",
-        "stdint",
-        "stdio",
-        "stdlib",
-        "string",
-        "tgmath",
-        "time",
-        "wchar",
-        "wctype",
-    ]
-)  # a model of such a name would hide the system's header
+# a model of such a name would hide the system's header
+C_HEADERS = (
+    "assert|complex|ctype|errno|features|fenv|float|inttypes|iso646|limits|locale|math|setjmp|"
+    "signal|stdarg|stdbool|stddef|stdint|stdio|stdlib|string|tgmath|time|wchar|wctype"
+)
 MOST_LINKS = 100_000  # segments * links: beyond it a slip, not a tail
 
 
@@ -59,11 +35,14 @@ def is_whole(x: object) -> bool:
 FLAG = Rule("true or false, without quotes", lambda x: isinstance(x, bool))
 COUNT = Rule("a whole number, 1 or above", lambda x: is_whole(x) and x >= 1)
 TEXT = Rule('a text, in "quotes"', lambda x: isinstance(x, str))
+# the prefix of C symbols, a file's and a folder's name; the runtime has the same rule, in
+# serpentail/scenes/names.py
 NAME = Rule(
-    "a text of a-z, 0-9 and _, a letter first, that names no C header: rename the file, or set "
-    'name = "..." in it',
+    "a text of up to 63 of a-z, 0-9 and _, a letter first, that names no C header: rename the "
+    'file, or set name = "..." in it',
     lambda x: (
-        isinstance(x, str) and re.fullmatch("[a-z][a-z0-9_]*", x) is not None and x not in C_HEADERS
+        isinstance(x, str)
+        and re.fullmatch(f"(?!({C_HEADERS})$)[a-z][a-z0-9_]{{0,62}}", x) is not None
     ),
 )
 BEND = Rule(

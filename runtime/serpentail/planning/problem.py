@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import number, numbers, one_of
+from ..checks import number, numbers, one_of, shown
 from ..errors import PlanningError
 from ..model.layout import QUATERNION, TAIL_Q, TAIL_V
 from ..model.model import Model
@@ -103,7 +103,7 @@ def checked_problem(
 def _vector(field: str, value: Any, size: int) -> np.ndarray:
     """Return finite numbers (size,); PlanningError else, also of one number alone."""
     if np.ndim(value) == 0:
-        raise PlanningError(f"{field}: value {value!r}: needs {size} numbers")
+        raise PlanningError(f"{field}: value {shown(value)}: needs {size} numbers")
     return numbers(field, value, size, PlanningError)
 
 
@@ -117,7 +117,7 @@ def _unit_quaternion(field: str, quaternion: np.ndarray) -> np.ndarray:
 
 def _start(model: Model, start: Any) -> tuple[np.ndarray, np.ndarray]:
     if not isinstance(start, tuple | list) or len(start) != 2:
-        raise PlanningError(f"start: value {start!r}: needs (q0, v0), two arrays")
+        raise PlanningError(f"start: value {shown(start)}: needs (q0, v0), two arrays")
     q0, v0 = _vector("start[0]", start[0], model.nq), _vector("start[1]", start[1], model.nv)
     q0[QUATERNION] = _unit_quaternion("start[0][3:7]", q0[QUATERNION])
     return q0, v0
@@ -125,7 +125,7 @@ def _start(model: Model, start: Any) -> tuple[np.ndarray, np.ndarray]:
 
 def _goal(goal: Any, tail: int) -> Goal:
     if not isinstance(goal, Goal):
-        raise PlanningError(f"goal: value {goal!r}: needs a serpentail.Goal")
+        raise PlanningError(f"goal: value {shown(goal)}: needs a serpentail.Goal")
     attitude = goal.attitude
     upright = isinstance(attitude, str) and attitude == "upright"
     if attitude is not None and not upright:
@@ -151,18 +151,18 @@ def _partly_free(field: str, value: Any, size: int) -> np.ndarray | None:
         free = np.array([entry is None for entry in value])
     except (TypeError, ValueError):
         raise PlanningError(
-            f"{field}: value {value!r}: needs {size} numbers, None where free"
+            f"{field}: value {shown(value)}: needs {size} numbers, None where free"
         ) from None
     if array.shape != (size,) or not np.isfinite(array[~free]).all():
         raise PlanningError(
-            f"{field}: value {value!r}: needs {size} finite numbers, None where free"
+            f"{field}: value {shown(value)}: needs {size} finite numbers, None where free"
         )
     return array
 
 
 def _bounds(bounds: Any, tail: int) -> Bounds:
     if not isinstance(bounds, Bounds):
-        raise PlanningError(f"bounds: value {bounds!r}: needs a serpentail.Bounds")
+        raise PlanningError(f"bounds: value {shown(bounds)}: needs a serpentail.Bounds")
     return Bounds(
         *(_magnitudes(entry.name, getattr(bounds, entry.name), tail) for entry in fields(Bounds))
     )
@@ -174,7 +174,7 @@ def _magnitudes(name: str, value: Any, tail: int) -> np.ndarray | None:
         return None
     magnitudes = numbers(f"bounds.{name}", value, tail, PlanningError)
     if not (magnitudes > 0).all():
-        raise PlanningError(f"bounds.{name}: value {value!r}: needs magnitudes above 0")
+        raise PlanningError(f"bounds.{name}: value {shown(value)}: needs magnitudes above 0")
     return magnitudes
 
 
@@ -205,11 +205,11 @@ def _duration(duration: Any) -> tuple[float, float]:
     pair = duration if isinstance(duration, tuple | list) else (duration, duration)
     if len(pair) != 2:
         raise PlanningError(
-            f"duration: value {duration!r}: needs one number, or (least, most), in s"
+            f"duration: value {shown(duration)}: needs one number, or (least, most), in s"
         )
     least, most = (number("duration", value, PlanningError, above=0) for value in pair)
     if most < least:
-        raise PlanningError(f"duration: value {duration!r}: needs least <= most, in s")
+        raise PlanningError(f"duration: value {shown(duration)}: needs least <= most, in s")
     return least, most
 
 
@@ -224,7 +224,7 @@ def _path(path: Sequence[Any]) -> tuple[PathConstraint, ...]:
     for k, row in enumerate(path):
         if not isinstance(row, tuple | list) or len(row) != 3 or not callable(row[0]):
             raise PlanningError(
-                f"path[{k}]: value {row!r}: needs (function of a point, least, most)"
+                f"path[{k}]: value {shown(row)}: needs (function of a point, least, most)"
             )
         least, most = float(row[1]), float(row[2])
         if not least <= most:

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import number, one_of
+from ..checks import number, one_of, shown
 from ..errors import PlanningError
 from ..motion.trajectory import Trajectory
 
@@ -46,13 +46,14 @@ def checked_settings(model, **settings) -> PlanSettings:
     for name, least in WHOLE_NUMBERS.items():
         value = getattr(checked, name)
         if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
-            raise PlanningError(f"{name}: value {value!r}: needs a whole number from {least}")
+            raise PlanningError(f"{name}: value {shown(value)}: needs a whole number from {least}")
     for name in ("tolerance", "time_limit"):
         if getattr(checked, name) is not None:
             number(name, getattr(checked, name), PlanningError, above=0)
     if not isinstance(checked.options, dict):
         raise PlanningError(
-            f"options: value {checked.options!r}: needs a dict, such as {{'ipopt.max_iter': 500}}"
+            f"options: value {shown(checked.options)}: needs a dict, such as "
+            "{'ipopt.max_iter': 500}"
         )
     _check_guess(model, checked.guess)
     number("guess_damping", checked.guess_damping, PlanningError, least=0)
@@ -66,7 +67,7 @@ def _check_guess(model, guess) -> None:
         return
     motion = getattr(guess, "trajectory", guess)
     if not isinstance(motion, Trajectory):
-        raise PlanningError(f"guess: value {guess!r}: needs a Plan or a Trajectory")
+        raise PlanningError(f"guess: value {shown(guess)}: needs a Plan or a Trajectory")
     if motion.q.shape[1] != model.nq or len(motion.t) < 2:
         raise PlanningError(
             f"guess: q has shape {motion.q.shape}: needs at least two samples of {model.nq}"

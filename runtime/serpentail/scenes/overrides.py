@@ -4,6 +4,7 @@ import tomllib
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from ..checks import shown
 from ..errors import SimulationError
 
 
@@ -43,5 +44,6 @@ def _with(part: Any, path: list[str], value: Any, name: str) -> Any:
         k = int(first)
         return [*part[:k], _with(part[k], rest, value, name), *part[k + 1 :]]
     raise SimulationError(
-        f"change {name!r}: {first!r} is not in {part!r}: name a key, or a place from 0"
+        f"change {shown(name)}: {shown(first)} is not in {shown(part)}: name a key, or a place "
+        "from 0"
     )

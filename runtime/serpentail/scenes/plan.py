@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from typing import Any
 
-from ..checks import one_of
+from ..checks import one_of, shown
 from ..errors import PlanningError
 from ..planning.planner import plan
 from ..planning.problem import PROBLEM_SETTINGS, Bounds, Goal
@@ -36,7 +36,7 @@ def plan_arguments(table: Mapping) -> dict[str, Any]:
     # tables of their own: start, goal and bounds
     start = _part("start", table["start"], ("q", "v"))
     if set(start) != {"q", "v"}:
-        raise PlanningError(f"plan.start: value {start!r}: needs q and v")
+        raise PlanningError(f"plan.start: value {shown(start)}: needs q and v")
     goal = _part("goal", table.get("goal", {}), _names(Goal))
     bounds = _part("bounds", table.get("bounds", {}), _names(Bounds))
 
@@ -56,7 +56,7 @@ def _check_keys(table: Mapping) -> None:
     for name in table:
         if name in CODE_ONLY:
             raise PlanningError(
-                f"plan.{name}: value {table[name]!r}: only programs can give it; call "
+                f"plan.{name}: value {shown(table[name])}: only programs can give it; call "
                 "serpentail.plan"
             )
         one_of("plan: key", name, KEYS, PlanningError)
@@ -73,7 +73,7 @@ def _part(field: str, value: Any, known: Sequence[str]) -> dict:
     """A table in [plan] with known keys."""
     if not isinstance(value, Mapping):
         raise PlanningError(
-            f"plan.{field}: value {value!r}: needs a table, under a line [plan.{field}]"
+            f"plan.{field}: value {shown(value)}: needs a table, under a line [plan.{field}]"
         )
     for name in value:
         one_of(f"plan.{field}: key", name, known, PlanningError)

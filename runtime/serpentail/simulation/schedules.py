@@ -8,7 +8,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import finite_array, number, one_of, refusal
+from ..checks import finite_array, number, one_of, refusal, shown
 from ..errors import SimulationError
 from ..model.model import Model
 from .piecewise import Piecewise, blends, checked_nodes, linear, spline
@@ -165,7 +165,7 @@ def _move(field: str, move: Mapping[str, float], last: Node) -> list[Node]:
         raise SimulationError(f"{field}: takes {duration!r} s: needs {needs}")
     if at < end:
         remedy = f"the move before it ends at {end:.6g} s: move it after that"
-        raise SimulationError(f"{field}.at: value {at!r}: {remedy}")
+        raise SimulationError(f"{field}.at: value {shown(at)}: {remedy}")
     # a move that follows at once begins at the last node
     if at == end:
         return [(at + duration, goal)]
