@@ -231,7 +231,7 @@ def test_what_was_edited_or_lost_is_made_again(tree, make):
         (["M=1.5"], "argument --segments: invalid int value: '1.5'"),
         (["N="], "argument --links: invalid int value: ''"),
         (["TAIL=snake"], "argument --tail: invalid choice: 'snake' (choose from 'articulated'"),
-        (["M=1000", "N=1000"], "more than 100000 links in all; choose fewer segments or links"),
+        (["N=10001"], "more than 10000 links in all; choose fewer segments or links"),
         (["REAL=half"], 'real: value \'half\': needs "double" or "float"'),
         (["EMISSION=fast"], "emission: value 'fast': needs "),
         (["FUNCTIONS=energi"], "functions[0]: value 'energi': unknown; did you mean 'energy'?"),

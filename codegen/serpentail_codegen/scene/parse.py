@@ -14,7 +14,7 @@ from .checks import (
     lacking,
     plain,
     single_problems,
-    tail_links,
+    tail_pieces,
     unknown_keys,
 )
 from .problems import Problem, SceneError
@@ -57,7 +57,7 @@ def parse_scene(table: Mapping[str, Any], name: str) -> Scene:
     problems += function_problems(values["functions"]) + contact_problems(table, values, contacts)
 
     # parameters: which there are follows from the kind and the contacts
-    links = min(tail_links(values), MOST_LINKS)
+    links = min(tail_pieces(values), MOST_LINKS)
     try:
         values["parameters"] = resolve_parameters(values["parameters"], links, kind, contacts)
     except SceneError as error:

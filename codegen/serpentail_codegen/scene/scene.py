@@ -18,7 +18,11 @@ C_HEADERS = (
     "assert|complex|ctype|errno|features|fenv|float|inttypes|iso646|limits|locale|math|setjmp|"
     "signal|stdarg|stdbool|stddef|stdint|stdio|stdlib|string|tgmath|time|wchar|wctype"
 )
-MOST_LINKS = 100_000  # segments * links: beyond it a slip, not a tail
+# What is generated within a minute or so; the work grows as the cube of the segments, and
+# straight lines grow with every piece.
+MOST_SEGMENTS = 100
+MOST_LINKS = 10_000  # or samples, of all segments
+MOST_STRAIGHT = (20, 100)  # segments, and pieces in all, of straight lines
 
 
 def _one_of(names: Sequence[str], remark: str = "") -> Rule:

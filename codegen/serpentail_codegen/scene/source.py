@@ -16,7 +16,7 @@ DECIMAL = re.compile(r"(?<![\w.])\d[\d_]*\.\d[\d_]*(?:[eE][+-]?\d+)?(?![\w.])")
 def tables_of(path: Path) -> dict[str, Any]:
     """Return the tables of a scene file; ValueError says why it has none, and what to do."""
     try:
-        return tomllib.loads(_text(path))
+        return tables_in(_text(path))
     except OSError as error:
         reason = f"cannot be read: {error.strerror}; give the path of a scene file (.toml)"
     except UnicodeDecodeError as error:
@@ -27,7 +27,7 @@ def tables_of(path: Path) -> dict[str, Any]:
 
 
 def _text(path: Path) -> str:
-    """Return the text of a file that the TOML parser can be trusted with."""
+    """Return the text of a regular file of a bounded size."""
     # opening a pipe would wait for its other end, reading a device would never end
     if path.exists() and not path.is_file():
         raise OSError(0, "no regular file")
@@ -35,8 +35,12 @@ def _text(path: Path) -> str:
         content = stream.read(MOST_BYTES + 1)
     if len(content) > MOST_BYTES:
         raise OSError(0, f"larger than {MOST_BYTES // 1_000_000} MB")
-    text = content.decode("utf-8-sig")
+    return content.decode("utf-8-sig")
+
+
+def tables_in(text: str) -> dict[str, Any]:
+    """Return the tables of a TOML text; ValueError or RecursionError where it is none."""
     for number, line in enumerate(text.splitlines(), 1):
         if line.count(".") > MOST_DOTS and DECIMAL.sub("", line).count(".") > MOST_DOTS:
             raise ValueError(f"more than {MOST_DOTS} dots in line {number}; no key is so deep")
-    return text
+    return tomllib.loads(text)

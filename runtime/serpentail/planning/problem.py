@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import number, numbers, one_of, shown
+from ..checks import number, numbers, numbers_in, one_of, refusal, shown
 from ..errors import PlanningError
 from ..model.layout import QUATERNION, TAIL_Q, TAIL_V
 from ..model.model import Model
@@ -17,6 +17,7 @@ from .nlp.node import FORMULATIONS
 OBJECTIVES = ("effort", "energy", "time")
 # N m s: the effort counts a tail's rates as torques, or a plan whirls a light tail at no cost
 SMOOTHING = 3e-4
+HUGE = 1e100  # beyond it squares overflow
 START_SLACK = 1e-6  # rad, rad/s: how far a start may be beyond its bounds
 
 
@@ -91,7 +92,7 @@ def checked_problem(
     # settings, those that are names last
     checks: dict[str, Callable[[Any], Any]] = {"objective": _objective, "path": _path}
     for name in ("smoothing", "damping"):
-        checks[name] = partial(number, name, error=PlanningError, least=0)
+        checks[name] = partial(number, name, error=PlanningError, least=0, most=HUGE)
     checked = {
         name: checks[name](value) if name in checks else value for name, value in settings.items()
     }
@@ -102,8 +103,9 @@ def checked_problem(
 
 def _vector(field: str, value: Any, size: int) -> np.ndarray:
     """Return finite numbers (size,); PlanningError else, also of one number alone."""
-    if np.ndim(value) == 0:
-        raise PlanningError(f"{field}: value {shown(value)}: needs {size} numbers")
+    array = numbers_in(value)
+    if array is None or array.shape == ():
+        raise refusal(field, value, f"{size} numbers", PlanningError)
     return numbers(field, value, size, PlanningError)
 
 
@@ -149,7 +151,7 @@ def _partly_free(field: str, value: Any, size: int) -> np.ndarray | None:
     try:
         array = np.array([np.nan if entry is None else float(entry) for entry in value])
         free = np.array([entry is None for entry in value])
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise PlanningError(
             f"{field}: value {shown(value)}: needs {size} numbers, None where free"
         ) from None
@@ -172,7 +174,7 @@ def _magnitudes(name: str, value: Any, tail: int) -> np.ndarray | None:
     """Return one bound of every tail coordinate; None where there is none."""
     if value is None:
         return None
-    magnitudes = numbers(f"bounds.{name}", value, tail, PlanningError)
+    magnitudes = numbers(f"bounds.{name}", value, tail, PlanningError, most=HUGE)
     if not (magnitudes > 0).all():
         raise PlanningError(f"bounds.{name}: value {shown(value)}: needs magnitudes above 0")
     return magnitudes

@@ -113,6 +113,8 @@ class Legs:
         Each move is a mapping: at (s), its end's gamma, delta or both (rad), and duration (s) or
         rate (rad/s, of the angle that goes farther).  Moves follow each other in time.
         """
+        if isinstance(moves, str | Mapping) or not isinstance(moves, Iterable):
+            raise refusal("legs.moves", moves, "an array of tables", SimulationError)
         nodes: list[Node] = [(-math.inf, (gamma, delta))]
         for index, move in enumerate(moves):
             nodes += _move(f"legs.moves[{index}]", move, nodes[-1])

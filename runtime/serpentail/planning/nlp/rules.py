@@ -63,7 +63,7 @@ def collocation_rule(name: str, degree: int | None = None) -> CollocationRule:
     "trapezoidal" (the paper's, Eqs. 41, 42), "hermite-simpson" (Lobatto of degree 2), "lobatto"
     (degree + 1 nodes, both ends among them), "radau" (degree nodes, the right end among them).
     """
-    if name not in FAMILIES:
+    if not isinstance(name, str) or name not in FAMILIES:
         raise PlanningError(f"rule: value {shown(name)}: needs {' or '.join(map(repr, FAMILIES))}")
     degree = FAMILIES[name] if degree is None else degree
     if isinstance(degree, bool) or not isinstance(degree, int) or not 1 <= degree <= MOST_DEGREE:

@@ -80,7 +80,7 @@ def solver(
     """
     import casadi as ca
 
-    if not ca.has_nlpsol(name):
+    if not isinstance(name, str) or not ca.has_nlpsol(name):
         raise PlanningError(
             f"solver: value {shown(name)}: CasADi has no such solver here; 'ipopt' comes with it"
         )
