@@ -44,6 +44,11 @@ def real_array(
         raise error(
             f"{field}: type {type(value).__name__}: needs real numbers ({reason})"
         ) from reason
+    if np.ma.is_masked(value):
+        raise error(
+            f"{field}: {np.ma.count_masked(value)} masked entries: needs real numbers; use "
+            "filled() to choose some"
+        )
     if array.dtype.kind not in "fiu":
         raise error(f"{field}: type {array.dtype}: needs real numbers")
     with np.errstate(over="ignore"):  # what float cannot hold becomes inf, which is refused later

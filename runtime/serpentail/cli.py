@@ -4,9 +4,10 @@ import argparse
 import json
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from .errors import SerpentailError
@@ -98,13 +99,16 @@ def _add_scene(verb: argparse.ArgumentParser, example: str) -> None:
     verb.add_argument("--folder", help=folder)
 
 
+Files = Mapping[str, Callable[[str], object]]  # option that names each -> what writes it
+
+
 class Outcome(NamedTuple):
     """What a verb came to: a report as data and as text, whether all is well, files to write."""
 
     report: dict[str, Any]
     text: str
     good: bool
-    files: dict[str, Callable[[str], object]] = {}  # option that names each -> what writes it
+    files: Files = MappingProxyType({})
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -183,10 +187,8 @@ def simulated(arguments: argparse.Namespace) -> Outcome:
 
     scene = scenario(arguments.scene, arguments.folder, parsed(arguments.changes))
     motion = scene.simulate()
-    report, files = (
-        scene.summary(motion),
-        {"save": motion.save, "film": partial(scene.film, motion)},
-    )
+    report = scene.summary(motion)
+    files: Files = {"save": motion.save, "film": partial(scene.film, motion)}
     return Outcome(report, _rows(report), True, files)
 
 
