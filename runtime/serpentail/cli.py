@@ -120,6 +120,9 @@ def main(argv: list[str] | None = None) -> int:
     except SerpentailError as error:
         print(error, file=sys.stderr)
         return 2
+    except OSError as error:  # a path that the system refuses, a disk that is full
+        print(f"{arguments.verb}: {error!s:.300}", file=sys.stderr)
+        return 2
     tell(json.dumps(outcome.report) if arguments.json else outcome.text)
     written = [write(arguments, *entry) for entry in outcome.files.items()]
     return 0 if outcome.good and all(written) else 1
