@@ -111,10 +111,12 @@ def _vector(field: str, value: Any, size: int) -> np.ndarray:
 
 def _unit_quaternion(field: str, quaternion: np.ndarray) -> np.ndarray:
     """Return the quaternion, of norm 1; PlanningError where it is zero."""
-    norm = np.linalg.norm(quaternion)
-    if norm == 0:
+    largest = np.abs(quaternion).max()
+    if largest == 0:
         raise PlanningError(f"{field}: the zero quaternion: upright is (1, 0, 0, 0)")
-    return quaternion / norm
+    if not 1 / HUGE < largest < HUGE:  # whose squares are no numbers, or 0
+        quaternion = quaternion / largest
+    return quaternion / np.linalg.norm(quaternion)
 
 
 def _start(model: Model, start: Any) -> tuple[np.ndarray, np.ndarray]:
