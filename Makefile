@@ -14,16 +14,22 @@ CPU    ?= m4
 ifneq ($(filter embedded,$(MAKECMDGOALS)),)
 REAL   ?= $(if $(filter m4,$(CPU)),float,double)
 endif
+# a word of the shell, whatever is in it
+quoted  = '$(subst ','\'',$(1))'
 # options of `make model`: REAL=float EMISSION=loops PROFILE=reproducible BAKED=1 FUNCTIONS=energy,momentum
-OPTIONS := $(if $(REAL),--real $(REAL)) $(if $(EMISSION),--emission $(EMISSION)) \
-           $(if $(PROFILE),--profile $(PROFILE)) $(if $(BAKED),--baked) $(if $(FUNCTIONS),--functions $(FUNCTIONS))
+OPTIONS := $(if $(REAL),--real $(call quoted,$(REAL))) \
+           $(if $(EMISSION),--emission $(call quoted,$(EMISSION))) \
+           $(if $(PROFILE),--profile $(call quoted,$(PROFILE))) \
+           $(if $(BAKED),--baked) \
+           $(if $(FUNCTIONS),--functions $(call quoted,$(FUNCTIONS)))
 NAME    := $(TAIL)_m$(M)$(if $(filter continuum,$(TAIL)),,_n$(N))
 SCENE   ?= $(wildcard scenes/$(NAME).toml)
-OWN     := $(if $(SCENE),$(shell sed -n 's/^name *= *"\([^"]*\)".*/\1/p' $(SCENE) 2>/dev/null))
-MODEL   := $(if $(OWN),$(OWN),$(if $(SCENE),$(basename $(notdir $(SCENE))),$(NAME)))
-SOURCES := $(shell find codegen -name '*.py' -o -name '*.jinja')
-STAMP   := generated/$(MODEL)/.made
-WANTED  := $(if $(SCENE),$(SCENE),--tail $(TAIL) --segments $(M) $(if $(filter continuum,$(TAIL)),,--links $(N))) $(OPTIONS)
+SIZE    := --tail $(call quoted,$(TAIL)) --segments $(call quoted,$(M)) \
+           $(if $(filter continuum,$(TAIL)),,--links $(call quoted,$(N)))
+WANTED  := $(OPTIONS) $(if $(SCENE),-- $(call quoted,$(SCENE)),$(SIZE))
+# what it makes and how it is called is the generator's to tell: options are part of the name
+GENERATE := $(PY) -m serpentail_codegen
+FOLDER   := "$$($(GENERATE) --print-folder $(WANTED))"
 
 .PHONY: help setup demo test test-portable test-all model verify bench stress embedded size-report studies study-models study-righting study-contact lint golden clean
 .DELETE_ON_ERROR:
@@ -39,8 +45,8 @@ help:
 	@echo "  make model  TAIL=articulated M=3 N=4       -> generated/articulated_m3_n4"
 	@echo "  make model  TAIL=continuum M=3             -> generated/continuum_m3"
 	@echo "  make model  SCENE=scenes/kangaroo_rat_m3_n4.toml"
-	@echo "              options: REAL=float EMISSION=loops PROFILE=reproducible BAKED=1"
-	@echo "                       FUNCTIONS=energy,momentum"
+	@echo "              options, part of the name: REAL=float EMISSION=loops PROFILE=reproducible BAKED=1"
+	@echo "                       FUNCTIONS=energy,momentum -> generated/articulated_m3_n4_float..."
 	@echo "  make verify TAIL=articulated M=3 N=4       verification report of that model"
 	@echo "  make bench                                 benchmark report"
 	@echo "  make stress                                errors, drifts, drops, fuzz at the limits; CALLS=2000 random calls"
@@ -89,24 +95,14 @@ lint: $(READY)
 	$(VENV)/bin/mypy
 	$(PY) -m tests.house.file_lengths
 
-model: $(STAMP)
-	@echo "generated/$(MODEL) is up to date"
-
-$(STAMP): $(SOURCES) $(SCENE) generated/.options/$(MODEL) | $(READY)
-	$(PY) -m serpentail_codegen $(WANTED)
-	$(VENV)/bin/serpentail info generated/$(MODEL)
-	@touch $@
-
-# holds the options of the last call: newer than the stamp only when they change
-generated/.options/$(MODEL): .FORCE
-	@mkdir -p $(@D)
-	@echo '$(WANTED)' | cmp -s - $@ || echo '$(WANTED)' > $@
-
-.PHONY: .FORCE
-.FORCE:
+# The generator compares hashes, and makes what differs; what it made is compiled and told once.
+model: $(READY)
+	@said=$$($(GENERATE) $(WANTED)) && echo "$$said" && folder=$${said%%:*} && \
+	stamp=generated/.stamps/$${folder##*/} && { cmp -s $$stamp $$stamp.told || \
+	{ $(VENV)/bin/serpentail info "$$folder" && cp $$stamp $$stamp.told; }; }
 
 verify: model
-	$(PY) -m tests.verification.verify_model generated/$(MODEL)
+	$(PY) -m tests.verification.verify_model $(FOLDER)
 
 bench: $(READY)
 	$(PY) -m benchmarks.bench
@@ -115,7 +111,7 @@ stress: $(READY)
 	$(PY) -m stress.stress --calls $(CALLS)
 
 embedded: model
-	$(PY) -m embedded.check generated/$(MODEL) --board $(CPU)
+	$(PY) -m embedded.check $(FOLDER) --board $(CPU)
 
 size-report: $(READY)
 	$(PY) -m embedded.size_report

@@ -98,6 +98,7 @@ def generated(
     """Run the generator as `make model` does, for a continuum if there are no links; return the
     generated folder.
     """
+    name = f"articulated_m{segments}_n{links}" if links else f"continuum_m{segments}"
     tail = ["--tail", "articulated", "--links", str(links)] if links else ["--tail", "continuum"]
     tail += (["--functions", functions] if functions else []) + ["--real", real]
     command = [
@@ -107,11 +108,13 @@ def generated(
         *tail,
         "--segments",
         str(segments),
+        "--name",
+        name,
         "--output",
         str(parent),
     ]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-    return parent / (f"articulated_m{segments}_n{links}" if links else f"continuum_m{segments}")
+    return parent / name
 
 
 def label(segments: int, links: int | None) -> str:

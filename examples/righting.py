@@ -41,9 +41,10 @@ PAPER |= {"smoothing": 0.0}
 def model(folder: Path, segments: int, links: int | None) -> st.Model:
     """Generate and load a tail with exact derivatives; a continuum where links is None."""
     tail = ["--tail", "articulated", "--links", str(links)] if links else ["--tail", "continuum"]
-    options = ["--segments", str(segments), "--functions", FUNCTIONS, "--output", str(folder)]
+    options = ["--segments", str(segments), "--functions", FUNCTIONS]
+    place = ["--name", name(segments, links), "--output", str(folder)]
     subprocess.run(
-        [sys.executable, "-m", "serpentail_codegen", *tail, *options],
+        [sys.executable, "-m", "serpentail_codegen", *tail, *options, *place],
         check=True,
         stdout=subprocess.DEVNULL,
     )
@@ -52,9 +53,12 @@ def model(folder: Path, segments: int, links: int | None) -> st.Model:
 
 def loaded(folder: Path, segments: int, links: int | None) -> st.Model:
     """Load a tail that was generated."""
-    return st.load(
-        folder / (f"articulated_m{segments}_n{links}" if links else f"continuum_m{segments}")
-    )
+    return st.load(folder / name(segments, links))
+
+
+def name(segments: int, links: int | None) -> str:
+    """Return what a tail's model is called."""
+    return f"articulated_m{segments}_n{links}" if links else f"continuum_m{segments}"
 
 
 def share(rat: st.Model) -> np.ndarray:

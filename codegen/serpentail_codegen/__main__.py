@@ -7,10 +7,12 @@ import time
 from pathlib import Path
 from typing import Any
 
+from .scene.naming import suffix
 from .scene.parse import load_scene, parse_scene, scene_for, scene_to_dict
 from .scene.problems import SceneError
 from .scene.scene import KINDS, Scene
 from .scene.signatures.table import ALL
+from .stamp import is_made, key_of, note
 
 
 def parser() -> argparse.ArgumentParser:
@@ -30,17 +32,19 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--emission", help="auto, straight, loops, lanes or segments")
     p.add_argument("--profile", help="fast, or reproducible: the same bits on every machine")
     p.add_argument("--baked", action="store_true", help="fold the parameters into the code")
+    p.add_argument("--name", help="of the model; by default the scene's, and what options change")
     p.add_argument(
         "--output", type=Path, default=Path("generated"), help="parent of the generated folder"
     )
+    p.add_argument("--print-folder", action="store_true", help="only tell which folder it is")
     return p
 
 
 def scene_of(arguments: argparse.Namespace) -> Scene:
-    """Return the scene that the arguments describe."""
+    """Return the scene that the arguments describe, of a name that the options are part of."""
     chosen: dict[str, Any] = {
         name: getattr(arguments, name)
-        for name in ("real", "emission", "profile")
+        for name in ("real", "emission", "profile", "name")
         if getattr(arguments, name)
     }
     if arguments.functions:
@@ -48,38 +52,61 @@ def scene_of(arguments: argparse.Namespace) -> Scene:
         chosen["functions"] = names if names == "all" else names.split(",")
     if arguments.baked:
         chosen["baked"] = True
+    scene, own = _with_options(arguments, chosen)
+    if arguments.name:
+        return scene
+    return _renamed(scene, own.name + suffix(scene, own, arguments.functions))
+
+
+def _with_options(arguments: argparse.Namespace, chosen: dict[str, Any]) -> tuple[Scene, Scene]:
+    """Return a scene with options, and the same without."""
     if arguments.scene:
-        scene = load_scene(arguments.scene)
-        return parse_scene(scene_to_dict(scene) | chosen, scene.name)
-    if None in (arguments.tail, arguments.segments):
+        own = load_scene(arguments.scene)
+        return parse_scene(scene_to_dict(own) | chosen, own.name), own
+    size = (arguments.tail, arguments.segments, arguments.links)
+    if None in size[:2]:
         raise SystemExit("give a scene file, or --tail and --segments (and --links): see --help")
-    return scene_for(arguments.tail, arguments.segments, arguments.links, **chosen)
+    return scene_for(*size, **chosen), scene_for(*size)
+
+
+def _renamed(scene: Scene, name: str) -> Scene:
+    """Return a scene of another name; SceneError where it can have none such."""
+    return parse_scene(scene_to_dict(scene) | {"name": name}, name)
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Generate; return the exit status."""
+    """Generate what is not made yet; return the exit status."""
     try:
         arguments = parser().parse_args(argv)
         scene = scene_of(arguments)
     except SceneError as error:
         print(error, file=sys.stderr)
         return 2
-    from .pipeline import generate  # sympy is imported only now
-
+    folder = arguments.output / scene.name
+    if arguments.print_folder:
+        print(folder)
+        return 0
     start = time.perf_counter()
     try:
-        changed = generate(scene, arguments.output)
+        changed = made(scene, folder)
     except SceneError as error:  # its folder cannot be written
         print(error, file=sys.stderr)
         return 2
-    seconds = time.perf_counter() - start
-    folder = arguments.output / scene.name
-    print(
-        f"{folder}: {len(changed)} files written, {seconds:.2f} s"
-        if changed
-        else f"{folder}: up to date, {seconds:.2f} s"
-    )
+    told = f"{len(changed)} files written" if changed else "up to date"
+    print(f"{folder}: {told}, {time.perf_counter() - start:.2f} s")
     return 0
+
+
+def made(scene: Scene, folder: Path) -> list[str]:
+    """Generate a scene unless its folder is what it would be; return the files that changed."""
+    key = key_of(scene)
+    if is_made(folder, key):
+        return []
+    from .pipeline import generate  # sympy is imported only now
+
+    changed = generate(scene, folder.parent)
+    note(folder, key)
+    return changed
 
 
 if __name__ == "__main__":

@@ -108,12 +108,15 @@ def made(folder: Path, links: int | None) -> Path:
     """Generate one segment of so many links, or a continuum for None; return the generated
     folder.
     """
+    name = f"articulated_m1_n{links}" if links else "continuum_m1"
     tail = ["--tail", "articulated", "--links", str(links)] if links else ["--tail", "continuum"]
     options = [
         "--segments",
         "1",
         "--functions",
         "mass_matrix,forward_dynamics",
+        "--name",
+        name,
         "--output",
         str(folder),
     ]
@@ -122,7 +125,7 @@ def made(folder: Path, links: int | None) -> Path:
         check=True,
         stdout=subprocess.DEVNULL,
     )
-    return folder / (f"articulated_m1_n{links}" if links else "continuum_m1")
+    return folder / name
 
 
 def load_all(folder: Path) -> dict[int | None, Fixture]:

@@ -16,7 +16,22 @@ Error = type[Exception]
 
 def refusal(field: str, value: object, needs: str, error: Error) -> Exception:
     """Return the error about a value that a field cannot have."""
-    return error(f"{field}: value {value!r:.200}: needs {needs}")
+    return error(f"{field}: value {shown(value)}: needs {needs}")
+
+
+def shown(value: object) -> str:
+    """Return a value as Python writes it, on one line and shortened where it is long."""
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError):  # repr refuses integers of more than 4300 digits
+        return f"of type {type(value).__name__}, too long to show"
+    return one_line(text)
+
+
+def one_line(text: str) -> str:
+    """Return a text on one line of at most 200 characters."""
+    line = text if text.isprintable() else " ".join(text.split())
+    return line if len(line) <= 200 else line[:197] + "..."
 
 
 def real_array(
@@ -29,6 +44,11 @@ def real_array(
         raise error(
             f"{field}: type {type(value).__name__}: needs real numbers ({reason})"
         ) from reason
+    if np.ma.is_masked(value):
+        raise error(
+            f"{field}: {np.ma.count_masked(value)} masked entries: needs real numbers; use "
+            "filled() to choose some"
+        )
     if array.dtype.kind not in "fiu":
         raise error(f"{field}: type {array.dtype}: needs real numbers")
     with np.errstate(over="ignore"):  # what float cannot hold becomes inf, which is refused later
@@ -52,22 +72,34 @@ def refuse_not_finite(field: str, array: NDArray[Any], error: Error, whose: str 
 
 
 def number(
-    field: str, value: object, error: Error, *, above: float = -np.inf, least: float = -np.inf
+    field: str,
+    value: object,
+    error: Error,
+    *,
+    above: float = -np.inf,
+    least: float = -np.inf,
+    most: float = np.inf,
 ) -> float:
-    """Return a finite number above one bound and not below the other."""
-    numbers = numbers_in(value)
-    if numbers is None or numbers.shape != () or not _within(numbers, above, least):
-        raise refusal(field, value, f"a {_words('number', above, least)}", error)
+    """Return a finite number above one bound, not below another and not beyond the last."""
+    numbers, bounds = numbers_in(value), (above, least, most)
+    if numbers is None or numbers.shape != () or not _within(numbers, bounds):
+        raise refusal(field, value, f"a {_words('number', bounds)}", error)
     return float(numbers)
 
 
 def numbers(
-    field: str, value: object, size: int, error: Error, *, least: float = -np.inf
+    field: str,
+    value: object,
+    size: int,
+    error: Error,
+    *,
+    least: float = -np.inf,
+    most: float = np.inf,
 ) -> NDArray[np.float64]:
-    """Return finite numbers (size,), not below a bound; a single one is repeated."""
-    numbers = numbers_in(value)
-    if numbers is None or numbers.shape not in ((), (size,)) or not _within(numbers, least=least):
-        raise refusal(field, value, f"one or {size} {_words('numbers', least=least)}", error)
+    """Return finite numbers (size,) within bounds; a single one is repeated."""
+    numbers, bounds = numbers_in(value), (-np.inf, least, most)
+    if numbers is None or numbers.shape not in ((), (size,)) or not _within(numbers, bounds):
+        raise refusal(field, value, f"one or {size} {_words('numbers', bounds)}", error)
     return np.broadcast_to(numbers, (size,)).copy()
 
 
@@ -79,16 +111,23 @@ def numbers_in(value: object) -> NDArray[np.float64] | None:
         return None
 
 
-def _within(numbers: NDArray[np.float64], above: float = -np.inf, least: float = -np.inf) -> bool:
+Bounds = tuple[float, float, float]  # above, least, most
+
+
+def _within(numbers: NDArray[np.float64], bounds: Bounds) -> bool:
     """Tell whether numbers are finite and within bounds."""
-    return bool((np.isfinite(numbers) & (numbers > above) & (numbers >= least)).all())
+    above, least, most = bounds
+    sound = np.isfinite(numbers) & (numbers > above) & (numbers >= least) & (numbers <= most)
+    return bool(sound.all())
 
 
-def _words(noun: str, above: float = -np.inf, least: float = -np.inf) -> str:
+def _words(noun: str, bounds: Bounds) -> str:
     """Return what `_within` demands, in words."""
+    above, least, most = bounds
+    to = f" to {most:g}" if most < np.inf else ""
     if above > -np.inf:
-        return f"{noun} above {above:g}"
-    return f"{noun} from {least:g}" if least > -np.inf else f"finite {noun}"
+        return f"{noun} above {above:g}{to}"
+    return f"{noun} from {least:g}{to}" if least > -np.inf else f"finite {noun}{to}"
 
 
 def one_of(field: str, value: object, names: Collection[str], error: Error) -> str:
@@ -96,7 +135,7 @@ def one_of(field: str, value: object, names: Collection[str], error: Error) -> s
     if isinstance(value, str) and value in names:
         return value
     remedy = did_you_mean(value, names) or f"needs {' or '.join(map(repr, names))}"
-    raise error(f"{field}: value {value!r:.200}: {remedy}")
+    raise error(f"{field}: value {shown(value)}: {remedy}")
 
 
 def did_you_mean(value: object, names: Collection[str]) -> str:

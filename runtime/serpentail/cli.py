@@ -2,10 +2,16 @@
 
 import argparse
 import json
+import os
 import sys
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping
+from functools import partial
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from .errors import SerpentailError
+from .files import refuse_unwritable
 
 if TYPE_CHECKING:
     from .motion.trajectory import Trajectory
@@ -102,28 +108,80 @@ def _add_scene(verb: argparse.ArgumentParser, example: str) -> None:
     verb.add_argument("--folder", help=folder)
 
 
+Files = Mapping[str, Callable[[str], object]]  # option that names each -> what writes it
+
+
+class Outcome(NamedTuple):
+    """What a verb came to: a report as data and as text, whether all is well, files to write."""
+
+    report: dict[str, Any]
+    text: str
+    good: bool
+    files: Files = MappingProxyType({})
+
+
 def main(argv: list[str] | None = None) -> int:
-    """Run a verb; 0 if it went well, 1 if a check failed, 2 if the input was refused, 130 after
-    Ctrl-C.
+    """Run a verb; 0 if it went well, 1 if a check or a file failed, 2 if the input was refused, 130
+    after Ctrl-C.
     """
     arguments = parser().parse_args(argv)
     try:
-        report, text, good = run(arguments)
+        refuse_targets(arguments)
+        outcome = Outcome(*run(arguments))
     except SerpentailError as error:
         print(error, file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         print("serpentail: interrupted", file=sys.stderr)
         return INTERRUPTED
-    print(json.dumps(report) if arguments.json else text)
-    if report.get("stopped") == "interrupt":
+    except OSError as error:  # a path that the system refuses, a disk that is full
+        print(f"{arguments.verb}: {error!s:.300}", file=sys.stderr)
+        return 2
+    tell(json.dumps(outcome.report) if arguments.json else outcome.text)
+    written = [write(arguments, *entry) for entry in outcome.files.items()]
+    if outcome.report.get("stopped") == "interrupt":
         print("serpentail: interrupted; this is what there was until then", file=sys.stderr)
         return INTERRUPTED
-    return 0 if good else 1
+    return 0 if outcome.good and all(written) else 1
 
 
-def run(arguments: argparse.Namespace) -> tuple[dict[str, Any], str, bool]:
-    """Return the report of a verb, as data and as text, and whether all is well."""
+def refuse_targets(arguments: argparse.Namespace) -> None:
+    """SerpentailError where a file could not be written after the work is done."""
+    from .pictures.style import writable
+
+    for option, check in (("save", Path), ("film", writable)):
+        path = getattr(arguments, option, None)
+        try:
+            if path is not None:
+                refuse_unwritable(check(path))
+        except (OSError, ValueError) as error:
+            raise SerpentailError(f"--{option} {path}: {error}; name another file") from error
+
+
+def tell(text: str) -> None:
+    """Print a report; whoever reads it may stop to."""
+    try:
+        print(text, flush=True)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def write(arguments: argparse.Namespace, option: str, make: Callable[[str], object]) -> bool:
+    """Write the file that an option asks for; tell whether it could be, and on stderr why not."""
+    path = getattr(arguments, option)
+    if path is None:
+        return True
+    try:
+        make(path)
+    except Exception as error:  # whatever a picture or a disk fails by, the report is out
+        reason = " ".join(str(error).split()) or type(error).__name__
+        print(f"--{option} {path}: could not be written: {reason:.300}", file=sys.stderr)
+        return False
+    return True
+
+
+def run(arguments: argparse.Namespace) -> tuple[Any, ...]:
+    """Return the outcome of a verb."""
     verbs = {
         "info": informed,
         "plan": planned,
@@ -134,35 +192,30 @@ def run(arguments: argparse.Namespace) -> tuple[dict[str, Any], str, bool]:
     return verbs[arguments.verb](arguments)
 
 
-def informed(arguments: argparse.Namespace) -> tuple[dict[str, Any], str, bool]:
+def informed(arguments: argparse.Namespace) -> Outcome:
     """Return what a model is."""
     report = info(arguments.folder)
-    return report, describe(report), True
+    return Outcome(report, describe(report), True)
 
 
-def planned(arguments: argparse.Namespace) -> tuple[dict[str, Any], str, bool]:
+def planned(arguments: argparse.Namespace) -> Outcome:
     """Return the report of a scene's plan, and whether it converged."""
     from .scenes import plan as scenes
 
     plan = scenes.planned(arguments.scene, arguments.folder)
-    if arguments.save:
-        plan.trajectory.save(arguments.save)
-    return plan.report, _rows(plan.report), plan.success
+    return Outcome(plan.report, _rows(plan.report), plan.success, {"save": plan.trajectory.save})
 
 
-def simulated(arguments: argparse.Namespace) -> tuple[dict[str, Any], str, bool]:
+def simulated(arguments: argparse.Namespace) -> Outcome:
     """Return the report of a scene's motion."""
     from .scenes.overrides import parsed
     from .scenes.simulate import scenario
 
     scene = scenario(arguments.scene, arguments.folder, parsed(arguments.changes))
     motion, stopped = _motion(scene)
-    if arguments.save:
-        motion.save(arguments.save)
-    if arguments.film:
-        scene.film(motion, arguments.film)
     report = scene.summary(motion) | stopped
-    return report, _rows(report), True
+    files: Files = {"save": motion.save, "film": partial(scene.film, motion)}
+    return Outcome(report, _rows(report), True, files)
 
 
 def _motion(scene: "Scenario") -> tuple["Trajectory", dict[str, str]]:
@@ -176,17 +229,17 @@ def _motion(scene: "Scenario") -> tuple["Trajectory", dict[str, str]]:
         return motion, {"stopped": "interrupt"}
 
 
-def verified(arguments: argparse.Namespace) -> tuple[dict[str, Any], str, bool]:
+def verified(arguments: argparse.Namespace) -> Outcome:
     """Return which laws a model obeys, and whether it obeys all of them."""
     from .model.model import load
     from .verification.report import as_text, laws, summary
 
     model = load(arguments.folder)
     checks = laws(model)
-    return summary(model, checks), as_text(model, checks), all(c.passed for c in checks)
+    return Outcome(summary(model, checks), as_text(model, checks), all(c.passed for c in checks))
 
 
-def cached(arguments: argparse.Namespace) -> tuple[dict[str, Any], str, bool]:
+def cached(arguments: argparse.Namespace) -> Outcome:
     """Return what the cache of compiled models holds, emptied before where that is asked for."""
     from .model.bound import contents, empty
     from .model.cache import cache_folder
@@ -195,7 +248,7 @@ def cached(arguments: argparse.Namespace) -> tuple[dict[str, Any], str, bool]:
     if arguments.clean:
         empty(folder)
     report = contents(folder)
-    return report, _rows(report), True
+    return Outcome(report, _rows(report), True)
 
 
 def _rows(report: dict[str, Any]) -> str:

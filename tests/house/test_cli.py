@@ -104,6 +104,13 @@ def test_missing_folder_is_status_2(run, tmp_path, verb, form):
     assert err.startswith(f"{tmp_path / 'nowhere'} is no generated folder") and "make model" in err
 
 
+@pytest.mark.parametrize("folder", ["a" * 5000, "a\0b", "/dev/null", "/dev/zero/a"])
+@pytest.mark.parametrize("verb", ["info", "verify"])
+def test_a_path_that_is_none_is_one_line(run, verb, folder):
+    status, out, err = run(verb, folder)
+    assert (status, out) == (2, "") and err.count("\n") == 1 and len(err) < 400
+
+
 def test_missing_compiler_is_status_2(run, folder, monkeypatch):
     monkeypatch.setenv("CC", "no-such-cc")
     status, out, err = run("info", folder)

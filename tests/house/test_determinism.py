@@ -73,7 +73,10 @@ def test_same_bytes_under_any_hash_seed_and_from_any_folder(expected, tmp_path, 
     tail = ("--tail", "articulated", "--segments", "2", "--links", "2", "--emission", "loops")
     surroundings = {"PYTHONHASHSEED": seed, "LC_ALL": "C", "TZ": f"Etc/GMT+{seed}"}
     printed = call(
-        *tail, "--functions", functions, "--output", "made/here", cwd=cwd, **surroundings
+        *tail,
+        *("--functions", functions, "--name", NAME, "--output", "made/here"),
+        cwd=cwd,
+        **surroundings,
     )
     assert f"made/here/{NAME}: {len(FILES)} files written" in printed
     assert texts(cwd / "made" / "here" / NAME) == expected

@@ -151,3 +151,15 @@ def test_baked_parameters_are_refused_with_the_remedy():
 def test_values_cannot_be_changed_in_place(manifest):
     with pytest.raises(TypeError):
         resolve(manifest, None)["tail_mass"] = 1.0
+
+
+def test_the_struct_of_a_model_cannot_be_written_to():
+    model = st.load(model_folder(SEGMENTS, LINKS, functions=["mass_matrix"]))
+    for vector in (model.parameter_vector, model.with_parameters(gravity=0).parameter_vector):
+        with pytest.raises(ValueError, match="read-only"):
+            vector[0] = 1.0
+
+
+def test_masked_values_are_refused(manifest):
+    inertia = np.ma.masked_array(INERTIA, [False, True, False])
+    assert "link_inertia: value masked_array" in refusal(manifest, {"link_inertia": inertia})

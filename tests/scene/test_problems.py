@@ -55,14 +55,37 @@ def test_required_keys(refuse, key):
     assert str(problem).startswith(f"{key}: no value: needs ")
 
 
-@pytest.mark.parametrize("size", ["100001", "0x" + "f" * 5000])
-def test_absurd_tails_are_refused(refuse, size):
-    problem = refuse(f'kind = "articulated"\nsegments = 1\nlinks = {size}')["segments * links"]
-    assert "fewer" in problem.remedy
+@pytest.mark.parametrize(
+    ("text", "field", "words"),
+    [
+        ("segments = 1\nlinks = 10001", "segments * links", "more than 10000 links in all"),
+        ("segments = 1\nlinks = 0x" + "f" * 5000, "segments * links", "more than 10000 links"),
+        ("segments = 99999\nlinks = 1", "segments", "more than 100 segments would take hours"),
+        (
+            'segments = 21\nlinks = 1\nemission = "straight"',
+            "segments",
+            'more than 20 segments of emission "straight" would take hours',
+        ),
+        (
+            'segments = 1\nlinks = 101\nemission = "straight"',
+            "segments * links",
+            'more than 100 links of emission "straight" in all',
+        ),
+    ],
+)
+def test_absurd_tails_are_refused(refuse, text, field, words):
+    problems = refuse('kind = "articulated"\n' + text)
+    assert words in problems[field].remedy and "fewer" in problems[field].remedy
 
 
-def test_the_largest_tail_is_accepted():
-    assert scene_for("articulated", 1000, 100).segments == 1000
+def test_samples_of_a_continuum_are_bounded_too(refuse):
+    problems = refuse('kind = "continuum"\nsegments = 2\nsamples = 5001')
+    assert "more than 10000 samples in all" in problems["segments * samples"].remedy
+
+
+def test_the_largest_tails_are_accepted():
+    assert scene_for("articulated", 100, 100).segments == 100
+    assert scene_for("articulated", 20, 5, emission="straight").links == 5
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,8 @@
 
 import json
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -90,3 +92,70 @@ def test_a_flight_is_a_scene_too(tmp_path, monkeypatch, capsys):
     assert summary["com_rise_m"] == pytest.approx(2 * 0.1 - 4.9 * 0.01, abs=0.01)
     Path("still.toml").write_text(text + "start = { settle = {} }\n")
     assert cli.main(["simulate", "still.toml"]) == 2 and "cannot settle" in capsys.readouterr().err
+
+
+# Files to write.
+
+
+@pytest.mark.parametrize(
+    ("option", "path", "words"),
+    [
+        ("--save", "simple.toml/a.npz", "simple.toml is no folder"),
+        ("--save", "generated", "generated is a folder"),
+        ("--film", "simple.toml/deep/a.png", "simple.toml is no folder"),
+        ("--film", "a.gif", "has suffix '.gif': use one of .pdf, .png, .svg"),
+        ("--film", "a", "has suffix '': use one of"),
+        ("--save", "/proc/a.npz", "could not be written|cannot be written to|no folder"),
+    ],
+)
+def test_a_target_that_cannot_be_is_refused_before_the_run(
+    scene, capsys, monkeypatch, option, path, words
+):
+    ran = []
+    monkeypatch.setattr(st.Scenario, "simulate", lambda *_: ran.append(1))
+    if path.startswith("/proc"):  # whatever the user may do, there no folder can be written
+        monkeypatch.setattr("os.access", lambda folder, _: str(folder) != "/proc")
+    assert cli.main(["simulate", scene(), option, path]) == 2
+    out, err = capsys.readouterr()
+    assert not out and not ran and re.search(words, err)
+    assert err.startswith(f"{option} {path}: ") and err.count("\n") == 1
+
+
+def test_a_failed_picture_loses_nothing(scene, capsys, monkeypatch):
+    def fails(*_, **__):
+        raise RuntimeError("no fonts\non this machine")
+
+    monkeypatch.setattr("serpentail.scenes.simulate.filmstrip", fails)
+    given = ["--film", "a.png", "--save", "new/a.npz", "--json", "-"]
+    assert cli.main(["simulate", scene(), *given]) == 1
+    out, err = capsys.readouterr()
+    assert json.loads(out)["model"] == "simple"
+    assert err == "--film a.png: could not be written: no fonts on this machine\n"
+    assert st.Trajectory.load("new/a.npz").t[-1] == 0.02 and not Path("a.png").exists()
+
+
+def test_a_plan_is_told_before_it_is_saved(scene, capsys, monkeypatch):
+    class Found:
+        report, success = {"converged": True}, True
+
+        class trajectory:  # noqa: N801
+            @staticmethod
+            def save(_):
+                raise OSError("no space left on device")
+
+    monkeypatch.setattr("serpentail.scenes.plan.planned", lambda *_: Found)
+    assert cli.main(["plan", scene(), "--save", "a.npz", "--json", "-"]) == 1
+    out, err = capsys.readouterr()
+    assert json.loads(out) == {"converged": True} and "no space left on device" in err
+    assert cli.main(["plan", scene(), "--save", "simple.toml/a.npz"]) == 2
+
+
+def test_a_reader_that_stops_is_no_error(scene, tmp_path):
+    done = subprocess.run(
+        f"{sys.executable} -m serpentail.cli simulate {scene()} --save a.npz | true; echo end",
+        shell=True,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.stdout, done.stderr) == ("end\n", "") and (tmp_path / "a.npz").is_file()

@@ -6,7 +6,17 @@ from typing import Any
 
 from .parameters import PARAMETERS, SINGLE, Parameter, Value
 from .problems import Problem, suggest
-from .scene import COUNT, KEYS, MOST_LINKS, NAMES, ONLY, Only, is_whole
+from .scene import (
+    COUNT,
+    KEYS,
+    MOST_LINKS,
+    MOST_SEGMENTS,
+    MOST_STRAIGHT,
+    NAMES,
+    ONLY,
+    Only,
+    is_whole,
+)
 from .signatures.table import ALL, DERIVATIVES, NEEDS
 
 
@@ -43,12 +53,27 @@ def number_problem(parameter: Parameter, value: object) -> Problem:
 
 
 def key_problems(values: Mapping[str, Any]) -> list[Problem]:
-    """Return a problem for each key whose rule is broken, and for a tail of too many links."""
+    """Return a problem for each key whose rule is broken, and for a tail that is too long."""
     broken = [(key, rule) for key, (_, rule) in KEYS.items() if not rule.holds(values[key])]
     problems = [Problem(key, values[key], f"needs {rule.text}") for key, rule in broken]
-    if tail_links(values) > MOST_LINKS:
-        remedy = f"more than {MOST_LINKS} links in all; choose fewer segments or links"
-        problems.append(Problem("segments * links", tail_links(values), remedy))
+    return problems + size_problems(values)
+
+
+def size_problems(values: Mapping[str, Any]) -> list[Problem]:
+    """Return a problem for each size of which a model would not be generated in sensible time."""
+    most, of = (MOST_SEGMENTS, MOST_LINKS), ""
+    if values["emission"] == "straight":
+        most, of = MOST_STRAIGHT, ' of emission "straight"'
+    segments = values["segments"] if COUNT.holds(values["segments"]) else 1
+    problems = []
+    if segments > most[0]:
+        remedy = f"more than {most[0]} segments{of} would take hours; choose fewer"
+        problems.append(Problem("segments", segments, remedy))
+    for key in ("links", "samples"):
+        pieces = tail_pieces(values, key)
+        if pieces > most[1]:
+            remedy = f"more than {most[1]} {key}{of} in all; choose fewer segments or {key}"
+            problems.append(Problem(f"segments * {key}", pieces, remedy))
     return problems
 
 
@@ -133,9 +158,9 @@ def single_problems(parameters: Mapping[str, Value]) -> list[Problem]:
     return problems
 
 
-def tail_links(values: Mapping[str, Any]) -> int:
-    """N = m n, or 1 where m or n is wrong."""
-    m, n = values["segments"], values["links"]
+def tail_pieces(values: Mapping[str, Any], key: str = "links") -> int:
+    """N = m n, or 1 where m or n is wrong; n is the links or the samples of a segment."""
+    m, n = values["segments"], values[key]
     return m * n if COUNT.holds(m) and COUNT.holds(n) else 1
 
 

@@ -1,7 +1,6 @@
 """Reads scene files and tables; what comes back is a checked, frozen Scene."""
 
 import re
-import tomllib
 from collections.abc import Collection, Mapping
 from dataclasses import fields
 from pathlib import Path
@@ -15,29 +14,24 @@ from .checks import (
     lacking,
     plain,
     single_problems,
-    tail_links,
+    tail_pieces,
     unknown_keys,
 )
 from .problems import Problem, SceneError
 from .resolve import resolve_parameters
 from .scene import CONTACTS, GROUPS, KEYS, MOST_LINKS, ONLY, TARGETS, Only, Scene
 from .signatures.table import ALL, DEFAULT, DEFAULT_ON_GROUND, DERIVATIVES, NEEDS
+from .source import tables_of
 
 
 def load_scene(path: str | Path) -> Scene:
     """Read a scene file, named by its stem unless it has a `name`; raises SceneError."""
     path = Path(path)
     try:
-        table = tomllib.loads(path.read_bytes().decode("utf-8-sig"))
-    except OSError as error:
-        remedy = f"{error.strerror}; give the path of a scene file (.toml)"
-    except UnicodeDecodeError as error:
-        remedy = f"not UTF-8 from byte {error.start} on; save it as UTF-8 text"
-    except (ValueError, RecursionError) as error:  # of the TOML parser, or for a NUL in the path
-        remedy = f"cannot be read as TOML: {error}"
-    else:
-        return parse_scene(table, path.stem)
-    raise SceneError([Problem("scene file", str(path), remedy)])
+        table = tables_of(path)
+    except ValueError as error:
+        raise SceneError([Problem("scene file", str(path), str(error))]) from error
+    return parse_scene(table, path.stem)
 
 
 def scene_for(tail: str, segments: int, links: int | None = None, **overrides: object) -> Scene:
@@ -63,7 +57,7 @@ def parse_scene(table: Mapping[str, Any], name: str) -> Scene:
     problems += function_problems(values["functions"]) + contact_problems(table, values, contacts)
 
     # parameters: which there are follows from the kind and the contacts
-    links = min(tail_links(values), MOST_LINKS)
+    links = min(tail_pieces(values), MOST_LINKS)
     try:
         values["parameters"] = resolve_parameters(values["parameters"], links, kind, contacts)
     except SceneError as error:

@@ -13,36 +13,16 @@ KINDS = ("articulated", "continuum")
 GROUPS = ("feet", "tail", "torso")  # of contact points, in their order
 FRICTION = ("cone", "box", "smooth", "paper")
 TARGETS = ("c", "casadi")  # languages to emit, in their order
-C_HEADERS = frozenset(
-    [
-        "assert",
-        "complex",
-        "ctype",
-        "errno",
-        "features",
-        "fenv",
-        "float",
-        "inttypes",
-        "iso646",
-        "limits",
-        "locale",
-        "math",
-        "setjmp",
-        "signal",
-        "stdarg",
-        "stdbool",
-        "stddef",
-        "stdint",
-        "stdio",
-        "stdlib",
-        "string",
-        "tgmath",
-        "time",
-        "wchar",
-        "wctype",
-    ]
-)  # a model of such a name would hide the system's header
-MOST_LINKS = 100_000  # segments * links: beyond it a slip, not a tail
+# a model of such a name would hide the system's header
+C_HEADERS = (
+    "assert|complex|ctype|errno|features|fenv|float|inttypes|iso646|limits|locale|math|setjmp|"
+    "signal|stdarg|stdbool|stddef|stdint|stdio|stdlib|string|tgmath|time|wchar|wctype"
+)
+# What is generated within a minute or so; the work grows as the cube of the segments, and
+# straight lines grow with every piece.
+MOST_SEGMENTS = 100
+MOST_LINKS = 10_000  # or samples, of all segments
+MOST_STRAIGHT = (20, 100)  # segments, and pieces in all, of straight lines
 
 
 def _one_of(names: Sequence[str], remark: str = "") -> Rule:
@@ -59,11 +39,14 @@ def is_whole(x: object) -> bool:
 FLAG = Rule("true or false, without quotes", lambda x: isinstance(x, bool))
 COUNT = Rule("a whole number, 1 or above", lambda x: is_whole(x) and x >= 1)
 TEXT = Rule('a text, in "quotes"', lambda x: isinstance(x, str))
+# the prefix of C symbols, a file's and a folder's name; the runtime has the same rule, in
+# serpentail/scenes/names.py
 NAME = Rule(
-    "a text of a-z, 0-9 and _, a letter first, that names no C header: rename the file, or set "
-    'name = "..." in it',
+    "a text of up to 63 of a-z, 0-9 and _, a letter first, that names no C header: rename the "
+    'file, or set name = "..." in it',
     lambda x: (
-        isinstance(x, str) and re.fullmatch("[a-z][a-z0-9_]*", x) is not None and x not in C_HEADERS
+        isinstance(x, str)
+        and re.fullmatch(f"(?!({C_HEADERS})$)[a-z][a-z0-9_]{{0,62}}", x) is not None
     ),
 )
 BEND = Rule(

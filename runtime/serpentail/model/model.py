@@ -132,6 +132,7 @@ class Model(Functions):
         self.contacts = {entry["group"]: entry["count"] for entry in manifest["contacts"]}
         # its functions, as compiled
         self.parameter_vector = np.array(flat(manifest, parameters), real_type(manifest))
+        self.parameter_vector.setflags(write=False)  # with_parameters makes another model
         self.batch_library = batch_library or BatchLibrary(checked, profile)
         self.kernels: dict[str, Kernel] = {}
         if library is not None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import did_you_mean, numbers_in
+from ..checks import did_you_mean, numbers_in, shown
 from ..errors import ModelError, UnlikeBodies
 
 Value = float | tuple[float, ...]
@@ -102,7 +102,7 @@ def _checked_changes(manifest: dict, changes: object, runs: int | None) -> dict[
     """Return a caller's changes checked, of one model or, with a leading axis, of many runs."""
     if not isinstance(changes, Mapping | None):
         raise ModelError(
-            f"parameters: value {changes!r:.60}: needs a mapping, such as {{'gravity': 9.8}}"
+            f"parameters: value {shown(changes)}: needs a mapping, such as {{'gravity': 9.8}}"
         )
     fields = {p["name"]: p for p in manifest["parameters"]}
     problems, sound = [], {}
@@ -188,7 +188,7 @@ def _checked(fields: dict, name: str, value: object, runs: int | None) -> np.nda
         needs, shape = f"{needs}, for each of {runs} runs", (runs, *shape)
     numbers = numbers_in(value)
     if numbers is None or numbers.shape != shape:
-        return f"{name}: value {value!r:.200}: {needs}"
+        return f"{name}: value {shown(value)}: {needs}"
     # the first run of which it does not hold
     rows = numbers.reshape(-1, size)
     with np.errstate(over="ignore"):
@@ -196,5 +196,5 @@ def _checked(fields: dict, name: str, value: object, runs: int | None) -> np.nda
     if not len(wrong):
         return numbers
     if runs is None:
-        return f"{name}: value {value!r}: {needs}"
-    return f"{name} of run {wrong[0]}: value {numbers[wrong[0]].tolist()!r}: {needs}"
+        return f"{name}: value {shown(value)}: {needs}"
+    return f"{name} of run {wrong[0]}: value {shown(numbers[wrong[0]].tolist())}: {needs}"

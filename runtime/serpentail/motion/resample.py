@@ -64,6 +64,15 @@ def hermite_q(rows: Interpolation, q: Array, v: Array) -> Array:
     return result
 
 
+def smooth(t: Array, values: Array, times: Array) -> Array:
+    """Cubic splines (of fourth order) through the rows of values, which nothing makes jump."""
+    from scipy.interpolate import CubicSpline
+
+    if len(t) == 1:
+        return np.repeat(values, len(times), axis=0)
+    return np.asarray(CubicSpline(t, values, axis=0)(times))
+
+
 def monotone(t: Array, values: Array, times: Array) -> Array:
     """Shape-preserving cubics (PCHIP) through the rows of values."""
     from scipy.interpolate import PchipInterpolator

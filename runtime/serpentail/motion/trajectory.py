@@ -18,9 +18,10 @@ from ..files import replacing
 from ..model.layout import PER_SEGMENT, QUATERNION, TAIL_Q, TORSO_NQ, Layout
 from .contact import ARRAYS as TOUCHING
 from .contact import Contact
-from .resample import Interpolation, hermite_q, inside, monotone
+from .resample import Interpolation, hermite_q, inside, monotone, smooth
 
 SUFFIX = ".npz"
+MOST_EXPANSION = 100  # times the file: ours is not compressed, a motion in one that is fits, too
 UNIT_TOLERANCE = 1e-3  # how far a stored quaternion's norm may drift from 1
 
 
@@ -131,18 +132,20 @@ class Trajectory:
 
         p and q_t: cubic Hermite through positions and velocities. Attitude: the same on the
         quaternion with q_dot = q (0, omega) / 2, normalised (samples less than half a turn apart).
-        v, energies and momenta: monotone cubic, so no overshoot at impacts. tau and contact:
-        linear, since they may jump.
+        v in flight: cubic spline, of fourth order in the samples' distance. v on the ground, and
+        energies and momenta: monotone cubic, of second order where they turn, so no overshoot at
+        impacts. tau and contact: linear, since they may jump.
         """
         times = inside(_real("t", t), self.t)
         rows = Interpolation.at(times, self.t)
-        smooth: dict[str, Any] = {
+        cubics: dict[str, Any] = {
             name: monotone(self.t, getattr(self, name), times) for name in MONOTONE
         }
+        cubics["v"] = (monotone if self.contact else smooth)(self.t, self.v, times)
         q = hermite_q(rows, self.q, self.v)
         contact = self.contact.mapped(rows.linear) if self.contact else None
         return dataclasses.replace(
-            self, t=times, q=q, tau=rows.linear(self.tau), contact=contact, **smooth
+            self, t=times, q=q, tau=rows.linear(self.tau), contact=contact, **cubics
         )
 
 
@@ -150,7 +153,7 @@ ARRAYS = tuple(
     entry.name for entry in dataclasses.fields(Trajectory) if entry.name not in ("info", "contact")
 )
 CONTACT = "contact_"  # before the names of a contact's arrays in a file
-MONOTONE = ("v", "kinetic", "potential", "linear_momentum", "angular_momentum")
+MONOTONE = ("kinetic", "potential", "linear_momentum", "angular_momentum")
 
 
 def _real(name: str, value: ArrayLike) -> Array:
@@ -223,6 +226,9 @@ def _read(source: Path) -> dict[str, Any]:
     """The fields of a trajectory file, as stored, after a check of every checksum."""
     try:
         with zipfile.ZipFile(source) as archive:
+            size = sum(entry.file_size for entry in archive.infolist())
+            if size > MOST_EXPANSION * source.stat().st_size:
+                raise ValueError(f"it would unpack to {size / 1e9:.2g} GB")
             damaged = archive.testzip()
         if damaged:
             raise ValueError(f"the checksum of {damaged} is wrong")
@@ -234,6 +240,7 @@ def _read(source: Path) -> dict[str, Any]:
     except (
         ValueError,
         EOFError,
+        MemoryError,
         NotImplementedError,
         RuntimeError,
         zipfile.BadZipFile,

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import number, numbers, one_of
+from ..checks import number, numbers, numbers_in, one_of, refusal, shown
 from ..errors import PlanningError
 from ..model.layout import QUATERNION, TAIL_Q, TAIL_V
 from ..model.model import Model
@@ -17,6 +17,7 @@ from .nlp.node import FORMULATIONS
 OBJECTIVES = ("effort", "energy", "time")
 # N m s: the effort counts a tail's rates as torques, or a plan whirls a light tail at no cost
 SMOOTHING = 3e-4
+HUGE = 1e100  # beyond it squares overflow
 START_SLACK = 1e-6  # rad, rad/s: how far a start may be beyond its bounds
 
 
@@ -91,7 +92,7 @@ def checked_problem(
     # settings, those that are names last
     checks: dict[str, Callable[[Any], Any]] = {"objective": _objective, "path": _path}
     for name in ("smoothing", "damping"):
-        checks[name] = partial(number, name, error=PlanningError, least=0)
+        checks[name] = partial(number, name, error=PlanningError, least=0, most=HUGE)
     checked = {
         name: checks[name](value) if name in checks else value for name, value in settings.items()
     }
@@ -102,22 +103,25 @@ def checked_problem(
 
 def _vector(field: str, value: Any, size: int) -> np.ndarray:
     """Return finite numbers (size,); PlanningError else, also of one number alone."""
-    if np.ndim(value) == 0:
-        raise PlanningError(f"{field}: value {value!r}: needs {size} numbers")
+    array = numbers_in(value)
+    if array is None or array.shape == ():
+        raise refusal(field, value, f"{size} numbers", PlanningError)
     return numbers(field, value, size, PlanningError)
 
 
 def _unit_quaternion(field: str, quaternion: np.ndarray) -> np.ndarray:
     """Return the quaternion, of norm 1; PlanningError where it is zero."""
-    norm = np.linalg.norm(quaternion)
-    if norm == 0:
+    largest = np.abs(quaternion).max()
+    if largest == 0:
         raise PlanningError(f"{field}: the zero quaternion: upright is (1, 0, 0, 0)")
-    return quaternion / norm
+    if not 1 / HUGE < largest < HUGE:  # whose squares are no numbers, or 0
+        quaternion = quaternion / largest
+    return quaternion / np.linalg.norm(quaternion)
 
 
 def _start(model: Model, start: Any) -> tuple[np.ndarray, np.ndarray]:
     if not isinstance(start, tuple | list) or len(start) != 2:
-        raise PlanningError(f"start: value {start!r}: needs (q0, v0), two arrays")
+        raise PlanningError(f"start: value {shown(start)}: needs (q0, v0), two arrays")
     q0, v0 = _vector("start[0]", start[0], model.nq), _vector("start[1]", start[1], model.nv)
     q0[QUATERNION] = _unit_quaternion("start[0][3:7]", q0[QUATERNION])
     return q0, v0
@@ -125,7 +129,7 @@ def _start(model: Model, start: Any) -> tuple[np.ndarray, np.ndarray]:
 
 def _goal(goal: Any, tail: int) -> Goal:
     if not isinstance(goal, Goal):
-        raise PlanningError(f"goal: value {goal!r}: needs a serpentail.Goal")
+        raise PlanningError(f"goal: value {shown(goal)}: needs a serpentail.Goal")
     attitude = goal.attitude
     upright = isinstance(attitude, str) and attitude == "upright"
     if attitude is not None and not upright:
@@ -149,20 +153,20 @@ def _partly_free(field: str, value: Any, size: int) -> np.ndarray | None:
     try:
         array = np.array([np.nan if entry is None else float(entry) for entry in value])
         free = np.array([entry is None for entry in value])
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise PlanningError(
-            f"{field}: value {value!r}: needs {size} numbers, None where free"
+            f"{field}: value {shown(value)}: needs {size} numbers, None where free"
         ) from None
     if array.shape != (size,) or not np.isfinite(array[~free]).all():
         raise PlanningError(
-            f"{field}: value {value!r}: needs {size} finite numbers, None where free"
+            f"{field}: value {shown(value)}: needs {size} finite numbers, None where free"
         )
     return array
 
 
 def _bounds(bounds: Any, tail: int) -> Bounds:
     if not isinstance(bounds, Bounds):
-        raise PlanningError(f"bounds: value {bounds!r}: needs a serpentail.Bounds")
+        raise PlanningError(f"bounds: value {shown(bounds)}: needs a serpentail.Bounds")
     return Bounds(
         *(_magnitudes(entry.name, getattr(bounds, entry.name), tail) for entry in fields(Bounds))
     )
@@ -172,9 +176,9 @@ def _magnitudes(name: str, value: Any, tail: int) -> np.ndarray | None:
     """Return one bound of every tail coordinate; None where there is none."""
     if value is None:
         return None
-    magnitudes = numbers(f"bounds.{name}", value, tail, PlanningError)
+    magnitudes = numbers(f"bounds.{name}", value, tail, PlanningError, most=HUGE)
     if not (magnitudes > 0).all():
-        raise PlanningError(f"bounds.{name}: value {value!r}: needs magnitudes above 0")
+        raise PlanningError(f"bounds.{name}: value {shown(value)}: needs magnitudes above 0")
     return magnitudes
 
 
@@ -205,11 +209,11 @@ def _duration(duration: Any) -> tuple[float, float]:
     pair = duration if isinstance(duration, tuple | list) else (duration, duration)
     if len(pair) != 2:
         raise PlanningError(
-            f"duration: value {duration!r}: needs one number, or (least, most), in s"
+            f"duration: value {shown(duration)}: needs one number, or (least, most), in s"
         )
     least, most = (number("duration", value, PlanningError, above=0) for value in pair)
     if most < least:
-        raise PlanningError(f"duration: value {duration!r}: needs least <= most, in s")
+        raise PlanningError(f"duration: value {shown(duration)}: needs least <= most, in s")
     return least, most
 
 
@@ -224,7 +228,7 @@ def _path(path: Sequence[Any]) -> tuple[PathConstraint, ...]:
     for k, row in enumerate(path):
         if not isinstance(row, tuple | list) or len(row) != 3 or not callable(row[0]):
             raise PlanningError(
-                f"path[{k}]: value {row!r}: needs (function of a point, least, most)"
+                f"path[{k}]: value {shown(row)}: needs (function of a point, least, most)"
             )
         least, most = float(row[1]), float(row[2])
         if not least <= most:

@@ -5,16 +5,18 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import number, one_of
+from ..checks import number, one_of, refusal, shown
 from ..errors import PlanningError
 from ..motion.trajectory import Trajectory
+from .problem import HUGE
 
-WHOLE_NUMBERS = {  # settings that count something -> the least of each
-    "intervals": 1,
-    "rounds": 0,
-    "most_intervals": 1,
-    "multi_start": 1,
-    "retries": 0,
+WHOLE_NUMBERS = {  # least and most of each; beyond the most a search would not end
+    "intervals": (1, 10_000),
+    "rounds": (0, 1000),
+    "most_intervals": (1, 10_000),
+    "multi_start": (1, 10_000),
+    "retries": (0, 10_000),
+    "seed": (0, 2**63 - 1),
 }
 
 
@@ -43,19 +45,23 @@ class PlanSettings:
 def checked_settings(model, **settings) -> PlanSettings:
     """Return the settings; PlanningError names the first that is wrong, and the remedy."""
     checked = PlanSettings(**settings)
-    for name, least in WHOLE_NUMBERS.items():
+    for name, (least, most) in WHOLE_NUMBERS.items():
         value = getattr(checked, name)
-        if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
-            raise PlanningError(f"{name}: value {value!r}: needs a whole number from {least}")
+        whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+        if not whole or not least <= value <= most:
+            raise refusal(name, value, f"a whole number from {least} to {most}", PlanningError)
     for name in ("tolerance", "time_limit"):
         if getattr(checked, name) is not None:
             number(name, getattr(checked, name), PlanningError, above=0)
     if not isinstance(checked.options, dict):
         raise PlanningError(
-            f"options: value {checked.options!r}: needs a dict, such as {{'ipopt.max_iter': 500}}"
+            f"options: value {shown(checked.options)}: needs a dict, such as "
+            "{'ipopt.max_iter': 500}"
         )
     _check_guess(model, checked.guess)
-    number("guess_damping", checked.guess_damping, PlanningError, least=0)
+    number("guess_damping", checked.guess_damping, PlanningError, least=0, most=HUGE)
+    if not isinstance(checked.track, bool | np.bool_):
+        raise refusal("track", checked.track, "True or False", PlanningError)
     one_of("dynamics", checked.dynamics, ("auto", "compiled", "symbolic"), PlanningError)
     return checked
 
@@ -66,7 +72,7 @@ def _check_guess(model, guess) -> None:
         return
     motion = getattr(guess, "trajectory", guess)
     if not isinstance(motion, Trajectory):
-        raise PlanningError(f"guess: value {guess!r}: needs a Plan or a Trajectory")
+        raise PlanningError(f"guess: value {shown(guess)}: needs a Plan or a Trajectory")
     if motion.q.shape[1] != model.nq or len(motion.t) < 2:
         raise PlanningError(
             f"guess: q has shape {motion.q.shape}: needs at least two samples of {model.nq}"

@@ -1,17 +1,20 @@
 """Reading a scene file, and loading the model that belongs to it, generated first where needed."""
 
+import shlex
 import subprocess
 import sys
-import tomllib
 from collections.abc import Mapping
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from ..checks import refusal, shown
 from ..errors import ModelError
 from ..model.manifest import read_manifest
 from ..model.model import Model, load
 from ..model.parameters import merged
+from .names import checked_name
+from .source import tables_of
 
 # keys of a scene that its generated code depends on, and that a folder is compared by
 MADE_OF = (
@@ -29,11 +32,9 @@ MADE_OF = (
 def read_scene(path: str | Path, error: type[Exception]) -> dict:
     """Return the tables of a scene file; ``error`` where it cannot be read."""
     try:
-        return tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
-    except (OSError, ValueError, RecursionError) as reason:
-        raise error(
-            f"scene file: value {str(path)!r}: cannot be read ({reason}); give a scene file (.toml)"
-        ) from reason
+        return tables_of(Path(path))
+    except ValueError as reason:
+        raise error(f"scene file: value {shown(str(path))}: {reason}") from reason
 
 
 def subtable(scene: Mapping, name: str, path: str | Path, error: type[Exception]) -> dict:
@@ -41,7 +42,7 @@ def subtable(scene: Mapping, name: str, path: str | Path, error: type[Exception]
     table = scene.get(name)
     if not isinstance(table, Mapping):
         raise error(
-            f"{name}: value {table!r}: {path} has no table [{name}]; add one, with start and "
+            f"{name}: value {shown(table)}: {path} has no table [{name}]; add one, with start and "
             "duration"
         )
     return dict(table)
@@ -52,22 +53,36 @@ def model_of(
 ) -> Model:
     """Return the model of a scene, with the scene's parameters, then those given here.
 
-    folder: by default generated/<name>; it is generated where it is missing.  ModelError where it
-    is of another scene.
+    folder: by default generated/<name>, which is generated where it is missing.  ModelError where
+    the folder is of another scene.
     """
-    folder = Path(folder or Path("generated") / str(scene.get("name", Path(path).stem)))
-    if not folder.exists():
-        _generate(Path(path), folder)
-    made = read_manifest(folder)["scene"]
+    name = checked_name(scene.get("name", Path(path).stem))
+    place = Path(folder or Path("generated") / name)
+    if not folder and not place.exists():
+        _generate(Path(path), place)
+    made = read_manifest(place)["scene"]
     for key in MADE_OF:
         if key in scene and not _same(scene[key], made.get(key)):
             raise ModelError(
-                f"{folder} has {key} = {made.get(key)!r}, {path} has {scene[key]!r}: generate it "
-                f"again, `make model SCENE={path}`"
+                f"{place} has {key} = {made.get(key)!r}, {path} has {shown(scene[key])}: generate "
+                f"it again, `{make_model(path)}`"
             )
     if made["baked"]:
-        return load(folder, parameters)
-    return load(folder, merged(scene.get("parameters", {}), parameters))
+        return load(place, parameters)
+    return load(place, merged(_own_parameters(scene), parameters))
+
+
+def make_model(path: str | Path) -> str:
+    """Return the command that generates a scene's model."""
+    return f"make model SCENE={shlex.quote(str(path))}"
+
+
+def _own_parameters(scene: Mapping) -> Mapping:
+    """Return the parameters that a scene names."""
+    own = scene.get("parameters", {})
+    if not isinstance(own, Mapping):
+        raise refusal("parameters", own, "a table, under a line [parameters]", ModelError)
+    return own
 
 
 def _generate(path: Path, folder: Path) -> None:
@@ -77,11 +92,10 @@ def _generate(path: Path, folder: Path) -> None:
     """
     if find_spec("serpentail_codegen") is None:
         raise ModelError(
-            f"{folder} is no generated folder: make it where the generator is, `make model "
-            f"SCENE={path}`"
+            f"{folder} is no generated folder: make it where the generator is, `{make_model(path)}`"
         )
     generator = [sys.executable, "-m", "serpentail_codegen"]
-    command = [*generator, str(path), "--output", str(folder.parent)]
+    command = [*generator, "--output", str(folder.parent), "--", str(path)]
     done = subprocess.run(
         command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False
     )
@@ -93,5 +107,5 @@ def _generate(path: Path, folder: Path) -> None:
 def _same(value: Any, made: Any) -> bool:
     """Tell whether a scene's value is that of a manifest; the order of a list means nothing."""
     if isinstance(value, list) and isinstance(made, list):
-        return sorted(map(str, value)) == sorted(map(str, made))
+        return all(value.count(x) == made.count(x) for x in (*value, *made))
     return bool(value == made)

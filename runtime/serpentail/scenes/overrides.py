@@ -1,23 +1,30 @@
 """Changes of a scene's values by their names, such as "mu=0.5" on the command line."""
 
-import tomllib
+import re
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from ..checks import one_line, shown
 from ..errors import SimulationError
+from .source import tables_in
+
+DEEPEST = 8  # names in a path
+PLACE = re.compile("[0-9]{1,9}")  # in an array
 
 
 def parsed(texts: Iterable[str]) -> dict:
     """Return name -> value of texts NAME=VALUE, values as in a scene file; a word is a text."""
     values = {}
     for text in texts:
-        name, sign, value = text.partition("=")
-        if not (sign and name.strip() and value.strip()):
-            raise SimulationError(f"--set {text}: needs NAME=VALUE, such as mu=0.5")
+        name, sign, value = (part.strip() for part in text.partition("="))
+        if not (sign and name and value) or len(text.splitlines()) > 1:
+            raise SimulationError(
+                f"--set {one_line(text)}: needs NAME=VALUE, on one line, such as mu=0.5"
+            )
         try:
-            values[name.strip()] = tomllib.loads(f"value = {value}")["value"]
-        except tomllib.TOMLDecodeError:
-            values[name.strip()] = value.strip()
+            values[name] = tables_in(f"value = {value}")["value"]
+        except (ValueError, RecursionError):  # what is no TOML
+            values[name] = value
     return values
 
 
@@ -27,7 +34,12 @@ def changed(table: Mapping, changes: Mapping) -> dict:
     Names are such as "start.pitch", or "legs.moves.0.rate" in an array of tables.
     """
     for name, value in changes.items():
-        table = _with(table, name.split("."), value, name)
+        path = name.split(".")
+        if len(path) > DEEPEST:
+            raise SimulationError(
+                f"change {shown(name)}: {len(path)} names: needs at most {DEEPEST}, with dots"
+            )
+        table = _with(table, path, value, name)
     return dict(table)
 
 
@@ -36,12 +48,13 @@ def _with(part: Any, path: list[str], value: Any, name: str) -> Any:
     if not path:
         return value
     first, *rest = path
-    in_missing_array = rest and rest[0].isdigit()
+    in_missing_array = rest and PLACE.fullmatch(rest[0])
     if isinstance(part, Mapping) and (first in part or not in_missing_array):
         return dict(part) | {first: _with(part.get(first, {}), rest, value, name)}
-    if isinstance(part, list) and first.isdigit() and int(first) < len(part):
+    if isinstance(part, list) and PLACE.fullmatch(first) and int(first) < len(part):
         k = int(first)
         return [*part[:k], _with(part[k], rest, value, name), *part[k + 1 :]]
     raise SimulationError(
-        f"change {name!r}: {first!r} is not in {part!r}: name a key, or a place from 0"
+        f"change {shown(name)}: {shown(first)} is not in {shown(part)}: name a key, or a place "
+        "from 0"
     )

@@ -1,10 +1,11 @@
 """The plan that a scene file's table [plan] asks for."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from typing import Any
 
-from ..checks import one_of
+from ..checks import one_of, refusal, shown
 from ..errors import PlanningError
 from ..planning.planner import plan
 from ..planning.problem import PROBLEM_SETTINGS, Bounds, Goal
@@ -12,6 +13,7 @@ from ..planning.result.plan import Plan
 from ..planning.settings import PlanSettings
 from .file import model_of, read_scene, subtable
 
+ELSEWHERE = "programs can give others, to serpentail.plan"
 FREE = "free"  # TOML has no None
 CODE_ONLY = ("guess", "path")  # what no file can hold
 SETTINGS = (*PROBLEM_SETTINGS, *(entry.name for entry in fields(PlanSettings)))
@@ -36,7 +38,7 @@ def plan_arguments(table: Mapping) -> dict[str, Any]:
     # tables of their own: start, goal and bounds
     start = _part("start", table["start"], ("q", "v"))
     if set(start) != {"q", "v"}:
-        raise PlanningError(f"plan.start: value {start!r}: needs q and v")
+        raise PlanningError(f"plan.start: value {shown(start)}: needs q and v")
     goal = _part("goal", table.get("goal", {}), _names(Goal))
     bounds = _part("bounds", table.get("bounds", {}), _names(Bounds))
 
@@ -48,7 +50,19 @@ def plan_arguments(table: Mapping) -> dict[str, Any]:
     }
     if arguments.get("tolerance") == FREE:
         arguments["tolerance"] = None
+    _check_solver(arguments.get("solver", "ipopt"), arguments.get("options", {}))
     return arguments
+
+
+def _check_solver(solver: Any, options: Any) -> None:
+    """PlanningError where a solver could be made to load libraries, run code or write files."""
+    if not isinstance(solver, str) or not re.fullmatch("[a-z]+", solver):
+        raise refusal("plan.solver", solver, f"a name of a-z; {ELSEWHERE}", PlanningError)
+    for name, value in options.items() if isinstance(options, Mapping) else [("", options)]:
+        own = re.fullmatch(rf"{solver}\.(?!\w*(file|lib))\w+", name)
+        if not own or not isinstance(value, int | float | str):
+            needs = f"numbers and words of the solver, such as ipopt.max_iter; {ELSEWHERE}"
+            raise refusal(f"plan.options.{name}".rstrip("."), value, needs, PlanningError)
 
 
 def _check_keys(table: Mapping) -> None:
@@ -56,7 +70,7 @@ def _check_keys(table: Mapping) -> None:
     for name in table:
         if name in CODE_ONLY:
             raise PlanningError(
-                f"plan.{name}: value {table[name]!r}: only programs can give it; call "
+                f"plan.{name}: value {shown(table[name])}: only programs can give it; call "
                 "serpentail.plan"
             )
         one_of("plan: key", name, KEYS, PlanningError)
@@ -73,7 +87,7 @@ def _part(field: str, value: Any, known: Sequence[str]) -> dict:
     """A table in [plan] with known keys."""
     if not isinstance(value, Mapping):
         raise PlanningError(
-            f"plan.{field}: value {value!r}: needs a table, under a line [plan.{field}]"
+            f"plan.{field}: value {shown(value)}: needs a table, under a line [plan.{field}]"
         )
     for name in value:
         one_of(f"plan.{field}: key", name, known, PlanningError)

@@ -7,7 +7,7 @@ from typing import Any, overload
 
 import numpy as np
 
-from ..checks import finite_array, number, one_of, refusal
+from ..checks import finite_array, number, one_of, refusal, shown
 from ..errors import SimulationError
 from ..model.layout import OMEGA, VELOCITY
 from ..model.model import Model
@@ -115,7 +115,7 @@ def scenario(
     for name in parameters:
         if "." in name:
             raise SimulationError(
-                f"change {name!r}: unknown; needs a parameter, or a key below [simulate]"
+                f"change {shown(name)}: unknown; needs a parameter, or a key below [simulate]"
             )
     model = model_of(scene, path, folder, parameters)
     return scenario_of(model, changed(table, of_table), Path(path).parent)
@@ -146,7 +146,7 @@ def scenario_of(model: Model, table: Mapping, parent: Path) -> Scenario:
 def _checked(where: str, table: Any, names: Collection[str]) -> Mapping:
     """Return a table; SimulationError where it is none, or has another key."""
     if not isinstance(table, Mapping):
-        raise SimulationError(f"{where}: value {table!r}: needs a table, under a line [{where}]")
+        raise refusal(where, table, f"a table, under a line [{where}]", SimulationError)
     for name in table:
         one_of(f"{where}: key", name, names, SimulationError)
     return table
@@ -157,8 +157,8 @@ def _legs(table: Any) -> Legs:
     missing = [name for name in ("gamma", "delta") if name not in table]
     if missing or {"moves", "times"} <= set(table):
         raise SimulationError(
-            f"simulate.legs: value {dict(table)!r}: needs gamma, delta, and moves or times, not "
-            "both"
+            f"simulate.legs: value {shown(dict(table))}: needs gamma, delta, and moves or times, "
+            "not both"
         )
     if "times" in table:
         return Legs(table["times"], table["gamma"], table["delta"])
@@ -176,11 +176,11 @@ def _reference(model: Model, table: Any, parent: Path) -> Reference | Trajectory
             return Trajectory.load(parent / str(table["file"]))
         except (OSError, ValueError) as error:
             raise SimulationError(
-                f"simulate.reference.file: value {table['file']!r}: {error}"
+                f"simulate.reference.file: value {shown(table['file'])}: {error}"
             ) from error
     if not {"times", "bends"} <= set(table) or "file" in table:
         raise SimulationError(
-            f"simulate.reference: value {dict(table)!r}: needs times and bends, or a file"
+            f"simulate.reference: value {shown(dict(table))}: needs times and bends, or a file"
         )
     return Reference.of_bends(model, table["times"], table["bends"], table.get("blend", "quintic"))
 
@@ -191,12 +191,12 @@ def _controller(model: Model, value: Any, reference: Any) -> Controller:
         return _law(model, "simulate.controller", value, reference)
     if not isinstance(value, list) or not value:
         remedy = "needs a table, or tables under lines [[simulate.controller]], with begin"
-        raise SimulationError(f"simulate.controller: value {value!r}: {remedy}")
+        raise SimulationError(f"simulate.controller: value {shown(value)}: {remedy}")
     pairs = []
     for index, table in enumerate(value):
         where = f"simulate.controller[{index}]"
         if not isinstance(table, Mapping) or "begin" not in table:
-            raise SimulationError(f"{where}: value {table!r}: needs a table with begin (s)")
+            raise SimulationError(f"{where}: value {shown(table)}: needs a table with begin (s)")
         law = {name: value for name, value in table.items() if name != "begin"}
         begin = number(f"{where}.begin", table["begin"], SimulationError)
         pairs.append((begin, _law(model, where, law, reference)))

@@ -8,7 +8,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import finite_array, number, one_of, refusal
+from ..checks import finite_array, number, one_of, refusal, shown
 from ..errors import SimulationError
 from ..model.model import Model
 from .piecewise import Piecewise, blends, checked_nodes, linear, spline
@@ -113,6 +113,8 @@ class Legs:
         Each move is a mapping: at (s), its end's gamma, delta or both (rad), and duration (s) or
         rate (rad/s, of the angle that goes farther).  Moves follow each other in time.
         """
+        if isinstance(moves, str | Mapping) or not isinstance(moves, Iterable):
+            raise refusal("legs.moves", moves, "an array of tables", SimulationError)
         nodes: list[Node] = [(-math.inf, (gamma, delta))]
         for index, move in enumerate(moves):
             nodes += _move(f"legs.moves[{index}]", move, nodes[-1])
@@ -165,7 +167,7 @@ def _move(field: str, move: Mapping[str, float], last: Node) -> list[Node]:
         raise SimulationError(f"{field}: takes {duration!r} s: needs {needs}")
     if at < end:
         remedy = f"the move before it ends at {end:.6g} s: move it after that"
-        raise SimulationError(f"{field}.at: value {at!r}: {remedy}")
+        raise SimulationError(f"{field}.at: value {shown(at)}: {remedy}")
     # a move that follows at once begins at the last node
     if at == end:
         return [(at + duration, goal)]

@@ -19,6 +19,7 @@ from .actuation import Actuation
 from .compiled_run import CompiledRun, Memory, Samples
 from .controllers import Controller
 from .ground import Ground
+from .limits import MOST_STEPS, refuse_endless
 from .measured import trajectory_or_error
 from .methods import SCIPY, IntegrationMethod, checked_method, chosen, step_counts
 from .records import Records
@@ -153,8 +154,11 @@ def choose(
         decay = None if model.contacts else fastest_decay(actuation, start, parameters)
         name, reason = chosen(settings, available, decay)
     method = checked_method(name, settings, available, single)
+    span, most_steps = start.end - start.start, method.settings.get("most_steps", MOST_STEPS)
     for each in ("step", "most_step"):
-        refuse_vanishing(start, each, method.settings.get(each, np.inf))
+        length = method.settings.get(each, np.inf)
+        refuse_vanishing(start, each, length)
+        refuse_endless(each, length, span, most_steps)
     if name == "rk4":  # steps divide the output's
         interval = np.array([start.interval])
         steps = step_counts(interval, 1e-12 * interval, method.settings["step"])

@@ -11,6 +11,7 @@ from ..errors import SimulationError, StateError
 from ..model.kept import kept
 from ..model.layout import QUATERNION
 from ..model.model import Model
+from .limits import refuse_overfull
 
 MOST_SAMPLES = 10_000_000  # of all runs: more are a slip, and fill the memory
 SHORTEST = 1e-100  # s: between samples; methods multiply times
@@ -63,6 +64,7 @@ class Start:
             raise SimulationError(
                 f"output_step {step:.3g}: too short to move the time: give {least:.2g} s or more"
             )
+        refuse_overfull(model, checked.runs, checked.intervals + 1)
         return checked
 
     @property

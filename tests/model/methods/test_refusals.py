@@ -49,6 +49,20 @@ def test_other_things_than_real_numbers_are_refused(model, name, value):
 
 
 @every_function
+def test_masked_entries_are_refused_and_counted(model, name):
+    for argument in CALLS[name][0]:
+        for given in (state(), states(5)):
+            masked = np.ma.masked_array(given[argument], np.zeros(given[argument].shape, bool))
+            whole = call(model, name, given | {argument: masked})
+            masked[..., 2] = np.ma.masked
+            with pytest.raises(
+                st.StateError, match=f"^{name}: {argument}: . masked entries: needs"
+            ):
+                call(model, name, given | {argument: masked})
+            assert_same(whole, call(model, name, given))
+
+
+@every_function
 def test_wrong_shape_is_named_with_the_right_one(model, name):
     for argument in CALLS[name][0]:
         size = SIZES[argument]

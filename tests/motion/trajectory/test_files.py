@@ -4,6 +4,7 @@ inversion.
 
 import dataclasses
 import json
+import zipfile
 
 import numpy as np
 import pytest
@@ -157,3 +158,41 @@ def test_other_archives_are_refused_without_unpickling(tmp_path, flight):
     np.savez(tmp_path / "short.npz", **fields(flight) | {"info": json.dumps({}), "v": flight.v[1:]})
     with pytest.raises(ValueError, match=r"short\.npz' holds no sound trajectory: v has shape"):
         Trajectory.load(tmp_path / "short.npz")
+
+
+@pytest.mark.parametrize("norm", [1 - 2e-3, 1 + 2e-3, 1.4, 0.6])
+def test_quaternions_that_are_no_units_are_refused(flight, norm):
+    q = flight.q.copy()
+    q[7, 3:7] *= norm
+    with pytest.raises(ValueError, match=r"q\[7, 3:7\] has norm"):
+        dataclasses.replace(flight, q=q)
+    q[7, 3:7] *= (1 + np.sign(norm - 1) * 9e-4) / norm
+    assert dataclasses.replace(flight, q=q).q[7, 3] == q[7, 3]
+
+
+def test_masked_entries_are_no_samples(flight):
+    v = np.ma.masked_greater(flight.v, 3.0)
+    with pytest.raises(ValueError, match=r"v: \d+ masked entries: .* use filled\(\)"):
+        dataclasses.replace(flight, v=v)
+    nothing_masked = np.ma.masked_greater(flight.v, 1e9)
+    np.testing.assert_array_equal(dataclasses.replace(flight, v=nothing_masked).v, flight.v)
+
+
+def test_files_that_would_fill_the_memory_are_refused(tmp_path, flight):
+    great = np.zeros(10_000_000)
+    np.savez_compressed(tmp_path / "bomb.npz", **fields(flight) | {"kinetic": great, "info": "{}"})
+    with pytest.raises(ValueError, match=r"bomb\.npz' is damaged .*it would unpack to 0\.08 GB"):
+        Trajectory.load(tmp_path / "bomb.npz")
+    np.savez_compressed(tmp_path / "small.npz", **fields(flight) | {"info": "{}"})
+    assert_same(dataclasses.replace(flight, info={}), Trajectory.load(tmp_path / "small.npz"))
+    # a header that tells of more numbers than there are
+    header = b"{'descr': '<f8', 'fortran_order': False, 'shape': (1152921504606846,)}\n"
+    content = b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") + header
+    with zipfile.ZipFile(flight.save(tmp_path / "lie"), "a") as archive:
+        names = [name for name in archive.namelist() if name != "q.npy"]
+        parts = {name: archive.read(name) for name in names} | {"q.npy": content}
+    with zipfile.ZipFile(tmp_path / "lie.npz", "w") as archive:
+        for name, part in parts.items():
+            archive.writestr(name, part)
+    with pytest.raises(ValueError, match=r"lie\.npz' is damaged or not a trajectory"):
+        Trajectory.load(tmp_path / "lie.npz")

@@ -40,7 +40,7 @@ def test_resample_converges_to_the_free_top_and_the_sines():
     coarse, half = (attitude_error(motion(np.linspace(0, 0.4, n)).resample(fine)) for n in (41, 81))
     assert coarse[0] < 2e-5
     np.testing.assert_allclose(np.log2(coarse / half)[:2], 4, atol=0.1)
-    assert np.log2(coarse / half)[2] > 1.9
+    assert np.log2(coarse / half)[2] > 3.5 and coarse[2] < 1e-3
 
 
 def test_resample_is_exact_for_a_parabolic_flight_and_keeps_unit_quaternions(flight):
@@ -77,6 +77,16 @@ def test_the_first_time_outside_is_named(flight, t, first):
         ValueError, match=f"t = {first} s is outside the trajectory: give times from 0.0 to 0.4 s"
     ):
         flight.resample(t)
+
+
+@pytest.mark.parametrize("beyond", [-1e-3, -1e-9, 0.4 + 1e-9, 0.401, 1e9, -1e300])
+@pytest.mark.parametrize("samples", [1, 2, 41])
+def test_no_motion_goes_on_beyond_its_samples(beyond, samples):
+    short = motion(np.linspace(0.4, 0, samples)[::-1])
+    with pytest.raises(ValueError, match="is outside the trajectory"):
+        short.resample([beyond])
+    with pytest.raises(ValueError, match="is outside the trajectory"):
+        short.resample(sorted([0.4, beyond]))
 
 
 def test_rounding_at_the_ends_is_inside(flight):

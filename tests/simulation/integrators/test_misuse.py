@@ -53,7 +53,7 @@ def test_interrupt_ends_a_long_run():
         "import sys, serpentail as st\nm = st.load(sys.argv[1])\nq = [0, 0, 0, 1] + [0] * (m.nq - "
         "4)\n"
         "print('ready', flush=True)\n"
-        "st.simulate(m, q, [1.0] * m.nv, t_span=1e5, output_step=1e4, method='rk4', step=1e-5)"
+        "st.simulate(m, q, [1.0] * m.nv, t_span=1e3, output_step=1e2, method='rk4', step=1e-5)"
     )
     command = [sys.executable, "-c", script, str(model().folder)]
     run = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)

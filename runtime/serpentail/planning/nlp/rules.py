@@ -8,6 +8,7 @@ import numpy as np
 from numpy.polynomial import Legendre, Polynomial
 from numpy.typing import ArrayLike
 
+from ...checks import shown
 from ...errors import PlanningError
 
 # name -> default degree
@@ -62,16 +63,17 @@ def collocation_rule(name: str, degree: int | None = None) -> CollocationRule:
     "trapezoidal" (the paper's, Eqs. 41, 42), "hermite-simpson" (Lobatto of degree 2), "lobatto"
     (degree + 1 nodes, both ends among them), "radau" (degree nodes, the right end among them).
     """
-    if name not in FAMILIES:
-        raise PlanningError(f"rule: value {name!r}: needs {' or '.join(map(repr, FAMILIES))}")
+    if not isinstance(name, str) or name not in FAMILIES:
+        raise PlanningError(f"rule: value {shown(name)}: needs {' or '.join(map(repr, FAMILIES))}")
     degree = FAMILIES[name] if degree is None else degree
     if isinstance(degree, bool) or not isinstance(degree, int) or not 1 <= degree <= MOST_DEGREE:
         raise PlanningError(
-            f"degree: value {degree!r}: needs a whole number from 1 to {MOST_DEGREE}"
+            f"degree: value {shown(degree)}: needs a whole number from 1 to {MOST_DEGREE}"
         )
     if name in FIXED and degree != FAMILIES[name]:
         raise PlanningError(
-            f"degree: value {degree!r}: {name} has {FAMILIES[name]}; leave it out, or use 'radau'"
+            f"degree: value {shown(degree)}: {name} has {FAMILIES[name]}; leave it out, or use "
+            "'radau'"
         )
     return _rule(name, degree)
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...checks import shown
 from ...errors import PlanningError
 from .blas_threads import one_thread
 from .bounds import Limits
@@ -81,9 +82,9 @@ def solver(
     """
     import casadi as ca
 
-    if not ca.has_nlpsol(name):
+    if not isinstance(name, str) or not ca.has_nlpsol(name):
         raise PlanningError(
-            f"solver: value {name!r}: CasADi has no such solver here; 'ipopt' comes with it"
+            f"solver: value {shown(name)}: CasADi has no such solver here; 'ipopt' comes with it"
         )
     settings: dict[str, Any] = {"print_time": False, "error_on_fail": False}
     if name == "ipopt":
@@ -94,7 +95,7 @@ def solver(
         return memoised(key, partial(_engine, nlp, name, settings))
     except RuntimeError as error:
         raise PlanningError(
-            f"options: value {options!r}: {name} refuses them: {_reason(error)}"
+            f"options: value {shown(options)}: {name} refuses them: {_reason(error)}"
         ) from error
 
 

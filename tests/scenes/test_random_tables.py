@@ -1,0 +1,135 @@
+"""Any value at any key of a scene is taken, or refused by the errors that say so."""
+
+import copy
+import datetime
+import tomllib
+from functools import cache
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as some
+
+import serpentail as st
+from serpentail.planning import planner
+from serpentail.planning.nlp.rules import collocation_rule
+from serpentail.scenes import plan, simulate
+from serpentail_codegen.scene.parse import parse_scene
+from serpentail_codegen.scene.problems import SceneError
+from serpentail_codegen.scene.scene import KEYS, NAMES
+from tests.scenes.conftest import SIMPLE
+from tests.support.models import folder_of
+
+Q = [0, 0, 0.3, 1, 0, 0, 0, 0.1, 0.1]
+SIMULATE = {
+    "duration": 0.005,
+    "output_step": 0.001,
+    "start": {"height": 0.1, "bends": [0.1], "velocity": [0, 0, 1]},
+    "legs": {"gamma": 3.67, "delta": -0.26, "moves": [{"at": 0.001, "delta": -1.0, "rate": 70.0}]},
+    "reference": {"times": [0.0, 0.01], "bends": [[0.1], [0.2]]},
+    "controller": {"kind": "damping", "damping": 1e-3},
+}
+PLAN = {
+    "start": {"q": Q, "v": [0, 0, 1, 5, 0, 0, 0, 0]},
+    "goal": {"attitude": "upright", "tail": [0.0, "free"], "turns": [0, 0]},
+    "duration": 0.3,
+    "bounds": {"angle": 3.0, "torque": 0.02},
+}
+GENERATE = {
+    "name": "x",
+    "kind": "articulated",
+    "segments": 2,
+    "links": 3,
+    "functions": ["mass_matrix"],
+    "parameters": {"tail_mass": 0.1, "hip": [0, 0, 0.0]},
+    "contacts": ["feet"],
+}
+WORDS = ("", "free", "auto", "rk4", "pfl", "torques", "²", "\0", "a\nb", "x" * 1000)
+HUGE = (10**18, 10**300, 10**400, -(10**400), 1e-320, 1e300)
+VALUES = some.recursive(
+    some.one_of(
+        some.booleans(),
+        some.integers(-3, 3),
+        some.sampled_from(HUGE),
+        some.floats(),
+        some.sampled_from(WORDS),
+        some.just(datetime.date(2000, 1, 1)),
+    ),
+    lambda inner: some.lists(inner, max_size=3) | some.dictionaries(some.just("a"), inner),
+    max_leaves=6,
+)
+
+
+def places(table, keys):
+    """Every path to a value of a table, and to keys that it may have."""
+    found = [(key,) for key in keys]
+    for key, value in table.items() if isinstance(table, dict) else enumerate(table):
+        found.append((key,))
+        if isinstance(value, dict | list):
+            found += [(key, *path) for path in places(value, ())]
+    return found
+
+
+def changed(table, path, value):
+    """A copy of a table with a value at a path."""
+    part = table = copy.deepcopy(table)
+    for key in path[:-1]:
+        part = part[key]
+    part[path[-1]] = value
+    return table
+
+
+def anything(table, keys):
+    """Tables with any value at one or two places."""
+    places_of = some.sampled_from(places(table, keys))
+    return some.builds(changed, some.just(table), places_of, VALUES)
+
+
+def one_line(error):
+    """Refuse an error that says nothing, or too much."""
+    lines = str(error).splitlines()
+    assert lines and all(lines) and max(map(len, lines)) < 900
+
+
+@cache
+def simple():
+    """The model of the simple scene."""
+    return st.load(folder_of(parse_scene(tomllib.loads(SIMPLE), "simple")))
+
+
+many = settings(
+    max_examples=300, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck)
+)
+
+
+@many
+@given(anything(GENERATE, (*KEYS, *NAMES)))
+def test_the_generator_takes_or_refuses_any_table(table):
+    try:
+        parse_scene(table, "x")
+    except SceneError as error:
+        one_line(error)
+
+
+@many
+@given(anything(SIMULATE, simulate.KEYS))
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_the_runtime_takes_or_refuses_any_motion(table):
+    if isinstance(table.get("start"), dict):
+        table["start"].pop("settle", None)  # which takes as long as it takes
+    try:
+        simulate.scenario_of(simple(), table, Path())
+    except st.SerpentailError as error:
+        one_line(error)
+
+
+@many
+@given(anything(PLAN, plan.KEYS))
+def test_the_runtime_takes_or_refuses_any_plan(table):
+    try:
+        arguments = plan.plan_arguments(table)
+        task = [arguments.pop(name) for name in ("start", "goal", "duration", "bounds")]
+        checked = planner._checked(simple(), tuple(task), arguments)[1]
+        collocation_rule(checked.rule, checked.degree)
+    except st.PlanningError as error:
+        one_line(error)
