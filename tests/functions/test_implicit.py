@@ -11,6 +11,7 @@ from tests.references.contact import Contacts
 from tests.references.parameters import random_states
 
 NAMES = ("mass_matrix", "implicit")
+MOVING = ("energy", "momentum", "rollout", "tail_points", "contact_dynamics")
 GAINS = {"passive": (0.0, 0.0), "tracked": (4e4, 400.0), "damped": (0.0, 30.0)}
 
 
@@ -124,7 +125,7 @@ def refused(model, seed, w):
 
 def test_a_step_of_what_jams_is_taken_as_if_friction_did_not_follow_the_load():
     """Linearly implicit Euler: (1 - w J) k = w times the rates, J without that slope."""
-    model = touching(2, 2, functions=(*NAMES, "energy", "momentum", "rollout", "tail_points"))
+    model = touching(2, 2, functions=(*NAMES, *MOVING))
     reference, w, none, count = Contacts(model), 0.01, np.zeros(4), 0
     for q, v, bristles, legs in refused(model, 5, w):
         H = model.mass_matrix(q)

@@ -3,7 +3,7 @@
 import pytest
 
 import serpentail as st
-from serpentail_codegen.scene.signatures.table import NEEDS
+from serpentail_codegen.scene.signatures.table import ALL, NEEDS
 from tests.references.exact_continuum import ExactContinuum
 from tests.references.parameters import KINDS, TABLE_1
 from tests.support.exact_continuum_states import SIZES, states_of
@@ -19,7 +19,7 @@ def model():
 @pytest.fixture(scope="module")
 def having(model):
     """Return a function from a function's name to a sound model that has it."""
-    names = ["mass_matrix", "bias_force", *NEEDS]
+    names = ["mass_matrix", "bias_force", "rollout", *(name for name in NEEDS if name in ALL)]
     touching = st.load(model_folder(1, 3, functions=names, contacts=["feet", "tail", "torso"]))
     return lambda name: touching if name in NEEDS else model
 

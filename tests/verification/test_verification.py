@@ -115,7 +115,7 @@ def test_what_was_left_out_is_said(tmp_path):
 
 @pytest.mark.parametrize("name", list(CATALOGUE))
 def test_a_model_of_one_function_is_checked(name):
-    asked = {"tracked_dynamics": ["pfl", "rollout"]}.get(
+    asked = {"tracked_dynamics": ["pfl", "rollout"], "contact_rates": ["rollout"]}.get(
         name, [name.removesuffix("_factor").removesuffix("_solve")]
     )
     touching = {"contacts": ["tail"], "feet": ["feet"]}

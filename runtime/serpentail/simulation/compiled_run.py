@@ -20,7 +20,7 @@ from .records import Records
 from .start import Start
 
 PAUSED, STEP_TOO_SMALL, TOO_MANY_STEPS, STOPPED_AT_EVENT, TORQUE_FAILED = range(32, 37)
-STEP_TOO_LONG = 38
+STEP_TOO_LONG, BAD_TIMES = 38, 39
 MOST_STEPS = 2**31 - 1  # that the C interface counts
 PAUSE = 100  # steps before the first look at signals, such as Ctrl-C
 PAUSE_S = 0.05  # s between looks: pauses grow to that
@@ -44,6 +44,7 @@ WHY = {
         "a step turns the torso too far to tell what it touches: is it too long, or omega too "
         "large?"
     ),
+    BAD_TIMES: "the samples are too close: in the model's numbers their times do not increase",
     TORQUE_FAILED: "the compiled torque function did not return 0: what has it refused?",
 }
 

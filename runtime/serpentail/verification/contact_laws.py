@@ -159,6 +159,30 @@ def the_ground_accelerates_by_its_generalised_force(model: Model, s: State) -> E
     return relative(residual / scale, 0, size / scale) / sensitivity(model, s.q)
 
 
+@law("contact_rates", "contact_points", "contact_dynamics", units=VALUE_LIMIT, only="contact")
+def simulations_ask_what_users_do(model: Model, s: State) -> Errors:
+    """Heights are those of the points, accelerations and forces those of contact_dynamics, and the
+    ground's power is of forces on moving points.
+    """
+    s = sunk(model, s)
+    arguments = (s.q, s.v, s.tau, bristles(model), *legs(model))
+    v_dot, rates, forces, heights, powers = model.kernel("contact_rates")(*arguments)
+    positions, speeds = model.contact_points(s.q, s.v, *legs(model))
+    expected = model.contact_dynamics(*arguments)
+    # the legs' drives hold what their own drift does against the forces
+    still = model.contact_points(s.q, s.v, *(x * (np.arange(8) < 4) for x in legs(model)))[1]
+    work = [float((forces * each).sum(dtype=float)) for each in (speeds, still - speeds)]
+    scale = np.abs(forces * np.abs(speeds).max(initial=1)).sum(dtype=float)
+    return {
+        "heights": relative(heights[:, 0], positions[:, 2], np.abs(positions).max()),
+        "rises": relative(heights[:, 1], speeds[:, 2], np.abs(speeds).max()),
+        "v_dot": relative(v_dot, expected[0], expected[0]) / sensitivity(model, s.q),
+        "bristle_rates": relative(rates, expected[1], np.abs(expected[1]).max()),
+        "forces": relative(forces, expected[2], np.abs(expected[2]).max()),
+        "powers": relative(powers, work, scale),
+    }
+
+
 @law("contact_points", "contact_dynamics", units=8, only="contact")
 def the_ground_never_pulls_nor_holds_by_more_than_friction(model: Model, s: State) -> Errors:
     """f_n is not below 0, and the horizontal force not above mu f_n."""

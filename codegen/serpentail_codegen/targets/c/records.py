@@ -111,7 +111,7 @@ LEDGER = fields(
     (
         "ledger",
         "real *",
-        "work (J) of torques, damping, ground, legs, and impulses (N s) of groups: so far",
+        "work (J) of torques, damping, ground, legs, and impulses (N s) of groups: so far; or NULL",
     )
 )
 BRISTLES = fields(
@@ -130,7 +130,7 @@ SETTINGS = fields(
 )
 SAMPLES = fields(
     ("samples", "long", "wanted"),
-    ("times", "const real *", "[samples] increasing (s); the run ends at the last"),
+    ("times", "const real *", "[samples] increasing (s), from t on; the run ends at the last"),
     ("q_out", "real *", "[samples][NQ]"),
     ("v_out", "real *", "[samples][NV]"),
     ("tau_out", "real *", "[samples][NT]"),
