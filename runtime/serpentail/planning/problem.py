@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import number, numbers, one_of
+from ..checks import number, numbers, numbers_in, one_of, refusal
 from ..errors import PlanningError
 from ..model.layout import QUATERNION, TAIL_Q, TAIL_V
 from ..model.model import Model
@@ -102,8 +102,9 @@ def checked_problem(
 
 def _vector(field: str, value: Any, size: int) -> np.ndarray:
     """Return finite numbers (size,); PlanningError else, also of one number alone."""
-    if np.ndim(value) == 0:
-        raise PlanningError(f"{field}: value {value!r}: needs {size} numbers")
+    array = numbers_in(value)
+    if array is None or array.shape == ():
+        raise refusal(field, value, f"{size} numbers", PlanningError)
     return numbers(field, value, size, PlanningError)
 
 
@@ -146,6 +147,8 @@ def _partly_free(field: str, value: Any, size: int) -> np.ndarray | None:
     """Return numbers (size,), nan where they are free; None where all are."""
     if value is None:
         return None
+    if np.ma.is_masked(value):
+        raise PlanningError(f"{field}: has masked entries: give None where it is free")
     try:
         array = np.array([np.nan if entry is None else float(entry) for entry in value])
         free = np.array([entry is None for entry in value])
@@ -220,13 +223,19 @@ def _objective(objective: Any) -> str | Callable[[Any], Any]:
 
 
 def _path(path: Sequence[Any]) -> tuple[PathConstraint, ...]:
+    if not isinstance(path, tuple | list):
+        needs = "rows (function of a point, least, most)"
+        raise refusal("path", path, needs, PlanningError)
     constraints = []
     for k, row in enumerate(path):
         if not isinstance(row, tuple | list) or len(row) != 3 or not callable(row[0]):
             raise PlanningError(
                 f"path[{k}]: value {row!r}: needs (function of a point, least, most)"
             )
-        least, most = float(row[1]), float(row[2])
+        bounds = numbers_in(row[1:])
+        if bounds is None or bounds.shape != (2,):
+            raise PlanningError(f"path[{k}]: bounds {row[1:]!r:.200}: needs two numbers")
+        least, most = bounds.tolist()
         if not least <= most:
             raise PlanningError(f"path[{k}]: bounds ({least}, {most}): needs least <= most")
         constraints.append((row[0], least, most))
