@@ -157,9 +157,14 @@ def rows(recorder: Recorder, mutation: Mutation) -> Iterator[list[str]]:
 
 def nearby(path: str, file: str) -> bool:
     """Tell if a file of tests is of the room, or of the concept, of a source."""
-    source, test = (set(Path(p).with_suffix("").parts) for p in (path, file))
-    words = {part.removeprefix("test_").split(".")[0] for part in test}
-    return bool((source & words) - {"tests"} | ({Path(path).name.split(".")[0]} & words))
+    source, test = (words(Path(p)) for p in (path, file))
+    return bool(source & test)
+
+
+def words(path: Path) -> set[str]:
+    """Return the words of a path in the singular: of its folders and of its file."""
+    parts = (*path.parts[1:-1], path.name.split(".")[0].removeprefix("test_"))
+    return {part.removesuffix("s").removesuffix("e") for part in parts}
 
 
 def seconds(recorder: Recorder, tests: list[str]) -> float:

@@ -14,7 +14,7 @@ from . import tree
 from .mutation import Mutation
 from .processes import run
 
-# They compare texts, or tell of documents, the checkout and make: a change of a text is no fault.
+# They compare texts, or tell of documents, mutants and make: a change of a text is no fault.
 NO_JUDGES = {
     "tests/house/test_architecture.py",
     "tests/house/test_benchmark_targets.py",
@@ -23,6 +23,7 @@ NO_JUDGES = {
     "tests/house/test_functions_document.py",
     "tests/house/test_golden.py",
     "tests/house/test_make.py",
+    "tests/house/test_mutants.py",
 }
 LONGEST = 1200.0  # s that one file of tests may take
 
