@@ -1,5 +1,7 @@
 """Runs on the ground that are paused or stopped in between go on, and end, as they were."""
 
+import time
+
 import numpy as np
 import pytest
 
@@ -31,3 +33,17 @@ def test_a_run_that_is_paused_after_each_few_steps_gives_the_same_bits(settings,
         np.testing.assert_array_equal(getattr(paused, name), getattr(whole, name))
     np.testing.assert_array_equal(paused.contact.bristles, whole.contact.bristles)
     assert paused.events == whole.events and paused.info["steps"] == whole.info["steps"]
+
+
+@pytest.mark.parametrize("output_step", [0.1, 1e-2, 1e-3])
+def test_a_run_that_stops_has_all_samples_before(output_step):
+    stopped = kick(stop_at=[("touch_down", "feet")], t_span=1.2, output_step=output_step)
+    times = np.linspace(0, 1.2, round(1.2 / output_step) + 1)
+    np.testing.assert_allclose(stopped.t[:-1], times[times < stopped.t[-1]], rtol=0, atol=1e-12)
+
+
+def test_times_that_a_run_took_are_told():
+    begun = time.perf_counter(), time.process_time()
+    info = kick(t_span=0.1).info
+    assert 0 < info["seconds"] <= time.perf_counter() - begun[0]
+    assert 0 <= info["cpu_seconds"] <= time.process_time() - begun[1]
