@@ -30,7 +30,8 @@ def snapshot() -> None:
     for path in sources():
         (BASE / path).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy2(ROOT / path, BASE / path)
-    subprocess.run(["git", "init", "--quiet"], cwd=BASE, check=True)  # some tests ask git
+    for words in (["init", "--quiet"], ["add", "--all"]):  # some tests ask git
+        subprocess.run(["git", *words], cwd=BASE, check=True)
 
 
 def planted(name: str) -> Path:
