@@ -10,6 +10,9 @@ N    ?= 3
 STARTS ?= 200
 WORKERS ?= -n auto --dist worksteal
 CALLS ?= 2000
+MUTANTS ?= 200
+SEED ?= 1
+JOBS ?= 2
 CPU    ?= m4
 ifneq ($(filter embedded,$(MAKECMDGOALS)),)
 REAL   ?= $(if $(filter m4,$(CPU)),float,double)
@@ -31,7 +34,7 @@ WANTED  := $(OPTIONS) $(if $(SCENE),-- $(call quoted,$(SCENE)),$(SIZE))
 GENERATE := $(PY) -m serpentail_codegen
 FOLDER   := "$$($(GENERATE) --print-folder $(WANTED))"
 
-.PHONY: help setup demo test test-portable test-all model verify bench stress embedded size-report studies study-models study-righting study-contact lint golden clean
+.PHONY: help setup demo test test-portable test-all model verify bench stress mutants embedded size-report studies study-models study-righting study-contact lint golden clean
 .DELETE_ON_ERROR:
 
 help:
@@ -50,6 +53,7 @@ help:
 	@echo "  make verify TAIL=articulated M=3 N=4       verification report of that model"
 	@echo "  make bench                                 benchmark report"
 	@echo "  make stress                                errors, drifts, drops, fuzz at the limits; CALLS=2000 random calls"
+	@echo "  make mutants                               do the tests notice small changes of the sources? MUTANTS=200 SEED=1 JOBS=2"
 	@echo "  make embedded TAIL=articulated M=1 N=3     run it on a Cortex-M4F in QEMU against the host; CPU=m7: in double"
 	@echo "  make size-report                           flash, RAM, stack and instructions -> docs/embedded.md"
 	@echo "  make study-models                          the paper's Fig. 8: both tails compared, and what each costs"
@@ -109,6 +113,9 @@ bench: $(READY)
 
 stress: $(READY)
 	$(PY) -m stress.stress --calls $(CALLS)
+
+mutants: $(READY)
+	$(PY) -m mutants.run --mutants $(MUTANTS) --seed $(SEED) --jobs $(JOBS)
 
 embedded: model
 	$(PY) -m embedded.check $(FOLDER) --board $(CPU)

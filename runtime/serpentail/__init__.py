@@ -36,6 +36,7 @@ _HOME = {
             "StateError",
             "SimulationError",
             "PlanningError",
+            "NotWritten",
             "UnlikeBodies",
         ],
         "errors",

@@ -39,5 +39,9 @@ class PlanningError(SerpentailError, ValueError):
     """A planning problem that cannot be posed."""
 
 
+class NotWritten(SerpentailError, OSError):
+    """A file cannot be written; what was there before is there still."""
+
+
 class UnlikeBodies(UserWarning):
     """Torso and tail are so unlike in size that moments cancel in H, which loses digits."""

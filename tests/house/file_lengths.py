@@ -4,7 +4,7 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-FOLDERS = ("codegen", "runtime", "tests", "benchmarks", "embedded", "examples", "stress")
+FOLDERS = ("codegen", "runtime", "tests", "benchmarks", "embedded", "examples", "mutants", "stress")
 MOST_LINES = 300
 
 

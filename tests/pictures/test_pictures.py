@@ -85,8 +85,8 @@ def test_a_failed_drawing_leaves_the_old_file(tmp_path, monkeypatch):
     path = time_plots(flight(), tmp_path / "times.svg")
     before = path.read_bytes()
 
-    def cut_short(figure, part, **options):
-        part.write_bytes(b"half")
+    def cut_short(figure, stream, **options):
+        stream.write(b"half")
         raise OSError("no space left")
 
     monkeypatch.setattr("matplotlib.figure.Figure.savefig", cut_short)

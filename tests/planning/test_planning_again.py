@@ -32,6 +32,21 @@ def test_planning_again_from_neighbouring_states_derives_nothing(monkeypatch):
     np.testing.assert_allclose(again.trajectory.v[0, 3:], 1.01 * v[3:], atol=1e-9)
 
 
+def test_a_plan_of_the_same_size_lends_its_multipliers_and_no_other(monkeypatch):
+    model, begun = rat(), []
+
+    def noted(nlp, name, options, guess):
+        begun.append(guess)
+        return solver.solver(nlp, name, options, guess)
+
+    monkeypatch.setattr(rounds, "solver", noted)
+    plan = st.plan(model, start=start(model), intervals=4, **AGAIN)
+    for settings, guess in (({}, "warm"), ({"rule": "lobatto"}, "close")):
+        del begun[:]
+        again = st.plan(model, start=start(model), guess=plan, **AGAIN, **settings)
+        assert again.report["converged"] and begun[0] == guess
+
+
 def test_other_problems_and_models_share_no_program():
     """A memoised program answers for its own problem only: damping, goal and model all matter."""
     model, coarse = rat(), {"intervals": 4}

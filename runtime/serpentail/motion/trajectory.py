@@ -99,7 +99,9 @@ class Trajectory:
         return self.q[:, TAIL_Q]
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write one npz file (suffix added if absent), whole or not at all, and return its path."""
+        """Write one npz file (suffix added if absent), whole or not at all, and return its path;
+        NotWritten where that cannot be done.
+        """
         target = _npz(path)
         arrays = {name: getattr(self, name) for name in ARRAYS} | self._touching()
         with replacing(target) as part, part.open("wb") as stream:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 GAP, LEFT, TITLES, FOOT, RULER = 0.06, 0.62, 0.26, 0.5, 0.62  # page margins, inches
-LEAST_WIDTH = 6.1  # of the page, for the key, inches
+LEAST_WIDTH = 6.6  # of the page, for the key, inches
 TALLEST_PATH = 3.2  # panel of the path below a film, inches
 MOST_PER_LINE = 6  # frames
 

@@ -1,5 +1,6 @@
 """The look that all drawings share, and how they are written."""
 
+import io
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -50,6 +51,9 @@ def write(path: Path, draw: Callable[[], "Figure"]) -> Path:
     from matplotlib import style
 
     kind = path.suffix.lower()
-    with style.context(STYLE, after_reset=True), replacing(path) as part:
-        draw().savefig(part, format=kind[1:], metadata=METADATA[kind], dpi=DPI)
+    drawn = io.BytesIO()  # Matplotlib would hide that a write failed, and leave its file open
+    with style.context(STYLE, after_reset=True):
+        draw().savefig(drawn, format=kind[1:], metadata=METADATA[kind], dpi=DPI)
+    with replacing(path) as part:
+        part.write_bytes(drawn.getvalue())
     return path

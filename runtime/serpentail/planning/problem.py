@@ -150,6 +150,8 @@ def _partly_free(field: str, value: Any, size: int) -> np.ndarray | None:
     """Return numbers (size,), nan where they are free; None where all are."""
     if value is None:
         return None
+    if np.ma.is_masked(value):
+        raise PlanningError(f"{field}: has masked entries: give None where it is free")
     try:
         array = np.array([np.nan if entry is None else float(entry) for entry in value])
         free = np.array([entry is None for entry in value])
@@ -224,13 +226,19 @@ def _objective(objective: Any) -> str | Callable[[Any], Any]:
 
 
 def _path(path: Sequence[Any]) -> tuple[PathConstraint, ...]:
+    if not isinstance(path, tuple | list):
+        needs = "rows (function of a point, least, most)"
+        raise refusal("path", path, needs, PlanningError)
     constraints = []
     for k, row in enumerate(path):
         if not isinstance(row, tuple | list) or len(row) != 3 or not callable(row[0]):
             raise PlanningError(
                 f"path[{k}]: value {shown(row)}: needs (function of a point, least, most)"
             )
-        least, most = float(row[1]), float(row[2])
+        bounds = numbers_in(row[1:])
+        if bounds is None or bounds.shape != (2,):
+            raise PlanningError(f"path[{k}]: bounds {shown(row[1:])}: needs two numbers")
+        least, most = bounds.tolist()
         if not least <= most:
             raise PlanningError(f"path[{k}]: bounds ({least}, {most}): needs least <= most")
         constraints.append((row[0], least, most))

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import refusal
+from ..checks import numbers_in, refusal
 from ..errors import SimulationError
 from .controllers import Controller, NativeTorque, Parts, TorqueFunction, parts_of, phases_of
 from .ctrl_c import CtrlC
@@ -120,12 +120,13 @@ class Actuation:
         if not (np.isfinite(q).all() and np.isfinite(v).all()):
             return np.full(self.nt, np.nan)
         with np.errstate(**self.float_errors):
-            result = np.asarray(user(t, q, v), float)
-        if result.shape != (self.nt,) or not np.isfinite(result).all():
+            given = user(t, q, v)
+        torques = numbers_in(given)
+        if torques is None or torques.shape != (self.nt,) or not np.isfinite(torques).all():
             raise SimulationError(
-                f"the controller gave {result!r} at t = {t:.6g} s, not {self.nt} finite torques"
+                f"the controller gave {given!r:.200} at t = {t:.6g} s, not {self.nt} finite torques"
             )
-        return result
+        return torques
 
 
 def _native(law: NativeTorque) -> dict[str, int | None]:

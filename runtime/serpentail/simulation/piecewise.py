@@ -40,6 +40,7 @@ class Piecewise:
         value, rate, acceleration = (_horner(_derived(c, order), x) for order in range(3))
         return value, np.where(held, 0.0, rate), np.where(held, 0.0, acceleration)
 
+    @np.errstate(over="ignore", invalid="ignore")  # a run refuses what is beyond numbers
     def kinks(self, orders: int) -> np.ndarray:
         """Times at which a derivative below this order jumps, both ends among them."""
         jumps = np.zeros(len(self.times), bool)
@@ -88,7 +89,10 @@ def linear(times: np.ndarray, values: np.ndarray) -> Piecewise:
     """Straight lines between nodes; one node is a constant."""
     if len(times) == 1:
         return constant(times[0], values[0])
-    slopes = np.diff(values, axis=0) / np.diff(times)[:, None]
+    with np.errstate(over="ignore"):
+        slopes = np.diff(values, axis=0) / np.diff(times)[:, None]
+    if not np.isfinite(slopes).all():
+        raise SimulationError(f"times {times.tolist()!s:.60}: too close to each other for values")
     return Piecewise(times, np.stack([values[:-1], slopes], axis=-1))
 
 

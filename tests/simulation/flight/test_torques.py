@@ -52,6 +52,20 @@ def test_table_is_linear_in_between_and_held_outside(fly, settings, damping):
     np.testing.assert_allclose(user.q, flight.q, rtol=0, atol=1e-9)
 
 
+@pytest.mark.parametrize("size", [1e308, 1e200])
+def test_table_beyond_numbers_is_refused_without_a_warning(fly, size):
+    beyond = np.zeros((2, NT))
+    beyond[:, 0] = size, -size
+    with pytest.raises(st.SimulationError):
+        fly(controller=st.TorqueTable([0.0, 1e-3], beyond), t_span=0.1)
+
+
+@pytest.mark.parametrize("given", [set(), "1", [[1.0], [2.0, 3.0]]], ids=repr)
+def test_function_that_gives_no_numbers_is_refused(fly, given):
+    with pytest.raises(st.SimulationError, match=r"the controller gave .* not 4 finite torques"):
+        fly(controller=lambda t, q, v: given, t_span=0.1)
+
+
 def test_table_of_one_node_is_a_constant(fly):
     for node in (-1.0, 0.05, 7.0):
         flight = fly(controller=st.TorqueTable([node], TORQUES[:1]), t_span=0.1)

@@ -120,3 +120,11 @@ def test_only_jumps_and_kinks_are_stops():
     assert st.Reference([0, 1, 2], [[0.0], [1], [0]], "spline").curve.kinks(2).tolist() == [0, 2]
     jump = st.Piecewise(np.array([0.0, 1, 2]), np.array([[[0.0, 0]], [[1.0, 0]]]))
     assert jump.kinks(1).tolist() == [1]
+
+
+@pytest.mark.parametrize("size", [1e-12, 1.0, 1e12])
+def test_what_is_a_kink_hangs_on_no_unit(size):
+    table = st.TorqueTable([0, 1, 2, 3], size * np.array([[0.0], [1.0], [2.0], [0.0]]))
+    assert table.parts(1).kinks() == [0, 2, 3]
+    rounding = size * np.array([[[1.0, 0]], [[1.0 + 1e-12, 0]]])
+    assert st.Piecewise(np.array([0.0, 1, 2]), rounding).kinks(1).size == 0

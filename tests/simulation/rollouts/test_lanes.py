@@ -51,6 +51,21 @@ def test_flights_abreast_are_what_they_are_alone(law):
         )
 
 
+@pytest.mark.usefixtures("any_number_is_many")
+@pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
+def test_sound_flights_are_made_abreast_and_no_second_time(law, monkeypatch):
+    """A group that fails is made singly, run by run: none of these may."""
+    made, go = [], batched_runs.BatchedRuns.go
+
+    def noted(runs, group, ended):
+        made.append(go(runs, group, ended))
+        return made[-1]
+
+    monkeypatch.setattr(batched_runs.BatchedRuns, "go", noted)
+    st.simulate(tail(), *starts(tail(), 19), controller=law, **FLIGHT)
+    assert made == [True] * 3
+
+
 FORMS = {
     "loops": ((2, 2), {"emission": "loops"}, 1e-11),
     "baked": ((2, 2), {"baked": True}, 1e-11),

@@ -1,0 +1,1 @@
+"""`make mutants`: breaks the sources one small change at a time, and asks the tests to notice."""

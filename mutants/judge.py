@@ -1,0 +1,172 @@
+"""Runs the tests that should notice a mutant, in a tree of its own."""
+
+import contextlib
+import json
+import os
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+from . import tree
+from .mutation import Mutation
+from .processes import run
+from .python_source import with_first
+from .recorded import Recorder
+from .sample import part_of
+
+GOLDEN = "tests/house/test_golden.py"
+STARTING = 40.0  # s that a process of tests may take above its tests
+SLOWER = 6.0  # times that a mutant's tests may take
+FIRST = 15.0  # s of tests that the first process of a mutant runs; each other four times as many
+LONGEST = 1200.0  # s of tests after which a mutant has survived
+
+
+class NotLoaded(Exception):
+    """Tests failed, but not for the mutant: it was never loaded."""
+
+
+class Tree:
+    """A copy of the sources that holds one mutant after the other."""
+
+    def __init__(self, name: str, recorder: Recorder):
+        self.root, self.recorder = tree.planted(name), recorder
+
+    def judged(
+        self, mutation: Mutation, mutated: bytes, most: float = LONGEST
+    ) -> tuple[bool, str, str, int]:
+        """Return whether tests notice a mutated file, which did, its words, and how many ran; at
+        most so many seconds of tests.
+        """
+        self._plant(mutation, mutated)
+        ran = 0
+        try:
+            for tests in packed(self.recorder, mutation, most):
+                ran += len(tests)
+                found = self._noticed(mutation, mutated, tests)
+                if found:
+                    return True, *found, ran
+            return False, "", "" if ran else "no test runs this line", ran
+        finally:
+            shutil.copy2(tree.BASE / mutation.path, self.root / mutation.path)
+
+    def golden(self, mutation: Mutation) -> bool:
+        """Tell if the golden models would show a mutant in the generator."""
+        self._plant(mutation, mutation.of((tree.BASE / mutation.path).read_bytes()))
+        try:
+            return bool(self._failed(mutation, [GOLDEN]))
+        finally:
+            shutil.copy2(tree.BASE / mutation.path, self.root / mutation.path)
+
+    @property
+    def _witness(self) -> Path:
+        return self.root / ".build" / "witness"
+
+    def _plant(self, mutation: Mutation, mutated: bytes) -> None:
+        """Write the mutant, and what was compiled without it; what was generated, for the runtime
+        alone.
+        """
+        shutil.rmtree(self.root / ".build", ignore_errors=True)
+        models = ["models"] if part_of(mutation.path) == "runtime" else []
+        for kept in ("cache", "objects", *models):
+            made = tree.BASE / ".build" / kept
+            if made.exists():
+                with contextlib.suppress(shutil.Error):  # what is being made there vanishes
+                    hidden = shutil.ignore_patterns(".*", "*.part")
+                    shutil.copytree(made, self.root / ".build" / kept, ignore=hidden)
+        (self.root / ".build").mkdir(exist_ok=True)
+        file = self.root / mutation.path
+        file.write_bytes(marked(mutation, self._witness, mutated))
+        moment = 1_000_000_000 + int(mutation.key[:7], 16)  # no bytecode is of this second
+        os.utime(file, (moment, moment))
+
+    def _noticed(
+        self, mutation: Mutation, mutated: bytes, tests: list[str]
+    ) -> tuple[str, str] | None:
+        """Run tests; return which noticed the mutant and what it said.  A test that fails here for
+        the first time must pass without the mutant, else it is no judge any more.
+        """
+        while tests := [test for test in tests if test not in self.recorder.distrusted]:
+            found = self._failed(mutation, tests)
+            if not found or found[0] not in tests or found[0] in self.recorder.trusted:
+                return found
+            self._plant(mutation, (tree.BASE / mutation.path).read_bytes())
+            fails = self._failed(mutation, [found[0]])
+            self._plant(mutation, mutated)
+            (self.recorder.distrusted if fails else self.recorder.trusted).add(found[0])
+        return None
+
+    def _failed(self, mutation: Mutation, tests: list[str]) -> tuple[str, str] | None:
+        """Run tests; return which failed first and what it said."""
+        orders, verdict = self.root / ".build" / "orders", self.root / ".build" / "verdict"
+        verdict.unlink(missing_ok=True)
+        told = {"witness": str(self._witness), "verdict": str(verdict), "mark": mutation.key}
+        orders.write_text(json.dumps(told | {"tests": tests}))
+        files = list(dict.fromkeys(test.split("::")[0] for test in tests))
+        scratch = self.root / ".build" / "scratch"
+        words = tree.pytest_with("mutants.watch", scratch, "-x", *files)
+        env = tree.surroundings(self.root, scratch, SERPENTAIL_MUTANT=str(orders))
+        limit = STARTING + SLOWER * seconds(self.recorder, tests)
+        status, output = run(words, self.root, env, limit)
+        if status == 0:
+            return None
+        if status == 5 or not self._witness.exists():
+            raise NotLoaded(f"{mutation}: ended by {status}, not loaded: {output[-3000:]}")
+        if status is None:
+            return "timeout", f"{limit:.0f} s"
+        found = json.loads(verdict.read_text()) if verdict.exists() else {}
+        return found.get("by", "process"), found.get("words", output[-300:])
+
+
+def marked(mutation: Mutation, witness: Path, source: bytes) -> bytes:
+    """Return a file that says it was loaded, its lines where they were."""
+    if not mutation.path.endswith(".py"):
+        return source + b"{# %s #}" % mutation.key.encode()
+    return with_first(source, f"open({str(witness)!r}, 'w').close()")
+
+
+def packed(recorder: Recorder, mutation: Mutation, most: float) -> Iterator[list[str]]:
+    """Yield the tests that run a mutated line, so many for each process as it should run."""
+    pack: list[str] = []
+    limit, spent = FIRST, 0.0
+    for tests in rows(recorder, mutation):
+        if pack and seconds(recorder, pack + tests) > limit:
+            yield pack
+            spent, limit, pack = spent + seconds(recorder, pack), 4 * limit, []
+        if spent > most:
+            return
+        pack = pack + tests
+    if pack:
+        yield pack
+
+
+def rows(recorder: Recorder, mutation: Mutation) -> Iterator[list[str]]:
+    """Yield the tests of each file that run a mutated line: files of the same room first, and those
+    that take less; last the files that must be recorded to know.
+    """
+    waiting = recorder.files()
+
+    def rank(file: str) -> tuple[bool, bool, float]:
+        cost = recorder.cost(file)
+        return cost == float("inf"), not nearby(mutation.path, file), cost
+
+    while waiting:
+        file = min(waiting, key=rank)
+        waiting.remove(file)
+        yield from filter(None, recorder.chosen(mutation, file))
+
+
+def nearby(path: str, file: str) -> bool:
+    """Tell if a file of tests is of the room, or of the concept, of a source."""
+    source, test = (words(Path(p)) for p in (path, file))
+    return bool(source & test)
+
+
+def words(path: Path) -> set[str]:
+    """Return the words of a path in the singular: of its folders and of its file."""
+    parts = (*path.parts[1:-1], path.name.split(".")[0].removeprefix("test_"))
+    return {part.removesuffix("s").removesuffix("e") for part in parts}
+
+
+def seconds(recorder: Recorder, tests: list[str]) -> float:
+    """Return how long tests took without a mutant."""
+    return sum(recorder.of(t.split("::")[0]).tests[t]["seconds"] for t in tests if "::" in t)

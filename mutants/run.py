@@ -1,0 +1,120 @@
+"""`make mutants`: runs a sample of mutants, each against the tests that run its line; prints a
+score and the survivors. It may be interrupted, and goes on where it was.
+"""
+
+import argparse
+import os
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from queue import Queue
+
+from . import tree
+from .judge import NotLoaded, Tree
+from .mutation import Mutation
+from .recorded import Recorder
+from .results import Verdict, keep, kept, report, score
+from .sample import drawn, part_of
+
+WANTED = 95.0  # percent of the mutants that tests should notice
+# One file of each part that much else uses: broken for good, it must be noticed; as it is, not.
+CONTROLS = {
+    "codegen/serpentail_codegen/ir/tape.py": b"\nraise RuntimeError('control')\n",
+    "codegen/serpentail_codegen/targets/c/templates/math/ldl.c.jinja": b"{{ control }}",
+    "runtime/serpentail/attitude.py": b"\nraise RuntimeError('control')\n",
+}
+
+
+def arguments() -> argparse.Namespace:
+    """Return the command line's arguments."""
+    p = argparse.ArgumentParser(description=__doc__)
+    p.add_argument("--mutants", type=int, default=200, help="how many to run")
+    p.add_argument("--seed", type=int, default=1, help="of the sample")
+    p.add_argument("--jobs", type=int, default=2, help="mutants at the same time")
+    p.add_argument("--only", default="", help="only mutants of files whose path has this")
+    return p.parse_args()
+
+
+def controlled(place: Tree) -> None:
+    """Refuse to go on where a broken file is not noticed, or one as it is."""
+    for path, end in CONTROLS.items():
+        source = (tree.BASE / path).read_bytes()
+        as_it_is = Mutation(path, 1, 0, 0, "", "", f"control of {path}")
+        for text, wanted in ((source + end, True), (source, False)):
+            noticed, by, words, tests = place.judged(as_it_is, text, most=10.0)
+            if noticed != wanted or not tests:
+                raise SystemExit(
+                    f"control {path}: noticed is {noticed}, not {wanted}, by {by!r} of {tests} "
+                    f"tests: {words}"
+                )
+        print(f"control {path}: noticed when broken, and only then", flush=True)
+
+
+def judged(place: Tree, mutation: Mutation, state: str) -> Verdict:
+    """Return what becomes of a mutant, and keep it."""
+    begun = time.monotonic()
+    mutated = mutation.of((tree.BASE / mutation.path).read_bytes())
+    try:
+        killed, by, words, tests = place.judged(mutation, mutated)
+        if not killed and part_of(mutation.path) != "runtime" and tests:
+            shown = place.golden(mutation)
+            words = "the golden text shows it" if shown else "nor does the golden text"
+    except NotLoaded as error:
+        killed, by, words, tests = False, "", str(error), 0
+    took = round(time.monotonic() - begun, 1)
+    found = Verdict(mutation, killed, by, words, tests, took, tree.digest(mutation.path), state)
+    keep(found)
+    return found
+
+
+def all_judged(sample: list[Mutation], state: str, jobs: int) -> Iterator[Verdict]:
+    """Yield the verdict of every mutant as it comes."""
+    waiting = [mutation for mutation in sample if kept(mutation, state) is None]
+    yield from (kept(mutation, state) for mutation in sample if mutation not in waiting)
+    if not waiting:
+        return
+    recorder, places = Recorder(), Queue()
+    for k in range(jobs):
+        places.put(Tree(f"tree{k}", recorder))
+    controlled(places.queue[0])
+
+    def one(mutation: Mutation) -> Verdict:
+        place = places.get()
+        try:
+            return judged(place, mutation, state)
+        finally:
+            places.put(place)
+
+    pool = ThreadPoolExecutor(jobs)
+    try:
+        for done in as_completed([pool.submit(one, mutation) for mutation in waiting]):
+            yield done.result()
+    finally:  # on Ctrl-C those that run now are ended, and the others left
+        pool.shutdown(cancel_futures=True)
+
+
+def main() -> int:
+    """Run the sample; 1 where fewer than wanted were noticed."""
+    options = arguments()
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's job may ignore it
+    os.nice(5)
+    tree.snapshot()
+    state = tree.state(tests=True)
+    sample = drawn(tree.BASE, options.mutants, options.seed, options.only)
+    verdicts: list[Verdict] = []
+    try:
+        for found in all_judged(sample, state, options.jobs):
+            verdicts.append(found)
+            end = f"killed by {found.by}" if found.killed else "SURVIVED"
+            took = f"{len(verdicts)}/{len(sample)} {found.seconds:.0f} s"
+            print(f"{took}  {found.mutation}  {end}", flush=True)
+    except KeyboardInterrupt:
+        print("interrupted: the same command goes on from here", flush=True)
+    print(report(verdicts))
+    return 0 if len(verdicts) == len(sample) and score(verdicts) >= WANTED else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

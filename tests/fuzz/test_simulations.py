@@ -1,0 +1,153 @@
+"""Simulations and what acts in them are run or refused, whatever they are given."""
+
+import numpy as np
+import pytest
+from hypothesis import strategies as some
+
+import serpentail as st
+from tests.support.models import model_folder
+
+from .searching import answer
+from .strange import strange
+
+METHODS = ("rk4", "tsit5", "ros34pw2", "implicit_euler", "dop853", "lsoda", "auto")
+SPAN = 0.002  # s
+# numbers of a setting: steps of less than this and more than nothing would take for ever
+SHORT = 1e-5
+NOT_ENDLESS = strange((3,)).filter(lambda x: not (isinstance(x, float) and 0 < abs(x) < SHORT))
+TIMES = NOT_ENDLESS.filter(lambda x: not (isinstance(x, int | float) and x > SPAN))
+
+
+@pytest.fixture(scope="module")
+def model():
+    functions = ["energy", "momentum", "forward_dynamics", "rollout", "pfl"]
+    return st.load(model_folder(1, 1, contacts=["feet", "tail"], functions=functions))
+
+
+def start(model):
+    """A motion above the ground that ends at once."""
+    q, v = np.zeros(model.nq), np.full(model.nv, 0.1)
+    q[2:4] = 0.3, 1.0
+    common = {"q0": q, "v0": v, "controller": st.Damping(1e-5), "t_span": SPAN}
+    return common | {"output_step": SPAN / 2, "legs": st.Legs.fixed(3.6, -0.3)}
+
+
+def test_a_run_from_a_strange_state_is_made_or_refused(model, search):
+    def law(name, value, method):
+        answer(st.simulate, model, **start(model) | {name: value, "method": method})
+
+    search(
+        law,
+        name=some.sampled_from(["q0", "v0"]),
+        value=strange((model.nq,)) | strange((model.nv,)),
+        method=some.sampled_from(METHODS),
+    )
+
+
+def test_settings_are_taken_or_refused(model, search):
+    names = ("rtol", "atol", "step", "first_step", "least_step", "most_step", "most_steps", "bad")
+
+    def law(name, value, method):
+        settings = start(model) | {"method": method, name: value}
+        if name != "most_steps":
+            settings["most_steps"] = 10_000
+        if method not in ("tsit5", "ros34pw2"):
+            settings.pop("most_steps")
+        answer(st.simulate, model, **settings)
+
+    search(
+        law,
+        name=some.sampled_from(names),
+        value=NOT_ENDLESS,
+        method=some.sampled_from(METHODS),
+    )
+
+
+def test_what_a_run_is_told_is_taken_or_refused(model, search):
+    names = ("controller", "legs", "bristles0", "stop_at", "method", "parameters", "output_step")
+
+    def law(name, value):
+        answer(st.simulate, model, **start(model) | {name: value})
+
+    search(law, name=some.sampled_from(names), value=NOT_ENDLESS)
+    search(law, name=some.just("t_span"), value=TIMES)
+
+
+def test_many_runs_are_made_or_refused(model, search):
+    """Parameters, starts and bristles of many runs."""
+
+    def law(name, value):
+        given = start(model)
+        many = {"q0": np.stack([given["q0"]] * 3), "method": "rk4"}
+        if name == "parameters":
+            answer(st.simulate, model, **given | many | {"parameters": value})
+            value = {"tail_mass": value}
+        answer(st.simulate, model, **given | many | {name: value})
+
+    search(
+        law,
+        name=some.sampled_from(["parameters", "v0", "bristles0"]),
+        value=strange((3,)) | strange((3, 8)),
+    )
+
+
+ACTING = {
+    "Damping": st.Damping,
+    "TorqueTable times": lambda x: st.TorqueTable(x, np.zeros((2, 2))),
+    "TorqueTable torques": lambda x: st.TorqueTable([0.0, 1.0], x),
+    "TorqueTable damping": lambda x: st.TorqueTable([0.0, 1.0], np.zeros((2, 2)), x),
+    "TorqueCurve": st.TorqueCurve,
+    "Phases": st.Phases,
+    "Phases time": lambda x: st.Phases([(0.0, None), (x, None)]),
+    "Phases controller": lambda x: st.Phases([(0.0, x)]),
+    "a function": lambda x: lambda t, q, v: x,
+}
+
+
+@pytest.mark.parametrize("name", ACTING)
+def test_what_acts_is_taken_or_refused(model, search, name):
+    def law(value):
+        controller = answer(ACTING[name], value)
+        if controller is not None:
+            answer(st.simulate, model, **start(model) | {"controller": controller})
+
+    search(law, value=strange((2,)) | strange((2, 2)))
+
+
+MADE = {
+    "Legs": (st.Legs, {"times": [0.0, 1.0], "gamma": 3.6, "delta": [0.0, 1.0]}),
+    "Legs.fixed": (st.Legs.fixed, {"gamma": 3.6, "delta": -0.3}),
+    "Legs.ramp": (st.Legs.ramp, {"gamma": 3.6, "delta": (-0.3, -1.0), "at": 0.4, "rate": -70.0}),
+    "Reference": (
+        st.Reference,
+        {"times": [0.0, 1.0], "angles": np.zeros((2, 2)), "blend": "quintic"},
+    ),
+    "polar_to_bend": (
+        st.polar_to_bend,
+        dict.fromkeys(("phi", "theta", "phi_dot", "theta_dot"), 0.3),
+    ),
+    "bend_to_polar": (st.bend_to_polar, dict.fromkeys(("a", "b", "a_dot", "b_dot"), 0.3)),
+    "rotation_matrix": (st.rotation_matrix, {"quaternion": np.array([0.5, 0.5, -0.5, 0.5])}),
+    "pitch_roll_yaw": (st.pitch_roll_yaw, {"q": np.full(9, 0.5)}),
+}
+
+
+@pytest.mark.parametrize("name", MADE)
+def test_what_is_made_of_strange_things_is_made_or_refused(search, name):
+    function, given = MADE[name]
+
+    def law(which, value):
+        answer(function, **given | {which: value})
+
+    search(law, which=some.sampled_from(sorted(given)), value=strange() | strange((2, 2)))
+
+
+def test_a_linearising_controller_is_made_or_refused(model, search):
+    given = {"model": model, "reference": ([0.0, 1.0], np.zeros((2, 2))), "kp": 1.0, "kd": 2.0}
+
+    def law(which, value):
+        controller = answer(st.Pfl, **given | {which: value})
+        if controller is not None:
+            answer(st.simulate, model, **start(model) | {"controller": controller})
+
+    search(law, which=some.sampled_from(["reference", "kp", "kd"]), value=strange((2,)))

@@ -1,0 +1,146 @@
+"""Mutants change what runs and nothing that only tells, and are what the tests have loaded."""
+
+import ast
+import importlib.util
+from pathlib import Path
+
+import pytest
+
+from mutants import python_source, sample, template_source
+from mutants.mutation import Mutation
+from mutants.recorded import NO_JUDGES, own_lines
+from mutants.results import Verdict, argument, arguments, report, score
+
+ROOT = Path(__file__).parents[2]
+TOLD = '''"""Docs 1 < 2."""
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from a import b as c
+
+
+@cached(3)
+def f(x: Literal[3]) -> Literal[4]:
+    """Docs 1 < 2."""
+    raise StateError(f"{x + 1}: needs 3")
+'''
+
+
+def python(text):
+    """The changes of a text of Python, after the head that every test shares."""
+    return {m.change for m in python_source.mutations("a.py", text.encode())}
+
+
+def template(text):
+    return {m.change for m in template_source.mutations("a.c.jinja", text.encode())}
+
+
+@pytest.mark.parametrize(
+    ("text", "changes"),
+    [
+        ("a < b", {"a < b -> a <= b", "a < b -> a >= b"}),
+        ("x = a + b", {"a + b -> a - b"}),
+        ("x = 'a' + b", set()),
+        ("x = a and b", {"a and b -> a or b"}),
+        ("x = not a", {"not a -> a"}),
+        ("x = 3", {"3 -> 4"}),
+        ("x = 2.0", {"2.0 -> 3.0"}),
+        ("x = 0.0", {"0.0 -> 1.0"}),
+        ("x = True", {"True -> False"}),
+        ("x = f(a, b)", {"f(a, b) -> f(b, a)"}),
+        ("x = f(a, b=c)", {"f(a, b=c) -> f(a)"}),
+        ("x.y = z", {"x.y = z -> pass"}),
+        ("x += y", {"x += y -> pass", "x += y -> x -= y"}),
+        ("f()", {"f() -> pass"}),
+        ("if x:\n    y = z", {"x -> not x"}),
+        ("x = [a for a in b if c]", {"[a for a in b if c] -> [a for a in b]"}),
+        ("def f():\n    return x", {"return x -> return None"}),
+        (TOLD, {'raise StateError(f"{x + 1}: needs 3") -> pass'.replace('"', "'")}),
+    ],
+)
+def test_python_changes_where_it_runs(text, changes):
+    assert python(text) == changes | ({f"{text} -> pass"} if text == "a < b" else set())
+
+
+@pytest.mark.parametrize(
+    ("text", "changes"),
+    [
+        ("  x = a + b;", {" + -> -", "x = a + b; -> ;"}),
+        ("  const real x = a * b;", {"* -> /"}),
+        ("  real *const x = a;", set()),
+        ("  if (a < {{ 0 | number }}) {", {"< -> <=", "< -> >=", "0 -> 1"}),
+        ("/* a < 3 */ {# 4 #}", set()),
+        ('#include "a.h"\n#define A 3', set()),
+        ("{% if has.contacts %}", {"has.contacts -> not (has.contacts)"}),
+        ("  f(a, 1);", {"1 -> 2", "f(a, 1); -> ;"}),
+        ("  return a;", set()),
+        ("  if (!a) {", {"! -> (nothing)", "!a -> !(!a)"}),
+    ],
+)
+def test_templates_change_where_they_emit_code(text, changes):
+    found = {change for change in template(text) if "->" in change}
+    conditions = {"a < {{ 0 | number }} -> !(a < {{ 0 | number }})"}
+    assert {change.strip() for change in found} - conditions == {c.strip() for c in changes}
+
+
+def test_every_mutant_of_the_sources_is_a_program_of_its_own():
+    for part in ("generator", "runtime"):
+        found = sample.of_part(ROOT, part)
+        assert len({mutation.key for mutation in found}) == len(found) > 5000
+        for mutation in found[::40]:
+            source = (ROOT / mutation.path).read_bytes()
+            assert ast.dump(ast.parse(mutation.of(source))) != ast.dump(ast.parse(source))
+
+
+def test_a_sample_is_of_all_parts_and_grows():
+    few, many = sample.drawn(ROOT, 30, 7), sample.drawn(ROOT, 60, 7)
+    assert many[:30] == few != sample.drawn(ROOT, 30, 8)
+    parts = [sample.part_of(mutation.path) for mutation in few]
+    assert [parts.count(part) for part in sample.PARTS] == [10, 10, 10]
+
+
+@pytest.mark.parametrize(
+    "head", ['"""Docs."""\n', '"""Docs.\n\nMore.\n"""\n\nfrom __future__ import annotations\n']
+)
+def test_a_mutant_says_that_it_was_loaded(tmp_path, head):
+    witness, file = tmp_path / "witness", tmp_path / "mutant.py"
+    text = f"{head}\nimport math\n\nX = math.pi\nraise ValueError\n".encode()
+    file.write_bytes(python_source.with_first(text, f"open({str(witness)!r}, 'w').close()"))
+    assert len(file.read_bytes().splitlines()) == len(text.splitlines())
+    found = importlib.util.spec_from_file_location("mutant", file)
+    with pytest.raises(ValueError, match=r"^$"):
+        found.loader.exec_module(importlib.util.module_from_spec(found))
+    assert witness.exists()
+
+
+def test_lines_of_a_compound_statement_are_its_head():
+    tree = ast.parse("if (a and\n    b):\n    c()\nd()\n")
+    assert [list(own_lines(node)) for node in tree.body] == [[1, 2], [4]]
+
+
+def verdict(path, killed, **of):
+    mutation = Mutation(path, 1, 0, 1, "", of.get("text", "x"), of.get("change", "a -> b"))
+    return Verdict(mutation, killed, "test" if killed else "", "", 1, 1.0, "", "")
+
+
+def test_the_score_leaves_out_what_is_argued(monkeypatch):
+    why = {"file": "runtime/serpentail/a.py", "line": "x", "change": "a -> b", "why": "the same"}
+    monkeypatch.setattr("mutants.results.arguments", lambda: [why])
+    of = "runtime/serpentail/a.py"
+    found = [verdict(of, True), verdict(of, False), verdict(of, False, change="a -> c")]
+    assert score(found) == 50
+    told = report(found)
+    assert "runtime       3 mutants,   2 survived,   1 of them argued equivalent:  50.0 %" in told
+    assert "equivalent: the same" in told and told.count("SURVIVED") == 1
+
+
+def test_every_argument_is_of_a_line_that_is_there():
+    """One whose line has changed must be thought about again."""
+    for entry in arguments():
+        found = [m for m in sample.of_file(ROOT, entry["file"]) if argument(m, [entry])]
+        assert found, f"no such mutant any more: {entry}"
+        assert len(entry["why"]) > 20
+
+
+def test_judges_that_are_left_out_exist():
+    assert all((ROOT / name).is_file() for name in NO_JUDGES)
