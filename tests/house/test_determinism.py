@@ -18,12 +18,25 @@ from serpentail_codegen.targets.write import digest, write_folder
 
 OPTIONS = {"functions": ["forward_dynamics", "tail_points", "rollout"], "emission": "loops"}
 NAME = "articulated_m2_n2"
-HEADER, MODEL, HOST = f"include/{NAME}.h", f"src/{NAME}.c", f"src/{NAME}_host.c"
+HEADER, UNCHECKED = f"include/{NAME}.h", f"include/{NAME}_unchecked.h"
+MODEL, HOST = f"src/{NAME}.c", f"src/{NAME}_host.c"
 BATCH, FLIGHTS = f"src/{NAME}_batch.c", f"src/{NAME}_flights.c"
 EXAMPLE, CASADI, MANIFEST = "example/main.c", f"{NAME}_casadi.py", "manifest.json"
 PACKAGE = {"Makefile", "CMakeLists.txt", "LICENSE", "README.md"}
 SIMULATION = {f"include/{NAME}_simulation.h", f"src/{NAME}_simulation.c"}
-FILES = {HEADER, MODEL, HOST, BATCH, FLIGHTS, *SIMULATION, EXAMPLE, CASADI, MANIFEST, *PACKAGE}
+FILES = {
+    HEADER,
+    UNCHECKED,
+    MODEL,
+    HOST,
+    BATCH,
+    FLIGHTS,
+    *SIMULATION,
+    EXAMPLE,
+    CASADI,
+    MANIFEST,
+    *PACKAGE,
+}
 
 
 def scene(**options):
