@@ -92,7 +92,7 @@ def _read(folder: Path) -> CheckedFolder:
         raise _no_folder(folder) from error
     except OSError as error:
         raise ModelError(
-            f"{str(folder):.200} cannot be read ({error.strerror}): give the path of a generated "
+            f"{folder!s:.200} cannot be read ({error.strerror}): give the path of a generated "
             "folder"
         ) from error
 
