@@ -27,6 +27,7 @@ _HOME = {
     "filmstrip": "pictures.filmstrip",
     "leg_joints": "pictures.skeleton",
     "time_plots": "pictures.time_plots",
+    "view": "viewer.view",
     **dict.fromkeys(
         [
             "SerpentailError",
@@ -36,6 +37,7 @@ _HOME = {
             "StateError",
             "SimulationError",
             "PlanningError",
+            "ViewError",
             "UnlikeBodies",
         ],
         "errors",

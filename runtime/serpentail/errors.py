@@ -39,5 +39,9 @@ class PlanningError(SerpentailError, ValueError):
     """A planning problem that cannot be posed."""
 
 
+class ViewError(SerpentailError, ValueError):
+    """A page that cannot be written as asked."""
+
+
 class UnlikeBodies(UserWarning):
     """Torso and tail are so unlike in size that moments cancel in H, which loses digits."""

@@ -20,6 +20,7 @@ KINDS = ("touch_down", "take_off")
 MAX_STATIC_LOAD = (
     5.0  # weights: a static force of one point beyond it means a start inside the ground
 )
+LEG_ANGLES = 4  # of both legs, which their rates follow
 MOST_EVENTS = 10_000  # that are kept
 
 
@@ -102,7 +103,8 @@ class Ground:
         legs = self.legs_at(t)
         positions, _ = model.contact_points(q, v, *legs)
         _, _, forces = model.contact_dynamics(q, v, tau, bristles.reshape(len(bristles), -1), *legs)
-        return Contact(positions, forces, bristles, self.groups)
+        angles = legs[0][:, :LEG_ANGLES] if legs else None
+        return Contact(positions, forces, bristles, self.groups, angles)
 
     def event(self, t: float, number: int) -> dict:
         """Return an event of the C interface as plain data."""

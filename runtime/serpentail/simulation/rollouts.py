@@ -1,10 +1,12 @@
 """Many runs at once, on all cores: their samples, measures and errors as one set of arrays."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from os import PathLike
+from pathlib import Path
 from threading import Event
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -74,6 +76,26 @@ class Rollouts:
 
     def __len__(self) -> int:
         return len(self.q)
+
+    def view(self, k: int | Sequence[int], path: str | PathLike[str] = "run.html") -> Path:
+        """Write the page of run k, or of several; return its path.  Failed runs show their begin.
+
+        Raises as ``st.view``, or the error of a run that never began.
+        """
+        from ..viewer.view import view
+
+        numbers = [k] if isinstance(k, int | np.integer) else list(k)
+        motions = [self._begun(number) for number in numbers]
+        return view(motions, path, names=[f"run {number}" for number in numbers])
+
+    def _begun(self, k: int) -> Trajectory:
+        """Return the trajectory of run k, as far as it went."""
+        error = self.errors[k]
+        if error is None:
+            return self[k]
+        if error.trajectory is None:
+            raise error
+        return cast(Trajectory, error.trajectory)
 
     def __getitem__(self, k: int) -> Trajectory:
         """Return the trajectory of run k, or raise its error."""
