@@ -22,6 +22,7 @@ SCENE   ?= $(wildcard scenes/$(NAME).toml)
 OWN     := $(if $(SCENE),$(shell sed -n 's/^name *= *"\([^"]*\)".*/\1/p' $(SCENE) 2>/dev/null))
 MODEL   := $(if $(OWN),$(OWN),$(if $(SCENE),$(basename $(notdir $(SCENE))),$(NAME)))
 SOURCES := $(shell find codegen -name '*.py' -o -name '*.jinja')
+PAGE    := $(wildcard hatch_build.py viewer/*.* viewer/src/*)
 STAMP   := generated/$(MODEL)/.made
 WANTED  := $(if $(SCENE),$(SCENE),--tail $(TAIL) --segments $(M) $(if $(filter continuum,$(TAIL)),,--links $(N))) $(OPTIONS)
 
@@ -56,11 +57,12 @@ help:
 
 setup: $(READY)
 
-$(READY): pyproject.toml
+$(READY): pyproject.toml $(PAGE)
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 	  { echo "Python 3.11 or newer is needed, $(PYTHON) is older: make setup PYTHON=python3.11"; exit 1; }
 	@test -x $(PY) || $(PYTHON) -m venv $(VENV)
 	$(PY) -m pip install --quiet --disable-pip-version-check --editable '.[dev,peers]'
+	@test -f runtime/serpentail/viewer/page.html || echo 'no page of runs: it needs Node.js 18 or newer, and npm its packages'
 	@touch $@
 
 demo: $(READY)
