@@ -3,9 +3,14 @@
 import argparse
 import json
 import sys
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from .errors import SerpentailError
+from .errors import SerpentailError, SimulationError
+
+if TYPE_CHECKING:
+    from .motion.trajectory import Trajectory
+    from .scenes.simulate import Scenario
 
 
 def info(folder: str) -> dict[str, Any]:
@@ -75,12 +80,19 @@ def parser() -> argparse.ArgumentParser:
     )
     simulate.add_argument("--save", help="write the motion to this .npz file")
     simulate.add_argument("--film", help="draw it as a filmstrip, to this .png, .svg or .pdf file")
+    for verb in (plan, simulate):
+        verb.add_argument("--view", metavar="PAGE", help="show it in a page, this .html file")
+    # of a motion
+    view = verbs.add_parser("view", help="show saved motions in a page, over each other")
+    view.add_argument("files", nargs="+", help="what --save wrote: .npz files")
+    view.add_argument("--folder", help="the generated folder, by default the one in generated/")
+    view.add_argument("--output", help="the page, by default the first file's name with .html")
     # of a generated folder
     about_model = verbs.add_parser("info", help="what a generated model is")
     verify = verbs.add_parser("verify", help="check the laws that a model must obey")
     for verb in (about_model, verify):
         verb.add_argument("folder", help="a generated folder, such as generated/articulated_m3_n4")
-    for verb in (plan, simulate, about_model, verify):
+    for verb in (plan, simulate, view, about_model, verify):
         text = "print one JSON object on stdout instead of text"
         verb.add_argument("--json", choices=["-"], help=text)
     return root
@@ -107,7 +119,13 @@ def main(argv: list[str] | None = None) -> int:
 
 def run(arguments: argparse.Namespace) -> tuple[dict[str, Any], str, bool]:
     """Return the report of a verb, as data and as text, and whether all is well."""
-    verbs = {"info": informed, "plan": planned, "simulate": simulated, "verify": verified}
+    verbs = {
+        "info": informed,
+        "plan": planned,
+        "simulate": simulated,
+        "verify": verified,
+        "view": viewed,
+    }
     return verbs[arguments.verb](arguments)
 
 
@@ -121,9 +139,13 @@ def planned(arguments: argparse.Namespace) -> tuple[dict[str, Any], str, bool]:
     """Return the report of a scene's plan, and whether it converged."""
     from .scenes import plan as scenes
 
+    if arguments.view:
+        _refuse_early(arguments.view)
     plan = scenes.planned(arguments.scene, arguments.folder)
     if arguments.save:
         plan.trajectory.save(arguments.save)
+    if arguments.view:
+        plan.view(arguments.view)
     return plan.report, _rows(plan.report), plan.success
 
 
@@ -133,13 +155,49 @@ def simulated(arguments: argparse.Namespace) -> tuple[dict[str, Any], str, bool]
     from .scenes.simulate import scenario
 
     scene = scenario(arguments.scene, arguments.folder, parsed(arguments.changes))
-    motion = scene.simulate()
+    motion = _moved(scene, arguments.view)
     if arguments.save:
         motion.save(arguments.save)
     if arguments.film:
         scene.film(motion, arguments.film)
     report = scene.summary(motion)
     return report, _rows(report), True
+
+
+def _moved(scene: "Scenario", page: str | None) -> "Trajectory":
+    """Return a scene's motion; its page is written also where it fails."""
+    if not page:
+        return scene.simulate()
+    _refuse_early(page)
+    try:
+        motion = scene.simulate()
+    except SimulationError as error:
+        if error.trajectory is not None:
+            error.trajectory.view(page)
+        raise
+    motion.view(page)
+    return motion
+
+
+def _refuse_early(page: str) -> None:
+    """Raise what would keep a page from being written, before the work that it is to show."""
+    from .viewer.view import checked_path, template
+
+    checked_path(page)
+    template()
+
+
+def viewed(arguments: argparse.Namespace) -> tuple[dict[str, Any], str, bool]:
+    """Write the page of saved motions, and return where it is."""
+    from .viewer.saved import read
+    from .viewer.view import view
+
+    motions = [read(file, arguments.folder) for file in arguments.files]
+    names = list(arguments.files) if len(motions) > 1 else None
+    page = view(
+        motions, arguments.output or Path(arguments.files[0]).with_suffix(".html"), names=names
+    )
+    return {"page": str(page)}, str(page), True
 
 
 def verified(arguments: argparse.Namespace) -> tuple[dict[str, Any], str, bool]:
