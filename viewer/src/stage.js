@@ -9,7 +9,7 @@ import { colour, onChange } from "./theme.js";
 
 const VIEWS = { oblique: [1, -0.65, 0.5], side: [1, 0, 0.04], front: [0.04, 1, 0.12], top: [0.02, 0, 1] };
 const FIELD = 35; // degrees
-const DISTANCE = 2.1; // of the camera, in lengths of the animal
+const DISTANCE = 2.5; // of the camera, in lengths of the animal
 const SQUARES = 60; // of the ground, along and across
 
 // The edges of all squares, each for itself: a line that begins behind the camera may not be drawn at all.

@@ -30,7 +30,9 @@ def figures(model: Model, motion: Trajectory) -> list[tuple[str, str]]:
     ]
     for group in motion.contact.groups if motion.contact else ():
         rows.append((f"largest force at a point: {group} (N)", peak_force(motion, group)))
-    return [(label, f"{round(value, DECIMALS):.4g}") for label, value in rows if value is not None]
+    return [
+        (label, f"{round(value, DECIMALS) + 0.0:.4g}") for label, value in rows if value is not None
+    ]
 
 
 def events(motion: Trajectory, name: str) -> list[dict[str, Any]]:
