@@ -34,11 +34,14 @@ def need_chromium() -> None:
 
 
 @contextmanager
-def chromium():
-    """A headless Chromium that draws by software, and remembers console and requests."""
+def chromium(*more):
+    """A headless Chromium that draws by software, and remembers console and requests.
+
+    more: options.
+    """
     options = webdriver.ChromeOptions()
     options.binary_location = shutil.which("chromium")
-    for option in OPTIONS:
+    for option in (*OPTIONS, *more):
         options.add_argument(option)
     options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
     driver = webdriver.Chrome(options, Service(shutil.which("chromedriver")))

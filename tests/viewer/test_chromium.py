@@ -175,6 +175,16 @@ def test_other_motions_open(browser, tmp_path, kind, flight, single):
     assert text(driver, "play") == ("Play" if kind == "single" else "Pause")
 
 
+def test_without_webgl_all_but_the_animal_is_there(pages):
+    need(chromium.need_chromium)
+    with chromium.chromium("--disable-3d-apis") as driver:
+        opened(driver, pages["kick"])
+        assert "this browser has no WebGL" in text(driver, "notes")
+        before = text(driver, "plots")
+        press(driver, Keys.END)
+        assert value(driver) == pytest.approx(1.2) and text(driver, "plots") != before
+
+
 def test_the_licences_are_in_it(browser, pages):
     said = text(opened(browser, pages["kick"]), "panel")
     assert said.count("MIT License") == 2 and "three.js authors" in said and "Leon Sorokin" in said

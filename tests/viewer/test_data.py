@@ -170,6 +170,9 @@ def test_rollouts_show_runs_and_where_they_failed(tmp_path):
     assert [run["name"] for run in data["runs"]] == ["run 0", "run 1"]
     assert len(data["notes"]) == 1 and str(runs.errors[1]) in data["notes"][0]
     assert data_of(runs.view(2, tmp_path / "runs.html"))["runs"][0]["rows"] == len(runs.t)
+    for wrong in (3, -1, [0, 3], "ab", None, 1.5):
+        with pytest.raises(st.ViewError, match=r"k: value .*: needs a run, or runs, from 0 to 2"):
+            runs.view(wrong, tmp_path / "runs.html")
 
 
 def test_a_plan_shows_what_it_plans_and_what_is_true(tmp_path):

@@ -14,7 +14,7 @@ function stageOf(canvas, runs, meta) {
     return new Stage(canvas, runs, meta);
   } catch (error) {
     addNotes(find("notes"), [`The animal cannot be drawn: this browser has no WebGL (${error.message}).`]);
-    canvas.hidden = true;
+    canvas.style.visibility = "hidden";
     return undefined;
   }
 }
@@ -49,7 +49,7 @@ async function open() {
 }
 
 function obey(event, player, switches, look) {
-  if (event.ctrlKey || event.altKey || event.metaKey) return;
+  if (event.ctrlKey || event.altKey || event.metaKey || event.target.matches("select")) return;
   const own = { f: () => find("follow").click(), r: look };
   const action = player.action(event) ?? own[event.key] ?? switched(switches, event.key);
   if (!action) return;

@@ -2,7 +2,7 @@
 
 const SPEEDS = [0.01, 0.02, 0.05, 0.1, 0.25, 0.5, 1, 2, 5];
 const WATCHED = 8; // s, that a run takes at the speed it begins with
-const NATIVE = { " ": "button, input[type=checkbox], summary, select", arrows: "select" };
+const PRESSED = "button, input[type=checkbox], summary"; // by the space bar
 const MOST_MARKS = 200;
 
 export class Player {
@@ -102,7 +102,6 @@ export class Player {
       "+": () => this.faster(1),
       "-": () => this.faster(-1),
     };
-    const native = key === " " ? NATIVE[" "] : NATIVE.arrows;
-    return target.matches?.(native) ? undefined : actions[key];
+    return key === " " && target.matches(PRESSED) ? undefined : actions[key];
   }
 }

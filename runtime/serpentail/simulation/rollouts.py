@@ -10,7 +10,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from ..errors import SimulationError, StateError
+from ..errors import SimulationError, StateError, ViewError
 from ..model.kernel import RunKernel
 from ..model.model import Model
 from ..model.parameters import RunParameters
@@ -84,7 +84,9 @@ class Rollouts:
         """
         from ..viewer.view import view
 
-        numbers = [k] if isinstance(k, int | np.integer) else list(k)
+        numbers = [k] if isinstance(k, int | np.integer) else k
+        if not isinstance(numbers, Sequence) or any(n not in range(len(self)) for n in numbers):
+            raise ViewError(f"k: value {k!r:.200}: needs a run, or runs, from 0 to {len(self) - 1}")
         motions = [self._begun(number) for number in numbers]
         return view(motions, path, names=[f"run {number}" for number in numbers])
 

@@ -35,13 +35,13 @@ def figures(model: Model, motion: Trajectory) -> list[tuple[str, str]]:
     ]
 
 
-def events(motion: Trajectory, name: str) -> list[dict[str, Any]]:
-    """Return the first events inside the motion: time (s), kind, and a label that has the run."""
+def events(motion: Trajectory, prefix: str = "") -> list[dict[str, Any]]:
+    """Return the first events of the motion: time (s), kind, and a label that begins as given."""
     return [
         {
             "time": event["time"],
             "kind": event["kind"],
-            "label": f"{name}: {event['group']} {event['kind'].replace('_', ' ')}",
+            "label": f"{prefix}{event['group']} {event['kind'].replace('_', ' ')}",
         }
         for event in motion.events[:MOST_EVENTS]
     ]

@@ -8,21 +8,13 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ..errors import ViewError
 from ..files import replacing
 from ..model.model import Model
-from ..model.parameters import total_mass
 from ..motion.trajectory import Trajectory
-from .figures import events, figures
-from .packing import packed
-from .panels import panels
-from .samples import samples, thinned
-from .shape import length, shape
+from .data import page_data
 
 PAGE = Path(__file__).with_name("page.html")  # made of the sources in viewer/ when this is built
-COMMON = 95  # percentile of the forces whose arrow is as long as half the torso
 
 
 def view(
@@ -43,7 +35,7 @@ def view(
     motions = _checked_motions(motions)
     target, names = checked_path(path), _checked_names(names, motions)
     models = [_model_of(k, motion, model) for k, motion in enumerate(motions)]
-    page, data = template(), _data(motions, names, models)
+    page, data = template(), page_data(motions, names, models)
     parts = {
         "<!--TITLE-->": escape(", ".join(dict.fromkeys(each.name for each in models))),
         "/*DATA*/": json.dumps(data, allow_nan=False).replace("<", "\\u003c"),
@@ -56,60 +48,6 @@ def view(
     except OSError as error:
         raise ViewError(f"path: value {str(path)!r}: cannot be written ({error})") from error
     return target
-
-
-def _data(motions: list[Trajectory], names: list[str], models: list[Model]) -> dict[str, Any]:
-    """What the page reads."""
-    shown, notes, runs = [], [], []
-    for motion, name, model in zip(motions, names, models, strict=True):
-        few, step = thinned(motion)
-        shown.append(few)
-        notes += _notes(name, motion, step)
-        numbers = [*figures(model, motion), ("samples", str(len(motion.t)))]
-        runs.append(
-            _run(few, model) | {"name": name, "numbers": numbers, "events": events(motion, name)}
-        )
-    weight = max(float(total_mass(m.parameters) * m.parameters["gravity"]) for m in models)
-    return {
-        "runs": runs,
-        "notes": notes,
-        "plots": panels(names, shown, weight or 1.0),
-        "length": max(map(length, models)),
-        "force_scale": _common_force(shown) or weight or 1.0,
-    }
-
-
-def _run(motion: Trajectory, model: Model) -> dict[str, Any]:
-    """A run as the page reads it: sizes, and arrays as text."""
-    arrays = samples(model, motion)
-    return {
-        "rows": len(motion.t),
-        "points": arrays["tail"].shape[1],
-        "legs": 2 if "legs" in arrays else 0,
-        "contacts": sum(motion.contact.groups.values()) if motion.contact else 0,
-        "grounded": motion.contact is not None,
-        "body": shape(model),
-        "arrays": {name: packed(array) for name, array in arrays.items()},
-    }
-
-
-def _notes(name: str, motion: Trajectory, step: int) -> list[str]:
-    """What a reader of the page has to know of a run."""
-    notes = []
-    if "failure" in motion.info:
-        notes.append(f"{name}: the run failed, and ends here: {motion.info['failure']}")
-    if step > 1:
-        notes.append(
-            f"{name}: one of {step} samples is shown; the numbers are of all {len(motion.t)}."
-        )
-    return notes
-
-
-def _common_force(motions: list[Trajectory]) -> float:
-    """The 95th percentile of the forces that act, N; 0 where none does."""
-    touching = [motion.contact.forces for motion in motions if motion.contact is not None]
-    sizes = np.concatenate([[0.0], *(np.linalg.norm(f, axis=-1).ravel() for f in touching)])
-    return float(np.percentile(sizes[sizes > 0], COMMON)) if sizes.any() else 0.0
 
 
 def _checked_motions(motions: Any) -> list[Trajectory]:
