@@ -1,7 +1,15 @@
 // One run's animal on the stage: torso, tail, legs, forces, centre of mass and its path.
 import {
-  BufferAttribute, BufferGeometry, CircleGeometry, Group, Line, LineBasicMaterial, Mesh, MeshBasicMaterial,
-  MeshLambertMaterial, Vector3,
+  BufferAttribute,
+  BufferGeometry,
+  CircleGeometry,
+  Group,
+  Line,
+  LineBasicMaterial,
+  Mesh,
+  MeshBasicMaterial,
+  MeshLambertMaterial,
+  Vector3,
 } from "three";
 import { BALL, Balls, Heads, Rods } from "./shapes.js";
 import { colour, series } from "./theme.js";
@@ -28,7 +36,8 @@ export class Animal {
     this.shafts = new Rods(this.materials.force, run.contacts);
     this.tips = new Heads(this.materials.force, run.contacts);
     this.group.add(this.torso.group);
-    for (const parts of [this.tail, this.joints, this.legs, this.knees, this.shafts, this.tips]) this.group.add(parts.mesh);
+    for (const parts of [this.tail, this.joints, this.legs, this.knees, this.shafts, this.tips])
+      this.group.add(parts.mesh);
     this.addCentre();
     this.addShadow();
     this.paint();
@@ -40,7 +49,8 @@ export class Animal {
     this.centre.scale.setScalar(0.065 * Math.max(...this.run.body.semi_axes));
     this.centre.renderOrder = 2;
     const places = new Float32Array(3 * this.run.rows);
-    for (let row = 0; row < this.run.rows; row++) this.run.point("com", row, 0, to).toArray(places, 3 * row);
+    for (let row = 0; row < this.run.rows; row++)
+      this.run.point("com", row, 0, to).toArray(places, 3 * row);
     const line = new BufferGeometry().setAttribute("position", new BufferAttribute(places, 3));
     this.path = new Line(line, new LineBasicMaterial());
     this.path.frustumCulled = false;

@@ -21,7 +21,10 @@ export class Run {
   constructor(meta, columns) {
     Object.assign(this, meta);
     this.columns = columns;
-    this.times = Float64Array.from({ length: meta.rows }, (_, k) => this.value("t", k, 0) + this.value("t", k, 1));
+    this.times = Float64Array.from(
+      { length: meta.rows },
+      (_, k) => this.value("t", k, 0) + this.value("t", k, 1),
+    );
   }
 
   static async of(meta) {
@@ -36,7 +39,11 @@ export class Run {
 
   // Put point i of a row into a vector.
   point(name, row, i, vector) {
-    return vector.set(this.value(name, row, 3 * i), this.value(name, row, 3 * i + 1), this.value(name, row, 3 * i + 2));
+    return vector.set(
+      this.value(name, row, 3 * i),
+      this.value(name, row, 3 * i + 1),
+      this.value(name, row, 3 * i + 2),
+    );
   }
 
   // The last sample that is not after t, the first before all of them.

@@ -13,7 +13,9 @@ function stageOf(canvas, runs, meta) {
   try {
     return new Stage(canvas, runs, meta);
   } catch (error) {
-    addNotes(find("notes"), [`The animal cannot be drawn: this browser has no WebGL (${error.message}).`]);
+    addNotes(find("notes"), [
+      `The animal cannot be drawn: this browser has no WebGL (${error.message}).`,
+    ]);
     canvas.style.visibility = "hidden";
     return undefined;
   }
@@ -29,7 +31,9 @@ async function open() {
   const player = new Player(find, runs, (t) => parts.forEach((part) => part.show(t)));
   const plots = new Plots(find("plots"), meta.plots, runs, (t) => player.seek(t));
   const parts = stage ? [plots, stage] : [plots];
-  const switches = addSwitches(find("runs"), runs, (k, on) => parts.forEach((part) => part.switchRun(k, on)));
+  const switches = addSwitches(find("runs"), runs, (k, on) =>
+    parts.forEach((part) => part.switchRun(k, on)),
+  );
 
   const resize = () => {
     for (const part of parts) part.resize();

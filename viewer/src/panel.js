@@ -1,7 +1,8 @@
 // What stands beside the stage in words: notes, switches of the runs, numbers.
 import { onChange, series } from "./theme.js";
 
-const made = (name, text = "", more = {}) => Object.assign(document.createElement(name), { textContent: text }, more);
+const made = (name, text = "", more = {}) =>
+  Object.assign(document.createElement(name), { textContent: text }, more);
 
 export function addNotes(holder, notes) {
   holder.append(...notes.map((note) => made("p", note)));
@@ -19,7 +20,10 @@ export function addSwitches(holder, runs, change) {
     holder.append(label);
     return box;
   });
-  const paint = () => holder.querySelectorAll(".swatch").forEach((swatch, k) => swatch.style.setProperty("background", series(k)));
+  const paint = () =>
+    holder
+      .querySelectorAll(".swatch")
+      .forEach((swatch, k) => swatch.style.setProperty("background", series(k)));
   paint();
   onChange(paint);
   holder.hidden = runs.length === 1;

@@ -29,7 +29,8 @@ export class Player {
 
   addSpeeds() {
     const wanted = (this.end - this.begin) / WATCHED;
-    for (const speed of SPEEDS) this.speed.add(new Option(speed < 1 ? `1/${Math.round(1 / speed)}` : `${speed}`, speed));
+    for (const speed of SPEEDS)
+      this.speed.add(new Option(speed < 1 ? `1/${Math.round(1 / speed)}` : `${speed}`, speed));
     this.speed.value = SPEEDS.findLast((speed) => speed <= wanted) ?? SPEEDS[0];
   }
 
@@ -49,7 +50,10 @@ export class Player {
     this.time = Math.min(Math.max(t, this.begin), this.end);
     this.slider.value = this.time;
     const near = this.events.filter((event) => Math.abs(event.time - this.time) < 1e-9);
-    this.clock.textContent = [`${this.time.toFixed(4)} s`, ...near.map((event) => event.label)].join(", ");
+    this.clock.textContent = [
+      `${this.time.toFixed(4)} s`,
+      ...near.map((event) => event.label),
+    ].join(", ");
     this.slider.setAttribute("aria-valuetext", this.clock.textContent);
     this.show(this.time);
   }
@@ -87,7 +91,8 @@ export class Player {
     this.speed.selectedIndex = Math.min(Math.max(this.speed.selectedIndex + by, 0), last);
   }
 
-  // What a key does; undefined where it is not one of the player's, or the focused control has its own use for it.
+  // What a key does; undefined where it is not one of the player's, or the focused control has
+  // its own use for it.
   action(event) {
     const { key, shiftKey, target } = event;
     const count = shiftKey ? 10 : 1;

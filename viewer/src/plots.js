@@ -6,7 +6,8 @@ const HEIGHT = 150;
 const DASHES = [[], [6, 4], [2, 3], [9, 3, 2, 3]];
 
 // Four digits; rounding that is nothing beside the plot's largest value is 0.
-const digits = (value, largest) => Number((Math.abs(value) < 1e-6 * largest ? 0 : value).toPrecision(4)).toString();
+const digits = (value, largest) =>
+  Number((Math.abs(value) < 1e-6 * largest ? 0 : value).toPrecision(4)).toString();
 
 class Plot {
   constructor(holder, meta, runs, seek) {
@@ -20,9 +21,15 @@ class Plot {
 
     const options = {
       ...this.size(),
-      scales: { x: { time: false }, y: meta.compressed ? { distr: 4, asinh: meta.compressed } : {} },
+      scales: {
+        x: { time: false },
+        y: meta.compressed ? { distr: 4, asinh: meta.compressed } : {},
+      },
       series: [{}, ...this.curves.map((curve, i) => this.look(curve, i))],
-      axes: [this.axis({ size: 26, values: (_, times) => times.map((time) => `${time} s`) }), this.axis({ size: 56 })],
+      axes: [
+        this.axis({ size: 26, values: (_, times) => times.map((time) => `${time} s`) }),
+        this.axis({ size: 56 }),
+      ],
       legend: { show: false },
       cursor: { show: false },
       padding: [8, 18, 0, 0],
@@ -31,7 +38,8 @@ class Plot {
     this.now = document.createElement("div");
     this.now.className = "now";
     this.plot.over.append(this.now);
-    const at = (event) => seek(this.plot.posToVal(event.clientX - this.plot.over.getBoundingClientRect().left, "x"));
+    const at = (event) =>
+      seek(this.plot.posToVal(event.clientX - this.plot.over.getBoundingClientRect().left, "x"));
     this.plot.over.addEventListener("pointerdown", at);
     this.plot.over.addEventListener("pointermove", (event) => event.buttons && at(event));
   }
@@ -42,7 +50,12 @@ class Plot {
   }
 
   look(curve, i) {
-    return { stroke: () => this.stroke(curve, i), width: 1.5, dash: this.dash(curve), spanGaps: true };
+    return {
+      stroke: () => this.stroke(curve, i),
+      width: 1.5,
+      dash: this.dash(curve),
+      spanGaps: true,
+    };
   }
 
   dash(curve) {
@@ -51,16 +64,27 @@ class Plot {
 
   axis(more) {
     const grid = { stroke: () => colour("grid"), width: 1 };
-    return { stroke: () => colour("ink"), grid, ticks: grid, font: "11px system-ui, sans-serif", ...more };
+    return {
+      stroke: () => colour("ink"),
+      grid,
+      ticks: grid,
+      font: "11px system-ui, sans-serif",
+      ...more,
+    };
   }
 
   // Runs may be sampled at times of their own.
   data() {
     const tables = this.curves.map(({ run, array, column }) => {
       const { times, rows } = this.runs[run];
-      return [Array.from(times), Array.from({ length: rows }, (_, k) => this.runs[run].value(array, k, column))];
+      return [
+        Array.from(times),
+        Array.from({ length: rows }, (_, k) => this.runs[run].value(array, k, column)),
+      ];
     });
-    this.largest = tables.flatMap(([, values]) => values).reduce((most, value) => Math.max(most, Math.abs(value)), 0);
+    this.largest = tables
+      .flatMap(([, values]) => values)
+      .reduce((most, value) => Math.max(most, Math.abs(value)), 0);
     return uPlot.join(tables);
   }
 
@@ -73,7 +97,8 @@ class Plot {
       const value = document.createElement("output");
       const line = document.createElementNS("http://www.w3.org/2000/svg", "svg");
       line.setAttribute("aria-hidden", "true");
-      line.innerHTML = `<line x1="0" y1="5" x2="22" y2="5" stroke-dasharray="${this.dash(curve).join(" ")}"/>`;
+      const dashes = this.dash(curve).join(" ");
+      line.innerHTML = `<line y1="5" x2="22" y2="5" stroke-dasharray="${dashes}"/>`;
       entry.append(line, `${curve.label} `, value);
       this.key.append(entry);
       return { entry, value, line };
@@ -82,7 +107,9 @@ class Plot {
   }
 
   paint() {
-    this.values.forEach(({ line }, i) => line.style.setProperty("stroke", this.stroke(this.curves[i], i)));
+    this.values.forEach(({ line }, i) =>
+      line.style.setProperty("stroke", this.stroke(this.curves[i], i)),
+    );
     this.plot?.redraw(false);
   }
 
@@ -90,7 +117,10 @@ class Plot {
     this.now.style.transform = `translateX(${this.plot.valToPos(t, "x")}px)`;
     this.values.forEach(({ value }, i) => {
       const { run, array, column } = this.curves[i];
-      value.textContent = digits(this.runs[run].value(array, this.runs[run].row(t), column), this.largest);
+      value.textContent = digits(
+        this.runs[run].value(array, this.runs[run].row(t), column),
+        this.largest,
+      );
     });
   }
 

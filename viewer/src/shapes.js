@@ -1,5 +1,13 @@
 // Many rods, balls and arrow heads at once: one draw call each, placed anew for every moment.
-import { ConeGeometry, CylinderGeometry, InstancedMesh, Matrix4, Quaternion, SphereGeometry, Vector3 } from "three";
+import {
+  ConeGeometry,
+  CylinderGeometry,
+  InstancedMesh,
+  Matrix4,
+  Quaternion,
+  SphereGeometry,
+  Vector3,
+} from "three";
 
 const ROD = new CylinderGeometry(1, 1, 1, 12);
 const HEAD = new ConeGeometry(1, 1, 14);

@@ -1,25 +1,52 @@
 // The stage: light, ground, cameras, and the animals on it.
 import {
-  AmbientLight, BufferGeometry, Color, DirectionalLight, DoubleSide, Float32BufferAttribute, Group, HemisphereLight,
-  LineBasicMaterial, LineSegments, Mesh, MeshBasicMaterial, PerspectiveCamera, PlaneGeometry, Scene, Vector3, WebGLRenderer,
+  AmbientLight,
+  BufferGeometry,
+  Color,
+  DirectionalLight,
+  DoubleSide,
+  Float32BufferAttribute,
+  Group,
+  HemisphereLight,
+  LineBasicMaterial,
+  LineSegments,
+  Mesh,
+  MeshBasicMaterial,
+  PerspectiveCamera,
+  PlaneGeometry,
+  Scene,
+  Vector3,
+  WebGLRenderer,
 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { Animal } from "./animal.js";
 import { colour, onChange } from "./theme.js";
 
-const VIEWS = { oblique: [1, -0.65, 0.5], side: [1, 0, 0.04], front: [0.04, 1, 0.12], top: [0.02, 0, 1] };
+const VIEWS = {
+  oblique: [1, -0.65, 0.5],
+  side: [1, 0, 0.04],
+  front: [0.04, 1, 0.12],
+  top: [0.02, 0, 1],
+};
 const FIELD = 35; // degrees
 const DISTANCE = 2.5; // of the camera, in lengths of the animal
 const SQUARES = 60; // of the ground, along and across
 
-// The edges of all squares, each for itself: a line that begins behind the camera may not be drawn at all.
+// The edges of all squares, each for itself: a line that begins behind the camera may not be
+// drawn at all.
 function edges(square) {
   const points = [];
   const half = SQUARES / 2;
   for (let i = -half; i <= half; i++) {
     for (let j = -half; j < half; j++) points.push(i, j, 0, i, j + 1, 0, j, i, 0, j + 1, i, 0);
   }
-  return new BufferGeometry().setAttribute("position", new Float32BufferAttribute(points.map((x) => square * x), 3));
+  return new BufferGeometry().setAttribute(
+    "position",
+    new Float32BufferAttribute(
+      points.map((x) => square * x),
+      3,
+    ),
+  );
 }
 
 export class Stage {
@@ -62,10 +89,20 @@ export class Stage {
   // A floor that lets what lies below it be seen, with squares of 1, 2 or 5 times a power of ten.
   layGround() {
     const power = 10 ** Math.floor(Math.log10(this.length / 2));
-    const square = (this.square = power * [5, 2, 1].find((step) => step * power <= this.length / 2));
+    const square = (this.square =
+      power * [5, 2, 1].find((step) => step * power <= this.length / 2));
     const grid = new LineSegments(edges(square), new LineBasicMaterial({ color: colour("grid") }));
-    const look = { color: colour("ground"), transparent: true, opacity: 0.75, side: DoubleSide, depthWrite: false };
-    const floor = new Mesh(new PlaneGeometry(SQUARES * square, SQUARES * square), new MeshBasicMaterial(look));
+    const look = {
+      color: colour("ground"),
+      transparent: true,
+      opacity: 0.75,
+      side: DoubleSide,
+      depthWrite: false,
+    };
+    const floor = new Mesh(
+      new PlaneGeometry(SQUARES * square, SQUARES * square),
+      new MeshBasicMaterial(look),
+    );
     floor.position.z = -1e-3 * this.length;
     floor.renderOrder = 1;
     this.ground.add(floor, grid);
@@ -73,7 +110,11 @@ export class Stage {
 
   // By whole squares, so that it has no end and still seems at rest.
   moveGround({ x, y }) {
-    if (this.grounded) this.ground.position.set(...[x, y].map((at) => this.square * Math.round(at / this.square)), 0);
+    if (this.grounded)
+      this.ground.position.set(
+        ...[x, y].map((at) => this.square * Math.round(at / this.square)),
+        0,
+      );
   }
 
   // The run that a following camera follows: the first one that is shown.

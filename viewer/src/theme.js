@@ -2,7 +2,8 @@
 
 const dark = matchMedia("(prefers-color-scheme: dark)");
 
-export const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+export const colour = (name) =>
+  getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 
 const COLOURS = 8; // of runs and curves
 export const series = (k) => colour(`series-${k % COLOURS}`);

@@ -1,5 +1,13 @@
 // The torso with what tells its sides apart: a pale belly, a head with snout, ears and eyes.
-import { BufferAttribute, Color, Group, MathUtils, Mesh, MeshLambertMaterial, SphereGeometry } from "three";
+import {
+  BufferAttribute,
+  Color,
+  Group,
+  MathUtils,
+  Mesh,
+  MeshLambertMaterial,
+  SphereGeometry,
+} from "three";
 import { BALL } from "./shapes.js";
 
 const BELLY = [-0.22, -0.08]; // heights, in semi-axes, between which the coat turns pale
