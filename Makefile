@@ -33,6 +33,7 @@ WANTED  := $(OPTIONS) $(if $(SCENE),-- $(call quoted,$(SCENE)),$(SIZE))
 # what it makes and how it is called is the generator's to tell: options are part of the name
 GENERATE := $(PY) -m serpentail_codegen
 FOLDER   := "$$($(GENERATE) --print-folder $(WANTED))"
+PAGE     := $(wildcard hatch_build.py viewer/*.* viewer/src/*)
 
 .PHONY: help setup demo test test-portable test-all model verify bench stress mutants embedded size-report studies study-models study-righting study-contact lint golden clean
 .DELETE_ON_ERROR:
@@ -66,11 +67,12 @@ help:
 
 setup: $(READY)
 
-$(READY): pyproject.toml
+$(READY): pyproject.toml $(PAGE)
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 	  { echo "Python 3.11 or newer is needed, $(PYTHON) is older: make setup PYTHON=python3.11"; exit 1; }
 	@test -x $(PY) || $(PYTHON) -m venv $(VENV)
 	$(PY) -m pip install --quiet --disable-pip-version-check --editable '.[dev,peers]'
+	@test -f runtime/serpentail/viewer/page.html || echo 'no page of runs: it needs Node.js 18 or newer, and npm its packages'
 	@touch $@
 
 demo: $(READY)

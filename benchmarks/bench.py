@@ -19,6 +19,7 @@ from benchmarks import (
     contact_costs,
     continuum_forms,
     derivatives,
+    pages,
     planning,
     precisions,
     scaling,
@@ -275,6 +276,7 @@ MEASURES = {
     "continuum_forms": continuum_forms.form_errors,
     "continuum_form_times": continuum_forms.form_times,
     "planning": planning.planning,
+    "page_speed": pages.page_speed,
 }
 
 

@@ -89,6 +89,9 @@ COLUMNS = {
     "implicit_operations": "of an implicit step's matrix",
     "dynamics_ns": "v_dot, ns",
     "implicit_ns": "implicit step's matrix, ns",
+    "page_bytes": "page, bytes",
+    "ready_s": "ready, s",
+    "frames_per_s": "frames a second",
 }
 
 

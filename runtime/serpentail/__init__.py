@@ -27,6 +27,7 @@ _HOME = {
     "filmstrip": "pictures.filmstrip",
     "leg_joints": "pictures.skeleton",
     "time_plots": "pictures.time_plots",
+    "view": "viewer.view",
     **dict.fromkeys(
         [
             "SerpentailError",
@@ -37,6 +38,7 @@ _HOME = {
             "SimulationError",
             "PlanningError",
             "NotWritten",
+            "ViewError",
             "UnlikeBodies",
         ],
         "errors",

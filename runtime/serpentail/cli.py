@@ -10,7 +10,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from .errors import SerpentailError
+from .errors import SerpentailError, SimulationError
 from .files import refuse_unwritable
 
 if TYPE_CHECKING:
@@ -87,6 +87,13 @@ def parser() -> argparse.ArgumentParser:
     )
     simulate.add_argument("--save", help="write the motion to this .npz file")
     simulate.add_argument("--film", help="draw it as a filmstrip, to this .png, .svg or .pdf file")
+    for verb in (plan, simulate):
+        verb.add_argument("--view", metavar="PAGE", help="show it in a page, this .html file")
+    # of a motion
+    view = verbs.add_parser("view", help="show saved motions in a page, over each other")
+    view.add_argument("files", nargs="+", help="what --save wrote: .npz files")
+    view.add_argument("--folder", help="the generated folder, by default the one in generated/")
+    view.add_argument("--output", help="the page, by default the first file's name with .html")
     # of a generated folder
     about_model = verbs.add_parser("info", help="what a generated model is")
     verify = verbs.add_parser("verify", help="check the laws that a model must obey")
@@ -95,7 +102,7 @@ def parser() -> argparse.ArgumentParser:
     # of this machine
     cache = verbs.add_parser("cache", help="what the cache of compiled models holds, and where")
     cache.add_argument("--clean", action="store_true", help="empty it")
-    for verb in (plan, simulate, about_model, verify, cache):
+    for verb in (plan, simulate, view, about_model, verify, cache):
         text = "print one JSON object on stdout instead of text"
         verb.add_argument("--json", choices=["-"], help=text)
     return root
@@ -148,8 +155,11 @@ def main(argv: list[str] | None = None) -> int:
 def refuse_targets(arguments: argparse.Namespace) -> None:
     """SerpentailError where a file could not be written after the work is done."""
     from .pictures.style import writable
+    from .viewer.view import checked_path, template
 
-    for option, check in (("save", Path), ("film", writable)):
+    if getattr(arguments, "view", None) is not None:
+        template()
+    for option, check in (("save", Path), ("film", writable), ("view", checked_path)):
         path = getattr(arguments, option, None)
         try:
             if path is not None:
@@ -188,6 +198,7 @@ def run(arguments: argparse.Namespace) -> tuple[Any, ...]:
         "simulate": simulated,
         "verify": verified,
         "cache": cached,
+        "view": viewed,
     }
     return verbs[arguments.verb](arguments)
 
@@ -203,7 +214,8 @@ def planned(arguments: argparse.Namespace) -> Outcome:
     from .scenes import plan as scenes
 
     plan = scenes.planned(arguments.scene, arguments.folder)
-    return Outcome(plan.report, _rows(plan.report), plan.success, {"save": plan.trajectory.save})
+    files: Files = {"save": plan.trajectory.save, "view": plan.view}
+    return Outcome(plan.report, _rows(plan.report), plan.success, files)
 
 
 def simulated(arguments: argparse.Namespace) -> Outcome:
@@ -212,21 +224,45 @@ def simulated(arguments: argparse.Namespace) -> Outcome:
     from .scenes.simulate import scenario
 
     scene = scenario(arguments.scene, arguments.folder, parsed(arguments.changes))
-    motion, stopped = _motion(scene)
+    motion, stopped = _motion(scene, arguments.view)
     report = scene.summary(motion) | stopped
-    files: Files = {"save": motion.save, "film": partial(scene.film, motion)}
+    files: Files = {
+        "save": motion.save,
+        "film": partial(scene.film, motion),
+        "view": motion.view,
+    }
     return Outcome(report, _rows(report), True, files)
 
 
-def _motion(scene: "Scenario") -> tuple["Trajectory", dict[str, str]]:
-    """Return a motion, after Ctrl-C as far as it came, and whether that stopped it."""
+def _motion(scene: "Scenario", page: str | None) -> tuple["Trajectory", dict[str, str]]:
+    """Return a motion, after Ctrl-C as far as it came, and whether that stopped it.
+
+    Where it fails, a page of it is written up to there.
+    """
     try:
         return scene.simulate(), {}
+    except SimulationError as error:
+        if page is not None and error.trajectory is not None:
+            error.trajectory.view(page)
+        raise
     except KeyboardInterrupt as stop:
         motion = getattr(stop, "motion", None)
         if motion is None or len(motion.t) < 2:
             raise
         return motion, {"stopped": "interrupt"}
+
+
+def viewed(arguments: argparse.Namespace) -> Outcome:
+    """Write the page of saved motions, and return where it is."""
+    from .viewer.saved import read
+    from .viewer.view import view
+
+    motions = [read(file, arguments.folder) for file in arguments.files]
+    names = list(arguments.files) if len(motions) > 1 else None
+    page = view(
+        motions, arguments.output or Path(arguments.files[0]).with_suffix(".html"), names=names
+    )
+    return Outcome({"page": str(page)}, str(page), True)
 
 
 def verified(arguments: argparse.Namespace) -> Outcome:

@@ -43,5 +43,9 @@ class NotWritten(SerpentailError, OSError):
     """A file cannot be written; what was there before is there still."""
 
 
+class ViewError(SerpentailError, ValueError):
+    """A page that cannot be written as asked."""
+
+
 class UnlikeBodies(UserWarning):
     """Torso and tail are so unlike in size that moments cancel in H, which loses digits."""

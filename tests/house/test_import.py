@@ -44,6 +44,14 @@ def test_flight_needs_numpy_alone():
     assert fresh(program, folder).split() == ["numpy"]
 
 
+def test_what_draws_is_not_loaded_before_it_is_asked_for():
+    program = (
+        "import sys, serpentail.cli, serpentail.scenes.simulate, serpentail.planning.result.plan\n"
+        "print([name for name in sys.modules if name.startswith('serpentail.viewer')])"
+    )
+    assert fresh(program) == "[]\n"
+
+
 @pytest.mark.parametrize("name", st.__all__)
 def test_public_name_is_documented(name):
     assert getattr(st, name).__name__ == name

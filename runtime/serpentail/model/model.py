@@ -20,7 +20,16 @@ from .kernel import Kernel
 from .layout import Layout
 from .library import open_library
 from .manifest import CheckedFolder, read_folder
-from .parameters import RunParameters, Value, flat, merged, real_type, resolve, warn_of_unlike
+from .parameters import (
+    RunParameters,
+    Value,
+    flat,
+    independent,
+    merged,
+    real_type,
+    resolve,
+    warn_of_unlike,
+)
 from .snapshot import restored, snapshot
 
 if TYPE_CHECKING:
@@ -173,8 +182,7 @@ class Model(Functions):
         """Return the parameters that the others follow from; none where they are baked."""
         if self.manifest["scene"]["baked"]:
             return {}
-        computed = "link_inertia" if "link_radius" in self.parameters else ""
-        return {name: value for name, value in self.parameters.items() if name != computed}
+        return independent(self.parameters)
 
     def __reduce__(self) -> tuple[Any, ...]:
         with suppress(SerpentailError):  # a folder that is as it was serves too

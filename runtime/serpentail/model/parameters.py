@@ -90,6 +90,12 @@ def merged(values: Values, changes: Values) -> dict[str, Any]:
     return {name: x for name, x in values.items() if name not in replaced} | dict(changes)
 
 
+def independent(values: Values) -> dict[str, Any]:
+    """Return the values that others follow from."""
+    computed = "link_inertia" if "link_radius" in values else ""
+    return {name: value for name, value in values.items() if name != computed}
+
+
 def completed(manifest: dict, values: Values) -> dict[str, Any]:
     """Return the values with link_inertia, of each run, where it follows from link_radius."""
     if "link_radius" not in values:

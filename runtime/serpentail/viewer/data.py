@@ -1,0 +1,72 @@
+"""What the page reads: runs with their samples, numbers and events, plots, and notes."""
+
+from typing import Any
+
+import numpy as np
+
+from ..model.model import Model
+from ..model.parameters import total_mass
+from ..motion.trajectory import Trajectory
+from .figures import events, figures
+from .packing import packed
+from .panels import panels
+from .samples import samples, thinned
+from .shape import length, shape
+
+COMMON = 95  # percentile of the forces whose arrow is as long as half the torso
+
+
+def page_data(motions: list[Trajectory], names: list[str], models: list[Model]) -> dict[str, Any]:
+    """Return what the page reads, ready for JSON."""
+    shown, notes, runs = [], [], []
+    for motion, name, model in zip(motions, names, models, strict=True):
+        few, step = thinned(motion)
+        shown.append(few)
+        notes += _notes(name, motion, step)
+        numbers = [*figures(model, motion), ("samples", str(len(motion.t)))]
+        prefix = f"{name}: " if len(motions) > 1 else ""
+        words = {"name": name, "numbers": numbers, "events": events(motion, prefix)}
+        runs.append(_run(few, model) | words)
+    weight = max(float(total_mass(m.parameters) * m.parameters["gravity"]) for m in models)
+    return {
+        "runs": runs,
+        "notes": notes,
+        "plots": panels(names, shown, weight or 1.0),
+        "length": max(map(length, models)),
+        "force_scale": _common_force(shown) or weight or 1.0,
+    }
+
+
+def _run(motion: Trajectory, model: Model) -> dict[str, Any]:
+    """A run as the page reads it: sizes, and arrays as text."""
+    arrays = samples(model, motion)
+    return {
+        "rows": len(motion.t),
+        "points": arrays["tail"].shape[1],
+        "legs": 2 if "legs" in arrays else 0,
+        "contacts": sum(motion.contact.groups.values()) if motion.contact else 0,
+        "grounded": motion.contact is not None,
+        "body": shape(model),
+        "arrays": {name: packed(array) for name, array in arrays.items()},
+    }
+
+
+def _notes(name: str, motion: Trajectory, step: int) -> list[str]:
+    """What a reader of the page has to know of a run."""
+    notes = []
+    if "failure" in motion.info:
+        notes.append(f"{name}: the run failed, and ends here: {motion.info['failure']}")
+    if step > 1:
+        notes.append(
+            f"{name}: one of {step} samples is shown; the numbers are of all {len(motion.t)}."
+        )
+    return notes
+
+
+def _common_force(motions: list[Trajectory]) -> float:
+    """The 95th percentile of the forces that act, N; 0 where none does."""
+    touching = [motion.contact.forces for motion in motions if motion.contact is not None]
+    with np.errstate(over="ignore"):  # of a run that blows up
+        every = [np.linalg.norm(forces, axis=-1).ravel() for forces in touching]
+    sizes = np.nan_to_num(np.concatenate([[0.0], *every]))
+    return float(np.percentile(sizes[sizes > 0], COMMON)) if sizes.any() else 0.0

@@ -1,0 +1,42 @@
+"""What the page plots over time: the panels, and which curves of which runs each has."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from ..motion.trajectory import Trajectory
+
+ENERGIES = ("total", "kinetic", "potential")
+
+
+def panels(
+    names: Sequence[str], motions: Sequence[Trajectory], weight: float
+) -> list[dict[str, Any]]:
+    """Return the panels: title, curves, and of forces the weight (N) where the scale bends."""
+    titles = {
+        "height": "height of the torso (m)",
+        "tilt": "tilt of the back (deg)",
+        "coordinates": "tail coordinates (deg)",
+        "torque": "joint torques (N m)",
+        "force": "force of the ground (N), scale compressed",
+        "energy": "energy (J)",
+    }
+    found = []
+    for array, title in titles.items():
+        curves = []
+        for run, (name, motion) in enumerate(zip(names, motions, strict=True)):
+            for column, label in enumerate(_columns(array, motion)):
+                words = label if len(motions) == 1 else f"{name} {label}".strip()
+                curves.append({"run": run, "array": array, "column": column, "label": words})
+        if curves:
+            compressed = weight if array == "force" else 0
+            found.append({"title": title, "curves": curves, "compressed": compressed})
+    return found
+
+
+def _columns(array: str, motion: Trajectory) -> Sequence[str]:
+    """The names of an array's columns, none where a motion does not have it."""
+    if array in ("coordinates", "torque"):
+        return [f"{bend} {i + 1}" for i in range(motion.segments) for bend in ("pitch", "yaw")]
+    if array == "force":
+        return list(motion.contact.groups) if motion.contact else []
+    return ENERGIES if array == "energy" else [""]

@@ -1,0 +1,74 @@
+"""The samples of a motion that the page has, and where the parts of the animal are at each."""
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+
+from ..attitude import Array, tilt_deg
+from ..model.layout import POSITION, TORSO_NQ
+from ..model.model import Model
+from ..motion.trajectory import ARRAYS, Trajectory
+
+MOST = 2400  # samples of a run in a page
+
+
+def thinned(motion: Trajectory) -> tuple[Trajectory, int]:
+    """Return every n-th sample of a motion, the last one too, and n."""
+    step = max(-(-(len(motion.t) - 1) // (MOST - 1)), 1)
+    if step == 1:
+        return motion, 1
+    rows = np.append(np.arange(0, len(motion.t) - 1, step), len(motion.t) - 1)
+    arrays: dict[str, Any] = {name: getattr(motion, name)[rows] for name in ARRAYS}
+    contact = motion.contact and motion.contact.mapped(lambda samples: samples[rows])
+    return dataclasses.replace(motion, contact=contact, **arrays), step
+
+
+def samples(model: Model, motion: Trajectory) -> dict[str, Array]:
+    """Return arrays (K, ...) by name, SI; angles to be read in degrees.
+
+    t as two floats that add up to it; pose: p and quaternion; tail, legs, touching: points in the
+    world; forces of the ground at ``touching``; then what is plotted.
+    """
+    t = motion.t.astype(np.float32)
+    arrays = {
+        "t": np.stack([t, motion.t - t], axis=1),
+        "pose": motion.q[:, :TORSO_NQ],
+        "tail": model.tail_points(motion.q),
+        "com": centre_of_mass(model, motion),
+        "height": motion.q[:, 2],
+        "tilt": tilt_deg(motion.attitude),
+        "coordinates": np.degrees(motion.tail),
+        "torque": motion.tau,
+        "energy": np.stack([motion.energy, motion.kinetic, motion.potential], axis=1),
+    }
+    return {
+        name: np.asarray(array, float) for name, array in (arrays | _ground(model, motion)).items()
+    }
+
+
+def centre_of_mass(model: Model, motion: Trajectory) -> Array:
+    """Return (K, 3), m; of the torso where the scene left out the function ``center_of_mass``."""
+    if "center_of_mass" not in model.kernels:
+        return motion.q[:, POSITION]
+    return np.asarray(model.center_of_mass(motion.q, motion.v)[0])
+
+
+def _ground(model: Model, motion: Trajectory) -> dict[str, Array]:
+    """Legs, points that touch and their forces, and each group's total; none in flight."""
+    contact = motion.contact
+    if contact is None:
+        return {}
+    # where no force acts no arrow is drawn, so no point is needed
+    pushed = np.abs(contact.forces).max(axis=2, keepdims=True) > 0
+    totals = [
+        np.linalg.norm(contact.of(group).forces.sum(axis=1), axis=1) for group in contact.groups
+    ]
+    arrays = {
+        "touching": np.where(pushed, contact.points, 0),
+        "forces": contact.forces,
+        "force": np.stack(totals, axis=1),
+    }
+    if contact.legs is not None and "leg_points" in model.kernels:
+        arrays["legs"] = model.leg_points(motion.q, contact.legs)
+    return arrays

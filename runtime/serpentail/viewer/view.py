@@ -1,0 +1,114 @@
+"""``view``: writes one or several motions to a page that needs nothing but a browser."""
+
+import json
+import os
+import re
+from collections.abc import Sequence
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from ..errors import ViewError
+from ..files import replacing
+from ..model.model import Model
+from ..motion.trajectory import Trajectory
+from .data import page_data
+
+PAGE = Path(__file__).with_name("page.html")  # made of the sources in viewer/ when this is built
+
+
+def view(
+    motions: Trajectory | Sequence[Trajectory],
+    path: str | os.PathLike[str] = "run.html",
+    *,
+    names: Sequence[str] | None = None,
+    model: Model | None = None,
+) -> Path:
+    """Write a page that shows motions over each other; return its path.
+
+    motions: a Trajectory, or several.  path: an .html file; it is complete in itself, fetches
+    nothing, and replaces what was there once it is whole.  names: of the motions, by default what
+    each is.  model: of motions that were loaded from files; others know theirs.
+    More than 2400 samples are thinned, which the page says, as it says that a run failed.  Raises
+    ViewError with argument, value and remedy, ModelError where the model lacks ``tail_points``.
+    """
+    motions = _checked_motions(motions)
+    target, names = checked_path(path), _checked_names(names, motions)
+    models = [_model_of(k, motion, model) for k, motion in enumerate(motions)]
+    page, data = template(), page_data(motions, names, models)
+    parts = {
+        "<!--TITLE-->": escape(", ".join(dict.fromkeys(each.name for each in models))),
+        "/*DATA*/": json.dumps(data, allow_nan=False).replace("<", "\\u003c"),
+    }
+    marks = re.compile("|".join(map(re.escape, parts)))
+    text = marks.sub(lambda mark: parts[mark[0]], page)
+    try:
+        with replacing(target) as part:
+            part.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise ViewError(f"path: value {str(path)!r}: cannot be written ({error})") from error
+    return target
+
+
+def _checked_motions(motions: Any) -> list[Trajectory]:
+    """The motions as a list."""
+    listed = list(motions) if isinstance(motions, list | tuple) else [motions]
+    for k, motion in enumerate(listed):
+        if not isinstance(motion, Trajectory):
+            raise ViewError(f"motions[{k}]: type {type(motion).__name__}: needs a Trajectory")
+    if not listed:
+        raise ViewError("motions: none: needs one Trajectory or more")
+    return listed
+
+
+def checked_path(path: Any) -> Path:
+    """Return the path of a page; ViewError where it names none."""
+    try:
+        target = Path(path)
+    except TypeError:
+        raise ViewError(f"path: value {path!r:.60}: needs the name of an .html file") from None
+    if target.suffix.lower() != ".html" or target.is_dir():
+        raise ViewError(f"path: value {str(path)!r}: needs a file whose name ends in .html")
+    return target
+
+
+def _checked_names(names: Any, motions: list[Trajectory]) -> list[str]:
+    """A name for each motion."""
+    if names is None:
+        kinds = ["planned" if m.info.get("kind") == "plan" else "run" for m in motions]
+        return [
+            kind if kinds.count(kind) == 1 else f"{kind} {k + 1}" for k, kind in enumerate(kinds)
+        ]
+    listed = list(names) if isinstance(names, list | tuple) else []
+    whole = all(isinstance(name, str) and name.strip() for name in listed)
+    if not whole or len(listed) != len(motions) or len(set(listed)) != len(listed):
+        raise ViewError(f"names: value {names!r:.200}: needs {len(motions)} names that differ")
+    return listed
+
+
+def _model_of(k: int, motion: Trajectory, model: Any) -> Model:
+    """The model of motion k."""
+    found = motion.model if motion.model is not None else model
+    if found is None:
+        raise ViewError(
+            f"motions[{k}]: was loaded from a file, which has no model: give model=st.load(folder)"
+        )
+    if not isinstance(found, Model):
+        raise ViewError(f"model: type {type(found).__name__}: needs a Model, as st.load returns")
+    if motion.q.shape[1] != found.nq:
+        raise ViewError(
+            f"motions[{k}]: q has {motion.q.shape[1]} numbers, {found.name} has {found.nq}: give "
+            "its own model"
+        )
+    return found
+
+
+def template() -> str:
+    """Return the page without motions; ViewError where it was not built."""
+    try:
+        return PAGE.read_text(encoding="utf-8")
+    except OSError:
+        raise ViewError(
+            "the page was not built, since node or npm's packages were missing: install Node.js 18 "
+            "or newer and set serpentail up again, `make setup`"
+        ) from None

@@ -1,0 +1,202 @@
+"""The page in a real browser: it needs nothing else, seeks, switches, obeys keys, fits a phone."""
+
+import time
+
+import pytest
+from selenium.webdriver import ActionChains
+from selenium.webdriver.common.keys import Keys
+from selenium.webdriver.support.ui import WebDriverWait
+
+import serpentail as st
+from tests.support import chromium
+from tests.support.chromium import opened, requests
+from tests.support.page import need
+
+from .conftest import simulated
+
+PHONE = (375, 740)
+SETTLED = 0.1  # s, for what is drawn when a frame comes
+
+
+@pytest.fixture(scope="module")
+def browser():
+    need(chromium.need_chromium)
+    with chromium.chromium() as driver:
+        yield driver
+
+
+@pytest.fixture(scope="module")
+def pages(tmp_path_factory):
+    """Pages of the kick, and of two runs over each other."""
+    folder, kick = tmp_path_factory.mktemp("pages"), simulated("kick")
+    slow = kick.resample(kick.t[:600:3])
+    return {
+        "kick": kick.view(folder / "kick & more.html"),
+        "two": st.view([kick, slow], folder / "two.html", names=["whole", "begin"]),
+    }
+
+
+def text(driver, name):
+    return driver.execute_script(f"return document.getElementById('{name}').textContent")
+
+
+def seek(driver, t):
+    driver.execute_script(f"serpentail.seek({t})")
+
+
+def picture(driver):
+    """What the stage shows, as a drawn image."""
+    time.sleep(SETTLED)
+    return driver.find_element("id", "view").screenshot_as_png
+
+
+def press(driver, *keys, on="body"):
+    driver.find_element("css selector", on).send_keys(*keys)
+
+
+def value(driver):
+    return float(driver.execute_script("return document.getElementById('time').value"))
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("size", [(1280, 800), PHONE])
+def test_it_needs_nothing_else_and_complains_of_nothing(browser, pages, size, scheme):
+    for page in pages.values():
+        driver = opened(browser, page, size, scheme)
+        seek(driver, 0.5)
+        picture(driver)
+        assert requests(driver) == [page.as_uri()]
+        assert driver.get_log("browser") == []
+        sizes = driver.execute_script(
+            "const e = document.documentElement; return [e.scrollWidth, e.clientWidth]"
+        )
+        assert sizes[0] <= sizes[1]
+
+
+def test_it_may_not_fetch(browser, pages):
+    driver = opened(browser, pages["kick"])
+    script = "fetch('data:,x').then(() => arguments[0]('got it'), () => arguments[0]('refused'))"
+    assert driver.execute_async_script(script) == "refused"
+
+
+def test_seeking_changes_picture_and_numbers(browser, pages):
+    driver = opened(browser, pages["kick"])
+    seen = []
+    for t in (0.1, 0.5, 0.8):
+        seek(driver, t)
+        seen.append((picture(driver), text(driver, "plots"), text(driver, "clock")))
+    assert all(len({each[k] for each in seen}) == 3 for k in range(3))
+    assert seen[1][2] == "0.5000 s"
+    for t, end in ((-1, 0.0), (99, 1.2)):
+        seek(driver, t)
+        assert value(driver) == end
+
+
+def test_dark_is_another_picture(browser, pages):
+    shades = [picture(opened(browser, pages["kick"], scheme=s)) for s in ("light", "dark")]
+    assert shades[0] != shades[1]
+
+
+def test_a_click_on_a_plot_seeks(browser, pages):
+    driver = opened(browser, pages["kick"])
+    plot = driver.find_element("css selector", ".u-over")
+    quarter = plot.size["width"] // 4
+    ActionChains(driver).move_to_element_with_offset(plot, quarter, 5).click().perform()
+    assert 0.8 < value(driver) < 1.0
+
+
+def test_runs_switch_on_and_off(browser, pages):
+    driver = opened(browser, pages["two"])
+    seek(driver, 0.7)
+    both, words = picture(driver), "return document.querySelectorAll('figcaption [hidden]').length"
+    boxes = driver.find_elements("css selector", "#runs input")
+    boxes[1].click()
+    one = picture(driver)
+    assert one != both and driver.execute_script(words) > 0
+    press(driver, "2")
+    assert boxes[1].is_selected() and driver.execute_script(words) == 0
+    assert picture(driver) == both
+    press(driver, "1", "2")
+    assert not any(box.is_selected() for box in boxes)
+
+
+def test_keys(browser, pages, kick):
+    driver = opened(browser, pages["kick"])
+    begin, end = Keys.HOME, Keys.END
+    first = kick.events[0]["time"]
+    for keys, expected in (
+        ([Keys.ARROW_RIGHT], 0.001),
+        ([Keys.SHIFT, Keys.ARROW_RIGHT, Keys.NULL], 0.011),
+        ([Keys.ARROW_LEFT], 0.010),
+        (["n"], first),
+        ([end], 1.2),
+        ([begin], 0.0),
+        (["n", "n", "p"], first),
+    ):
+        press(driver, *keys)
+        assert value(driver) == pytest.approx(expected, abs=1e-6), keys
+    assert "take off" in text(driver, "clock")
+
+    # on the slider the same, not the browser's own step
+    press(driver, begin, Keys.ARROW_RIGHT, on="#time")
+    assert value(driver) == pytest.approx(0.001, abs=1e-6)
+
+
+def test_space_plays_and_pauses(browser, pages):
+    driver = opened(browser, pages["kick"])
+    press(driver, " ")
+    assert text(driver, "play") == "Pause"
+    WebDriverWait(driver, 60).until(value)  # some time has passed
+    press(driver, " ")
+    assert text(driver, "play") == "Play"
+    held = value(driver)
+    time.sleep(SETTLED)
+    assert value(driver) == held
+    driver.execute_script("document.getElementById('play').focus()")
+    press(driver, " ", on="#play")  # the focused button's own key, once
+    assert text(driver, "play") == "Pause"
+
+
+def test_controls_are_focusable_and_named(browser, pages):
+    driver = opened(browser, pages["two"])
+    unnamed = """
+      const named = (each) => each.getAttribute("aria-label") || each.closest("label")
+        || each.textContent.trim();
+      const controls = document.querySelectorAll("button, select, input, canvas[tabindex]");
+      return [...controls].filter((each) => each.tabIndex < 0 || !named(each))
+        .map((each) => each.outerHTML);"""
+    assert driver.execute_script(unnamed) == []
+
+
+@pytest.mark.parametrize("kind", ["continuum", "single"])
+def test_other_motions_open(browser, tmp_path, kind, flight, single):
+    page = (single if kind == "single" else flight).view(tmp_path / "run.html")
+    driver = opened(browser, page)
+    seek(driver, 0.1)
+    press(driver, " ", "n", "f", "r", "+", "-")
+    assert driver.get_log("browser") == []
+    assert text(driver, "play") == ("Play" if kind == "single" else "Pause")
+
+
+def test_without_webgl_all_but_the_animal_is_there(pages):
+    need(chromium.need_chromium)
+    with chromium.chromium("--disable-3d-apis") as driver:
+        opened(driver, pages["kick"])
+        assert "this browser has no WebGL" in text(driver, "notes")
+        before = text(driver, "plots")
+        press(driver, Keys.END)
+        assert value(driver) == pytest.approx(1.2) and text(driver, "plots") != before
+
+
+def test_the_licences_are_in_it(browser, pages):
+    said = text(opened(browser, pages["kick"]), "panel")
+    assert said.count("MIT License") == 2 and "three.js authors" in said and "Leon Sorokin" in said
+
+
+def test_a_damaged_page_says_so(browser, pages, tmp_path):
+    whole = pages["kick"].read_text()
+    (tmp_path / "cut.html").write_text(whole.replace('"rows": 1201', '"rows": 1202'))
+    browser.get((tmp_path / "cut.html").as_uri())
+    WebDriverWait(browser, 60).until(lambda b: b.execute_script("return serpentail.error"))
+    ready, said = browser.execute_script("return [serpentail.ready, serpentail.error]")
+    assert not ready and "damaged" in said and "could not be opened" in text(browser, "notes")

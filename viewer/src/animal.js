@@ -1,0 +1,143 @@
+// One run's animal on the stage: torso, tail, legs, forces, centre of mass and its path.
+import {
+  BufferAttribute,
+  BufferGeometry,
+  CircleGeometry,
+  Group,
+  Line,
+  LineBasicMaterial,
+  Mesh,
+  MeshBasicMaterial,
+  MeshLambertMaterial,
+  Vector3,
+} from "three";
+import { BALL, Balls, Heads, Rods } from "./shapes.js";
+import { colour, series } from "./theme.js";
+import { Torso } from "./torso.js";
+
+const LEG = 6; // joints: hip, D, knee, A, M and T
+const from = new Vector3();
+const to = new Vector3();
+const force = new Vector3();
+
+export class Animal {
+  constructor(run, k, alone, scale) {
+    Object.assign(this, { run, k, alone, scale, group: new Group() });
+    const opacity = k === 0 ? 1 : 0.5;
+    const lambert = () => new MeshLambertMaterial({ transparent: opacity < 1, opacity });
+    this.torso = new Torso(run.body.semi_axes, opacity);
+    this.materials = { tail: lambert(), joint: lambert(), leg: lambert(), force: lambert() };
+
+    const links = Math.max(run.points - 1, 0);
+    this.tail = new Rods(this.materials.tail, links);
+    this.joints = new Balls(run.body.jointed ? this.materials.joint : this.materials.tail, links);
+    this.legs = new Rods(this.materials.leg, run.legs * (LEG - 1));
+    this.knees = new Balls(this.materials.leg, run.legs * LEG);
+    this.shafts = new Rods(this.materials.force, run.contacts);
+    this.tips = new Heads(this.materials.force, run.contacts);
+    this.group.add(this.torso.group);
+    for (const parts of [this.tail, this.joints, this.legs, this.knees, this.shafts, this.tips])
+      this.group.add(parts.mesh);
+    this.addCentre();
+    this.addShadow();
+    this.paint();
+  }
+
+  // The centre of mass is seen through the torso.
+  addCentre() {
+    this.centre = new Mesh(BALL, new MeshBasicMaterial({ depthTest: false, transparent: true }));
+    this.centre.scale.setScalar(0.065 * Math.max(...this.run.body.semi_axes));
+    this.centre.renderOrder = 2;
+    const places = new Float32Array(3 * this.run.rows);
+    for (let row = 0; row < this.run.rows; row++)
+      this.run.point("com", row, 0, to).toArray(places, 3 * row);
+    const line = new BufferGeometry().setAttribute("position", new BufferAttribute(places, 3));
+    this.path = new Line(line, new LineBasicMaterial());
+    this.path.frustumCulled = false;
+    this.group.add(this.centre, this.path);
+  }
+
+  // Straight below the torso: it tells how high that is.
+  addShadow() {
+    const look = { color: "#000", transparent: true, opacity: 0.22, depthWrite: false };
+    this.shadow = new Mesh(new CircleGeometry(1, 40), new MeshBasicMaterial(look));
+    this.shadow.visible = this.run.grounded;
+    this.group.add(this.shadow);
+  }
+
+  paint() {
+    const own = series(this.k);
+    this.torso.paint(this.alone ? colour("fur") : own, colour("belly"), colour("eye"));
+    this.materials.tail.color.set(this.alone ? colour("tail") : own);
+    this.materials.joint.color.set(colour("eye"));
+    this.materials.leg.color.set(this.alone ? colour("leg") : own);
+    this.materials.force.color.set(colour("force"));
+    this.centre.material.color.set(colour("centre"));
+    this.path.material.color.set(this.alone ? colour("path") : own);
+  }
+
+  show(t) {
+    const { run } = this;
+    const row = run.row(t);
+    const pose = (i) => run.value("pose", row, i);
+    this.torso.group.position.set(pose(0), pose(1), pose(2));
+    this.torso.group.quaternion.set(pose(4), pose(5), pose(6), pose(3)).normalize();
+    run.point("com", row, 0, this.centre.position);
+    const [a, b] = run.body.semi_axes;
+    this.shadow.position.set(pose(0), pose(1), 1e-3 * b);
+    this.shadow.scale.set(a, b, 1);
+    this.showTail(row);
+    this.showLegs(row);
+    this.showForces(row);
+  }
+
+  // Thinner towards the tip.
+  showTail(row) {
+    const { points, body } = this.run;
+    for (let j = 0; j + 1 < points; j++) {
+      const radius = body.tail_radius * (1.15 - (0.5 * j) / points);
+      this.run.point("tail", row, j, from);
+      this.run.point("tail", row, j + 1, to);
+      this.tail.place(j, from, to, radius);
+      this.joints.place(j, body.jointed ? from : to, body.jointed ? 1.25 * radius : radius);
+    }
+    this.tail.placed();
+    this.joints.placed();
+  }
+
+  showLegs(row) {
+    const radius = 0.085 * this.run.body.semi_axes[2];
+    for (let leg = 0; leg < this.run.legs; leg++) {
+      for (let j = 0; j < LEG; j++) {
+        this.run.point("legs", row, LEG * leg + j, to);
+        this.knees.place(LEG * leg + j, to, radius);
+        if (j > 0) this.legs.place((LEG - 1) * leg + j - 1, from, to, radius);
+        from.copy(to);
+      }
+    }
+    this.legs.placed();
+    this.knees.placed();
+  }
+
+  // An arrow of a common force is as long as the torso's half; none is longer than three.
+  showForces(row) {
+    const longest = Math.max(...this.run.body.semi_axes);
+    for (let c = 0; c < this.run.contacts; c++) {
+      const size = this.run.point("forces", row, c, force).length();
+      const length = longest * Math.min(size / this.scale, 3);
+      if (!(length > 0.02 * longest)) {
+        this.shafts.hide(c);
+        this.tips.hide(c);
+        continue;
+      }
+      force.divideScalar(size);
+      const tip = Math.min(0.3 * longest, 0.5 * length);
+      this.run.point("touching", row, c, from);
+      to.copy(from).addScaledVector(force, length - tip);
+      this.shafts.place(c, from, to, 0.035 * longest);
+      this.tips.place(c, to, force, 0.1 * longest, tip);
+    }
+    this.shafts.placed();
+    this.tips.placed();
+  }
+}

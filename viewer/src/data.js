@@ -1,0 +1,60 @@
+// The motions of a page, as they were packed by serpentail: columns of floats by name.
+
+// Columns are four planes of bytes, of differences between the bits of one row and the next.
+export async function decoded(text, rows) {
+  const packed = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
+  const planes = new Uint8Array(await new Response(stream).arrayBuffer());
+  const count = planes.length / 4;
+  if (count % rows) throw new Error("its data are damaged");
+  const bits = new Uint32Array(count);
+  for (let i = 0; i < count; i++) {
+    let step = 0;
+    for (let plane = 3; plane >= 0; plane--) step = step * 256 + planes[plane * count + i];
+    bits[i] = (i % rows ? bits[i - 1] : 0) + step;
+  }
+  return new Float32Array(bits.buffer);
+}
+
+// One motion: what it is (meta) and its samples.
+export class Run {
+  constructor(meta, columns) {
+    Object.assign(this, meta);
+    this.columns = columns;
+    this.times = Float64Array.from(
+      { length: meta.rows },
+      (_, k) => this.value("t", k, 0) + this.value("t", k, 1),
+    );
+  }
+
+  static async of(meta) {
+    const names = Object.keys(meta.arrays);
+    const columns = await Promise.all(names.map((name) => decoded(meta.arrays[name], meta.rows)));
+    return new Run(meta, Object.fromEntries(names.map((name, i) => [name, columns[i]])));
+  }
+
+  value(name, row, column) {
+    return this.columns[name][column * this.rows + row];
+  }
+
+  // Put point i of a row into a vector.
+  point(name, row, i, vector) {
+    return vector.set(
+      this.value(name, row, 3 * i),
+      this.value(name, row, 3 * i + 1),
+      this.value(name, row, 3 * i + 2),
+    );
+  }
+
+  // The last sample that is not after t, the first before all of them.
+  row(t) {
+    let low = 0;
+    let high = this.rows - 1;
+    while (low < high) {
+      const middle = (low + high + 1) >> 1;
+      if (this.times[middle] <= t + 1e-9) low = middle;
+      else high = middle - 1;
+    }
+    return low;
+  }
+}

@@ -1,0 +1,46 @@
+// What stands beside the stage in words: notes, switches of the runs, numbers.
+import { onChange, series } from "./theme.js";
+
+const made = (name, text = "", more = {}) =>
+  Object.assign(document.createElement(name), { textContent: text }, more);
+
+export function addNotes(holder, notes) {
+  holder.append(...notes.map((note) => made("p", note)));
+  holder.hidden = !notes.length;
+}
+
+// One switch a run; returns them.
+export function addSwitches(holder, runs, change) {
+  const switches = runs.map((run, k) => {
+    const box = made("input", "", { type: "checkbox", checked: true });
+    box.addEventListener("change", () => change(k, box.checked));
+    const swatch = made("span", "", { className: "swatch" });
+    const label = made("label");
+    label.append(box, swatch, run.name);
+    holder.append(label);
+    return box;
+  });
+  const paint = () =>
+    holder
+      .querySelectorAll(".swatch")
+      .forEach((swatch, k) => swatch.style.setProperty("background", series(k)));
+  paint();
+  onChange(paint);
+  holder.hidden = runs.length === 1;
+  return switches;
+}
+
+// A row a number, a column a run.
+export function addNumbers(table, runs) {
+  const labels = [...new Set(runs.flatMap((run) => run.numbers.map(([label]) => label)))];
+  if (runs.length > 1) {
+    const head = table.createTHead().insertRow();
+    head.append(made("td"), ...runs.map((run) => made("th", run.name, { scope: "col" })));
+  }
+  const body = table.createTBody();
+  for (const label of labels) {
+    const row = body.insertRow();
+    row.append(made("th", label, { scope: "row" }));
+    for (const run of runs) row.append(made("td", Object.fromEntries(run.numbers)[label] ?? "–"));
+  }
+}

@@ -1,0 +1,112 @@
+// The present time: played, sought, stepped, by mouse and by keyboard.
+
+const SPEEDS = [0.01, 0.02, 0.05, 0.1, 0.25, 0.5, 1, 2, 5];
+const WATCHED = 8; // s, that a run takes at the speed it begins with
+const PRESSED = "button, input[type=checkbox], summary"; // by the space bar
+const MOST_MARKS = 200;
+
+export class Player {
+  constructor(find, runs, show) {
+    Object.assign(this, { runs, show });
+    this.begin = Math.min(...runs.map((run) => run.times[0]));
+    this.end = Math.max(...runs.map((run) => run.times.at(-1)));
+    this.events = runs.flatMap((run) => run.events).sort((a, b) => a.time - b.time);
+    this.slider = find("time");
+    this.clock = find("clock");
+    this.button = find("play");
+    this.speed = find("speed");
+    Object.assign(this.slider, { min: this.begin, max: this.end, step: "any" });
+    this.slider.addEventListener("input", () => this.seek(Number(this.slider.value)));
+    this.button.addEventListener("click", () => this.toggle());
+    find("before").addEventListener("click", () => this.jump(-1));
+    find("after").addEventListener("click", () => this.jump(1));
+    for (const id of ["before", "after"]) find(id).hidden = !this.events.length;
+    this.addSpeeds();
+    this.addMarks(find("marks"));
+    this.time = this.begin;
+    this.playing = false;
+  }
+
+  addSpeeds() {
+    const wanted = (this.end - this.begin) / WATCHED;
+    for (const speed of SPEEDS)
+      this.speed.add(new Option(speed < 1 ? `1/${Math.round(1 / speed)}` : `${speed}`, speed));
+    this.speed.value = SPEEDS.findLast((speed) => speed <= wanted) ?? SPEEDS[0];
+  }
+
+  addMarks(holder) {
+    const step = Math.ceil(this.events.length / MOST_MARKS);
+    for (const event of this.events.filter((_, i) => i % step === 0)) {
+      const mark = document.createElement("i");
+      mark.style.left = `${(100 * (event.time - this.begin)) / (this.end - this.begin || 1)}%`;
+      mark.className = event.kind;
+      mark.title = event.label;
+      mark.addEventListener("click", () => this.seek(event.time));
+      holder.append(mark);
+    }
+  }
+
+  seek(t) {
+    this.time = Math.min(Math.max(t, this.begin), this.end);
+    this.slider.value = this.time;
+    const near = this.events.filter((event) => Math.abs(event.time - this.time) < 1e-9);
+    this.clock.textContent = [
+      `${this.time.toFixed(4)} s`,
+      ...near.map((event) => event.label),
+    ].join(", ");
+    this.slider.setAttribute("aria-valuetext", this.clock.textContent);
+    this.show(this.time);
+  }
+
+  toggle(on = !this.playing) {
+    this.playing = on && this.end > this.begin;
+    this.button.textContent = this.playing ? "Pause" : "Play";
+    this.before = undefined;
+    if (this.playing) requestAnimationFrame((now) => this.frame(now));
+  }
+
+  frame(now) {
+    if (!this.playing) return;
+    const next = this.time + (Number(this.speed.value) * (now - (this.before ?? now))) / 1000;
+    this.before = now;
+    this.seek(this.time >= this.end ? this.begin : next);
+    requestAnimationFrame((later) => this.frame(later));
+  }
+
+  // Samples of the run that is sampled most.
+  step(count) {
+    const run = this.runs.reduce((most, each) => (each.rows > most.rows ? each : most));
+    const row = Math.min(Math.max(run.row(this.time) + count, 0), run.rows - 1);
+    this.toggle(false);
+    this.seek(run.times[row]);
+  }
+
+  jump(way) {
+    const ahead = this.events.filter((event) => way * (event.time - this.time) > 1e-9);
+    if (ahead.length) this.seek(ahead.at(way > 0 ? 0 : -1).time);
+  }
+
+  faster(by) {
+    const last = this.speed.length - 1;
+    this.speed.selectedIndex = Math.min(Math.max(this.speed.selectedIndex + by, 0), last);
+  }
+
+  // What a key does; undefined where it is not one of the player's, or the focused control has
+  // its own use for it.
+  action(event) {
+    const { key, shiftKey, target } = event;
+    const count = shiftKey ? 10 : 1;
+    const actions = {
+      " ": () => this.toggle(),
+      ArrowLeft: () => this.step(-count),
+      ArrowRight: () => this.step(count),
+      Home: () => this.seek(this.begin),
+      End: () => this.seek(this.end),
+      n: () => this.jump(1),
+      p: () => this.jump(-1),
+      "+": () => this.faster(1),
+      "-": () => this.faster(-1),
+    };
+    return key === " " && target.matches(PRESSED) ? undefined : actions[key];
+  }
+}

@@ -1,0 +1,157 @@
+// Curves over time with a cursor at the present; a click or a drag on one seeks.
+import uPlot from "uplot";
+import { colour, onChange, series } from "./theme.js";
+
+const HEIGHT = 150;
+const DASHES = [[], [6, 4], [2, 3], [9, 3, 2, 3]];
+
+// Four digits; rounding that is nothing beside the plot's largest value is 0.
+const digits = (value, largest) =>
+  Number((Math.abs(value) < 1e-6 * largest ? 0 : value).toPrecision(4)).toString();
+
+class Plot {
+  constructor(holder, meta, runs, seek) {
+    Object.assign(this, { meta, runs, curves: meta.curves });
+    this.alone = runs.length === 1;
+    this.box = document.createElement("figure");
+    this.key = document.createElement("figcaption");
+    this.box.append(this.key);
+    holder.append(this.box);
+    this.addKey();
+
+    const options = {
+      ...this.size(),
+      scales: {
+        x: { time: false },
+        y: meta.compressed ? { distr: 4, asinh: meta.compressed } : {},
+      },
+      series: [{}, ...this.curves.map((curve, i) => this.look(curve, i))],
+      axes: [
+        this.axis({ size: 26, values: (_, times) => times.map((time) => `${time} s`) }),
+        this.axis({ size: 56 }),
+      ],
+      legend: { show: false },
+      cursor: { show: false },
+      padding: [8, 18, 0, 0],
+    };
+    this.plot = new uPlot(options, this.data(), this.box);
+    this.now = document.createElement("div");
+    this.now.className = "now";
+    this.plot.over.append(this.now);
+    const at = (event) =>
+      seek(this.plot.posToVal(event.clientX - this.plot.over.getBoundingClientRect().left, "x"));
+    this.plot.over.addEventListener("pointerdown", at);
+    this.plot.over.addEventListener("pointermove", (event) => event.buttons && at(event));
+  }
+
+  // One run: a colour a curve. Several: a colour a run, a dash a curve.
+  stroke(curve, i) {
+    return series(this.alone ? i : curve.run);
+  }
+
+  look(curve, i) {
+    return {
+      stroke: () => this.stroke(curve, i),
+      width: 1.5,
+      dash: this.dash(curve),
+      spanGaps: true,
+    };
+  }
+
+  dash(curve) {
+    return this.alone ? [] : DASHES[curve.column % DASHES.length];
+  }
+
+  axis(more) {
+    const grid = { stroke: () => colour("grid"), width: 1 };
+    return {
+      stroke: () => colour("ink"),
+      grid,
+      ticks: grid,
+      font: "11px system-ui, sans-serif",
+      ...more,
+    };
+  }
+
+  // Runs may be sampled at times of their own.
+  data() {
+    const tables = this.curves.map(({ run, array, column }) => {
+      const { times, rows } = this.runs[run];
+      return [
+        Array.from(times),
+        Array.from({ length: rows }, (_, k) => this.runs[run].value(array, k, column)),
+      ];
+    });
+    this.largest = tables
+      .flatMap(([, values]) => values)
+      .reduce((most, value) => Math.max(most, Math.abs(value)), 0);
+    return uPlot.join(tables);
+  }
+
+  addKey() {
+    const title = document.createElement("b");
+    title.textContent = this.meta.title;
+    this.key.append(title);
+    this.values = this.curves.map((curve, i) => {
+      const entry = document.createElement("span");
+      const value = document.createElement("output");
+      const line = document.createElementNS("http://www.w3.org/2000/svg", "svg");
+      line.setAttribute("aria-hidden", "true");
+      const dashes = this.dash(curve).join(" ");
+      line.innerHTML = `<line y1="5" x2="22" y2="5" stroke-dasharray="${dashes}"/>`;
+      entry.append(line, `${curve.label} `, value);
+      this.key.append(entry);
+      return { entry, value, line };
+    });
+    this.paint();
+  }
+
+  paint() {
+    this.values.forEach(({ line }, i) =>
+      line.style.setProperty("stroke", this.stroke(this.curves[i], i)),
+    );
+    this.plot?.redraw(false);
+  }
+
+  show(t) {
+    this.now.style.transform = `translateX(${this.plot.valToPos(t, "x")}px)`;
+    this.values.forEach(({ value }, i) => {
+      const { run, array, column } = this.curves[i];
+      value.textContent = digits(
+        this.runs[run].value(array, this.runs[run].row(t), column),
+        this.largest,
+      );
+    });
+  }
+
+  switchRun(run, on) {
+    this.curves.forEach((curve, i) => {
+      if (curve.run !== run) return;
+      this.plot.setSeries(i + 1, { show: on });
+      this.values[i].entry.hidden = !on;
+    });
+  }
+
+  size() {
+    return { width: Math.max(this.box.clientWidth, 200), height: HEIGHT };
+  }
+}
+
+export class Plots {
+  constructor(holder, metas, runs, seek) {
+    this.plots = metas.map((meta) => new Plot(holder, meta, runs, seek));
+    onChange(() => this.plots.forEach((plot) => plot.paint()));
+  }
+
+  show(t) {
+    for (const plot of this.plots) plot.show(t);
+  }
+
+  switchRun(run, on) {
+    for (const plot of this.plots) plot.switchRun(run, on);
+  }
+
+  resize() {
+    for (const plot of this.plots) plot.plot.setSize(plot.size());
+  }
+}

@@ -1,0 +1,171 @@
+// The stage: light, ground, cameras, and the animals on it.
+import {
+  AmbientLight,
+  BufferGeometry,
+  Color,
+  DirectionalLight,
+  DoubleSide,
+  Float32BufferAttribute,
+  Group,
+  HemisphereLight,
+  LineBasicMaterial,
+  LineSegments,
+  Mesh,
+  MeshBasicMaterial,
+  PerspectiveCamera,
+  PlaneGeometry,
+  Scene,
+  Vector3,
+  WebGLRenderer,
+} from "three";
+import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+import { Animal } from "./animal.js";
+import { colour, onChange } from "./theme.js";
+
+const VIEWS = {
+  oblique: [1, -0.65, 0.5],
+  side: [1, 0, 0.04],
+  front: [0.04, 1, 0.12],
+  top: [0.02, 0, 1],
+};
+const FIELD = 35; // degrees
+const DISTANCE = 2.5; // of the camera, in lengths of the animal
+const SQUARES = 60; // of the ground, along and across
+
+// The edges of all squares, each for itself: a line that begins behind the camera may not be
+// drawn at all.
+function edges(square) {
+  const points = [];
+  const half = SQUARES / 2;
+  for (let i = -half; i <= half; i++) {
+    for (let j = -half; j < half; j++) points.push(i, j, 0, i, j + 1, 0, j, i, 0, j + 1, i, 0);
+  }
+  return new BufferGeometry().setAttribute(
+    "position",
+    new Float32BufferAttribute(
+      points.map((x) => square * x),
+      3,
+    ),
+  );
+}
+
+export class Stage {
+  constructor(canvas, runs, meta) {
+    this.canvas = canvas;
+    this.length = meta.length;
+    this.renderer = new WebGLRenderer({ canvas, antialias: true });
+    this.scene = new Scene();
+    this.camera = new PerspectiveCamera(FIELD, 1, 0.01 * this.length, 1000 * this.length);
+    this.camera.up.set(0, 0, 1);
+    this.orbit = new OrbitControls(this.camera, canvas);
+    this.orbit.addEventListener("change", () => this.render());
+    this.addLights();
+    this.animals = runs.map((run, k) => new Animal(run, k, runs.length === 1, meta.force_scale));
+    this.scene.add(...this.animals.map((animal) => animal.group));
+    this.ground = new Group();
+    this.scene.add(this.ground);
+    this.following = true;
+    this.at = new Vector3();
+    this.grounded = runs.some((run) => run.grounded);
+    this.paint();
+    onChange(() => this.paint());
+  }
+
+  addLights() {
+    const sun = new DirectionalLight("#fff", 1.7);
+    sun.position.set(1, -0.6, 2);
+    this.scene.add(new AmbientLight("#fff", 0.5), new HemisphereLight("#fff", "#998", 1.3), sun);
+    this.scene.children.at(-2).position.set(0, 0, 1);
+  }
+
+  paint() {
+    this.scene.background = new Color(colour("stage"));
+    for (const animal of this.animals) animal.paint();
+    this.ground.clear();
+    if (this.grounded) this.layGround();
+    this.render();
+  }
+
+  // A floor that lets what lies below it be seen, with squares of 1, 2 or 5 times a power of ten.
+  layGround() {
+    const power = 10 ** Math.floor(Math.log10(this.length / 2));
+    const square = (this.square =
+      power * [5, 2, 1].find((step) => step * power <= this.length / 2));
+    const grid = new LineSegments(edges(square), new LineBasicMaterial({ color: colour("grid") }));
+    const look = {
+      color: colour("ground"),
+      transparent: true,
+      opacity: 0.75,
+      side: DoubleSide,
+      depthWrite: false,
+    };
+    const floor = new Mesh(
+      new PlaneGeometry(SQUARES * square, SQUARES * square),
+      new MeshBasicMaterial(look),
+    );
+    floor.position.z = -1e-3 * this.length;
+    floor.renderOrder = 1;
+    this.ground.add(floor, grid);
+  }
+
+  // By whole squares, so that it has no end and still seems at rest.
+  moveGround({ x, y }) {
+    if (this.grounded)
+      this.ground.position.set(
+        ...[x, y].map((at) => this.square * Math.round(at / this.square)),
+        0,
+      );
+  }
+
+  // The run that a following camera follows: the first one that is shown.
+  get followed() {
+    return this.animals.find((animal) => animal.group.visible) ?? this.animals[0];
+  }
+
+  look(view) {
+    const away = new Vector3(...VIEWS[view]).normalize();
+    const narrow = Math.min(this.camera.aspect, 1);
+    this.at.copy(this.followed.centre.position);
+    this.orbit.target.copy(this.at);
+    this.camera.position.copy(this.at).addScaledVector(away, (DISTANCE * this.length) / narrow);
+    this.orbit.update();
+    this.render();
+  }
+
+  follow(on) {
+    this.following = on;
+    this.at.copy(this.followed.centre.position);
+  }
+
+  switchRun(k, on) {
+    this.animals[k].group.visible = on;
+    this.at.copy(this.followed.centre.position);
+    this.render();
+  }
+
+  show(t) {
+    for (const animal of this.animals) animal.show(t);
+    const centre = this.followed.centre.position;
+    this.moveGround(centre);
+    if (this.following) {
+      this.camera.position.add(centre).sub(this.at);
+      this.orbit.target.add(centre).sub(this.at);
+    }
+    this.at.copy(centre);
+    this.render();
+  }
+
+  resize() {
+    const { clientWidth, clientHeight } = this.canvas;
+    if (!clientWidth || !clientHeight) return;
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.renderer.setSize(clientWidth, clientHeight, false);
+    this.camera.aspect = clientWidth / clientHeight;
+    this.camera.updateProjectionMatrix();
+    this.render();
+  }
+
+  render() {
+    this.renderer.render(this.scene, this.camera);
+  }
+}
