@@ -214,7 +214,7 @@ def planned(arguments: argparse.Namespace) -> Outcome:
     from .scenes import plan as scenes
 
     plan = scenes.planned(arguments.scene, arguments.folder)
-    files: Files = {"save": plan.trajectory.save, "view": lambda path: plan.view(path)}
+    files: Files = {"save": plan.trajectory.save, "view": plan.view}
     return Outcome(plan.report, _rows(plan.report), plan.success, files)
 
 

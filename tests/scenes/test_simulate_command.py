@@ -136,7 +136,7 @@ def test_a_failed_picture_loses_nothing(scene, capsys, monkeypatch):
 
 def test_a_plan_is_told_before_it_is_saved(scene, capsys, monkeypatch):
     class Found:
-        report, success = {"converged": True}, True
+        report, success, view = {"converged": True}, True, None
 
         class trajectory:  # noqa: N801
             @staticmethod
