@@ -11,7 +11,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-enum { MOST_ARRAYS = 8, NQ = @@_NQ, NV = @@_NV, NT = @@_NT, BRISTLES = 2 * @@_CONTACTS, SAMPLES = 4, EVENTS = 16 };
+enum { MOST_ARRAYS = 10, NQ = @@_NQ, NV = @@_NV, NT = @@_NT, BRISTLES = 2 * @@_CONTACTS, SAMPLES = 4, EVENTS = 16 };
 
 typedef struct {
   int (*bare)(const @_parameters *, real **, real *);

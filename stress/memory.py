@@ -47,7 +47,7 @@ NUMBERS = (
     0.0,
 )
 STATUSES = {0, 1, 2, 3}
-ENDS = STATUSES | {33, 34}  # of runs: steps too small, too many
+ENDS = STATUSES | {33, 34, 38}  # of runs: steps too small, too many, too long
 
 
 @dataclass(frozen=True)
