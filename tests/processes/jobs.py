@@ -54,7 +54,11 @@ def casadi(model) -> str:
 
 
 def plan(model) -> str:
-    """Plan a motion: IPOPT, its linear algebra, and the truth of its end."""
+    """Plan a motion: IPOPT, its linear algebra, and the truth of its end.
+
+    After a batch: from then on nodes are evaluated in lanes, whose last digits are their own.
+    """
+    batch(model)
     found = st.plan(model, start=start(model), intervals=4, **AGAIN)
     assert found.report["converged"], found.report
     return _digest(found.solution.w, found.trajectory.q)
