@@ -109,7 +109,9 @@ def test_what_acts_is_taken_or_refused(model, search, name):
     def law(value):
         controller = answer(ACTING[name], value)
         if controller is not None:
-            answer(st.simulate, model, **start(model) | {"controller": controller})
+            answer(
+                st.simulate, model, **start(model) | {"controller": controller, "most_steps": 2000}
+            )
 
     search(law, value=strange((2,)) | strange((2, 2)))
 
@@ -148,6 +150,8 @@ def test_a_linearising_controller_is_made_or_refused(model, search):
     def law(which, value):
         controller = answer(st.Pfl, **given | {which: value})
         if controller is not None:
-            answer(st.simulate, model, **start(model) | {"controller": controller})
+            answer(
+                st.simulate, model, **start(model) | {"controller": controller, "most_steps": 2000}
+            )
 
     search(law, which=some.sampled_from(["reference", "kp", "kd"]), value=strange((2,)))
