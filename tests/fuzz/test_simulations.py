@@ -107,6 +107,8 @@ ACTING = {
 @pytest.mark.parametrize("name", ACTING)
 def test_what_acts_is_taken_or_refused(model, search, name):
     def law(value):
+        if name == "Phases controller" and callable(value):
+            return  # a function of the user's raises what it likes
         controller = answer(ACTING[name], value)
         if controller is not None:
             answer(

@@ -119,7 +119,8 @@ class Phases:
             raise SimulationError(
                 "Phases: one of the controllers is Phases itself: put all pairs in one list"
             )
-        object.__setattr__(self, "phases", pairs)
+        acting = (controller for _, controller in pairs)
+        object.__setattr__(self, "phases", tuple(zip(times.tolist(), acting, strict=True)))
 
 
 Single = Damping | TorqueTable | TorqueCurve | Pfl | NativeTorque | TorqueFunction
