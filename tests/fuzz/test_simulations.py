@@ -67,6 +67,8 @@ def test_what_a_run_is_told_is_taken_or_refused(model, search):
     names = ("controller", "legs", "bristles0", "stop_at", "method", "parameters", "output_step")
 
     def law(name, value):
+        if name == "controller" and callable(value):
+            return  # a function of the user's raises what it likes
         answer(st.simulate, model, **start(model) | {name: value})
 
     search(law, name=some.sampled_from(names), value=NOT_ENDLESS)
