@@ -1,7 +1,6 @@
 """CasADi's own C of Jacobians and Hessians, as closures to time."""
 
 import ctypes
-import importlib.util
 import subprocess
 import time
 from pathlib import Path
@@ -126,11 +125,7 @@ class Graph:
 
 def casadi_module(model: st.Model) -> ModuleType:
     """Return the generated module that builds SX expressions."""
-    name = f"{model.name}_casadi"
-    spec = importlib.util.spec_from_file_location(name, model.folder / f"{name}.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return model.checked.casadi_module
 
 
 def jacobians(model: st.Model, turn_by_hand: bool) -> ca.Function:

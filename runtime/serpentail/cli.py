@@ -134,7 +134,7 @@ def main(argv: list[str] | None = None) -> int:
     arguments = parser().parse_args(argv)
     try:
         refuse_targets(arguments)
-        outcome = Outcome(*run(arguments))
+        outcome = run(arguments)
     except SerpentailError as error:
         print(error, file=sys.stderr)
         return 2
@@ -154,18 +154,30 @@ def main(argv: list[str] | None = None) -> int:
 
 def refuse_targets(arguments: argparse.Namespace) -> None:
     """SerpentailError where a file could not be written after the work is done."""
-    from .pictures.style import writable
-    from .viewer.view import checked_path, template
-
     if getattr(arguments, "view", None) is not None:
+        from .viewer.view import template
+
         template()
-    for option, check in (("save", Path), ("film", writable), ("view", checked_path)):
+    for option in ("save", "film", "view"):
         path = getattr(arguments, option, None)
         try:
             if path is not None:
-                refuse_unwritable(check(path))
+                refuse_unwritable(target(option, path))
         except (OSError, ValueError) as error:
             raise SerpentailError(f"--{option} {path}: {error}; name another file") from error
+
+
+def target(option: str, path: str) -> Path:
+    """Return where the file of an option goes; ValueError where its name is of no known kind."""
+    if option == "film":
+        from .pictures.style import writable
+
+        return writable(path)
+    if option == "view":
+        from .viewer.view import checked_path
+
+        return checked_path(path)
+    return Path(path)
 
 
 def tell(text: str) -> None:
@@ -190,16 +202,10 @@ def write(arguments: argparse.Namespace, option: str, make: Callable[[str], obje
     return True
 
 
-def run(arguments: argparse.Namespace) -> tuple[Any, ...]:
+def run(arguments: argparse.Namespace) -> Outcome:
     """Return the outcome of a verb."""
-    verbs = {
-        "info": informed,
-        "plan": planned,
-        "simulate": simulated,
-        "verify": verified,
-        "cache": cached,
-        "view": viewed,
-    }
+    verbs = {"info": informed, "plan": planned, "simulate": simulated, "verify": verified}
+    verbs |= {"cache": cached, "view": viewed}
     return verbs[arguments.verb](arguments)
 
 
@@ -226,11 +232,8 @@ def simulated(arguments: argparse.Namespace) -> Outcome:
     scene = scenario(arguments.scene, arguments.folder, parsed(arguments.changes))
     motion, stopped = _motion(scene, arguments.view)
     report = scene.summary(motion) | stopped
-    files: Files = {
-        "save": motion.save,
-        "film": partial(scene.film, motion),
-        "view": motion.view,
-    }
+    film = partial(scene.film, motion)
+    files: Files = {"save": motion.save, "film": film, "view": motion.view}
     return Outcome(report, _rows(report), True, files)
 
 

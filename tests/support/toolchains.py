@@ -5,6 +5,7 @@ fails.
 import os
 import shutil
 from collections.abc import Callable
+from functools import partial
 
 import pytest
 
@@ -33,21 +34,15 @@ def cppcheck() -> None:
 
 def valgrind() -> None:
     """Ask for valgrind."""
-    _required(_need_valgrind)
-
-
-def _need_valgrind() -> None:
-    if shutil.which("valgrind") is None:
-        remedy = "Debian, Ubuntu: apt-get install --no-install-recommends valgrind"
-        raise ToolchainMissing(f"valgrind is not on PATH; {remedy}")
+    _required(partial(_need, "valgrind", "valgrind"))
 
 
 def clang() -> None:
     """Ask for clang, which brings its sanitizers."""
-    _required(_need_clang)
+    _required(partial(_need, "clang", "clang libclang-rt-14-dev"))
 
 
-def _need_clang() -> None:
-    if shutil.which("clang") is None:
-        remedy = "Debian, Ubuntu: apt-get install --no-install-recommends clang libclang-rt-14-dev"
-        raise ToolchainMissing(f"clang is not on PATH; {remedy}")
+def _need(program: str, packages: str) -> None:
+    if shutil.which(program) is None:
+        remedy = f"Debian, Ubuntu: apt-get install --no-install-recommends {packages}"
+        raise ToolchainMissing(f"{program} is not on PATH; {remedy}")

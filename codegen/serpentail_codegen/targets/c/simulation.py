@@ -35,7 +35,6 @@ def simulation_context(
         **{name: name + ("f" if single else "") for name in ("pow", "fabs", "ceil")},
         "eps": "FLT_EPSILON" if single else "DBL_EPSILON",
         "has": has,
-        "ground_damping": scene.parameters.get("D_n"),  # Eq. 36, where it is folded in
         "values": scene.parameters,  # where they are folded in
         "articulated": tail.kind == "articulated",
         "part": 1.0

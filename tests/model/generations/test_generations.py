@@ -21,19 +21,6 @@ RACE_S = 4.0  # s that loads and generations of one folder go on
 RACERS = 8
 
 
-@pytest.fixture
-def cache(tmp_path, monkeypatch):
-    """An empty cache."""
-    monkeypatch.setenv("SERPENTAIL_CACHE", str(tmp_path / "cache"))
-    return tmp_path / "cache"
-
-
-@pytest.fixture
-def folder(tmp_path):
-    """Where models called tail come and go."""
-    return tmp_path / "tail"
-
-
 def padded(links):
     """A model whose CasADi functions are a file of a certain length."""
     files, manifest = model_of(links)

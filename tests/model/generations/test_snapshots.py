@@ -13,19 +13,6 @@ from serpentail_codegen.targets.write import signed
 from tests.support.generations import Q, model_of, put
 
 
-@pytest.fixture
-def cache(tmp_path, monkeypatch):
-    """An empty cache."""
-    monkeypatch.setenv("SERPENTAIL_CACHE", str(tmp_path / "cache"))
-    return tmp_path / "cache"
-
-
-@pytest.fixture
-def folder(tmp_path):
-    """Where models called tail come and go."""
-    return tmp_path / "tail"
-
-
 def test_planted_header_is_not_seen(folder, cache):
     put(folder, model_of(1))
     expected = st.load(folder).mass_matrix(Q)

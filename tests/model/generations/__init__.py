@@ -1,0 +1,1 @@
+"""Tests of models whose folders are generated again."""
