@@ -3,8 +3,6 @@
 import dataclasses
 import json
 import os
-import zipfile
-import zlib
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self
@@ -14,14 +12,12 @@ from numpy.typing import ArrayLike
 
 from ..attitude import Array
 from ..checks import finite_array
-from ..files import replacing
 from ..model.layout import PER_SEGMENT, QUATERNION, TAIL_Q, TORSO_NQ, Layout
 from ..model.model import Model
+from . import archive
 from .contact import Contact
 from .resample import Interpolation, hermite_q, inside, monotone, smooth
 
-SUFFIX = ".npz"
-MOST_EXPANSION = 100  # times the file: ours is not compressed, a motion in one that is fits, too
 UNIT_TOLERANCE = 1e-3  # how far a stored quaternion's norm may drift from 1
 
 
@@ -103,30 +99,15 @@ class Trajectory:
         """Write one npz file (suffix added if absent), whole or not at all, and return its path;
         NotWritten where that cannot be done.
         """
-        target = _npz(path)
-        arrays = {name: getattr(self, name) for name in ARRAYS} | self._touching()
-        with replacing(target) as part, part.open("wb") as stream:
-            np.savez(stream, info=np.array(_json(self.info)), **arrays)
-        return target
-
-    def _touching(self) -> dict[str, Any]:
-        """The contact as arrays of a file."""
-        if self.contact is None:
-            return {}
-        arrays = {CONTACT + name: array for name, array in self.contact.arrays.items()}
-        return arrays | {CONTACT + "groups": np.array(_json(self.contact.groups))}
+        arrays = {name: getattr(self, name) for name in ARRAYS}
+        return archive.write(path, arrays, self.info, self.contact)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
         """Read a saved file; FileNotFoundError if absent, ValueError if it is no trajectory."""
-        source = _npz(path)
-        if not source.is_file():
-            raise FileNotFoundError(
-                f"no trajectory file {str(source)!r}: check the name, or save one first"
-            )
-        fields = _read(source)
+        source, fields = archive.read(path, ARRAYS)
         try:
-            return cls(**_parsed(fields))
+            return cls(**fields)
         except ValueError as error:
             raise ValueError(f"{str(source)!r} holds no sound trajectory: {error}") from error
 
@@ -167,7 +148,6 @@ ARRAYS = tuple(
     for entry in dataclasses.fields(Trajectory)
     if entry.name not in ("info", "contact", "model")
 )
-CONTACT = "contact_"  # before the names of a contact's arrays in a file
 MONOTONE = ("kinetic", "potential", "linear_momentum", "angular_momentum")
 
 
@@ -229,52 +209,3 @@ def _json(info: Any) -> str:
             f"info is not JSON-ready ({error}): convert arrays by tolist(), use None for nan"
         ) from error
     raise ValueError(f"info is a {type(info).__name__}: give a dict of plain JSON values")
-
-
-def _npz(path: str | os.PathLike[str]) -> Path:
-    """The path with the suffix .npz."""
-    path = Path(path)
-    return path if path.suffix == SUFFIX else path.with_name(path.name + SUFFIX)
-
-
-def _read(source: Path) -> dict[str, Any]:
-    """The fields of a trajectory file, as stored, after a check of every checksum."""
-    try:
-        with zipfile.ZipFile(source) as archive:
-            size = sum(entry.file_size for entry in archive.infolist())
-            if size > MOST_EXPANSION * source.stat().st_size:
-                raise ValueError(f"it would unpack to {size / 1e9:.2g} GB")
-            damaged = archive.testzip()
-        if damaged:
-            raise ValueError(f"the checksum of {damaged} is wrong")
-        with np.load(source, allow_pickle=False) as stored:
-            touching = [name for name in stored.files if name.startswith(CONTACT)]
-            return {name: stored[name] for name in (*ARRAYS, "info", *touching)}
-    except KeyError as error:
-        raise ValueError(f"{str(source)!r} is not a trajectory: {error.args[0]}") from error
-    except (
-        ValueError,
-        EOFError,
-        MemoryError,
-        NotImplementedError,
-        RuntimeError,
-        zipfile.BadZipFile,
-        zlib.error,
-    ) as error:
-        raise ValueError(
-            f"{str(source)!r} is damaged or not a trajectory ({error}): save it again"
-        ) from error
-
-
-def _parsed(fields: dict[str, Any]) -> dict[str, Any]:
-    """The arguments of a trajectory from the fields of a file."""
-    arguments, touching = {}, {}
-    for name, value in fields.items():
-        if name.startswith(CONTACT):
-            touching[name.removeprefix(CONTACT)] = value
-        else:
-            arguments[name] = value
-    if touching:
-        groups = json.loads(str(touching.pop("groups")))
-        arguments["contact"] = Contact(**touching, groups=groups)
-    return arguments | {"info": json.loads(str(fields["info"]))}

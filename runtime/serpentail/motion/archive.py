@@ -1,0 +1,102 @@
+"""Files of motions: arrays in one npz, read again only where every checksum is right."""
+
+import json
+import os
+import zipfile
+import zlib
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..files import replacing
+from .contact import Contact
+
+SUFFIX = ".npz"
+CONTACT = "contact_"  # before the names of a contact's arrays in a file
+MOST_EXPANSION = 100  # times the file: ours is not compressed, a motion in one that is fits, too
+
+
+def write(
+    path: str | os.PathLike[str],
+    arrays: Mapping[str, Any],
+    info: Mapping[str, Any],
+    contact: Contact | None,
+) -> Path:
+    """Write one npz file (suffix added if absent), whole or not at all, and return its path;
+    NotWritten where that cannot be done.
+    """
+    target = _npz(path)
+    touching: dict[str, Any] = {}
+    if contact is not None:
+        touching = {CONTACT + name: array for name, array in contact.arrays.items()}
+        touching[CONTACT + "groups"] = np.array(json.dumps(contact.groups))
+    with replacing(target) as part, part.open("wb") as stream:
+        np.savez(stream, info=np.array(json.dumps(info)), **arrays, **touching)
+    return target
+
+
+def read(path: str | os.PathLike[str], arrays: Iterable[str]) -> tuple[Path, dict[str, Any]]:
+    """Return the path of a file, and its arrays, info and contact; FileNotFoundError if absent,
+    ValueError if it is none of ours.
+    """
+    source = _npz(path)
+    if not source.is_file():
+        raise FileNotFoundError(
+            f"no trajectory file {str(source)!r}: check the name, or save one first"
+        )
+    fields = _stored(source, arrays)
+    try:
+        return source, _parsed(fields)
+    except ValueError as error:
+        raise ValueError(f"{str(source)!r} holds no sound trajectory: {error}") from error
+
+
+def _npz(path: str | os.PathLike[str]) -> Path:
+    """The path with the suffix .npz."""
+    path = Path(path)
+    return path if path.suffix == SUFFIX else path.with_name(path.name + SUFFIX)
+
+
+def _stored(source: Path, arrays: Iterable[str]) -> dict[str, Any]:
+    """The fields of a trajectory file, as stored, after a check of every checksum."""
+    try:
+        with zipfile.ZipFile(source) as archive:
+            size = sum(entry.file_size for entry in archive.infolist())
+            if size > MOST_EXPANSION * source.stat().st_size:
+                raise ValueError(f"it would unpack to {size / 1e9:.2g} GB")
+            damaged = archive.testzip()
+        if damaged:
+            raise ValueError(f"the checksum of {damaged} is wrong")
+        with np.load(source, allow_pickle=False) as stored:
+            touching = [name for name in stored.files if name.startswith(CONTACT)]
+            return {name: stored[name] for name in (*arrays, "info", *touching)}
+    except KeyError as error:
+        raise ValueError(f"{str(source)!r} is not a trajectory: {error.args[0]}") from error
+    except (
+        ValueError,
+        EOFError,
+        MemoryError,
+        NotImplementedError,
+        RuntimeError,
+        zipfile.BadZipFile,
+        zlib.error,
+    ) as error:
+        raise ValueError(
+            f"{str(source)!r} is damaged or not a trajectory ({error}): save it again"
+        ) from error
+
+
+def _parsed(fields: dict[str, Any]) -> dict[str, Any]:
+    """The arguments of a trajectory from the fields of a file."""
+    arguments, touching = {}, {}
+    for name, value in fields.items():
+        if name.startswith(CONTACT):
+            touching[name.removeprefix(CONTACT)] = value
+        else:
+            arguments[name] = value
+    if touching:
+        groups = json.loads(str(touching.pop("groups")))
+        arguments["contact"] = Contact(**touching, groups=groups)
+    return arguments | {"info": json.loads(str(fields["info"]))}
