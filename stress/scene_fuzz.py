@@ -118,7 +118,8 @@ def refused(verb: str, path: Path) -> None:
 def made_ready(model: st.Model, path: Path) -> None:
     """Make a scene's motion ready, from where it starts: to settle takes as long as it takes."""
     with contextlib.suppress(st.SerpentailError):
-        table = subtable(read_scene(path, st.SimulationError), "simulate", path, st.SimulationError)
+        tables, _ = read_scene(path, st.SimulationError)
+        table = subtable(tables, "simulate", path, st.SimulationError)
         if isinstance(table.get("start"), dict):
             table["start"].pop("settle", None)
         scenario_of(model, table, path.parent)

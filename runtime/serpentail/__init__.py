@@ -6,6 +6,8 @@ from typing import Any
 __version__ = "0.1.0"
 _HOME = {
     **dict.fromkeys(["load", "Model"], "model.model"),
+    "build": "building.build",
+    "examples": "building.examples",
     "simulate": "simulation.simulate",
     "Rollouts": "simulation.rollouts",
     "settle": "simulation.settle",

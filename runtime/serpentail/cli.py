@@ -92,7 +92,9 @@ def parser() -> argparse.ArgumentParser:
     # of a motion
     view = verbs.add_parser("view", help="show saved motions in a page, over each other")
     view.add_argument("files", nargs="+", help="what --save wrote: .npz files")
-    view.add_argument("--folder", help="the generated folder, by default the one in generated/")
+    view.add_argument(
+        "--folder", help="the generated folder of their model, by default what the cache has"
+    )
     view.add_argument("--output", help="the page, by default the first file's name with .html")
     # of a generated folder
     about_model = verbs.add_parser("info", help="what a generated model is")
@@ -110,8 +112,8 @@ def parser() -> argparse.ArgumentParser:
 
 def _add_scene(verb: argparse.ArgumentParser, example: str) -> None:
     """Let a verb take a scene and its folder."""
-    verb.add_argument("scene", help=f"a scene file, such as {example}")
-    folder = "its generated folder, by default generated/ and the scene's name"
+    verb.add_argument("scene", help=f"a scene file, such as {example}, or the name of an example")
+    folder = "the generated folder of its model, by default one that is built in the cache"
     verb.add_argument("--folder", help=folder)
 
 

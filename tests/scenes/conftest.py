@@ -5,9 +5,6 @@ from pathlib import Path
 
 import pytest
 
-from serpentail_codegen.scene.parse import load_scene
-from tests.support.models import folder_of
-
 SIMPLE = """kind = "articulated"
 segments = 1
 links = 2
@@ -31,9 +28,7 @@ def scene(tmp_path, monkeypatch):
     """Return a function that writes the simple scene, with text added or replaced, and its path."""
     monkeypatch.chdir(tmp_path)
     text = SIMPLE.replace('kind = "art', 'name = "simple"\nkind = "art')
-    Path("generated").mkdir()
     Path("simple.toml").write_text(text)
-    Path("generated/simple").symlink_to(folder_of(load_scene("simple.toml")))
 
     def write(added="", **replaced):
         own = text

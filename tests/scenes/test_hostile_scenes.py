@@ -9,7 +9,8 @@ import serpentail as st
 from serpentail.scenes.overrides import changed, parsed
 from serpentail.scenes.plan import plan_arguments
 from serpentail.simulation import limits
-from tests.support.models import model_folder
+from serpentail_codegen.scene.parse import load_scene
+from tests.support.models import folder_of, model_folder
 
 START = {"q": [0, 0, 0.3, 1, 0, 0, 0, 0, 0], "v": [0] * 8}
 TASK = {"start": START, "duration": 0.3}
@@ -25,13 +26,21 @@ def one_line(caught):
 @pytest.mark.parametrize(
     ("replaced", "added", "words"),
     [
-        ({"segments": "segments = 1\nparameters = true"}, "", "parameters: value True: needs a"),
+        (
+            {"segments": "segments = 1\nparameters = true"},
+            "",
+            "parameters: value true: needs",
+        ),
         ({"delta": "delta = -0.26\nmoves = 1"}, "", "legs.moves: value 1: needs an array of tab"),
         ({"delta": 'delta = -0.26\nmoves = "at"'}, "", "legs.moves: value 'at': needs an array"),
         ({"name": 'name = "../simple"'}, "", "name: value '../simple': needs a text of up to 63"),
         ({"name": "name = 3"}, "", "name: value 3: needs a text of up to 63 of a-z, 0-9 and _"),
         ({"name": f"name = {'a' * 240!r}"}, "", "name: value 'aaa"),
-        ({"contacts": f"contacts = [0x{'f' * 5000}]"}, "", "too long to show: generate it again"),
+        (
+            {"contacts": f"contacts = [0x{'f' * 5000}]"},
+            "",
+            "contacts: value of type int, too long",
+        ),
         ({"duration": "duration = 1" + "0" * 400}, "", "simulate.duration: value 1000"),
         ({"duration": f"duration = 0x{'f' * 5000}"}, "", "simulate.duration: value of type int"),
         ({"duration": "duration = 1.0\nstep = 1e-12"}, "", "step 1e-12: needs 1e+12 steps, more"),
@@ -53,9 +62,9 @@ def test_what_no_scene_can_mean_is_one_line_at_once(scene, replaced, added, word
 
 def test_no_name_leads_to_another_folder(scene, tmp_path):
     """What "../elsewhere/t" would mean is there, and is not taken."""
-    path = scene(name='name = "../elsewhere/t"')
     (tmp_path / "elsewhere").mkdir()
-    (tmp_path / "elsewhere" / "t").symlink_to((tmp_path / "generated" / "simple").resolve())
+    (tmp_path / "elsewhere" / "t").symlink_to(folder_of(load_scene(scene())))
+    path = scene(name='name = "../elsewhere/t"')
     with pytest.raises(st.ModelError, match="needs a text of up to 63"):
         st.scenario(path)
 

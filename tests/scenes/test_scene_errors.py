@@ -5,6 +5,8 @@ from pathlib import Path
 import pytest
 
 import serpentail as st
+from serpentail_codegen.scene.parse import load_scene
+from tests.support.models import folder_of
 
 # Errors.
 
@@ -129,11 +131,10 @@ def test_wrong_changes_are_named(scene, changes, words):
 
 
 def test_a_folder_of_another_scene_is_refused(scene):
-    with pytest.raises(
-        st.ModelError, match=r"has contacts = .*: generate it again, `make model SCENE=simple.toml`"
-    ):
-        st.scenario(scene(contacts='contacts = ["feet"]'))
-    assert st.scenario(scene(contacts='contacts = ["tail", "feet"]')).model.contacts == {
+    folder = folder_of(load_scene(scene()))
+    with pytest.raises(st.ModelError, match=r"has contacts = .*: generate it again, or leave"):
+        st.scenario(scene(contacts='contacts = ["feet"]'), folder)
+    assert st.scenario(scene(contacts='contacts = ["tail", "feet"]'), folder).model.contacts == {
         "feet": 6,
         "tail": 2,
     }

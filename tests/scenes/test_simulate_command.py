@@ -66,7 +66,8 @@ def test_a_missing_model_is_generated_first(tmp_path, monkeypatch, capsys):
     Path("simple.toml").write_text(SIMPLE.replace('kind = "art', 'name = "simple"\nkind = "art'))
     assert cli.main(["simulate", "simple.toml", "--json", "-"]) == 0
     out, err = capsys.readouterr()
-    assert json.loads(out)["model"] == "simple" and "generated/simple: " in err
+    assert json.loads(out)["model"] == "simple" and not err
+    assert [path.name for path in Path().iterdir()] == ["simple.toml"]
 
 
 def test_a_scene_that_cannot_be_generated_is_status_2(tmp_path, monkeypatch, capsys):
@@ -101,7 +102,7 @@ def test_a_flight_is_a_scene_too(tmp_path, monkeypatch, capsys):
     ("option", "path", "words"),
     [
         ("--save", "simple.toml/a.npz", "simple.toml is no folder"),
-        ("--save", "generated", "generated is a folder"),
+        ("--save", ".", ". is a folder"),
         ("--film", "simple.toml/deep/a.png", "simple.toml is no folder"),
         ("--film", "a.gif", "has suffix '.gif': use one of .pdf, .png, .svg"),
         ("--film", "a", "has suffix '': use one of"),

@@ -17,10 +17,8 @@ KICK = str(SCENES / "kick.toml")
 
 @pytest.fixture
 def run(tmp_path, monkeypatch, capsys):
-    """Return a function from arguments to status, stdout and stderr, beside generated/kick."""
+    """Return a function from arguments to status, stdout and stderr."""
     monkeypatch.chdir(tmp_path)
-    Path("generated").mkdir()
-    Path("generated/kick").symlink_to(folder_of(load_scene(KICK)))
 
     def invoke(*arguments):
         status = cli.main(list(arguments))
@@ -49,7 +47,7 @@ def test_a_simulation_that_fails_has_a_page_up_to_there(run):
 def test_a_wrong_name_is_refused_before_the_work(run, verb, scene):
     status, out, err = run(verb, str(SCENES / scene), "--view", "kick.htm", "--save", "kick.npz")
     assert (status, out) == (2, "") and "needs a file whose name ends in .html" in err
-    assert [path.name for path in Path().iterdir()] == ["generated"]
+    assert not list(Path().iterdir())
 
 
 def test_saved_motions_find_their_model(run):
@@ -64,17 +62,24 @@ def test_saved_motions_find_their_model(run):
     assert names == ["kick.npz", "again.npz"]
 
 
-def test_saved_motions_whose_model_is_elsewhere(run):
-    assert run("simulate", KICK, "--save", "kick.npz", "--set", "duration=0.02")[0] == 0
-    Path("generated/kick").rename("elsewhere")
+def test_saved_motions_whose_model_is_elsewhere(run, tmp_path, monkeypatch):
+    made = folder_of(load_scene(KICK))
+    arguments = ["--folder", str(made), "--set", "duration=0.02"]
+    assert run("simulate", KICK, "--save", "kick.npz", *arguments)[0] == 0
+    monkeypatch.setenv("SERPENTAIL_CACHE", str(tmp_path / "cache"))
     status, out, err = run("view", "kick.npz")
     assert (status, out) == (2, "")
-    assert "generated/kick is not what this motion of 'kick' was made with" in err
-    assert run("view", "kick.npz", "--folder", "elsewhere")[0] == 0
+    assert "of 'kick' is neither in the cache nor in generated/kick: give its" in err
+    assert run("view", "kick.npz", "--folder", str(made))[0] == 0
+    monkeypatch.setenv("SERPENTAIL_CACHE", str(tmp_path / "empty"))
+    Path("generated").mkdir()
+    Path("generated/kick").symlink_to(made)
+    assert run("view", "kick.npz")[0] == 0
 
     # another model of the same name
-    other = load_scene(SCENES / "contact_m1_n3.toml")
-    Path("generated/kick").symlink_to(folder_of(other))
+    Path("generated/kick").unlink()
+    Path("generated/kick").symlink_to(folder_of(load_scene(SCENES / "contact_m1_n3.toml")))
+    monkeypatch.setenv("SERPENTAIL_CACHE", str(tmp_path / "none"))
     assert run("view", "kick.npz")[0] == 2
 
 

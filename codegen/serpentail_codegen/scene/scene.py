@@ -39,8 +39,7 @@ def is_whole(x: object) -> bool:
 FLAG = Rule("true or false, without quotes", lambda x: isinstance(x, bool))
 COUNT = Rule("a whole number, 1 or above", lambda x: is_whole(x) and x >= 1)
 TEXT = Rule('a text, in "quotes"', lambda x: isinstance(x, str))
-# the prefix of C symbols, a file's and a folder's name; the runtime has the same rule, in
-# serpentail/scenes/names.py
+# the prefix of C symbols, a file's and a folder's name
 NAME = Rule(
     "a text of up to 63 of a-z, 0-9 and _, a letter first, that names no C header: rename the "
     'file, or set name = "..." in it',

@@ -1,6 +1,6 @@
 """Reads scene files as data: regular files of a bounded size, with keys of a bounded depth.
 
-The runtime reads them by the same rules, in ``serpentail/scenes/source.py``.
+The runtime reads them by the same rules, in ``serpentail/building/source.py``.
 """
 
 import re

@@ -11,17 +11,17 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import SerpentailError
-from .cache import COMPILERS, LIBRARIES, LOCKS, MODELS, PARTS, discard
+from .cache import BUILDS, COMPILERS, LIBRARIES, LOCKS, MODELS, PARTS, discard
 
 DEFAULT_SIZE = "1G"
 UNITS = {"": 1, "K": 2**10, "M": 2**20, "G": 2**30, "T": 2**40}
 IN_USE_S = 600.0  # s: what was used so lately stays, since its user may not have opened it yet
 LOST_S = 3600.0  # s after which a part is that of a build that was killed
-KINDS = (LIBRARIES, MODELS, COMPILERS)
+KINDS = (LIBRARIES, MODELS, BUILDS, COMPILERS)
 # Names of entries and of parts: what else lies in a folder that a user chose is not the cache's.
 OURS = {
     **dict.fromkeys((LIBRARIES, MODELS), re.compile(r"[0-9a-f]{64}")),
-    COMPILERS: re.compile(r"[0-9a-f]{64}\.json"),
+    **dict.fromkeys((BUILDS, COMPILERS), re.compile(r"[0-9a-f]{64}\.json")),
     LOCKS: re.compile(r"[0-9a-f]{64}\.lock"),
     PARTS: re.compile(r"[0-9a-f]{24}"),
 }

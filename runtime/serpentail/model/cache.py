@@ -21,6 +21,7 @@ ROOT = 0  # user id of whom nothing can be kept from
 # Folders of the cache. An entry is made in PARTS, and one rename puts it in its place.
 LIBRARIES = "libraries"  # <key>/<digest of the library>.so: each has the proof of its content
 MODELS = "models"  # <manifest hash>/: generated folders as they were checked
+BUILDS = "builds"  # <key>.json: which of the models a scene became
 COMPILERS = "compilers"  # <key>.json: what a compiler said of itself
 LOCKS = "locks"
 PARTS = "parts"

@@ -60,17 +60,17 @@ def load(
         raise ModelError(
             f"folder: value {folder!r:.60}: needs the path of a generated folder"
         ) from None
-    return _loaded(read_folder(folder), parameters, profile, compiled, threads)
+    return model_from(read_folder(folder), parameters, profile, compiled, threads)
 
 
-def _loaded(
+def model_from(
     checked: CheckedFolder,
     parameters: Mapping[str, object] | None,
-    profile: str | None,
-    compiled: bool,
-    threads: int | None,
+    profile: str | None = None,
+    compiled: bool = True,
+    threads: int | None = None,
 ) -> "Model":
-    """Return the model of a folder that was checked."""
+    """Return the model of a folder that was checked, as ``load`` does."""
     manifest = checked.manifest
     values = resolve(manifest, parameters)
     warn_of_unlike(values, 3)  # who calls st.load
@@ -93,7 +93,7 @@ def _unpickled(
     options: tuple[bool, int | None],
 ) -> "Model":
     """Return a pickled model, of the manifest that it was pickled with."""
-    return _loaded(restored(manifest_hash, folder), parameters, profile, *options)
+    return model_from(restored(manifest_hash, folder), parameters, profile, *options)
 
 
 def _without_c(manifest: Mapping[str, Any]) -> ModelError:

@@ -4,9 +4,9 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from ..building.source import tables_in
 from ..checks import one_line, shown
 from ..errors import SimulationError
-from .source import tables_in
 
 DEEPEST = 8  # names in a path
 PLACE = re.compile("[0-9]{1,9}")  # in an array

@@ -23,12 +23,13 @@ KEYS = ("start", "goal", "duration", "bounds", *(key for key in SETTINGS if key 
 def planned(path: str, folder: str | None = None) -> Plan:
     """Return the plan that a scene file asks for.
 
-    folder: of its model, by default generated/<scene>.  Raises PlanningError with field, value and
+    path: a scene file, or the name of an example; folder: of its model, where that was generated;
+    None: it is built, or was.  Raises PlanningError with field, value and
     remedy, ModelError where the folder is of another scene.
     """
-    scene = read_scene(path, PlanningError)
-    arguments = plan_arguments(subtable(scene, "plan", path, PlanningError))
-    return plan(model_of(scene, path, folder, {}), **arguments)
+    tables, place = read_scene(path, PlanningError)
+    arguments = plan_arguments(subtable(tables, "plan", place, PlanningError))
+    return plan(model_of(tables, place, folder, {}), **arguments)
 
 
 def plan_arguments(table: Mapping) -> dict[str, Any]:

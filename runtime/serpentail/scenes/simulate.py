@@ -99,13 +99,14 @@ def scenario(
 ) -> Scenario:
     """Return what a scene file's table [simulate] describes.
 
-    folder: the generated one, by default generated/<scene>, made first where it is missing.
+    path: a scene file, or the name of an example; see ``examples``.
+    folder: of its model, where that was generated; None: it is built, or was.
     changes: new values by name, of parameters of the model, or of keys below [simulate], such as
     "duration", "start.pitch" or "legs.moves.0.rate".
     Raises SimulationError with field, value and remedy, ModelError where parameters are wrong or
     the folder is of another scene.
     """
-    scene = read_scene(path, SimulationError)
+    scene, path = read_scene(path, SimulationError)
     table = subtable(scene, "simulate", path, SimulationError)
 
     # a change is of a key below [simulate], or of a parameter
@@ -118,7 +119,7 @@ def scenario(
                 f"change {shown(name)}: unknown; needs a parameter, or a key below [simulate]"
             )
     model = model_of(scene, path, folder, parameters)
-    return scenario_of(model, changed(table, of_table), Path(path).parent)
+    return scenario_of(model, changed(table, of_table), path.parent)
 
 
 def scenario_of(model: Model, table: Mapping, parent: Path) -> Scenario:

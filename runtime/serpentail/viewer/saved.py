@@ -4,9 +4,10 @@ import dataclasses
 from pathlib import Path
 
 from ..errors import ModelError, ViewError
-from ..model.manifest import read_manifest
-from ..model.model import Model, load
+from ..model.manifest import read_folder
+from ..model.model import Model, model_from
 from ..model.parameters import independent
+from ..model.snapshot import restored
 from ..motion.trajectory import Trajectory
 
 GENERATED = Path("generated")
@@ -24,23 +25,18 @@ def read(file: str, folder: str | None = None) -> Trajectory:
 def model_of(motion: Trajectory, folder: str | None = None) -> Model:
     """Return the model of a motion with its parameters.
 
-    folder: its generated folder, by default the one in generated/ that has its name and content.
-    ViewError where that is not there, or of another content.
+    folder: where it was generated; None: it is looked for in the cache, and below generated/.
+    ViewError where it is in neither.
     """
-    name = str(motion.info.get("model", "?"))
-    place = Path(folder) if folder else GENERATED / name
-    if folder is None and not _made(place, motion.info.get("content_hash")):
-        raise ViewError(
-            f"model: {place} is not what this motion of {name!r} was made with: give its generated "
-            "folder, --folder FOLDER"
-        )
-    baked = read_manifest(place)["scene"]["baked"]
-    return load(place, None if baked else independent(motion.info.get("parameters", {})))
-
-
-def _made(folder: Path, content: object) -> bool:
-    """Tell whether a folder is there and has this content."""
+    name, made = str(motion.info.get("model", "?")), str(motion.info.get("manifest_hash", "?"))
     try:
-        return bool(read_manifest(folder)["content_hash"] == content)
-    except ModelError:
-        return False
+        checked = read_folder(Path(folder)) if folder else restored(made, GENERATED / name)
+    except ModelError as error:
+        if folder:
+            raise
+        raise ViewError(
+            f"model: what made this motion of {name!r} is neither in the cache nor in "
+            f"{GENERATED / name}: give its generated folder, --folder FOLDER"
+        ) from error
+    baked = checked.manifest["scene"]["baked"]
+    return model_from(checked, None if baked else independent(motion.info.get("parameters", {})))

@@ -1,0 +1,55 @@
+"""The generator, in a process of its own: this package never imports it, nor what it imports."""
+
+import hashlib
+import os
+import sys
+from importlib.metadata import PackageNotFoundError, version
+from importlib.util import find_spec
+from pathlib import Path
+
+from ..errors import ModelError
+from ..model.cache import digest
+from ..model.commands import run_all
+
+PACKAGE = "serpentail_codegen"
+TOOLS = ("sympy", "jinja2")  # another version of which may print another text
+REMEDY = "pip install serpentail, or generate where it is and give the folder to st.load"
+
+
+def identity() -> str:
+    """Return the digest of all but a scene that generated text depends on; ModelError without a
+    generator.
+    """
+    home = _home()
+    content = hashlib.sha256()
+    for path in sorted(path for path in home.rglob("*") if path.suffix in (".py", ".jinja")):
+        content.update(f"{path.relative_to(home)}\0".encode() + path.read_bytes() + b"\0")
+    try:
+        tools = [version(tool) for tool in TOOLS]
+    except PackageNotFoundError as error:
+        raise ModelError(f"no model can be generated without {error.name}: {REMEDY}") from error
+    return digest([content.hexdigest(), tools, sys.version])
+
+
+def generate(scene: Path, output: Path) -> Path:
+    """Generate the model of a scene file below a folder, and return the model's own folder.
+
+    ModelError has the generator's words where it refuses.
+    """
+    _home()
+    # -P: what lies in the working folder is not the generator
+    command = [sys.executable, "-P", "-m", PACKAGE, "--output", str(output), "--", str(scene)]
+    done = run_all([command], os.environ)[0]
+    folders = [path.parent for path in output.glob("*/manifest.json")]
+    if done.returncode or len(folders) != 1:
+        words = (done.stderr or done.stdout).strip().replace(f"{scene}", scene.name)
+        raise ModelError(f"{scene.stem} could not be generated: {words}")
+    return folders[0]
+
+
+def _home() -> Path:
+    """Return the folder of the generator's package."""
+    found = find_spec(PACKAGE)
+    if found is None or found.origin is None:
+        raise ModelError(f"no model can be generated without the package {PACKAGE}: {REMEDY}")
+    return Path(found.origin).parent

@@ -1,0 +1,87 @@
+"""What a model can be built from: the keys of a scene, and the parameters of its body."""
+
+from collections.abc import Sequence
+from typing import Any, TypedDict
+
+from ..checks import did_you_mean, shown
+from ..errors import ModelError
+
+Three = Sequence[float]
+
+
+class Parameters(TypedDict, total=False):
+    """Parameters by name, SI; the scene's, or else those of the paper's kangaroo rat, by default.
+
+    They have the meaning that [docs/theory.md] and scene files give them; not every tail has all.
+    """
+
+    gravity: float
+    torso_mass: float
+    torso_inertia: Three
+    tail_mount: Three
+    tail_mass: float
+    tail_length: float
+    link_radius: float
+    link_inertia: Three
+    K_n: float
+    D_n: float
+    K_f: float
+    D_f: float
+    mu: float
+    L_h2d: float
+    L_d2k: float
+    L_k2a: float
+    L_a2m: float
+    L_m2t: float
+    delta_m: float
+    hip: Three
+    torso_semi_axes: Three
+
+
+class SceneKeys(TypedDict, total=False):
+    """Keys of a scene that generated code depends on; ``tail`` is a scene's ``kind``."""
+
+    tail: str
+    segments: int
+    links: int
+    samples: int
+    functions: Sequence[str] | str
+    contacts: Sequence[str]
+    friction: str
+    coordinates: str
+    bend_range: float
+    real: str
+    emission: str
+    profile: str
+    baked: bool
+    targets: Sequence[str]
+    name: str
+
+
+class Options(SceneKeys, Parameters, total=False):
+    """All that ``serpentail.build`` takes by name."""
+
+
+def separated(options: Options) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return the keys of the scene, as scene files call them, and the parameters.
+
+    ModelError names what is neither.
+    """
+    keys, parameters = {}, {}
+    for name, value in options.items():
+        if name in SceneKeys.__annotations__:
+            keys["kind" if name == "tail" else name] = value
+        elif name in Parameters.__annotations__:
+            parameters[name] = value
+        else:
+            raise _unknown(name, value)
+    return keys, parameters
+
+
+def _unknown(name: str, value: object) -> ModelError:
+    """Return the error about a name that is neither a key nor a parameter."""
+    known = Options.__annotations__
+    remedy = did_you_mean(name, known) or f"give some of {', '.join(known)}"
+    return ModelError(
+        f"{name}: value {shown(value)}: is no key of a scene and no parameter; {remedy}"
+    )

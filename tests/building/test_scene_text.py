@@ -1,0 +1,60 @@
+"""Tables survive the way through a scene file, and options are those of the generator."""
+
+import math
+import tomllib
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as some
+
+import serpentail as st
+from serpentail.building.options import Parameters, SceneKeys
+from serpentail.building.scene_text import scene_text
+from serpentail_codegen.scene.parameters import PARAMETERS
+from serpentail_codegen.scene.scene import KEYS
+
+TEXTS = some.text(some.characters(codec="utf-8"))
+VALUES = some.recursive(
+    some.booleans() | some.integers(-(2**63) + 1, 2**63 - 1) | some.floats(allow_nan=False) | TEXTS,
+    lambda inner: some.lists(inner, max_size=4) | some.dictionaries(TEXTS, inner, max_size=4),
+    max_leaves=20,
+)
+
+
+@given(some.dictionaries(TEXTS, VALUES, max_size=5))
+def test_tables_survive(tables):
+    assert tomllib.loads(scene_text(tables)) == tables
+
+
+def test_numbers_of_numpy_are_numbers():
+    tables = {"a": np.float32(0.5), "b": np.int64(3), "c": np.eye(2), "d": (1, 2.5)}
+    back = tomllib.loads(scene_text(tables))
+    assert back == {"a": 0.5, "b": 3, "c": [[1.0, 0.0], [0.0, 1.0]], "d": [1, 2.5]}
+    assert math.isnan(tomllib.loads(scene_text({"a": math.nan}))["a"])
+
+
+@pytest.mark.parametrize("value", [None, 1j, object(), {1}, b"x", 2**63])
+def test_what_toml_cannot_say_is_named(value):
+    with pytest.raises(st.ModelError, match=r"^a\.b: value "):
+        scene_text({"a": {"b": value}})
+
+
+def test_half_a_character_is_refused():
+    with pytest.raises(st.ModelError, match="has no UTF-8"):
+        scene_text({"name": "\ud800"})
+
+
+def test_what_is_nested_without_end_is_refused():
+    deep = []
+    for _ in range(5000):
+        deep = [deep]
+    with pytest.raises(st.ModelError, match="nested too deeply"):
+        scene_text({"a": deep})
+
+
+def test_options_are_what_the_generator_knows():
+    keys = {"tail" if key == "kind" else key for key in KEYS}
+    left = {"description", "parameters", "plan", "simulate"}
+    assert set(SceneKeys.__annotations__) == keys - left
+    assert list(Parameters.__annotations__) == [parameter.name for parameter in PARAMETERS]
