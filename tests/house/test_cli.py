@@ -119,9 +119,9 @@ def test_missing_compiler_is_status_2(run, folder, monkeypatch):
 
 def test_wrong_usage_is_status_2(capsys, folder):
     for arguments, words in [
-        ([], "required: verb"),
+        ([], "required: VERB"),
         (["fly"], "invalid choice: 'fly'"),
-        (["info"], "required: folder"),
+        (["info"], "required: model"),
         (["info", folder, "--json", "report.json"], "invalid choice: 'report.json'"),
     ]:
         status, err = refused(capsys, *arguments)

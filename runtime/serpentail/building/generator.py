@@ -36,15 +36,18 @@ def generate(scene: Path, output: Path) -> Path:
 
     ModelError has the generator's words where it refuses.
     """
-    _home()
-    # -P: what lies in the working folder is not the generator
-    command = [sys.executable, "-P", "-m", PACKAGE, "--output", str(output), "--", str(scene)]
-    done = run_all([command], os.environ)[0]
+    done = run_all([[*command(), "--output", str(output), "--", str(scene)]], os.environ)[0]
     folders = [path.parent for path in output.glob("*/manifest.json")]
     if done.returncode or len(folders) != 1:
         words = (done.stderr or done.stdout).strip().replace(f"{scene}", scene.name)
         raise ModelError(f"{scene.stem} could not be generated: {words}")
     return folders[0]
+
+
+def command() -> list[str]:
+    """Return the command of the generator, of which its arguments follow."""
+    _home()
+    return [sys.executable, "-P", "-m", PACKAGE]  # -P: not what lies in the working folder
 
 
 def _home() -> Path:

@@ -1,0 +1,98 @@
+"""The arguments of the command line."""
+
+import argparse
+
+from .. import __version__
+
+FOLDER = "the generated folder of its model, by default one that is built in the cache"
+
+
+def parser() -> argparse.ArgumentParser:
+    """Return the argument parser."""
+    about = "Work with models of tailed animals and robots: scenes, motions, plans, pages."
+    root = argparse.ArgumentParser(prog="serpentail", description=about)
+    root.add_argument("--version", action="version", version=f"serpentail {__version__}")
+    verbs = root.add_subparsers(dest="verb", required=True, metavar="VERB")
+    for add in (_of_scenes, _of_motions, _of_models, _of_this_machine):
+        add(verbs)
+    # what each can print for programs
+    for name, verb in verbs.choices.items():
+        if name not in ("generate", "completion"):
+            text = "print one JSON object on stdout instead of text"
+            verb.add_argument("--json", choices=["-"], help=text)
+    return root
+
+
+def _of_scenes(verbs: argparse._SubParsersAction) -> None:
+    """Add the verbs about scene files."""
+    verbs.add_parser("examples", help="list the scenes that come with the package")
+    new = verbs.add_parser("new", help="write a commented scene file, ready to simulate")
+    new.add_argument("file", help="the file to write, such as rat.toml")
+    new.add_argument("--example", metavar="NAME", help="a copy of this example, and no options")
+    new.add_argument("--tail", default="articulated", choices=["articulated", "continuum"])
+    new.add_argument("--segments", type=int, default=1, help="m, by default 1")
+    new.add_argument("--links", type=int, help="n in each segment of an articulated tail: 3")
+    new.add_argument(
+        "--contacts",
+        nargs="+",
+        default=[],
+        choices=["feet", "tail", "torso"],
+        help="what can touch the ground; without it the animal flies",
+    )
+    verbs.add_parser(
+        "generate",
+        help="write the C and CasADi of a scene to generated/: see generate --help",
+        add_help=False,
+    )
+
+
+def _of_motions(verbs: argparse._SubParsersAction) -> None:
+    """Add the verbs that make motions, or show them."""
+    simulate = verbs.add_parser(
+        "simulate", help="simulate the motion of a scene's table [simulate]"
+    )
+    _add_scene(simulate, "scenes/kick.toml")
+    simulate.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        dest="changes",
+        help=(
+            "another value of a parameter (mu=0.5) or of a key below "
+            "[simulate] (duration=2, start.height=0.1)"
+        ),
+    )
+    simulate.add_argument("--save", help="write the motion to this .npz file")
+    simulate.add_argument("--film", help="draw it as a filmstrip, to this .png, .svg or .pdf file")
+    plan = verbs.add_parser("plan", help="plan the motion of a scene's table [plan]")
+    _add_scene(plan, "scenes/righting_m1_n3.toml")
+    plan.add_argument("--save", help="write the planned motion to this .npz file")
+    for verb in (plan, simulate):
+        verb.add_argument("--view", metavar="PAGE", help="show it in a page, this .html file")
+    view = verbs.add_parser("view", help="show saved motions in a page, over each other")
+    view.add_argument("files", nargs="+", help="what --save wrote: .npz files")
+    view.add_argument("--folder", help=FOLDER.replace("one that is built", "what is"))
+    view.add_argument("--output", help="the page, by default the first file's name with .html")
+
+
+def _add_scene(verb: argparse.ArgumentParser, example: str) -> None:
+    """Let a verb take a scene and its folder."""
+    verb.add_argument("scene", help=f"a scene file, such as {example}, or the name of an example")
+    verb.add_argument("--folder", help=FOLDER)
+
+
+def _of_models(verbs: argparse._SubParsersAction) -> None:
+    """Add the verbs about models."""
+    info = verbs.add_parser("info", help="what a model is: sizes, functions, costs")
+    verify = verbs.add_parser("verify", help="check the laws that a model must obey")
+    for verb in (info, verify):
+        verb.add_argument("model", help="a generated folder, a scene file or an example's name")
+
+
+def _of_this_machine(verbs: argparse._SubParsersAction) -> None:
+    """Add the verbs about this machine."""
+    cache = verbs.add_parser("cache", help="what the cache of compiled models holds, and where")
+    cache.add_argument("--clean", action="store_true", help="empty it")
+    shell = verbs.add_parser("completion", help="print the script by which a shell completes")
+    shell.add_argument("shell", choices=["bash", "zsh", "tcsh"])

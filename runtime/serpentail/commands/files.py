@@ -1,0 +1,53 @@
+"""Files that options ask for: refused before the work where they cannot be, written after it."""
+
+import argparse
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from ..errors import SerpentailError
+from ..files import refuse_unwritable
+
+OPTIONS = ("save", "film", "view")
+
+
+def refuse_targets(arguments: argparse.Namespace) -> None:
+    """SerpentailError where a file could not be written after the work is done."""
+    if getattr(arguments, "view", None) is not None:
+        from ..viewer.view import template
+
+        template()
+    for option in OPTIONS:
+        path = getattr(arguments, option, None)
+        try:
+            if path is not None:
+                refuse_unwritable(target(option, path))
+        except (OSError, ValueError) as error:
+            raise SerpentailError(f"--{option} {path}: {error}; name another file") from error
+
+
+def target(option: str, path: str) -> Path:
+    """Return where the file of an option goes; ValueError where its name is of no known kind."""
+    if option == "film":
+        from ..pictures.style import writable
+
+        return writable(path)
+    if option == "view":
+        from ..viewer.view import checked_path
+
+        return checked_path(path)
+    return Path(path)
+
+
+def write(arguments: argparse.Namespace, option: str, make: Callable[[str], object]) -> bool:
+    """Write the file that an option asks for; tell whether it could be, and on stderr why not."""
+    path = getattr(arguments, option)
+    if path is None:
+        return True
+    try:
+        make(path)
+    except Exception as error:  # whatever a picture or a disk fails by, the report is out
+        reason = " ".join(str(error).split()) or type(error).__name__
+        print(f"--{option} {path}: could not be written: {reason:.300}", file=sys.stderr)
+        return False
+    return True

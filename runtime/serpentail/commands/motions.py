@@ -1,0 +1,65 @@
+"""The verbs that make motions, or show them: plan, simulate, view."""
+
+import argparse
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..errors import SimulationError
+from .outcome import Files, Outcome, rows
+
+if TYPE_CHECKING:
+    from ..motion.trajectory import Trajectory
+    from ..scenes.simulate import Scenario
+
+
+def plan(arguments: argparse.Namespace) -> Outcome:
+    """Return the report of a scene's plan, and whether it converged."""
+    from ..scenes import plan as scenes
+
+    plan = scenes.planned(arguments.scene, arguments.folder)
+    files: Files = {"save": plan.trajectory.save, "view": plan.view}
+    return Outcome(plan.report, rows(plan.report), plan.success, files)
+
+
+def simulate(arguments: argparse.Namespace) -> Outcome:
+    """Return the report of a scene's motion."""
+    from ..scenes.overrides import parsed
+    from ..scenes.simulate import scenario
+
+    scene = scenario(arguments.scene, arguments.folder, parsed(arguments.changes))
+    motion, stopped = _motion(scene, arguments.view)
+    report = scene.summary(motion) | stopped
+    film = partial(scene.film, motion)
+    files: Files = {"save": motion.save, "film": film, "view": motion.view}
+    return Outcome(report, rows(report), True, files)
+
+
+def _motion(scene: "Scenario", page: str | None) -> tuple["Trajectory", dict[str, str]]:
+    """Return a motion, after Ctrl-C as far as it came, and whether that stopped it.
+
+    Where it fails, a page of it is written up to there.
+    """
+    try:
+        return scene.simulate(), {}
+    except SimulationError as error:
+        if page is not None and error.trajectory is not None:
+            error.trajectory.view(page)
+        raise
+    except KeyboardInterrupt as stop:
+        motion = getattr(stop, "motion", None)
+        if motion is None or len(motion.t) < 2:
+            raise
+        return motion, {"stopped": "interrupt"}
+
+
+def view(arguments: argparse.Namespace) -> Outcome:
+    """Write the page of saved motions, and return where it is."""
+    from ..viewer.saved import read
+    from ..viewer.view import view as page_of
+
+    motions = [read(file, arguments.folder) for file in arguments.files]
+    names = list(arguments.files) if len(motions) > 1 else None
+    path = arguments.output or Path(arguments.files[0]).with_suffix(".html")
+    page = page_of(motions, path, names=names)
+    return Outcome({"page": str(page)}, str(page))

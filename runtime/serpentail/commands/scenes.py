@@ -1,0 +1,61 @@
+"""The verbs about scene files: which there are, a new one, the C of one."""
+
+import argparse
+import subprocess
+from pathlib import Path
+
+from ..errors import SerpentailError
+from ..files import replacing
+from .outcome import Outcome
+
+
+def examples(arguments: argparse.Namespace) -> Outcome:
+    """Return the scenes that come with the package."""
+    from ..building.examples import examples
+
+    found = examples()
+    return Outcome(found, "\n".join(f"{name:<30}{words}" for name, words in found.items()))
+
+
+def new(arguments: argparse.Namespace) -> Outcome:
+    """Write a scene file: of options, or a copy of an example."""
+    from ..building.examples import scene_path
+    from ..building.new_scene import new_scene
+
+    path = Path(arguments.file)
+    if path.suffix != ".toml":
+        raise SerpentailError(f"file: value {arguments.file!r:.200}: needs a name ending in .toml")
+    if path.exists():
+        raise SerpentailError(f"file: value {arguments.file!r:.200}: is there; name another one")
+    if arguments.example:
+        text = scene_path(arguments.example).read_text(encoding="utf-8")
+    else:
+        options = ("tail", "segments", "links", "contacts")
+        text = new_scene(**{name: getattr(arguments, name) for name in options})
+    with replacing(path) as part:
+        part.write_text(text, encoding="utf-8")
+    return Outcome({"scene": str(path)}, f"{path}: try `serpentail simulate {path}`")
+
+
+def generate(arguments: argparse.Namespace) -> int:
+    """Run the generator's own command line, and return its status."""
+    from ..building.examples import examples, scene_path
+    from ..building.generator import command
+
+    names = examples()
+    words = [str(scene_path(word)) if word in names else word for word in arguments.words]
+    return subprocess.run([*command(), *words], check=False).returncode
+
+
+def completion(arguments: argparse.Namespace) -> Outcome:
+    """Return the script by which a shell completes the command line."""
+    try:
+        import shtab
+    except ImportError as error:
+        raise SerpentailError(
+            'shell completion needs shtab: pip install "serpentail[completion]"'
+        ) from error
+    from .arguments import parser
+
+    script = shtab.complete(parser(), arguments.shell)
+    return Outcome({"script": script}, script)
