@@ -1,13 +1,15 @@
 """A model as CasADi functions, of operations that CasADi knows or of the compiled C."""
 
 from types import ModuleType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import casadi
 
 from ..errors import ModelError
 from .kept import kept
+from .layout import OMEGA, QUATERNION, TAIL_V, VELOCITY
 from .parameters import flat
+from .state_space import RATE
 
 if TYPE_CHECKING:
     from .model import Model
@@ -47,9 +49,34 @@ class CasadiFunctions:
         setattr(self, name, function)
         return function
 
+    @kept
+    def x_dot(self) -> casadi.Function:
+        """Time derivative of the state x = (q, v) under torques u, of SX operations.
+
+        Inputs x (nq + nv), u (2m), p: the parameters, such as ``parameter_vector``; see
+        ``Model.x_dot``.  ``external("x_dot")`` is the same of the compiled C.
+        """
+        return self._x_dot(self.symbolic("forward_dynamics"), casadi.SX)
+
+    def _x_dot(self, forward_dynamics: casadi.Function, kind: Any) -> casadi.Function:
+        """Return x_dot of a function of q, v, tau and parameters; SX or MX."""
+        layout = self._model.layout
+        sizes = {"x": layout.nq + layout.nv, "u": layout.nt, "p": self.parameter_vector.numel()}
+        x, u, p = inputs = [kind.sym(name, size) for name, size in sizes.items()]
+        q, v = casadi.vertsplit(x, [0, layout.nq, sizes["x"]])
+        quaternion, omega = q[QUATERNION], v[OMEGA]
+        scalar, vector = quaternion[0], quaternion[1:]
+        turning = casadi.vertcat(
+            -casadi.dot(vector, omega), scalar * omega + casadi.cross(vector, omega)
+        )
+        restoring = RATE * (1 - casadi.sumsqr(quaternion)) * quaternion
+        v_dot = forward_dynamics(q, v, u, p)
+        x_dot = casadi.vertcat(v[VELOCITY], turning / 2 + restoring, v[TAIL_V], v_dot)
+        return casadi.Function("x_dot", inputs, [x_dot], [*sizes], ["x_dot"])
+
     def __dir__(self) -> list[str]:
         symbolic = self._module.SIGNATURES if self._has_module else ()
-        return [*symbolic, "symbolic", "external", "parameter_vector"]
+        return [*symbolic, "x_dot", "symbolic", "external", "parameter_vector"]
 
     @property
     def parameter_vector(self) -> casadi.DM:
@@ -62,6 +89,8 @@ class CasadiFunctions:
 
     def external(self, name: str, derivatives: int = 0, folded: bool = False) -> casadi.Function:
         """Return the compiled C as a function whose last input is the parameter vector.
+
+        name: of a function of the scene, or "x_dot".
 
         Only models of doubles have it.
         derivatives: 1 or 2 raises ModelError here where the scene lacks what exact derivatives
@@ -77,8 +106,11 @@ class CasadiFunctions:
             )
         if self._model.library is None:
             raise ModelError(f"{prefix} was loaded with compiled=False: load it again to use its C")
-        self._check(self._known(name), derivatives)
-        function = casadi.external(f"{prefix}_casadi_{name}", self._model.library._name)
+        if name == "x_dot":
+            function = self._x_dot(self.external("forward_dynamics", derivatives), casadi.MX)
+        else:
+            self._check(self._known(name), derivatives)
+            function = casadi.external(f"{prefix}_casadi_{name}", self._model.library._name)
         if not folded:
             return function
         names = function.name_in()[:-1]

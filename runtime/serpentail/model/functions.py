@@ -9,6 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 from ..checks import finite_array
 from ..errors import StateError
 from .kernel import Kernel
+from .layout import Layout
+from .state_space import jacobians, q_dot, split
 
 Array = NDArray[Any]  # of doubles, or of floats where the scene asks for them
 
@@ -19,6 +21,7 @@ class Functions(ABC):
     name: str
     manifest: dict
     contacts: dict[str, int]
+    layout: Layout
 
     @abstractmethod
     def kernel(self, name: str) -> Kernel:
@@ -47,6 +50,22 @@ class Functions(ABC):
         if f_ext is None:
             return self.kernel("forward_dynamics")(q, v, tau)
         return self.kernel("forward_dynamics_external")(q, v, tau, f_ext)
+
+    def x_dot(self, x: ArrayLike, u: ArrayLike) -> Array:
+        """Time derivative (nq + nv,) of the state x = (q, v) under joint torques u (2m,) (N m).
+
+        The quaternion follows q (0, omega) / 2 + (1 - |q|^2) q / s, which keeps its norm at 1: see
+        ``serpentail.model.state_space``.
+        """
+        q, v = split(self.layout, finite_array("x", x))
+        v_dot = self.forward_dynamics(q, v, u)
+        kinematics = np.broadcast_to(q_dot(q, v), (*v_dot.shape[:-1], q.shape[-1]))
+        return np.concatenate([kinematics, v_dot], axis=-1)
+
+    def x_dot_derivatives(self, x: ArrayLike, u: ArrayLike) -> tuple[Array, Array]:
+        """Exact Jacobians A (nx, nx), B (nx, 2m) of ``x_dot`` by x and u; nx = nq + nv."""
+        q, v = split(self.layout, finite_array("x", x))
+        return jacobians(self.layout, q, v, self.forward_dynamics_derivatives(q, v, u))
 
     def external_force(
         self,

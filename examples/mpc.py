@@ -1,0 +1,65 @@
+"""Model-predictive control in the air: the tail rights a falling rat, planned anew every 20 ms.
+
+The controller's tail is a fifth lighter than the one that flies.  Run it: python -m examples.mpc
+"""
+
+import casadi
+import numpy as np
+
+import serpentail as st
+
+STEP, HORIZON, FLIGHT = 0.02, 12, 20  # s, steps that are planned, steps that are flown
+TORQUE = 0.02  # N m, the largest
+
+
+def controller(model: st.Model):
+    """Return a function from a state to torques (2m,) N m, which remembers its last plan."""
+    f, nx, nu = model.casadi.external("x_dot", derivatives=2, folded=True), 9 + 8, 2
+    x, u = casadi.MX.sym("x", nx), casadi.MX.sym("u", nu)
+    k1 = f(x, u)
+    k2 = f(x + STEP / 2 * k1, u)
+    k3 = f(x + STEP / 2 * k2, u)
+    k4 = f(x + STEP * k3, u)
+    step = casadi.Function("step", [x, u], [x + STEP / 6 * (k1 + 2 * k2 + 2 * k3 + k4)])
+
+    # multiple shooting: the tilt of the back, its rate and the effort are small at every step
+    X, U = casadi.MX.sym("X", nx, HORIZON), casadi.MX.sym("U", nu, HORIZON)
+    before = casadi.horzcat(x, X[:, :-1])
+    gaps = X - step.map(HORIZON)(before, U)
+    tilt = casadi.sum2(X[4, :] ** 2 + X[5, :] ** 2)  # sin^2 of half the angle of the back
+    cost = tilt + 2e-4 * casadi.sumsqr(X[12:15, :]) + 10 * casadi.sumsqr(U)
+    nlp = {"x": casadi.veccat(X, U), "p": x, "f": cost, "g": casadi.vec(gaps)}
+    quiet = {"ipopt.print_level": 0, "ipopt.sb": "yes", "print_time": False, "ipopt.max_iter": 60}
+    solver = casadi.nlpsol("mpc", "ipopt", nlp, quiet)
+    bound = np.r_[np.full(nx * HORIZON, np.inf), np.full(nu * HORIZON, TORQUE)]
+    memory = {"plan": None}
+
+    def torques(state: np.ndarray) -> np.ndarray:
+        guess = memory["plan"]
+        if guess is None:
+            guess = np.r_[np.tile(state, HORIZON), np.zeros(nu * HORIZON)]
+        memory["plan"] = solver(x0=guess, p=state, lbx=-bound, ubx=bound, lbg=0, ubg=0)["x"].full()
+        return memory["plan"][nx * HORIZON :][:nu, 0]
+
+    return torques
+
+
+def main() -> None:
+    """Fly, and print the tilt of the back."""
+    names = "forward_dynamics_derivatives,forward_dynamics_vjp,inverse_dynamics_hessian,"
+    names += "forward_dynamics,mass_matrix,energy,momentum,rollout"
+    rat = st.build("kangaroo_rat_m1_n3", functions=names.split(","))
+    torques = controller(rat.with_parameters(tail_mass=0.8 * rat.parameters["tail_mass"]))
+    q = np.r_[0, 0, 1, np.cos(0.6), np.sin(0.6), 0, 0, 0, 0]
+    v = np.r_[0, 0, 1, 0, 0.5, 0, 0, 0]
+    for k in range(FLIGHT):
+        held = st.TorqueTable([0, STEP], np.tile(torques(np.r_[q, v]), (2, 1)))
+        flight = st.simulate(rat, q, v, controller=held, t_span=STEP)
+        q, v = flight.q[-1], flight.v[-1]
+        if k % 4 == 3:
+            tilt = np.degrees(np.arccos(st.rotation_matrix(q[3:7])[2, 2]))
+            print(f"{1e3 * STEP * (k + 1):4.0f} ms: the back is tilted by {tilt:5.1f} deg")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,84 @@
+"""The equations of motion as x_dot = f(x, u): x = (q, v) is one state, u the joint torques.
+
+p_dot is the velocity, q_t_dot are the rates of the tail, and the quaternion follows
+q_dot = q (0, omega) / 2 + RATE (1 - |q|^2) q, whose last term brings the norm back to 1 after an
+integrator's errors and is 0 there. The other accelerations depend on its direction alone.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import StateError
+from .layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TAIL_V, VELOCITY, Layout
+
+Array = NDArray[Any]
+RATE = 1.0  # 1/s: an error e of the norm decays as exp(-2 RATE t)
+
+
+def split(layout: Layout, x: Array) -> tuple[Array, Array]:
+    """Return q (..., nq), v (..., nv) of states x (..., nq + nv); StateError for other widths."""
+    if x.ndim < 1 or x.shape[-1] != layout.nq + layout.nv:
+        raise StateError(
+            f"x has shape {x.shape}: needs {layout.nq + layout.nv} numbers, q ({layout.nq}) and v "
+            f"({layout.nv}), or rows of them"
+        )
+    return x[..., : layout.nq], x[..., layout.nq :]
+
+
+def q_dot(q: Array, v: Array) -> Array:
+    """Return dq/dt (..., nq)."""
+    quaternion = q[..., QUATERNION]
+    turning = (product_matrix(quaternion) @ v[..., OMEGA, None])[..., 0] / 2
+    norm = 1 - (quaternion**2).sum(-1, keepdims=True)
+    return np.concatenate(
+        [v[..., VELOCITY], turning + RATE * norm * quaternion, v[..., TAIL_V]], axis=-1
+    )
+
+
+def product_matrix(quaternion: Array) -> Array:
+    """Return M (..., 4, 3): the quaternion times (0, omega) is M omega."""
+    w, x, y, z = np.moveaxis(quaternion, -1, 0)
+    rows = [[-x, -y, -z], [w, -z, y], [z, w, -x], [-y, x, w]]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def jacobians(
+    layout: Layout, q: Array, v: Array, of_v_dot: tuple[Array, Array, Array]
+) -> tuple[Array, Array]:
+    """Return d(x_dot)/dx (..., nx, nx), d(x_dot)/du (..., nx, 2m).
+
+    of_v_dot: those of v_dot by turns of the torso and shifts (..., nv, nv), by v, by tau.
+    """
+    by_turns, by_v, by_tau = of_v_dot
+    quaternion, shape = q[..., QUATERNION], by_v.shape[:-2]
+    products, square = product_matrix(quaternion), (quaternion**2).sum(-1)[..., None, None]
+    size = layout.nq + layout.nv
+    A, B = np.zeros((*shape, size, size)), np.zeros((*shape, size, layout.nt))
+
+    # kinematics: velocities move, the quaternion turns and keeps its norm
+    speeds = A[..., : layout.nq, layout.nq :]
+    speeds[..., POSITION, VELOCITY] = np.eye(3)
+    speeds[..., QUATERNION, OMEGA] = products / 2
+    speeds[..., TAIL_Q, TAIL_V] = np.eye(layout.nt)
+    outer = quaternion[..., :, None] * quaternion[..., None, :]
+    restoring = RATE * ((1 - square) * np.eye(4) - 2 * outer)
+    A[..., QUATERNION, QUATERNION] = turning_matrix(v[..., OMEGA]) / 2 + restoring
+
+    # dynamics: a change of the quaternion is the turn 2 vec(conj(q) dq) / |q|^2
+    dynamics = A[..., layout.nq :, : layout.nq]
+    dynamics[..., POSITION] = by_turns[..., VELOCITY]
+    dynamics[..., QUATERNION] = by_turns[..., OMEGA] @ (2 * np.swapaxes(products, -1, -2) / square)
+    dynamics[..., TAIL_Q] = by_turns[..., TAIL_V]
+    A[..., layout.nq :, layout.nq :] = by_v
+    B[..., layout.nq :, :] = by_tau
+    return A, B
+
+
+def turning_matrix(omega: Array) -> Array:
+    """Return W (..., 4, 4): a quaternion q times (0, omega) is W q."""
+    x, y, z = np.moveaxis(omega, -1, 0)
+    o = np.zeros_like(x)
+    rows = [[o, -x, -y, -z], [x, o, z, -y], [y, -z, o, x], [z, y, -x, o]]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
