@@ -36,6 +36,7 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument(
         "--output", type=Path, default=Path("generated"), help="parent of the generated folder"
     )
+    p.add_argument("--progress", type=Path, help="keep in this file how far it is")
     p.add_argument("--print-folder", action="store_true", help="only tell which folder it is")
     return p
 
@@ -88,7 +89,7 @@ def main(argv: list[str] | None = None) -> int:
         return 0
     start = time.perf_counter()
     try:
-        changed = made(scene, folder)
+        changed = made(scene, folder, arguments.progress)
     except SceneError as error:  # its folder cannot be written
         print(error, file=sys.stderr)
         return 2
@@ -97,14 +98,21 @@ def main(argv: list[str] | None = None) -> int:
     return 0
 
 
-def made(scene: Scene, folder: Path) -> list[str]:
-    """Generate a scene unless its folder is what it would be; return the files that changed."""
+def made(scene: Scene, folder: Path, progress: Path | None = None) -> list[str]:
+    """Generate a scene unless its folder is what it would be; return the files that changed.
+
+    progress: a file that is kept to say how far that is.
+    """
     key = key_of(scene)
     if is_made(folder, key):
         return []
     from .pipeline import generate  # sympy is imported only now
 
-    changed = generate(scene, folder.parent)
+    def tell(done: float, function: str) -> None:
+        if progress is not None:
+            progress.write_text(f"{done:.3f} {function}\n")
+
+    changed = generate(scene, folder.parent, tell)
     note(folder, key)
     return changed
 

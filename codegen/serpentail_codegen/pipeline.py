@@ -1,10 +1,11 @@
 """The stages of a generation in order, from a scene to its folder."""
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
 
 from . import __version__
 from .functions.catalogue import CATALOGUE
+from .functions.function import Function
 from .functions.tail import Tail
 from .scene.scene import Scene
 from .targets.c.target import C
@@ -16,11 +17,20 @@ from .targets.write import digest, write_folder
 TARGETS = {target.name: target for target in (C, CASADI)}
 
 
-def generate(scene: Scene, output: Path) -> list[str]:
-    """Derive, emit and write what a scene asks for to ``output/<scene>``; return what changed."""
+Tell = Callable[[float, str], object]  # which part is done, and the function that comes now
+
+
+def generate(scene: Scene, output: Path, tell: Tell | None = None) -> list[str]:
+    """Derive, emit and write what a scene asks for to ``output/<scene>``; return what changed.
+
+    tell: called as each function is begun for each target.
+    """
     tail = tail_of(scene)
     functions = [CATALOGUE[name].of(tail) for name in needed(scene.functions, bool(scene.contacts))]
-    emissions = [TARGETS[name].emit(scene, tail, functions, __version__) for name in scene.targets]
+    emissions = []
+    for k, name in enumerate(scene.targets):
+        one_by_one = told(functions, tell, (k, len(scene.targets)))
+        emissions.append(TARGETS[name].emit(scene, tail, one_by_one, __version__))
 
     # the hash is of texts without it, and then put into them
     content_hash = hash_of(emissions[0])
@@ -32,6 +42,17 @@ def generate(scene: Scene, output: Path) -> list[str]:
     head = {"format": FORMAT, "generator": __version__, "content_hash": content_hash}
     described = head | manifest(scene, tail, functions, emissions)
     return write_folder(output / scene.name, files, described)
+
+
+def told(
+    functions: Collection[Function], tell: Tell | None, place: tuple[int, int]
+) -> Iterator[Function]:
+    """Yield the functions of target ``place[0]`` of ``place[1]``, and tell of each."""
+    k, targets = place
+    for j, function in enumerate(functions):
+        if tell is not None:
+            tell((k + j / len(functions)) / targets, function.name)
+        yield function
 
 
 def hash_of(emission: Emission) -> str:

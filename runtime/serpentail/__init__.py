@@ -8,6 +8,7 @@ _HOME = {
     **dict.fromkeys(["load", "Model"], "model.model"),
     "build": "building.build",
     "examples": "building.examples",
+    **dict.fromkeys(["progress", "Progress"], "stages"),
     "simulate": "simulation.simulate",
     "Rollouts": "simulation.rollouts",
     "settle": "simulation.settle",

@@ -9,6 +9,7 @@ from .commands.arguments import parser
 from .commands.files import refuse_targets, write
 from .commands.outcome import Outcome, tell
 from .errors import SerpentailError
+from .stages import progress
 
 INTERRUPTED = 130  # status of a command that Ctrl-C ended: 128 and the signal's number
 ROOMS = {  # modules of `commands`, each with a function of the name of each verb
@@ -25,7 +26,8 @@ def main(argv: list[str] | None = None) -> int:
     arguments = arguments_of(argv)
     try:
         refuse_targets(arguments)
-        outcome = run(arguments)
+        with progress():
+            outcome = run(arguments)
     except SerpentailError as error:
         print(error, file=sys.stderr)
         return 2

@@ -6,7 +6,7 @@ The printer has one method for each kind of statement, chosen by the statement's
 that it does not know, or cannot print, ends the generation with an error and is never left out.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -68,4 +68,4 @@ class Target:
 
     name: str
     printer: type[Printer]
-    emit: Callable[[Scene, Tail, Sequence[Function], str], Emission]
+    emit: Callable[[Scene, Tail, Iterable[Function], str], Emission]

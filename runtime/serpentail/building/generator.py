@@ -3,6 +3,7 @@
 import hashlib
 import os
 import sys
+from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from pathlib import Path
@@ -10,6 +11,7 @@ from pathlib import Path
 from ..errors import ModelError
 from ..model.cache import digest
 from ..model.commands import run_all
+from ..stages import Stage
 
 PACKAGE = "serpentail_codegen"
 TOOLS = ("sympy", "jinja2")  # another version of which may print another text
@@ -36,7 +38,12 @@ def generate(scene: Path, output: Path) -> Path:
 
     ModelError has the generator's words where it refuses.
     """
-    done = run_all([[*command(), "--output", str(output), "--", str(scene)]], os.environ)[0]
+    noted = output.with_name("progress")
+    options = ["--output", str(output), "--progress", str(noted)]
+    with Stage("derive", scene.stem) as stage:
+        done = run_all(
+            [[*command(), *options, "--", str(scene)]], os.environ, lambda: _tell(stage, noted)
+        )[0]
     folders = [path.parent for path in output.glob("*/manifest.json")]
     if done.returncode or len(folders) != 1:
         words = (done.stderr or done.stdout).strip().replace(f"{scene}", scene.name)
@@ -48,6 +55,14 @@ def command() -> list[str]:
     """Return the command of the generator, of which its arguments follow."""
     _home()
     return [sys.executable, "-P", "-m", PACKAGE]  # -P: not what lies in the working folder
+
+
+def _tell(stage: Stage, noted: Path) -> None:
+    """Tell how far the generator has noted that it is."""
+    with suppress(OSError, ValueError):
+        part, function = noted.read_text().split()
+        return stage.tell(float(part), f"{stage.subject}: {function}")
+    return stage.tell()
 
 
 def _home() -> Path:

@@ -3,22 +3,26 @@
 import os
 import signal
 import subprocess
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 
+TICK_S = 0.2  # s between looks at how far a command is
 GRACE_S = 0.5  # s that a command has to remove its temporary files
 
 
 def run_all(
-    commands: Sequence[Sequence[str]], surroundings: Mapping[str, str]
+    commands: Sequence[Sequence[str]],
+    surroundings: Mapping[str, str],
+    tick: Callable[[], object] = lambda: None,
 ) -> list[subprocess.CompletedProcess[str]]:
     """Return the finished commands; OSError where one cannot be started.
 
+    tick: called now and then while they run.
     Where Ctrl-C or an error comes before their end, they are ended, and what they have started.
     """
     with ExitStack() as running:
         started = [running.enter_context(_running(each, surroundings)) for each in commands]
-        return [_finished(each) for each in started]
+        return [_finished(each, tick) for each in started]
 
 
 @contextmanager
@@ -52,7 +56,13 @@ def _end(process: subprocess.Popen[str]) -> None:
         os.killpg(process.pid, signal.SIGKILL)
 
 
-def _finished(process: subprocess.Popen[str]) -> subprocess.CompletedProcess[str]:
+def _finished(
+    process: subprocess.Popen[str], tick: Callable[[], object]
+) -> subprocess.CompletedProcess[str]:
     """Wait for a command, and return what it said."""
-    said, errors = process.communicate()
+    while True:
+        with suppress(subprocess.TimeoutExpired):
+            said, errors = process.communicate(timeout=TICK_S)
+            break
+        tick()
     return subprocess.CompletedProcess(process.args, process.returncode, said, errors)

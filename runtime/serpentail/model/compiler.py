@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
 from ..errors import CompileFailed, ModelError
+from ..stages import Stage
 from .bound import bound, limit
 from .cache import (
     LIBRARIES,
@@ -180,7 +181,9 @@ def _compile(sources: Sequence[Path], include: Path, toolchain: Toolchain, made:
         (*compiler, *headers, "-c", str(source.absolute()), "-o", file)
         for source, file in zip(sources, files, strict=True)
     ]
-    for command, finished in zip(commands, run_commands(commands), strict=True):
+    with Stage("compile", ", ".join(source.name for source in sources)) as stage:
+        done = run_commands(commands, stage.tell)
+    for command, finished in zip(commands, done, strict=True):
         if finished.returncode:
             raise _failure(command, finished)
 

@@ -10,7 +10,7 @@ import shlex
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -151,12 +151,17 @@ def run_command(command: Sequence[str]) -> subprocess.CompletedProcess[str]:
     return run_commands([command])[0]
 
 
-def run_commands(commands: Sequence[Sequence[str]]) -> list[subprocess.CompletedProcess[str]]:
-    """Return the finished commands, run at the same time; 127 where one could not be started."""
+def run_commands(
+    commands: Sequence[Sequence[str]], tick: Callable[[], object] = lambda: None
+) -> list[subprocess.CompletedProcess[str]]:
+    """Return the finished commands, run at the same time; 127 where one could not be started.
+
+    tick: called now and then meanwhile.
+    """
     places = {name: os.environ[name] for name in PLACES if name in os.environ}
     surroundings = {**places, **kept_surroundings(), "LC_ALL": "C"}
     try:
-        return run_all(commands, surroundings)
+        return run_all(commands, surroundings, tick)
     except OSError as error:
         reason = error.strerror or str(error)
         return [subprocess.CompletedProcess(each, 127, "", reason) for each in commands]

@@ -1,6 +1,6 @@
 """The C target's files: the model, batches of states, and a package that builds without Python."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from typing import Any
 
 from ...functions.function import Function
@@ -16,7 +16,7 @@ from .package import package_files
 from .records import layouts
 
 
-def emit(scene: Scene, tail: Tail, functions: Sequence[Function], version: str) -> Emission:
+def emit(scene: Scene, tail: Tail, functions: Iterable[Function], version: str) -> Emission:
     """Return the C of a scene; the content hash is of the model's own files."""
     printed = [printed_function(scene, tail, function) for function in functions]
     context = c_context(scene, tail, printed, version)

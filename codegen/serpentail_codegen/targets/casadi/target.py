@@ -1,6 +1,6 @@
 """The CasADi target's files: one Python module with the functions that can be symbolic graphs."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from typing import Any
 
 from ...functions.catalogue import SYMBOLIC
@@ -13,7 +13,7 @@ from ..templating import render
 from .printer import PythonPrinter, step_view
 
 
-def emit(scene: Scene, tail: Tail, functions: Sequence[Function], version: str) -> Emission:
+def emit(scene: Scene, tail: Tail, functions: Iterable[Function], version: str) -> Emission:
     """Return the module of a scene; functions that have no symbolic form are left to the C."""
     views: list[dict[str, Any]] = []
     steps: dict[str, Step] = {}
