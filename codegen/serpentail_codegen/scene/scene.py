@@ -50,7 +50,7 @@ NAME = Rule(
     ),
 )
 BEND = Rule(
-    "a number of radians above 0 and up to 100",
+    'an angle above 0 and up to 100 rad, such as "360 deg" or a plain number in rad',
     lambda x: not isinstance(x, bool) and isinstance(x, int | float) and 0 < x <= 100,
 )
 CONTACTS = Rule(

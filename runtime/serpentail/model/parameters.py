@@ -10,6 +10,7 @@ import numpy as np
 
 from ..checks import did_you_mean, numbers_in, shown
 from ..errors import ModelError, UnlikeBodies
+from ..units import in_unit
 
 Value = float | tuple[float, ...]
 Values = Mapping[str, Any]  # name -> number or 3 numbers, SI; of many runs (k,) or (k, 3)
@@ -192,7 +193,10 @@ def _checked(fields: dict, name: str, value: object, runs: int | None) -> np.nda
     needs, shape = f"needs {kind} ({unit}), {words}", (size,) if size > 1 else ()
     if runs is not None:
         needs, shape = f"{needs}, for each of {runs} runs", (runs, *shape)
-    numbers = numbers_in(value)
+    try:
+        numbers = numbers_in(in_unit(value, unit))
+    except ValueError as error:
+        return f"{name}: value {shown(value)}: {error}"
     if numbers is None or numbers.shape != shape:
         return f"{name}: value {shown(value)}: {needs}"
     # the first run of which it does not hold
