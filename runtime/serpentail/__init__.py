@@ -40,6 +40,7 @@ _HOME = {
             "NotWritten",
             "ViewError",
             "UnlikeBodies",
+            "UnusualSize",
         ],
         "errors",
     ),

@@ -4,6 +4,7 @@ import argparse
 import json
 import os
 import sys
+import warnings
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
@@ -18,47 +19,6 @@ if TYPE_CHECKING:
     from .scenes.simulate import Scenario
 
 INTERRUPTED = 130  # status of a command that Ctrl-C ended: 128 and the signal's number
-
-
-def info(folder: str) -> dict[str, Any]:
-    """Return what a model is: sizes, functions, how each was emitted, what it costs."""
-    from .model.model import load
-    from .model.parameters import json_ready
-
-    model = load(folder)
-    functions = {}
-    for name, entry in model.manifest["functions"].items():
-        functions[name] = {
-            "inputs": {port["name"]: port["shape"] for port in entry["inputs"]},
-            "outputs": {port["name"]: port["shape"] for port in entry["outputs"]},
-            "emission": entry["emission"],
-            "operations": entry["operations"],
-        }
-    return {
-        "name": model.name,
-        "real": model.manifest["real"],
-        "kind": model.kind,
-        "segments": model.segments,
-        "links": model.links,
-        "samples": model.samples,
-        "nq": model.nq,
-        "nv": model.nv,
-        "parameters": json_ready(model.parameters),
-        "functions": functions,
-    }
-
-
-def describe(report: dict[str, Any]) -> str:
-    """Return an info report as text."""
-    shape = "{segments} continuum segments"
-    if report["links"]:
-        shape = "{segments} segments x {links} links"
-    head = ("{name}: " + shape + ", nq {nq}, nv {nv}, {real}").format(**report)
-    rows = [
-        f"  {name:<28}{entry['emission']:<10}{entry['operations']:>8} operations"
-        for name, entry in report["functions"].items()
-    ]
-    return "\n".join([head, *rows])
 
 
 def parser() -> argparse.ArgumentParser:
@@ -99,10 +59,11 @@ def parser() -> argparse.ArgumentParser:
     verify = verbs.add_parser("verify", help="check the laws that a model must obey")
     for verb in (about_model, verify):
         verb.add_argument("folder", help="a generated folder, such as generated/articulated_m3_n4")
-    # of this machine
+    # of scenes and of this machine
+    schema = verbs.add_parser("schema", help="the JSON Schema of scene files, for editors")
     cache = verbs.add_parser("cache", help="what the cache of compiled models holds, and where")
     cache.add_argument("--clean", action="store_true", help="empty it")
-    for verb in (plan, simulate, view, about_model, verify, cache):
+    for verb in (plan, simulate, view, about_model, verify, schema, cache):
         text = "print one JSON object on stdout instead of text"
         verb.add_argument("--json", choices=["-"], help=text)
     return root
@@ -134,7 +95,9 @@ def main(argv: list[str] | None = None) -> int:
     arguments = parser().parse_args(argv)
     try:
         refuse_targets(arguments)
-        outcome = run(arguments)
+        with warnings.catch_warnings():
+            warnings.showwarning = tell_warning
+            outcome = run(arguments)
     except SerpentailError as error:
         print(error, file=sys.stderr)
         return 2
@@ -150,6 +113,11 @@ def main(argv: list[str] | None = None) -> int:
         print("serpentail: interrupted; this is what there was until then", file=sys.stderr)
         return INTERRUPTED
     return 0 if outcome.good and all(written) else 1
+
+
+def tell_warning(message: Warning | str, *_: Any, **__: Any) -> None:
+    """Print a warning as a line on stderr."""
+    print(f"serpentail: warning: {message}", file=sys.stderr)
 
 
 def refuse_targets(arguments: argparse.Namespace) -> None:
@@ -205,14 +173,25 @@ def write(arguments: argparse.Namespace, option: str, make: Callable[[str], obje
 def run(arguments: argparse.Namespace) -> Outcome:
     """Return the outcome of a verb."""
     verbs = {"info": informed, "plan": planned, "simulate": simulated, "verify": verified}
-    verbs |= {"cache": cached, "view": viewed}
+    verbs |= {"cache": cached, "view": viewed, "schema": schemed}
     return verbs[arguments.verb](arguments)
 
 
 def informed(arguments: argparse.Namespace) -> Outcome:
     """Return what a model is."""
-    report = info(arguments.folder)
-    return Outcome(report, describe(report), True)
+    from .model.info import described, info
+    from .model.model import load
+
+    model = load(arguments.folder)
+    return Outcome(info(model), described(model), True)
+
+
+def schemed(arguments: argparse.Namespace) -> Outcome:
+    """Return the JSON Schema of scene files, for editors."""
+    from .scenes.schema import scene_schema
+
+    schema = scene_schema()
+    return Outcome(schema, json.dumps(schema, indent=1), True)
 
 
 def planned(arguments: argparse.Namespace) -> Outcome:

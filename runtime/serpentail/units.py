@@ -4,6 +4,7 @@ The generator's `scene/units.py` and the runtime's `units.py` are the same text,
 imports the other; a test compares them.
 """
 
+import math
 import re
 from collections.abc import Sequence
 from fractions import Fraction
@@ -11,8 +12,7 @@ from typing import Any
 
 ONE, KILO = Fraction(1), Fraction(1000)
 CENTI, MILLI, MICRO = (Fraction(1, n) for n in (100, 1000, 10**6))
-PI = Fraction("3.14159265358979323846264338327950288419716939937511")
-DEGREE = PI / 180
+DEGREE = Fraction(math.pi) / 180  # of the double pi, so that 30 deg are math.pi / 6
 # The unit of a field, powers without "^" -> what it measures, and what else may be written there:
 # how much of the field's unit each unit is.
 MEASURES: dict[str, tuple[str, dict[str, Fraction]]] = {
@@ -79,12 +79,15 @@ def choices(unit: str) -> str:
     return f"{', '.join(MEASURES[plain(unit)][1])} or a plain number in {unit}"
 
 
-def pattern(unit: str) -> str:
-    """Return the regular expression of a number with one of the units of a field."""
+def pattern(unit: str, others: str = "{0}") -> str:
+    """Return the regular expression of a number and others, with one of the units of a field.
+
+    others: how many, as regular expressions say it.
+    """
     names = [name.replace(".", "[.]") for name in MEASURES[plain(unit)][1]]
     spelled = "|".join(re.sub("([ms])([12])", r"\1\^?\2", name) for name in names)
     gap = r"\s+" if spelled.startswith("1") else r"\s*"
-    return rf"^\s*{NUMBER}(\s*,\s*{NUMBER})*{gap}({spelled})\s*$"
+    return rf"^\s*{NUMBER}(?:\s*,\s*{NUMBER}){others}{gap}(?:{spelled})\s*$"
 
 
 def _factor(written: str, unit: str) -> Fraction:

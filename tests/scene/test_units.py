@@ -1,5 +1,6 @@
 """Numbers with units mean, to the last bit, what the same numbers in SI units mean."""
 
+import math
 import re
 from decimal import Decimal
 from fractions import Fraction
@@ -47,11 +48,18 @@ def test_a_decimal_shift_rounds_once(written, unit, shift, number):
 @pytest.mark.parametrize(("written", "unit"), [("deg", "rad"), ("deg/s", "rad/s"), ("rad", "deg")])
 @settings(max_examples=100, deadline=None, derandomize=True)
 @given(number=some.decimals(-4000, 4000, places=6))
-def test_an_angle_is_the_double_nearest_to_it(written, unit, number):
+def test_an_angle_in_degrees_is_that_of_the_double_pi_rounded_once(written, unit, number):
     with mp.workdps(60):
-        factor = mp.pi / 180 if unit.startswith("rad") else 180 / mp.pi
+        factor = mpf(math.pi) / 180 if unit.startswith("rad") else 180 / mpf(math.pi)
         nearest = float(mpf(str(number)) * factor)
-    assert in_unit(f"{number} {written}", unit) == nearest
+        exact = mpf(str(number)) * (mp.pi / 180 if unit.startswith("rad") else 180 / mp.pi)
+    found = in_unit(f"{number} {written}", unit)
+    assert found == nearest and abs(found - exact) <= math.ulp(found)
+
+
+@pytest.mark.parametrize("n", [n for n in range(1, 181) if 180 % n == 0])
+def test_a_part_of_half_a_turn_is_that_part_of_pi(n):
+    assert in_unit(f"{180 // n} deg", "rad") == math.pi / n
 
 
 def test_a_speed_of_a_car_is_the_nearest_double_too():
@@ -117,9 +125,10 @@ def test_a_bend_range_is_an_angle(refuse):
 def test_the_pattern_of_a_unit_is_what_its_texts_match():
     for unit, (_, known) in MEASURES.items():
         for name in known:
-            for text in (f"-1.5e-3 {name}", f" .5, 2 {name} "):
-                assert re.match(pattern(unit), text)
-                in_unit(text, unit)
+            assert re.match(pattern(unit), f"-1.5e-3 {name}")
+            assert re.match(pattern(unit, "*"), f" .5, 2 {name} ")
+            assert not re.match(pattern(unit), f"1, 2 {name}") and not re.match(pattern(unit), "1")
+            in_unit([f"-1.5e-3 {name}", f" .5, 2 {name} "], unit)
 
 
 def test_models_of_numbers_with_units_are_the_same_to_the_byte(tmp_path):

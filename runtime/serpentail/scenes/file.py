@@ -4,6 +4,7 @@ import shlex
 import subprocess
 import sys
 from collections.abc import Mapping
+from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from ..errors import ModelError
 from ..model.manifest import read_manifest
 from ..model.model import Model, load
 from ..model.parameters import merged
+from ..units import in_unit
 from .names import checked_name
 from .source import tables_of
 
@@ -62,7 +64,7 @@ def model_of(
         _generate(Path(path), place)
     made = read_manifest(place)["scene"]
     for key in MADE_OF:
-        if key in scene and not _same(scene[key], made.get(key)):
+        if key in scene and not _same(_in_radians(key, scene[key]), made.get(key)):
             raise ModelError(
                 f"{place} has {key} = {made.get(key)!r}, {path} has {shown(scene[key])}: generate "
                 f"it again, `{make_model(path)}`"
@@ -109,3 +111,10 @@ def _same(value: Any, made: Any) -> bool:
     if isinstance(value, list) and isinstance(made, list):
         return all(value.count(x) == made.count(x) for x in (*value, *made))
     return bool(value == made)
+
+
+def _in_radians(key: str, value: Any) -> Any:
+    """Return the value of a key, of an angle as a number where it has a unit."""
+    with suppress(ValueError):  # it is not what the model was made with, then
+        return in_unit(value, "rad") if key == "bend_range" else value
+    return value
