@@ -183,7 +183,7 @@ def test_methods_exist(document, folder):
 def test_verbs_exist(document):
     for span in code(document):
         for verb in re.findall(r"^(?:\.venv/bin/)?serpentail (\w+)", span):
-            folder = [] if verb == "cache" else ["folder"]
+            folder = [] if verb in ("cache", "schema") else ["folder"]
             assert parser().parse_args([verb, *folder]).verb == verb
 
 

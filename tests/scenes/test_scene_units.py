@@ -1,5 +1,6 @@
 """Numbers with units in [simulate], [plan] and changes; magnitudes that are slips of units."""
 
+import re
 from dataclasses import fields
 from math import pi, radians
 from pathlib import Path
@@ -16,6 +17,9 @@ from serpentail.scenes.keys import read
 from serpentail.scenes.plan import CODE_ONLY, plan_arguments
 from serpentail.scenes.plan_keys import BOUNDS, GOAL, PLAN
 from serpentail.scenes.simulate_keys import SIMULATE
+from serpentail.units import MEASURES
+from serpentail_codegen.scene.parse import load_scene
+from tests.support.models import folder_of
 
 SPOKEN = """
 [simulate.reference]
@@ -225,3 +229,26 @@ def test_a_scene_in_grams_millimetres_and_degrees_is_told(scene, capsys):
     for name, words in (("torso_mass", "105.7 g"), ("pitch", "20 deg"), ("height", "300 mm")):
         (line,) = [line for line in lines if name in line]
         assert line.endswith(f'did you mean "{words}"?')
+
+
+# The document.
+
+DOCUMENT = (Path(__file__).parents[2] / "docs" / "scenes.md").read_text(encoding="utf-8")
+
+
+def test_the_document_has_every_unit():
+    rows = DOCUMENT.split("| what | units |")[1].split("\n\n")[0].splitlines()[2:]
+    listed = {unit for row in rows for unit in row.split("|")[2].strip().split(", ")}
+    assert listed == {unit for _, units in MEASURES.values() for unit in units}
+
+
+def test_the_documents_example_is_a_motion(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    text = re.findall(r"^```toml\n(.*?)^```$", DOCUMENT, re.MULTILINE | re.DOTALL)[0]
+    Path("rat.toml").write_text(text)
+    found = st.scenario("rat.toml", folder_of(load_scene("rat.toml")))
+    assert found.duration == 0.6 and found.v0[2] == 3.0 and found.q0[2] == 0.3
+    assert found.controller == st.Damping(1e-3)
+    parameters = found.model.parameters
+    assert parameters["torso_mass"] == 0.1057
+    assert parameters["torso_inertia"] == (6.72e-5, 3.64e-5, 7.28e-5)
