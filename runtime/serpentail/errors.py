@@ -52,4 +52,4 @@ class UnlikeBodies(UserWarning):
 
 
 class UnusualSize(UserWarning):
-    """A mass, length, angle or other number that no animal or robot has: a slip of units?"""
+    """A mass, length, angle or other number that no animal or robot has: mostly a slip of units."""

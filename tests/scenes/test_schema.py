@@ -156,6 +156,12 @@ def test_what_is_missing_is_not_valid(valid, key):
     assert not valid(table)
 
 
+def test_a_wrong_goal_is_told_both_forms():
+    """A word where a table belongs names both."""
+    with pytest.raises(SerpentailError, match=r"needs a table, under .*, or 'upright'$"):
+        plan_arguments(with_value("plan.goal", "upwright")["plan"])
+
+
 def test_editors_show_what_each_parameter_is(printed):
     shown = json.loads(printed)["properties"]["parameters"]["properties"]
     assert set(shown) == {p.name for p in PARAMETERS}

@@ -72,7 +72,7 @@ def _read(value: Any, key: Key, where: str, part: Part) -> Any:
     if isinstance(value, Mapping):
         return _read_table(value, key, where, part)
     if key.is_table and key.each is None:
-        needs = " or ".join([*map(repr, key.words), f"a table, under a line [{where}]"])
+        needs = ", or ".join([f"a table, under a line [{where}]", *map(repr, key.words)])
         part[0].add(part[1], needed(where, value, needs))
     return _read_numbers(value, key, where, part) if key.unit else value
 
