@@ -151,9 +151,9 @@ def fuzz(found: list[Target], count: int, seed: int) -> list[Fault]:
     before = signal.signal(signal.SIGALRM, _too_long)
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter(
-                "ignore", st.UnlikeBodies
-            )  # any other is a fault where warnings are errors
+            # any other is a fault where warnings are errors
+            warnings.simplefilter("ignore", st.UnlikeBodies)
+            warnings.simplefilter("ignore", st.UnusualSize)
             for _ in range(count):
                 target = found[rng.integers(len(found))]
                 fault = tried(target, changed(target, rng))

@@ -104,6 +104,7 @@ def changed(of: Subject, **parameters) -> Subject:
     """Return a subject with other parameters, however unlike."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", st.UnlikeBodies)
+        warnings.simplefilter("ignore", st.UnusualSize)
         model = of.model.with_parameters(**parameters)
     return Subject(f"{of.name} {', '.join(parameters)}", model, exact_of(model))
 

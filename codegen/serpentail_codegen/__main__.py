@@ -2,6 +2,7 @@
 
 import argparse
 import gc
+import json
 import sys
 import time
 from pathlib import Path
@@ -11,6 +12,7 @@ from .scene.naming import suffix
 from .scene.parse import load_scene, parse_scene, scene_for, scene_to_dict
 from .scene.problems import SceneError
 from .scene.scene import KINDS, Scene
+from .scene.schema import scene_schema
 from .scene.signatures.table import ALL
 from .stamp import is_made, key_of, note
 
@@ -38,6 +40,7 @@ def parser() -> argparse.ArgumentParser:
     )
     p.add_argument("--progress", type=Path, help="keep in this file how far it is")
     p.add_argument("--print-folder", action="store_true", help="only tell which folder it is")
+    p.add_argument("--schema", action="store_true", help="only print the JSON Schema of scenes")
     return p
 
 
@@ -79,6 +82,9 @@ def main(argv: list[str] | None = None) -> int:
     """Generate what is not made yet; return the exit status."""
     try:
         arguments = parser().parse_args(argv)
+        if arguments.schema:
+            print(json.dumps(scene_schema()))
+            return 0
         scene = scene_of(arguments)
     except SceneError as error:
         print(error, file=sys.stderr)

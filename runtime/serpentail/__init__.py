@@ -43,6 +43,7 @@ _HOME = {
             "NotWritten",
             "ViewError",
             "UnlikeBodies",
+            "UnusualSize",
         ],
         "errors",
     ),

@@ -2,21 +2,53 @@
 error, which names the field, the value and what the field needs.
 """
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from difflib import get_close_matches
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from .errors import StateError
+from .errors import SerpentailError, StateError
 
 Error = type[Exception]
+T = TypeVar("T")
+
+
+class Refusals:
+    """What is refused of a table, part by part, so that all of it is told at once."""
+
+    def __init__(self, error: Error) -> None:
+        self.error, self.lines = error, dict[str, list[str]]()
+
+    def add(self, part: str, line: str) -> None:
+        """Note what is wrong with a part."""
+        self.lines.setdefault(part, []).append(line)
+
+    def attempt(self, part: str, make: Callable[..., T], *arguments: Any) -> T | None:
+        """Return what is made; None where a part was refused before, or is refused now."""
+        if part in self.lines:
+            return None
+        try:
+            return make(*arguments)
+        except SerpentailError as error:
+            self.add(part, str(error))
+            return None
+
+    def tell(self) -> None:
+        """Raise the error about all that was refused, a line for each."""
+        if self.lines:
+            raise self.error("\n".join(line for lines in self.lines.values() for line in lines))
 
 
 def refusal(field: str, value: object, needs: str, error: Error) -> Exception:
     """Return the error about a value that a field cannot have."""
-    return error(f"{field}: value {shown(value)}: needs {needs}")
+    return error(needed(field, value, needs))
+
+
+def needed(field: str, value: object, needs: str) -> str:
+    """Return a line about a value that a field cannot have."""
+    return f"{field}: value {shown(value)}: needs {needs}"
 
 
 def shown(value: object) -> str:
@@ -132,10 +164,18 @@ def _words(noun: str, bounds: Bounds) -> str:
 
 def one_of(field: str, value: object, names: Collection[str], error: Error) -> str:
     """Return a value that is one of the names; the error has the nearest one."""
+    line = none_of(field, value, names)
+    if line:
+        raise error(line)
+    return str(value)
+
+
+def none_of(field: str, value: object, names: Collection[str]) -> str:
+    """Return a line about a value that is none of the names, with the nearest; else ""."""
     if isinstance(value, str) and value in names:
-        return value
+        return ""
     remedy = did_you_mean(value, names) or f"needs {' or '.join(map(repr, names))}"
-    raise error(f"{field}: value {shown(value)}: {remedy}")
+    return f"{field}: value {shown(value)}: {remedy}"
 
 
 def did_you_mean(value: object, names: Collection[str]) -> str:

@@ -3,7 +3,9 @@
 import argparse
 import json
 import sys
+import warnings
 from importlib import import_module
+from typing import Any
 
 from .commands.arguments import parser
 from .commands.files import refuse_targets, write
@@ -13,7 +15,7 @@ from .stages import progress
 
 INTERRUPTED = 130  # status of a command that Ctrl-C ended: 128 and the signal's number
 ROOMS = {  # modules of `commands`, each with a function of the name of each verb
-    "scenes": ("examples", "new", "generate", "completion"),
+    "scenes": ("examples", "new", "generate", "schema", "completion"),
     "motions": ("simulate", "plan", "view"),
     "models": ("info", "verify", "cache"),
 }
@@ -26,7 +28,8 @@ def main(argv: list[str] | None = None) -> int:
     arguments = arguments_of(argv)
     try:
         refuse_targets(arguments)
-        with progress():
+        with progress(), warnings.catch_warnings():
+            warnings.showwarning = tell_warning
             outcome = run(arguments)
     except SerpentailError as error:
         print(error, file=sys.stderr)
@@ -48,6 +51,11 @@ def arguments_of(argv: list[str] | None) -> argparse.Namespace:
         root.error(f"unrecognized arguments: {' '.join(words)}")
     arguments.words = words
     return arguments
+
+
+def tell_warning(message: Warning | str, *_: Any, **__: Any) -> None:
+    """Print a warning as a line on stderr."""
+    print(f"serpentail: warning: {message}", file=sys.stderr)
 
 
 def run(arguments: argparse.Namespace) -> Outcome | int:

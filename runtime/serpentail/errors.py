@@ -49,3 +49,7 @@ class ViewError(SerpentailError, ValueError):
 
 class UnlikeBodies(UserWarning):
     """Torso and tail are so unlike in size that moments cancel in H, which loses digits."""
+
+
+class UnusualSize(UserWarning):
+    """A mass, length, angle or other number that no animal or robot has: mostly a slip of units."""

@@ -39,6 +39,7 @@ def answer(function: Callable, *arguments, refusals=REFUSALS, **more):
     try:
         with in_time(), warnings.catch_warnings():
             warnings.simplefilter("ignore", st.UnlikeBodies)
+            warnings.simplefilter("ignore", st.UnusualSize)
             found = function(*arguments, **more)
     except refusals as refusal:
         assert str(refusal).strip(), f"{type(refusal).__name__} says nothing"

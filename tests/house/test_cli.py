@@ -3,6 +3,7 @@ was.
 """
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -11,7 +12,10 @@ import pytest
 
 from serpentail import cli
 from serpentail.verification import report as verify
+from serpentail_codegen.scene.signatures.table import SIGNATURES
 from tests.support.models import model_folder
+
+MADE = ("mass_matrix", "forward_dynamics", "energy")  # in their order; a rollout calls one
 
 
 @pytest.fixture(scope="module")
@@ -41,13 +45,34 @@ def refused(capsys, *arguments):
 
 def test_info_is_a_table(run, folder):
     status, out, err = run("info", folder)
-    head, *rows = out.splitlines()
+    head, *lines = out.splitlines()
     assert (status, err) == (0, "")
     assert head == "tail: 1 segments x 1 links, nq 9, nv 8, double"
-    assert [row.split()[0] for row in rows] == ["mass_matrix", "forward_dynamics", "energy"]
+    rows = [line for line in lines if not line.startswith("    ")]
+    assert [row.split()[0] for row in rows] == [*MADE]
     for row in rows:
         _, emission, operations, word = row.split()
         assert emission == "straight" and int(operations) > 10 and word == "operations"
+    assert len({line.index(" operations") for line in rows}) == 1
+
+
+def test_info_has_arguments_with_shapes_and_units_in_columns(run, folder):
+    _, out, _ = run("info", folder)
+    lines = [line for line in out.splitlines() if line.startswith("    ")]
+    words = [re.split("  +", line.strip()) for line in lines]
+    assert ["out H", "8 x 8", str(SIGNATURES["mass_matrix"].outputs[0].meaning)] in words
+    assert ["in", "q", "9", SIGNATURES["energy"].inputs[0].meaning] in words
+    # each last column begins where the others do
+    assert len({line.index(last) for line, (*_, last) in zip(lines, words, strict=True)}) == 1
+    ports = (p for n in MADE for p in (*SIGNATURES[n].inputs, *SIGNATURES[n].outputs))
+    assert [last for *_, last in words] == [port.meaning for port in ports]
+
+
+def test_no_column_of_info_is_glued_to_the_next(run):
+    """The longest name, a form's name and a large number, with spaces in between."""
+    place = model_folder(3, 4, functions=["forward_dynamics_derivatives"])
+    _, out, _ = run("info", str(place))
+    assert re.search(r"^  forward_dynamics_derivatives  \w+ +\d+ operations$", out, re.MULTILINE)
 
 
 def test_info_as_json(run, folder):

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.model.parameters import UNLIKE as UNLIKE_FROM
-from serpentail.model.parameters import disparity
+from serpentail.model.sizes import UNLIKE as UNLIKE_FROM
+from serpentail.model.sizes import disparity
 from stress import call_fuzz, drops, scene_fuzz, stress_plots
 from stress.call_fuzz import Fault, Target
 from stress.figures import Figure, table
@@ -118,6 +118,7 @@ UNLIKE = {
 }
 
 
+@pytest.mark.filterwarnings("ignore::serpentail.errors.UnusualSize")
 @pytest.mark.parametrize("change", UNLIKE.values(), ids=UNLIKE)
 def test_bodies_of_unlike_size_are_told(lying, change):
     with pytest.warns(

@@ -13,7 +13,7 @@ from hypothesis import strategies as some
 import serpentail as st
 from serpentail.planning import planner
 from serpentail.planning.nlp.rules import collocation_rule
-from serpentail.scenes import plan, simulate
+from serpentail.scenes import plan, plan_keys, simulate, simulate_keys
 from serpentail_codegen.scene.parse import parse_scene
 from serpentail_codegen.scene.problems import SceneError
 from serpentail_codegen.scene.scene import KEYS, NAMES
@@ -112,8 +112,8 @@ def test_the_generator_takes_or_refuses_any_table(table):
 
 
 @many
-@given(anything(SIMULATE, simulate.KEYS))
-@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+@given(anything(SIMULATE, simulate_keys.SIMULATE.keys))
+@pytest.mark.filterwarnings("ignore::RuntimeWarning", "ignore::serpentail.errors.UnusualSize")
 def test_the_runtime_takes_or_refuses_any_motion(table):
     if isinstance(table.get("start"), dict):
         table["start"].pop("settle", None)  # which takes as long as it takes
@@ -124,7 +124,8 @@ def test_the_runtime_takes_or_refuses_any_motion(table):
 
 
 @many
-@given(anything(PLAN, plan.KEYS))
+@pytest.mark.filterwarnings("ignore::serpentail.errors.UnusualSize")
+@given(anything(PLAN, plan_keys.PLAN.keys))
 def test_the_runtime_takes_or_refuses_any_plan(table):
     try:
         arguments = plan.plan_arguments(table)

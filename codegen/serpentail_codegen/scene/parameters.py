@@ -1,7 +1,7 @@
 """The physical parameters of a model: what each is, its default and its rule."""
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import pi
 from typing import Any
 
@@ -11,20 +11,22 @@ Value = float | tuple[float, ...]
 
 @dataclass(frozen=True)
 class Rule:
-    """What a value must fulfil: in words that complete "needs ...", and as a test."""
+    """What a value must fulfil: in words that complete "needs ...", as a test, as JSON Schema."""
 
     text: str
     holds: Callable[[Any], bool]
+    schema: Mapping[str, Any] = field(default_factory=dict, compare=False)
 
 
 ANY = Rule("", lambda _: True)
 # Rules for the numbers of a parameter; 1e-12 lets a flat body, with equal sums, pass in spite of
 # rounding.
-POSITIVE = Rule(" above 0", lambda x: min(x) > 0)
-NOT_NEGATIVE = Rule(", 0 or above", lambda x: min(x) >= 0)
+POSITIVE = Rule(" above 0", lambda x: min(x) > 0, {"exclusiveMinimum": 0})
+NOT_NEGATIVE = Rule(", 0 or above", lambda x: min(x) >= 0, {"minimum": 0})
 BODY_INERTIA = Rule(
     " above 0, none above the sum of the other two",
     lambda x: min(x) > 0 and 2 * max(x) <= sum(x) * (1 + 1e-12),
+    {"exclusiveMinimum": 0},
 )
 
 

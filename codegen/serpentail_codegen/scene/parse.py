@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Collection, Mapping
+from contextlib import suppress
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,7 @@ from .resolve import resolve_parameters
 from .scene import CONTACTS, GROUPS, KEYS, MOST_LINKS, ONLY, TARGETS, Only, Scene
 from .signatures.table import ALL, DEFAULT, DEFAULT_ON_GROUND, DERIVATIVES, NEEDS
 from .source import tables_of
+from .units import in_unit
 
 
 def load_scene(path: str | Path) -> Scene:
@@ -51,6 +53,8 @@ def parse_scene(table: Mapping[str, Any], name: str) -> Scene:
     values = _with_defaults(table, name, rules)
     contacts = tuple(values["contacts"]) if CONTACTS.holds(values["contacts"]) else ()
     values["functions"] = _chosen_functions(table, values["coordinates"], contacts)
+    with suppress(ValueError):  # the rule for the key refuses a text
+        values["bend_range"] = in_unit(values["bend_range"], "rad")
 
     # everything that is wrong with keys and functions
     problems = unknown_keys(table, "", KEYS) + key_problems(values) + kind_problems(table, rules)

@@ -8,6 +8,7 @@ from .checks import fits, number_problem, unknown_keys
 from .parameters import PARAMETERS, Parameter, Parameters, Value
 from .problems import Problem, SceneError
 from .scene import NAMES, ONLY
+from .units import in_unit
 
 
 def parameters_of(kind: str, contacts: Collection[str] = ()) -> tuple[Parameter, ...]:
@@ -31,15 +32,22 @@ def resolve_parameters(
     if "link_inertia" in named and "link_radius" in named:
         remedy = "given together with link_radius, which it overrides; remove one of the two"
         problems.append(Problem("parameters.link_inertia", named["link_inertia"], remedy))
-    wrong = [p for p in PARAMETERS if p.name in named and not fits(p, named[p.name])]
-    problems += [number_problem(p, named[p.name]) for p in wrong]
+    given = {}
+    for p in [p for p in PARAMETERS if p.name in named]:
+        try:
+            given[p.name] = in_unit(named[p.name], p.unit)
+        except ValueError as error:
+            problems.append(Problem(f"parameters.{p.name}", named[p.name], str(error)))
+            continue
+        if not fits(p, given[p.name]):
+            problems.append(number_problem(p, named[p.name]))
     if problems:
         raise SceneError(problems)
 
     # defaults for what is not named; the link's inertia follows from its radius, or replaces it
     unused = "link_radius" if "link_inertia" in named else "link_inertia"
     values = {p.name: p.default for p in parameters_of(kind, contacts) if p.name != unused}
-    resolved = {name: _floats(value) for name, value in (values | dict(named)).items()}
+    resolved = {name: _floats(value) for name, value in (values | given).items()}
     if "link_radius" in resolved:
         resolved["link_inertia"] = _ellipsoid_inertia(resolved, tail_links)
     return Parameters(tuple((name, resolved[name]) for name in NAMES if name in resolved))

@@ -28,7 +28,13 @@ MOST_STRAIGHT = (20, 100)  # segments, and pieces in all, of straight lines
 def _one_of(names: Sequence[str], remark: str = "") -> Rule:
     """Return the rule that a value is one of these names."""
     text = " or ".join(f'"{name}"' for name in names)
-    return Rule(text + remark, lambda x: isinstance(x, str) and x in names)
+    schema = {"enum": list(names)}
+    return Rule(text + remark, lambda x: isinstance(x, str) and x in names, schema)
+
+
+def _names(names: Sequence[str], **more: Any) -> dict[str, Any]:
+    """Return the JSON Schema of an array of different names."""
+    return {"type": "array", "items": {"enum": list(names)}, "uniqueItems": True} | more
 
 
 def is_whole(x: object) -> bool:
@@ -36,9 +42,13 @@ def is_whole(x: object) -> bool:
     return isinstance(x, int) and not isinstance(x, bool)
 
 
-FLAG = Rule("true or false, without quotes", lambda x: isinstance(x, bool))
-COUNT = Rule("a whole number, 1 or above", lambda x: is_whole(x) and x >= 1)
-TEXT = Rule('a text, in "quotes"', lambda x: isinstance(x, str))
+FLAG = Rule("true or false, without quotes", lambda x: isinstance(x, bool), {"type": "boolean"})
+COUNT = Rule(
+    "a whole number, 1 or above",
+    lambda x: is_whole(x) and x >= 1,
+    {"type": "integer", "minimum": 1},
+)
+TEXT = Rule('a text, in "quotes"', lambda x: isinstance(x, str), {"type": "string"})
 # the prefix of C symbols, a file's and a folder's name
 NAME = Rule(
     "a text of up to 63 of a-z, 0-9 and _, a letter first, that names no C header: rename the "
@@ -47,14 +57,21 @@ NAME = Rule(
         isinstance(x, str)
         and re.fullmatch(f"(?!({C_HEADERS})$)[a-z][a-z0-9_]{{0,62}}", x) is not None
     ),
+    {
+        "type": "string",
+        "pattern": "^[a-z][a-z0-9_]{0,62}$",
+        "not": {"enum": C_HEADERS.split("|")},
+    },
 )
 BEND = Rule(
-    "a number of radians above 0 and up to 100",
+    'an angle above 0 and up to 100 rad, such as "360 deg" or a plain number in rad',
     lambda x: not isinstance(x, bool) and isinstance(x, int | float) and 0 < x <= 100,
+    {"exclusiveMinimum": 0, "maximum": 100},
 )
 CONTACTS = Rule(
     'an array of different names out of "feet", "tail" and "torso", such as ["feet"]',
     lambda x: isinstance(x, list | tuple) and all(n in GROUPS and x.count(n) == 1 for n in x),
+    _names(GROUPS),
 )
 TARGET_NAMES = Rule(
     'an array of different names out of "c" and "casadi", at least one, such as ["c"]',
@@ -63,12 +80,14 @@ TARGET_NAMES = Rule(
         and len(x) > 0
         and all(n in TARGETS and x.count(n) == 1 for n in x)
     ),
+    _names(TARGETS, minItems=1),
 )
 
 
 def _table(name: str) -> Rule:
     """Return the rule that a value is a table."""
-    return Rule(f"a table, under a line [{name}]", lambda x: isinstance(x, Mapping))
+    text = f"a table, under a line [{name}]"
+    return Rule(text, lambda x: isinstance(x, Mapping), {"type": "object"})
 
 
 @dataclass(frozen=True)

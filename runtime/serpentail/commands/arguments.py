@@ -39,6 +39,7 @@ def _of_scenes(verbs: argparse._SubParsersAction) -> None:
         choices=["feet", "tail", "torso"],
         help="what can touch the ground; without it the animal flies",
     )
+    verbs.add_parser("schema", help="print the JSON Schema of scene files, for editors")
     verbs.add_parser(
         "generate",
         help="write the C and CasADi of a scene to generated/: see generate --help",

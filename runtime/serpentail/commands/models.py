@@ -2,7 +2,7 @@
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from .outcome import Outcome, rows
 
@@ -12,8 +12,11 @@ if TYPE_CHECKING:
 
 def info(arguments: argparse.Namespace) -> Outcome:
     """Return what a model is."""
-    report = described(model_of(arguments.model))
-    return Outcome(report, as_text(report))
+    from ..model.info import described
+    from ..model.info import info as report
+
+    model = model_of(arguments.model)
+    return Outcome(report(model), described(model))
 
 
 def model_of(place: str) -> "Model":
@@ -24,45 +27,6 @@ def model_of(place: str) -> "Model":
 
     scene = Path(place).suffix == ".toml" or (place in examples() and not Path(place).exists())
     return build(place) if scene else load(place)
-
-
-def described(model: "Model") -> dict[str, Any]:
-    """Return what a model is: sizes, functions, how each was emitted, what it costs."""
-    from ..model.parameters import json_ready
-
-    functions = {}
-    for name, entry in model.manifest["functions"].items():
-        functions[name] = {
-            "inputs": {port["name"]: port["shape"] for port in entry["inputs"]},
-            "outputs": {port["name"]: port["shape"] for port in entry["outputs"]},
-            "emission": entry["emission"],
-            "operations": entry["operations"],
-        }
-    return {
-        "name": model.name,
-        "real": model.manifest["real"],
-        "kind": model.kind,
-        "segments": model.segments,
-        "links": model.links,
-        "samples": model.samples,
-        "nq": model.nq,
-        "nv": model.nv,
-        "parameters": json_ready(model.parameters),
-        "functions": functions,
-    }
-
-
-def as_text(report: dict[str, Any]) -> str:
-    """Return an info report as text."""
-    shape = "{segments} continuum segments"
-    if report["links"]:
-        shape = "{segments} segments x {links} links"
-    head = ("{name}: " + shape + ", nq {nq}, nv {nv}, {real}").format(**report)
-    lines = [
-        f"  {name:<28}{entry['emission']:<10}{entry['operations']:>8} operations"
-        for name, entry in report["functions"].items()
-    ]
-    return "\n".join([head, *lines])
 
 
 def verify(arguments: argparse.Namespace) -> Outcome:

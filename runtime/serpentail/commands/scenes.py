@@ -1,6 +1,7 @@
 """The verbs about scene files: which there are, a new one, the C of one."""
 
 import argparse
+import json
 import subprocess
 from pathlib import Path
 
@@ -45,6 +46,14 @@ def generate(arguments: argparse.Namespace) -> int:
     names = examples()
     words = [str(scene_path(word)) if word in names else word for word in arguments.words]
     return subprocess.run([*command(), *words], check=False).returncode
+
+
+def schema(arguments: argparse.Namespace) -> Outcome:
+    """Return the JSON Schema of scene files, for editors."""
+    from ..scenes.schema import scene_schema
+
+    found = scene_schema()
+    return Outcome(found, json.dumps(found, indent=1))
 
 
 def completion(arguments: argparse.Namespace) -> Outcome:

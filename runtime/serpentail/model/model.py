@@ -28,8 +28,8 @@ from .parameters import (
     merged,
     real_type,
     resolve,
-    warn_of_unlike,
 )
+from .sizes import warn_of_sizes
 from .snapshot import restored, snapshot
 
 if TYPE_CHECKING:
@@ -45,14 +45,15 @@ def load(
 ) -> "Model":
     """Return the model of a generated folder, its C compiled (or taken from the cache) and loaded.
 
-    parameters: name -> number or 3 numbers, SI; override the scene's, without recompiling.
+    parameters: name -> number or 3 numbers, in SI or with units, such as "3.5 g"; override the
+    scene's, without recompiling.
     profile: "fast" (this CPU, FMA) or "reproducible" (same bits everywhere); None: the scene's.
     compiled: False needs no C compiler; then only ``model.casadi`` evaluates.
     threads: most that its batches and many runs use; None: $SERPENTAIL_THREADS, else one a core
     that this process may use, one in workers of process pools.
     Raises ModelError (folder missing, stale or changed; parameter unknown or unphysical),
-    CompilerNotFound, CompileFailed.  Warns UnlikeBodies where torso and tail are so unlike in size
-    that H loses digits.
+    CompilerNotFound, CompileFailed.  Warns UnusualSize of what no animal or robot has, UnlikeBodies
+    where torso and tail are so unlike in size that H loses digits.
     """
     try:
         folder = Path(folder)
@@ -73,7 +74,7 @@ def model_from(
     """Return the model of a folder that was checked, as ``load`` does."""
     manifest = checked.manifest
     values = resolve(manifest, parameters)
-    warn_of_unlike(values, 3)  # who calls st.load
+    warn_of_sizes(manifest, values, 3)  # who calls st.load
     profile = manifest["scene"]["profile"] if profile is None else profile
     if not isinstance(compiled, bool | np.bool_):
         raise ModelError(f"compiled: value {compiled!r:.60}: needs True or False")
@@ -156,7 +157,7 @@ class Model(Functions):
     def with_parameters(self, **changes: ArrayLike) -> "Model":
         """Return this model with other parameters; nothing is compiled.  Warns as ``load`` does."""
         values = resolve(self.manifest, merged(self._independent(), changes))
-        warn_of_unlike(values)
+        warn_of_sizes(self.manifest, values)
         return self._twin(values)
 
     def _twin(self, parameters: Mapping[str, Any]) -> "Model":
@@ -175,7 +176,7 @@ class Model(Functions):
             vectors = np.broadcast_to(self.parameter_vector, (runs, len(self.parameter_vector)))
             return RunParameters({}, self.parameters, vectors)
         parameters = RunParameters.checked(self.manifest, self._independent(), changes, runs)
-        warn_of_unlike(parameters.values, 4)  # who calls st.simulate
+        warn_of_sizes(self.manifest, parameters.values, 4)  # who calls st.simulate
         return parameters
 
     def _independent(self) -> dict[str, Value]:

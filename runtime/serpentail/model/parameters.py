@@ -1,6 +1,5 @@
 """Parameters of a model or of each of many runs: defaults, and a caller's checked changes."""
 
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -9,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from ..checks import did_you_mean, numbers_in, shown
-from ..errors import ModelError, UnlikeBodies
+from ..errors import ModelError
+from ..units import in_unit
 
 Value = float | tuple[float, ...]
 Values = Mapping[str, Any]  # name -> number or 3 numbers, SI; of many runs (k,) or (k, 3)
@@ -22,7 +22,6 @@ CHECKS = {  # of rows (K, size), for each one
         "above 0, none above the sum of the other two",
     ),
 }
-UNLIKE = 1e4  # from here on H may be off by 1e-12 of its diagonal: docs/stability.md
 
 
 def resolve(manifest: dict, changes: Mapping[str, object] | None) -> MappingProxyType[str, Value]:
@@ -145,31 +144,6 @@ def ellipsoid(values: Values, links: int) -> tuple[Any, Any, Any]:
     return across, along, across
 
 
-def disparity(values: Values) -> float:
-    """Return how unlike torso and tail are, of many runs the largest.
-
-    That is the larger of m (|b2t| + L)^2 / min I_b, moments of inertia that cancel in H over what
-    is left, and of |b2t| / L, m and L being the tail's mass and length.
-    """
-    mass, length = np.asarray(values["tail_mass"]), np.asarray(values["tail_length"])
-    with np.errstate(all="ignore"):
-        mount = np.linalg.norm(values["tail_mount"], axis=-1)
-        torso = np.min(values["torso_inertia"], axis=-1)
-        moments = mass * (mount + length) ** 2 / torso
-        return float(np.max(np.maximum(moments, mount / length)))
-
-
-def warn_of_unlike(values: Values, calls: int = 2) -> None:
-    """Warn who called so many calls above where H loses digits by bodies of unlike size."""
-    ratio = disparity(values)
-    if ratio > UNLIKE:
-        sizes = "tail_mass, tail_length, tail_mount, torso_inertia"
-        words = (
-            f"torso and tail are unlike by {ratio:.1e} ({sizes}): H may be off by as many roundings"
-        )
-        warnings.warn(f"{words}; are the units kg and m?", UnlikeBodies, stacklevel=calls + 1)
-
-
 def flat(manifest: dict, values: Mapping[str, Value]) -> list[float]:
     """Return the scalars of the C parameter struct in order."""
     scalars: list[float] = []
@@ -192,7 +166,10 @@ def _checked(fields: dict, name: str, value: object, runs: int | None) -> np.nda
     needs, shape = f"needs {kind} ({unit}), {words}", (size,) if size > 1 else ()
     if runs is not None:
         needs, shape = f"{needs}, for each of {runs} runs", (runs, *shape)
-    numbers = numbers_in(value)
+    try:
+        numbers = numbers_in(in_unit(value, unit))
+    except ValueError as error:
+        return f"{name}: value {shown(value)}: {error}"
     if numbers is None or numbers.shape != shape:
         return f"{name}: value {shown(value)}: {needs}"
     # the first run of which it does not hold

@@ -7,17 +7,18 @@ import time
 from dataclasses import fields
 from typing import Any
 
-from ..checks import one_of
+from ..checks import Refusals, none_of
 from ..errors import PlanningError
 from ..model.model import Model
 from .nlp.fork_gate import forks_wait
 from .nlp.interrupt import stoppable
 from .nlp.node import equations_of_motion
 from .nlp.rules import collocation_rule
-from .problem import PROBLEM_SETTINGS, Bounds, Goal, PlanningProblem, checked_problem
+from .problem import SETTINGS as PROBLEM_SETTINGS
+from .problem import Bounds, Goal, PlanningProblem, checked_problem
 from .result.plan import Plan
 from .rounds import Search
-from .settings import PlanSettings, checked_settings
+from .settings import PlanSettings, check_settings
 
 NEEDED = ("mass_matrix", "inverse_dynamics", "rollout")  # functions of the model
 
@@ -26,7 +27,7 @@ def plan(
     model: Model,
     *,
     start: Any,
-    goal: Goal | None = None,
+    goal: Goal | str | None = None,
     duration: float | tuple[float, float],
     bounds: Bounds | None = None,
     **settings: Any,
@@ -34,7 +35,7 @@ def plan(
     """Plan a motion of the tail by direct collocation (Sect. 3), and tell what its torques do.
 
     start: (q0 (nq,), v0 (nv,)).
-    goal: a Goal; by default upright, the torso at rest.
+    goal: a Goal, or "upright", which it is by default: the torso upright and at rest.
     duration: s, or (least, most) where it is free.
     bounds: a Bounds; by default |tau| <= 0.02 N m.
 
@@ -83,14 +84,25 @@ def plan(
 def _checked(
     model: Model, task: tuple, settings: dict[str, Any]
 ) -> tuple[PlanningProblem, PlanSettings]:
-    """Return the problem, of (start, goal, duration, bounds), and the settings of its search."""
+    """Return the problem, of (start, goal, duration, bounds), and the settings of its search.
+
+    PlanningError has a line for each thing that is wrong.
+    """
+    refused = Refusals(PlanningError)
     names = (*PROBLEM_SETTINGS, *(entry.name for entry in fields(PlanSettings)))
     for name in settings:
-        one_of("setting", name, names, PlanningError)
+        unknown = none_of("setting", name, names)
+        if unknown:
+            refused.add(name, unknown)
+    known = {name: value for name, value in settings.items() if name in names}
+    of_problem = {name: value for name, value in known.items() if name in PROBLEM_SETTINGS}
+    of_search = {name: value for name, value in known.items() if name not in PROBLEM_SETTINGS}
     start, goal, duration, bounds = task
     goal = Goal() if goal is None else goal
     bounds = Bounds() if bounds is None else bounds
-    of_problem = {name: value for name, value in settings.items() if name in PROBLEM_SETTINGS}
-    of_search = {name: value for name, value in settings.items() if name not in PROBLEM_SETTINGS}
-    problem = checked_problem(model, start, goal, duration, bounds, **of_problem)
-    return problem, checked_settings(model, **of_search)
+    search = PlanSettings(**of_search)
+    check_settings(model, search, refused)
+    problem = checked_problem(model, (start, goal, duration, bounds), of_problem, refused)
+    refused.tell()
+    assert problem is not None  # all has been told
+    return problem, search

@@ -1,13 +1,13 @@
 """What a user asks of a plan, checked field by field before anything is derived."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, fields
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from ..checks import number, numbers, numbers_in, one_of, refusal, shown
+from ..checks import Refusals, number, numbers, numbers_in, one_of, refusal, shown
 from ..errors import PlanningError
 from ..model.layout import QUATERNION, TAIL_Q, TAIL_V
 from ..model.model import Model
@@ -37,6 +37,9 @@ class Goal:
     tail: Any = None
     tail_rate: Any = None
     turns: Any = None
+
+
+GOALS = {"upright": Goal()}  # by name
 
 
 @dataclass(frozen=True)
@@ -73,32 +76,34 @@ class PlanningProblem:
     attitude: str = "quaternion"
 
 
-PROBLEM_SETTINGS = ("objective", "smoothing", "damping", "path", "formulation", "attitude")
-
-
 def checked_problem(
-    model: Model, start: Any, goal: Any, duration: Any, bounds: Any, **settings: Any
-) -> PlanningProblem:
-    """Return the problem; PlanningError names the first wrong field, its value and the remedy."""
-    # start and goal, and whether the bounds allow them
-    q0, v0 = _start(model, start)
-    tail = model.layout.nt
-    goal, bounds = _goal(goal, tail), _bounds(bounds, tail)
-    _start_inside(q0[TAIL_Q], bounds.angle, "angle", "rad")
-    _start_inside(v0[TAIL_V], bounds.rate, "rate", "rad/s")
-    _goal_inside("tail", goal.tail, bounds.angle)
-    _goal_inside("tail_rate", goal.tail_rate, bounds.rate)
+    model: Model, task: tuple[Any, Any, Any, Any], settings: dict[str, Any], refused: Refusals
+) -> PlanningProblem | None:
+    """Return the problem of (start, goal, duration, bounds) and settings; None where it is none.
 
-    # settings, those that are names last
-    checks: dict[str, Callable[[Any], Any]] = {"objective": _objective, "path": _path}
-    for name in ("smoothing", "damping"):
-        checks[name] = partial(number, name, error=PlanningError, least=0, most=HUGE)
-    checked = {
-        name: checks[name](value) if name in checks else value for name, value in settings.items()
+    Notes each field that is wrong, its value and the remedy.
+    """
+    # start, goal and bounds, and whether these allow the others
+    attempt, tail = refused.attempt, model.layout.nt
+    start, goal = attempt("start", _start, model, task[0]), attempt("goal", _goal, task[1], tail)
+    duration, bounds = (
+        attempt("duration", _duration, task[2]),
+        attempt("bounds", _bounds, task[3], tail),
+    )
+    if start is not None and bounds is not None:
+        attempt("bounds.angle", _start_inside, start[0][TAIL_Q], bounds.angle, "angle", "rad")
+        attempt("bounds.rate", _start_inside, start[1][TAIL_V], bounds.rate, "rate", "rad/s")
+    if goal is not None and bounds is not None:
+        attempt("goal.tail", _goal_inside, "tail", goal.tail, bounds.angle)
+        attempt("goal.tail_rate", _goal_inside, "tail_rate", goal.tail_rate, bounds.rate)
+
+    # settings
+    checked: dict[str, Any] = {
+        name: attempt(name, SETTINGS[name], value) for name, value in settings.items()
     }
-    one_of("formulation", settings.get("formulation", "airborne"), FORMULATIONS, PlanningError)
-    one_of("attitude", settings.get("attitude", "quaternion"), KINDS, PlanningError)
-    return PlanningProblem(q0, v0, goal, _duration(duration), bounds, **checked)
+    if refused.lines or start is None or goal is None or duration is None or bounds is None:
+        return None
+    return PlanningProblem(*start, goal, duration, bounds, **checked)
 
 
 def _vector(field: str, value: Any, size: int) -> np.ndarray:
@@ -128,6 +133,8 @@ def _start(model: Model, start: Any) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _goal(goal: Any, tail: int) -> Goal:
+    if isinstance(goal, str):
+        goal = GOALS[one_of("goal", goal, GOALS, PlanningError)]
     if not isinstance(goal, Goal):
         raise PlanningError(f"goal: value {shown(goal)}: needs a serpentail.Goal")
     attitude = goal.attitude
@@ -243,3 +250,23 @@ def _path(path: Sequence[Any]) -> tuple[PathConstraint, ...]:
             raise PlanningError(f"path[{k}]: bounds ({least}, {most}): needs least <= most")
         constraints.append((row[0], least, most))
     return tuple(constraints)
+
+
+def _work(name: str) -> Callable[[Any], float]:
+    """Return the check of a damping."""
+    return partial(number, name, error=PlanningError, least=0, most=HUGE)
+
+
+def _name(field: str, names: Collection[str]) -> Callable[[Any], str]:
+    """Return the check of one of the names."""
+    return partial(one_of, field, names=names, error=PlanningError)
+
+
+SETTINGS: dict[str, Callable[[Any], Any]] = {  # of the problem, and their checks
+    "objective": _objective,
+    "smoothing": _work("smoothing"),
+    "damping": _work("damping"),
+    "path": _path,
+    "formulation": _name("formulation", FORMULATIONS),
+    "attitude": _name("attitude", KINDS),
+}

@@ -1,13 +1,16 @@
 """How to search for a plan: the settings of rule, mesh, solver and guesses, and their checks."""
 
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from ..checks import number, one_of, refusal, shown
+from ..checks import Refusals, needed, number, one_of, refusal, shown
 from ..errors import PlanningError
+from ..model.model import Model
 from ..motion.trajectory import Trajectory
+from .nlp.rules import collocation_rule
 from .problem import HUGE
 
 WHOLE_NUMBERS = {  # least and most of each; beyond the most a search would not end
@@ -18,6 +21,7 @@ WHOLE_NUMBERS = {  # least and most of each; beyond the most a search would not 
     "retries": (0, 10_000),
     "seed": (0, 2**63 - 1),
 }
+DYNAMICS = ("auto", "compiled", "symbolic")
 
 
 @dataclass(frozen=True)
@@ -42,31 +46,38 @@ class PlanSettings:
     track: bool = True
 
 
-def checked_settings(model, **settings) -> PlanSettings:
-    """Return the settings; PlanningError names the first that is wrong, and the remedy."""
-    checked = PlanSettings(**settings)
-    for name, (least, most) in WHOLE_NUMBERS.items():
-        value = getattr(checked, name)
-        whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
-        if not whole or not least <= value <= most:
-            raise refusal(name, value, f"a whole number from {least} to {most}", PlanningError)
+def check_settings(model: Model, settings: PlanSettings, refused: Refusals) -> None:
+    """Note each setting that is wrong, with the remedy."""
+    for name, bounds in WHOLE_NUMBERS.items():
+        refused.attempt(name, _check_whole, name, getattr(settings, name), *bounds)
     for name in ("tolerance", "time_limit"):
-        if getattr(checked, name) is not None:
-            number(name, getattr(checked, name), PlanningError, above=0)
-    if not isinstance(checked.options, dict):
-        raise PlanningError(
-            f"options: value {shown(checked.options)}: needs a dict, such as "
-            "{'ipopt.max_iter': 500}"
-        )
-    _check_guess(model, checked.guess)
-    number("guess_damping", checked.guess_damping, PlanningError, least=0, most=HUGE)
-    if not isinstance(checked.track, bool | np.bool_):
-        raise refusal("track", checked.track, "True or False", PlanningError)
-    one_of("dynamics", checked.dynamics, ("auto", "compiled", "symbolic"), PlanningError)
-    return checked
+        if getattr(settings, name) is not None:
+            refused.attempt(name, _check_positive, name, getattr(settings, name))
+    if not isinstance(settings.options, dict):
+        needs = "a dict, such as {'ipopt.max_iter': 500}"
+        refused.add("options", needed("options", settings.options, needs))
+    refused.attempt("guess", _check_guess, model, settings.guess)
+    damping = partial(number, error=PlanningError, least=0, most=HUGE)
+    refused.attempt("guess_damping", damping, "guess_damping", settings.guess_damping)
+    if not isinstance(settings.track, bool | np.bool_):
+        refused.add("track", needed("track", settings.track, "True or False"))
+    refused.attempt("dynamics", one_of, "dynamics", settings.dynamics, DYNAMICS, PlanningError)
+    refused.attempt("rule", collocation_rule, settings.rule, settings.degree)
 
 
-def _check_guess(model, guess) -> None:
+def _check_whole(name: str, value: Any, least: int, most: int) -> None:
+    """PlanningError unless a value is a whole number within bounds."""
+    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    if not whole or not least <= value <= most:
+        raise refusal(name, value, f"a whole number from {least} to {most}", PlanningError)
+
+
+def _check_positive(name: str, value: Any) -> None:
+    """PlanningError unless a value is a number above 0."""
+    number(name, value, PlanningError, above=0)
+
+
+def _check_guess(model: Model, guess: Any) -> None:
     """PlanningError unless a guess is None, or a motion of such a model."""
     if guess is None:
         return

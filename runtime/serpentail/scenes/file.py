@@ -1,6 +1,7 @@
 """Reading a scene file, and the model that belongs to it."""
 
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ from ..errors import ModelError, SerpentailError
 from ..model.manifest import read_manifest
 from ..model.model import Model, load, model_from
 from ..model.parameters import merged
+from ..units import in_unit
 
 # keys of a scene that its generated code depends on, and that a folder is compared by
 MADE_OF = (
@@ -54,7 +56,7 @@ def model_of(scene: Mapping, path: Path, folder: str | Path | None, parameters: 
         return model_from(*built(scene, path.stem, parameters))
     made = read_manifest(Path(folder))["scene"]
     for key in MADE_OF:
-        if key in scene and not _same(scene[key], made.get(key)):
+        if key in scene and not _same(_in_radians(key, scene[key]), made.get(key)):
             raise ModelError(
                 f"{folder} has {key} = {made.get(key)!r}, {path} has {shown(scene[key])}: generate "
                 "it again, or leave the folder out"
@@ -77,3 +79,10 @@ def _same(value: Any, made: Any) -> bool:
     if isinstance(value, list) and isinstance(made, list):
         return all(value.count(x) == made.count(x) for x in (*value, *made))
     return bool(value == made)
+
+
+def _in_radians(key: str, value: Any) -> Any:
+    """Return the value of a key, of an angle as a number where it has a unit."""
+    with suppress(ValueError):  # it is not what the model was made with, then
+        return in_unit(value, "rad") if key == "bend_range" else value
+    return value

@@ -1,23 +1,20 @@
 """The plan that a scene file's table [plan] asks for."""
 
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import fields
+from collections.abc import Mapping
 from typing import Any
 
-from ..checks import one_of, refusal, shown
+from ..checks import Refusals, needed, refusal, shown
 from ..errors import PlanningError
 from ..planning.planner import plan
-from ..planning.problem import PROBLEM_SETTINGS, Bounds, Goal
+from ..planning.problem import Bounds, Goal
 from ..planning.result.plan import Plan
-from ..planning.settings import PlanSettings
 from .file import model_of, read_scene, subtable
+from .keys import read
+from .plan_keys import FREE, PLAN
 
 ELSEWHERE = "programs can give others, to serpentail.plan"
-FREE = "free"  # TOML has no None
 CODE_ONLY = ("guess", "path")  # what no file can hold
-SETTINGS = (*PROBLEM_SETTINGS, *(entry.name for entry in fields(PlanSettings)))
-KEYS = ("start", "goal", "duration", "bounds", *(key for key in SETTINGS if key not in CODE_ONLY))
 
 
 def planned(path: str, folder: str | None = None) -> Plan:
@@ -33,25 +30,32 @@ def planned(path: str, folder: str | None = None) -> Plan:
 
 
 def plan_arguments(table: Mapping) -> dict[str, Any]:
-    """Return the arguments of ``plan`` that a table [plan] has."""
-    _check_keys(table)
+    """Return the arguments of ``plan`` that a table [plan] has.
 
-    # tables of their own: start, goal and bounds
-    start = _part("start", table["start"], ("q", "v"))
-    if set(start) != {"q", "v"}:
-        raise PlanningError(f"plan.start: value {shown(start)}: needs q and v")
-    goal = _part("goal", table.get("goal", {}), _names(Goal))
-    bounds = _part("bounds", table.get("bounds", {}), _names(Bounds))
+    PlanningError has a line for each key that is wrong.
+    """
+    refused = Refusals(PlanningError)
+    _check_keys(table, refused)
+    own = {name: value for name, value in table.items() if name not in CODE_ONLY}
+    table = read(own, PLAN, "plan", refused)
+    solver = table.get("solver", "ipopt"), table.get("options", {})
+    refused.attempt("solver", _check_solver, *solver)
+    start = table.get("start", {})
+    if isinstance(start, Mapping) and "start" in own and set(start) != {"q", "v"}:
+        refused.add("start", needed("plan.start", dict(start), "q and v"))
+    refused.tell()
 
-    # the others as they are, but for "free"
-    arguments = dict(table) | {
+    # tables of their own are start, goal and bounds; the others are as they are, but for "free"
+    goal = table.get("goal", {})
+    if isinstance(goal, Mapping):
+        goal = Goal(**{key: _free(value) for key, value in goal.items()})
+    arguments = table | {
         "start": (start["q"], start["v"]),
-        "goal": Goal(**{key: _free(value) for key, value in goal.items()}),
-        "bounds": Bounds(**bounds),
+        "goal": goal,
+        "bounds": Bounds(**table.get("bounds", {})),
     }
     if arguments.get("tolerance") == FREE:
         arguments["tolerance"] = None
-    _check_solver(arguments.get("solver", "ipopt"), arguments.get("options", {}))
     return arguments
 
 
@@ -66,33 +70,15 @@ def _check_solver(solver: Any, options: Any) -> None:
             raise refusal(f"plan.options.{name}".rstrip("."), value, needs, PlanningError)
 
 
-def _check_keys(table: Mapping) -> None:
-    """PlanningError where a table [plan] has a key that it cannot have, or lacks one."""
-    for name in table:
-        if name in CODE_ONLY:
-            raise PlanningError(
-                f"plan.{name}: value {shown(table[name])}: only programs can give it; call "
-                "serpentail.plan"
-            )
-        one_of("plan: key", name, KEYS, PlanningError)
-    for name, needed in (("start", "q and v"), ("duration", "seconds")):
+def _check_keys(table: Mapping, refused: Refusals) -> None:
+    """Note keys that no file can have, and those that are missing."""
+    for name in CODE_ONLY:
+        if name in table:
+            remedy = "only programs can give it; call serpentail.plan"
+            refused.add(name, f"plan.{name}: value {shown(table[name])}: {remedy}")
+    for name, needs in (("start", "q and v"), ("duration", "seconds")):
         if name not in table:
-            raise PlanningError(f"plan.{name}: no value: needs {needed}")
-
-
-def _names(kind: type[Goal] | type[Bounds]) -> list[str]:
-    return [entry.name for entry in fields(kind)]
-
-
-def _part(field: str, value: Any, known: Sequence[str]) -> dict:
-    """A table in [plan] with known keys."""
-    if not isinstance(value, Mapping):
-        raise PlanningError(
-            f"plan.{field}: value {shown(value)}: needs a table, under a line [plan.{field}]"
-        )
-    for name in value:
-        one_of(f"plan.{field}: key", name, known, PlanningError)
-    return dict(value)
+            refused.add(name, f"plan.{name}: no value: needs {needs}")
 
 
 def _free(value: Any) -> Any:

@@ -1,13 +1,13 @@
 """The motion that a scene file's table [simulate] asks for: start, legs, controller, settings."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, overload
 
 import numpy as np
 
-from ..checks import finite_array, number, one_of, refusal, shown
+from ..checks import Refusals, finite_array, none_of, number, one_of, refusal, shown
 from ..errors import SimulationError
 from ..model.layout import OMEGA, VELOCITY
 from ..model.model import Model
@@ -20,24 +20,12 @@ from ..simulation.methods import SETTINGS
 from ..simulation.pfl import KD, KP, Pfl
 from ..simulation.rollouts import Rollouts
 from ..simulation.schedules import Legs, Reference, shared_among_links
-from ..simulation.settle import settle
+from ..simulation.settle import check_settling, settle
 from ..simulation.simulate import simulate
 from .file import model_of, read_scene, subtable
+from .keys import read
 from .overrides import changed
-
-# settings of all methods, each once
-NUMBERS = (*dict.fromkeys(name for names in SETTINGS.values() for name in names), "output_step")
-KEYS = ("duration", "method", *NUMBERS, "start", "legs", "reference", "controller")
-ANGLES = ("pitch", "roll", "yaw")
-START = ("height", *ANGLES, "bends", "velocity", "rate", "settle")
-LEGS = ("gamma", "delta", "moves", "times")
-REFERENCE = ("times", "bends", "blend", "file")
-LAWS = {  # kinds of controllers and what each has
-    "none": (),
-    "damping": ("damping",),
-    "pfl": ("kp", "kd", "feedforward"),
-    "torques": ("times", "torques", "damping"),
-}
+from .simulate_keys import ANGLES, LAWS, NUMBERS, SIMULATE
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +99,9 @@ def scenario(
 
     # a change is of a key below [simulate], or of a parameter
     values = dict(changes or {})
-    of_table = {name: value for name, value in values.items() if name.split(".")[0] in KEYS}
+    of_table = {
+        name: value for name, value in values.items() if name.split(".")[0] in SIMULATE.keys
+    }
     parameters = {name: value for name, value in values.items() if name not in of_table}
     for name in parameters:
         if "." in name:
@@ -123,38 +113,57 @@ def scenario(
 
 
 def scenario_of(model: Model, table: Mapping, parent: Path) -> Scenario:
-    """Return the scenario of a table [simulate]; files in it are relative to ``parent``."""
-    _checked("simulate", table, KEYS)
-    if "duration" not in table:
-        raise SimulationError("simulate.duration: no value: needs seconds")
-    legs = _legs(table["legs"]) if "legs" in table else None
-    reference = _reference(model, table["reference"], parent) if "reference" in table else None
-    controller = _controller(model, table.get("controller", {"kind": "none"}), reference)
+    """Return the scenario of a table [simulate]; files in it are relative to ``parent``.
+
+    SimulationError has a line for each thing that is wrong.
+    """
+    refused = Refusals(SimulationError)
+    table = read(table, SIMULATE, "simulate", refused)
     settings = {name: table[name] for name in ("method", *NUMBERS) if name in table}
+    _check_settings(settings, refused)
+    if "duration" not in table:
+        refused.add("duration", "simulate.duration: no value: needs seconds")
+    duration = refused.attempt("duration", _positive, "simulate.duration", table.get("duration"))
 
-    # what acts while a start settles
-    settling = {name: value for name, value in settings.items() if name != "output_step"}
-    settling["controller"] = controller
-    if legs is not None:
-        settling["legs"] = legs
-    q0, v0, bristles = _start(model, table.get("start", {}), reference, settling)
-    if bristles is not None:
-        settings["bristles0"] = bristles
-    duration = number("simulate.duration", table["duration"], SimulationError, above=0)
-    return Scenario(model, q0, v0, duration, controller, legs, settings)
+    # what acts; a straight tail stands in for a reference that is refused, so that the rest is told
+    legs = refused.attempt("legs", _legs, table["legs"]) if "legs" in table else None
+    reference = None
+    if "reference" in table:
+        straight = Reference([0.0, 1.0], np.zeros((2, model.layout.nt)))
+        found = refused.attempt("reference", _reference, model, table["reference"], parent)
+        reference = found or straight
+    law = table.get("controller", {"kind": "none"})
+    controller = refused.attempt("controller", _controller, model, law, reference)
+    start = table.get("start", {})
+    state = refused.attempt("start", _start, model, start, reference)
+    refused.tell()
+    assert duration is not None and state is not None  # all has been told
+
+    if "settle" in start:
+        # what acts while a start settles
+        acting = {name: value for name, value in settings.items() if name != "output_step"}
+        acting |= {"controller": controller} | ({} if legs is None else {"legs": legs})
+        q0, v0, settings["bristles0"] = settle(model, state[0], **acting | dict(start["settle"]))
+        state = q0, v0
+    return Scenario(model, *state, duration, controller, legs, settings)
 
 
-def _checked(where: str, table: Any, names: Collection[str]) -> Mapping:
-    """Return a table; SimulationError where it is none, or has another key."""
-    if not isinstance(table, Mapping):
-        raise refusal(where, table, f"a table, under a line [{where}]", SimulationError)
-    for name in table:
-        one_of(f"{where}: key", name, names, SimulationError)
-    return table
+def _check_settings(settings: Mapping[str, Any], refused: Refusals) -> None:
+    """Note a method that is none, and numbers that no method can have."""
+    unknown = none_of("simulate.method", settings.get("method", "auto"), ("auto", *SETTINGS))
+    if unknown:
+        refused.add("method", unknown)
+    for name in NUMBERS:
+        if name in settings:
+            refused.attempt(name, _positive, f"simulate.{name}", settings[name])
 
 
-def _legs(table: Any) -> Legs:
-    table = _checked("simulate.legs", table, LEGS)
+def _positive(field: str, value: Any) -> float:
+    """Return a number above 0."""
+    return number(field, value, SimulationError, above=0)
+
+
+def _legs(table: Mapping) -> Legs:
     missing = [name for name in ("gamma", "delta") if name not in table]
     if missing or {"moves", "times"} <= set(table):
         raise SimulationError(
@@ -169,9 +178,8 @@ def _legs(table: Any) -> Legs:
     return Legs.moves(gamma, delta, table.get("moves", []))
 
 
-def _reference(model: Model, table: Any, parent: Path) -> Reference | Trajectory:
+def _reference(model: Model, table: Mapping, parent: Path) -> Reference | Trajectory:
     """A Reference, or the Trajectory that `serpentail plan --save` wrote."""
-    table = _checked("simulate.reference", table, REFERENCE)
     if set(table) == {"file"}:
         try:
             return Trajectory.load(parent / str(table["file"]))
@@ -207,7 +215,6 @@ def _controller(model: Model, value: Any, reference: Any) -> Controller:
 def _law(model: Model, where: str, table: Mapping, reference: Any) -> Controller:
     """The controller of a table, by its kind."""
     kind = one_of(f"{where}.kind", table.get("kind"), LAWS, SimulationError)
-    table = _checked(where, table, ("kind", *LAWS[kind]))
     values = {name: value for name, value in table.items() if name != "kind"}
     if kind == "none":
         return None
@@ -222,23 +229,20 @@ def _law(model: Model, where: str, table: Mapping, reference: Any) -> Controller
     return Pfl(model, reference, **{"kp": KP, "kd": KD} | values)
 
 
-def _start(
-    model: Model, table: Any, reference: Any, settling: dict[str, Any]
-) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
-    """Return q0, v0 and, where it settled, the bristles."""
-    table = _checked("simulate.start", table, START)
+def _start(model: Model, table: Mapping, reference: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Return q0 and v0, before it settles."""
     q = np.concatenate([_pose(table), _tail(model, table, reference)])
     v = np.zeros(model.nv)
     v[VELOCITY] = _three("simulate.start.velocity", table.get("velocity", (0, 0, 0)))
     v[OMEGA] = _three("simulate.start.rate", table.get("rate", (0, 0, 0)))
-    if "settle" not in table:
-        return q, v, None
-    if v.any():
-        raise SimulationError(
-            "simulate.start.settle: a start that settles has no velocity and no rate: remove them"
-        )
-    rest = _checked("simulate.start.settle", table["settle"], ("rounds", "duration"))
-    return settle(model, q, **settling | dict(rest))
+    if "settle" in table:
+        check_settling(model, **table["settle"])
+        if v.any():
+            raise SimulationError(
+                "simulate.start.settle: a start that settles has no velocity and no rate: remove "
+                "them"
+            )
+    return q, v
 
 
 def _pose(table: Mapping) -> np.ndarray:

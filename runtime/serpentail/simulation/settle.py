@@ -34,13 +34,7 @@ def settle(
         raise StateError(
             f"q0 has shape {np.shape(q0)}, not ({model.nq},): settle one start state after another"
         )
-    number("duration", duration, SimulationError, above=0)
-    if isinstance(rounds, bool) or not isinstance(rounds, int) or rounds < 1:
-        raise refusal("rounds", rounds, "a whole number from 1", SimulationError)
-    if not model.contacts:
-        raise SimulationError(
-            f"{model.name} touches nothing, so it cannot settle: add `contacts` to its scene"
-        )
+    check_settling(model, rounds, duration)
     q, v = np.asarray(q0), np.zeros(model.nv)
     bristles = settings.pop("bristles0", None)
     span: dict[str, Any] = {"output_step": duration, "t_span": (at - duration, at)}
@@ -49,3 +43,14 @@ def settle(
         assert isinstance(motion, Trajectory) and motion.contact is not None  # one start, on ground
         q, bristles = motion.q[-1], motion.contact.bristles[-1]
     return q, v, bristles
+
+
+def check_settling(model: Model, rounds: object = 1, duration: object = 1.5) -> None:
+    """SimulationError where a model cannot come to rest in so many rounds."""
+    number("duration", duration, SimulationError, above=0)
+    if isinstance(rounds, bool) or not isinstance(rounds, int) or rounds < 1:
+        raise refusal("rounds", rounds, "a whole number from 1", SimulationError)
+    if not model.contacts:
+        raise SimulationError(
+            f"{model.name} touches nothing, so it cannot settle: add `contacts` to its scene"
+        )

@@ -141,6 +141,7 @@ def test_model_works_on_after_a_refusal(model):
         assert_same(call(model, "forward_dynamics", state()), expected)
 
 
+@pytest.mark.filterwarnings("ignore::serpentail.errors.UnusualSize")
 def test_indefinite_inertia_is_named():
     """A tail so long that H overflows."""
     with pytest.warns(st.UnlikeBodies, match="unlike by inf"):

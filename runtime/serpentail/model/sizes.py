@@ -1,0 +1,78 @@
+"""Warns of parameters that no animal has, or that digits are lost by: most are slips of units."""
+
+import math
+import warnings
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..errors import UnlikeBodies, UnusualSize
+from ..magnitudes import warn_of_unusual
+from .parameters import Values
+
+UNLIKE = 1e4  # from here on H may be off by 1e-12 of its diagonal: docs/stability.md
+SMALLEST = {"torso_mass": (1e-4, "0.1 g"), "tail_length": (1e-3, "1 mm")}
+DENSEST = 1e6  # kg/m^3: 44 times osmium, as studies may change a mass and leave its inertia
+
+
+def warn_of_sizes(manifest: dict, values: Values, calls: int = 2) -> None:
+    """Warn who called so many calls above of sizes of a model, or of many runs.
+
+    UnusualSize: no animal or robot has them.  UnlikeBodies: H loses digits.
+    """
+    units = {p["name"]: p["unit"] for p in manifest["parameters"]}
+    for name, value in values.items():
+        largest = float(np.max(np.abs(value), initial=0.0))
+        warn_of_unusual(name, largest, units[name], calls + 1)
+    for told in (*_too_small(values, units), *_too_dense(values)):
+        warnings.warn(told, UnusualSize, stacklevel=calls + 1)
+    warn_of_unlike(values, calls + 1)
+
+
+def _too_small(values: Values, units: dict[str, str]) -> Iterator[str]:
+    """Yield what to tell of parameters that are too small."""
+    for name, (least, words) in SMALLEST.items():
+        smallest = np.min(values[name])
+        if smallest < least:
+            told = f"{name}: value {smallest:.6g} {units[name]}: below {words}, which no animal or"
+            yield f"{told} robot has: are the units kg and m?"
+
+
+def _too_dense(values: Values) -> Iterator[str]:
+    """Yield what to tell of a torso that is denser than any metal: of many runs, of the first."""
+    masses = np.atleast_1d(values["torso_mass"])
+    moments = np.atleast_1d(np.max(values["torso_inertia"], axis=-1))
+    # of all bodies of this moment of inertia the ball, I = 2/5 m r^2, is the least dense
+    with np.errstate(all="ignore"):
+        radii = np.sqrt(2.5 * moments / masses)
+        densities = masses / (4 / 3 * math.pi * radii**3)
+    masses, moments = np.broadcast_arrays(masses, moments)
+    for k in np.flatnonzero(densities > DENSEST)[:1]:
+        mass, moment = masses[k], moments[k]
+        told = f"torso_mass: value {mass:.6g} kg: with a torso_inertia of {moment:.3g} kg m^2 it is"
+        yield f'{told} denser than any metal: did you mean "{mass:.6g} g"?'
+
+
+def disparity(values: Values) -> float:
+    """Return how unlike torso and tail are, of many runs the largest.
+
+    That is the larger of m (|b2t| + L)^2 / min I_b, moments of inertia that cancel in H over what
+    is left, and of |b2t| / L, m and L being the tail's mass and length.
+    """
+    mass, length = np.asarray(values["tail_mass"]), np.asarray(values["tail_length"])
+    with np.errstate(all="ignore"):
+        mount = np.linalg.norm(values["tail_mount"], axis=-1)
+        torso = np.min(values["torso_inertia"], axis=-1)
+        moments = mass * (mount + length) ** 2 / torso
+        return float(np.max(np.maximum(moments, mount / length)))
+
+
+def warn_of_unlike(values: Values, calls: int = 2) -> None:
+    """Warn who called so many calls above where H loses digits by bodies of unlike size."""
+    ratio = disparity(values)
+    if ratio > UNLIKE:
+        sizes = "tail_mass, tail_length, tail_mount, torso_inertia"
+        words = (
+            f"torso and tail are unlike by {ratio:.1e} ({sizes}): H may be off by as many roundings"
+        )
+        warnings.warn(f"{words}; are the units kg and m?", UnlikeBodies, stacklevel=calls + 1)

@@ -1,0 +1,98 @@
+"""What the keys of a scene's tables hold: their units and shapes, from which the tables are read.
+
+The JSON Schema for editors is made of the same.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from ..checks import Refusals, needed, none_of, shown
+from ..magnitudes import warn_of_unusual
+from ..units import in_unit
+
+
+@dataclass(frozen=True)
+class Key:
+    """What a key holds: numbers in a unit, a table of other keys, or something of another form.
+
+    unit: of the numbers, "1" where they are pure, "" where it is none; several: of the entries of
+    an array, the last one of all others.  depth: how deep arrays of them may be.  usual: whether
+    more than any animal has is told.
+    keys: of a table, those that it needs.  kinds: keys by the table's ``kind``.  each: of the
+    tables in an array.
+    words: what may be written instead.  form: JSON Schema of anything else.
+    """
+
+    unit: str | Sequence[str] = ""
+    depth: int = 0
+    usual: bool = True
+    keys: Mapping[str, "Key"] = field(default_factory=dict)
+    needs: tuple[str, ...] = ()
+    kinds: Mapping[str, "Key"] = field(default_factory=dict)
+    each: "Key | None" = None
+    words: tuple[str, ...] = ()
+    form: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def is_table(self) -> bool:
+        """Tell whether a table belongs here."""
+        return bool(self.keys or self.kinds)
+
+
+def one_word(*words: str) -> Key:
+    """Return the key of one of these words."""
+    return Key(form={"enum": list(words)})
+
+
+def read(table: Mapping, key: Key, where: str, refused: Refusals, part: str = "") -> dict:
+    """Return a table with all numbers in the units of their keys; notes keys that there are not.
+
+    part: what is refused belongs to it, by default to the key of this table that it is in.
+    """
+    found = {}
+    for name, value in table.items():
+        belongs, unknown = part or name, none_of(f"{where}: key", name, key.keys)
+        if unknown:
+            refused.add(belongs, unknown)
+        else:
+            found[name] = _read(value, key.keys[name], f"{where}.{name}", (refused, belongs))
+    return found
+
+
+Part = tuple[Refusals, str]  # where refusals of a value are noted, and what they are part of
+
+
+def _read(value: Any, key: Key, where: str, part: Part) -> Any:
+    """Return a value with all numbers in the units of their keys."""
+    if isinstance(value, str) and value in key.words:
+        return value
+    if key.each and isinstance(value, list):
+        return [_read(x, key.each, f"{where}[{k}]", part) for k, x in enumerate(value)]
+    if isinstance(value, Mapping):
+        return _read_table(value, key, where, part)
+    if key.is_table and key.each is None:
+        needs = ", or ".join([f"a table, under a line [{where}]", *map(repr, key.words)])
+        part[0].add(part[1], needed(where, value, needs))
+    return _read_numbers(value, key, where, part) if key.unit else value
+
+
+def _read_table(table: Mapping, key: Key, where: str, part: Part) -> Mapping:
+    """Return a table with numbers in the units of its keys, as it is where it has no known kind."""
+    kind = table.get("kind")
+    if key.kinds:
+        key = key.kinds.get(kind, Key()) if isinstance(kind, str) else Key()
+    return read(table, key, where, *part) if key.keys else table
+
+
+def _read_numbers(value: Any, key: Key, where: str, part: Part) -> Any:
+    """Return numbers in the unit of their key."""
+    refused, name = part
+    try:
+        numbers = in_unit(value, key.unit)
+    except ValueError as error:
+        refused.add(name, f"{where}: value {shown(value)}: {error}")
+        return value
+    if key.usual:
+        warn_of_unusual(where, numbers, key.unit)
+    return numbers

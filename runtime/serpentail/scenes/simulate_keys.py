@@ -1,0 +1,65 @@
+"""The keys of a scene's table [simulate]."""
+
+from ..simulation.methods import SETTINGS
+from ..simulation.schedules import BLENDS, MOVE
+from .keys import Key, one_word
+
+SECONDS, METRES, ANGLE = Key("s"), Key("m"), Key("rad")
+RATE, PURE, FLAG = Key("rad/s"), Key("1"), Key(form={"type": "boolean"})
+TIMES, BENDS = Key("s", depth=1), Key("rad", depth=3)
+DAMPING = Key("N m s", depth=1)
+WHOLE = Key(form={"type": "integer", "minimum": 1})
+ANGLES = ("pitch", "roll", "yaw")
+# settings of all methods, each once
+NUMBERS = (*dict.fromkeys(name for names in SETTINGS.values() for name in names), "output_step")
+SETTING = {name: SECONDS if name.endswith("step") else PURE for name in NUMBERS}
+
+START = {
+    "height": METRES,
+    **dict.fromkeys(ANGLES, ANGLE),
+    "bends": BENDS,
+    "velocity": Key("m/s", depth=1),
+    "rate": Key("rad/s", depth=1),
+    "settle": Key(keys={"rounds": WHOLE, "duration": SECONDS}),
+}
+MOVES = dict.fromkeys(MOVE, ANGLE) | {"at": SECONDS, "duration": SECONDS, "rate": RATE}
+LEGS = {
+    "gamma": Key("rad", depth=2),
+    "delta": Key("rad", depth=2),
+    "moves": Key(each=Key(keys=MOVES, needs=("at",))),
+    "times": TIMES,
+}
+REFERENCE = {
+    "times": TIMES,
+    "bends": BENDS,
+    "blend": one_word(*BLENDS),
+    "file": Key(form={"type": "string"}),
+}
+LAWS = {  # kinds of controllers and what each has
+    "none": {},
+    "damping": {"damping": DAMPING},
+    "pfl": {"kp": Key("1/s^2"), "kd": Key("1/s"), "feedforward": FLAG},
+    "torques": {"times": TIMES, "torques": Key("N m", depth=2), "damping": DAMPING},
+}
+
+
+def _controllers(more: dict[str, Key]) -> dict[str, Key]:
+    """Return the keys of each kind of controller, and more."""
+    return {
+        kind: Key(keys={"kind": one_word(kind), **keys, **more}, needs=("kind", *more))
+        for kind, keys in LAWS.items()
+    }
+
+
+SIMULATE = Key(
+    keys={
+        "duration": SECONDS,
+        "method": one_word("auto", *SETTINGS),
+        **SETTING,
+        "start": Key(keys=START),
+        "legs": Key(keys=LEGS, needs=("gamma", "delta")),
+        "reference": Key(keys=REFERENCE),
+        "controller": Key(kinds=_controllers({}), each=Key(kinds=_controllers({"begin": SECONDS}))),
+    },
+    needs=("duration",),
+)
