@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from .errors import SerpentailError, SimulationError
 from .files import refuse_unwritable
+from .motion.table import as_text
 
 if TYPE_CHECKING:
     from .motion.trajectory import Trajectory
@@ -221,11 +222,12 @@ def planned(arguments: argparse.Namespace) -> Outcome:
 
     plan = scenes.planned(arguments.scene, arguments.folder)
     files: Files = {"save": plan.trajectory.save, "view": plan.view}
-    return Outcome(plan.report, _rows(plan.report), plan.success, files)
+    return Outcome(plan.report, as_text(plan.report), plan.success, files)
 
 
 def simulated(arguments: argparse.Namespace) -> Outcome:
     """Return the report of a scene's motion."""
+    from .motion.numbers import UNITS
     from .scenes.overrides import parsed
     from .scenes.simulate import scenario
 
@@ -234,7 +236,7 @@ def simulated(arguments: argparse.Namespace) -> Outcome:
     report = scene.summary(motion) | stopped
     film = partial(scene.film, motion)
     files: Files = {"save": motion.save, "film": film, "view": motion.view}
-    return Outcome(report, _rows(report), True, files)
+    return Outcome(report, as_text(report, UNITS), True, files)
 
 
 def _motion(scene: "Scenario", page: str | None) -> tuple["Trajectory", dict[str, str]]:
@@ -287,12 +289,7 @@ def cached(arguments: argparse.Namespace) -> Outcome:
     if arguments.clean:
         empty(folder)
     report = contents(folder)
-    return Outcome(report, _rows(report), True)
-
-
-def _rows(report: dict[str, Any]) -> str:
-    """Return a report as lines of names and values."""
-    return "\n".join(f"{name:<30}{value}" for name, value in report.items())
+    return Outcome(report, as_text(report), True)
 
 
 if __name__ == "__main__":
