@@ -152,6 +152,7 @@ def test_a_tail_that_comes_back_into_the_torso_is_told():
     model = scene_of("kick").model
     q = at_height(model, 1.0, 2)
     q[1, 7] = 2 * np.pi / 3 * 1.1  # a triangle, whose last link crosses the torso
+    q[:, 3:7] = 0.5, 0.7, -0.1, 0.5  # however the torso lies
     found = the(made(model, q).warnings, "tail: goes")
     mount, length = np.array([0, -0.0405, 0.0045]), 0.19466 / 3
     points, way = [mount], np.array([0, -length, 0])

@@ -112,7 +112,10 @@ def test_who_falls_on_its_back_and_rolls_onto_its_feet_stands_but_has_not_landed
 
 
 def test_touching_times_by_hand():
-    """Feet touch from the start to 0.3, from 0.6 to 0.7, and from 0.9 on; the tail never leaves."""
+    """Feet touch from the start to 0.3, from 0.6 to 0.7, and from 0.9 on; the tail never leaves.
+
+    Then the other way round: the feet are not pushed at the start, but leave the ground later.
+    """
     model = scene_of("tail_support_jump").model
     events = [off("feet", 0.3), down("feet", 0.6), off("feet", 0.7), down("feet", 0.9)]
     t, forces = np.linspace(0, 1, 3), np.zeros((3, 18, 3))
@@ -122,6 +125,8 @@ def test_touching_times_by_hand():
     assert told["first_touch_down_s"] == {"feet": 0.6, "tail": None}
     assert told["last_take_off_s"] == {"feet": 0.7, "tail": None}
     assert told["landed"] is told["landing_group"] is told["recontact_s"] is None
+    quiet = made(model, at_height(model, 0.1), t=t, events=events)
+    assert summary(model, quiet)["touching_s"] == pytest.approx({"feet": 0.5, "tail": 0.0})
 
 
 def test_touching_times_of_the_leap(leap):

@@ -13,9 +13,8 @@ def sunk(points: Array) -> Array:
     ball once, it may be as near to the centre as its mount; from then on it must stay outside.
     """
     distance = np.linalg.norm(points, axis=2)
-    begins = np.minimum(distance[:, :1], 1)
     outside = np.maximum.accumulate(distance, axis=1)[:, :-1] > 1
-    allowed = np.where(outside, 1, begins)
+    allowed = np.where(outside, 1, distance[:, :1])
     return np.asarray(np.max(allowed - _nearest(points), axis=1, initial=0))
 
 
