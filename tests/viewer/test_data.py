@@ -76,7 +76,7 @@ def test_the_kick_s_numbers_and_events(tmp_path, kick, kick_scene):
     numbers, summary = dict(run["numbers"]), kick_scene.summary(kick)
     assert float(numbers["take-off (s)"]) == pytest.approx(summary["take_off_s"], rel=1e-3)
     assert float(numbers["highest torso (m)"]) == pytest.approx(summary["apex_m"], rel=1e-3)
-    assert numbers["samples"] == "1201" and numbers["landed on its feet"] == "no"
+    assert numbers["samples"] == "1201" and numbers["landed, and stands at the end"] == "no"
     forces = np.linalg.norm(kick.contact.forces.sum(axis=1), axis=1)
     weight = 9.8 * (0.10572 + 0.00351)
     assert float(numbers["largest force of the ground (N)"]) == pytest.approx(

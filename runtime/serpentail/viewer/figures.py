@@ -13,7 +13,7 @@ LABELS = {  # of the numbers that the page shows
     "duration_s": "duration",
     "take_off_s": "take-off",
     "recontact_s": "landing",
-    "landed": "landed on its feet",
+    "landed": "landed, and stands at the end",
     "least_upright_landing": "least upright from the landing on",
     "turned_landing_rad": "turned from the landing on",
     "apex_m": "highest torso",
