@@ -21,6 +21,7 @@ _HOME = {
     **dict.fromkeys(["Legs", "Reference"], "simulation.schedules"),
     "Contact": "motion.contact",
     "Trajectory": "motion.trajectory",
+    "summary": "motion.summary",
     **dict.fromkeys(["pitch_roll_yaw", "rotation_matrix"], "attitude"),
     **dict.fromkeys(["polar_to_bend", "bend_to_polar"], "model.polar"),
     "plan": "planning.planner",

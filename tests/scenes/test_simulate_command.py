@@ -47,6 +47,18 @@ def test_simulate_prints_a_table_and_draws(scene, capsys):
     assert Path("a.png").stat().st_size > 10_000
 
 
+def test_simulate_tells_units_and_warnings(scene, capsys):
+    bent = ["simulate", scene(), "--set", "start.bends=[[4.0, 0.0]]"]
+    assert cli.main(bent) == 0
+    out, err = capsys.readouterr()
+    assert re.search(r"^apex_m +0\.10000 +m$", out, re.MULTILINE)
+    assert re.search(r"^peak_ground_force_weights +\S+ +body weights$", out, re.MULTILINE)
+    assert re.search(r"^warnings +tail: segment 1 is bent by 4 rad", out, re.MULTILINE) and not err
+    assert cli.main([*bent, "--json", "-"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert any("segment 1 is bent by 4 rad" in each for each in told["warnings"])
+
+
 @pytest.mark.parametrize(
     ("given", "words"),
     [

@@ -85,7 +85,7 @@ def test_work_and_impulses_are_the_integrals_of_the_samples():
         drives = integral(run.t, (forces * (still - speeds)).sum(axis=(1, 2)))
         assert work["ground"] == pytest.approx(ground, rel=1e-3)
         assert work["legs"] == pytest.approx(drives, rel=1e-3) and drives > 1e-4
-        assert run.warnings == []
+        assert run.info["warnings"] == []
 
 
 @pytest.mark.parametrize("name", METHODS)
@@ -104,7 +104,7 @@ def check_drops(name, seeds):
     for rtol in METHODS[name]:
         for seed in seeds:
             run = landed(model, seed, method=name, rtol=rtol, atol=rtol)
-            assert run.warnings == [], (rtol, seed)
+            assert run.info["warnings"] == [], (rtol, seed)
             assert run.info["imbalance"]["relative"] < 100 * rtol
 
 
@@ -160,4 +160,4 @@ def test_what_does_not_balance_is_reported():
 def test_float_models_balance_by_their_own_roundings():
     model = animal("feet", "tail", "torso", real="float")
     run = landed(model, 3, method="ros34pw2")
-    assert run.warnings == [] and run.info["imbalance"]["relative"] < 0.1
+    assert run.info["warnings"] == [] and run.info["imbalance"]["relative"] < 0.1

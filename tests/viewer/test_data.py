@@ -40,9 +40,9 @@ def test_what_float32_cannot_hold_becomes_its_largest():
 
 def test_the_kick_is_whole_and_below_1_mb(tmp_path, kick, kick_scene):
     path = kick.view(tmp_path / "run.html")
-    data, run = single_run(path)
+    _, run = single_run(path)
     assert path == tmp_path / "run.html" and path.stat().st_size <= 1e6
-    assert run["rows"] == len(kick.t) == 1201 and not data["notes"]
+    assert run["rows"] == len(kick.t) == 1201
 
     # times, poses and points are the motion's
     arrays, model = run["arrays"], kick_scene.model
@@ -76,7 +76,16 @@ def test_the_kick_s_numbers_and_events(tmp_path, kick, kick_scene):
     numbers, summary = dict(run["numbers"]), kick_scene.summary(kick)
     assert float(numbers["take-off (s)"]) == pytest.approx(summary["take_off_s"], rel=1e-3)
     assert float(numbers["highest torso (m)"]) == pytest.approx(summary["apex_m"], rel=1e-3)
-    assert numbers["samples"] == "1201"
+    assert numbers["samples"] == "1201" and numbers["landed, and stands at the end"] == "no"
+    forces = np.linalg.norm(kick.contact.forces.sum(axis=1), axis=1)
+    weight = 9.8 * (0.10572 + 0.00351)
+    assert float(numbers["largest force of the ground (N)"]) == pytest.approx(
+        forces.max(), rel=1e-4
+    )
+    times = float(numbers["largest force of the ground (body weights)"])
+    assert times == pytest.approx(forces.max() / weight, rel=1e-4)
+    assert float(numbers["tilt at the end (deg)"]) == pytest.approx(0.795, abs=0.01)
+    assert data["notes"] == [f"run: {each}" for each in kick.warnings] and len(data["notes"]) == 5
     assert [event["time"] for event in run["events"]] == [event["time"] for event in kick.events]
     forces = np.linalg.norm(kick.contact.forces, axis=2)
     assert data["force_scale"] == pytest.approx(np.percentile(forces[forces > 0], 95))
@@ -97,6 +106,7 @@ def test_a_flight_has_no_ground_and_no_legs(tmp_path, flight):
     assert not {"legs", "forces", "touching", "force"} & set(run["arrays"])
     assert not run["body"]["jointed"]
     assert not any("force" in plot["title"] for plot in data["plots"])
+    assert not data["notes"] and not any("force" in label for label, _ in run["numbers"])
 
 
 def test_the_torso_is_the_ellipsoid_of_its_inertia(tmp_path, flight):
@@ -134,7 +144,8 @@ def test_a_run_that_failed_is_shown_up_to_there(tmp_path, kick_scene):
     for motion in (cut, st.Trajectory.load(tmp_path / "cut.npz")):
         path = st.view(motion, tmp_path / "run.html", model=kick_scene.model)
         data, run = single_run(path)
-        assert data["notes"] == [f"run: the run failed, and ends here: {caught.value}"]
+        told = [f"the run failed, and ends here: {caught.value}", *cut.warnings]
+        assert data["notes"] == [f"run: {each}" for each in told] and len(told) > 1
         assert run["rows"] == len(cut.t) and 1 < len(cut.t) < 1201
 
 

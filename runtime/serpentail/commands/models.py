@@ -4,7 +4,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .outcome import Outcome, rows
+from ..motion.table import as_text
+from .outcome import Outcome
 
 if TYPE_CHECKING:
     from ..model.model import Model
@@ -31,11 +32,12 @@ def model_of(place: str) -> "Model":
 
 def verify(arguments: argparse.Namespace) -> Outcome:
     """Return which laws a model obeys, and whether it obeys all of them."""
-    from ..verification.report import as_text, laws, summary
+    from ..verification.report import as_text as told
+    from ..verification.report import laws, summary
 
     model = model_of(arguments.model)
     checks = laws(model)
-    return Outcome(summary(model, checks), as_text(model, checks), all(c.passed for c in checks))
+    return Outcome(summary(model, checks), told(model, checks), all(c.passed for c in checks))
 
 
 def cache(arguments: argparse.Namespace) -> Outcome:
@@ -47,4 +49,4 @@ def cache(arguments: argparse.Namespace) -> Outcome:
     if arguments.clean:
         empty(folder)
     report = contents(folder)
-    return Outcome(report, rows(report))
+    return Outcome(report, as_text(report))

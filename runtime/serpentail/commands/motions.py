@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import SimulationError
-from .outcome import Files, Outcome, rows
+from ..motion.table import as_text
+from .outcome import Files, Outcome
 
 if TYPE_CHECKING:
     from ..motion.trajectory import Trajectory
@@ -19,11 +20,12 @@ def plan(arguments: argparse.Namespace) -> Outcome:
 
     plan = scenes.planned(arguments.scene, arguments.folder)
     files: Files = {"save": plan.trajectory.save, "view": plan.view}
-    return Outcome(plan.report, rows(plan.report), plan.success, files)
+    return Outcome(plan.report, as_text(plan.report), plan.success, files)
 
 
 def simulate(arguments: argparse.Namespace) -> Outcome:
     """Return the report of a scene's motion."""
+    from ..motion.numbers import UNITS
     from ..scenes.overrides import parsed
     from ..scenes.simulate import scenario
 
@@ -32,7 +34,7 @@ def simulate(arguments: argparse.Namespace) -> Outcome:
     report = scene.summary(motion) | stopped
     film = partial(scene.film, motion)
     files: Files = {"save": motion.save, "film": film, "view": motion.view}
-    return Outcome(report, rows(report), True, files)
+    return Outcome(report, as_text(report, UNITS), True, files)
 
 
 def _motion(scene: "Scenario", page: str | None) -> tuple["Trajectory", dict[str, str]]:

@@ -18,11 +18,6 @@ class Outcome(NamedTuple):
     files: Files = MappingProxyType({})
 
 
-def rows(report: Mapping[str, Any]) -> str:
-    """Return a report as lines of names and values."""
-    return "\n".join(f"{name:<30}{value}" for name, value in report.items())
-
-
 def tell(text: str) -> None:
     """Print a report; whoever reads it may stop to."""
     try:

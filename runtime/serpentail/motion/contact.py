@@ -44,6 +44,11 @@ class Contact:
         """Depth (K, P) in m of the points below the ground; negative above it."""
         return -self.points[..., 2]
 
+    @property
+    def total(self) -> Array:
+        """Size (K,) in N of the ground's force on all points together."""
+        return np.asarray(np.linalg.norm(self.forces.sum(axis=1), axis=1))
+
     def of(self, group: str) -> "Contact":
         """Return the points of one group; KeyError where the motion has none."""
         if group not in self.groups:

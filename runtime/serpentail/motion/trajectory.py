@@ -16,6 +16,7 @@ from ..model.layout import PER_SEGMENT, QUATERNION, TAIL_Q, TORSO_NQ, Layout
 from ..model.model import Model
 from . import archive
 from .contact import Contact
+from .doubts import doubts, warnings_of
 from .resample import Interpolation, hermite_q, inside, monotone, smooth
 
 UNIT_TOLERANCE = 1e-3  # how far a stored quaternion's norm may drift from 1
@@ -77,8 +78,12 @@ class Trajectory:
 
     @property
     def warnings(self) -> list[str]:
-        """What to mind about the run: energy or momentum that does not balance, unfelt touches."""
-        return self.info.get("warnings", [])
+        """What to mind about the motion, a sentence each: see docs/simulation.md.
+
+        Books that do not balance, unfelt touches, what cannot be true of an animal.  The last needs
+        the model: where that is gone, it is what was found when the motion was saved or pickled.
+        """
+        return warnings_of(self.model, self)
 
     @property
     def segments(self) -> int:
@@ -100,7 +105,7 @@ class Trajectory:
         NotWritten where that cannot be done.
         """
         arrays = {name: getattr(self, name) for name in ARRAYS}
-        return archive.write(path, arrays, self.info, self.contact)
+        return archive.write(path, arrays, self._told(), self.contact)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
@@ -113,7 +118,12 @@ class Trajectory:
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave the model behind, whose compiled code belongs to one machine."""
-        return vars(self) | {"model": None}
+        return vars(self) | {"model": None, "info": self._told()}
+
+    def _told(self) -> dict[str, Any]:
+        """Info with what only the model can tell."""
+        found = [] if self.model is None else doubts(self.model, self)
+        return self.info | {"doubts": found} if found else self.info
 
     def view(self, path: str | os.PathLike[str] = "run.html", model: Model | None = None) -> Path:
         """Write the page of this motion, and return its path; see ``st.view``."""

@@ -11,7 +11,7 @@ from ..checks import Refusals, finite_array, none_of, number, one_of, refusal, s
 from ..errors import SimulationError
 from ..model.layout import OMEGA, VELOCITY
 from ..model.model import Model
-from ..motion.summary import summary
+from ..motion.summary import Summary, summary
 from ..motion.trajectory import Trajectory
 from ..pictures.filmstrip import filmstrip
 from ..pictures.skeleton import leg_joints
@@ -77,8 +77,8 @@ class Scenario:
             look["com"] = model.center_of_mass(motion.q, motion.v)[0]
         return filmstrip(motion, model.tail_points(motion.q), path, frames, **look)
 
-    def summary(self, motion: Trajectory) -> dict[str, Any]:
-        """Return take-off, apex, how a motion ends, peak forces, steps and time; SI."""
+    def summary(self, motion: Trajectory) -> Summary:
+        """Return the numbers of a motion by name: leap, landing, forces, books, effort; SI."""
         return summary(self.model, motion)
 
 

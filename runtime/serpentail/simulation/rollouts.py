@@ -48,9 +48,10 @@ class Rollouts:
     them.  ends (k,) s: when each run ended: at the last time, at an event of ``stop_at``, or where
     it failed.  errors: None or the SimulationError of each run, which keeps the trajectory up to
     there.  audit: work, impulses and what they do not account for, (k,); warnings: of each run,
-    what does not balance.  info: what all have in common, JSON-ready; steps, rejected, evaluations
-    and factorisations are those of all.  ``rollouts[k]`` is the Trajectory of run k, with its own
-    parameters, counts and contact, or raises its error.
+    what does not balance; ``rollouts[k].warnings`` tell also what no animal does.  info: what all
+    have in common, JSON-ready; steps, rejected, evaluations and factorisations are those of all.
+    ``rollouts[k]`` is the Trajectory of run k, with its own parameters, counts and contact, or
+    raises its error.
     """
 
     t: np.ndarray

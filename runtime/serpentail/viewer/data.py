@@ -5,7 +5,8 @@ from typing import Any
 import numpy as np
 
 from ..model.model import Model
-from ..model.parameters import total_mass
+from ..motion.body import weight as weight_of
+from ..motion.doubts import warnings_of
 from ..motion.trajectory import Trajectory
 from .figures import events, figures
 from .packing import packed
@@ -22,12 +23,12 @@ def page_data(motions: list[Trajectory], names: list[str], models: list[Model]) 
     for motion, name, model in zip(motions, names, models, strict=True):
         few, step = thinned(motion)
         shown.append(few)
-        notes += _notes(name, motion, step)
+        notes += [*_notes(name, motion, step), *_warnings(name, model, motion)]
         numbers = [*figures(model, motion), ("samples", str(len(motion.t)))]
         prefix = f"{name}: " if len(motions) > 1 else ""
         words = {"name": name, "numbers": numbers, "events": events(motion, prefix)}
         runs.append(_run(few, model) | words)
-    weight = max(float(total_mass(m.parameters) * m.parameters["gravity"]) for m in models)
+    weight = max(map(weight_of, models))
     return {
         "runs": runs,
         "notes": notes,
@@ -61,6 +62,11 @@ def _notes(name: str, motion: Trajectory, step: int) -> list[str]:
             f"{name}: one of {step} samples is shown; the numbers are of all {len(motion.t)}."
         )
     return notes
+
+
+def _warnings(name: str, model: Model, motion: Trajectory) -> list[str]:
+    """What to mind about a run."""
+    return [f"{name}: {each}" for each in warnings_of(model, motion)]
 
 
 def _common_force(motions: list[Trajectory]) -> float:

@@ -2,37 +2,44 @@
 
 from typing import Any
 
-import numpy as np
-
-from ..attitude import tilt_deg
 from ..model.model import Model
-from ..motion.summary import com_rise, flight, peak_force
+from ..motion.numbers import UNITS
+from ..motion.summary import summary
+from ..motion.table import as_word
 from ..motion.trajectory import Trajectory
 
 MOST_EVENTS = 1000  # that a page has
-DECIMALS = 12  # what is smaller is rounding
+LABELS = {  # of the numbers that the page shows
+    "duration_s": "duration",
+    "take_off_s": "take-off",
+    "recontact_s": "landing",
+    "landed": "landed, and stands at the end",
+    "least_upright_landing": "least upright from the landing on",
+    "turned_landing_rad": "turned from the landing on",
+    "apex_m": "highest torso",
+    "com_rise_m": "rise of the centre of mass",
+    "tilt_max_deg": "largest tilt of the back",
+    "tilt_end_deg": "tilt at the end",
+    "peak_ground_force_N": "largest force of the ground",
+    "peak_ground_force_weights": "largest force of the ground",
+    "peak_group_force_N": "largest force",
+    "peak_torque_N_m": "largest joint torque",
+    "energy_change_J": "energy gained",
+}
 
 
 def figures(model: Model, motion: Trajectory) -> list[tuple[str, str]]:
     """Return labels with units, and values, of what the motion has."""
-    take_off, landing = flight(motion)
-    tilt = tilt_deg(motion.attitude)
-    rows = [
-        ("duration (s)", motion.t[-1] - motion.t[0]),
-        ("take-off (s)", take_off),
-        ("landing (s)", landing),
-        ("highest torso (m)", motion.q[:, 2].max()),
-        ("rise of the centre of mass (m)", com_rise(model, motion)),
-        ("largest tilt of the back (deg)", tilt.max()),
-        ("tilt at the end (deg)", tilt[-1]),
-        ("largest joint torque (N m)", np.abs(motion.tau).max(initial=0)),
-        ("energy gained (J)", motion.energy[-1] - motion.energy[0]),
-    ]
-    for group in motion.contact.groups if motion.contact else ():
-        rows.append((f"largest force at a point: {group} (N)", peak_force(motion, group)))
-    return [
-        (label, f"{round(value, DECIMALS) + 0.0:.4g}") for label, value in rows if value is not None
-    ]
+    told, rows = summary(model, motion), []
+    for name, label in LABELS.items():
+        unit = f" ({UNITS[name]})" if UNITS[name] else ""
+        value = told[name]
+        parts = value if isinstance(value, dict) else {"": value}
+        for part, each in parts.items():
+            whose = f": {part.replace('_', ' ')}" if part else ""
+            if each is not None:
+                rows.append((f"{label}{whose}{unit}", as_word(each)))
+    return rows
 
 
 def events(motion: Trajectory, prefix: str = "") -> list[dict[str, Any]]:

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from ..model.model import Model
+from ..motion.body import semi_axes
 
 THINNEST = 0.15  # a semi-axis that is drawn, over the largest
 SLENDER = 0.015  # radius over length of a tail whose radius no parameter tells
@@ -14,15 +15,11 @@ MOST_JOINTS = 60  # that are marked on a tail
 def shape(model: Model) -> dict[str, Any]:
     """Return semi-axes of the torso and radius of the tail, m, and whether its joints are marked.
 
-    The torso is the ellipsoid that touches the ground, else the homogeneous one of its inertia.
+    The torso is that of ``motion.body``, no semi-axis too thin to be seen.
     """
-    p = model.parameters
-    spread = np.sum(p["torso_inertia"]) - 2 * np.array(p["torso_inertia"])
-    of_inertia = np.sqrt(np.maximum(2.5 / p["torso_mass"] * spread, 0))
-    semi_axes = np.array(p.get("torso_semi_axes", of_inertia))
-    semi_axes = np.maximum(semi_axes, THINNEST * semi_axes.max())
+    p, axes = model.parameters, semi_axes(model)
     return {
-        "semi_axes": semi_axes.tolist(),
+        "semi_axes": np.maximum(axes, THINNEST * axes.max()).tolist(),
         "tail_radius": float(p.get("link_radius") or SLENDER * p["tail_length"]),
         "jointed": model.kind == "articulated"
         and model.manifest["dimensions"]["total"] <= MOST_JOINTS,

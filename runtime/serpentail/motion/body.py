@@ -1,0 +1,24 @@
+"""What of the animal's body a motion's numbers need: its weight, and how large its torso is."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..model.model import Model
+from ..model.parameters import total_mass
+
+
+def weight(model: Model) -> float:
+    """Return the weight (N) of torso and tail; 0 without gravity."""
+    return float(total_mass(model.parameters) * model.parameters["gravity"])
+
+
+def semi_axes(model: Model) -> NDArray[np.float64]:
+    """Return the semi-axes (3,) of the torso, m, along its own axes.
+
+    The torso is the ellipsoid that touches the ground, else the homogeneous one of its inertia.
+    """
+    p = model.parameters
+    if "torso_semi_axes" in p:
+        return np.array(p["torso_semi_axes"], float)
+    spread = np.sum(p["torso_inertia"]) - 2 * np.array(p["torso_inertia"])
+    return np.sqrt(np.maximum(2.5 / p["torso_mass"] * spread, 0))

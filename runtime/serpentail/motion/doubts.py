@@ -1,0 +1,168 @@
+"""What cannot be true of an animal in a motion: parts in the ground or in each other, blows, bends.
+
+Found in the samples when somebody asks, never while a run is simulated.
+"""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..attitude import Array, rotation_matrix
+from ..errors import StateError
+from ..model.layout import FIRST_Q, POSITION, QUATERNION, SECOND_Q
+from ..model.model import Model
+from .body import semi_axes, weight
+from .through_torso import sunk
+
+if TYPE_CHECKING:
+    from .trajectory import Trajectory
+
+DEEP = 0.1  # of the torso's length, below the ground: as deep as a torso rests in it by contact
+SUNK = 0.1  # of the way from the torso's centre to its surface
+MOST_WEIGHTS = 20.0  # body weights of the ground's force: hopping animals reach 10
+MOST_BEND = np.pi  # rad, of a segment: beyond it the segment's end points back into the segment
+KNEES = 3  # hip, D and knee come first in a leg, and are no contacts
+AT_ONCE = 4096  # samples
+
+Moment = tuple[float, float]  # value, time (s)
+Measure = Callable[[slice], Array]  # samples -> (K,)
+
+
+def warnings_of(model: Model | None, motion: "Trajectory") -> list[str]:
+    """Return what to mind about a motion: its books, then what cannot be true of an animal.
+
+    Without a model the latter is what was found before the motion was saved or pickled.
+    """
+    books: list[str] = motion.info.get("warnings", [])
+    found = motion.info.get("doubts", []) if model is None else doubts(model, motion)
+    return [*books, *found]
+
+
+def doubts(model: Model, motion: "Trajectory") -> list[str]:
+    """Return a sentence with value, time and remedy for all that cannot be true of an animal.
+
+    What needs points of tail or legs is looked at where the scene has the functions
+    ``tail_points`` and ``leg_points``.
+    """
+    with np.errstate(all="ignore"):  # of a run that blows up
+        return [
+            *_in_the_ground(model, motion),
+            *_through_the_torso(model, motion),
+            *_blows(model, motion),
+            *_bends(model, motion),
+        ]
+
+
+def _in_the_ground(model: Model, motion: "Trajectory") -> list[str]:
+    """Parts that the scene gave no contact although there is a ground, and that are deep in it."""
+    if motion.contact is None:
+        return []
+    allowed, told = DEEP * 2 * float(semi_axes(model).max()), []
+    for part, (depth, time) in _depths(model, motion).items():
+        if depth > allowed:
+            remedy = f'add "{part}" to `contacts` of the scene'
+            if part == "legs":
+                remedy = "above the ankle they touch nothing: start higher, or bend the legs less"
+            told.append(
+                f"{part}: {1e3 * depth:.3g} mm below the ground at t = {time:.4g} s, more than "
+                f"{1e3 * allowed:.3g} mm, and no contact there: {remedy}"
+            )
+    return told
+
+
+def _depths(model: Model, motion: "Trajectory") -> dict[str, Moment]:
+    """The largest depth (m) of each part that has no contact of its own, and when."""
+    contact = motion.contact
+    assert contact is not None
+    q, axes, depths = motion.q, semi_axes(model), {}
+    if "torso" not in contact.groups:
+        depths["torso"] = _largest(motion, lambda rows: _depth_of_torso(q[rows], axes))
+    if "tail" not in contact.groups and "tail_points" in model.kernels:
+        depths["tail"] = _largest(
+            motion, lambda rows: -model.tail_points(q[rows])[..., 2].min(axis=1)
+        )
+    legs = contact.legs
+    if legs is not None and "leg_points" in model.kernels:
+        depths["legs"] = _largest(
+            motion,
+            lambda rows: -model.leg_points(q[rows], legs[rows])[..., :KNEES, 2].min(axis=(1, 2)),
+        )
+    return depths
+
+
+def _depth_of_torso(q: Array, axes: Array) -> Array:
+    """Depth (K,) in m of the lowest point of the torso's ellipsoid."""
+    up = rotation_matrix(q[:, QUATERNION])[:, 2]
+    return np.linalg.norm(axes * up, axis=1) - q[:, 2]
+
+
+def _through_the_torso(model: Model, motion: "Trajectory") -> list[str]:
+    """A tail that bends into the torso, or comes back into it."""
+    axes = semi_axes(model)
+    if "tail_points" not in model.kernels or not axes.all():
+        return []
+
+    def depth(rows: slice) -> Array:
+        q = motion.q[rows]
+        from_b = model.tail_points(q) - q[:, None, POSITION]
+        return sunk(np.einsum("kij,kpi->kpj", rotation_matrix(q[:, QUATERNION]), from_b) / axes)
+
+    deepest, time = _largest(motion, depth)
+    if not deepest > SUNK:
+        return []
+    return [
+        f"tail: goes through the torso at t = {time:.4g} s, {deepest:.2g} of the way from its "
+        f"surface to its centre too deep, more than {SUNK}: bend the tail less, or damp it more"
+    ]
+
+
+def _blows(model: Model, motion: "Trajectory") -> list[str]:
+    """A force of the ground that no animal stands."""
+    contact, whole = motion.contact, weight(model)
+    if contact is None or not whole:
+        return []
+    forces = contact.total
+    k = int(forces.argmax())
+    if not forces[k] > MOST_WEIGHTS * whole:
+        return []
+    return [
+        f"ground: pushes with {forces[k]:.4g} N at t = {motion.t[k]:.4g} s, {forces[k] / whole:.3g}"
+        f" body weights, more than {MOST_WEIGHTS:g}: let the legs move, or the animal land, more "
+        "slowly, or make the ground softer by K_n and D_n"
+    ]
+
+
+def _bends(model: Model, motion: "Trajectory") -> list[str]:
+    """Segments that are bent by more than half a turn."""
+    bends = _bend(model, motion.q)
+    told = []
+    for segment, k in enumerate(bends.argmax(axis=0)):
+        if bends[k, segment] > MOST_BEND:
+            told.append(
+                f"tail: segment {segment + 1} is bent by {bends[k, segment]:.3g} rad at t = "
+                f"{motion.t[k]:.4g} s, more than {MOST_BEND:.3g}: damp it more, or give its "
+                "reference smaller bends"
+            )
+    return told
+
+
+def _bend(model: Model, q: Array) -> Array:
+    """How far the segments are bent, (K, m), rad: of joints the larger of pitch and yaw."""
+    first, second = q[:, FIRST_Q], q[:, SECOND_Q]
+    if model.links is not None:
+        return model.links * np.maximum(np.abs(first), np.abs(second))
+    polar = model.manifest["scene"]["coordinates"] == "polar"
+    return np.abs(second) if polar else np.hypot(first, second)
+
+
+def _largest(motion: "Trajectory", measure: Measure) -> Moment:
+    """The largest value of a measure of samples, and its time; some samples at once."""
+    try:
+        values = np.concatenate(
+            [measure(slice(k, k + AT_ONCE)) for k in range(0, len(motion.t), AT_ONCE)]
+        )
+    except StateError:  # a run that blows up has points that no number holds
+        return -np.inf, float(motion.t[0])
+    k = int(values.argmax())
+    return float(values[k]), float(motion.t[k])

@@ -1,0 +1,216 @@
+"""The numbers of a run: each with its name, its unit, what it means and how it is found.
+
+Reports, pages and documents all read this one table.
+"""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..attitude import pitch_roll_yaw, tilt_deg
+from ..model.model import Model
+from .body import weight
+from .doubts import warnings_of
+from .forces import in_weights, peak_force, peak_total, peaks
+from .landing import (
+    MAX_SPEED,
+    MIN_SHARE,
+    MIN_UPRIGHT,
+    flight,
+    landed,
+    landing_group,
+    least_upright,
+    standing,
+    times_of,
+    touching_time,
+    turned,
+    upright,
+)
+from .table import as_markdown
+from .trajectory import Trajectory
+
+
+class Number(NamedTuple):
+    """A number of a run: ``of`` returns it ready for JSON, or None where there is none."""
+
+    name: str
+    unit: str
+    meaning: str
+    of: Callable[[Model, Trajectory], Any]
+
+
+def com_rise(model: Model, motion: Trajectory) -> float | None:
+    """Highest rise (m) of the centre of mass, by the potential energy M g z; None without g."""
+    whole = weight(model)
+    return float((motion.potential.max() - motion.potential[0]) / whole) if whole else None
+
+
+def _told(name: str) -> Callable[[Model, Trajectory], Any]:
+    """What the run itself told in its info."""
+    return lambda model, motion: motion.info.get(name)
+
+
+def _ground_impulse(motion: Trajectory) -> list[float] | None:
+    """The sum of the groups' impulses; None in flight, and where no run added them up."""
+    impulses = motion.info.get("impulse_N_s")
+    return np.sum(list(impulses.values()), axis=0).tolist() if impulses else None
+
+
+def _peaks_in_weights(model: Model, motion: Trajectory) -> dict[str, float | None] | None:
+    found = peaks(motion)
+    if found is None:
+        return None
+    return {name: in_weights(model, force) for name, force in found.items()}
+
+
+def _real_time_factor(motion: Trajectory) -> float | None:
+    seconds = motion.info.get("cpu_seconds")
+    return float(motion.t[-1] - motion.t[0]) / seconds if seconds else None
+
+
+SAMPLES = "in the samples, which may lie beside a blow's highest moment"
+NUMBERS = (
+    Number("model", "", "name of the model", lambda model, motion: model.name),
+    Number(
+        "duration_s", "s", "from the first sample to the last",
+        lambda model, motion: float(motion.t[-1] - motion.t[0]),
+    ),
+    # the leap
+    Number(
+        "take_off_s", "s", "where the flight about the apex begins: nothing touches any more",
+        lambda model, motion: flight(motion)[0],
+    ),
+    Number(
+        "apex_m", "m", "highest B, the torso's centre of mass",
+        lambda model, motion: float(motion.q[:, 2].max()),
+    ),
+    Number("com_rise_m", "m", "highest centre of mass, over its start", com_rise),
+    Number(
+        "recontact_s", "s", "the landing: where the flight about the apex ends",
+        lambda model, motion: flight(motion)[1],
+    ),
+    Number(
+        "landing_group", "", "the group of points that lands first",
+        lambda model, motion: landing_group(motion),
+    ),
+    # the attitude, and whether it was a landing or a tumble
+    Number(
+        "pitch_at_end_rad", "rad", "pitch, turns counted",
+        lambda model, motion: float(pitch_roll_yaw(motion.q, unwrap=True)[-1, 0]),
+    ),
+    Number(
+        "tilt_max_deg", "deg", "largest angle of the torso's z axis off the vertical",
+        lambda model, motion: float(tilt_deg(motion.attitude).max()),
+    ),
+    Number(
+        "tilt_end_deg", "deg", "the same at the end",
+        lambda model, motion: float(tilt_deg(motion.attitude[-1])),
+    ),
+    Number(
+        "upright_end", "", "z of the torso's z axis at the end: 1 level, -1 on its back",
+        lambda model, motion: upright(motion),
+    ),
+    Number(
+        "least_upright_landing", "", "least such z from the landing on: below 0 it was on its back",
+        lambda model, motion: least_upright(motion),
+    ),
+    Number(
+        "turned_landing_rad", "rad",
+        "how far the torso turned about horizontal axes from the landing on, to and fro",
+        lambda model, motion: turned(motion),
+    ),
+    Number(
+        "standing_end", "",
+        f"at the end: upright above {MIN_UPRIGHT}, B below {MAX_SPEED} m/s, more than {MIN_SHARE} "
+        "of the weight on the feet, however it came there",
+        standing,
+    ),
+    Number(
+        "landed", "", "stands at the end, and was upright above 0 from the landing on", landed
+    ),
+    # the ground
+    Number(
+        "body_weight_N", "N", "weight of torso and tail",
+        lambda model, motion: weight(model) or None,
+    ),
+    Number(
+        "peak_ground_force_N", "N", f"largest force on all points together, {SAMPLES}",
+        lambda model, motion: peak_total(motion),
+    ),
+    Number(
+        "peak_ground_force_weights", "body weights", "the same",
+        lambda model, motion: in_weights(model, peak_total(motion)),
+    ),
+    Number(
+        "peak_group_force_N", "N", "largest force on each group and on each foot, of the samples",
+        lambda model, motion: peaks(motion),
+    ),
+    Number("peak_group_force_weights", "body weights", "the same", _peaks_in_weights),
+    Number(
+        "peak_foot_force_N", "N",
+        "largest force on one point, A, M or T of both feet together, of the samples",
+        lambda model, motion: peak_force(motion, "feet"),
+    ),
+    Number(
+        "peak_tail_force_N", "N", "largest force on one point of the tail, of the samples",
+        lambda model, motion: peak_force(motion, "tail"),
+    ),
+    Number(
+        "ground_impulse_N_s", "N s",
+        "x, y and z of the ground's impulse on all points, added up by the integrator",
+        lambda model, motion: _ground_impulse(motion),
+    ),
+    Number("impulse_N_s", "N s", "the same on each group", _told("impulse_N_s")),
+    Number(
+        "touching_s", "s", "for how long each group touched the ground, in all",
+        lambda model, motion: touching_time(motion),
+    ),
+    Number(
+        "first_touch_down_s", "s", "first touch-down of each group",
+        lambda model, motion: times_of(motion, "touch_down", 0),
+    ),
+    Number(
+        "last_take_off_s", "s", "last take-off of each group",
+        lambda model, motion: times_of(motion, "take_off", -1),
+    ),
+    # the books
+    Number(
+        "peak_torque_N_m", "N m", "largest torque of a joint coordinate, of the samples",
+        lambda model, motion: float(np.abs(motion.tau).max(initial=0)),
+    ),
+    Number(
+        "energy_change_J", "J", "energy at the end less that at the start",
+        lambda model, motion: float(motion.energy[-1] - motion.energy[0]),
+    ),
+    Number(
+        "work_J", "J",
+        "what changed it: work of torques, of damping, of the ground, of the legs' drives",
+        _told("work_J"),
+    ),
+    Number(
+        "imbalance", "",
+        "what work and impulses leave over: energy (J), momentum (N s), the larger over what was "
+        "moved",
+        _told("imbalance"),
+    ),
+    Number("warnings", "", "what to mind about the run", warnings_of),
+    # the effort
+    Number("method", "", "the integrator", _told("method")),
+    Number("reason", "", "why that one", _told("reason")),
+    Number("steps", "", "steps that were taken", _told("steps")),
+    Number("rejected", "", "steps that were taken again, shorter", _told("rejected")),
+    Number("evaluations", "", "evaluations of the equations of motion", _told("evaluations")),
+    Number("cpu_s", "s", "processor time", _told("cpu_seconds")),
+    Number(
+        "real_time_factor", "", "duration over processor time",
+        lambda model, motion: _real_time_factor(motion),
+    ),
+)  # fmt: skip
+UNITS = {number.name: number.unit for number in NUMBERS}
+
+
+def explained() -> str:
+    """Return all names, units and meanings as a Markdown table."""
+    rows = ((f"`{each.name}`", each.unit, each.meaning) for each in NUMBERS)
+    return as_markdown(("number", "unit", "meaning"), rows)

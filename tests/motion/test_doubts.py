@@ -1,0 +1,223 @@
+"""What cannot be true of an animal is told with its value, against geometry by brute force."""
+
+import pickle
+import re
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import serpentail as st
+from serpentail.motion.through_torso import sunk
+from tests.references import contact as reference
+from tests.support.models import model_folder
+
+from .conftest import at_height, made, scene_of
+
+SEMI_AXES = np.array([0.0315, 0.0495, 0.027])  # m: of the rat's torso, by its inertia
+FREE = ["energy", "momentum", "rollout", "tail_points"]
+WEIGHT = (0.10572 + 0.00351) * 9.8
+
+
+def the(warnings, word):
+    """The one warning that begins with a word, and no other."""
+    (found,) = [each for each in warnings if each.startswith(word)]
+    return found
+
+
+def millimetres(warning):
+    return float(re.search(r": ([\d.]+) mm below the ground", warning)[1])
+
+
+def sphere(count):
+    directions = np.random.default_rng(3).normal(size=(count, 3))
+    return directions / np.linalg.norm(directions, axis=1, keepdims=True)
+
+
+# The kick's own, and none of what is sound.
+
+
+def test_the_kick_is_told_all(kick):
+    told = kick.warnings
+    assert len(told) == 5
+    assert millimetres(the(told, "torso: ")) == pytest.approx(10.7, abs=0.2)
+    assert millimetres(the(told, "tail: 1")) == pytest.approx(150, abs=2)
+    assert "714 body weights" in the(told, "ground: ") and "t = 0.4 s" in the(told, "ground: ")
+    assert "segment 1 is bent by 7.03 rad" in the(told, "tail: segment")
+    assert "goes through the torso" in the(told, "tail: goes")
+    assert all(re.search(r" at t = [\d.]+ s.*more than [\d.]+.*: \w", each) for each in told)
+
+
+@pytest.mark.parametrize(("segments", "links"), [(1, 2), (2, None)])
+def test_a_clean_flight_has_none(segments, links):
+    model = st.load(model_folder(segments, links, functions=FREE))
+    q = np.concatenate([[0, 0, -3, 1, 0, 0, 0], 0.3 * np.cos(np.arange(2 * segments))])
+    v = np.concatenate([[0, 0, 1, 9, 1, 2], np.zeros(2 * segments)])
+    flight = st.simulate(model, q, v, controller=st.Damping(1e-3), t_span=0.3)
+    assert flight.warnings == []
+
+
+# The ground, where a scene has one.
+
+
+def test_the_torso_s_depth_by_points_of_its_surface(rat):
+    """At random attitudes; the lowest of 40,000 points of the ellipsoid."""
+    surface = sphere(40_000) * SEMI_AXES
+    for seed in range(5):
+        rotation = Rotation.random(random_state=seed)
+        q = at_height(rat, 0.005, 2)
+        q[1, 2], q[1, 3:7] = 0.004, np.roll(rotation.as_quat(), 1)
+        q[0, 2] = 1.0  # far above
+        expected = -1e3 * (rotation.apply(surface)[:, 2].min() + 0.004)
+        found = the(made(rat, q).warnings, "torso: ")
+        assert millimetres(found) == pytest.approx(expected, rel=0.01)
+        assert "t = 1 s" in found and '"torso" to `contacts`' in found
+
+
+def test_the_tail_s_depth_by_hand(rat):
+    """Straight, hanging from a torso pitched by 60 degrees about its mount."""
+    q = at_height(rat, 0.15, 1)
+    q[0, 3:5] = np.cos(np.pi / 6), np.sin(np.pi / 6)
+    mount, length = np.array([0, -0.0405, 0.0045]), 0.19466
+    tip = reference.attitude(q[0, 3:7]) @ (mount - [0, length, 0])
+    assert millimetres(the(made(rat, q).warnings, "tail: ")) == pytest.approx(
+        -1e3 * (0.15 + tip[2]), rel=0.01
+    )
+
+
+def test_the_legs_depth_by_the_reference(rat):
+    """Hip, D and knee; ankle and foot are contacts, and may be in the ground."""
+    angles = np.radians([210, -40, 210, -75])
+    q = at_height(rat, 0.002, 1)
+    every = np.array(reference.joints(rat.parameters, angles))
+    found = the(made(rat, q, legs=angles[None]).warnings, "legs: ")
+    assert millimetres(found) == pytest.approx(-1e3 * (0.002 + every[:, :3, 2].min()), rel=0.01)
+    q[0, 2] = -every[:, :3, 2].min()
+    assert (every[:, 3:, 2] + q[0, 2]).min() < -0.02
+    assert not any("legs" in each for each in made(rat, q, legs=angles[None]).warnings)
+
+
+def test_a_tenth_of_the_torso_s_length_is_allowed(rat):
+    """9.9 mm; the straight tail is out of the ground."""
+    for depth, count in ((9.8e-3, 0), (10e-3, 1)):
+        q = at_height(rat, SEMI_AXES[2] - depth)
+        assert len(made(rat, q).warnings) == count
+
+
+def test_what_has_contact_may_be_deep_and_where_is_no_ground_all_may():
+    model = scene_of("self_recovery").model
+    assert made(model, at_height(model, -0.1)).warnings == []
+    for contacts, words in ((["tail"], ["torso"]), (["torso"], ["tail"]), ([], [])):
+        model = st.load(model_folder(1, 2, functions=FREE, contacts=contacts))
+        told = made(model, at_height(model, -0.1)).warnings
+        assert [each.split(":")[0] for each in told] == words
+
+
+# The tail through the torso.
+
+
+def through(points, parts=4000):
+    """How deep polylines (P, 3) go into the unit ball, by points close together."""
+    deepest, left, begin = 0.0, False, min(np.linalg.norm(points[0]), 1)
+    for start, end in pairwise(points):
+        left |= np.linalg.norm(start) > 1
+        line = start + np.linspace(0, 1, parts)[:, None] * (end - start)
+        deepest = max(deepest, (1 if left else begin) - np.linalg.norm(line, axis=1).min())
+    return deepest
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_how_deep_a_tail_goes_by_points_close_together(seed):
+    random = np.random.default_rng(seed)
+    tails = random.normal(size=(20, 6, 3)) * random.uniform(0.3, 2)
+    found = sunk(tails)
+    np.testing.assert_allclose(found, [through(tail) for tail in tails], atol=1e-6)
+    assert (found[0] > 0) or seed != 0
+
+
+def test_tails_that_leave_the_torso_are_not_in_it():
+    mounts = 0.84 * sphere(50)
+    ways = np.linspace(0, 3, 7)[:, None] * np.ones((50, 1, 3))
+    assert sunk(mounts[:, None] * (1 + ways)).max() == 0  # straight away
+    inward = mounts[:, None] * (1 - ways[:, :4])
+    assert sunk(inward).min() == pytest.approx(0.84)  # through the centre
+    outside = np.concatenate([1.0 * mounts / 0.84, 3 * mounts]).reshape(2, 50, 3).swapaxes(0, 1)
+    assert sunk(outside).max() < 1e-12  # which begin on the surface
+    assert sunk(mounts[:, None]).max() == 0  # no link at all
+
+
+def test_a_tail_that_comes_back_into_the_torso_is_told():
+    """One of three links of 65 mm: the first out, the others folded back by nearly half a turn."""
+    model = scene_of("kick").model
+    q = at_height(model, 1.0, 2)
+    q[1, 7] = 2 * np.pi / 3 * 1.1  # a triangle, whose last link crosses the torso
+    q[:, 3:7] = 0.5, 0.7, -0.1, 0.5  # however the torso lies
+    found = the(made(model, q).warnings, "tail: goes")
+    mount, length = np.array([0, -0.0405, 0.0045]), 0.19466 / 3
+    points, way = [mount], np.array([0, -length, 0])
+    for _ in range(3):
+        way = Rotation.from_rotvec([q[1, 7], 0, 0]).apply(way)
+        points.append(points[-1] + way)
+    depth = through(np.array(points) / SEMI_AXES)
+    assert f"{depth:.2g} of the way" in found and "t = 1 s" in found
+
+
+# Blows and bends.
+
+
+def test_blows_from_20_body_weights_on(rat):
+    for weights, count in ((19.9, 0), (20.1, 1)):
+        forces = np.zeros((3, 6, 3))
+        forces[2, :, 2] = weights * WEIGHT / 6
+        told = made(rat, at_height(rat, 1.0), forces=forces).warnings
+        assert len(told) == count
+        assert all("t = 2 s" in each and "20.1 body weights" in each for each in told)
+
+
+@pytest.mark.parametrize(("kind", "parts"), [("joints", 3), ("arcs", 1), ("polar", 1)])
+def test_bends_beyond_half_a_turn(kind, parts):
+    """Of joints what all links turn together; of arcs the length of (a, b), or theta."""
+    options = {"coordinates": "polar"} if kind == "polar" else {}
+    links = 3 if kind == "joints" else None
+    model = st.load(model_folder(2, links, functions=["energy", "momentum", "rollout"], **options))
+    for bend, count in ((3.1, 0), (3.2, 1)):
+        q = at_height(model, 1.0)
+        q[:, 8::2] = 0.1
+        if kind == "arcs":
+            q[2, 9:11] = bend * np.cos(2.0), bend * np.sin(2.0)
+        else:
+            q[2, 10] = -bend / parts
+        told = made(model, q).warnings
+        assert len(told) == count
+        assert all("segment 2 is bent by 3.2 rad at t = 2 s" in each for each in told)
+
+
+# Where the model is, and where it is not.
+
+
+def test_files_and_pickles_keep_what_was_found(kick, tmp_path):
+    loaded = st.Trajectory.load(kick.save(tmp_path / "kick.npz"))
+    for copy in (loaded, pickle.loads(pickle.dumps(kick))):
+        assert copy.model is None and copy.warnings == kick.warnings
+    again = st.Trajectory.load(loaded.save(tmp_path / "again.npz"))
+    assert again.warnings == kick.warnings and "doubts" not in kick.info
+
+
+def test_runs_that_fail_have_warnings_up_to_there():
+    with pytest.raises(st.SimulationError) as caught:
+        scene_of("kick").simulate(most_steps=400)
+    told = caught.value.trajectory.warnings
+    assert the(told, "torso: ") and the(told, "ground: ")
+
+
+def test_books_that_do_not_balance_come_first(rat):
+    motion = made(rat, at_height(rat, 0.0))
+    motion.info["warnings"] = ["the books"]
+    assert motion.warnings[0] == "the books" and len(motion.warnings) > 1
+
+
+def test_what_lies_beyond_the_first_thousands_of_samples_counts(rat):
+    q = at_height(rat, 1.0, 10_000)
+    q[9000, 2] = 0.0
+    assert "t = 9000 s" in the(made(rat, q).warnings, "torso: ")
