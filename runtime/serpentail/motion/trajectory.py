@@ -15,6 +15,7 @@ from ..checks import finite_array
 from ..model.layout import PER_SEGMENT, QUATERNION, TAIL_Q, TORSO_NQ, Layout
 from ..model.model import Model
 from . import archive
+from .account import account
 from .contact import Contact
 from .resample import Interpolation, hermite_q, inside, monotone, smooth
 
@@ -56,6 +57,8 @@ class Trajectory:
         _check_time(self.t)
         _check_unit(self.attitude)
         object.__setattr__(self, "info", json.loads(_json(self.info)))
+
+    __repr__ = account
 
     @property
     def energy(self) -> Array:

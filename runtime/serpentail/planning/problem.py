@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..brief import brief
 from ..checks import number, numbers, numbers_in, one_of, refusal, shown
 from ..errors import PlanningError
 from ..model.layout import QUATERNION, TAIL_Q, TAIL_V
@@ -71,6 +72,7 @@ class PlanningProblem:
     path: tuple[PathConstraint, ...] = ()
     formulation: str = "airborne"
     attitude: str = "quaternion"
+    __repr__ = brief
 
 
 PROBLEM_SETTINGS = ("objective", "smoothing", "damping", "path", "formulation", "attitude")

@@ -7,6 +7,7 @@ from typing import Any, overload
 
 import numpy as np
 
+from ..brief import brief
 from ..checks import finite_array, number, one_of, refusal, shown
 from ..errors import SimulationError
 from ..model.layout import OMEGA, VELOCITY
@@ -55,6 +56,7 @@ class Scenario:
     controller: Controller = None
     legs: Legs | None = None
     settings: dict[str, Any] = field(default_factory=dict)
+    __repr__ = brief
 
     @overload
     def simulate(self) -> Trajectory: ...

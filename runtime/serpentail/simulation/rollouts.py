@@ -11,6 +11,7 @@ import numpy as np
 from ..errors import SimulationError, ViewError
 from ..model.model import Model
 from ..model.parameters import RunParameters
+from ..motion.account import arrays_of, framed, made, tail_of
 from ..motion.trajectory import Trajectory
 from .audit import Audit
 from .compiled_run import Outcome, Samples, sampled
@@ -71,6 +72,22 @@ class Rollouts:
 
     def __len__(self) -> int:
         return len(self.q)
+
+    def __repr__(self) -> str:
+        """On at most six lines what they are, and which failed."""
+        model, failed = self.source.model, [k for k, e in enumerate(self.errors) if e is not None]
+        lines = [
+            f"Rollouts of {model.name}, {tail_of(model)}: {len(self)} runs of "
+            f"{len(self.t)} samples, {self.t[0]:.6g} to {self.t[-1]:.6g} s",
+            arrays_of(self),
+            made(self.info) + " in all",
+        ]
+        if failed:
+            lines.append(
+                f"{len(failed)} failed, the first run {failed[0]}: {self.errors[failed[0]]}"
+            )
+        warned = sum(map(bool, self.warnings))
+        return framed(lines + ([f"{warned} have warnings"] if warned else []))
 
     def view(self, k: int | Sequence[int], path: str | PathLike[str] = "run.html") -> Path:
         """Write the page of run k, or of several; return its path.  Failed runs show their begin.
