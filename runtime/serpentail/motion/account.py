@@ -58,14 +58,19 @@ def _touched(motion: "Trajectory") -> str:
     if motion.contact is None:
         return "in flight"
     points = [f"{count} of the {group}" for group, count in motion.contact.groups.items()]
-    events = len(motion.info["events"]) if "events" in motion.info else "no"
-    return f"on the ground by points: {', '.join(points)}; {events} events"
+    events = _listed(motion.info, "events")
+    return f"on the ground by points: {', '.join(points)}; {len(events)} events"
 
 
 def _ended(motion: "Trajectory") -> list[str]:
     """What went wrong."""
     if "failure" in motion.info:
         return [f"failed: {motion.info['failure']}"]
-    if motion.warnings:
-        return [f"{len(motion.warnings)} warnings, the first: {motion.warnings[0]}"]
-    return []
+    warnings = _listed(motion.info, "warnings")
+    return [f"{len(warnings)} warnings, the first: {warnings[0]}"] if warnings else []
+
+
+def _listed(info: dict[str, Any], name: str) -> list[Any]:
+    """A list in an info, which is whatever its maker gave."""
+    found = info.get(name)
+    return found if isinstance(found, list) else []

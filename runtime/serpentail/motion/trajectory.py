@@ -124,6 +124,12 @@ class Trajectory:
 
         return view(self, path, model=model)
 
+    def _repr_html_(self) -> str:
+        """For notebooks: the text, and the page."""
+        from ..viewer.notebook import in_notebook
+
+        return in_notebook(self, lambda: [self])
+
     def resample(self, t: ArrayLike) -> Self:
         """The motion at the increasing times t (n,), s; ValueError names the first one outside.
 

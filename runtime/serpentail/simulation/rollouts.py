@@ -18,6 +18,8 @@ from .compiled_run import Outcome, Samples, sampled
 from .ground import Ground
 from .measured import trajectory_or_error
 
+SHOWN = 3  # runs that a notebook shows over each other
+
 
 @dataclass(frozen=True, eq=False)
 class Source:
@@ -101,6 +103,15 @@ class Rollouts:
             raise ViewError(f"k: value {k!r:.200}: needs a run, or runs, from 0 to {len(self) - 1}")
         motions = [self._begun(number) for number in numbers]
         return view(motions, path, names=[f"run {number}" for number in numbers])
+
+    def _repr_html_(self) -> str:
+        """For notebooks: the text, and the page of the first runs that began."""
+        from ..viewer.notebook import in_notebook
+
+        begun = [k for k, e in enumerate(self.errors) if e is None or e.trajectory is not None]
+        begun = begun[:SHOWN]
+        names = [f"run {k}" for k in begun]
+        return in_notebook(self, lambda: [self._begun(k) for k in begun], names)
 
     def _begun(self, k: int) -> Trajectory:
         """Return the trajectory of run k, as far as it went."""

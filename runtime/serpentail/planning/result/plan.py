@@ -82,11 +82,23 @@ class Plan:
         """
         from ...viewer.view import view
 
+        own = self.trajectory.model if self.trajectory.model is not None else model
+        motions = self._motions(own)
+        return view(motions, path, names=SHOWN[: len(motions)], model=own)
+
+    def _repr_html_(self) -> str:
+        """For notebooks: the text, and the page."""
+        from ...viewer.notebook import in_notebook
+
+        return in_notebook(self, lambda: self._motions(self.trajectory.model), SHOWN)
+
+    def _motions(self, model: Model | None) -> list[Trajectory]:
+        """The motion as planned, and where there is a model, what its torques do, and passive."""
+        if model is None:
+            return [self.trajectory]
         damping = self.problem.damping
         laws = (TorqueCurve(planned_torques(self.curve), damping), Damping(damping))
-        own = self.trajectory.model if self.trajectory.model is not None else model
-        flown = [] if own is None else [self._flown(own, law) for law in laws]
-        return view([self.trajectory, *flown], path, names=SHOWN[: 1 + len(flown)], model=own)
+        return [self.trajectory, *(self._flown(model, law) for law in laws)]
 
     def _flown(self, model: Model, law: Controller) -> Trajectory:
         """The motion under a law, or what there is of it where it fails."""
