@@ -37,6 +37,7 @@ _HOME = {
             "StateError",
             "SimulationError",
             "PlanningError",
+            "ExtraMissing",
             "NotWritten",
             "ViewError",
             "UnlikeBodies",

@@ -69,7 +69,6 @@ def parser() -> argparse.ArgumentParser:
     # of a scene
     plan = verbs.add_parser("plan", help="plan the motion of a scene's table [plan]")
     _add_scene(plan, "scenes/righting_m1_n3.toml")
-    plan.add_argument("--save", help="write the planned motion to this .npz file")
     simulate = verbs.add_parser(
         "simulate", help="simulate the motion of a scene's table [simulate]"
     )
@@ -85,9 +84,9 @@ def parser() -> argparse.ArgumentParser:
             "[simulate] (duration=2, start.height=0.1)"
         ),
     )
-    simulate.add_argument("--save", help="write the motion to this .npz file")
     simulate.add_argument("--film", help="draw it as a filmstrip, to this .png, .svg or .pdf file")
     for verb in (plan, simulate):
+        verb.add_argument("--save", help="write the motion to this .npz, .csv or .nc file")
         verb.add_argument("--view", metavar="PAGE", help="show it in a page, this .html file")
     # of a motion
     view = verbs.add_parser("view", help="show saved motions in a page, over each other")
@@ -128,9 +127,7 @@ class Outcome(NamedTuple):
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Run a verb; 0 if it went well, 1 if a check or a file failed, 2 if the input was refused, 130
-    after Ctrl-C.
-    """
+    """Run a verb; 0: it went well, 1: a check or a file failed, 2: refused, 130: after Ctrl-C."""
     arguments = parser().parse_args(argv)
     try:
         refuse_targets(arguments)
@@ -177,7 +174,9 @@ def target(option: str, path: str) -> Path:
         from .viewer.view import checked_path
 
         return checked_path(path)
-    return Path(path)
+    from .containers.files import checked
+
+    return checked(path)
 
 
 def tell(text: str) -> None:
@@ -217,15 +216,17 @@ def informed(arguments: argparse.Namespace) -> Outcome:
 
 def planned(arguments: argparse.Namespace) -> Outcome:
     """Return the report of a scene's plan, and whether it converged."""
+    from .containers.files import save
     from .scenes import plan as scenes
 
     plan = scenes.planned(arguments.scene, arguments.folder)
-    files: Files = {"save": plan.trajectory.save, "view": plan.view}
+    files: Files = {"save": partial(save, plan.trajectory), "view": plan.view}
     return Outcome(plan.report, _rows(plan.report), plan.success, files)
 
 
 def simulated(arguments: argparse.Namespace) -> Outcome:
     """Return the report of a scene's motion."""
+    from .containers.files import save
     from .scenes.overrides import parsed
     from .scenes.simulate import scenario
 
@@ -233,7 +234,7 @@ def simulated(arguments: argparse.Namespace) -> Outcome:
     motion, stopped = _motion(scene, arguments.view)
     report = scene.summary(motion) | stopped
     film = partial(scene.film, motion)
-    files: Files = {"save": motion.save, "film": film, "view": motion.view}
+    files: Files = {"save": partial(save, motion), "film": film, "view": motion.view}
     return Outcome(report, _rows(report), True, files)
 
 

@@ -17,13 +17,14 @@ from ..model.model import Model
 from . import archive
 from .account import account
 from .contact import Contact
+from .exports import Exports
 from .resample import Interpolation, hermite_q, inside, monotone, smooth
 
 UNIT_TOLERANCE = 1e-3  # how far a stored quaternion's norm may drift from 1
 
 
 @dataclass(frozen=True, eq=False)
-class Trajectory:
+class Trajectory(Exports):
     """K samples of a motion with m tail segments, SI, in read-only arrays; ValueError if unsound.
 
     t (K,) s, increasing; q (K, 7+2m), v (K, 6+2m); tau (K, 2m) N m; kinetic, potential (K,) J; in

@@ -12,6 +12,7 @@ from ..errors import SimulationError, ViewError
 from ..model.model import Model
 from ..model.parameters import RunParameters
 from ..motion.account import arrays_of, framed, made, tail_of
+from ..motion.exports import Exports
 from ..motion.trajectory import Trajectory
 from .audit import Audit
 from .compiled_run import Outcome, Samples, sampled
@@ -43,7 +44,7 @@ class Source:
 
 
 @dataclass(frozen=True, eq=False)
-class Rollouts:
+class Rollouts(Exports):
     """k motions, sampled at the same s times, in read-only arrays; NaN after a motion's end.
 
     t (s,) s; q (k, s, 7+2m), v (k, s, 6+2m); tau (k, s, 2m) N m; kinetic, potential (k, s) J;
