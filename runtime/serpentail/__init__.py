@@ -28,6 +28,7 @@ _HOME = {
     "leg_joints": "pictures.skeleton",
     "time_plots": "pictures.time_plots",
     "view": "viewer.view",
+    "live": "watching.live",
     **dict.fromkeys(
         [
             "SerpentailError",
