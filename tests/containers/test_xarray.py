@@ -1,5 +1,6 @@
 """Datasets: named dimensions, units, NaN after a run's end, and NetCDF files with the same bits."""
 
+import dataclasses
 import json
 
 import numpy as np
@@ -81,6 +82,14 @@ def test_points_are_named_and_grouped(drop):
     assert np.array_equal(toe, drop.contact.points[:, 5, 2])
     assert np.array_equal(data.legs.sel(leg="delta_left"), drop.contact.legs[:, 3])
     assert np.array_equal(data.bristles.sel(plane="y"), drop.contact.bristles[..., 1])
+
+
+def test_points_of_other_feet_are_counted(flight):
+    """Only feet of six points have names for each."""
+    none = np.zeros((41, 2, 3))
+    contact = st.Contact(none, none, none[..., :2], {"feet": 2})
+    data = dataclasses.replace(flight, contact=contact).to_xarray()
+    assert data.point.values.tolist() == ["feet_1", "feet_2"] and "legs" not in data
 
 
 def test_facts_are_attributes(drop):

@@ -97,14 +97,15 @@ def _states(
     motion: Any, labels: Mapping[str, Any], leading: tuple[str, ...]
 ) -> dict[str, Variable]:
     """States, torques and measures, which both kinds have under the same names."""
-    tail = len(labels["joint"])
+    tail = len(labels.get("joint", ()))
     q_units = [*TORSO_Q.values(), *["rad"] * tail]
     v_units = [*TORSO_V.values(), *["rad/s"] * tail]
     found = {
         "q": Variable((*leading, "coordinate"), motion.q, q_units, "configuration"),
         "v": Variable((*leading, "rate"), motion.v, v_units, "velocity"),
-        "tau": Variable((*leading, "joint"), motion.tau, "N m", "torques of the tail"),
     }
+    if tail:
+        found["tau"] = Variable((*leading, "joint"), motion.tau, "N m", "torques of the tail")
     measures = {
         name: _variable(entry, leading, getattr(motion, name)) for name, entry in MEASURES.items()
     }
@@ -123,9 +124,8 @@ def _labels(tail: list[str]) -> dict[str, Any]:
     return {
         "coordinate": [*TORSO_Q, *tail],
         "rate": [*TORSO_V, *(f"{name}_dot" for name in tail)],
-        "joint": tail,
         "axis": AXES,
-    }
+    } | ({"joint": tail} if tail else {})
 
 
 def _touch_labels(contact: Contact) -> dict[str, Any]:

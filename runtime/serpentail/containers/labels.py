@@ -35,6 +35,7 @@ def points(groups: Mapping[str, int]) -> list[str]:
     """Return the names of the points that touch the ground, such as feet_right_A, tail_1."""
     names = []
     for group, count in groups.items():
-        own = FOOT if group == "feet" else [str(k + 1) for k in range(count)]
+        counted = tuple(str(k + 1) for k in range(count))
+        own = FOOT if (group, count) == ("feet", len(FOOT)) else counted
         names += [f"{group}_{name}" for name in own]
     return names
