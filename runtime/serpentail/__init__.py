@@ -32,6 +32,7 @@ _HOME = {
     "leg_joints": "pictures.skeleton",
     "time_plots": "pictures.time_plots",
     "view": "viewer.view",
+    "live": "watching.live",
     **dict.fromkeys(
         [
             "SerpentailError",
@@ -41,6 +42,7 @@ _HOME = {
             "StateError",
             "SimulationError",
             "PlanningError",
+            "ExtraMissing",
             "NotWritten",
             "ViewError",
             "UnlikeBodies",

@@ -39,6 +39,10 @@ class PlanningError(SerpentailError, ValueError):
     """A planning problem that cannot be posed."""
 
 
+class ExtraMissing(SerpentailError, ImportError):
+    """A library is not installed; the message names the extra that brings it."""
+
+
 class NotWritten(SerpentailError, OSError):
     """A file cannot be written; what was there before is there still."""
 

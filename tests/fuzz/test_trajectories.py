@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import xarray
 from hypothesis import assume
 from hypothesis import strategies as some
 
@@ -73,6 +74,35 @@ def test_what_is_kept_is_read_again(search, tmp_path):
 
     times = some.lists(some.floats(-9, 9), min_size=1, max_size=9, unique=True)
     search(law, times=times.map(sorted), segments=some.integers(0, 3))
+
+
+def test_tables_have_what_was_kept(search, tmp_path):
+    def law(times, segments):
+        assume(len(times) == 1 or min(np.diff(times)) > 0)
+        flight = motion(np.array(times), segments)
+        again = np.genfromtxt(flight.to_csv(tmp_path / "run.csv"), delimiter=",", names=True)
+        again = np.atleast_1d(again)
+        np.testing.assert_array_equal(again["time_s"], flight.t)
+        np.testing.assert_array_equal(again["qw_1"], flight.q[:, 3])
+        np.testing.assert_array_equal(flight.to_xarray().q, flight.q)
+        with xarray.open_dataset(flight.to_netcdf(tmp_path / "run.nc")) as data:
+            np.testing.assert_array_equal(data.v, flight.v)
+
+    times = some.lists(some.floats(-9, 9), min_size=1, max_size=9, unique=True)
+    search(law, times=times.map(sorted), segments=some.integers(0, 3))
+
+
+@pytest.mark.parametrize("method", ["to_csv", "to_netcdf"])
+def test_names_of_tables_are_taken_or_refused(method, flight, search, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    names = some.text(some.characters(codec="utf-8", exclude_characters="/"), max_size=300)
+
+    def law(name):
+        found = answer(getattr(flight, method), name, refusals=(*REFUSED, TypeError))
+        assert found is None or found.stat().st_size > 100
+        assert {p.resolve().parent for p in tmp_path.iterdir()} <= {tmp_path.resolve()}
+
+    search(law, name=names | some.none() | some.integers())
 
 
 def test_names_of_files_are_taken_or_refused(flight, search, tmp_path, monkeypatch):

@@ -54,6 +54,7 @@ def one_line(caught):
     ids=lambda value: value[:20] if isinstance(value, str) else "",
 )
 def test_what_no_scene_can_mean_is_one_line_at_once(scene, replaced, added, words):
+    st.build(scene())
     path, begun = scene(added, **replaced), time.perf_counter()
     with pytest.raises(st.SerpentailError) as caught:
         st.scenario(path).simulate()

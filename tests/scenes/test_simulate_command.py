@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from scipy.io import netcdf_file
 
 import serpentail as st
 from serpentail import cli
@@ -115,6 +116,8 @@ def test_a_flight_is_a_scene_too(tmp_path, monkeypatch, capsys):
     [
         ("--save", "simple.toml/a.npz", "simple.toml is no folder"),
         ("--save", ".", ". is a folder"),
+        ("--save", "a.dat", "its name ends in .dat, which is none of .npz, .csv, .nc"),
+        ("--save", "a.csv/a.v2", "its name ends in .v2"),
         ("--film", "simple.toml/deep/a.png", "simple.toml is no folder"),
         ("--film", "a.gif", "has suffix '.gif': use one of .pdf, .png, .svg"),
         ("--film", "a", "has suffix '': use one of"),
@@ -145,6 +148,38 @@ def test_a_failed_picture_loses_nothing(scene, capsys, monkeypatch):
     assert json.loads(out)["model"] == "simple"
     assert err == "--film a.png: could not be written: no fonts on this machine\n"
     assert st.Trajectory.load("new/a.npz").t[-1] == 0.02 and not Path("a.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("path", "written"),
+    [("a.npz", "a.npz"), ("new/a", "new/a.npz"), ("a.csv", "a.csv"), ("a.nc", "a.nc")],
+)
+def test_the_name_tells_the_kind_of_file(scene, capsys, path, written):
+    assert cli.main(["simulate", scene(), "--save", path]) == 0
+    assert capsys.readouterr().err == ""
+    readers = {".npz": npz_times, ".csv": csv_times, ".nc": netcdf_times}
+    times = readers[Path(written).suffix](written)
+    assert times[-1] == 0.02 and len(times) == 201
+
+
+def npz_times(path):
+    return st.Trajectory.load(path).t
+
+
+def csv_times(path):
+    return [float(line.partition(",")[0]) for line in Path(path).read_text().splitlines()[1:]]
+
+
+def netcdf_times(path):
+    with netcdf_file(path, mmap=False) as file:
+        return file.variables["time"][:]
+
+
+def test_a_file_that_nothing_can_write_is_refused_before_the_run(scene, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "xarray", None)
+    monkeypatch.setattr(st.Scenario, "simulate", None)
+    assert cli.main(["simulate", scene(), "--save", "a.nc"]) == 2
+    assert 'pip install "serpentail[xarray]"' in capsys.readouterr().err
 
 
 def test_a_plan_is_told_before_it_is_saved(scene, capsys, monkeypatch):

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+import serpentail as st
 from serpentail import cli
 from serpentail_codegen.scene.parse import load_scene
 from tests.support.models import folder_of
@@ -17,8 +18,9 @@ KICK = str(SCENES / "kick.toml")
 
 @pytest.fixture
 def run(tmp_path, monkeypatch, capsys):
-    """Return a function from arguments to status, stdout and stderr."""
+    """Return a function from arguments to status, stdout and stderr; kick's model is built."""
     monkeypatch.chdir(tmp_path)
+    st.build("kick")
 
     def invoke(*arguments):
         status = cli.main(list(arguments))

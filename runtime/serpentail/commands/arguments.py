@@ -64,12 +64,11 @@ def _of_motions(verbs: argparse._SubParsersAction) -> None:
             "[simulate] (duration=2, start.height=0.1)"
         ),
     )
-    simulate.add_argument("--save", help="write the motion to this .npz file")
     simulate.add_argument("--film", help="draw it as a filmstrip, to this .png, .svg or .pdf file")
     plan = verbs.add_parser("plan", help="plan the motion of a scene's table [plan]")
     _add_scene(plan, "scenes/righting_m1_n3.toml")
-    plan.add_argument("--save", help="write the planned motion to this .npz file")
     for verb in (plan, simulate):
+        verb.add_argument("--save", help="write the motion to this .npz, .csv or .nc file")
         verb.add_argument("--view", metavar="PAGE", help="show it in a page, this .html file")
     view = verbs.add_parser("view", help="show saved motions in a page, over each other")
     view.add_argument("files", nargs="+", help="what --save wrote: .npz files")

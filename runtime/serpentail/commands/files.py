@@ -36,7 +36,9 @@ def target(option: str, path: str) -> Path:
         from ..viewer.view import checked_path
 
         return checked_path(path)
-    return Path(path)
+    from ..containers.files import checked
+
+    return checked(path)
 
 
 def write(arguments: argparse.Namespace, option: str, make: Callable[[str], object]) -> bool:

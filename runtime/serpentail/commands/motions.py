@@ -16,15 +16,17 @@ if TYPE_CHECKING:
 
 def plan(arguments: argparse.Namespace) -> Outcome:
     """Return the report of a scene's plan, and whether it converged."""
+    from ..containers.files import save
     from ..scenes import plan as scenes
 
     plan = scenes.planned(arguments.scene, arguments.folder)
-    files: Files = {"save": plan.trajectory.save, "view": plan.view}
+    files: Files = {"save": partial(save, plan.trajectory), "view": plan.view}
     return Outcome(plan.report, as_text(plan.report), plan.success, files)
 
 
 def simulate(arguments: argparse.Namespace) -> Outcome:
     """Return the report of a scene's motion."""
+    from ..containers.files import save
     from ..motion.numbers import UNITS
     from ..scenes.overrides import parsed
     from ..scenes.simulate import scenario
@@ -33,7 +35,7 @@ def simulate(arguments: argparse.Namespace) -> Outcome:
     motion, stopped = _motion(scene, arguments.view)
     report = scene.summary(motion) | stopped
     film = partial(scene.film, motion)
-    files: Files = {"save": motion.save, "film": film, "view": motion.view}
+    files: Files = {"save": partial(save, motion), "film": film, "view": motion.view}
     return Outcome(report, as_text(report, UNITS), True, files)
 
 

@@ -58,13 +58,8 @@ def schema(arguments: argparse.Namespace) -> Outcome:
 
 def completion(arguments: argparse.Namespace) -> Outcome:
     """Return the script by which a shell completes the command line."""
-    try:
-        import shtab
-    except ImportError as error:
-        raise SerpentailError(
-            'shell completion needs shtab: pip install "serpentail[completion]"'
-        ) from error
+    from ..extras import needed
     from .arguments import parser
 
-    script = shtab.complete(parser(), arguments.shell)
+    script = needed("shtab", "completion").complete(parser(), arguments.shell)
     return Outcome({"script": script}, script)

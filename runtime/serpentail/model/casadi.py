@@ -1,5 +1,6 @@
 """A model as CasADi functions, of operations that CasADi knows or of the compiled C."""
 
+import textwrap
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
@@ -73,6 +74,13 @@ class CasadiFunctions:
         v_dot = forward_dynamics(q, v, u, p)
         x_dot = casadi.vertcat(v[VELOCITY], turning / 2 + restoring, v[TAIL_V], v_dot)
         return casadi.Function("x_dot", inputs, [x_dot], [*sizes], ["x_dot"])
+
+    def __repr__(self) -> str:
+        names = ", ".join(self._model.manifest["functions"])
+        lines = textwrap.wrap(names, 90, max_lines=4, placeholder=" ...")
+        kinds = "SX and compiled" if self._has_module else "compiled alone"
+        head = f"<CasadiFunctions of {self._model.name}, {kinds}:"
+        return "\n  ".join([head, *lines]) + ">"
 
     def __dir__(self) -> list[str]:
         symbolic = self._module.SIGNATURES if self._has_module else ()

@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..brief import brief
+
 Array = NDArray[np.float64]
 
 
@@ -32,6 +34,8 @@ class Contact:
             array = np.array(value, float)
             array.setflags(write=False)
             object.__setattr__(self, name, array)
+
+    __repr__ = brief
 
     @property
     def arrays(self) -> dict[str, Array]:

@@ -15,15 +15,17 @@ from ..checks import finite_array
 from ..model.layout import PER_SEGMENT, QUATERNION, TAIL_Q, TORSO_NQ, Layout
 from ..model.model import Model
 from . import archive
+from .account import account
 from .contact import Contact
 from .doubts import doubts, warnings_of
+from .exports import Exports
 from .resample import Interpolation, hermite_q, inside, monotone, smooth
 
 UNIT_TOLERANCE = 1e-3  # how far a stored quaternion's norm may drift from 1
 
 
 @dataclass(frozen=True, eq=False)
-class Trajectory:
+class Trajectory(Exports):
     """K samples of a motion with m tail segments, SI, in read-only arrays; ValueError if unsound.
 
     t (K,) s, increasing; q (K, 7+2m), v (K, 6+2m); tau (K, 2m) N m; kinetic, potential (K,) J; in
@@ -57,6 +59,8 @@ class Trajectory:
         _check_time(self.t)
         _check_unit(self.attitude)
         object.__setattr__(self, "info", json.loads(_json(self.info)))
+
+    __repr__ = account
 
     @property
     def energy(self) -> Array:
@@ -130,6 +134,12 @@ class Trajectory:
         from ..viewer.view import view
 
         return view(self, path, model=model)
+
+    def _repr_html_(self) -> str:
+        """For notebooks: the text, and the page."""
+        from ..viewer.notebook import in_notebook
+
+        return in_notebook(self, lambda: [self])
 
     def resample(self, t: ArrayLike) -> Self:
         """The motion at the increasing times t (n,), s; ValueError names the first one outside.

@@ -4,10 +4,11 @@ The search refines its mesh until the planned torques, applied to the model, do 
 """
 
 import time
+from collections.abc import Callable
 from dataclasses import fields
 from typing import Any
 
-from ..checks import Refusals, none_of
+from ..checks import Refusals, none_of, refusal
 from ..errors import PlanningError
 from ..model.model import Model
 from .nlp.fork_gate import forks_wait
@@ -60,6 +61,7 @@ def plan(
     dynamics: "auto", "compiled", "symbolic".
     time_limit: s, of the search.
     track: simulate with PFL, too.
+    watch: a function that is given the Plan of each round as it is found; what it raises ends all.
 
     Programs and solvers are remembered: planning again on a plan's mesh, from another start,
     derives nothing.  Ctrl-C ends the search, as the time limit does, and the best so far is
@@ -67,6 +69,7 @@ def plan(
     Returns a Plan; look at its ``success`` and ``report``.  Raises PlanningError (a field, its
     value, the remedy), ModelError (the scene lacks functions).
     """
+    watch = _watch(settings.pop("watch", None))
     problem, checked = _checked(model, (start, goal, duration, bounds), settings)
     missing = [name for name in NEEDED if name not in model.generated]
     if missing:
@@ -77,8 +80,19 @@ def plan(
         equations = equations_of_motion(model, checked.dynamics)
         search = Search(model, problem, checked, equations, rule)
         with stoppable(checked.time_limit):
-            rounds = search.refined(search.first())
-        return search.plan(rounds, time.perf_counter() - begun)
+            rounds = []
+            for each in search.rounds():
+                rounds.append(each)
+                if watch is not None:
+                    watch(search.plan(each, len(rounds), time.perf_counter() - begun))
+        return search.plan(search.best(rounds), len(rounds), time.perf_counter() - begun)
+
+
+def _watch(watch: Any) -> Callable[[Plan], object] | None:
+    """What is called after each round; PlanningError where it cannot be."""
+    if watch is not None and not callable(watch):
+        raise refusal("watch", watch, "a function of a Plan, or None", PlanningError)
+    return watch
 
 
 def _checked(

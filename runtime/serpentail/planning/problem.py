@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..brief import brief
 from ..checks import Refusals, number, numbers, numbers_in, one_of, refusal, shown
 from ..errors import PlanningError
 from ..model.layout import QUATERNION, TAIL_Q, TAIL_V
@@ -74,6 +75,7 @@ class PlanningProblem:
     path: tuple[PathConstraint, ...] = ()
     formulation: str = "airborne"
     attitude: str = "quaternion"
+    __repr__ = brief
 
 
 def checked_problem(

@@ -76,7 +76,7 @@ class Search:
         self.iterations = self.attempts = 0
         self.stopped: str | None = None
 
-    def first(self) -> Round:
+    def _first(self) -> Round:
         """Return the best solution on the first mesh, from all guesses, and more if these fail."""
         settings, guess = self.settings, self.settings.guess
         same_rule = isinstance(guess, Plan) and guess.rule is self.rule
@@ -89,13 +89,13 @@ class Search:
             solutions.append(self._solved(nlp, self._pushed(k)))
         return self._round(nlp, min(solutions, key=lambda entry: (not entry.success, entry.value)))
 
-    def refined(self, first: Round) -> list[Round]:
-        """Return the rounds: intervals that are wrong are split until the end is right."""
-        rounds, tolerance = [first], self.settings.tolerance
+    def rounds(self) -> Iterator[Round]:
+        """Make rounds: intervals that are wrong are split until the end is right."""
+        last, tolerance = self._first(), self.settings.tolerance
+        yield last
         if tolerance is None:
-            return rounds
+            return
         for _ in range(self.settings.rounds):
-            last = rounds[-1]
             if not last.solution.success or last.error <= tolerance or self._stopped():
                 break
             mesh = self._split(last, tolerance)
@@ -104,18 +104,21 @@ class Search:
             nlp = self._transcribed(mesh)
             motion = Motion(last.curve.duration, last.curve.at)
             multipliers = carried(last.solution.multipliers, last.nlp, nlp)
-            rounds.append(self._round(nlp, self._solved_near(nlp, motion, multipliers)))
-        return rounds
+            last = self._round(nlp, self._solved_near(nlp, motion, multipliers))
+            yield last
 
-    def plan(self, rounds: list[Round], wall_s: float) -> Plan:
-        """Return the plan of the best round."""
-        best = min(rounds, key=lambda entry: (not entry.solution.success, entry.error))
+    def best(self, rounds: list[Round]) -> Round:
+        """Return the round that is solved, and whose end is nearest to the truth."""
+        return min(rounds, key=lambda entry: (not entry.solution.success, entry.error))
+
+    def plan(self, best: Round, rounds: int, wall_s: float) -> Plan:
+        """Return the plan of a round, the best of so many."""
         tolerance = self.settings.tolerance
         true = tolerance is None or best.error <= tolerance
         success = bool(best.solution.success and true)
         trajectory = sampled(self.model, self.problem, best.curve)
         counts = {
-            "rounds": len(rounds),
+            "rounds": rounds,
             "iterations": self.iterations,
             "guesses": self.attempts,
             "stopped": self.stopped,

@@ -7,6 +7,7 @@ from typing import Any, overload
 
 import numpy as np
 
+from ..brief import brief
 from ..checks import Refusals, finite_array, none_of, number, one_of, refusal, shown
 from ..errors import SimulationError
 from ..model.layout import OMEGA, VELOCITY
@@ -43,6 +44,7 @@ class Scenario:
     controller: Controller = None
     legs: Legs | None = None
     settings: dict[str, Any] = field(default_factory=dict)
+    __repr__ = brief
 
     @overload
     def simulate(self) -> Trajectory: ...

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..brief import brief
 from ..model.model import Model
 from ..model.parameters import total_mass
 
@@ -38,6 +39,7 @@ class Audit:
     energy: np.ndarray
     momentum: np.ndarray
     relative: np.ndarray
+    __repr__ = brief
 
     def of(self, k: int) -> "Audit":
         """Return the books of run k."""

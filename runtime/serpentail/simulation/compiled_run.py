@@ -109,6 +109,11 @@ class Memory:
             if records.has("run", member):
                 self.places.append((member, array.ctypes.data, array.strides[0]))
 
+    def part(self, k: int, first: int, done: int) -> Samples:
+        """Return what run k has written so far, from a sample on."""
+        arrays = {name: a[k, first:done] for name, a in self.out.items()}
+        return sampled(self.start.times[first:], arrays, Outcome(done - first, 0, np.zeros(0), {}))
+
     def samples(self, k: int, outcome: Outcome) -> Samples:
         """Return what run k wrote."""
         return sampled(self.start.times, {name: a[k] for name, a in self.out.items()}, outcome)
@@ -154,8 +159,11 @@ class CompiledRun:
         function.argtypes = (ctypes.c_void_p, *arguments)
         return function
 
-    def go(self, ended: Event | None = None) -> int:
-        """Advance until the run or something ends it, or ``ended`` is set; return the status."""
+    def go(self, ended: Event | None = None, look: Callable[[], None] | None = None) -> int:
+        """Advance until the run or something ends it, or ``ended`` is set; return the status.
+
+        look: called at each pause.
+        """
         status = PAUSED
         try:
             with self.actuation.ctrl_c.waits(self.actuation.of_python):
@@ -164,6 +172,8 @@ class CompiledRun:
                     status = self.rollout(self.address)
                     if time.perf_counter() - begun < PAUSE_S:
                         self.record.pause *= 2
+                    if look is not None:
+                        look()
         except KeyboardInterrupt as stop:  # ends the run, whose motion until then is kept
             self.actuation.error = stop
         return status

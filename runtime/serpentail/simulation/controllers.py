@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..brief import brief
 from ..checks import finite_array, numbers, refusal
 from ..errors import SimulationError
 from .pfl import Pfl
@@ -59,6 +60,7 @@ class TorqueTable:
     times: ArrayLike
     torques: ArrayLike
     damping: float | tuple[float, ...] = 0.0
+    __repr__ = brief
 
     def parts(self, nt: int) -> Parts:
         """Return what it adds up for 2m tail coordinates."""
@@ -102,6 +104,7 @@ class Phases:
     """Controllers one after another: pairs of an increasing time (s) and what acts from then on."""
 
     phases: Iterable[tuple[float, "Controller"]]
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         """Refuse what is no list of pairs in the order of time."""

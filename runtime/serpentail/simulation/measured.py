@@ -41,7 +41,7 @@ def measured(model: Model, samples: Samples, ground: Ground) -> Trajectory:
     kinetic, potential = model.energy(q, v)
     linear_momentum, angular_momentum = model.momentum(q, v)
     contact = ground.contact(model, t, (q, v, tau, samples.bristles))
-    if samples.failure is None:
+    if samples.failure is None and samples.ledger.size:  # a part of a run has no ledger
         measures = kinetic, potential, linear_momentum
         ends = {name: each[[0, -1]] for name, each in zip(BALANCED, measures, strict=True)}
         books = audited(model, model.parameters, samples.ledger, t[-1] - t[0], ends)

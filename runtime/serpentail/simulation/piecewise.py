@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..brief import brief
 from ..checks import finite_array, refusal
 from ..errors import SimulationError
 
@@ -21,6 +22,7 @@ class Piecewise:
 
     times: np.ndarray
     coefficients: np.ndarray
+    __repr__ = brief
 
     @property
     def channels(self) -> int:

@@ -11,11 +11,15 @@ import numpy as np
 from ..errors import SimulationError, ViewError
 from ..model.model import Model
 from ..model.parameters import RunParameters
+from ..motion.account import arrays_of, framed, made, tail_of
+from ..motion.exports import Exports
 from ..motion.trajectory import Trajectory
 from .audit import Audit
 from .compiled_run import Outcome, Samples, sampled
 from .ground import Ground
 from .measured import trajectory_or_error
+
+SHOWN = 3  # runs that a notebook shows over each other
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +44,7 @@ class Source:
 
 
 @dataclass(frozen=True, eq=False)
-class Rollouts:
+class Rollouts(Exports):
     """k motions, sampled at the same s times, in read-only arrays; NaN after a motion's end.
 
     t (s,) s; q (k, s, 7+2m), v (k, s, 6+2m); tau (k, s, 2m) N m; kinetic, potential (k, s) J;
@@ -73,6 +77,22 @@ class Rollouts:
     def __len__(self) -> int:
         return len(self.q)
 
+    def __repr__(self) -> str:
+        """On at most six lines what they are, and which failed."""
+        model, failed = self.source.model, [k for k, e in enumerate(self.errors) if e is not None]
+        lines = [
+            f"Rollouts of {model.name}, {tail_of(model)}: {len(self)} runs of "
+            f"{len(self.t)} samples, {self.t[0]:.6g} to {self.t[-1]:.6g} s",
+            arrays_of(self),
+            made(self.info) + " in all",
+        ]
+        if failed:
+            lines.append(
+                f"{len(failed)} failed, the first run {failed[0]}: {self.errors[failed[0]]}"
+            )
+        warned = sum(map(bool, self.warnings))
+        return framed(lines + ([f"{warned} have warnings"] if warned else []))
+
     def view(self, k: int | Sequence[int], path: str | PathLike[str] = "run.html") -> Path:
         """Write the page of run k, or of several; return its path.  Failed runs show their begin.
 
@@ -85,6 +105,15 @@ class Rollouts:
             raise ViewError(f"k: value {k!r:.200}: needs a run, or runs, from 0 to {len(self) - 1}")
         motions = [self._begun(number) for number in numbers]
         return view(motions, path, names=[f"run {number}" for number in numbers])
+
+    def _repr_html_(self) -> str:
+        """For notebooks: the text, and the page of the first runs that began."""
+        from ..viewer.notebook import in_notebook
+
+        begun = [k for k, e in enumerate(self.errors) if e is None or e.trajectory is not None]
+        begun = begun[:SHOWN]
+        names = [f"run {k}" for k in begun]
+        return in_notebook(self, lambda: [self._begun(k) for k in begun], names)
 
     def _begun(self, k: int) -> Trajectory:
         """Return the trajectory of run k, as far as it went."""

@@ -8,6 +8,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..brief import brief
 from ..checks import finite_array, number, one_of, refusal, shown
 from ..errors import SimulationError
 from ..model.model import Model
@@ -28,6 +29,7 @@ class Reference:
     angles: ArrayLike
     blend: str = "quintic"
     curve: Piecewise = field(init=False)
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         """Refuse nodes that are no motion."""
@@ -76,6 +78,7 @@ class Legs:
     gamma: ArrayLike
     delta: ArrayLike
     curve: Piecewise = field(init=False)
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         """Refuse nodes that are no motion."""

@@ -1,6 +1,7 @@
 """SciPy's methods on the compiled model: an independent check of the generated ones."""
 
 import ctypes
+from dataclasses import replace
 
 import numpy as np
 
@@ -9,6 +10,7 @@ from ..model.layout import QUATERNION
 from ..model.library import NOT_FINITE
 from .compiled_run import CompiledRun, Samples, failed
 from .methods import IntegrationMethod
+from .watched import Watched, rest
 
 Part = tuple[float, np.ndarray, float]  # start (s), state there, end (s)
 
@@ -53,8 +55,8 @@ class StateRate:
 class SampleWriter:
     """Samples written one after another as steps pass their times."""
 
-    def __init__(self, rate: StateRate, times: np.ndarray):
-        self.rate, self.times = rate, times
+    def __init__(self, rate: StateRate, times: np.ndarray, watched: Watched | None):
+        self.rate, self.times, self.watched = rate, times, watched
         self.states: list[np.ndarray] = []
         self.torques: list[np.ndarray] = []
 
@@ -65,16 +67,32 @@ class SampleWriter:
         self.torques.append(self.rate.torque(t, y))
         self.states.append(y)
 
+    def look(self) -> None:
+        """Let the run be looked at."""
+        if self.watched is not None:
+            self.watched.look(len(self.states), lambda first: rest(self.part(first), 0))
+
+    def part(self, first: int) -> Samples:
+        """Return what was written from a sample on."""
+        run, done = self.rate.run, len(self.states)
+        sizes = np.cumsum([run.model.nq, run.model.nv, 2 * run.ground.points])
+        q, v, bristles, ledger = np.split(np.array(self.states[first:]), sizes, axis=1)
+        bristles = bristles.reshape(len(q), run.ground.points, 2)
+        tau, times = np.array(self.torques[first:]), self.times[first:done]
+        return Samples(times, q, v, tau, bristles, ledger[-1], {})
+
     def due(self, t: float) -> np.ndarray:
         """Times of the samples not later than t."""
         return self.times[len(self.states) : np.searchsorted(self.times, t, "right")]
 
 
 @np.errstate(all="ignore")  # a trial step may overflow, and is then taken again, shorter
-def integrate_by_scipy(run: CompiledRun, method: IntegrationMethod) -> Samples:
+def integrate_by_scipy(
+    run: CompiledRun, method: IntegrationMethod, watched: Watched | None = None
+) -> Samples:
     """Return the samples of a run, made from stop to stop, and what ended it before its end."""
     rate = StateRate(run, method.name == "dop853")  # which takes a step with NaN again, shorter
-    samples, counts = SampleWriter(rate, run.start.times), {"steps": 0, "evaluations": 0}
+    samples, counts = SampleWriter(rate, run.start.times, watched), {"steps": 0, "evaluations": 0}
     ends = [*(t for t in run.actuation.stops if run.start.start < t < run.start.end), run.start.end]
     y, t = np.concatenate([*run.state.values()]).astype(float), run.start.start
     failure: BaseException | None = None
@@ -89,13 +107,7 @@ def integrate_by_scipy(run: CompiledRun, method: IntegrationMethod) -> Samples:
         if not samples.states:
             raise
         failure = error
-    done = len(samples.states)
-    nq, nv = run.model.nq, run.model.nv
-    parts = np.cumsum([nq, nv, 2 * run.ground.points])
-    q, v, bristles, ledger = np.split(np.array(samples.states), parts, axis=1)
-    bristles = bristles.reshape(done, run.ground.points, 2)
-    tau, times = np.array(samples.torques), samples.times[:done]
-    return Samples(times, q, v, tau, bristles, ledger[-1], counts, failure)
+    return replace(samples.part(0), info=counts, failure=failure)
 
 
 def _smooth_part(
@@ -120,6 +132,7 @@ def _smooth_part(
         interpolant = solver.dense_output()
         for at in samples.due(solver.t):
             samples.write(at, interpolant(at) if at < solver.t else solver.y)
+        samples.look()
         if method.name == "dop853":
             norm = np.linalg.norm(solver.y[QUATERNION])
             solver.y[QUATERNION] /= norm

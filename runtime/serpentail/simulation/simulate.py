@@ -3,6 +3,7 @@
 import ctypes
 import time
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,7 @@ from .parallel_runs import run_parallel
 from .records import Records
 from .rollouts import Rollouts
 from .start import Start
+from .watched import Watch, Watched, checked_watch
 
 
 def simulate(
@@ -56,6 +58,9 @@ def simulate(
     most_steps; fixed steps: step (s, default 1e-4, shortened to divide output_step); SciPy's: rtol,
     atol (defaults 1e-10, 1e-12; 1e-6 both for a float model).
 
+    watch: a function that is given the samples as they come, at most ten times a second, each once:
+    Trajectories that follow on one another, the last at the end.  What it raises ends the run.
+
     Raises StateError (shapes, values), SimulationError (settings; the state left what numbers can
     hold; its ``trajectory`` is the motion up to there), ModelError (the scene left out rollout,
     energy or momentum).  Ctrl-C raises KeyboardInterrupt, whose ``motion`` is what there was: the
@@ -75,13 +80,14 @@ def simulate(
     if missing:
         raise model.without(*missing)
     start = Start.checked(model, (q0, v0), t_span, settings.pop("output_step", None))
+    watch = checked_watch(settings.pop("watch", None), start.many)
     threads = _threads(model, start, settings.pop("threads", None))
     memory, actuation, choice = prepared(model, start, controller, method, settings)
     clocks = time.perf_counter(), time.process_time()
     if start.many:
         runs = run_parallel(memory, actuation, choice, threads)
         return runs.rollouts(_spent(clocks))
-    samples = integrate(memory, actuation, choice)
+    samples = integrate(memory, actuation, choice, watch)
     info = samples.info | choice.info | _spent(clocks)
     return trajectory_or_error(model, replace(samples, info=info), memory.ground)
 
@@ -205,11 +211,25 @@ def evaluated(rows: RunKernel, k: int, count: int) -> bool:
     return True
 
 
-def integrate(memory: Memory, actuation: Actuation, method: IntegrationMethod) -> Samples:
-    """Return the samples of a single run."""
+def integrate(
+    memory: Memory, actuation: Actuation, method: IntegrationMethod, watch: Watch | None = None
+) -> Samples:
+    """Return the samples of a single run, of which a function is told meanwhile."""
     run = CompiledRun(memory, actuation, method)
+    watched = None if watch is None else Watched(watch, run.model, memory.ground)
     if method.name in SCIPY:
         from .scipy_methods import integrate_by_scipy
 
-        return integrate_by_scipy(run, method)
-    return run.samples(run.go())
+        samples = integrate_by_scipy(run, method, watched)
+    else:
+        look = None if watched is None else partial(_look, run, watched)
+        samples = run.samples(run.go(look=look))
+    if watched is not None:
+        watched.end(samples)
+    return samples
+
+
+def _look(run: CompiledRun, watched: Watched) -> None:
+    """Let a run in C be looked at."""
+    done = run.record.done
+    watched.look(done, lambda first: run.memory.part(run.k, first, done))

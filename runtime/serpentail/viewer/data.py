@@ -17,11 +17,13 @@ from .shape import length, shape
 COMMON = 95  # percentile of the forces whose arrow is as long as half the torso
 
 
-def page_data(motions: list[Trajectory], names: list[str], models: list[Model]) -> dict[str, Any]:
-    """Return what the page reads, ready for JSON."""
+def page_data(
+    motions: list[Trajectory], names: list[str], models: list[Model], most: int
+) -> dict[str, Any]:
+    """Return what the page reads, ready for JSON; most: samples of a run that it has."""
     shown, notes, runs = [], [], []
     for motion, name, model in zip(motions, names, models, strict=True):
-        few, step = thinned(motion)
+        few, step = thinned(motion, most)
         shown.append(few)
         notes += [*_notes(name, motion, step), *_warnings(name, model, motion)]
         numbers = [*figures(model, motion), ("samples", str(len(motion.t)))]

@@ -10,12 +10,10 @@ from ..model.layout import POSITION, TORSO_NQ
 from ..model.model import Model
 from ..motion.trajectory import ARRAYS, Trajectory
 
-MOST = 2400  # samples of a run in a page
 
-
-def thinned(motion: Trajectory) -> tuple[Trajectory, int]:
-    """Return every n-th sample of a motion, the last one too, and n."""
-    step = max(-(-(len(motion.t) - 1) // (MOST - 1)), 1)
+def thinned(motion: Trajectory, most: int) -> tuple[Trajectory, int]:
+    """Return every n-th sample of a motion, the last one too, at most so many; and n."""
+    step = max(-(-(len(motion.t) - 1) // (most - 1)), 1)
     if step == 1:
         return motion, 1
     rows = np.append(np.arange(0, len(motion.t) - 1, step), len(motion.t) - 1)

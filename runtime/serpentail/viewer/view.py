@@ -14,6 +14,7 @@ from ..model.model import Model
 from ..motion.trajectory import Trajectory
 from .data import page_data
 
+MOST = 2400  # samples of a run in a page
 PAGE = Path(__file__).with_name("page.html")  # made of the sources in viewer/ when this is built
 
 
@@ -32,22 +33,33 @@ def view(
     More than 2400 samples are thinned, which the page says, as it says that a run failed.  Raises
     ViewError with argument, value and remedy, ModelError where the model lacks ``tail_points``.
     """
-    motions = _checked_motions(motions)
-    target, names = checked_path(path), _checked_names(names, motions)
-    models = [_model_of(k, motion, model) for k, motion in enumerate(motions)]
-    page, data = template(), page_data(motions, names, models)
-    parts = {
-        "<!--TITLE-->": escape(", ".join(dict.fromkeys(each.name for each in models))),
-        "/*DATA*/": json.dumps(data, allow_nan=False).replace("<", "\\u003c"),
-    }
-    marks = re.compile("|".join(map(re.escape, parts)))
-    text = marks.sub(lambda mark: parts[mark[0]], page)
+    target = checked_path(path)
+    text = page_text(motions, names, model)
     try:
         with replacing(target) as part:
             part.write_text(text, encoding="utf-8")
     except OSError as error:
         raise ViewError(f"path: value {str(path)!r}: cannot be written ({error})") from error
     return target
+
+
+def page_text(
+    motions: Trajectory | Sequence[Trajectory],
+    names: Sequence[str] | None = None,
+    model: Model | None = None,
+    most: int = MOST,
+) -> str:
+    """Return the page of motions as a text, with at most so many samples of each; see ``view``."""
+    motions = _checked_motions(motions)
+    names = _checked_names(names, motions)
+    models = [_model_of(k, motion, model) for k, motion in enumerate(motions)]
+    page, data = template(), page_data(motions, names, models, most)
+    parts = {
+        "<!--TITLE-->": escape(", ".join(dict.fromkeys(each.name for each in models))),
+        "/*DATA*/": json.dumps(data, allow_nan=False).replace("<", "\\u003c"),
+    }
+    marks = re.compile("|".join(map(re.escape, parts)))
+    return marks.sub(lambda mark: parts[mark[0]], page)
 
 
 def _checked_motions(motions: Any) -> list[Trajectory]:

@@ -102,6 +102,23 @@ def st_interp(t):
     return np.array([np.interp(t, KINKS.times, column) for column in KINKS.torques.T])
 
 
+@pytest.mark.parametrize("method", ["rk4", "implicit_euler"])
+@pytest.mark.parametrize("side", [-1, 1])
+def test_a_kink_beside_a_sample_takes_no_step_of_its_own(method, side):
+    """What lies between a sample and a kink that rounding sets apart is no full step: the momentum
+    of a free fall is M g t, whatever the torques.
+    """
+    m, samples = model(), np.linspace(0, 0.2, 201)[1:-1]
+    kinks = np.nextafter(samples, side * np.inf)
+    table = st.TorqueTable(kinks, 1e-5 * (-1.0) ** np.arange(len(kinks))[:, None] * np.ones(4))
+    settings = {"t_span": 0.2, "output_step": 1e-3, "step": 1e-4, "method": method}
+    flight = fly(m, controller=table, **settings)
+    assert flight.info["steps"] <= 2000 + len(kinks)
+    weight = 9.8 * (m.parameters["torso_mass"] + m.parameters["tail_mass"])
+    fallen = flight.linear_momentum[0, 2] - flight.linear_momentum[:, 2]
+    np.testing.assert_allclose(fallen, weight * flight.t, rtol=0, atol=1e-6 * weight)
+
+
 def test_phases_act_one_after_another():
     damping = st.Damping(3e-5)
     flight = fly(

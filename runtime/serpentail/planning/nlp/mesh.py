@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...brief import brief
 from .rules import CollocationRule
 
 MOST_PIECES = 4  # an interval is split into at a time
@@ -14,6 +15,7 @@ class Mesh:
     """Ends of the intervals (N + 1,) as fractions of the duration, from 0 to 1."""
 
     ends: np.ndarray
+    __repr__ = brief
 
     @property
     def intervals(self) -> int:

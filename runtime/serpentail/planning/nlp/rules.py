@@ -8,6 +8,7 @@ import numpy as np
 from numpy.polynomial import Legendre, Polynomial
 from numpy.typing import ArrayLike
 
+from ...brief import brief
 from ...checks import shown
 from ...errors import PlanningError
 
@@ -33,6 +34,7 @@ class CollocationRule:
     states: np.ndarray
     slopes: np.ndarray
     weights: np.ndarray
+    __repr__ = brief
 
     @property
     def steps(self) -> int:

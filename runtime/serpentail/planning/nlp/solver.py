@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...brief import brief
 from ...checks import shown
 from ...errors import PlanningError
 from .blas_threads import one_thread
@@ -67,6 +68,7 @@ class Solution:
     status: str
     iterations: int
     cpu_s: float
+    __repr__ = brief
 
 
 def solver(

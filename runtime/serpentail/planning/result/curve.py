@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...brief import brief
 from ..nlp.rules import CollocationRule
 from ..nlp.transcription import Transcription
 
@@ -22,6 +23,8 @@ class Curve:
     starts: dict[str, np.ndarray]
     increments: dict[str, np.ndarray]
     nodes: dict[str, np.ndarray]
+
+    __repr__ = brief
 
     @property
     def duration(self) -> float:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from ...errors import SimulationError
 from ...model.layout import TAIL_V
 from ...model.model import Model
+from ...motion.account import UNITS, framed, tail_of
 from ...motion.origin import origin
 from ...motion.trajectory import Trajectory
 from ...simulation.controllers import Controller, Damping, TorqueCurve
@@ -26,6 +27,7 @@ from .truth import planned_torques
 
 SAMPLES = 240  # of a trajectory, at least
 SHOWN = ("planned", "true", "passive")  # motions of its page
+TRUTH = ("open_loop_attitude_error_deg", "open_loop_goal_error_deg")
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +51,24 @@ class Plan:
     rule: CollocationRule
     solution: Solution
 
+    def __repr__(self) -> str:
+        """On at most six lines whether it succeeded, what it costs, and how true it is."""
+        told, model = self.report, self.trajectory.model
+        moved = tail_of(model) if model else "without its model"
+        ended = "success" if self.success else f"no success ({told['status']})"
+        names = "effort", "energy_J", "peak_power_W", *TRUTH
+        effort, energy, power, to_plan, to_goal = (_shown(told[name]) for name in names)
+        return framed(
+            [
+                f"Plan of {self.trajectory.info['model']}, {moved}: {ended}",
+                f"{self.duration:.6g} s, {self.mesh.intervals} intervals by {self.rule.name} of "
+                f"degree {self.rule.degree}, {len(self.trajectory.t)} samples; {UNITS}",
+                f"effort {effort} N^2 m^2 s, energy {energy} J, peak power {power} W",
+                f"attitude its torques lead to: {to_plan} deg to the plan, {to_goal} to the goal",
+                f"{told['rounds']} rounds, {told['iterations']} iterations, {told['wall_s']:.3g} s",
+            ]
+        )
+
     @property
     def duration(self) -> float:
         """Duration in s."""
@@ -62,11 +82,23 @@ class Plan:
         """
         from ...viewer.view import view
 
+        own = self.trajectory.model if self.trajectory.model is not None else model
+        motions = self._motions(own)
+        return view(motions, path, names=SHOWN[: len(motions)], model=own)
+
+    def _repr_html_(self) -> str:
+        """For notebooks: the text, and the page."""
+        from ...viewer.notebook import in_notebook
+
+        return in_notebook(self, lambda: self._motions(self.trajectory.model), SHOWN)
+
+    def _motions(self, model: Model | None) -> list[Trajectory]:
+        """The motion as planned, and where there is a model, what its torques do, and passive."""
+        if model is None:
+            return [self.trajectory]
         damping = self.problem.damping
         laws = (TorqueCurve(planned_torques(self.curve), damping), Damping(damping))
-        own = self.trajectory.model if self.trajectory.model is not None else model
-        flown = [] if own is None else [self._flown(own, law) for law in laws]
-        return view([self.trajectory, *flown], path, names=SHOWN[: 1 + len(flown)], model=own)
+        return [self.trajectory, *(self._flown(model, law) for law in laws)]
 
     def _flown(self, model: Model, law: Controller) -> Trajectory:
         """The motion under a law, or what there is of it where it fails."""
@@ -86,6 +118,11 @@ class Plan:
     def controller(self, t: float, _q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Open-loop torque law for ``st.simulate``: planned torques less the problem's damping."""
         return self.torque(min(max(t, 0.0), self.duration))[0] - self.problem.damping * v[TAIL_V]
+
+
+def _shown(value: float | None) -> str:
+    """A number of the report, which has None for what is not finite."""
+    return "no finite" if value is None else f"{value:.4g}"
 
 
 def sample_times(ends: np.ndarray) -> np.ndarray:

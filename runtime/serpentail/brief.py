@@ -1,0 +1,36 @@
+"""What a REPL shows of a dataclass that holds arrays: their shapes, in place of their numbers."""
+
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+
+MOST = 90  # characters of a field's value
+FEW = 7  # numbers that are shown as they are: an attitude, a vector, a small row of bounds
+
+
+def brief(thing: Any) -> str:
+    """Return a dataclass on one line, such as ``Contact(points=(1201, 6, 3), ...)``.
+
+    It is a ``__repr__``: arrays of more than FEW numbers are told by their shapes, and what is long
+    is cut.
+    """
+    told = [f"{each.name}={_value(getattr(thing, each.name))}" for each in fields(thing)]
+    return f"{type(thing).__name__}({', '.join(told)})"
+
+
+def cut(text: str, most: int = MOST) -> str:
+    """Return a text on one line of at most so many characters."""
+    line = " ".join(text.split())
+    return line if len(line) <= most else line[: most - 3] + "..."
+
+
+def _value(value: Any) -> str:
+    """A field's value."""
+    if isinstance(value, Mapping):
+        told = [f"{name}: {_value(entry)}" for name, entry in value.items()]
+        return cut(f"{{{', '.join(told)}}}")
+    if isinstance(value, np.ndarray) and value.size > FEW:
+        return f"array of {' x '.join(map(str, value.shape))}"
+    return cut(repr(value.tolist() if isinstance(value, np.ndarray) else value))

@@ -1,0 +1,37 @@
+"""Files of a motion by their names: .npz, which is read again, .csv and .nc for other programs."""
+
+from pathlib import Path
+
+from ..extras import needed
+from ..motion.trajectory import Trajectory
+from .labelled import EXTRA
+
+WRITERS = {".npz": "save", ".csv": "to_csv", ".nc": "to_netcdf"}
+
+
+def checked(path: str) -> Path:
+    """Return the path of a file, with .npz where it has no suffix.
+
+    ValueError where its suffix is of no known kind, OSError where it is a folder, ExtraMissing
+    where nothing can write it.
+    """
+    target = Path(path)
+    if target.is_dir():
+        raise IsADirectoryError(f"{path} is a folder")
+    if not target.suffix:
+        return target.with_name(target.name + ".npz")
+    if target.suffix not in WRITERS:
+        raise ValueError(f"its name ends in {target.suffix}, which is none of {', '.join(WRITERS)}")
+    if target.suffix == ".nc":
+        needed("xarray", EXTRA)
+    return target
+
+
+def save(motion: Trajectory, path: str) -> Path:
+    """Write a motion to a file of the kind that its name tells; return the path.
+
+    Raises as ``checked``, and NotWritten where it cannot be written.
+    """
+    target = checked(path)
+    written: Path = getattr(motion, WRITERS[target.suffix])(target)
+    return written

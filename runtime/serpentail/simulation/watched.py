@@ -1,0 +1,65 @@
+"""Tells a function of the user's what a run has come to, while it goes on."""
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ..checks import refusal
+from ..errors import SimulationError, StateError
+from ..model.model import Model
+from ..motion.trajectory import Trajectory
+from .compiled_run import Samples
+from .ground import Ground
+from .measured import measured
+
+EVERY = 0.1  # s from the end of one call to the next, at least
+
+Watch = Callable[[Trajectory], object]
+
+
+def checked_watch(watch: Any, many: bool) -> Watch | None:
+    """Return what is to be called; SimulationError where that cannot be."""
+    if watch is not None and not callable(watch):
+        raise refusal("watch", watch, "a function of a Trajectory, or None", SimulationError)
+    if watch is not None and many:
+        raise SimulationError("watch: many starts are not watched: leave it out, or give one start")
+    return watch
+
+
+class Watched:
+    """A run that is watched: how many of its samples were told, and when."""
+
+    def __init__(self, watch: Watch, model: Model, ground: Ground):
+        self.watch, self.model, self.ground = watch, model, ground
+        self.seen, self.told = 0, -np.inf
+
+    def look(self, done: int, part: Callable[[int], Samples]) -> None:
+        """Tell the samples from the first new one on, as ``part`` makes them, if it is time."""
+        if done > self.seen and time.perf_counter() - self.told >= EVERY:
+            self._tell(part(self.seen))
+
+    def end(self, samples: Samples) -> None:
+        """Tell what is left of all samples, unless the user ended the run."""
+        if len(samples.t) > self.seen and isinstance(samples.failure, SimulationError | None):
+            self._tell(rest(samples, self.seen))
+
+    def _tell(self, samples: Samples) -> None:
+        """Call the function."""
+        self.seen += len(samples.t)
+        try:
+            motion = measured(self.model, samples, self.ground)
+        except StateError:  # no number holds its energy: the run will say so itself
+            return
+        self.watch(motion)
+        self.told = time.perf_counter()
+
+
+def rest(samples: Samples, first: int) -> Samples:
+    """Return samples from one on, as a part of a run: without its ledger, and what ended it."""
+    arrays: dict[str, Any] = {
+        name: getattr(samples, name)[first:] for name in ("t", "q", "v", "tau", "bristles")
+    }
+    return replace(samples, **arrays, ledger=np.zeros(0), info={}, failure=None)

@@ -1,0 +1,34 @@
+"""What a notebook shows of motions: their text, and below it their page in a frame."""
+
+from collections.abc import Callable, Sequence
+from html import escape
+
+from ..motion.trajectory import Trajectory
+from .view import page_text
+
+MOST = 600  # samples of a run: what a notebook keeps of it is small
+HEIGHT = 620  # px, of the frame
+
+
+def in_notebook(
+    thing: object,
+    motions: Callable[[], Sequence[Trajectory]],
+    names: Sequence[str] | None = None,
+) -> str:
+    """Return the HTML of a thing, of its text and the page of its motions; it never raises.
+
+    The page lies in a frame of its own, since notebooks run no scripts of what they are given.
+    Where there is no page, since no motion has a model, the model lacks ``tail_points`` or the page
+    was not built, a line says why.
+    """
+    text = f"<pre>{escape(repr(thing))}</pre>"
+    try:
+        shown = motions()
+        page = page_text(shown, names and names[: len(shown)], most=MOST)
+    except Exception as reason:  # whatever it is, the text above must be seen
+        return f"{text}<p>Without the page of the run: {escape(str(reason))}</p>"
+    source = page.replace("&", "&amp;").replace('"', "&quot;")
+    return (
+        f'{text}<iframe sandbox="allow-scripts" title="page of the run" width="100%" '
+        f'height="{HEIGHT}" style="border:0" srcdoc="{source}"></iframe>'
+    )

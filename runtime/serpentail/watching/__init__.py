@@ -1,0 +1,1 @@
+"""Runs and plans seen in a browser while they are made."""

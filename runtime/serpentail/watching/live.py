@@ -1,0 +1,133 @@
+"""``live``: a page that shows a run while it is integrated, and a plan while it is refined."""
+
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+
+from ..attitude import Array
+from ..checks import refusal
+from ..errors import ViewError
+from ..extras import needed
+from ..model.layout import POSITION
+from ..model.model import Model
+from ..motion.trajectory import Trajectory
+from ..planning.result.plan import Plan
+from ..viewer.shape import length
+from .poses import Instances, animal
+
+EXTRA = "live"
+EYE = np.array([2.0, -1.0, 0.7])  # from the animal, in its lengths
+POSES = 9  # of a plan, seen at once
+COLOURS = {
+    "back": (150, 90, 40),
+    "belly": (240, 225, 205),
+    "head": (120, 70, 30),
+    "tail": (200, 150, 120),
+    "legs": (110, 110, 120),
+}
+ROUND = 16  # sides of a rod
+
+
+def live(model: Model, *, host: str = "127.0.0.1", port: int = 8080) -> "Live":
+    """Return a view of a model, to be given as ``watch`` to ``simulate`` and ``plan``.
+
+    It serves a page at its ``url``; host: "0.0.0.0" lets other machines see it; port: where that is
+    taken, the next free one.  Raises ExtraMissing without the extra "live", ModelError where the
+    model lacks ``tail_points``.
+    """
+    model.kernel("tail_points")
+    viser = needed("viser", EXTRA)
+    return Live(model, viser.ViserServer(host=host, port=port, label=model.name, verbose=False))
+
+
+class Live:
+    """A view that shows the last pose of a run, or poses of a plan; it serves until ``stop``."""
+
+    def __init__(self, model: Model, server: Any):
+        self.model, self.server = model, server
+        self.nodes: dict[str, Any] = {}
+        solids = needed("trimesh", EXTRA).creation
+        ball, rod = solids.icosphere(subdivisions=3), solids.cylinder(1.0, 1.0, sections=ROUND)
+        self.meshes = dict.fromkeys(("tail", "legs"), rod)
+        self.meshes |= dict.fromkeys(("back", "belly", "head"), ball)
+        self.text = server.gui.add_markdown("nothing yet")
+        server.scene.set_up_direction("+z")
+        size = length(model)
+        if model.contacts:
+            cells = {"cell_size": size / 4, "section_size": size, "infinite_grid": True}
+            server.scene.add_grid("/ground", plane="xy", **cells)
+
+    @property
+    def url(self) -> str:
+        """Where a browser finds it."""
+        return f"http://{self.server.get_host()}:{self.server.get_port()}"
+
+    def __repr__(self) -> str:
+        return f"<serpentail live view of {self.model.name} at {self.url}>"
+
+    def __call__(self, news: Trajectory | Plan) -> None:
+        """Show the last sample of a motion, or nine moments of a plan; ViewError if of another
+        model.
+        """
+        motion = news.trajectory if isinstance(news, Plan) else news
+        if not isinstance(motion, Trajectory) or motion.q.shape[1] != self.model.nq:
+            needs = f"a Trajectory or a Plan of {self.model.name}, whose q has {self.model.nq}"
+            raise refusal("news", news, needs, ViewError)
+        rows, text = np.array([-1]), f"t = {motion.t[-1]:.4f} s"
+        if isinstance(news, Plan):
+            rows = np.linspace(0, len(motion.t) - 1, POSES).round().astype(int)
+            text = f"```\n{news!r}\n```"
+        legs = None if motion.contact is None else motion.contact.legs
+        self._show(motion.q[rows], None if legs is None else legs[rows], text)
+
+    def _show(self, q: Array, legs: Array | None, text: str) -> None:
+        """Show poses (n, nq), as one change of the scene."""
+        if not self.nodes:
+            self._aim(q[0, POSITION])
+        with self.server.atomic():
+            for name, instances in animal(self.model, q, legs).items():
+                self._place(name, instances)
+            self.text.content = text
+        self.server.flush()
+
+    def _aim(self, at: Array) -> None:
+        """Look at a place (3,), m, from where the whole animal is seen."""
+        begin = self.server.initial_camera  # of those who come later
+        for camera in (begin, *(client.camera for client in self.server.get_clients().values())):
+            camera.position = at + length(self.model) * EYE
+            camera.look_at = at
+
+    def _place(self, name: str, instances: Instances) -> None:
+        """Move the copies of a part, or make them where there were none, or others."""
+        node, mesh = self.nodes.get(name), self.meshes[name]
+        if node is None or len(node.batched_positions) != len(instances.positions):
+            self.nodes[name] = self.server.scene.add_batched_meshes_simple(
+                f"/animal/{name}",
+                np.asarray(mesh.vertices),
+                np.asarray(mesh.faces),
+                batched_wxyzs=instances.wxyzs,
+                batched_positions=instances.positions,
+                batched_scales=instances.scales,
+                batched_colors=COLOURS[name],
+                lod="off",
+            )
+            return
+        node.batched_positions = instances.positions
+        node.batched_wxyzs = instances.wxyzs
+        node.batched_scales = instances.scales
+
+    def stop(self) -> None:
+        """End the page."""
+        self.server.stop()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.stop()

@@ -1,0 +1,69 @@
+"""Where the parts of the animal are in given poses, as instances of a ball and of a rod."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..attitude import Array, rotation_matrix
+from ..model.layout import POSITION, QUATERNION
+from ..model.model import Model
+from ..viewer.shape import shape
+
+# of the torso's ellipsoid: where it is and how large, in semi-axes, so that its sides are told
+# apart
+PARTS = {
+    "back": ((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)),
+    "belly": ((0.0, 0.0, -0.1), (0.97, 0.97, 0.93)),
+    "head": ((0.0, 1.0, 0.3), (0.6, 0.35, 0.6)),
+}
+LEG_RADIUS = 0.1  # of the torso's smallest semi-axis
+SHORTEST = 1e-9  # m, of a rod that has a direction
+
+
+@dataclass(frozen=True, eq=False)
+class Instances:
+    """n copies of a mesh of unit size: positions (n, 3) m, quaternions (n, 4), sizes (n, 3) m."""
+
+    positions: Array
+    wxyzs: Array
+    scales: Array
+
+
+def animal(model: Model, q: Array, legs: Array | None) -> dict[str, Instances]:
+    """Return the parts in the poses q (n, nq): balls of the torso, rods of tail and legs.
+
+    legs (n, 4): their angles, rad; they are left out where these are unknown, or the model has no
+    ``leg_points``.
+    """
+    look = shape(model)
+    semi_axes = np.array(look["semi_axes"])
+    found = {name: _ball(q, semi_axes, name) for name in PARTS}
+    found["tail"] = rods(model.tail_points(q), look["tail_radius"])
+    if legs is not None and "leg_points" in model.kernels:
+        joints = model.leg_points(q, legs).reshape(2 * len(q), 6, 3)
+        found["legs"] = rods(joints, LEG_RADIUS * semi_axes.min())
+    return found
+
+
+def _ball(q: Array, semi_axes: Array, name: str) -> Instances:
+    """One part of the torso."""
+    at, size = (np.array(each) * semi_axes for each in PARTS[name])
+    places = q[:, POSITION] + rotation_matrix(q[:, QUATERNION]) @ at
+    return Instances(places, q[:, QUATERNION], np.tile(size, (len(q), 1)))
+
+
+def rods(points: Array, radius: float) -> Instances:
+    """Return rods between following points of chains (n, k, 3), m, of a radius (m)."""
+    begins, ends = points[:, :-1].reshape(-1, 3), points[:, 1:].reshape(-1, 3)
+    lengths = np.linalg.norm(ends - begins, axis=1)
+    along = (ends - begins) / np.maximum(lengths, SHORTEST)[:, None]
+    scales = np.column_stack([np.full((len(lengths), 2), radius), lengths])
+    return Instances((begins + ends) / 2, from_z(along), scales)
+
+
+def from_z(along: Array) -> Array:
+    """Return quaternions (n, 4) that turn the z axis to unit vectors (n, 3)."""
+    x, y, z = along.T
+    turns = np.stack([1 + z, -y, x, 0 * z], axis=1)
+    turns[z < -1 + 1e-9] = [0, 1, 0, 0]  # half a turn about x
+    return turns / np.linalg.norm(turns, axis=1, keepdims=True)

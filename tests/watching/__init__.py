@@ -1,0 +1,1 @@
+"""Tests of views of runs and plans that are being made."""

@@ -1,0 +1,162 @@
+"""A live view, served by a real viser: its nodes are where the model says, in a browser too."""
+
+import socket
+import sys
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from selenium.webdriver.support.ui import WebDriverWait
+
+import serpentail as st
+from serpentail.watching.poses import from_z, rods
+from tests.support import chromium
+from tests.support.models import model_folder
+from tests.support.page import need
+from tests.support.tumbling import planned
+
+WANTED = ["energy", "momentum", "rollout", "implicit", "tail_points", "leg_points"]
+LEGS = st.Legs.fixed(3.6, -0.3)
+START = [0, 0, 0.06, 1, 0, 0, 0, 0.1, 0]
+
+
+@cache
+def rat():
+    return st.load(model_folder(1, 3, contacts=["feet"], functions=WANTED))
+
+
+def free_port():
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        return listener.getsockname()[1]
+
+
+@pytest.fixture
+def view():
+    with st.live(rat(), port=free_port()) as opened:
+        yield opened
+
+
+def dropped(**settings):
+    return st.simulate(rat(), START, np.zeros(8), legs=LEGS, t_span=0.1, rtol=1e-6, **settings)
+
+
+def ends(node):
+    """Both ends (n, 3) of the rods of a node."""
+    turns = Rotation.from_quat(np.roll(node.batched_wxyzs, -1, axis=1))
+    half = turns.apply(np.eye(3)[2] * node.batched_scales[:, 2:] / 2)
+    return node.batched_positions - half, node.batched_positions + half
+
+
+def assert_at(view, q, legs):
+    """The parts are where the model has them in one pose."""
+    close = {"rtol": 0, "atol": 1e-6}  # of float32
+    np.testing.assert_allclose(view.nodes["back"].batched_positions[0], q[:3], **close)
+    np.testing.assert_allclose(view.nodes["back"].batched_wxyzs[0], q[3:7], **close)
+    begins, tips = ends(view.nodes["tail"])
+    points = rat().tail_points(q)
+    np.testing.assert_allclose(begins, points[:-1], **close)
+    np.testing.assert_allclose(tips, points[1:], **close)
+    begins, tips = ends(view.nodes["legs"])
+    joints = rat().leg_points(q, legs)
+    np.testing.assert_allclose(begins.reshape(2, 5, 3), joints[:, :-1], **close)
+    np.testing.assert_allclose(tips.reshape(2, 5, 3), joints[:, 1:], **close)
+
+
+def test_a_run_is_shown_where_it_has_come_to(view):
+    motion = dropped(watch=view)
+    assert {node.name for node in view.nodes.values()} == {
+        "/animal/back",
+        "/animal/belly",
+        "/animal/head",
+        "/animal/tail",
+        "/animal/legs",
+    }
+    assert_at(view, motion.q[-1], motion.contact.legs[-1])
+    assert view.text.content == "t = 0.1000 s"
+
+
+def test_it_moves_and_keeps_its_nodes(view):
+    motion = dropped()
+    view(motion)
+    before = dict(view.nodes)
+    part = motion.resample(motion.t[:50])
+    view(part)
+    assert view.nodes == before
+    assert_at(view, part.q[-1], part.contact.legs[-1])
+
+
+def test_head_and_belly_tell_the_sides_apart(view):
+    q = np.array([0, 0, 1, 0, 1.0, 0, 0, 0, 0])  # upside down: half a turn about x
+    still = st.simulate(rat(), q, np.zeros(8), legs=LEGS, t_span=1e-4, method="rk4")
+    view(still.resample(still.t[:1]))
+    back, belly, head = (
+        view.nodes[name].batched_positions[0] for name in ("back", "belly", "head")
+    )
+    assert belly[2] > back[2] and head[1] < back[1] - 0.5 * view.nodes["back"].batched_scales[0, 1]
+
+
+def test_a_plan_is_shown_at_nine_moments():
+    plan = planned()
+    with st.live(plan.trajectory.model, port=free_port()) as view:
+        view(plan)
+        assert "Plan of" in view.text.content and "legs" not in view.nodes
+        places = view.nodes["back"].batched_positions
+        rows = np.linspace(0, len(plan.trajectory.t) - 1, 9).round().astype(int)
+        np.testing.assert_allclose(places, plan.trajectory.q[rows, :3], atol=1e-6)
+        assert len(view.nodes["tail"].batched_positions) == 9 * 3
+        view(plan.trajectory)  # other copies of the same parts
+        assert len(view.nodes["tail"].batched_positions) == 3
+
+
+def test_rods_lie_between_their_points():
+    rng = np.random.default_rng(0)
+    points = rng.normal(size=(2, 5, 3))
+    points[0, 1] = points[0, 0] - [0, 0, 2]  # straight down
+    points[1, 2] = points[1, 1]  # no length
+    found = rods(points, 0.1)
+    along = Rotation.from_quat(np.roll(found.wxyzs, -1, axis=1)).apply([0, 0, 1])
+    begins = found.positions - along * found.scales[:, 2:] / 2
+    np.testing.assert_allclose(begins, points[:, :-1].reshape(-1, 3), atol=1e-12)
+    assert np.isfinite(found.wxyzs).all() and (found.scales[:, :2] == 0.1).all()
+    assert from_z(np.array([[0, 0, -1.0]])).tolist() == [[0, 1, 0, 0]]
+
+
+def test_it_says_where_it_is(view):
+    assert view.url.startswith("http://127.0.0.1:")
+    assert repr(view) == f"<serpentail live view of {rat().name} at {view.url}>"
+
+
+@pytest.mark.parametrize("news", [3, None, "run"])
+def test_what_is_no_motion_is_refused(view, news):
+    with pytest.raises(st.ViewError, match=r"news: value .*: needs a Trajectory or a Plan"):
+        view(news)
+
+
+def test_a_motion_of_another_tail_is_refused(view):
+    other = st.load(model_folder(2, 1, functions=["energy", "momentum", "rollout"]))
+    motion = st.simulate(other, [0, 0, 0, 1, *[0] * 7], np.zeros(10), t_span=0.01)
+    with pytest.raises(st.ViewError, match="whose q has 9"):
+        view(motion)
+
+
+def test_what_is_missing_is_named_before_anything_is_served(monkeypatch):
+    silent = st.load(model_folder(1, 1, functions=["energy"]))
+    with pytest.raises(st.ModelError, match="without 'tail_points'"):
+        st.live(silent)
+    monkeypatch.setitem(sys.modules, "viser", None)
+    with pytest.raises(st.ExtraMissing, match=r'pip install "serpentail\[live\]"'):
+        st.live(rat())
+
+
+def test_a_browser_sees_it(view):
+    need(chromium.need_chromium)
+    with chromium.chromium() as driver:
+        driver.get(view.url)
+        view(dropped())
+        words = "return document.body.innerText"
+        seen = WebDriverWait(driver, 60).until(
+            lambda browser: "t = 0.1000 s" in browser.execute_script(words)
+        )
+        assert seen and rat().name in driver.execute_script(words)
