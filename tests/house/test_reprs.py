@@ -27,8 +27,8 @@ def flown(runs=None, **settings):
 
 
 def tired(t, q, v):
-    """A controller that gives up at 0.02 s, above 0.25 m."""
-    if 0.02 < t < 0.022 and q[2] > 0.25:
+    """A controller that gives up at 0.02 s, above 0.29 m."""
+    if 0.02 < t < 0.022 and q[2] > 0.29:
         raise st.SimulationError("it is tired")
     return np.zeros(2)
 
