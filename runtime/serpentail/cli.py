@@ -5,7 +5,6 @@ import json
 import os
 import sys
 from collections.abc import Callable, Mapping
-from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -86,7 +85,8 @@ def parser() -> argparse.ArgumentParser:
         ),
     )
     simulate.add_argument("--save", help="write the motion to this .npz file")
-    simulate.add_argument("--film", help="draw it as a filmstrip, to this .png, .svg or .pdf file")
+    film = "draw it to this file: .mp4, .gif move, .png, .svg, .pdf are filmstrips, .html a page"
+    simulate.add_argument("--film", help=film)
     for verb in (plan, simulate):
         verb.add_argument("--view", metavar="PAGE", help="show it in a page, this .html file")
     # of a motion
@@ -170,9 +170,9 @@ def refuse_targets(arguments: argparse.Namespace) -> None:
 def target(option: str, path: str) -> Path:
     """Return where the file of an option goes; ValueError where its name is of no known kind."""
     if option == "film":
-        from .pictures.style import writable
+        from .pictures.film import film_path
 
-        return writable(path)
+        return film_path(path)
     if option == "view":
         from .viewer.view import checked_path
 
@@ -232,8 +232,7 @@ def simulated(arguments: argparse.Namespace) -> Outcome:
     scene = scenario(arguments.scene, arguments.folder, parsed(arguments.changes))
     motion, stopped = _motion(scene, arguments.view)
     report = scene.summary(motion) | stopped
-    film = partial(scene.film, motion)
-    files: Files = {"save": motion.save, "film": film, "view": motion.view}
+    files: Files = {"save": motion.save, "film": motion.film, "view": motion.view}
     return Outcome(report, _rows(report), True, files)
 
 
