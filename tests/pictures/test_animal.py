@@ -4,9 +4,10 @@ import dataclasses
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from scipy.spatial.transform import Rotation
 
-from serpentail.pictures.animal import above_ground, hull
+from serpentail.pictures.animal import Pen, above_ground, hull
 from serpentail.pictures.frames import frames, silhouette
 from serpentail.pictures.views import NAMED
 from tests.support.drawn_flight import SEMI_AXES, flight
@@ -79,3 +80,16 @@ def test_a_torso_above_the_ground_has_no_part_below():
     frame = film_frame(1, height=0.06)
     assert above_ground(frame) is None and frame.lowest < 0.06 - SEMI_AXES.min()
     assert len(above_ground(film_frame(1, height=-0.06))) == 0
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_line_before_the_torso_has_a_rim_and_one_behind_is_hidden(side):
+    """Seen from the right, +x: of a line across, what is drawn over the torso, and its rim."""
+    frame = dataclasses.replace(film_frame(0), rotation=np.eye(3))
+    axes = Figure().subplots()
+    pen = Pen(axes, frame, NAMED["side"], frame.torso)
+    across = frame.torso + np.array([[0.05 * side, -0.2, 0], [0.05 * side, 0.2, 0]])
+    pen.line(across, color="red", linewidth=1.0)
+    over = [line for line in axes.lines if line.get_zorder() > 0.4]  # the torso's level
+    assert [line.get_color() for line in over] == (["white", "red"] if side > 0 else [])
+    assert all(np.ptp(line.get_xdata()) == pytest.approx(0.4) for line in axes.lines)

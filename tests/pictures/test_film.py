@@ -2,6 +2,7 @@
 all.
 """
 
+import dataclasses
 import re
 import subprocess
 import sys
@@ -125,6 +126,11 @@ def test_an_html_film_is_the_page(tmp_path, monkeypatch):
         ("a", {}, "has suffix '': use one of"),
         ("a.gif", {"speed": 0}, "speed: value 0: needs a number above 0"),
         ("a.gif", {"speed": "slow"}, "speed: value 'slow': needs a number above 0"),
+        (
+            "a.gif",
+            {"speed": 1e-9},
+            r"speed: 1.45e\+10 frames .*at most 10000; give a greater speed",
+        ),
         ("a.gif", {"views": ("sidee",)}, "did you mean 'side'"),
     ],
 )
@@ -132,6 +138,20 @@ def test_what_no_film_can_be_is_refused(tmp_path, path, change, words):
     with pytest.raises(st.ViewError, match=words):
         flight().film(tmp_path / path, **change)
     assert not list(tmp_path.iterdir())
+
+
+def test_the_last_frame_lies_in_the_motion(tmp_path, monkeypatch):
+    """Whatever the rounding, where the motion lasts a whole number of frames."""
+    seen = []
+    monkeypatch.setattr(
+        st.Trajectory, "resample", lambda self, t: (seen.append(t), dataclasses.replace(self))[1]
+    )
+    monkeypatch.setattr("serpentail.pictures.film.pictures", lambda *_: iter(()))
+    monkeypatch.setitem(sys.modules[st.film.__module__].MOVING, ".gif", lambda *_: None)
+    for end in np.random.default_rng(2).uniform(0.1, 9, 50):
+        motion = dataclasses.replace(flight(), t=np.linspace(0.3, 0.3 + end, 59))
+        motion.film(tmp_path / "a.gif", speed=25 * end / 50)
+        assert len(seen[-1]) == 51 and seen[-1][-1] <= motion.t[-1]
 
 
 def test_a_motion_without_time_makes_no_film(tmp_path):

@@ -14,10 +14,11 @@ from ..viewer.view import checked_motions, template, view
 from .encode import RATE, encoder, write_gif, write_mp4
 from .filmstrip import VIEWS, filmstrip, strip_of
 from .movie import pictures
-from .style import METADATA
+from .style import METADATA, Array
 from .views import views_of
 
 MOVING = {".gif": write_gif, ".mp4": write_mp4}
+MOST = 10_000  # frames
 LASTS = 4.0  # s, a film whose speed is not told: slow motion, never faster than life
 
 
@@ -47,10 +48,11 @@ def film(
         filmstrip(motions, target, views=views, names=names, model=model)
         return target
     every = checked_motions(motions)
-    slowness = _slowness(every, speed)
     begin, end = max(m.t[0] for m in every), min(m.t[-1] for m in every)
-    count = int((end - begin) * slowness * RATE + 1e-9) + 1
-    times = begin + np.arange(count) / (RATE * slowness)
+    if begin >= end:
+        raise ViewError("motions: no time that all of them have: a moving film needs some")
+    slowness = _slowness(speed, end - begin)
+    times = _times(begin, end, RATE * slowness)
     moved = [motion.resample(times) for motion in every]
     strip = strip_of(moved, times, views_of(views), names, model)
     MOVING[kind](target, pictures(strip, slowness))
@@ -73,11 +75,19 @@ def film_path(path: str | os.PathLike[str]) -> Path:
     return target
 
 
-def _slowness(motions: list[Trajectory], speed: float | None) -> float:
-    """How many times slower than life a film is."""
-    if speed is not None:
-        return 1 / number("speed", speed, ViewError, above=0)
-    lasts = min(m.t[-1] for m in motions) - max(m.t[0] for m in motions)
-    if lasts <= 0:
-        raise ViewError("motions: no time that all of them have: a moving film needs some")
-    return float(max(1, round(LASTS / lasts)))
+def _slowness(speed: float | None, lasts: float) -> float:
+    """How many times slower than life a film of so many seconds is."""
+    if speed is None:
+        return float(max(1, round(LASTS / lasts)))
+    return 1 / number("speed", speed, ViewError, above=0)
+
+
+def _times(begin: float, end: float, rate: float) -> Array:
+    """The times of the frames, so many a second of life; ViewError where that is too many."""
+    count = (end - begin) * rate + 1e-9
+    if count >= MOST:
+        raise ViewError(
+            f"speed: {count:.3g} frames for {end - begin:.4g} s of motion: a film has at most "
+            f"{MOST}; give a greater speed"
+        )
+    return np.minimum(begin + np.arange(int(count) + 1) / rate, end)

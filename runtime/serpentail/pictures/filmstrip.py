@@ -113,7 +113,7 @@ def filmstrip(
 
 def strip_of(
     motions: list[Trajectory],
-    wanted: int | Sequence[float],
+    wanted: int | Sequence[float] | Array,
     views: list[View],
     names: Sequence[str] | None,
     model: Model | None,
