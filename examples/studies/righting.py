@@ -147,7 +147,7 @@ def segments(study: Study) -> dict:
             )
             flights[size] = as_flight(true["flight"])
             study.film(size, flights[size], f"fig12_m{size[0]}_n{size[1]}")
-    draw_figure_13(flights, study.folder / "fig13.png")
+    draw_figure_13(flights, study.rats, study.folder / "fig13.png")
     return {"rows": rows}
 
 

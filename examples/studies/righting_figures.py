@@ -11,9 +11,10 @@ from serpentail.attitude import angle_deg, tilt_deg
 from serpentail.pictures.panels import SINGULAR
 from serpentail.pictures.style import drawn
 
+BLUE = "#0072b2"
 LOOKS = {  # a band, and the curve that may lie on it
     "planned": {"color": "#8fd3bd", "linewidth": 4.0},
-    "tracked": {"color": "#0072b2", "linewidth": 1.0},
+    "tracked": {"color": BLUE, "linewidth": 1.0},
     "passive": {"color": "#d55e00", "linestyle": "--"},
 }
 WAYS = {"paper": ("#d55e00", "o--"), "ours": ("#0072b2", "s-")}
@@ -25,7 +26,6 @@ PANELS = (  # of Fig. 10
     *(r"$\tau_\alpha$ [mN m]", r"$\tau_\beta$ [mN m]"),
     *("tracked off planned:\nattitude [mdeg]", "tracked \N{MINUS SIGN} planned:\nbends [mdeg]"),
 )
-COLOURS = ("#0072b2", "#d55e00", "#009e73")
 
 
 def draw_figure_10(
@@ -63,10 +63,10 @@ def _draw_differences(
     """Tracked minus planned: the angle between the torsos, and the bends of the tail."""
     t = planned.t[planned.t <= tracked.t[-1]]
     planned, tracked = planned.resample(t), tracked.resample(t)
-    panels[0].plot(t, 1e3 * angle_deg(planned.attitude, tracked.attitude), color=COLOURS[0])
+    panels[0].plot(t, 1e3 * angle_deg(planned.attitude, tracked.attitude), color=BLUE)
     bends = 1e3 * links * np.degrees(tracked.tail - planned.tail)
     for curve, name, dash in zip(bends.T, ("pitch", "yaw"), ("-", "--"), strict=True):
-        panels[1].plot(t, curve, dash, color=COLOURS[0], label=name)
+        panels[1].plot(t, curve, dash, color=BLUE, label=name)
     panels[1].legend(loc="upper left", fontsize=7)
 
 
@@ -137,36 +137,19 @@ def draw_figure_11(rows: dict[str, list[dict]], path: Path) -> tuple[Figure, np.
     return drawn(draw, path)
 
 
-def draw_figure_13(flights: dict, path: Path) -> tuple[Figure, np.ndarray]:
-    """Attitude, tail and torques of plans for tails of one, two and three segments."""
+def draw_figure_13(
+    flights: dict[tuple, st.Trajectory], rats: dict[tuple, st.Model], path: Path
+) -> tuple[Figure, np.ndarray]:
+    """Attitude, bends and torques of plans for tails of one, two and three segments."""
 
     def draw() -> tuple[Figure, np.ndarray]:
         figure = Figure(figsize=(7.2, 5.4), layout="constrained")
-        axes = figure.subplots(3, len(flights), squeeze=False, sharey="row")
+        axes = figure.subplots(3, len(flights), squeeze=False, sharex="col")
         for column, ((m, n), flight) in zip(axes.T, flights.items(), strict=True):
-            angles = np.degrees(st.pitch_roll_yaw(flight.q, unwrap=True))
-            for k, name in enumerate((r"$\phi_x$", r"$\phi_y$", r"$\phi_z$")):
-                column[0].plot(flight.t, angles[:, k], color=COLOURS[k], label=name)
-            for i in range(m):
-                for j, dash in enumerate(("-", "--")):
-                    name = f"{('pitch', 'yaw')[j]} {i + 1}"
-                    column[1].plot(
-                        flight.t,
-                        np.degrees(flight.tail[:, 2 * i + j]),
-                        dash,
-                        color=COLOURS[i],
-                        label=name,
-                    )
-                    column[2].plot(flight.t, 1e3 * flight.tau[:, 2 * i + j], dash, color=COLOURS[i])
+            flight.plot("attitude", "tail", "torque", ax=column, model=rats[m, n])
             column[0].set_title(f"$m = {m}$, $n = {n}$")
-            column[2].set_xlabel("time [s]")
-            column[0].legend(fontsize=6, loc="upper left")
-            column[1].legend(fontsize=6, ncols=3, loc="lower center")
-            column[1].margins(y=0.4)
-        for panel, name in zip(
-            axes[:, 0], ("attitude [deg]", "tail [deg]", "torque [mN m]"), strict=True
-        ):
-            panel.set_ylabel(name)
+        for panel in axes[:, 1:].flat:
+            panel.set_ylabel("")
         return figure, axes
 
     return drawn(draw, path)

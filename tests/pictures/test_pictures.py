@@ -91,3 +91,13 @@ def test_unknown_suffix_lists_the_known(tmp_path, name, draw):
 def test_a_notebook_shows_a_figure():
     for figure, _ in (flight().filmstrip(frames=2), flight().plot("height")):
         assert figure._repr_png_().startswith(STARTS[".png"])
+
+
+@pytest.mark.parametrize("name", DRAWN)
+def test_a_figure_keeps_its_look_until_it_is_saved(tmp_path, name):
+    """Whoever saves it, with whatever settings: Matplotlib makes ticks when it draws."""
+    figures = [DRAWN[name](flight(), None)[0] for _ in range(2)]
+    figures[0].savefig(tmp_path / "a.png")
+    with matplotlib.rc_context({"font.size": 20, "xtick.color": "red", "axes.linewidth": 5}):
+        figures[1].savefig(tmp_path / "b.png")
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()

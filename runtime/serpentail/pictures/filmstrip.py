@@ -227,7 +227,7 @@ def _draw_key(figure: "Figure", page: Page, window: Array, key: dict[str, dict[s
     from matplotlib.lines import Line2D
 
     length = 0.05 * page.column / float(window[1, 0] - window[0, 0])
-    axes = page.add(figure, (LEFT, page.foot - 0.25, 1.0, 0.16))
+    axes = page.add(figure, (LEFT, page.foot - 0.2, 1.0, 0.16))
     axes.set(xlim=(0, 1), ylim=(0, 1))
     axes.set_axis_off()
     axes.plot([0, length], [0.5, 0.5], color=INK, linewidth=2, solid_capstyle="butt", clip_on=False)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import ViewError
 from ..files import replacing
 
 if TYPE_CHECKING:
@@ -37,10 +38,10 @@ STYLE: dict[str, Any] = {
 
 
 def writable(path: str | os.PathLike[str]) -> Path:
-    """The path, if its suffix names a known format."""
+    """The path, if its suffix names a known format; ViewError where it does not."""
     path = Path(path)
     if path.suffix.lower() not in METADATA:
-        raise ValueError(
+        raise ViewError(
             f"figure {str(path)!r} has suffix {path.suffix!r}: use one of {', '.join(METADATA)}"
         )
     return path
