@@ -9,13 +9,17 @@ import sys
 from itertools import pairwise
 
 import imageio_ffmpeg
+import matplotlib
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from PIL import Image
 
 import serpentail as st
 from serpentail.pictures import encode
-from serpentail.pictures.movie import speed_words
+from serpentail.pictures.filmstrip import strip_of
+from serpentail.pictures.movie import even, pictures, speed_words
+from serpentail.pictures.views import SIDE
 from tests.support.drawn_flight import flight
 
 LASTS = 0.58  # s, the flight
@@ -77,6 +81,19 @@ def test_a_film_is_slow_motion_of_four_seconds(tmp_path, monkeypatch):
 )
 def test_a_film_tells_its_speed(slowness, words):
     assert speed_words(slowness).startswith(words)
+
+
+def test_pictures_have_even_sizes():
+    """4.1 inches at 100 dots an inch are 409.99999999999994."""
+    for pixels in range(100, 1100, 2):
+        assert int(Figure(figsize=(even(pixels / 100), 1), dpi=100).bbox.width) == pixels
+
+
+def test_the_look_of_others_is_theirs_between_two_pictures():
+    strip = strip_of([flight()], 3, [SIDE], None, None)
+    before = dict(matplotlib.rcParams)
+    for _ in pictures(strip, 1.0):
+        assert dict(matplotlib.rcParams) == before
 
 
 def test_the_same_film_twice(tmp_path):

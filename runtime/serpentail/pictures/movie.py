@@ -36,7 +36,7 @@ def pictures(strip: Strip, slowness: float) -> Iterator[Picture]:
         with style.context(STYLE, after_reset=True):
             canvas.restore_region(empty)
             _draw_frame(figure, panels, strip, k)
-            yield np.asarray(canvas.buffer_rgba())[..., :3].copy()
+        yield np.asarray(canvas.buffer_rgba())[..., :3].copy()
 
 
 def speed_words(slowness: float) -> str:
@@ -46,6 +46,11 @@ def speed_words(slowness: float) -> str:
     if slowness > 1:
         return f"1/{slowness:.3g} of real time"
     return f"{1 / slowness:.3g} times real time"
+
+
+def even(length: float) -> float:
+    """Inches of an even number of pixels, which encoders ask for; a bit more, against rounding."""
+    return (2 * round(DPI * length / 2) + 0.01) / DPI
 
 
 def _stage(strip: Strip) -> tuple["Figure", list[tuple["Axes", View, int]]]:
@@ -59,7 +64,7 @@ def _stage(strip: Strip) -> tuple["Figure", list[tuple["Axes", View, int]]]:
     scale = min(room / sizes[:, 0].sum(), TALLEST / sizes[:, 1].max())
     width = max(scale * sizes[:, 0].sum() + GAP * (len(places) + 1), 4.0)
     height = scale * sizes[:, 1].max() + TOP + FOOT
-    width, height = (2 * round(DPI * length / 2) / DPI for length in (width, height))  # even
+    width, height = even(width), even(height)
     figure = Figure(figsize=(width, height), dpi=DPI)
     x, panels = (width - scale * sizes[:, 0].sum() - GAP * (len(places) - 1)) / 2, []
     for (view, film), (wide, high) in zip(places, scale * sizes, strict=True):
