@@ -1,4 +1,4 @@
-"""The main job on the paper's rat: it kicks, tumbles, and is drawn.
+"""The main job on the paper's rat: it kicks, tumbles, rights itself by its tail, and is drawn.
 
 Usage: python examples/demo.py [FOLDER], by default output/demo
 """
@@ -13,6 +13,8 @@ import numpy as np
 from scipy.integrate import simpson
 
 import serpentail as st
+from serpentail.attitude import tilt_deg
+from serpentail.scenes.plan import planned
 
 ROOT = Path(__file__).resolve().parent.parent
 SCENES = ("kangaroo_rat_m1_n3", "kangaroo_rat_m3_n4")
@@ -21,7 +23,8 @@ HEIGHT, VELOCITY, PITCH, SPIN = 0.34, (0.0, -0.302, 2.385), 3.80, 26.2
 BEND, BEND_RATE = 3 * -0.558, 3 * 4.70  # rad, rad/s: of the whole tail, in pitch
 FLIGHT = 0.58  # s, until shortly before landing
 FRAME = 1e-3  # s, between samples
-KICK = (0.0, 0.4, 0.404, 0.44, 0.55, 0.75, 0.95, 1.09)  # s, moments of the kick's film
+KICK = (0.0, 0.402, 0.41, 0.44, 0.55, 0.75, 0.95, 1.09)  # s, moments of the kick's film
+MOMENTS = 7  # of the film of both tumbles
 K_DMP = 1e-3  # N m s, the passive tail of the paper's Table 1
 
 
@@ -106,10 +109,8 @@ def fly(scene: str, folder: Path) -> None:
             method="dop853",
         )
     with step("draw and save"):
-        points = model.tail_points(flight.q)
-        com = model.center_of_mass(flight.q, flight.v)[0]
-        st.filmstrip(flight, points, folder / f"{scene}_film.png", com=com)
-        st.time_plots(flight, folder / f"{scene}_time.png")
+        flight.film(folder / f"{scene}_film.png")
+        flight.plot(path=folder / f"{scene}_time.png")
         flight.save(folder / f"{scene}.npz")
     print(report(model, flight, check), end="\n\n")
 
@@ -124,7 +125,7 @@ def kick(folder: Path) -> None:
     with step(f"simulate {scene.duration} s, implicit steps in C"):
         motion = scene.simulate()
     with step("draw and save"):
-        scene.film(motion, folder / "kick_film.png", KICK)
+        motion.filmstrip(folder / "kick_film.png", frames=KICK)
         motion.save(folder / "kick.npz")
     told = scene.summary(motion)
     leap = "take-off {take_off_s:.3f} s, apex {apex_m:.3f} m, landing {recontact_s:.3f} s".format(
@@ -137,12 +138,39 @@ def kick(folder: Path) -> None:
     )
 
 
+def righting(folder: Path) -> None:
+    """Plan how the tail rights the tumbling rat, and compare with a tail that only damps."""
+    print("righting_m1_n3")
+    with step("generate C and CasADi from the scene"):
+        generated = generate("righting_m1_n3", folder / "generated")
+    with step("plan the tail's torques"):
+        plan = planned(str(ROOT / "scenes" / "righting_m1_n3.toml"), str(generated))
+    model, start = plan.trajectory.model, (plan.problem.q0, plan.problem.v0)
+    with step(f"simulate {plan.duration:.2f} s with a passive tail"):
+        passive = st.simulate(model, *start, controller=st.Damping(K_DMP), t_span=plan.duration)
+    both, names = [passive, plan.trajectory], ["passive", "planned"]
+    with step("draw both side by side"):
+        look = {"frames": MOMENTS, "names": names, "views": ("side",)}
+        st.filmstrip(both, folder / "righting_film.png", **look)
+    with step("draw both as a moving film"):
+        st.film(both, folder / "righting.gif", names=names)
+    ends = [tilt_deg(motion.attitude[-1]) for motion in both]
+    print(
+        f"  tilt at the end:  {ends[0]:.0f} deg with a passive, {ends[1]:.2f} deg with the planned"
+        " tail",
+        end="\n\n",
+    )
+
+
 def main(folder: Path) -> None:
-    """Kick, then fly both scenes."""
+    """Kick, tumble and right, then fly both scenes."""
     kick(folder)
+    righting(folder)
     for scene in SCENES:
         fly(scene, folder)
-    print(f"Pictures (*_film.png, *_time.png) and trajectories (*.npz): {folder}")
+    print(
+        f"Pictures (*_film.png, *_time.png), a film (righting.gif), trajectories (*.npz): {folder}"
+    )
 
 
 if __name__ == "__main__":

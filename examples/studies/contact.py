@@ -15,7 +15,7 @@ from examples.studies.parts import run
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENES = {  # the moments (s) that films show
-    "kick": (0.0, 0.4, 0.404, 0.44, 0.55, 0.75, 0.95, 1.09),
+    "kick": (0.0, 0.402, 0.41, 0.44, 0.55, 0.75, 0.95, 1.09),
     "tail_support_jump": (0.0, 0.402, 0.42, 0.5, 0.75, 1.0, 1.11, 1.5),
     "tail_support_jump_continuum": (0.0, 0.402, 0.42, 0.5, 0.75, 1.0, 1.11, 1.5),
     "self_recovery": (0.0, 0.25, 0.4, 0.5, 0.6, 0.7, 1.0, 1.3, 2.5),
@@ -115,10 +115,10 @@ def main(folder: Path) -> None:
     """Simulate, draw, compare."""
     rows = {}
     for name, moments in SCENES.items():
-        scene, flight, rows[name] = motion(name, folder)
+        _, flight, rows[name] = motion(name, folder)
         flight.save(folder / f"{name}.npz")
-        scene.film(flight, folder / f"{name}_film.png", moments)
-        st.time_plots(flight, folder / f"{name}_time.png")
+        flight.filmstrip(folder / f"{name}_film.png", frames=moments)
+        flight.plot(path=folder / f"{name}_time.png")
         print(f"{name}: {flight.info['steps']} steps, {rows[name]['cpu_s']:.3f} s", flush=True)
     for words, (name, without, changes) in CONTRASTS.items():
         rows[words] = motion(name, folder, without, changes)[2]

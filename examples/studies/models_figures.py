@@ -1,12 +1,12 @@
 """Draws the comparison of tail models: Fig. 8, and cost against difference."""
 
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from serpentail.pictures.style import HEAD, INK, QUIET, TAIL, write
+from serpentail.pictures.style import HEAD, INK, QUIET, TAIL, drawn
 
 if TYPE_CHECKING:
+    import numpy as np
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -26,38 +26,32 @@ THIN = {
     "linewidth": 1.0,
     "label": "links without inertia of their own",
 }
-SIGNS = "a gap in a line: the difference changes its sign here"
 FEWEST, MOST = 2, 64  # links in Fig. 8b
-# where a number of links is written, points from its mark
-LABELS = dict.fromkeys((1, 3, 4, 6, 8, 12, 16, 24, 32, 64, 128, 256), (-7, -1)) | {2: (0, -13)}
+LABELLED = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 64, 128, 256)  # numbers of links that are written
 
 
-def draw_figure_8(study: dict, path: Path) -> Path:
-    """Draw (a) the torso's yaw over time and (b) the final difference over the number of links;
-    return the path.
-    """
-    return write(path, lambda: _figure_8(study))
+def draw_figure_8(study: dict, path: Path) -> tuple["Figure", "np.ndarray"]:
+    """Draw (a) the torso's yaw over time and (b) the final difference over the number of links."""
+    return drawn(lambda: _figure_8(study), path)
 
 
-def draw_cost(study: dict, path: Path) -> Path:
-    """Draw the time of one forward dynamics over the difference of final yaw, n at each mark;
-    return the path.
-    """
-    return write(path, lambda: _cost(study))
+def draw_cost(study: dict, path: Path) -> tuple["Figure", "Axes"]:
+    """Draw the time of one forward dynamics over the difference of final yaw, n at each mark."""
+    return drawn(lambda: _cost(study), path)
 
 
-def _figure_8(study: dict) -> "Figure":
+def _figure_8(study: dict) -> tuple["Figure", "np.ndarray"]:
     """Both panels."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(7.2, 2.9), layout="constrained")
-    motion, difference = figure.subplots(1, 2)
+    motion, difference = both = figure.subplots(1, 2)
     _motion(motion, study)
     _difference(difference, study)
-    for axes in (motion, difference):
+    for axes in both:
         axes.grid(**GRID)
         axes.set_axisbelow(True)
-    return figure
+    return figure, both
 
 
 def _motion(axes: "Axes", study: dict) -> None:
@@ -137,16 +131,18 @@ def _difference(axes: "Axes", study: dict) -> None:
     axes.legend(loc="upper right", fontsize=7)
 
 
-def _cost(study: dict) -> "Figure":
-    """Run time over difference, both logarithmic; the difference shrinks to the right."""
+def _cost(study: dict) -> tuple["Figure", "Axes"]:
+    """Run time over difference, both logarithmic.
+
+    Marks are not joined: the difference changes its sign, and neither it nor the time is steady.
+    """
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(7.2, 3.9), layout="constrained")
     axes = figure.subplots()
     rows, arc = study["articulated"], study["continuum"]["ns"]
-    times = [row["ns"] for row in rows]
-    for key, style in (("thin_difference", THIN), ("difference", AS_BUILT)):
-        axes.plot(*_joined_by_sign([row[key] for row in rows], times), **style)
+    for key, style in (("difference", AS_BUILT), ("thin_difference", THIN)):
+        _draw_marks(axes, rows, key, style)
     axes.axhline(arc, color=INK, linewidth=1.0)
     axes.annotate(
         f"continuum: {arc:.0f} ns, no difference",
@@ -156,51 +152,45 @@ def _cost(study: dict) -> "Figure":
         xytext=(0, -10),
         ha="right",
     )
-    axes.text(0.98, 0.3, SIGNS, transform=axes.transAxes, ha="right", fontsize=7)
     for row in rows:
-        if row["links"] in LABELS:
+        if row["links"] in LABELLED:
             _label(axes, row)
     _log_axes(axes)
-    axes.legend(*(reversed(each) for each in axes.get_legend_handles_labels()), loc="upper left")
-    return figure
+    axes.legend(loc="upper right", fontsize=7)
+    return figure, axes
 
 
-def _joined_by_sign(
-    differences: list[float], times: list[float]
-) -> tuple[list[float], list[float]]:
-    """Sizes of the differences and the times, with a gap wherever the sign changes."""
-    x, y = [abs(differences[0])], [times[0]]
-    for before, after, time in zip(differences, differences[1:], times[1:], strict=False):
-        if before * after < 0:
-            x, y = [*x, math.nan], [*y, math.nan]
-        x, y = [*x, abs(after)], [*y, time]
-    return x, y
+def _draw_marks(axes: "Axes", rows: list[dict], key: str, style: dict) -> None:
+    """A mark for each number of links: filled where it yaws more than the continuum, else hollow.
+
+    Final yaws are negative, so that is a negative difference.
+    """
+    look = style | {"linestyle": ""}
+    for more in (True, False):
+        chosen = [row for row in rows if (row[key] < 0) == more]
+        words = f"{style['label']}, yawing {'more' if more else 'less'}"
+        face = style["color"] if more else "white"
+        x, y = [abs(row[key]) for row in chosen], [row["ns"] for row in chosen]
+        axes.plot(x, y, **look | {"markerfacecolor": face, "label": words})
 
 
 def _label(axes: "Axes", row: dict) -> None:
-    """Write n beside a mark."""
+    """Write n at the right of a mark."""
     words = f"$n = {row['links']}$" if row["links"] in (1, 256) else str(row["links"])
-    place = LABELS[row["links"]]
-    axes.annotate(
-        words,
-        (abs(row["difference"]), row["ns"]),
-        textcoords="offset points",
-        xytext=place,
-        color=TAIL,
-        fontsize=7,
-        ha="right" if place[0] else "center",
-    )
+    place = (abs(row["difference"]), row["ns"])
+    look = {"textcoords": "offset points", "color": TAIL, "fontsize": 7, "va": "center"}
+    axes.annotate(words, place, xytext=(6, 0), **look)
 
 
 def _log_axes(axes: "Axes") -> None:
     """Scales, labels and grid of the diagram of cost."""
     from matplotlib.ticker import FuncFormatter, NullFormatter
 
-    axes.set(xscale="log", yscale="log", xlim=(4, 0.01), ylim=(50, 10_000))
+    axes.set(xscale="log", yscale="log", xlim=(0.01, 10), ylim=(50, 20_000))
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axis.set_minor_formatter(NullFormatter())
-    axes.set_xlabel("|final yaw, articulated \N{MINUS SIGN} continuum| [deg], smaller to the right")
+    axes.set_xlabel("|final yaw, articulated \N{MINUS SIGN} continuum| [deg]")
     axes.set_ylabel("forward dynamics, one call from C [ns]")
     axes.grid(which="major", **GRID)
     axes.set_axisbelow(True)

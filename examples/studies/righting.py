@@ -75,9 +75,7 @@ class Study:
 
     def film(self, size: tuple, flight: st.Trajectory, title: str) -> None:
         """Draw a strip of pictures of a flight."""
-        rat = self.rats[size]
-        com = rat.center_of_mass(flight.q, flight.v)[0]
-        st.filmstrip(flight, rat.tail_points(flight.q), self.folder / f"{title}.png", com=com)
+        flight.filmstrip(self.folder / f"{title}.png", model=self.rats[size])
 
 
 def righted(study: Study) -> dict:
@@ -86,7 +84,7 @@ def righted(study: Study) -> dict:
     flights = {kind: as_flight(lists) for kind, lists in found["flights"].items()}
     for kind, flight in flights.items():
         study.film(RAT, flight, f"fig9_{kind}")
-    draw_figure_10(flights, study.folder / "fig10.png")
+    draw_figure_10(flights, RAT[1], study.folder / "fig10.png")
     return found["row"]
 
 
@@ -149,7 +147,7 @@ def segments(study: Study) -> dict:
             )
             flights[size] = as_flight(true["flight"])
             study.film(size, flights[size], f"fig12_m{size[0]}_n{size[1]}")
-    draw_figure_13(flights, study.folder / "fig13.png")
+    draw_figure_13(flights, study.rats, study.folder / "fig13.png")
     return {"rows": rows}
 
 

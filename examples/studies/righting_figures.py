@@ -7,58 +7,76 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
 import serpentail as st
-from serpentail.pictures.style import write
+from serpentail.attitude import angle_deg, tilt_deg
+from serpentail.pictures.panels import SINGULAR
+from serpentail.pictures.style import drawn
 
-LOOKS = {"planned": ("#009e73", "-"), "tracked": ("#0072b2", "-."), "passive": ("#d55e00", "--")}
+BLUE = "#0072b2"
+LOOKS = {  # a band, and the curve that may lie on it
+    "planned": {"color": "#8fd3bd", "linewidth": 4.0},
+    "tracked": {"color": BLUE, "linewidth": 1.0},
+    "passive": {"color": "#d55e00", "linestyle": "--"},
+}
 WAYS = {"paper": ("#d55e00", "o--"), "ours": ("#0072b2", "s-")}
-COLOURS = ("#0072b2", "#d55e00", "#009e73")
+PANELS = (  # of Fig. 10
+    *("$p_{b,y}$ [m]", "$p_{b,z}$ [m]"),
+    *(r"pitch $\phi_x$ [deg]", r"roll $\phi_y$ [deg]"),
+    *(r"yaw $\phi_z$ [deg]", "tilt of back [deg]"),
+    *("bend in pitch [deg]", "bend in yaw [deg]"),
+    *(r"$\tau_\alpha$ [mN m]", r"$\tau_\beta$ [mN m]"),
+    *("tracked off planned:\nattitude [mdeg]", "tracked \N{MINUS SIGN} planned:\nbends [mdeg]"),
+)
 
 
-def draw_figure_10(flights: dict[str, st.Trajectory], path: Path) -> Path:
-    """Position, attitude, tail and torques of the planned, the tracked and the passive flight."""
+def draw_figure_10(
+    flights: dict[str, st.Trajectory], links: int, path: Path
+) -> tuple[Figure, np.ndarray]:
+    """Position, attitude, tail bends and torques of the planned, the tracked and the passive
+    flight, and how far the tracked one is off the planned.
+    """
 
-    def draw() -> Figure:
-        figure = Figure(figsize=(7.2, 6.4), layout="constrained")
-        axes = figure.subplots(4, 2, sharex=True)
-        names = ("$p_{b,y}$ [m]", "$p_{b,z}$ [m]", r"pitch $\phi_x$ [deg]", r"roll $\phi_y$ [deg]")
-        names += (
-            r"$\alpha_1$ [deg]",
-            r"$\beta_1$ [deg]",
-            r"$\tau_\alpha$ [mN m]",
-            r"$\tau_\beta$ [mN m]",
-        )
+    def draw() -> tuple[Figure, np.ndarray]:
+        figure = Figure(figsize=(7.2, 8.6), layout="constrained")
+        axes = figure.subplots(6, 2, sharex=True)
         for name, flight in flights.items():
-            colour, dash = LOOKS[name]
-            for k, curve in enumerate(
-                _curves(flight, flight if name == "passive" else flights["tracked"])
-            ):
-                axes.flat[k].plot(flight.t, curve, dash, color=colour, label=name)
-        for panel, name in zip(axes.flat, names, strict=True):
-            panel.set_ylabel(name)
+            look = LOOKS[name] | {"label": name}
+            like = flight if name == "passive" else flights["tracked"]
+            for panel, curve in zip(axes.flat, _curves(flight, like, links), strict=False):
+                panel.plot(flight.t, curve, **look)
+        _draw_differences(axes[-1], flights["planned"], flights["tracked"], links)
+        for panel, label in zip(axes.flat, PANELS, strict=True):
+            panel.set_ylabel(label)
             panel.grid(color="#e6e6e6", linewidth=0.6)
         for panel in axes[-1]:
             panel.set_xlabel("time since 0.1 s after the kick [s]")
-        figure.legend(
-            *axes.flat[0].get_legend_handles_labels(), loc="outside upper center", ncols=3
-        )
-        return figure
+        keys = axes.flat[0].get_legend_handles_labels()
+        figure.legend(*keys, loc="outside upper center", ncols=3)
+        figure.align_ylabels()
+        return figure, axes
 
-    return write(path, draw)
+    return drawn(draw, path)
 
 
-def _curves(flight: st.Trajectory, like: st.Trajectory) -> list[np.ndarray]:
-    angles = np.degrees(_angles_near(flight, like))
-    tail, tau = np.degrees(flight.tail), 1e3 * flight.tau
-    return [
-        flight.q[:, 1],
-        flight.q[:, 2],
-        angles[:, 0],
-        angles[:, 1],
-        tail[:, 0],
-        tail[:, 1],
-        tau[:, 0],
-        tau[:, 1],
-    ]
+def _draw_differences(
+    panels: np.ndarray, planned: st.Trajectory, tracked: st.Trajectory, links: int
+) -> None:
+    """Tracked minus planned: the angle between the torsos, and the bends of the tail."""
+    t = planned.t[planned.t <= tracked.t[-1]]
+    planned, tracked = planned.resample(t), tracked.resample(t)
+    panels[0].plot(t, 1e3 * angle_deg(planned.attitude, tracked.attitude), color=BLUE)
+    bends = 1e3 * links * np.degrees(tracked.tail - planned.tail)
+    for curve, name, dash in zip(bends.T, ("pitch", "yaw"), ("-", "--"), strict=True):
+        panels[1].plot(t, curve, dash, color=BLUE, label=name)
+    panels[1].legend(loc="upper left", fontsize=7)
+
+
+def _curves(flight: st.Trajectory, like: st.Trajectory, links: int) -> list[np.ndarray]:
+    angles = _angles_near(flight, like)
+    # near the vertical, roll and yaw mean little
+    angles[np.abs(np.cos(angles[:, 0])) < SINGULAR, 1:] = np.nan
+    bends = links * np.degrees(flight.tail)
+    curves = [flight.q[:, 1], flight.q[:, 2], *np.degrees(angles).T, tilt_deg(flight.attitude)]
+    return [*curves, *bends.T, *(1e3 * flight.tau).T]
 
 
 def _angles_near(flight: st.Trajectory, like: st.Trajectory) -> np.ndarray:
@@ -76,7 +94,7 @@ def _angles_near(flight: st.Trajectory, like: st.Trajectory) -> np.ndarray:
     return both[nearest, np.arange(len(angles))]
 
 
-def draw_figure_11(rows: dict[str, list[dict]], path: Path) -> Path:
+def draw_figure_11(rows: dict[str, list[dict]], path: Path) -> tuple[Figure, np.ndarray]:
     """Iterations, effort, time and true error against the nodes a second, and time against
     error.
     """
@@ -87,7 +105,7 @@ def draw_figure_11(rows: dict[str, list[dict]], path: Path) -> Path:
     }
     panels["open_loop_attitude_error_deg"] = "true error [deg]"
 
-    def draw() -> Figure:
+    def draw() -> tuple[Figure, np.ndarray]:
         figure = Figure(figsize=(7.2, 4.4), layout="constrained")
         axes = figure.subplots(2, 3)
         for way, points in rows.items():
@@ -114,54 +132,37 @@ def draw_figure_11(rows: dict[str, list[dict]], path: Path) -> Path:
         figure.legend(
             *axes.flat[0].get_legend_handles_labels(), loc="outside upper center", ncols=2
         )
-        return figure
+        return figure, axes
 
-    return write(path, draw)
+    return drawn(draw, path)
 
 
-def draw_figure_13(flights: dict, path: Path) -> Path:
-    """Attitude, tail and torques of plans for tails of one, two and three segments."""
+def draw_figure_13(
+    flights: dict[tuple, st.Trajectory], rats: dict[tuple, st.Model], path: Path
+) -> tuple[Figure, np.ndarray]:
+    """Attitude, bends and torques of plans for tails of one, two and three segments."""
 
-    def draw() -> Figure:
+    def draw() -> tuple[Figure, np.ndarray]:
         figure = Figure(figsize=(7.2, 5.4), layout="constrained")
-        axes = figure.subplots(3, len(flights), squeeze=False, sharey="row")
+        axes = figure.subplots(3, len(flights), squeeze=False, sharex="col")
         for column, ((m, n), flight) in zip(axes.T, flights.items(), strict=True):
-            angles = np.degrees(st.pitch_roll_yaw(flight.q, unwrap=True))
-            for k, name in enumerate((r"$\phi_x$", r"$\phi_y$", r"$\phi_z$")):
-                column[0].plot(flight.t, angles[:, k], color=COLOURS[k], label=name)
-            for i in range(m):
-                for j, dash in enumerate(("-", "--")):
-                    name = f"{('pitch', 'yaw')[j]} {i + 1}"
-                    column[1].plot(
-                        flight.t,
-                        np.degrees(flight.tail[:, 2 * i + j]),
-                        dash,
-                        color=COLOURS[i],
-                        label=name,
-                    )
-                    column[2].plot(flight.t, 1e3 * flight.tau[:, 2 * i + j], dash, color=COLOURS[i])
+            flight.plot("attitude", "tail", "torque", ax=column, model=rats[m, n])
             column[0].set_title(f"$m = {m}$, $n = {n}$")
-            column[2].set_xlabel("time [s]")
-            column[0].legend(fontsize=6, loc="upper left")
-            column[1].legend(fontsize=6, ncols=3, loc="lower center")
-            column[1].margins(y=0.4)
-        for panel, name in zip(
-            axes[:, 0], ("attitude [deg]", "tail [deg]", "torque [mN m]"), strict=True
-        ):
-            panel.set_ylabel(name)
-        return figure
+        for panel in axes[:, 1:].flat:
+            panel.set_ylabel("")
+        return figure, axes
 
-    return write(path, draw)
+    return drawn(draw, path)
 
 
-def draw_rates(rates: dict[str, list[dict]], path: Path) -> Path:
+def draw_rates(rates: dict[str, list[dict]], path: Path) -> tuple[Figure, np.ndarray]:
     """Share of random starts that have a true plan within a CPU time, and the true errors of all of
     them.
     """
 
-    def draw() -> Figure:
+    def draw() -> tuple[Figure, np.ndarray]:
         figure = Figure(figsize=(7.2, 3.2), layout="constrained")
-        left, right = figure.subplots(1, 2)
+        left, right = axes = figure.subplots(1, 2)
         for k, (kind, rows) in enumerate(rates.items()):
             look = {"color": f"C{k}", "label": kind, "where": "post"}
             share = np.arange(1, len(rows) + 1) / len(rows)
@@ -180,6 +181,6 @@ def draw_rates(rates: dict[str, list[dict]], path: Path) -> Path:
         for panel in (left, right):
             panel.grid(color="#e6e6e6", linewidth=0.6)
         left.legend(fontsize=6)
-        return figure
+        return figure, axes
 
-    return write(path, draw)
+    return drawn(draw, path)

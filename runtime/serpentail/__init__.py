@@ -28,9 +28,10 @@ _HOME = {
     **dict.fromkeys(["Goal", "Bounds"], "planning.problem"),
     "Plan": "planning.result.plan",
     "Pfl": "simulation.pfl",
+    "film": "pictures.film",
     "filmstrip": "pictures.filmstrip",
     "leg_joints": "pictures.skeleton",
-    "time_plots": "pictures.time_plots",
+    "plot": "pictures.plot",
     "view": "viewer.view",
     "live": "watching.live",
     **dict.fromkeys(

@@ -48,7 +48,7 @@ class NotWritten(SerpentailError, OSError):
 
 
 class ViewError(SerpentailError, ValueError):
-    """A page that cannot be written as asked."""
+    """A page, a film or a figure that cannot be drawn as asked."""
 
 
 class UnlikeBodies(UserWarning):

@@ -115,6 +115,10 @@ def test_demo_runs_anywhere_and_writes_its_files(tmp_path):
         assert flight.energy[0] - flight.energy[-1] == pytest.approx(damped, rel=1e-3)
         for picture in ("film", "time"):
             assert (tmp_path / "demo" / f"{scene}_{picture}.png").read_bytes()[:4] == b"\x89PNG"
+    for picture in ("kick_film.png", "righting_film.png"):
+        assert (tmp_path / "demo" / picture).read_bytes()[:4] == b"\x89PNG"
+    assert (tmp_path / "demo" / "righting.gif").read_bytes()[:6] == b"GIF89a"
+    assert "0.00 deg with the planned tail" in printed
     drifts = re.findall(r"constant to (\S+),", printed)
     differences = re.findall(r"differ by (\S+) at most", printed)
     assert len(drifts) == 4

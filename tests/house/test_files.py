@@ -16,16 +16,15 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.pictures.filmstrip import filmstrip
-from serpentail.pictures.time_plots import time_plots
-from tests.support.drawn_flight import flight, tail_points
+from tests.support.drawn_flight import flight
 
 ROOT = Path(__file__).parents[2]
 WRITERS = {
     "run.npz": lambda motion, path: motion.save(path),
-    "times.svg": time_plots,
-    "times.png": time_plots,
-    "film.pdf": lambda motion, path: filmstrip(motion, tail_points(motion), path),
+    "times.svg": lambda motion, path: motion.plot(path=path),
+    "times.png": lambda motion, path: motion.plot(path=path),
+    "film.pdf": lambda motion, path: motion.film(path),
+    "film.gif": lambda motion, path: motion.film(path, speed=2.0),
 }
 ERRORS = ("ENOSPC", "EIO", "EFBIG", "EDQUOT", "EACCES", "EXDEV")
 OLD = b"what was there before"

@@ -4,11 +4,13 @@ import dataclasses
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from scipy.spatial.transform import Rotation
 
-from serpentail.pictures import filmstrip as film
-from serpentail.pictures.animal import SIDE, TOP, Body, silhouette
-from tests.support.drawn_flight import SEMI_AXES, flight, tail_points
+from serpentail.pictures.animal import Pen, above_ground, hull
+from serpentail.pictures.frames import frames, silhouette
+from serpentail.pictures.views import NAMED
+from tests.support.drawn_flight import SEMI_AXES, flight
 
 
 def surface(count=300):
@@ -18,22 +20,15 @@ def surface(count=300):
     return np.stack(sphere, axis=-1).reshape(-1, 3) * SEMI_AXES
 
 
-def film_frame(seed):
-    """One frame of a film in a random attitude."""
+def film_frame(seed, height=0.06):
+    """One frame in a random attitude."""
     trajectory = flight(samples=1)
     q = trajectory.q.copy()
-    q[:, 3:7] = Rotation.random(rng=seed).as_quat()
-    trajectory = dataclasses.replace(trajectory, q=q)
-    points = tail_points(trajectory)
-    return film._frame(trajectory, points, q[:, :3], Body(), 0)
+    q[:, 2], q[:, 3:7] = height, Rotation.random(rng=seed).as_quat()
+    return frames(trajectory.model, dataclasses.replace(trajectory, q=q), [0], 0.0)[0]
 
 
-@pytest.mark.parametrize("view", [SIDE, TOP], ids=lambda view: view.name)
-def test_views_are_right_handed(view):
-    np.testing.assert_array_equal(np.cross(view.matrix[0], view.matrix[1]), view.matrix[2])
-
-
-@pytest.mark.parametrize("view", [SIDE, TOP], ids=lambda view: view.name)
+@pytest.mark.parametrize("view", NAMED.values(), ids=lambda view: view.name)
 @pytest.mark.parametrize("seed", range(5))
 def test_silhouette_is_the_outline_of_the_projected_surface(view, seed):
     rotation = Rotation.random(rng=seed).as_matrix()
@@ -46,7 +41,7 @@ def test_silhouette_is_the_outline_of_the_projected_surface(view, seed):
     np.testing.assert_allclose(outline[0], outline[-1], atol=1e-15)
 
 
-@pytest.mark.parametrize("view", [SIDE, TOP], ids=lambda view: view.name)
+@pytest.mark.parametrize("view", NAMED.values(), ids=lambda view: view.name)
 @pytest.mark.parametrize("seed", range(3))
 def test_the_torso_hides_exactly_what_a_ray_to_the_viewer_hits(view, seed):
     frame = film_frame(seed)
@@ -65,3 +60,36 @@ def test_the_torso_hides_exactly_what_a_ray_to_the_viewer_hits(view, seed):
     covered = np.einsum("ni,ij,nj->n", flat, np.linalg.inv(spread @ spread.T), flat) < 1
     assert not (over & ~clear & ~grazing).any()
     assert not (under_but_clear & covered & ~grazing).any()
+
+
+@pytest.mark.parametrize("view", NAMED.values(), ids=lambda view: view.name)
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("height", [-0.02, 0.005])
+def test_what_is_above_the_ground_is_outlined(view, seed, height):
+    frame = film_frame(seed, height)
+    world = frame.torso + surface() @ frame.rotation.T
+    shadow = view.of(world[world[:, 2] >= 0])[:, :2]
+    outline = hull(view.of(above_ground(frame))[:, :2])
+    angle = np.linspace(0, 2 * np.pi, 90)
+    directions = np.stack([np.cos(angle), np.sin(angle)])
+    widths = (outline @ directions).max(axis=0), (shadow @ directions).max(axis=0)
+    np.testing.assert_allclose(*widths, atol=5e-4)
+
+
+def test_a_torso_above_the_ground_has_no_part_below():
+    frame = film_frame(1, height=0.06)
+    assert above_ground(frame) is None and frame.lowest < 0.06 - SEMI_AXES.min()
+    assert len(above_ground(film_frame(1, height=-0.06))) == 0
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_line_before_the_torso_has_a_rim_and_one_behind_is_hidden(side):
+    """Seen from the right, +x: of a line across, what is drawn over the torso, and its rim."""
+    frame = dataclasses.replace(film_frame(0), rotation=np.eye(3))
+    axes = Figure().subplots()
+    pen = Pen(axes, frame, NAMED["side"], frame.torso)
+    across = frame.torso + np.array([[0.05 * side, -0.2, 0], [0.05 * side, 0.2, 0]])
+    pen.line(across, color="red", linewidth=1.0)
+    over = [line for line in axes.lines if line.get_zorder() > 0.4]  # the torso's level
+    assert [line.get_color() for line in over] == (["white", "red"] if side > 0 else [])
+    assert all(np.ptp(line.get_xdata()) == pytest.approx(0.4) for line in axes.lines)

@@ -1,4 +1,4 @@
-"""Laws of the figures of motions on the ground: the key fits, blows and weights are both seen."""
+"""Laws of the pictures of motions on the ground: the key fits, ground and what is below it."""
 
 import dataclasses
 
@@ -7,65 +7,117 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.pictures import filmstrip as film
-from serpentail.pictures import time_plots as plots
-from serpentail.pictures.style import STYLE
-from tests.support.drawn_flight import flight, tail_points
+from serpentail.pictures.animal import PALE, SHADOW
+from serpentail.pictures.style import STYLE, TORSO
+from tests.support.drawn_flight import flight
 
 GROUPS = {"feet": 6, "tail": 3, "torso": 1}
 WEIGHT, BLOW = 0.2, 20.0  # N, of a point
+EVENTS = [
+    {"time": 0.1, "group": "feet", "kind": "take_off"},
+    {"time": 0.11, "group": "tail", "kind": "take_off"},
+    {"time": 0.5, "group": "feet", "kind": "touch_down"},
+]
 
 
-@pytest.fixture
-def figure(monkeypatch):
-    """Return a function that draws instead of writing."""
-    for module in (film, plots):
-        monkeypatch.setattr(module, "write", lambda path, draw: draw())
-
-    def drawn(draw, *arguments, **options):
-        with matplotlib.rc_context(STYLE):
-            found = draw(*arguments, "a.svg", **options)
-            found.draw_without_rendering()
-        return found
-
-    return drawn
-
-
-def standing():
+def standing(height=0.0, legs=False):
     """The flight as if it had stood, with one blow."""
     motion, count = flight(), sum(GROUPS.values())
     shape = (len(motion.t), count, 3)
     points = np.random.default_rng(3).uniform(-0.1, 0.1, shape)
     forces = np.broadcast_to([0, 0, WEIGHT], shape).copy()
     forces[len(motion.t) // 2, :, 2] = BLOW
-    contact = st.Contact(points, forces, np.zeros((*shape[:2], 2)), GROUPS)
-    return dataclasses.replace(motion, contact=contact)
+    angles = np.zeros((len(motion.t), 4)) if legs else None
+    contact = st.Contact(points, forces, np.zeros((*shape[:2], 2)), GROUPS, angles)
+    if legs:
+        motion.model.kernels["leg_points"] = None
+        motion.model.leg_points = lambda q, _: q[:, None, None, :3] + np.zeros((1, 2, 6, 1))
+    q = motion.q + height * (np.arange(motion.q.shape[1]) == 2)
+    info = {"events": EVENTS}
+    return dataclasses.replace(motion, q=q, contact=contact, info=info, model=motion.model)
+
+
+def marks(figure):
+    return [text.get_text() for text in figure.legends[0].get_texts()]
 
 
 @pytest.mark.parametrize("frames", [1, 4, 8])
 @pytest.mark.parametrize("legs", [True, False])
-def test_the_key_has_every_mark_and_lies_on_the_page(figure, frames, legs):
-    motion = standing()
-    joints = {"legs": np.zeros((len(motion.t), 2, 6, 3)) + motion.q[:, None, None, :3]}
-    found = figure(
-        film.filmstrip, motion, tail_points(motion), frames=frames, **(joints if legs else {})
-    )
-    box, words = found.legends[0].get_window_extent(), found.legends[0].get_texts()
+def test_the_key_has_every_mark_and_lies_on_the_page(frames, legs):
+    with matplotlib.rc_context(STYLE):
+        found, _ = standing(legs=legs).filmstrip(frames=frames)
+        found.draw_without_rendering()
+    box = found.legends[0].get_window_extent()
     assert found.bbox.x0 <= box.x0 < box.x1 <= found.bbox.x1
     assert found.bbox.y0 <= box.y0 < box.y1 <= found.bbox.y1
-    told = [text.get_text() for text in words]
-    assert len(told) == 6 + legs and ("leg" in told) == legs
-    assert told[-1].startswith("ground's force, ")
+    told = marks(found)
+    assert len(told) == 7 + legs and ("leg" in told) == legs
+    assert told[-1] == "below the ground" and told[-2].startswith("force, 60 mm: ")
+    assert "below the ground" not in marks(standing(height=1.0).filmstrip()[0])
 
 
-def test_blows_and_weights_are_both_seen(figure):
-    found = figure(plots.time_plots, standing())
-    (axes,) = [axes for axes in found.axes if axes.get_ylabel().startswith("normal force")]
+def faces(axes, colour):
+    """Filled outlines of a colour: how opaque each is, and its corners."""
+    wanted = matplotlib.colors.to_rgb(colour)
+    patches = [each for each in axes.patches if each.get_facecolor()[:3] == wanted]
+    return [(each.get_facecolor()[3], each.get_xy()) for each in patches]
+
+
+@pytest.mark.parametrize("view", ["side", "oblique", "top"])
+def test_what_is_below_the_ground_is_pale(view):
+    """The torso half in the ground: all of it pale, and its upper part over that."""
+    _, axes = standing(height=-0.06).filmstrip(frames=[0.0], views=(view,))
+    (whole, outline), (part, above) = faces(axes[0, 0], TORSO)
+    assert whole == PALE and part == 1
+    assert (np.ptp(above, axis=0) <= np.ptp(outline, axis=0) + 1e-9).all()
+    for line in axes[0, 0].lines:
+        if line.get_alpha() is None and view == "side" and line.get_linewidth() == 1.4:
+            assert np.nanmin(line.get_ydata(), initial=0) >= 0
+    assert any(line.get_alpha() == PALE for line in axes[0, 0].lines)
+
+
+@pytest.mark.parametrize(("view", "lies"), [("side", False), ("oblique", True), ("top", True)])
+def test_shadows_lie_where_one_looks_down(view, lies):
+    _, axes = standing(height=0.3).filmstrip(frames=[0.0], views=(view,))
+    assert bool(faces(axes[0, 0], SHADOW)) == lies
+
+
+def test_arrows_are_the_forces():
+    motion = standing()
+    _, axes = motion.filmstrip(frames=[0.0, float(motion.t[29])], views=("side",))
+    for panel, size in zip(axes[0], (np.sqrt(WEIGHT / BLOW), 1), strict=True):
+        (arrows,) = [each for each in panel.collections if hasattr(each, "U")]
+        np.testing.assert_allclose(np.hypot(arrows.U, arrows.V), 0.06 * size)
+        assert len(arrows.U) == sum(GROUPS.values())
+
+
+# Plots.
+
+
+def axes_of(figure, label):
+    (axes,) = [axes for axes in figure.axes if axes.get_ylabel().startswith(label)]
+    return axes
+
+
+def test_forces_are_drawn_on_a_linear_axis():
+    figure, every = standing().plot()
+    axes = axes_of(figure, "normal force")
     for line, count in zip(axes.lines, GROUPS.values(), strict=True):
         drawn = line.get_ydata().min(), line.get_ydata().max()
         assert drawn == pytest.approx((count * WEIGHT, count * BLOW))
-    heights = axes.transAxes.inverted().transform(
-        axes.transData.transform([(0, force) for force in (0, WEIGHT, 6 * WEIGHT, 6 * BLOW)])
-    )[:, 1]
-    assert heights[0] == 0 and heights[1] > 0.03 and 0.09 < heights[2] < heights[3] < 1
-    assert {each.get_yscale() for each in found.axes if each is not axes} == {"linear"}
+    assert {each.get_yscale() for each in every} == {"linear"}
+
+
+def test_events_are_lines_on_every_panel_and_told_above_the_first():
+    _, every = standing().plot("height", "force", "tail")
+    for axes in every:
+        lines = {each.get_label(): each for each in axes.collections}
+        for kind in ("take_off", "touch_down"):
+            drawn = [segment[0, 0] for segment in lines[f"_{kind}"].get_segments()]
+            assert drawn == [event["time"] for event in EVENTS if event["kind"] == kind]
+    assert [text.get_text() for text in every[0].texts] == ["feet off", "feet on"]
+
+
+def test_a_motion_whose_events_are_unknown_has_no_lines():
+    _, axes = dataclasses.replace(standing(), info={"method": "dop853"}).plot("height")
+    assert not axes[0].collections and not axes[0].texts

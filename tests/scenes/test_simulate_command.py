@@ -119,7 +119,7 @@ def test_a_flight_is_a_scene_too(tmp_path, monkeypatch, capsys):
         ("--save", "a.dat", "its name ends in .dat, which is none of .npz, .csv, .nc"),
         ("--save", "a.csv/a.v2", "its name ends in .v2"),
         ("--film", "simple.toml/deep/a.png", "simple.toml is no folder"),
-        ("--film", "a.gif", "has suffix '.gif': use one of .pdf, .png, .svg"),
+        ("--film", "a.avi", "has suffix '.avi': use one of .gif, .html, .mp4, .pdf, .png, .svg"),
         ("--film", "a", "has suffix '': use one of"),
         ("--save", "/proc/a.npz", "could not be written|cannot be written to|no folder"),
     ],
@@ -137,11 +137,28 @@ def test_a_target_that_cannot_be_is_refused_before_the_run(
     assert err.startswith(f"{option} {path}: ") and err.count("\n") == 1
 
 
+def test_a_film_without_an_encoder_is_refused_before_the_run(scene, capsys, monkeypatch):
+    ran = []
+    monkeypatch.setattr(st.Scenario, "simulate", lambda *_: ran.append(1))
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    monkeypatch.setattr("shutil.which", lambda name: None)
+    assert cli.main(["simulate", scene(), "--film", "a.mp4"]) == 2
+    assert not ran and 'pip install "serpentail[film]"' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("suffix", [".gif", ".mp4", ".svg"])
+def test_a_film_is_what_its_suffix_says(scene, capsys, suffix):
+    assert cli.main(["simulate", scene(), "--film", f"new/a{suffix}"]) == 0
+    begins = {".gif": b"GIF89a", ".mp4": b"\0\0\0", ".svg": b"<?xml"}
+    assert Path(f"new/a{suffix}").read_bytes().startswith(begins[suffix])
+    assert not capsys.readouterr().err and len(list(Path("new").iterdir())) == 1
+
+
 def test_a_failed_picture_loses_nothing(scene, capsys, monkeypatch):
     def fails(*_, **__):
         raise RuntimeError("no fonts\non this machine")
 
-    monkeypatch.setattr("serpentail.scenes.simulate.filmstrip", fails)
+    monkeypatch.setattr("serpentail.pictures.film.filmstrip", fails)
     given = ["--film", "a.png", "--save", "new/a.npz", "--json", "-"]
     assert cli.main(["simulate", scene(), *given]) == 1
     out, err = capsys.readouterr()

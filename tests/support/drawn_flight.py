@@ -1,4 +1,6 @@
-"""A flight to draw: its trajectory and the points of its tail."""
+"""A flight to draw: its trajectory, and a stand-in for a model that tells the tail's points."""
+
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -17,6 +19,33 @@ SPEEDS = {
     "far": (2.6, 2.8),
     "still": (0.0, 0.0),
 }  # forward and up at the start, m/s
+
+
+@dataclass
+class Drawn:
+    """What drawings ask of a model with links along -y; it is of no generated folder."""
+
+    segments: int
+    links: int = 4
+    name: str = "drawn"
+    kind: str = "articulated"
+    kernels: dict = field(default_factory=dict)
+
+    def __post_init__(self):
+        self.nq = 7 + 2 * self.segments
+        self.manifest = {"dimensions": {"total": self.segments * self.links}}
+        self.parameters = {
+            "torso_mass": 0.1,
+            "torso_inertia": (1e-4, 1e-4, 1e-4),
+            "torso_semi_axes": tuple(SEMI_AXES),
+            "tail_mount": tuple(MOUNT),
+            "tail_length": 0.19466,
+            "tail_mass": 0.009,
+            "gravity": 9.8,
+        }
+
+    def tail_points(self, q):
+        return tail_points(q, self.links)[:, 1:]
 
 
 def flight(speed=SPEEDS["up"], segments=2, samples=59):
@@ -39,18 +68,19 @@ def flight(speed=SPEEDS["up"], segments=2, samples=59):
         potential=0.109 * gravity * position[:, 2],
         linear_momentum=momentum,
         angular_momentum=np.array([-6e-4, 1e-4, 1.5e-4]) + 1e-18 * np.cos(t)[:, None],
+        model=Drawn(segments),
     )
 
 
-def tail_points(trajectory, links=4, length=0.19466):
+def tail_points(q, links=4, length=0.19466):
     """Joints (K, m links + 1, 3) of an articulated tail: R_j = R_{j-1} Rx(alpha) Rz(beta), links
     along -y.
     """
-    rotation = rotation_matrix(trajectory.attitude)
-    points = [trajectory.q[:, :3] + rotation @ MOUNT]
-    for i in range(trajectory.segments):
-        bend = Rotation.from_euler("XZ", trajectory.tail[:, 2 * i : 2 * i + 2]).as_matrix()
+    rotation, segments = rotation_matrix(q[:, 3:7]), (q.shape[1] - 7) // 2
+    points = [q[:, :3] + rotation @ MOUNT]
+    for i in range(segments):
+        bend = Rotation.from_euler("XZ", q[:, 7 + 2 * i : 9 + 2 * i]).as_matrix()
         for _ in range(links):
             rotation = rotation @ bend
-            points.append(points[-1] - rotation[:, :, 1] * length / (links * trajectory.segments))
+            points.append(points[-1] - rotation[:, :, 1] * length / (links * segments))
     return np.stack(points, axis=1)

@@ -64,7 +64,8 @@ def _of_motions(verbs: argparse._SubParsersAction) -> None:
             "[simulate] (duration=2, start.height=0.1)"
         ),
     )
-    simulate.add_argument("--film", help="draw it as a filmstrip, to this .png, .svg or .pdf file")
+    film = "draw it to this file: .mp4, .gif move, .png, .svg, .pdf are filmstrips, .html a page"
+    simulate.add_argument("--film", help=film)
     plan = verbs.add_parser("plan", help="plan the motion of a scene's table [plan]")
     _add_scene(plan, "scenes/righting_m1_n3.toml")
     for verb in (plan, simulate):

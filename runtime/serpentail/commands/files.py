@@ -29,9 +29,9 @@ def refuse_targets(arguments: argparse.Namespace) -> None:
 def target(option: str, path: str) -> Path:
     """Return where the file of an option goes; ValueError where its name is of no known kind."""
     if option == "film":
-        from ..pictures.style import writable
+        from ..pictures.film import film_path
 
-        return writable(path)
+        return film_path(path)
     if option == "view":
         from ..viewer.view import checked_path
 

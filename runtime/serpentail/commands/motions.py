@@ -34,8 +34,7 @@ def simulate(arguments: argparse.Namespace) -> Outcome:
     scene = scenario(arguments.scene, arguments.folder, parsed(arguments.changes))
     motion, stopped = _motion(scene, arguments.view)
     report = scene.summary(motion) | stopped
-    film = partial(scene.film, motion)
-    files: Files = {"save": partial(save, motion), "film": film, "view": motion.view}
+    files: Files = {"save": partial(save, motion), "film": motion.film, "view": motion.view}
     return Outcome(report, as_text(report, UNITS), True, files)
 
 

@@ -141,6 +141,24 @@ class Trajectory(Exports):
 
         return in_notebook(self, lambda: [self])
 
+    def film(self, path: str | os.PathLike[str], **options: Any) -> Path:
+        """Write a moving film, a filmstrip or a page, by the suffix; see ``st.film``."""
+        from ..pictures.film import film
+
+        return film(self, path, **options)
+
+    def filmstrip(self, path: str | os.PathLike[str] | None = None, **options: Any) -> Any:
+        """Draw moments side by side; return figure and axes; see ``st.filmstrip``."""
+        from ..pictures.filmstrip import filmstrip
+
+        return filmstrip(self, path, **options)
+
+    def plot(self, *panels: str, **options: Any) -> Any:
+        """Draw panels over time, named or all; return figure and axes; see ``st.plot``."""
+        from ..pictures.plot import plot
+
+        return plot(self, *panels, **options)
+
     def resample(self, t: ArrayLike) -> Self:
         """The motion at the increasing times t (n,), s; ValueError names the first one outside.
 

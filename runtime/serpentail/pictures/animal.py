@@ -1,177 +1,146 @@
 """How the animal looks at one moment in a view: torso, tail, legs and forces of the ground."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
+from .frames import Frame, tick
 from .style import HEAD, INK, TAIL, TORSO, Array
+from .views import TOP, View
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 MOST_DOTS = 20  # more tail points than this are drawn without dots
 LEG, FORCE = "#009e73", "#cc79a7"  # Okabe and Ito
-LONGEST = 0.06  # m, the arrow of the largest force of a film
-
-
-@dataclass(frozen=True)
-class Body:
-    """The drawn torso: its ellipsoid's semi-axes and the tail's root, in the torso frame, m."""
-
-    semi_axes: tuple[float, float, float] = (0.0315, 0.0495, 0.027)
-    tail_mount: tuple[float, float, float] = (0.0, -0.0405, 0.0045)
-
-    def __post_init__(self) -> None:
-        """Semi-axes and root are three finite numbers each, the first ones positive."""
-        for name, value in vars(self).items():
-            if np.shape(value) != (3,) or not np.isfinite(value).all():
-                raise ValueError(f"{name} is {value!r}: give three finite lengths in m")
-        if min(self.semi_axes) <= 0:
-            raise ValueError(f"semi_axes is {self.semi_axes!r}: give positive lengths in m")
-
-
-@dataclass(frozen=True, eq=False)
-class View:
-    """An orthographic view.
-
-    The rows of its matrix are the world directions right, up and towards the viewer.
-    """
-
-    name: str
-    right: str
-    up: str
-    matrix: Array
-
-    def of(self, world: Array) -> Array:
-        """World vectors (n, 3) as (right, up, towards the viewer)."""
-        return world @ self.matrix.T
-
-
-SIDE = View("side", "y", "z", np.array([[0.0, 1, 0], [0, 0, 1], [1, 0, 0]]))
-TOP = View("top", "y", "\u2212x", np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]]))
-
-
-@dataclass(frozen=True, eq=False)
-class Frame:
-    """One moment of a film, world, SI: time, torso, root and tail (P + 1, 3), COM.
-
-    On the ground also legs (L, J, 3) and arrows (n, 2, 3) of its forces, from the point that is
-    pushed to the tip.
-    """
-
-    time: float
-    torso: Array
-    rotation: Array
-    tail: Array
-    com: Array
-    body: Body
-    legs: Array = field(default_factory=lambda: np.zeros((0, 2, 3)))
-    arrows: Array = field(default_factory=lambda: np.zeros((0, 2, 3)))
-    grounded: bool = False
-
-    def world(self, local: ArrayLike) -> Array:
-        """Torso points (n, 3) in the world."""
-        return self.torso + np.asarray(local, dtype=float) @ self.rotation.T
-
-    def outline(self, view: View) -> Array:
-        """The torso's silhouette (n, 2) in a view."""
-        return view.of(self.torso)[:2] + silhouette(self.rotation, self.body.semi_axes, view)
-
-    def in_front(self, world: Array, view: View) -> NDArray[np.bool_]:
-        """Which world points x (n, 3) it cannot hide: |u| >= 1 on the near side.
-
-        u = diag(a)^-1 R^T (x - p).
-        """
-        u = (world - self.torso) @ self.rotation / self.body.semi_axes
-        towards = view.matrix[2] @ self.rotation / self.body.semi_axes
-        return np.asarray((np.linalg.norm(u, axis=1) > 1 - 1e-9) & (u @ towards > -1e-6))
-
-
-def silhouette(rotation: Array, semi_axes: ArrayLike, view: View = SIDE, count: int = 121) -> Array:
-    """Outline (count, 2), m, about the centre, of an ellipsoid rotated by R.
-
-    It is the ellipse P R diag(a^2) R^T P^T.
-    """
-    spread = view.matrix[:2] @ rotation * np.asarray(semi_axes, dtype=float)
-    angle = np.linspace(0, 2 * np.pi, count)
-    circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    return circle @ np.linalg.cholesky(spread @ spread.T).T
-
-
-def arrows(points: Array, forces: Array, largest: float) -> Array:
-    """Arrows (n, 2, 3) of forces at points (P, 3), as long as the roots of the forces.
-
-    The largest force has an arrow of LONGEST.
-    """
-    sizes = np.linalg.norm(forces, axis=1)
-    acting = sizes > 1e-4 * largest
-    shown, sizes = forces[acting], sizes[acting, None]
-    tips = points[acting] + LONGEST * shown / np.sqrt(sizes * largest)
-    return np.stack([points[acting], tips], axis=1)
-
-
-def tick(body: Body) -> Array:
-    """The mark on the back, (2, 3), in the torso frame."""
-    height = body.semi_axes[2]
-    return np.array([[0, 0, height], [0, 0, 1.5 * height]])
+SHADE, SHADOW = "#ecebe6", "#c9c7bf"  # the ground
+PALE = 0.3  # how much is seen of what is below it
+GRIDS = np.array([0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10])  # m, between lines on the ground
+LINES = 8  # of the ground's grid that are seen, about
+SLIVER = 0.05  # rad, of the torso's cap above the ground that is not drawn
+EDGE_ON = 0.08  # sine of the elevation below which the ground is a line
 
 
 @dataclass(frozen=True, eq=False)
 class Pen:
-    """Draws one frame on axes in a view, world point `origin` at zero, above all lower levels."""
+    """Draws one frame on axes in a view, world point `origin` at zero, above all lower levels.
+
+    Where there is ground, z = 0, what is below it is pale.
+    """
 
     axes: "Axes"
     frame: Frame
     view: View
     origin: Array
+    grounded: bool = False
     level: float = 0.0
 
+    def flat(self, world: Array) -> Array:
+        """World points (..., 3) on the axes, (..., 2)."""
+        return self.view.of(world - self.origin)[..., :2]
+
+    # artists are made here, since Axes.plot and Axes.fill take thrice as long: they look for limits
+
     def plot(self, world: Array, mark: str, zorder: float, **look: Any) -> None:
-        """World points (n, 3) as matplotlib's mark says."""
-        self.axes.plot(
-            *self.view.of(world - self.origin).T[:2], mark, zorder=self.level + zorder, **look
-        )
+        """World points (n, 3), joined by a line ("-", ":") or each a dot ("o")."""
+        from matplotlib.lines import Line2D
+
+        drawn = {"linestyle": "", "marker": mark} if mark == "o" else {"linestyle": mark}
+        line = Line2D(*self.flat(world).T, zorder=self.level + zorder, **drawn | look)
+        self.axes.add_artist(line)
+
+    def fill(self, outline: Array, zorder: float, **look: Any) -> None:
+        """A polygon (n, 2) on the axes."""
+        from matplotlib.patches import Polygon
+
+        self.axes.add_artist(Polygon(outline, zorder=self.level + zorder, **look))
 
     def torso(self) -> None:
-        """The filled silhouette."""
+        """The filled silhouette, and again what of it is above the ground."""
+        look = {"facecolor": TORSO, "edgecolor": INK, "linewidth": 0.7}
         outline = self.frame.outline(self.view) - self.view.of(self.origin)[:2]
-        self.axes.fill(
-            *outline.T, facecolor=TORSO, edgecolor=INK, linewidth=0.7, zorder=self.level + 0.4
-        )
+        above = above_ground(self.frame) if self.grounded else None
+        if above is None:
+            self.fill(outline, 0.4, **look)
+            return
+        self.fill(outline, 0.4, alpha=PALE, **look)
+        if len(above):
+            self.fill(hull(self.flat(above)), 0.41, **look)
 
     def line(self, corners: Array, **look: Any) -> None:
-        """A line, all of it under the torso, and again over it where the torso cannot hide it."""
+        """A line, all of it under the torso, and again over it where the torso cannot hide it.
+
+        That part has a white rim, so that it is seen to pass in front.
+        """
         fine = np.linspace(0, len(corners) - 1, 16 * (len(corners) - 1) + 1)
         world = np.stack([np.interp(fine, np.arange(len(corners)), c) for c in corners.T], axis=1)
-        self.plot(world, "-", 0.2, **look)
-        self.plot(self.visible(world), "-", 0.6, **look)
+        above, below = self.parted(world)
+        if below is not None:
+            self.plot(below, "-", 0.2, alpha=PALE, **look)
+        self.plot(above, "-", 0.2, **look)
+        front = self.visible(above)
+        if np.isfinite(front).any():
+            rim = look | {"color": "white", "linewidth": look["linewidth"] + 1.4}
+            rim |= {"solid_capstyle": "butt"}
+            self.plot(front, "-", 0.59, **rim)
+            self.plot(front, "-", 0.6, **look)
 
     def dots(self, world: Array, **look: Any) -> None:
         """Dots, under and over the torso likewise."""
-        self.plot(world, "o", 0.3, **look)
-        self.plot(self.visible(world), "o", 0.7, **look)
+        above, below = self.parted(world)
+        if below is not None:
+            self.plot(below, "o", 0.3, alpha=PALE, **look)
+        self.plot(above, "o", 0.3, **look)
+        self.plot(self.visible(above), "o", 0.7, **look)
 
-    def arrow(self, ends: Array) -> None:
-        """An arrow from a world point to another, (2, 3), over all else."""
-        tail, head = self.view.of(ends - self.origin)[:, :2]
-        look = {
-            "arrowstyle": "-|>,head_width=0.12,head_length=0.25",
-            "color": FORCE,
-            "linewidth": 1.0,
-        }
-        look |= {"shrinkA": 0, "shrinkB": 0, "zorder": self.level + 0.9}
-        self.axes.annotate("", head, tail, arrowprops=look)
+    def arrows(self, ends: Array) -> None:
+        """Arrows (n, 2, 3) from world points to others, over all else."""
+        if not len(ends):
+            return
+        begin, end = self.flat(ends[:, 0]), self.flat(ends[:, 1])
+        look = {"angles": "xy", "scale_units": "xy", "scale": 1, "units": "inches"}
+        look |= {"width": 0.014, "headwidth": 4, "headlength": 4.5, "headaxislength": 4.5}
+        self.axes.quiver(
+            *begin.T, *(end - begin).T, color=FORCE, zorder=self.level + 0.9, minlength=0.5, **look
+        )
 
-    def ground(self) -> None:
-        """The ground, in a view from the side."""
-        if self.frame.grounded and self.view is SIDE:
-            self.axes.axhline(-self.origin[2], color=INK, linewidth=0.8, zorder=self.level)
+    def parted(self, world: Array) -> tuple[Array, Array | None]:
+        """World points above the ground and below it, nan where they are not; None for none."""
+        below = world[:, 2:] < 0
+        if not self.grounded or not below.any():
+            return world, None
+        return np.where(below, np.nan, world), np.where(below, world, np.nan)
 
     def visible(self, world: Array) -> Array:
         """World points, nan where the torso may hide them."""
         return np.where(self.frame.in_front(world, self.view)[:, None], world, np.nan)
+
+
+def above_ground(frame: Frame) -> Array | None:
+    """Points (n, 3) of the torso's surface above the ground; None where all of it is.
+
+    On the unit sphere they are a cap about n = diag(a) R^T e_z / d: z = p_z + d cos(polar).
+    """
+    normal = frame.rotation[2] * frame.body.semi_axes
+    depth = np.linalg.norm(normal)
+    if frame.torso[2] >= depth:
+        return None
+    edge = np.arccos(np.clip(-frame.torso[2] / depth, -1, 1))
+    if edge < SLIVER:
+        return np.zeros((0, 3))
+    polar, around = np.meshgrid(np.linspace(0, edge, 31), np.linspace(0, 2 * np.pi, 61))
+    beside = np.linalg.svd(normal[None])[2][1:]
+    ring = np.cos(around)[..., None] * beside[0] + np.sin(around)[..., None] * beside[1]
+    sphere = np.cos(polar)[..., None] * normal / depth + np.sin(polar)[..., None] * ring
+    return frame.world(sphere.reshape(-1, 3) * frame.body.semi_axes)
+
+
+def hull(points: Array) -> Array:
+    """The convex outline (k, 2) of points (n, 2)."""
+    from scipy.spatial import ConvexHull
+
+    return points[ConvexHull(points).vertices]
 
 
 def draw_animal(pen: Pen) -> None:
@@ -182,8 +151,7 @@ def draw_animal(pen: Pen) -> None:
     pen.line(pen.frame.tail, color=TAIL, linewidth=1.4)
     if len(pen.frame.tail) <= MOST_DOTS + 1:
         pen.dots(pen.frame.tail[1:], color=INK, markersize=2.4, markeredgewidth=0)
-    for arrow in pen.frame.arrows:
-        pen.arrow(arrow)
+    pen.arrows(pen.frame.arrows)
 
 
 def draw_marks(pen: Pen) -> None:
@@ -198,3 +166,46 @@ def draw_marks(pen: Pen) -> None:
     head = pen.frame.world([[0, length, 0]])
     fill = HEAD if pen.frame.in_front(head, pen.view)[0] else "white"
     pen.plot(head, "o", 0.8, color=HEAD, markersize=4, markerfacecolor=fill)
+
+
+def draw_shadow(pen: Pen) -> None:
+    """What the animal's shadow covers at noon, in views that look down on the ground."""
+    if not pen.grounded or pen.view.matrix[2, 2] <= 0:
+        return
+    outline = pen.frame.outline(TOP) @ TOP.matrix[:2]
+    pen.fill(pen.flat(outline), 0.02, facecolor=SHADOW, linewidth=0)
+    pen.plot(pen.frame.tail * (1, 1, 0), "-", 0.02, color=SHADOW, linewidth=1.4)
+
+
+def draw_ground(axes: "Axes", view: View, origin: Array) -> None:
+    """The ground z = 0 that the axes' limits have in them, from aside a line over a shaded half.
+
+    In views from above it is a grid.
+    """
+    (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+    height = -view.of(origin)[1]
+    if view.matrix[2, 2] < EDGE_ON:
+        axes.axhspan(min(low, height), height, color=SHADE, linewidth=0, zorder=-2)
+        axes.axhline(height, color=INK, linewidth=0.8, zorder=-1)
+        return
+    axes.set_facecolor(SHADE)
+    corners = np.array([[x, y] for x in (left, right) for y in (low, high)])
+    lines = _grid(corners, view, origin)
+    axes.plot(*lines.T, color="white", linewidth=0.7, zorder=-1)
+    axes.set(xlim=(left, right), ylim=(low, high))
+
+
+def _grid(corners: Array, view: View, origin: Array) -> Array:
+    """The grid's lines (n, 2) on axes with these corners (4, 2), nan between lines."""
+    across = view.matrix[:2, :2]  # from ground to axes, about the ground's zero
+    ground = np.linalg.solve(across, (corners + view.of(origin)[:2]).T).T
+    step = GRIDS[np.abs(np.sqrt(np.ptp(ground, axis=0).prod()) / LINES - GRIDS).argmin()]
+    low, high = np.floor(ground.min(axis=0) / step), np.ceil(ground.max(axis=0) / step)
+    (x0, y0), (x1, y1) = low * step, high * step
+    nan = [np.nan, np.nan]
+    points = []
+    for x in np.arange(low[0], high[0] + 1) * step:
+        points += [[x, y0], [x, y1], nan]
+    for y in np.arange(low[1], high[1] + 1) * step:
+        points += [[x0, y], [x1, y], nan]
+    return np.array(points) @ across.T - view.of(origin)[:2]

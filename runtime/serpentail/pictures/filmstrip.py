@@ -1,38 +1,32 @@
-"""Films on paper: moments of a motion side by side, seen from the side and from above."""
+"""Films on paper: moments of motions side by side, in one or several views."""
 
-import dataclasses
 import math
 import os
 from collections.abc import Sequence
-from pathlib import Path
+from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from ..attitude import rotation_matrix
-from ..model.layout import POSITION
+from ..checks import numbers_in, refusal
+from ..errors import ViewError
+from ..model.model import Model
 from ..motion.trajectory import Trajectory
-from .animal import (
-    FORCE,
-    LEG,
-    LONGEST,
-    SIDE,
-    TOP,
-    Body,
-    Frame,
-    Pen,
-    View,
-    arrows,
-    draw_animal,
-    draw_marks,
-)
-from .page import LEFT, Page, drawn_points, page_of, path_window, window_around
-from .style import HEAD, INK, QUIET, TAIL, Array, writable, write
+from ..viewer.samples import centre_of_mass
+from ..viewer.view import checked_motions, checked_names, model_of
+from .animal import FORCE, LEG, Pen, draw_animal, draw_ground, draw_marks, draw_shadow
+from .frames import LONGEST, Frame, frames, largest_force, moments, way
+from .page import LEFT, Page, drawn_points, of_equal_widths, page_of, path_window, window_around
+from .style import HEAD, INK, QUIET, TAIL, Array, drawn
+from .views import SIDE, View, views_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+VIEWS = ("side", "oblique")
+HIGHEST = 4.0  # widths of a panel that a motion may rise for its panels to have the ground in them
 DOT: dict[str, Any] = {"color": HEAD, "linestyle": "", "marker": "o", "markersize": 4}
 KEY: dict[str, dict[str, Any]] = {
     "head": DOT,
@@ -43,187 +37,215 @@ KEY: dict[str, dict[str, Any]] = {
 }
 
 
-def filmstrip(
-    trajectory: Trajectory,
-    points: ArrayLike,
-    path: str | os.PathLike[str],
-    frames: int | Sequence[float] = 8,
-    com: ArrayLike | None = None,
-    **look: Any,
-) -> Path:
-    """Draw moments of a motion, side (y, z) over top (y, -x) view at one scale, and the COM's path.
+@dataclass(frozen=True, eq=False)
+class Strip:
+    """What is drawn: the frames and the COM's path (K, 3) of each motion; in which views.
 
-    points (K, P, 3): the tail in the world at every sample, m.  frames: how many, or their times
-    (s).  com (K, 3): m, by default the torso's.  look: legs (K, L, J, 3), their joints in the
-    world, m (see ``leg_joints``); semi_axes and tail_mount, m (see Body).
-    On the ground, arrows are its forces.  The path has no panel when the COM stays within half a
-    torso's length.  Returns the path of the file; ValueError where an array has another shape.
+    names: of motions that are told apart.  grounded: there is ground at z = 0.  largest: the
+    largest force, N.
     """
-    path, legs = writable(path), look.pop("legs", None)
-    body, count = Body(**look), len(trajectory.t)
 
-    # the motion, sample by sample
-    points = _checked("points", points, (count, -1, 3))
-    com = trajectory.q[:, POSITION] if com is None else _checked("com", com, (count, 3))
-    if legs is None:
-        legs = np.zeros((count, 0, 2, 3))
-    else:
-        legs = _checked("legs", legs, (count, -1, -1, 3))
+    films: list[list[Frame]]
+    coms: list[Array]
+    views: list[View]
+    names: list[str]
+    grounded: bool
+    largest: float
 
-    # the samples to draw
-    moments = _moments(trajectory.t, frames)
-    film = [_frame(trajectory, points, com, body, k) for k in moments]
-    film = [
-        dataclasses.replace(frame, legs=legs[k]) for frame, k in zip(film, moments, strict=True)
-    ]
-    film, largest = _with_forces(film, trajectory, moments)
-    return write(path, lambda: _draw_film(film, com, largest))
+    def origin(self, frame: Frame) -> Array:
+        """The world point at the middle of a frame's panels: over the ground its height is 0."""
+        return frame.com * (1, 1, 0) if self.anchored else frame.com
 
+    @cached_property
+    def every(self) -> list[Frame]:
+        """All frames."""
+        return [frame for film in self.films for frame in film]
 
-def _with_forces(
-    film: list[Frame], trajectory: Trajectory, moments: list[int]
-) -> tuple[list[Frame], float]:
-    """Frames with arrows of the ground's forces, and the largest of these, N; 0 in flight."""
-    if trajectory.contact is None:
-        return film, 0.0
-    points, forces = trajectory.contact.points[moments], trajectory.contact.forces[moments]
-    largest = float(np.linalg.norm(forces, axis=-1).max())
-    shown = [arrows(x, f, largest) for x, f in zip(points, forces, strict=True)]
-    grounded = [
-        dataclasses.replace(f, arrows=a, grounded=True) for f, a in zip(film, shown, strict=True)
-    ]
-    return grounded, largest
+    @cached_property
+    def anchored(self) -> bool:
+        """Whether every panel has the ground in it: it is not too far below."""
+        reach = np.ptp(np.vstack([drawn_points(f, SIDE) - SIDE.of(f.com)[:2] for f in self.every]))
+        return self.grounded and max(f.com[2] for f in self.every) < HIGHEST * reach
 
+    def windows(self) -> list[Array]:
+        """What the panels of each view show, about their origins."""
+        found = []
+        for view in self.views:
+            shapes = [drawn_points(f, view) - view.of(self.origin(f))[:2] for f in self.every]
+            if self.anchored and view.matrix[1, 2] > 0:
+                shapes.append(np.array([[0.0, -0.02]]))
+            found.append(window_around(shapes))
+        return of_equal_widths(found)
 
-def _checked(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Array:
-    """A finite array of the shape, where -1 is any size but 0."""
-    array = np.asarray(value, dtype=float)
-    fits = array.ndim == len(shape) and all(
-        k in (n, -1) for n, k in zip(array.shape, shape, strict=True)
-    )
-    if not fits or not array.size:
-        wanted = str(shape).replace("-1", "P")
-        raise ValueError(f"{name} has shape {array.shape}: give {wanted}, one row per sample")
-    if not np.isfinite(array).all():
-        raise ValueError(
-            f"{name} {array.shape} has values that are not finite: give finite positions in m"
-        )
-    return array
+    def key(self) -> dict[str, dict[str, Any]]:
+        """What the marks mean."""
+        legs = {"leg": {"color": LEG, "linewidth": 1.4}} if len(self.every[0].legs) else {}
+        force = f"force, {1e3 * LONGEST:.0f} mm: {self.largest:.3g} N"
+        forces = {force: {"color": FORCE, "linewidth": 1.4}} if self.largest else {}
+        under = any(frame.lowest < -2e-3 for frame in self.every)
+        pale: dict[str, Any] = {"color": TAIL, "linewidth": 1.4, "alpha": 0.3}
+        below = {"below the ground": pale} if self.grounded and under else {}
+        return KEY | legs | forces | below
 
 
-def _moments(t: Array, wanted: int | Sequence[float]) -> list[int]:
-    """The samples nearest to the wanted times, or to so many evenly spaced ones."""
-    if np.ndim(wanted) == 1 and np.size(wanted) and np.isfinite(wanted).all():
-        times = np.asarray(wanted, float)
-    elif isinstance(wanted, bool) or not isinstance(wanted, int | np.integer) or wanted < 1:
-        raise ValueError(f"frames is {wanted!r}: give a whole number of at least 1, or times in s")
-    else:
-        times = np.linspace(t[0], t[-1], wanted)
-    return sorted({int(np.abs(t - time).argmin()) for time in times})
+def filmstrip(
+    motions: Trajectory | Sequence[Trajectory],
+    path: str | os.PathLike[str] | None = None,
+    *,
+    frames: int | Sequence[float] = 8,
+    views: Sequence[str | tuple[float, float]] = VIEWS,
+    names: Sequence[str] | None = None,
+    model: Model | None = None,
+) -> tuple["Figure", np.ndarray]:
+    """Draw moments of a motion, or of several at the same times; return figure and its axes.
+
+    The axes (rows, frames) have a row for each view of each motion.  frames: their times (s), or
+    how many, between which the animal moves alike.  views: names out of "side", "top", "oblique",
+    or (azimuth, elevation) in degrees.  names, model: as ``st.view``.  path: also write the figure
+    to this .pdf, .png or .svg file, whole or not at all.  Where a motion stays above the ground, or
+    touches it, the ground is drawn, and what is below it is pale.  Arrows are the ground's forces.
+    Raises ViewError with argument, value and remedy, ModelError where the model lacks
+    ``tail_points``.
+    """
+    strip = strip_of(checked_motions(motions), frames, views_of(views), names, model)
+    return drawn(lambda: _draw(strip), path)
 
 
-def _frame(trajectory: Trajectory, points: Array, com: Array, body: Body, k: int) -> Frame:
-    """Sample k of the film."""
-    torso, rotation = trajectory.q[k, POSITION], rotation_matrix(trajectory.attitude[k])
-    tail = np.vstack([torso + rotation @ body.tail_mount, points[k]])
-    return Frame(float(trajectory.t[k]), torso, rotation, tail, com[k], body)
+def strip_of(
+    motions: list[Trajectory],
+    wanted: int | Sequence[float] | Array,
+    views: list[View],
+    names: Sequence[str] | None,
+    model: Model | None,
+) -> Strip:
+    """What to draw of motions."""
+    told = checked_names(names, motions) if len(motions) > 1 or names else [""]
+    models = [model_of(k, motion, model) for k, motion in enumerate(motions)]
+    rows = _rows(models, motions, wanted)
+    largest = largest_force(motions, rows)
+    pairs = list(zip(models, motions, rows, strict=True))
+    films = [frames(*pair, largest) for pair in pairs]
+    coms = [centre_of_mass(*pair[:2]) for pair in pairs]
+    lowest = min(frame.lowest for film in films for frame in film)
+    grounded = lowest > 0 or any(motion.contact is not None for motion in motions)
+    return Strip(films, coms, views, told, grounded, largest)
 
 
-def _draw_film(film: list[Frame], com: Array, largest: float = 0.0) -> "Figure":
-    """The film's page."""
-    from matplotlib.figure import Figure
+def _rows(models: list[Model], motions: list[Trajectory], wanted: Any) -> Array:
+    """The samples (motions, frames) to draw, those nearest to the times."""
+    times = numbers_in(wanted)
+    if isinstance(wanted, int | np.integer) and not isinstance(wanted, bool) and wanted > 0:
+        tracks = [(pair[1].t, way(*pair)) for pair in zip(models, motions, strict=True)]
+        times = moments(tracks, int(wanted))
+    elif times is None or times.ndim != 1 or not times.size or not np.isfinite(times).all():
+        raise refusal("frames", wanted, "a whole number from 1, or times in s", ViewError)
+    nearest = [[int(np.abs(m.t - time).argmin()) for time in np.sort(times)] for m in motions]
+    return np.unique(nearest, axis=1)
 
-    windows = [
-        window_around([drawn_points(f, view) - view.of(f.com)[:2] for f in film])
-        for view in (SIDE, TOP)
-    ]
-    page = page_of(film, windows, com)
-    figure = Figure(figsize=page.size)
-    for row in range(2):
-        _draw_row(figure, page, row, film, windows[row], com)
-    _draw_key(figure, page, windows[0], _key(film, largest))
+
+def _draw(strip: Strip) -> tuple["Figure", np.ndarray]:
+    """The strip's page."""
+    from .figure import Drawing
+
+    windows, key = strip.windows(), strip.key()
+    lines = [(film, row) for film in range(len(strip.films)) for row in range(len(windows))]
+    shown = None if strip.anchored else _path_aspect(strip)
+    page = page_of(len(strip.films[0]), [windows[row] for _, row in lines], len(key), shown)
+    figure = Drawing(figsize=page.size)
+    axes = np.empty((len(lines), page.frames), dtype=object)
+    for line, (film, row) in enumerate(lines):
+        axes[line] = _draw_row(figure, page, line, strip, (film, row), windows[row])
+    _draw_key(figure, page, windows[0], key)
     if page.path is not None:
-        _draw_path(page.add(figure, page.path_panel()), film, com)
-    return figure
+        _draw_path(page.add(figure, page.path_panel()), strip)
+    return figure, axes
+
+
+def _path_aspect(strip: Strip) -> float | None:
+    """Width over height of the path's panel; None where the COM stays within half a torso, or
+    where several motions would cover each other.
+    """
+    still = np.ptp(strip.coms[0][:, 1:], axis=0).max() < max(strip.every[0].body.semi_axes)
+    if len(strip.films) > 1 or still:
+        return None
+    low, high = path_window(strip.films[0], strip.coms[0])
+    return float((high - low)[0] / (high - low)[1])
 
 
 def _draw_row(
-    figure: "Figure", page: Page, row: int, film: list[Frame], window: Array, com: Array
-) -> None:
-    """One view of every frame, each about its own COM; its name and directions at the left."""
-    view = (SIDE, TOP)[row]
+    figure: "Figure", page: Page, line: int, strip: Strip, which: tuple[int, int], window: Array
+) -> list["Axes"]:
+    """One view of every frame of a motion; its name and directions at the left."""
+    film, view = strip.films[which[0]], strip.views[which[1]]
+    every = []
     for k, frame in enumerate(film):
-        x, y, width, height = page.panel(k, row)
+        x, y, width, height = page.panel(k, line)
         axes = page.add(figure, (x, y, width, height))
         axes.set(xlim=window[:, 0], ylim=window[:, 1], xticks=[], yticks=[])
         axes.spines[:].set_visible(True)
-        pen = Pen(axes, frame, view, frame.com)
-        pen.plot(com, ":", 0, color=QUIET, linewidth=1.0)
-        pen.ground()
+        pen = Pen(axes, frame, view, strip.origin(frame), strip.grounded)
+        if strip.grounded:
+            draw_ground(axes, view, pen.origin)
+            draw_shadow(pen)
+        pen.plot(strip.coms[which[0]], ":", 0.1, color=QUIET, linewidth=1.0)
         draw_animal(pen)
         draw_marks(pen)
-        if row == 0:
+        if line == 0:
             axes.set_title(_label(k, film), pad=3)
         if x == LEFT:
-            _draw_directions(page.add(figure, (0, y + height / 2 - 0.4, x, 0.8)), view)
+            place = (0, y + height / 2 - 0.45, x, 0.9)
+            name = strip.names[which[0]] if which[1] == 0 else ""
+            _draw_directions(page.add(figure, place), view, name)
+        every.append(axes)
+    return every
 
 
 def _label(k: int, film: list[Frame]) -> str:
     """Number and time of frame k, with the decimals that tell the frames apart."""
     step = min(np.diff([frame.time for frame in film]), default=1.0)
     decimals = max(0, math.ceil(-math.log10(1e3 * step)))
-    return rf"$\mathbf{{{k + 1}}}$   {1e3 * film[k].time:.{decimals}f} ms"
+    return rf"$\mathbf{{{k + 1}}}$  {1e3 * film[k].time:.{decimals}f} ms"
 
 
-def _draw_directions(axes: "Axes", view: View) -> None:
-    """The view's name and its two directions, in a margin."""
-    axes.set(xlim=(0, 1), ylim=(0, 1), xticks=[], yticks=[])
+def _draw_directions(axes: "Axes", view: View, motion: str) -> None:
+    """The motion's and the view's name and the world's directions, in a margin."""
+    axes.set(xlim=(-0.36, 0.36), ylim=(-0.35, 0.55), xticks=[], yticks=[])
     axes.set_axis_off()
-    head = "-|>,head_width=0.15,head_length=0.3"
+    axes.text(0, 0.58, motion, ha="center", va="bottom", weight="bold")
+    axes.text(0, 0.45, view.name, ha="center", va="center")
+    head = "-|>,head_width=0.12,head_length=0.25"
     arrow = {"arrowstyle": head, "color": INK, "linewidth": 0.8, "shrinkA": 0, "shrinkB": 0}
-    axes.text(0.45, 0.88, view.name, ha="center", va="center", weight="bold")
-    for end, name, where in (
-        ((0.7, 0.2), view.right, (0.8, 0.2)),
-        ((0.3, 0.6), view.up, (0.3, 0.7)),
-    ):
-        axes.annotate("", end, (0.3, 0.2), arrowprops=arrow)
-        axes.text(*where, name, ha="center", va="center", style="italic")
-
-
-def _key(film: list[Frame], largest: float) -> dict[str, dict[str, Any]]:
-    """What the marks of a film mean: on the ground also legs and forces."""
-    legs = {"leg": {"color": LEG, "linewidth": 1.4}} if len(film[0].legs) else {}
-    words = f"ground's force, {1e3 * LONGEST:.0f} mm: {largest:.3g} N"
-    return KEY | legs | ({words: {"color": FORCE, "linewidth": 1.0}} if largest else {})
+    for name, direction in zip("xyz", view.matrix[:2].T, strict=True):
+        if np.linalg.norm(direction) > 0.1:
+            axes.annotate("", 0.22 * direction, (0, 0), arrowprops=arrow, annotation_clip=False)
+            place = direction * (0.22 + 0.09 / np.linalg.norm(direction))
+            axes.text(place[0], place[1], f"${name}$", ha="center", va="center", fontsize=7)
 
 
 def _draw_key(figure: "Figure", page: Page, window: Array, key: dict[str, dict[str, Any]]) -> None:
-    """The scale bar and what the marks mean, under the film."""
+    """The scale bar and what the marks mean, at the foot of the page."""
     from matplotlib.lines import Line2D
 
     length = 0.05 * page.column / float(window[1, 0] - window[0, 0])
-    axes = page.add(figure, (LEFT, page.base - 0.25, 1.0, 0.16))
+    axes = page.add(figure, (LEFT, page.foot - 0.2, 1.0, 0.16))
     axes.set(xlim=(0, 1), ylim=(0, 1))
     axes.set_axis_off()
     axes.plot([0, length], [0.5, 0.5], color=INK, linewidth=2, solid_capstyle="butt", clip_on=False)
     axes.text(length + 0.06, 0.5, "50 mm", va="center_baseline")
     handles = [Line2D([], [], label=name, **look) for name, look in key.items()]
-    corner = ((LEFT + length + 0.6) / page.size[0], (page.base - 0.17) / page.size[1])
-    figure.legend(
-        handles=handles,
-        loc="center left",
-        bbox_to_anchor=corner,
-        ncols=5 if len(key) < 6 else 4,
-        columnspacing=1.4,
-    )
+    corner = ((LEFT + length + 0.55) / page.size[0], (page.foot - 0.06) / page.size[1])
+    look = {"ncols": page.key_columns, "columnspacing": 1.2, "borderaxespad": 0, "borderpad": 0}
+    figure.legend(handles=handles, loc="upper left", bbox_to_anchor=corner, **look)
 
 
-def _draw_path(axes: "Axes", film: list[Frame], com: Array) -> None:
-    """The flight from the side in true scale, every frame in its place, numbered at its COM."""
+def _draw_path(axes: "Axes", strip: Strip) -> None:
+    """The motion from the side in true scale, every frame in its place, numbered at its COM."""
+    film, com = strip.films[0], strip.coms[0]
     low, high = path_window(film, com)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel="$y$ [m]", ylabel="$z$ [m]")
-    pens = [Pen(axes, frame, SIDE, np.zeros(3), k) for k, frame in enumerate(film)]
-    pens[0].ground()
+    pens = [Pen(axes, frame, SIDE, np.zeros(3), strip.grounded, k) for k, frame in enumerate(film)]
+    if strip.grounded:
+        draw_ground(axes, SIDE, np.zeros(3))
     for pen in pens:
         draw_animal(pen)
     pens[-1].plot(com, ":", 1, color=INK, linewidth=1.0)
@@ -231,6 +253,5 @@ def _draw_path(axes: "Axes", film: list[Frame], com: Array) -> None:
         disc = {"color": "white", "markersize": 8, "markeredgecolor": INK, "markeredgewidth": 0.5}
         pens[-1].plot(frame.com[None], "o", 2, **disc)
         y, z, _ = SIDE.of(frame.com)
-        axes.text(
-            y, z, str(k + 1), ha="center", va="center_baseline", fontsize=6, zorder=len(film) + 2
-        )
+        look: dict[str, Any] = {"fontsize": 6, "zorder": len(film) + 2}
+        axes.text(y, z, str(k + 1), ha="center", va="center_baseline", **look)

@@ -1,6 +1,5 @@
-"""The page of a film: where its panels are, and what part of the world each of them shows."""
+"""The page of a filmstrip: where its panels are, and what part of the world each of them shows."""
 
-import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,51 +7,83 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .animal import SIDE, Frame, View, tick
+from .frames import Frame, tick
 from .style import Array
+from .views import SIDE, View
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-GAP, LEFT, TITLES, FOOT, RULER = 0.06, 0.62, 0.26, 0.5, 0.62  # page margins, inches
-LEAST_WIDTH = 6.6  # of the page, for the key, inches
+GAP, LEFT, TITLES = 0.06, 0.72, 0.24  # page margins, inches
+RULER, TICKS = 0.62, 0.42  # margins at the left of and below the path, inches
+KEY_LINE, KEY_COLUMN = 0.17, 1.55  # a mark of the key, inches
+LEAST_WIDTH, MOST_WIDTH = 6.4, 10.0  # of all panels, inches
 TALLEST_PATH = 3.2  # panel of the path below a film, inches
-MOST_PER_LINE = 6  # frames
 
 
 @dataclass(frozen=True)
 class Page:
-    """A film's page, in inches."""
+    """A filmstrip's page, in inches."""
 
     frames: int
     column: float  # width of a panel
-    rows: tuple[float, float]  # heights of the side and top views
-    path: tuple[float, float] | None  # width and height of the path's panel, if any
-    beside: bool  # the film, not below it
+    rows: tuple[float, ...]  # heights of the panels, from above
+    marks: int  # of the key
+    path: float | None  # aspect of the path's panel, if there is one
 
     @property
     def per_line(self) -> int:
         """Frames on a line."""
-        return math.ceil(self.frames / math.ceil(self.frames / MOST_PER_LINE))
+        most = max(1, int((MOST_WIDTH + GAP) / (self.column + GAP)))
+        return math.ceil(self.frames / math.ceil(self.frames / most))
+
+    @property
+    def line(self) -> float:
+        """Height of a line: titles and rows."""
+        return TITLES + sum(self.rows) + GAP * len(self.rows)
 
     @property
     def film(self) -> tuple[float, float]:
         """Width and height of all lines."""
         lines = math.ceil(self.frames / self.per_line)
-        return self.per_line * (self.column + GAP) - GAP, lines * (TITLES + GAP + sum(self.rows))
+        return self.per_line * (self.column + GAP) - GAP, lines * self.line
+
+    @property
+    def beside(self) -> bool:
+        """Whether the path is beside the film, where there is room, not below it."""
+        return self.path is not None and self.path < 1.6 and self.film[1] > 2
+
+    @property
+    def path_size(self) -> tuple[float, float]:
+        """Width and height of the path's panel."""
+        if self.path is None:
+            return 0.0, 0.0
+        tall = min(TALLEST_PATH, max(self.film[0], 4.0) / self.path)
+        tall = self.film[1] - TITLES - TICKS if self.beside else tall
+        return tall * self.path, tall
+
+    @property
+    def key_columns(self) -> int:
+        """Marks of the key side by side."""
+        return max(1, int((max(self.film[0], LEAST_WIDTH) - 1.0) / KEY_COLUMN))
+
+    @property
+    def foot(self) -> float:
+        """Height of the key."""
+        return 0.12 + KEY_LINE * math.ceil(self.marks / self.key_columns)
 
     @property
     def base(self) -> float:
         """Height of the film's lower edge on the page."""
-        return FOOT + (0 if self.path is None or self.beside else self.path[1] + FOOT)
+        below = self.path is not None and not self.beside
+        return self.foot + (TICKS + GAP + self.path_size[1] if below else 0.0)
 
     @property
     def size(self) -> tuple[float, float]:
         """Width and height of the page."""
-        reach = RULER + self.path[0] if self.path is not None and self.beside else 0
-        width = LEFT + max(self.film[0] + reach, LEAST_WIDTH)
-        return width + 3 * GAP, self.base + self.film[1] + GAP
+        reach = RULER + self.path_size[0] if self.beside else 0
+        return LEFT + max(self.film[0] + reach, LEAST_WIDTH) + 3 * GAP, self.base + self.film[1]
 
     def add(self, figure: "Figure", place: Sequence[float]) -> "Axes":
         """Axes at (x, y, w, h) inches."""
@@ -60,17 +91,24 @@ class Page:
         return figure.add_axes((x / width, y / height, w / width, h / height))
 
     def panel(self, k: int, row: int) -> tuple[float, float, float, float]:
-        """Place of frame k's panel in the upper (0) or lower (1) row of its line."""
+        """Place of frame k's panel in a row of its line."""
         line, column = divmod(k, self.per_line)
-        line_top = self.base + self.film[1] - line * (TITLES + GAP + sum(self.rows))
-        top = line_top - TITLES - self.rows[0]
-        x, y = LEFT + column * (self.column + GAP), top - row * (GAP + self.rows[1])
-        return x, y, self.column, self.rows[row]
+        top = self.base + self.film[1] - line * self.line - TITLES
+        y = top - sum(self.rows[: row + 1]) - row * GAP
+        return LEFT + column * (self.column + GAP), y, self.column, self.rows[row]
 
     def path_panel(self) -> tuple[float, float, float, float]:
         """Place of the path panel."""
-        width, height = self.path or (0, 0)
-        return (LEFT + self.film[0] + RULER if self.beside else LEFT), FOOT, width, height
+        x = LEFT + self.film[0] + RULER if self.beside else LEFT
+        return x, self.foot + TICKS, *self.path_size
+
+
+def page_of(frames: int, windows: Sequence[Array], marks: int, path: float | None) -> Page:
+    """The page of panels that show windows of equal widths, one a row, at one scale."""
+    sizes = np.array([window[1] - window[0] for window in windows])
+    wide = sizes[0, 0]
+    column = min(max(1.4 * math.sqrt(wide / sizes[:, 1].max()), 0.85), 1.9)
+    return Page(frames, column, tuple(column * sizes[:, 1] / wide), marks, path)
 
 
 def drawn_points(frame: Frame, view: View) -> Array:
@@ -79,31 +117,22 @@ def drawn_points(frame: Frame, view: View) -> Array:
     return np.vstack([frame.outline(view), view.of(lines)[:, :2]])
 
 
-def window_around(shapes: list[Array], margin: float = 0.012) -> Array:
+def window_around(shapes: Sequence[Array], margin: float = 0.012) -> Array:
     """Lower and upper corner (2, 2) of a box around all shapes."""
     every = np.vstack(shapes)
     return np.array([every.min(axis=0) - margin, every.max(axis=0) + margin])
 
 
-def page_of(film: list[Frame], windows: list[Array], com: Array) -> Page:
-    """Sizes from the windows; the path's panel is beside the film, below it or left out."""
-    # panels that show their windows at one scale
-    (wide, high), (_, deep) = (window[1] - window[0] for window in windows)
-    column = min(max(1.4 * math.sqrt(wide / high), 1.35), 1.9)
-    alone = Page(len(film), column, (column * high / wide, column * deep / wide), None, False)
-
-    # no path where the COM stays within half a torso's length
-    if np.ptp(com[:, 1:], axis=0).max() < max(film[0].body.semi_axes):
-        return alone
-
-    # beside the film where there is room for it
-    low, up = path_window(film, com)
-    aspect = float((up - low)[0] / (up - low)[1])
-    beside = aspect < 1.6 and alone.per_line >= 4
-    tall = alone.film[1] - TITLES if beside else min(TALLEST_PATH, max(alone.film[0], 4.0) / aspect)
-    return dataclasses.replace(alone, path=(tall * aspect, tall), beside=beside)
+def of_equal_widths(windows: Sequence[Array]) -> list[Array]:
+    """The windows, each widened to both sides until all are as wide as the widest."""
+    widest = max(float(window[1, 0] - window[0, 0]) for window in windows)
+    found = []
+    for window in windows:
+        more = (widest - float(window[1, 0] - window[0, 0])) / 2
+        found.append(window + np.array([[-more, 0], [more, 0]]))
+    return found
 
 
-def path_window(film: list[Frame], com: Array) -> Array:
+def path_window(film: Sequence[Frame], com: Array) -> Array:
     """The corners (2, 2) of the path panel."""
     return window_around([*(drawn_points(frame, SIDE) for frame in film), SIDE.of(com)[:, :2]])

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import ViewError
 from ..files import replacing
 
 if TYPE_CHECKING:
@@ -37,23 +38,34 @@ STYLE: dict[str, Any] = {
 
 
 def writable(path: str | os.PathLike[str]) -> Path:
-    """The path, if its suffix names a known format."""
+    """The path, if its suffix names a known format; ViewError where it does not."""
     path = Path(path)
     if path.suffix.lower() not in METADATA:
-        raise ValueError(
+        raise ViewError(
             f"figure {str(path)!r} has suffix {path.suffix!r}: use one of {', '.join(METADATA)}"
         )
     return path
 
 
-def write(path: Path, draw: Callable[[], "Figure"]) -> Path:
-    """Draw and write a figure whole or not at all; the same bytes every time."""
+Drawn = tuple["Figure", Any]  # with its axes
+
+
+def drawn(draw: Callable[[], Drawn], path: str | os.PathLike[str] | None) -> Drawn:
+    """Draw in the shared look; where there is a path, write the figure, too."""
     from matplotlib import style
 
+    target = None if path is None else writable(path)
+    with style.context(STYLE, after_reset=True):
+        figure, axes = draw()
+        if target is not None:
+            write(target, figure)
+    return figure, axes
+
+
+def write(path: Path, figure: "Figure") -> None:
+    """Write a figure whole or not at all; the same bytes every time."""
     kind = path.suffix.lower()
     drawn = io.BytesIO()  # Matplotlib would hide that a write failed, and leave its file open
-    with style.context(STYLE, after_reset=True):
-        draw().savefig(drawn, format=kind[1:], metadata=METADATA[kind], dpi=DPI)
+    figure.savefig(drawn, format=kind[1:], metadata=METADATA[kind], dpi=DPI)
     with replacing(path) as part:
         part.write_bytes(drawn.getvalue())
-    return path

@@ -1,6 +1,6 @@
 """The motion that a scene file's table [simulate] asks for: start, legs, controller, settings."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, overload
@@ -14,8 +14,6 @@ from ..model.layout import OMEGA, VELOCITY
 from ..model.model import Model
 from ..motion.summary import Summary, summary
 from ..motion.trajectory import Trajectory
-from ..pictures.filmstrip import filmstrip
-from ..pictures.skeleton import leg_joints
 from ..simulation.controllers import Controller, Damping, Phases, TorqueTable
 from ..simulation.methods import SETTINGS
 from ..simulation.pfl import KD, KP, Pfl
@@ -61,23 +59,6 @@ class Scenario:
         if self.legs is not None:
             arguments["legs"] = self.legs
         return simulate(self.model, self.q0, self.v0, **arguments | changes)
-
-    def film(self, motion: Trajectory, path: str | Path, frames: int | Sequence[float] = 8) -> Path:
-        """Draw moments of a motion: torso, legs, tail and the ground's forces; return the path.
-
-        frames: how many, or their times (s).  They are drawn about the centre of mass, or about the
-        torso where the scene left out the function ``center_of_mass``; without legs where it left
-        out ``leg_points``.
-        """
-        model, parameters = self.model, self.model.parameters
-        look: dict[str, Any] = {"tail_mount": parameters["tail_mount"]}
-        if "torso_semi_axes" in parameters:
-            look["semi_axes"] = parameters["torso_semi_axes"]
-        if self.legs is not None and "leg_points" in model.kernels:
-            look["legs"] = leg_joints(model, motion, self.legs.curve.at(motion.t)[0])
-        if "center_of_mass" in model.kernels:
-            look["com"] = model.center_of_mass(motion.q, motion.v)[0]
-        return filmstrip(motion, model.tail_points(motion.q), path, frames, **look)
 
     def summary(self, motion: Trajectory) -> Summary:
         """Return the numbers of a motion by name: leap, landing, forces, books, effort; SI."""

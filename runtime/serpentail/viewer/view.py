@@ -50,9 +50,9 @@ def page_text(
     most: int = MOST,
 ) -> str:
     """Return the page of motions as a text, with at most so many samples of each; see ``view``."""
-    motions = _checked_motions(motions)
-    names = _checked_names(names, motions)
-    models = [_model_of(k, motion, model) for k, motion in enumerate(motions)]
+    motions = checked_motions(motions)
+    names = checked_names(names, motions)
+    models = [model_of(k, motion, model) for k, motion in enumerate(motions)]
     page, data = template(), page_data(motions, names, models, most)
     parts = {
         "<!--TITLE-->": escape(", ".join(dict.fromkeys(each.name for each in models))),
@@ -62,8 +62,8 @@ def page_text(
     return marks.sub(lambda mark: parts[mark[0]], page)
 
 
-def _checked_motions(motions: Any) -> list[Trajectory]:
-    """The motions as a list."""
+def checked_motions(motions: Any) -> list[Trajectory]:
+    """Return the motions as a list; ViewError where one is no Trajectory, or there is none."""
     listed = list(motions) if isinstance(motions, list | tuple) else [motions]
     for k, motion in enumerate(listed):
         if not isinstance(motion, Trajectory):
@@ -84,8 +84,8 @@ def checked_path(path: Any) -> Path:
     return target
 
 
-def _checked_names(names: Any, motions: list[Trajectory]) -> list[str]:
-    """A name for each motion."""
+def checked_names(names: Any, motions: list[Trajectory]) -> list[str]:
+    """Return a name for each motion; ViewError unless there are as many, and they differ."""
     if names is None:
         kinds = ["planned" if m.info.get("kind") == "plan" else "run" for m in motions]
         return [
@@ -98,15 +98,15 @@ def _checked_names(names: Any, motions: list[Trajectory]) -> list[str]:
     return listed
 
 
-def _model_of(k: int, motion: Trajectory, model: Any) -> Model:
-    """The model of motion k."""
+def model_of(k: int, motion: Trajectory, model: Any) -> Model:
+    """Return the model of motion k; ViewError where there is none that fits."""
     found = motion.model if motion.model is not None else model
     if found is None:
         raise ViewError(
             f"motions[{k}]: was loaded from a file, which has no model: give model=st.load(folder)"
         )
-    if not isinstance(found, Model):
-        raise ViewError(f"model: type {type(found).__name__}: needs a Model, as st.load returns")
+    if found is model and not isinstance(model, Model):
+        raise ViewError(f"model: type {type(model).__name__}: needs a Model, as st.load returns")
     if motion.q.shape[1] != found.nq:
         raise ViewError(
             f"motions[{k}]: q has {motion.q.shape[1]} numbers, {found.name} has {found.nq}: give "
