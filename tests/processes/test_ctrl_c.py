@@ -113,10 +113,10 @@ links = 3
 """
 FLIGHT = """
 [simulate]
-duration = 1e4
-output_step = 0.01
+duration = 500.0
+output_step = 5e-4
 method = "rk4"
-step = 1e-4
+step = 5e-6
 [simulate.start]
 height = 1.0
 rate = [0.1, 0.2, 0.3]

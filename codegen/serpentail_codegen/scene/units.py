@@ -8,6 +8,7 @@ import math
 import re
 from collections.abc import Sequence
 from fractions import Fraction
+from functools import lru_cache
 from typing import Any
 
 ONE, KILO = Fraction(1), Fraction(1000)
@@ -67,6 +68,7 @@ def in_unit(value: Any, unit: str | Sequence[str], depth: int = DEEPEST) -> Any:
     return numbers if len(numbers) > 1 else numbers[0]
 
 
+@lru_cache(256)
 def plain(unit: str) -> str:
     """Return a unit as MEASURES spells it, such as "kg m2" for "kg m^2"."""
     for old, new in SPELLINGS.items():
