@@ -18,7 +18,8 @@ class Progress:
     """How far a stage is.
 
     stage: such as "compile"; what: of what, such as a model's name; done: part from 0 to 1, None
-    where that is not known; seconds: since its begin; ended: whether it is over.
+    where that is not known; seconds: since its begin; ended: whether it is over; depth: how many
+    other stages it is a part of.
     """
 
     stage: str
@@ -26,6 +27,7 @@ class Progress:
     done: float | None
     seconds: float
     ended: bool = False
+    depth: int = 0
 
     @property
     def left(self) -> float | None:
@@ -45,16 +47,18 @@ class Progress:
 
 Hook = Callable[[Progress], object]
 _hook: ContextVar[Hook | None] = ContextVar("serpentail.progress", default=None)
+_depth: ContextVar[int] = ContextVar("serpentail.depth", default=0)
 
 
 @contextmanager
 def progress(hook: Hook | None = None) -> Iterator[None]:
     """Let all long work inside ``with serpentail.progress():`` tell how far it is.
 
-    hook: a function of a Progress, which each stage (derive, compile, simulate, plan, sweep and so
-    on) calls as it goes on and at its end; what it raises ends the work.  None: stages that take
-    more than a second are told on stderr, as one line that is written over on a terminal, else as
-    lines.  Without it nothing is told; the log "serpentail" has the end of each stage either way.
+    hook: a function of a Progress, which each stage (derive, compile, simulate, plan and so on)
+    calls as it goes on and at its end; what it raises ends the work.  None: stages that take more
+    than a second and are part of no other are told on stderr, as one line that is written over on a
+    terminal, else as lines.  Without it nothing is told; the log "serpentail" has the end of each
+    stage either way.
     """
     token = _hook.set(hook or Told(sys.stderr))
     try:
@@ -72,7 +76,8 @@ class Stage:
         self.done: float | None = None
 
     def __enter__(self) -> "Stage":
-        self.begun = time.perf_counter()
+        self.begun, self.depth = time.perf_counter(), _depth.get()
+        _depth.set(self.depth + 1)
         return self
 
     def tell(self, done: float | None = None, what: str | None = None) -> None:
@@ -87,6 +92,7 @@ class Stage:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
+        _depth.set(self.depth)
         logging: Any = sys.modules.get("logging")  # nobody listens who has not imported it
         if logging is not None:
             words = "%s" if kind is None else "%s, ended by " + kind.__name__
@@ -97,7 +103,8 @@ class Stage:
     def _now(self, ended: bool = False) -> Progress:
         """Return how far it is."""
         what = self.subject if ended else self.what
-        return Progress(self.name, what, self.done, time.perf_counter() - self.begun, ended)
+        seconds = time.perf_counter() - self.begun
+        return Progress(self.name, what, self.done, seconds, ended, self.depth)
 
 
 class Told:
@@ -110,6 +117,8 @@ class Told:
 
     def __call__(self, now: Progress) -> None:
         """Write a line, where the stage has gone on for long enough."""
+        if now.depth:
+            return
         if now.seconds < PATIENCE_S or (self.over and now.ended):
             self._clear()
             return

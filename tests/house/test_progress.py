@@ -3,10 +3,12 @@
 import io
 import logging
 
+import numpy as np
 import pytest
 
 import serpentail as st
 from serpentail.stages import Stage, Told
+from tests.support.models import model_folder
 
 TINY = {"tail": "articulated", "segments": 1, "links": 1, "functions": ["energy", "momentum"]}
 
@@ -88,6 +90,19 @@ def test_a_terminal_has_one_line_that_ends_empty(clock):
     assert text.rsplit("\r", 2)[1].isspace() and text.endswith("\r")
 
 
+def test_a_part_of_another_stage_is_told_to_functions_alone(clock):
+    stream, told = io.StringIO(), []
+    for hook in (Told(stream), told.append):
+        with st.progress(hook), Stage("plan", "all") as outer:
+            clock(2)
+            outer.tell()
+            with Stage("simulate", "part") as inner:
+                clock(20)
+                inner.tell()
+    assert "simulate" not in stream.getvalue() and stream.getvalue().count("plan all") == 2
+    assert [now.depth for now in told] == [0, 1, 1, 0]
+
+
 def test_nobody_is_told_by_default(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("SERPENTAIL_CACHE", str(tmp_path))
     st.build(**TINY)
@@ -101,3 +116,60 @@ def test_the_log_has_the_end_of_each_stage(caplog):
         with pytest.raises(KeyError), Stage("derive", "rat"):
             raise KeyError
     assert caplog.messages == ["compile rat.c: 0.0 s", "derive rat: 0.0 s, ended by KeyError"]
+
+
+@pytest.fixture(scope="module")
+def rat():
+    functions = ["mass_matrix", "inverse_dynamics", "energy", "momentum", "rollout"]
+    return st.load(model_folder(1, 2, functions=[*functions, "forward_dynamics"]))
+
+
+def start(model):
+    """A tumble: q, v."""
+    q, v = np.zeros(model.nq), np.zeros(model.nv)
+    q[3], v[3] = 1, 9
+    return q, v
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_runs_are_told_by_the_part_that_is_done(rat, threads):
+    told, (q, v) = [], start(rat)
+    many = np.tile(q, (400, 1))
+    with st.progress(told.append):
+        st.simulate(rat, many, v, t_span=1.0, method="rk4", threads=threads)
+    told = [now for now in told if now.stage == "simulate"]
+    parts = [now.done for now in told]
+    assert "400 runs" in told[0].what
+    assert parts == sorted(parts) and parts[-1] == 1.0 and told[-1].ended
+
+
+def test_a_long_run_is_told(rat):
+    told, (q, v) = [], start(rat)
+    with st.progress(told.append):
+        st.simulate(rat, q, v, t_span=500, method="rk4", output_step=1.0, step=1e-3)
+    parts = [now.done for now in told]
+    assert len(parts) > 2 and parts == sorted(parts) and parts[0] < 1
+
+
+@pytest.mark.parametrize("what", ["run", "runs", "plan"])
+def test_what_the_function_raises_ends_long_work(rat, what):
+    q, v = start(rat)
+
+    def enough(now):
+        raise ZeroDivisionError(now.stage)
+
+    with pytest.raises(ZeroDivisionError), st.progress(enough):
+        if what == "plan":
+            st.plan(rat, start=(q, v), duration=0.3)
+        else:
+            st.simulate(rat, np.tile(q, (3, 1)) if what == "runs" else q, v, t_span=500)
+
+
+def test_a_plan_tells_its_rounds(rat):
+    told, (q, v) = [], start(rat)
+    with st.progress(told.append):
+        plan = st.plan(rat, start=(q, v), duration=0.3, track=False)
+    plans = [now for now in told if now.stage == "plan"]
+    rounds = {now.what for now in plans if "after round" in now.what}
+    assert len(rounds) == plan.report["rounds"] and plans[-1].ended
+    assert len(plans) > plan.report["iterations"]

@@ -2,6 +2,7 @@
 is solved.
 """
 
+import inspect
 import json
 import tomllib
 from pathlib import Path
@@ -12,7 +13,9 @@ import pytest
 import serpentail as st
 from serpentail import cli
 from serpentail.scenes.plan import plan_arguments, planned
+from serpentail.scenes.plan_keys import PLAN
 from tests.support.models import model_folder
+from tests.support.told import besides_progress
 from tests.support.tumbling import DURATION, FUNCTIONS, rat, start
 
 SCENE = Path(__file__).parents[2] / "scenes" / "righting_m1_n3.toml"
@@ -65,6 +68,12 @@ def refused(**changes) -> str:
         ({"tolerance": 0.0}, "tolerance: value 0.0"),
         ({"time_limit": 0}, "time_limit: value 0: needs a number above 0"),
         ({"time_limit": float("nan")}, "time_limit: value nan"),
+        (
+            {"objective": lambda p: p.torqe**2},
+            "objective: a point has no 'torqe', it has attitude",
+        ),
+        ({"objective": lambda p: p.torqe**2}, "did you mean 'torque'?"),
+        ({"path": [(lambda p: p.height, 0, 1)]}, "path[0]: a point has no 'height', it has"),
         ({"interval": 20}, "setting: value 'interval': did you mean 'intervals'?"),
         ({"guess": 3}, "guess: value 3: needs a Plan or a Trajectory"),
         ({"solver": "no_such"}, "solver: value 'no_such'"),
@@ -166,7 +175,7 @@ def test_command_line_prints_one_object(tmp_path, capsys):
     )
     out, err = capsys.readouterr()
     report = json.loads(out)
-    assert (status, err, out.count("\n")) == (0, "", 1)
+    assert (status, besides_progress(err), out.count("\n")) == (0, "", 1)
     assert report["success"] and report["open_loop_attitude_error_deg"] <= 0.01
     assert {
         "iterations",
@@ -179,3 +188,15 @@ def test_command_line_prints_one_object(tmp_path, capsys):
     assert st.Trajectory.load(saved).t[-1] == pytest.approx(DURATION)
     assert cli.main(["plan", str(tmp_path / "none.toml")]) == 2
     assert "scene file" in capsys.readouterr().err
+
+
+def test_settings_are_named_for_editors_and_help():
+    parameters = inspect.signature(st.plan).parameters
+    named = [p for p in parameters.values() if p.kind == p.KEYWORD_ONLY]
+    assert len(named) == 27 and all(p.annotation is not p.empty for p in named)
+    assert {key for key in PLAN.keys if key not in parameters} == set()
+
+
+def test_an_error_of_the_users_own_is_not_taken_for_a_points():
+    with pytest.raises(AttributeError, match="'NoneType' object has no attribute 'torque'"):
+        st.plan(rat(), start=start(rat()), duration=DURATION, objective=lambda p: None.torque)

@@ -75,15 +75,19 @@ def _in_pieces(
 
 
 def in_turn(
-    count: int, threads: int, work: Callable[[Iterator[int], threading.Event], None]
+    count: int,
+    threads: int,
+    work: Callable[[Iterator[int], threading.Event], None],
+    tick: Callable[[], object] = lambda: None,
 ) -> None:
     """Call ``work(numbers, ended)`` in threads, which take the numbers below ``count`` in turn.
 
     The first error, Ctrl-C among them, sets ``ended`` and is raised when all threads have returned.
+    tick: called now and then, in this thread.
     """
     numbers, ended = deque(range(count)), threading.Event()
     if threads == 1:
-        work(_taken(numbers), ended)
+        work(_taken(numbers, tick), ended)
         return
     with ThreadPoolExecutor(threads, thread_name_prefix="serpentail") as crew:
         try:
@@ -92,14 +96,16 @@ def in_turn(
                 done, waiting = wait(waiting, POLL_S, FIRST_EXCEPTION)
                 for future in done:
                     future.result()
+                tick()
         finally:
             numbers.clear()
             ended.set()
 
 
-def _taken(numbers: deque[int]) -> Iterator[int]:
+def _taken(numbers: deque[int], tick: Callable[[], object] = lambda: None) -> Iterator[int]:
     """Numbers that no other thread has taken."""
     while True:
+        tick()
         try:
             yield numbers.popleft()
         except IndexError:

@@ -4,19 +4,20 @@ The search refines its mesh until the planned torques, applied to the model, do 
 """
 
 import time
-from collections.abc import Callable
-from dataclasses import fields
-from typing import Any
+from collections.abc import Callable, Sequence
+from inspect import Parameter, signature
+from typing import Any, Never
 
-from ..checks import Refusals, none_of, refusal
+from ..checks import Refusals, needed, none_of
 from ..errors import PlanningError
 from ..model.model import Model
+from ..motion.trajectory import Trajectory
+from ..stages import Stage
 from .nlp.fork_gate import forks_wait
 from .nlp.interrupt import stoppable
 from .nlp.node import equations_of_motion
 from .nlp.rules import collocation_rule
-from .problem import SETTINGS as PROBLEM_SETTINGS
-from .problem import Bounds, Goal, PlanningProblem, checked_problem
+from .problem import SMOOTHING, Bounds, Goal, PathConstraint, PlanningProblem, checked_problem
 from .result.plan import Plan
 from .rounds import Search
 from .settings import PlanSettings, check_settings
@@ -24,14 +25,42 @@ from .settings import PlanSettings, check_settings
 NEEDED = ("mass_matrix", "inverse_dynamics", "rollout")  # functions of the model
 
 
-def plan(
+def plan(  # noqa: PLR0913 - the public face names all that it takes
     model: Model,
     *,
     start: Any,
     goal: Goal | str | None = None,
     duration: float | tuple[float, float],
     bounds: Bounds | None = None,
-    **settings: Any,
+    # the problem
+    objective: str | Callable[[Any], Any] = "effort",
+    smoothing: float = SMOOTHING,
+    damping: float = 0.0,
+    path: Sequence[PathConstraint] = (),
+    formulation: str = "airborne",
+    attitude: str = "quaternion",
+    # the mesh
+    rule: str = "radau",
+    degree: int | None = None,
+    intervals: int = 12,
+    most_intervals: int = 200,
+    rounds: int = 6,
+    tolerance: float | None = 0.01,
+    # the solver
+    solver: str = "ipopt",
+    options: dict[str, Any] | None = None,
+    dynamics: str = "auto",
+    time_limit: float | None = None,
+    # where it begins
+    guess: Plan | Trajectory | None = None,
+    guess_damping: float = 1e-3,
+    multi_start: int = 1,
+    retries: int = 4,
+    seed: int = 0,
+    # what is told
+    track: bool = True,
+    watch: Callable[[Plan], object] | None = None,
+    **unknown: Never,
 ) -> Plan:
     """Plan a motion of the tail by direct collocation (Sect. 3), and tell what its torques do.
 
@@ -40,83 +69,112 @@ def plan(
     duration: s, or (least, most) where it is free.
     bounds: a Bounds; by default |tau| <= 0.02 N m.
 
-    Settings of the problem:
+    The problem
     objective: "effort" (integral of tau^2 + (smoothing q_t_dot)^2), "energy" (of sum
     |tau q_t_dot|), "time", or a function of a point.
     smoothing: N m s; without it plans whirl a light tail.
     damping: N m s (Eq. 47), in addition to the planned torques.
     path: rows (function of a point, least, most).  A point has the CasADi blocks tail, tail_rate,
-    torso_rate, torque, attitude, quaternion in SI.
+    torso_rate, torque, attitude, quaternion in SI, and those of its formulation.
     formulation: "airborne" (angular momentum conserved by construction), "translation-free",
     "full".
     attitude: "quaternion", "euler".
 
-    Settings of the search:
-    rule: "radau" (default), "lobatto", "hermite-simpson", "trapezoidal"; degree: of the rule.
-    intervals: of the first mesh; most_intervals: of the last.
-    tolerance: deg, of the true attitude at the end, None for no demand; rounds: of refinement.
+    The mesh
+    rule: "radau", "lobatto", "hermite-simpson", "trapezoidal"; degree: of the rule.
+    intervals: of the first mesh; most_intervals: of the last; rounds: of refinement.
+    tolerance: deg, of the true attitude at the end, None for no demand.
+
+    The solver
     solver, options: of ``casadi.nlpsol``.
-    guess: a Plan or a Trajectory; by default passive flight, with guess_damping (N m s).
-    multi_start: guesses solved, the best is kept; retries: more guesses after failures; seed.
     dynamics: "auto", "compiled", "symbolic".
     time_limit: s, of the search.
+
+    Where it begins
+    guess: a Plan or a Trajectory; by default passive flight, with guess_damping (N m s).
+    multi_start: guesses solved, the best is kept; retries: more guesses after failures; seed.
+
+    What is told
     track: simulate with PFL, too.
     watch: a function that is given the Plan of each round as it is found; what it raises ends all.
 
     Programs and solvers are remembered: planning again on a plan's mesh, from another start,
     derives nothing.  Ctrl-C ends the search, as the time limit does, and the best so far is
     returned; a second one raises KeyboardInterrupt.
-    Returns a Plan; look at its ``success`` and ``report``.  Raises PlanningError (a field, its
-    value, the remedy), ModelError (the scene lacks functions).
+    Returns a Plan; look at its ``success`` and ``report``.  Raises PlanningError (fields, their
+    values, remedies), ModelError (the scene lacks functions).
     """
-    watch = _watch(settings.pop("watch", None))
-    problem, checked = _checked(model, (start, goal, duration, bounds), settings)
+    refused = Refusals(PlanningError)
+    for name in unknown:
+        refused.add(name, none_of("setting", name, NAMES))
+    if watch is not None and not callable(watch):
+        refused.add("watch", needed("watch", watch, "a function of a Plan, or None"))
+    settings = PlanSettings(
+        rule=rule,
+        degree=degree,
+        intervals=intervals,
+        most_intervals=most_intervals,
+        rounds=rounds,
+        tolerance=tolerance,
+        solver=solver,
+        options={} if options is None else options,
+        dynamics=dynamics,
+        time_limit=time_limit,
+        guess=guess,
+        guess_damping=guess_damping,
+        multi_start=multi_start,
+        retries=retries,
+        seed=seed,
+        track=track,
+    )
+    check_settings(model, settings, refused)
+    of_problem = {
+        "objective": objective,
+        "smoothing": smoothing,
+        "damping": damping,
+        "path": path,
+        "formulation": formulation,
+        "attitude": attitude,
+    }
+    task = (
+        start,
+        Goal() if goal is None else goal,
+        duration,
+        Bounds() if bounds is None else bounds,
+    )
+    problem = checked_problem(model, task, of_problem, refused)
+    refused.tell()
+    assert problem is not None  # all has been told
+    return _found(model, problem, settings, watch)
+
+
+def _found(
+    model: Model,
+    problem: PlanningProblem,
+    settings: PlanSettings,
+    watch: Callable[[Plan], object] | None,
+) -> Plan:
+    """Search, round by round, and return the best plan."""
     missing = [name for name in NEEDED if name not in model.generated]
     if missing:
         raise model.without(*missing)
     begun = time.perf_counter()
-    rule = collocation_rule(checked.rule, checked.degree)
-    with forks_wait():
-        equations = equations_of_motion(model, checked.dynamics)
-        search = Search(model, problem, checked, equations, rule)
-        with stoppable(checked.time_limit):
+    rule = collocation_rule(settings.rule, settings.degree)
+    with forks_wait(), Stage("plan", model.name) as stage:
+        equations = equations_of_motion(model, settings.dynamics)
+        search = Search(model, problem, settings, equations, rule)
+        with stoppable(settings.time_limit, stage.tell):
             rounds = []
             for each in search.rounds():
                 rounds.append(each)
+                stage.tell(what=f"{model.name}: {each} after round {len(rounds)}")
                 if watch is not None:
                     watch(search.plan(each, len(rounds), time.perf_counter() - begun))
         return search.plan(search.best(rounds), len(rounds), time.perf_counter() - begun)
 
 
-def _watch(watch: Any) -> Callable[[Plan], object] | None:
-    """What is called after each round; PlanningError where it cannot be."""
-    if watch is not None and not callable(watch):
-        raise refusal("watch", watch, "a function of a Plan, or None", PlanningError)
-    return watch
-
-
-def _checked(
-    model: Model, task: tuple, settings: dict[str, Any]
-) -> tuple[PlanningProblem, PlanSettings]:
-    """Return the problem, of (start, goal, duration, bounds), and the settings of its search.
-
-    PlanningError has a line for each thing that is wrong.
-    """
-    refused = Refusals(PlanningError)
-    names = (*PROBLEM_SETTINGS, *(entry.name for entry in fields(PlanSettings)))
-    for name in settings:
-        unknown = none_of("setting", name, names)
-        if unknown:
-            refused.add(name, unknown)
-    known = {name: value for name, value in settings.items() if name in names}
-    of_problem = {name: value for name, value in known.items() if name in PROBLEM_SETTINGS}
-    of_search = {name: value for name, value in known.items() if name not in PROBLEM_SETTINGS}
-    start, goal, duration, bounds = task
-    goal = Goal() if goal is None else goal
-    bounds = Bounds() if bounds is None else bounds
-    search = PlanSettings(**of_search)
-    check_settings(model, search, refused)
-    problem = checked_problem(model, (start, goal, duration, bounds), of_problem, refused)
-    refused.tell()
-    assert problem is not None  # all has been told
-    return problem, search
+NAMES = [
+    name
+    for name, parameter in signature(plan).parameters.items()
+    if parameter.kind == Parameter.KEYWORD_ONLY
+]

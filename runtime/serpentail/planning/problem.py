@@ -69,12 +69,12 @@ class PlanningProblem:
     goal: Goal
     duration: tuple[float, float]
     bounds: Bounds
-    objective: str | Callable[[Any], Any] = "effort"
-    smoothing: float = SMOOTHING
-    damping: float = 0.0
-    path: tuple[PathConstraint, ...] = ()
-    formulation: str = "airborne"
-    attitude: str = "quaternion"
+    objective: str | Callable[[Any], Any]
+    smoothing: float
+    damping: float
+    path: tuple[PathConstraint, ...]
+    formulation: str
+    attitude: str
     __repr__ = brief
 
 

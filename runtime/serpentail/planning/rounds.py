@@ -55,6 +55,9 @@ class Round:
         error = max(attitude_errors(self.nlp.problem, planned, true))
         return error if np.isfinite(error) else np.inf
 
+    def __str__(self) -> str:
+        return f"{self.nlp.mesh.intervals} intervals, {self.error:.2g} deg off"
+
 
 class Search:
     """One call of ``plan``: what stays the same in all its rounds, and what they have cost."""

@@ -1,6 +1,6 @@
 """How to search for a plan: the settings of rule, mesh, solver and guesses, and their checks."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -28,22 +28,22 @@ DYNAMICS = ("auto", "compiled", "symbolic")
 class PlanSettings:
     """How to find a plan: collocation rule, mesh, tolerance of the truth, solver, guesses."""
 
-    rule: str = "radau"
-    degree: int | None = None
-    intervals: int = 12
-    tolerance: float | None = 0.01  # deg; None: no demand
-    rounds: int = 6
-    most_intervals: int = 200
-    solver: str = "ipopt"
-    options: dict[str, Any] = field(default_factory=dict)
-    guess: Any = None  # a Plan or a Trajectory
-    guess_damping: float = 1e-3  # N m s
-    multi_start: int = 1
-    retries: int = 4
-    seed: int = 0
-    dynamics: str = "auto"
-    time_limit: float | None = None  # s
-    track: bool = True
+    rule: str
+    degree: int | None
+    intervals: int
+    most_intervals: int
+    rounds: int
+    tolerance: float | None  # deg; None: no demand
+    solver: str
+    options: dict[str, Any]
+    dynamics: str
+    time_limit: float | None  # s
+    guess: Any  # a Plan or a Trajectory
+    guess_damping: float  # N m s
+    multi_start: int
+    retries: int
+    seed: int
+    track: bool
 
 
 def check_settings(model: Model, settings: PlanSettings, refused: Refusals) -> None:

@@ -12,6 +12,7 @@ from ..model.cores import threads as allowed
 from ..model.kernel import RunKernel
 from ..model.workers import in_turn
 from ..motion.trajectory import Trajectory
+from ..stages import Stage
 from .actuation import Actuation
 from .audit import BALANCED, Audit, audited, warnings_of
 from .batched_runs import BatchedRuns, worth_batching
@@ -50,6 +51,11 @@ class ParallelRuns:
                 self.measures[name] = np.zeros((runs, samples, *shape), kernel.dtype)
         self.unmeasured: list[int] = []  # whose energy or momentum no number holds
         self.stop: KeyboardInterrupt | None = None  # what ended all before their end
+
+    @property
+    def part_done(self) -> float:
+        """Which part of the runs has ended."""
+        return len(self.outcomes) / self.memory.start.runs
 
     def run_singly(self, numbers: Iterator[int], ended: Event) -> None:
         """Take up runs in one thread until none is left, or ``ended`` is set."""
@@ -204,7 +210,8 @@ def run_parallel(
     runs = ParallelRuns(memory, actuation, method, threads)
     work = partial(runs.run_batches, runs.batched) if runs.batched else runs.run_singly
     try:
-        in_turn(runs.tasks, runs.threads, work)
+        with Stage("simulate", f"{memory.start.runs} runs of {runs.model.name}") as stage:
+            in_turn(runs.tasks, runs.threads, work, lambda: stage.tell(runs.part_done))
     except KeyboardInterrupt as stop:
         runs.stop = stop
         for k in set(range(memory.start.runs)) - runs.outcomes.keys():

@@ -16,6 +16,7 @@ from ..model.layout import TAIL_V
 from ..model.model import Model
 from ..model.parameters import RunParameters
 from ..motion.trajectory import Trajectory
+from ..stages import Stage
 from .actuation import Actuation
 from .compiled_run import CompiledRun, Memory, Samples
 from .controllers import Controller
@@ -217,19 +218,21 @@ def integrate(
     """Return the samples of a single run, of which a function is told meanwhile."""
     run = CompiledRun(memory, actuation, method)
     watched = None if watch is None else Watched(watch, run.model, memory.ground)
-    if method.name in SCIPY:
-        from .scipy_methods import integrate_by_scipy
+    with Stage("simulate", run.model.name) as stage:
+        if method.name in SCIPY:
+            from .scipy_methods import integrate_by_scipy
 
-        samples = integrate_by_scipy(run, method, watched)
-    else:
-        look = None if watched is None else partial(_look, run, watched)
-        samples = run.samples(run.go(look=look))
+            samples = integrate_by_scipy(run, method, watched)
+        else:
+            samples = run.samples(run.go(look=partial(_look, run, stage, watched)))
     if watched is not None:
         watched.end(samples)
     return samples
 
 
-def _look(run: CompiledRun, watched: Watched) -> None:
+def _look(run: CompiledRun, stage: Stage, watched: Watched | None) -> None:
     """Let a run in C be looked at."""
     done = run.record.done
-    watched.look(done, lambda first: run.memory.part(run.k, first, done))
+    stage.tell(done / len(run.start.times))
+    if watched is not None:
+        watched.look(done, lambda first: run.memory.part(run.k, first, done))

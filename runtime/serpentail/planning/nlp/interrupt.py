@@ -8,7 +8,7 @@ import math
 import signal
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import SimpleNamespace
 
@@ -20,35 +20,48 @@ _ctrl_c = SimpleNamespace(noted=0, listener=None, before=None)
 
 
 class _Search(threading.local):
-    """The search of one thread: when it is to end (s), and what had been noted when it began."""
+    """The search of one thread: when it is to end (s), what had been noted when it began, whom it
+    tells that it goes on, and what that raised.
+    """
 
     deadline = math.inf
     noted = 0
+    tick: Callable[[], object] = staticmethod(lambda: None)
+    raised: BaseException | None = None
 
 
 _search = _Search()
 
 
 def stop_reason() -> str | None:
-    """Return why the search of this thread should end: "interrupt", "time limit", or None."""
+    """Return why the search of this thread should end: "interrupt", "time limit", "progress" (the
+    function that is told of it raised something), or None.
+    """
     let_forks_pass()
+    _tick()
+    if _search.raised is not None:
+        return "progress"
     if _ctrl_c.noted > _search.noted:
         return "interrupt"
     return "time limit" if time.monotonic() >= _search.deadline else None
 
 
 @contextmanager
-def stoppable(time_limit: float | None = None) -> Iterator[None]:
+def stoppable(
+    time_limit: float | None = None, tick: Callable[[], object] = lambda: None
+) -> Iterator[None]:
     """Let Ctrl-C stop the search, once, a second one acting as usual; and so a limit (s) from now.
 
     The search of the main thread hears it, for all threads: without one, the time limit alone
     counts.
+    tick: called as the search goes on, at every iteration of the solver; what it raises ends it.
     """
-    _search.noted = _ctrl_c.noted
+    _search.noted, _search.tick, _search.raised = _ctrl_c.noted, tick, None
     _search.deadline = math.inf if time_limit is None else time.monotonic() + time_limit
     before = signal.getsignal(signal.SIGINT)
     if threading.current_thread() is not threading.main_thread() or before is None:
         yield
+        _raise()
         return
     _ctrl_c.listener, _ctrl_c.before = threading.get_ident(), before
     signal.signal(signal.SIGINT, _note)
@@ -56,6 +69,22 @@ def stoppable(time_limit: float | None = None) -> Iterator[None]:
         yield
     finally:
         _hear_no_more()
+    _raise()
+
+
+def _tick() -> None:
+    """Tell that the search goes on; CasADi hands no exception through, so it is kept."""
+    try:
+        _search.tick()
+    except BaseException as error:
+        _search.raised = error
+
+
+def _raise() -> None:
+    """Raise what the function raised that was told."""
+    raised, _search.raised = _search.raised, None
+    if raised is not None:
+        raise raised
 
 
 def _note(_number: int, _frame: object) -> None:

@@ -3,14 +3,15 @@
 Every node of every mesh evaluates the same CasADi function, of which the program is then built.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...errors import ModelError
+from ...checks import did_you_mean
+from ...errors import ModelError, PlanningError
 from ...model.kept import kept
 from ...model.layout import OMEGA, TAIL_V, VELOCITY
 from ...model.model import Model
@@ -153,7 +154,10 @@ def node_function(
     duration, rates = zeta[0], _rates(model, point, attitude, results[0])
     state_rates = ca.vertcat(*(rates[name] for name, _ in variables.states))
     residuals = _momentum(model, point, h, results[1]) if algebraic else ca.SX.zeros(0)
-    constraints = [ca.vec(ca.SX(function(point))) for function, _, _ in problem.path]
+    constraints = [
+        ca.vec(ca.SX(asked(f"path[{k}]", function, point)))
+        for k, (function, _, _) in enumerate(problem.path)
+    ]
     path = ca.vertcat(ca.SX.zeros(0), *constraints)
     y = ca.vertcat(
         duration * state_rates / variables.scale(variables.states),
@@ -165,10 +169,33 @@ def node_function(
     return Node(function, tuple(calls), states, residuals.size1(), path.size1())
 
 
+class Point(SimpleNamespace):
+    """A node as objectives and path constraints see it: CasADi blocks by name, in SI units."""
+
+    def __getattr__(self, name: str) -> Any:
+        has = sorted(vars(self))
+        remedy = did_you_mean(name, has) or "choose one of these"
+        raise AttributeError(
+            f"a point has no {name!r}, it has {', '.join(has)}; {remedy}", name=name, obj=self
+        )
+
+
+def asked(field: str, function: Callable[[Any], Any], point: Point) -> Any:
+    """Return what a function of the user's makes of a point; PlanningError where it asks for what
+    the point lacks.
+    """
+    try:
+        return function(point)
+    except AttributeError as error:
+        if error.obj is not point:
+            raise
+        raise PlanningError(f"{field}: {error}") from error
+
+
 def _calls(
     model: Model,
     problem: "PlanningProblem",
-    point: SimpleNamespace,
+    point: Point,
     zeta: "ca.SX",
     equations: Equations,
 ) -> list[NodeCall]:
@@ -191,9 +218,7 @@ def _calls(
     return calls
 
 
-def _point(
-    zeta: "ca.SX", variables: Variables, attitude: Attitude, controls: int
-) -> SimpleNamespace:
+def _point(zeta: "ca.SX", variables: Variables, attitude: Attitude, controls: int) -> Point:
     """Return the blocks of a node in SI units, which objectives and path constraints see."""
     blocks: dict[str, Any] = {}
     start = 1
@@ -201,12 +226,10 @@ def _point(
         blocks[name] = variables.units[name] * zeta[start : start + size]
         start += size
     blocks["quaternion"] = attitude.quaternion(blocks["attitude"])
-    return SimpleNamespace(**blocks)
+    return Point(**blocks)
 
 
-def _rates(
-    model: Model, point: SimpleNamespace, attitude: Attitude, v_dot: "ca.SX"
-) -> dict[str, Any]:
+def _rates(model: Model, point: Point, attitude: Attitude, v_dot: "ca.SX") -> dict[str, Any]:
     """Return the rates of state blocks; p_ddot = R (p_ddot(identity) + g z) - g z."""
     import casadi as ca
 
@@ -221,7 +244,7 @@ def _rates(
     }
 
 
-def _momentum(model: Model, point: SimpleNamespace, h: "ca.SX", momentum: "ca.SX") -> "ca.SX":
+def _momentum(model: Model, point: Point, h: "ca.SX", momentum: "ca.SX") -> "ca.SX":
     """H v of the motion relative to the COM less (0, R^T h), in units: zero where omega carries h.
 
     Where the linear momentum is zero, the angular momentum about B is that about the COM.
@@ -236,13 +259,13 @@ def _momentum(model: Model, point: SimpleNamespace, h: "ca.SX", momentum: "ca.SX
     )
 
 
-def cost(problem: "PlanningProblem", point: SimpleNamespace, torque_unit: np.ndarray) -> "ca.SX":
+def cost(problem: "PlanningProblem", point: Point, torque_unit: np.ndarray) -> "ca.SX":
     """Return the objective's integrand (Eq. 40; CasADi), in units of the torques."""
     import casadi as ca
 
     unit = torque_unit.mean()
     if callable(problem.objective):
-        return problem.objective(point)
+        return asked("objective", problem.objective, point)
     if problem.objective == "effort":
         rates = problem.smoothing**2 * ca.sumsqr(point.tail_rate)
         return (ca.sumsqr(point.torque) + rates) / unit**2
