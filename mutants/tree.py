@@ -10,6 +10,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 PLACE = ROOT / ".build" / "mutants"
 BASE = PLACE / "base"  # the checkout as it was when the run began
+BUILT = (Path("runtime/serpentail/viewer/page.html"),)  # which git does not know, and tests need
 JUDGED_BY = ("codegen", "runtime", "tests", "stress", "scenes", "pyproject.toml")
 
 
@@ -27,7 +28,7 @@ def snapshot() -> None:
         if entry.name != ".build":
             remove = shutil.rmtree if entry.is_dir() else Path.unlink
             remove(entry)
-    for path in sources():
+    for path in [*sources(), *(path for path in BUILT if (ROOT / path).is_file())]:
         (BASE / path).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy2(ROOT / path, BASE / path)
     for words in (["init", "--quiet"], ["add", "--all"]):  # some tests ask git

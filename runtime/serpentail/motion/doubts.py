@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 DEEP = 0.1  # of the torso's length, below the ground: as deep as a torso rests in it by contact
 SUNK = 0.1  # of the way from the torso's centre to its surface
 MOST_WEIGHTS = 20.0  # body weights of the ground's force: hopping animals reach 10
-MOST_BEND = np.pi  # rad, of a segment: beyond it the segment's end points back into the segment
+# rad, of a segment: beyond half a turn its end points back into it, and plans may go just so far
+MOST_BEND = 1.02 * np.pi
 KNEES = 3  # hip, D and knee come first in a leg, and are no contacts
 AT_ONCE = 4096  # samples
 
@@ -134,7 +135,7 @@ def _blows(model: Model, motion: "Trajectory") -> list[str]:
 
 
 def _bends(model: Model, motion: "Trajectory") -> list[str]:
-    """Segments that are bent by more than half a turn."""
+    """Segments that are bent by clearly more than half a turn."""
     bends = _bend(model, motion.q)
     told = []
     for segment, k in enumerate(bends.argmax(axis=0)):
