@@ -176,6 +176,7 @@ def test_command_line_prints_one_object(tmp_path, capsys):
     out, err = capsys.readouterr()
     report = json.loads(out)
     assert (status, besides_progress(err), out.count("\n")) == (0, "", 1)
+    assert report["warnings"] == []
     assert report["success"] and report["open_loop_attitude_error_deg"] <= 0.01
     assert {
         "iterations",

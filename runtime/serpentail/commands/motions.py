@@ -21,7 +21,8 @@ def plan(arguments: argparse.Namespace) -> Outcome:
 
     plan = scenes.planned(arguments.scene, arguments.folder)
     files: Files = {"save": partial(save, plan.trajectory), "view": plan.view}
-    return Outcome(plan.report, as_text(plan.report), plan.success, files)
+    report = plan.report | {"warnings": plan.warnings}
+    return Outcome(report, as_text(report), plan.success, files)
 
 
 def simulate(arguments: argparse.Namespace) -> Outcome:

@@ -70,6 +70,11 @@ class Plan:
         )
 
     @property
+    def warnings(self) -> list[str]:
+        """What to mind about the planned motion: see ``Trajectory.warnings``."""
+        return self.trajectory.warnings
+
+    @property
     def duration(self) -> float:
         """Duration in s."""
         return self.curve.duration
