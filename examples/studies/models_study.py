@@ -44,13 +44,14 @@ def motion(links: int | None) -> dict:
     return found
 
 
-def times() -> list[float]:
+def run_times() -> list[float]:
     """Return the least ns of one forward dynamics call: of the continuum, then of LINKS."""
     with TemporaryDirectory() as folder:
         tails = [built(1, links, functions=FUNCTIONS) for links in (None, *LINKS)]
-        closures = [fixture(tail, Path(folder)).closure for tail in tails]
+        timed = [fixture(tail, Path(folder)) for tail in tails]  # whose memory the calls use
         states = timing.random_states(1)
-        return [least for least, _ in timing.time_rounds(closures, states, ROUNDS, CALLS)]
+        times = timing.time_rounds([each.closure for each in timed], states, ROUNDS, CALLS)
+        return [least for least, _ in times]
 
 
 def measured(folder: Path) -> dict:
@@ -62,7 +63,7 @@ def measured(folder: Path) -> dict:
     parts = {title: Part(partial(motion, links), of) for links, title in titles.items()}
     moved = made("tails", folder / "parts", dict(reversed(parts.items())))  # the longest first
     # alone, as what else runs costs time
-    ns = made("timing", folder / "parts", {"times": Part(times, of)})["times"]
+    ns = made("timing", folder / "parts", {"times": Part(run_times, of)})["times"]
     yaw = moved["continuum"]["motion"][-1]
     rows = [row(n, moved[titles[n]], yaw) | {"ns": t} for n, t in zip(LINKS, ns[1:], strict=True)]
     return {
