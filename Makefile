@@ -108,7 +108,7 @@ model: $(READY)
 	{ $(VENV)/bin/serpentail info "$$folder" && cp $$stamp $$stamp.told; }; }
 
 verify: model
-	$(PY) -m tests.verification.verify_model $(FOLDER)
+	$(PY) -m tests.verification $(FOLDER)
 
 bench: $(READY)
 	$(PY) -m benchmarks.bench

@@ -8,7 +8,7 @@ from unittest import mock
 import numpy as np
 
 import serpentail as st
-from benchmarks.fixtures import generated, label
+from benchmarks.fixtures import built, label
 from serpentail.model.batch import MIN_BATCH
 from serpentail.model.kernel import aligned, argument_record
 from serpentail.simulation import batched_runs
@@ -26,7 +26,7 @@ def batch_times(folder: Path) -> list[dict]:
     """
     rows = []
     for size in SIZES:
-        model = st.load(generated(folder / "speed", *size))
+        model = built(*size)
         alone, together = c_times(model)
         many = random_states(model, 100 * STATES)
         whole = best(lambda model=model, many=many: model.forward_dynamics(*many), 7) / len(many[0])
@@ -45,7 +45,7 @@ def rollout_rates(folder: Path) -> list[dict]:
     """
     rows = []
     for size in SIZES:
-        model = st.load(generated(folder / "speed", *size))
+        model = built(*size)
         q, v, _ = random_states(model, FLIGHTS)
         q[:, 3] += 2
         times = np.min([flight_times(model, q, v) for _ in range(9)], axis=0) / FLIGHTS

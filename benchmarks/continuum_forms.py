@@ -2,14 +2,12 @@
 times, a picture.
 """
 
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 
 import serpentail as st
-from benchmarks.fixtures import fixture
+from benchmarks.fixtures import built, fixture
 from benchmarks.peers import timing
 
 THETAS = (*(10.0 ** (np.arange(-24, 2) / 3)), np.pi, 2 * np.pi)
@@ -21,14 +19,10 @@ COLOURS = {"bend": "#0072b2", "polar": "#d55e00"}
 LABELS = {"bend": "bend components", "polar": "polar closed forms"}
 
 
-def form(folder: Path, coordinates: str, segments: int) -> Path:
-    """Generate the tail in one form as `make model SCENE=` does; return the generated folder."""
+def form(coordinates: str, segments: int) -> st.Model:
+    """Return the tail in one form."""
     name = f"continuum_m{segments}_{coordinates}"
-    scene = folder / f"{name}.toml"
-    scene.write_text(f'kind = "continuum"\nsegments = {segments}\ncoordinates = "{coordinates}"\n')
-    command = [sys.executable, "-m", "serpentail_codegen", str(scene), "--output", str(folder)]
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-    return folder / name
+    return built(segments, coordinates=coordinates, name=name)
 
 
 def form_errors(folder: Path) -> list[dict]:
@@ -40,7 +34,7 @@ def form_errors(folder: Path) -> list[dict]:
     """
     from tests.references.exact_polar import ExactPolar
 
-    models = {name: st.load(form(folder, name, 1)) for name in COLOURS}
+    models = {name: form(name, 1) for name in COLOURS}
     exact = ExactPolar(models["polar"].parameters, 1)
     rows = []
     for theta in THETAS:
@@ -103,7 +97,7 @@ def form_times(folder: Path) -> list[dict]:
     """
     rows = []
     for m in (1, 3):
-        pair = {name: fixture(form(folder, name, m), folder) for name in COLOURS}
+        pair = {name: fixture(form(name, m), folder) for name in COLOURS}
         q, v, tau = timing.random_states(m)
         q[:, 8::2] = (
             np.abs(q[:, 8::2]) + 0.5

@@ -1,13 +1,12 @@
 """Derivatives in C beside Pinocchio's and CasADi's: run times, sizes and build times."""
 
 import resource
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 
 import serpentail as st
+from serpentail.building.generator import generate
 from serpentail.model.compiler import compile_library
 from serpentail_codegen.scene.signatures.table import DERIVATIVES
 
@@ -34,9 +33,7 @@ def generated(parent: Path, size: tuple[int, int], functions, emission: str = "a
         f"functions = {list(functions)}",
     ]
     scene.write_text("\n".join([*lines, f'emission = "{emission}"', ""]))
-    command = [sys.executable, "-m", "serpentail_codegen", str(scene), "--output", str(parent)]
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-    return parent / name
+    return generate(scene, parent / f"made_{name}")
 
 
 # ---- measures ------------------------------------------------------------------------------------
@@ -63,7 +60,7 @@ def jacobian_times(folder: Path) -> list[dict]:
 
 def jacobian_row(folder: Path, size: tuple[int, int]) -> dict:
     """Measure one size."""
-    ours = fixture(generated(folder, size, (*IN_SX, JACOBIANS)), folder, JACOBIANS)
+    ours = fixture(st.load(generated(folder, size, (*IN_SX, JACOBIANS))), folder, JACOBIANS)
     by_hand = in_casadi("by_hand", jacobians(ours.model, True), ours.model, folder)
     by_itself = by_hand and in_casadi(
         "by_itself", jacobians(ours.model, False), ours.model, folder
@@ -146,7 +143,7 @@ def hessian_times(folder: Path) -> list[dict]:
     """
     rows = []
     for size in SIZES[:2]:
-        ours = fixture(generated(folder, size, (*IN_SX, HESSIAN)), folder, HESSIAN)
+        ours = fixture(st.load(generated(folder, size, (*IN_SX, HESSIAN))), folder, HESSIAN)
         peer = in_casadi("hessian", hessian(ours.model), ours.model, folder)
         states = multiplied(timing.random_states(size[0]))
         row = {"model": f"({size[0]}, {size[1]})"} | compared(
@@ -187,7 +184,7 @@ def derivative_code(folder: Path) -> list[dict]:
     for size in (*SIZES, (8, 16)):
         before = children_seconds()
         model = generated(folder, size, DERIVATIVES, "loops")
-        generate = children_seconds() - before
+        generated_in = children_seconds() - before
         sources = [model / "src" / f"{model.name}{ending}.c" for ending in ("", "_host")]
         before = children_seconds()
         compile_library(sources, model / "include", cache=folder / f"empty_{model.name}")
@@ -200,7 +197,7 @@ def derivative_code(folder: Path) -> list[dict]:
         }
         row |= {
             "derivative_bytes": sources[0].stat().st_size,
-            "generate_cpu": generate,
+            "generate_cpu": generated_in,
             "compile_cpu": spent,
         }
         rows.append(row)

@@ -1,9 +1,7 @@
-"""Generates and compiles the models that benchmarks measure, and wraps their C to be timed."""
+"""Builds the models that benchmarks measure, and wraps their C to be timed."""
 
 import ctypes
 import math
-import subprocess
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -95,29 +93,10 @@ COLUMNS = {
 }
 
 
-def generated(
-    parent: Path, segments: int, links: int | None = None, functions: str = "", real: str = "double"
-) -> Path:
-    """Run the generator as `make model` does, for a continuum if there are no links; return the
-    generated folder.
-    """
-    name = f"articulated_m{segments}_n{links}" if links else f"continuum_m{segments}"
-    tail = ["--tail", "articulated", "--links", str(links)] if links else ["--tail", "continuum"]
-    tail += (["--functions", functions] if functions else []) + ["--real", real]
-    command = [
-        sys.executable,
-        "-m",
-        "serpentail_codegen",
-        *tail,
-        "--segments",
-        str(segments),
-        "--name",
-        name,
-        "--output",
-        str(parent),
-    ]
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-    return parent / name
+def built(segments: int, links: int | None = None, **options) -> st.Model:
+    """Build and load a tail, a continuum if there are no links."""
+    tail = {"tail": "articulated", "links": links} if links else {"tail": "continuum"}
+    return st.build(segments=segments, **tail, **options)
 
 
 def label(segments: int, links: int | None) -> str:
@@ -139,13 +118,13 @@ class Fixture:
         return dict(self.model.parameters)
 
 
-def fixture(folder: Path, scratch: Path, function: str = "forward_dynamics") -> Fixture:
-    """Load a generated folder and compile an adapter to the timer's call.
+def fixture(model: st.Model, scratch: Path, function: str = "forward_dynamics") -> Fixture:
+    """Compile an adapter of one of a model's functions to the timer's call.
 
     The third array of the timer holds all inputs after q and v, one after the other; more than one
     output stays in the context, behind the workspace, which begins at a cache line.
     """
-    model = st.load(folder)
+    folder = model.folder
     work = -(-(model.manifest["work"][function] + 1) // 8) * 8
     inputs, outputs = (
         sizes(model.manifest["functions"][function][key]) for key in ("inputs", "outputs")

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 import serpentail as st
-from benchmarks.fixtures import generated, label
+from benchmarks.fixtures import built, label
 from tests.support.chromium import chromium, opened
 
 SIZES = ((1, 3), (4, 10))
@@ -31,7 +31,7 @@ def page_speed(folder: Path) -> list[dict]:
     rows = []
     with chromium() as driver:
         for size in SIZES:
-            model = st.load(generated(folder / "pages", *size))
+            model = built(*size)
             page = _tumble(model).view(folder / "page.html")
             begun = time.perf_counter()
             opened(driver, page)

@@ -51,7 +51,7 @@ def planning(folder: Path) -> list[dict]:
     Paper's method: SciPy's SLSQP with finite differences of the trapezoidal program in Euler
     angles; cut, unsolved, at 500 times the best way's time, 5 minutes at most.
     """
-    models = {size: righting.model(folder / "planning", *size) for size in STARTS}
+    models = {size: righting.model(*size) for size in STARTS}
     rat, free = models[1, 3], st.Goal(torso_rate=None)
     rows = [
         *one_problem(rat),

@@ -6,7 +6,7 @@ import numpy as np
 
 import serpentail as st
 from benchmarks.batches import c_times, random_states
-from benchmarks.fixtures import generated, label
+from benchmarks.fixtures import built, label
 from tests.references.exact_chain import ExactChain
 from tests.references.exact_continuum import ExactContinuum
 
@@ -24,7 +24,7 @@ def precision_times(folder: Path) -> list[dict]:
     for size in ((1, 3), (3, 4), (6, 6), (1, None), (3, None)):
         row = {"model": label(*size)}
         for real in ("double", "float"):
-            model = st.load(generated(folder / real, *size, "forward_dynamics", real))
+            model = built(*size, functions=["forward_dynamics"], real=real)
             alone, together = c_times(model)
             row |= {
                 f"{real}, ns": alone,

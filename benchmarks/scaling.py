@@ -8,7 +8,7 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
-from benchmarks.fixtures import fixture, generated, label
+from benchmarks.fixtures import built, fixture, label
 from benchmarks.peers import build, timing
 
 SWEEPS = {
@@ -31,10 +31,7 @@ def scaling(folder: Path) -> list[dict]:
     rows = []
     for sweep, sizes in SWEEPS.items():
         for size in sizes:
-            ours = fixture(
-                generated(folder / "scaling", *size, functions="forward_dynamics"),
-                folder / "scaling",
-            )
+            ours = fixture(built(*size, functions=["forward_dynamics"]), folder)
             least, _ = timing.time_rounds(
                 [ours.closure], timing.random_states(size[0]), ROUNDS, CALLS
             )[0]

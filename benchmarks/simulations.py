@@ -1,7 +1,5 @@
 """Run time against error of every integration method, in flight and on the ground."""
 
-import subprocess
-import sys
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -9,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 import serpentail as st
+from benchmarks.fixtures import built
 from benchmarks.peers import mujoco_scene
 from serpentail.pictures.skeleton import leg_joints
 
@@ -27,20 +26,22 @@ SETTINGS = {
 }
 
 
-def generated(folder: Path, name: str, contacts: str) -> st.Model:
-    """Generate and load a tail of three segments of four links, with contacts or without."""
-    path = folder / "scenes" / f"{name}.toml"
-    path.parent.mkdir(parents=True, exist_ok=True)
-    touching = f'contacts = [{contacts}]\nfriction = "cone"\n' if contacts else ""
-    functions = (
-        '"energy", "momentum", "rollout", "implicit", "pfl", "tail_points", "forward_dynamics"'
-    )
-    functions += ', "contact_points", "leg_points", "contact_dynamics"' if contacts else ""
-    text = f'kind = "articulated"\nsegments = 3\nlinks = 4\n{touching}functions = [{functions}]\n'
-    path.write_text(text, encoding="utf-8")
-    command = [sys.executable, "-m", "serpentail_codegen", str(path), "--output", str(folder)]
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-    return st.load(folder / name)
+FLYING = ["energy", "momentum", "rollout", "implicit", "pfl", "tail_points", "forward_dynamics"]
+TOUCHING = {
+    "contacts": ["feet", "tail"],
+    "friction": "cone",
+    "functions": [*FLYING, "contact_points", "leg_points", "contact_dynamics"],
+}
+
+
+def flying() -> st.Model:
+    """Return a tail of three segments of four links in the air."""
+    return built(3, 4, functions=FLYING)
+
+
+def touching() -> st.Model:
+    """Return it on the ground."""
+    return built(3, 4, **TOUCHING)
 
 
 def thrown(model: st.Model) -> tuple[np.ndarray, np.ndarray]:
@@ -51,17 +52,17 @@ def thrown(model: st.Model) -> tuple[np.ndarray, np.ndarray]:
     return q, v
 
 
-def flight(folder: Path) -> tuple[Callable, float]:
+def flight() -> tuple[Callable, float]:
     """0.6 s of damped flight."""
-    model = generated(folder, "flight_3_4", "")
+    model = flying()
     return lambda **how: st.simulate(
         model, *thrown(model), controller=st.Damping(DAMPING), t_span=0.6, **how
     ), 0.6
 
 
-def tracking(folder: Path) -> tuple[Callable, float]:
+def tracking() -> tuple[Callable, float]:
     """0.6 s of flight whose tail tracks a motion by partial feedback linearisation."""
-    model = generated(folder, "flight_3_4", "")
+    model = flying()
     bends = [[0.4, 0.4, 0.4], [-0.5, 0.8, 0.3], [0.6, -0.4, 0.2]]
     law = st.Pfl(model, st.Reference.of_bends(model, [0.0, 0.3, 0.6], bends))
     return lambda **how: st.simulate(model, *thrown(model), controller=law, t_span=0.6, **how), 0.6
@@ -76,17 +77,17 @@ def standing(model: st.Model) -> dict:
     return {"q0": q, "v0": v, "bristles0": bristles} | acting
 
 
-def sliding(folder: Path) -> tuple[Callable, float]:
+def sliding() -> tuple[Callable, float]:
     """0.5 s of sliding on feet and tail, from 1 m/s askew."""
-    model = generated(folder, "ground_3_4", '"feet", "tail"')
+    model = touching()
     start = standing(model.with_parameters(mu=0.3))
     start["v0"][:2] = 0.8, 0.6
     return lambda **how: st.simulate(model.with_parameters(mu=0.3), t_span=0.5, **start | how), 0.5
 
 
-def impact(folder: Path) -> tuple[Callable, float]:
+def impact() -> tuple[Callable, float]:
     """0.5 s of falling onto feet and tail from 50 mm, pitched and rolled."""
-    model = generated(folder, "ground_3_4", '"feet", "tail"')
+    model = touching()
     q, v = np.zeros(model.nq), np.zeros(model.nv)
     q[2:7] = 0.12, np.cos(0.15), np.sin(0.15), 0.05, 0
     own = {"controller": st.Damping(DAMPING), "legs": st.Legs.fixed(GAMMA, STAND), "t_span": 0.5}
@@ -102,9 +103,9 @@ def setting(options: dict) -> str:
     return f"{name} {value:g}"
 
 
-def scene_rows(name: str, folder: Path) -> list[dict]:
+def scene_rows(name: str) -> list[dict]:
     """Run time and error of every method in one scene: the least of five runs."""
-    run, span = SCENES[name](folder)
+    run, span = SCENES[name]()
     exact = run(method="tsit5", rtol=1e-12, atol=1e-13, output_step=span)
     rows = []
     for method, settings in SETTINGS.items():
@@ -140,7 +141,7 @@ def simulation_times(folder: Path) -> list[dict]:
     Flight and tracking 0.6 s, sliding and impact 0.5 s; lsoda and dop853 are SciPy's on the
     compiled model.  nan: the method failed, as one whose steps are too long does.
     """
-    return [row for name in SCENES for row in scene_rows(name, folder)]
+    return [row for name in SCENES for row in scene_rows(name)]
 
 
 def least(rows: list[dict], methods: tuple[str, ...], error: float) -> dict:
@@ -200,7 +201,7 @@ def mujoco_times(folder: Path) -> list[dict]:
     """0.5 s of sliding on feet and tail by MuJoCo, whose contacts and ties are soft constraints:
     another physics.
     """
-    model = generated(folder, "ground_3_4", '"feet", "tail"').with_parameters(mu=0.3)
+    model = touching().with_parameters(mu=0.3)
     start = standing(model)
     start["v0"][:2] = 0.8, 0.6
     still = st.simulate(model, t_span=1e-6, **start)

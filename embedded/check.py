@@ -1,132 +1,27 @@
 """Runs a model on an emulated board and compares every result with the host's."""
 
-import argparse
-import sys
-from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
-from embedded.boards import BOARDS, PROFILES, ToolchainMissing
-from embedded.image import Image, build, manifest_of
-from embedded.results import Result, blocks, run
-from embedded.stack import deepest
-
-BOUND = (
-    1e4  # units of the last place of an output's largest entry: what the fast profile may differ by
-)
+from embedded.boards import BOARDS, PROFILES
+from examples import front
 
 
-@dataclass(frozen=True)
-class Comparison:
-    """One function on a board: whether its bits are the host's, by how much it differs, what a call
-    costs.
-    """
-
-    name: str
-    same_bits: bool
-    # largest difference from the host, in units of the last place of the output's largest entry
-    units: float
-    instructions: int
-    stack: int  # bytes, the sum of frames along the deepest chain of calls
-    painted: int  # bytes, as found on the board
-
-    def holds(self, profile: str) -> bool:
-        """Tell if the profile's promise is kept."""
-        return self.same_bits if profile == "reproducible" else self.units <= BOUND
-
-
-def compare(folder: Path, board: str, output: Path, profile: str | None = None) -> list[Comparison]:
-    """Build and run the check on a board and on the host; raises ToolchainMissing or
-    RuntimeError.
-    """
-    images = [build(folder, BOARDS[name], output / name, profile) for name in (board, "host")]
-    results = [run(image) for image in images]
-    depths = deepest(sorted(images[0].path.parent.glob("*.ci")))
-    return [
-        _compared(images[0], name, results[0][name], results[1][name], depths)
-        for name in results[0]
-    ]
-
-
-def _compared(
-    image: Image, name: str, found: Result, host: Result, depths: dict[str, int]
-) -> Comparison:
-    if found.statuses != host.statuses:
-        raise RuntimeError(
-            f"{name}: status {found.statuses} on {image.board.name}, {host.statuses} on the host"
-        )
-    epsilon = np.finfo(np.float32 if image.manifest["real"] == "float" else np.float64).eps
-    units = [
-        _difference(found.values[:, part], host.values[:, part])
-        for part in blocks(image, name).values()
-    ]
-    return Comparison(
-        name,
-        np.array_equal(found.bits, host.bits),
-        max(units) / epsilon,
-        max(found.instructions),
-        depths[f"call_{name}"],
-        max(found.depths) + depths["call_room"],
-    )
-
-
-def _difference(some: np.ndarray, others: np.ndarray) -> float:
-    """Return the largest difference relative to the largest entry of each state; infinite where one
-    is no number.
-    """
-    scale = np.abs(others).max(axis=1)
-    difference = np.abs(some - others).max(axis=1)
-    relative = difference / np.where(scale > 0, scale, 1)
-    return float(relative.max()) if np.isfinite(relative).all() else float("inf")
-
-
-def table(rows: list[Comparison]) -> list[str]:
-    """Return the comparison as lines of text."""
-    head = f"{'function':<28}{'bits':>10}{'units':>10}{'instructions':>14}"
-    head += f"{'stack, bytes':>14}{'painted':>9}"
-    lines = [
-        f"{r.name:<28}{'same' if r.same_bits else 'differ':>10}{r.units:>10.3g}{r.instructions:>14}"
-        f"{r.stack:>14}{r.painted:>9}"
-        for r in rows
-    ]
-    return [head, *lines]
-
-
-def parser() -> argparse.ArgumentParser:
-    """Return the argument parser."""
-    p = argparse.ArgumentParser(description=__doc__)
-    p.add_argument("folder", type=Path, help="generated folder")
-    p.add_argument("--board", choices=[name for name in BOARDS if name != "host"], default="m4")
-    p.add_argument("--profile", choices=PROFILES, help="how to compile; default: the scene's")
-    p.add_argument(
-        "--output", type=Path, default=Path("output/embedded"), help="parent of what is built"
-    )
-    return p
-
-
-def main() -> int:
+def main(*given) -> int:
     """Check one folder on one board; return the exit status."""
-    arguments = parser().parse_args()
-    place = arguments.output.absolute() / arguments.folder.name
-    try:
-        rows = compare(arguments.folder.absolute(), arguments.board, place, arguments.profile)
-    except (ToolchainMissing, RuntimeError, OSError) as error:
-        print(error, file=sys.stderr)
-        return 2
-    profile = arguments.profile or manifest_of(arguments.folder)["scene"]["profile"]
-    board = BOARDS[arguments.board]
-    print(f"{arguments.folder} on {board.title} in QEMU, {profile} profile; against the host:")
-    print("\n".join(table(rows)))
-    bad = [row.name for row in rows if not row.holds(profile)]
-    promise = (
-        "the host's bits"
-        if profile == "reproducible"
-        else f"within {BOUND:g} units of the last place"
-    )
-    print(f"{'FAILED: ' + ', '.join(bad) + ' not ' if bad else ''}{promise}")
-    return 1 if bad else 0
+    from embedded.comparison import check
+
+    return check(*given)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    parser = front.parser(__doc__)
+    parser.add_argument("folder", type=Path, help="generated folder")
+    boards = [name for name in BOARDS if name != "host"]
+    parser.add_argument("--board", choices=boards, default="m4")
+    parser.add_argument(
+        "--profile", choices=PROFILES, help="how to compile (default: as the scene says)"
+    )
+    told = "parent of the folder of what is built (default: output/embedded)"
+    parser.add_argument("--output", type=front.usable, default="output/embedded", help=told)
+    given = parser.parse_args()
+    front.run(main, given.folder, given.board, given.profile, given.output)

@@ -1,20 +1,15 @@
-"""The main job on the paper's rat: it kicks, tumbles, rights itself by its tail, and is drawn.
+"""The main job on the paper's rat: it kicks, tumbles, rights itself by its tail, and is drawn."""
 
-Usage: python examples/demo.py [FOLDER], by default output/demo
-"""
+from __future__ import annotations  # those of serpentail would import it
 
-import subprocess
+import argparse
 import sys
 import time
 from contextlib import contextmanager
 from pathlib import Path
 
-import numpy as np
-from scipy.integrate import simpson
-
 import serpentail as st
-from serpentail.attitude import tilt_deg
-from serpentail.scenes.plan import planned
+from serpentail.files import refuse_unusable
 
 ROOT = Path(__file__).resolve().parent.parent
 SCENES = ("kangaroo_rat_m1_n3", "kangaroo_rat_m3_n4")
@@ -37,30 +32,25 @@ def step(words: str):
     print(f"{time.perf_counter() - start:8.3f} s", flush=True)
 
 
-def generate(scene: str, folder: Path) -> Path:
-    """Run the generator in a process of its own; the runtime needs only the folder that it
-    writes.
-    """
-    source = ROOT / "scenes" / f"{scene}.toml"
-    command = [sys.executable, "-m", "serpentail_codegen", str(source), "--output", str(folder)]
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-    return folder / scene
-
-
-def start(model: st.Model) -> tuple[np.ndarray, np.ndarray]:
+def start(model: st.Model) -> tuple:
     """Return q and v after the kick; every joint takes the same share of the tail's bend."""
+    import numpy as np
+
     share = np.tile([1.0, 0.0], model.segments) / (model.segments * model.links)
     q = [0, 0, HEIGHT, np.cos(PITCH / 2), np.sin(PITCH / 2), 0, 0, *BEND * share]
     return np.array(q), np.array([*VELOCITY, SPIN, 0, 0, *BEND_RATE * share])
 
 
-def drift(vectors: np.ndarray) -> float:
+def drift(vectors) -> float:
     """Return the largest change of a vector (K, 3), relative to its start."""
-    return np.abs(vectors - vectors[0]).max() / np.linalg.norm(vectors[0])
+    return abs(vectors - vectors[0]).max() / (vectors[0] ** 2).sum() ** 0.5
 
 
 def report(model: st.Model, flight: st.Trajectory, check: st.Trajectory) -> str:
     """Return what the conservation laws and the other integrator say about a flight."""
+    import numpy as np
+    from scipy.integrate import simpson
+
     weight = model.parameters["gravity"] * (
         model.parameters["torso_mass"] + model.parameters["tail_mass"]
     )
@@ -90,9 +80,9 @@ def fly(scene: str, folder: Path) -> None:
     """Do everything for one scene."""
     print(scene)
     with step("generate C and CasADi from the scene"):
-        generated = generate(scene, folder / "generated")
+        st.build(scene, compiled=False)
     with step("compile the C (or find it in the cache) and load"):
-        model = st.load(generated)
+        model = st.build(scene)
     q, v = start(model)
     with step(f"simulate {FLIGHT} s of flight, Tsit5 in C"):
         flight = st.simulate(
@@ -119,9 +109,9 @@ def kick(folder: Path) -> None:
     """Settle, kick and land, as the scene's table [simulate] says."""
     print("kick")
     with step("generate C and CasADi from the scene"):
-        generated = generate("kick", folder / "generated")
+        st.build("kick", compiled=False)
     with step("compile the C (or find it in the cache), settle"):
-        scene = st.scenario(ROOT / "scenes" / "kick.toml", generated)
+        scene = st.scenario("kick")
     with step(f"simulate {scene.duration} s, implicit steps in C"):
         motion = scene.simulate()
     with step("draw and save"):
@@ -140,11 +130,14 @@ def kick(folder: Path) -> None:
 
 def righting(folder: Path) -> None:
     """Plan how the tail rights the tumbling rat, and compare with a tail that only damps."""
+    from serpentail.attitude import tilt_deg
+    from serpentail.scenes.plan import planned
+
     print("righting_m1_n3")
     with step("generate C and CasADi from the scene"):
-        generated = generate("righting_m1_n3", folder / "generated")
+        st.build("righting_m1_n3", compiled=False)
     with step("plan the tail's torques"):
-        plan = planned(str(ROOT / "scenes" / "righting_m1_n3.toml"), str(generated))
+        plan = planned("righting_m1_n3")
     model, start = plan.trajectory.model, (plan.problem.q0, plan.problem.v0)
     with step(f"simulate {plan.duration:.2f} s with a passive tail"):
         passive = st.simulate(model, *start, controller=st.Damping(K_DMP), t_span=plan.duration)
@@ -173,8 +166,25 @@ def main(folder: Path) -> None:
     )
 
 
-if __name__ == "__main__":
+def arguments() -> argparse.Namespace:
+    """Return the command line's arguments."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    told = "where results go (default: output/demo of the checkout)"
+    parser.add_argument("folder", nargs="?", type=Path, default=ROOT / "output/demo", help=told)
+    given = parser.parse_args()
     try:
-        main(Path(sys.argv[1]).absolute() if sys.argv[1:] else ROOT / "output" / "demo")
+        refuse_unusable(given.folder)
+    except OSError as reason:
+        parser.error(f"{str(given.folder)!r}: {reason}: give a folder that can be written to")
+    return given
+
+
+if __name__ == "__main__":
+    wanted = arguments()
+    try:
+        main(wanted.folder.absolute())
     except st.SerpentailError as error:
         sys.exit(str(error))
+    except KeyboardInterrupt:
+        print("\ninterrupted", file=sys.stderr)
+        sys.exit(130)

@@ -1,12 +1,12 @@
 """Model-predictive control in the air: the tail rights a falling rat, planned anew every 20 ms.
 
-The controller's tail is a fifth lighter than the one that flies.  Run it: python -m examples.mpc
+The controller's tail is a fifth lighter than the one that flies; the tilt of the back is printed.
 """
 
-import casadi
-import numpy as np
+from __future__ import annotations  # those of serpentail would import it
 
 import serpentail as st
+from examples import front
 
 STEP, HORIZON, FLIGHT = 0.02, 12, 20  # s, steps that are planned, steps that are flown
 TORQUE = 0.02  # N m, the largest
@@ -14,6 +14,9 @@ TORQUE = 0.02  # N m, the largest
 
 def controller(model: st.Model):
     """Return a function from a state to torques (2m,) N m, which remembers its last plan."""
+    import casadi
+    import numpy as np
+
     f, nx, nu = model.casadi.external("x_dot", derivatives=2, folded=True), 9 + 8, 2
     x, u = casadi.MX.sym("x", nx), casadi.MX.sym("u", nu)
     k1 = f(x, u)
@@ -34,7 +37,7 @@ def controller(model: st.Model):
     bound = np.r_[np.full(nx * HORIZON, np.inf), np.full(nu * HORIZON, TORQUE)]
     memory = {"plan": None}
 
-    def torques(state: np.ndarray) -> np.ndarray:
+    def torques(state):
         guess = memory["plan"]
         if guess is None:
             guess = np.r_[np.tile(state, HORIZON), np.zeros(nu * HORIZON)]
@@ -46,6 +49,8 @@ def controller(model: st.Model):
 
 def main() -> None:
     """Fly, and print the tilt of the back."""
+    import numpy as np
+
     names = "forward_dynamics_derivatives,forward_dynamics_vjp,inverse_dynamics_hessian,"
     names += "forward_dynamics,mass_matrix,energy,momentum,rollout"
     rat = st.build("kangaroo_rat_m1_n3", functions=names.split(","))
@@ -62,4 +67,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    front.parser(__doc__).parse_args()
+    front.run(main)

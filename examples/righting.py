@@ -1,15 +1,10 @@
 """Models, starts and plans that the righting study and the planning benchmark share."""
 
-import subprocess
-import sys
-from pathlib import Path
-
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 import serpentail as st
 
-ROOT = Path(__file__).resolve().parent.parent
 FLIGHT = 0.58  # s, from 0.1 s after the kick until shortly before landing
 TORQUE = 0.02  # N m
 K_DMP = 1e-3  # N m s, of the passive tail
@@ -38,27 +33,10 @@ PAPER = {
 PAPER |= {"smoothing": 0.0}
 
 
-def model(folder: Path, segments: int, links: int | None) -> st.Model:
-    """Generate and load a tail with exact derivatives; a continuum where links is None."""
-    tail = ["--tail", "articulated", "--links", str(links)] if links else ["--tail", "continuum"]
-    options = ["--segments", str(segments), "--functions", FUNCTIONS]
-    place = ["--name", name(segments, links), "--output", str(folder)]
-    subprocess.run(
-        [sys.executable, "-m", "serpentail_codegen", *tail, *options, *place],
-        check=True,
-        stdout=subprocess.DEVNULL,
-    )
-    return loaded(folder, segments, links)
-
-
-def loaded(folder: Path, segments: int, links: int | None) -> st.Model:
-    """Load a tail that was generated."""
-    return st.load(folder / name(segments, links))
-
-
-def name(segments: int, links: int | None) -> str:
-    """Return what a tail's model is called."""
-    return f"articulated_m{segments}_n{links}" if links else f"continuum_m{segments}"
+def model(segments: int, links: int | None) -> st.Model:
+    """Return a tail with exact derivatives; a continuum where links is None."""
+    tail = {"tail": "articulated", "links": links} if links else {"tail": "continuum"}
+    return st.build(segments=segments, functions=FUNCTIONS.split(","), **tail)
 
 
 def share(rat: st.Model) -> np.ndarray:

@@ -4,12 +4,13 @@ score and the survivors. It may be interrupted, and goes on where it was.
 
 import argparse
 import os
-import signal
-import sys
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from queue import Queue
+
+from examples import front
+from serpentail.stages import Stage
 
 from . import tree
 from .judge import NotLoaded, Tree
@@ -29,10 +30,10 @@ CONTROLS = {
 
 def arguments() -> argparse.Namespace:
     """Return the command line's arguments."""
-    p = argparse.ArgumentParser(description=__doc__)
-    p.add_argument("--mutants", type=int, default=200, help="how many to run")
+    p = front.parser(__doc__)
+    p.add_argument("--mutants", type=front.count, default=200, help="how many to run")
     p.add_argument("--seed", type=int, default=1, help="of the sample")
-    p.add_argument("--jobs", type=int, default=2, help="mutants at the same time")
+    p.add_argument("--jobs", type=front.count, default=2, help="mutants at the same time")
     p.add_argument("--only", default="", help="only mutants of files whose path has this")
     return p.parse_args()
 
@@ -95,26 +96,23 @@ def all_judged(sample: list[Mutation], state: str, jobs: int) -> Iterator[Verdic
         pool.shutdown(cancel_futures=True)
 
 
-def main() -> int:
+def main(options: argparse.Namespace) -> int:
     """Run the sample; 1 where fewer than wanted were noticed."""
-    options = arguments()
-    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's job may ignore it
     os.nice(5)
     tree.snapshot()
     state = tree.state(tests=True)
     sample = drawn(tree.BASE, options.mutants, options.seed, options.only)
     verdicts: list[Verdict] = []
     try:
-        for found in all_judged(sample, state, options.jobs):
-            verdicts.append(found)
-            end = f"killed by {found.by}" if found.killed else "SURVIVED"
-            took = f"{len(verdicts)}/{len(sample)} {found.seconds:.0f} s"
-            print(f"{took}  {found.mutation}  {end}", flush=True)
-    except KeyboardInterrupt:
-        print("interrupted: the same command goes on from here", flush=True)
-    print(report(verdicts))
+        with Stage("mutants") as stage:
+            for found in all_judged(sample, state, options.jobs):
+                verdicts.append(found)
+                end = "killed" if found.killed else "SURVIVED"
+                stage.tell(len(verdicts) / len(sample), f"{found.mutation} {end}")
+    finally:
+        print(report(verdicts))
     return 0 if len(verdicts) == len(sample) and score(verdicts) >= WANTED else 1
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    front.run(main, arguments(), after=front.GOES_ON)

@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 
 from benchmarks import derivatives
-from benchmarks.fixtures import fixture, generated, label
+from benchmarks.fixtures import built, fixture, label
 from benchmarks.peers import build, casadi_derivatives, timing
 
 SIZES = ((1, 3), (3, 4), (6, 6))
@@ -33,7 +33,7 @@ def other_peers(folder: Path) -> list[dict]:
 
 def row(folder: Path, size: tuple[int, int], library: ctypes.CDLL) -> dict:
     """Return the figures of one tail."""
-    ours = fixture(generated(folder / "speed", *size), folder / "speed")
+    ours = fixture(built(*size), folder)
     states = timing.random_states(size[0])
     chain = library.mujoco_chain_new(str(chain_xml(folder, ours.model)).encode(), *size)
     if not chain:

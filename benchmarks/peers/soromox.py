@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.batches import best
-from benchmarks.fixtures import Fixture, fixture, generated, label
+from benchmarks.fixtures import Fixture, built, fixture, label
 from benchmarks.peers import timing
 
 SIZES = (1, 3, 6)
@@ -36,10 +36,7 @@ def continuum_peer(folder: Path) -> list[dict]:
 
 def row(folder: Path, segments: int) -> dict:
     """Return the figures of one tail."""
-    ours, states = (
-        fixture(generated(folder / "speed", segments), folder / "speed"),
-        timing.random_states(segments),
-    )
+    ours, states = fixture(built(segments), folder), timing.random_states(segments)
     call, loop = compiled(robot(ours), states)
     times = []
     for _ in range(ROUNDS):

@@ -3,8 +3,10 @@
 from pathlib import Path
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
-from matplotlib.ticker import NullFormatter
+from matplotlib.ticker import LogLocator, NullFormatter
 
 import serpentail as st
 from serpentail.attitude import angle_deg, tilt_deg
@@ -100,7 +102,7 @@ def draw_figure_11(rows: dict[str, list[dict]], path: Path) -> tuple[Figure, np.
     """
     panels = {
         "iterations": "iterations",
-        "effort": "effort [N$^2$ m$^2$ s]",
+        "effort": "effort [(mN m)$^2$ s]",
         "solve_cpu_s": "solver time [s]",
     }
     panels["open_loop_attitude_error_deg"] = "true error [deg]"
@@ -111,7 +113,7 @@ def draw_figure_11(rows: dict[str, list[dict]], path: Path) -> tuple[Figure, np.
         for way, points in rows.items():
             colour, mark = WAYS[way]
             look = {"color": colour, "markersize": 3.5, "label": way}
-            good = [r for r in points if r["converged"]]
+            good = [r | {"effort": 1e6 * r["effort"]} for r in points if r["converged"]]
             for panel, key in zip(axes.flat, panels, strict=False):
                 panel.plot([r["frequency"] for r in good], [r[key] for r in good], mark, **look)
             errors = [r["open_loop_attitude_error_deg"] for r in good]
@@ -126,9 +128,10 @@ def draw_figure_11(rows: dict[str, list[dict]], path: Path) -> tuple[Figure, np.
             panel.yaxis.set_minor_formatter(NullFormatter())
             panel.grid(color="#e6e6e6", linewidth=0.6)
         axes.flat[4].set(xlabel="solver time [s]", xscale="log")
-        axes.flat[4].xaxis.set_minor_formatter(NullFormatter())
-        axes.flat[0].set(yscale="linear", ylim=(0, None))
-        axes.flat[1].yaxis.set_minor_formatter("{x:.0e}")
+        for axis in (axes.flat[2].yaxis, axes.flat[4].xaxis):
+            _write_times(axis)
+        for panel in axes.flat[:2]:
+            panel.set(yscale="linear", ylim=(0, None))
         figure.legend(
             *axes.flat[0].get_legend_handles_labels(), loc="outside upper center", ncols=2
         )
@@ -159,28 +162,41 @@ def draw_rates(rates: dict[str, list[dict]], path: Path) -> tuple[Figure, np.nda
     """Share of random starts that have a true plan within a CPU time, and the true errors of all of
     them.
     """
+    times = {k: [r["cpu_s"] if r["success"] else np.inf for r in rows] for k, rows in rates.items()}
+    errors = {k: [r["open_loop_attitude_error_deg"] for r in rows] for k, rows in rates.items()}
 
     def draw() -> tuple[Figure, np.ndarray]:
-        figure = Figure(figsize=(7.2, 3.2), layout="constrained")
+        figure = Figure(figsize=(7.2, 3.5), layout="constrained")
         left, right = axes = figure.subplots(1, 2)
-        for k, (kind, rows) in enumerate(rates.items()):
-            look = {"color": f"C{k}", "label": kind, "where": "post"}
-            share = np.arange(1, len(rows) + 1) / len(rows)
-            times = [r["cpu_s"] if r["success"] else np.inf for r in rows]
-            left.step(np.sort(times), 100 * share, **look)
-            right.step(
-                np.sort([r["open_loop_attitude_error_deg"] for r in rows]), 100 * share, **look
-            )
-        left.set(
-            xlabel="CPU time [s]", ylabel="starts with a true plan [%]", xscale="log", ylim=(0, 101)
-        )
-        right.set(
-            xlabel="true error at the end [deg]", ylabel="starts [%]", xscale="log", ylim=(0, 101)
-        )
-        right.axvline(0.01, color="0.5", linestyle=":")
-        for panel in (left, right):
+        for panel, values in ((left, times), (right, errors)):
+            panel.set(xscale="log", ylim=(0, 101))
+            _draw_shares(panel, values)
             panel.grid(color="#e6e6e6", linewidth=0.6)
-        left.legend(fontsize=6)
+        left.set(xlabel="CPU time [s]", ylabel="starts with a true plan [%]")
+        _write_times(left.xaxis)
+        right.set(xlabel="true error at the end [deg]", ylabel="starts [%]")
+        right.axvline(0.01, color="0.5", linestyle=":")
+        keys = left.get_legend_handles_labels()
+        figure.legend(*keys, loc="outside upper center", ncols=4, fontsize=7)
         return figure, axes
 
     return drawn(draw, path)
+
+
+def _draw_shares(panel: Axes, values: dict[str, list[float]]) -> None:
+    """Draw for each kind which share (%) of all is up to a value: from 0, to the panel's edge."""
+    known = {kind: np.sort(np.array(all_)[np.isfinite(all_)]) for kind, all_ in values.items()}
+    most = 1.2 * max((x.max() for x in known.values() if len(x)), default=1.0)
+    for k, (kind, found) in enumerate(known.items()):
+        share = 100 * np.arange(len(found) + 1) / len(values[kind])
+        x = np.concatenate([found[:1], found, [most]])
+        y = np.concatenate([share, share[-1:]]) if len(found) else [0]
+        panel.step(x, y, color=f"C{k}", label=f"{kind}: {len(values[kind])}", where="post")
+    panel.set_xlim(None, most)
+
+
+def _write_times(axis: Axis) -> None:
+    """Write 1, 2 and 5 of each power of ten: times span few of these."""
+    axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_formatter(NullFormatter())

@@ -35,10 +35,15 @@ def refuse_unwritable(path: str | os.PathLike[str]) -> None:
     target = Path(path)
     if target.is_dir():
         raise IsADirectoryError(f"{path} is a folder")
-    folder = target.absolute().parent
-    while not folder.exists():  # those are made
-        folder = folder.parent
-    if not folder.is_dir():
-        raise NotADirectoryError(f"{folder} is no folder")
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise PermissionError(f"{folder} cannot be written to")
+    refuse_unusable(target.absolute().parent)
+
+
+def refuse_unusable(folder: str | os.PathLike[str]) -> None:
+    """OSError where no file can be written into a folder, which need not be there yet."""
+    place = Path(folder).absolute()
+    while not place.exists():  # those are made
+        place = place.parent
+    if not place.is_dir():
+        raise NotADirectoryError(f"{place} is no folder")
+    if not os.access(place, os.W_OK | os.X_OK):
+        raise PermissionError(f"{place} cannot be written to")

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from embedded import boards, check, image, results, stack
+from embedded import boards, comparison, image, results, stack
 from tests.support.models import model_folder
 from tests.support.toolchains import board
 
@@ -38,7 +38,8 @@ def compared(tmp_path, name, profile, **options):
     """Every function of a model on a board beside the host."""
     board(name)
     return {
-        row.name: row for row in check.compare(folder(name, profile, **options), name, tmp_path)
+        row.name: row
+        for row in comparison.compare(folder(name, profile, **options), name, tmp_path)
     }
 
 
@@ -82,7 +83,7 @@ def test_profiles_keep_their_promises_in_every_form(tmp_path, name, tail, emissi
     sizes = {"segments": tail[0], "links": tail[1]}
     rows = compared(tmp_path, name, profile, **sizes, emission=emission, functions=more)
     assert all(row.holds(profile) for row in rows.values()), "\n".join(
-        check.table(list(rows.values()))
+        comparison.table(list(rows.values()))
     )
     assert_stack_is_the_sum_of_frames(rows)
 
@@ -109,13 +110,13 @@ def test_forward_dynamics_keeps_its_budget(tmp_path, name, tail, emission, instr
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "tail"), [("m4", (1, 3)), ("m4", (3, 4)), ("m7", (1, 3))])
 def test_forward_dynamics_in_loops_is_small(tmp_path, name, tail):
-    from embedded import size_report
+    from embedded import size_tables
 
     model = folder(
         name, "fast", *tail, functions=["forward_dynamics"], contacts=[], emission="loops"
     )
     assert (
-        size_report.flash(image.build(model, board(name), tmp_path), "forward_dynamics") <= 6 * 1024
+        size_tables.flash(image.build(model, board(name), tmp_path), "forward_dynamics") <= 6 * 1024
     )
 
 
@@ -178,7 +179,9 @@ def test_a_wrong_bit_fails(host_image):
     }
     for off, kept in expected.items():
         other = exact + off * np.abs(exact).max()
-        row = check._compared(host_image, "forward_dynamics", result(other), result(exact), depths)
+        row = comparison._compared(
+            host_image, "forward_dynamics", result(other), result(exact), depths
+        )
         assert (row.holds("reproducible"), row.holds("fast")) == kept, off
 
 
@@ -187,7 +190,7 @@ def test_another_status_is_an_error(host_image):
     with pytest.raises(
         RuntimeError, match=r"forward_dynamics: status \(1,\) on host, \(0,\) on the host"
     ):
-        check._compared(host_image, "forward_dynamics", replace(ones, statuses=(1,)), ones, {})
+        comparison._compared(host_image, "forward_dynamics", replace(ones, statuses=(1,)), ones, {})
 
 
 def test_stored_states_are_the_same_in_both_precisions(host_image):

@@ -1,5 +1,6 @@
 """Refuses Python files that are too long to read; `make lint` runs it."""
 
+import argparse
 import sys
 from pathlib import Path
 
@@ -26,4 +27,5 @@ def main() -> int:
 
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(description=__doc__).parse_args()
     sys.exit(main())

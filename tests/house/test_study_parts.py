@@ -1,33 +1,152 @@
-"""Parts of studies: kept files are read, and made anew exactly where what they depend on has
-changed.
+"""Parts of studies: made side by side, each once whatever happens; kept ones are read, and made
+anew exactly where what they depend on has changed.
 """
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from pathlib import Path
 
 import numpy as np
 import pytest
+from filelock import FileLock
 
-from examples.studies.parts import as_flight, as_lists, digest, part
+import serpentail as st
+from examples.studies.parts import Part, as_flight, as_lists, digest, made
+from tests.support import tiny_study
 from tests.support.tumbling import planned
+
+ROOT = Path(__file__).parents[2]
+PATIENCE = 60  # s
+
+
+def one(folder, of, make, files=()):
+    """The result of a part called "one"."""
+    return made("study", folder, {"one": Part(make, of, files)})["one"]
 
 
 def test_parts_are_made_once(tmp_path):
-    path, made = tmp_path / "parts" / "one.json", []
+    path, ran = tmp_path / "parts" / "one.json", []
 
     def make():
-        made.append(len(made))
-        return {"rows": made, "lost": float("nan")}
+        ran.append(len(ran))
+        return {"rows": list(ran), "lost": float("nan")}
 
-    first, again = (part(path, {"starts": (1, 2)}, make) for _ in range(2))
+    first, again = (one(path.parent, {"starts": (1, 2)}, make) for _ in range(2))
     assert first["rows"] == again["rows"] == [0] and np.isnan(again["lost"])
-    assert part(path, {"starts": (1, 3)}, make)["rows"] == [0, 1]
+    assert one(path.parent, {"starts": (1, 3)}, make)["rows"] == [0, 1]
     path.write_text(path.read_text()[:-9])
-    assert part(path, {"starts": (1, 3)}, make)["rows"] == [0, 1, 2]
-    assert list(path.parent.iterdir()) == [path]
+    assert one(path.parent, {"starts": (1, 3)}, make)["rows"] == [0, 1, 2]
+    assert [p.name for p in path.parent.glob("*") if p.name != ".lock"] == ["one.json"]
+
+
+def test_a_part_is_made_anew_where_a_file_of_it_is_missing(tmp_path):
+    picture, ran = tmp_path / "picture.png", []
+
+    def make():
+        picture.write_bytes(b"")
+        ran.append(None)
+        return []
+
+    for _ in range(2):
+        one(tmp_path / "parts", {}, make, (picture,))
+    assert len(ran) == 1
+    picture.unlink()
+    one(tmp_path / "parts", {}, make, (picture,))
+    assert len(ran) == 2 and picture.exists()
 
 
 def test_a_part_that_fails_leaves_no_file(tmp_path):
     with pytest.raises(ZeroDivisionError):
-        part(tmp_path / "one.json", {}, lambda: 1 / 0)
-    assert not list(tmp_path.iterdir())
+        one(tmp_path, {}, lambda: 1 / 0)
+    assert not list(tmp_path.glob("*.json"))
+
+
+def test_what_a_killed_process_left_is_removed(tmp_path):
+    (tmp_path / ".one.json.0badcafe.part").write_text("half a p")
+    assert one(tmp_path, {}, lambda: [1]) == [1]
+    assert not list(tmp_path.glob(".*.part"))
+
+
+def test_two_runs_in_one_folder_are_refused(tmp_path):
+    lock = FileLock(tmp_path / ".lock")
+    with lock, pytest.raises(st.SerpentailError, match="another process makes parts"):
+        one(tmp_path, {}, lambda: [1])
+
+
+@pytest.fixture
+def results(tmp_path, monkeypatch):
+    """The results of the tiny study in one process."""
+    monkeypatch.setenv("SERPENTAIL_THREADS", "1")
+    (tmp_path / "serial").mkdir()
+    return str(sorted(made("tiny", tmp_path / "serial", tiny_study.parts(tmp_path)).items()))
+
+
+def started(folder, threads="3", **settings):
+    """Start the tiny study in processes."""
+    folder.mkdir(exist_ok=True)
+    return subprocess.Popen(
+        [sys.executable, "-m", "tests.support.tiny_study", str(folder)],
+        cwd=ROOT,
+        env=os.environ | {"SERPENTAIL_THREADS": threads},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        **settings,
+    )
+
+
+def ended(folder):
+    """How often each part ended, and in which processes parts did."""
+    path = folder / "ended"
+    rows = [line.split() for line in path.read_text().splitlines()] if path.exists() else []
+    return Counter(int(number) for number, _ in rows), {pid for _, pid in rows}
+
+
+def test_parts_side_by_side_are_those_one_after_the_other(tmp_path, results):
+    process = started(tmp_path / "many")
+    printed, errors = process.communicate(timeout=PATIENCE)
+    assert (process.returncode, printed) == (0, results + "\n"), errors
+    counts, processes = ended(tmp_path / "many")
+    assert counts == dict.fromkeys(range(tiny_study.PARTS), 1)
+    assert 2 <= len(processes) <= 3 and str(process.pid) not in processes
+
+
+def test_a_study_that_is_killed_goes_on_and_makes_no_part_twice(tmp_path, results):
+    folder, dice, kept = tmp_path / "many", random.Random(5), {}
+    for _ in range(4):
+        process = started(folder)
+        time.sleep(dice.uniform(0.5, 2.5))
+        process.kill()
+        process.communicate(timeout=PATIENCE)  # ends when the workers have, which hold its pipes
+        counts = ended(folder)[0]
+        assert {k: counts[k] for k in kept} == kept
+        whole = [int(path.stem.split()[1]) for path in (folder / "parts").glob("*.json")]
+        kept = {k: counts[k] for k in whole}
+    printed, errors = started(folder).communicate(timeout=PATIENCE)
+    assert printed == results + "\n", errors
+    counts = ended(folder)[0]
+    assert {k: counts[k] for k in kept} == kept and len(counts) == tiny_study.PARTS
+
+
+@pytest.mark.parametrize("whole", [True, False], ids=["terminal", "parent alone"])
+def test_ctrl_c_ends_all_in_one_line(tmp_path, whole):
+    folder = tmp_path / "many"
+    process = started(folder, start_new_session=True)
+    while not list((folder / "parts").glob("*.json")):
+        time.sleep(0.02)
+    (os.killpg if whole else os.kill)(process.pid, signal.SIGINT)
+    asked = time.monotonic()
+    printed, errors = process.communicate(timeout=PATIENCE)
+    assert time.monotonic() - asked < 5
+    assert process.returncode == 130 and printed == ""
+    *told, last = errors.splitlines()
+    assert last == "interrupted: the same command goes on from here"
+    assert all(line.startswith("tiny") for line in told)
 
 
 def test_digests_follow_the_sources(tmp_path):

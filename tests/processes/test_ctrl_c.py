@@ -215,28 +215,29 @@ def alive(pid: int) -> bool:
 STUDY = """
 import sys
 from pathlib import Path
-from examples.studies.parts import part, planned, run
+from examples.front import GOES_ON, run
+from examples.studies.parts import Part, made, planned
 from tests.support.tumbling import rat, start, AGAIN
 
-def main(folder):
-    part(folder / "first.json", {}, lambda: [1])
+def endless():
     print("ready", flush=True)
     stubborn = {"ipopt.tol": 1e-300, "ipopt.acceptable_iter": 0, "ipopt.max_iter": 10**6}
-    def endless():
-        while True:
-            planned(rat(), start=start(rat()), intervals=30, options=stubborn, **AGAIN)
-    part(folder / "second.json", {}, endless)
+    while True:
+        planned(rat(), start=start(rat()), intervals=30, options=stubborn, **AGAIN)
 
-run(main, Path(sys.argv[1]))
+def main(folder):
+    made("study", folder, {"first": Part(lambda: [1], {}), "second": Part(endless, {})})
+
+run(main, Path(sys.argv[1]), after=GOES_ON)
 """
 
 
 def test_a_study_keeps_its_parts_and_no_plan_that_was_stopped(tmp_path):
     rat()
-    process = child(STUDY, tmp_path)
+    process = child(STUDY, tmp_path, env=os.environ | {"SERPENTAIL_THREADS": "1"})
     assert process.stdout.readline() == "ready\n"
     _, errors, _ = ended(process, after=3.0)
     assert process.returncode == 130
-    assert errors.splitlines()[-1] == "  interrupted; what is finished is kept"
+    assert errors.splitlines()[-1] == "interrupted: the same command goes on from here"
     assert "Traceback" not in errors
-    assert [path.name for path in tmp_path.iterdir()] == ["first.json"]
+    assert [path.name for path in tmp_path.glob("*.json")] == ["first.json"]

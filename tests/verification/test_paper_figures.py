@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from examples.studies import models as study_models
+from examples.studies import models_motion as study_models
 from tests.support.models import model_folder
 
 ROOT = Path(__file__).parents[2]

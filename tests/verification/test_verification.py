@@ -158,7 +158,7 @@ def test_a_failed_check_states_its_law(model):
 
 def test_command_writes_reports_and_returns_one_where_a_check_failed(tmp_path, capsys, monkeypatch):
     folder, output = model_folder(1, 2), tmp_path / "reports"
-    assert verify_model.main([str(folder), "--output", str(output)]) == 0
+    assert verify_model.report(folder, output) == 0
     report = json.loads((output / "articulated_m1_n2.json").read_text())
     assert report["passed"] and report["counts"]["failed"] == 0
     text, printed = (output / "articulated_m1_n2.txt").read_text(), capsys.readouterr().out
@@ -168,10 +168,10 @@ def test_command_writes_reports_and_returns_one_where_a_check_failed(tmp_path, c
     monkeypatch.setattr(
         verify_model, "verify", lambda folder: [verify.Check("name", "Law.", 2.0, 1.0)]
     )
-    assert verify_model.main([str(folder), "--output", str(output)]) == 1
+    assert verify_model.report(folder, output) == 1
     assert "FAILED" in capsys.readouterr().out
 
 
 def test_command_refuses_what_is_no_model(tmp_path, capsys):
-    assert verify_model.main([str(tmp_path)]) == 2
+    assert verify_model.report(tmp_path, tmp_path) == 2
     assert "manifest.json" in capsys.readouterr().err

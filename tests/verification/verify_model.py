@@ -4,7 +4,6 @@ The others are the generator's interpreter, Pinocchio, MuJoCo, arithmetic of 40 
 tail in other segments.
 """
 
-import argparse
 import json
 import sys
 import tempfile
@@ -218,27 +217,17 @@ def split_errors(whole: st.Model, halves: st.Model, s: State) -> dict[str, float
     }
 
 
-def main(argv: list[str] | None = None) -> int:
+def report(folder: Path, output: Path) -> int:
     """Verify a folder, write the reports, print a short table; 1 if a check failed."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folder", type=Path, help="a generated folder")
-    parser.add_argument(
-        "--output", type=Path, default=Path("output/verify"), help="folder of the reports"
-    )
-    chosen = parser.parse_args(argv)
     try:
-        checks, model = verify(chosen.folder), st.load(chosen.folder)
+        checks, model = verify(folder), st.load(folder)
     except st.SerpentailError as error:
         print(error, file=sys.stderr)
         return 2
-    chosen.output.mkdir(parents=True, exist_ok=True)
-    report = chosen.output / f"{model.name}.txt"
-    report.write_text(as_text(model, checks) + "\n")
-    report.with_suffix(".json").write_text(json.dumps(summary(model, checks), indent=1) + "\n")
+    output.mkdir(parents=True, exist_ok=True)
+    path = output / f"{model.name}.txt"
+    path.write_text(as_text(model, checks) + "\n")
+    path.with_suffix(".json").write_text(json.dumps(summary(model, checks), indent=1) + "\n")
     print(as_short_text(model, checks))
-    print(f"  report: {report}")
+    print(f"  report: {path}")
     return 0 if all(c.passed for c in checks) else 1
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -1,0 +1,83 @@
+"""The plans of the righting study, each a part of it: by tail, from plain data to plain data."""
+
+import time
+from functools import cache
+
+import numpy as np
+
+import serpentail as st
+from examples import righting
+from examples.studies.parts import as_lists, planned
+
+EXAMPLE = 4  # the random start of Fig. 11: both ways of planning converge on it
+RAT = (1, 3)
+LIMIT = 300.0  # s a plan
+
+rat = cache(righting.model)
+
+
+def content(size: tuple) -> dict:
+    """Build a tail's model, and tell which it is."""
+    return {"content_hash": rat(*size).manifest["content_hash"]}
+
+
+def section_4_2() -> dict:
+    """Plan from the kick's state within 0.58 s; flights that follow the plan, by its torques and by
+    feedback, and one whose tail only damps.
+    """
+    model = rat(*RAT)
+    start, limits = righting.kicked(model), righting.bounds(model)
+    given = {"start": start, "bounds": limits, "duration": (0.3, righting.FLIGHT)}
+    plan = planned(model, retries=8, time_limit=LIMIT, **given)
+    flights = {"planned": plan.trajectory, "tracked": righting.tracked(model, plan)}
+    flights["passive"] = righting.passive(model, start, plan.duration)
+    at = np.clip(plan.trajectory.t, 0, flights["tracked"].t[-1])
+    deviation = flights["tracked"].resample(at).tail - plan.trajectory.tail
+    row = righting.row(plan) | {
+        "mean_rad": deviation.mean(axis=0).tolist(),
+        "std_rad": deviation.std(axis=0).tolist(),
+    }
+    return {"row": row, "flights": {kind: as_lists(flight) for kind, flight in flights.items()}}
+
+
+def example(settings: dict) -> dict:
+    """Fig. 11: plan from one random start."""
+    model = rat(*RAT)
+    common = {"start": righting.tumbling(model, EXAMPLE), "bounds": righting.bounds(model)}
+    return righting.row(
+        planned(model, duration=righting.FLIGHT, time_limit=LIMIT, **common, **settings)
+    )
+
+
+def true(size: tuple) -> dict:
+    """Sect. 4.3: plan from the kick's state until the plan is true."""
+    model = rat(*size)
+    start, limits = righting.kicked(model), righting.bounds(model, 2 * np.pi)
+    given = {"start": start, "bounds": limits, "duration": (0.3, righting.FLIGHT)}
+    plan = planned(model, retries=8, time_limit=LIMIT, **given)
+    return {"row": righting.row(plan), "flight": as_lists(plan.trajectory)}
+
+
+def paper(size: tuple) -> dict:
+    """Sect. 4.3: plan from the kick's state as the paper does, at 100 Hz."""
+    model = rat(*size)
+    start, limits = righting.kicked(model), righting.bounds(model, 2 * np.pi)
+    given = {"start": start, "bounds": limits, "duration": righting.FLIGHT}
+    plan = planned(model, **righting.PAPER, intervals=58, time_limit=LIMIT, **given)
+    return righting.row(plan)
+
+
+def block(size: tuple, starts: list[int], any_rate: bool, settings: dict) -> list[dict]:
+    """Plan from random starts; the whole tail bends by 180 degrees as in Sect. 4.2, or by 360 as in
+    4.3.  Upright at rest, or at any rate.
+    """
+    model, rows = rat(*size), []
+    limits = righting.bounds(model, np.pi if size == RAT else 2 * np.pi)
+    given = {"duration": (0.3, righting.FLIGHT), "bounds": limits, "time_limit": LIMIT}
+    if any_rate:
+        given["goal"] = st.Goal(torso_rate=None)
+    for k in starts:
+        begun = time.process_time()
+        plan = planned(model, start=righting.tumbling(model, k), track=False, **given, **settings)
+        rows.append(righting.row(plan) | {"start": k, "cpu_s": time.process_time() - begun})
+    return rows
