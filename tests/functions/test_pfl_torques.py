@@ -69,6 +69,7 @@ def test_operations_are_those_of_the_function():
     np.testing.assert_allclose(found, model.pfl(q, v, v_dot[6:]), rtol=1e-10)
 
 
+@pytest.mark.filterwarnings("ignore::serpentail.UnusualSize")
 def test_under_a_torso_that_stays_a_link_needs_its_own_inertia():
     """One link on a torso so heavy that it stays: tau = (I + m (L / 2)^2) alpha_ddot."""
     parameters = {"torso_mass": 1e9, "torso_inertia": [1e9, 1e9, 1e9]}

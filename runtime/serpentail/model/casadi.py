@@ -83,8 +83,10 @@ class CasadiFunctions:
         return "\n  ".join([head, *lines]) + ">"
 
     def __dir__(self) -> list[str]:
-        symbolic = self._module.SIGNATURES if self._has_module else ()
-        return [*symbolic, "x_dot", "symbolic", "external", "parameter_vector"]
+        symbolic = [*self._module.SIGNATURES] if self._has_module else []
+        if "forward_dynamics" in symbolic:
+            symbolic.append("x_dot")
+        return [*symbolic, "symbolic", "external", "parameter_vector"]
 
     @property
     def parameter_vector(self) -> casadi.DM:

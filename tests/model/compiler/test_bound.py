@@ -110,7 +110,7 @@ def test_command_tells_and_empties(model, cache, capsys):
     assert cli.main(["cache", "--json", "-"]) == 0
     report = json.loads(capsys.readouterr().out)
     assert report.pop("bytes") > sum(library.stat().st_size for library in libraries)
-    counts = {"libraries": 2, "models": 0, "compilers": 1}
+    counts = {"libraries": 2, "models": 0, "builds": 0, "compilers": 1}
     assert report == {"folder": str(cache), **counts, "limit": 2**30}
     (cache / "mine.txt").touch()
     (cache / "libraries" / "mine").mkdir()
@@ -129,5 +129,5 @@ def test_command_tells_and_empties(model, cache, capsys):
 def test_command_where_there_is_no_cache(cache, capsys):
     for arguments in (["cache"], ["cache", "--clean"]):
         assert cli.main(arguments) == 0
-        assert capsys.readouterr().out.startswith(f"folder {' ' * 23}{cache}\n")
+        assert capsys.readouterr().out.splitlines()[0].split() == ["folder", str(cache)]
     assert not cache.exists()
