@@ -10,6 +10,7 @@ from typing import Any
 
 from ..checks import Refusals, none_of, refusal
 from ..errors import PlanningError
+from ..extras import needed
 from ..model.model import Model
 from .nlp.fork_gate import forks_wait
 from .nlp.interrupt import stoppable
@@ -67,8 +68,10 @@ def plan(
     derives nothing.  Ctrl-C ends the search, as the time limit does, and the best so far is
     returned; a second one raises KeyboardInterrupt.
     Returns a Plan; look at its ``success`` and ``report``.  Raises PlanningError (a field, its
-    value, the remedy), ModelError (the scene lacks functions).
+    value, the remedy), ModelError (the scene lacks functions), ExtraMissing without the extra
+    "plan".
     """
+    needed("casadi", "plan")
     watch = _watch(settings.pop("watch", None))
     problem, checked = _checked(model, (start, goal, duration, bounds), settings)
     missing = [name for name in NEEDED if name not in model.generated]
