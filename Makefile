@@ -2,7 +2,11 @@
 PYTHON ?= python3
 VENV   := .venv
 PY     := $(VENV)/bin/python
+# what is installed: what the demo uses, the page of runs, all the rest
+DRAWS  := $(VENV)/.draws
+PAGED  := $(VENV)/.paged
 READY  := $(VENV)/.ready
+UV     ?= $(shell command -v uv)
 
 TAIL ?= articulated
 M    ?= 1
@@ -35,13 +39,13 @@ GENERATE := $(PY) -m serpentail_codegen
 FOLDER   := "$$($(GENERATE) --print-folder $(WANTED))"
 PAGE     := $(wildcard hatch_build.py viewer/*.* viewer/src/*)
 
-.PHONY: help setup demo test test-portable test-all model verify bench stress mutants embedded size-report studies study-models study-righting study-contact lint golden clean
+.PHONY: help setup demo test test-portable test-all model verify bench stress mutants embedded size-report studies study-models study-righting study-contact wheels lint golden clean
 .DELETE_ON_ERROR:
 
 help:
 	@echo "serpentail: dynamics of a floating body with a serpentine tail, generated"
 	@echo
-	@echo "  make setup                                 .venv with everything"
+	@echo "  make setup                                 .venv with everything, by uv where it is on PATH"
 	@echo "  make demo                                  the paper's rat: generate, compile, simulate, draw"
 	@echo "  make test                                  the quick tests;  make test-all: every test, models optimised"
 	@echo "  make test   ROOM=simulation                the tests of one room, a folder of tests/"
@@ -61,22 +65,44 @@ help:
 	@echo "  make study-righting                        the paper's Figs. 9 to 13, Table 2: righting, planned and true"
 	@echo "  make study-contact                         kick, jump from the tail, self-recovery: films, plots, a table"
 	@echo "  make studies                               all; STARTS=200 random starts in the second"
+	@echo "  make wheels                                builds wheel and sdist, installs the wheel for each Python that is here"
 	@echo "  make lint                                  style, import rules, types, lengths of files"
 	@echo "  make golden                                accept what the generator emits now as the golden models"
 	@echo "  make clean                                 remove what was generated, and output/"
 
+ifneq ($(UV),)
+ENVIRONMENT := $(UV) venv --quiet --seed --python $(PYTHON) $(VENV)
+INSTALL := $(UV) pip install --quiet --python $(PY) --reinstall-package serpentail
+else
+ENVIRONMENT := $(PYTHON) -m venv $(VENV)
+INSTALL := $(PY) -m pip install --quiet --disable-pip-version-check
+endif
+TELL_PAGE := test -f runtime/serpentail/viewer/page.html || \
+             echo 'no page of runs: it needs Node.js 18 or newer, and npm its packages'
+
 setup: $(READY)
 
-$(READY): pyproject.toml $(PAGE)
+# The page needs Node.js and npm, which would keep the first picture waiting.
+$(DRAWS): pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 	  { echo "Python 3.11 or newer is needed, $(PYTHON) is older: make setup PYTHON=python3.11"; exit 1; }
-	@test -x $(PY) || $(PYTHON) -m venv $(VENV)
-	$(PY) -m pip install --quiet --disable-pip-version-check --editable '.[dev,peers]'
-	@test -f runtime/serpentail/viewer/page.html || echo 'no page of runs: it needs Node.js 18 or newer, and npm its packages'
+	@test -x $(PY) || $(ENVIRONMENT)
+	SERPENTAIL_PAGE=later $(INSTALL) --editable '.[plan,plot]'
 	@touch $@
 
-demo: $(READY)
+$(PAGED): $(PAGE) | $(DRAWS)
+	$(INSTALL) --no-deps --editable .
+	@$(TELL_PAGE)
+	@touch $@
+
+$(READY): $(DRAWS) $(PAGE)
+	$(INSTALL) --editable '.[dev,peers]'
+	@$(TELL_PAGE)
+	@touch $(PAGED) $@
+
+demo: $(DRAWS)
 	$(PY) examples/demo.py
+	@$(MAKE) --no-print-directory $(PAGED)
 
 # What pytest and Python compile is kept, away from the sources; seconds of every process.
 test test-portable test-all: export PYTHONDONTWRITEBYTECODE :=
@@ -135,6 +161,9 @@ study-contact: $(READY)
 	$(PY) -m examples.studies.contact
 
 studies: study-models study-righting study-contact
+
+wheels: $(READY)
+	$(PY) -m tests.packaging.wheels
 
 golden: $(READY)
 	$(PY) -m pytest tests/house/test_golden.py tests/house/test_functions_document.py --update-golden

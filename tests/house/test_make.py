@@ -16,6 +16,7 @@ VARIABLES = {"TAIL", "M", "N", "SCENE", "REAL", "EMISSION", "BAKED", "FUNCTIONS"
 ORDER = ("TAIL=articulated", "M=1", "N=1", "FUNCTIONS=mass_matrix")
 NAME = "articulated_m1_n1_fc4a05d"  # of these functions
 UP_TO_DATE = rf"generated/{NAME}: up to date, \d+\.\d\d s\n"
+STAMPS = (".draws", ".paged", ".ready")  # of what is installed, each after those before it
 # Programs of .venv: this interpreter, and no installation, which would reach the real environment.
 PROGRAM = (
     '#!/bin/sh\ncase "$*" in *"pip install"*) echo "no pip in here" >&2; exit 9;; esac\nexec {} '
@@ -38,7 +39,8 @@ def tree(tmp_path):
     ):
         (programs / name).write_text(PROGRAM.format(command))
         (programs / name).chmod(0o755)
-    (tmp_path / ".venv" / ".ready").touch()
+    for stamp in STAMPS:
+        (tmp_path / ".venv" / stamp).touch()
     return tmp_path
 
 
@@ -52,7 +54,7 @@ def make(tree):
             for k, v in os.environ.items()
             if k not in VARIABLES and not re.match("MAKE|MFLAGS", k)
         }
-        own |= {"PYTHONPATH": str(tree / "codegen"), "LC_ALL": "C", **more}
+        own |= {"PYTHONPATH": str(tree / "codegen"), "LC_ALL": "C", "UV": "", **more}
         return subprocess.run(
             ["make", *arguments], cwd=tree, env=own, capture_output=True, text=True, check=False
         )
@@ -279,7 +281,7 @@ def test_clean_removes_what_was_made(tree, make):
 
 def test_old_environment_is_installed_again(tree, make):
     """A newer pyproject.toml leads to pip, which this stand-in refuses."""
-    os.utime(tree / ".venv" / ".ready", (0, 0))
+    os.utime(tree / ".venv" / ".draws", (0, 0))
     done = make("model", *ORDER)
     assert done.returncode == 2 and "no pip in here" in done.stderr
     assert not (tree / "generated" / NAME).exists()

@@ -4,7 +4,6 @@ from pathlib import Path
 
 from ..extras import needed
 from ..motion.trajectory import Trajectory
-from .labelled import EXTRA
 
 WRITERS = {".npz": "save", ".csv": "to_csv", ".nc": "to_netcdf"}
 
@@ -23,7 +22,7 @@ def checked(path: str) -> Path:
     if target.suffix not in WRITERS:
         raise ValueError(f"its name ends in {target.suffix}, which is none of {', '.join(WRITERS)}")
     if target.suffix == ".nc":
-        needed("xarray", EXTRA)
+        needed("xarray", "xarray")
     return target
 
 

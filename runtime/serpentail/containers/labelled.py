@@ -11,12 +11,10 @@ from .contents import Contents
 if TYPE_CHECKING:
     import xarray
 
-EXTRA = "xarray"
-
 
 def dataset(held: Contents) -> "xarray.Dataset":
     """Return the dataset; ExtraMissing without xarray."""
-    xarray = needed("xarray", EXTRA)
+    xarray = needed("xarray", "xarray")
     coordinates: dict[str, Any] = {name: (name, list(each)) for name, each in held.labels.items()}
     coordinates["time"] = ("time", held.labels["time"], {"units": "s", "long_name": "time"})
     if held.groups:

@@ -15,7 +15,6 @@ from .contents import Contents, Variable
 if TYPE_CHECKING:
     import pandas
 
-EXTRA = "pandas"
 BARE = ("q", "v")  # whose labels are names enough
 Column = tuple[str, np.ndarray]  # its unit, and its numbers (rows,)
 
@@ -50,7 +49,7 @@ def frame(held: Contents) -> "pandas.DataFrame":
 
     ExtraMissing without pandas.
     """
-    pandas = needed("pandas", EXTRA)
+    pandas = needed("pandas", "pandas")
     index = pandas.MultiIndex.from_product(
         [held.labels[name] for name in held.leading], names=list(held.leading)
     )

@@ -48,7 +48,12 @@ def digest(data: object) -> str:
 
 
 def refuse_others(*paths: Path) -> None:
-    """Raise SerpentailError where others than the user and root own or may write what is there."""
+    """Raise SerpentailError where others than the user and root own or may write what is there.
+
+    Windows tells neither owners nor rights in this way: a cache there is as safe as its folder.
+    """
+    if not hasattr(os, "geteuid"):
+        return
     for path in paths:
         with contextlib.suppress(OSError):
             status = os.stat(path)

@@ -38,7 +38,7 @@ def _running(
         stderr=subprocess.PIPE,
         encoding="utf-8",
         errors="replace",
-        process_group=0,
+        process_group=0,  # Windows has none, and overlooks it
     ) as process:
         try:
             yield process
@@ -49,6 +49,9 @@ def _running(
 
 def _end(process: subprocess.Popen[str]) -> None:
     """End a process and what it has started: a compiler's driver leaves the compiler to itself."""
+    if not hasattr(os, "killpg"):  # on Windows
+        process.kill()
+        return
     os.killpg(process.pid, signal.SIGTERM)
     with suppress(subprocess.TimeoutExpired):
         process.wait(GRACE_S)

@@ -11,7 +11,7 @@ from types import ModuleType
 from .. import __version__
 from ..errors import ModelError
 from .kept import kept
-from .reading import handle_of, leads_to, regular_bytes
+from .reading import Held, held
 
 FORMAT = 2
 KEYS = [
@@ -79,13 +79,13 @@ def remedy(folder: Path) -> str:
 
 
 def _read(folder: Path) -> CheckedFolder:
-    """Return what one handle of the folder shows; Exchanged where the folder is another by then."""
+    """Return what a folder that is held shows; Exchanged where the folder is another by then."""
     try:
-        with handle_of(folder) as handle:
+        with held(folder) as opened:
             try:
-                return _checked(folder, handle)
+                return _checked(folder, opened)
             except ModelError as error:
-                if leads_to(folder, handle):
+                if opened.is_there():
                     raise
                 raise Exchanged(f"{folder} is exchanged all the time: load it later") from error
     except (FileNotFoundError, NotADirectoryError, ValueError) as error:
@@ -109,11 +109,11 @@ def _unreadable(folder: Path, path: Path, error: OSError) -> ModelError:
     return ModelError(f"{path} cannot be read ({error.strerror}): {remedy(folder)}")
 
 
-def _checked(folder: Path, handle: int) -> CheckedFolder:
+def _checked(folder: Path, opened: Held) -> CheckedFolder:
     """Return the manifest and the files that it names, each read once."""
     path = folder / "manifest.json"
     try:
-        text = regular_bytes(path.name, handle)
+        text = opened.read(path.name)
     except FileNotFoundError as error:
         raise _no_folder(folder) from error
     except OSError as error:
@@ -124,7 +124,7 @@ def _checked(folder: Path, handle: int) -> CheckedFolder:
         names = {name: digest for name, digest in manifest["files"].items() if _inside(name)}
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise ModelError(f"{path} is damaged ({error}): {remedy(folder)}") from error
-    return CheckedFolder(folder, manifest, {n: _file(folder, handle, n, names[n]) for n in names})
+    return CheckedFolder(folder, manifest, {n: _file(folder, opened, n, names[n]) for n in names})
 
 
 def _inside(name: str) -> bool:
@@ -135,11 +135,11 @@ def _inside(name: str) -> bool:
     return True
 
 
-def _file(folder: Path, handle: int, name: str, digest: str) -> bytes:
+def _file(folder: Path, opened: Held, name: str, digest: str) -> bytes:
     """Return a file's content, which must have this digest."""
     path = folder / name
     try:
-        content = regular_bytes(name, handle)
+        content = opened.read(name)
     except OSError as error:
         raise _unreadable(folder, path, error) from error
     if _sha256(content) != digest:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import ModelError, SerpentailError
+from ..extras import needed
 from .batch import BatchLibrary
 from .cache import cache_folder
 from .cores import checked_threads
@@ -225,7 +226,11 @@ class Model(Functions):
 
     @kept
     def casadi(self) -> "CasadiFunctions":
-        """``casadi.Function``s by name, parameters folded in: ``model.casadi.energy(q, v)``."""
+        """``casadi.Function``s by name, parameters folded in: ``model.casadi.energy(q, v)``.
+
+        ExtraMissing without the extra "plan".
+        """
+        needed("casadi", "plan")
         from .casadi import CasadiFunctions
 
         return CasadiFunctions(self)

@@ -5,7 +5,11 @@ import os
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
+
+# Windows has only the last, and opens no folders: files there are found by their paths.
+PLAIN = sum(getattr(os, name, 0) for name in ("O_NONBLOCK", "O_CLOEXEC", "O_BINARY"))
 
 
 def regular_bytes(path: str | Path, folder: int | None = None) -> bytes:
@@ -13,7 +17,7 @@ def regular_bytes(path: str | Path, folder: int | None = None) -> bytes:
 
     OSError where it cannot be read, or is a pipe, a device or a folder: nothing waits for a writer.
     """
-    handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC, dir_fd=folder)
+    handle = os.open(path, os.O_RDONLY | PLAIN, dir_fd=folder)
     try:
         if not stat.S_ISREG(os.fstat(handle).st_mode):
             raise OSError(errno.EINVAL, "not a regular file", str(path))
@@ -23,19 +27,37 @@ def regular_bytes(path: str | Path, folder: int | None = None) -> bytes:
         os.close(handle)
 
 
+@dataclass(frozen=True)
+class Held:
+    """A folder as it was first seen; its handle, if any, stays with it wherever it is moved."""
+
+    path: Path
+    seen: os.stat_result
+    handle: int | None
+
+    def read(self, name: str) -> bytes:
+        """Return the content of a file in it; OSError as of ``regular_bytes``."""
+        if self.handle is None:
+            return regular_bytes(self.path / name)
+        return regular_bytes(name, self.handle)
+
+    def is_there(self) -> bool:
+        """Tell whether its path still leads to it."""
+        try:
+            return os.path.samestat(os.stat(self.path), self.seen)
+        except OSError:
+            return False
+
+
 @contextmanager
-def handle_of(folder: Path) -> Iterator[int]:
-    """Lend a handle of a folder, which stays with that folder wherever it is moved."""
-    handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+def held(folder: Path) -> Iterator[Held]:
+    """Lend a folder to read; OSError where it is none."""
+    if os.open not in os.supports_dir_fd:
+        os.listdir(folder)  # NotADirectoryError for a file
+        yield Held(folder, os.stat(folder), None)
+        return
+    handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | PLAIN)
     try:
-        yield handle
+        yield Held(folder, os.fstat(handle), handle)
     finally:
         os.close(handle)
-
-
-def leads_to(path: Path, handle: int) -> bool:
-    """Tell whether a path still leads to the folder of a handle."""
-    try:
-        return os.path.samestat(os.stat(path), os.fstat(handle))
-    except OSError:
-        return False

@@ -44,7 +44,10 @@ REMEDY_NOT_FOUND = (
 )
 # What a compiler is given of the environment: much else that it reads, such as CPATH, changes what
 # it makes.  Of these the places do not, and the rest is part of every key.
-PLACES = ("PATH", "HOME", "TMPDIR", "XDG_CACHE_HOME", "XDG_CONFIG_HOME", "PYTHONPATH")
+PLACES = (
+    *("PATH", "HOME", "TMPDIR", "XDG_CACHE_HOME", "XDG_CONFIG_HOME", "PYTHONPATH"),
+    *("APPDATA", "LOCALAPPDATA", "PATHEXT", "SYSTEMROOT", "TEMP", "TMP", "USERPROFILE"),  # Windows
+)
 KEPT = ("LD_LIBRARY_PATH", "SDKROOT", "DEVELOPER_DIR", "MACOSX_DEPLOYMENT_TARGET")
 KEPT_OF = ("CCACHE_", "SCCACHE_", "ZIG_", "NIX_")  # wrappers of compilers
 
@@ -256,4 +259,6 @@ def _processor() -> str:
         )
         lines = Path("/proc/cpuinfo").read_text(errors="replace").splitlines()
         return "\n".join(sorted({line for line in lines if line.startswith(names)}))
-    return " ".join(os.uname())
+    if hasattr(os, "uname"):
+        return " ".join(os.uname())
+    return os.environ.get("PROCESSOR_IDENTIFIER", sys.platform)  # on Windows

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..checks import number
 from ..errors import ViewError
+from ..extras import needed
 from ..model.model import Model
 from ..motion.trajectory import Trajectory
 from ..viewer.view import checked_motions, template, view
@@ -38,7 +39,7 @@ def film(
     by default slow motion that lasts about 4 s, or life's speed where that lasts longer.  views,
     names, model: as ``st.filmstrip``; the page has its own views.  The file is written whole or not
     at all.  Raises ViewError with argument, value and remedy, ModelError where the model lacks
-    ``tail_points``.
+    ``tail_points``, ExtraMissing without the extra "plot".
     """
     target = film_path(path)
     kind = target.suffix.lower()
@@ -61,7 +62,7 @@ def film(
 
 def film_path(path: str | os.PathLike[str]) -> Path:
     """Return the path of a film; ViewError where its suffix is unknown, or an encoder or the page
-    that it needs is missing.
+    that it needs is missing, ExtraMissing for a picture without the extra "plot".
     """
     target = Path(path)
     kind = target.suffix.lower()
@@ -72,6 +73,8 @@ def film_path(path: str | os.PathLike[str]) -> Path:
         encoder()
     if kind == ".html":
         template()
+    else:
+        needed("matplotlib", "plot")
     return target
 
 

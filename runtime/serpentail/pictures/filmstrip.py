@@ -11,6 +11,7 @@ import numpy as np
 
 from ..checks import numbers_in, refusal
 from ..errors import ViewError
+from ..extras import needed
 from ..model.model import Model
 from ..motion.trajectory import Trajectory
 from ..viewer.samples import centre_of_mass
@@ -105,8 +106,9 @@ def filmstrip(
     to this .pdf, .png or .svg file, whole or not at all.  Where a motion stays above the ground, or
     touches it, the ground is drawn, and what is below it is pale.  Arrows are the ground's forces.
     Raises ViewError with argument, value and remedy, ModelError where the model lacks
-    ``tail_points``.
+    ``tail_points``, ExtraMissing without the extra "plot".
     """
+    needed("matplotlib", "plot")
     strip = strip_of(checked_motions(motions), frames, views_of(views), names, model)
     return drawn(lambda: _draw(strip), path)
 

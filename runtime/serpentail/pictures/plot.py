@@ -9,6 +9,7 @@ import numpy as np
 
 from ..checks import one_of
 from ..errors import ViewError
+from ..extras import needed
 from ..model.model import Model
 from ..motion.trajectory import Trajectory
 from .panels import PANELS, Panel
@@ -42,8 +43,9 @@ def plot(
     many as panels; without them a figure of its own.  path: also write the figure to this .pdf,
     .png or .svg file, whole or not at all.  model: of a motion from a file, so that the bends of
     its segments are known.  Vertical lines are touch-downs (solid) and take-offs (dashed).
-    Raises ViewError with argument, value and remedy.
+    Raises ViewError with argument, value and remedy, ExtraMissing without the extra "plot".
     """
+    needed("matplotlib", "plot")
     names = [one_of(f"panels[{k}]", name, PANELS, ViewError) for k, name in enumerate(panels)]
     if len(motion.t) < 2:
         raise ViewError("motion: one sample: give at least two to draw over time")

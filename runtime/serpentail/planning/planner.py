@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from inspect import Parameter, signature
 from typing import Any, Never
 
+from .. import extras
 from ..checks import Refusals, needed, none_of
 from ..errors import PlanningError
 from ..model.model import Model
@@ -102,8 +103,10 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
     derives nothing.  Ctrl-C ends the search, as the time limit does, and the best so far is
     returned; a second one raises KeyboardInterrupt.
     Returns a Plan; look at its ``success`` and ``report``.  Raises PlanningError (fields, their
-    values, remedies), ModelError (the scene lacks functions).
+    values, remedies), ModelError (the scene lacks functions), ExtraMissing without the extra
+    "plan".
     """
+    extras.needed("casadi", "plan")
     refused = Refusals(PlanningError)
     for name in unknown:
         refused.add(name, none_of("setting", name, NAMES))

@@ -4,6 +4,7 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
+from .. import extras
 from ..checks import Refusals, needed, refusal, shown
 from ..errors import PlanningError
 from ..planning.planner import plan
@@ -22,8 +23,9 @@ def planned(path: str, folder: str | None = None) -> Plan:
 
     path: a scene file, or the name of an example; folder: of its model, where that was generated;
     None: it is built, or was.  Raises PlanningError with field, value and
-    remedy, ModelError where the folder is of another scene.
+    remedy, ModelError where the folder is of another scene, ExtraMissing without the extra "plan".
     """
+    extras.needed("casadi", "plan")  # before the model is built
     tables, place = read_scene(path, PlanningError)
     arguments = plan_arguments(subtable(tables, "plan", place, PlanningError))
     return plan(model_of(tables, place, folder, {}), **arguments)

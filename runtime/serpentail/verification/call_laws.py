@@ -37,7 +37,7 @@ def batches_are_singles(model: Model, s: State) -> Errors:
     return errors
 
 
-@law(units=VALUE_LIMIT)
+@law(units=VALUE_LIMIT, casadi=True)
 def casadi_functions_agree(model: Model, s: State) -> Errors:
     """The CasADi functions of SX operations give what the C gives, v_dot relative to cond(H)."""
     return {
@@ -49,7 +49,7 @@ def casadi_functions_agree(model: Model, s: State) -> Errors:
     }
 
 
-@law(only="double")
+@law(only="double", casadi=True)
 def casadi_externals_are_the_compiled_code(model: Model, s: State) -> Errors:
     """casadi.external on the compiled C gives the bits of the model's own call."""
     errors = {}

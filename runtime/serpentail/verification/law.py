@@ -32,6 +32,7 @@ class Law:
     units: float = 0.0  # limit, in roundings (eps) of the model's real type
     floor: float = 0.0  # limit of what has other reasons than rounding
     only: str = ""  # real type or kind of tail of the models that it holds for
+    casadi: bool = False  # whether it evaluates CasADi functions
 
     def limit(self, model: Model) -> float:
         """Return the limit, which grows with the links of a segment.

@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import SerpentailError
+from ..errors import ExtraMissing, SerpentailError
+from ..extras import needed
 from ..model.model import Model
 from . import call_laws, contact_laws, derivative_laws, frame_laws, value_laws
 from .law import Law
@@ -85,6 +86,11 @@ def unchecked(entry: Law, model: Model) -> str:
     kinds += ["contact"] if model.contacts else []
     if entry.only not in kinds:
         return f"only for {entry.only} models"
+    if entry.casadi:
+        try:
+            needed("casadi", "plan")
+        except ExtraMissing as missing:
+            return str(missing)
     absent = ", ".join(name for name in entry.needs if name not in model.generated)
     return f"not generated: {absent}" if absent else ""
 

@@ -16,7 +16,6 @@ from ..planning.result.plan import Plan
 from ..viewer.shape import length
 from .poses import Instances, animal
 
-EXTRA = "live"
 EYE = np.array([2.0, -1.0, 0.7])  # from the animal, in its lengths
 POSES = 9  # of a plan, seen at once
 COLOURS = {
@@ -37,7 +36,7 @@ def live(model: Model, *, host: str = "127.0.0.1", port: int = 8080) -> "Live":
     model lacks ``tail_points``.
     """
     model.kernel("tail_points")
-    viser = needed("viser", EXTRA)
+    viser = needed("viser", "live")
     return Live(model, viser.ViserServer(host=host, port=port, label=model.name, verbose=False))
 
 
@@ -47,7 +46,7 @@ class Live:
     def __init__(self, model: Model, server: Any):
         self.model, self.server = model, server
         self.nodes: dict[str, Any] = {}
-        solids = needed("trimesh", EXTRA).creation
+        solids = needed("trimesh", "live").creation
         ball, rod = solids.icosphere(subdivisions=3), solids.cylinder(1.0, 1.0, sections=ROUND)
         self.meshes = dict.fromkeys(("tail", "legs"), rod)
         self.meshes |= dict.fromkeys(("back", "belly", "head"), ball)

@@ -1,0 +1,1 @@
+"""What is published: the wheel, its contents, and its use in empty environments."""

@@ -1,0 +1,143 @@
+"""Builds the sdist and of it the wheel, and uses the wheel as strangers do, for each Python here.
+
+Usage: python -m tests.packaging.wheels [FOLDER], by default output/dist, where both are left
+"""
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from tests.packaging.contents import ROOT, faults
+
+VERSIONS = ("3.11", "3.12", "3.13")
+PATIENCE_S = 300.0
+PROGRAM = """
+import numpy as np, serpentail as st
+wanted = ["forward_dynamics", "rollout", "energy", "momentum"]
+model = st.build(tail="articulated", segments=1, links=2, functions=wanted)
+flight = st.simulate(model, [0, 0, 1, 1, 0, 0, 0, 0, 0], np.zeros(8), t_span=0.1)
+assert abs(flight.q[-1, 2] - (1 - 9.8 / 2 * 0.1**2)) < 1e-9, flight.q[-1, 2]
+"""
+TINY = ["generate", "--tail", "articulated", "--segments", "1", "--links", "1"]
+MADE = ("generated/articulated_m1_n1/articulated_m1_n1_casadi.py", "kick.html")
+WORKS = (  # without any extra
+    ["serpentail", "--version"],
+    ["serpentail", "examples"],
+    ["serpentail", "simulate", "kick", "--json", "-", "--save", "kick.npz"],
+    ["serpentail", "view", "kick.npz"],
+    ["serpentail", "verify", "righting_m1_n3"],
+    ["serpentail", "info", "righting_m1_n3"],
+    ["serpentail", *TINY],
+    ["python", "-c", PROGRAM],
+)
+REFUSED = {  # what names the extra that it needs
+    "plan": ["serpentail", "plan", "righting_m1_n3"],
+    "plot": ["serpentail", "simulate", "kick", "--film", "kick.png"],
+    "completion": ["serpentail", "completion", "bash"],
+}
+UV = shutil.which("uv")
+
+
+def main(folder: Path) -> int:
+    """Build and try everything; 1 where something failed, which is told."""
+    wheel = build(folder)
+    tell_all = faults(wheel, page=shutil.which("npm") is not None)
+    with tempfile.TemporaryDirectory() as scratch:
+        cache = Path(scratch) / "cache"
+        for version in VERSIONS:
+            begun, python = time.monotonic(), interpreter(version)
+            if python is None:
+                print(f"Python {version}: is not here, so the wheel was not tried", flush=True)
+                continue
+            found = tried(wheel, python, Path(scratch) / version, cache)
+            tell_all += [f"Python {version}: {fault}" for fault in found]
+            verdict = "FAILED" if found else "works"
+            print(f"Python {version}: {verdict}, {time.monotonic() - begun:.0f} s", flush=True)
+    print(*tell_all, sep="\n", end="\n" if tell_all else "")
+    return 1 if tell_all else 0
+
+
+def build(folder: Path) -> Path:
+    """Return the wheel of the sdist of the checkout, both of which twine accepts."""
+    shutil.rmtree(folder, ignore_errors=True)
+    installer = ["--installer", "uv"] if UV else []
+    own = [sys.executable, "-m"]
+    subprocess.run([*own, "build", *installer, "--outdir", folder, ROOT], check=True)
+    (wheel,), (sdist,) = folder.glob("*.whl"), folder.glob("*.tar.gz")
+    subprocess.run([*own, "twine", "check", "--strict", wheel, sdist], check=True)
+    return wheel
+
+
+def interpreter(version: str) -> str | None:
+    """Return a Python of a version that can make environments: of PATH, pyenv or uv."""
+    question = "import ensurepip, sys; print('%d.%d' % sys.version_info[:2])"
+    for candidate in candidates(version):
+        done = subprocess.run([candidate, "-c", question], capture_output=True, check=False)
+        if done.stdout.decode().strip() == version:
+            return candidate
+    return None
+
+
+def candidates(version: str) -> Iterator[str]:
+    """Yield programs that may be a Python of a version."""
+    on_path = shutil.which(f"python{version}")
+    if on_path:
+        yield on_path
+    if "PYENV_ROOT" in os.environ:
+        found = Path(os.environ["PYENV_ROOT"]).glob(f"versions/{version}.*/bin/python")
+        yield from map(str, sorted(found))
+    if UV:
+        command = [UV, "python", "find", "--no-python-downloads", version]
+        done = subprocess.run(command, capture_output=True, check=False)
+        if done.returncode == 0:
+            yield done.stdout.decode().strip()
+
+
+def tried(wheel: Path, python: str, home: Path, cache: Path) -> list[str]:
+    """Install the wheel alone, use it in an empty folder, and return what failed."""
+    environment, empty = home / "environment", home / "empty"
+    empty.mkdir(parents=True)
+    programs = environment / ("Scripts" if os.name == "nt" else "bin")
+    if UV:
+        run([UV, "venv", "--quiet", "--python", python, environment], empty)
+        run([UV, "pip", "install", "--quiet", "--python", programs / "python", wheel], empty)
+    else:
+        run([python, "-m", "venv", environment], empty)
+        run([programs / "python", "-m", "pip", "install", "--quiet", wheel], empty)
+
+    own = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
+    own |= {"PATH": f"{programs}{os.pathsep}{own['PATH']}", "SERPENTAIL_CACHE": str(cache)}
+    told = []
+    for words in WORKS:
+        done = run(words, empty, own)
+        if done.returncode:
+            told.append(f"{' '.join(words)}: status {done.returncode}: {done.stderr[-2000:]}")
+    for extra, words in REFUSED.items():
+        done = run(words, empty, own)
+        if done.returncode != 2 or f'pip install "serpentail[{extra}]"' not in done.stderr:
+            told.append(f"{' '.join(words)}: does not name {extra}: {done.stderr[-2000:]}")
+    return told + [f"{name}: was not written" for name in MADE if not (empty / name).exists()]
+
+
+def run(
+    words: Sequence[str | Path], folder: Path, own: dict[str, str] | None = None
+) -> subprocess.CompletedProcess[str]:
+    """Return the finished command; without an environment of its own it must succeed."""
+    return subprocess.run(
+        words,
+        cwd=folder,
+        env=own,
+        capture_output=own is not None,
+        text=True,
+        check=own is None,
+        timeout=PATIENCE_S,
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main(Path(sys.argv[1]).absolute() if sys.argv[1:] else ROOT / "output" / "dist"))
