@@ -1,7 +1,4 @@
-"""Builds the sdist and of it the wheel, and uses the wheel as strangers do, for each Python here.
-
-Usage: python -m tests.packaging.wheels [FOLDER], by default output/dist, where both are left
-"""
+"""Builds the sdist and of it the wheel, and uses the wheel as strangers do, for each Python here."""
 
 import os
 import shutil
@@ -12,6 +9,7 @@ import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from examples import front
 from tests.packaging.contents import ROOT, faults
 
 VERSIONS = ("3.11", "3.12", "3.13")
@@ -140,4 +138,4 @@ def run(
 
 
 if __name__ == "__main__":
-    sys.exit(main(Path(sys.argv[1]).absolute() if sys.argv[1:] else ROOT / "output" / "dist"))
+    front.run(main, front.parser(__doc__, "output/dist").parse_args().folder)
