@@ -1,4 +1,4 @@
-"""Builds the sdist and of it the wheel, and uses the wheel as strangers do, for each Python here."""
+"""Builds the sdist, of it the wheel, and uses that as strangers do, for each Python here."""
 
 import os
 import shutil
