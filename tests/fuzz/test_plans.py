@@ -5,8 +5,8 @@ import pytest
 from hypothesis import strategies as some
 
 import serpentail as st
-from serpentail.planning.planner import _checked as checked
 from tests.support.models import model_folder
+from tests.support.posed import posed
 
 from .searching import answer
 from .strange import strange
@@ -32,7 +32,8 @@ def asked(model, start=None, goal=None, duration=0.5, bounds=None, **settings):
     q = np.zeros(model.nq)
     q[3] = 1.0
     upright = (q, np.zeros(model.nv)) if start is None else start
-    return checked(model, (upright, goal, duration, bounds), settings)
+    given = {"start": upright, "goal": goal, "duration": duration, "bounds": bounds}
+    return posed(model, **given | settings)
 
 
 def test_starts_and_durations_are_taken_or_refused(model, search):

@@ -11,7 +11,6 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as some
 
 import serpentail as st
-from serpentail.planning import planner
 from serpentail.planning.nlp.rules import collocation_rule
 from serpentail.scenes import plan, plan_keys, simulate, simulate_keys
 from serpentail_codegen.scene.parse import parse_scene
@@ -19,6 +18,7 @@ from serpentail_codegen.scene.problems import SceneError
 from serpentail_codegen.scene.scene import KEYS, NAMES
 from tests.scenes.conftest import SIMPLE
 from tests.support.models import folder_of
+from tests.support.posed import posed
 
 Q = [0, 0, 0.3, 1, 0, 0, 0, 0.1, 0.1]
 SIMULATE = {
@@ -129,8 +129,7 @@ def test_the_runtime_takes_or_refuses_any_motion(table):
 def test_the_runtime_takes_or_refuses_any_plan(table):
     try:
         arguments = plan.plan_arguments(table)
-        task = [arguments.pop(name) for name in ("start", "goal", "duration", "bounds")]
-        checked = planner._checked(simple(), tuple(task), arguments)[1]
-        collocation_rule(checked.rule, checked.degree)
+        settings = posed(simple(), **arguments)[1]
+        collocation_rule(settings.rule, settings.degree)
     except st.PlanningError as error:
         one_line(error)

@@ -1,0 +1,14 @@
+"""Plans that are posed and checked, and not searched for."""
+
+from unittest.mock import patch
+
+import serpentail as st
+from serpentail.planning import planner
+
+
+def posed(model, **arguments):
+    """The problem and the settings of a plan."""
+    with patch.object(
+        planner, "_found", lambda model, problem, settings, watch: (problem, settings)
+    ):
+        return st.plan(model, **arguments)
