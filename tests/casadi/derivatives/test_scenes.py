@@ -98,7 +98,7 @@ def oldest():
     project = tomllib.loads((Path(__file__).parents[3] / "pyproject.toml").read_text())["project"]
     return next(
         re.search(r">=([\d.]+)", need)[1]
-        for need in project["dependencies"]
+        for need in project["optional-dependencies"]["plan"]
         if need.startswith("casadi")
     )
 
