@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, DTypeLike
 from ..checks import real_array, refuse_not_finite
 from ..errors import StateError
 from .batch import BatchLibrary, RecordFunction
+from .calls import Call, call_of, declined
 from .layout import FIRST_Q, QUATERNION, SECOND_Q
 from .library import NOT_POSITIVE_DEFINITE, OUT_OF_RANGE
 from .workers import shared
@@ -43,6 +44,8 @@ def argument_record(
     return ArgumentRecord(parameters.ctypes.data, count, 0, work.ctypes.data, addresses)
 
 
+# reals that a function works on: one of more takes so long that other threads should run meanwhile
+MOST_HELD = 8192
 CACHE_LINE = 64  # bytes, and the widest vector
 
 
@@ -53,15 +56,14 @@ def aligned(count: int, dtype: DTypeLike) -> ndarray:
     return memory[first : first + (count + 1) * np.dtype(dtype).itemsize].view(dtype)
 
 
-class Buffers(threading.local):
-    """Arrays that one thread hands to C; as they stay, a call on one state costs little."""
+class Buffers:
+    """Arrays that are handed to C; as they stay, a call on one state costs little."""
 
     def __init__(
         self, dtype: DTypeLike, inputs: Shapes, outputs: Shapes, work: int, parameters: ndarray
     ):
         self.inputs = [np.zeros(shape, dtype) for shape in inputs]
         self.outputs = [np.zeros(shape, dtype) for shape in outputs]
-        self.slots = [(array.shape, array) for array in self.inputs]
         self.only = self.outputs[0] if len(self.outputs) == 1 else None
         self.work = aligned(work, dtype)
         self.record = argument_record(parameters, 1, self.work, (*self.inputs, *self.outputs))
@@ -119,16 +121,46 @@ class Kernel:
         self.parameters, self.work = parameters, manifest["work"][name]
         self.bend_range = manifest["scene"].get("bend_range")
         self.polar = manifest["scene"]["coordinates"] == "polar"
-        self.buffers = Buffers(self.dtype, self.shapes, self.out_shapes, self.work, parameters)
+        self.own = threading.local()  # buffers of each thread
+        self.fast: Call | None = None  # made at the first call
 
     def __call__(self, *arrays: ArrayLike) -> Any:
         """Return the output, or a tuple of outputs; StateError names an argument that is wrong."""
-        buffers, dtype = self.buffers, self.dtype
-        if len(arrays) != len(buffers.slots):
+        found = (self.fast or self._prepared())(*arrays)
+        return self._by_ctypes(arrays) if found is None else found
+
+    def _prepared(self) -> Call:
+        """Return what calls the function where all is as it should be, and gives None elsewhere."""
+        own = self._buffers()
+        arrays = *own.inputs, *own.outputs
+        if self.work + sum(array.size for array in arrays) > MOST_HELD:
+            self.fast = declined
+        else:
+            self.kept = own
+            self.fast = call_of(self.function, own.record, arrays, len(own.inputs))
+        return self.fast
+
+    def _buffers(self) -> Buffers:
+        """Return buffers of our own."""
+        return Buffers(self.dtype, self.shapes, self.out_shapes, self.work, self.parameters)
+
+    def _by_ctypes(self, arrays: Sequence[ArrayLike]) -> Any:
+        """Return outputs for whatever was given."""
+        if len(arrays) != len(self.names):
             raise TypeError(f"{self.name} takes {', '.join(self.names)}")
-        for array, (shape, buffer) in zip(arrays, buffers.slots):  # noqa: B905  counted above: strict costs 0.2 us
+        dtype = self.dtype
+        for array, shape in zip(arrays, self.shapes):  # noqa: B905  counted above: strict costs 0.2 us
             if type(array) is not ndarray or array.shape != shape or array.dtype is not dtype:
                 return self._any(arrays)
+        return self._one(arrays)
+
+    def _one(self, arrays: Sequence[Any]) -> Any:
+        """Return outputs for arrays of one state; other threads run while C does."""
+        try:
+            buffers = self.own.buffers
+        except AttributeError:  # this thread's first call
+            buffers = self.own.buffers = self._buffers()
+        for array, buffer in zip(arrays, buffers.inputs):  # noqa: B905  as above
             buffer[:] = array
         if status := self.function(buffers.address):
             self.fail(status, 0, [b[None] for b in buffers.inputs])
@@ -142,8 +174,7 @@ class Kernel:
         dimensions = zip(arrays, self.shapes, strict=True)
         counts = {array.shape[0] for array, shape in dimensions if array.ndim > len(shape)}
         if not counts:
-            outputs = self._batch(1, arrays)
-            return tuple(o[0] for o in outputs) if isinstance(outputs, tuple) else outputs[0]
+            return self._one(arrays)
         if len(counts) > 1:
             raise StateError(
                 f"{self.name}: batch sizes differ ({', '.join(map(str, sorted(counts)))}): give one"

@@ -1,0 +1,60 @@
+"""Calls of compiled functions through a small extension in C, where this Python has the headers
+that it needs; where not, ctypes calls them.
+"""
+
+import ctypes
+import sys
+import sysconfig
+from collections.abc import Callable, Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from numpy import ndarray
+
+from ..errors import SerpentailError
+from .compiler import compile_library
+
+SOURCE = Path(__file__).with_name("native") / "calls.c"
+# what an extension needs of a linker that asks for every symbol
+LINKING = ("-Wl,-undefined,dynamic_lookup",) if sys.platform == "darwin" else ()
+Call = Callable[..., Any]  # takes arguments, returns outputs, or None where it does not serve
+
+
+def call_of(
+    function: Any, record: ctypes.Structure, arrays: Sequence[ndarray], inputs: int
+) -> Call:
+    """Return what calls a function of the generated C on one state.
+
+    function: as ctypes has it.  record points to arrays, of which the first are the inputs; both
+    must outlive the call, as must all else that the record points to.
+    """
+    library = extension()
+    if library is None:
+        return declined
+    address = ctypes.cast(function, ctypes.c_void_p)
+    return library.serpentail_call(address, ctypes.addressof(record), tuple(arrays), inputs)
+
+
+def declined(*_: Any) -> None:
+    """Serve in place of such a call where ctypes makes all."""
+
+
+@cache
+def extension() -> ctypes.PyDLL | None:
+    """Return the extension, compiled once for a compiler and a Python; None where it cannot be."""
+    headers = Path(sysconfig.get_path("include"))
+    locked = sys.implementation.name == "cpython" and not sysconfig.get_config_var(
+        "Py_GIL_DISABLED"
+    )
+    if not (locked and (headers / "Python.h").is_file()):
+        return None
+    flags = ("-I", str(headers), *LINKING)
+    try:
+        library = ctypes.PyDLL(str(compile_library([SOURCE], SOURCE.parent, flags=flags)))
+    except (SerpentailError, OSError):  # ctypes serves, and needs nothing more
+        return None
+    made = library.serpentail_call
+    made.restype = ctypes.py_object
+    made.argtypes = (ctypes.c_void_p, ctypes.c_void_p, ctypes.py_object, ctypes.c_ssize_t)
+    return library
