@@ -16,10 +16,9 @@ from .actuation import Actuation
 from .audit import BALANCED, Audit, audited, warnings_of
 from .batched_runs import BatchedRuns, worth_batching
 from .compiled_run import COUNTS, PAUSED, CompiledRun, Memory, Outcome
+from .measured import MEASURES
 from .methods import SCIPY, IntegrationMethod
 from .rollouts import Rollouts, Source
-
-MEASURES = {"energy": ("kinetic", "potential"), "momentum": ("linear_momentum", "angular_momentum")}
 
 
 class ParallelRuns:
