@@ -132,10 +132,31 @@ def test_what_no_number_may_hold_is_told_at_once(real):
     assert held(motion) == {*DERIVED} and np.isfinite(motion.kinetic).all()
 
 
-def test_runs_of_many_are_derived_late_too(model):
-    q0 = np.tile([0, 0, 1.0, *QUATERNION, 0.3, -0.2], (3, 1))
-    runs = st.simulate(model, q0, np.zeros(8), t_span=0.1)
-    motion = runs[1]
-    assert held(motion) == set()
-    np.testing.assert_array_equal(motion.kinetic, runs.kinetic[1])
-    np.testing.assert_array_equal(motion.angular_momentum, runs.angular_momentum[1])
+@pytest.mark.parametrize("real", ["double", "float"])
+@pytest.mark.parametrize("threads", [1, 3])
+def test_many_runs_are_measured_when_somebody_asks(real, threads):
+    model = st.load(model_folder(1, 3, functions=FEW, real=real))
+    q0 = np.tile([0, 0, 1.0, *QUATERNION, 0.3, -0.2], (5, 1))
+    own = {"tail_mass": np.linspace(0.004, 0.006, 5)}
+    runs = st.simulate(model, q0, np.ones(8), t_span=0.1, parameters=own, threads=threads)
+    assert not {*DERIVED} & {*vars(runs)} - {"info"} and runs.errors == [None] * 5
+    for k in range(5):
+        motion = runs[k]
+        assert held(motion) == set()
+        for name in DERIVED[:4]:
+            found = getattr(runs, name)
+            assert found is getattr(runs, name) and not found.flags.writeable
+            np.testing.assert_array_equal(found[k], getattr(motion, name))
+        assert motion.info["imbalance"]["relative"] == pytest.approx(runs.audit.relative[k])
+    twin = pickle.loads(pickle.dumps(runs))
+    np.testing.assert_array_equal(twin.kinetic, runs.kinetic)
+
+
+def test_of_many_runs_one_may_be_beyond_numbers(model):
+    q0, v0 = np.array([0, 0, 1.0, *QUATERNION, 0, 0]), np.zeros((3, 8))
+    v0[1, 0], v0[2, 0] = 1e160, 1e100
+    runs = st.simulate(model, q0, v0, t_span=1e-3, method="rk4")
+    assert [error is None for error in runs.errors] == [True, False, True]
+    assert "by sample: energy: the result" in str(runs.errors[1])
+    assert np.isfinite(runs.kinetic[[0, 2]]).all() and np.isnan(runs.kinetic[1]).all()
+    assert held(runs[2]) == {*DERIVED} and held(runs[0]) == set()

@@ -4,7 +4,6 @@ that it needs; where not, ctypes calls them.
 
 import ctypes
 import sys
-import sysconfig
 from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
@@ -43,6 +42,8 @@ def declined(*_: Any) -> None:
 @cache
 def extension() -> ctypes.PyDLL | None:
     """Return the extension, compiled once for a compiler and a Python; None where it cannot be."""
+    import sysconfig
+
     headers = Path(sysconfig.get_path("include"))
     locked = sys.implementation.name == "cpython" and not sysconfig.get_config_var(
         "Py_GIL_DISABLED"

@@ -93,21 +93,22 @@ class RunKernel:
 
     def __init__(self, kernel: "Kernel", parameters: ndarray, inputs: Arrays, outputs: Arrays):
         self.kernel, self.inputs = kernel, inputs
-        self.places = [(address_of(a), a.strides[0]) for a in (*inputs, *outputs)]
+        self.places = [(address_of(a), *a.strides[:2]) for a in (*inputs, *outputs)]
         self.parameters = address_of(parameters), parameters.strides[0]
         self.work = aligned(kernel.work, kernel.dtype)
         self.record = argument_record(parameters, 0, self.work, (*inputs, *outputs))
         self.address = ctypes.addressof(self.record)
 
-    def __call__(self, run: int, rows: int) -> None:
-        """Evaluate the first rows of a run; StateError counts all rows from the first run's on."""
+    def __call__(self, run: int, rows: int, begin: int = 0) -> None:
+        """Evaluate so many rows of a run; StateError counts all rows from the first run's on."""
         record = self.record
         record.parameters, record.count = self.parameters[0] + run * self.parameters[1], rows
-        for k, (first, apart) in enumerate(self.places):
-            record.arrays[k] = first + run * apart
+        for k, (first, apart, row) in enumerate(self.places):
+            record.arrays[k] = first + run * apart + begin * row
         if status := self.kernel.function(self.address):
             whole = [a.reshape(-1, *a.shape[2:]) for a in self.inputs]
-            self.kernel.fail(status, run * self.inputs[0].shape[1] + record.failed, whole)
+            failed = run * self.inputs[0].shape[1] + begin + record.failed
+            self.kernel.fail(status, failed, whole)
 
 
 class Kernel:

@@ -1,11 +1,27 @@
 """Fields of a motion that are derived when somebody first asks for them."""
 
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, TypeVar
+
+T = TypeVar("T")
 
 LATER = "later"  # what derives them, in a motion that has it
 # the name of a field -> that one, and what else comes with it, by name
 Later = Callable[[str], dict[str, Any]]
+
+
+def made(kind: type[T], fields: Mapping[str, Any], later: Later) -> T:
+    """Return a motion with these fields, all others of which are derived later."""
+    motion = object.__new__(kind)
+    vars(motion).update(fields, **{LATER: later})
+    return motion
+
+
+def settled(motion: Any, names: Iterable[str]) -> dict[str, Any]:
+    """Return what a motion consists of when fields of these names have been derived."""
+    state = vars(motion) | {name: getattr(motion, name) for name in names}
+    state.pop(LATER, None)
+    return state
 
 
 class Derived:

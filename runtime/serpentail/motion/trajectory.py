@@ -17,7 +17,7 @@ from ..model.model import Model
 from . import archive
 from .account import account
 from .contact import Contact
-from .derived import LATER, Derived, Later
+from .derived import Derived, Later, made, settled
 from .doubts import doubts, warnings_of
 from .exports import Exports
 from .resample import Interpolation, hermite_q, inside, monotone, smooth
@@ -68,9 +68,7 @@ class Trajectory(Exports):
         """
         for array in arrays.values():
             array.setflags(write=False)
-        motion = object.__new__(cls)
-        vars(motion).update(arrays, model=model, later=later)
-        return motion
+        return made(cls, arrays | {"model": model}, later)
 
     __repr__ = account
 
@@ -134,9 +132,7 @@ class Trajectory(Exports):
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave the model behind, whose compiled code belongs to one machine."""
-        state = vars(self) | {name: getattr(self, name) for name in DERIVED}
-        state.pop(LATER, None)
-        return state | {"model": None, "info": self._told()}
+        return settled(self, DERIVED) | {"model": None, "info": self._told()}
 
     def _told(self) -> dict[str, Any]:
         """Info with what only the model can tell."""

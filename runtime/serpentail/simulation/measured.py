@@ -1,6 +1,7 @@
 """Makes a trajectory of the samples of a run, or raises the error that ended the run."""
 
 import json
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
@@ -48,22 +49,22 @@ def measured(model: Model, samples: Samples, ground: Ground) -> Trajectory:
     """
     arrays = {"t": samples.t, "q": samples.q, "v": samples.v, "tau": samples.tau}
     motion = Trajectory.of_run(arrays, model, Measures(model, samples, ground))
-    return motion if _certain(model, samples) else replace(motion)
+    whole = samples.failure is None and samples.ledger.size > 0
+    method = samples.info.get("method") if whole else None
+    numbers = model.parameter_vector, samples.q, samples.v, samples.bristles
+    return motion if certain(model, method, numbers) else replace(motion)
 
 
-def _certain(model: Model, samples: Samples) -> bool:
-    """Tell whether numbers are sure to hold what follows from the samples of a whole run in C.
+def certain(model: Model, method: str | None, numbers: Iterable[np.ndarray]) -> bool:
+    """Tell whether numbers are sure to hold what follows from a run in C of these numbers.
 
     Energies, momenta and forces are sums of products of at most five parameters, coordinates and
     rates; a continuum may be bent too far between steps.
     """
-    if samples.failure is not None or samples.info.get("method") not in (*FIXED, *ADAPTIVE):
+    if method not in (*FIXED, *ADAPTIVE) or model.kind != "articulated":
         return False
-    if model.kind != "articulated" or not samples.ledger.size:
-        return False
-    most = MODEST[model.parameter_vector.dtype]
-    arrays = model.parameter_vector, samples.q, samples.v, samples.bristles
-    return all(np.vdot(array, array) < most * most for array in arrays)
+    most = MODEST[model.parameter_vector.dtype] ** 2
+    return all(np.vdot(array, array) < most for array in numbers)
 
 
 class Measures:
@@ -115,4 +116,4 @@ class Measures:
         for q, v in zip(self.samples.q[[0, -1]], self.samples.v[[0, -1]], strict=True):
             rows.append((*self.model.energy(q, v), self.model.momentum(q, v)[0]))
         columns = zip(*rows, strict=True)
-        return {name: np.array(each) for name, each in zip(BALANCED, columns, strict=True)}
+        return {name: np.array(each, float) for name, each in zip(BALANCED, columns, strict=True)}
