@@ -4,10 +4,10 @@ that it needs; where not, ctypes calls them.
 
 import ctypes
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from numpy import ndarray
 
@@ -20,19 +20,21 @@ LINKING = ("-Wl,-undefined,dynamic_lookup",) if sys.platform == "darwin" else ()
 Call = Callable[..., Any]  # takes arguments, returns outputs, or None where it does not serve
 
 
-def call_of(
-    function: Any, record: ctypes.Structure, arrays: Sequence[ndarray], inputs: int
-) -> Call:
-    """Return what calls a function of the generated C on one state.
+class Memory(Protocol):
+    """What a function works on, and the address of a record that points to it."""
 
-    function: as ctypes has it.  record points to arrays, of which the first are the inputs; both
-    must outlive the call, as must all else that the record points to.
-    """
+    inputs: list[ndarray]
+    outputs: list[ndarray]
+    address: int
+
+
+def call_of(function: Any, own: Memory) -> Call:
+    """Return what calls a function of the generated C, as ctypes has it, on one state."""
     library = extension()
     if library is None:
         return declined
-    address = ctypes.cast(function, ctypes.c_void_p)
-    return library.serpentail_call(address, ctypes.addressof(record), tuple(arrays), inputs)
+    code, arrays = ctypes.cast(function, ctypes.c_void_p), (*own.inputs, *own.outputs)
+    return library.serpentail_call(code, own.address, arrays, len(own.inputs), own)
 
 
 def declined(*_: Any) -> None:
@@ -57,5 +59,6 @@ def extension() -> ctypes.PyDLL | None:
         return None
     made = library.serpentail_call
     made.restype = ctypes.py_object
-    made.argtypes = (ctypes.c_void_p, ctypes.c_void_p, ctypes.py_object, ctypes.c_ssize_t)
+    pointer, thing = ctypes.c_void_p, ctypes.py_object
+    made.argtypes = (pointer, pointer, thing, ctypes.c_ssize_t, thing)
     return library

@@ -75,7 +75,7 @@ class Buffers:
         self.inputs = [np.zeros(shape, dtype) for shape in inputs]
         self.outputs = [np.zeros(shape, dtype) for shape in outputs]
         self.only = self.outputs[0] if len(self.outputs) == 1 else None
-        self.work = aligned(work, dtype)
+        self.work, self.parameters = aligned(work, dtype), parameters
         self.record = argument_record(parameters, 1, self.work, (*self.inputs, *self.outputs))
         self.address = ctypes.addressof(self.record)
 
@@ -143,13 +143,9 @@ class Kernel:
     def _prepared(self) -> Call:
         """Return what calls the function where all is as it should be, and gives None elsewhere."""
         own = self._buffers()
-        arrays = *own.inputs, *own.outputs
-        if self.work + sum(array.size for array in arrays) > MOST_HELD:
-            self.fast = declined
-        else:
-            self.kept = own
-            self.fast = call_of(self.function, own.record, arrays, len(own.inputs))
-        return self.fast
+        size = self.work + sum(array.size for array in (*own.inputs, *own.outputs))
+        self.fast = fast = declined if size > MOST_HELD else call_of(self.function, own)
+        return fast
 
     def _buffers(self) -> Buffers:
         """Return buffers of our own."""

@@ -191,6 +191,19 @@ def test_models_come_and_go(model):
     assert grown * os.sysconf("SC_PAGE_SIZE") < 1_000_000
 
 
+def test_a_call_keeps_what_it_works_on(model):
+    """Threads that make a kernel's first call at once each make what calls; one of them stays."""
+    s = state()
+    expected = model.energy(s["q"], s["v"])
+    function = copy.copy(model).kernel("energy")
+    first, second = function._prepared(), function._prepared()
+    assert first is not second and function.fast is second
+    del function
+    gc.collect()
+    filler = [np.full(size, np.nan) for size in range(1, 40) for _ in range(200)]
+    assert first(s["q"], s["v"]) == second(s["q"], s["v"]) == expected and filler
+
+
 def test_a_call_within_a_call(model):
     """Garbage that is collected while outputs are copied may run a call of the same function."""
     a, b = state(1), state(2)

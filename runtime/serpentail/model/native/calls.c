@@ -13,7 +13,7 @@ enum { MOST_ARRAYS = 10 };
 
 typedef int (*Function)(void *record);
 
-/* A function, its argument record, and the arrays that the record points to. */
+/* A function, its argument record, the arrays that the record points to, and what owns all. */
 typedef struct {
     Function function;
     void *record;
@@ -21,6 +21,7 @@ typedef struct {
     Py_buffer arrays[MOST_ARRAYS]; /* inputs, then outputs; held, so that they stay where they are */
     PyObject *copies[MOST_ARRAYS]; /* what copies an output; NULL of a scalar */
     PyObject *whole;               /* the index () */
+    PyObject *owner;               /* of all that the record points to, and of the record */
     int busy;                      /* whether a call is copying outputs */
 } Call;
 
@@ -115,6 +116,7 @@ static void release(PyObject *capsule)
         Py_XDECREF(call->copies[k]);
     }
     Py_XDECREF(call->whole);
+    Py_XDECREF(call->owner);
     PyMem_Free(call);
 }
 
@@ -143,8 +145,9 @@ static PyMethodDef METHOD = {"evaluate", (PyCFunction)(void (*)(void))evaluate, 
 
 /* Return what evaluates a function, given its arrays, of which so many are inputs.
 
-   The record points to them; it, the function and all else that it needs must outlive the call. */
-PyObject *serpentail_call(void *function, void *record, PyObject *arrays, Py_ssize_t inputs)
+   The record points to them.  The owner of both is kept; the function must outlive the call. */
+PyObject *serpentail_call(
+    void *function, void *record, PyObject *arrays, Py_ssize_t inputs, PyObject *owner)
 {
     PyObject *capsule, *made;
     Call *call = PyMem_Calloc(1, sizeof *call);
@@ -154,9 +157,12 @@ PyObject *serpentail_call(void *function, void *record, PyObject *arrays, Py_ssi
     call->function = (Function)(size_t)function;
     call->record = record;
     call->inputs = inputs;
+    Py_INCREF(owner);
+    call->owner = owner;
     call->outputs = PyTuple_Size(arrays) - inputs;
     capsule = PyCapsule_New(call, NAME, release);
     if (capsule == NULL) {
+        Py_DECREF(owner);
         PyMem_Free(call);
         return NULL;
     }
