@@ -70,6 +70,8 @@ def real_array(
     field: str, value: object, error: Error = StateError, dtype: DTypeLike = np.float64
 ) -> NDArray[Any]:
     """Return real numbers of any shape as a contiguous array; they may be nan or infinite."""
+    if type(value) is np.ndarray and value.dtype == dtype and value.flags.c_contiguous:
+        return value
     try:
         array = np.asarray(value)
     except Exception as reason:  # whatever the __array__ of a foreign type raises
@@ -96,11 +98,11 @@ def finite_array(field: str, value: object, error: Error = StateError) -> NDArra
 
 def refuse_not_finite(field: str, array: NDArray[Any], error: Error, whose: str = "") -> None:
     """Raise the error about the first entry that is nan or infinite, and whose it is."""
-    wrong = np.argwhere(~np.isfinite(array))
-    if len(wrong):
-        index = wrong[0].tolist()
-        place = f"{field}{index or ''}{whose}"
-        raise error(f"{place}: value {array[tuple(index)]}: needs a finite number")
+    if np.isfinite(array).all():
+        return
+    index = np.argwhere(~np.isfinite(array))[0].tolist()
+    place = f"{field}{index or ''}{whose}"
+    raise error(f"{place}: value {array[tuple(index)]}: needs a finite number")
 
 
 def number(
@@ -113,6 +115,8 @@ def number(
     most: float = np.inf,
 ) -> float:
     """Return a finite number above one bound, not below another and not beyond the last."""
+    if type(value) is float and above < value < np.inf and least <= value <= most:
+        return value
     numbers, bounds = numbers_in(value), (above, least, most)
     if numbers is None or numbers.shape != () or not _within(numbers, bounds):
         raise refusal(field, value, f"a {_words('number', bounds)}", error)

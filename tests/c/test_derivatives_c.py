@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import serpentail as st
+from serpentail.model.calls import declined
 from serpentail.model.model import Model
 from serpentail.model.toolchain import candidates as _candidates
 from serpentail_codegen.ir.interpret import Numbers, Run
@@ -158,15 +159,19 @@ def test_workspace_may_begin_anywhere_and_hold_anything(model, name, offset):
     state = state_of(model)
     other = Model(model.checked, model.parameters, model.library)
     kernel = other.kernel(name)
-    size = len(kernel.buffers.work)
+    size = kernel.work + 1
     memory = np.full(size + 16 + offset, np.nan)
     first = -(memory.ctypes.data // 8) % 8 + offset
-    kernel.buffers.work = memory[first : first + size]
-    assert kernel.buffers.work.ctypes.data % 64 == 8 * offset
-    found = kernel(*(x[None] for x in arguments(model, name, state)))
+    work = memory[first : first + size]
+    assert work.ctypes.data % 64 == 8 * offset
+    kernel.fast = declined
+    kernel.own.buffers = kernel._buffers()
+    kernel.own.buffers.record.work = work.ctypes.data
+    found = kernel(*arguments(model, name, state))
     found = found if isinstance(found, tuple) else (found,)
     for one, expected in zip(found, outputs(model, name, state), strict=True):
-        np.testing.assert_array_equal(one[0], expected)
+        np.testing.assert_array_equal(one, expected)
+    assert not kernel.work or not np.isnan(work).all()
     assert np.isnan(memory[:first]).all() and np.isnan(memory[first + size :]).all()
 
 

@@ -8,6 +8,7 @@ import os
 import shlex
 import subprocess
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from ..errors import CompileFailed, ModelError
@@ -46,42 +47,60 @@ REMEDY_FAILED = (
 
 
 def compile_library(
-    sources: Sequence[Path], include: Path, profile: str = "fast", cache: Path | None = None
+    sources: Sequence[Path],
+    include: Path,
+    profile: str = "fast",
+    cache: Path | None = None,
+    flags: tuple[str, ...] = (),
 ) -> Path:
     """Return the shared library of sources and headers, compiled unless the cache has it.
 
     `profile` is "fast" or "reproducible"; `cache` defaults to $SERPENTAIL_CACHE, then the user's
-    cache. Raises CompilerNotFound, CompileFailed, ModelError (unreadable sources), SerpentailError
-    (profile, cache).
+    cache; `flags` join the profile's. Raises CompilerNotFound, CompileFailed, ModelError
+    (unreadable sources), SerpentailError (profile, cache).
     """
     text = _text_of(sources, include)
-    return library_of(text, lambda: (sources, include), profile, cache_folder(cache))
+    return library_of(text, lambda: (sources, include), profile, cache_folder(cache), flags)
 
 
-def library_of(text: str, places: Callable[[], Places], profile: str, cache: Path) -> Path:
+def library_of(
+    text: str,
+    places: Callable[[], Places],
+    profile: str,
+    cache: Path,
+    flags: tuple[str, ...] = (),
+) -> Path:
     """Return the library of texts that have this digest; where they lie is asked to compile them.
 
-    One process compiles while others wait for it.  Errors as of ``compile_library``.
+    flags: that join the profile's.  One process compiles while others wait for it.  Errors as of
+    ``compile_library``.
     """
     check_profile(profile)
     refuse_others(cache)
-    library = _noted(text, profile, cache)
+    library = _noted(text, profile, cache, flags)
     if library:
         return library
     with alone(cache, digest([text, profile])):
-        library = _noted(text, profile, cache)
+        library = _noted(text, profile, cache, flags)
         if library:
             return library
         # A note may describe a compiler since upgraded behind a wrapper, so nothing is built on
         # its word.
-        toolchain = examine(profile, cache)
+        toolchain = _joined(examine(profile, cache), flags)
         return library_in(_place(text, toolchain, cache)) or _build(text, places, toolchain, cache)
 
 
-def _noted(text: str, profile: str, cache: Path) -> Path | None:
+def _noted(text: str, profile: str, cache: Path, flags: tuple[str, ...]) -> Path | None:
     """Return the library that the compiler made which notes tell of; no process is started."""
     toolchain = recall(profile, cache)
-    return library_in(_place(text, toolchain, cache)) if toolchain else None
+    if toolchain is None:
+        return None
+    return library_in(_place(text, _joined(toolchain, flags), cache))
+
+
+def _joined(toolchain: Toolchain, flags: tuple[str, ...]) -> Toolchain:
+    """Return a compiler with more flags."""
+    return replace(toolchain, flags=toolchain.flags + flags)
 
 
 def describe_compiler(profile: str = "fast") -> dict[str, object]:

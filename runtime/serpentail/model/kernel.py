@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, DTypeLike
 from ..checks import real_array, refuse_not_finite
 from ..errors import StateError
 from .batch import BatchLibrary, RecordFunction
+from .calls import Call, call_of, declined
 from .layout import FIRST_Q, QUATERNION, SECOND_Q
 from .library import NOT_POSITIVE_DEFINITE, OUT_OF_RANGE
 from .workers import shared
@@ -39,8 +40,19 @@ def argument_record(
     parameters: ndarray, count: int, work: ndarray, arrays: Arrays
 ) -> ArgumentRecord:
     """Return a record of arrays, which the caller keeps alive."""
-    addresses = (ctypes.c_void_p * MOST_ARRAYS)(*(a.ctypes.data for a in arrays))
-    return ArgumentRecord(parameters.ctypes.data, count, 0, work.ctypes.data, addresses)
+    addresses = (ctypes.c_void_p * MOST_ARRAYS)(*map(address_of, arrays))
+    return ArgumentRecord(address_of(parameters), count, 0, address_of(work), addresses)
+
+
+# reals that a function works on: one of more takes so long that other threads should run meanwhile
+MOST_HELD = 8192
+
+
+def address_of(array: ndarray) -> int:
+    """Return where the numbers of an array lie; ``array.ctypes.data`` takes three times as long."""
+    if array.flags.carray and array.size:
+        return ctypes.addressof(ctypes.c_char.from_buffer(array))  # type: ignore[arg-type]
+    return array.ctypes.data
 
 
 CACHE_LINE = 64  # bytes, and the widest vector
@@ -48,22 +60,22 @@ CACHE_LINE = 64  # bytes, and the widest vector
 
 def aligned(count: int, dtype: DTypeLike) -> ndarray:
     """Return a workspace that begins at a cache line, so that no vector in it lies across two."""
-    memory = np.zeros((count + 1) * np.dtype(dtype).itemsize + CACHE_LINE, np.uint8)
-    first = -memory.ctypes.data % CACHE_LINE
-    return memory[first : first + (count + 1) * np.dtype(dtype).itemsize].view(dtype)
+    size = (count + 1) * np.dtype(dtype).itemsize
+    memory = np.zeros(size + CACHE_LINE, np.uint8)
+    first = -address_of(memory) % CACHE_LINE
+    return memory[first : first + size].view(dtype)
 
 
-class Buffers(threading.local):
-    """Arrays that one thread hands to C; as they stay, a call on one state costs little."""
+class Buffers:
+    """Arrays that are handed to C; as they stay, a call on one state costs little."""
 
     def __init__(
         self, dtype: DTypeLike, inputs: Shapes, outputs: Shapes, work: int, parameters: ndarray
     ):
         self.inputs = [np.zeros(shape, dtype) for shape in inputs]
         self.outputs = [np.zeros(shape, dtype) for shape in outputs]
-        self.slots = [(array.shape, array) for array in self.inputs]
         self.only = self.outputs[0] if len(self.outputs) == 1 else None
-        self.work = aligned(work, dtype)
+        self.work, self.parameters = aligned(work, dtype), parameters
         self.record = argument_record(parameters, 1, self.work, (*self.inputs, *self.outputs))
         self.address = ctypes.addressof(self.record)
 
@@ -81,21 +93,22 @@ class RunKernel:
 
     def __init__(self, kernel: "Kernel", parameters: ndarray, inputs: Arrays, outputs: Arrays):
         self.kernel, self.inputs = kernel, inputs
-        self.places = [(a.ctypes.data, a.strides[0]) for a in (*inputs, *outputs)]
-        self.parameters = parameters.ctypes.data, parameters.strides[0]
+        self.places = [(address_of(a), *a.strides[:2]) for a in (*inputs, *outputs)]
+        self.parameters = address_of(parameters), parameters.strides[0]
         self.work = aligned(kernel.work, kernel.dtype)
         self.record = argument_record(parameters, 0, self.work, (*inputs, *outputs))
         self.address = ctypes.addressof(self.record)
 
-    def __call__(self, run: int, rows: int) -> None:
-        """Evaluate the first rows of a run; StateError counts all rows from the first run's on."""
+    def __call__(self, run: int, rows: int, begin: int = 0) -> None:
+        """Evaluate so many rows of a run; StateError counts all rows from the first run's on."""
         record = self.record
         record.parameters, record.count = self.parameters[0] + run * self.parameters[1], rows
-        for k, (first, apart) in enumerate(self.places):
-            record.arrays[k] = first + run * apart
+        for k, (first, apart, row) in enumerate(self.places):
+            record.arrays[k] = first + run * apart + begin * row
         if status := self.kernel.function(self.address):
             whole = [a.reshape(-1, *a.shape[2:]) for a in self.inputs]
-            self.kernel.fail(status, run * self.inputs[0].shape[1] + record.failed, whole)
+            failed = run * self.inputs[0].shape[1] + begin + record.failed
+            self.kernel.fail(status, failed, whole)
 
 
 class Kernel:
@@ -119,16 +132,42 @@ class Kernel:
         self.parameters, self.work = parameters, manifest["work"][name]
         self.bend_range = manifest["scene"].get("bend_range")
         self.polar = manifest["scene"]["coordinates"] == "polar"
-        self.buffers = Buffers(self.dtype, self.shapes, self.out_shapes, self.work, parameters)
+        self.own = threading.local()  # buffers of each thread
+        self.fast: Call | None = None  # made at the first call
 
     def __call__(self, *arrays: ArrayLike) -> Any:
         """Return the output, or a tuple of outputs; StateError names an argument that is wrong."""
-        buffers, dtype = self.buffers, self.dtype
-        if len(arrays) != len(buffers.slots):
+        found = (self.fast or self._prepared())(*arrays)
+        return self._by_ctypes(arrays) if found is None else found
+
+    def _prepared(self) -> Call:
+        """Return what calls the function where all is as it should be, and gives None elsewhere."""
+        own = self._buffers()
+        size = self.work + sum(array.size for array in (*own.inputs, *own.outputs))
+        self.fast = fast = declined if size > MOST_HELD else call_of(self.function, own)
+        return fast
+
+    def _buffers(self) -> Buffers:
+        """Return buffers of our own."""
+        return Buffers(self.dtype, self.shapes, self.out_shapes, self.work, self.parameters)
+
+    def _by_ctypes(self, arrays: Sequence[ArrayLike]) -> Any:
+        """Return outputs for whatever was given."""
+        if len(arrays) != len(self.names):
             raise TypeError(f"{self.name} takes {', '.join(self.names)}")
-        for array, (shape, buffer) in zip(arrays, buffers.slots):  # noqa: B905  counted above: strict costs 0.2 us
+        dtype = self.dtype
+        for array, shape in zip(arrays, self.shapes):  # noqa: B905  counted above: strict costs 0.2 us
             if type(array) is not ndarray or array.shape != shape or array.dtype is not dtype:
                 return self._any(arrays)
+        return self._one(arrays)
+
+    def _one(self, arrays: Sequence[Any]) -> Any:
+        """Return outputs for arrays of one state; other threads run while C does."""
+        try:
+            buffers = self.own.buffers
+        except AttributeError:  # this thread's first call
+            buffers = self.own.buffers = self._buffers()
+        for array, buffer in zip(arrays, buffers.inputs):  # noqa: B905  as above
             buffer[:] = array
         if status := self.function(buffers.address):
             self.fail(status, 0, [b[None] for b in buffers.inputs])
@@ -142,8 +181,7 @@ class Kernel:
         dimensions = zip(arrays, self.shapes, strict=True)
         counts = {array.shape[0] for array, shape in dimensions if array.ndim > len(shape)}
         if not counts:
-            outputs = self._batch(1, arrays)
-            return tuple(o[0] for o in outputs) if isinstance(outputs, tuple) else outputs[0]
+            return self._one(arrays)
         if len(counts) > 1:
             raise StateError(
                 f"{self.name}: batch sizes differ ({', '.join(map(str, sorted(counts)))}): give one"

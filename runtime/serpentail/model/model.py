@@ -174,7 +174,8 @@ class Model(Functions):
     def parameters_of_runs(self, changes: Mapping[str, object] | None, runs: int) -> RunParameters:
         """Return the parameters of many runs; changes: name -> (runs,) or (runs, 3), SI."""
         if changes is None or (isinstance(changes, Mapping) and not changes):
-            vectors = np.broadcast_to(self.parameter_vector, (runs, len(self.parameter_vector)))
+            vector = self.parameter_vector
+            vectors = vector[None] if runs == 1 else np.broadcast_to(vector, (runs, len(vector)))
             return RunParameters({}, self.parameters, vectors)
         parameters = RunParameters.checked(self.manifest, self._independent(), changes, runs)
         warn_of_sizes(self.manifest, parameters.values, 4)  # who calls st.simulate
@@ -197,7 +198,7 @@ class Model(Functions):
             (self.library is not None, self.batch_library.threads),
         )
 
-    @property
+    @kept
     def generated(self) -> tuple[str, ...]:
         """Names of all functions that were generated, the rollout of simulations included."""
         return tuple(self.manifest["functions"] | self.manifest.get("work", {}))

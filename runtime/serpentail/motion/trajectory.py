@@ -17,6 +17,7 @@ from ..model.model import Model
 from . import archive
 from .account import account
 from .contact import Contact
+from .derived import Derived, Later, made, settled
 from .doubts import doubts, warnings_of
 from .exports import Exports
 from .resample import Interpolation, hermite_q, inside, monotone, smooth
@@ -59,6 +60,15 @@ class Trajectory(Exports):
         _check_time(self.t)
         _check_unit(self.attitude)
         object.__setattr__(self, "info", json.loads(_json(self.info)))
+
+    @classmethod
+    def of_run(cls, arrays: dict[str, Array], model: Model, later: Later) -> Self:
+        """Return a motion of sound arrays t, q, v, tau of its own, whose other fields are derived
+        by ``later(name)`` when they are first asked for.
+        """
+        for array in arrays.values():
+            array.setflags(write=False)
+        return made(cls, arrays | {"model": model}, later)
 
     __repr__ = account
 
@@ -122,7 +132,7 @@ class Trajectory(Exports):
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave the model behind, whose compiled code belongs to one machine."""
-        return vars(self) | {"model": None, "info": self._told()}
+        return settled(self, DERIVED) | {"model": None, "info": self._told()}
 
     def _told(self) -> dict[str, Any]:
         """Info with what only the model can tell."""
@@ -187,6 +197,9 @@ ARRAYS = tuple(
     if entry.name not in ("info", "contact", "model")
 )
 MONOTONE = ("kinetic", "potential", "linear_momentum", "angular_momentum")
+DERIVED = (*MONOTONE, "info", "contact")
+for _name in DERIVED:
+    setattr(Trajectory, _name, Derived(_name))
 
 
 def _real(name: str, value: ArrayLike) -> Array:

@@ -21,12 +21,13 @@ class Actuation:
         self.error: BaseException | None = None
         self.ctrl_c = CtrlC()
         self.nt = self.model.layout.nt
-        self.float_errors = np.geterr()  # the user's: SciPy's methods work with their own
         # phases, each by its parts
         phases = phases_of(controller)
         begins = [begin for begin, _ in phases]
         self.parts = [self._available(parts_of(each, self.nt)) for _, each in phases]
         self.legs = legs
+        if self.of_python:  # the user's: SciPy's methods work with their own
+            self.float_errors = np.geterr()
         # times at which something is not smooth, where steps end
         stops = {*self._kinks(begins)}
         members = {}

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import SimulationError
-from ..model.kernel import aligned
+from ..model.kernel import address_of, aligned
 from ..model.library import NOT_FINITE, NOT_POSITIVE_DEFINITE, OUT_OF_RANGE
 from ..model.parameters import RunParameters
 from .actuation import Actuation
@@ -107,7 +107,7 @@ class Memory:
         self.places = []
         for member, array in arrays.items():
             if records.has("run", member):
-                self.places.append((member, array.ctypes.data, array.strides[0]))
+                self.places.append((member, address_of(array), array.strides[0]))
 
     def part(self, k: int, first: int, done: int) -> Samples:
         """Return what run k has written so far, from a sample on."""

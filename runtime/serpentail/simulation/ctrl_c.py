@@ -22,9 +22,9 @@ class CtrlC:
         """Let signals wait for the next `enter`, or the end; where wanted, and in the main thread,
         which alone gets them.
         """
-        before = signal.getsignal(signal.SIGINT)
-        main = threading.current_thread() is threading.main_thread()
-        if not (wanted and main and callable(before)):
+        main = wanted and threading.current_thread() is threading.main_thread()
+        before = signal.getsignal(signal.SIGINT) if main else None
+        if not callable(before):
             yield
             return
 

@@ -1,5 +1,10 @@
 """Makes a trajectory of the samples of a run, or raises the error that ended the run."""
 
+import json
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 
 from ..errors import SimulationError, StateError
@@ -9,6 +14,11 @@ from ..motion.trajectory import Trajectory
 from .audit import BALANCED, audited, warnings_of
 from .compiled_run import Samples
 from .ground import Ground
+from .methods import ADAPTIVE, FIXED
+
+# numbers whose eighth power a real can hold
+MODEST = {np.dtype(real): float(np.finfo(real).max) ** 0.125 for real in (np.float32, np.float64)}
+MEASURES = {"energy": ("kinetic", "potential"), "momentum": ("linear_momentum", "angular_momentum")}
 
 
 def trajectory_or_error(model: Model, samples: Samples, ground: Ground) -> Trajectory:
@@ -33,30 +43,77 @@ def trajectory_or_error(model: Model, samples: Samples, ground: Ground) -> Traje
 
 
 def measured(model: Model, samples: Samples, ground: Ground) -> Trajectory:
-    """Return samples with energies, momenta and forces; StateError where no number holds these."""
-    t, q, v, tau = samples.t, samples.q, samples.v, samples.tau
-    info = samples.info | origin(model)
-    if samples.failure is not None:
-        info["failure"] = str(samples.failure)
-    kinetic, potential = model.energy(q, v)
-    linear_momentum, angular_momentum = model.momentum(q, v)
-    contact = ground.contact(model, t, (q, v, tau, samples.bristles))
-    if samples.failure is None and samples.ledger.size:  # a part of a run has no ledger
-        measures = kinetic, potential, linear_momentum
-        ends = {name: each[[0, -1]] for name, each in zip(BALANCED, measures, strict=True)}
-        books = audited(model, model.parameters, samples.ledger, t[-1] - t[0], ends)
-        eps = float(np.finfo(model.parameter_vector.dtype).eps)
-        info |= books.info() | {"warnings": warnings_of(books, info, eps)}
-    return Trajectory(
-        t=t,
-        q=q,
-        v=v,
-        tau=tau,
-        kinetic=kinetic,
-        potential=potential,
-        linear_momentum=linear_momentum,
-        angular_momentum=angular_momentum,
-        info=info,
-        contact=contact,
-        model=model,
-    )
+    """Return samples whose energies, momenta, forces and info are derived when asked for.
+
+    Where it is not certain that numbers hold them they are derived now; StateError where not.
+    """
+    arrays = {"t": samples.t, "q": samples.q, "v": samples.v, "tau": samples.tau}
+    motion = Trajectory.of_run(arrays, model, Measures(model, samples, ground))
+    whole = samples.failure is None and samples.ledger.size > 0
+    method = samples.info.get("method") if whole else None
+    numbers = model.parameter_vector, samples.q, samples.v, samples.bristles
+    return motion if certain(model, method, numbers) else replace(motion)
+
+
+def certain(model: Model, method: str | None, numbers: Iterable[np.ndarray]) -> bool:
+    """Tell whether numbers are sure to hold what follows from a run in C of these numbers.
+
+    Energies, momenta and forces are sums of products of at most five parameters, coordinates and
+    rates; a continuum may be bent too far between steps.
+    """
+    if method not in (*FIXED, *ADAPTIVE) or model.kind != "articulated":
+        return False
+    most = MODEST[model.parameter_vector.dtype] ** 2
+    return all(np.vdot(array, array) < most for array in numbers)
+
+
+class Measures:
+    """What follows from the samples of a run: given the name of a field, it and its companions.
+
+    StateError where no number holds it.
+    """
+
+    def __init__(self, model: Model, samples: Samples, ground: Ground):
+        self.model, self.samples, self.ground = model, samples, ground
+
+    def __call__(self, name: str) -> dict[str, Any]:
+        """Return fields of a trajectory by name."""
+        samples = self.samples
+        state = samples.q, samples.v
+        if name == "info":
+            return {"info": json.loads(json.dumps(self._info()))}
+        if name == "contact":
+            given = *state, samples.tau, samples.bristles
+            return {"contact": self.ground.contact(self.model, samples.t, given)}
+        function, names = next(row for row in MEASURES.items() if name in row[1])
+        found = getattr(self.model, function)(*state)
+        measures = {k: np.asarray(array, float) for k, array in zip(names, found, strict=True)}
+        for array in measures.values():
+            array.setflags(write=False)
+        return measures
+
+    def _info(self) -> dict[str, Any]:
+        """Return what is told of the run, its books among it."""
+        samples = self.samples
+        info = samples.info | origin(self.model)
+        if samples.failure is not None:
+            return info | {"failure": str(samples.failure)}
+        if not samples.ledger.size:  # a part of a run
+            return info
+        books = audited(
+            self.model,
+            self.model.parameters,
+            samples.ledger,
+            samples.t[-1] - samples.t[0],
+            self._ends(),
+        )
+        eps = float(np.finfo(self.model.parameter_vector.dtype).eps)
+        return info | books.info() | {"warnings": warnings_of(books, info, eps)}
+
+    def _ends(self) -> dict[str, np.ndarray]:
+        """Return energies (2,) and linear momentum (2, 3) at the start and at the end."""
+        rows = []
+        for q, v in zip(self.samples.q[[0, -1]], self.samples.v[[0, -1]], strict=True):
+            rows.append((*self.model.energy(q, v), self.model.momentum(q, v)[0]))
+        columns = zip(*rows, strict=True)
+        return {name: np.array(each, float) for name, each in zip(BALANCED, columns, strict=True)}

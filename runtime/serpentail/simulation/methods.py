@@ -60,11 +60,12 @@ def checked_method(
             f"{name} has no setting {', '.join(map(repr, unknown))}; it has {has}"
         )
     checked = {key: number(key, value, SimulationError, above=0) for key, value in settings.items()}
-    least = MIN_ROUNDINGS * np.finfo(np.float32 if single and name not in SCIPY else float).eps
-    if checked.get("rtol", 1.0) < least:
-        raise SimulationError(
-            f"rtol {checked['rtol']:.3g}: too near to rounding: give {least:.2g} or more"
-        )
+    if "rtol" in checked:
+        least = MIN_ROUNDINGS * np.finfo(np.float32 if single and name not in SCIPY else float).eps
+        if checked["rtol"] < least:
+            raise SimulationError(
+                f"rtol {checked['rtol']:.3g}: too near to rounding: give {least:.2g} or more"
+            )
     return IntegrationMethod(name, "", _defaults(name, single, checked))
 
 

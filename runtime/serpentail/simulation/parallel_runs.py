@@ -11,16 +11,16 @@ from ..errors import SimulationError, StateError
 from ..model.cores import threads as allowed
 from ..model.kernel import RunKernel
 from ..model.workers import in_turn
+from ..motion.derived import made
 from ..motion.trajectory import Trajectory
 from ..stages import Stage
 from .actuation import Actuation
 from .audit import BALANCED, Audit, audited, warnings_of
 from .batched_runs import BatchedRuns, worth_batching
 from .compiled_run import COUNTS, PAUSED, CompiledRun, Memory, Outcome
+from .measured import MEASURES, certain
 from .methods import SCIPY, IntegrationMethod
 from .rollouts import Rollouts, Source
-
-MEASURES = {"energy": ("kinetic", "potential"), "momentum": ("linear_momentum", "angular_momentum")}
 
 
 class ParallelRuns:
@@ -49,6 +49,7 @@ class ParallelRuns:
         for kernel in map(self.model.kernel, MEASURES):
             for name, shape in zip(MEASURES[kernel.name], kernel.out_shapes, strict=True):
                 self.measures[name] = np.zeros((runs, samples, *shape), kernel.dtype)
+        self.late: list[int] = []  # measured at both ends so far
         self.unmeasured: list[int] = []  # whose energy or momentum no number holds
         self.stop: KeyboardInterrupt | None = None  # what ended all before their end
 
@@ -91,9 +92,15 @@ class ParallelRuns:
         self.outcomes[k] = outcome
         if outcome.failure is not None:
             return  # measured with its error
+        arrays = [self.memory.out[name][k, : outcome.done] for name in ("q", "v", "bristles")]
+        late = certain(self.model, self.method.name, (self.memory.parameters.vectors[k], *arrays))
         try:
             for measure in measures:
-                measure(k, outcome.done)
+                measure(k, 1 if late else outcome.done)
+                if late:
+                    measure(k, 1, outcome.done - 1)
+            if late:
+                self.late.append(k)
         except StateError:
             self.unmeasured.append(k)
 
@@ -127,26 +134,39 @@ class ParallelRuns:
         shared = {"model": self.model.name, "threads": self.threads, "abreast": abreast}
         info = counts | self.method.info | shared | info
         arrays = self._arrays(outcomes)
-        books = self._audit(arrays, outcomes)
+        books = self._audit(arrays["ends"], outcomes)
         eps = float(np.finfo(self.memory.records.dtype).eps)
         warnings = [
             [] if errors[k] else warnings_of(books.of(k), self.method.info | outcome.info, eps)
             for k, outcome in enumerate(outcomes)
         ]
-        found = Rollouts(
-            **arrays, errors=errors, audit=books, warnings=warnings, info=info, source=self.source
-        )
+        told = {"errors": errors, "audit": books, "warnings": warnings, "info": info}
+        found = made(Rollouts, arrays | told | {"source": self.source}, self.measured)
         if self.stop is not None:
             vars(self.stop)["motion"] = found
             raise self.stop
         return found
 
-    def _audit(self, arrays: dict[str, np.ndarray], outcomes: list[Outcome]) -> Audit:
+    def measured(self, _: str) -> dict[str, np.ndarray]:
+        """Return energies and momenta of all runs, nan after the end of a run, read-only."""
+
+        def work(numbers: Iterator[int], _: Event) -> None:
+            measures = [self._rows(name) for name in MEASURES]
+            for number in numbers:
+                k = self.late[number]
+                for measure in measures:
+                    measure(k, self.outcomes[k].done)
+
+        in_turn(len(self.late), self.threads, work)
+        return {name: read_only(array) for name, array in self.measures.items()}
+
+    def _audit(self, times: np.ndarray, outcomes: list[Outcome]) -> Audit:
         """Return the books of all runs, from start to end; nan of those that failed."""
         last = np.array([max(outcome.done, 1) - 1 for outcome in outcomes])
         each, ends = np.arange(len(outcomes)), {}
         for name in BALANCED:
-            ends[name] = np.stack([arrays[name][:, 0], arrays[name][each, last]], axis=1)
+            array = self.measures[name]
+            ends[name] = np.stack([array[:, 0], array[each, last]], axis=1).astype(float)
         for k, outcome in enumerate(outcomes):
             if outcome.failure is not None:
                 ends["kinetic"][k] = np.nan
@@ -154,25 +174,22 @@ class ParallelRuns:
                 model, state = self.source.model_of(k), (outcome.stop["q"], outcome.stop["v"])
                 ends["kinetic"][k, 1], ends["potential"][k, 1] = model.energy(*state)
                 ends["linear_momentum"][k, 1] = model.momentum(*state)[0]
-        span = arrays["ends"] - self.memory.start.start
+        span = times - self.memory.start.start
         ledger = np.array([outcome.ledger for outcome in outcomes])
         return audited(self.model, self.memory.parameters.values, ledger, span, ends)
 
     def _arrays(self, outcomes: list[Outcome]) -> dict[str, np.ndarray]:
-        """Return samples and measures, nan after the end of a run, read-only."""
-        arrays = self.memory.out | self.measures
-        arrays = {name: np.asarray(array, float) for name, array in arrays.items()}
+        """Return samples, nan after the end of a run as in the measures, read-only."""
         for k, outcome in enumerate(outcomes):
             if outcome.done < len(self.memory.start.times):
-                for array in arrays.values():
+                for array in (*self.memory.out.values(), *self.measures.values()):
                     array[k, outcome.done :] = np.nan
+        arrays = {name: np.asarray(array, float) for name, array in self.memory.out.items()}
         shape = (*arrays["q"].shape[:2], self.memory.ground.points, 2)
         arrays["bristles"] = arrays["bristles"].reshape(shape)
         arrays["t"] = np.array(self.memory.start.times)
         arrays["ends"] = np.array([outcome.end for outcome in outcomes])
-        for array in arrays.values():
-            array.setflags(write=False)
-        return arrays
+        return {name: read_only(array) for name, array in arrays.items()}
 
     def _judge(self, k: int) -> SimulationError | None:
         """Return the error that ended run k; measure it up to there."""
@@ -195,6 +212,13 @@ class ParallelRuns:
         inputs = [self.memory.out[argument] for argument in ("q", "v")]
         outputs = [self.measures[measure] for measure in MEASURES[name]]
         return RunKernel(self.model.kernel(name), self.memory.parameters.vectors, inputs, outputs)
+
+
+def read_only(array: np.ndarray) -> np.ndarray:
+    """Return an array as doubles that nobody writes."""
+    array = np.asarray(array, float).view()
+    array.setflags(write=False)
+    return array
 
 
 def in_c(run: CompiledRun, ended: Event) -> Outcome | None:

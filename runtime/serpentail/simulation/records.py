@@ -3,14 +3,22 @@
 import ctypes
 from functools import lru_cache
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..model.kept import kept
+from ..model.kernel import address_of
 from ..model.model import Model
 
 CFunction: Any = type(ctypes.CFUNCTYPE(None)()).__mro__[1]  # of all functions that ctypes makes
+
+
+_types: WeakKeyDictionary[Model, dict[str, type[ctypes.Structure]]] = WeakKeyDictionary()
+
+
+OF_MEMORY = ctypes.Structure, ctypes.Array
+REALS = {np.dtype(real): real for real in (ctypes.c_float, ctypes.c_double)}
 
 
 class Records:
@@ -20,24 +28,27 @@ class Records:
         self.model = model
         self.kept: list[Any] = []
         self.dtype = model.parameter_vector.dtype
-        self.real = np.ctypeslib.as_ctypes_type(self.dtype)
-        self.members = model.manifest["simulation"]["records"]
+        self.real = REALS[self.dtype]
+        self.types = _types.get(model) or _types.setdefault(model, self._made())
 
-    @kept
-    def types(self) -> dict[str, type[ctypes.Structure]]:
+    def _made(self) -> dict[str, type[ctypes.Structure]]:
         """Structure types by name."""
-        types = {}
-        for name, members in self.members.items():
-            types[name] = structure(name, tuple(map(tuple, members)), self.real)
-        return types
+        members = self.model.manifest["simulation"]["records"]
+        return {
+            name: structure(name, tuple(map(tuple, each)), self.real)
+            for name, each in members.items()
+        }
 
     def has(self, record: str, member: str) -> bool:
         """Tell if a record has a member."""
-        return any(name == member for name, _ in self.members[record])
+        return hasattr(self.types[record], member)
 
     def record(self, name: str, **members: Any) -> ctypes.Structure:
         """Return a record, zero but for these members; arrays are given by their addresses."""
-        record = self.types[name](**{key: self._plain(value) for key, value in members.items()})
+        for key, value in members.items():
+            if type(value) not in (int, float):
+                members[key] = self._plain(value)
+        record = self.types[name](**members)
         self.kept.append(record)
         return record
 
@@ -57,8 +68,8 @@ class Records:
         """Return a value as a structure's member takes it."""
         if isinstance(value, np.ndarray):
             self.kept.append(value)
-            return value.ctypes.data
-        if isinstance(value, ctypes.Structure | ctypes.Array):
+            return address_of(value)
+        if isinstance(value, OF_MEMORY):
             return ctypes.addressof(value)
         return ctypes.cast(value, ctypes.c_void_p) if isinstance(value, CFunction) else value
 

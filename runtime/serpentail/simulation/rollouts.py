@@ -12,8 +12,9 @@ from ..errors import SimulationError, ViewError
 from ..model.model import Model
 from ..model.parameters import RunParameters
 from ..motion.account import arrays_of, framed, made, tail_of
+from ..motion.derived import Derived, settled
 from ..motion.exports import Exports
-from ..motion.trajectory import Trajectory
+from ..motion.trajectory import MONOTONE, Trajectory
 from .audit import Audit
 from .compiled_run import Outcome, Samples, sampled
 from .ground import Ground
@@ -77,6 +78,9 @@ class Rollouts(Exports):
     def __len__(self) -> int:
         return len(self.q)
 
+    def __getstate__(self) -> dict[str, Any]:
+        return settled(self, MONOTONE)
+
     def __repr__(self) -> str:
         """On at most six lines what they are, and which failed."""
         model, failed = self.source.model, [k for k, e in enumerate(self.errors) if e is not None]
@@ -132,3 +136,7 @@ class Rollouts(Exports):
             raise error
         arrays = {name: getattr(self, name)[k] for name in ("q", "v", "tau", "bristles")}
         return self.source.trajectory(k, sampled(self.t, arrays, self.source.outcomes[k]))
+
+
+for _name in MONOTONE:
+    setattr(Rollouts, _name, Derived(_name))

@@ -27,7 +27,7 @@ from .methods import SCIPY, IntegrationMethod, checked_method, chosen, step_coun
 from .parallel_runs import run_parallel
 from .records import Records
 from .rollouts import Rollouts
-from .start import Start
+from .start import EPS, Start
 from .watched import Watch, Watched, checked_watch
 
 
@@ -176,7 +176,7 @@ def choose(
 
 def refuse_vanishing(start: Start, name: str, step: float) -> None:
     """SimulationError where steps of at most this length (s) are too short to move the time."""
-    least = np.finfo(float).eps * max(abs(start.start), abs(start.end))
+    least = EPS * max(abs(start.start), abs(start.end))
     if step < least:
         raise SimulationError(
             f"{name} {step:.3g}: too short to move the time: give {least:.2g} s or more"
@@ -185,11 +185,10 @@ def refuse_vanishing(start: Start, name: str, step: float) -> None:
 
 def fastest_decay(actuation: Actuation, start: Start, parameters: RunParameters) -> float:
     """Largest eigenvalue (1/s) of K (H^-1)_tt at the starts, K being joint damping."""
-    laws = [np.zeros(actuation.nt)]
-    laws += [parts.damping for parts in actuation.parts if parts.damping is not None]
-    damping = np.max(laws, axis=0)
-    if not damping.any():
+    laws = [parts.damping for parts in actuation.parts if parts.damping is not None]
+    if not any(law.any() for law in laws):
         return 0.0
+    damping = np.max(laws, axis=0)
     # without torque and with unit torques: the differences are columns of H^-1
     kernel, shape = actuation.model.kernel("forward_dynamics"), (start.runs, actuation.nt + 1)
     q = np.repeat(start.q0[:, None], shape[1], axis=1).astype(kernel.dtype)

@@ -80,11 +80,15 @@ class Start:
     @kept
     def times(self) -> np.ndarray:
         """Output times (intervals + 1,)."""
-        return np.linspace(self.start, self.end, self.intervals + 1)
+        times = np.arange(self.intervals + 1) * self.interval + self.start
+        times[-1] = self.end
+        return times
 
 
 def checked_span(t_span: ArrayLike) -> tuple[float, float]:
     """Return start and end (s); SimulationError where they are none."""
+    if type(t_span) is float and 0 < t_span < math.inf:
+        return 0.0, t_span
     span = finite_array("t_span", t_span, SimulationError)
     if span.shape not in ((), (2,)):
         raise refusal("t_span", t_span, "(start, end) in s, or the end", SimulationError)
@@ -102,8 +106,9 @@ def checked_states(name: str, value: ArrayLike, size: int) -> np.ndarray:
             f"{name} has shape {array.shape}, not ({size},) of one start state, or (k, {size}) of "
             "k runs"
         )
-    rows = np.atleast_2d(array)
-    for run in np.flatnonzero(~np.isfinite(rows).all(axis=1))[:1]:
+    if not np.isfinite(array).all():
+        rows = np.atleast_2d(array)
+        run = int(np.isfinite(rows).all(axis=1).argmin())
         refuse_not_finite(name, rows[run], StateError, f" of run {run}" if array.ndim == 2 else "")
     return array
 
@@ -115,7 +120,9 @@ def _paired(q0: np.ndarray, v0: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         raise StateError(
             f"q0 has {len(q0)} runs, v0 {len(v0)}: give as many of both, or one of either"
         )
-    runs = counts.pop() if counts else 1
+    if not counts:
+        return np.array(q0, ndmin=2), np.array(v0, ndmin=2)
+    runs = counts.pop()
     q0 = np.broadcast_to(q0, (runs, q0.shape[-1]))
     v0 = np.broadcast_to(v0, (runs, v0.shape[-1]))
     return np.array(q0, order="C"), np.array(v0, order="C")

@@ -1,0 +1,64 @@
+"""Calls of compiled functions through a small extension in C, where this Python has the headers
+that it needs; where not, ctypes calls them.
+"""
+
+import ctypes
+import sys
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any, Protocol
+
+from numpy import ndarray
+
+from ..errors import SerpentailError
+from .compiler import compile_library
+
+SOURCE = Path(__file__).with_name("native") / "calls.c"
+# what an extension needs of a linker that asks for every symbol
+LINKING = ("-Wl,-undefined,dynamic_lookup",) if sys.platform == "darwin" else ()
+Call = Callable[..., Any]  # takes arguments, returns outputs, or None where it does not serve
+
+
+class Memory(Protocol):
+    """What a function works on, and the address of a record that points to it."""
+
+    inputs: list[ndarray]
+    outputs: list[ndarray]
+    address: int
+
+
+def call_of(function: Any, own: Memory) -> Call:
+    """Return what calls a function of the generated C, as ctypes has it, on one state."""
+    library = extension()
+    if library is None:
+        return declined
+    code, arrays = ctypes.cast(function, ctypes.c_void_p), (*own.inputs, *own.outputs)
+    return library.serpentail_call(code, own.address, arrays, len(own.inputs), own)
+
+
+def declined(*_: Any) -> None:
+    """Serve in place of such a call where ctypes makes all."""
+
+
+@cache
+def extension() -> ctypes.PyDLL | None:
+    """Return the extension, compiled once for a compiler and a Python; None where it cannot be."""
+    import sysconfig
+
+    headers = Path(sysconfig.get_path("include"))
+    locked = sys.implementation.name == "cpython" and not sysconfig.get_config_var(
+        "Py_GIL_DISABLED"
+    )
+    if not (locked and (headers / "Python.h").is_file()):
+        return None
+    flags = ("-I", str(headers), *LINKING)
+    try:
+        library = ctypes.PyDLL(str(compile_library([SOURCE], SOURCE.parent, flags=flags)))
+    except (SerpentailError, OSError):  # ctypes serves, and needs nothing more
+        return None
+    made = library.serpentail_call
+    made.restype = ctypes.py_object
+    pointer, thing = ctypes.c_void_p, ctypes.py_object
+    made.argtypes = (pointer, pointer, thing, ctypes.c_ssize_t, thing)
+    return library

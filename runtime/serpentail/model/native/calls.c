@@ -1,0 +1,172 @@
+/* Calls of compiled functions on one state, from Python and without its interpreter.
+
+   A call takes the plain case alone: NumPy arrays of the right type and shape.  For all else, and
+   where the function refuses the state, it returns None, and its caller does the same in Python,
+   which converts arguments and words the errors.  Only CPython's stable ABI is used, so that a
+   build serves every version from 3.11 on, and every NumPy. */
+
+#define Py_LIMITED_API 0x030B0000
+#include <Python.h>
+#include <string.h>
+
+enum { MOST_ARRAYS = 10 };
+
+typedef int (*Function)(void *record);
+
+/* A function, its argument record, the arrays that the record points to, and what owns all. */
+typedef struct {
+    Function function;
+    void *record;
+    Py_ssize_t inputs, outputs;
+    Py_buffer arrays[MOST_ARRAYS]; /* inputs, then outputs; held, so that they stay where they are */
+    PyObject *copies[MOST_ARRAYS]; /* what copies an output; NULL of a scalar */
+    PyObject *whole;               /* the index () */
+    PyObject *owner;               /* of all that the record points to, and of the record */
+    int busy;                      /* whether a call is copying outputs */
+} Call;
+
+static const char NAME[] = "serpentail.call";
+
+/* Whether an argument is an array like one of ours. */
+static int alike(const Py_buffer *given, const Py_buffer *own)
+{
+    return given->ndim == own->ndim && strcmp(given->format, own->format) == 0
+        && memcmp(given->shape, own->shape, (size_t)own->ndim * sizeof *own->shape) == 0;
+}
+
+/* Copy an argument into the array that the function reads; 0 where it is not the plain case. */
+static int taken(PyObject *argument, const Py_buffer *own)
+{
+    Py_buffer given;
+    int plain;
+    if (Py_TYPE(argument) != Py_TYPE(own->obj)) { /* subclasses may be masked, or matrices */
+        return 0;
+    }
+    if (PyObject_GetBuffer(argument, &given, PyBUF_RECORDS_RO) < 0) {
+        PyErr_Clear();
+        return 0;
+    }
+    plain = alike(&given, own) && PyBuffer_ToContiguous(own->buf, &given, own->len, 'C') == 0;
+    PyBuffer_Release(&given);
+    return plain;
+}
+
+/* A fresh copy of output k. */
+static PyObject *copied(const Call *call, Py_ssize_t k)
+{
+    if (call->copies[k] != NULL) {
+        return PyObject_CallNoArgs(call->copies[k]);
+    }
+    return PyObject_GetItem(call->arrays[call->inputs + k].obj, call->whole);
+}
+
+/* Fresh copies of all outputs: one alone, or a tuple. */
+static PyObject *results(const Call *call)
+{
+    Py_ssize_t k;
+    PyObject *all, *one;
+    if (call->outputs == 1) {
+        return copied(call, 0);
+    }
+    all = PyTuple_New(call->outputs);
+    for (k = 0; all != NULL && k < call->outputs; k++) {
+        one = copied(call, k);
+        if (one == NULL || PyTuple_SetItem(all, k, one) < 0) {
+            Py_DECREF(all);
+            return NULL;
+        }
+    }
+    return all;
+}
+
+/* Evaluate on one state.  Python's lock is held from the first argument to the last result, but
+   where NumPy lets go of it to copy much, or where Python collects garbage and runs what a user
+   wrote: a call that comes meanwhile finds this one busy, and is made in Python. */
+static PyObject *evaluate(PyObject *self, PyObject *const *arguments, Py_ssize_t count)
+{
+    Call *call = PyCapsule_GetPointer(self, NAME);
+    PyObject *found;
+    Py_ssize_t k;
+    if (call == NULL) {
+        return NULL;
+    }
+    if (count != call->inputs || call->busy) {
+        Py_RETURN_NONE;
+    }
+    for (k = 0; k < count; k++) {
+        if (!taken(arguments[k], &call->arrays[k])) {
+            Py_RETURN_NONE;
+        }
+    }
+    if (call->function(call->record) != 0) {
+        Py_RETURN_NONE;
+    }
+    call->busy = 1;
+    found = results(call);
+    call->busy = 0;
+    return found;
+}
+
+static void release(PyObject *capsule)
+{
+    Call *call = PyCapsule_GetPointer(capsule, NAME);
+    Py_ssize_t k;
+    for (k = 0; k < MOST_ARRAYS; k++) {
+        PyBuffer_Release(&call->arrays[k]); /* nothing where none is held */
+        Py_XDECREF(call->copies[k]);
+    }
+    Py_XDECREF(call->whole);
+    Py_XDECREF(call->owner);
+    PyMem_Free(call);
+}
+
+/* Hold the arrays, and what copies the outputs; -1 and an error where that cannot be done. */
+static int held(Call *call, PyObject *arrays)
+{
+    Py_ssize_t k;
+    PyObject *array;
+    for (k = 0; k < call->inputs + call->outputs; k++) {
+        array = PyTuple_GetItem(arrays, k);
+        if (array == NULL || PyObject_GetBuffer(array, &call->arrays[k], PyBUF_RECORDS) < 0) {
+            return -1;
+        }
+        if (k >= call->inputs && call->arrays[k].ndim > 0) {
+            call->copies[k - call->inputs] = PyObject_GetAttrString(array, "copy");
+            if (call->copies[k - call->inputs] == NULL) {
+                return -1;
+            }
+        }
+    }
+    call->whole = PyTuple_New(0);
+    return call->whole == NULL ? -1 : 0;
+}
+
+static PyMethodDef METHOD = {"evaluate", (PyCFunction)(void (*)(void))evaluate, METH_FASTCALL, NULL};
+
+/* Return what evaluates a function, given its arrays, of which so many are inputs.
+
+   The record points to them.  The owner of both is kept; the function must outlive the call. */
+PyObject *serpentail_call(
+    void *function, void *record, PyObject *arrays, Py_ssize_t inputs, PyObject *owner)
+{
+    PyObject *capsule, *made;
+    Call *call = PyMem_Calloc(1, sizeof *call);
+    if (call == NULL) {
+        return PyErr_NoMemory();
+    }
+    call->function = (Function)(size_t)function;
+    call->record = record;
+    call->inputs = inputs;
+    Py_INCREF(owner);
+    call->owner = owner;
+    call->outputs = PyTuple_Size(arrays) - inputs;
+    capsule = PyCapsule_New(call, NAME, release);
+    if (capsule == NULL) {
+        Py_DECREF(owner);
+        PyMem_Free(call);
+        return NULL;
+    }
+    made = held(call, arrays) < 0 ? NULL : PyCFunction_New(&METHOD, capsule);
+    Py_DECREF(capsule);
+    return made;
+}

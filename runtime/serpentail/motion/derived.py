@@ -1,0 +1,42 @@
+"""Fields of a motion that are derived when somebody first asks for them."""
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, TypeVar
+
+T = TypeVar("T")
+
+LATER = "later"  # what derives them, in a motion that has it
+# the name of a field -> that one, and what else comes with it, by name
+Later = Callable[[str], dict[str, Any]]
+
+
+def made(kind: type[T], fields: Mapping[str, Any], later: Later) -> T:
+    """Return a motion with these fields, all others of which are derived later."""
+    motion = object.__new__(kind)
+    vars(motion).update(fields, **{LATER: later})
+    return motion
+
+
+def settled(motion: Any, names: Iterable[str]) -> dict[str, Any]:
+    """Return what a motion consists of when fields of these names have been derived."""
+    state = vars(motion) | {name: getattr(motion, name) for name in names}
+    state.pop(LATER, None)
+    return state
+
+
+class Derived:
+    """A field that its motion derives once and keeps; where it was given, this is not asked.
+
+    In a race of threads the first one's values stay.
+    """
+
+    def __init__(self, name: str):
+        self.name = name
+
+    def __get__(self, motion: Any, owner: type | None = None) -> Any:
+        known = {} if motion is None else vars(motion)
+        if LATER not in known:
+            raise AttributeError(f"no {self.name!r}: it was not given")
+        for name, value in known[LATER](self.name).items():
+            known.setdefault(name, value)
+        return known[self.name]
