@@ -51,6 +51,7 @@ def dialect(real: str, prefix: str = "") -> Dialect:
     return Dialect(
         "const real {name} = {text};",
         {"sqrt": "sqrtf" if real == "float" else "sqrt"},
+        {"sqrt": f"{prefix}_sqrt_row"},
         real,
         sincos=f"real {{sine}}, {{cosine}}; {prefix}_sincos{both}",
         wide_sincos=f"lanes {{sine}}, {{cosine}}; {prefix}_sincos_row{both}",
