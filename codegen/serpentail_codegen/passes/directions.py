@@ -134,10 +134,16 @@ class _Turns:
             yield Fill(self.at(target, unit.first + k), one)
 
     def copy(self, copy: Copy) -> Iterator[Statement]:
-        """Yield the copy for each direction, or that of single lanes."""
+        """Yield the copy for each direction that has anything, or that of single lanes."""
         moved = replace(copy, target=self.at(copy.target), source=self.at(copy.source))
-        lanes = copy.target.lanes or copy.source.lanes
-        yield self.each(lanes, moved) if lanes else moved
+        if not copy.source.lanes:
+            yield self.each(copy.target.lanes, moved) if copy.target.lanes else moved
+            return
+        for first, last, moving in self.kinds(copy, as_index(copy.target.lanes)):
+            zeros = [] if copy.adds else self.cleared(copy.target)
+            body = [moved] if moving else zeros
+            if body:
+                yield replace(self.each(last, *body), start=first)
 
     def solve(self, solve: Solve) -> Iterator[Statement]:
         """Yield a solution for each direction."""
@@ -169,19 +175,20 @@ class _Turns:
         stop = as_index(lanes if call.columns is None else call.columns)
         for first, last, moving in self.kinds(call, stop):
             step = without(parts.each, wide - moving)
-            body = self.cleared(call) if is_zero(step) else [applied(step)]
+            body = self.cleared(*call.stored()) if is_zero(step) else [applied(step)]
             if body:
                 yield replace(self.each(last, *body), start=first)
 
-    def cleared(self, call: Apply) -> list[Statement]:
-        """Return what stores the zeros that a step gives of zeros."""
-        wide = [ref for ref in call.stored() if ref.lanes]
-        return [Fill(self.at(ref), (0,) * ref.size) for ref in wide]
+    def cleared(self, *targets: Ref) -> list[Statement]:
+        """Return what stores the zeros that come of nothing but zeros."""
+        return [Fill(self.at(ref), (0,) * ref.size) for ref in targets if ref.lanes]
 
-    def kinds(self, call: Apply, stop: Index) -> Iterator[tuple[Index, Index, frozenset[str]]]:
-        """Yield ranges of directions, and what is not zero in them of what a step reads."""
+    def kinds(
+        self, call: Apply | Copy, stop: Index
+    ) -> Iterator[tuple[Index, Index, frozenset[str]]]:
+        """Yield ranges of directions, and what is not zero in them of what a statement reads."""
         runs = self.patterns.get(id(call), [])
-        lanes = next(ref.lanes for ref in (*call.reads, *call.writes) if ref.lanes)
+        lanes = next(ref.lanes for ref in (*reads(call), *writes(call)) if ref.lanes)
         marks = [as_index(0)]
         for mark in self.boundaries.get(lanes, []):
             known = all(variable in self.variables for variable, _ in mark.terms)

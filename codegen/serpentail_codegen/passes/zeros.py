@@ -5,9 +5,10 @@ scalar counts for every lane.
 """
 
 from ..ir.interpret import Run
-from ..ir.program import Apply, Program
+from ..ir.program import Apply, Copy, Program, Ref
 
 NONE, ALL = 0, -1
+SOURCE = "source"  # what a copy reads
 Patterns = dict[int, list[tuple[dict[str, int], dict[str, int]]]]
 
 
@@ -32,7 +33,7 @@ class Bits:
 
 
 class _Watch(Run):
-    """A run that notes what each step reads: the lanes of each input, in every iteration."""
+    """A run that notes what steps and copies read: the lanes of each input, in every iteration."""
 
     def __init__(self, program: Program):
         self.seen: Patterns = {}
@@ -41,18 +42,27 @@ class _Watch(Run):
 
     def apply(self, call: Apply, at: dict[str, int]) -> None:
         """Note what a step reads, and run it."""
+        self.note(call, call.inputs(), at)
+        super().apply(call, at)
+
+    def copy(self, copy: Copy, at: dict[str, int]) -> None:
+        """Note what a copy reads, and run it."""
+        self.note(copy, {SOURCE: copy.source}, at)
+        super().copy(copy, at)
+
+    def note(self, statement: Apply | Copy, inputs: dict[str, Ref], at: dict[str, int]) -> None:
+        """Note the lanes of what a statement reads."""
         lanes: dict[str, int] = {}
-        for name, ref in call.inputs().items():
+        for name, ref in inputs.items():
             if ref.lanes:
                 for value in self.read(ref, at):
                     lanes[name] = lanes.get(name, NONE) | value
         if lanes:
-            self.seen.setdefault(id(call), []).append((dict(at), lanes))
-        super().apply(call, at)
+            self.seen.setdefault(id(statement), []).append((dict(at), lanes))
 
 
 def lanes_read(program: Program) -> Patterns:
-    """Return the loop variables and the lanes of each wide input for all runs of a step, by its id.
+    """Return the loop variables and the lanes of each wide input for all runs, by statement's id.
 
     The program has no calls.
     """
