@@ -27,6 +27,7 @@ from ..ir.program import (
     statements,
 )
 from ..ir.step import Step
+from .fused import fused
 from .parted import SLOPES, is_zero, parted, without
 from .unread import without_unread_fills
 from .zeros import Patterns, lanes_read
@@ -42,7 +43,7 @@ def directions_in_turn(program: Program) -> Program:
     """
     if not has_directions(program):
         return program
-    program = inlined(program)
+    program = fused(inlined(program))
     turns = _Turns(lanes_read(program), boundaries(program))
     body = turns.body(program.body, ())
     arrays = tuple(turns.narrow(a) for a in program.arrays)

@@ -82,3 +82,11 @@ def test_batches_stay_straight_for_longer_tails_than_single_states(segments, lin
     manifest = json.loads((folder / "manifest.json").read_text())
     assert manifest["functions"]["forward_dynamics"]["emission"] in ("lanes", "segments")
     assert ("written_out" in (folder / "src" / f"{folder.name}_batch.c").read_text()) == straight
+
+
+@pytest.mark.parametrize(("segments", "links", "straight"), [(1, 3, True), (3, 4, False)])
+def test_batches_of_derivatives_are_straight_for_short_tails_alone(segments, links, straight):
+    folder = model_folder(segments, links, functions=["forward_dynamics_derivatives"])
+    source = (folder / "src" / f"{folder.name}_batch_derivatives.c").read_text()
+    assert ("written_out" in source) == straight
+    assert ("for (int d = 0;" in source) != straight

@@ -6,7 +6,7 @@ from typing import Any
 
 from ...functions.function import Function, assemble
 from ...functions.tail import Tail
-from ...ir.cost import applied, branches
+from ...ir.cost import applied, branches, executed
 from ...ir.program import Program
 from ...passes.batch import batched, unrolled_step
 from ...passes.directions import directions_in_turn, has_directions
@@ -21,6 +21,7 @@ from .views import ArgumentView, callee_view, step_views
 STATES = {"double": 8, "float": 16}  # side by side: lanes of the widest vector
 # nodes: beyond, loops are hardly slower, and compile in a quarter of the time
 STRAIGHT_UP_TO = 10000
+MOST_APPLIED = 3 * STRAIGHT_UP_TO  # nodes: of more, no line is that short without its zeros
 # by the source that they lie in: each is compiled when it is first needed
 PARTS = {
     "batch": ("mass_matrix", "bias_force", "inverse_dynamics", "forward_dynamics"),
@@ -65,11 +66,24 @@ def batches(scene: Scene, tail: Tail, printed: Sequence[PrintedFunction]) -> lis
 def _batch(scene: Scene, tail: Tail, function: Function) -> Batch:
     fixed, single, states = baked_values(scene), assemble(function, tail), STATES[scene.real]
     if has_directions(single):
-        single = unrolled_ldl(directions_in_turn(single), UNROLLED_ROWS)
+        single = _of_directions(scene, single, fixed)
     elif straight(scene, single):
         single = unrolled_step(single, fixed)
     lanes = batched(single, states)
     return Batch(function, states, lanes, in_loops(lanes, scene.real, scene.name, fixed))
+
+
+def _of_directions(scene: Scene, single: Program, fixed: dict[str, list]) -> Program:
+    """Return a program whose directions come in turn, or all of it as one line where that is short.
+
+    Of no scene it is a long line: a compiler would work on it for minutes.
+    """
+    turns = directions_in_turn(unrolled_ldl(single, UNROLLED_ROWS))
+    if scene.emission in ("auto", "straight") and applied(turns) <= MOST_APPLIED:
+        line = unrolled_step(turns, fixed)
+        if executed(line) <= STRAIGHT_UP_TO:
+            return line
+    return turns
 
 
 def straight(scene: Scene, program: Program) -> bool:
