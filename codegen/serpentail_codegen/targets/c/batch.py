@@ -21,7 +21,7 @@ from .views import ArgumentView, callee_view, step_views
 STATES = {"double": 8, "float": 16}  # side by side: lanes of the widest vector
 # nodes: beyond, loops are hardly slower, and compile in a quarter of the time
 STRAIGHT_UP_TO = 10000
-MOST_APPLIED = 3 * STRAIGHT_UP_TO  # nodes: of more, no line is that short without its zeros
+MOST_APPLIED = 22000  # nodes: of more, no line is that short without its zeros
 # by the source that they lie in: each is compiled when it is first needed
 PARTS = {
     "batch": ("mass_matrix", "bias_force", "inverse_dynamics", "forward_dynamics"),
