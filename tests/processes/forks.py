@@ -69,7 +69,7 @@ def while_it_compiles(model: st.Model):
     batches = model.batch_library
 
     def work():
-        with batches.batch.lock, batches.rollouts.lock:
+        with batches.sources["batch"].lock, batches.rollouts.lock:
             held.set()
             over.wait()
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from ..ir.dataflow import backward_slice, forward_slice, inner_arrays, pruned, writes
+from ..ir.dataflow import backward_slice, forward_slice, inner_arrays, overlap, pruned, writes
 from ..ir.program import (
     Apply,
     Array,
@@ -96,18 +96,6 @@ def _apart(ref: Ref, loops: tuple[Loop | When, ...]) -> bool:
             return False
         span += stride * (loop.stop.offset - loop.start.offset - 1)
     return True
-
-
-def _overlap(ref: Ref, other: Ref) -> bool:
-    """Tell if two references may share a scalar."""
-    if ref.array.name != other.array.name:
-        return False
-    if ref.offset.terms != other.offset.terms:
-        return True
-    first, other_first = ref.offset.offset, other.offset.offset
-    last = first + (ref.size - 1) * ref.stride
-    other_last = other_first + (other.size - 1) * other.stride
-    return first <= other_last and other_first <= last
 
 
 @dataclass
@@ -237,7 +225,7 @@ class _Reversal:
 def _check_overlaps(call: Apply, stored: list[Ref], targets: list[Ref]) -> None:
     """Refuse a step that overwrites a part of what it reads, or what it reads under two names."""
     for ref in stored:
-        overlaps = sum(_overlap(ref, target) for target in targets)
+        overlaps = sum(overlap(ref, target) for target in targets)
         if overlaps > (ref in targets):
             raise ValueError(
                 f"{call.step.name} overwrites part of what it reads in {ref.array.name}"

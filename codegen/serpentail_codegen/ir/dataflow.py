@@ -29,6 +29,18 @@ from .program import (
 Body = tuple[Statement, ...]
 
 
+def overlap(ref: Ref, other: Ref) -> bool:
+    """Tell if two references may share a number."""
+    if ref.array.name != other.array.name:
+        return False
+    if ref.lane or other.lane or ref.offset.terms != other.offset.terms:
+        return True
+    first, other_first = ref.offset.offset, other.offset.offset
+    last = first + (ref.size - 1) * ref.stride
+    other_last = other_first + (other.size - 1) * other.stride
+    return first <= other_last and other_first <= last
+
+
 @singledispatch
 def reads(statement: Statement) -> tuple[Ref, ...]:
     """Return what a statement reads; sums and what is overwritten in place are read too."""

@@ -1,7 +1,7 @@
 """Prints the scalar expressions of steps: one definition a line, in the dialect of a language."""
 
 from collections import Counter, defaultdict
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from ..ir.program import Index
 from ..ir.tape import BINARY, LEAVES, lanes_of, live_nodes, operands
@@ -30,6 +30,7 @@ class Dialect:
 
     definition: str
     functions: dict[str, str]
+    wide_functions: dict[str, str] = field(default_factory=dict)  # of wide arguments
     real: str = "double"
     select: str = "{c} > {zero} ? {a} : {b}"
     sincos: str = ""  # defines sine and cosine of one argument at once; empty: by two functions
@@ -137,11 +138,11 @@ class Scalars:
             return self.dialect.select.format(c=c, a=a, b=b, zero=self.dialect.literal(0))
         if op == "lane":
             return f"work[{self.stored[args[0]] + args[1]}]"
-        return (
-            self._leaf(op, args)
-            if op in LEAVES
-            else f"{self.dialect.functions[op]}({self.text[args[0]]})"
-        )
+        if op in LEAVES:
+            return self._leaf(op, args)
+        wide = self.lanes[args[0]]
+        functions = self.dialect.wide_functions if wide else self.dialect.functions
+        return f"{functions[op]}({self.text[args[0]]})"
 
     def _leaf(self, op: str, args) -> str:
         if op == "const":
@@ -157,7 +158,7 @@ class Scalars:
 
 def called(nodes, inputs=()) -> set[str]:
     """Return the helpers that nodes call, from the lanes of their inputs."""
-    if not any(node[0] in ("sin", "cos") for node in nodes):
+    if not any(node[0] in ("sin", "cos", "sqrt") for node in nodes):
         return set()
     lanes: list[int] = []
     helpers = set()
@@ -165,4 +166,6 @@ def called(nodes, inputs=()) -> set[str]:
         lanes.append(lanes_of((op, *args), lanes, inputs))
         if op in ("sin", "cos"):
             helpers |= {"sincos", "wide_sincos"} if lanes[args[0]] else {"sincos"}
+        if op == "sqrt" and lanes[args[0]]:
+            helpers.add("wide_sqrt")
     return helpers

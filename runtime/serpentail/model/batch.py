@@ -13,8 +13,9 @@ from .snapshot import model_library
 from .workers import after_fork
 
 MIN_BATCH = 1000  # states: from here on a batch pays for compiling
-LAZY_SOURCES = ("batch", "flights")  # sources of a model that are compiled when they are needed
-NO_BATCH: dict = {"states": 1, "work": {}}  # of models without C
+# sources of a model that are compiled when they are needed
+LAZY_SOURCES = ("batch", "batch_derivatives", "flights")
+NO_BATCH: dict = {"states": 1, "work": {}, "parts": {}}  # of models without C
 RecordFunction = Callable[[int], int]  # takes the address of a record, returns a status
 
 
@@ -62,12 +63,15 @@ class BatchLibrary:
         batch = checked.manifest.get("batch", NO_BATCH)
         self.states: int = batch["states"]
         self.work: dict[str, int] = batch["work"]
-        self.batch, self.rollouts = (LazyLibrary(checked, profile, part) for part in LAZY_SOURCES)
+        self.parts: dict[str, str] = batch["parts"]
+        self.sources = {part: LazyLibrary(checked, profile, part) for part in LAZY_SOURCES}
+        self.rollouts = self.sources["flights"]
 
     def entry(self, name: str, count: int) -> RecordFunction | None:
         """Return the C function for a batch of so many states, None where it is not worth it."""
-        if name not in self.work or count < (
-            MIN_BATCH if self.batch.library is None else self.states
-        ):
+        if name not in self.work:
             return None
-        return self.batch.function(f"{self.prefix}_side_by_side_{name}")
+        source = self.sources[self.parts[name]]
+        if count < (MIN_BATCH if source.library is None else self.states):
+            return None
+        return source.function(f"{self.prefix}_side_by_side_{name}")

@@ -16,6 +16,12 @@ ARGUMENTS = {
     "bias_force": ("q", "v"),
     "inverse_dynamics": ("q", "v", "v_dot"),
     "forward_dynamics": ("q", "v", "tau"),
+    "inverse_dynamics_derivatives": ("q", "v", "v_dot"),
+    "forward_dynamics_derivatives": ("q", "v", "tau"),
+    "inverse_dynamics_vjp": ("q", "v", "v_dot", "multiplier"),
+    "forward_dynamics_jvp": ("q", "v", "tau", "dq", "dv", "dtau"),
+    "forward_dynamics_vjp": ("q", "v", "tau", "multiplier"),
+    "inverse_dynamics_hessian": ("q", "v", "v_dot", "multiplier"),
 }
 
 
@@ -30,6 +36,7 @@ def states(model, count, seed=0):
     """Random states, one argument a name."""
     rng = np.random.default_rng(seed)
     sizes = {"q": model.nq, "v": model.nv, "v_dot": model.nv, "tau": model.nv - 6}
+    sizes |= {"multiplier": model.nv, "dq": model.nv, "dv": model.nv, "dtau": model.nv - 6}
     return {name: rng.normal(size=(count, size)) for name, size in sizes.items()}
 
 
@@ -38,8 +45,15 @@ def given(arguments, name):
     return [arguments[a] for a in ARGUMENTS[name]]
 
 
+def evaluated(model, name, values):
+    """All numbers that a function gives: of one state, or a row for each of many."""
+    outputs = model.kernel(name)(*values)
+    outputs = outputs if isinstance(outputs, tuple) else (outputs,)
+    lead = np.shape(values[0])[:-1]
+    return np.concatenate([np.reshape(o, (*lead, -1)) for o in outputs], axis=-1)
+
+
 def alone(model, name, arguments):
     """Every state by a call of its own."""
-    return np.array(
-        [getattr(model, name)(*state) for state in zip(*given(arguments, name), strict=True)]
-    )
+    states = zip(*given(arguments, name), strict=True)
+    return np.array([evaluated(model, name, state) for state in states])

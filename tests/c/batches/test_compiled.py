@@ -11,7 +11,7 @@ import pytest
 from serpentail.model.compiler import compile_library
 from serpentail_codegen.targets.c.batch import BATCHED, STATES
 
-from .tails import alone, given, model, states
+from .tails import alone, evaluated, given, model, states
 
 FORMS = [
     pytest.param(
@@ -38,7 +38,7 @@ def test_any_number_of_states_gives_what_each_gives_alone(tail, emission, real, 
     expected = alone(found, name, arguments)
     scale, digits = np.abs(expected).max(axis=0), np.finfo(expected.dtype).eps
     for count in (1, 7, *range(STATES[real], len(expected), STATES[real] - 3), len(expected)):
-        out = getattr(found, name)(*(a[:count] for a in given(arguments, name)))
+        out = evaluated(found, name, [a[:count] for a in given(arguments, name)])
         assert out.dtype == expected.dtype
         assert (np.abs(out - expected[:count]) <= 3e3 * digits * scale).all()
 
@@ -49,9 +49,8 @@ def test_any_number_of_states_gives_what_each_gives_alone(tail, emission, real, 
 def test_the_reproducible_profile_gives_the_same_bits(tail, emission, name):
     found = model(*tail, profile="reproducible", emission=emission)
     arguments = states(found, 11)
-    assert np.array_equal(
-        getattr(found, name)(*given(arguments, name)), alone(found, name, arguments)
-    )
+    together = evaluated(found, name, given(arguments, name))
+    assert np.array_equal(together, alone(found, name, arguments))
 
 
 @mpmath.workdps(60)

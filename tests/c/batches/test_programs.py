@@ -7,12 +7,13 @@ import json
 import numpy as np
 import pytest
 
+from serpentail_codegen.functions.catalogue import CATALOGUE
 from serpentail_codegen.functions.function import assemble
-from serpentail_codegen.functions.plain import FUNCTIONS
 from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.passes.batch import batched as widened
 from serpentail_codegen.passes.batch import unrolled_step
+from serpentail_codegen.passes.directions import directions_in_turn
 from serpentail_codegen.targets.c.batch import BATCHED
 
 from ...support.models import model_folder
@@ -36,14 +37,14 @@ def numbers(program, rng):
 @pytest.mark.parametrize("tail", TAILS)
 @pytest.mark.parametrize("name", BATCHED)
 def test_a_program_of_many_states_means_each_of_them(tail, name):
-    single, rng = assemble(FUNCTIONS[name], TAILS[tail]), np.random.default_rng(1)
+    single, rng = assemble(CATALOGUE[name], TAILS[tail]), np.random.default_rng(1)
     states = [numbers(single, rng) for _ in range(3)]
     for state in states[1:]:
         state.update({a.name: states[0][a.name] for a in single.of_role("parameters")})
     many = dict(states[0])
     for a in single.of_role("input"):
         many[a.name] = list(np.array([state[a.name] for state in states]).T)
-    found = Run(widened(single, 3), Numbers(np), many).values
+    found = Run(widened(directions_in_turn(single), 3), Numbers(np), many).values
     for k, state in enumerate(states):
         alone = Run(single, Numbers(np), state).values
         for a in single.of_role("output"):
@@ -53,7 +54,7 @@ def test_a_program_of_many_states_means_each_of_them(tail, name):
 @pytest.mark.parametrize("tail", TAILS)
 @pytest.mark.parametrize("name", BATCHED)
 def test_a_program_written_out_means_the_same_and_guards_the_same(tail, name):
-    single = assemble(FUNCTIONS[name], TAILS[tail])
+    single = assemble(CATALOGUE[name], TAILS[tail])
     values = numbers(single, np.random.default_rng(2))
     expected, found = (Run(p, Numbers(np), values) for p in (single, unrolled_step(single)))
     for a in single.of_role("output"):
@@ -69,7 +70,7 @@ def test_a_program_written_out_means_the_same_and_guards_the_same(tail, name):
 def test_what_depends_on_parameters_alone_stays_narrow():
     arrays = {
         a.name: a.lanes
-        for a in widened(assemble(FUNCTIONS["inverse_dynamics"], Tail(2, 2)), 8).arrays
+        for a in widened(assemble(CATALOGUE["inverse_dynamics"], Tail(2, 2)), 8).arrays
     }
     assert arrays["q"] == arrays["force"] == 8
     assert arrays["link"] == arrays["tail_mass"] == 0
@@ -81,3 +82,11 @@ def test_batches_stay_straight_for_longer_tails_than_single_states(segments, lin
     manifest = json.loads((folder / "manifest.json").read_text())
     assert manifest["functions"]["forward_dynamics"]["emission"] in ("lanes", "segments")
     assert ("written_out" in (folder / "src" / f"{folder.name}_batch.c").read_text()) == straight
+
+
+@pytest.mark.parametrize(("segments", "links", "straight"), [(1, 3, True), (3, 4, False)])
+def test_batches_of_derivatives_are_straight_for_short_tails_alone(segments, links, straight):
+    folder = model_folder(segments, links, functions=["forward_dynamics_derivatives"])
+    source = (folder / "src" / f"{folder.name}_batch_derivatives.c").read_text()
+    assert ("written_out" in source) == straight
+    assert ("for (int d = 0;" in source) != straight

@@ -6,12 +6,14 @@ from typing import Any
 
 from ...functions.function import Function, assemble
 from ...functions.tail import Tail
-from ...ir.cost import applied, branches
+from ...ir.cost import applied, branches, executed
 from ...ir.program import Program
 from ...passes.batch import batched, unrolled_step
+from ...passes.directions import directions_in_turn, has_directions
+from ...passes.unrolled_ldl import unrolled_ldl
 from ...scene.scene import Scene
 from ..templating import render
-from .form import PrintedFunction, baked_values
+from .form import UNROLLED_ROWS, PrintedFunction, baked_values
 from .loops import in_loops
 from .routine import CFunction
 from .views import ArgumentView, callee_view, step_views
@@ -19,7 +21,20 @@ from .views import ArgumentView, callee_view, step_views
 STATES = {"double": 8, "float": 16}  # side by side: lanes of the widest vector
 # nodes: beyond, loops are hardly slower, and compile in a quarter of the time
 STRAIGHT_UP_TO = 10000
-BATCHED = ("mass_matrix", "bias_force", "inverse_dynamics", "forward_dynamics")
+MOST_APPLIED = 22000  # nodes: of more, no line is that short without its zeros
+# by the source that they lie in: each is compiled when it is first needed
+PARTS = {
+    "batch": ("mass_matrix", "bias_force", "inverse_dynamics", "forward_dynamics"),
+    "batch_derivatives": (
+        "inverse_dynamics_derivatives",
+        "forward_dynamics_derivatives",
+        "inverse_dynamics_vjp",
+        "forward_dynamics_jvp",
+        "forward_dynamics_vjp",
+        "inverse_dynamics_hessian",
+    ),
+}
+BATCHED = {name: part for part, names in PARTS.items() for name in names}
 
 
 @dataclass(frozen=True)
@@ -50,9 +65,25 @@ def batches(scene: Scene, tail: Tail, printed: Sequence[PrintedFunction]) -> lis
 
 def _batch(scene: Scene, tail: Tail, function: Function) -> Batch:
     fixed, single, states = baked_values(scene), assemble(function, tail), STATES[scene.real]
-    single = unrolled_step(single, fixed) if straight(scene, single) else single
+    if has_directions(single):
+        single = _of_directions(scene, single, fixed)
+    elif straight(scene, single):
+        single = unrolled_step(single, fixed)
     lanes = batched(single, states)
     return Batch(function, states, lanes, in_loops(lanes, scene.real, scene.name, fixed))
+
+
+def _of_directions(scene: Scene, single: Program, fixed: dict[str, list]) -> Program:
+    """Return a program whose directions come in turn, or all of it as one line where that is short.
+
+    Of no scene it is a long line: a compiler would work on it for minutes.
+    """
+    turns = directions_in_turn(unrolled_ldl(single, UNROLLED_ROWS))
+    if scene.emission in ("auto", "straight") and applied(turns) <= MOST_APPLIED:
+        line = unrolled_step(turns, fixed)
+        if executed(line) <= STRAIGHT_UP_TO:
+            return line
+    return turns
 
 
 def straight(scene: Scene, program: Program) -> bool:
@@ -77,23 +108,36 @@ class BatchView:
         self.arguments_work = batch.arguments_work
 
 
-def batch_file(
+def batch_files(
     scene: Scene, tail: Tail, batches: Sequence[Batch], context: dict[str, Any]
 ) -> dict[str, str]:
-    """Render the file of batches, if there are any."""
-    if not batches:
-        return {}
+    """Render the files of batches that there are."""
+    files = {}
+    for part in PARTS:
+        here = [batch for batch in batches if BATCHED[batch.function.name] == part]
+        if here:
+            text = render("c", "batch/batch.c.jinja", context | batch_context(scene, tail, here))
+            files[f"src/{scene.name}_{part}.c"] = text
+    return files
+
+
+def batch_context(scene: Scene, tail: Tail, batches: Sequence[Batch]) -> dict[str, Any]:
+    """Return what the template of one file lays out."""
     helpers = set().union(*(batch.body.helpers for batch in batches))
-    differing = {
+    return {
         "states": STATES[scene.real],
         "widest": STATES[scene.real],
         "functions": [BatchView(batch, tail, scene.name) for batch in batches],
         "steps": step_views(batches, scene.real, scene.name),
         "helpers": sorted(helpers | {"lanes", "all_lanes"}),
     }
-    return {f"src/{scene.name}_batch.c": render("c", "batch/batch.c.jinja", context | differing)}
 
 
 def batch_entry(scene: Scene, batches: Sequence[Batch]) -> dict[str, Any]:
-    """Return what a loader must know of batches: their states side by side, their workspace."""
-    return {"states": STATES[scene.real], "work": {b.function.name: b.work for b in batches}}
+    """Return what a loader must know of batches: states side by side, workspace, sources."""
+    names = [b.function.name for b in batches]
+    return {
+        "states": STATES[scene.real],
+        "work": {b.function.name: b.work for b in batches},
+        "parts": {name: BATCHED[name] for name in names},
+    }

@@ -3,7 +3,6 @@
 from dataclasses import replace
 from functools import singledispatchmethod
 
-from ...ir.cost import executed
 from ...ir.program import (
     Apply,
     Array,
@@ -54,9 +53,7 @@ class LoopPrinter:
         behind = [inner + body.work for _, body in self.callees.values() if body.work]
         work = max([work, *behind])
         routines, callees = tuple(self.routines.values()), tuple(self.callees.values())
-        return CFunction(
-            lines, work, routines, frozenset(self.helpers), executed(self.program), callees
-        )
+        return CFunction(lines, work, routines, frozenset(self.helpers), self.program, callees)
 
     def _declarations(self) -> tuple[list[str], int]:
         lines, work = [], 0

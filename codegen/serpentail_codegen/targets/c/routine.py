@@ -2,7 +2,9 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
 
+from ...ir.cost import executed
 from ...ir.program import Array, Index, Program, Ref
 from ...ir.step import Step
 from ..expressions import Dialect, Scalars, index_text
@@ -41,8 +43,13 @@ class CFunction:
     work: int  # scalars of workspace
     routines: tuple[Routine, ...]
     helpers: frozenset[str]
-    operations: int  # executed, each lane counted
+    cost: Program | int  # operations, or the program whose run tells them
     callees: "tuple[tuple[Program, CFunction], ...]" = ()  # programs that it calls, with their C
+
+    @cached_property
+    def operations(self) -> int:
+        """Operations executed, each lane counted."""
+        return self.cost if isinstance(self.cost, int) else executed(self.cost)
 
 
 def dialect(real: str, prefix: str = "") -> Dialect:
@@ -51,6 +58,7 @@ def dialect(real: str, prefix: str = "") -> Dialect:
     return Dialect(
         "const real {name} = {text};",
         {"sqrt": "sqrtf" if real == "float" else "sqrt"},
+        {"sqrt": f"{prefix}_sqrt_row"},
         real,
         sincos=f"real {{sine}}, {{cosine}}; {prefix}_sincos{both}",
         wide_sincos=f"lanes {{sine}}, {{cosine}}; {prefix}_sincos_row{both}",

@@ -7,7 +7,7 @@ from ...functions.function import Function
 from ...functions.tail import Tail
 from ...scene.scene import Scene
 from ..target import Emission, Target
-from .batch import batch_entry, batch_file, batches
+from .batch import batch_entry, batch_files, batches
 from .batch_rollout import batch_rollout, batch_rollout_entry, batch_rollout_file
 from .form import printed_function
 from .loops import LoopPrinter
@@ -25,7 +25,7 @@ def emit(scene: Scene, tail: Tail, functions: Iterable[Function], version: str) 
     # what a host uses beside the model
     batched = batches(scene, tail, printed)
     rollout = batch_rollout(scene, tail, printed)
-    files = model | batch_file(scene, tail, batched, context) | package_files(context)
+    files = model | batch_files(scene, tail, batched, context) | package_files(context)
     files |= batch_rollout_file(scene, rollout, context)
 
     entries = c_entries(context) | {"batch": batch_entry(scene, batched)}
