@@ -201,7 +201,7 @@ def test_a_file_that_nothing_can_write_is_refused_before_the_run(scene, capsys, 
 
 def test_a_plan_is_told_before_it_is_saved(scene, capsys, monkeypatch):
     class Found:
-        report, success, view = {"converged": True}, True, None
+        report, success, view, warnings = {"converged": True}, True, None, []
 
         class trajectory:  # noqa: N801
             @staticmethod
@@ -211,7 +211,9 @@ def test_a_plan_is_told_before_it_is_saved(scene, capsys, monkeypatch):
     monkeypatch.setattr("serpentail.scenes.plan.planned", lambda *_: Found)
     assert cli.main(["plan", scene(), "--save", "a.npz", "--json", "-"]) == 1
     out, err = capsys.readouterr()
-    assert json.loads(out) == {"converged": True} and "no space left on device" in err
+    assert (
+        json.loads(out) == {"converged": True, "warnings": []} and "no space left on device" in err
+    )
     assert cli.main(["plan", scene(), "--save", "simple.toml/a.npz"]) == 2
 
 
