@@ -84,6 +84,7 @@ def test_the_fuzz_sees_bare_errors():
     assert isinstance(found[0], Fault)
 
 
+@pytest.mark.filterwarnings("ignore::serpentail.errors.UnusualSize")
 @pytest.mark.parametrize("count", [300, slow_count])
 def test_mutated_scene_files_are_read_or_refused(count, tmp_path, monkeypatch):
     functions = ["forward_dynamics", "rollout", "energy", "momentum", "pfl"]
@@ -147,6 +148,7 @@ def test_the_warning_is_true(lying):
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::serpentail.errors.UnusualSize")
 @pytest.mark.parametrize("name", ["standing", "lying"])
 def test_bodies_without_the_warning_keep_their_digits(request, name):
     """Random bodies as unlike as may be without it."""
