@@ -139,6 +139,7 @@ def test_many_runs_are_measured_when_somebody_asks(real, threads):
     q0 = np.tile([0, 0, 1.0, *QUATERNION, 0.3, -0.2], (5, 1))
     own = {"tail_mass": np.linspace(0.004, 0.006, 5)}
     runs = st.simulate(model, q0, np.ones(8), t_span=0.1, parameters=own, threads=threads)
+    eps = float(np.finfo(np.float32 if real == "float" else float).eps)
     assert not {*DERIVED} & {*vars(runs)} - {"info"} and runs.errors == [None] * 5
     for k in range(5):
         motion = runs[k]
@@ -147,7 +148,8 @@ def test_many_runs_are_measured_when_somebody_asks(real, threads):
             found = getattr(runs, name)
             assert found is getattr(runs, name) and not found.flags.writeable
             np.testing.assert_array_equal(found[k], getattr(motion, name))
-        assert motion.info["imbalance"]["relative"] == pytest.approx(runs.audit.relative[k])
+        left = pytest.approx(runs.audit.relative[k], abs=eps)  # in sums of another order
+        assert motion.info["imbalance"]["relative"] == left
     twin = pickle.loads(pickle.dumps(runs))
     np.testing.assert_array_equal(twin.kinetic, runs.kinetic)
 
