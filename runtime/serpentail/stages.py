@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
-from types import TracebackType
 from typing import Any, TextIO
 
 PATIENCE_S = 1.0  # s of a stage after which it is worth a line
@@ -86,19 +85,15 @@ class Stage:
             self.done, self.what = done, self.what if what is None else what
             self.hook(self._now())
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         _depth.set(self.depth)
+        now = self._now(ended=True)
         logging: Any = sys.modules.get("logging")  # nobody listens who has not imported it
         if logging is not None:
             words = "%s" if kind is None else "%s, ended by " + kind.__name__
-            logging.getLogger("serpentail").info(words, self._now(ended=True))
+            logging.getLogger("serpentail").info(words, now)
         if self.hook is not None:
-            self.hook(self._now(ended=True))
+            self.hook(now)
 
     def _now(self, ended: bool = False) -> Progress:
         """Return how far it is."""

@@ -19,9 +19,13 @@ def examples() -> dict[str, str]:
     ``st.build("kick")``, ``serpentail simulate kick``.
     """
     return {
-        path.stem: str(tables_of(path).get("description", ""))
-        for path in sorted(_folder().glob("*.toml"))
+        name: str(tables_of(path).get("description", "")) for name, path in example_paths().items()
     }
+
+
+def example_paths() -> dict[str, Path]:
+    """Return the paths of these scenes by their names; none of them is read."""
+    return {path.stem: path for path in sorted(_folder().glob("*.toml"))}
 
 
 def scene_path(scene: str | PathLike[str]) -> Path:
@@ -37,11 +41,10 @@ def scene_path(scene: str | PathLike[str]) -> Path:
         ) from None
     if path.suffix or len(path.parts) != 1 or path.exists():
         return path
-    example = _folder() / f"{path}.toml"
-    if example.is_file():
-        return example
-    names = [path.stem for path in sorted(_folder().glob("*.toml"))]
-    remedy = did_you_mean(str(path), names) or f"the examples are {', '.join(names)}"
+    known = example_paths()
+    if str(path) in known:
+        return known[str(path)]
+    remedy = did_you_mean(str(path), known) or f"the examples are {', '.join(known)}"
     raise SerpentailError(
         f"scene file: value {shown(str(path))}: is no file, and no example; {remedy}"
     )

@@ -23,10 +23,10 @@ def info(arguments: argparse.Namespace) -> Outcome:
 def model_of(place: str) -> "Model":
     """Return the model of a generated folder, else of a scene file or an example."""
     from ..building.build import build
-    from ..building.examples import examples
+    from ..building.examples import example_paths
     from ..model.model import load
 
-    scene = Path(place).suffix == ".toml" or (place in examples() and not Path(place).exists())
+    scene = Path(place).suffix == ".toml" or (place in example_paths() and not Path(place).exists())
     return build(place) if scene else load(place)
 
 

@@ -40,11 +40,11 @@ def new(arguments: argparse.Namespace) -> Outcome:
 
 def generate(arguments: argparse.Namespace) -> int:
     """Run the generator's own command line, and return its status."""
-    from ..building.examples import examples, scene_path
+    from ..building.examples import example_paths, scene_path
     from ..building.generator import command
 
-    names = examples()
-    words = [str(scene_path(word)) if word in names else word for word in arguments.words]
+    known = example_paths()
+    words = [str(scene_path(word)) if word in known else word for word in arguments.words]
     return subprocess.run([*command(), *words], check=False).returncode
 
 

@@ -22,7 +22,7 @@ def account(motion: "Trajectory") -> str:
         f"Trajectory of {name}, {moved}: {len(motion.t)} samples, {first:.6g} to {last:.6g} s",
         arrays_of(motion),
         _touched(motion),
-        made(motion.info),
+        how_made(motion.info),
     ]
     return framed(lines + _ended(motion))
 
@@ -40,7 +40,7 @@ def arrays_of(motion: Any) -> str:
     return f"{', '.join(shapes)}; {UNITS}"
 
 
-def made(info: dict[str, Any]) -> str:
+def how_made(info: dict[str, Any]) -> str:
     """Return how a motion was made, as far as its info says so."""
     if "method" not in info:
         return "planned" if info.get("kind") == "plan" else "by no method that it tells"

@@ -1,8 +1,9 @@
-"""What of the animal's body a motion's numbers need: its weight, and how large its torso is."""
+"""What of the animal's body numbers and pictures need: weight, size, centre of mass, legs."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..attitude import Array
+from ..model.layout import POSITION
 from ..model.model import Model
 from ..model.parameters import total_mass
 
@@ -12,7 +13,7 @@ def weight(model: Model) -> float:
     return float(total_mass(model.parameters) * model.parameters["gravity"])
 
 
-def semi_axes(model: Model) -> NDArray[np.float64]:
+def semi_axes(model: Model) -> Array:
     """Return the semi-axes (3,) of the torso, m, along its own axes.
 
     The torso is the ellipsoid that touches the ground, else the homogeneous one of its inertia.
@@ -22,3 +23,19 @@ def semi_axes(model: Model) -> NDArray[np.float64]:
         return np.array(p["torso_semi_axes"], float)
     spread = np.sum(p["torso_inertia"]) - 2 * np.array(p["torso_inertia"])
     return np.sqrt(np.maximum(2.5 / p["torso_mass"] * spread, 0))
+
+
+def centre_of_mass(model: Model, q: Array, v: Array) -> Array:
+    """Return (K, 3), m; of the torso where the scene left out the function ``center_of_mass``."""
+    if "center_of_mass" not in model.kernels:
+        return q[:, POSITION]
+    return np.asarray(model.center_of_mass(q, v)[0])
+
+
+def leg_points(model: Model, q: Array, legs: Array | None) -> Array | None:
+    """Return the joints (K, 2, 6, 3) of the legs, m, world; None where the angles (K, 4) are
+    unknown, or the scene left out the function ``leg_points``.
+    """
+    if legs is None or "leg_points" not in model.kernels:
+        return None
+    return np.asarray(model.leg_points(q, legs))

@@ -13,8 +13,8 @@ from ..checks import numbers_in, refusal
 from ..errors import ViewError
 from ..extras import needed
 from ..model.model import Model
+from ..motion.body import centre_of_mass
 from ..motion.trajectory import Trajectory
-from ..viewer.samples import centre_of_mass
 from ..viewer.view import checked_motions, checked_names, model_of
 from .animal import FORCE, LEG, Pen, draw_animal, draw_ground, draw_marks, draw_shadow
 from .frames import LONGEST, Frame, frames, largest_force, moments, way
@@ -127,7 +127,7 @@ def strip_of(
     largest = largest_force(motions, rows)
     pairs = list(zip(models, motions, rows, strict=True))
     films = [frames(*pair, largest) for pair in pairs]
-    coms = [centre_of_mass(*pair[:2]) for pair in pairs]
+    coms = [centre_of_mass(model, motion.q, motion.v) for model, motion, _ in pairs]
     lowest = min(frame.lowest for film in films for frame in film)
     grounded = lowest > 0 or any(motion.contact is not None for motion in motions)
     return Strip(films, coms, views, told, grounded, largest)

@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 from ..attitude import rotation_matrix
 from ..model.layout import POSITION
 from ..model.model import Model
+from ..motion.body import centre_of_mass, leg_points
 from ..motion.trajectory import Trajectory
-from ..viewer.samples import centre_of_mass
 from ..viewer.shape import shape
 from .style import Array
 from .views import View
@@ -95,7 +95,7 @@ def frames(model: Model, motion: Trajectory, rows: Iterable[int], largest: float
     """The frames of samples; `largest` (N) is the force whose arrow is LONGEST, 0 draws none."""
     rows, body = list(rows), body_of(model)
     q = motion.q[rows]
-    points, com = model.tail_points(q), centre_of_mass(model, motion)[rows]
+    points, com = model.tail_points(q), centre_of_mass(model, q, motion.v[rows])
     rotations, legs = rotation_matrix(motion.attitude[rows]), _legs(model, motion, rows)
     found = []
     for k, row in enumerate(rows):
@@ -109,9 +109,9 @@ def frames(model: Model, motion: Trajectory, rows: Iterable[int], largest: float
 
 def _legs(model: Model, motion: Trajectory, rows: list[int]) -> Array:
     """Joints (n, L, J, 3) of the legs; none where the motion or its model has none."""
-    if motion.contact is None or motion.contact.legs is None or "leg_points" not in model.kernels:
-        return np.zeros((len(rows), 0, 2, 3))
-    return np.asarray(model.leg_points(motion.q[rows], motion.contact.legs[rows]))
+    angles = None if motion.contact is None else motion.contact.legs
+    joints = leg_points(model, motion.q[rows], None if angles is None else angles[rows])
+    return np.zeros((len(rows), 0, 2, 3)) if joints is None else joints
 
 
 def _arrows(motion: Trajectory, row: int, largest: float) -> Array:

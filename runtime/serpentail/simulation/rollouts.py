@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import SimulationError, ViewError
 from ..model.model import Model
 from ..model.parameters import RunParameters
-from ..motion.account import arrays_of, framed, made, tail_of
+from ..motion.account import arrays_of, framed, how_made, tail_of
 from ..motion.derived import Derived, settled
 from ..motion.exports import Exports
 from ..motion.trajectory import MONOTONE, Trajectory
@@ -88,7 +88,7 @@ class Rollouts(Exports):
             f"Rollouts of {model.name}, {tail_of(model)}: {len(self)} runs of "
             f"{len(self.t)} samples, {self.t[0]:.6g} to {self.t[-1]:.6g} s",
             arrays_of(self),
-            made(self.info) + " in all",
+            how_made(self.info) + " in all",
         ]
         if failed:
             lines.append(

@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 
 from ..attitude import Array, tilt_deg
-from ..model.layout import POSITION, TORSO_NQ
+from ..model.layout import TORSO_NQ
 from ..model.model import Model
+from ..motion.body import centre_of_mass, leg_points
 from ..motion.trajectory import ARRAYS, Trajectory
 
 
@@ -33,7 +34,7 @@ def samples(model: Model, motion: Trajectory) -> dict[str, Array]:
         "t": np.stack([t, motion.t - t], axis=1),
         "pose": motion.q[:, :TORSO_NQ],
         "tail": model.tail_points(motion.q),
-        "com": centre_of_mass(model, motion),
+        "com": centre_of_mass(model, motion.q, motion.v),
         "height": motion.q[:, 2],
         "tilt": tilt_deg(motion.attitude),
         "coordinates": np.degrees(motion.tail),
@@ -45,13 +46,6 @@ def samples(model: Model, motion: Trajectory) -> dict[str, Array]:
     }
 
 
-def centre_of_mass(model: Model, motion: Trajectory) -> Array:
-    """Return (K, 3), m; of the torso where the scene left out the function ``center_of_mass``."""
-    if "center_of_mass" not in model.kernels:
-        return motion.q[:, POSITION]
-    return np.asarray(model.center_of_mass(motion.q, motion.v)[0])
-
-
 def _ground(model: Model, motion: Trajectory) -> dict[str, Array]:
     """Legs, points that touch and their forces, and each group's total; none in flight."""
     contact = motion.contact
@@ -59,14 +53,10 @@ def _ground(model: Model, motion: Trajectory) -> dict[str, Array]:
         return {}
     # where no force acts no arrow is drawn, so no point is needed
     pushed = np.abs(contact.forces).max(axis=2, keepdims=True) > 0
-    totals = [
-        np.linalg.norm(contact.of(group).forces.sum(axis=1), axis=1) for group in contact.groups
-    ]
     arrays = {
         "touching": np.where(pushed, contact.points, 0),
         "forces": contact.forces,
-        "force": np.stack(totals, axis=1),
+        "force": np.stack([contact.of(group).total for group in contact.groups], axis=1),
     }
-    if contact.legs is not None and "leg_points" in model.kernels:
-        arrays["legs"] = model.leg_points(motion.q, contact.legs)
-    return arrays
+    legs = leg_points(model, motion.q, contact.legs)
+    return arrays if legs is None else arrays | {"legs": legs}

@@ -1,6 +1,5 @@
 """``live``: a page that shows a run while it is integrated, and a plan while it is refined."""
 
-from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
@@ -123,10 +122,5 @@ class Live:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.stop()

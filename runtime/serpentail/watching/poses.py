@@ -7,6 +7,7 @@ import numpy as np
 from ..attitude import Array, rotation_matrix
 from ..model.layout import POSITION, QUATERNION
 from ..model.model import Model
+from ..motion.body import leg_points
 from ..viewer.shape import shape
 
 # of the torso's ellipsoid: where it is and how large, in semi-axes, so that its sides are told
@@ -39,9 +40,9 @@ def animal(model: Model, q: Array, legs: Array | None) -> dict[str, Instances]:
     semi_axes = np.array(look["semi_axes"])
     found = {name: _ball(q, semi_axes, name) for name in PARTS}
     found["tail"] = rods(model.tail_points(q), look["tail_radius"])
-    if legs is not None and "leg_points" in model.kernels:
-        joints = model.leg_points(q, legs).reshape(2 * len(q), 6, 3)
-        found["legs"] = rods(joints, LEG_RADIUS * semi_axes.min())
+    joints = leg_points(model, q, legs)
+    if joints is not None:
+        found["legs"] = rods(joints.reshape(2 * len(q), 6, 3), LEG_RADIUS * semi_axes.min())
     return found
 
 
