@@ -96,7 +96,15 @@ def independent(values: Values) -> dict[str, Any]:
 
 
 def completed(manifest: dict, values: Values) -> dict[str, Any]:
-    """Return the values with link_inertia, of each run, where it follows from link_radius."""
+    """Return the values with link_inertia, of each run, where it follows from link_radius;
+    ModelError where the weight is no finite number.
+    """
+    with np.errstate(over="ignore"):
+        weight = np.asarray(total_mass(values)) * values["gravity"]
+    if not np.isfinite(weight).all():
+        raise ModelError(
+            "parameters: torso_mass, tail_mass and gravity give no finite weight: use kg and m/s^2"
+        )
     if "link_radius" not in values:
         return dict(values)
     moments = np.broadcast_arrays(*ellipsoid(values, manifest["dimensions"]["total"]))

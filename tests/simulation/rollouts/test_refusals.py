@@ -117,6 +117,13 @@ def test_a_start_deep_in_the_ground_is_named():
         st.simulate(rat(), q, v, legs=LEGS)
 
 
+def test_a_weight_beyond_all_numbers_is_refused():
+    q, v = starts(rat(), 3)
+    heavy = {"tail_mass": [1e308] * 3}
+    with pytest.raises(st.ModelError, match="tail_mass and gravity give no finite weight"):
+        st.simulate(rat(), q, v, legs=LEGS, t_span=0.002, method="rk4", parameters=heavy)
+
+
 def test_bristles_of_another_number_of_runs_are_refused():
     q, v = starts(rat(), 3)
     with pytest.raises(
