@@ -83,19 +83,33 @@ class Tree:
         self, mutation: Mutation, mutated: bytes, tests: list[str]
     ) -> tuple[str, str] | None:
         """Run tests; return which noticed the mutant and what it said.  A test that fails here for
-        the first time must pass without the mutant, else it is no judge any more.
+        the first time must pass without the mutant, else it is no judge any more; what comes too
+        late must come in time without it, else the machine is busy and all get more time.
         """
+        patience = 1.0
         while tests := [test for test in tests if test not in self.recorder.distrusted]:
-            found = self._failed(mutation, tests)
-            if not found or found[0] not in tests or found[0] in self.recorder.trusted:
+            found = self._failed(mutation, tests, patience)
+            if not found or (not late(found) and self._believed(found[0], tests)):
                 return found
             self._plant(mutation, (tree.BASE / mutation.path).read_bytes())
-            fails = self._failed(mutation, [found[0]])
+            again = [found[0]] if found[0] in tests else tests
+            fails = self._failed(mutation, again, patience)
             self._plant(mutation, mutated)
-            (self.recorder.distrusted if fails else self.recorder.trusted).add(found[0])
+            if late(found) and not fails:
+                return found
+            if late(found):
+                patience *= 2.0
+            else:
+                (self.recorder.distrusted if fails else self.recorder.trusted).add(found[0])
         return None
 
-    def _failed(self, mutation: Mutation, tests: list[str]) -> tuple[str, str] | None:
+    def _believed(self, by: str, tests: list[str]) -> bool:
+        """Tell if what noticed a mutant is known to notice nothing without it."""
+        return by in self.recorder.trusted or by not in tests
+
+    def _failed(
+        self, mutation: Mutation, tests: list[str], patience: float = 1.0
+    ) -> tuple[str, str] | None:
         """Run tests; return which failed first and what it said."""
         orders, verdict = self.root / ".build" / "orders", self.root / ".build" / "verdict"
         verdict.unlink(missing_ok=True)
@@ -103,9 +117,10 @@ class Tree:
         orders.write_text(json.dumps(told | {"tests": tests}))
         files = list(dict.fromkeys(test.split("::")[0] for test in tests))
         scratch = self.root / ".build" / "scratch"
-        words = tree.pytest_with("mutants.watch", scratch, "-x", *files)
+        alone = ("-o", f"timeout={patience * tree.LONGEST_TEST:.0f}")
+        words = tree.pytest_with("mutants.watch", scratch, "-x", *alone, *files)
         env = tree.surroundings(self.root, scratch, SERPENTAIL_MUTANT=str(orders))
-        limit = STARTING + SLOWER * seconds(self.recorder, tests)
+        limit = patience * (STARTING + SLOWER * seconds(self.recorder, tests))
         status, output = run(words, self.root, env, limit)
         if status == 0:
             return None
@@ -115,6 +130,11 @@ class Tree:
             return "timeout", f"{limit:.0f} s"
         found = json.loads(verdict.read_text()) if verdict.exists() else {}
         return found.get("by", "process"), found.get("words", output[-300:])
+
+
+def late(found: tuple[str, str]) -> bool:
+    """Tell if tests, or one of them, only took too long."""
+    return found[0] == "timeout" or "from pytest-timeout" in found[1]
 
 
 def marked(mutation: Mutation, witness: Path, source: bytes) -> bytes:

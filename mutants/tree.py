@@ -11,6 +11,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PLACE = ROOT / ".build" / "mutants"
 BASE = PLACE / "base"  # the checkout as it was when the run began
 BUILT = (Path("runtime/serpentail/viewer/page.html"),)  # which git does not know, and tests need
+LONGEST_TEST = 120  # s that one test may take
 JUDGED_BY = ("codegen", "runtime", "tests", "stress", "scenes", "pyproject.toml")
 
 
@@ -71,6 +72,6 @@ def surroundings(tree: Path, scratch: Path, **more: str) -> dict[str, str]:
 
 def pytest_with(plugin: str, scratch: Path, *words: str) -> list[str]:
     """Return the command that runs tests, with one of the plugins here."""
-    settings = ["--quick", "-m", "not slow", "-n", "0", "-o", "timeout=120", "-q"]
+    settings = ["--quick", "-m", "not slow", "-n", "0", "-o", f"timeout={LONGEST_TEST}", "-q"]
     quiet = ["-p", "no:cacheprovider", "--tb=line", "--basetemp", str(scratch / "t")]
     return [sys.executable, "-m", "pytest", "-p", plugin, *settings, *quiet, *words]

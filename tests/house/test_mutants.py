@@ -3,10 +3,11 @@
 import ast
 import importlib.util
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
-from mutants import python_source, sample, template_source
+from mutants import judge, python_source, sample, template_source
 from mutants.mutation import Mutation
 from mutants.recorded import NO_JUDGES, own_lines
 from mutants.results import Verdict, argument, arguments, report, score
@@ -111,6 +112,31 @@ def test_a_mutant_says_that_it_was_loaded(tmp_path, head):
     with pytest.raises(ValueError, match=r"^$"):
         found.loader.exec_module(importlib.util.module_from_spec(found))
     assert witness.exists()
+
+
+@pytest.mark.parametrize("end", ["timeout", "tests/a.py::test_b"])
+def test_what_is_late_on_a_busy_machine_gets_more_time(monkeypatch, end):
+    """Late with and without the mutant: the machine is busy.  Late with it alone: it is noticed."""
+    told, patient = [], []
+
+    def failed(place, mutation, tests, patience=1.0):
+        patient.append(patience)
+        with_mutant, needed = told[-1] == b"mutant", 4.0 if place.hangs else 2.0
+        if patience >= needed and not (place.hangs and with_mutant):
+            return None
+        return end, "Failed: Timeout (>120.0s) from pytest-timeout."
+
+    monkeypatch.setattr(judge.tree, "BASE", ROOT)
+    monkeypatch.setattr(judge.Tree, "_failed", failed)
+    monkeypatch.setattr(judge.Tree, "_plant", lambda place, mutation, text: told.append(text))
+    place = object.__new__(judge.Tree)
+    place.recorder = SimpleNamespace(distrusted=set(), trusted={"tests/a.py::test_b"})
+    change = Mutation("runtime/serpentail/attitude.py", 1, 0, 0, "", "", "")
+    for place.hangs, noticed, tries in [(False, None, [1, 1, 2]), (True, end, [1, 1, 2, 2, 4, 4])]:
+        told[:], patient[:] = [b"mutant"], []
+        found = place._noticed(change, b"mutant", ["tests/a.py::test_b"])
+        assert (found and found[0], patient) == (noticed, tries)
+        assert told[-1] == b"mutant" and not place.recorder.distrusted
 
 
 def test_lines_of_a_compound_statement_are_its_head():
