@@ -11,7 +11,9 @@ from ...attitude import pitch_roll_yaw
 from ...model.layout import POSITION
 from ..problem import Goal, PlanningProblem
 from .coordinates import Attitude
-from .transcription import Transcription, columns_of, goal_matrix
+from .direct import goal_matrix
+from .indices import columns_of
+from .transcription import Transcription
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,10 +78,11 @@ def _constraint_bounds(nlp: Transcription, angles: np.ndarray) -> tuple[np.ndarr
     one_node = np.column_stack([np.zeros((2, node.residuals)), _path(problem, node.path)])
     at_nodes = np.tile(one_node, len(indices.others))
     goal = _goal_values(problem.goal, nlp.attitude, angles)
-    steps = 0 if problem.bounds.torque_rate is None else 2 * indices.controls[1:].size
+    least, most = nlp.direct.least.copy(), nlp.direct.most.copy()
+    least[: len(goal)] = most[: len(goal)] = goal
     return (
-        np.concatenate([defects, at_nodes[0], goal, np.full(steps, -np.inf)]),
-        np.concatenate([defects, at_nodes[1], goal, np.zeros(steps)]),
+        np.concatenate([defects, at_nodes[0], least]),
+        np.concatenate([defects, at_nodes[1], most]),
     )
 
 

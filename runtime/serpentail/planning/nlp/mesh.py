@@ -12,9 +12,13 @@ MOST_PIECES = 4  # an interval is split into at a time
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Ends of the intervals (N + 1,) as fractions of the duration, from 0 to 1."""
+    """Ends of the intervals (N + 1,) as fractions of the duration, from 0 to 1.
+
+    guarded (N,): intervals in which torques keep their bounds between nodes, too.
+    """
 
     ends: np.ndarray
+    guarded: np.ndarray
     __repr__ = brief
 
     @property
@@ -39,12 +43,12 @@ class Mesh:
             np.linspace(a, b, count, endpoint=False)
             for a, b, count in zip(self.ends[:-1], self.ends[1:], pieces, strict=True)
         ]
-        return Mesh(np.append(np.concatenate(rows), 1.0))
+        return Mesh(np.append(np.concatenate(rows), 1.0), np.repeat(self.guarded, pieces))
 
 
 def uniform(intervals: int) -> Mesh:
     """Return a mesh of equal intervals."""
-    return Mesh(np.linspace(0.0, 1.0, intervals + 1))
+    return Mesh(np.linspace(0.0, 1.0, intervals + 1), np.zeros(intervals, bool))
 
 
 def refined(mesh: Mesh, errors: np.ndarray, factor: float, order: int, most: int) -> Mesh:

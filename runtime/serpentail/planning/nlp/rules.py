@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
+from math import comb
 
 import numpy as np
 from numpy.polynomial import Legendre, Polynomial
@@ -53,6 +54,17 @@ class CollocationRule:
     def powers(self) -> np.ndarray:
         """Coefficients of these, (K, degree + 1), of the powers of s, constants first."""
         return np.array([polynomial.coef for polynomial in _lagrange(tuple(self.nodes))])
+
+    def bernstein(self) -> np.ndarray:
+        """Coefficients (K, K) in the Bernstein basis of degree K - 1 of a polynomial, times its
+        values at the nodes; none is exceeded by the polynomial in the interval.
+        """
+        degree = len(self.nodes) - 1
+        powers = np.zeros((degree + 1, degree + 1))  # of s, in the Bernstein basis
+        for i in range(degree + 1):
+            for j in range(i + 1):
+                powers[i, j] = comb(i, j) / comb(degree, j)
+        return powers @ self.powers().T
 
     def integrals(self, s: ArrayLike) -> np.ndarray:
         """Integrals of these from 0 to s (..., K)."""

@@ -7,7 +7,6 @@ one function.
 
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import accumulate
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,53 +17,14 @@ from ..problem import PlanningProblem
 from .cache import memoised
 from .coordinates import Attitude, attitude
 from .derivatives import Assembly
+from .direct import DirectRows, direct_rows
+from .indices import Indices, indices_of
 from .mesh import Mesh
 from .node import Equations, Node, Variables, node_function, variables_of
 from .rules import CollocationRule
 
 if TYPE_CHECKING:
     import casadi as ca
-
-
-@dataclass(frozen=True, eq=False)
-class Indices:
-    """Where the unknowns are in w: the duration first, then points and nodes along the motion.
-
-    states (P, nx): of all points; others (N, na + nu): algebraic unknowns and torques of all nodes.
-    """
-
-    states: np.ndarray
-    others: np.ndarray
-    algebraic: int  # na
-    first: int  # the point that is the first node: 0, or 1 where the start is none
-
-    @property
-    def controls(self) -> np.ndarray:
-        """Indices (N, nu) of the torques."""
-        return self.others[:, self.algebraic :]
-
-    @property
-    def size(self) -> int:
-        """Number of unknowns."""
-        return 1 + self.states.size + self.others.size
-
-    def nodes(self) -> np.ndarray:
-        """Indices (1 + nx + na + nu, N) of what each node's function takes."""
-        duration = np.zeros((len(self.others), 1), int)
-        return np.column_stack([duration, self.states[self.first :], self.others]).T
-
-
-def indices_of(variables: Variables, mesh: Mesh, rule: CollocationRule) -> Indices:
-    """Return the indices, unknowns that meet in an equation being neighbours."""
-    nx, na, nu = variables.sizes()
-    points = mesh.intervals * rule.steps + 1
-    first = 0 if rule.nodes[0] == 0 else 1
-    widths = np.full(points, nx + na + nu)
-    widths[:first] = nx
-    starts = 1 + np.concatenate([[0], np.cumsum(widths)[:-1]])
-    states = starts[:, None] + np.arange(nx)
-    others = (starts[first:] + nx)[:, None] + np.arange(na + nu)
-    return Indices(states, others, na, first)
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +41,7 @@ class Transcription:
     indices: Indices
     functions: "dict[str, ca.Function]"  # by CasADi's names: nlp, jac_g, grad_f, hess_lag; values
     rows: int  # of the constraints
+    direct: DirectRows  # the last of these
 
     @property
     def fractions(self) -> np.ndarray:
@@ -111,7 +72,7 @@ def transcription_of(
     make_node = partial(node_function, model, problem, coordinates, variables, equations)
     node = memoised(("node", *key), make_node)
     make_nlp = partial(transcribe, problem, mesh, rule, equations, variables, node)
-    nlp = memoised((*key, tuple(mesh.ends), rule), make_nlp)
+    nlp = memoised((*key, tuple(mesh.ends), tuple(mesh.guarded), rule), make_nlp)
     return replace(nlp, problem=problem)
 
 
@@ -126,12 +87,22 @@ def transcribe(
     """Return the program of a problem on a mesh, of the function of one node."""
     coordinates = attitude(problem.attitude)
     indices = indices_of(variables, mesh, rule)
-    direct = _direct_rows(problem, variables, indices, mesh, rule)
-    assembly = collocate(node, indices, (mesh, rule), direct, problem.objective == "time")
+    direct = direct_rows(problem, variables, indices, mesh, rule)
+    assembly = collocate(node, indices, (mesh, rule), direct.matrix, problem.objective == "time")
     functions = assembly.functions()
     rows = functions["nlp"].size1_out("g")
     return Transcription(
-        problem, mesh, rule, coordinates, variables, equations, node, indices, functions, rows
+        problem,
+        mesh,
+        rule,
+        coordinates,
+        variables,
+        equations,
+        node,
+        indices,
+        functions,
+        rows,
+        direct,
     )
 
 
@@ -204,64 +175,6 @@ def _cost(node: Node, mesh: Mesh, rule: CollocationRule, nodes: int) -> np.ndarr
     for k, width in enumerate(mesh.widths):
         cost[k * rule.steps : k * rule.steps + K, -1] += width * rule.weights
     return cost.ravel()
-
-
-def _direct_rows(
-    problem: PlanningProblem,
-    variables: Variables,
-    indices: Indices,
-    mesh: Mesh,
-    rule: CollocationRule,
-) -> Any:
-    """Rows of w alone: the attitude at the end, then the torques' steps within +- rate * time."""
-    from scipy.sparse import coo_matrix, vstack
-
-    coordinates = attitude(problem.attitude)
-    goal = goal_matrix(problem.goal.attitude, coordinates)
-    i, j = np.nonzero(goal)
-    end = columns_of(indices.states, variables.states, "attitude")[-1]
-    rows = [coo_matrix((goal[i, j], (i, end[j])), (len(goal), indices.size))]
-    if problem.bounds.torque_rate is not None:
-        rate = problem.bounds.torque_rate / variables.units["torque"]
-        rows += _torque_steps(indices, rate, mesh.points(rule)[indices.first :])
-    return vstack(rows).tocoo()
-
-
-def _torque_steps(indices: Indices, rate: np.ndarray, times: np.ndarray) -> list:
-    """Rows u[n + 1] - u[n] - r T dt <= 0 and -(u[n + 1] - u[n]) - r T dt <= 0."""
-    from scipy.sparse import coo_matrix
-
-    later, earlier = indices.controls[1:].ravel(), indices.controls[:-1].ravel()
-    largest = np.outer(np.diff(times), rate).ravel()
-    row, ones = np.arange(later.size), np.ones(later.size)
-    rows, columns = np.tile(row, 3), np.concatenate([later, earlier, 0 * row])
-    shape = (later.size, indices.size)
-    return [
-        coo_matrix((np.concatenate([sign * ones, -sign * ones, -largest]), (rows, columns)), shape)
-        for sign in (1, -1)
-    ]
-
-
-def columns_of(indices: np.ndarray, blocks: tuple[tuple[str, int], ...], name: str) -> np.ndarray:
-    """Indices (K, size) of one block, of those (K, sizes) of all blocks (name, size) in a row."""
-    starts = accumulate((size for _, size in blocks), initial=0)
-    start = dict(zip((block for block, _ in blocks), starts, strict=False))[name]
-    return indices[:, start : start + dict(blocks)[name]]
-
-
-def goal_matrix(goal: Any, coordinates: Attitude) -> np.ndarray:
-    """Rows (.., size) of the attitude at the end that are zero, or for "euler" have given values.
-
-    These are of the boundary constraints f_bc of Eq. 43.
-    """
-    if goal is None:
-        return np.zeros((0, coordinates.size))
-    if coordinates.kind == "euler":
-        return np.eye(3)[: 2 if isinstance(goal, str) else 3]
-    if isinstance(goal, str):
-        return np.eye(4)[1:3]  # x = y = 0: a turn about the vertical
-    w, x, y, z = goal  # the vector part of conj(goal) q
-    return np.array([[-x, w, z, -y], [-y, -z, w, x], [-z, y, -x, w]])
 
 
 def _stack(parts: list[tuple[Any, int]]) -> Any:
