@@ -84,13 +84,13 @@ def test_interrupt_in_the_first_solve_returns_its_iterate():
 
 
 def test_interrupt_in_a_later_round_returns_the_round_before(monkeypatch):
-    split = rounds.Search._split
+    finer = rounds.Search._finer
 
-    def interrupted(search, last, tolerance):
+    def interrupted(search, last):
         signal.raise_signal(signal.SIGINT)
-        return split(search, last, tolerance)
+        return finer(search, last)
 
-    monkeypatch.setattr(rounds.Search, "_split", interrupted)
+    monkeypatch.setattr(rounds.Search, "_finer", interrupted)
     plan = st.plan(
         rat(), start=start(rat()), intervals=6, **AGAIN | {"tolerance": 1e-9, "rounds": 30}
     )

@@ -47,6 +47,8 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
     most_intervals: int = 200,
     rounds: int = 6,
     tolerance: float | None = 0.01,
+    tail_tolerance: float | None = 0.1,
+    rate_tolerance: float | None = 0.1,
     # the solver
     solver: str = "ipopt",
     options: dict[str, Any] | None = None,
@@ -84,7 +86,9 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
     The mesh
     rule: "radau", "lobatto", "hermite-simpson", "trapezoidal"; degree: of the rule.
     intervals: of the first mesh; most_intervals: of the last; rounds: of refinement.
-    tolerance: deg, of the true attitude at the end, None for no demand.
+    tolerance: deg, of the true attitude at the end; None for no demand at all.
+    tail_tolerance: deg, rate_tolerance: rad/s of torso and tail, of the truth at the end; None for
+    no demand.  Between nodes, bounds hold to 1e-3 of them.
 
     The solver
     solver, options: of ``casadi.nlpsol``.
@@ -119,6 +123,8 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
         most_intervals=most_intervals,
         rounds=rounds,
         tolerance=tolerance,
+        tail_tolerance=tail_tolerance,
+        rate_tolerance=rate_tolerance,
         solver=solver,
         options={} if options is None else options,
         dynamics=dynamics,

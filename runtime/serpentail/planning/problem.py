@@ -48,7 +48,7 @@ class Bounds:
     """Largest magnitudes along the motion (g_pc of Eq. 43); None: no bound.
 
     Each is one number, or one a tail coordinate: angle (rad), rate (rad/s), torque (N m),
-    torque_rate (N m/s, from node to node).
+    torque_rate (N m/s; torques are continuous then).
     """
 
     angle: Any = None

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..model.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TAIL_V, VELOCITY
+from ..model.layout import OMEGA, POSITION, TAIL_Q, TAIL_V, VELOCITY
 from ..model.model import Model
 from .nlp.bounds import limits
 from .nlp.coordinates import attitude
@@ -25,10 +25,11 @@ from .nlp.solver import Solution, solve, solver
 from .nlp.transcription import Transcription, torque_unit, transcription_of
 from .problem import PlanningProblem
 from .result.curve import Curve, curve
+from .result.excess import SLACK, Excess, exceeded, excess, largest
 from .result.full_state import full_state
 from .result.plan import Plan, sampled
-from .result.report import attitude_errors, report
-from .result.truth import local_errors, open_loop
+from .result.report import report
+from .result.truth import end_errors, local_errors, open_loop
 from .settings import PlanSettings
 
 FIRST_PUSH = 0.05  # of the torques' unit: takes the first guess out of a plane of symmetry
@@ -37,7 +38,10 @@ DURATIONS = (1.0, 0.5, 0.75, 0.25)  # of guesses, in turn, from the least (0) to
 
 @dataclass(frozen=True, eq=False)
 class Round:
-    """One solution on one mesh: q, v planned at the ends of intervals, and true at the last end."""
+    """One solution on one mesh: q, v planned at the ends of intervals, and true at the last end.
+
+    errors: of the truth there, as ``end_errors`` has them; excess: over bounds, by intervals.
+    """
 
     nlp: Transcription
     solution: Solution
@@ -45,18 +49,11 @@ class Round:
     planned: tuple[np.ndarray, np.ndarray]
     true: tuple[np.ndarray, np.ndarray]
 
-    @property
-    def error(self) -> float:
-        """True error (deg) of the attitude at the end, to the plan or the goal, the larger one.
-
-        inf if the motion is lost.
-        """
-        planned, true = self.planned[0][-1, QUATERNION], self.true[0][QUATERNION]
-        error = max(attitude_errors(self.nlp.problem, planned, true))
-        return error if np.isfinite(error) else np.inf
+    errors: dict[str, float]
+    excess: Excess
 
     def __str__(self) -> str:
-        return f"{self.nlp.mesh.intervals} intervals, {self.error:.2g} deg off"
+        return f"{self.nlp.mesh.intervals} intervals, {self.errors['attitude']:.2g} deg off"
 
 
 class Search:
@@ -94,15 +91,13 @@ class Search:
 
     def rounds(self) -> Iterator[Round]:
         """Make rounds: intervals that are wrong are split until the end is right."""
-        last, tolerance = self._first(), self.settings.tolerance
+        last = self._first()
         yield last
-        if tolerance is None:
-            return
         for _ in range(self.settings.rounds):
-            if not last.solution.success or last.error <= tolerance or self._stopped():
+            if not last.solution.success or self._wrong(last) <= 1 or self._stopped():
                 break
-            mesh = self._split(last, tolerance)
-            if mesh.intervals == last.nlp.mesh.intervals:
+            mesh = self._finer(last)
+            if mesh.same(last.nlp.mesh):
                 break
             nlp = self._transcribed(mesh)
             motion = Motion(last.curve.duration, last.curve.at)
@@ -112,13 +107,22 @@ class Search:
 
     def best(self, rounds: list[Round]) -> Round:
         """Return the round that is solved, and whose end is nearest to the truth."""
-        return min(rounds, key=lambda entry: (not entry.solution.success, entry.error))
+        return min(rounds, key=lambda entry: (not entry.solution.success, self._wrong(entry)))
+
+    def _off(self, found: Round) -> float:
+        """Return the errors of the truth over what is allowed, the largest."""
+        allowed = self.settings.allowed
+        return max((found.errors[name] / most for name, most in allowed.items()), default=0.0)
+
+    def _wrong(self, found: Round) -> float:
+        """The same, and how far bounds are exceeded over what is allowed."""
+        if self.settings.tolerance is None:
+            return 0.0
+        return max(self._off(found), largest(found.excess)[0] / SLACK)
 
     def plan(self, best: Round, rounds: int, wall_s: float) -> Plan:
         """Return the plan of a round, the best of so many."""
-        tolerance = self.settings.tolerance
-        true = tolerance is None or best.error <= tolerance
-        success = bool(best.solution.success and true)
+        success = bool(best.solution.success and self._wrong(best) <= 1)
         trajectory = sampled(self.model, self.problem, best.curve)
         counts = {
             "rounds": rounds,
@@ -230,12 +234,20 @@ class Search:
             blocks = motion.at(motion.ends)
             planned = full_state(self.model, self.start, self.attitude, motion.ends, blocks)
             true = open_loop(self.model, motion, self.problem.damping, self.start)
-        return Round(nlp, solution, motion, planned, true)
+            errors = end_errors(self.problem, (planned[0][-1], planned[1][-1]), true)
+            beyond = excess(nlp, motion, self.h)
+        return Round(nlp, solution, motion, planned, true, errors, beyond)
 
-    def _split(self, last: Round, tolerance: float) -> Mesh:
-        """Return a finer mesh, by the local errors."""
+    def _finer(self, last: Round) -> Mesh:
+        """Return the next mesh: guards where torques go too far, finer where the truth is wrong, or
+        else where other bounds are exceeded.
+        """
+        mesh, most, off = last.nlp.mesh, self.settings.most_intervals, self._off(last)
+        far = {name: exceeded(part) for name, part in last.excess.items()}
+        no_interval = np.zeros(mesh.intervals, bool)
+        mesh = mesh.with_guards(far.pop("torque", no_interval))
+        if off <= 1:
+            return mesh.halved(np.any([no_interval, *far.values()], axis=0), most)
         with self._timed("truth_s"):
             errors = local_errors(self.model, last.curve, self.problem.damping, *last.planned)
-        factor = min(0.3 * tolerance / last.error, 0.3)
-        most = self.settings.most_intervals
-        return refined(last.nlp.mesh, errors, factor, self.rule.order, most)
+        return refined(mesh, errors, min(0.3 / off, 0.3), self.rule.order, most)

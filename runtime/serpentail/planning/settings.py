@@ -33,7 +33,9 @@ class PlanSettings:
     intervals: int
     most_intervals: int
     rounds: int
-    tolerance: float | None  # deg; None: no demand
+    tolerance: float | None  # deg; None: no demand at all
+    tail_tolerance: float | None  # deg; None: no demand
+    rate_tolerance: float | None  # rad/s; None: no demand
     solver: str
     options: dict[str, Any]
     dynamics: str
@@ -45,12 +47,22 @@ class PlanSettings:
     seed: int
     track: bool
 
+    @property
+    def allowed(self) -> dict[str, float]:
+        """Largest errors of the truth at the end: attitude and tail, deg, rates, rad/s."""
+        named = {
+            "attitude": self.tolerance,
+            "tail": self.tail_tolerance,
+            "rate": self.rate_tolerance,
+        }
+        return {name: most for name, most in named.items() if most is not None}
+
 
 def check_settings(model: Model, settings: PlanSettings, refused: Refusals) -> None:
     """Note each setting that is wrong, with the remedy."""
     for name, bounds in WHOLE_NUMBERS.items():
         refused.attempt(name, _check_whole, name, getattr(settings, name), *bounds)
-    for name in ("tolerance", "time_limit"):
+    for name in ("tolerance", "tail_tolerance", "rate_tolerance", "time_limit"):
         if getattr(settings, name) is not None:
             refused.attempt(name, _check_positive, name, getattr(settings, name))
     if not isinstance(settings.options, dict):

@@ -56,9 +56,12 @@ def plan_arguments(table: Mapping) -> dict[str, Any]:
         "goal": goal,
         "bounds": Bounds(**table.get("bounds", {})),
     }
-    if arguments.get("tolerance") == FREE:
-        arguments["tolerance"] = None
-    return arguments
+    return {name: None if _is_free(value) else value for name, value in arguments.items()}
+
+
+def _is_free(value: Any) -> bool:
+    """Tell if nothing is demanded."""
+    return isinstance(value, str) and value == FREE
 
 
 def _check_solver(solver: Any, options: Any) -> None:

@@ -60,6 +60,8 @@ PLAN = Key(
         "rule": one_word(*FAMILIES),
         "degree": _whole(1, MOST_DEGREE),
         "tolerance": Key("deg", words=(FREE,)),
+        "tail_tolerance": Key("deg", words=(FREE,)),
+        "rate_tolerance": Key("rad/s", words=(FREE,)),
         "solver": Key(form={"type": "string", "pattern": "^[a-z]+$"}),
         "options": Key(form={"type": "object"}),
         "guess_damping": WORK,

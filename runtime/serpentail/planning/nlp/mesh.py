@@ -31,6 +31,23 @@ class Mesh:
         """Widths (N,) of the intervals."""
         return np.diff(self.ends)
 
+    def same(self, other: "Mesh") -> bool:
+        """Tell if two meshes are the same."""
+        mine, others = (self.ends, self.guarded), (other.ends, other.guarded)
+        return all(map(np.array_equal, mine, others))
+
+    def with_guards(self, intervals: np.ndarray) -> "Mesh":
+        """Return the mesh with guards in more intervals (N,), and in those beside them."""
+        padded = np.pad(intervals, 1)
+        return Mesh(self.ends, self.guarded | padded[:-2] | padded[1:-1] | padded[2:])
+
+    def halved(self, chosen: np.ndarray, most: int) -> "Mesh":
+        """Return the mesh with chosen intervals (N,) halved, the first of them if these are too
+        many for a mesh of at most so many intervals.
+        """
+        room = most - self.intervals
+        return self.split(1 + (chosen & (np.cumsum(chosen) <= room)))
+
     def points(self, rule: CollocationRule) -> np.ndarray:
         """Points (N S + 1,) at which states are unknowns."""
         inside = self.ends[:-1, None] + self.widths[:, None] * rule.supports[1:-1]

@@ -34,7 +34,8 @@ TRUTH = ("open_loop_attitude_error_deg", "open_loop_goal_error_deg")
 class Plan:
     """A planned motion and its truth.
 
-    success: the solver converged, and the torques, applied open loop, end within the tolerance.
+    success: the solver converged, the torques, applied open loop, end within the tolerances, and
+    bounds hold between nodes, too.
     trajectory: the planned motion and its torques (before damping), at and between all ends of
     intervals.
     report: JSON-ready summary; errors in degrees, times in s, energy in J, power in W.

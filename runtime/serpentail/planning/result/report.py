@@ -4,15 +4,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...attitude import angle_deg, pitch_roll_yaw, tilt_deg
+from ...attitude import pitch_roll_yaw
 from ...errors import SimulationError
-from ...model.layout import OMEGA, POSITION, QUATERNION, TAIL_V
+from ...model.layout import POSITION, QUATERNION
 from ...model.model import Model
 from ...motion.trajectory import Trajectory
 from ...simulation.pfl import Pfl
 from ...simulation.simulate import simulate
 from ..problem import PlanningProblem
 from .curve import Curve
+from .excess import largest
+from .truth import attitude_errors, work
 
 if TYPE_CHECKING:
     from ..rounds import Round, Search
@@ -26,7 +28,8 @@ def report(search: "Search", best: "Round", planned: Trajectory) -> dict[str, An
     planned: the round's trajectory.
     """
     problem, solution, nlp = search.problem, best.solution, best.nlp
-    energy, power = work(planned)
+    energy, power = work(search.model, best.curve, problem.damping, search.start)
+    excess, of = largest(best.excess)
     values = {
         "converged": solution.success,
         "status": solution.status,
@@ -42,6 +45,8 @@ def report(search: "Search", best: "Round", planned: Trajectory) -> dict[str, An
         "effort": effort(best.curve),
         "energy_J": energy,
         "peak_power_W": power,
+        "bound_excess": excess,
+        "bound_excess_of": of,
     }
     values |= truth(search, best, planned)
     lost = [name for name, x in values.items() if isinstance(x, float) and not np.isfinite(x)]
@@ -50,14 +55,13 @@ def report(search: "Search", best: "Round", planned: Trajectory) -> dict[str, An
 
 def truth(search: "Search", best: "Round", planned: Trajectory) -> dict[str, float | None]:
     """Return the plan's errors at its end: torques applied open loop, the tail tracked by PFL."""
-    problem, after_position = search.problem, slice(OMEGA.start, None)
-    (planned_q, planned_v), (true_q, true_v) = best.planned, best.true
-    to_plan, to_goal = attitude_errors(problem, planned_q[-1, QUATERNION], true_q[QUATERNION])
-    rates = np.abs(true_v[after_position] - planned_v[-1, after_position]).max()
+    problem, true_q = search.problem, best.true[0]
+    to_plan, to_goal = attitude_errors(problem, best.planned[0][-1, QUATERNION], true_q[QUATERNION])
     errors: dict[str, float | None] = {
         "open_loop_attitude_error_deg": to_plan,
         "open_loop_goal_error_deg": to_goal,
-        "open_loop_rate_error": float(rates),
+        "open_loop_tail_error_deg": best.errors["tail"],
+        "open_loop_rate_error": best.errors["rate"],
         "tracked_attitude_error_deg": None,
         "tracked_tail_error_rad": None,
         "dyn_err": None,
@@ -92,24 +96,6 @@ def effort(curve: Curve) -> float:
     """Integral of tau^2 (N^2 m^2 s) by the rule's quadrature."""
     squares = np.sum(curve.nodes["torque"] ** 2, axis=2)
     return float(np.diff(curve.ends) @ squares @ curve.rule.weights)
-
-
-def work(trajectory: Trajectory) -> tuple[float, float]:
-    """Energy (J), the integral of sum |tau q_t_dot|, and the largest such power (W)."""
-    power = np.abs(trajectory.tau * trajectory.v[:, TAIL_V]).sum(axis=1)
-    return float(np.trapezoid(power, trajectory.t)), float(power.max())
-
-
-def attitude_errors(
-    problem: PlanningProblem, planned: np.ndarray, reached: np.ndarray
-) -> tuple[float, float]:
-    """Angles (deg) of the attitude that was reached to the planned one, and to the goal; (4,)."""
-    to_plan, goal = float(angle_deg(planned, reached)), problem.goal.attitude
-    if goal is None:
-        return to_plan, to_plan
-    if isinstance(goal, str):
-        return to_plan, float(tilt_deg(reached))
-    return to_plan, float(angle_deg(goal, reached))
 
 
 def tracked(model: Model, problem: PlanningProblem, planned: Trajectory) -> Trajectory:

@@ -5,16 +5,19 @@ From end to end this is the plan's error; by intervals it tells where the mesh i
 
 import numpy as np
 
-from ...attitude import angle_deg
+from ...attitude import angle_deg, tilt_deg
 from ...errors import SimulationError
-from ...model.layout import OMEGA, QUATERNION, TAIL_Q
+from ...model.layout import OMEGA, QUATERNION, TAIL_Q, TAIL_V
 from ...model.model import Model
+from ...motion.trajectory import Trajectory
 from ...simulation.controllers import TorqueCurve
 from ...simulation.piecewise import Piecewise
-from ...simulation.simulate import end_state
+from ...simulation.simulate import end_state, simulate
+from ..problem import PlanningProblem
 from .curve import Curve
 
 LONGEST_STEP = 1e-4  # s, of RK4
+SAMPLE = 1e-3  # s, the most between samples of a flight
 SHORT_INTERVAL = 0.02  # s: rates of shorter ones are weighed as if they were as long
 
 
@@ -46,6 +49,71 @@ def open_loop(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return q (nq,), v (nv,) at the end, the planned torques applied from the start."""
     return applied(model, planned_torques(curve), damping, *start)
+
+
+def end_errors(
+    problem: PlanningProblem,
+    planned: tuple[np.ndarray, np.ndarray],
+    true: tuple[np.ndarray, np.ndarray],
+) -> dict[str, float]:
+    """Return how far a true q, v at the end are from the planned ones; inf where they are lost.
+
+    "attitude": deg, to the plan or the goal, the larger one; "tail": deg; "rate": rad/s, of torso
+    and tail.
+    """
+    (q, v), (true_q, true_v) = planned, true
+    rates = slice(OMEGA.start, None)
+    errors = {
+        "attitude": max(attitude_errors(problem, q[QUATERNION], true_q[QUATERNION])),
+        "tail": float(np.degrees(np.abs(true_q[TAIL_Q] - q[TAIL_Q]).max(initial=0))),
+        "rate": float(np.abs(true_v[rates] - v[rates]).max()),
+    }
+    return {name: error if np.isfinite(error) else np.inf for name, error in errors.items()}
+
+
+def attitude_errors(
+    problem: PlanningProblem, planned: np.ndarray, reached: np.ndarray
+) -> tuple[float, float]:
+    """Angles (deg) of the attitude that was reached to the planned one, and to the goal; (4,)."""
+    to_plan, goal = float(angle_deg(planned, reached)), problem.goal.attitude
+    if goal is None:
+        return to_plan, to_plan
+    if isinstance(goal, str):
+        return to_plan, float(tilt_deg(reached))
+    return to_plan, float(angle_deg(goal, reached))
+
+
+def work(
+    model: Model, curve: Curve, damping: float, start: tuple[np.ndarray, np.ndarray]
+) -> tuple[float, float]:
+    """Return the energy (J), the integral of sum |tau q_t_dot|, of the planned torques applied from
+    the start, and the largest such power (W); nan where the motion is lost.
+
+    By Gauss's rule of four nodes, between which torques do not jump.
+    """
+    torques = planned_torques(curve)
+    law, sample = TorqueCurve(torques, damping), min(SAMPLE, curve.duration / 4)
+    try:
+        flight = simulate(
+            model, *start, controller=law, t_span=curve.duration, method="rk4", output_step=sample
+        )
+    except SimulationError:
+        return np.nan, np.nan
+    assert isinstance(flight, Trajectory)  # one start, one motion
+    counts = np.ceil(np.diff(curve.ends) / sample).astype(int)
+    widths = np.repeat(np.diff(curve.ends) / counts, counts)
+    nodes, weights = np.polynomial.legendre.leggauss(4)
+    starts = np.cumsum(widths) - widths
+    times = starts[:, None] + widths[:, None] * (1 + nodes) / 2
+
+    def power(t: np.ndarray) -> np.ndarray:
+        return np.abs(torques.at(t)[0] * flight.resample(t).v[:, TAIL_V]).sum(axis=1)
+
+    # the largest may be where torques jump, just before or after
+    joints = np.nextafter(curve.ends[1:], 0)
+    between, before, after = power(times.ravel()), power(joints), power(curve.ends[:-1])
+    energy = np.outer(widths, weights / 2).ravel() @ between
+    return float(energy), float(np.concatenate([between, before, after]).max())
 
 
 def local_errors(

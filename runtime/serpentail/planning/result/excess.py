@@ -1,0 +1,92 @@
+"""How far a plan goes beyond its bounds, which the program knows at nodes alone, between them."""
+
+import numpy as np
+
+from ..nlp.node import Node
+from ..nlp.transcription import Transcription
+from .curve import Curve
+from .truth import planned_torques
+
+SAMPLES = 33  # of an interval, its ends among them
+SLACK = 1e-3  # of a bound, by which a plan that is called true may exceed it
+
+Excess = dict[str, np.ndarray]
+
+
+def excess(nlp: Transcription, curve: Curve, h: np.ndarray) -> Excess:
+    """Return by what part (N,) of a bound each interval exceeds it, by name; 0 or less inside it.
+
+    Names: "torque", "torque_rate", "angle", "rate", "path", those that are bounded.  A path
+    constraint's part is that of its larger limit.  h (3,): angular momentum.
+    """
+    bounds, N = nlp.problem.bounds, nlp.mesh.intervals
+    k, s = np.repeat(np.arange(N), SAMPLES), np.tile(np.linspace(0, 1, SAMPLES), N)
+    blocks = curve.inside(k, s)
+    found = {
+        name: _beyond(blocks[block] / bound, N)
+        for name, block, bound in (
+            ("torque", "torque", bounds.torque),
+            ("angle", "tail", bounds.angle),
+            ("rate", "tail_rate", bounds.rate),
+        )
+        if bound is not None
+    }
+    if bounds.torque_rate is not None:
+        found["torque_rate"] = _beyond(_slopes(nlp, curve, k, s) / bounds.torque_rate, N)
+    if nlp.problem.path:
+        found["path"] = _path(nlp, curve.duration, blocks, h)
+    return found
+
+
+def largest(found: Excess) -> tuple[float, str | None]:
+    """Return the largest excess, 0 where no bound is exceeded, and what it is of."""
+    of = {name: float(np.nan_to_num(part, nan=np.inf).max()) for name, part in found.items()}
+    worst = max(of, key=lambda name: of[name], default=None)
+    return (0.0, None) if worst is None or of[worst] <= 0 else (of[worst], worst)
+
+
+def exceeded(part: np.ndarray) -> np.ndarray:
+    """Tell of each interval if it goes too far."""
+    return ~(part <= SLACK)
+
+
+def _beyond(ratios: np.ndarray, intervals: int) -> np.ndarray:
+    """Largest magnitude (N,) of ratios (N SAMPLES, c), less 1."""
+    return np.abs(ratios).reshape(intervals, -1).max(axis=1) - 1
+
+
+def _slopes(nlp: Transcription, curve: Curve, k: np.ndarray, s: np.ndarray) -> np.ndarray:
+    """Slopes of torques (N SAMPLES, 2m), N m/s; of torques that are constant in intervals, their
+    steps over the distance of nodes.
+    """
+    torques, width = planned_torques(curve), np.diff(curve.ends)
+    if len(nlp.rule.nodes) == 1:
+        steps = np.diff(torques.coefficients[..., 0], axis=0) / width[1:, None]
+        return np.vstack([0 * steps[:1], steps])[k]
+    c, x = torques.coefficients[k], (s * width[k])[:, None]
+    return sum(j * c[..., j] * x ** (j - 1) for j in range(1, c.shape[2]))
+
+
+def _path(
+    nlp: Transcription, duration: float, blocks: dict[str, np.ndarray], h: np.ndarray
+) -> np.ndarray:
+    """Excess (N,) of the path constraints, over the larger of their limits."""
+    variables, node, count = nlp.variables, nlp.node, len(blocks["tail"])
+    names = [name for name, _ in (*variables.states, *variables.algebraic, ("torque", 0))]
+    parts = [blocks[name] / variables.units[name] for name in names]
+    zeta = np.column_stack([np.full(count, duration), *parts])
+    values = _path_values(node, zeta, h)
+    limits = np.array([row[1:] for row in nlp.problem.path])
+    least, most = np.repeat(limits, node.path // len(limits), axis=0).T
+    sizes = np.where(np.isfinite([least, most]), np.abs([least, most]), 0).max(axis=0)
+    over = np.maximum(values - most, least - values) / np.where(sizes > 0, sizes, 1.0)
+    return over.reshape(nlp.mesh.intervals, -1).max(axis=1)
+
+
+def _path_values(node: Node, zeta: np.ndarray, h: np.ndarray) -> np.ndarray:
+    """Values (n, path) of the path constraints, which no call of the dynamics has a part in."""
+    count, function = len(zeta), node.function
+    results = [np.zeros((function.size1_in(k), count)) for k in range(2, function.n_in())]
+    y = function.map(count)(zeta.T, np.tile(h[:, None], count), *results)
+    first = node.rates + node.residuals
+    return np.array(y)[first : first + node.path].T
