@@ -126,14 +126,14 @@ def finite_differences(rat: st.Model, cap: float) -> tuple[float, str]:
     """CPU seconds of SLSQP without derivatives on the paper's program, at most `cap`, and how it
     ended.
     """
-    transcription, limits, w, h = captured(rat)
+    transcription, limits, w, p = captured(rat)
     nlp, fixed = transcription.functions["nlp"], limits.lbg == limits.ubg
     begun = time.process_time()
 
     def both(x):
         if time.process_time() - begun > cap:
             raise Cut
-        return nlp(x, h)
+        return nlp(x, p)
 
     from scipy.optimize import Bounds, minimize
 
@@ -158,14 +158,14 @@ def finite_differences(rat: st.Model, cap: float) -> tuple[float, str]:
 
 
 def captured(rat: st.Model) -> tuple:
-    """The paper's program, its limits, passive flight as the guess and the momentum, as ``plan``
-    has them.
+    """The paper's program, its limits, passive flight as the guess and the parameters, as
+    ``plan`` has them.
     """
     seen, solve = [], rounds.solve
 
-    def note(engine, limits, w, h, multipliers=None):
-        seen.append((limits, np.clip(w, limits.lbx, limits.ubx), h))
-        return solve(engine, limits, w, h, multipliers)
+    def note(engine, limits, w, p, multipliers=None):
+        seen.append((limits, np.clip(w, limits.lbx, limits.ubx), p))
+        return solve(engine, limits, w, p, multipliers)
 
     rounds.solve = note
     try:

@@ -78,7 +78,8 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
     smoothing: N m s; without it plans whirl a light tail.
     damping: N m s (Eq. 47), in addition to the planned torques.
     path: rows (function of a point, least, most).  A point has the CasADi blocks tail, tail_rate,
-    torso_rate, torque, attitude, quaternion in SI, and those of its formulation.
+    torso_rate, torque, attitude, quaternion, time, duration, position, height, tip, tail_points,
+    center_of_mass in SI, parameters by name, and the blocks of its formulation.
     formulation: "airborne" (angular momentum conserved by construction), "translation-free",
     "full".
     attitude: "quaternion", "euler".

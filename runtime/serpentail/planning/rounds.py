@@ -19,14 +19,14 @@ from .nlp.guess import Motion, of_trajectory, passive, pushes, unknowns
 from .nlp.interrupt import stop_reason
 from .nlp.mesh import Mesh, refined, uniform
 from .nlp.multipliers import Multipliers, carried
-from .nlp.node import Equations
+from .nlp.node import SMALL_POWER, Equations
 from .nlp.rules import CollocationRule
 from .nlp.solver import Solution, solve, solver
 from .nlp.transcription import Transcription, torque_unit, transcription_of
 from .problem import PlanningProblem
 from .result.curve import Curve, curve
 from .result.excess import SLACK, Excess, exceeded, excess, largest
-from .result.full_state import full_state
+from .result.full_state import com_at_start, full_state
 from .result.plan import Plan, sampled
 from .result.report import report
 from .result.truth import end_errors, local_errors, open_loop
@@ -70,7 +70,8 @@ class Search:
         self.model, self.problem, self.settings = model, problem, settings
         self.equations, self.rule = equations, rule
         self.start = (problem.q0, problem.v0)
-        self.h = model.momentum(*self.start)[1]
+        momentum, com = model.momentum(*self.start)[1], com_at_start(model, self.start)
+        self.parameters = np.concatenate([momentum, *com, [SMALL_POWER]])
         self.attitude = attitude(problem.attitude)
         self.spent = dict.fromkeys(("derive_s", "solve_cpu_s", "truth_s"), 0.0)
         self.iterations = self.attempts = 0
@@ -208,7 +209,7 @@ class Search:
         w = unknowns(motion, nlp, float(np.clip(motion.duration, *self.problem.duration)))
         angles = motion.at(np.array([motion.duration]))["attitude"][0]
         bounds = limits(nlp, self._start_blocks(), angles)
-        solution = solve(engine, bounds, w, self.h, multipliers)
+        solution = solve(engine, bounds, w, self.parameters, multipliers)
         self.spent["solve_cpu_s"] += solution.cpu_s
         self.iterations += solution.iterations
         self.attempts += 1
@@ -229,13 +230,13 @@ class Search:
 
     def _round(self, nlp: Transcription, solution: Solution) -> Round:
         """Return a round: the solution's curve, and its truth."""
-        motion = curve(nlp, solution.w, self.h)
+        motion = curve(nlp, solution.w, self.parameters)
         with self._timed("truth_s"):
             blocks = motion.at(motion.ends)
             planned = full_state(self.model, self.start, self.attitude, motion.ends, blocks)
             true = open_loop(self.model, motion, self.problem.damping, self.start)
             errors = end_errors(self.problem, (planned[0][-1], planned[1][-1]), true)
-            beyond = excess(nlp, motion, self.h)
+            beyond = excess(nlp, motion, self.parameters)
         return Round(nlp, solution, motion, planned, true, errors, beyond)
 
     def _finer(self, last: Round) -> Mesh:

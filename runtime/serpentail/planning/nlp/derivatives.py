@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .node import Node
+from .node import PARAMETERS, Node
 from .node_calls import MappedNode
 
 if TYPE_CHECKING:
@@ -20,11 +20,12 @@ if TYPE_CHECKING:
 class Assembly:
     """f = cost Y + direct w, g = linear w + weights Y.
 
-    Y (nodes * size): values of the node's function at w[indices] of every node.
+    Y (nodes * size): values of the node's function at w[indices] and fractions of every node.
     """
 
     node: Node
     indices: np.ndarray  # (unknowns of a node, nodes)
+    fractions: np.ndarray  # (nodes,) of the duration
     linear: Any  # SciPy's sparse matrix (rows, w)
     weights: Any  # SciPy's sparse matrix (rows, nodes * size)
     cost: np.ndarray
@@ -38,45 +39,45 @@ class Assembly:
         import casadi as ca
 
         # symbols, and what all nodes give
-        w, h = ca.MX.sym("x", len(self.direct)), ca.MX.sym("p", 3)
+        w, p = ca.MX.sym("x", len(self.direct)), ca.MX.sym("p", PARAMETERS)
         lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", self.linear.shape[0])
         derivatives, count = self.node.derivatives, self.indices.shape[1]
-        mapped = MappedNode(derivatives, count)
+        mapped = MappedNode(derivatives, self.fractions)
         Z = ca.reshape(w[self.indices.T.ravel().tolist()], self.indices.shape)
         mu = lam_f * ca.DM(self.cost) + ca.mtimes(_dm(self.weights.T.tocsc()), lam_g)
-        Y, J = ca.vec(mapped.values(Z, h)), mapped.jacobians(Z, h)
-        S = mapped.hessians(Z, h, ca.reshape(mu, self.node.size, count))
+        Y, J = ca.vec(mapped.values(Z, p)), mapped.jacobians(Z, p)
+        S = mapped.hessians(Z, p, ca.reshape(mu, self.node.size, count))
 
         # objective and constraints
-        f = self._objective(mapped, Z, h, w)
+        f = self._objective(mapped, Z, p, w)
         g = ca.mtimes(_dm(self.linear), w) + ca.mtimes(_dm(self.weights), Y)
 
         # their derivatives
         pattern, matrix, constant = self._jacobian(*_triplet(derivatives.jacobian.sparsity_out(0)))
         triangle, gather = self._hessian(*_triplet(derivatives.hessian.sparsity_out(0)))
         jac = ca.MX(pattern, ca.mtimes(matrix, J) + constant)
-        hess, grad = ca.MX(triangle, ca.mtimes(gather, S)), self._gradient(mapped, Z, h)
+        hess, grad = ca.MX(triangle, ca.mtimes(gather, S)), self._gradient(mapped, Z, p)
         return {
-            "values": ca.Function("values", [w, h], [mapped.values(Z, h)]),
-            "nlp": ca.Function("nlp", [w, h], [f, g], ["x", "p"], ["f", "g"]),
-            "grad_f": ca.Function("nlp_grad_f", [w, h], [f, grad], ["x", "p"], ["f", "grad:f:x"]),
-            "jac_g": ca.Function("nlp_jac_g", [w, h], [g, jac], ["x", "p"], ["g", "jac:g:x"]),
+            "values": ca.Function("values", [w, p], [mapped.values(Z, p)]),
+            "nlp": ca.Function("nlp", [w, p], [f, g], ["x", "p"], ["f", "g"]),
+            "grad_f": ca.Function("nlp_grad_f", [w, p], [f, grad], ["x", "p"], ["f", "grad:f:x"]),
+            "jac_g": ca.Function("nlp_jac_g", [w, p], [g, jac], ["x", "p"], ["g", "jac:g:x"]),
             "hess_lag": ca.Function(
                 "nlp_hess_l",
-                [w, h, lam_f, lam_g],
+                [w, p, lam_f, lam_g],
                 [hess],
                 ["x", "p", "lam:f", "lam:g"],
                 ["triu:hess:gamma:x:x"],
             ),
         }
 
-    def _objective(self, mapped: MappedNode, Z: "ca.MX", h: "ca.MX", w: "ca.MX") -> "ca.MX":
+    def _objective(self, mapped: MappedNode, Z: "ca.MX", p: "ca.MX", w: "ca.MX") -> "ca.MX":
         import casadi as ca
 
         weights = ca.DM(self.cost.reshape(-1, self.node.size)[:, -1])
-        return ca.dot(weights, ca.vec(mapped.costs(Z, h))) + ca.dot(ca.DM(self.direct), w)
+        return ca.dot(weights, ca.vec(mapped.costs(Z, p))) + ca.dot(ca.DM(self.direct), w)
 
-    def _gradient(self, mapped: MappedNode, Z: "ca.MX", h: "ca.MX") -> "ca.MX":
+    def _gradient(self, mapped: MappedNode, Z: "ca.MX", p: "ca.MX") -> "ca.MX":
         """The objective's gradient: the dynamics has no part in it."""
         import casadi as ca
 
@@ -84,7 +85,7 @@ class Assembly:
         index, cost = self.indices[columns].T.ravel(), self.cost.reshape(-1, self.node.size)[:, -1]
         weights = np.repeat(cost, len(columns))
         gather = _sparse(weights, index, np.arange(index.size), (len(self.direct), index.size))
-        return ca.mtimes(gather, mapped.slopes(Z, h)) + ca.DM(self.direct)
+        return ca.mtimes(gather, mapped.slopes(Z, p)) + ca.DM(self.direct)
 
     def _jacobian(
         self, rows: np.ndarray, columns: np.ndarray

@@ -3,21 +3,20 @@
 Every node of every mesh evaluates the same CasADi function, of which the program is then built.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
-from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...checks import did_you_mean
-from ...errors import ModelError, PlanningError
+from ...errors import ModelError
 from ...model.kept import kept
 from ...model.layout import OMEGA, TAIL_V, VELOCITY
 from ...model.model import Model
 from ...model.parameters import total_mass
 from .coordinates import IDENTITY_POSE, Attitude, rotated
 from .node_calls import NodeCall, NodeDerivatives, linear_call
+from .point import Point, asked, point_of
 
 if TYPE_CHECKING:
     import casadi as ca
@@ -42,6 +41,9 @@ UNITS = {
     "drift": 0.1,
 }
 SMALL_POWER = 1e-4  # W, below which |power| is rounded off
+# of a program: angular momentum (3,), position and velocity (3,) of the COM at the start, the
+# power (W) below which |power| is rounded off; a node has its fraction of the duration, too
+PARAMETERS = 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,12 +106,12 @@ def variables_of(
 
 @dataclass(frozen=True, eq=False)
 class Node:
-    """A node's function y(zeta, h, results of calls), the calls, whose inputs are linear in zeta.
+    """A node's function y(zeta, p, results of calls), the calls, whose inputs are linear in zeta.
 
-    zeta: [duration, states, algebraic unknowns, torques] in units.  h (3,): angular momentum about
-    the COM (kg m^2/s, world), which the airborne formulation conserves.  y: duration * rates of the
-    states, algebraic residuals, path constraints, duration * objective, all in units; rates,
-    residuals and path are the numbers of them.
+    zeta: [duration, states, algebraic unknowns, torques] in units.  p: parameters, first the
+    angular momentum about the COM (kg m^2/s, world), which the airborne formulation conserves.
+    y: duration * rates of the states, algebraic residuals, path constraints, duration * objective,
+    all in units; rates, residuals and path are the numbers of them.
     """
 
     function: "ca.Function"
@@ -145,15 +147,15 @@ def node_function(
 
     # symbols of the unknowns, and of what the calls give
     states, algebraic, controls = variables.sizes()
-    zeta, h = ca.SX.sym("zeta", 1 + states + algebraic + controls), ca.SX.sym("h", 3)
-    point = _point(zeta, variables, attitude, controls)
+    zeta, p = ca.SX.sym("zeta", 1 + states + algebraic + controls), ca.SX.sym("p", PARAMETERS + 1)
+    point = _point(model, zeta, p, variables, attitude)
     calls = _calls(model, problem, point, zeta, equations)[: 2 if algebraic else 1]
     results = [ca.SX.sym("result", call.function.size1_out(0)) for call in calls]
 
     # the parts of y
     duration, rates = zeta[0], _rates(model, point, attitude, results[0])
     state_rates = ca.vertcat(*(rates[name] for name, _ in variables.states))
-    residuals = _momentum(model, point, h, results[1]) if algebraic else ca.SX.zeros(0)
+    residuals = _momentum(model, point, p[:3], results[1]) if algebraic else ca.SX.zeros(0)
     constraints = [
         ca.vec(ca.SX(asked(f"path[{k}]", function, point)))
         for k, (function, _, _) in enumerate(problem.path)
@@ -163,33 +165,10 @@ def node_function(
         duration * state_rates / variables.scale(variables.states),
         residuals,
         path,
-        duration * cost(problem, point, variables.units["torque"]),
+        duration * cost(problem, point, p[PARAMETERS - 1], variables.units["torque"]),
     )
-    function = ca.Function("node", [zeta, h, *results], [y])
+    function = ca.Function("node", [zeta, p, *results], [y])
     return Node(function, tuple(calls), states, residuals.size1(), path.size1())
-
-
-class Point(SimpleNamespace):
-    """A node as objectives and path constraints see it: CasADi blocks by name, in SI units."""
-
-    def __getattr__(self, name: str) -> Any:
-        has = sorted(vars(self))
-        remedy = did_you_mean(name, has) or "choose one of these"
-        raise AttributeError(
-            f"a point has no {name!r}, it has {', '.join(has)}; {remedy}", name=name, obj=self
-        )
-
-
-def asked(field: str, function: Callable[[Any], Any], point: Point) -> Any:
-    """Return what a function of the user's makes of a point; PlanningError where it asks for what
-    the point lacks.
-    """
-    try:
-        return function(point)
-    except AttributeError as error:
-        if error.obj is not point:
-            raise
-        raise PlanningError(f"{field}: {error}") from error
 
 
 def _calls(
@@ -218,15 +197,18 @@ def _calls(
     return calls
 
 
-def _point(zeta: "ca.SX", variables: Variables, attitude: Attitude, controls: int) -> Point:
+def _point(
+    model: Model, zeta: "ca.SX", p: "ca.SX", variables: Variables, attitude: Attitude
+) -> Point:
     """Return the blocks of a node in SI units, which objectives and path constraints see."""
-    blocks: dict[str, Any] = {}
+    blocks: dict[str, Any] = {"duration": zeta[0], "time": p[PARAMETERS] * zeta[0]}
     start = 1
-    for name, size in (*variables.states, *variables.algebraic, ("torque", controls)):
+    controls = ("torque", variables.units["torque"].size)
+    for name, size in (*variables.states, *variables.algebraic, controls):
         blocks[name] = variables.units[name] * zeta[start : start + size]
         start += size
     blocks["quaternion"] = attitude.quaternion(blocks["attitude"])
-    return Point(**blocks)
+    return point_of(model, blocks, p[3:9])
 
 
 def _rates(model: Model, point: Point, attitude: Attitude, v_dot: "ca.SX") -> dict[str, Any]:
@@ -259,7 +241,9 @@ def _momentum(model: Model, point: Point, h: "ca.SX", momentum: "ca.SX") -> "ca.
     )
 
 
-def cost(problem: "PlanningProblem", point: Point, torque_unit: np.ndarray) -> "ca.SX":
+def cost(
+    problem: "PlanningProblem", point: Point, small_power: "ca.SX", torque_unit: np.ndarray
+) -> "ca.SX":
     """Return the objective's integrand (Eq. 40; CasADi), in units of the torques."""
     import casadi as ca
 
@@ -271,5 +255,5 @@ def cost(problem: "PlanningProblem", point: Point, torque_unit: np.ndarray) -> "
         return (ca.sumsqr(point.torque) + rates) / unit**2
     if problem.objective == "energy":
         power = point.torque * point.tail_rate
-        return ca.sum1(ca.sqrt(power**2 + SMALL_POWER**2) - SMALL_POWER) / (unit * 10)
+        return ca.sum1(ca.sqrt(power**2 + small_power**2) - small_power) / (unit * 10)
     return ca.SX(0)

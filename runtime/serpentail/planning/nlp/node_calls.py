@@ -1,7 +1,7 @@
 """The calls of compiled dynamics inside a node's function, with their exact derivatives.
 
 CasADi cannot look into compiled C, so that the chain rule through a call is written out here.  A
-node's function is y(zeta, h, e), e being results of calls e = c(L zeta + l).  With E = c' L, its
+node's function is y(zeta, p, e), e being results of calls e = c(L zeta + l).  With E = c' L, its
 Jacobian is y_zeta + y_e E, and the Hessian of mu^T y is
 [I; E]^T (mu^T y)'' [I; E] + L^T (nu^T c)'' L with nu = y_e^T mu.
 """
@@ -10,6 +10,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import chain
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 if TYPE_CHECKING:
     import casadi as ca
@@ -43,7 +45,7 @@ def linear_call(function: "ca.Function", zeta: "ca.SX", arguments: Iterable[Any]
 
 
 class NodeDerivatives:
-    """Exact derivatives of a node's function, as functions of zeta, h and what its calls give."""
+    """Exact derivatives of a node's function, as functions of zeta, p and what its calls give."""
 
     def __init__(self, node: "Node"):
         import casadi as ca
@@ -51,14 +53,14 @@ class NodeDerivatives:
         self.node, self.calls, self.function = node, node.calls, node.function
 
         # symbols of the inputs, and y
-        self.zeta, self.h, *self.results = node.function.sx_in()
-        self.y = node.function.call([self.zeta, self.h, *self.results])[0]
+        self.zeta, self.p, *self.results = node.function.sx_in()
+        self.y = node.function.call([self.zeta, self.p, *self.results])[0]
 
         # derivatives of the calls, of the objective, which is the last of y, and of all y
         self.jacobians_of_calls = [call.function.jacobian() for call in node.calls]
         self.hessians_of_calls = [call.function.reverse(1).jacobian() for call in node.calls]
-        self.cost = ca.Function("cost", [self.zeta, self.h], [self.y[-1]])
-        self.slope = ca.Function("slope", [self.zeta, self.h], [ca.jacobian(self.y[-1], self.zeta)])
+        self.cost = ca.Function("cost", [self.zeta, self.p], [self.y[-1]])
+        self.slope = ca.Function("slope", [self.zeta, self.p], [ca.jacobian(self.y[-1], self.zeta)])
         self.jacobian = self._jacobian()
         self.weights = self._weights()
         self.hessian = self._hessian()
@@ -94,7 +96,7 @@ class NodeDerivatives:
         through = ca.horzcat(*(ca.jacobian(self.y, result) for result in self.results))
         total = direct + ca.mtimes(through, self._by_zeta(blocks))
         return ca.Function(
-            "jacobian", [self.zeta, self.h, *self.results, *chain.from_iterable(blocks)], [total]
+            "jacobian", [self.zeta, self.p, *self.results, *chain.from_iterable(blocks)], [total]
         )
 
     def _weights(self) -> "ca.Function":
@@ -105,7 +107,7 @@ class NodeDerivatives:
         total = ca.dot(mu, self.y)
         return ca.Function(
             "weights",
-            [self.zeta, self.h, *self.results, mu],
+            [self.zeta, self.p, *self.results, mu],
             [ca.gradient(total, r) for r in self.results],
         )
 
@@ -127,15 +129,15 @@ class NodeDerivatives:
                 seconds.append(ca.SX.sym("S", hessian.sparsity_out(place)))
                 total += ca.mtimes([call.inputs[i][0].T, seconds[-1], call.inputs[j][0]])
 
-        symbols = [self.zeta, self.h, *self.results, mu, *chain.from_iterable(blocks), *seconds]
+        symbols = [self.zeta, self.p, *self.results, mu, *chain.from_iterable(blocks), *seconds]
         return ca.Function("hessian", symbols, [total])
 
 
 class MappedNode:
-    """A node's function at all of `count` nodes, of their unknowns Z (n, count) and of h (3)."""
+    """A node's function at all of `count` nodes, of their unknowns Z (n, count) and of p."""
 
-    def __init__(self, node: NodeDerivatives, count: int):
-        self.node, self.count = node, count
+    def __init__(self, node: NodeDerivatives, fractions: np.ndarray):
+        self.node, self.count, self.fractions = node, len(fractions), fractions
 
     def _inputs(self, call: NodeCall, Z: "ca.MX") -> "list[ca.MX]":
         import casadi as ca
@@ -155,38 +157,41 @@ class MappedNode:
             blocks += [outputs[k] for k in call.moving]
         return results, blocks
 
-    def _repeated(self, h: "ca.MX") -> "ca.MX":
+    def _parameters(self, p: "ca.MX") -> "ca.MX":
+        """p of each node, and its fraction of the duration."""
         import casadi as ca
 
-        return ca.repmat(h, 1, self.count)
+        return ca.vertcat(ca.repmat(p, 1, self.count), ca.DM(self.fractions[None]))
 
-    def values(self, Z: "ca.MX", h: "ca.MX") -> "ca.MX":
+    def values(self, Z: "ca.MX", p: "ca.MX") -> "ca.MX":
         """Y (size, count)."""
         results = [
             call.function.map(self.count)(*self._inputs(call, Z)) for call in self.node.calls
         ]
-        return self.node.function.map(self.count)(Z, self._repeated(h), *results)
+        return self.node.function.map(self.count)(Z, self._parameters(p), *results)
 
-    def costs(self, Z: "ca.MX", h: "ca.MX") -> "ca.MX":
+    def costs(self, Z: "ca.MX", p: "ca.MX") -> "ca.MX":
         """The last row of Y."""
-        return self.node.cost.map(self.count)(Z, self._repeated(h))
+        return self.node.cost.map(self.count)(Z, self._parameters(p))
 
-    def slopes(self, Z: "ca.MX", h: "ca.MX") -> "ca.MX":
+    def slopes(self, Z: "ca.MX", p: "ca.MX") -> "ca.MX":
         """Entries of the costs' gradients, node after node."""
-        return _entries(self.node.slope.map(self.count)(Z, self._repeated(h)))
+        return _entries(self.node.slope.map(self.count)(Z, self._parameters(p)))
 
-    def jacobians(self, Z: "ca.MX", h: "ca.MX") -> "ca.MX":
+    def jacobians(self, Z: "ca.MX", p: "ca.MX") -> "ca.MX":
         """Entries of the Jacobians, node after node."""
         results, blocks = self._first(Z)
-        return _entries(self.node.jacobian.map(self.count)(Z, self._repeated(h), *results, *blocks))
+        jacobian, own = self.node.jacobian.map(self.count), self._parameters(p)
+        return _entries(jacobian(Z, own, *results, *blocks))
 
-    def hessians(self, Z: "ca.MX", h: "ca.MX", mu: "ca.MX") -> "ca.MX":
+    def hessians(self, Z: "ca.MX", p: "ca.MX", mu: "ca.MX") -> "ca.MX":
         """Entries of the Hessians of mu^T y, node after node; mu (size, count)."""
         import casadi as ca
 
         # results and Jacobians of the calls, and the weights nu of their second derivatives
         results, blocks = self._first(Z)
-        nus = self.node.weights.map(self.count).call([Z, self._repeated(h), *results, mu])
+        own = self._parameters(p)
+        nus = self.node.weights.map(self.count).call([Z, own, *results, mu])
 
         # second derivatives of the calls; of the adjoint's inputs the last ones do not matter
         seconds: list[ca.MX] = []
@@ -199,9 +204,7 @@ class MappedNode:
             ]
             outputs = hessian.map(self.count).call([*self._inputs(call, Z), result, nu, *unused])
             seconds += [outputs[place] for _, _, place in _pairs(call)]
-        return _entries(
-            self.node.hessian.map(self.count)(Z, self._repeated(h), *results, mu, *blocks, *seconds)
-        )
+        return _entries(self.node.hessian.map(self.count)(Z, own, *results, mu, *blocks, *seconds))
 
 
 def _pairs(call: NodeCall) -> list[tuple[int, int, int]]:

@@ -17,6 +17,7 @@ from .bounds import Limits
 from .cache import memoised
 from .interrupt import stop_reason
 from .multipliers import Multipliers
+from .node import PARAMETERS
 from .transcription import Transcription
 
 if TYPE_CHECKING:
@@ -126,8 +127,8 @@ def _watch(unknowns: int, rows: int) -> "ca.Callback":
             return ca.nlpsol_out(k)
 
         def get_sparsity_in(self, k):
-            sizes = {"f": 1, "x": unknowns, "lam_x": unknowns, "g": rows, "lam_g": rows, "lam_p": 3}
-            return ca.Sparsity.dense(sizes[ca.nlpsol_out(k)], 1)
+            sizes = {"f": 1, "x": unknowns, "g": rows, "p": PARAMETERS}
+            return ca.Sparsity.dense(sizes[ca.nlpsol_out(k).removeprefix("lam_")], 1)
 
         def eval(self, _iterate):
             return [int(stop_reason() is not None)]
@@ -141,11 +142,11 @@ def solve(
     engine: "ca.Function",
     limits: Limits,
     w: np.ndarray,
-    h: np.ndarray,
+    p: np.ndarray,
     multipliers: Multipliers | None = None,
 ) -> Solution:
-    """Run a solver from the unknowns w (and multipliers of a like problem); h: angular momentum."""
-    arguments = vars(limits) | {"x0": np.clip(w, limits.lbx, limits.ubx), "p": h}
+    """Run a solver from the unknowns w (and multipliers of a like problem); p: its parameters."""
+    arguments = vars(limits) | {"x0": np.clip(w, limits.lbx, limits.ubx), "p": p}
     if multipliers is not None:
         arguments |= {"lam_x0": multipliers[0], "lam_g0": multipliers[1]}
     begun = time.process_time()

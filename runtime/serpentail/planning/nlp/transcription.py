@@ -126,7 +126,15 @@ def collocate(
     weights = _pad(weights, linear.shape[0])
     slope = np.zeros(indices.size)
     slope[0] = time
-    return Assembly(node, indices.nodes(), linear, weights, _cost(node, mesh, rule, nodes), slope)
+    return Assembly(
+        node,
+        indices.nodes(),
+        mesh.points(rule)[indices.first :],
+        linear,
+        weights,
+        _cost(node, mesh, rule, nodes),
+        slope,
+    )
 
 
 def torque_unit(problem: PlanningProblem) -> np.ndarray:

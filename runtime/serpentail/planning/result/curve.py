@@ -61,15 +61,15 @@ class Curve:
         }
 
 
-def curve(nlp: Transcription, w: np.ndarray, h: np.ndarray) -> Curve:
-    """Return the curve of the unknowns w; h (3,): angular momentum."""
+def curve(nlp: Transcription, w: np.ndarray, p: np.ndarray) -> Curve:
+    """Return the curve of the unknowns w; p: the program's parameters."""
     indices, rule, variables, mesh = nlp.indices, nlp.rule, nlp.variables, nlp.mesh
     scale = variables.scale(variables.states)
     at_nodes = np.arange(mesh.intervals)[:, None] * rule.steps + np.arange(len(rule.nodes))
 
     # states where intervals start, and what their rates at the nodes add
     states = w[indices.states[: -1 : rule.steps]] * scale
-    values = np.array(nlp.functions["values"](w, h)).T
+    values = np.array(nlp.functions["values"](w, p)).T
     rates = values[:, : nlp.node.rates] * scale
     increments = rates[at_nodes] * mesh.widths[:, None, None]
 

@@ -13,11 +13,11 @@ SLACK = 1e-3  # of a bound, by which a plan that is called true may exceed it
 Excess = dict[str, np.ndarray]
 
 
-def excess(nlp: Transcription, curve: Curve, h: np.ndarray) -> Excess:
+def excess(nlp: Transcription, curve: Curve, p: np.ndarray) -> Excess:
     """Return by what part (N,) of a bound each interval exceeds it, by name; 0 or less inside it.
 
     Names: "torque", "torque_rate", "angle", "rate", "path", those that are bounded.  A path
-    constraint's part is that of its larger limit.  h (3,): angular momentum.
+    constraint's part is that of its larger limit.  p: the program's parameters.
     """
     bounds, N = nlp.problem.bounds, nlp.mesh.intervals
     k, s = np.repeat(np.arange(N), SAMPLES), np.tile(np.linspace(0, 1, SAMPLES), N)
@@ -34,7 +34,8 @@ def excess(nlp: Transcription, curve: Curve, h: np.ndarray) -> Excess:
     if bounds.torque_rate is not None:
         found["torque_rate"] = _beyond(_slopes(nlp, curve, k, s) / bounds.torque_rate, N)
     if nlp.problem.path:
-        found["path"] = _path(nlp, curve.duration, blocks, h)
+        times = curve.ends[k] + s * np.diff(curve.ends)[k]
+        found["path"] = _path(nlp, curve.duration, times, blocks, p)
     return found
 
 
@@ -68,14 +69,19 @@ def _slopes(nlp: Transcription, curve: Curve, k: np.ndarray, s: np.ndarray) -> n
 
 
 def _path(
-    nlp: Transcription, duration: float, blocks: dict[str, np.ndarray], h: np.ndarray
+    nlp: Transcription,
+    duration: float,
+    times: np.ndarray,
+    blocks: dict[str, np.ndarray],
+    p: np.ndarray,
 ) -> np.ndarray:
     """Excess (N,) of the path constraints, over the larger of their limits."""
-    variables, node, count = nlp.variables, nlp.node, len(blocks["tail"])
+    variables, node, count = nlp.variables, nlp.node, len(times)
     names = [name for name, _ in (*variables.states, *variables.algebraic, ("torque", 0))]
     parts = [blocks[name] / variables.units[name] for name in names]
     zeta = np.column_stack([np.full(count, duration), *parts])
-    values = _path_values(node, zeta, h)
+    own = np.column_stack([np.tile(p, (count, 1)), times / duration])
+    values = _path_values(node, zeta, own)
     limits = np.array([row[1:] for row in nlp.problem.path])
     least, most = np.repeat(limits, node.path // len(limits), axis=0).T
     sizes = np.where(np.isfinite([least, most]), np.abs([least, most]), 0).max(axis=0)
@@ -83,10 +89,10 @@ def _path(
     return over.reshape(nlp.mesh.intervals, -1).max(axis=1)
 
 
-def _path_values(node: Node, zeta: np.ndarray, h: np.ndarray) -> np.ndarray:
+def _path_values(node: Node, zeta: np.ndarray, p: np.ndarray) -> np.ndarray:
     """Values (n, path) of the path constraints, which no call of the dynamics has a part in."""
     count, function = len(zeta), node.function
     results = [np.zeros((function.size1_in(k), count)) for k in range(2, function.n_in())]
-    y = function.map(count)(zeta.T, np.tile(h[:, None], count), *results)
+    y = function.map(count)(zeta.T, p.T, *results)
     first = node.rates + node.residuals
     return np.array(y)[first : first + node.path].T

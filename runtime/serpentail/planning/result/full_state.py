@@ -64,20 +64,26 @@ def _falling(
 
     body: rotations (K, 3, 3) and mass matrices.  rates: (omega, q_t_dot).
     """
-    (R, H), (q0, v0) = body, start
+    R, H = body
     mass = H[:, 0, 0][:, None]
 
-    # the COM from B, world: where it is, how fast, and where it was at the start
+    # the COM from B, world: where it is, and how fast
     offset = np.einsum("kij,kj->ki", R, _com(H))
     drift = -np.einsum("kij,kjl,kl->ki", R, H[:, VELOCITY, OMEGA.start :], rates)
-    H0 = model.mass_matrix(_at_identity(q0[None, TAIL_Q]))
-    first = rotation_matrix(q0[QUATERNION]) @ _com(H0)[0]
 
     # the COM in the world
     t, fall = np.asarray(times)[:, None], np.array([0, 0, -model.parameters["gravity"]])
-    v_com = model.momentum(q0, v0)[0] / mass[0]
-    position = q0[POSITION] + first + v_com * t + fall * t**2 / 2 - offset
+    com, v_com = com_at_start(model, start)
+    position = com + v_com * t + fall * t**2 / 2 - offset
     return position, v_com + fall * t + drift / mass
+
+
+def com_at_start(model: Model, start: State) -> State:
+    """Position and velocity (3,) of the COM, world, at the start (q0, v0)."""
+    q0, v0 = start
+    H = model.mass_matrix(_at_identity(q0[None, TAIL_Q]))
+    position = q0[POSITION] + rotation_matrix(q0[QUATERNION]) @ _com(H)[0]
+    return position, model.momentum(q0, v0)[0] / H[0, 0, 0]
 
 
 def _com(H: np.ndarray) -> np.ndarray:

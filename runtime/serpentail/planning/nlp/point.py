@@ -1,0 +1,96 @@
+"""A node as objectives and path constraints see it."""
+
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
+
+from ...checks import did_you_mean
+from ...errors import PlanningError
+from ...model.layout import OMEGA, TORSO_NV
+from ...model.model import Model
+from .coordinates import IDENTITY_POSE, rotated
+
+if TYPE_CHECKING:
+    import casadi as ca
+
+MADE = ("center_of_mass", "position", "height", "tail_points", "tip")  # when asked for
+
+
+class Point(SimpleNamespace):
+    """CasADi blocks by name, in SI units: those of the formulation, torque (2m,), quaternion, time
+    and duration (s), parameters (numbers by name).
+
+    Made of them when first asked for, in world axes, m: center_of_mass (3,), position (3,) of B and
+    its height, tail_points (K, 3) as the model has them, and the last of them, tip (3,).
+    """
+
+    def __getattr__(self, name: str) -> Any:
+        makers = vars(self).get("makers", {})
+        if name in makers:
+            setattr(self, name, makers[name](self))
+            return getattr(self, name)
+        has = sorted((vars(self).keys() | makers.keys()) - {"makers"})
+        remedy = did_you_mean(name, has) or "choose one of these"
+        raise AttributeError(
+            f"a point has no {name!r}, it has {', '.join(has)}; {remedy}", name=name, obj=self
+        )
+
+
+def asked(field: str, function: Callable[[Any], Any], point: Point) -> Any:
+    """Return what a function of the user's makes of a point; PlanningError where it asks for what
+    the point lacks.
+    """
+    try:
+        return function(point)
+    except AttributeError as error:
+        if error.obj is not point:
+            raise
+        raise PlanningError(f"{field}: {error}") from error
+
+
+def point_of(model: Model, blocks: dict[str, Any], start: "ca.SX") -> Point:
+    """Return the point of a node's blocks; start (6,): position and velocity of the COM then."""
+    import casadi as ca
+
+    gravity = ca.DM([0, 0, -model.parameters["gravity"]])
+
+    def center_of_mass(point: Point) -> "ca.SX":
+        if "velocity" in blocks:
+            return point.position + _offset(model, point)
+        t = point.time
+        return start[:3] + start[3:] * t + gravity * t**2 / 2
+
+    def position(point: Point) -> "ca.SX":
+        return point.center_of_mass - _offset(model, point)
+
+    def tail_points(point: Point) -> "ca.SX":
+        own = model.casadi.tail_points(_at_identity(point))
+        rows = [point.position + rotated(point.quaternion, own[k, :].T) for k in range(own.size1())]
+        return ca.horzcat(*rows).T
+
+    makers = {
+        "center_of_mass": center_of_mass,
+        "position": position,
+        "height": lambda point: point.position[2],
+        "tail_points": tail_points,
+        "tip": lambda point: point.tail_points[-1, :].T,
+    }
+    without = () if "tail_points" in model.generated else ("tail_points", "tip")
+    kept = {name: makers[name] for name in MADE if name not in without}
+    return Point(makers=kept, parameters=dict(model.parameters), **blocks)
+
+
+def _at_identity(point: Point) -> "ca.SX":
+    """q of the tail on a torso at the origin that is not rotated."""
+    import casadi as ca
+
+    return ca.vertcat(ca.DM(IDENTITY_POSE), point.tail)
+
+
+def _offset(model: Model, point: Point) -> "ca.SX":
+    """The COM from B, world: H's block for (p_ddot, omega_dot) is -mass skew(COM)."""
+    import casadi as ca
+
+    H = model.casadi.mass_matrix(_at_identity(point))
+    x, y, z = OMEGA.start, OMEGA.start + 1, TORSO_NV - 1
+    return rotated(point.quaternion, ca.vertcat(H[1, z], H[2, x], H[0, y]) / H[0, 0])
