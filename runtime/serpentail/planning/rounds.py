@@ -33,6 +33,9 @@ from .result.truth import end_errors, local_errors, open_loop
 from .settings import PlanSettings
 
 FIRST_PUSH = 0.05  # of the torques' unit: takes the first guess out of a plane of symmetry
+# W, below which |power| is rounded off, in the first rounds of an objective of energy: a kink far
+# below a plan's powers stops the solver
+POWERS = (3e-2, 3e-3, SMALL_POWER)
 DURATIONS = (1.0, 0.5, 0.75, 0.25)  # of guesses, in turn, from the least (0) to the most (1)
 
 
@@ -41,6 +44,7 @@ class Round:
     """One solution on one mesh: q, v planned at the ends of intervals, and true at the last end.
 
     errors: of the truth there, as ``end_errors`` has them; excess: over bounds, by intervals.
+    small_power: W, below which |power| is rounded off.
     """
 
     nlp: Transcription
@@ -51,6 +55,7 @@ class Round:
 
     errors: dict[str, float]
     excess: Excess
+    small_power: float
 
     def __str__(self) -> str:
         return f"{self.nlp.mesh.intervals} intervals, {self.errors['attitude']:.2g} deg off"
@@ -71,11 +76,17 @@ class Search:
         self.equations, self.rule = equations, rule
         self.start = (problem.q0, problem.v0)
         momentum, com = model.momentum(*self.start)[1], com_at_start(model, self.start)
-        self.parameters = np.concatenate([momentum, *com, [SMALL_POWER]])
+        self.conserved = np.concatenate([momentum, *com])
+        self.powers = _powers(problem, settings.guess)
         self.attitude = attitude(problem.attitude)
         self.spent = dict.fromkeys(("derive_s", "solve_cpu_s", "truth_s"), 0.0)
         self.iterations = self.attempts = 0
         self.stopped: str | None = None
+
+    @property
+    def parameters(self) -> np.ndarray:
+        """Parameters of the program."""
+        return np.append(self.conserved, self.powers[0])
 
     def _first(self) -> Round:
         """Return the best solution on the first mesh, from all guesses, and more if these fail."""
@@ -94,12 +105,13 @@ class Search:
         """Make rounds: intervals that are wrong are split until the end is right."""
         last = self._first()
         yield last
-        for _ in range(self.settings.rounds):
-            if not last.solution.success or self._wrong(last) <= 1 or self._stopped():
+        for _ in range(self.settings.rounds + len(self.powers) - 1):
+            if not last.solution.success or self._stopped():
                 break
-            mesh = self._finer(last)
-            if mesh.same(last.nlp.mesh):
+            mesh = last.nlp.mesh if self._wrong(last) <= 1 else self._finer(last)
+            if mesh.same(last.nlp.mesh) and len(self.powers) == 1:
                 break
+            self.powers = self.powers[1:] or self.powers
             nlp = self._transcribed(mesh)
             motion = Motion(last.curve.duration, last.curve.at)
             multipliers = carried(last.solution.multipliers, last.nlp, nlp)
@@ -107,8 +119,13 @@ class Search:
             yield last
 
     def best(self, rounds: list[Round]) -> Round:
-        """Return the round that is solved, and whose end is nearest to the truth."""
-        return min(rounds, key=lambda entry: (not entry.solution.success, self._wrong(entry)))
+        """Return the round that is solved, whose objective is the one that was asked for, and whose
+        end is nearest to the truth.
+        """
+        return min(
+            rounds,
+            key=lambda entry: (not entry.solution.success, entry.small_power, self._wrong(entry)),
+        )
 
     def _off(self, found: Round) -> float:
         """Return the errors of the truth over what is allowed, the largest."""
@@ -237,7 +254,7 @@ class Search:
             true = open_loop(self.model, motion, self.problem.damping, self.start)
             errors = end_errors(self.problem, (planned[0][-1], planned[1][-1]), true)
             beyond = excess(nlp, motion, self.parameters)
-        return Round(nlp, solution, motion, planned, true, errors, beyond)
+        return Round(nlp, solution, motion, planned, true, errors, beyond, self.powers[0])
 
     def _finer(self, last: Round) -> Mesh:
         """Return the next mesh: guards where torques go too far, finer where the truth is wrong, or
@@ -252,3 +269,9 @@ class Search:
         with self._timed("truth_s"):
             errors = local_errors(self.model, last.curve, self.problem.damping, *last.planned)
         return refined(mesh, errors, min(0.3 / off, 0.3), self.rule.order, most)
+
+
+def _powers(problem: PlanningProblem, guess: object) -> tuple[float, ...]:
+    """Return the powers of the first rounds; the last is that of all others."""
+    known = isinstance(guess, Plan) and guess.problem.objective == "energy"
+    return POWERS if problem.objective == "energy" and not known else POWERS[-1:]
