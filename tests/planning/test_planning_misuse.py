@@ -73,7 +73,7 @@ def refused(**changes) -> str:
             "objective: a point has no 'torqe', it has attitude",
         ),
         ({"objective": lambda p: p.torqe**2}, "did you mean 'torque'?"),
-        ({"path": [(lambda p: p.height, 0, 1)]}, "path[0]: a point has no 'height', it has"),
+        ({"path": [(lambda p: p.hight, 0, 1)]}, "path[0]: a point has no 'hight', it has"),
         ({"interval": 20}, "setting: value 'interval': did you mean 'intervals'?"),
         ({"guess": 3}, "guess: value 3: needs a Plan or a Trajectory"),
         ({"solver": "no_such"}, "solver: value 'no_such'"),
@@ -194,7 +194,7 @@ def test_command_line_prints_one_object(tmp_path, capsys):
 def test_settings_are_named_for_editors_and_help():
     parameters = inspect.signature(st.plan).parameters
     named = [p for p in parameters.values() if p.kind == p.KEYWORD_ONLY]
-    assert len(named) == 29 and all(p.annotation is not p.empty for p in named)
+    assert len(named) == 30 and all(p.annotation is not p.empty for p in named)
     assert {key for key in PLAN.keys if key not in parameters} == set()
 
 

@@ -62,6 +62,12 @@ def test_after_the_reference_the_tail_is_held():
         (([1, 0], np.zeros((2, 2))), {}, "needs increasing times"),
         (([0, 1], np.full((2, 2), np.nan)), {}, "]: value nan: needs a finite number"),
         (([0, 1], np.zeros((2, 2))), {"kp": -1}, "kp: value -1: needs a number from 0"),
+        (
+            ([0, 1], np.zeros((2, 2))),
+            {"torque": 0},
+            "torque: value 0: needs torques above 0, in N m",
+        ),
+        (([0, 1], np.zeros((2, 2))), {"torque": [1, 2, 3]}, "Pfl: torque"),
     ],
 )
 def test_misuse(reference, gains, words):
@@ -85,3 +91,18 @@ def test_tracking_a_plan_takes_the_planned_torques():
     )
     assert by_plan[[0, -1]].max() < 1e-2 and np.median(by_plan) < 1e-2
     assert (3 * by_plan[[0, -1]] < by_rates[[0, -1]]).all()
+
+
+@pytest.mark.parametrize("method", ["tsit5", "dop853"])
+def test_torques_keep_their_limit(method):
+    """A far reference asks for more than there is; a limit that is never met changes nothing."""
+    model, (q, v) = rat(), start(rat())
+    reference = ([0.0, 0.1], np.stack([q[7:], q[7:] + 0.3]))
+    settings = {"t_span": 0.1, "method": method}
+    free, wide, tight = (
+        st.simulate(model, q, v, controller=st.Pfl(model, reference, torque=limit), **settings)
+        for limit in (None, 1e3, (1e-3, 2e-3))
+    )
+    assert np.abs(free.tau).max() > 4e-3
+    np.testing.assert_allclose(wide.q, free.q, atol=1e-6)
+    assert np.abs(tight.tau).max(axis=0) == pytest.approx([1e-3, 2e-3])

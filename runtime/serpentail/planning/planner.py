@@ -13,6 +13,7 @@ from ..checks import Refusals, needed, none_of
 from ..errors import PlanningError
 from ..model.model import Model
 from ..motion.trajectory import Trajectory
+from ..simulation.schedules import Legs
 from ..stages import Stage
 from .nlp.fork_gate import forks_wait
 from .nlp.interrupt import stoppable
@@ -38,6 +39,7 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
     smoothing: float = SMOOTHING,
     damping: float = 0.0,
     path: Sequence[PathConstraint] = (),
+    legs: Legs | None = None,
     formulation: str = "airborne",
     attitude: str = "quaternion",
     # the mesh
@@ -80,6 +82,7 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
     path: rows (function of a point, least, most).  A point has the CasADi blocks tail, tail_rate,
     torso_rate, torque, attitude, quaternion, time, duration, position, height, tip, tail_points,
     center_of_mass in SI, parameters by name, and the blocks of its formulation.
+    legs: of a model with feet, for path constraints on its contact_points; as they are at 0 s.
     formulation: "airborne" (angular momentum conserved by construction), "translation-free",
     "full".
     attitude: "quaternion", "euler".
@@ -143,6 +146,7 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
         "smoothing": smoothing,
         "damping": damping,
         "path": path,
+        "legs": legs,
         "formulation": formulation,
         "attitude": attitude,
     }

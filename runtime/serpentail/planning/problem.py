@@ -12,6 +12,7 @@ from ..checks import Refusals, number, numbers, numbers_in, one_of, refusal, sho
 from ..errors import PlanningError
 from ..model.layout import QUATERNION, TAIL_Q, TAIL_V
 from ..model.model import Model
+from ..simulation.schedules import Legs
 from .nlp.coordinates import KINDS
 from .nlp.node import FORMULATIONS
 
@@ -73,6 +74,7 @@ class PlanningProblem:
     smoothing: float
     damping: float
     path: tuple[PathConstraint, ...]
+    legs: Legs | None
     formulation: str
     attitude: str
     __repr__ = brief
@@ -254,6 +256,12 @@ def _path(path: Sequence[Any]) -> tuple[PathConstraint, ...]:
     return tuple(constraints)
 
 
+def _legs(legs: Any) -> Legs | None:
+    if legs is not None and not isinstance(legs, Legs):
+        raise refusal("legs", legs, "Legs, such as st.Legs.fixed(gamma, delta)", PlanningError)
+    return legs
+
+
 def _work(name: str) -> Callable[[Any], float]:
     """Return the check of a damping."""
     return partial(number, name, error=PlanningError, least=0, most=HUGE)
@@ -269,6 +277,7 @@ SETTINGS: dict[str, Callable[[Any], Any]] = {  # of the problem, and their check
     "smoothing": _work("smoothing"),
     "damping": _work("damping"),
     "path": _path,
+    "legs": _legs,
     "formulation": _name("formulation", FORMULATIONS),
     "attitude": _name("attitude", KINDS),
 }

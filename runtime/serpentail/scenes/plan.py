@@ -15,7 +15,7 @@ from .keys import read
 from .plan_keys import FREE, PLAN
 
 ELSEWHERE = "programs can give others, to serpentail.plan"
-CODE_ONLY = ("guess", "path")  # what no file can hold
+CODE_ONLY = ("guess", "path", "legs")  # what no file can hold
 
 
 def planned(path: str, folder: str | None = None) -> Plan:

@@ -139,7 +139,7 @@ def parts_of(controller: Controller, nt: int) -> Parts:
     """Return the parts of one controller for 2m tail coordinates; SimulationError if it is none."""
     if controller is None:
         return Parts()
-    if isinstance(controller, Pfl):
+    if isinstance(controller, Pfl) and controller.torque is None:
         return Parts(pfl=controller)
     if isinstance(controller, Damping | TorqueTable | TorqueCurve | NativeTorque):
         return controller.parts(nt)

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import number
+from ..checks import number, numbers, refusal
 from ..errors import SimulationError
 from ..model.layout import TAIL_Q, TAIL_V, TORSO_NV, TORSO_V
 from ..model.model import Model
@@ -21,20 +21,29 @@ class Pfl:
     Tail accelerations become q_t_ddot_r + Kd e_dot + Kp e, e = q_t_r - q_t.  reference: a
     Reference, a Plan, a Trajectory, or (times (K,) s, tail coordinates (K, 2m) rad); of the last
     three a cubic spline; after it the last value at rest.  kp (1/s^2), kd (1/s): gains, one number
-    each.  feedforward: use q_t_ddot_r, which the paper leaves out.
+    each.  feedforward: use q_t_ddot_r, which the paper leaves out.  torque: N m, the most that the
+    tail's motors give, one number or one a coordinate, None for no limit; with a limit, compiled
+    methods call back to Python.
 
     Called with (t, q, v) it returns tau (2m,) in N m.  Needs pfl of the model, or its
     inverse_dynamics and mass_matrix.  Raises SimulationError where an argument is wrong.
     """
 
     def __init__(
-        self, model: Model, reference: Any, kp: float = KP, kd: float = KD, feedforward: bool = True
+        self,
+        model: Model,
+        reference: Any,
+        kp: float = KP,
+        kd: float = KD,
+        feedforward: bool = True,
+        torque: Any = None,
     ):
         self.model = model
         self.kp = number("Pfl: kp", kp, SimulationError, least=0)
         self.kd = number("Pfl: kd", kd, SimulationError, least=0)
         self.curve = _curve(reference, model.layout.nt)
         self.feedforward = bool(feedforward)
+        self.torque = None if torque is None else _limit(torque, model.layout.nt)
 
     def reference(self, t: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return tail coordinates, rates and accelerations (2m,) wanted at t (s)."""
@@ -42,12 +51,12 @@ class Pfl:
         return angles, rates, accelerations if self.feedforward else 0 * accelerations
 
     def __call__(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Return tau (2m,), N m: X^-1 (S H^-1 C + a), X = S H^-1 [0; I]."""
+        """Return tau (2m,), N m: X^-1 (S H^-1 C + a), X = S H^-1 [0; I], within its limit."""
         angles, rates, accelerations = self.reference(t)
         wanted = accelerations + self.kd * (rates - v[TAIL_V]) + self.kp * (angles - q[TAIL_Q])
-        if "pfl" in self.model.kernels:
-            return self.model.pfl(q, v, wanted)
-        return self._eliminated(q, v, wanted)
+        exact = self.model.pfl if "pfl" in self.model.kernels else self._eliminated
+        tau = exact(q, v, wanted)
+        return tau if self.torque is None else np.clip(tau, -self.torque, self.torque)
 
     def _eliminated(self, q: np.ndarray, v: np.ndarray, wanted: np.ndarray) -> np.ndarray:
         """The same by H and C: the base's accelerations solve its rows of Eq. 1."""
@@ -55,6 +64,14 @@ class Pfl:
         H, force = self.model.mass_matrix(q), self.model.inverse_dynamics(q, v, v_dot)
         base = np.linalg.solve(H[TORSO_V, TORSO_V], -force[TORSO_V])
         return force[TAIL_V] + H[TAIL_V, TORSO_V] @ base
+
+
+def _limit(torque: Any, size: int) -> np.ndarray:
+    """Return the largest torques (2m,)."""
+    limit = numbers("Pfl: torque", torque, size, SimulationError)
+    if not (limit > 0).all():
+        raise refusal("Pfl: torque", torque, "torques above 0, in N m", SimulationError)
+    return limit
 
 
 def _curve(reference: object, size: int) -> Piecewise:

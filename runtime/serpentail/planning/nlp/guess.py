@@ -11,7 +11,7 @@ from ...model.model import Model
 from ...model.parameters import total_mass
 from ...motion.trajectory import Trajectory
 from ...simulation.controllers import TorqueTable
-from ...simulation.simulate import simulate
+from ..flight import flight
 from ..problem import PlanningProblem
 from .coordinates import Attitude, attitude
 from .transcription import Transcription
@@ -37,9 +37,8 @@ def passive(
     """
     times = np.linspace(0, duration, len(push))
     law = TorqueTable(times, push, max(damping, problem.damping))
-    flight = simulate(model, problem.q0, problem.v0, controller=law, t_span=duration)
-    assert isinstance(flight, Trajectory)  # one start, one motion
-    return of_trajectory(model, flight, attitude(problem.attitude), problem.damping)
+    motion = flight(model, (problem.q0, problem.v0), law, duration)
+    return of_trajectory(model, motion, attitude(problem.attitude), problem.damping)
 
 
 def pushes(random: np.random.Generator, size: float, model: Model) -> np.ndarray:
@@ -52,26 +51,26 @@ def pushes(random: np.random.Generator, size: float, model: Model) -> np.ndarray
 
 
 def of_trajectory(
-    model: Model, flight: Trajectory, coordinates: Attitude, damping: float = 0.0
+    model: Model, motion: Trajectory, coordinates: Attitude, damping: float = 0.0
 ) -> Motion:
     """Return the motion of a trajectory; what damping gives is taken off its torques."""
     mass = total_mass(model.parameters)
     R, velocity, tail_rate = (
-        rotation_matrix(flight.attitude),
-        flight.v[:, VELOCITY],
-        flight.v[:, TAIL_V],
+        rotation_matrix(motion.attitude),
+        motion.v[:, VELOCITY],
+        motion.v[:, TAIL_V],
     )
     samples = {
-        "position": flight.q[:, POSITION],
-        "attitude": coordinates.coordinates(flight.q),
-        "tail": flight.q[:, TAIL_Q],
+        "position": motion.q[:, POSITION],
+        "attitude": coordinates.coordinates(motion.q),
+        "tail": motion.q[:, TAIL_Q],
         "velocity": velocity,
-        "torso_rate": flight.v[:, OMEGA],
+        "torso_rate": motion.v[:, OMEGA],
         "tail_rate": tail_rate,
-        "drift": np.einsum("kji,kj->ki", R, velocity - flight.linear_momentum / mass),
-        "torque": flight.tau + damping * tail_rate,
+        "drift": np.einsum("kji,kj->ki", R, velocity - motion.linear_momentum / mass),
+        "torque": motion.tau + damping * tail_rate,
     }
-    t = flight.t - flight.t[0]
+    t = motion.t - motion.t[0]
 
     def at(times: np.ndarray) -> dict[str, np.ndarray]:
         return {name: _linear(t, values, times) for name, values in samples.items()}

@@ -21,6 +21,7 @@ from .point import Point, asked, point_of
 if TYPE_CHECKING:
     import casadi as ca
 
+    from ...simulation.schedules import Legs
     from ..problem import PlanningProblem
 
 # name -> blocks of the state, which has a rate, and of the algebraic unknowns, which a node's
@@ -148,7 +149,7 @@ def node_function(
     # symbols of the unknowns, and of what the calls give
     states, algebraic, controls = variables.sizes()
     zeta, p = ca.SX.sym("zeta", 1 + states + algebraic + controls), ca.SX.sym("p", PARAMETERS + 1)
-    point = _point(model, zeta, p, variables, attitude)
+    point = _point(model, zeta, p, variables, attitude, problem.legs)
     calls = _calls(model, problem, point, zeta, equations)[: 2 if algebraic else 1]
     results = [ca.SX.sym("result", call.function.size1_out(0)) for call in calls]
 
@@ -198,7 +199,12 @@ def _calls(
 
 
 def _point(
-    model: Model, zeta: "ca.SX", p: "ca.SX", variables: Variables, attitude: Attitude
+    model: Model,
+    zeta: "ca.SX",
+    p: "ca.SX",
+    variables: Variables,
+    attitude: Attitude,
+    legs: "Legs | None" = None,
 ) -> Point:
     """Return the blocks of a node in SI units, which objectives and path constraints see."""
     blocks: dict[str, Any] = {"duration": zeta[0], "time": p[PARAMETERS] * zeta[0]}
@@ -208,7 +214,7 @@ def _point(
         blocks[name] = variables.units[name] * zeta[start : start + size]
         start += size
     blocks["quaternion"] = attitude.quaternion(blocks["attitude"])
-    return point_of(model, blocks, p[3:9])
+    return point_of(model, blocks, p[3:9], legs)
 
 
 def _rates(model: Model, point: Point, attitude: Attitude, v_dot: "ca.SX") -> dict[str, Any]:

@@ -4,6 +4,8 @@ from collections.abc import Callable
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ...checks import did_you_mean
 from ...errors import PlanningError
 from ...model.layout import OMEGA, TORSO_NV
@@ -13,7 +15,7 @@ from .coordinates import IDENTITY_POSE, rotated
 if TYPE_CHECKING:
     import casadi as ca
 
-MADE = ("center_of_mass", "position", "height", "tail_points", "tip")  # when asked for
+    from ...simulation.schedules import Legs
 
 
 class Point(SimpleNamespace):
@@ -21,7 +23,8 @@ class Point(SimpleNamespace):
     and duration (s), parameters (numbers by name).
 
     Made of them when first asked for, in world axes, m: center_of_mass (3,), position (3,) of B and
-    its height, tail_points (K, 3) as the model has them, and the last of them, tip (3,).
+    its height, tail_points (K, 3) as the model has them, the last of them, tip (3,), and of models
+    with contacts contact_points (K, 3), for which those with feet need the plan's legs.
     """
 
     def __getattr__(self, name: str) -> Any:
@@ -48,7 +51,9 @@ def asked(field: str, function: Callable[[Any], Any], point: Point) -> Any:
         raise PlanningError(f"{field}: {error}") from error
 
 
-def point_of(model: Model, blocks: dict[str, Any], start: "ca.SX") -> Point:
+def point_of(
+    model: Model, blocks: dict[str, Any], start: "ca.SX", legs: "Legs | None" = None
+) -> Point:
     """Return the point of a node's blocks; start (6,): position and velocity of the COM then."""
     import casadi as ca
 
@@ -68,16 +73,26 @@ def point_of(model: Model, blocks: dict[str, Any], start: "ca.SX") -> Point:
         rows = [point.position + rotated(point.quaternion, own[k, :].T) for k in range(own.size1())]
         return ca.horzcat(*rows).T
 
+    def contact_points(point: Point) -> "ca.SX":
+        if "feet" in model.contacts and legs is None:
+            raise PlanningError(
+                "contact_points: give the plan `legs`, such as st.Legs.fixed(gamma, delta)"
+            )
+        unit = point.quaternion / ca.norm_2(point.quaternion)
+        q = ca.vertcat(point.position, unit, point.tail)
+        still = () if legs is None else (np.append(legs.curve.at(0.0)[0], np.zeros(4)),)
+        return model.casadi.contact_points(q, np.zeros(model.nv), *still)[0]
+
     makers = {
         "center_of_mass": center_of_mass,
         "position": position,
         "height": lambda point: point.position[2],
-        "tail_points": tail_points,
-        "tip": lambda point: point.tail_points[-1, :].T,
     }
-    without = () if "tail_points" in model.generated else ("tail_points", "tip")
-    kept = {name: makers[name] for name in MADE if name not in without}
-    return Point(makers=kept, parameters=dict(model.parameters), **blocks)
+    if "tail_points" in model.generated:
+        makers |= {"tail_points": tail_points, "tip": lambda point: point.tail_points[-1, :].T}
+    if model.contacts:
+        makers["contact_points"] = contact_points
+    return Point(makers=makers, parameters=dict(model.parameters), **blocks)
 
 
 def _at_identity(point: Point) -> "ca.SX":

@@ -67,6 +67,7 @@ def transcription_of(
     arrays = (goal, bounds.torque, bounds.torque_rate)
     key: tuple[Any, ...] = tuple(None if x is None else tuple(x) for x in arrays)
     key += (problem.objective, problem.smoothing, problem.damping, problem.path)
+    key += (None if problem.legs is None else tuple(problem.legs.curve.at(0.0)[0]),)
     key += (problem.formulation, problem.attitude, model, equations.source)
 
     make_node = partial(node_function, model, problem, coordinates, variables, equations)

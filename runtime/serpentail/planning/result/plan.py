@@ -15,7 +15,7 @@ from ...motion.account import UNITS, framed, tail_of
 from ...motion.origin import origin
 from ...motion.trajectory import Trajectory
 from ...simulation.controllers import Controller, Damping, TorqueCurve
-from ...simulation.simulate import simulate
+from ..flight import flight
 from ..nlp.coordinates import attitude
 from ..nlp.mesh import Mesh
 from ..nlp.rules import CollocationRule
@@ -110,12 +110,11 @@ class Plan:
         """The motion under a law, or what there is of it where it fails."""
         start = self.problem.q0, self.problem.v0
         try:
-            motion = simulate(model, *start, controller=law, t_span=self.duration, method="rk4")
+            return flight(model, start, law, self.duration, method="rk4")
         except SimulationError as error:
             if error.trajectory is None:
                 raise
-            motion = error.trajectory
-        return cast(Trajectory, motion)
+            return cast(Trajectory, error.trajectory)
 
     def torque(self, times: ArrayLike) -> np.ndarray:
         """Planned torques (n, 2m), N m, at times (n,) s from the start."""

@@ -10,7 +10,7 @@ from ...model.layout import POSITION, QUATERNION
 from ...model.model import Model
 from ...motion.trajectory import Trajectory
 from ...simulation.pfl import Pfl
-from ...simulation.simulate import simulate
+from ..flight import flight
 from ..problem import PlanningProblem
 from .curve import Curve
 from .excess import largest
@@ -53,31 +53,35 @@ def report(search: "Search", best: "Round", planned: Trajectory) -> dict[str, An
     return values | dict.fromkeys(lost)
 
 
-def truth(search: "Search", best: "Round", planned: Trajectory) -> dict[str, float | None]:
-    """Return the plan's errors at its end: torques applied open loop, the tail tracked by PFL."""
+def truth(search: "Search", best: "Round", planned: Trajectory) -> dict[str, Any]:
+    """Return the plan's errors at its end: torques applied open loop, and the tail tracked by PFL
+    with torques within their bound.
+    """
     problem, true_q = search.problem, best.true[0]
     to_plan, to_goal = attitude_errors(problem, best.planned[0][-1, QUATERNION], true_q[QUATERNION])
-    errors: dict[str, float | None] = {
+    errors: dict[str, Any] = {
         "open_loop_attitude_error_deg": to_plan,
         "open_loop_goal_error_deg": to_goal,
         "open_loop_tail_error_deg": best.errors["tail"],
         "open_loop_rate_error": best.errors["rate"],
         "tracked_attitude_error_deg": None,
         "tracked_tail_error_rad": None,
+        "true_when_tracked": None,
         "dyn_err": None,
     }
     if not search.settings.track:
         return errors
     try:
-        flight = tracked(search.model, problem, planned)
+        motion = tracked(search.model, problem, planned)
     except SimulationError:  # a plan that did not converge may ask for anything
         return errors
-    deviation = flight.resample(np.clip(planned.t, 0, flight.t[-1])).tail - planned.tail
-    ends = attitude_errors(problem, planned.attitude[-1], flight.attitude[-1])
+    deviation = motion.resample(np.clip(planned.t, 0, motion.t[-1])).tail - planned.tail
+    ends = attitude_errors(problem, planned.attitude[-1], motion.attitude[-1])
     return errors | {
         "tracked_attitude_error_deg": max(ends),
+        "true_when_tracked": bool(max(ends) <= (search.settings.tolerance or np.inf)),
         "tracked_tail_error_rad": float(np.abs(deviation).max()),
-        "dyn_err": dynamics_error(planned, flight),
+        "dyn_err": dynamics_error(planned, motion),
     }
 
 
@@ -100,19 +104,16 @@ def effort(curve: Curve) -> float:
 
 def tracked(model: Model, problem: PlanningProblem, planned: Trajectory) -> Trajectory:
     """Return the simulated motion whose tail tracks the plan by PFL."""
-    flight = simulate(
+    return flight(
         model,
-        problem.q0,
-        problem.v0,
-        controller=Pfl(model, planned),
-        t_span=planned.t[-1],
+        (problem.q0, problem.v0),
+        Pfl(model, planned, torque=problem.bounds.torque),
+        planned.t[-1],
         method="dop853",
         rtol=1e-8,
         atol=1e-10,
         output_step=planned.t[-1] / TRACKED_SAMPLES,
     )
-    assert isinstance(flight, Trajectory)  # one start, one motion
-    return flight
 
 
 def dynamics_error(planned: Trajectory, tracked: Trajectory) -> float:

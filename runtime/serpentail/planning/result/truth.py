@@ -9,10 +9,9 @@ from ...attitude import angle_deg, tilt_deg
 from ...errors import SimulationError
 from ...model.layout import OMEGA, QUATERNION, TAIL_Q, TAIL_V
 from ...model.model import Model
-from ...motion.trajectory import Trajectory
 from ...simulation.controllers import TorqueCurve
 from ...simulation.piecewise import Piecewise
-from ...simulation.simulate import end_state, simulate
+from ..flight import end_of_flight, flight
 from ..problem import PlanningProblem
 from .curve import Curve
 
@@ -32,7 +31,7 @@ def applied(
     step = min(LONGEST_STEP, np.diff(torques.times).min() / 4)
     law = TorqueCurve(torques, damping)
     try:
-        return end_state(model, q, v, controller=law, duration=duration, step=step)
+        return end_of_flight(model, (q, v), law, duration, step)
     except SimulationError:  # bent or whirled beyond what the model describes
         return np.full_like(q, np.nan), np.full_like(v, np.nan)
 
@@ -94,12 +93,9 @@ def work(
     torques = planned_torques(curve)
     law, sample = TorqueCurve(torques, damping), min(SAMPLE, curve.duration / 4)
     try:
-        flight = simulate(
-            model, *start, controller=law, t_span=curve.duration, method="rk4", output_step=sample
-        )
+        motion = flight(model, start, law, curve.duration, method="rk4", output_step=sample)
     except SimulationError:
         return np.nan, np.nan
-    assert isinstance(flight, Trajectory)  # one start, one motion
     counts = np.ceil(np.diff(curve.ends) / sample).astype(int)
     widths = np.repeat(np.diff(curve.ends) / counts, counts)
     nodes, weights = np.polynomial.legendre.leggauss(4)
@@ -107,7 +103,7 @@ def work(
     times = starts[:, None] + widths[:, None] * (1 + nodes) / 2
 
     def power(t: np.ndarray) -> np.ndarray:
-        return np.abs(torques.at(t)[0] * flight.resample(t).v[:, TAIL_V]).sum(axis=1)
+        return np.abs(torques.at(t)[0] * motion.resample(t).v[:, TAIL_V]).sum(axis=1)
 
     # the largest may be where torques jump, just before or after
     joints = np.nextafter(curve.ends[1:], 0)
