@@ -49,6 +49,33 @@ def test_rate_bounds_hold_at_the_nodes():
     assert 2.45 < np.abs(plan.curve.at(plan.curve.ends)["tail_rate"]).max() <= 2.5 + 1e-6
 
 
+def test_plans_of_least_time_are_true_and_straight():
+    """From passive flight: a plan of least effort comes before."""
+    model = rat()
+    settings = {"start": start(model), "duration": (0.1, DURATION), "track": False}
+    settings["bounds"] = st.Bounds(angle=np.pi / 3, torque=0.005)
+    plan, calm = (st.plan(model, objective=name, **settings) for name in ("time", "effort"))
+    assert plan.success and plan.duration < 0.95 * calm.duration
+    assert plan.report["objective"] == plan.duration
+    ends = plan.curve.ends
+    middles = plan.torque((ends[:-1] + ends[1:]) / 2)
+    outer = [plan.torque(ends[:-1] + s * np.diff(ends)) for s in (0.1, 0.9)]
+    np.testing.assert_allclose(middles, sum(outer) / 2, atol=1e-8)
+
+
+@pytest.mark.parametrize("objective", ["effort", "time"])
+def test_torques_are_one_polynomial_in_a_control_interval(objective):
+    """However fine the mesh of the states is."""
+    plan = planned(objective=objective, controls=4, intervals=16, tolerance=None)
+    assert plan.report["converged"] and plan.mesh.intervals == 16
+    degree = 1 if objective == "time" else 2
+    for k in range(4):
+        times = DURATION * (k + np.linspace(0.01, 0.99, 30)) / 4
+        torques = plan.torque(times)
+        fit = np.polyval(np.polyfit(times - times[0], torques[:, 0], degree), times - times[0])
+        np.testing.assert_allclose(fit, torques[:, 0], atol=1e-7)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 2, 4])
 def test_energy_plans_from_passive_flight_are_true(seed):

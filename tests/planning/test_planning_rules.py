@@ -131,7 +131,7 @@ def test_optimum_converges_at_the_order_of_the_rule(name, degree, coarse, order)
 
 
 def test_split_meshes_keep_their_ends():
-    mesh = Mesh(np.array([0.0, 0.2, 1.0]), np.array([True, False])).split(np.array([2, 1]))
+    mesh = Mesh(np.array([0.0, 0.2, 1.0]), np.array([True, False]), None).split(np.array([2, 1]))
     np.testing.assert_allclose(mesh.ends, [0, 0.1, 0.2, 1])
     assert mesh.guarded.tolist() == [True, True, False]
     points = mesh.points(collocation_rule("hermite-simpson"))

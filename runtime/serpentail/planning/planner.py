@@ -5,6 +5,7 @@ The search refines its mesh until the planned torques, applied to the model, do 
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from inspect import Parameter, signature
 from typing import Any, Never
 
@@ -18,10 +19,9 @@ from ..stages import Stage
 from .nlp.fork_gate import forks_wait
 from .nlp.interrupt import stoppable
 from .nlp.node import equations_of_motion
-from .nlp.rules import collocation_rule
 from .problem import SMOOTHING, Bounds, Goal, PathConstraint, PlanningProblem, checked_problem
 from .result.plan import Plan
-from .rounds import Search
+from .rounds import Round, Search
 from .settings import PlanSettings, check_settings
 
 NEEDED = ("mass_matrix", "inverse_dynamics", "rollout")  # functions of the model
@@ -47,6 +47,7 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
     degree: int | None = None,
     intervals: int = 12,
     most_intervals: int = 200,
+    controls: int | None = None,
     rounds: int = 6,
     tolerance: float | None = 0.01,
     tail_tolerance: float | None = 0.1,
@@ -90,6 +91,8 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
     The mesh
     rule: "radau", "lobatto", "hermite-simpson", "trapezoidal"; degree: of the rule.
     intervals: of the first mesh; most_intervals: of the last; rounds: of refinement.
+    controls: control intervals, in each of which torques are one polynomial, however fine the mesh;
+    None: in each interval of the mesh.  With "time" they are straight there.
     tolerance: deg, of the true attitude at the end; None for no demand at all.
     tail_tolerance: deg, rate_tolerance: rad/s of torso and tail, of the truth at the end; None for
     no demand.  Between nodes, bounds hold to 1e-3 of them.
@@ -125,6 +128,7 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
         degree=degree,
         intervals=intervals,
         most_intervals=most_intervals,
+        controls=controls,
         rounds=rounds,
         tolerance=tolerance,
         tail_tolerance=tail_tolerance,
@@ -172,19 +176,35 @@ def _found(
     missing = [name for name in NEEDED if name not in model.generated]
     if missing:
         raise model.without(*missing)
-    begun = time.perf_counter()
-    rule = collocation_rule(settings.rule, settings.degree)
+    begun, goes_before = time.perf_counter(), []
     with forks_wait(), Stage("plan", model.name) as stage:
         equations = equations_of_motion(model, settings.dynamics)
-        search = Search(model, problem, settings, equations, rule)
         with stoppable(settings.time_limit, stage.tell):
-            rounds = []
-            for each in search.rounds():
-                rounds.append(each)
-                stage.tell(what=f"{model.name}: {each} after round {len(rounds)}")
-                if watch is not None:
-                    watch(search.plan(each, len(rounds), time.perf_counter() - begun))
+            if problem.objective == "time" and settings.guess is None:
+                # from passive flight it is hardly ever solved
+                easier = Search(model, replace(problem, objective="effort"), settings, equations)
+                goes_before, found = [easier], _rounds(easier, stage)
+                guess = easier.plan(easier.best(found), len(found), 0.0)
+                settings = replace(settings, guess=guess)
+            search = Search(model, problem, settings, equations, goes_before)
+            rounds = _rounds(search, stage, watch, begun)
         return search.plan(search.best(rounds), len(rounds), time.perf_counter() - begun)
+
+
+def _rounds(
+    search: Search,
+    stage: Stage,
+    watch: Callable[[Plan], object] | None = None,
+    begun: float = 0.0,
+) -> list[Round]:
+    """Return all rounds of a search, each told, and watched, as it is found."""
+    rounds: list[Round] = []
+    for each in search.rounds():
+        rounds.append(each)
+        stage.tell(what=f"{search.model.name}: {each} after round {len(rounds)}")
+        if watch is not None:
+            watch(search.plan(each, len(rounds), time.perf_counter() - begun))
+    return rounds
 
 
 NAMES = [

@@ -5,7 +5,7 @@ does something else than planned are split for the next round.
 """
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -19,8 +19,8 @@ from .nlp.guess import Motion, of_trajectory, passive, pushes, unknowns
 from .nlp.interrupt import stop_reason
 from .nlp.mesh import Mesh, refined, uniform
 from .nlp.multipliers import Multipliers, carried
-from .nlp.node import SMALL_POWER, Equations
-from .nlp.rules import CollocationRule
+from .nlp.node import Equations
+from .nlp.rules import collocation_rule
 from .nlp.solver import Solution, solve, solver
 from .nlp.transcription import Transcription, torque_unit, transcription_of
 from .problem import PlanningProblem
@@ -33,9 +33,9 @@ from .result.truth import end_errors, local_errors, open_loop
 from .settings import PlanSettings
 
 FIRST_PUSH = 0.05  # of the torques' unit: takes the first guess out of a plane of symmetry
-# W, below which |power| is rounded off, in the first rounds of an objective of energy: a kink far
-# below a plan's powers stops the solver
-POWERS = (3e-2, 3e-3, SMALL_POWER)
+# what softens an objective, see ``cost``, in the first rounds, and the last in all others: from
+# afar the objectives themselves are seldom solved
+SOFTENING = {"energy": (3e-2, 3e-3, 1e-4), "time": (1.0, 0.3)}
 DURATIONS = (1.0, 0.5, 0.75, 0.25)  # of guesses, in turn, from the least (0) to the most (1)
 
 
@@ -44,7 +44,7 @@ class Round:
     """One solution on one mesh: q, v planned at the ends of intervals, and true at the last end.
 
     errors: of the truth there, as ``end_errors`` has them; excess: over bounds, by intervals.
-    small_power: W, below which |power| is rounded off.
+    softening: of the objective.
     """
 
     nlp: Transcription
@@ -55,14 +55,14 @@ class Round:
 
     errors: dict[str, float]
     excess: Excess
-    small_power: float
+    softening: float
 
     def __str__(self) -> str:
         return f"{self.nlp.mesh.intervals} intervals, {self.errors['attitude']:.2g} deg off"
 
 
 class Search:
-    """One call of ``plan``: what stays the same in all its rounds, and what they have cost."""
+    """What stays the same in all rounds, and what they have cost, and searches before."""
 
     def __init__(
         self,
@@ -70,29 +70,35 @@ class Search:
         problem: PlanningProblem,
         settings: PlanSettings,
         equations: Equations,
-        rule: CollocationRule,
+        before: "Sequence[Search]" = (),
     ):
         self.model, self.problem, self.settings = model, problem, settings
-        self.equations, self.rule = equations, rule
+        self.equations, self.rule = equations, collocation_rule(settings.rule, settings.degree)
         self.start = (problem.q0, problem.v0)
         momentum, com = model.momentum(*self.start)[1], com_at_start(model, self.start)
         self.conserved = np.concatenate([momentum, *com])
-        self.powers = _powers(problem, settings.guess)
+        self.softening = _softening(problem, settings.guess)
         self.attitude = attitude(problem.attitude)
         self.spent = dict.fromkeys(("derive_s", "solve_cpu_s", "truth_s"), 0.0)
         self.iterations = self.attempts = 0
+        for search in before:
+            self.spent = {name: x + search.spent[name] for name, x in self.spent.items()}
+            self.iterations += search.iterations
+            self.attempts += search.attempts
         self.stopped: str | None = None
 
     @property
     def parameters(self) -> np.ndarray:
         """Parameters of the program."""
-        return np.append(self.conserved, self.powers[0])
+        return np.append(self.conserved, self.softening[0])
 
     def _first(self) -> Round:
         """Return the best solution on the first mesh, from all guesses, and more if these fail."""
         settings, guess = self.settings, self.settings.guess
         same_rule = isinstance(guess, Plan) and guess.rule is self.rule
-        nlp = self._transcribed(guess.mesh if same_rule else uniform(settings.intervals))
+        nlp = self._transcribed(
+            guess.mesh if same_rule else uniform(settings.intervals, settings.controls)
+        )
         solutions = [self._solved_given(nlp)]
         for k in range(1, settings.multi_start + settings.retries):
             enough = k >= settings.multi_start and any(entry.success for entry in solutions)
@@ -105,13 +111,13 @@ class Search:
         """Make rounds: intervals that are wrong are split until the end is right."""
         last = self._first()
         yield last
-        for _ in range(self.settings.rounds + len(self.powers) - 1):
+        for _ in range(self.settings.rounds + len(self.softening) - 1):
             if not last.solution.success or self._stopped():
                 break
             mesh = last.nlp.mesh if self._wrong(last) <= 1 else self._finer(last)
-            if mesh.same(last.nlp.mesh) and len(self.powers) == 1:
+            if mesh.same(last.nlp.mesh) and len(self.softening) == 1:
                 break
-            self.powers = self.powers[1:] or self.powers
+            self.softening = self.softening[1:] or self.softening
             nlp = self._transcribed(mesh)
             motion = Motion(last.curve.duration, last.curve.at)
             multipliers = carried(last.solution.multipliers, last.nlp, nlp)
@@ -124,7 +130,7 @@ class Search:
         """
         return min(
             rounds,
-            key=lambda entry: (not entry.solution.success, entry.small_power, self._wrong(entry)),
+            key=lambda entry: (not entry.solution.success, entry.softening, self._wrong(entry)),
         )
 
     def _off(self, found: Round) -> float:
@@ -254,7 +260,7 @@ class Search:
             true = open_loop(self.model, motion, self.problem.damping, self.start)
             errors = end_errors(self.problem, (planned[0][-1], planned[1][-1]), true)
             beyond = excess(nlp, motion, self.parameters)
-        return Round(nlp, solution, motion, planned, true, errors, beyond, self.powers[0])
+        return Round(nlp, solution, motion, planned, true, errors, beyond, self.softening[0])
 
     def _finer(self, last: Round) -> Mesh:
         """Return the next mesh: guards where torques go too far, finer where the truth is wrong, or
@@ -271,7 +277,8 @@ class Search:
         return refined(mesh, errors, min(0.3 / off, 0.3), self.rule.order, most)
 
 
-def _powers(problem: PlanningProblem, guess: object) -> tuple[float, ...]:
-    """Return the powers of the first rounds; the last is that of all others."""
-    known = isinstance(guess, Plan) and guess.problem.objective == "energy"
-    return POWERS if problem.objective == "energy" and not known else POWERS[-1:]
+def _softening(problem: PlanningProblem, guess: object) -> tuple[float, ...]:
+    """Return what softens the objective in the first rounds; the last is that of all others."""
+    steps = SOFTENING.get(str(problem.objective), (0.0,))
+    known = isinstance(guess, Plan) and guess.problem.objective == problem.objective
+    return steps[-1:] if known else steps

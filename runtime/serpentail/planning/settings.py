@@ -13,6 +13,7 @@ from ..motion.trajectory import Trajectory
 from .nlp.rules import collocation_rule
 from .problem import HUGE
 
+MOST_CONTROLS = 10_000
 WHOLE_NUMBERS = {  # least and most of each; beyond the most a search would not end
     "intervals": (1, 10_000),
     "rounds": (0, 1000),
@@ -32,6 +33,7 @@ class PlanSettings:
     degree: int | None
     intervals: int
     most_intervals: int
+    controls: int | None
     rounds: int
     tolerance: float | None  # deg; None: no demand at all
     tail_tolerance: float | None  # deg; None: no demand
@@ -62,6 +64,8 @@ def check_settings(model: Model, settings: PlanSettings, refused: Refusals) -> N
     """Note each setting that is wrong, with the remedy."""
     for name, bounds in WHOLE_NUMBERS.items():
         refused.attempt(name, _check_whole, name, getattr(settings, name), *bounds)
+    if settings.controls is not None:
+        refused.attempt("controls", _check_whole, "controls", settings.controls, 1, MOST_CONTROLS)
     for name in ("tolerance", "tail_tolerance", "rate_tolerance", "time_limit"):
         if getattr(settings, name) is not None:
             refused.attempt(name, _check_positive, name, getattr(settings, name))

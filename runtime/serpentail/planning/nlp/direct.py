@@ -36,9 +36,11 @@ def direct_rows(
     rule: CollocationRule,
 ) -> DirectRows:
     """Return the rows of the goal, of torques in guarded intervals, and of their rates."""
-    from scipy.sparse import vstack
-
     rows = [_goal_rows(problem, variables, indices)]
+    if mesh.controls is not None:
+        rows.append(_shared_rows(indices, mesh.controls, mesh, rule))
+    if problem.objective == "time" and len(rule.nodes) > 2:
+        rows.append(_straight_rows(indices, mesh, rule))
     bounds, unit = problem.bounds, variables.units["torque"]
     if bounds.torque is not None and mesh.guarded.any():
         rows.append(_torque_rows(indices, bounds.torque / unit, mesh, rule))
@@ -78,6 +80,35 @@ def _goal_rows(problem: "PlanningProblem", variables: "Variables", indices: Indi
     return DirectRows(_sparse(goal[i, j], i, end[j], (len(goal), indices.size)), zero, zero)
 
 
+def _shared_rows(
+    indices: Indices, controls: np.ndarray, mesh: Mesh, rule: CollocationRule
+) -> DirectRows:
+    """Torques of intervals less what their polynomial in the interval before is there, which are
+    zero inside a control interval.
+    """
+    earlier = np.flatnonzero(np.diff(controls) == 0)
+    own = rule.nodes > 0  # the first may be the last of the interval before
+    parts = [_of_nodes(indices, earlier[:0], np.eye(len(rule.nodes))[own], rule)]
+    for k in earlier:
+        ahead = rule.basis(1 + rule.nodes * mesh.widths[k + 1] / mesh.widths[k])
+        now = _of_nodes(indices, np.array([k + 1]), np.eye(len(rule.nodes))[own], rule)
+        parts.append(now - _of_nodes(indices, np.array([k]), ahead[own], rule))
+    return _zero(vstack(parts))
+
+
+def _straight_rows(indices: Indices, mesh: Mesh, rule: CollocationRule) -> DirectRows:
+    """Second differences of Bernstein coefficients, which are zero where torques are straight."""
+    k = np.arange(mesh.intervals)
+    if mesh.controls is not None:  # the first of each control interval; others share its polynomial
+        k = np.flatnonzero(np.diff(mesh.controls, prepend=-1))
+    return _zero(_of_nodes(indices, k, np.diff(rule.bernstein(), n=2, axis=0), rule))
+
+
+def _zero(matrix: Any) -> DirectRows:
+    """Rows that are zero."""
+    return DirectRows(matrix, np.zeros(matrix.shape[0]), np.zeros(matrix.shape[0]))
+
+
 def _torque_rows(
     indices: Indices, bound: np.ndarray, mesh: Mesh, rule: CollocationRule
 ) -> DirectRows:
@@ -92,12 +123,10 @@ def _slope_rows(
     indices: Indices, rate: np.ndarray, mesh: Mesh, rule: CollocationRule
 ) -> DirectRows:
     """Those of slopes, d, within +- rate T width: d - r T w <= 0 and -d - r T w <= 0."""
-    from scipy.sparse import vstack
-
     degree = len(rule.nodes) - 1
     slopes = degree * np.diff(rule.bernstein(), axis=0)
     matrix = _of_nodes(indices, np.arange(mesh.intervals), slopes, rule)
-    return _within_rate(matrix, np.kron(np.repeat(mesh.widths, degree), rate), vstack)
+    return _within_rate(matrix, np.kron(np.repeat(mesh.widths, degree), rate))
 
 
 def _joint_rows(indices: Indices, mesh: Mesh, rule: CollocationRule) -> DirectRows:
@@ -108,23 +137,20 @@ def _joint_rows(indices: Indices, mesh: Mesh, rule: CollocationRule) -> DirectRo
     matrix = _of_nodes(indices, inner, bernstein[-1:], rule) - _of_nodes(
         indices, inner + 1, bernstein[:1], rule
     )
-    zero = np.zeros(matrix.shape[0])
-    return DirectRows(matrix, zero, zero)
+    return _zero(matrix)
 
 
 def _step_rows(indices: Indices, rate: np.ndarray, mesh: Mesh, rule: CollocationRule) -> DirectRows:
     """Steps of torques that are constant in each interval, within +- rate times their distance."""
-    from scipy.sparse import vstack
-
     later, earlier = indices.controls[1:].ravel(), indices.controls[:-1].ravel()
     row, ones = np.arange(later.size), np.ones(later.size)
     shape = (later.size, indices.size)
     steps = _sparse(ones, row, later, shape) - _sparse(ones, row, earlier, shape)
     apart = np.diff(mesh.points(rule)[indices.first :])
-    return _within_rate(steps, np.kron(apart, rate), vstack)
+    return _within_rate(steps, np.kron(apart, rate))
 
 
-def _within_rate(rows: Any, largest: np.ndarray, vstack: Any) -> DirectRows:
+def _within_rate(rows: Any, largest: np.ndarray) -> DirectRows:
     """Rows within +- largest times the duration, the first unknown."""
     count, size = rows.shape
     duration = _sparse(largest, np.arange(count), np.zeros(count, int), (count, size))
@@ -146,6 +172,13 @@ def _of_nodes(
     values = weights[i, j]
     shape = (len(intervals) * r * nu, indices.size)
     return _sparse(values.ravel(), rows.ravel(), columns.ravel(), shape)
+
+
+def vstack(parts: list) -> Any:
+    """Rows below each other."""
+    from scipy.sparse import vstack as stacked
+
+    return stacked(parts)
 
 
 def _sparse(values: np.ndarray, rows: np.ndarray, columns: np.ndarray, shape: tuple) -> Any:

@@ -1,6 +1,6 @@
 """How the duration is divided into intervals, and how these are split where a solution is wrong."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,10 +15,13 @@ class Mesh:
     """Ends of the intervals (N + 1,) as fractions of the duration, from 0 to 1.
 
     guarded (N,): intervals in which torques keep their bounds between nodes, too.
+    controls (N,): number of the control interval of each; torques are one polynomial in it, however
+    many intervals it has.  None: one in each interval.
     """
 
     ends: np.ndarray
     guarded: np.ndarray
+    controls: np.ndarray | None
     __repr__ = brief
 
     @property
@@ -33,13 +36,18 @@ class Mesh:
 
     def same(self, other: "Mesh") -> bool:
         """Tell if two meshes are the same."""
-        mine, others = (self.ends, self.guarded), (other.ends, other.guarded)
-        return all(map(np.array_equal, mine, others))
+        return self.key == other.key
+
+    @property
+    def key(self) -> tuple:
+        """All that it consists of."""
+        controls = () if self.controls is None else tuple(self.controls)
+        return (*self.ends, *self.guarded, *controls)
 
     def with_guards(self, intervals: np.ndarray) -> "Mesh":
         """Return the mesh with guards in more intervals (N,), and in those beside them."""
         padded = np.pad(intervals, 1)
-        return Mesh(self.ends, self.guarded | padded[:-2] | padded[1:-1] | padded[2:])
+        return replace(self, guarded=self.guarded | padded[:-2] | padded[1:-1] | padded[2:])
 
     def halved(self, chosen: np.ndarray, most: int) -> "Mesh":
         """Return the mesh with chosen intervals (N,) halved, the first of them if these are too
@@ -60,12 +68,18 @@ class Mesh:
             np.linspace(a, b, count, endpoint=False)
             for a, b, count in zip(self.ends[:-1], self.ends[1:], pieces, strict=True)
         ]
-        return Mesh(np.append(np.concatenate(rows), 1.0), np.repeat(self.guarded, pieces))
+        controls = None if self.controls is None else np.repeat(self.controls, pieces)
+        return Mesh(np.append(np.concatenate(rows), 1.0), np.repeat(self.guarded, pieces), controls)
 
 
-def uniform(intervals: int) -> Mesh:
-    """Return a mesh of equal intervals."""
-    return Mesh(np.linspace(0.0, 1.0, intervals + 1), np.zeros(intervals, bool))
+def uniform(intervals: int, controls: int | None = None) -> Mesh:
+    """Return a mesh of equal intervals, or of at least as many in equal control intervals."""
+    if controls is None:
+        return Mesh(np.linspace(0.0, 1.0, intervals + 1), np.zeros(intervals, bool), None)
+    coarse = Mesh(
+        np.linspace(0.0, 1.0, controls + 1), np.zeros(controls, bool), np.arange(controls)
+    )
+    return coarse.split(np.full(controls, -(-intervals // controls)))
 
 
 def refined(mesh: Mesh, errors: np.ndarray, factor: float, order: int, most: int) -> Mesh:

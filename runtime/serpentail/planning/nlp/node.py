@@ -41,9 +41,9 @@ UNITS = {
     "tail_rate": 10.0,
     "drift": 0.1,
 }
-SMALL_POWER = 1e-4  # W, below which |power| is rounded off
+UNIT_OF_BOUND = 0.05  # of a torque's bound: plans of least effort are far inside
 # of a program: angular momentum (3,), position and velocity (3,) of the COM at the start, the
-# power (W) below which |power| is rounded off; a node has its fraction of the duration, too
+# softening of the objective; a node has its fraction of the duration, too
 PARAMETERS = 10
 
 
@@ -248,18 +248,22 @@ def _momentum(model: Model, point: Point, h: "ca.SX", momentum: "ca.SX") -> "ca.
 
 
 def cost(
-    problem: "PlanningProblem", point: Point, small_power: "ca.SX", torque_unit: np.ndarray
+    problem: "PlanningProblem", point: Point, softening: "ca.SX", torque_unit: np.ndarray
 ) -> "ca.SX":
-    """Return the objective's integrand (Eq. 40; CasADi), in units of the torques."""
+    """Return the objective's integrand (Eq. 40; CasADi), in units of the torques.
+
+    softening: of "energy", W, below which |power| is rounded off; of "time", which is in the
+    program's objective itself, s that a second with all torques at their bounds adds.
+    """
     import casadi as ca
 
-    unit = torque_unit.mean()
+    unit, rates = torque_unit.mean(), problem.smoothing**2 * ca.sumsqr(point.tail_rate)
+    effort = (ca.sumsqr(point.torque) + rates) / unit**2
     if callable(problem.objective):
         return asked("objective", problem.objective, point)
-    if problem.objective == "effort":
-        rates = problem.smoothing**2 * ca.sumsqr(point.tail_rate)
-        return (ca.sumsqr(point.torque) + rates) / unit**2
     if problem.objective == "energy":
         power = point.torque * point.tail_rate
-        return ca.sum1(ca.sqrt(power**2 + small_power**2) - small_power) / (unit * 10)
-    return ca.SX(0)
+        return ca.sum1(ca.sqrt(power**2 + softening**2) - softening) / (unit * 10)
+    if problem.objective == "time":
+        return softening * UNIT_OF_BOUND**2 / len(torque_unit) * effort
+    return effort

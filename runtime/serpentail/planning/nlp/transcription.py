@@ -20,7 +20,7 @@ from .derivatives import Assembly
 from .direct import DirectRows, direct_rows
 from .indices import Indices, indices_of
 from .mesh import Mesh
-from .node import Equations, Node, Variables, node_function, variables_of
+from .node import UNIT_OF_BOUND, Equations, Node, Variables, node_function, variables_of
 from .rules import CollocationRule
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ def transcription_of(
     make_node = partial(node_function, model, problem, coordinates, variables, equations)
     node = memoised(("node", *key), make_node)
     make_nlp = partial(transcribe, problem, mesh, rule, equations, variables, node)
-    nlp = memoised((*key, tuple(mesh.ends), tuple(mesh.guarded), rule), make_nlp)
+    nlp = memoised((*key, mesh.key, rule), make_nlp)
     return replace(nlp, problem=problem)
 
 
@@ -139,11 +139,11 @@ def collocate(
 
 
 def torque_unit(problem: PlanningProblem) -> np.ndarray:
-    """Unit (2m,) of torques: a fraction of their bound, as plans of least effort are far inside."""
+    """Unit (2m,) of torques: a fraction of their bound."""
     bound = problem.bounds.torque
     if bound is None:
         return np.full(len(problem.q0[TAIL_Q]), 1e-3)
-    return 0.05 * bound
+    return UNIT_OF_BOUND * bound
 
 
 def _defect_rows(indices: Indices, mesh: Mesh, rule: CollocationRule) -> Any:

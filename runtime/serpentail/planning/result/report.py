@@ -93,7 +93,7 @@ def objective(best: "Round") -> float:
         return value * unit**2
     if problem.objective == "energy":
         return value * (10 * unit)
-    return value
+    return best.curve.duration if problem.objective == "time" else value
 
 
 def effort(curve: Curve) -> float:
