@@ -161,7 +161,7 @@ def dropped(k):
     ("method", "rtol", "most"), [("ros34pw2", 1e-4, 0.4), ("tsit5", 1e-6, 0.16)]
 )
 def test_a_step_that_fails_on_a_touch_ends_there(method, rtol, most):
-    """Else it is shortened again and again, as the steps after it are: 0.46 and 0.23 were in vain."""
+    """Else it is shortened again and again, as those after it are: 0.46 and 0.23 were in vain."""
     how = {"t_span": 0.2, "controller": PASSIVE, "legs": LEGS, "method": method, "rtol": rtol}
     infos = [st.simulate(animal(), *dropped(k), **how).info for k in range(5)]
     assert sum(info["rejected"] for info in infos) < most * sum(info["steps"] for info in infos)

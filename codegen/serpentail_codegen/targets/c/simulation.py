@@ -17,8 +17,8 @@ SLOTS = 11  # states in the workspace: see simulation/workspace.c.jinja
 # of simulation/workspace.c.jinja, undefined again where the file ends
 MACROS = (
     *("NQ", "NV", "NT", "SIZE", "SLOT", "START", "END", "STAGES", "END_RATE", "TRIAL", "RIGHT"),
-    *("TAU", "TABLE", "FORCES", "HEIGHTS", "REACHED", "LOOKS", "BENDS", "POINTS", "GROUPS", "FACTORS"),
-    *("INNER", "CORE", "LEDGER", "BYTES"),
+    *("TAU", "TABLE", "FORCES", "HEIGHTS", "REACHED", "LOOKS", "BENDS", "POINTS", "GROUPS"),
+    *("FACTORS", "INNER", "CORE", "LEDGER", "BYTES"),
 )
 
 
