@@ -113,8 +113,10 @@ class Memory:
                 self.places.append((member, address_of(array), array.strides[0]))
 
     def restart(self, q0: np.ndarray, v0: np.ndarray) -> None:
-        """Take other starts q0 (k, nq), v0 (k, nv) of flights."""
+        """Take other starts q0 (k, nq), v0 (k, nv)."""
         self.state["q"][...], self.state["v"][...], self.state["ledger"][...] = q0, v0, 0
+        if self.ground.points:
+            self.state["bristles"][...] = self.ground.bristles.reshape(self.start.runs, -1)
 
     def part(self, k: int, first: int, done: int) -> Samples:
         """Return what run k has written so far, from a sample on."""
@@ -137,8 +139,8 @@ class CompiledRun:
         members = dict(start_members(method), pause=PAUSE, samples=start.intervals + 1)
         members["times"] = records.array(start.times)
         if ground.points:
-            self.event_times = np.zeros(MOST_EVENTS, records.dtype)
-            self.event_kinds = np.zeros(MOST_EVENTS, np.intc)
+            self.event_times = np.empty(MOST_EVENTS, records.dtype)
+            self.event_kinds = np.empty(MOST_EVENTS, np.intc)
             members |= {"event_times": self.event_times, "event_kinds": self.event_kinds}
             members |= {"most_events": MOST_EVENTS, "stop_at": ground.stop_at}
         members["work"] = aligned(self.model.manifest["work"]["rollout"], records.dtype)

@@ -80,7 +80,7 @@ def simulate(
     missing = [name for name in ("rollout", "energy", "momentum") if name not in model.generated]
     if missing:
         raise model.without(*missing)
-    asked = asked_for(model, controller, t_span, method, settings)
+    asked = asked_for(controller, t_span, method, settings)
     run = taken(model, asked, (q0, v0))
     watch = None
     if run is None or not still_chosen(run, method):
@@ -190,7 +190,7 @@ def choose(
 
 def still_chosen(run: CompiledRun, name: str) -> bool:
     """Tell whether a run from a new start has the method that is asked for, and note why."""
-    if name != "auto":
+    if name != "auto" or run.ground.points:  # on the ground "auto" asks for no start
         return True
     method, available = run.method, run.model.manifest["simulation"]["methods"]
     name, reason = chosen(method.settings, available, run.decay(run.memory.state["q"]))

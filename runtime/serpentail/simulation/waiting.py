@@ -1,7 +1,8 @@
-"""Flights that wait to be made again from another start: of a short one most is not the motion but
-the making of its records, which do not depend on the start.
+"""Runs that wait to be made again from another start: of a short one most is not the motion but the
+making of its records, which do not depend on the start.
 """
 
+from dataclasses import replace
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -12,11 +13,12 @@ from ..model.model import Model
 from .compiled_run import CompiledRun
 from .controllers import Controller, Damping
 from .methods import SCIPY
+from .schedules import Legs
 from .start import checked_starts
 
 MOST_RUNS = 4  # that wait, of a model
 MOST_SAMPLES = 10_000  # of one: with more its records cost little, and its memory much
-PLAIN = {float, int, str, type(None), np.float64}  # types whose equal values mean the same
+PLAIN = {float, int, str, type(None), np.float64, Legs}  # types whose equals mean the same
 Asked = tuple[Any, ...]
 
 # A run is taken out while it is made: no two threads have the same one.
@@ -24,15 +26,15 @@ _waiting: WeakKeyDictionary[Model, dict[Asked, CompiledRun]] = WeakKeyDictionary
 
 
 def asked_for(
-    model: Model,
     controller: Controller,
     t_span: ArrayLike,
     method: str,
     settings: dict[str, Any],
 ) -> Asked | None:
-    """Return by what a flight's records are found again; None where they are not to be kept.
+    """Return by what a run's records are found again; None where they are not to be kept.
 
-    Kept are those of flights without torque or with damping, all given as plain numbers and names.
+    Kept are those of runs without torque or with damping, the same legs, and all else given as
+    plain numbers and names.
     """
     acting: tuple[Any, ...] = ()
     if type(controller) is Damping:
@@ -40,13 +42,13 @@ def asked_for(
     elif controller is not None:
         return None
     asked = (t_span, method, *settings, *settings.values(), *acting)
-    if model.contacts or not all(map(_plain, asked)) or method in SCIPY:
-        return None
-    return asked
+    return asked if all(map(_plain, asked)) and method not in SCIPY else None
 
 
 def _plain(value: Any) -> bool:
-    """Tell whether a value is a plain one, or some of them."""
+    """Tell whether a value is a plain one, or some of them, or legs, which are equal to none but
+    themselves.
+    """
     kind = type(value)
     return kind in PLAIN or (kind is tuple and PLAIN.issuperset(map(type, value)))
 
@@ -56,15 +58,18 @@ def taken(
 ) -> CompiledRun | None:
     """Return a run that was asked for before, at its new start; None where none waits.
 
-    StateError where the start is wrong.
+    StateError where the start is wrong, SimulationError where it is deep in the ground.
     """
     runs = None if asked is None else _waiting.get(model)
     if not runs or asked not in runs:
         return None
     q0, v0, many = checked_starts(model, state)
     run = None if many else runs.pop(asked, None)
-    if run is not None:
-        run.again(q0, v0)
+    if run is None:
+        return None
+    if run.ground.points:
+        run.ground.refuse_deep(model, replace(run.start, q0=q0, v0=v0), run.memory.parameters)
+    run.again(q0, v0)
     return run
 
 

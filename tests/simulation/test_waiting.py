@@ -1,4 +1,4 @@
-"""A flight from another start is, when it is asked for again, what it is the first time."""
+"""A run from another start is, when it is asked for again, what it is the first time."""
 
 import gc
 import multiprocessing
@@ -11,7 +11,7 @@ import pytest
 import serpentail as st
 from serpentail.simulation import waiting
 
-from ...support.models import model_folder
+from ..support.models import model_folder
 
 FEW = ["forward_dynamics", "energy", "momentum", "rollout", "implicit"]
 FIELDS = ("t", "q", "v", "tau", "energy", "linear_momentum", "angular_momentum")
@@ -62,6 +62,50 @@ def test_bit_for_bit_what_it_is_the_first_time(controller, how, real):
     assert len(waits(model)) == 1
     for k, motion in enumerate(found):
         assert_same(motion, st.simulate(loaded(real=real), *start(k), **how))
+
+
+LEGS = st.Legs.fixed(np.radians(210), np.radians(-15))
+GROUNDED = [*FEW, "contact_points", "contact_dynamics"]
+
+
+def grounded():
+    return st.load(model_folder(1, 3, contacts=["feet", "tail"], functions=GROUNDED))
+
+
+def above_ground(k):
+    rng, q = np.random.default_rng(k), np.array([0, 0, 0.05, 1.0, 0, 0, 0, 0, 0])
+    q[4:] = 0.1 * rng.normal(size=5)
+    return q, 0.3 * rng.normal(size=8)
+
+
+@pytest.mark.parametrize("how", [{}, {"method": "tsit5", "rtol": 1e-4}, {"step": 1e-3}])
+def test_the_same_on_the_ground(how):
+    model, how = grounded(), {"legs": LEGS, "controller": st.Damping(1e-3), "t_span": 0.2, **how}
+    found = [st.simulate(model, *above_ground(k), **how) for k in range(3)]
+    assert len(waits(model)) == 1 and any(motion.events for motion in found)
+    for k, motion in enumerate(found):
+        first = st.simulate(grounded(), *above_ground(k), **how)
+        assert_same(motion, first)
+        np.testing.assert_array_equal(motion.contact.bristles, first.contact.bristles)
+        np.testing.assert_array_equal(motion.contact.forces, first.contact.forces)
+
+
+def test_on_the_ground_what_differs_is_made_anew():
+    model, (q, v) = grounded(), above_ground(0)
+    how = {"controller": st.Damping(1e-3), "t_span": 0.05}
+    st.simulate(model, q, v, legs=LEGS, **how)
+    deep = np.array([*q[:2], -0.1, *q[3:]])
+    with pytest.raises(st.SimulationError, match="mm deep at the start"):
+        st.simulate(model, deep, v, legs=LEGS, **how)
+    for other in (
+        {"legs": st.Legs.fixed(3.5, -0.2)},
+        {"legs": LEGS, "bristles0": np.full((9, 2), 1e-4)},
+        {"legs": LEGS, "stop_at": [("touch_down", "feet")]},
+    ):
+        motion, first = (st.simulate(m, q, v, **how, **other) for m in (model, grounded()))
+        assert_same(motion, first)
+    with pytest.raises(st.SimulationError, match="this model has feet"):
+        st.simulate(model, q, v, **how)
 
 
 def test_auto_chooses_for_each_start():
