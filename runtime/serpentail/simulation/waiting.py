@@ -17,7 +17,7 @@ from .schedules import Legs
 from .start import checked_starts
 
 MOST_RUNS = 4  # that wait, of a model
-MOST_SAMPLES = 10_000  # of one: with more its records cost little, and its memory much
+MOST_SAMPLES = 2_000  # of one: with more its records cost little, and its memory much
 PLAIN = {float, int, str, type(None), np.float64, Legs}  # types whose equals mean the same
 Asked = tuple[Any, ...]
 
