@@ -9,6 +9,7 @@ from pathlib import Path
 from benchmarks import (
     batches,
     contact_costs,
+    contact_shares,
     continuum_forms,
     derivatives,
     pages,
@@ -43,6 +44,7 @@ MEASURES = {
     "simulation_times": simulations.simulation_times,
     "mujoco_times": simulations.mujoco_times,
     "contact_costs": contact_costs.contact_costs,
+    "contact_shares": contact_shares.contact_shares,
     "continuum_forms": continuum_forms.form_errors,
     "continuum_form_times": continuum_forms.form_times,
     "planning": planning.planning,

@@ -146,3 +146,22 @@ def test_a_step_that_turns_too_far_is_taken_shorter_or_refused():
     assert run.info["steps"] * 2 > 300 * SPAN
     with pytest.raises(st.SimulationError, match="turns the torso too far"):
         flown(animal(), q, v, method="implicit_euler", step=0.02, output_step=0.06)
+
+
+def dropped(k):
+    """Return a start from which animals fall on feet, tail and torso."""
+    rng, model = np.random.default_rng(k), animal()
+    q, v = np.zeros(model.nq), np.zeros(model.nv)
+    q[2:4], q[4:7], q[7:] = (0.1, 1.0), 0.1 * rng.normal(size=3), 0.2 * rng.normal(size=4)
+    v[3:6] = rng.normal(size=3)
+    return q, v
+
+
+@pytest.mark.parametrize(
+    ("method", "rtol", "most"), [("ros34pw2", 1e-4, 0.4), ("tsit5", 1e-6, 0.16)]
+)
+def test_a_step_that_fails_on_a_touch_ends_there(method, rtol, most):
+    """Else it is shortened again and again, as those after it are: 0.46 and 0.23 were in vain."""
+    how = {"t_span": 0.2, "controller": PASSIVE, "legs": LEGS, "method": method, "rtol": rtol}
+    infos = [st.simulate(animal(), *dropped(k), **how).info for k in range(5)]
+    assert sum(info["rejected"] for info in infos) < most * sum(info["steps"] for info in infos)

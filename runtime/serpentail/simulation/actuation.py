@@ -7,6 +7,7 @@ import numpy as np
 
 from ..checks import numbers_in, refusal
 from ..errors import SimulationError
+from ..model.model import Model
 from .controllers import Controller, NativeTorque, Parts, TorqueFunction, parts_of, phases_of
 from .ctrl_c import CtrlC
 from .piecewise import Piecewise
@@ -17,7 +18,7 @@ class Actuation:
     """Controllers and legs as a C record, times to stop at, and what a user's function raised."""
 
     def __init__(self, records: Records, controller: Controller, legs: Piecewise | None = None):
-        self.records, self.model = records, records.model
+        self.records = records
         self.error: BaseException | None = None
         self.ctrl_c = CtrlC()
         self.nt = self.model.layout.nt
@@ -44,6 +45,11 @@ class Actuation:
             stop_times=self.stops,
             **members,
         )
+
+    @property
+    def model(self) -> Model:
+        """The model whose tail is driven."""
+        return self.records.model
 
     @property
     def of_python(self) -> bool:

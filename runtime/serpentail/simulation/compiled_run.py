@@ -10,10 +10,13 @@ from typing import Any
 import numpy as np
 
 from ..errors import SimulationError
+from ..model.kept import kept
 from ..model.kernel import address_of, aligned
 from ..model.library import NOT_FINITE, NOT_POSITIVE_DEFINITE, OUT_OF_RANGE
+from ..model.model import Model
 from ..model.parameters import RunParameters
 from .actuation import Actuation
+from .decay import FastestDecay
 from .ground import MOST_EVENTS, Ground
 from .methods import IntegrationMethod
 from .records import Records
@@ -109,6 +112,12 @@ class Memory:
             if records.has("run", member):
                 self.places.append((member, address_of(array), array.strides[0]))
 
+    def restart(self, q0: np.ndarray, v0: np.ndarray) -> None:
+        """Take other starts q0 (k, nq), v0 (k, nv)."""
+        self.state["q"][...], self.state["v"][...], self.state["ledger"][...] = q0, v0, 0
+        if self.ground.points:
+            self.state["bristles"][...] = self.ground.bristles.reshape(self.start.runs, -1)
+
     def part(self, k: int, first: int, done: int) -> Samples:
         """Return what run k has written so far, from a sample on."""
         arrays = {name: a[k, first:done] for name, a in self.out.items()}
@@ -125,13 +134,13 @@ class CompiledRun:
     def __init__(self, memory: Memory, actuation: Actuation, method: IntegrationMethod):
         records, start, ground = memory.records, memory.start, memory.ground
         self.memory, self.records, self.actuation = memory, records, actuation
-        self.start, self.ground, self.model = start, ground, records.model
+        self.method, self.start, self.ground = method, start, ground
         # what all runs share
         members = dict(start_members(method), pause=PAUSE, samples=start.intervals + 1)
         members["times"] = records.array(start.times)
         if ground.points:
-            self.event_times = np.zeros(MOST_EVENTS, records.dtype)
-            self.event_kinds = np.zeros(MOST_EVENTS, np.intc)
+            self.event_times = np.empty(MOST_EVENTS, records.dtype)
+            self.event_kinds = np.empty(MOST_EVENTS, np.intc)
             members |= {"event_times": self.event_times, "event_kinds": self.event_kinds}
             members |= {"most_events": MOST_EVENTS, "stop_at": ground.stop_at}
         members["work"] = aligned(self.model.manifest["work"]["rollout"], records.dtype)
@@ -147,6 +156,21 @@ class CompiledRun:
         for member, first, apart in self.memory.places:
             setattr(self.record, member, first + k * apart)
         self.k, self.actuation.error = k, None
+
+    def again(self, q0: np.ndarray, v0: np.ndarray) -> None:
+        """Take up the first run anew, from another start."""
+        self.memory.restart(q0, v0)
+        self.begin(0)
+
+    @kept
+    def decay(self) -> FastestDecay:
+        """How fast its joint damping is, for other starts."""
+        return FastestDecay(self.actuation, self.start.runs, self.memory.parameters)
+
+    @property
+    def model(self) -> Model:
+        """The model that moves."""
+        return self.records.model
 
     @property
     def state(self) -> dict[str, np.ndarray]:
@@ -214,7 +238,7 @@ class CompiledRun:
 
 def sampled(times: np.ndarray, arrays: dict[str, np.ndarray], outcome: Outcome) -> Samples:
     """Return what a run wrote to q, v, tau, bristles, and where it stopped as a last sample."""
-    t, done, stop = times[: outcome.done], outcome.done, outcome.stop
+    t, done, stop = times[: outcome.done].copy(), outcome.done, outcome.stop
     rows = {name: a[:done].astype(float).reshape(done, a[0].size) for name, a in arrays.items()}
     if stop is not None:
         t = np.append(t, stop["t"])

@@ -80,6 +80,9 @@ class Ground:
 
     def _heights(self, model: Model, start: Start, parameters: RunParameters) -> np.ndarray:
         """Heights (k, points) in m of the points at the starts."""
+        if not start.many:
+            points, _ = model.contact_points(start.q0[0], start.v0[0], *self.legs_at(start.start))
+            return points[None, :, 2]
         kernel, one = model.kernel("contact_points"), (start.runs, 1)
         legs = (np.broadcast_to(each, (*one, 8)) for each in self.legs_at(start.start))
         states = (start.q0[:, None], start.v0[:, None], *legs)

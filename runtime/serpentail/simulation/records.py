@@ -2,8 +2,8 @@
 
 import ctypes
 from functools import lru_cache
-from typing import Any
-from weakref import WeakKeyDictionary
+from typing import Any, cast
+from weakref import WeakKeyDictionary, ref
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,11 +25,16 @@ class Records:
     """Makes the C records of a model, and keeps alive all that they point to."""
 
     def __init__(self, model: Model):
-        self.model = model
+        self._model = ref(model)  # a run that waits to be made again keeps no model alive
         self.kept: list[Any] = []
         self.dtype = model.parameter_vector.dtype
         self.real = REALS[self.dtype]
         self.types = _types.get(model) or _types.setdefault(model, self._made())
+
+    @property
+    def model(self) -> Model:
+        """The model, which the caller of a run keeps alive."""
+        return cast(Model, self._model())
 
     def _made(self) -> dict[str, type[ctypes.Structure]]:
         """Structure types by name."""

@@ -9,10 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import ModelError, SimulationError, StateError
+from ..errors import ModelError, SimulationError
 from ..model.cores import checked_threads
-from ..model.kernel import RunKernel
-from ..model.layout import TAIL_V
 from ..model.model import Model
 from ..model.parameters import RunParameters
 from ..motion.trajectory import Trajectory
@@ -20,6 +18,7 @@ from ..stages import Stage
 from .actuation import Actuation
 from .compiled_run import CompiledRun, Memory, Samples
 from .controllers import Controller
+from .decay import FastestDecay
 from .ground import Ground
 from .limits import MOST_STEPS, refuse_endless
 from .measured import trajectory_or_error
@@ -28,6 +27,7 @@ from .parallel_runs import run_parallel
 from .records import Records
 from .rollouts import Rollouts
 from .start import EPS, Start
+from .waiting import asked_for, let_wait, taken
 from .watched import Watch, Watched, checked_watch
 
 
@@ -80,17 +80,24 @@ def simulate(
     missing = [name for name in ("rollout", "energy", "momentum") if name not in model.generated]
     if missing:
         raise model.without(*missing)
-    start = Start.checked(model, (q0, v0), t_span, settings.pop("output_step", None))
-    watch = checked_watch(settings.pop("watch", None), start.many)
-    threads = _threads(model, start, settings.pop("threads", None))
-    memory, actuation, choice = prepared(model, start, controller, method, settings)
-    clocks = time.perf_counter(), time.process_time()
-    if start.many:
-        runs = run_parallel(memory, actuation, choice, threads)
-        return runs.rollouts(_spent(clocks))
-    samples = integrate(memory, actuation, choice, watch)
-    info = samples.info | choice.info | _spent(clocks)
-    return trajectory_or_error(model, replace(samples, info=info), memory.ground)
+    asked = asked_for(controller, t_span, method, settings)
+    run = taken(model, asked, (q0, v0))
+    watch = None
+    if run is None or not still_chosen(run, method):
+        start = Start.checked(model, (q0, v0), t_span, settings.pop("output_step", None))
+        watch = checked_watch(settings.pop("watch", None), start.many)
+        threads = _threads(model, start, settings.pop("threads", None))
+        parts = prepared(model, start, controller, method, settings)
+        if start.many:
+            clocks = read_clocks()
+            return run_parallel(*parts, threads).rollouts(spent(clocks))
+        run = CompiledRun(*parts)
+    clocks = read_clocks()
+    samples = integrate(run, watch)
+    info = samples.info | run.method.info | spent(clocks)
+    motion = trajectory_or_error(model, replace(samples, info=info), run.ground)
+    let_wait(model, asked, run)
+    return motion
 
 
 def _threads(model: Model, start: Start, asked: int | None) -> int | None:
@@ -105,7 +112,12 @@ def _threads(model: Model, start: Start, asked: int | None) -> int | None:
     return checked_threads("threads", asked, SimulationError)
 
 
-def _spent(clocks: tuple[float, float]) -> dict[str, float]:
+def read_clocks() -> tuple[float, float]:
+    """Return wall and processor time (s)."""
+    return time.perf_counter(), time.process_time()
+
+
+def spent(clocks: tuple[float, float]) -> dict[str, float]:
     """Return the times (s) that passed since clocks were read."""
     seconds, cpu_seconds = time.perf_counter() - clocks[0], time.process_time() - clocks[1]
     return {"seconds": seconds, "cpu_seconds": cpu_seconds}
@@ -122,7 +134,7 @@ def end_state(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return q (nq,), v (nv,) where "rk4" ends after a duration (s), with nothing measured."""
     start = Start.checked(model, (q0, v0), duration, duration)
-    samples = integrate(*prepared(model, start, controller, "rk4", {"step": step}))
+    samples = integrate(CompiledRun(*prepared(model, start, controller, "rk4", {"step": step})))
     if samples.failure is not None:
         raise samples.failure
     return samples.q[-1], samples.v[-1]
@@ -159,7 +171,9 @@ def choose(
     model, single = actuation.model, actuation.records.real is ctypes.c_float
     available, reason = model.manifest["simulation"]["methods"], "asked for"
     if isinstance(name, str) and name == "auto":
-        decay = None if model.contacts else fastest_decay(actuation, start, parameters)
+        decay = None
+        if not model.contacts:
+            decay = FastestDecay(actuation, start.runs, parameters)(start.q0)
         name, reason = chosen(settings, available, decay)
     method = checked_method(name, settings, available, single)
     span, most_steps = start.end - start.start, method.settings.get("most_steps", MOST_STEPS)
@@ -174,6 +188,16 @@ def choose(
     return replace(method, reason=reason)
 
 
+def still_chosen(run: CompiledRun, name: str) -> bool:
+    """Tell whether a run from a new start has the method that is asked for, and note why."""
+    if name != "auto" or run.ground.points:  # on the ground "auto" asks for no start
+        return True
+    method, available = run.method, run.model.manifest["simulation"]["methods"]
+    name, reason = chosen(method.settings, available, run.decay(run.memory.state["q"]))
+    run.method = replace(method, reason=reason)
+    return name == method.name
+
+
 def refuse_vanishing(start: Start, name: str, step: float) -> None:
     """SimulationError where steps of at most this length (s) are too short to move the time."""
     least = EPS * max(abs(start.start), abs(start.end))
@@ -183,40 +207,10 @@ def refuse_vanishing(start: Start, name: str, step: float) -> None:
         )
 
 
-def fastest_decay(actuation: Actuation, start: Start, parameters: RunParameters) -> float:
-    """Largest eigenvalue (1/s) of K (H^-1)_tt at the starts, K being joint damping."""
-    laws = [parts.damping for parts in actuation.parts if parts.damping is not None]
-    if not any(law.any() for law in laws):
-        return 0.0
-    damping = np.max(laws, axis=0)
-    # without torque and with unit torques: the differences are columns of H^-1
-    kernel, shape = actuation.model.kernel("forward_dynamics"), (start.runs, actuation.nt + 1)
-    q = np.repeat(start.q0[:, None], shape[1], axis=1).astype(kernel.dtype)
-    torques = np.eye(actuation.nt + 1, actuation.nt, -1, kernel.dtype)
-    tau = np.tile(torques, (start.runs, 1, 1))
-    v, v_dot = (np.zeros((*shape, actuation.model.nv), kernel.dtype) for _ in range(2))
-    evaluate = RunKernel(kernel, parameters.vectors, (q, v, tau), (v_dot,))
-    sound = [k for k in range(start.runs) if evaluated(evaluate, k, shape[1])]
-    tail = v_dot[sound, :, TAIL_V]
-    columns = (tail[:, 1:] - tail[:, :1]) * np.sqrt(np.outer(damping, damping))
-    return float(np.linalg.eigvalsh(columns).max(initial=0.0))
-
-
-def evaluated(rows: RunKernel, k: int, count: int) -> bool:
-    """Evaluate rows of run k; tell whether it could be done."""
-    try:
-        rows(k, count)
-    except StateError:
-        return False
-    return True
-
-
-def integrate(
-    memory: Memory, actuation: Actuation, method: IntegrationMethod, watch: Watch | None = None
-) -> Samples:
+def integrate(run: CompiledRun, watch: Watch | None = None) -> Samples:
     """Return the samples of a single run, of which a function is told meanwhile."""
-    run = CompiledRun(memory, actuation, method)
-    watched = None if watch is None else Watched(watch, run.model, memory.ground)
+    method = run.method
+    watched = None if watch is None else Watched(watch, run.model, run.ground)
     with Stage("simulate", run.model.name) as stage:
         if method.name in SCIPY:
             from .scipy_methods import integrate_by_scipy

@@ -38,16 +38,7 @@ class Start:
         output_step: object,
     ) -> "Start":
         """Return starts; StateError or SimulationError where an argument is wrong."""
-        q0 = checked_states("q0", state[0], model.nq)
-        v0 = checked_states("v0", state[1], model.nv)
-        many = q0.ndim == 2 or v0.ndim == 2
-        q0, v0 = _paired(q0, v0)
-        # unit quaternions
-        norms = np.array([math.hypot(*quaternion) for quaternion in q0[:, QUATERNION].tolist()])
-        if not norms.all():
-            where = f" of run {int(norms.argmin())}" if many else ""
-            raise StateError(f"q0[3:7]{where} is the zero quaternion: upright is (1, 0, 0, 0)")
-        q0[:, QUATERNION] /= norms[:, None]
+        q0, v0, many = checked_starts(model, state)
         # the grid of output times, the end among them
         start, end = checked_span(t_span)
         output_step = (end - start) / 200 if output_step is None else output_step
@@ -98,6 +89,22 @@ def checked_span(t_span: ArrayLike) -> tuple[float, float]:
     return start, end
 
 
+def checked_starts(
+    model: Model, state: tuple[ArrayLike, ArrayLike]
+) -> tuple[np.ndarray, np.ndarray, bool]:
+    """Return q0 (k, nq), its quaternions unit ones, v0 (k, nv), and whether k runs were given."""
+    q0 = checked_states("q0", state[0], model.nq)
+    v0 = checked_states("v0", state[1], model.nv)
+    many = q0.ndim == 2 or v0.ndim == 2
+    q0, v0 = _paired(q0, v0)
+    norms = [math.hypot(*quaternion) for quaternion in q0[:, QUATERNION].tolist()]
+    if not all(norms):
+        where = f" of run {norms.index(0.0)}" if many else ""
+        raise StateError(f"q0[3:7]{where} is the zero quaternion: upright is (1, 0, 0, 0)")
+    q0[:, QUATERNION] /= np.array(norms)[:, None]
+    return q0, v0, many
+
+
 def checked_states(name: str, value: ArrayLike, size: int) -> np.ndarray:
     """Return finite vectors (size,) or (k, size); StateError names what is wrong."""
     array = real_array(name, value)
@@ -106,7 +113,7 @@ def checked_states(name: str, value: ArrayLike, size: int) -> np.ndarray:
             f"{name} has shape {array.shape}, not ({size},) of one start state, or (k, {size}) of "
             "k runs"
         )
-    if not np.isfinite(array).all():
+    if not math.isfinite(np.vdot(array, array)) and not np.isfinite(array).all():
         rows = np.atleast_2d(array)
         run = int(np.isfinite(rows).all(axis=1).argmin())
         refuse_not_finite(name, rows[run], StateError, f" of run {run}" if array.ndim == 2 else "")

@@ -17,8 +17,8 @@ SLOTS = 11  # states in the workspace: see simulation/workspace.c.jinja
 # of simulation/workspace.c.jinja, undefined again where the file ends
 MACROS = (
     *("NQ", "NV", "NT", "SIZE", "SLOT", "START", "END", "STAGES", "END_RATE", "TRIAL", "RIGHT"),
-    *("TAU", "TABLE", "FORCES", "HEIGHTS", "REACHED", "LOOKS", "POINTS", "GROUPS", "FACTORS"),
-    *("INNER", "CORE", "LEDGER"),
+    *("TAU", "TABLE", "FORCES", "HEIGHTS", "REACHED", "LOOKS", "BENDS", "POINTS", "GROUPS"),
+    *("FACTORS", "INNER", "CORE", "LEDGER", "BYTES"),
 )
 
 
@@ -29,7 +29,7 @@ def simulation_context(
     single = scene.real == "float"
     ledger, table = sum(size for _, size in has.ledger), max(4 * tail.nt, 2 * tail.nv)
     size = tail.nq + tail.nv + 2 * has.contacts + ledger
-    states = SLOTS * size + tail.nt + table + (11 + 2 * LOOKS) * has.contacts
+    states = SLOTS * size + tail.nt + table + (12 + 2 * LOOKS) * has.contacts
     resolution, level, felt = RESOLUTION[scene.real]
     return {
         **{name: name + ("f" if single else "") for name in ("pow", "fabs", "ceil")},

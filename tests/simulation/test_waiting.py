@@ -1,0 +1,232 @@
+"""A run from another start is, when it is asked for again, what it is the first time."""
+
+import gc
+import multiprocessing
+import threading
+import weakref
+
+import numpy as np
+import pytest
+
+import serpentail as st
+from serpentail.simulation import waiting
+
+from ..support.models import model_folder
+
+FEW = ["forward_dynamics", "energy", "momentum", "rollout", "implicit"]
+FIELDS = ("t", "q", "v", "tau", "energy", "linear_momentum", "angular_momentum")
+TIMES = {"seconds", "cpu_seconds"}
+
+
+def loaded(**options):
+    return st.load(model_folder(1, 3, functions=FEW, **options))
+
+
+@pytest.fixture
+def model():
+    return loaded()
+
+
+def start(k=0):
+    rng = np.random.default_rng(k)
+    return np.array([0, 0, 1.0, *rng.normal(size=6)]), rng.normal(size=8)
+
+
+def waits(model):
+    return waiting._waiting.get(model, {})
+
+
+def assert_same(one, other):
+    for name in FIELDS:
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+    infos = ({k: v for k, v in each.info.items() if k not in TIMES} for each in (one, other))
+    assert next(infos) == next(infos)
+
+
+@pytest.mark.parametrize("controller", [None, st.Damping(1e-3), st.Damping((1e-3, 2e-3))])
+@pytest.mark.parametrize(
+    "how",
+    [
+        {},
+        {"method": "tsit5", "rtol": 1e-4, "output_step": 0.1},
+        {"method": "ros34pw2", "most_steps": 1000},
+        {"method": "rk4", "step": 1e-3},
+        {"step": np.float64(1e-3)},
+    ],
+)
+@pytest.mark.parametrize("real", ["double", "float"])
+def test_bit_for_bit_what_it_is_the_first_time(controller, how, real):
+    model = loaded(real=real)
+    how = {"controller": controller, "t_span": (0.1, 0.3), **how}
+    found = [st.simulate(model, *start(k), **how) for k in range(4)]
+    assert len(waits(model)) == 1
+    for k, motion in enumerate(found):
+        assert_same(motion, st.simulate(loaded(real=real), *start(k), **how))
+
+
+LEGS = st.Legs.fixed(np.radians(210), np.radians(-15))
+GROUNDED = [*FEW, "contact_points", "contact_dynamics"]
+
+
+def grounded():
+    return st.load(model_folder(1, 3, contacts=["feet", "tail"], functions=GROUNDED))
+
+
+def above_ground(k):
+    rng, q = np.random.default_rng(k), np.array([0, 0, 0.05, 1.0, 0, 0, 0, 0, 0])
+    q[4:] = 0.1 * rng.normal(size=5)
+    return q, 0.3 * rng.normal(size=8)
+
+
+@pytest.mark.parametrize("how", [{}, {"method": "tsit5", "rtol": 1e-4}, {"step": 1e-3}])
+def test_the_same_on_the_ground(how):
+    model, how = grounded(), {"legs": LEGS, "controller": st.Damping(1e-3), "t_span": 0.2, **how}
+    found = [st.simulate(model, *above_ground(k), **how) for k in range(3)]
+    assert len(waits(model)) == 1 and any(motion.events for motion in found)
+    for k, motion in enumerate(found):
+        first = st.simulate(grounded(), *above_ground(k), **how)
+        assert_same(motion, first)
+        np.testing.assert_array_equal(motion.contact.bristles, first.contact.bristles)
+        np.testing.assert_array_equal(motion.contact.forces, first.contact.forces)
+
+
+def test_on_the_ground_what_differs_is_made_anew():
+    model, (q, v) = grounded(), above_ground(0)
+    how = {"controller": st.Damping(1e-3), "t_span": 0.05}
+    st.simulate(model, q, v, legs=LEGS, **how)
+    deep = np.array([*q[:2], -0.1, *q[3:]])
+    with pytest.raises(st.SimulationError, match="mm deep at the start"):
+        st.simulate(model, deep, v, legs=LEGS, **how)
+    for other in (
+        {"legs": st.Legs.fixed(3.5, -0.2)},
+        {"legs": LEGS, "bristles0": np.full((9, 2), 1e-4)},
+        {"legs": LEGS, "stop_at": [("touch_down", "feet")]},
+    ):
+        motion, first = (st.simulate(m, q, v, **how, **other) for m in (model, grounded()))
+        assert_same(motion, first)
+    with pytest.raises(st.SimulationError, match="this model has feet"):
+        st.simulate(model, q, v, **how)
+
+
+def test_auto_chooses_for_each_start():
+    model, stretched, bent = loaded(), *(np.array([0, 0, 1, 1, 0, 0, 0, a, 0]) for a in (0, 1.2))
+    decays = []
+    for q in (stretched, bent):
+        motion = st.simulate(model, q, np.zeros(8), t_span=0.01, controller=st.Damping(1e-3))
+        decays.append(motion.info["reason"])
+        other = st.simulate(loaded(), q, np.zeros(8), t_span=0.01, controller=st.Damping(1e-3))
+        assert_same(motion, other)
+    assert decays[0] != decays[1]
+    # just stiff for one of the starts
+    rates = [float(words.split()[-2]) for words in decays]
+    law = st.Damping(1e-3 * 5e3 / np.sqrt(np.prod(rates)))
+    found = [
+        st.simulate(model, q, np.zeros(8), t_span=0.001, controller=law).info["method"]
+        for q in (stretched, bent, stretched)
+    ]
+    assert sorted({*found}) == ["ros34pw2", "tsit5"] and found[0] == found[2]
+
+
+def test_what_was_found_before_stays(model):
+    first = st.simulate(model, *start(0), t_span=0.1)
+    before = {name: getattr(first, name).copy() for name in ("t", "q", "v", "tau")}
+    second = st.simulate(model, *start(1), t_span=0.1)
+    for name, array in before.items():
+        np.testing.assert_array_equal(getattr(first, name), array)
+        assert not np.shares_memory(getattr(first, name), getattr(second, name))
+    # books that are asked for late
+    assert first.info["imbalance"] == st.simulate(loaded(), *start(0), t_span=0.1).info["imbalance"]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"q0": [1.0]}, "q0 has shape"),
+        ({"q0": np.full(9, np.nan)}, r"q0\[0\]: value nan"),
+        ({"v0": np.full(8, np.inf)}, r"v0\[0\]: value inf"),
+        ({"q0": np.zeros(9)}, "zero quaternion"),
+        ({"controller": st.Damping(True)}, "damping: value True"),
+        ({"controller": st.Damping(-1.0)}, "damping: value -1.0"),
+        ({"t_span": True}, "t_span"),
+        ({"rtol": True}, "rtol: value True"),
+        ({"most": 3}, "no setting 'most'"),
+        ({"threads": 2}, "one start only"),
+        ({"watch": 1}, "watch: value 1"),
+        ({"legs": 3}, "touches nothing"),
+        ({"method": "euler"}, "method: value 'euler'"),
+    ],
+)
+def test_refused_as_the_first_time(model, wrong, words):
+    q0, v0 = start()
+    sound = {"q0": q0, "v0": v0, "controller": st.Damping(1.0), "t_span": 1.0, "rtol": 1.0}
+    sound["method"] = "ros34pw2"
+    st.simulate(model, **sound)
+    for twice in range(2):
+        with pytest.raises(st.SerpentailError, match=words):
+            st.simulate(model, **sound | wrong)
+        assert len(waits(model)) == 1, twice
+
+
+def test_only_what_is_plain_and_came_to_its_end_waits(model):
+    st.simulate(model, *start(), t_span=0.1, controller=lambda t, q, v: [0, 0])
+    st.simulate(model, *start(), t_span=0.1, controller=st.TorqueTable([0, 1], np.ones((2, 2))))
+    st.simulate(model, *start(), t_span=[0.0, 0.1])
+    st.simulate(model, *start(), t_span=0.1, watch=lambda part: None)
+    st.simulate(model, *start(), t_span=0.1, method="dop853")
+    with pytest.raises(st.SimulationError, match="most_steps"):
+        st.simulate(model, *start(), t_span=0.1, most_steps=1)
+    assert not waits(model)
+
+
+def test_few_wait_and_none_keeps_its_model_alive(model):
+    for k in range(1, 12):
+        st.simulate(model, *start(), t_span=k / 100)
+    assert len(waits(model)) == waiting.MOST_RUNS
+    st.simulate(model, *start(), t_span=1e-3, output_step=1e-3 / waiting.MOST_SAMPLES)
+    assert all(run.start.intervals < waiting.MOST_SAMPLES for run in waits(model).values())
+    gc.collect()
+    gc.disable()
+    try:
+        twin = model.with_parameters(gravity=1.0)
+        st.simulate(twin, *start(), t_span=0.1)
+        gone = weakref.ref(twin)
+        del twin
+        assert gone() is None
+    finally:
+        gc.enable()
+
+
+def test_threads_share_no_run(model):
+    alone = [st.simulate(loaded(), *start(k), t_span=0.2) for k in range(4)]
+    wrong = []
+
+    def fly(k):
+        for _ in range(30):
+            motion = st.simulate(model, *start(k), t_span=0.2)
+            if not (np.array_equal(motion.q, alone[k].q) and np.array_equal(motion.v, alone[k].v)):
+                wrong.append(k)
+
+    threads = [threading.Thread(target=fly, args=(k,)) for k in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not wrong and len(waits(model)) == 1
+
+
+@pytest.mark.skipif("fork" not in multiprocessing.get_all_start_methods(), reason="needs fork")
+def test_a_child_makes_its_own(model):
+    first = st.simulate(model, *start(0), t_span=0.2)
+    ours, theirs = multiprocessing.get_context("fork").Pipe()
+
+    def fly():
+        theirs.send(st.simulate(model, *start(1), t_span=0.2).q)
+
+    child = multiprocessing.get_context("fork").Process(target=fly)
+    child.start()
+    mine = st.simulate(model, *start(0), t_span=0.2)
+    assert ours.poll(60)
+    found = ours.recv()
+    child.join()
+    assert_same(mine, first)
+    np.testing.assert_array_equal(found, st.simulate(loaded(), *start(1), t_span=0.2).q)
