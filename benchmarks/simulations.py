@@ -1,5 +1,10 @@
 """Run time against error of every integration method, in flight and on the ground."""
 
+if __name__ == "__main__":
+    from benchmarks import alone
+
+    alone.main("simulations", __doc__)
+
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -54,10 +59,14 @@ def thrown(model: st.Model) -> tuple[np.ndarray, np.ndarray]:
 
 def flight() -> tuple[Callable, float]:
     """0.6 s of damped flight."""
-    model = flying()
-    return lambda **how: st.simulate(
-        model, *thrown(model), controller=st.Damping(DAMPING), t_span=0.6, **how
-    ), 0.6
+    return fly(flying(), 0.6)
+
+
+def fly(model: st.Model, span: float) -> tuple[Callable, float]:
+    """So many s of damped flight."""
+    start = thrown(model)
+    damped = st.Damping(DAMPING)
+    return lambda **how: st.simulate(model, *start, controller=damped, t_span=span, **how), span
 
 
 def tracking() -> tuple[Callable, float]:
