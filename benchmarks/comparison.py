@@ -1,6 +1,7 @@
 """Times one function of a model beside peers, each by every compiler: the faster counts."""
 
 from collections.abc import Mapping
+from types import MappingProxyType
 
 from benchmarks.fixtures import Fixture
 from benchmarks.peers import timing
@@ -14,8 +15,10 @@ def compared(
     states: timing.States,
     rounds: int = 200,
     calls: int = 128,
+    again: Mapping[str, Fixture] = MappingProxyType({}),
 ) -> dict:
-    """Time all in one go, rounds interleaved."""
+    """Time all in one go, rounds interleaved; again: ours by clang."""
+    peers = {**peers, "clang": {by: each.closure for by, each in again.items()}}
     there = [(name, by, closure) for name, made in peers.items() for by, closure in made.items()]
     closures = [ours.closure, *(closure for *_, closure in there)]
     times = timing.time_rounds(closures, states, rounds, calls)

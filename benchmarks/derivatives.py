@@ -18,7 +18,7 @@ from serpentail.model.compiler import compile_library
 from serpentail_codegen.scene.signatures.table import DERIVATIVES
 
 from .comparison import compared
-from .fixtures import fixture, label
+from .fixtures import by_clang, fixture, label
 from .peers import build, pinocchio, timing
 from .peers.casadi_derivatives import IN_SX, InCasadi, hessian, in_casadi, jacobians
 
@@ -57,7 +57,7 @@ def jacobian_times(folder: Path) -> list[dict]:
     types.  CasADi: C of the SX graph of -H^-1 dID, cse, -O2, by its Jacobian along all directions
     and with the columns of a turn written by hand; it writes no column that is zero throughout.
     Differences: of the documented path, which loses two digits as B is a metre from the origin; the
-    largest of the others.
+    largest of the others.  Ours is compiled as its users have it, and by clang beside that.
     """
     plain, tuned = (
         build.by_each(partial(build.build_library, source, build.CACHE))
@@ -81,7 +81,9 @@ def jacobian_row(folder: Path, size: tuple[int, int], plain: dict, tuned: dict) 
             "casadi": {by: peer.closure for by, peer in by_itself.items()},
             "hand": {by: peer.closure for by, peer in by_hand.items()},
         }
-        row = {"model": label(*size)} | compared(ours, peers, states, ROUNDS, CALLS)
+        row = {"model": label(*size)} | compared(
+            ours, peers, states, ROUNDS, CALLS, by_clang(ours.model, folder, JACOBIANS)
+        )
         first = pinocchio_difference(ours.model, next(iter(plain.values())), states)
         errors = [
             pinocchio_difference(ours.model, peer, states, path)
@@ -133,7 +135,7 @@ def hessian_times(folder: Path) -> list[dict]:
     Ours writes four square blocks, zeros and both triangles of symmetric ones included.  CasADi:
     SX, Jacobian of the gradient; cse, -O2, by the faster of the compilers.  In like terms: the same
     four blocks.  Its nonzeros: of the lower triangle and of the mixed block, less than ours gives.
-    Ratios by minima (by medians in brackets).
+    Ratios by minima (by medians in brackets).  Ours by clang beside it, too.
     """
     rows = []
     for size in SIZES[:2]:
@@ -147,7 +149,9 @@ def hessian_times(folder: Path) -> list[dict]:
             "casadi": {by: peer.closure for by, peer in alike.items()},
             "sparse": {by: peer.closure for by, peer in sparse.items()},
         }
-        row = {"model": label(*size)} | compared(ours, peers, states, ROUNDS, CALLS)
+        row = {"model": label(*size)} | compared(
+            ours, peers, states, ROUNDS, CALLS, by_clang(ours.model, folder, HESSIAN)
+        )
         errors = [hessian_difference(ours.model, peer, states) for peer in sparse.values()]
         errors += [block_difference(ours.model, peer, states) for peer in alike.values()]
         rows.append(row | {"hessian_difference": max(errors)})

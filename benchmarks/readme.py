@@ -1,4 +1,6 @@
-"""The table of the README, from a report: AVX-512 before AVX2 in each cell."""
+"""The table of the README, from a report: AVX-512 before AVX2 in each cell; of a peer how many
+times as long as ours it takes.
+"""
 
 from collections.abc import Callable
 
@@ -66,7 +68,7 @@ def block(report: dict) -> list[str]:
     if not there:
         return []
     report = report | {"flights": by_model(report.get("flight_times", []))}
-    lines = [["articulated tail (m, n); " + " / ".join(there), *MODELS], ["---"] * 5]
+    lines = [[f"articulated tail (m, n): {' / '.join(there)}", *MODELS], ["---"] * 5]
     for words, measure, function, show in ROWS:
         rows = [r for r in report.get(measure, []) if function in (None, r.get("function"))]
         cells = [cell(rows, model, there, show) for model in MODELS]

@@ -17,8 +17,9 @@ from pathlib import Path
 import numpy as np
 
 import serpentail as st
+from benchmarks.batches import best
 from benchmarks.comparison import compared
-from benchmarks.fixtures import Fixture, built, fixture, label
+from benchmarks.fixtures import Fixture, built, by_clang, fixture, label
 from benchmarks.peers import build, pinocchio, timing
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -60,7 +61,7 @@ def speed(folder: Path) -> list[dict]:
 
     Ratios by minima (by medians in brackets).  Pinocchio: as its documentation shows it; its CRBA
     with all that was found to speed it up; the tied columns summed by own code on its types
-    (pinocchio_chain.cpp).
+    (pinocchio_chain.cpp).  Ours is compiled as its users have it, and by clang beside that.
     """
     plain, tuned = (
         build.by_each(partial(build.build_library, source, build.CACHE))
@@ -80,7 +81,8 @@ def speed_row(folder: Path, size: tuple, plain: dict[str, Path], tuned: dict[str
             "tuned": {by: chain.crba_closure for by, chain in chains[1].items()},
             "own": {by: chain.closure for by, chain in chains[1].items()},
         }
-        row = compared(ours, peers, states)
+        again = by_clang(ours.model, folder, "forward_dynamics")
+        row = compared(ours, peers, states, again=again)
     return {"model": label(*size)} | row | {"v_dot_difference": max(errors)}
 
 
@@ -148,8 +150,8 @@ def internal_energy(flight, model) -> np.ndarray:
 
 
 def work_precision(folder: Path) -> list[dict]:
-    """Run time against error of 0.58 s of damped flight: RK4, Tsit5 and DOP853 at several steps or
-    tolerances.
+    """What the caller waits against error of 0.58 s of damped flight: RK4, Tsit5 and DOP853 at
+    several steps or tolerances.
     """
     model = built(1, 3)
     start = thrown(model)
@@ -165,10 +167,10 @@ def work_precision(folder: Path) -> list[dict]:
     exact = fly("dop853", {"rtol": 1e-13, "atol": 1e-15})
     rows = []
     for method, options in settings:
-        flights = [fly(method, options | {"output_step": 0.58 / 5}) for _ in range(3)]
-        error = np.abs(flights[0].q[-1] - exact.q[-1]).max()
+        again = partial(fly, method, options | {"output_step": 0.58 / 5})
+        error = np.abs(again().q[-1] - exact.q[-1]).max()
         name, value = next(iter(options.items()))
-        milliseconds = 1e3 * min(f.info["seconds"] for f in flights)
+        milliseconds = best(again, 5) / 1e6
         rows.append(
             {
                 "method": method,

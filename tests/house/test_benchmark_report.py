@@ -54,7 +54,7 @@ def test_the_closing_table_has_before_peer_and_limit(monkeypatch, tmp_path):
 def test_the_table_of_the_readme_has_both_processors_in_a_cell():
     head, _, *rows = block(REPORT)
     assert (
-        head == "| articulated tail (m, n); AVX-512 / AVX2 | (1, 3) | (3, 4) | (6, 6) | (8, 16) |"
+        head == "| articulated tail (m, n): AVX-512 / AVX2 | (1, 3) | (3, 4) | (6, 6) | (8, 16) |"
     )
     assert rows == [
         "| **forward dynamics, one call from C**, us | 0.1 / 0.16 |  |  |  |",
