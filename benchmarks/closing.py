@@ -101,7 +101,8 @@ def closed(figure: Figure, row: dict, report: dict, before: dict) -> dict:
     gain = (value / old if figure.most else old / value) if old else None
     there |= {"times faster": f"{gain:.2f}x" if gain else ""}
     there |= {"peer's best": peer or "", "peer": f"{peer / value:.2f}x slower" if peer else ""}
-    return there | {"limit": limit or "", "left": f"{value / limit:.1f}x" if limit else ""}
+    there |= {"limit": limit or "", "left": f"{value / limit:.1f}x" if limit else ""}
+    return there | {"of the peak": f"{limit / value:.0%}" if limit else ""}
 
 
 def best_peer(figure: Figure, row: dict, report: dict) -> float | None:

@@ -24,6 +24,11 @@ def times(column: str) -> Callable[[dict], str]:
     return lambda row: f"{short(row[f'{column}_ns'] / row['ns'])}x"
 
 
+def alone(row: dict) -> str:
+    """Show a state of a batch in us, and how many times as long it takes alone."""
+    return f"{short(row['side by side, ns'] * 1e-3)} ({short(row['ratio'])}x)"
+
+
 def waited(row: dict) -> str:
     """Show microseconds for the caller, and those outside C."""
     return f"{short(row['caller_us'])} ({short(row['overhead_us'])})"
@@ -38,19 +43,19 @@ ROWS: tuple[tuple[str, str, str | None, Callable[[dict], str]], ...] = (
     ("own summation of the tied columns on its types", "speed", None, times("own")),
     ("MuJoCo, its full chain reduced", "other_peers", None, times("mujoco")),
     ("C by CasADi", "other_peers", None, times("casadi")),
-    ("**one state of a batch**, one core, us", "batch_times", FD, us("side by side, ns")),
+    ("**one state of a batch**, one core, us (one by one)", "batch_times", FD, alone),
     ("**Jacobians of v_dot, from C**, us", "jacobian_times", None, us("ns")),
     ("from Python (of it outside C), us", "call_times", DFD, waited),
     ("computeRNEADerivatives, as documented", "jacobian_times", None, times("plain")),
     ("the same, tuned", "jacobian_times", None, times("revolutes")),
     ("own summation on its types", "jacobian_times", None, times("own")),
     ("C by CasADi, columns of a turn by hand", "jacobian_times", None, times("hand")),
-    ("one state of a batch, us", "batch_times", DFD, us("side by side, ns")),
+    ("one state of a batch, one core, us (one by one)", "batch_times", DFD, alone),
     ("**Hessian of lambda^T (H v_dot + C), from C**, us", "hessian_times", None, us("ns")),
     ("from Python (of it outside C), us", "call_times", HESSIAN, waited),
     ("C by CasADi, the same numbers", "hessian_times", None, times("casadi")),
     ("C by CasADi, only what is not zero of a triangle", "hessian_times", None, times("sparse")),
-    ("one state of a batch, us", "batch_times", HESSIAN, us("side by side, ns")),
+    ("one state of a batch, one core, us (one by one)", "batch_times", HESSIAN, alone),
     ("**flight of 0.6 s, off by 1e-6, for the caller**, us", "flights", None, us("caller_us", 1)),
     ("times real time", "flights", None, us("real_time_factor", 1)),
     (
