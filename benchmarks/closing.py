@@ -65,11 +65,33 @@ FIGURES = (
 
 def closing(report: dict) -> list[dict]:
     """Return the rows of the closing table; before: what ``before.json`` has of the same."""
-    before = json.loads(BEFORE.read_text()) if BEFORE.exists() else {"machine": "", "figures": {}}
+    before = recorded()["figures"] if comparable(report) else {}
     return [
         {key: row[key] for key in row if key != "figure"} | closed(figure, row, report, before)
         for figure, row in present(report)
     ]
+
+
+def recorded() -> dict:
+    """Return what ``before.json`` holds; nothing where it is not there."""
+    return json.loads(BEFORE.read_text()) if BEFORE.exists() else {"machine": "", "figures": {}}
+
+
+def comparable(report: dict) -> bool:
+    """Tell whether the figures before are of the machine of a report."""
+    return recorded()["machine"] == report["machine"]["processor"]
+
+
+def about(report: dict) -> str:
+    """Say what the closing table's columns are, and what before is."""
+    place = recorded()["machine"] or "none"
+    told = "" if comparable(report) else f", of another processor ({place}), so not shown"
+    return (
+        f"Before: the same benchmark of the code before, as benchmarks/before.json has it{told}. "
+        "Peer's best: of all peers and compilers. Limit: operations that are needed, at the core's "
+        "peak of multiply-adds, of scalars for v_dot from C, else of vectors: no code can be "
+        "faster, most cannot come near."
+    )
 
 
 def figures(report: dict) -> dict:
@@ -95,7 +117,7 @@ def name_of(figure: Figure, row: dict) -> str:
 
 def closed(figure: Figure, row: dict, report: dict, before: dict) -> dict:
     """Return the numbers of one row."""
-    value, old = row["value"], before["figures"].get(name_of(figure, row))
+    value, old = row["value"], before.get(name_of(figure, row))
     peer, limit = best_peer(figure, row, report), floor(figure, row, report)
     there = {"before": old or "", "value": value, "unit": figure.unit}
     gain = (value / old if figure.most else old / value) if old else None

@@ -7,17 +7,11 @@ import json
 from pathlib import Path
 
 from benchmarks import readme
-from benchmarks.closing import closing, figures
+from benchmarks.closing import about, closing, figures
 from benchmarks.fixtures import COLUMNS
 from benchmarks.targets import judged
 
 NOTABLE = 1.15  # ratio to the last run from which a figure is listed
-CLOSING = (
-    "Before: the same benchmark of the code before, as benchmarks/before.json has it, which is a "
-    "figures.json. Peer's best: of all peers and compilers. Limit: operations that are needed, at "
-    "the core's peak of multiply-adds, of scalars for v_dot from C, else of vectors: no code can "
-    "be faster, most cannot come near."
-)
 TARGETS = "What is asked, what was found in this run, by minima; ratios: times slower."
 
 
@@ -30,7 +24,7 @@ def written(folder: Path, report: dict, words: dict[str, str], pictures: list[Pa
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / "report.json"
     last = json.loads(path.read_text()) if path.is_file() else None
-    sections = [("closing", CLOSING, closing(report)), ("targets", TARGETS, judged(report))]
+    sections = [("closing", about(report), closing(report)), ("targets", TARGETS, judged(report))]
     sections += [(name, inspect.cleandoc(words[name]), report[name]) for name in words]
     sections.append(("seconds", "What each measure took.", report["seconds"]))
     sections.append(("since the last run", *changes(report, last)))

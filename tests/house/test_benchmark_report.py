@@ -42,6 +42,7 @@ def test_the_closing_table_has_before_peer_and_limit(monkeypatch, tmp_path):
     slower = json.loads(json.dumps(REPORT))
     slower["speed"][0]["ns"], slower["rollout_rates"][0]["6000 in a call, 1/s"] = 150.0, 7160.5
     (tmp_path / "before.json").write_text(json.dumps(closing.figures(slower)))
+    assert "so not shown" not in closing.about(REPORT)
     eight, four, flights = closing.closing(REPORT)
     assert (eight["before"], eight["value"], eight["times faster"]) == (150.0, 100.0, "1.50x")
     assert (eight["peer's best"], eight["peer"]) == (80.0, "0.80x slower")
@@ -49,6 +50,14 @@ def test_the_closing_table_has_before_peer_and_limit(monkeypatch, tmp_path):
     # no peak and no CasADi were measured there
     assert (four["times faster"], four["peer's best"], four["limit"]) == ("1.00x", 500.0, "")
     assert (flights["times faster"], flights["peer"]) == ("2.00x", "")
+
+
+def test_figures_of_another_machine_are_not_compared(monkeypatch, tmp_path):
+    monkeypatch.setattr(closing, "BEFORE", tmp_path / "before.json")
+    other = closing.figures(REPORT) | {"machine": "another"}
+    (tmp_path / "before.json").write_text(json.dumps(other))
+    assert "of another processor (another), so not shown" in closing.about(REPORT)
+    assert {row["before"] for row in closing.closing(REPORT)} == {""}
 
 
 def test_the_table_of_the_readme_has_both_processors_in_a_cell():
