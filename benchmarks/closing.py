@@ -122,7 +122,7 @@ def closed(figure: Figure, row: dict, report: dict, before: dict) -> dict:
     there = {"before": old or "", "value": value, "unit": figure.unit}
     gain = (value / old if figure.most else old / value) if old else None
     there |= {"times faster": f"{gain:.2f}x" if gain else ""}
-    there |= {"peer's best": peer or "", "peer": f"{peer / value:.2f}x slower" if peer else ""}
+    there |= {"peer's best": peer or "", "peer / ours": f"{peer / value:.2f}x" if peer else ""}
     there |= {"limit": limit or "", "left": f"{value / limit:.1f}x" if limit else ""}
     return there | {"of the peak": f"{limit / value:.0%}" if limit else ""}
 

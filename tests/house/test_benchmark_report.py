@@ -45,11 +45,11 @@ def test_the_closing_table_has_before_peer_and_limit(monkeypatch, tmp_path):
     assert "so not shown" not in closing.about(REPORT)
     eight, four, flights = closing.closing(REPORT)
     assert (eight["before"], eight["value"], eight["times faster"]) == (150.0, 100.0, "1.50x")
-    assert (eight["peer's best"], eight["peer"]) == (80.0, "0.80x slower")
+    assert (eight["peer's best"], eight["peer / ours"]) == (80.0, "0.80x")
     assert (eight["limit"], eight["left"], eight["of the peak"]) == (50.0, "2.0x", "50%")
     # no peak and no CasADi were measured there
     assert (four["times faster"], four["peer's best"], four["limit"]) == ("1.00x", 500.0, "")
-    assert (flights["times faster"], flights["peer"]) == ("2.00x", "")
+    assert (flights["times faster"], flights["peer / ours"]) == ("2.00x", "")
 
 
 def test_figures_of_another_machine_are_not_compared(monkeypatch, tmp_path):
