@@ -1,9 +1,13 @@
-"""Times batches and rollouts beside single calls."""
+"""Times batches and rollouts beside single calls, with the thresholds that users get."""
+
+if __name__ == "__main__":
+    from benchmarks import alone
+
+    alone.main("batches", __doc__)
 
 import ctypes
 import time
 from pathlib import Path
-from unittest import mock
 
 import numpy as np
 
@@ -11,98 +15,123 @@ import serpentail as st
 from benchmarks.fixtures import built, label
 from serpentail.model.batch import MIN_BATCH
 from serpentail.model.kernel import aligned, argument_record
-from serpentail.simulation import batched_runs
 
-STATES, ROUNDS = 512, 300  # a batch that stays in the cache
-FLIGHTS = 64
-SIZES = ((1, 3), (2, 3), (3, 4), (6, 6), (3, None))
+STATES, ROUNDS = 512, 100  # a batch that stays in the cache
+MANY = 20  # times as many in a call from Python
+FD, DFD = "forward_dynamics", "forward_dynamics_derivatives"
+HESSIAN = "inverse_dynamics_hessian"
+BATCHES = {
+    FD: ((1, 3), (2, 3), (3, 4), (6, 6), (8, 16), (3, None)),
+    DFD: ((1, 3), (3, 4)),
+    HESSIAN: ((1, 3), (3, 4)),
+}
+FLIGHTS = (64, 6000)  # of 200 steps: of the second number there are more than a million
+FLOWN = ((1, 3), (3, 4), (6, 6), (3, None))
 
 
 def batch_times(folder: Path) -> list[dict]:
-    """Nanoseconds a state of one core: forward dynamics one by one, and side by side; and from
-    Python, all cores.
+    """Nanoseconds a state: on one core in C, one by one and as a user's batch of 1000 states or
+    more is evaluated; for the caller in Python, on all cores.
 
-    Both check that arguments and results are finite. Target: side by side 6x faster (AVX-512).
+    All check that arguments and results are finite.  Where a function has no batches, a batch is
+    evaluated one by one.
     """
-    rows = []
-    for size in SIZES:
-        model = built(*size)
-        alone, together = c_times(model)
-        many = random_states(model, 100 * STATES)
-        whole = best(lambda model=model, many=many: model.forward_dynamics(*many), 7) / len(many[0])
-        row = {"model": label(*size), "one by one, ns": alone, "side by side, ns": together}
-        rows.append(row | {"ratio": alone / together, "from Python, all cores, ns": whole})
-    return rows
+    return [batch_row(name, size) for name, sizes in BATCHES.items() for size in sizes]
+
+
+def batch_row(name: str, size: tuple) -> dict:
+    """Return the times of one function of one tail."""
+    model = built(*size, functions=[name])
+    alone, together = c_times(model, name)
+    many = random_inputs(model, name, MANY * STATES)
+    kernel = model.kernels[name]
+    kernel(*many)  # compiles, starts threads
+    whole = best(lambda: kernel(*many), 5) / len(many[0])
+    row = {"function": name, "model": label(*size), "one by one, ns": alone}
+    row |= {"side by side, ns": together, "ratio": alone / together}
+    return row | {"for the caller, all cores, ns": whole}
 
 
 def rollout_rates(folder: Path) -> list[dict]:
-    """Damped flights of 200 steps of RK4, 11 samples, a second: one call each, all in one call, and
-    abreast in it.
+    """Damped flights of 200 steps of RK4, 11 samples, a second, for the caller: one call each, and
+    so many in one call on all cores, each with its own parameters.
 
-    All but the first on all cores, each flight with its own parameters. Last: what a flight of one
-    step takes, which is
-    what a run costs besides its steps. Target: abreast 3x faster, 50 us.
+    Whether those fly abreast in lanes is left to st.simulate.  Last: microseconds of a flight of
+    one step among 64, which is what a run costs besides its steps.
     """
     rows = []
-    for size in SIZES:
+    for size in FLOWN:
         model = built(*size)
-        q, v, _ = random_states(model, FLIGHTS)
-        q[:, 3] += 2
-        times = np.min([flight_times(model, q, v) for _ in range(9)], axis=0) / FLIGHTS
-        rates = dict(
-            zip(("one by one, 1/s", "at once, 1/s", "abreast, 1/s"), 1e9 / times, strict=False)
-        )
-        rows.append(
-            {"model": label(*size)}
-            | rates
-            | {"ratio": times[1] / times[2], "a run, us": times[3] / 1e3}
-        )
+        row: dict = {"model": label(*size), "one call each, 1/s": alone_rate(model)}
+        for count in FLIGHTS:
+            row[f"{count} in a call, 1/s"] = 1e9 / flight_ns(model, count, 0.2, 0.02)
+        rows.append(row | {"a run, us": flight_ns(model, FLIGHTS[0], 1e-3, 1e-3) / 1e3})
     return rows
 
 
-def flight_times(model, q: np.ndarray, v: np.ndarray) -> list[float]:
-    """Return nanoseconds of all flights by each way, and of flights of one step."""
-    settings = {
-        "controller": st.Damping(1e-6),
-        "t_span": 0.2,
-        "step": 1e-3,
-        "output_step": 0.02,
-        "method": "rk4",
-    }
-    own = {"tail_mass": np.linspace(0.003, 0.004, len(q))}
-    models = [model.with_parameters(tail_mass=mass) for mass in own["tail_mass"]]
-    ways = [lambda: [st.simulate(*one, **settings) for one in zip(models, q, v, strict=True)]]
-    ways.append(lambda: st.simulate(model, q, v, parameters=own, **settings))
-    found = []
-    for way, many in zip((*ways, ways[1]), (np.inf, np.inf, 1), strict=True):
-        with mock.patch.object(batched_runs, "MIN_BATCHED_STEPS", many):
-            found.append(best(way, 1))
-    step = settings | {"t_span": 1e-3, "output_step": 1e-3}
-    return [*found, best(lambda: st.simulate(model, q, v, parameters=own, **step), 1)]
+def alone_rate(model: st.Model) -> float:
+    """Return flights a second, each by a call of its own."""
+    q, v = flown(model, FLIGHTS[0])
+    settings = settled(0.2, 0.02)
+    models = [model.with_parameters(tail_mass=mass) for mass in masses(len(q))]
+    calls = list(zip(models, q, v, strict=True))
+    return 1e9 * len(q) / best(lambda: [st.simulate(*call, **settings) for call in calls], 5)
 
 
-def random_states(model, count: int) -> tuple[np.ndarray, ...]:
+def flight_ns(model: st.Model, count: int, t_span: float, output_step: float) -> float:
+    """Return nanoseconds a flight of so many in one call."""
+    q, v = flown(model, count)
+    own, settings = {"tail_mass": masses(count)}, settled(t_span, output_step)
+    return best(lambda: st.simulate(model, q, v, parameters=own, **settings), 3) / count
+
+
+def settled(t_span: float, output_step: float) -> dict:
+    """Return the settings of a flight."""
+    times = {"t_span": t_span, "output_step": output_step}
+    return {"controller": st.Damping(1e-6), "step": 1e-3, "method": "rk4"} | times
+
+
+def masses(count: int) -> np.ndarray:
+    """Return a tail's mass (kg) for each flight."""
+    return np.linspace(0.003, 0.004, count)
+
+
+def flown(model: st.Model, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return q, v of as many starts."""
+    q, v, _ = random_states(model, count)
+    q[:, 3] += 2
+    return q, v
+
+
+def random_states(model: st.Model, count: int) -> tuple[np.ndarray, ...]:
     """Return q, v and tau."""
-    rng = np.random.default_rng(1)
-    return tuple(
-        0.5 * rng.normal(size=(count, size)) for size in (model.nq, model.nv, model.nv - 6)
-    )
+    return random_inputs(model, FD, count)
 
 
-def c_times(model) -> tuple[float, float]:
-    """Return nanoseconds a state of both C functions of forward dynamics, rounds interleaved."""
-    kernel, keep, calls = model.kernels["forward_dynamics"], [], []
-    states = [x.astype(kernel.dtype) for x in random_states(model, STATES)]
-    out = np.empty((STATES, model.nv), kernel.dtype)
-    for function, size in (
-        (kernel.function, kernel.work),
-        (kernel.batch_library.entry(kernel.name, MIN_BATCH), None),
-    ):
-        keep.append(aligned(size or kernel.batch_library.work[kernel.name], kernel.dtype))
-        record = argument_record(kernel.parameters, STATES, keep[-1], (*states, out))
+def random_inputs(model: st.Model, name: str, count: int) -> tuple[np.ndarray, ...]:
+    """Return all inputs of a function, of so many states."""
+    rng, shapes = np.random.default_rng(1), model.kernels[name].shapes
+    return tuple(0.5 * rng.normal(size=(count, *shape)) for shape in shapes)
+
+
+def c_times(model: st.Model, name: str = FD) -> tuple[float, float]:
+    """Return nanoseconds a state of both C functions of one function, rounds interleaved; of one
+    that has no batches the same twice.
+    """
+    kernel, keep, calls = model.kernels[name], [], []
+    states = [x.astype(kernel.dtype) for x in random_inputs(model, name, STATES)]
+    out = [np.empty((STATES, *shape), kernel.dtype) for shape in kernel.out_shapes]
+    ways = [(kernel.function, kernel.work)]
+    if (together := kernel.batch_library.entry(name, MIN_BATCH)) is not None:
+        ways.append((together, kernel.batch_library.work[name]))
+    for function, size in ways:
+        keep.append(aligned(size, kernel.dtype))
+        record = argument_record(kernel.parameters, STATES, keep[-1], (*states, *out))
         calls.append(lambda function=function, record=record: function(ctypes.addressof(record)))
-    times = [[best(call, 1) for call in calls] for _ in range(ROUNDS)]
-    return tuple(np.min(times, axis=0) / STATES)
+    if failed := [call() for call in calls if call()]:
+        raise RuntimeError(f"{name}: status {failed[0]} at a random state")
+    times = np.min([[best(call, 1) for call in calls] for _ in range(ROUNDS)], axis=0) / STATES
+    return times[0], times[-1]
 
 
 def best(call, repeats: int) -> float:

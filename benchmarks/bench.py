@@ -1,6 +1,8 @@
-"""`make bench`: measures generation, speed, drift and precision in one run, and reports.
+"""`make bench`: measures speed beside peers, generation, drift and precision, and reports.
 
-It needs an idle machine and takes about an hour.
+It needs an idle machine and takes about half an hour. What hangs on the processor is measured for
+AVX-512 and for AVX2 where the machine has both. One file of measures runs alone as
+`.venv/bin/python -m benchmarks.batches`, say.
 """
 
 from examples import front

@@ -5,6 +5,11 @@ Times are processor time of single calls from C, the least of many rounds over t
 functions in turn.
 """
 
+if __name__ == "__main__":
+    from benchmarks import alone
+
+    alone.main("contact_costs", __doc__)
+
 import json
 import subprocess
 from pathlib import Path

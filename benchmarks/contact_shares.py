@@ -1,5 +1,10 @@
 """Where the time of a run on the ground goes: its calls of the model's C, and all else."""
 
+if __name__ == "__main__":
+    from benchmarks import alone
+
+    alone.main("contact_shares", __doc__)
+
 import time
 from pathlib import Path
 

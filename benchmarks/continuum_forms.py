@@ -2,6 +2,11 @@
 times, a picture.
 """
 
+if __name__ == "__main__":
+    from benchmarks import alone
+
+    alone.main("continuum_forms", __doc__)
+
 from pathlib import Path
 
 import numpy as np

@@ -1,6 +1,13 @@
 """Derivatives in C beside Pinocchio's and CasADi's: run times, sizes and build times."""
 
+if __name__ == "__main__":
+    from benchmarks import alone
+
+    alone.main("derivatives", __doc__)
+
 import resource
+from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -10,9 +17,10 @@ from serpentail.building.generator import generate
 from serpentail.model.compiler import compile_library
 from serpentail_codegen.scene.signatures.table import DERIVATIVES
 
-from .fixtures import Fixture, fixture
+from .comparison import compared
+from .fixtures import by_clang, fixture, label
 from .peers import build, pinocchio, timing
-from .peers.casadi_derivatives import IN_SX, OVER, InCasadi, hessian, in_casadi, jacobians
+from .peers.casadi_derivatives import IN_SX, InCasadi, hessian, in_casadi, jacobians
 
 SIZES = ((1, 3), (3, 4), (6, 6))
 ROUNDS, CALLS = 200, 64
@@ -41,63 +49,50 @@ def generated(parent: Path, size: tuple[int, int], functions, emission: str = "a
 
 def jacobian_times(folder: Path) -> list[dict]:
     """Nanoseconds of the Jacobians of v_dot from (q, v, tau), forward dynamics included, rounds
-    interleaved.
+    interleaved; each peer by the faster of the compilers.
 
     Ratios by minima (by medians in brackets).  Pinocchio, full chain of 2 m n revolutes: v_dot,
-    computeRNEADerivatives
-    there, G^T (...) G, Cholesky; as its documentation shows it, and with all that was found to
-    speed it up
-    (pinocchio_derivatives.cpp); own sums over the tied columns on its types.  CasADi: C of the SX
-    graph of -H^-1 dID,
-    cse, gcc -O2 -march=native, by its Jacobian along all directions and with the columns of a turn
-    written by hand.
+    computeRNEADerivatives there, G^T (...) G, Cholesky; as its documentation shows it, and with all
+    that was found to speed it up (pinocchio_derivatives.cpp); own sums over the tied columns on its
+    types.  CasADi: C of the SX graph of -H^-1 dID, cse, -O2, by its Jacobian along all directions
+    and with the columns of a turn written by hand; it writes no column that is zero throughout.
     Differences: of the documented path, which loses two digits as B is a metre from the origin; the
-    largest of the
-    others.
+    largest of the others.  Ours is compiled as its users have it, and by clang beside that.
     """
-    return [jacobian_row(folder, size) for size in SIZES]
+    plain, tuned = (
+        build.by_each(partial(build.build_library, source, build.CACHE))
+        for source in (build.PLAIN, build.DERIVATIVES)
+    )
+    return [jacobian_row(folder, size, plain, tuned) for size in SIZES]
 
 
-def jacobian_row(folder: Path, size: tuple[int, int]) -> dict:
-    """Measure one size."""
+def jacobian_row(folder: Path, size: tuple[int, int], plain: dict, tuned: dict) -> dict:
+    """Measure one size; the libraries by compiler."""
     ours = fixture(st.load(generated(folder, size, (*IN_SX, JACOBIANS))), folder, JACOBIANS)
     by_hand = in_casadi("by_hand", jacobians(ours.model, True), ours.model, folder)
-    by_itself = by_hand and in_casadi(
-        "by_itself", jacobians(ours.model, False), ours.model, folder
-    )  # the larger text
+    by_itself = in_casadi("by_itself", jacobians(ours.model, False), ours.model, folder)
     states = timing.random_states(size[0])
-    libraries = (
-        build.build_library(source, build.CACHE) for source in (build.PLAIN, build.DERIVATIVES)
-    )
-    plain, tuned = (
-        pinocchio.PinocchioBench(*size, ours.parameters, library) for library in libraries
-    )
-    with plain, tuned:
-        found = {"plain": plain.derivatives_closure, "revolutes": tuned.derivatives_closure}
-        found["own"] = tuned.own_derivatives_closure
-        found |= {"casadi": by_itself and by_itself.closure, "hand": by_hand and by_hand.closure}
-        row = {"model": f"({size[0]}, {size[1]})"} | compared(ours, found, states)
-        row["gcc_s"] = by_itself.seconds if by_itself else OVER
-        row["plain_difference"] = pinocchio_difference(ours.model, plain, states)
-        errors = [pinocchio_difference(ours.model, tuned, states, path) for path in ("", "_own")]
-    errors += [casadi_difference(ours.model, peer, states) for peer in (by_itself, by_hand) if peer]
-    row["jacobian_difference"] = max(errors)
-    return row
-
-
-def compared(
-    ours: Fixture, others: dict[str, timing.Closure | None], states: timing.States
-) -> dict:
-    """Time all in one go; a peer that is None is one that gcc did not finish."""
-    there = {name: closure for name, closure in others.items() if closure}
-    times = timing.time_rounds([ours.closure, *there.values()], states, ROUNDS, CALLS)
-    own, found = times[0], dict(zip(there, times[1:], strict=True))
-    row = {"ns": own[0], "median_ns": own[1]}
-    for name in others:
-        least, median = found.get(name, (None, None))
-        row[f"{name}_ns"] = least or OVER
-        row[f"{name}_ratio"] = f"{least / own[0]:.1f}x ({median / own[1]:.1f}x)" if least else ""
-    return row
+    with ExitStack() as freed:
+        plain, tuned = (pinocchio.chains(freed, made, size, ours) for made in (plain, tuned))
+        peers = {
+            "plain": {by: peer.derivatives_closure for by, peer in plain.items()},
+            "revolutes": {by: peer.derivatives_closure for by, peer in tuned.items()},
+            "own": {by: peer.own_derivatives_closure for by, peer in tuned.items()},
+            "casadi": {by: peer.closure for by, peer in by_itself.items()},
+            "hand": {by: peer.closure for by, peer in by_hand.items()},
+        }
+        row = {"model": label(*size)} | compared(
+            ours, peers, states, ROUNDS, CALLS, by_clang(ours.model, folder, JACOBIANS)
+        )
+        first = pinocchio_difference(ours.model, next(iter(plain.values())), states)
+        errors = [
+            pinocchio_difference(ours.model, peer, states, path)
+            for peer in tuned.values()
+            for path in ("", "_own")
+        ]
+    casadi = (*by_itself.values(), *by_hand.values())
+    errors += [casadi_difference(ours.model, peer, states) for peer in casadi]
+    return row | {"plain_difference": first, "jacobian_difference": max(errors)}
 
 
 def pinocchio_difference(
@@ -135,24 +130,41 @@ def difference(a: np.ndarray, b: np.ndarray) -> float:
 
 
 def hessian_times(folder: Path) -> list[dict]:
-    """Nanoseconds of the Hessian of lambda^T (H v_dot + C) from C, all blocks that are not zero,
-    rounds interleaved.
+    """Nanoseconds of the Hessian of lambda^T (H v_dot + C) from C, rounds interleaved.
 
-    CasADi: SX, Jacobian of the gradient, its lower triangle only, and the mixed block; cse, gcc -O2
-    -march=native. Ratio by minima (by medians in brackets).
+    Ours writes four square blocks, zeros and both triangles of symmetric ones included.  CasADi:
+    SX, Jacobian of the gradient; cse, -O2, by the faster of the compilers.  In like terms: the same
+    four blocks.  Its nonzeros: of the lower triangle and of the mixed block, less than ours gives.
+    Ratios by minima (by medians in brackets).  Ours by clang beside it, too.
     """
     rows = []
     for size in SIZES[:2]:
         ours = fixture(st.load(generated(folder, size, (*IN_SX, HESSIAN))), folder, HESSIAN)
-        peer = in_casadi("hessian", hessian(ours.model), ours.model, folder)
         states = multiplied(timing.random_states(size[0]))
-        row = {"model": f"({size[0]}, {size[1]})"} | compared(
-            ours, {"casadi": peer and peer.closure}, states
+        alike, sparse = (
+            in_casadi(name, hessian(ours.model, name == "dense"), ours.model, folder)
+            for name in ("dense", "sparse")
         )
-        row["gcc_s"] = peer.seconds if peer else OVER
-        row["hessian_difference"] = hessian_difference(ours.model, peer, states) if peer else ""
-        rows.append(row)
+        peers = {
+            "casadi": {by: peer.closure for by, peer in alike.items()},
+            "sparse": {by: peer.closure for by, peer in sparse.items()},
+        }
+        row = {"model": label(*size)} | compared(
+            ours, peers, states, ROUNDS, CALLS, by_clang(ours.model, folder, HESSIAN)
+        )
+        errors = [hessian_difference(ours.model, peer, states) for peer in sparse.values()]
+        errors += [block_difference(ours.model, peer, states) for peer in alike.values()]
+        rows.append(row | {"hessian_difference": max(errors)})
     return rows
+
+
+def block_difference(model: st.Model, peer: InCasadi, states: timing.States) -> float:
+    """Largest difference in the four blocks."""
+    errors = []
+    for q, v, both in zip(*states, strict=True):
+        blocks = model.inverse_dynamics_hessian(q, v, *np.split(both, 2))
+        errors.append(difference(np.hstack(blocks), peer(q, v, both)[0]))
+    return max(errors)
 
 
 def multiplied(states: timing.States) -> timing.States:

@@ -8,9 +8,12 @@ from pathlib import Path
 import numpy as np
 
 import serpentail as st
+from benchmarks.peers.build import CACHE, build_library
+from benchmarks.peers.compilers import Compiler, compilers
 from benchmarks.peers.timing import Closure
 from serpentail.model.compiler import compile_library
 from serpentail.model.kernel import aligned
+from serpentail.model.toolchain import PROFILES
 
 ADAPTER = """
 #include "{prefix}.h"
@@ -43,8 +46,9 @@ COLUMNS = {
     "own_ratio": "times slower",
     "continuum_ns": "continuum, ns",
     "articulated_ns": "articulated (m, 3), ns",
-    "us": "us a call",
-    "overhead_us": "of it outside C",
+    "c_us": "in C, us",
+    "caller_us": "for the caller, us",
+    "overhead_us": "of it outside C, us",
     "energy_drift": "energy drift",
     "momentum_drift": "momentum drift",
     "quaternion": "norm error",
@@ -66,7 +70,25 @@ COLUMNS = {
     "casadi_ratio": "times slower",
     "hand_ns": "the same, turn by hand, ns",
     "hand_ratio": "times slower",
-    "gcc_s": "gcc on CasADi's C, s",
+    "clang_ns": "ours by clang, ns",
+    "clang_ratio": "times ours",
+    "clang_by": "by",
+    "sparse_ns": "CasADi's C, its nonzeros, ns",
+    "sparse_ratio": "times slower",
+    "plain_by": "by",
+    "tuned_by": "by",
+    "own_by": "by",
+    "revolutes_by": "by",
+    "mujoco_by": "by",
+    "casadi_by": "by",
+    "hand_by": "by",
+    "sparse_by": "by",
+    "scalar_gf": "peak of scalars, GF/s",
+    "vector_gf": "peak of vectors, GF/s",
+    "took_s": "took, s",
+    "v_dot_ns": "v_dot, ns",
+    "jacobians_ns": "its Jacobians, ns",
+    "value": "after",
     "plain_difference": "difference: Pinocchio",
     "jacobian_difference": "others",
     "hessian_difference": "difference",
@@ -76,6 +98,8 @@ COLUMNS = {
     "derivative_bytes": "C text, bytes",
     "generate_cpu": "generate, CPU s",
     "compile_cpu": "compile, CPU s",
+    "ms": "for the caller, ms",
+    "cpu_ms": "processor, ms",
     "real_time_factor": "times real time",
     "lsoda_ms": "SciPy's LSODA, ms",
     "lsoda_error": "its error",
@@ -118,13 +142,18 @@ class Fixture:
         return dict(self.model.parameters)
 
 
-def fixture(model: st.Model, scratch: Path, function: str = "forward_dynamics") -> Fixture:
+def fixture(
+    model: st.Model,
+    scratch: Path,
+    function: str = "forward_dynamics",
+    compiler: Compiler | None = None,
+) -> Fixture:
     """Compile an adapter of one of a model's functions to the timer's call.
 
     The third array of the timer holds all inputs after q and v, one after the other; more than one
     output stays in the context, behind the workspace, which begins at a cache line.
+    compiler: one of the peers', by default what users of the model get.
     """
-    folder = model.folder
     work = -(-(model.manifest["work"][function] + 1) // 8) * 8
     inputs, outputs = (
         sizes(model.manifest["functions"][function][key]) for key in ("inputs", "outputs")
@@ -141,9 +170,7 @@ def fixture(model: st.Model, scratch: Path, function: str = "forward_dynamics") 
         arguments=", ".join(arguments),
     )
     adapter.write_text(text)
-    library = ctypes.CDLL(
-        str(compile_library([adapter, folder / "src" / f"{model.name}.c"], folder / "include"))
-    )
+    library = ctypes.CDLL(str(compiled(model, adapter, compiler)))
     context = aligned(work + len(model.parameter_vector) + sum(outputs), float)
     context[work : work + len(model.parameter_vector)] = model.parameter_vector
     return Fixture(
@@ -151,6 +178,23 @@ def fixture(model: st.Model, scratch: Path, function: str = "forward_dynamics") 
         Closure(ctypes.cast(library.measured, ctypes.c_void_p).value, context.ctypes.data),
         context,
     )
+
+
+def compiled(model: st.Model, adapter: Path, compiler: Compiler | None) -> Path:
+    """Return the library of a model and an adapter of it."""
+    source, include = model.folder / "src" / f"{model.name}.c", model.folder / "include"
+    if compiler is None:
+        return compile_library([adapter, source], include)
+    both = adapter.with_name(f"{adapter.stem}_{compiler.name}.c")
+    both.write_text(source.read_text() + adapter.read_text())
+    profile = [flag for flag in PROFILES["fast"] if flag.startswith("-fno")]
+    return build_library(both, CACHE, compiler, ("-I", str(include), "-lm", *profile))
+
+
+def by_clang(model: st.Model, scratch: Path, function: str) -> dict[str, Fixture]:
+    """Return a fixture of a function by clang, where that is here."""
+    found = (compiler for compiler in compilers() if compiler.name == "clang")
+    return {each.name: fixture(model, scratch, function, each) for each in found}
 
 
 def sizes(arguments: list[dict]) -> list[int]:

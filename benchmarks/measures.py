@@ -1,84 +1,159 @@
 """What `make bench` measures, in this order, and the report of one run of it."""
 
+import json
 import os
-import platform
+import subprocess
 import sys
 import tempfile
+import time
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 from benchmarks import (
     batches,
+    callers,
     contact_costs,
     contact_shares,
     continuum_forms,
     derivatives,
+    long_tails,
+    operations,
     pages,
+    peak,
     planning,
     precisions,
+    processors,
     scaling,
     simulations,
     speeds,
 )
+from benchmarks.peers import compilers
 from benchmarks.peers import mujoco_casadi as more_peers
 from benchmarks.peers import soromox as continuum_peer
 from benchmarks.report import written
 from serpentail.stages import Stage
 
+ROOT = Path(__file__).resolve().parent.parent
+
+
+class Measure(NamedTuple):
+    """What gives a table's rows; each: once for each processor."""
+
+    rows: Callable[[Path], list[dict]]
+    each: bool = False
+
+
 MEASURES = {
-    "generation": speeds.generation,
-    "speed": speeds.speed,
-    "other_peers": more_peers.other_peers,
-    "scaling": scaling.scaling,
-    "batch_times": batches.batch_times,
-    "rollout_rates": batches.rollout_rates,
-    "precision_times": precisions.precision_times,
-    "tails": speeds.tails,
-    "continuum_peer": continuum_peer.continuum_peer,
-    "jacobian_times": derivatives.jacobian_times,
-    "hessian_times": derivatives.hessian_times,
-    "derivative_code": derivatives.derivative_code,
-    "python_overhead": speeds.python_overhead,
-    "drift": speeds.drift,
-    "work_precision": speeds.work_precision,
-    "simulation_summary": simulations.simulation_summary,
-    "simulation_times": simulations.simulation_times,
-    "mujoco_times": simulations.mujoco_times,
-    "contact_costs": contact_costs.contact_costs,
-    "contact_shares": contact_shares.contact_shares,
-    "continuum_forms": continuum_forms.form_errors,
-    "continuum_form_times": continuum_forms.form_times,
-    "planning": planning.planning,
-    "page_speed": pages.page_speed,
+    "peak": Measure(peak.peaks, True),
+    "speed": Measure(speeds.speed, True),
+    "other_peers": Measure(more_peers.other_peers, True),
+    "jacobian_times": Measure(derivatives.jacobian_times, True),
+    "hessian_times": Measure(derivatives.hessian_times, True),
+    "batch_times": Measure(batches.batch_times, True),
+    "long_times": Measure(long_tails.long_times, True),
+    "call_times": Measure(callers.call_times, True),
+    "flight_times": Measure(callers.flight_times, True),
+    "rollout_rates": Measure(batches.rollout_rates, True),
+    "operation_counts": Measure(operations.operation_counts),
+    "generation": Measure(speeds.generation),
+    "derivative_code": Measure(derivatives.derivative_code),
+    "scaling": Measure(scaling.scaling),
+    "tails": Measure(speeds.tails),
+    "continuum_peer": Measure(continuum_peer.continuum_peer),
+    "precision_times": Measure(precisions.precision_times),
+    "drift": Measure(speeds.drift),
+    "work_precision": Measure(speeds.work_precision),
+    "simulation_summary": Measure(simulations.simulation_summary),
+    "simulation_times": Measure(simulations.simulation_times),
+    "mujoco_times": Measure(simulations.mujoco_times),
+    "contact_costs": Measure(contact_costs.contact_costs),
+    "contact_shares": Measure(contact_shares.contact_shares),
+    "continuum_forms": Measure(continuum_forms.form_errors),
+    "continuum_form_times": Measure(continuum_forms.form_times),
+    "planning": Measure(planning.planning),
+    "page_speed": Measure(pages.page_speed),
 }
+# a process that keeps to a lesser processor: a folder, then names of measures
+CHILD = """
+import json, sys
+from pathlib import Path
+import serpentail as st
+from benchmarks.measures import measured
+with st.progress():
+    found = measured(sys.argv[2:], Path(sys.argv[1]))
+(Path(sys.argv[1]) / "found.json").write_text(json.dumps(found, default=float))
+"""
 
 
-def bench(output: Path) -> None:
-    """Measure everything, write the report, print it."""
-    report = {"machine": machine()}
-    with tempfile.TemporaryDirectory() as folder, Stage("bench") as stage:
-        for done, (name, measure) in enumerate(MEASURES.items()):
-            stage.tell(done / len(MEASURES), name.replace("_", " "))
-            report[name] = measure(Path(folder))
+def bench(output: Path, names: Sequence[str] = tuple(MEASURES)) -> None:
+    """Measure everything that is named, write the report, print it."""
+    there = processors.processors()
+    report: dict = {"machine": machine(there), "seconds": []}
+    with tempfile.TemporaryDirectory() as scratch:
+        for processor in there:
+            wanted = [name for name in names if MEASURES[name].each or processor is there[0]]
+            found = on(processor, wanted, Path(scratch))
+            for name, (rows, seconds) in found.items():
+                tag = {"processor": processor.name} if MEASURES[name].each else {}
+                report.setdefault(name, []).extend(tag | row for row in rows)
+                report["seconds"].append({"measure": name} | tag | {"took_s": seconds})
+    report = {name: report[name] for name in ("machine", *MEASURES, "seconds") if name in report}
     output.mkdir(parents=True, exist_ok=True)
-    pictures = [output / f"{name}.png" for name in ("continuum_forms", "scaling", "simulations")]
-    continuum_forms.draw(report["continuum_forms"], report["continuum_form_times"], pictures[0])
-    scaling.draw(report["scaling"], pictures[1])
-    simulations.draw(report["simulation_times"], pictures[2])
-    print(written(output, report, MEASURES, pictures))
-    print(f"written: {output}: report.md, report.html, report.json and pictures", file=sys.stderr)
+    pictures = drawn(report, output)
+    words = {name: MEASURES[name].rows.__doc__ for name in MEASURES if name in report}
+    print(written(output, report, words, pictures))
+    print(f"written: {output}: report.md, report.html, report.json, figures.json", file=sys.stderr)
 
 
-def machine() -> dict:
-    """Return the processor and compiler."""
+def on(processor: processors.Processor, names: list[str], scratch: Path) -> dict:
+    """Return what is measured on a processor: here, or in a process that keeps to it."""
+    if processor.level is None or not names:
+        return measured(names, scratch)
+    own = scratch / processor.name
+    own.mkdir()
+    command = [sys.executable, "-c", CHILD, str(own), *names]
+    subprocess.run(command, cwd=ROOT, env=processor.environment, check=True)
+    return json.loads((own / "found.json").read_text())
+
+
+def measured(names: Sequence[str], scratch: Path) -> dict[str, tuple[list[dict], float]]:
+    """Return the rows of measures, and the seconds that each took."""
+    found = {}
+    with Stage("bench", processors.march()) as stage:
+        for done, name in enumerate(names):
+            stage.tell(done / len(names), name.replace("_", " "))
+            begun = time.perf_counter()
+            found[name] = MEASURES[name].rows(scratch), time.perf_counter() - begun
+    return found
+
+
+def drawn(report: dict, output: Path) -> list[Path]:
+    """Draw the pictures of what was measured."""
+    draw = {
+        "continuum_form_times": lambda path: continuum_forms.draw(
+            report["continuum_forms"], report["continuum_form_times"], path
+        ),
+        "scaling": lambda path: scaling.draw(report["scaling"], path),
+        "simulation_times": lambda path: simulations.draw(report["simulation_times"], path),
+    }
+    names = {"continuum_form_times": "continuum_forms", "simulation_times": "simulations"}
+    pictures = []
+    for measure in (name for name in draw if name in report):
+        pictures.append(output / f"{names.get(measure, measure)}.png")
+        draw[measure](pictures[-1])
+    return pictures
+
+
+def machine(there: list[processors.Processor]) -> dict:
+    """Return the processor, what stands for which, and the compilers."""
     from serpentail.model.compiler import describe_compiler
 
-    lines = Path("/proc/cpuinfo").read_text().splitlines() if Path("/proc/cpuinfo").exists() else []
-    processor = next(
-        (line.split(":")[1].strip() for line in lines if line.startswith("model name")),
-        platform.machine(),
-    )
+    columns = [f"{p.name} as {p.level}" if p.level else p.name for p in there]
     return {
-        "processor": processor,
+        "processor": processors.processor_line("model name") or there[0].name,
         "cores": os.cpu_count(),
+        "columns": ", ".join([*columns, *processors.left_out(there)]),
         "compiler": describe_compiler()["version"].splitlines()[0],
+        "peers": compilers.told(compilers.compilers()),
     }

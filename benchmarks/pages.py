@@ -1,5 +1,10 @@
 """How large the page of a run is, and how fast a browser without a graphics processor plays it."""
 
+if __name__ == "__main__":
+    from benchmarks import alone
+
+    alone.main("pages", __doc__)
+
 import time
 from pathlib import Path
 

@@ -5,6 +5,11 @@ random tumbling start, 59 nodes (Hermite-Simpson, 29 intervals), the guess passi
 ways of solving it.
 """
 
+if __name__ == "__main__":
+    from benchmarks import alone
+
+    alone.main("planning", __doc__)
+
 import importlib.util
 import time
 from pathlib import Path

@@ -1,5 +1,10 @@
 """What float costs and gives: time of forward dynamics against its error, beside double."""
 
+if __name__ == "__main__":
+    from benchmarks import alone
+
+    alone.main("precisions", __doc__)
+
 from pathlib import Path
 
 import numpy as np

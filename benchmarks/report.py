@@ -2,32 +2,38 @@
 
 import html
 import inspect
+import itertools
 import json
-from collections.abc import Callable
 from pathlib import Path
 
+from benchmarks import readme
+from benchmarks.closing import about, closing, figures
 from benchmarks.fixtures import COLUMNS
 from benchmarks.targets import judged
 
-Report = dict[str, list[dict]]
 NOTABLE = 1.15  # ratio to the last run from which a figure is listed
+TARGETS = "What is asked, what was found in this run, by minima; ratios: times slower."
 
 
-def written(folder: Path, report: dict, measures: dict[str, Callable], pictures: list[Path]) -> str:
-    """Write report.json, report.md and report.html, the last run compared; return the Markdown."""
+def written(folder: Path, report: dict, words: dict[str, str], pictures: list[Path]) -> str:
+    """Write report.json, report.md, report.html and figures.json, the last run compared; return the
+    Markdown.
+
+    words: of each measure what its docstring says.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / "report.json"
     last = json.loads(path.read_text()) if path.is_file() else None
-    sections = [(name, inspect.cleandoc(measures[name].__doc__), report[name]) for name in measures]
-    about = "Times slower than serpentail: what is asked, what was found in this run, by minima."
-    sections.insert(0, ("targets", about, judged(report)))
+    sections = [("closing", about(report), closing(report)), ("targets", TARGETS, judged(report))]
+    sections += [(name, inspect.cleandoc(words[name]), report[name]) for name in words]
+    sections.append(("seconds", "What each measure took.", report["seconds"]))
     sections.append(("since the last run", *changes(report, last)))
-    head = ", ".join(str(value) for value in report["machine"].values())
-    text = "\n".join(
-        ["# Benchmark", "", head, "", *(line for s in sections for line in markdown(*s))]
-    )
+    head = "; ".join(str(value) for value in report["machine"].values())
+    lines = ["# Benchmark", "", head, "", *(line for s in sections for line in markdown(*s))]
+    text = "\n".join([*lines, "## README", "", "Its table:", "", *readme.block(report), ""])
     (folder / "report.md").write_text(text)
     (folder / "report.html").write_text(page(head, sections, pictures))
+    (folder / "figures.json").write_text(json.dumps(figures(report), indent=1) + "\n")
     path.write_text(json.dumps(report, indent=1))
     return text
 
@@ -59,22 +65,27 @@ def change(name: str, row: dict, before: dict, key: str) -> dict | None:
     """Return one time that changed."""
     old, new = before.get(key), row[key]
     time = "ns" in key.split("_") or key.endswith((" ns", "_s", "_ms", "_us"))
-    if not time or next(iter(row.values())) != next(iter(before.values())):
+    if not time or which(row) != which(before):
         return None
     if (
         not all(isinstance(x, float) and x > 0 for x in (old, new))
         or 1 / NOTABLE < new / old < NOTABLE
     ):
         return None
-    which = str(next(iter(row.values())))
     return {
         "measure": name,
-        "of": which,
+        "of": which(row),
         "figure": COLUMNS.get(key, key),
         "before": old,
         "now": new,
         "ratio": new / old,
     }
+
+
+def which(row: dict) -> str:
+    """Return what a row is of: the texts that it begins with."""
+    texts = itertools.takewhile(lambda value: isinstance(value, str), row.values())
+    return ", ".join(texts) or str(next(iter(row.values())))
 
 
 def markdown(name: str, about: str, rows: list[dict]) -> list[str]:
@@ -86,13 +97,23 @@ def table(rows: list[dict]) -> list[str]:
     """Return rows as a Markdown table."""
     if not rows:
         return []
-    body = [[cell(value) for value in row.values()] for row in rows]
-    return ["| " + " | ".join(line) + " |" for line in (heads(rows), ["---"] * len(rows[0]), *body)]
+    lines = (heads(rows), ["---"] * len(keys(rows)), *body(rows))
+    return ["| " + " | ".join(line) + " |" for line in lines]
+
+
+def keys(rows: list[dict]) -> list[str]:
+    """Return all columns, in the order in which rows have them."""
+    return list(dict.fromkeys(key for row in rows for key in row))
 
 
 def heads(rows: list[dict]) -> list[str]:
     """Return the columns' names."""
-    return [COLUMNS.get(key, key) for key in rows[0]]
+    return [COLUMNS.get(key, key) for key in keys(rows)]
+
+
+def body(rows: list[dict]) -> list[list[str]]:
+    """Return the cells; what a row has not is empty."""
+    return [[cell(row.get(key, "")) for key in keys(rows)] for row in rows]
 
 
 def cell(value) -> str:
@@ -120,11 +141,7 @@ def page(head: str, sections: list[tuple], pictures: list[Path]) -> str:
 
 def section(name: str, about: str, rows: list[dict]) -> str:
     """Return a section as HTML."""
-    lines = (
-        [cells("th", heads(rows)), *(cells("td", map(cell, row.values())) for row in rows)]
-        if rows
-        else []
-    )
+    lines = [cells("th", heads(rows)), *(cells("td", row) for row in body(rows))] if rows else []
     title = html.escape(name.replace("_", " "))
     return f"<h2>{title}</h2><p>{html.escape(about)}</p><table>{''.join(lines)}</table>"
 

@@ -1,6 +1,10 @@
 """How forward dynamics grows with the tail, and what share of the core's peak it reaches."""
 
-import ctypes
+if __name__ == "__main__":
+    from benchmarks import alone
+
+    alone.main("scaling", __doc__)
+
 from pathlib import Path
 
 import matplotlib
@@ -9,7 +13,8 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
 from benchmarks.fixtures import built, fixture, label
-from benchmarks.peers import build, timing
+from benchmarks.peak import peak
+from benchmarks.peers import timing
 
 SWEEPS = {
     "links of one segment": [(1, n) for n in (1, 2, 4, 8, 16, 32, 64)],
@@ -27,7 +32,7 @@ def scaling(folder: Path) -> list[dict]:
     in lanes does more of them, and faster.  The peak is measured in this run, of scalars (of
     vectors in brackets).
     """
-    scalar, vector = peak(folder)
+    scalar, vector = peak()
     rows = []
     for sweep, sizes in SWEEPS.items():
         for size in sizes:
@@ -48,17 +53,6 @@ def scaling(folder: Path) -> list[dict]:
             }
             rows.append(row | {"emission": entry["emission"], "of the peak": share})
     return rows
-
-
-def peak(folder: Path) -> tuple[float, float]:
-    """Flops per nanosecond of this core: scalars, vectors, which take the same time."""
-    flags = ("-std=gnu11", "-O2", "-march=native", "-ffp-contract=fast", "-fPIC", "-shared")
-    target, width = folder / "peak.so", ctypes.c_int()
-    build.run(["gcc", *flags, str(Path(__file__).parent / "native" / "peak.c"), "-o", str(target)])
-    measure = ctypes.CDLL(str(target)).measure_peak
-    measure.restype = ctypes.c_double
-    vector = measure(ctypes.byref(width))
-    return vector / width.value, vector
 
 
 def draw(rows: list[dict], path: Path) -> None:

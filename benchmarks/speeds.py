@@ -1,17 +1,25 @@
-"""Times of making tails, of calls from C and from Python, and drifts of flights."""
+"""Times of making tails, of calls from C, and drifts of flights."""
+
+if __name__ == "__main__":
+    from benchmarks import alone
+
+    alone.main("speeds", __doc__)
 
 import json
 import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 import serpentail as st
-from benchmarks.fixtures import Fixture, built, fixture, label
+from benchmarks.batches import best
+from benchmarks.comparison import compared
+from benchmarks.fixtures import Fixture, built, by_clang, fixture, label
 from benchmarks.peers import build, pinocchio, timing
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -49,37 +57,33 @@ def generation(folder: Path) -> list[dict]:
 
 def speed(folder: Path) -> list[dict]:
     """Nanoseconds of one forward dynamics call from C, beside Pinocchio's coupled path, rounds
-    interleaved.
+    interleaved; each peer by the faster of the compilers.
 
     Ratios by minima (by medians in brackets).  Pinocchio: as its documentation shows it; its CRBA
     with all that was found to speed it up; the tied columns summed by own code on its types
-    (pinocchio_chain.cpp).
+    (pinocchio_chain.cpp).  Ours is compiled as its users have it, and by clang beside that.
     """
-    rows = []
-    for size in ((1, 3), (3, 4), (6, 6), (8, 16)):
-        ours = fixture(built(*size), folder)
-        plain_library = build.build_library(build.PLAIN, build.CACHE)
-        with (
-            pinocchio.PinocchioBench(*size, ours.parameters) as tuned,
-            pinocchio.PinocchioBench(*size, ours.parameters, plain_library) as plain,
-        ):
-            states = timing.random_states(size[0])
-            error = max(difference(ours, tuned, states), difference(ours, plain, states))
-            closures = [ours.closure, plain.closure, tuned.crba_closure, tuned.closure]
-            times = timing.time_rounds(closures, states, ROUNDS, CALLS)
-        row = {
-            "model": label(*size),
-            "ns": times[0][0],
-            "median_ns": times[0][1],
-            "v_dot_difference": error,
+    plain, tuned = (
+        build.by_each(partial(build.build_library, source, build.CACHE))
+        for source in (build.PLAIN, build.TUNED)
+    )
+    return [speed_row(folder, size, plain, tuned) for size in ((1, 3), (3, 4), (6, 6), (8, 16))]
+
+
+def speed_row(folder: Path, size: tuple, plain: dict[str, Path], tuned: dict[str, Path]) -> dict:
+    """Measure one size; the libraries by compiler."""
+    ours, states = fixture(built(*size), folder), timing.random_states(size[0])
+    with ExitStack() as freed:
+        chains = [pinocchio.chains(freed, made, size, ours) for made in (plain, tuned)]
+        errors = [difference(ours, peer, states) for made in chains for peer in made.values()]
+        peers = {
+            "plain": {by: chain.closure for by, chain in chains[0].items()},
+            "tuned": {by: chain.crba_closure for by, chain in chains[1].items()},
+            "own": {by: chain.closure for by, chain in chains[1].items()},
         }
-        for name, (least, median) in zip(("plain", "tuned", "own"), times[1:], strict=True):
-            row |= {
-                f"{name}_ns": least,
-                f"{name}_ratio": f"{least / times[0][0]:.1f}x ({median / times[0][1]:.1f}x)",
-            }
-        rows.append(row)
-    return rows
+        again = by_clang(ours.model, folder, "forward_dynamics")
+        row = compared(ours, peers, states, again=again)
+    return {"model": label(*size)} | row | {"v_dot_difference": max(errors)}
 
 
 def difference(ours: Fixture, pinocchio, states) -> float:
@@ -106,34 +110,6 @@ def tails(folder: Path) -> list[dict]:
             {"segments": m, "continuum_ns": arcs, "articulated_ns": links, "ratio": arcs / links}
         )
     return rows
-
-
-def python_overhead(folder: Path) -> list[dict]:
-    """Microseconds of one call from Python, and what of it is not the C function."""
-    rows = []
-    for size in ((1, 3), (3, 4)):
-        ours = fixture(built(*size), folder)
-        q, v, tau = (x[0] for x in timing.random_states(size[0]))
-        inside = (
-            timing.time_rounds([ours.closure], timing.random_states(size[0]), ROUNDS, CALLS)[0][0]
-            / 1e3
-        )
-        for name, arguments in (("forward_dynamics", (q, v, tau)), ("mass_matrix", (q,))):
-            total = best_us(getattr(ours.model, name), arguments)
-            rows.append({"model": label(*size), "call": name, "us": total})
-            rows[-1]["overhead_us"] = total - inside if name == "forward_dynamics" else ""
-    return rows
-
-
-def best_us(call: Callable, arguments: tuple, count: int = 5000, repeats: int = 9) -> float:
-    """Return the least microseconds of one call."""
-    best = float("inf")
-    for _ in range(repeats):
-        begun = time.perf_counter()
-        for _ in range(count):
-            call(*arguments)
-        best = min(best, (time.perf_counter() - begun) / count)
-    return best * 1e6
 
 
 def drift(folder: Path) -> list[dict]:
@@ -174,8 +150,8 @@ def internal_energy(flight, model) -> np.ndarray:
 
 
 def work_precision(folder: Path) -> list[dict]:
-    """Run time against error of 0.58 s of damped flight: RK4, Tsit5 and DOP853 at several steps or
-    tolerances.
+    """What the caller waits against error of 0.58 s of damped flight: RK4, Tsit5 and DOP853 at
+    several steps or tolerances.
     """
     model = built(1, 3)
     start = thrown(model)
@@ -191,10 +167,10 @@ def work_precision(folder: Path) -> list[dict]:
     exact = fly("dop853", {"rtol": 1e-13, "atol": 1e-15})
     rows = []
     for method, options in settings:
-        flights = [fly(method, options | {"output_step": 0.58 / 5}) for _ in range(3)]
-        error = np.abs(flights[0].q[-1] - exact.q[-1]).max()
+        again = partial(fly, method, options | {"output_step": 0.58 / 5})
+        error = np.abs(again().q[-1] - exact.q[-1]).max()
         name, value = next(iter(options.items()))
-        milliseconds = 1e3 * min(f.info["seconds"] for f in flights)
+        milliseconds = best(again, 5) / 1e6
         rows.append(
             {
                 "method": method,

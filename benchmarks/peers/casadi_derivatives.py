@@ -1,8 +1,6 @@
 """CasADi's own C of Jacobians and Hessians, as closures to time."""
 
 import ctypes
-import subprocess
-import time
 from pathlib import Path
 from types import ModuleType
 
@@ -11,11 +9,9 @@ import numpy as np
 
 import serpentail as st
 
-from . import timing
+from . import build, timing
+from .compilers import Compiler
 
-CASADI_FLAGS = ("-O2", "-march=native", "-fPIC", "-shared")
-PATIENCE = 240  # seconds for gcc on one of CasADi's files
-OVER = f"over {PATIENCE} s"
 IN_SX = ("mass_matrix", "bias_force", "inverse_dynamics")  # what CasADi differentiates
 CASADI_CALL = """
 struct context {{
@@ -36,29 +32,19 @@ int measured(void *c, const double *q, const double *v, const double *rest, doub
 
 
 class InCasadi:
-    """A CasADi function of (q, v, rest, parameters) as C that gcc has compiled, for the timer."""
+    """A CasADi function of (q, v, rest, parameters) as compiled C, for the timer."""
 
-    def __init__(self, name: str, function: ca.Function, model: st.Model, folder: Path):
-        """Generate and compile; subprocess.TimeoutExpired where gcc takes longer than PATIENCE."""
-        source = folder / f"{model.name}_{name}.c"
-        first, second = function.numel_out(0), function.numel_out(1)
-        function.generate(source.name, {"with_header": False})
-        sizes = {"parameters": len(model.parameter_vector), "out": first + second, "first": first}
-        sizes |= {"work": function.sz_w(), "integers": function.sz_iw()}
-        sizes |= {"arguments": max(4, function.sz_arg()), "results": max(2, function.sz_res())}
-        source.write_text(Path(source.name).read_text() + CASADI_CALL.format(**sizes))
-        Path(source.name).unlink()
-        begun = time.perf_counter()
-        command = ["gcc", *CASADI_FLAGS, str(source), "-o", str(source.with_suffix(".so")), "-lm"]
-        subprocess.run(command, check=True, timeout=PATIENCE)
-        self.seconds = time.perf_counter() - begun
-        self.function = ctypes.CDLL(str(source.with_suffix(".so"))).measured
+    def __init__(self, source: Path, function: ca.Function, model: st.Model, compiler: Compiler):
+        """Compile; TookTooLong where that takes too long."""
+        library = build.build_library(source, build.CACHE, compiler, ("-lm",))
+        self.function = ctypes.CDLL(str(library)).measured
+        sizes = lengths(function, model)
         self.context = np.zeros(
             sum(sizes[name] for name in ("parameters", "out", "work", "integers")) + 2
         )
         self.context[: sizes["parameters"]] = model.parameter_vector
-        self.out = self.context[sizes["parameters"] :][: first + second]
-        self.shapes = [function.size_out(k) for k in range(2)]
+        self.out = self.context[sizes["parameters"] :][: sizes["out"]]
+        self.sparsities = [function.sparsity_out(k) for k in range(2)]
 
     @property
     def closure(self) -> timing.Closure:
@@ -73,12 +59,17 @@ class InCasadi:
         addresses = [ctypes.c_void_p(array.ctypes.data) for array in (self.context, *arrays)]
         if self.function(*addresses):
             raise FloatingPointError("CasADi's C reports a failure")
-        first = int(np.prod(self.shapes[0]))
-        parts = (self.out[:first], self.out[first:])
-        return [
-            part.reshape(shape, order="F").copy()
-            for part, shape in zip(parts, self.shapes, strict=True)
-        ]
+        first = self.sparsities[0].nnz()
+        parts = zip(self.sparsities, (self.out[:first], self.out[first:]), strict=True)
+        return [ca.DM(sparsity, values).full() for sparsity, values in parts]
+
+
+def lengths(function: ca.Function, model: st.Model) -> dict[str, int]:
+    """Return the lengths of the arrays that a function is called with."""
+    first, second = function.nnz_out(0), function.nnz_out(1)
+    sizes = {"parameters": len(model.parameter_vector), "out": first + second, "first": first}
+    sizes |= {"work": function.sz_w(), "integers": function.sz_iw()}
+    return sizes | {"arguments": max(4, function.sz_arg()), "results": max(2, function.sz_res())}
 
 
 class Graph:
@@ -113,14 +104,10 @@ class Graph:
 
     def finished(self, rest, results) -> ca.Function:
         """Return the function of (q, v, rest, parameters), without a turn, equal subexpressions
-        computed once.
+        computed once; of a sparse result it writes what is not zero.
         """
         results = ca.cse(ca.substitute(results, [self.turn], [ca.SX.zeros(3)]))
-        return ca.Function(
-            "differentiated",
-            [self.q, self.v, rest, self.parameters],
-            [ca.densify(r) for r in results],
-        )
+        return ca.Function("differentiated", [self.q, self.v, rest, self.parameters], results)
 
 
 def casadi_module(model: st.Model) -> ModuleType:
@@ -158,12 +145,14 @@ def jacobians(model: st.Model, turn_by_hand: bool) -> ca.Function:
         turn = -R @ ca.skew(R.T @ (solved[:3] + ca.vertcat(0, 0, *g.fields["gravity"])))
     else:
         turn = ca.horzcat(*columns[2 * g.nt + 3 :])
-    return g.finished(tau, [rest, turn])
+    return g.finished(tau, [ca.densify(rest), ca.densify(turn)])
 
 
-def hessian(model: st.Model) -> ca.Function:
-    """Second derivatives of lambda^T ID in SX: lower triangle for turn, tail, omega, rates; rows of
-    v_dot for q.
+def hessian(model: st.Model, dense: bool) -> ca.Function:
+    """Second derivatives of lambda^T ID in SX.
+
+    sparse: what is not zero of the lower triangle for turn, tail, omega, rates, and of the rows of
+    v_dot for q.  dense: the four square blocks that the generated function writes, side by side.
     """
     g = Graph(model)
     both = ca.SX.sym("v_dot_and_multiplier", 2 * g.nv)
@@ -171,14 +160,27 @@ def hessian(model: st.Model) -> ca.Function:
     power = ca.dot(multiplier, g.force(g.turned(), v_dot))
     of_q = ca.vertcat(g.turn, g.q[7:])
     directions = ca.vertcat(of_q, g.v[3:])
-    second = ca.jacobian(ca.cse(ca.gradient(power, directions)), directions)
+    second = ca.tril(ca.jacobian(ca.cse(ca.gradient(power, directions)), directions))
     mixed = ca.jacobian(ca.cse(ca.gradient(power, both)[: g.nv]), of_q)
-    return g.finished(both, [ca.tril(second), mixed])
+    if not dense:
+        return g.finished(both, [second, mixed])
+    whole, k = ca.tril2symm(second), g.nv - 3
+
+    def square(block):
+        return ca.vertcat(ca.SX(3, g.nv), ca.horzcat(ca.SX(k, 3), block))
+
+    squares = [square(block) for block in (whole[:k, :k], whole[:k, k:], whole[k:, k:])]
+    blocks = ca.horzcat(*squares, ca.horzcat(ca.SX(g.nv, 3), mixed))
+    return g.finished(both, [ca.densify(blocks), ca.SX(0, 0)])
 
 
-def in_casadi(name: str, function: ca.Function, model: st.Model, folder: Path) -> InCasadi | None:
-    """Return the compiled function; None where gcc takes too long."""
-    try:
-        return InCasadi(name, function, model, folder)
-    except subprocess.TimeoutExpired:
-        return None
+def in_casadi(
+    name: str, function: ca.Function, model: st.Model, folder: Path
+) -> dict[str, InCasadi]:
+    """Return the compiled function by each compiler that finishes it."""
+    source = folder / f"{model.name}_{name}.c"
+    function.generate(source.name, {"with_header": False})  # into the working folder
+    text = Path(source.name).read_text() + CASADI_CALL.format(**lengths(function, model))
+    source.write_text(text)
+    Path(source.name).unlink()
+    return build.by_each(lambda compiler: InCasadi(source, function, model, compiler))

@@ -1,54 +1,58 @@
 """Times MuJoCo and CasADi on the same forward dynamics as the generated C."""
 
+if __name__ == "__main__":
+    from benchmarks import alone
+
+    alone.main("peers.mujoco_casadi", __doc__)
+
 import ctypes
 import importlib.util
-import subprocess
+from contextlib import ExitStack
 from pathlib import Path
 
 import casadi as ca
 import numpy as np
 
-from benchmarks import derivatives
+from benchmarks.comparison import compared
 from benchmarks.fixtures import built, fixture, label
 from benchmarks.peers import build, casadi_derivatives, timing
+from benchmarks.peers.compilers import Compiler
 
 SIZES = ((1, 3), (3, 4), (6, 6))
-IN_CASADI = ((1, 3), (3, 4))  # gcc takes minutes for longer tails
-ROUNDS, CALLS = 200, 128
+IN_CASADI = ((1, 3), (3, 4))  # compilers take minutes for longer tails
 
 
 def other_peers(folder: Path) -> list[dict]:
     """Nanoseconds of forward dynamics beside MuJoCo's and CasADi's, rounds interleaved; ratios by
-    minima (by medians).
+    minima (by medians); each peer by the faster of the compilers.
 
-    MuJoCo: the full chain of 2 m n hinges, its inertia and bias by its own functions, reduced and
-    solved as
-    Pinocchio's is (mujoco_chain.c).  CasADi: C of the generated SX function, gcc -O2 -march=native,
-    CasADi's default.
-    Targets: MuJoCo 11x; CasADi 1.25x (m = 1), 1.7x (3, 4).
+    MuJoCo: the full chain of 2 m n hinges, its inertia and bias by its own functions, which come
+    compiled, reduced and solved as Pinocchio's is (mujoco_chain.c).  CasADi: C of the generated SX
+    function, -O2, as its documentation has it.
     """
-    library = mujoco_library(folder)
-    return [row(folder, size, library) for size in SIZES]
+    libraries = build.by_each(mujoco_library)
+    return [row(folder, size, libraries) for size in SIZES]
 
 
-def row(folder: Path, size: tuple[int, int], library: ctypes.CDLL) -> dict:
+def row(folder: Path, size: tuple[int, int], libraries: dict[str, ctypes.CDLL]) -> dict:
     """Return the figures of one tail."""
     ours = fixture(built(*size), folder)
-    states = timing.random_states(size[0])
-    chain = library.mujoco_chain_new(str(chain_xml(folder, ours.model)).encode(), *size)
-    if not chain:
-        raise build.PeerUnavailable("MuJoCo could not read the chain")
-    pointer = ctypes.cast(library.mujoco_forward_dynamics, ctypes.c_void_p).value
-    others = {"mujoco": timing.Closure(pointer, chain)}
-    if size in IN_CASADI:
-        others["casadi"] = casadi_derivatives.in_casadi(
-            "fd", acceleration(ours.model), ours.model, folder
-        ).closure
-    found = derivatives.compared(ours, others, states)
-    found |= {name: "" for name in ("casadi_ns", "casadi_ratio") if name not in found}
-    found["v_dot_difference"] = difference(library, chain, ours.model, states)
-    library.mujoco_chain_free(chain)
-    return {"model": label(*size)} | found
+    states, xml = timing.random_states(size[0]), chain_xml(folder, ours.model)
+    with ExitStack() as freed:
+        peers = {"mujoco": {}}
+        for name, library in libraries.items():
+            chain = library.mujoco_chain_new(str(xml).encode(), *size)
+            if not chain:
+                raise build.PeerUnavailable("MuJoCo could not read the chain")
+            freed.callback(library.mujoco_chain_free, chain)
+            pointer = ctypes.cast(library.mujoco_forward_dynamics, ctypes.c_void_p).value
+            peers["mujoco"][name] = timing.Closure(pointer, chain)
+        error = difference(library, chain, ours.model, states)
+        if size in IN_CASADI:
+            found = casadi_derivatives.in_casadi("fd", acceleration(ours.model), ours.model, folder)
+            peers["casadi"] = {name: peer.closure for name, peer in found.items()}
+        measured = compared(ours, peers, states)
+    return {"model": label(*size)} | measured | {"v_dot_difference": error}
 
 
 def acceleration(model) -> ca.Function:
@@ -64,7 +68,7 @@ def acceleration(model) -> ca.Function:
     return graph.finished(tau, [v_dot, ca.SX.zeros(1)])
 
 
-def mujoco_library(folder: Path) -> ctypes.CDLL:
+def mujoco_library(compiler: Compiler) -> ctypes.CDLL:
     """Compile mujoco_chain.c against the installed MuJoCo; PeerUnavailable where that is not
     there.
     """
@@ -73,19 +77,9 @@ def mujoco_library(folder: Path) -> ctypes.CDLL:
         raise build.PeerUnavailable("MuJoCo is not installed: pip install mujoco")
     home = Path(found.origin).parent
     shared = next(home.glob("libmujoco.so.*"))
-    target = folder / "mujoco_chain.so"
+    flags = ("-I", str(home / "include"), str(shared), f"-Wl,-rpath,{home}")
     source = Path(__file__).parent / "mujoco_chain.c"
-    flags = [
-        "-O2",
-        "-march=native",
-        "-fPIC",
-        "-shared",
-        "-I",
-        str(home / "include"),
-        f"-Wl,-rpath,{home}",
-    ]
-    subprocess.run(["gcc", *flags, str(source), str(shared), "-o", str(target)], check=True)
-    library = ctypes.CDLL(str(target))
+    library = ctypes.CDLL(str(build.build_library(source, build.CACHE, compiler, flags)))
     library.mujoco_chain_new.restype = ctypes.c_void_p
     library.mujoco_chain_free.argtypes = [ctypes.c_void_p]
     library.mujoco_forward_dynamics.argtypes = [ctypes.c_void_p] * 5

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Mapping
+from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
 
-from .build import CACHE, TUNED, PeerUnavailable, build_library
+from .compilers import PeerUnavailable
 from .timing import Closure, pointer
 
 # In the order of the array that pinocchio_chain_new takes.
@@ -28,10 +29,10 @@ class PinocchioBench:
     timer.
     """
 
-    def __init__(self, segments: int, links: int, parameters: Mapping, library: Path | None = None):
+    def __init__(self, segments: int, links: int, parameters: Mapping, library: Path):
         """Build the chain from parameters by name (SI), link_inertia among them."""
         self.nv = 6 + 2 * segments
-        self._library = _declared(library or build_library(TUNED, CACHE))
+        self._library = _declared(library)
         values = np.hstack([parameters[name] for name in PARAMETERS])
         self._chain = self._library.pinocchio_chain_new(segments, links, pointer(values))
         if not self._chain:
@@ -110,6 +111,14 @@ class PinocchioBench:
         if getattr(self._library, name)(self._chain, *map(pointer, arrays), pointer(out)):
             raise FloatingPointError(f"{name}: the mass matrix is not positive definite")
         return out
+
+
+def chains(freed: ExitStack, made: Mapping[str, Path], size, ours) -> dict[str, PinocchioBench]:
+    """Return the chain of a fixture in each library, by compiler; the stack frees them."""
+    return {
+        by: freed.enter_context(PinocchioBench(*size, ours.parameters, library))
+        for by, library in made.items()
+    }
 
 
 def _declared(path: Path) -> ctypes.CDLL:

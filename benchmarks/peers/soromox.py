@@ -1,5 +1,10 @@
 """Times SoRoMoX (JAX) beside the continuum's forward dynamics."""
 
+if __name__ == "__main__":
+    from benchmarks import alone
+
+    alone.main("peers.soromox", __doc__)
+
 import importlib.util
 import math
 import sys
