@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from ...functions.function import Function, assemble
+from ...functions.sweeps.doubling import is_doubled
 from ...functions.tail import Tail, struct_parameters
 from ...ir.cost import applied, branches
 from ...ir.program import Program
@@ -48,8 +49,9 @@ def fastest(function: Function, tail: Tail) -> tuple[str, Program]:
     Straight lines are fastest until their text crowds the instruction cache, if all of them are
     always run; sweeps in lanes overtake them before that, and sweeps by segments overtake both.
     """
-    # sweeps by segments, where the tail is long
-    long = tail.segments > 1 and tail.nt * tail.total >= SEGMENTS_FROM
+    # sweeps by segments, where the tail or a segment is long
+    several = tail.segments > 1 and tail.nt * tail.total >= SEGMENTS_FROM
+    long = several or is_doubled(tail)
     form, swept = in_form("segments" if long else "lanes", function, tail)
     if form == "segments" or function.name in ALWAYS_IN_LOOPS:
         return form, swept
