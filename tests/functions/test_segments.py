@@ -11,7 +11,7 @@ from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.functions.plain import FUNCTIONS
 from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.ir.interpret import Numbers, Run
-from serpentail_codegen.targets.c.form import fastest
+from serpentail_codegen.targets.c.form import RULE, fastest
 from tests.functions.test_columns import arguments, assert_same_acceleration, outputs
 from tests.references.exact_chain import ExactChain
 from tests.references.metrics import block_error, equilibrated_condition
@@ -141,6 +141,21 @@ def test_the_manifest_tells_how_v_dot_comes_about(size, options, emission):
     model = st.load(model_folder(*size, functions=[FUNCTION, "energy"], **options), compiled=False)
     assert model.manifest["functions"][FUNCTION]["emission"] == emission
     assert model.manifest["functions"]["energy"]["emission"] in ("straight", "loops")
+
+
+@pytest.mark.parametrize(
+    ("size", "form"),
+    [((1, 9), "straight"), ((3, 2), "straight"), ((4, 1), "straight"), ((1, 10), "lanes")],
+)
+def test_straight_lines_end_where_their_text_fills_the_instruction_cache(size, form):
+    assert fastest(FUNCTIONS[FUNCTION], Tail(*size))[0] == form
+
+
+@pytest.mark.parametrize("emission", ["auto", "loops"])
+def test_the_manifest_tells_the_rule_where_forms_are_chosen(emission):
+    folder = model_folder(1, 1, functions=[FUNCTION], emission=emission)
+    manifest = st.load(folder, compiled=False).manifest
+    assert manifest.get("forms") == (RULE if emission == "auto" else None)
 
 
 @pytest.mark.parametrize(

@@ -14,11 +14,18 @@ from .routine import CFunction
 from .straight import straight_line
 
 STRAIGHT_UP_TO = 7000  # nodes: beyond, the text leaves the instruction cache and compile time grows
-STRAIGHT_BESIDE_LANES = 3500  # nodes: where there is a sweep in lanes, too, that is faster beyond
+# nodes: where there is a sweep in lanes, too; that is faster beyond, or the text has 32 KB
+STRAIGHT_BESIDE_LANES = 4100
 # zeros and copies above all: loops are as fast, and quick to compile
 ALWAYS_IN_LOOPS = ("tail_point_jacobians",)
 # columns of H times links, the work of a sweep in lanes: from here on segments are no slower
 SEGMENTS_FROM = 128
+# what the manifest says of the choice
+RULE = {
+    "straight_up_to": STRAIGHT_UP_TO,
+    "straight_beside_lanes_up_to": STRAIGHT_BESIDE_LANES,
+    "segments_from": SEGMENTS_FROM,
+}
 UNROLLED_ROWS = 12  # smaller matrices are factored without loops
 
 
