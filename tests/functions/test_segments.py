@@ -147,7 +147,7 @@ def test_the_manifest_tells_how_v_dot_comes_about(size, options, emission):
     ("size", "form"),
     [((1, 9), "straight"), ((3, 2), "straight"), ((4, 1), "straight"), ((1, 10), "lanes")],
 )
-def test_straight_lines_end_where_their_text_fills_the_instruction_cache(size, form):
+def test_straight_lines_beside_lanes_end_at_a_length(size, form):
     assert fastest(FUNCTIONS[FUNCTION], Tail(*size))[0] == form
 
 

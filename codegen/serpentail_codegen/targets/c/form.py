@@ -14,7 +14,7 @@ from .routine import CFunction
 from .straight import straight_line
 
 STRAIGHT_UP_TO = 7000  # nodes: beyond, the text leaves the instruction cache and compile time grows
-# nodes: where there is a sweep in lanes, too; that is faster beyond, or the text has 32 KB
+# nodes: where there is a sweep in lanes, too; v_dot's text of so many has 32 KB with AVX2
 STRAIGHT_BESIDE_LANES = 4100
 # zeros and copies above all: loops are as fast, and quick to compile
 ALWAYS_IN_LOOPS = ("tail_point_jacobians",)
