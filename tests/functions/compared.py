@@ -7,9 +7,9 @@ import pytest
 from tests.references.metrics import equilibrated_condition
 from tests.support.derivative_models import tail_name
 
-QUICK = [(1, 3, "straight"), (2, 2, "loops"), (2, None, "loops")]
+QUICK = [(1, 3, "straight"), (2, 2, "loops"), (2, None, "loops"), (3, 2, "segments")]
 SLOW = [(1, 3, "loops"), (2, 2, "straight"), (3, 4, "straight"), (3, 4, "loops")]
-SLOW += [(6, 6, "loops"), (8, 16, "loops")]
+SLOW += [(6, 6, "loops"), (8, 16, "loops"), (1, 3, "segments"), (8, 16, "segments")]
 SLOW += [(1, None, "straight"), (1, None, "loops"), (2, None, "straight"), (3, None, "loops")]
 ROUNDING = 1e-12  # largest error of a block, relative
 SOLVED = 1e-13  # the same for each unit of the condition number, where H is solved with

@@ -11,8 +11,8 @@ from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.functions.plain import FUNCTIONS
 from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.ir.interpret import Numbers, Run
-from serpentail_codegen.targets.c.form import fastest
-from tests.functions.test_columns import arguments, assert_same_acceleration
+from serpentail_codegen.targets.c.form import RULE, fastest
+from tests.functions.test_columns import arguments, assert_same_acceleration, outputs
 from tests.references.exact_chain import ExactChain
 from tests.references.metrics import block_error, equilibrated_condition
 from tests.references.parameters import TABLE_1, random_states
@@ -30,7 +30,7 @@ def test_segments_give_the_same_acceleration(size, name):
 
 
 def test_what_needs_the_matrix_goes_in_lanes():
-    for name in ("forward_dynamics_derivatives", "mass_matrix", "pfl"):
+    for name in ("forward_dynamics_jvp", "mass_matrix", "pfl"):
         assert assemble(CATALOGUE[name], Tail(3, 2), "segments") == assemble(
             CATALOGUE[name], Tail(3, 2), "lanes"
         )
@@ -39,8 +39,18 @@ def test_what_needs_the_matrix_goes_in_lanes():
 @pytest.mark.parametrize(
     ("size", "form"), [((1, 64), "lanes"), ((3, 4), "lanes"), ((4, 4), "segments")]
 )
-def test_long_tails_of_several_segments_go_by_segments(size, form):
-    assert fastest(FUNCTIONS[FUNCTION], Tail(*size))[0] == form
+@pytest.mark.parametrize("name", [FUNCTION, "forward_dynamics_derivatives"])
+def test_long_tails_of_several_segments_go_by_segments(name, size, form):
+    assert fastest(CATALOGUE[name], Tail(*size))[0] == form
+
+
+def test_derivatives_by_segments_are_those_of_long_segments_too():
+    name, tail = "forward_dynamics_derivatives", Tail(1, 96)
+    plain, segments = (assemble(CATALOGUE[name], tail, form) for form in ("lanes", "segments"))
+    given = arguments(plain)
+    expected, found = outputs(plain, given), outputs(segments, given)
+    for matrix, wanted in expected.items():
+        assert np.abs(found[matrix] - wanted).max() <= 1e-11 * np.abs(wanted).max()
 
 
 @pytest.mark.parametrize("name", ["forward_dynamics", "mass_matrix"])
@@ -131,6 +141,21 @@ def test_the_manifest_tells_how_v_dot_comes_about(size, options, emission):
     model = st.load(model_folder(*size, functions=[FUNCTION, "energy"], **options), compiled=False)
     assert model.manifest["functions"][FUNCTION]["emission"] == emission
     assert model.manifest["functions"]["energy"]["emission"] in ("straight", "loops")
+
+
+@pytest.mark.parametrize(
+    ("size", "form"),
+    [((1, 9), "straight"), ((3, 2), "straight"), ((4, 1), "straight"), ((1, 10), "lanes")],
+)
+def test_straight_lines_beside_lanes_end_at_a_length(size, form):
+    assert fastest(FUNCTIONS[FUNCTION], Tail(*size))[0] == form
+
+
+@pytest.mark.parametrize("emission", ["auto", "loops"])
+def test_the_manifest_tells_the_rule_where_forms_are_chosen(emission):
+    folder = model_folder(1, 1, functions=[FUNCTION], emission=emission)
+    manifest = st.load(folder, compiled=False).manifest
+    assert manifest.get("forms") == (RULE if emission == "auto" else None)
 
 
 @pytest.mark.parametrize(

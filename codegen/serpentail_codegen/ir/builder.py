@@ -40,6 +40,7 @@ class Builder:
     doc: str
     arrays: list[Array] = field(default_factory=list)
     _bodies: list[list[Statement]] = field(default_factory=lambda: [[]])
+    _columns: Index | None = None
 
     def declare(self, array: Array) -> Array:
         """Declare an array; local names are unique within a program."""
@@ -74,6 +75,8 @@ class Builder:
         step = narrowed(step, set(targets))
         outputs = [targets[name] for name, _ in step.outputs]
         call = Apply.named(step, reads, [ref for ref, _ in outputs], [adds for _, adds in outputs])
+        if any(ref.lanes for ref in call.writes):
+            call = replace(call, columns=self._columns)
 
         vectors = (*step.inputs, *step.outputs)
         for (name, size), ref in zip(vectors, call.reads + call.writes, strict=True):
@@ -139,6 +142,15 @@ class Builder:
         body = tuple(self._bodies.pop())
         if as_index(start) != as_index(count) and body:
             self.emit(Loop(var, as_index(start), as_index(count), downward, body))
+
+    @contextmanager
+    def first_lanes(self, count: Index) -> Iterator[None]:
+        """Apply steps to so many lanes of what is wide; the others are zero, or nobody reads
+        them.
+        """
+        self._columns, before = count, self._columns
+        yield
+        self._columns = before
 
     @contextmanager
     def when(self, scalar: Ref) -> Iterator[None]:

@@ -115,6 +115,7 @@ def free_coordinates(
         "b_base": [let("b", b[0] - yaw_load * K[7]) - pitch_load * pitch_lanes],
         "shares": Matrix([*pitch_share, pitch_load, *yaw_share, yaw_load]),
         "pivots": Matrix([left[6], yaw_row[7]]),
+        "over": Matrix([over_pitch, over_yaw]),
     }
 
 

@@ -17,6 +17,7 @@ from ..layout import OMEGA, POSITION, QUATERNION, VELOCITY, block, tail_v
 from ..plain import FUNCTIONS
 from ..scope import Vectors
 from ..tail import struct_parameters
+from .by_segments import derivatives_by_segments
 from .differentiated import CORE, VIRTUAL_POWER
 from .directions import Directions
 
@@ -87,6 +88,9 @@ def assemble_forward_dynamics_derivatives(draft: Draft, arrays: dict[str, Array]
     """-H^-1 times the tangents of H v_dot + C at fixed v_dot; with respect to tau, columns of
     H^-1.
     """
+    if draft.dynamics == "segments":
+        derivatives_by_segments(draft, arrays)
+        return
     tail, nv = draft.tail, draft.tail.nv
     factored, body = forward_dynamics_first(draft, arrays)
     directions = Directions(tail, ("omega",))

@@ -1,69 +1,49 @@
 """Forward dynamics of a long articulated tail, by segments: v_dot comes about without H.
 
-The links of all segments are swept at once, segment i in lane i.  Then one sweep takes the segments
-from the tip to the mount, each as an articulated body whose coordinates are free, and one takes
-accelerations from the torso to the tip.
+The links of all segments are swept at once, segment i in lane i, or joined by doubling.  Then one
+sweep takes the segments from the tip to the mount, each as an articulated body whose coordinates
+are free, and one takes accelerations from the torso to the tip.
 """
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 from ...ir.program import Array, Index, Ref, as_index
 from ...ir.tape import Number
-from ...mechanics import free_segment, link, rotations, torso
+from ...mechanics import free_segment, link, link_chain, rotations, torso
 from ...mechanics.link_columns import torso_bias
 from ..draft import Draft
 from ..layout import OMEGA, PER_SEGMENT, VELOCITY, block, coordinates, segment_v
 from ..scope import State, Vectors
 from ..tails.articulated import link_properties
 from ..tails.mechanism import simplified
+from .bodies import Body, Freed, Passes, lane
+from .doubling import is_doubled, joined_links, lanes_of_chain, links_of
 from .pieces import IDENTITY
 
 UNKNOWNS = 8  # motion of a segment's base, and two coordinates
 OWN_INERTIA = {"h": 3, "I": 6, "pitch": 6, "yaw": 6, "H_pp": 1, "H_py": 1, "H_yy": 1}
 
 
-@dataclass(frozen=True)
-class Passes:
-    """What the passes over the segments hand on: how each tip moves (lanes), what velocities alone
-    accelerate it by, what its coordinates' second derivatives follow from.
+def forward_dynamics(
+    draft: Draft, state: State, load: Array, torques: Array, v_dot: Array, again: bool = False
+) -> Freed:
+    """Fill ``v_dot`` from a load (force, moment) at B in torso axes and torques.
+
+    again: keep what other loads take.
     """
-
-    tip: Array
-    coasting: Array
-    elimination: Array
-
-    def tip_of(self, i: Index) -> dict[str, Ref]:
-        """What the motion of one tip is made of."""
-        return {"tip_map": self.tip.down(0, i, self.tip.size)}
-
-
-@dataclass(frozen=True)
-class Body:
-    """All that hangs on the base of a segment: its wrench is A a + b for the base's motion a."""
-
-    A: Array
-    b: Array
-
-    def rows(self, count: int) -> dict[str, Ref]:
-        """The first rows of A, number by number."""
-        return {f"A_{r}": self.A.lane(r, 0, 6) for r in range(count)}
-
-
-def forward_dynamics(draft: Draft, state: State, load: Array, torques: Array, v_dot: Array) -> None:
-    """Fill ``v_dot`` from a load (force, moment) at B in torso axes and torques."""
     m = draft.tail.segments
     tip = _wide(draft, "tip_map", 30).array
-    passes = Passes(tip, draft.array("coasting", 6, m), draft.array("shares", 15, m))
+    over = draft.array("over_pivots", 2, m) if again else None
+    passes = Passes(tip, draft.array("coasting", 6, m), draft.array("shares", 15, m), over)
 
-    # all links at once, segment i in lane i
-    links = _prepare(draft, state)
-    inertia = _own_inertia(draft, links, passes)
-    w = _angular_velocities(draft, state, passes)
-    bias = _bias(draft, state, links, w)
+    # what the segments' own links ask for
+    own = _doubled if is_doubled(draft.tail) else _link_by_link
+    inertia, bias = own(draft, state, passes)
 
     # inward: all that hangs on the mount, then the torso; outward: accelerations
     body = _inward_pass(draft, passes, inertia, bias, torques)
-    a_mount = _at_torso(draft, state, body, load, v_dot)
+    freed, a_mount = _at_torso(draft, state, body, load, v_dot)
     base = draft.array("base", 6)
     draft.copy(base.part(0, 3), a_mount)
     draft.copy(base.part(3, 3), block(v_dot, OMEGA))
@@ -71,6 +51,7 @@ def forward_dynamics(draft: Draft, state: State, load: Array, torques: Array, v_
         reads = {"shares": passes.elimination[i], "coasting": passes.coasting[i], "base": base[0]}
         writes = {"accelerations": segment_v(v_dot, i), "base": base[0]}
         draft.step(free_segment.outward, passes.tip_of(i), reads, **writes)
+    return Freed(passes, inertia, *freed)
 
 
 def _wide(draft: Draft, name: str, size: int, *values: Number) -> Ref:
@@ -79,6 +60,49 @@ def _wide(draft: Draft, name: str, size: int, *values: Number) -> Ref:
     if values:
         draft.fill(vector, *values)
     return vector
+
+
+def _link_by_link(draft: Draft, state: State, passes: Passes) -> tuple[Vectors, Vectors]:
+    """Inertia and bias of all segments, segment i in lane i; their tips go to ``passes``."""
+    links = _prepare(draft, state)
+    inertia = _own_inertia(draft, links, passes)
+    w = _wide(draft, "w", 3, 0)
+    with _each_base(draft, state, passes) as (i, w_base):
+        draft.copy(w.array.down(0, i, 3), w_base)
+    return inertia, _bias(draft, state, links, w)
+
+
+def _doubled(draft: Draft, state: State, passes: Passes) -> tuple[Vectors, Vectors]:
+    """The same by doubling: segments are chains of equal links, joined."""
+    m = draft.tail.segments
+    properties = link_properties(draft)
+    chain = joined_links(draft, state, properties["link"])
+    mass = draft.vectors(mass=1)
+    draft.step(link_chain.mass_of_links, properties, links_of(draft, draft.tail.links), **mass)
+    with draft.loop("i", m) as i:
+        tip = lanes_of_chain(chain, i, m)
+        draft.step(link_chain.chain_tip, Vectors(tip), **passes.tip_of(i))
+
+    sizes = {"F_next": 6, "torque": 2, "w_dot": 3, "a": 3}
+    bias = {name: draft.array(f"{name}_bias", size, m) for name, size in sizes.items()}
+    with _each_base(draft, state, passes) as (i, w_base):
+        moving = {"rates": state.rates(i), "w": w_base}
+        writes = {name: array[i] for name, array in bias.items()}
+        draft.step(link_chain.chain_bias, moving, Vectors(lanes_of_chain(chain, i, m)), **writes)
+    named = {name: Ref(array, as_index(0), array.size) for name, array in bias.items()}
+    H = {name: chain["H"].array.part(k, 1) for k, name in enumerate(("H_pp", "H_py", "H_yy"))}
+    return Vectors({**chain.only("h", "I", "pitch", "yaw").named, **H, **mass}), Vectors(named)
+
+
+@contextmanager
+def _each_base(draft: Draft, state: State, passes: Passes) -> Iterator[tuple[Index, Ref]]:
+    """Open a loop over segments; yields the segment and the angular velocity of its base."""
+    w_base = draft.vector("w_base", 3)
+    draft.copy(w_base, state.omega)
+    with draft.loop("i", draft.tail.segments) as i:
+        yield i, w_base
+        reads = {"rates": state.rates(i), "w": w_base}
+        draft.step(free_segment.tip_angular_velocity, passes.tip_of(i), reads, w=w_base)
 
 
 def _prepare(draft: Draft, state: State) -> Vectors:
@@ -116,17 +140,6 @@ def _own_inertia(draft: Draft, links: Vectors, passes: Passes) -> Vectors:
     return Vectors({**inertia, **mass})
 
 
-def _angular_velocities(draft: Draft, state: State, passes: Passes) -> Ref:
-    """Angular velocity of each segment's base."""
-    w, w_base = _wide(draft, "w", 3, 0), draft.vector("w_base", 3)
-    draft.copy(w_base, state.omega)
-    with draft.loop("i", draft.tail.segments) as i:
-        draft.copy(w.array.down(0, i, 3), w_base)
-        reads = {"rates": state.rates(i), "w": w_base}
-        draft.step(free_segment.tip_angular_velocity, passes.tip_of(i), reads, w=w_base)
-    return w
-
-
 def _bias(draft: Draft, state: State, links: Vectors, w: Ref) -> Vectors:
     """Loads that velocities alone ask for in each segment, ``F_next`` and ``torque``, and what they
     alone accelerate its tip by, ``w_dot`` and ``a``.
@@ -159,9 +172,6 @@ def _inward_pass(
     pivots = draft.vector("pivots", 2)
     body = Body(draft.wide("A", 6, UNKNOWNS), draft.wide("b_base", 1, UNKNOWNS))
 
-    def lane(vector: Ref, i: Index) -> Ref:
-        return vector.array.down(0, i, vector.size)
-
     def begin(i: Index) -> None:
         """The segment alone: its inertia, loads, and what velocities accelerate its tip by."""
         own = {name: lane(inertia[name], i) for name in OWN_INERTIA} | {"mass": inertia["mass"]}
@@ -183,6 +193,8 @@ def _inward_pass(
             "yaw_row": K.lane(7, 0, UNKNOWNS),
         }
         writes = {"A": body.A[0], "b_base": body.b[0], "shares": passes.elimination[i]}
+        if passes.over:
+            writes["over"] = passes.over[i]
         draft.step(free_segment.free_coordinates, reads, **writes, pivots=pivots)
         draft.guard(pivots, "NOT_POSITIVE_DEFINITE", *writes.values())
 
@@ -206,8 +218,12 @@ def _inward_pass(
     return body
 
 
-def _at_torso(draft: Draft, state: State, body: Body, load: Array, v_dot: Array) -> Ref:
-    """Accelerations of the torso; returns that of the mount."""
+def _at_torso(
+    draft: Draft, state: State, body: Body, load: Array, v_dot: Array
+) -> tuple[tuple[Array, Ref], Ref]:
+    """Accelerations of the torso; returns its inertia and attitude, and how the mount
+    accelerates.
+    """
     H, rhs = draft.array("H", UNKNOWNS, 6), draft.array("rhs", 6)
     zero, omega = draft.zero(3), state.omega
     F, a_mount = draft.vector("F_tail", 6), draft.vector("a_mount", 3)
@@ -233,4 +249,4 @@ def _at_torso(draft: Draft, state: State, body: Body, load: Array, v_dot: Array)
     reads = axes, {"a": motion["a"]}
     draft.step(rotations.world_acceleration, *reads, p_ddot=block(v_dot, VELOCITY))
     draft.step(torso.mount_acceleration, motion, a_mount=a_mount)
-    return a_mount
+    return (H, axes["R"]), a_mount

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from ...functions.function import Function, assemble
+from ...functions.sweeps.doubling import is_doubled
 from ...functions.tail import Tail, struct_parameters
 from ...ir.cost import applied, branches
 from ...ir.program import Program
@@ -13,11 +14,18 @@ from .routine import CFunction
 from .straight import straight_line
 
 STRAIGHT_UP_TO = 7000  # nodes: beyond, the text leaves the instruction cache and compile time grows
-STRAIGHT_BESIDE_LANES = 3500  # nodes: where there is a sweep in lanes, too, that is faster beyond
+# nodes: where there is a sweep in lanes, too; v_dot's text of so many has 32 KB with AVX2
+STRAIGHT_BESIDE_LANES = 4100
 # zeros and copies above all: loops are as fast, and quick to compile
 ALWAYS_IN_LOOPS = ("tail_point_jacobians",)
 # columns of H times links, the work of a sweep in lanes: from here on segments are no slower
 SEGMENTS_FROM = 128
+# what the manifest says of the choice
+RULE = {
+    "straight_up_to": STRAIGHT_UP_TO,
+    "straight_beside_lanes_up_to": STRAIGHT_BESIDE_LANES,
+    "segments_from": SEGMENTS_FROM,
+}
 UNROLLED_ROWS = 12  # smaller matrices are factored without loops
 
 
@@ -48,8 +56,9 @@ def fastest(function: Function, tail: Tail) -> tuple[str, Program]:
     Straight lines are fastest until their text crowds the instruction cache, if all of them are
     always run; sweeps in lanes overtake them before that, and sweeps by segments overtake both.
     """
-    # sweeps by segments, where the tail is long
-    long = tail.segments > 1 and tail.nt * tail.total >= SEGMENTS_FROM
+    # sweeps by segments, where the tail or a segment is long
+    several = tail.segments > 1 and tail.nt * tail.total >= SEGMENTS_FROM
+    long = several or is_doubled(tail)
     form, swept = in_form("segments" if long else "lanes", function, tail)
     if form == "segments" or function.name in ALWAYS_IN_LOOPS:
         return form, swept

@@ -9,7 +9,7 @@ from ...scene.scene import Scene
 from ..target import Emission, Target
 from .batch import batch_entry, batch_files, batches
 from .batch_rollout import batch_rollout, batch_rollout_entry, batch_rollout_file
-from .form import printed_function
+from .form import RULE, printed_function
 from .loops import LoopPrinter
 from .model import c_context, model_files
 from .package import package_files
@@ -30,6 +30,8 @@ def emit(scene: Scene, tail: Tail, functions: Iterable[Function], version: str) 
 
     entries = c_entries(context) | {"batch": batch_entry(scene, batched)}
     entries |= batch_rollout_entry(rollout)
+    if scene.emission == "auto":
+        entries["forms"] = RULE
     described = {
         f.function.name: {"emission": f.emission, "operations": f.body.operations} for f in printed
     }
