@@ -11,7 +11,7 @@ import serpentail as st
 from benchmarks.fixtures import built, label
 from serpentail.model.batch import MIN_BATCH
 from serpentail.model.kernel import aligned, argument_record
-from serpentail.simulation import batched_runs
+from serpentail.simulation import parallel_runs
 
 STATES, ROUNDS = 512, 300  # a batch that stays in the cache
 FLIGHTS = 64
@@ -74,8 +74,8 @@ def flight_times(model, q: np.ndarray, v: np.ndarray) -> list[float]:
     ways = [lambda: [st.simulate(*one, **settings) for one in zip(models, q, v, strict=True)]]
     ways.append(lambda: st.simulate(model, q, v, parameters=own, **settings))
     found = []
-    for way, many in zip((*ways, ways[1]), (np.inf, np.inf, 1), strict=True):
-        with mock.patch.object(batched_runs, "MIN_BATCHED_STEPS", many):
+    for way, abreast in zip((*ways, ways[1]), (False, False, True), strict=True):
+        with mock.patch.object(parallel_runs, "worth_batching", lambda *_, is_so=abreast: is_so):
             found.append(best(way, 1))
     step = settings | {"t_span": 1e-3, "output_step": 1e-3}
     return [*found, best(lambda: st.simulate(model, q, v, parameters=own, **step), 1)]

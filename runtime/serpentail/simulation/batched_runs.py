@@ -2,14 +2,17 @@
 
 import ctypes
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from threading import Event
 from typing import Any
 
 import numpy as np
 
+from ..model.cores import threads as allowed
 from ..model.kernel import aligned
 from ..model.layout import TAIL_V
+from ..model.model import Model
 from .actuation import Actuation
 from .compiled_run import PAUSE, PAUSE_S, Memory
 from .methods import IntegrationMethod, step_counts
@@ -17,9 +20,12 @@ from .piecewise import Piecewise
 from .records import structure
 from .start import Start
 
-# steps of all runs: from here on compiling the C of batched runs pays, which takes a second or two
-MIN_BATCHED_STEPS = 1_000_000
 MAX_SHARED_STEPS = 1_000_000  # steps of one run: beyond, what all runs share fills the memory
+AT_ONCE = 64  # groups of runs that a thread takes up at once
+# What compiling takes, and what a step saves in lanes, for tails from (1, 3) to (8, 16): about the
+# less favourable of what AVX2 and AVX-512 showed
+COMPILE_S_PER_BYTE = 25e-6  # of C
+STEP_SAVES_S, OPERATION_SAVES_S = 4e-7, 2e-10  # each step; each operation of forward dynamics
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,18 +85,33 @@ def before(curve: Piecewise, t: np.ndarray) -> np.ndarray:
     return curve.at(np.nextafter(t, -np.inf))[0]
 
 
-def worth_batching(memory: Memory, actuation: Actuation, method: IntegrationMethod) -> bool:
-    """Tell whether runs can be made in batches, and are so many that it pays."""
+def shared_steps(memory: Memory, actuation: Actuation, method: IntegrationMethod) -> int:
+    """Return how many steps all runs share, 0 where they cannot be made in batches."""
     start, parts = memory.start, actuation.parts[0]
     if method.name != "rk4" or "flights" not in memory.records.model.manifest:
-        return False
+        return 0
     # a single phase of damping and torques
     others = (parts.pfl, parts.native, parts.user)
     if len(actuation.parts) > 1 or any(part is not None for part in others):
-        return False
+        return 0
     spans, slack = _spans(_edges(start, actuation))
     steps = int(step_counts(spans, slack, method.settings["step"]).sum())
-    return start.runs > 1 and steps <= MAX_SHARED_STEPS and steps * start.runs >= MIN_BATCHED_STEPS
+    return steps if steps <= MAX_SHARED_STEPS else 0
+
+
+def worth_batching(model: Model, runs: int, steps: int) -> bool:
+    """Tell whether runs of so many steps fill the lanes, and whether these need not be compiled, or
+    compiling them has paid by what they save now and would have saved before.
+    """
+    source = model.batch_library.rollouts
+    if not steps or runs < model.manifest["flights"]["states"]:
+        return False
+    if source.library is not None or source.at_hand:
+        return True
+    operations = model.manifest["functions"]["forward_dynamics"]["operations"]
+    step = STEP_SAVES_S + OPERATION_SAVES_S * operations
+    source.missed += runs * steps * step / allowed(model.batch_library.threads)
+    return source.missed >= COMPILE_S_PER_BYTE * source.bytes
 
 
 class BatchedRuns:
@@ -117,18 +138,37 @@ class BatchedRuns:
         self.arrays = {name: np.ascontiguousarray(a, dtype) for name, a in shared.items()}
         self.arrays["due"] = self.steps.due
 
-    @property
-    def groups(self) -> int:
-        """Number of groups of runs that are made at once."""
-        return -(-self.memory.start.runs // self.states)
+    def parts(self, threads: int) -> list[range]:
+        """Return numbers of runs that a thread makes at once, whole groups where it can be."""
+        runs = self.memory.start.runs
+        groups = -(-runs // self.states)
+        size = self.states * max(1, min(AT_ONCE, groups // (2 * threads)))
+        return [range(runs)[first : first + size] for first in range(0, runs, size)]
 
-    def runs(self, group: int) -> range:
-        """Return the numbers of a group's runs."""
-        return range(self.memory.start.runs)[group * self.states : (group + 1) * self.states]
+    def go(self, runs: range, ended: Event) -> Iterator[tuple[range, bool]]:
+        """Make runs; yield ranges of them, and whether all there could be made, until ``ended``."""
+        out = self.memory.out
+        record, held = self._record(slice(runs.start, runs.stop))
+        while record.first < record.count and not ended.is_set():
+            first, begun = record.first, time.perf_counter()
+            failed = self.function(ctypes.addressof(record))
+            if time.perf_counter() - begun < PAUSE_S:
+                record.pause *= 2
+            last = min(record.first, record.count)
+            # of those that have ended, only the last ones may have failed
+            sound = (last - 1) // self.states * self.states if failed else last
+            if sound > first:
+                made = runs[first:sound]
+                rows = slice(made.start, made.stop)
+                damped = self.arrays["damping"] * out["v"][rows, :, TAIL_V]
+                out["tau"][rows] = self.torques - damped
+                yield made, True
+            if failed:
+                yield runs[sound:last], False
+        del held
 
-    def go(self, group: int, ended: Event) -> bool | None:
-        """Make a group's runs; tell whether all could be made, None where they were given up."""
-        rows = slice(self.runs(group).start, self.runs(group).stop)
+    def _record(self, rows: slice) -> tuple[Any, dict[str, np.ndarray]]:
+        """Return the C record of some runs, and the arrays that it points to."""
         state, out = self.memory.state, self.memory.out
         arrays = self.arrays | {
             "parameters": np.ascontiguousarray(self.memory.parameters.vectors[rows]),
@@ -139,21 +179,11 @@ class BatchedRuns:
             "ledger": state["ledger"][rows],
             "work": aligned(self.work, self.dtype),
         }
-        record: Any = self.record(
-            count=len(self.runs(group)),
+        record = self.record(
+            count=rows.stop - rows.start,
             samples=out["q"].shape[1],
             steps=len(self.steps.lengths),
             pause=PAUSE,
             **{name: array.ctypes.data for name, array in arrays.items()},
         )
-        # in between a look whether the runs are to end
-        while record.step < record.steps:
-            if ended.is_set():
-                return None
-            begun = time.perf_counter()
-            if self.function(ctypes.addressof(record)):
-                return False
-            if time.perf_counter() - begun < PAUSE_S:
-                record.pause *= 2
-        out["tau"][rows] = self.torques - self.arrays["damping"] * out["v"][rows, :, TAIL_V]
-        return True
+        return record, arrays

@@ -73,7 +73,8 @@ def simulate(
     see ``load``.  A NativeTorque must bear calls from several threads at once.
 
     Flights by "rk4" whose torques are None, Damping, a TorqueTable or a TorqueCurve fly as lanes of
-    vectors where they take 1e6 steps or more in all: several times as fast, other last digits.
+    vectors where the C of that is compiled, or its compilation pays: several times as fast, other
+    last digits.
     With a function of Python, or SciPy's methods, runs are made one after another in the calling
     thread, and what the function raises, unless it is a SimulationError, ends all.
     """

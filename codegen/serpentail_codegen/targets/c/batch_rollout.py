@@ -24,7 +24,7 @@ RECORD = fields(
     ("q_out", "real *", "[count][samples][NQ], the start first"),
     ("v_out", "real *", "[count][samples][NV]"),
     ("ledger", "real *", "[count][2] work (J) of torques and of damping, at the end"),
-    ("count", "size_t", "flights, at most STATES"),
+    ("count", "size_t", "flights, of which STATES are made at a time"),
     ("samples", "long", "of each"),
     ("damping", "const real *", "[NT] N m s"),
     ("lengths", "const real *", "[steps] (s)"),
@@ -37,8 +37,9 @@ RECORD = fields(
     ("steps", "long", ""),
     ("pause", "long", "steps of one call"),
     ("work", "real *", "holds the flights between calls"),
-    ("step", "long", "steps done"),
-    ("done", "long", "samples written"),
+    ("first", "size_t", "of the flights that are being made; those before it have ended"),
+    ("step", "long", "steps that they have done"),
+    ("done", "long", "samples that they have written"),
 )
 
 
