@@ -13,7 +13,7 @@ from ..errors import SimulationError
 from ..model.kernel import address_of, aligned
 from ..model.library import NOT_FINITE, NOT_POSITIVE_DEFINITE, OUT_OF_RANGE
 from ..model.parameters import RunParameters
-from .actuation import Actuation
+from .acting import Acting
 from .ground import MOST_EVENTS, Ground
 from .methods import IntegrationMethod
 from .records import Records
@@ -122,9 +122,9 @@ class Memory:
 class CompiledRun:
     """A record of the generated C that takes up runs one after another; for one thread."""
 
-    def __init__(self, memory: Memory, actuation: Actuation, method: IntegrationMethod):
+    def __init__(self, memory: Memory, acting: Acting, method: IntegrationMethod):
         records, start, ground = memory.records, memory.start, memory.ground
-        self.memory, self.records, self.actuation = memory, records, actuation
+        self.memory, self.records, self.acting = memory, records, acting
         self.start, self.ground, self.model = start, ground, records.model
         # what all runs share
         members = dict(start_members(method), pause=PAUSE, samples=start.intervals + 1)
@@ -136,7 +136,7 @@ class CompiledRun:
             members |= {"most_events": MOST_EVENTS, "stop_at": ground.stop_at}
         members["work"] = aligned(self.model.manifest["work"]["rollout"], records.dtype)
         members["method"] = self.model.manifest["simulation"]["methods"].get(method.name, 0)
-        self.record: Any = records.record("run", drive=actuation.record, t=start.start, **members)
+        self.record: Any = records.record("run", t=start.start, **members)
         self.blank = bytes(self.record)
         self.address, self.rollout = ctypes.addressof(self.record), self.function("rollout")
         self.begin(0)
@@ -146,7 +146,8 @@ class CompiledRun:
         ctypes.memmove(self.address, self.blank, len(self.blank))
         for member, first, apart in self.memory.places:
             setattr(self.record, member, first + k * apart)
-        self.k, self.actuation.error = k, None
+        self.k, self.actuation = k, self.acting.of(k)
+        self.record.drive, self.actuation.error = int(self.acting.drives[k]), None
 
     @property
     def state(self) -> dict[str, np.ndarray]:

@@ -12,7 +12,7 @@ from ..model.cores import threads as allowed
 from ..model.workers import in_turn
 from ..motion.derived import made
 from ..stages import Stage
-from .actuation import Actuation
+from .acting import Acting
 from .batched_runs import BatchedRuns, shared_steps, worth_batching
 from .compiled_run import COUNTS, PAUSED, CompiledRun, Memory, Outcome, failed
 from .measured_runs import MeasuredRuns, read_only
@@ -26,17 +26,17 @@ class ParallelRuns:
     """Runs on their way: threads take them up in turn, and write samples, measures and outcomes."""
 
     def __init__(
-        self, memory: Memory, actuation: Actuation, method: IntegrationMethod, threads: int | None
+        self, memory: Memory, acting: Acting, method: IntegrationMethod, threads: int | None
     ):
-        self.memory, self.actuation, self.method = memory, actuation, method
+        self.memory, self.acting, self.method = memory, acting, method
         model, runs = memory.records.model, memory.start.runs
         # tasks of the threads: runs, or ranges of them that fly abreast
         self.batched: BatchedRuns | None = None
-        steps = shared_steps(memory, actuation, method)
-        of_python = method.name in SCIPY or actuation.of_python
+        steps = shared_steps(memory, acting, method)
+        of_python = method.name in SCIPY or acting.of_python
         self.threads = 1 if of_python else min(allowed(threads), runs)
         if worth_batching(model, runs, steps):
-            self.batched = BatchedRuns(memory, actuation, method)
+            self.batched = BatchedRuns(memory, acting, method)
             self.parts = self.batched.parts(self.threads)
             self.threads = min(self.threads, len(self.parts))
         # what they come to
@@ -56,13 +56,13 @@ class ParallelRuns:
         count, work = self.memory.start.runs, self._run_in_turn
         if self.batched is not None:
             count, work = len(self.parts), self._run_batches
-        elif self.method.name in SCIPY or self.actuation.of_python or self.memory.ground.points:
+        elif self.method.name in SCIPY or self.acting.of_python or self.memory.ground.points:
             work = self._run_singly
         in_turn(count, self.threads, work, lambda: stage.tell(self.part_done))
 
     def _run_singly(self, numbers: Iterator[int], ended: Event) -> None:
         """Take up runs in one thread until none is left, or ``ended`` is set."""
-        run = CompiledRun(self.memory, self.actuation, self.method)
+        run = CompiledRun(self.memory, self.acting, self.method)
         measure = self.measures.of_thread()
         for k in numbers:
             run.begin(k)
@@ -78,7 +78,7 @@ class ParallelRuns:
 
     def _run_in_turn(self, numbers: Iterator[int], ended: Event) -> None:
         """The same for runs that need no Python until they end."""
-        runs = RunsInTurn(self.memory, self.actuation, self.method)
+        runs = RunsInTurn(self.memory, self.acting, self.method)
         measure, most = self.measures.of_thread(), len(self.outcomes) // (4 * self.threads) + 1
         while taken := list(islice(numbers, min(runs.at_once, most))):
             found = runs.make(taken, ended)
@@ -157,10 +157,10 @@ def in_c(run: CompiledRun, ended: Event) -> Outcome | None:
 
 
 def run_parallel(
-    memory: Memory, actuation: Actuation, method: IntegrationMethod, threads: int | None
+    memory: Memory, acting: Acting, method: IntegrationMethod, threads: int | None
 ) -> ParallelRuns:
     """Make all runs, in so many threads unless Python acts in them; Ctrl-C ends all."""
-    runs = ParallelRuns(memory, actuation, method, threads)
+    runs = ParallelRuns(memory, acting, method, threads)
     try:
         with Stage("simulate", f"{memory.start.runs} runs of {runs.source.model.name}") as stage:
             runs.make(stage)

@@ -8,7 +8,7 @@ from threading import Event
 import numpy as np
 
 from ..model.kernel import address_of
-from .actuation import Actuation
+from .acting import Acting
 from .compiled_run import PAUSE_S, CompiledRun, Memory
 from .methods import IntegrationMethod
 
@@ -27,8 +27,8 @@ class Ended:
 class RunsInTurn:
     """Takes up runs, so many at a time that Python may look around now and then; for one thread."""
 
-    def __init__(self, memory: Memory, actuation: Actuation, method: IntegrationMethod):
-        self.run = CompiledRun(memory, actuation, method)
+    def __init__(self, memory: Memory, acting: Acting, method: IntegrationMethod):
+        self.run = CompiledRun(memory, acting, method)
         self.places = memory.places
         self.blank = np.frombuffer(self.run.blank, np.dtype(type(self.run.record)))
         self.function = self.run.function("rollouts", ctypes.c_int, ctypes.c_void_p)
@@ -39,6 +39,7 @@ class RunsInTurn:
         numbers, records = np.array(runs), np.repeat(self.blank, len(runs))
         for member, first, apart in self.places:
             records[member] = first + numbers * apart
+        records["drive"] = self.run.acting.drives[numbers]
         statuses, done = np.zeros(len(runs), np.intc), 0
         while done < len(runs) and not ended.is_set():
             records["pause"][done:], begun = self.pause, time.perf_counter()

@@ -17,7 +17,7 @@ from ..model.model import Model
 from ..model.parameters import RunParameters
 from ..motion.trajectory import Trajectory
 from ..stages import Stage
-from .actuation import Actuation
+from .acting import Acting
 from .compiled_run import CompiledRun, Memory, Samples
 from .controllers import Controller
 from .ground import Ground
@@ -68,13 +68,15 @@ def simulate(
     Trajectory, or Rollouts in which runs without an end have errors.
 
     Many starts give Rollouts, which keep the SimulationErrors of single runs: the other runs go on.
-    One method is chosen for all.  parameters: name -> (k,) or (k, 3), SI, what the runs have of
-    their own; bristles0 may be (k, points, 2).  threads: that take up the runs; None: the model's,
-    see ``load``.  A NativeTorque must bear calls from several threads at once.
+    One method is chosen for all.  controller may be a list, one of any kind a run; or a TorqueTable
+    with torques (k, K, 2m), or a Damping of (k, 2m), one a run.  parameters: name -> (k,) or (k,
+    3), SI, what the runs have of their own; bristles0 may be (k, points, 2).  threads: that take up
+    the runs; None: the model's, see ``load``.  A NativeTorque must bear calls from several threads
+    at once.
 
-    Flights by "rk4" whose torques are None, Damping, a TorqueTable or a TorqueCurve fly as lanes of
-    vectors where the C of that is compiled, or its compilation pays: several times as fast, other
-    last digits.
+    Flights by "rk4" whose torques are None, Damping, a TorqueTable or a TorqueCurve, with kinks at
+    the same times, fly as lanes of vectors where the C of that is compiled, or its compilation
+    pays: several times as fast, other last digits.
     With a function of Python, or SciPy's methods, runs are made one after another in the calling
     thread, and what the function raises, unless it is a SimulationError, ends all.
     """
@@ -84,12 +86,12 @@ def simulate(
     start = Start.checked(model, (q0, v0), t_span, settings.pop("output_step", None))
     watch = checked_watch(settings.pop("watch", None), start.many)
     threads = _threads(model, start, settings.pop("threads", None))
-    memory, actuation, choice = prepared(model, start, controller, method, settings)
+    memory, acting, choice = prepared(model, start, controller, method, settings)
     clocks = time.perf_counter(), time.process_time()
     if start.many:
-        runs = run_parallel(memory, actuation, choice, threads)
+        runs = run_parallel(memory, acting, choice, threads)
         return runs.rollouts(_spent(clocks))
-    samples = integrate(memory, actuation, choice, watch)
+    samples = integrate(memory, acting, choice, watch)
     info = samples.info | choice.info | _spent(clocks)
     return trajectory_or_error(model, replace(samples, info=info), memory.ground)
 
@@ -131,7 +133,7 @@ def end_state(
 
 def prepared(
     model: Model, start: Start, controller: Controller, method: str, settings: dict[str, Any]
-) -> tuple[Memory, Actuation, IntegrationMethod]:
+) -> tuple[Memory, Acting, IntegrationMethod]:
     """Return what runs need to go; SimulationError or ModelError where a setting is wrong."""
     changes = settings.pop("parameters", None)
     if changes is not None and not start.many:
@@ -140,27 +142,27 @@ def prepared(
         )
     parameters = model.parameters_of_runs(changes, start.runs)
     ground = Ground.checked(model, start, parameters, settings)
-    actuation = Actuation(Records(model), controller, ground.legs.curve if ground.legs else None)
-    choice = choose(actuation, start, parameters, method, settings)
+    acting = Acting(Records(model), controller, start, ground.legs.curve if ground.legs else None)
+    choice = choose(acting, start, parameters, method, settings)
     if ground.stop_at and choice.name in SCIPY:
         raise SimulationError(
             f"stop_at: {choice.name} does not look for events: take tsit5 or ros34pw2"
         )
-    return Memory(actuation.records, start, ground, parameters), actuation, choice
+    return Memory(acting.records, start, ground, parameters), acting, choice
 
 
 def choose(
-    actuation: Actuation,
+    acting: Acting,
     start: Start,
     parameters: RunParameters,
     name: str,
     settings: dict[str, Any],
 ) -> IntegrationMethod:
     """Return the method that was asked for, or a choice and its reason."""
-    model, single = actuation.model, actuation.records.real is ctypes.c_float
+    model, single = acting.model, acting.records.real is ctypes.c_float
     available, reason = model.manifest["simulation"]["methods"], "asked for"
     if isinstance(name, str) and name == "auto":
-        decay = None if model.contacts else fastest_decay(actuation, start, parameters)
+        decay = None if model.contacts else fastest_decay(acting, start, parameters)
         name, reason = chosen(settings, available, decay)
     method = checked_method(name, settings, available, single)
     span, most_steps = start.end - start.start, method.settings.get("most_steps", MOST_STEPS)
@@ -184,18 +186,20 @@ def refuse_vanishing(start: Start, name: str, step: float) -> None:
         )
 
 
-def fastest_decay(actuation: Actuation, start: Start, parameters: RunParameters) -> float:
+def fastest_decay(acting: Acting, start: Start, parameters: RunParameters) -> float:
     """Largest eigenvalue (1/s) of K (H^-1)_tt at the starts, K being joint damping."""
-    laws = [parts.damping for parts in actuation.parts if parts.damping is not None]
+    parts = [parts for each in acting.distinct for parts in each.parts]
+    laws = [each.damping for each in parts if each.damping is not None]
     if not any(law.any() for law in laws):
         return 0.0
     damping = np.max(laws, axis=0)
     # without torque and with unit torques: the differences are columns of H^-1
-    kernel, shape = actuation.model.kernel("forward_dynamics"), (start.runs, actuation.nt + 1)
+    model, nt = acting.model, acting.model.layout.nt
+    kernel, shape = model.kernel("forward_dynamics"), (start.runs, nt + 1)
     q = np.repeat(start.q0[:, None], shape[1], axis=1).astype(kernel.dtype)
-    torques = np.eye(actuation.nt + 1, actuation.nt, -1, kernel.dtype)
+    torques = np.eye(nt + 1, nt, -1, kernel.dtype)
     tau = np.tile(torques, (start.runs, 1, 1))
-    v, v_dot = (np.zeros((*shape, actuation.model.nv), kernel.dtype) for _ in range(2))
+    v, v_dot = (np.zeros((*shape, model.nv), kernel.dtype) for _ in range(2))
     evaluate = RunKernel(kernel, parameters.vectors, (q, v, tau), (v_dot,))
     sound = [k for k in range(start.runs) if evaluated(evaluate, k, shape[1])]
     tail = v_dot[sound, :, TAIL_V]
@@ -213,10 +217,10 @@ def evaluated(rows: RunKernel, k: int, count: int) -> bool:
 
 
 def integrate(
-    memory: Memory, actuation: Actuation, method: IntegrationMethod, watch: Watch | None = None
+    memory: Memory, acting: Acting, method: IntegrationMethod, watch: Watch | None = None
 ) -> Samples:
     """Return the samples of a single run, of which a function is told meanwhile."""
-    run = CompiledRun(memory, actuation, method)
+    run = CompiledRun(memory, acting, method)
     watched = None if watch is None else Watched(watch, run.model, memory.ground)
     with Stage("simulate", run.model.name) as stage:
         if method.name in SCIPY:

@@ -26,13 +26,15 @@ RECORD = fields(
     ("ledger", "real *", "[count][2] work (J) of torques and of damping, at the end"),
     ("count", "size_t", "flights, of which STATES are made at a time"),
     ("samples", "long", "of each"),
-    ("damping", "const real *", "[NT] N m s"),
+    ("damping", "const real *", "[NT] N m s, of the first flight"),
+    ("damping_apart", "size_t", "reals from there to the next flight's; 0: all have the same"),
     ("lengths", "const real *", "[steps] (s)"),
     (
         "torques",
         "const real *",
-        "[steps][3][NT] (N m) at beginning, middle and end of each step; NULL: none",
+        "[steps][3][NT] (N m) at begin, middle, end of each step, of the first flight; NULL: none",
     ),
+    ("torques_apart", "size_t", "reals from there to the next flight's; 0: all have the same"),
     ("due", "const int *", "[steps] whether a sample follows"),
     ("steps", "long", ""),
     ("pause", "long", "steps of one call"),
@@ -65,7 +67,7 @@ class BatchRollout:
     @property
     def inner(self) -> int:
         """Where the workspace of forward dynamics begins."""
-        return padded(self.state + self.states * (4 * self.size + self.nt))
+        return padded(self.state + self.states * (4 * self.size + 2 * self.nt))
 
     @property
     def work(self) -> int:
