@@ -109,17 +109,17 @@ def shared_steps(memory: Memory, acting: Acting, method: IntegrationMethod) -> i
 
 
 def worth_batching(model: Model, runs: int, steps: int) -> bool:
-    """Tell whether runs of so many steps fill the lanes, and whether these need not be compiled, or
-    compiling them has paid by what they save now and would have saved before.
+    """Tell whether runs fill the lanes, and whether these need not be compiled, or compiling them
+    pays by what they save in so many steps of each run, and would have saved before.
     """
     source = model.batch_library.rollouts
-    if not steps or runs < model.manifest["flights"]["states"]:
+    if runs < model.manifest["flights"]["states"]:
         return False
     if source.library is not None or source.at_hand:
         return True
     operations = model.manifest["functions"]["forward_dynamics"]["operations"]
-    step = STEP_SAVES_S + OPERATION_SAVES_S * operations
-    source.missed += runs * steps * step / allowed(model.batch_library.threads)
+    saved = runs * steps * (STEP_SAVES_S + OPERATION_SAVES_S * operations)
+    source.missed += saved / allowed(model.batch_library.threads)
     return source.missed >= COMPILE_S_PER_BYTE * source.bytes
 
 
@@ -163,19 +163,21 @@ class BatchedRuns:
             torques = np.array([self.steps.torques(curve) for curve in curves], self.dtype)
         return Laws(np.array(damping, self.dtype), torques, np.array(sampled, self.dtype))
 
-    def parts(self, threads: int) -> list[range]:
-        """Return numbers of runs that a thread makes at once, whole groups where it can be."""
-        runs = self.memory.start.runs
-        groups, most = -(-runs // self.states), AT_ONCE
+    def parts(self, runs: range, threads: int) -> list[range]:
+        """Return which of some runs a thread makes at once, whole groups where it can be."""
+        groups, most = -(-len(runs) // self.states), AT_ONCE
         if not self.acting.alike:  # torques at each step of each run are to be held
             most = min(most, MAX_SHARED_STEPS // (self.states * len(self.lengths)))
         size = self.states * max(1, min(most, groups // (2 * threads)))
-        return [range(runs)[first : first + size] for first in range(0, runs, size)]
+        return [runs[first : first + size] for first in range(0, len(runs), size)]
 
-    def go(self, runs: range, ended: Event) -> Iterator[tuple[range, bool]]:
-        """Make runs; yield ranges of them, and whether all there could be made, until ``ended``."""
+    def go(self, runs: range, ended: Event) -> Iterator[tuple[np.ndarray, dict[str, Any] | None]]:
+        """Make runs; yield numbers of them and what they came to, None of those to make alone."""
         laws = self.shared or self._laws([self.acting.of(k) for k in runs])
         record, held = self._record(slice(runs.start, runs.stop), laws)
+        steps, start = len(self.lengths), self.memory.start
+        told: dict[str, Any] = {"steps": steps, "evaluations": 4 * steps}
+        told |= {"done": start.intervals + 1, "ends": start.end}
         while record.first < record.count and not ended.is_set():
             first, begun = record.first, time.perf_counter()
             failed = self.function(ctypes.addressof(record))
@@ -186,9 +188,10 @@ class BatchedRuns:
             sound = (last - 1) // self.states * self.states if failed else last
             if sound > first:
                 self._write_torques(runs[first:sound], laws, first)
-                yield runs[first:sound], True
+                numbers = np.array(runs[first:sound])
+                yield numbers, told | {"ledger": self.memory.state["ledger"][numbers]}
             if failed:
-                yield runs[sound:last], False
+                yield np.array(runs[sound:last]), None
         del held
 
     def _write_torques(self, runs: range, laws: Laws, first: int) -> None:

@@ -1,6 +1,7 @@
 """Makes many runs at once, on all cores."""
 
 from collections.abc import Callable, Iterator
+from functools import partial
 from itertools import islice
 from threading import Event
 from typing import Any
@@ -13,6 +14,7 @@ from ..model.workers import in_turn
 from ..motion.derived import made
 from ..stages import Stage
 from .acting import Acting
+from .adaptive_runs import AdaptiveRuns, adaptive_in_lanes
 from .batched_runs import BatchedRuns, shared_steps, worth_batching
 from .compiled_run import COUNTS, PAUSED, CompiledRun, Memory, Outcome, failed
 from .measured_runs import MeasuredRuns, read_only
@@ -20,6 +22,8 @@ from .methods import SCIPY, IntegrationMethod
 from .outcomes import Outcomes
 from .rollouts import Rollouts, Source
 from .runs_in_turn import RunsInTurn
+
+PILOTS = 64  # runs that tell how long others take before anything is compiled for these
 
 
 class ParallelRuns:
@@ -30,15 +34,9 @@ class ParallelRuns:
     ):
         self.memory, self.acting, self.method = memory, acting, method
         model, runs = memory.records.model, memory.start.runs
-        # tasks of the threads: runs, or ranges of them that fly abreast
-        self.batched: BatchedRuns | None = None
-        steps = shared_steps(memory, acting, method)
+        self.batched: BatchedRuns | AdaptiveRuns | None = None
         of_python = method.name in SCIPY or acting.of_python
         self.threads = 1 if of_python else min(allowed(threads), runs)
-        if worth_batching(model, runs, steps):
-            self.batched = BatchedRuns(memory, acting, method)
-            self.parts = self.batched.parts(self.threads)
-            self.threads = min(self.threads, len(self.parts))
         # what they come to
         self.outcomes = Outcomes(memory)
         self.source = Source(model, memory.parameters, memory.ground, self.outcomes, method.info)
@@ -51,14 +49,36 @@ class ParallelRuns:
         return self.outcomes.count / len(self.outcomes)
 
     def make(self, stage: Stage) -> None:
-        """Make all runs."""
-        work: Callable[[Iterator[int], Event], None]
-        count, work = self.memory.start.runs, self._run_in_turn
+        """Make all runs, those abreast that can be and for which it pays."""
+        first, runs = 0, self.memory.start.runs
+        told = self.memory, self.acting, self.method
+        if (steps := shared_steps(*told)) and self._pays(runs, steps):
+            self.batched = BatchedRuns(*told)
+        elif adaptive_in_lanes(*told):
+            if not self._pays(runs, 0):
+                # how long the others will take is known of some
+                first = min(PILOTS, runs)
+                self._share(first, self._run_in_turn, stage)
+            steps = int(self.outcomes.counts["steps"][:first].sum()) // max(first, 1)
+            if first == 0 or (first < runs and self._pays(runs - first, steps)):
+                self.batched = AdaptiveRuns(*told)
         if self.batched is not None:
-            count, work = len(self.parts), self._run_batches
+            self.parts = self.batched.parts(range(first, runs), self.threads)
+            self._share(len(self.parts), self._run_batches, stage)
         elif self.method.name in SCIPY or self.acting.of_python or self.memory.ground.points:
-            work = self._run_singly
-        in_turn(count, self.threads, work, lambda: stage.tell(self.part_done))
+            self._share(runs, self._run_singly, stage)
+        else:
+            rest = partial(self._run_in_turn, first=first)
+            self._share(runs - first, rest, stage)
+
+    def _pays(self, runs: int, steps: int) -> bool:
+        """Tell whether runs of about so many steps are to be made abreast."""
+        return worth_batching(self.source.model, runs, steps)
+
+    def _share(self, count: int, work: Callable[..., None], stage: Stage) -> None:
+        """Have threads take up so many tasks in turn."""
+        if count:
+            in_turn(count, min(self.threads, count), work, lambda: stage.tell(self.part_done))
 
     def _run_singly(self, numbers: Iterator[int], ended: Event) -> None:
         """Take up runs in one thread until none is left, or ``ended`` is set."""
@@ -76,12 +96,12 @@ class ParallelRuns:
             if outcome.failure is None:
                 measure(np.array([k]))
 
-    def _run_in_turn(self, numbers: Iterator[int], ended: Event) -> None:
-        """The same for runs that need no Python until they end."""
+    def _run_in_turn(self, numbers: Iterator[int], ended: Event, first: int = 0) -> None:
+        """The same for runs that need no Python until they end; numbers count from the first."""
         runs = RunsInTurn(self.memory, self.acting, self.method)
         measure, most = self.measures.of_thread(), len(self.outcomes) // (4 * self.threads) + 1
         while taken := list(islice(numbers, min(runs.at_once, most))):
-            found = runs.make(taken, ended)
+            found = runs.make([first + number for number in taken], ended)
             told = {name: found.records[name] for name in (*COUNTS, "done")}
             told |= {"ends": found.records["t"], "ledger": self.memory.state["ledger"][found.runs]}
             self.outcomes.keep_all(found.runs, told)
@@ -93,19 +113,15 @@ class ParallelRuns:
 
     def _run_batches(self, parts: Iterator[int], ended: Event) -> None:
         """The same for runs abreast; a group among which one cannot go on is made again in turn."""
-        batched, start, measure = self.batched, self.memory.start, self.measures.of_thread()
+        batched, measure = self.batched, self.measures.of_thread()
         assert batched is not None
-        steps = len(batched.steps.lengths)
-        told = {"steps": steps, "evaluations": 4 * steps, "done": start.intervals + 1}
         for part in parts:
-            for runs, sound in batched.go(self.parts[part], ended):
-                if not sound:
-                    self._run_in_turn(iter(runs), ended)
-                    continue
-                rows = slice(runs.start, runs.stop)
-                ledger = self.memory.state["ledger"][rows]
-                self.outcomes.keep_all(rows, told | {"ends": start.end, "ledger": ledger})
-                measure(np.array(runs))
+            for runs, told in batched.go(self.parts[part], ended):
+                if told is None:
+                    self._run_in_turn(iter(runs.tolist()), ended)
+                else:
+                    self.outcomes.keep_all(runs, told)
+                    measure(runs)
 
     def _by_scipy(self, run: CompiledRun) -> Outcome:
         """Return what a run came to by one of SciPy's methods, its samples kept."""

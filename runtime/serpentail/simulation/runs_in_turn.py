@@ -9,7 +9,7 @@ import numpy as np
 
 from ..model.kernel import address_of
 from .acting import Acting
-from .compiled_run import PAUSE_S, CompiledRun, Memory
+from .compiled_run import PAUSE, PAUSE_S, CompiledRun, Memory
 from .methods import IntegrationMethod
 
 MOST_AT_ONCE = 512  # runs of one call: more would not make the rest of a call cheaper
@@ -29,17 +29,12 @@ class RunsInTurn:
 
     def __init__(self, memory: Memory, acting: Acting, method: IntegrationMethod):
         self.run = CompiledRun(memory, acting, method)
-        self.places = memory.places
-        self.blank = np.frombuffer(self.run.blank, np.dtype(type(self.run.record)))
         self.function = self.run.function("rollouts", ctypes.c_int, ctypes.c_void_p)
-        self.pause, self.at_once = int(self.blank["pause"][0]), 1
+        self.pause, self.at_once = PAUSE, 1
 
     def make(self, runs: list[int], ended: Event) -> Ended:
         """Make runs; return those that came to an end, fewer where ``ended`` is set."""
-        numbers, records = np.array(runs), np.repeat(self.blank, len(runs))
-        for member, first, apart in self.places:
-            records[member] = first + numbers * apart
-        records["drive"] = self.run.acting.drives[numbers]
+        numbers, records = np.array(runs), self.run.records_of(runs)
         statuses, done = np.zeros(len(runs), np.intc), 0
         while done < len(runs) and not ended.is_set():
             records["pause"][done:], begun = self.pause, time.perf_counter()

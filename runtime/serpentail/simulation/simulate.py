@@ -74,9 +74,11 @@ def simulate(
     the runs; None: the model's, see ``load``.  A NativeTorque must bear calls from several threads
     at once.
 
-    Flights by "rk4" whose torques are None, Damping, a TorqueTable or a TorqueCurve, with kinks at
-    the same times, fly as lanes of vectors where the C of that is compiled, or its compilation
-    pays: several times as fast, other last digits.
+    Eight flights or more by "tsit5" or "rk4" whose torques are None, Damping, a TorqueTable or a
+    TorqueCurve (for "tsit5" also Phases of these, for "rk4" with kinks at the same times) fly as
+    lanes of vectors where the C of that is compiled, or its compilation pays: several times as
+    fast, other last digits.
+
     With a function of Python, or SciPy's methods, runs are made one after another in the calling
     thread, and what the function raises, unless it is a SimulationError, ends all.
     """

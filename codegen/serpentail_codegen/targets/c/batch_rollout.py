@@ -45,6 +45,16 @@ RECORD = fields(
 )
 
 
+ROLLOUTS = fields(
+    ("runs", "void *", "[count] records of runs, as the simulation has them"),
+    ("count", "long", "runs"),
+    ("statuses", "int *", "[count] of those that have ended: OK, or anything else: make it alone"),
+    ("lanes", "long *", "[STATES] run in each lane; -1: none"),
+    ("next", "long", "run that is taken up next"),
+    ("pause", "long", "steps of one call"),
+    ("work", "real *", "holds the flights between calls"),
+)
+SLOTS = 10  # states in the workspace: start, seven rates, end, error of an adaptive step
 LEDGER = 2  # numbers that a flight adds up behind its state
 
 
@@ -60,14 +70,19 @@ class BatchRollout:
     nt: int
 
     @property
-    def state(self) -> int:
-        """Where the states lie in the workspace: behind the parameters."""
+    def given(self) -> int:
+        """Where torques lie in the workspace: behind the parameters."""
         return self.states * self.parameters
+
+    @property
+    def state(self) -> int:
+        """Where the states lie: behind given torques, damping and torques in all."""
+        return self.given + 3 * self.states * self.nt
 
     @property
     def inner(self) -> int:
         """Where the workspace of forward dynamics begins."""
-        return padded(self.state + self.states * (4 * self.size + 2 * self.nt))
+        return padded(self.state + SLOTS * self.states * self.size)
 
     @property
     def work(self) -> int:
@@ -126,7 +141,14 @@ def rollout_context(scene: Scene, rollout: BatchRollout) -> dict[str, Any]:
         "arguments": ", ".join(arguments),
         "record": record,
         "parameter_count": rollout.parameters,
+        "given": rollout.given,
         "state": rollout.state,
+        "slots": SLOTS,
+        "rollouts_record": [
+            {"type": f.type if f.type.endswith("*") else f"{f.type} ", "name": f.name}
+            | {"meaning": f.meaning}
+            for f in ROLLOUTS
+        ],
         "inner": rollout.inner,
         "steps": step_views([rollout], scene.real, scene.name),
         "helpers": sorted(rollout.body.helpers | {"lanes", "all_lanes"}),
@@ -138,4 +160,6 @@ def batch_rollout_entry(rollout: BatchRollout | None) -> dict[str, Any]:
     if rollout is None:
         return {}
     members = [[f.name, f.kind] for f in RECORD]
-    return {"flights": {"states": rollout.states, "work": rollout.work, "record": members}}
+    adaptive = [[f.name, f.kind] for f in ROLLOUTS]
+    sizes = {"states": rollout.states, "work": rollout.work}
+    return {"flights": sizes | {"record": members, "rollouts": adaptive}}
