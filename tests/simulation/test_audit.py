@@ -109,14 +109,15 @@ def check_drops(name, seeds):
 
 
 def test_flights_balance_in_lanes_as_singly(monkeypatch):
-    from serpentail.simulation import batched_runs
+    from serpentail.simulation import parallel_runs
 
     model = animal()
     starts = [dropped(model, seed) for seed in range(9)]
     q, v = (np.array(each) for each in zip(*starts, strict=True))
     how = {"controller": st.Damping(1e-3), "t_span": 0.05, "method": "rk4", "step": 1e-5}
+    monkeypatch.setattr(parallel_runs, "worth_batching", lambda *_: False)
     singly = st.simulate(model, q, v, **how)
-    monkeypatch.setattr(batched_runs, "MIN_BATCHED_STEPS", 1)
+    monkeypatch.setattr(parallel_runs, "worth_batching", lambda *_: True)
     abreast = st.simulate(model, q, v, **how)
     assert abreast.info["abreast"] > 1 == singly.info["abreast"]
     for runs in (singly, abreast):

@@ -77,11 +77,11 @@ def library_of(
     """
     check_profile(profile)
     refuse_others(cache)
-    library = _noted(text, profile, cache, flags)
+    library = noted(text, profile, cache, flags)
     if library:
         return library
     with alone(cache, digest([text, profile])):
-        library = _noted(text, profile, cache, flags)
+        library = noted(text, profile, cache, flags)
         if library:
             return library
         # A note may describe a compiler since upgraded behind a wrapper, so nothing is built on
@@ -90,7 +90,7 @@ def library_of(
         return library_in(_place(text, toolchain, cache)) or _build(text, places, toolchain, cache)
 
 
-def _noted(text: str, profile: str, cache: Path, flags: tuple[str, ...]) -> Path | None:
+def noted(text: str, profile: str, cache: Path, flags: tuple[str, ...] = ()) -> Path | None:
     """Return the library that the compiler made which notes tell of; no process is started."""
     toolchain = recall(profile, cache)
     if toolchain is None:

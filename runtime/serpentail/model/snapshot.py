@@ -16,7 +16,7 @@ from .cache import (
     unwritable,
     workshop,
 )
-from .compiler import library_of, text_digest
+from .compiler import library_of, noted, text_digest
 from .manifest import CheckedFolder, read_folder
 from .reading import regular_bytes
 
@@ -30,6 +30,11 @@ def model_library(checked: CheckedFolder, sources: Sequence[str], profile: str) 
         return [folder / name for name in sources], folder / "include"
 
     return library_of(_text(checked, sources), places, profile, cache)
+
+
+def library_in_cache(checked: CheckedFolder, sources: Sequence[str], profile: str) -> Path | None:
+    """Return what ``model_library`` would return if nothing has to be compiled, else None."""
+    return noted(_text(checked, sources), profile, cache_folder(None))
 
 
 def _text(checked: CheckedFolder, sources: Sequence[str]) -> str:

@@ -2,36 +2,43 @@
 
 import ctypes
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from threading import Event
 from typing import Any
 
 import numpy as np
 
+from ..model.cores import threads as allowed
 from ..model.kernel import aligned
 from ..model.layout import TAIL_V
+from ..model.model import Model
+from .acting import Acting
 from .actuation import Actuation
 from .compiled_run import PAUSE, PAUSE_S, Memory
 from .methods import IntegrationMethod, step_counts
-from .piecewise import Piecewise
+from .piecewise import Piecewise, constant
 from .records import structure
 from .start import Start
 
-# steps of all runs: from here on compiling the C of batched runs pays, which takes a second or two
-MIN_BATCHED_STEPS = 1_000_000
 MAX_SHARED_STEPS = 1_000_000  # steps of one run: beyond, what all runs share fills the memory
+AT_ONCE = 64  # groups of runs that a thread takes up at once
+# What compiling takes, and what a step saves in lanes, for tails from (1, 3) to (8, 16): about the
+# less favourable of what AVX2 and AVX-512 showed
+COMPILE_S_PER_BYTE = 25e-6  # of C
+STEP_SAVES_S, OPERATION_SAVES_S = 4e-7, 2e-10  # each step; each operation of forward dynamics
 
 
 @dataclass(frozen=True, eq=False)
 class Steps:
     """Steps that all runs share.
 
-    lengths (n,) in s; torques (n, 3, 2m) in N m at begin, middle and end, or None; due (n,): 1
-    where a sample follows.
+    lengths (n,) in s; begins, ends (n,) in s; due (n,): 1 where a sample follows.
     """
 
     lengths: np.ndarray
-    torques: np.ndarray | None
+    begins: np.ndarray
+    ends: np.ndarray
     due: np.ndarray
 
     @classmethod
@@ -46,15 +53,16 @@ class Steps:
         last = within + 1 == counts[span]
         # where it begins and ends; steps that fit are exactly as long as asked for
         lengths = np.where(np.abs(counts * step - spans) <= slack, step, spans / counts)[span]
-        begin = edges[span] + within * lengths
-        end = np.where(last, edges[span + 1], begin + lengths)
+        begins = edges[span] + within * lengths
+        ends = np.where(last, edges[span + 1], begins + lengths)
         due = (last & np.isin(edges[span + 1], start.times)).astype(np.intc)
-        curve = actuation.parts[0].torques
-        if curve is None:
-            return cls(lengths, None, due)
-        middle = (begin + end) / 2
-        torques = np.stack([at(curve, begin), at(curve, middle), before(curve, end)], axis=1)
-        return cls(lengths, torques, due)
+        return cls(lengths, begins, ends, due)
+
+    def torques(self, curve: Piecewise) -> np.ndarray:
+        """Return torques (n, 3, 2m), N m, at begin, middle and end of each step."""
+        middles = (self.begins + self.ends) / 2
+        values = at(curve, self.begins), at(curve, middles), before(curve, self.ends)
+        return np.stack(values, axis=1)
 
 
 def _edges(start: Start, actuation: Actuation) -> np.ndarray:
@@ -71,66 +79,135 @@ def _spans(edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def at(curve: Piecewise, t: np.ndarray) -> np.ndarray:
     """Values (n, channels) at times (n,), s; where two pieces meet, of the later."""
+    if curve.never_changes:
+        return np.broadcast_to(curve.coefficients[0, :, 0], (len(t), curve.channels))
     return curve.at(t)[0]
 
 
 def before(curve: Piecewise, t: np.ndarray) -> np.ndarray:
     """Values (n, channels) at times (n,), s; where two pieces meet, of the earlier."""
-    return curve.at(np.nextafter(t, -np.inf))[0]
+    return at(curve, np.nextafter(t, -np.inf))
 
 
-def worth_batching(memory: Memory, actuation: Actuation, method: IntegrationMethod) -> bool:
-    """Tell whether runs can be made in batches, and are so many that it pays."""
-    start, parts = memory.start, actuation.parts[0]
+def shared_steps(memory: Memory, acting: Acting, method: IntegrationMethod) -> int:
+    """Return how many steps all runs share, 0 where they cannot be made in batches."""
+    start, first = memory.start, acting.distinct[0]
     if method.name != "rk4" or "flights" not in memory.records.model.manifest:
-        return False
-    # a single phase of damping and torques
-    others = (parts.pfl, parts.native, parts.user)
-    if len(actuation.parts) > 1 or any(part is not None for part in others):
-        return False
-    spans, slack = _spans(_edges(start, actuation))
+        return 0
+    for each in acting.distinct:
+        # a single phase of damping and torques, which end steps where those of the others do
+        parts = each.parts[0]
+        others = (parts.pfl, parts.native, parts.user)
+        if len(each.parts) > 1 or any(part is not None for part in others):
+            return 0
+        if not np.array_equal(each.stops, first.stops):
+            return 0
+    spans, slack = _spans(_edges(start, first))
     steps = int(step_counts(spans, slack, method.settings["step"]).sum())
-    return start.runs > 1 and steps <= MAX_SHARED_STEPS and steps * start.runs >= MIN_BATCHED_STEPS
+    runs = 1 if acting.alike else memory.records.model.manifest["flights"]["states"]
+    return steps if runs * steps <= MAX_SHARED_STEPS else 0
+
+
+def worth_batching(model: Model, runs: int, steps: int) -> bool:
+    """Tell whether runs fill the lanes, and whether these need not be compiled, or compiling them
+    pays by what they save in so many steps of each run, and would have saved before.
+    """
+    source = model.batch_library.rollouts
+    if runs < model.manifest["flights"]["states"]:
+        return False
+    if source.library is not None or source.at_hand:
+        return True
+    operations = model.manifest["functions"]["forward_dynamics"]["operations"]
+    saved = runs * steps * (STEP_SAVES_S + OPERATION_SAVES_S * operations)
+    source.missed += saved / allowed(model.batch_library.threads)
+    return source.missed >= COMPILE_S_PER_BYTE * source.bytes
+
+
+@dataclass(frozen=True, eq=False)
+class Laws:
+    """What acts in runs, or in all of them where there is one row.
+
+    damping (k, 2m), N m s; torques (k, n, 3, 2m), N m, at begin, middle and end of each step, or
+    None; sampled (k, samples, 2m), N m.
+    """
+
+    damping: np.ndarray
+    torques: np.ndarray | None
+    sampled: np.ndarray
 
 
 class BatchedRuns:
     """Runs of a memory, several of which the generated C makes at once."""
 
-    def __init__(self, memory: Memory, actuation: Actuation, method: IntegrationMethod):
-        self.memory, model = memory, memory.records.model
+    def __init__(self, memory: Memory, acting: Acting, method: IntegrationMethod):
+        self.memory, self.acting, model = memory, acting, memory.records.model
         # the C function, and its record
         entry, dtype = model.manifest["flights"], memory.records.dtype
         self.states, self.work, self.dtype = entry["states"], entry["work"], dtype
         self.record = structure("flights", tuple(map(tuple, entry["record"])), memory.records.real)
         self.function = model.batch_library.rollouts.function(f"{model.name}_side_by_side_flights")
-        # steps and torques, which all runs share
-        self.steps = Steps.planned(memory.start, actuation, method.settings["step"])
-        damping, curve = actuation.parts[0].damping, actuation.parts[0].torques
-        damping = np.zeros(actuation.nt) if damping is None else damping
-        shared = {"lengths": self.steps.lengths, "damping": damping}
-        self.torques: np.ndarray | float = 0.0
-        if curve is not None and self.steps.torques is not None:
-            times = memory.start.times
-            sampled = np.vstack([at(curve, times[:1]), before(curve, times[1:])])
-            self.torques = sampled.astype(dtype)
-            shared["torques"] = self.steps.torques
-        self.arrays = {name: np.ascontiguousarray(a, dtype) for name, a in shared.items()}
-        self.arrays["due"] = self.steps.due
+        self.steps = Steps.planned(memory.start, acting.distinct[0], method.settings["step"])
+        self.lengths = np.ascontiguousarray(self.steps.lengths, dtype)
+        self.shared = self._laws(acting.distinct) if acting.alike else None
 
-    @property
-    def groups(self) -> int:
-        """Number of groups of runs that are made at once."""
-        return -(-self.memory.start.runs // self.states)
+    def _laws(self, actuations: list[Actuation]) -> "Laws":
+        """Return what acts in runs, as the C takes it."""
+        parts = [each.parts[0] for each in actuations]
+        nt, times = actuations[0].nt, self.memory.start.times
+        still = constant(0.0, np.zeros(nt))
+        damping = [np.zeros(nt) if each.damping is None else each.damping for each in parts]
+        curves = [still if each.torques is None else each.torques for each in parts]
+        sampled = [np.vstack([at(c, times[:1]), before(c, times[1:])]) for c in curves]
+        torques = None
+        if any(each.torques is not None for each in parts):
+            torques = np.array([self.steps.torques(curve) for curve in curves], self.dtype)
+        return Laws(np.array(damping, self.dtype), torques, np.array(sampled, self.dtype))
 
-    def runs(self, group: int) -> range:
-        """Return the numbers of a group's runs."""
-        return range(self.memory.start.runs)[group * self.states : (group + 1) * self.states]
+    def parts(self, runs: range, threads: int) -> list[range]:
+        """Return which of some runs a thread makes at once, whole groups where it can be."""
+        groups, most = -(-len(runs) // self.states), AT_ONCE
+        if not self.acting.alike:  # torques at each step of each run are to be held
+            most = min(most, MAX_SHARED_STEPS // (self.states * len(self.lengths)))
+        size = self.states * max(1, min(most, groups // (2 * threads)))
+        return [runs[first : first + size] for first in range(0, len(runs), size)]
 
-    def go(self, group: int, ended: Event) -> bool | None:
-        """Make a group's runs; tell whether all could be made, None where they were given up."""
-        rows = slice(self.runs(group).start, self.runs(group).stop)
+    def go(self, runs: range, ended: Event) -> Iterator[tuple[np.ndarray, dict[str, Any] | None]]:
+        """Make runs; yield numbers of them and what they came to, None of those to make alone."""
+        laws = self.shared or self._laws([self.acting.of(k) for k in runs])
+        record, held = self._record(slice(runs.start, runs.stop), laws)
+        steps, start = len(self.lengths), self.memory.start
+        told: dict[str, Any] = {"steps": steps, "evaluations": 4 * steps}
+        told |= {"done": start.intervals + 1, "ends": start.end}
+        while record.first < record.count and not ended.is_set():
+            first, begun = record.first, time.perf_counter()
+            failed = self.function(ctypes.addressof(record))
+            if time.perf_counter() - begun < PAUSE_S:
+                record.pause *= 2
+            last = min(record.first, record.count)
+            # of those that have ended, only the last ones may have failed
+            sound = (last - 1) // self.states * self.states if failed else last
+            if sound > first:
+                self._write_torques(runs[first:sound], laws, first)
+                numbers = np.array(runs[first:sound])
+                yield numbers, told | {"ledger": self.memory.state["ledger"][numbers]}
+            if failed:
+                yield np.array(runs[sound:last]), None
+        del held
+
+    def _write_torques(self, runs: range, laws: Laws, first: int) -> None:
+        """Write the torques of the samples of runs; their laws begin at the first of some."""
+        rows = slice(runs.start, runs.stop)
+        own = slice(None) if self.acting.alike else slice(first, first + len(runs))
+        rates = self.memory.out["v"][rows, :, TAIL_V]
+        self.memory.out["tau"][rows] = laws.sampled[own] - laws.damping[own, None] * rates
+
+    def _record(self, rows: slice, laws: Laws) -> tuple[Any, dict[str, np.ndarray]]:
+        """Return the C record of some runs, and the arrays that it points to."""
         state, out = self.memory.state, self.memory.out
-        arrays = self.arrays | {
+        arrays = {
+            "lengths": self.lengths,
+            "due": self.steps.due,
+            "damping": laws.damping,
             "parameters": np.ascontiguousarray(self.memory.parameters.vectors[rows]),
             "q": state["q"][rows],
             "v": state["v"][rows],
@@ -139,21 +216,15 @@ class BatchedRuns:
             "ledger": state["ledger"][rows],
             "work": aligned(self.work, self.dtype),
         }
-        record: Any = self.record(
-            count=len(self.runs(group)),
+        if laws.torques is not None:
+            arrays["torques"] = laws.torques
+        own = {n: arrays[n][0].size for n in ("damping", "torques") if n in arrays}
+        record = self.record(
+            count=rows.stop - rows.start,
             samples=out["q"].shape[1],
-            steps=len(self.steps.lengths),
+            steps=len(self.lengths),
             pause=PAUSE,
+            **{f"{n}_apart": 0 if self.acting.alike else size for n, size in own.items()},
             **{name: array.ctypes.data for name, array in arrays.items()},
         )
-        # in between a look whether the runs are to end
-        while record.step < record.steps:
-            if ended.is_set():
-                return None
-            begun = time.perf_counter()
-            if self.function(ctypes.addressof(record)):
-                return False
-            if time.perf_counter() - begun < PAUSE_S:
-                record.pause *= 2
-        out["tau"][rows] = self.torques - self.arrays["damping"] * out["v"][rows, :, TAIL_V]
-        return True
+        return record, arrays

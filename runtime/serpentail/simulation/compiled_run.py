@@ -2,7 +2,7 @@
 
 import ctypes
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from threading import Event
 from typing import Any
@@ -15,7 +15,7 @@ from ..model.kernel import address_of, aligned
 from ..model.library import NOT_FINITE, NOT_POSITIVE_DEFINITE, OUT_OF_RANGE
 from ..model.model import Model
 from ..model.parameters import RunParameters
-from .actuation import Actuation
+from .acting import Acting
 from .decay import FastestDecay
 from .ground import MOST_EVENTS, Ground
 from .methods import IntegrationMethod
@@ -131,9 +131,9 @@ class Memory:
 class CompiledRun:
     """A record of the generated C that takes up runs one after another; for one thread."""
 
-    def __init__(self, memory: Memory, actuation: Actuation, method: IntegrationMethod):
+    def __init__(self, memory: Memory, acting: Acting, method: IntegrationMethod):
         records, start, ground = memory.records, memory.start, memory.ground
-        self.memory, self.records, self.actuation = memory, records, actuation
+        self.memory, self.records, self.acting = memory, records, acting
         self.method, self.start, self.ground = method, start, ground
         # what all runs share
         members = dict(start_members(method), pause=PAUSE, samples=start.intervals + 1)
@@ -145,7 +145,7 @@ class CompiledRun:
             members |= {"most_events": MOST_EVENTS, "stop_at": ground.stop_at}
         members["work"] = aligned(self.model.manifest["work"]["rollout"], records.dtype)
         members["method"] = self.model.manifest["simulation"]["methods"].get(method.name, 0)
-        self.record: Any = records.record("run", drive=actuation.record, t=start.start, **members)
+        self.record: Any = records.record("run", t=start.start, **members)
         self.blank = bytes(self.record)
         self.address, self.rollout = ctypes.addressof(self.record), self.function("rollout")
         self.begin(0)
@@ -155,7 +155,17 @@ class CompiledRun:
         ctypes.memmove(self.address, self.blank, len(self.blank))
         for member, first, apart in self.memory.places:
             setattr(self.record, member, first + k * apart)
-        self.k, self.actuation.error = k, None
+        self.k, self.actuation = k, self.acting.of(k)
+        self.record.drive, self.actuation.error = int(self.acting.drives[k]), None
+
+    def records_of(self, runs: Sequence[int]) -> np.ndarray:
+        """Return records of runs at their starts, which share the workspace."""
+        numbers = np.array(runs)
+        records = np.repeat(np.frombuffer(self.blank, np.dtype(type(self.record))), len(numbers))
+        for member, first, apart in self.memory.places:
+            records[member] = first + numbers * apart
+        records["drive"] = self.acting.drives[numbers]
+        return records
 
     def again(self, q0: np.ndarray, v0: np.ndarray) -> None:
         """Take up the first run anew, from another start."""
@@ -165,7 +175,7 @@ class CompiledRun:
     @kept
     def decay(self) -> FastestDecay:
         """How fast its joint damping is, for other starts."""
-        return FastestDecay(self.actuation, self.start.runs, self.memory.parameters)
+        return FastestDecay(self.acting, self.start.runs, self.memory.parameters)
 
     @property
     def model(self) -> Model:

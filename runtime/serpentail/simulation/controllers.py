@@ -2,13 +2,14 @@
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from itertools import repeat
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..brief import brief
-from ..checks import finite_array, numbers, refusal
+from ..checks import finite_array, numbers, numbers_in, refusal
 from ..errors import SimulationError
 from .pfl import Pfl
 from .piecewise import Piecewise, checked_nodes, linear
@@ -128,6 +129,44 @@ class Phases:
 
 Single = Damping | TorqueTable | TorqueCurve | Pfl | NativeTorque | TorqueFunction
 Controller = Single | Phases | None
+
+
+def controllers_of(controller: object, runs: int | None) -> list[Any]:
+    """Return the controllers that are given: one for all runs, or one a run.
+
+    runs: None for a single start.  Of many a list, or a TorqueTable or Damping whose numbers have a
+    leading axis of the runs; SimulationError where it has another number of them.
+    """
+    if runs is None and isinstance(controller, list | tuple):
+        remedy = "give one controller, or q0 or v0 a row a run"
+        raise SimulationError(f"controller: a list of {len(controller)}, one start: {remedy}")
+    given = None if runs is None else _rows(controller)
+    if given is None:
+        return [controller]
+    if len(given) != runs:
+        raise SimulationError(
+            f"controller: {len(given)} controllers for {runs} runs: give one, or one a run"
+        )
+    return given
+
+
+def _rows(controller: object) -> list[Any] | None:
+    """Return a controller a run, None where there is one for all."""
+    if isinstance(controller, list | tuple):
+        return [*controller]
+    if isinstance(controller, TorqueTable):
+        torques, damping = numbers_in(controller.torques), numbers_in(controller.damping)
+        if torques is None or torques.ndim != 3:
+            return None
+        own = damping is not None and damping.ndim == 2 and len(damping) == len(torques)
+        lost: Iterable[Any] = damping if damping is not None and own else repeat(controller.damping)
+        pairs = zip(torques, lost)  # noqa: B905  the damping may be repeated
+        return [TorqueTable(controller.times, row, each) for row, each in pairs]
+    if isinstance(controller, Damping):
+        damping = numbers_in(controller.damping)
+        if damping is not None and damping.ndim == 2:
+            return [Damping(row) for row in damping]
+    return None
 
 
 def phases_of(controller: Controller) -> list[tuple[float, Controller]]:

@@ -6,7 +6,7 @@ from ..errors import StateError
 from ..model.kernel import RunKernel
 from ..model.layout import TAIL_V
 from ..model.parameters import RunParameters
-from .actuation import Actuation
+from .acting import Acting
 
 
 class FastestDecay:
@@ -15,14 +15,16 @@ class FastestDecay:
     For one thread.
     """
 
-    def __init__(self, actuation: Actuation, runs: int, parameters: RunParameters):
-        laws = [parts.damping for parts in actuation.parts if parts.damping is not None]
-        damping = np.max(laws, axis=0) if laws else np.zeros(actuation.nt)
+    def __init__(self, acting: Acting, runs: int, parameters: RunParameters):
+        model, nt = acting.model, acting.model.layout.nt
+        parts = [parts for each in acting.distinct for parts in each.parts]
+        laws = [each.damping for each in parts if each.damping is not None]
+        damping = np.max(laws, axis=0) if laws else np.zeros(nt)
         self.damped, self.scale = bool(damping.any()), np.sqrt(np.outer(damping, damping))
         # without torque and with unit torques: the differences are columns of H^-1
-        model, kernel = actuation.model, actuation.model.kernel("forward_dynamics")
-        self.runs, self.columns = runs, actuation.nt + 1
-        torques = np.eye(self.columns, actuation.nt, -1, kernel.dtype)
+        kernel = model.kernel("forward_dynamics")
+        self.runs, self.columns = runs, nt + 1
+        torques = np.eye(self.columns, nt, -1, kernel.dtype)
         tau = np.tile(torques, (runs, 1, 1))
         sizes = model.nq, model.nv, model.nv
         self.q, v, self.v_dot = (

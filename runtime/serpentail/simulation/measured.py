@@ -67,6 +67,15 @@ def certain(model: Model, method: str | None, numbers: Iterable[np.ndarray]) -> 
     return all(np.vdot(array, array) < most for array in numbers)
 
 
+def certain_runs(model: Model, method: str, numbers: Iterable[np.ndarray]) -> np.ndarray:
+    """Tell of each of some runs what ``certain`` tells of one; their numbers, (runs, ...)."""
+    sound = []
+    for array in numbers:
+        rows = array.reshape(len(array), -1)
+        sound.append(np.einsum("ki,ki->k", rows, rows) < MODEST[rows.dtype] ** 2)
+    return np.all(sound, axis=0) & certain(model, method, ())
+
+
 class Measures:
     """What follows from the samples of a run: given the name of a field, it and its companions.
 

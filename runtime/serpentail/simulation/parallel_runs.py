@@ -1,108 +1,127 @@
-"""Makes many runs at once, on all cores, and measures them."""
+"""Makes many runs at once, on all cores."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
+from itertools import islice
 from threading import Event
 from typing import Any
 
 import numpy as np
 
-from ..errors import SimulationError, StateError
+from ..errors import SimulationError
 from ..model.cores import threads as allowed
-from ..model.kernel import RunKernel
 from ..model.workers import in_turn
 from ..motion.derived import made
-from ..motion.trajectory import Trajectory
 from ..stages import Stage
-from .actuation import Actuation
-from .audit import BALANCED, Audit, audited, warnings_of
-from .batched_runs import BatchedRuns, worth_batching
-from .compiled_run import COUNTS, PAUSED, CompiledRun, Memory, Outcome
-from .measured import MEASURES, certain
+from .acting import Acting
+from .adaptive_runs import AdaptiveRuns, adaptive_in_lanes
+from .batched_runs import BatchedRuns, shared_steps, worth_batching
+from .compiled_run import COUNTS, PAUSED, CompiledRun, Memory, Outcome, failed
+from .measured_runs import MeasuredRuns, read_only
 from .methods import SCIPY, IntegrationMethod
+from .outcomes import Outcomes
 from .rollouts import Rollouts, Source
+from .runs_in_turn import RunsInTurn
+
+PILOTS = 64  # runs that tell how long others take before anything is compiled for these
 
 
 class ParallelRuns:
     """Runs on their way: threads take them up in turn, and write samples, measures and outcomes."""
 
     def __init__(
-        self, memory: Memory, actuation: Actuation, method: IntegrationMethod, threads: int | None
+        self, memory: Memory, acting: Acting, method: IntegrationMethod, threads: int | None
     ):
-        runs, samples = memory.start.runs, memory.start.intervals + 1
-        self.memory, self.actuation, self.method = memory, actuation, method
-        # tasks of the threads: runs, or groups of them
-        self.batched: BatchedRuns | None = None
-        self.tasks = runs
-        if worth_batching(memory, actuation, method):
-            self.batched = BatchedRuns(memory, actuation, method)
-            self.tasks = self.batched.groups
-        of_python = method.name in SCIPY or actuation.of_python
-        self.threads = 1 if of_python else min(allowed(threads), self.tasks)
+        self.memory, self.acting, self.method = memory, acting, method
+        model, runs = memory.records.model, memory.start.runs
+        self.batched: BatchedRuns | AdaptiveRuns | None = None
+        of_python = method.name in SCIPY or acting.of_python
+        self.threads = 1 if of_python else min(allowed(threads), runs)
         # what they come to
-        self.model = memory.records.model
-        self.outcomes: dict[int, Outcome] = {}
-        self.source = Source(
-            self.model, memory.parameters, memory.ground, self.outcomes, method.info
-        )
-        self.measures: dict[str, np.ndarray] = {}
-        for kernel in map(self.model.kernel, MEASURES):
-            for name, shape in zip(MEASURES[kernel.name], kernel.out_shapes, strict=True):
-                self.measures[name] = np.zeros((runs, samples, *shape), kernel.dtype)
-        self.late: list[int] = []  # measured at both ends so far
-        self.unmeasured: list[int] = []  # whose energy or momentum no number holds
+        self.outcomes = Outcomes(memory)
+        self.source = Source(model, memory.parameters, memory.ground, self.outcomes, method.info)
+        self.measures = MeasuredRuns(memory, method, self.source, self.threads)
         self.stop: KeyboardInterrupt | None = None  # what ended all before their end
 
     @property
     def part_done(self) -> float:
         """Which part of the runs has ended."""
-        return len(self.outcomes) / self.memory.start.runs
+        return self.outcomes.count / len(self.outcomes)
 
-    def run_singly(self, numbers: Iterator[int], ended: Event) -> None:
+    def make(self, stage: Stage) -> None:
+        """Make all runs, those abreast that can be and for which it pays."""
+        first, runs = 0, self.memory.start.runs
+        told = self.memory, self.acting, self.method
+        if (steps := shared_steps(*told)) and self._pays(runs, steps):
+            self.batched = BatchedRuns(*told)
+        elif adaptive_in_lanes(*told):
+            if not self._pays(runs, 0):
+                # how long the others will take is known of some
+                first = min(PILOTS, runs)
+                self._share(first, self._run_in_turn, stage)
+            steps = int(self.outcomes.counts["steps"][:first].sum()) // max(first, 1)
+            if first == 0 or (first < runs and self._pays(runs - first, steps)):
+                self.batched = AdaptiveRuns(*told)
+        if self.batched is not None:
+            self.parts = self.batched.parts(range(first, runs), self.threads)
+            self._share(len(self.parts), self._run_batches, stage)
+        elif self.method.name in SCIPY or self.acting.of_python or self.memory.ground.points:
+            self._share(runs, self._run_singly, stage)
+        else:
+            rest = partial(self._run_in_turn, first=first)
+            self._share(runs - first, rest, stage)
+
+    def _pays(self, runs: int, steps: int) -> bool:
+        """Tell whether runs of about so many steps are to be made abreast."""
+        return worth_batching(self.source.model, runs, steps)
+
+    def _share(self, count: int, work: Callable[..., None], stage: Stage) -> None:
+        """Have threads take up so many tasks in turn."""
+        if count:
+            in_turn(count, min(self.threads, count), work, lambda: stage.tell(self.part_done))
+
+    def _run_singly(self, numbers: Iterator[int], ended: Event) -> None:
         """Take up runs in one thread until none is left, or ``ended`` is set."""
-        run = CompiledRun(self.memory, self.actuation, self.method)
-        measures = [self._rows(name) for name in MEASURES]
+        run = CompiledRun(self.memory, self.acting, self.method)
+        measure = self.measures.of_thread()
         for k in numbers:
             run.begin(k)
             outcome = self._by_scipy(run) if self.method.name in SCIPY else in_c(run, ended)
             if outcome is None:
                 return
-            self._keep(k, outcome, measures)
+            # an error that is not its own ends all runs
+            if not isinstance(outcome.failure, SimulationError | None):
+                raise outcome.failure
+            self.outcomes.keep(k, outcome)
+            if outcome.failure is None:
+                measure(np.array([k]))
 
-    def run_batches(self, batched: BatchedRuns, groups: Iterator[int], ended: Event) -> None:
-        """Take up groups of runs; those among which one cannot go on are made again, one by one."""
-        start, measures = self.memory.start, [self._rows(name) for name in MEASURES]
-        steps = len(batched.steps.lengths)
-        info = dict.fromkeys(COUNTS, 0) | {"steps": steps, "evaluations": 4 * steps}
-        for group in groups:
-            completed, runs = batched.go(group, ended), batched.runs(group)
-            if completed is None:
-                return
-            if not completed:
-                self.run_singly(iter(runs), ended)
-                continue
-            for k in runs:
-                ledger = self.memory.state["ledger"][k]
-                self._keep(k, Outcome(start.intervals + 1, start.end, ledger, dict(info)), measures)
+    def _run_in_turn(self, numbers: Iterator[int], ended: Event, first: int = 0) -> None:
+        """The same for runs that need no Python until they end; numbers count from the first."""
+        runs = RunsInTurn(self.memory, self.acting, self.method)
+        measure, most = self.measures.of_thread(), len(self.outcomes) // (4 * self.threads) + 1
+        while taken := list(islice(numbers, min(runs.at_once, most))):
+            found = runs.make([first + number for number in taken], ended)
+            told = {name: found.records[name] for name in (*COUNTS, "done")}
+            told |= {"ends": found.records["t"], "ledger": self.memory.state["ledger"][found.runs]}
+            self.outcomes.keep_all(found.runs, told)
+            wrong = np.flatnonzero(found.statuses)
+            for row in wrong.tolist():
+                error = failed(int(found.statuses[row]), float(found.records["t"][row]))
+                self.outcomes.failures[int(found.runs[row])] = error
+            measure(np.delete(found.runs, wrong))
 
-    def _keep(self, k: int, outcome: Outcome, measures: list[RunKernel]) -> None:
-        """Keep and measure what run k came to; an error that is not its own ends all runs."""
-        if not isinstance(outcome.failure, SimulationError | None):
-            raise outcome.failure
-        self.outcomes[k] = outcome
-        if outcome.failure is not None:
-            return  # measured with its error
-        arrays = [self.memory.out[name][k, : outcome.done] for name in ("q", "v", "bristles")]
-        late = certain(self.model, self.method.name, (self.memory.parameters.vectors[k], *arrays))
-        try:
-            for measure in measures:
-                measure(k, 1 if late else outcome.done)
-                if late:
-                    measure(k, 1, outcome.done - 1)
-            if late:
-                self.late.append(k)
-        except StateError:
-            self.unmeasured.append(k)
+    def _run_batches(self, parts: Iterator[int], ended: Event) -> None:
+        """The same for runs abreast; a group among which one cannot go on is made again in turn."""
+        batched, measure = self.batched, self.measures.of_thread()
+        assert batched is not None
+        for part in parts:
+            for runs, told in batched.go(self.parts[part], ended):
+                if told is None:
+                    self._run_in_turn(iter(runs.tolist()), ended)
+                else:
+                    self.outcomes.keep_all(runs, told)
+                    measure(runs)
 
     def _by_scipy(self, run: CompiledRun) -> Outcome:
         """Return what a run came to by one of SciPy's methods, its samples kept."""
@@ -122,103 +141,29 @@ class ParallelRuns:
 
         info: what else is to be told of them.
         """
-        outcomes = [self.outcomes[k] for k in range(len(self.outcomes))]
-        # the error of each run that failed, or whose measures no number holds
-        failed = {k for k, outcome in self.outcomes.items() if outcome.failure is not None}
-        errors: list[SimulationError | None] = [None] * len(outcomes)
-        for k in sorted(failed.union(self.unmeasured)):
-            errors[k] = self._judge(k)
+        errors = self.measures.errors()
         # counts of all runs together
-        counts = {name: sum(each.info.get(name, 0) for each in outcomes) for name in COUNTS}
+        counts = {name: int(each.sum()) for name, each in self.outcomes.counts.items()}
         abreast = 1 if self.batched is None else self.batched.states
-        shared = {"model": self.model.name, "threads": self.threads, "abreast": abreast}
-        info = counts | self.method.info | shared | info
-        arrays = self._arrays(outcomes)
-        books = self._audit(arrays["ends"], outcomes)
-        eps = float(np.finfo(self.memory.records.dtype).eps)
-        warnings = [
-            [] if errors[k] else warnings_of(books.of(k), self.method.info | outcome.info, eps)
-            for k, outcome in enumerate(outcomes)
-        ]
-        told = {"errors": errors, "audit": books, "warnings": warnings, "info": info}
-        found = made(Rollouts, arrays | told | {"source": self.source}, self.measured)
+        shared = {"model": self.source.model.name, "threads": self.threads, "abreast": abreast}
+        told = {"errors": errors, "info": counts | self.method.info | shared | info}
+        found = made(Rollouts, self._arrays() | told | {"source": self.source}, self.measures)
         if self.stop is not None:
             vars(self.stop)["motion"] = found
             raise self.stop
         return found
 
-    def measured(self, _: str) -> dict[str, np.ndarray]:
-        """Return energies and momenta of all runs, nan after the end of a run, read-only."""
-
-        def work(numbers: Iterator[int], _: Event) -> None:
-            measures = [self._rows(name) for name in MEASURES]
-            for number in numbers:
-                k = self.late[number]
-                for measure in measures:
-                    measure(k, self.outcomes[k].done)
-
-        in_turn(len(self.late), self.threads, work)
-        return {name: read_only(array) for name, array in self.measures.items()}
-
-    def _audit(self, times: np.ndarray, outcomes: list[Outcome]) -> Audit:
-        """Return the books of all runs, from start to end; nan of those that failed."""
-        last = np.array([max(outcome.done, 1) - 1 for outcome in outcomes])
-        each, ends = np.arange(len(outcomes)), {}
-        for name in BALANCED:
-            array = self.measures[name]
-            ends[name] = np.stack([array[:, 0], array[each, last]], axis=1).astype(float)
-        for k, outcome in enumerate(outcomes):
-            if outcome.failure is not None:
-                ends["kinetic"][k] = np.nan
-            elif outcome.stop is not None:  # between samples
-                model, state = self.source.model_of(k), (outcome.stop["q"], outcome.stop["v"])
-                ends["kinetic"][k, 1], ends["potential"][k, 1] = model.energy(*state)
-                ends["linear_momentum"][k, 1] = model.momentum(*state)[0]
-        span = times - self.memory.start.start
-        ledger = np.array([outcome.ledger for outcome in outcomes])
-        return audited(self.model, self.memory.parameters.values, ledger, span, ends)
-
-    def _arrays(self, outcomes: list[Outcome]) -> dict[str, np.ndarray]:
+    def _arrays(self) -> dict[str, np.ndarray]:
         """Return samples, nan after the end of a run as in the measures, read-only."""
-        for k, outcome in enumerate(outcomes):
-            if outcome.done < len(self.memory.start.times):
-                for array in (*self.memory.out.values(), *self.measures.values()):
-                    array[k, outcome.done :] = np.nan
+        done, start = self.outcomes.done, self.memory.start
+        for k in np.flatnonzero(done < len(start.times)).tolist():
+            for array in (*self.memory.out.values(), *self.measures.arrays.values()):
+                array[k, done[k] :] = np.nan
         arrays = {name: np.asarray(array, float) for name, array in self.memory.out.items()}
         shape = (*arrays["q"].shape[:2], self.memory.ground.points, 2)
         arrays["bristles"] = arrays["bristles"].reshape(shape)
-        arrays["t"] = np.array(self.memory.start.times)
-        arrays["ends"] = np.array([outcome.end for outcome in outcomes])
+        arrays["t"], arrays["ends"] = np.array(start.times), self.outcomes.ends
         return {name: read_only(array) for name, array in arrays.items()}
-
-    def _judge(self, k: int) -> SimulationError | None:
-        """Return the error that ended run k; measure it up to there."""
-        outcome = self.outcomes[k]
-        if not outcome.done and isinstance(outcome.failure, SimulationError):
-            return outcome.failure  # it never began
-        error: SimulationError | None = None
-        trajectory: Trajectory | None
-        try:
-            trajectory = self.source.trajectory(k, self.memory.samples(k, outcome))
-        except SimulationError as caught:
-            trajectory, error = caught.trajectory, caught
-        for name, array in self.measures.items():
-            measured = np.nan if trajectory is None else getattr(trajectory, name)[: outcome.done]
-            array[k, : outcome.done] = measured
-        return error
-
-    def _rows(self, name: str) -> RunKernel:
-        """Return a function of the model as it measures samples."""
-        inputs = [self.memory.out[argument] for argument in ("q", "v")]
-        outputs = [self.measures[measure] for measure in MEASURES[name]]
-        return RunKernel(self.model.kernel(name), self.memory.parameters.vectors, inputs, outputs)
-
-
-def read_only(array: np.ndarray) -> np.ndarray:
-    """Return an array as doubles that nobody writes."""
-    array = np.asarray(array, float).view()
-    array.setflags(write=False)
-    return array
 
 
 def in_c(run: CompiledRun, ended: Event) -> Outcome | None:
@@ -228,17 +173,14 @@ def in_c(run: CompiledRun, ended: Event) -> Outcome | None:
 
 
 def run_parallel(
-    memory: Memory, actuation: Actuation, method: IntegrationMethod, threads: int | None
+    memory: Memory, acting: Acting, method: IntegrationMethod, threads: int | None
 ) -> ParallelRuns:
     """Make all runs, in so many threads unless Python acts in them; Ctrl-C ends all."""
-    runs = ParallelRuns(memory, actuation, method, threads)
-    work = partial(runs.run_batches, runs.batched) if runs.batched else runs.run_singly
+    runs = ParallelRuns(memory, acting, method, threads)
     try:
-        with Stage("simulate", f"{memory.start.runs} runs of {runs.model.name}") as stage:
-            in_turn(runs.tasks, runs.threads, work, lambda: stage.tell(runs.part_done))
+        with Stage("simulate", f"{memory.start.runs} runs of {runs.source.model.name}") as stage:
+            runs.make(stage)
     except KeyboardInterrupt as stop:
         runs.stop = stop
-        for k in set(range(memory.start.runs)) - runs.outcomes.keys():
-            error = SimulationError("Ctrl-C came before its end: simulate it again")
-            runs.outcomes[k] = Outcome(0, memory.start.start, memory.state["ledger"][k], {}, error)
+        runs.outcomes.fail_rest("Ctrl-C came before its end: simulate it again")
     return runs

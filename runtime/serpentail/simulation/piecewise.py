@@ -29,6 +29,11 @@ class Piecewise:
         """Number of functions."""
         return self.coefficients.shape[1]
 
+    @property
+    def never_changes(self) -> bool:
+        """Whether it is one constant a channel."""
+        return self.coefficients.shape[::2] == (1, 1)
+
     def at(self, t: ArrayLike) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Values, rates, accelerations at t or t (K,), s: (channels,) or (K, channels) each.
 
@@ -45,6 +50,8 @@ class Piecewise:
     @np.errstate(over="ignore", invalid="ignore")  # a run refuses what is beyond numbers
     def kinks(self, orders: int) -> np.ndarray:
         """Times at which a derivative below this order jumps, both ends among them."""
+        if self.never_changes:
+            return self.times[:0]
         jumps = np.zeros(len(self.times), bool)
         for order in range(orders):
             c = _derived(self.coefficients, order)

@@ -16,10 +16,12 @@ from ..motion.derived import Derived, settled
 from ..motion.exports import Exports
 from ..motion.trajectory import MONOTONE, Trajectory
 from .audit import Audit
-from .compiled_run import Outcome, Samples, sampled
+from .compiled_run import Samples, sampled
 from .ground import Ground
 from .measured import trajectory_or_error
+from .outcomes import Outcomes
 
+LATER = (*MONOTONE, "audit", "warnings")  # what is derived when somebody asks
 SHOWN = 3  # runs that a notebook shows over each other
 
 
@@ -30,7 +32,7 @@ class Source:
     model: Model
     parameters: RunParameters
     ground: Ground
-    outcomes: dict[int, Outcome]
+    outcomes: Outcomes
     info: dict[str, Any]
 
     def model_of(self, k: int) -> Model:
@@ -79,7 +81,7 @@ class Rollouts(Exports):
         return len(self.q)
 
     def __getstate__(self) -> dict[str, Any]:
-        return settled(self, MONOTONE)
+        return settled(self, LATER)
 
     def __repr__(self) -> str:
         """On at most six lines what they are, and which failed."""
@@ -138,5 +140,5 @@ class Rollouts(Exports):
         return self.source.trajectory(k, sampled(self.t, arrays, self.source.outcomes[k]))
 
 
-for _name in MONOTONE:
+for _name in LATER:
     setattr(Rollouts, _name, Derived(_name))

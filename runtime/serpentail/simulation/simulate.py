@@ -15,7 +15,7 @@ from ..model.model import Model
 from ..model.parameters import RunParameters
 from ..motion.trajectory import Trajectory
 from ..stages import Stage
-from .actuation import Actuation
+from .acting import Acting
 from .compiled_run import CompiledRun, Memory, Samples
 from .controllers import Controller
 from .decay import FastestDecay
@@ -68,12 +68,17 @@ def simulate(
     Trajectory, or Rollouts in which runs without an end have errors.
 
     Many starts give Rollouts, which keep the SimulationErrors of single runs: the other runs go on.
-    One method is chosen for all.  parameters: name -> (k,) or (k, 3), SI, what the runs have of
-    their own; bristles0 may be (k, points, 2).  threads: that take up the runs; None: the model's,
-    see ``load``.  A NativeTorque must bear calls from several threads at once.
+    One method is chosen for all.  controller may be a list, one of any kind a run; or a TorqueTable
+    with torques (k, K, 2m), or a Damping of (k, 2m), one a run.  parameters: name -> (k,) or (k,
+    3), SI, what the runs have of their own; bristles0 may be (k, points, 2).  threads: that take up
+    the runs; None: the model's, see ``load``.  A NativeTorque must bear calls from several threads
+    at once.
 
-    Flights by "rk4" whose torques are None, Damping, a TorqueTable or a TorqueCurve fly as lanes of
-    vectors where they take 1e6 steps or more in all: several times as fast, other last digits.
+    Eight flights or more by "tsit5" or "rk4" whose torques are None, Damping, a TorqueTable or a
+    TorqueCurve (for "tsit5" also Phases of these, for "rk4" with kinks at the same times) fly as
+    lanes of vectors where the C of that is compiled, or its compilation pays: several times as
+    fast, other last digits.
+
     With a function of Python, or SciPy's methods, runs are made one after another in the calling
     thread, and what the function raises, unless it is a SimulationError, ends all.
     """
@@ -142,7 +147,7 @@ def end_state(
 
 def prepared(
     model: Model, start: Start, controller: Controller, method: str, settings: dict[str, Any]
-) -> tuple[Memory, Actuation, IntegrationMethod]:
+) -> tuple[Memory, Acting, IntegrationMethod]:
     """Return what runs need to go; SimulationError or ModelError where a setting is wrong."""
     changes = settings.pop("parameters", None)
     if changes is not None and not start.many:
@@ -151,29 +156,29 @@ def prepared(
         )
     parameters = model.parameters_of_runs(changes, start.runs)
     ground = Ground.checked(model, start, parameters, settings)
-    actuation = Actuation(Records(model), controller, ground.legs.curve if ground.legs else None)
-    choice = choose(actuation, start, parameters, method, settings)
+    acting = Acting(Records(model), controller, start, ground.legs.curve if ground.legs else None)
+    choice = choose(acting, start, parameters, method, settings)
     if ground.stop_at and choice.name in SCIPY:
         raise SimulationError(
             f"stop_at: {choice.name} does not look for events: take tsit5 or ros34pw2"
         )
-    return Memory(actuation.records, start, ground, parameters), actuation, choice
+    return Memory(acting.records, start, ground, parameters), acting, choice
 
 
 def choose(
-    actuation: Actuation,
+    acting: Acting,
     start: Start,
     parameters: RunParameters,
     name: str,
     settings: dict[str, Any],
 ) -> IntegrationMethod:
     """Return the method that was asked for, or a choice and its reason."""
-    model, single = actuation.model, actuation.records.real is ctypes.c_float
+    model, single = acting.model, acting.records.real is ctypes.c_float
     available, reason = model.manifest["simulation"]["methods"], "asked for"
     if isinstance(name, str) and name == "auto":
         decay = None
         if not model.contacts:
-            decay = FastestDecay(actuation, start.runs, parameters)(start.q0)
+            decay = FastestDecay(acting, start.runs, parameters)(start.q0)
         name, reason = chosen(settings, available, decay)
     method = checked_method(name, settings, available, single)
     span, most_steps = start.end - start.start, method.settings.get("most_steps", MOST_STEPS)

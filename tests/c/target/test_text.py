@@ -135,7 +135,8 @@ def assert_own_symbols(model, objects, *merged):
     names = f"{model.name}_(batch_|abi_hash$)|(jac_|adj1_|jac_adj1_)?{model.name}_casadi_"
     assert all(re.match(names, symbol) for symbol in host)
     assert batch and all(symbol.startswith(f"{model.name}_side_by_side_") for symbol in batch)
-    assert all(found == {f"{model.name}_side_by_side_flights"} for found in flights)
+    ways = {f"{model.name}_side_by_side_{way}" for way in ("flights", "rollouts")}
+    assert all(found == ways for found in flights)
 
 
 @every_model

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.simulation import batched_runs
+from serpentail.simulation import parallel_runs
 from tests.support.generations import FUNCTIONS, Q, agree, model_of, put, texts
 
 STATES = 3000
@@ -88,7 +88,7 @@ def test_batches_that_compile_late_are_of_the_model(folder, cache):
 
 
 def test_flights_that_compile_late_are_of_the_model(folder, cache, monkeypatch):
-    monkeypatch.setattr(batched_runs, "MIN_BATCHED_STEPS", 1)
+    monkeypatch.setattr(parallel_runs, "worth_batching", lambda *_: True)
     q, v = np.tile(Q, (12, 1)), 0.1 * states()[1][:12]
     model = st.load(put(folder, model_of(1)))
     shutil.rmtree(folder)

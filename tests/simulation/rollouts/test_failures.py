@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.simulation import batched_runs
+from serpentail.simulation import batched_runs, parallel_runs
 
 from .many import NT, NV, PER_RUN, starts, tail
 
@@ -117,9 +117,9 @@ def test_a_compiled_torque_that_refuses_ends_its_run(threads):
     assert "the compiled torque function did not return 0" in str(found.errors[1])
 
 
-@pytest.mark.parametrize("many", [1, 10**12], ids=["abreast", "alone"])
-def test_ctrl_c_ends_all_threads_within_a_second(monkeypatch, many):
-    monkeypatch.setattr(batched_runs, "MIN_BATCHED_STEPS", many)
+@pytest.mark.parametrize("abreast", [True, False], ids=["abreast", "alone"])
+def test_ctrl_c_ends_all_threads_within_a_second(monkeypatch, abreast):
+    monkeypatch.setattr(parallel_runs, "worth_batching", lambda *_: abreast)
     monkeypatch.setattr(batched_runs, "MAX_SHARED_STEPS", 10**12)
     q, v = starts(tail(), 50)
     tail().batch_library.rollouts.function(

@@ -7,7 +7,7 @@ import pytest
 
 import serpentail as st
 from serpentail.model.snapshot import model_library
-from serpentail.simulation import batched_runs
+from serpentail.simulation import batched_runs, parallel_runs
 
 from ...support.models import model_folder
 from .many import DAMPING, NT, PER_RUN, WANTED, alone, same, starts, tail
@@ -55,15 +55,8 @@ def test_flights_abreast_are_what_they_are_alone(law):
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
 def test_sound_flights_are_made_abreast_and_no_second_time(law, monkeypatch):
     """A group that fails is made singly, run by run: none of these may."""
-    made, go = [], batched_runs.BatchedRuns.go
-
-    def noted(runs, group, ended):
-        made.append(go(runs, group, ended))
-        return made[-1]
-
-    monkeypatch.setattr(batched_runs.BatchedRuns, "go", noted)
+    monkeypatch.setattr(parallel_runs, "RunsInTurn", lambda *_: pytest.fail("in turn"))
     st.simulate(tail(), *starts(tail(), 19), controller=law, **FLIGHT)
-    assert made == [True] * 3
 
 
 FORMS = {
@@ -126,21 +119,50 @@ def test_a_flight_that_fails_abreast_loses_no_other():
     assert np.isnan(found.q[2, 1:]).all()
 
 
-def test_few_steps_compile_nothing_and_other_laws_fly_alone(monkeypatch):
-    built = []
-    compiled = model_library
+@pytest.fixture
+def built(monkeypatch):
+    """What is compiled beside models, where the cache has nothing of it."""
+    found = []
     monkeypatch.setattr(
-        "serpentail.model.batch.model_library", lambda *a: built.append(a) or compiled(*a)
+        "serpentail.model.batch.model_library", lambda *a: found.append(a) or model_library(*a)
     )
+    monkeypatch.setattr("serpentail.model.batch.library_in_cache", lambda *_: None)
+    return found
+
+
+def test_short_work_compiles_nothing_until_all_of_it_would_have_paid(built, monkeypatch):
     model = st.load(tail().folder)
     q, v = starts(model, 9)
     assert st.simulate(model, q, v, **FLIGHT).info["abreast"] == 1 and not built
-    monkeypatch.setattr(batched_runs, "MIN_BATCHED_STEPS", 1)
+    source = model.batch_library.rollouts
+    price = batched_runs.COMPILE_S_PER_BYTE * source.bytes
+    assert 0 < source.missed < price
+    source.missed = price - source.missed / 2  # what many such calls would have come to
+    assert st.simulate(model, q[:7], v[:7], **FLIGHT).info["abreast"] == 1  # no full vector
+    assert st.simulate(model, q, v, **FLIGHT).info["abreast"] == 8 and len(built) == 1
+    assert st.simulate(model, q, v, **FLIGHT).info["abreast"] == 8 and len(built) == 1
+
+
+def test_long_work_compiles_at_once(built, monkeypatch):
+    monkeypatch.setattr(batched_runs, "COMPILE_S_PER_BYTE", 1e-10)
+    model = st.load(tail().folder)
+    assert st.simulate(model, *starts(model, 9), **FLIGHT).info["abreast"] == 8 and len(built) == 1
+
+
+def test_what_the_cache_has_is_used_for_short_work():
+    tail().batch_library.rollouts.function("tail_side_by_side_flights")
+    model = st.load(tail().folder)
+    assert st.simulate(model, *starts(model, 8), **FLIGHT).info["abreast"] == 8
+
+
+@pytest.mark.usefixtures("any_number_is_many")
+def test_other_laws_fly_alone(built):
+    model = st.load(tail().folder)
+    q, v = starts(model, 9)
     laws = [st.Phases([(0.0, None), (0.02, DAMPING)]), lambda t, q, v: [0.0] * NT]
     laws.append(st.Pfl(model, st.Reference([0.0, 0.05], [[0.0] * NT, [0.3] * NT])))
-    for settings in ({"method": "tsit5", "step": None}, *({"controller": law} for law in laws)):
-        own = {name: x for name, x in (FLIGHT | settings).items() if x is not None}
-        assert st.simulate(model, q, v, **own).info["abreast"] == 1
+    for law in laws:
+        assert st.simulate(model, q, v, **FLIGHT | {"controller": law}).info["abreast"] == 1
     assert not built
     assert st.simulate(model, q, v, **FLIGHT).info["abreast"] == 8 and len(built) == 1
     st.simulate(model.with_parameters(torso_mass=1.0), q, v, **FLIGHT)

@@ -24,24 +24,37 @@ RECORD = fields(
     ("q_out", "real *", "[count][samples][NQ], the start first"),
     ("v_out", "real *", "[count][samples][NV]"),
     ("ledger", "real *", "[count][2] work (J) of torques and of damping, at the end"),
-    ("count", "size_t", "flights, at most STATES"),
+    ("count", "size_t", "flights, of which STATES are made at a time"),
     ("samples", "long", "of each"),
-    ("damping", "const real *", "[NT] N m s"),
+    ("damping", "const real *", "[NT] N m s, of the first flight"),
+    ("damping_apart", "size_t", "reals from there to the next flight's; 0: all have the same"),
     ("lengths", "const real *", "[steps] (s)"),
     (
         "torques",
         "const real *",
-        "[steps][3][NT] (N m) at beginning, middle and end of each step; NULL: none",
+        "[steps][3][NT] (N m) at begin, middle, end of each step, of the first flight; NULL: none",
     ),
+    ("torques_apart", "size_t", "reals from there to the next flight's; 0: all have the same"),
     ("due", "const int *", "[steps] whether a sample follows"),
     ("steps", "long", ""),
     ("pause", "long", "steps of one call"),
     ("work", "real *", "holds the flights between calls"),
-    ("step", "long", "steps done"),
-    ("done", "long", "samples written"),
+    ("first", "size_t", "of the flights that are being made; those before it have ended"),
+    ("step", "long", "steps that they have done"),
+    ("done", "long", "samples that they have written"),
 )
 
 
+ROLLOUTS = fields(
+    ("runs", "void *", "[count] records of runs, as the simulation has them"),
+    ("count", "long", "runs"),
+    ("statuses", "int *", "[count] of those that have ended: OK, or anything else: make it alone"),
+    ("lanes", "long *", "[STATES] run in each lane; -1: none"),
+    ("next", "long", "run that is taken up next"),
+    ("pause", "long", "steps of one call"),
+    ("work", "real *", "holds the flights between calls"),
+)
+SLOTS = 10  # states in the workspace: start, seven rates, end, error of an adaptive step
 LEDGER = 2  # numbers that a flight adds up behind its state
 
 
@@ -57,14 +70,19 @@ class BatchRollout:
     nt: int
 
     @property
-    def state(self) -> int:
-        """Where the states lie in the workspace: behind the parameters."""
+    def given(self) -> int:
+        """Where torques lie in the workspace: behind the parameters."""
         return self.states * self.parameters
+
+    @property
+    def state(self) -> int:
+        """Where the states lie: behind given torques, damping and torques in all."""
+        return self.given + 3 * self.states * self.nt
 
     @property
     def inner(self) -> int:
         """Where the workspace of forward dynamics begins."""
-        return padded(self.state + self.states * (4 * self.size + self.nt))
+        return padded(self.state + SLOTS * self.states * self.size)
 
     @property
     def work(self) -> int:
@@ -123,7 +141,14 @@ def rollout_context(scene: Scene, rollout: BatchRollout) -> dict[str, Any]:
         "arguments": ", ".join(arguments),
         "record": record,
         "parameter_count": rollout.parameters,
+        "given": rollout.given,
         "state": rollout.state,
+        "slots": SLOTS,
+        "rollouts_record": [
+            {"type": f.type if f.type.endswith("*") else f"{f.type} ", "name": f.name}
+            | {"meaning": f.meaning}
+            for f in ROLLOUTS
+        ],
         "inner": rollout.inner,
         "steps": step_views([rollout], scene.real, scene.name),
         "helpers": sorted(rollout.body.helpers | {"lanes", "all_lanes"}),
@@ -135,4 +160,6 @@ def batch_rollout_entry(rollout: BatchRollout | None) -> dict[str, Any]:
     if rollout is None:
         return {}
     members = [[f.name, f.kind] for f in RECORD]
-    return {"flights": {"states": rollout.states, "work": rollout.work, "record": members}}
+    adaptive = [[f.name, f.kind] for f in ROLLOUTS]
+    sizes = {"states": rollout.states, "work": rollout.work}
+    return {"flights": sizes | {"record": members, "rollouts": adaptive}}

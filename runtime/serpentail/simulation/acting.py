@@ -1,0 +1,59 @@
+"""What acts in each of some runs: a controller for all of them, or one a run."""
+
+import ctypes
+
+import numpy as np
+
+from ..errors import SimulationError
+from ..model.model import Model
+from .actuation import Actuation
+from .controllers import Controller, controllers_of
+from .piecewise import Piecewise
+from .records import Records
+from .start import Start
+
+
+class Acting:
+    """The actuation of each run; ``distinct`` has each once, ``alike`` tells whether all share one.
+
+    drives: where the C records of what acts in each run lie.
+    """
+
+    def __init__(
+        self, records: Records, controller: object, start: Start, legs: Piecewise | None = None
+    ):
+        self.records = records
+        given = controllers_of(controller, start.runs if start.many else None)
+        # of one object that acts in several runs there is one record
+        made: dict[int, Actuation] = {}
+        for k, each in enumerate(given):
+            if id(each) not in made:
+                made[id(each)] = self._of(each, legs, k if len(given) > 1 else None)
+        self.distinct = [*made.values()]
+        self.alike = len(self.distinct) == 1
+        self._each = self.distinct if self.alike else [made[id(each)] for each in given]
+        drives = [ctypes.addressof(each.record) for each in self._each]
+        self.drives = np.broadcast_to(np.array(drives, np.uintp), start.runs)
+
+    @property
+    def model(self) -> Model:
+        """The model whose tails are driven."""
+        return self.records.model
+
+    def _of(self, controller: Controller, legs: Piecewise | None, k: int | None) -> Actuation:
+        """Return the actuation of run k, or of all; SimulationError where there can be none."""
+        try:
+            return Actuation(self.records, controller, legs)
+        except SimulationError as error:
+            if k is None:
+                raise
+            raise SimulationError(f"controller of run {k}: {error}") from None
+
+    def of(self, k: int) -> Actuation:
+        """Return what acts in run k."""
+        return self.distinct[0] if self.alike else self._each[k]
+
+    @property
+    def of_python(self) -> bool:
+        """Whether a function of Python acts in one of them."""
+        return any(each.of_python for each in self.distinct)

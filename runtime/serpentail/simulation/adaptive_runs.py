@@ -1,0 +1,65 @@
+"""Runs with adaptive steps, of which the generated C makes several at once: one in each lane."""
+
+import ctypes
+import time
+from collections.abc import Iterator
+from threading import Event
+from typing import Any
+
+import numpy as np
+
+from ..model.kernel import address_of, aligned
+from .acting import Acting
+from .compiled_run import COUNTS, PAUSE, PAUSE_S, PAUSED, CompiledRun, Memory
+from .methods import IntegrationMethod
+from .records import structure
+
+AT_ONCE = 64  # vectors of runs that a thread takes up at once
+
+
+def adaptive_in_lanes(memory: Memory, acting: Acting, method: IntegrationMethod) -> bool:
+    """Tell whether runs can be made in lanes: flights by tsit5 under damping and torques."""
+    if method.name != "tsit5" or "flights" not in memory.records.model.manifest:
+        return False
+    parts = [parts for each in acting.distinct for parts in each.parts]
+    return all(each.pfl is each.native is each.user is None for each in parts)
+
+
+class AdaptiveRuns:
+    """Runs of a memory, each with its own clock."""
+
+    def __init__(self, memory: Memory, acting: Acting, method: IntegrationMethod):
+        self.memory, self.acting, self.method = memory, acting, method
+        model, entry = memory.records.model, memory.records.model.manifest["flights"]
+        self.states, self.work = entry["states"], entry["work"]
+        members = tuple(map(tuple, entry["rollouts"]))
+        self.record = structure("side_by_side", members, memory.records.real)
+        name = f"{model.name}_side_by_side_rollouts"
+        self.function = model.batch_library.rollouts.function(name)
+
+    def parts(self, runs: range, threads: int) -> list[range]:
+        """Return which of some runs a thread makes at once."""
+        vectors = max(1, min(AT_ONCE, len(runs) // (2 * threads * self.states)))
+        size = self.states * vectors
+        return [runs[first : first + size] for first in range(0, len(runs), size)]
+
+    def go(self, runs: range, ended: Event) -> Iterator[tuple[np.ndarray, dict[str, Any] | None]]:
+        """Make runs; yield numbers of them and what they came to, None of those to make alone."""
+        records = CompiledRun(self.memory, self.acting, self.method).records_of(runs)
+        statuses = np.full(len(runs), PAUSED, np.intc)
+        lanes = np.full(self.states, -1, np.dtype(ctypes.c_long))
+        work = aligned(self.work, self.memory.records.dtype)
+        arrays = {"runs": records, "statuses": statuses, "lanes": lanes, "work": work}
+        places = {name: address_of(array) for name, array in arrays.items()}
+        record: Any = self.record(count=len(runs), pause=PAUSE, **places)
+        on_their_way = len(runs)
+        while on_their_way and not ended.is_set():
+            begun = time.perf_counter()
+            on_their_way = self.function(ctypes.addressof(record))
+            if time.perf_counter() - begun < PAUSE_S:
+                record.pause *= 2
+        numbers, sound = np.array(runs), statuses == 0
+        told = {name: records[name][sound] for name in (*COUNTS, "done")}
+        told |= {"ends": records["t"][sound], "ledger": self.memory.state["ledger"][numbers[sound]]}
+        yield numbers[sound], told
+        yield numbers[(statuses != 0) & (statuses != PAUSED)], None
