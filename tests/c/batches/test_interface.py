@@ -110,3 +110,13 @@ def test_what_a_batch_returns_begins_at_a_cache_line():
         assert output.ctypes.data % 64 == 0 and output.flags.c_contiguous and output.flags.writeable
     empty = found.mass_matrix(arguments["q"][:0])
     assert empty.shape == (0, found.nv, found.nv)
+
+
+@pytest.mark.parametrize("name", ["q", "v"])
+def test_a_number_that_is_none_is_found_wherever_it_is(name):
+    found = model()
+    for k in range(found.nq if name == "q" else found.nv):
+        arguments = states(found, 20)
+        arguments[name][11, k] = np.inf
+        with pytest.raises(st.StateError, match=rf"{name}\[{k}\] of state 11: value inf"):
+            found.bias_force(arguments["q"], arguments["v"])
