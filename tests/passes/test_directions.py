@@ -47,7 +47,7 @@ MOST = {
     ("forward_dynamics_derivatives", "m3_n4"): 1.2,
     ("inverse_dynamics_derivatives", "m1_n3"): 1.35,
     ("forward_dynamics_derivatives", "m1_n3"): 1.35,
-    ("inverse_dynamics_hessian", "m3_n4"): 1.65,
+    ("inverse_dynamics_hessian", "m3_n4"): 1.55,
 }
 
 

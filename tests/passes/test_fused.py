@@ -63,6 +63,15 @@ def test_steps_are_joined_only_where_the_second_reads_what_the_first_stored():
     assert not fit(call(0, 1, 2), wide)
 
 
+def test_steps_of_other_directions_stay_apart():
+    def twice(lanes):
+        x, y = (Array(f"{name}{lanes}", "local", 1, lanes=lanes) for name in "xy")
+        return Apply(ADD, (x[0], x[0]), (y[0],), (False,))
+
+    assert fit(twice(0), twice(2)) and fit(twice(2), twice(0))
+    assert not fit(twice(2), twice(5))
+
+
 def test_ways_to_join_two_steps_have_names_of_their_own():
     x, y = Array("x", "input", 3), Array("y", "local", 2)
     first = Apply(ADD, (x.part(0, 1), x.part(1, 1)), (y.part(0, 1),), (False,))

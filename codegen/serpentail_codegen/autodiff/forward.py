@@ -33,12 +33,16 @@ def all_lanes(loops: tuple[Loop, ...]) -> None:
 
 
 def tangent_program(
-    program: Program, active: Collection[str], lanes: int = 0, bound: Bound = all_lanes
+    program: Program,
+    active: Collection[str],
+    lanes: int = 0,
+    bound: Bound = all_lanes,
+    kept: Collection[str] = (),
 ) -> Program:
     """Return the program that takes ``d_<input>`` of the active inputs to ``d_<output>``.
 
     ``lanes`` is the number of directions, 0 for one direction in narrow scalars; ``bound`` tells
-    how many of the lanes are needed inside given loops.
+    how many of the lanes are needed inside given loops.  ``kept`` outputs are given, too.
     """
     # every array that depends on the active ones has tangents, or its angles have
     moving = forward_slice(program.body, active)
@@ -55,7 +59,9 @@ def tangent_program(
     body = _Tangents(companions, by_angles, bound).body(program.body, ())
     fills = tuple(Fill(ref, (0,) * ref.size) for ref in _partly_written(body))
 
-    arrays = (*inner_arrays(program), *companions.values())
+    own = inner_arrays(program)
+    own = tuple(replace(a, role="output") if a.name in kept else a for a in own)
+    arrays = (*own, *companions.values())
     name = "_".join(["d", *active, program.name])
     if lanes:
         name = f"{name}_rows_of_{lanes}"

@@ -92,6 +92,9 @@ def fit(first: Apply, second: Apply) -> bool:
     nodes = len(first.step.nodes) + len(second.step.nodes)
     if first.columns != second.columns or nodes > MOST_NODES:
         return False
+    refs = (*first.reads, *first.writes, *second.reads, *second.writes)
+    if len({ref.lanes for ref in refs} - {0}) > 1:
+        return False  # directions of one are not those of the other
     handed = first.stored()
     for written in first.writes:
         read = [ref for ref in second.reads if overlap(ref, written)]

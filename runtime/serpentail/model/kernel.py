@@ -66,6 +66,16 @@ def aligned(count: int, dtype: DTypeLike) -> ndarray:
     return memory[first : first + size].view(dtype)
 
 
+def aligned_rows(shape: tuple[int, ...], dtype: DTypeLike) -> ndarray:
+    """Return an array to be filled that begins at a cache line: vectors are stored in half the
+    time where none lies across two.
+    """
+    size = math.prod(shape) * np.dtype(dtype).itemsize
+    memory = np.empty(size + CACHE_LINE, np.uint8)
+    first = -address_of(memory) % CACHE_LINE
+    return memory[first : first + size].view(dtype).reshape(shape)
+
+
 class Buffers:
     """Arrays that are handed to C; as they stay, a call on one state costs little."""
 
@@ -204,7 +214,7 @@ class Kernel:
             np.ascontiguousarray(np.broadcast_to(a, (count, *shape)))
             for a, shape in zip(arrays, self.shapes, strict=True)
         ]
-        outputs = [np.empty((count, *shape), self.dtype) for shape in self.out_shapes]
+        outputs = [aligned_rows((count, *shape), self.dtype) for shape in self.out_shapes]
         function = self.batch_library.entry(self.name, count)
         run = self._each if function is None else partial(self._side_by_side, function)
         shared(count, self.batch_library.threads, partial(run, whole, outputs))

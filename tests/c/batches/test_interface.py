@@ -100,3 +100,23 @@ def test_a_single_state_is_repeated_over_a_batch():
     force = found.bias_force(arguments["q"][0], arguments["v"])
     expected = [found.bias_force(arguments["q"][0], v) for v in arguments["v"]]
     np.testing.assert_allclose(force, expected, rtol=1e-10, atol=1e-14)
+
+
+def test_what_a_batch_returns_begins_at_a_cache_line():
+    found, arguments = model(), states(model(), 20)
+    for output in found.forward_dynamics_derivatives(
+        *given(arguments, "forward_dynamics_derivatives")
+    ):
+        assert output.ctypes.data % 64 == 0 and output.flags.c_contiguous and output.flags.writeable
+    empty = found.mass_matrix(arguments["q"][:0])
+    assert empty.shape == (0, found.nv, found.nv)
+
+
+@pytest.mark.parametrize("name", ["q", "v"])
+def test_a_number_that_is_none_is_found_wherever_it_is(name):
+    found = model()
+    for k in range(found.nq if name == "q" else found.nv):
+        arguments = states(found, 20)
+        arguments[name][11, k] = np.inf
+        with pytest.raises(st.StateError, match=rf"{name}\[{k}\] of state 11: value inf"):
+            found.bias_force(arguments["q"], arguments["v"])

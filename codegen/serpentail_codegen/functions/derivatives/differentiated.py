@@ -4,23 +4,24 @@ In torso axes nothing depends on attitude or gravity: R^T (p_b_ddot + g z) stand
 """
 
 from ...ir.program import Array, Ref
-from ...mechanics import torso
 from ...scene.signatures.arguments import FORCE, MULTIPLIER, V_DOT, Argument, Q, V
 from ..draft import Draft
 from ..dynamics import inertial_forces
 from ..function import Function
-from ..layout import OMEGA, VELOCITY, block
+from ..layout import OMEGA, block
 from ..scope import Motion, State, Vectors
-from ..sweeps.pieces import attitude, mechanism
+from ..sweeps.momentum import gather_moment
+from ..sweeps.pieces import mechanism
 from ..sweeps.wrenches import virtual_power
 
 POWER = Argument("power", (1,), "lambda^T (H v_dot + C)")
+A = Argument("a", (3,), "R^T (p_b_ddot + g z), which stands for v_dot[0:3]")
+U_VIRTUAL = Argument("u", (3,), "R^T multiplier[0:3], the virtual velocity of B")
+FIRST_MOMENT = Argument("moment", (3,), "first moment about B, torso axes (kg m)")
 
 
 def assemble_core(draft: Draft, arrays: dict[str, Array]) -> None:
-    """H v_dot + C in torso axes throughout, v_dot[0:3] being R^T (p_b_ddot + g z): no attitude, no
-    gravity.
-    """
+    """H v_dot + C in torso axes throughout: no attitude, no gravity."""
     state = State(arrays["q"], arrays["v"])
     core_forces(draft, state, state.omega, arrays)
 
@@ -34,34 +35,41 @@ def core_forces(draft: Draft, state: State, omega: Ref, arrays: dict[str, Array]
     """Store H v_dot + C in torso axes."""
     v_dot = arrays["v_dot"]
     segments = mechanism(draft).prepare(draft, state, False)
-    motion = Motion(omega, block(v_dot, OMEGA), block(v_dot, VELOCITY))
+    motion = Motion(omega, block(v_dot, OMEGA), arrays["a"][0])
     inertial_forces(draft, segments, motion, v_dot, arrays["force"])
 
 
+def assemble_first_moment(draft: Draft, arrays: dict[str, Array]) -> None:
+    """First moment of the animal."""
+    segments = mechanism(draft).prepare(draft, State(arrays["q"]), False)
+    moment = gather_moment(draft, segments)
+    draft.copy(arrays["moment"][0], moment["h"])
+
+
 def assemble_virtual_power(draft: Draft, arrays: dict[str, Array]) -> None:
-    """lambda^T (H v_dot + C) as one sum over the links, from the torso to the tip."""
+    """lambda^T (H v_dot + C) in torso axes, as one sum over the links, from the torso to the
+    tip.
+    """
     v_dot, multiplier = arrays["v_dot"], arrays["multiplier"]
     state = State(arrays["q"], arrays["v"])
-    R = attitude(draft, state)
     segments = mechanism(draft).prepare(draft, state, False)
 
     # the torso moves by v and v_dot, and virtually by the multiplier
-    p_ddot = {"R": R, "p_ddot": block(v_dot, VELOCITY)}
-    a = draft.store(torso.torso_acceleration, p_ddot, a=3)
-    virtual = {"w_virtual": block(multiplier, OMEGA), "u_virtual": draft.vector("u_virtual", 3)}
-    p_dot = {"R": R, "p_dot": block(multiplier, VELOCITY)}
-    draft.step(torso.torso_velocity, p_dot, u=virtual["u_virtual"])
-    motion = {"w": state.omega, "w_dot": block(v_dot, OMEGA)}
-    start = Vectors({**motion, **a, **virtual})
+    motion = {"w": state.omega, "w_dot": block(v_dot, OMEGA), "a": arrays["a"][0]}
+    virtual = {"w_virtual": block(multiplier, OMEGA), "u_virtual": arrays["u"][0]}
+    start = Vectors(motion | virtual)
     virtual_power(draft, segments, start, multiplier, v_dot, arrays["power"][0])
 
 
-CORE = Function("core", "H v_dot + C in torso axes", (Q, V, V_DOT), (FORCE,), assemble_core)
-INERTIA = Function("inertia", "H v_dot in torso axes", (Q, V_DOT), (FORCE,), assemble_inertia)
+CORE = Function("core", "H v_dot + C in torso axes", (Q, V, V_DOT, A), (FORCE,), assemble_core)
+INERTIA = Function("inertia", "H v_dot in torso axes", (Q, V_DOT, A), (FORCE,), assemble_inertia)
+MOMENT = Function(
+    "first_moment", "first moment of the animal", (Q,), (FIRST_MOMENT,), assemble_first_moment
+)
 VIRTUAL_POWER = Function(
     "virtual_power",
     "lambda^T (H v_dot + C)",
-    (Q, V, V_DOT, MULTIPLIER),
+    (Q, V, V_DOT, A, MULTIPLIER, U_VIRTUAL),
     (POWER,),
     assemble_virtual_power,
 )

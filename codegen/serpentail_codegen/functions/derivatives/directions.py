@@ -7,7 +7,7 @@ body axes, tail coordinates; the columns of such a matrix are those of a velocit
 
 from dataclasses import dataclass
 
-from ...ir.program import Array, Index, Loop
+from ...ir.program import Array, Index, Loop, Ref
 from ...mechanics import rotations
 from ..draft import Draft
 from ..layout import (
@@ -35,6 +35,7 @@ class Directions:
 
     tail: Tail
     torso: tuple[str, ...]
+    coordinates: bool = True
     rates: bool = True
 
     @property
@@ -45,7 +46,7 @@ class Directions:
     @property
     def each(self) -> int:
         """Lanes of one segment."""
-        return (2 if self.rates else 1) * PER_SEGMENT
+        return (self.coordinates + self.rates) * PER_SEGMENT
 
     @property
     def count(self) -> int:
@@ -69,30 +70,43 @@ class Directions:
 
     def of_v(self, i: Index) -> Index:
         """First lane of the rates of segment i."""
-        return self.each * i + (self.base + PER_SEGMENT)
+        return self.each * i + (self.base + PER_SEGMENT * self.coordinates)
 
-    def tangents(self, draft: Draft, q: Array) -> dict[str, Array]:
-        """Declare ``d_q`` and ``d_v`` and store the directions in them as rows; q has a unit
-        quaternion.
+    @property
+    def label(self) -> str:
+        """A name of these directions."""
+        tail = {"q": self.coordinates, "v": self.rates}
+        return "_".join([*self.torso, *(name for name, here in tail.items() if here)])
+
+    def tangents(self, draft: Draft, q: Array | None = None) -> dict[str, Array]:
+        """Declare ``d_q`` and ``d_v``, where anything moves in them, and store the directions in
+        them as rows.
+
+        q, which has a unit quaternion, is given where the attitude is differentiated.
         """
-        label = "_".join(self.torso) or "tail"
-        d_q = draft.wide(f"d_q_{label}", self.tail.nq, self.count)
-        tangents = {"d_q": d_q}
-        if self.rates:
-            tangents["d_v"] = draft.wide(f"d_v_{label}", self.tail.nv, self.count)
+        sizes = {"d_q": self.tail.nq} if self.coordinates else {}
+        sizes |= {"d_v": self.tail.nv} if self.rates else {}
+        tangents = {n: draft.wide(f"{n}_{self.label}", s, self.count) for n, s in sizes.items()}
         for lane, name in enumerate(self.torso):
-            if name == "turn":
-                turn = draft.wide(f"d_{label}", 3, self.count)[0]
-                draft.unit(turn, 3 * lane)
-                reads = {"quaternion": block(q, QUATERNION), "turn": turn}
-                draft.step(rotations.turned_quaternion, reads, rate=block(d_q, QUATERNION))
-            else:
+            if name != "turn":
                 draft.unit(block(tangents["d_v"], TORSO[name][0]), 3 * lane)
+            elif q:
+                turn = {"quaternion": block(q, QUATERNION), "turn": self.turn(draft)}
+                draft.step(
+                    rotations.turned_quaternion, turn, rate=block(tangents["d_q"], QUATERNION)
+                )
         with draft.loop("i", self.tail.segments) as i:
-            draft.unit(segment_q(d_q, i), self.of_q(i))
+            if self.coordinates:
+                draft.unit(segment_q(tangents["d_q"], i), self.of_q(i))
             if self.rates:
                 draft.unit(segment_v(tangents["d_v"], i), self.of_v(i))
         return tangents
+
+    def turn(self, draft: Draft) -> Ref:
+        """Declare the directions of turns as rows of a vector, and store them."""
+        turn = draft.wide("turn", 3, self.count)[0]
+        draft.unit(turn, 3 * self.torso.index("turn"))
+        return turn
 
     def spread(self, draft: Draft, source: Array, of_q: Array, of_v: Array | None = None) -> None:
         """Copy wide rows to the columns of matrices (rows, nv)."""

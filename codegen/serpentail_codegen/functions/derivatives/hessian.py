@@ -1,128 +1,98 @@
 """Second derivatives: the Hessian of lambda^T (H v_dot + C)."""
 
-from dataclasses import dataclass
-
 from ...autodiff.forward import tangent_program
 from ...autodiff.reverse import adjoint_program
-from ...ir.program import Array, Index, Ref, as_index
-from ...mechanics import rotations, torso
+from ...ir.program import Array
+from ...mechanics import rotations, turns
 from ..draft import Draft
 from ..function import assemble
-from ..layout import OMEGA, QUATERNION, TORSO_NQ, TORSO_NV, VELOCITY, block, coordinate
-from ..scope import State
-from ..sweeps.pieces import attitude
-from .differentiated import INERTIA, VIRTUAL_POWER
-from .directions import TORSO, Directions
-from .jacobians import with_unit_quaternion
+from ..layout import OMEGA, TORSO_NV, VELOCITY, block
+from ..scope import Vectors
+from .differentiated import MOMENT, VIRTUAL_POWER
+from .directions import Directions
+from .hessian_blocks import HessianBlocks
+from .torso_axes import TorsoAxes, torso_axes
+
+BY_Q = ("q", "v", "v_dot", "a", "u")
+BY_V = ("v", "u")  # what remains is the transpose of what is by q, or zero
 
 
 def assemble_inverse_dynamics_hessian(draft: Draft, arrays: dict[str, Array]) -> None:
-    """Tangents of the gradient of lambda^T (H v_dot + C) with respect to q and v; its mixed block
-    by those of H lambda.
-
-    Only the lower triangle is computed: rows of segment i in the lanes of segments up to i.
+    """Tangents of the gradient of lambda^T (H v_dot + C) in torso axes, by tail coordinates and by
+    v; all that turns of the torso do follows from these.
     """
-    tail, nv = draft.tail, draft.tail.nv
-    directions = Directions(tail, ("turn", "omega"))
-    lanes = directions.count
-    inner = adjoint_program(assemble(VIRTUAL_POWER, tail), ("q", "v", "v_dot"), ("power",))
-    inner = tangent_program(inner, ("q", "v"), lanes, directions.up_to)
+    of_q = Directions(draft.tail, (), rates=False)
+    of_v = Directions(draft.tail, ("omega",), coordinates=False)
+    axes = torso_axes(draft, arrays["q"], arrays["v_dot"], arrays["multiplier"])
+    gradient = {name: draft.array(f"b_{name}", 3) for name in ("a", "u")}
+    given = {name: arrays[name] for name in ("q", "v", "v_dot", "multiplier")} | axes.arrays()
+    d_q, d_v = of_q.tangents(draft), of_v.tangents(draft)
+    by_q = tangents_of_gradient(draft, of_q, given | d_q, BY_Q, gradient)
+    by_v = tangents_of_gradient(draft, of_v, given | d_v, BY_V, {})
+    blocks = HessianBlocks(draft, of_q, of_v, arrays)
+    blocks.clear()
+    blocks.of_motion(by_q["q"], by_q["v"], by_v["v"])
 
-    # tangents of the gradient
-    b_q, b_v = draft.wide("d_b_q", tail.nq, lanes), draft.wide("d_b_v", nv, lanes)
-    b_v_dot = draft.wide("d_b_v_dot", nv, lanes)
-    q = with_unit_quaternion(draft, arrays["q"])
-    arguments = {"q": q} | {name: arrays[name] for name in ("v", "v_dot", "multiplier")}
-    d_q = directions.tangents(draft, q)
-    outputs = {"d_b_q": b_q, "d_b_v": b_v, "d_b_v_dot": b_v_dot}
-    draft.call(inner, b_power=draft.constant("one", [1]), **outputs, **arguments, **d_q)
-    turn = draft.wide("d_b_turn", 3, lanes)[0]
-    reads = {"quaternion": block(q, QUATERNION), "gradient": block(b_q, QUATERNION)}
-    draft.step(rotations.turn_gradient, reads, turn=turn)
+    # tangents of H lambda, its force in world axes
+    force, rows = {"R": axes.R, "vector": by_q["a"][0]}, by_q["v_dot"]
+    draft.step(rotations.world_vector, force, vector=block(rows, VELOCITY))
+    blocks.of_inertia(rows)
 
-    # to the blocks of the Hessian
-    rows = {"turn": turn, "omega": block(b_v, OMEGA)}
-    Mirror(draft, directions, arrays).copy(rows, b_q, b_v)
-    mixed_block(draft, q, arrays["multiplier"], arrays["aq"])
-    with draft.loop("row", nv) as row:
-        draft.copy(arrays["aq"].part(nv * row + OMEGA.start, 3), b_v_dot.lane(row, 0, 3))
-
-
-@dataclass(frozen=True)
-class Place:
-    """A row or column of the Hessian: its number, and whether it is of q or of v."""
-
-    number: Index
-    is_q: bool
+    # tangents of the gradient by a turn
+    turn_q, turn_v = (draft.wide(f"turn_{d.label}", 3, d.count) for d in (of_q, of_v))
+    changes = {f"b_{name}": by_q[name][0] for name in ("a", "u")}
+    draft.step(turns.power_by_turn, axes.vectors(), changes, turn=turn_q[0])
+    change = {"gradient": by_v["u"][0], "vector": axes.u[0]}
+    draft.step(turns.term_by_turn, change, turn=turn_v[0])
+    blocks.of_turn(turn_q, turn_v)
+    turned_twice(draft, d_q, axes, gradient, blocks)
 
 
-@dataclass(frozen=True)
-class Mirror:
-    """Copies the lower triangle of the Hessian to the blocks qq, qv and vv, and mirrors it."""
+def tangents_of_gradient(
+    draft: Draft,
+    directions: Directions,
+    arguments: dict[str, Array],
+    wanted: tuple[str, ...],
+    gradients: dict[str, Array],
+) -> dict[str, Array]:
+    """Return wide rows of tangents of the wanted gradients, and store some of the gradients."""
+    tail, lanes = draft.tail, directions.count
+    inner = adjoint_program(assemble(VIRTUAL_POWER, tail), wanted, ("power",))
+    active = [name for name in ("q", "v") if f"d_{name}" in arguments]
+    kept = {f"b_{name}": array for name, array in gradients.items()}
+    inner = tangent_program(inner, active, lanes, directions.outward, kept)
 
-    draft: Draft
-    directions: Directions
-    blocks: dict[str, Array]
-
-    def copy(self, torso: dict[str, Ref], of_q: Array, of_v: Array) -> None:
-        """Copy the rows of the torso, then those of the tail."""
-        draft, nv = self.draft, self.draft.tail.nv
-        for name in ("qq", "qv", "vv"):
-            draft.fill(self.blocks[name].part(0, nv * nv), 0)
-        for name in self.directions.torso:
-            where, is_q = TORSO[name]
-            with draft.loop("k", 3) as k:
-                row = torso[name].array.part(torso[name].offset + k, 1)
-                self._row(row, Place(k + where.start, is_q), None)
-        with draft.loop("i", draft.tail.segments) as i, draft.loop("k", 2) as k:
-            number = coordinate(i) + k
-            self._row(of_q.part(number + TORSO_NQ, 1), Place(number + TORSO_NV, True), i + 1)
-            self._row(of_v.part(number + TORSO_NV, 1), Place(number + TORSO_NV, False), i + 1)
-
-    def _row(self, row: Ref, place: Place, segments: Index | None) -> None:
-        """Copy one row: lanes of the torso, and of so many segments."""
-        directions = self.directions
-        for lane, name in enumerate(directions.torso):
-            where, is_q = TORSO[name]
-            self._entries(row, place, as_index(3 * lane), Place(as_index(where.start), is_q), 3)
-        if segments is None:
-            return
-        with self.draft.loop("l", segments) as other:
-            column = coordinate(other) + TORSO_NV
-            self._entries(row, place, directions.of_q(other), Place(column, True), 2)
-            self._entries(row, place, directions.of_v(other), Place(column, False), 2)
-
-    def _entries(self, row: Ref, place: Place, lane: Index, column: Place, size: int) -> None:
-        """Copy lanes of one row to the block they belong to, and to the mirrored place."""
-        nv, source = self.draft.tail.nv, row.array.lane(row.offset, lane, size)
-        name = "qv"
-        if place.is_q == column.is_q:
-            name = "qq" if place.is_q else "vv"
-        block = self.blocks[name]
-        if place.is_q or not column.is_q:
-            self.draft.copy(block.part(nv * place.number + column.number, size), source)
-        if column.is_q or not place.is_q:
-            self.draft.copy(block.part(nv * column.number + place.number, size, nv), source)
+    sizes = {"q": tail.nq, "v": tail.nv, "v_dot": tail.nv, "a": 3, "u": 3}
+    label, one = directions.label, draft.fixed("one", [1]).array
+    tangents = {n: draft.wide(f"d_b_{n}_{label}", sizes[n], lanes) for n in wanted}
+    outputs = {f"d_b_{name}": array for name, array in tangents.items()}
+    draft.call(inner, b_power=one, **arguments, **outputs, **kept)
+    return tangents
 
 
-def mixed_block(draft: Draft, q: Array, multiplier: Array, aq: Array) -> None:
-    """d(H lambda)/d(q_t): tangents of the inertia's force for the acceleration lambda, then brought
-    to world axes.
-    """
-    tail, nv = draft.tail, draft.tail.nv
-    directions = Directions(tail, (), rates=False)
-    inner = tangent_program(assemble(INERTIA, tail), ("q",), directions.count, directions.outward)
-    rows = draft.wide("inertial_rows", nv, directions.count)
-    body = draft.array("multiplier_in_torso_axes", nv)
-    R = {"R": attitude(draft, State(q))}
-    p_dot = {"p_dot": block(multiplier, VELOCITY)}
-    draft.step(torso.torso_velocity, R, p_dot, u=block(body, VELOCITY))
-    rest = slice(OMEGA.start, nv)
-    draft.copy(block(body, rest), block(multiplier, rest))
-    draft.call(inner, q=q, v_dot=body, d_force=rows, **directions.tangents(draft, q))
-    force = block(rows, VELOCITY)
-    draft.step(rotations.world_vector, R, {"vector": force}, vector=force)
-    directions.spread(draft, rows, aq)
+def turned_twice(
+    draft: Draft,
+    d_q: dict[str, Array],
+    axes: TorsoAxes,
+    gradient: dict[str, Array],
+    blocks: HessianBlocks,
+) -> None:
+    """Store second derivatives by turns, and how H lambda changes with a turn."""
+    of_q = blocks.of_q
+    inner = tangent_program(
+        assemble(MOMENT, draft.tail), ("q",), of_q.count, of_q.outward, ("moment",)
+    )
+    h, d_h = draft.array("h", 3), draft.wide("d_h", 3, of_q.count)
+    draft.call(inner, q=blocks.arrays["q"], moment=h, d_moment=d_h, **d_q)
+
+    gradients = {f"b_{name}": array[0] for name, array in gradient.items()}
+    turned = Vectors({**axes.vectors(), **gradients, "h": h[0], "R": axes.R})
+    draft.step(turns.turn_curvature, turned, **blocks.columns_of_turns("qq", OMEGA.start, 3))
+    draft.step(turns.turned_momentum, turned, **blocks.columns_of_turns("aq", 0, TORSO_NV))
+    by_turn = draft.wide("by_turn", 3, of_q.count)
+    change = {"gradient": d_h[0], "vector": axes.u[0]}
+    draft.step(turns.term_by_turn, change, turn=by_turn[0])
+    blocks.of_turned_inertia(by_turn)
 
 
 ASSEMBLIES = {"inverse_dynamics_hessian": assemble_inverse_dynamics_hessian}

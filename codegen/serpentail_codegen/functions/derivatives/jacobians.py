@@ -8,18 +8,20 @@ from collections.abc import Callable
 from ...autodiff.forward import tangent_program
 from ...autodiff.reverse import adjoint_program
 from ...ir.program import Array, Index, Ref
-from ...mechanics import rotations, torso, translation
+from ...mechanics import rotations, torso, translation, turns
 from ..draft import Draft
 from ..dynamics import assemble_forward_dynamics
 from ..factored import FactoredDynamics, Loads
 from ..function import Function, assemble
 from ..layout import OMEGA, POSITION, QUATERNION, VELOCITY, block, tail_v
 from ..plain import FUNCTIONS
-from ..scope import Vectors
+from ..scope import State, Vectors
+from ..sweeps.pieces import attitude
 from ..tail import struct_parameters
 from .by_segments import derivatives_by_segments
 from .differentiated import CORE, VIRTUAL_POWER
 from .directions import Directions
+from .torso_axes import TorsoAxes, acceleration_at, torso_axes, turned_back
 
 # ---- Jacobians -----------------------------------------------------------------------------------
 
@@ -37,28 +39,33 @@ def with_unit_quaternion(draft: Draft, q: Array) -> Array:
 
 
 def assemble_inverse_dynamics_derivatives(draft: Draft, arrays: dict[str, Array]) -> None:
-    """Tangents of H v_dot + C along all directions at once."""
-    directions = Directions(draft.tail, ("turn", "omega"))
-    function = assemble(FUNCTIONS["inverse_dynamics"], draft.tail)
-    inner = tangent_program(function, ("q", "v"), directions.count, directions.outward)
-    rows = draft.wide("rows", draft.tail.nv, directions.count)
-    q = with_unit_quaternion(draft, arrays["q"])
-    arguments = {"q": q, "v": arrays["v"], "v_dot": arrays["v_dot"]}
-    draft.call(inner, d_force=rows, **arguments, **directions.tangents(draft, q))
+    """Tangents of H v_dot + C along all directions at once, in torso axes."""
+    tail, directions = draft.tail, Directions(draft.tail, ("turn", "omega"))
+    lanes, active = directions.count, ("q", "v", "a")
+    R = attitude(draft, State(arrays["q"]))
+    a, turn = acceleration_at(draft, R, arrays["v_dot"]), directions.turn(draft)
+    inner = tangent_program(
+        assemble(CORE, tail), active, lanes, directions.outward, kept=("force",)
+    )
+    force, rows = draft.array("force", tail.nv), draft.wide("rows", tail.nv, lanes)
+    arguments = {name: arrays[name] for name in ("q", "v", "v_dot")} | {"a": a, "force": force}
+    tangents = directions.tangents(draft) | {"d_a": turned_back(draft, a, turn)}
+    draft.call(inner, **arguments, **tangents, d_force=rows)
+
+    # the force in world axes turns with the torso
+    change = block(rows, VELOCITY)
+    reads = {"R": R, "force": block(force, VELOCITY), "turn": turn, "change": change}
+    draft.step(turns.turning_force, reads, change=change)
     directions.spread(draft, rows, arrays["dq"], arrays["dv"])
 
 
 def forward_dynamics_first(
     draft: Draft, arrays: dict[str, Array]
-) -> tuple[FactoredDynamics, Array]:
-    """Forward dynamics, then its acceleration with R^T (p_b_ddot + g z) in place of p_b_ddot."""
-    nv = draft.tail.nv
-    v_dot, body = draft.array("acceleration", nv), draft.array("body_acceleration", nv)
+) -> tuple[FactoredDynamics, dict[str, Array]]:
+    """Forward dynamics: what solves it, and ``v_dot`` and ``a`` = R^T (p_b_ddot + g z)."""
+    v_dot = draft.array("acceleration", draft.tail.nv)
     factored = assemble_forward_dynamics(draft, arrays | {"v_dot": v_dot})
-    reads = {"R": factored.R, "p_ddot": block(v_dot, VELOCITY)}
-    draft.step(torso.torso_acceleration, reads, a=block(body, VELOCITY))
-    draft.copy(body.part(OMEGA.start, nv - 3), v_dot.part(OMEGA.start, nv - 3))
-    return factored, body
+    return factored, {"v_dot": v_dot, "a": acceleration_at(draft, factored.R, v_dot)}
 
 
 def loads_at_torso(draft: Draft, **loads: Ref) -> Vectors:
@@ -92,19 +99,18 @@ def assemble_forward_dynamics_derivatives(draft: Draft, arrays: dict[str, Array]
         derivatives_by_segments(draft, arrays)
         return
     tail, nv = draft.tail, draft.tail.nv
-    factored, body = forward_dynamics_first(draft, arrays)
+    factored, motion = forward_dynamics_first(draft, arrays)
     directions = Directions(tail, ("omega",))
     inner = tangent_program(assemble(CORE, tail), ("q", "v"), directions.count, directions.outward)
     rows, x = draft.wide("rows", nv, directions.count), draft.wide("x", nv, directions.count)
-    arguments = {name: arrays[name] for name in ("q", "v")}
-    tangents = directions.tangents(draft, arrays["q"])
-    draft.call(inner, d_force=rows, v_dot=body, **arguments, **tangents)
+    arguments = {name: arrays[name] for name in ("q", "v")} | motion
+    draft.call(inner, d_force=rows, **arguments, **directions.tangents(draft))
     factored.solve(draft, minus(draft, rows), x)
     directions.spread(draft, x, arrays["dq"], arrays["dv"])
 
     # how p_b_ddot moves with a rotation of the torso
     turned = {f"row_{r}": arrays["dq"].part(nv * r + OMEGA.start, 3) for r in range(3)}
-    reads = {"R": factored.R, "a": block(body, VELOCITY)}
+    reads = {"R": factored.R, "a": motion["a"][0]}
     draft.step(translation.turned_acceleration, reads, **turned)
     torque_columns(draft, factored, arrays["dtau"])
 
@@ -132,8 +138,8 @@ def assemble_inverse_dynamics_parameter_derivatives(draft: Draft, arrays: dict[s
 def assemble_forward_dynamics_parameter_derivatives(draft: Draft, arrays: dict[str, Array]) -> None:
     """-H^-1 times the tangents of H v_dot + C with respect to every parameter, at fixed v_dot."""
     count = draft.tail.parameter_numbers
-    factored, body = forward_dynamics_first(draft, arrays)
-    arguments = {"q": arrays["q"], "v": arrays["v"], "v_dot": body}
+    factored, motion = forward_dynamics_first(draft, arrays)
+    arguments = {name: arrays[name] for name in ("q", "v")} | motion
     rows = parameter_tangents(draft, CORE, arguments)
     x = draft.wide("x", draft.tail.nv, count)
     gravity = draft.wide("d_gravity_z", 1, count)[0]
@@ -172,39 +178,53 @@ def spread_parameters(draft: Draft, source: Array, dparameters: Array) -> None:
 def assemble_forward_dynamics_jvp(draft: Draft, arrays: dict[str, Array]) -> None:
     """Directional derivative of v_dot."""
     tail = draft.tail
-    factored, body = forward_dynamics_first(draft, arrays)
+    factored, motion = forward_dynamics_first(draft, arrays)
     d_q, rows, x = draft.array("d_q", tail.nq), draft.array("rows", tail.nv), arrays["dv_dot"]
     draft.copy(tail.all_q(d_q), tail.all_v(arrays["dq"]))
     inner = tangent_program(assemble(CORE, tail), ("q", "v"))
-    arguments = {"q": arrays["q"], "v": arrays["v"], "v_dot": body}
+    arguments = {name: arrays[name] for name in ("q", "v")} | motion
     draft.call(inner, **arguments, d_q=d_q, d_v=arrays["dv"], d_force=rows)
     factored.solve(draft, minus(draft, rows, lambda k: arrays["dtau"].part(k, 1)), x)
 
     # how p_b_ddot moves with a rotation of the torso
     p_ddot = block(x, VELOCITY)
-    reads = {"a": block(body, VELOCITY), "turn": block(arrays["dq"], OMEGA), "p_ddot": p_ddot}
+    reads = {"a": motion["a"][0], "turn": block(arrays["dq"], OMEGA), "p_ddot": p_ddot}
     draft.step(translation.turning_acceleration, {"R": factored.R}, reads, p_ddot=p_ddot)
 
 
 def assemble_inverse_dynamics_vjp(draft: Draft, arrays: dict[str, Array]) -> None:
     """Gradient of lambda^T (H v_dot + C), by one way out along the tail and one back."""
-    inner = adjoint_program(assemble(VIRTUAL_POWER, draft.tail), ("q", "v", "v_dot"), ("power",))
-    one, gradient = draft.constant("one", [1]), draft.array("gradient", draft.tail.nq)
-    q = with_unit_quaternion(draft, arrays["q"])
-    arguments = {"q": q} | {name: arrays[name] for name in ("v", "v_dot", "multiplier")}
-    gradients = {"b_q": gradient, "b_v": arrays["dv"], "b_v_dot": arrays["dv_dot"]}
-    draft.call(inner, b_power=one, **gradients, **arguments)
-    in_tangent_space(draft, q, gradient, arrays["dq"])
+    axes = torso_axes(draft, arrays["q"], arrays["v_dot"], arrays["multiplier"])
+    arguments = {name: arrays[name] for name in ("q", "v", "v_dot", "multiplier")}
+    wanted = {"b_v": arrays["dv"], "b_v_dot": arrays["dv_dot"]}
+    force = power_gradient(draft, axes, arguments, 1, arrays["dq"], wanted)
+    vector = {"R": axes.R, "vector": force}
+    draft.step(rotations.world_vector, vector, vector=block(arrays["dv_dot"], VELOCITY))
 
 
-def in_tangent_space(draft: Draft, q: Array, gradient: Array, dq: Array) -> None:
-    """Make of a gradient with respect to the numbers of q one with respect to a velocity's
-    directions.
+def power_gradient(
+    draft: Draft,
+    axes: TorsoAxes,
+    arguments: dict[str, Array],
+    weight: int,
+    dq: Array,
+    others: dict[str, Array],
+) -> Ref:
+    """Store the weighted gradient of lambda^T (H v_dot + C) by q in its tangent space, and others;
+    return that by a.
     """
-    draft.copy(block(dq, POSITION), block(gradient, POSITION))
-    reads = {"quaternion": block(q, QUATERNION), "gradient": block(gradient, QUATERNION)}
-    draft.step(rotations.turn_gradient, reads, turn=block(dq, OMEGA))
-    draft.copy(draft.tail.all_v(dq), draft.tail.all_q(gradient))
+    tail, gradient = draft.tail, draft.array("gradient", draft.tail.nq)
+    by = {f"b_{name}": draft.array(f"b_{name}", 3) for name in ("a", "u")}
+    wanted = ("q", *(name.removeprefix("b_") for name in others), "a", "u")
+    inner = adjoint_program(assemble(VIRTUAL_POWER, tail), wanted, ("power",))
+    given = arguments | axes.arrays() | {"b_power": draft.constant("weight", [weight])}
+    draft.call(inner, **given, b_q=gradient, **by, **others)
+
+    draft.fill(block(dq, POSITION), 0)
+    turned = {name: array[0] for name, array in by.items()}
+    draft.step(turns.power_by_turn, axes.vectors(), turned, turn=block(dq, OMEGA))
+    draft.copy(tail.all_v(dq), tail.all_q(gradient))
+    return by["b_a"][0]
 
 
 def assemble_forward_dynamics_vjp(draft: Draft, arrays: dict[str, Array]) -> None:
@@ -222,16 +242,23 @@ def assemble_forward_dynamics_vjp(draft: Draft, arrays: dict[str, Array]) -> Non
     factored.solve(draft, weightless(draft, lambda k: tail_v(multiplier, k), **load), mu)
 
     # minus the gradient of mu^T (H v_dot + C)
-    inner = adjoint_program(assemble(VIRTUAL_POWER, tail), ("q", "v"), ("power",))
-    weight, gradient = draft.constant("minus", [-1]), draft.array("gradient", tail.nq)
-    q = with_unit_quaternion(draft, arrays["q"])
-    arguments = {"q": q, "v": arrays["v"], "v_dot": v_dot, "multiplier": mu}
-    draft.call(inner, b_power=weight, b_q=gradient, b_v=arrays["dv"], **arguments)
-    in_tangent_space(draft, q, gradient, arrays["dq"])
+    axes = torso_axes(draft, arrays["q"], v_dot, mu, factored.R)
+    arguments = {name: arrays[name] for name in ("q", "v")} | {"v_dot": v_dot, "multiplier": mu}
+    power_gradient(draft, axes, arguments, -1, arrays["dq"], {"b_v": arrays["dv"]})
     draft.copy(arrays["dtau"].part(0, tail.nt), tail.all_v(mu))
 
 
 # ---- energy and momentum -------------------------------------------------------------------------
+
+
+def in_tangent_space(draft: Draft, q: Array, gradient: Array, dq: Array) -> None:
+    """Make of a gradient with respect to the numbers of q one with respect to a velocity's
+    directions.
+    """
+    draft.copy(block(dq, POSITION), block(gradient, POSITION))
+    reads = {"quaternion": block(q, QUATERNION), "gradient": block(gradient, QUATERNION)}
+    draft.step(rotations.turn_gradient, reads, turn=block(dq, OMEGA))
+    draft.copy(draft.tail.all_v(dq), draft.tail.all_q(gradient))
 
 
 def assemble_energy_derivatives(draft: Draft, arrays: dict[str, Array]) -> None:

@@ -7,6 +7,8 @@ from ...functions.sweeps.doubling import is_doubled
 from ...functions.tail import Tail, struct_parameters
 from ...ir.cost import applied, branches
 from ...ir.program import Program
+from ...passes.directions import has_directions
+from ...passes.still import without_still
 from ...passes.unrolled_ldl import unrolled_ldl
 from ...scene.scene import Scene
 from .loops import in_loops
@@ -46,6 +48,8 @@ def printed_function(scene: Scene, tail: Tail, function: Function) -> PrintedFun
         if scene.emission == "auto"
         else in_form(scene.emission, function, tail)
     )
+    if form == "loops" and has_directions(program):
+        program = without_still(program)
     printer = straight_line if form == "straight" else in_loops
     return PrintedFunction(function, printer(program, scene.real, scene.name, fixed), form)
 
