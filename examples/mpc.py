@@ -35,14 +35,16 @@ def controller(model: st.Model):
     quiet = {"ipopt.print_level": 0, "ipopt.sb": "yes", "print_time": False, "ipopt.max_iter": 60}
     solver = casadi.nlpsol("mpc", "ipopt", nlp, quiet)
     bound = np.r_[np.full(nx * HORIZON, np.inf), np.full(nu * HORIZON, TORQUE)]
-    memory = {"plan": None}
+    memory = {}
 
     def torques(state):
-        guess = memory["plan"]
-        if guess is None:
-            guess = np.r_[np.tile(state, HORIZON), np.zeros(nu * HORIZON)]
-        memory["plan"] = solver(x0=guess, p=state, lbx=-bound, ubx=bound, lbg=0, ubg=0)["x"].full()
-        return memory["plan"][nx * HORIZON :][:nu, 0]
+        # the last plan a step later: from it as it was, the solver finds another at each step
+        rows = memory.get("plan", (np.tile(state, (HORIZON, 1)), np.zeros((HORIZON, nu))))
+        later = [np.vstack([part[1:], part[-1:]]).ravel() for part in rows]
+        found = solver(x0=np.concatenate(later), p=state, lbx=-bound, ubx=bound, lbg=0, ubg=0)
+        states, plan = np.split(found["x"].full().ravel(), [nx * HORIZON])
+        memory["plan"] = states.reshape(HORIZON, nx), plan.reshape(HORIZON, nu)
+        return plan[:nu]
 
     return torques
 

@@ -10,7 +10,7 @@ from scipy.sparse import coo_matrix
 
 import serpentail as st
 from serpentail.planning.nlp.mesh import Mesh, refined, uniform
-from serpentail.planning.nlp.node import Node, Variables
+from serpentail.planning.nlp.node import PARAMETERS, Node, Variables
 from serpentail.planning.nlp.rules import MOST_DEGREE, collocation_rule
 from serpentail.planning.nlp.transcription import collocate, indices_of
 
@@ -84,13 +84,13 @@ def oscillator() -> tuple[Variables, Node]:
     """The oscillator as a node: zeta = (T, x, x_dot, u); its rate is a call, as dynamics is."""
     from serpentail.planning.nlp.node_calls import linear_call
 
-    zeta, h = casadi.SX.sym("zeta", 4), casadi.SX.sym("h", 3)
+    zeta, p = casadi.SX.sym("zeta", 4), casadi.SX.sym("p", PARAMETERS + 1)
     state, u = casadi.SX.sym("state", 2), casadi.SX.sym("u")
     f = casadi.Function("f", [state, u], [casadi.vertcat(state[1], u - state[0])])
     call = linear_call(f, zeta, [zeta[1:3], zeta[3]])
     result = casadi.SX.sym("result", 2)
     y = casadi.vertcat(zeta[0] * result, zeta[0] * zeta[3] ** 2)
-    node = Node(casadi.Function("node", [zeta, h, result], [y]), (call,), 2, 0, 0)
+    node = Node(casadi.Function("node", [zeta, p, result], [y]), (call,), 2, 0, 0)
     return Variables((("x", 2),), (), {"x": np.ones(2), "torque": np.ones(1)}), node
 
 

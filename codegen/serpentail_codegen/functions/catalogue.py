@@ -2,13 +2,14 @@
 
 from ..scene.signatures.table import SIGNATURES
 from . import contact, pfl
-from .derivatives import hessian, jacobians
+from .derivatives import by_parameters, hessian, jacobians
 from .function import signed
 from .implicit import functions as implicit
 from .plain import FUNCTIONS
 
 _FOUND = FUNCTIONS | signed(
     jacobians.ASSEMBLIES
+    | by_parameters.ASSEMBLIES
     | hessian.ASSEMBLIES
     | contact.ASSEMBLIES
     | pfl.ASSEMBLIES

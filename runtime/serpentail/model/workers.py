@@ -88,6 +88,7 @@ def in_turn(
     numbers, ended = deque(range(count)), threading.Event()
     if threads == 1:
         work(_taken(numbers, tick), ended)
+        tick()
         return
     with ThreadPoolExecutor(threads, thread_name_prefix="serpentail") as crew:
         try:

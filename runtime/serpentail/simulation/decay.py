@@ -21,6 +21,8 @@ class FastestDecay:
         laws = [each.damping for each in parts if each.damping is not None]
         damping = np.max(laws, axis=0) if laws else np.zeros(nt)
         self.damped, self.scale = bool(damping.any()), np.sqrt(np.outer(damping, damping))
+        if not self.damped:
+            return
         # without torque and with unit torques: the differences are columns of H^-1
         kernel = model.kernel("forward_dynamics")
         self.runs, self.columns = runs, nt + 1
