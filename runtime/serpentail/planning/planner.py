@@ -16,6 +16,7 @@ from ..model.model import Model
 from ..motion.trajectory import Trajectory
 from ..simulation.schedules import Legs
 from ..stages import Stage
+from .momentum import refuse_impossible
 from .nlp.fork_gate import forks_wait
 from .nlp.interrupt import stoppable
 from .nlp.node import equations_of_motion
@@ -176,6 +177,7 @@ def _found(
     missing = [name for name in NEEDED if name not in model.generated]
     if missing:
         raise model.without(*missing)
+    refuse_impossible(model, problem)
     begun, goes_before = time.perf_counter(), []
     with forks_wait(), Stage("plan", model.name) as stage:
         equations = equations_of_motion(model, settings.dynamics)
