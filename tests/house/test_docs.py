@@ -17,6 +17,7 @@ from serpentail.cli import ROOMS, arguments_of
 from serpentail_codegen.scene.parameters import PARAMETERS
 from serpentail_codegen.scene.parse import parse_scene
 from serpentail_codegen.scene.signatures.table import ALL
+from tests.support.told import besides_progress
 
 ROOT = Path(__file__).parents[2]
 DOCUMENTS = [
@@ -53,7 +54,8 @@ def code(document: Path) -> list[str]:
 def run(command: list[str], folder: Path) -> str:
     """What a command prints, once it has ended well and without a complaint."""
     finished = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-    assert (finished.returncode, finished.stderr) == (0, ""), finished.stderr
+    told = besides_progress(finished.stderr)
+    assert (finished.returncode, told) == (0, ""), told
     return finished.stdout
 
 

@@ -12,6 +12,7 @@ from scipy.io import netcdf_file
 import serpentail as st
 from serpentail import cli
 from tests.scenes.conftest import SIMPLE
+from tests.support.told import besides_progress
 
 # The command line.
 
@@ -173,7 +174,7 @@ def test_a_failed_picture_loses_nothing(scene, capsys, monkeypatch):
 )
 def test_the_name_tells_the_kind_of_file(scene, capsys, path, written):
     assert cli.main(["simulate", scene(), "--save", path]) == 0
-    assert capsys.readouterr().err == ""
+    assert besides_progress(capsys.readouterr().err) == ""
     readers = {".npz": npz_times, ".csv": csv_times, ".nc": netcdf_times}
     times = readers[Path(written).suffix](written)
     assert times[-1] == 0.02 and len(times) == 201
