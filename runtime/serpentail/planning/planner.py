@@ -22,7 +22,7 @@ from .nlp.interrupt import stoppable
 from .nlp.node import equations_of_motion
 from .problem import SMOOTHING, Bounds, Goal, PathConstraint, PlanningProblem, checked_problem
 from .result.plan import Plan
-from .rounds import Round, Search
+from .rounds import SOFTENING, Round, Search
 from .settings import PlanSettings, check_settings
 
 NEEDED = ("mass_matrix", "inverse_dynamics", "rollout")  # functions of the model
@@ -182,8 +182,8 @@ def _found(
     with forks_wait(), Stage("plan", model.name) as stage:
         equations = equations_of_motion(model, settings.dynamics)
         with stoppable(settings.time_limit, stage.tell):
-            if problem.objective == "time" and settings.guess is None:
-                # from passive flight it is hardly ever solved
+            if problem.objective in SOFTENING and settings.guess is None:
+                # from passive flight these are seldom solved
                 easier = Search(model, replace(problem, objective="effort"), settings, equations)
                 goes_before, found = [easier], _rounds(easier, stage)
                 guess = easier.plan(easier.best(found), len(found), 0.0)

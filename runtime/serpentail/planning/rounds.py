@@ -13,6 +13,7 @@ import numpy as np
 
 from ..model.layout import OMEGA, POSITION, TAIL_Q, TAIL_V, VELOCITY
 from ..model.model import Model
+from ..motion.trajectory import Trajectory
 from .nlp.bounds import limits
 from .nlp.coordinates import attitude
 from .nlp.guess import Motion, of_trajectory, passive, pushes, unknowns
@@ -34,8 +35,9 @@ from .settings import PlanSettings
 
 FIRST_PUSH = 0.05  # of the torques' unit: takes the first guess out of a plane of symmetry
 # what softens an objective, see ``cost``, in the first rounds, and the last in all others: from
-# afar the objectives themselves are seldom solved
-SOFTENING = {"energy": (3e-2, 3e-3, 1e-4), "time": (1.0, 0.3)}
+# afar the objectives themselves are seldom solved; of "energy" in mean powers of the guess
+SOFTENING = {"energy": (3.0, 0.3, 0.03), "time": (1.0, 0.3)}
+USUAL_POWER = 0.01  # W, of a guess without torques
 DURATIONS = (1.0, 0.5, 0.75, 0.25)  # of guesses, in turn, from the least (0) to the most (1)
 
 
@@ -280,5 +282,17 @@ class Search:
 def _softening(problem: PlanningProblem, guess: object) -> tuple[float, ...]:
     """Return what softens the objective in the first rounds; the last is that of all others."""
     steps = SOFTENING.get(str(problem.objective), (0.0,))
+    if problem.objective == "energy":
+        power = _mean_power(guess)
+        steps = tuple(power * step for step in steps)
     known = isinstance(guess, Plan) and guess.problem.objective == problem.objective
     return steps[-1:] if known else steps
+
+
+def _mean_power(guess: object) -> float:
+    """Return the mean of sum |tau q_t_dot| (W) in a guess."""
+    motion = getattr(guess, "trajectory", guess)
+    if not isinstance(motion, Trajectory):
+        return USUAL_POWER
+    power = np.abs(motion.tau * motion.v[:, TAIL_V]).sum(axis=1)
+    return float(np.trapezoid(power, motion.t) / np.ptp(motion.t)) or USUAL_POWER
