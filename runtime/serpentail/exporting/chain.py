@@ -1,0 +1,157 @@
+"""The rigid bodies of an articulated model: torso and links, their names, numbers and shapes."""
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+
+from .. import __version__
+from ..errors import ExportError
+from ..model.model import Model
+from ..viewer.shape import shape, tail_radii, usual_radius
+
+AXES = (("alpha", (1, 0, 0)), ("beta", (0, 0, 1)))  # of a link's two joints, in its own frame
+NO_TURN = (0.0, 0.0, 0.0)
+PASSIVE = ("tail_stiffness", "tail_damping", "tail_stop_stiffness")  # a parameter of each part
+Vector = tuple[float, ...]
+
+
+class Link(NamedTuple):
+    """A link: its segment and its number in it, from 1; SI units.
+
+    place, turn: its joints in the frame before it, and that frame's turn (roll, pitch and yaw,
+    rad, about fixed axes x, y, z), which only a tilted tail's first link has.  center: of mass, in
+    its own frame, whose axes are principal ones and whose y leads back to its joint.
+    """
+
+    segment: int
+    number: int
+    place: Vector
+    turn: Vector
+    length: float
+    mass: float
+    center: Vector
+    inertia: Vector
+    radius: float
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+        return f"link_{self.segment}_{self.number}"
+
+    @property
+    def end(self) -> Vector:
+        """Its end in its frame, m."""
+        return (0.0, -self.length, 0.0)
+
+    def joint(self, axis: str, number: int | None = None) -> str:
+        """Return the name of its joint about an axis, or of that of another link in its segment."""
+        return f"{axis}_{self.segment}_{number or self.number}"
+
+
+class Chain(NamedTuple):
+    """A torso and links, SI units."""
+
+    links: tuple[Link, ...]
+    torso_mass: float
+    torso_inertia: Vector
+
+
+class Capsule(NamedTuple):
+    """A cylinder between two half balls about the torso's COM, m; one ball where half is 0."""
+
+    axis: int
+    half: float
+    radius: float
+
+
+def chain_of(model: Model, kind: str) -> Chain:
+    """Return the chain of a model; ExportError where it has none."""
+    _refuse_other(model, kind)
+    p = model.parameters
+    numbers = [(i + 1, j + 1) for i, count in enumerate(model.joints_each) for j in range(count)]
+    masses, lengths, centers, inertias = _links(model, len(numbers))
+    own = "link_masses" in p
+    radii = tail_radii(model).tolist() if own else [usual_radius(model)] * len(numbers)
+    places = [p["tail_mount"], *((0.0, -length, 0.0) for length in lengths)]
+    links = tuple(
+        Link(*number, *rest)
+        for number, *rest in zip(
+            numbers,
+            places[:-1],
+            [_mount_turn(model), *[NO_TURN] * (len(numbers) - 1)],
+            lengths,
+            masses,
+            [(0.0, -center, 0.0) for center in centers],
+            inertias,
+            radii,
+            strict=True,
+        )
+    )
+    return Chain(links, p["torso_mass"], p["torso_inertia"])
+
+
+def _refuse_other(model: Model, kind: str) -> None:
+    """ExportError where a model is no free chain of rigid links that torques alone move."""
+    needs, remedy = "", 'export an "fmu"'
+    if model.links is None:
+        needs, remedy = (
+            "an articulated tail, and a continuum is no chain of rigid links",
+            'generate a scene with kind = "articulated" and some links, or export an "fmu"',
+        )
+    elif "torso_mass" not in model.parameters:
+        needs, remedy = "a torso that moves", 'generate the scene with base = "free"'
+    elif any(name in model.parameters for name in PASSIVE):
+        needs = "a tail without springs, damping and stops"
+    if needs:
+        raise ExportError(f"kind: value {kind!r}: needs {needs} ({model.name}): {remedy}")
+
+
+def _links(model: Model, count: int) -> tuple[list, list, list, list]:
+    """Return masses, lengths, places of the COM along them and moments of inertia of all links."""
+    p = model.parameters
+    if "link_masses" not in p:
+        length = p["tail_length"] / count
+        equal = (p["tail_mass"] / count, length, length / 2, p["link_inertia"])
+        masses, lengths, centers, inertias = ([each] * count for each in equal)
+        return masses, lengths, centers, inertias
+    names = ("link_masses", "link_lengths", "link_centers")
+    masses, lengths, centers = (np.ravel(p[name]).tolist() for name in names)
+    inertias = np.reshape(p["link_inertias"], (count, 3)).tolist()
+    return masses, lengths, centers, [tuple(each) for each in inertias]
+
+
+def _mount_turn(model: Model) -> Vector:
+    """Return roll, pitch and yaw about fixed axes of the frame in which the tail begins."""
+    if "mount_angles" not in model.parameters:
+        return NO_TURN
+    from scipy.spatial.transform import Rotation
+
+    pitch, roll, yaw = model.parameters["mount_angles"]
+    return tuple(Rotation.from_euler("ZXY", [yaw, pitch, roll]).as_euler("xyz").tolist())
+
+
+def torso_capsule(model: Model) -> Capsule:
+    """Return a capsule as long as the torso, its cross-section of the torso's area."""
+    axes = np.array(shape(model)["semi_axes"])
+    axis = int(axes.argmax())
+    radius = float(np.sqrt(np.prod(np.delete(axes, axis))))
+    return Capsule(axis, max(float(axes[axis]) - radius, 0.0), radius)
+
+
+def along(axis: int, distance: float) -> Vector:
+    """Return a vector along an axis."""
+    return tuple(distance if k == axis else 0.0 for k in range(3))
+
+
+def text(numbers: float | Iterable[float]) -> str:
+    """Return numbers as the shortest text from which the same numbers are read."""
+    return " ".join(map(repr, np.atleast_1d(np.asarray(numbers, float)).tolist()))
+
+
+def origin(model: Model) -> str:
+    """Return the line about where a file comes from, and what it lacks."""
+    return (
+        f" {model.name}, made by serpentail {__version__}. SI units; B is the torso's origin. "
+        "Legs and feet have no mass and are left out, and so are contacts. "
+    )

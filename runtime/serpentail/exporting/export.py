@@ -1,0 +1,53 @@
+"""``export``: writes a model to a file of another tool's kind."""
+
+import os
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from ..checks import one_of, shown
+from ..errors import ExportError
+from ..files import refuse_unwritable, replacing
+from ..model.model import Model
+from .bundle import name_of
+
+SUFFIXES = {"urdf": ".urdf", "mjcf": ".xml", "bundle": ".zip", "fmu": ".fmu"}
+SEPARATORS = ("/", os.sep)
+
+
+def export(model: Model, kind: str, path: str | os.PathLike[str] | None = None) -> Path:
+    """Write a model, with the parameters that it has, to a file; return its path.
+
+    kind: "urdf" and "mjcf", of articulated tails: joints that mimic each other, or are tied by
+    equalities; "bundle": a .zip of the generated folder, for ``st.load`` elsewhere; "fmu": FMI
+    2.0.  path: by default the model's name in the working folder, a bundle's with its hash;
+    the file is written whole or not at all, and replaces what was there.
+    Raises ExportError with argument, value and remedy, NotWritten where the system refuses the
+    file, ModelError where the scene left out a function that the kind needs.
+    """
+    one_of("kind", kind, SUFFIXES, ExportError)
+    if not isinstance(model, Model):
+        raise ExportError(f"model: value {shown(model)}: needs a model, as st.load returns it")
+    name = name_of(model) if kind == "bundle" else model.name
+    target = checked_path(kind, f"{name}{SUFFIXES[kind]}" if path is None else path)
+    content: bytes = getattr(import_module(f".{kind}", __package__), kind)(model)
+    with replacing(target) as part:
+        part.write_bytes(content)
+    return target
+
+
+def checked_path(kind: str, path: Any) -> Path:
+    """Return the path of a file of a kind; ExportError where its name is none's, or cannot be
+    written.
+    """
+    try:
+        target = Path(path)
+        named = target.suffix.lower() == SUFFIXES[kind] and "\0" not in target.name
+        if not named or os.fspath(path).endswith(SEPARATORS):
+            raise ValueError(f"needs a file whose name ends in {SUFFIXES[kind]}")
+        refuse_unwritable(target)
+    except (TypeError, ValueError) as error:
+        raise ExportError(f"path: value {shown(path)}: {error}") from error
+    except OSError as error:
+        raise ExportError(f"path: value {shown(path)}: {error}: name another file") from error
+    return target
