@@ -29,6 +29,8 @@ def account(motion: "Trajectory") -> str:
 
 def tail_of(model: Model) -> str:
     """Return what a model's tail is made of."""
+    if isinstance(model.links, tuple):
+        return f"{model.kind}, {', '.join(map(str, model.links))} links"
     if model.links:
         return f"{model.kind}, {model.segments} x {model.links} links"
     return f"{model.kind}, {model.segments} segments"

@@ -6,6 +6,7 @@ from ..attitude import Array
 from ..model.layout import POSITION
 from ..model.model import Model
 from ..model.parameters import total_mass
+from ..model.polar import polar_to_bend
 
 
 def weight(model: Model) -> float:
@@ -30,6 +31,19 @@ def centre_of_mass(model: Model, q: Array, v: Array) -> Array:
     if "center_of_mass" not in model.kernels:
         return q[:, POSITION]
     return np.asarray(model.center_of_mass(q, v)[0])
+
+
+def bends(model: Model, tail: Array) -> Array:
+    """Return the bends (K, 2m) of the segments in pitch and yaw, rad, of tail coordinates (K, 2m).
+
+    An articulated segment bends by what all its links turn together.
+    """
+    if model.links is not None:
+        return np.repeat(model.joints_each, 2) * tail
+    if model.manifest["scene"]["coordinates"] != "polar":
+        return tail
+    pitch, yaw, *_ = polar_to_bend(tail[:, 0::2], tail[:, 1::2])
+    return np.stack([pitch, yaw], axis=2).reshape(tail.shape)
 
 
 def leg_points(model: Model, q: Array, legs: Array | None) -> Array | None:

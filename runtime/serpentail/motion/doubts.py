@@ -152,7 +152,7 @@ def _bend(model: Model, q: Array) -> Array:
     """How far the segments are bent, (K, m), rad: of joints the larger of pitch and yaw."""
     first, second = q[:, FIRST_Q], q[:, SECOND_Q]
     if model.links is not None:
-        return model.links * np.maximum(np.abs(first), np.abs(second))
+        return model.joints_each * np.maximum(np.abs(first), np.abs(second))
     polar = model.manifest["scene"]["coordinates"] == "polar"
     return np.abs(second) if polar else np.hypot(first, second)
 

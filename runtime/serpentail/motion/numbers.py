@@ -9,7 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..attitude import pitch_roll_yaw, tilt_deg
+from ..model.layout import TAIL_Q
 from ..model.model import Model
+from ..model.passive import stored_energy
 from .body import weight
 from .doubts import warnings_of
 from .forces import in_weights, peak_force, peak_total, peaks
@@ -43,7 +45,8 @@ class Number(NamedTuple):
 def com_rise(model: Model, motion: Trajectory) -> float | None:
     """Highest rise (m) of the centre of mass, by the potential energy M g z; None without g."""
     whole = weight(model)
-    return float((motion.potential.max() - motion.potential[0]) / whole) if whole else None
+    lifted = motion.potential - stored_energy(model.parameters, motion.q[:, TAIL_Q])
+    return float((lifted.max() - lifted[0]) / whole) if whole else None
 
 
 def _told(name: str) -> Callable[[Model, Trajectory], Any]:
@@ -161,7 +164,10 @@ NUMBERS = (
         "x, y and z of the ground's impulse on all points, added up by the integrator",
         lambda model, motion: _ground_impulse(motion),
     ),
-    Number("impulse_N_s", "N s", "the same on each group", _told("impulse_N_s")),
+    Number(
+        "impulse_N_s", "N s", "the same on each group",
+        lambda model, motion: motion.info.get("impulse_N_s") or None,
+    ),
     Number(
         "touching_s", "s", "for how long each group touched the ground, in all",
         lambda model, motion: touching_time(motion),

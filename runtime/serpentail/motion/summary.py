@@ -17,6 +17,13 @@ class Summary(dict[str, Any]):
     def __str__(self) -> str:
         return as_text(self, UNITS)
 
+    def described(self) -> dict[str, dict[str, Any]]:
+        """Return value, unit and meaning of each number by name, ready for JSON."""
+        return {
+            each.name: {"value": self[each.name], "unit": each.unit, "meaning": each.meaning}
+            for each in NUMBERS
+        }
+
     def markdown(self) -> str:
         """Return a Markdown table of name, value, unit and meaning."""
         rows = ((each.name, as_word(self[each.name]), each.unit, each.meaning) for each in NUMBERS)

@@ -24,7 +24,11 @@ MADE_OF = (
     "friction",
     "bend_range",
     "coordinates",
+    "taper",
+    "base",
+    "weightless",
 )
+UNSAID = {"base": "free", "weightless": False}  # of manifests, which leave out these
 
 
 def read_scene(path: str | Path, error: type[Exception]) -> tuple[dict[str, Any], Path]:
@@ -39,10 +43,9 @@ def subtable(scene: Mapping, name: str, path: Path, error: type[Exception]) -> d
     """Return a table of a scene; ``error`` where it has none."""
     table = scene.get(name)
     if not isinstance(table, Mapping):
-        raise error(
-            f"{name}: value {shown(table)}: {path} has no table [{name}]; add one, with start and "
-            "duration"
-        )
+        others = [verb for verb in ("simulate", "plan") if verb != name and verb in scene]
+        remedy = "".join(f", or try `serpentail {verb}`" for verb in others)
+        raise error(f"{path} has no table [{name}]; add one, with start and duration{remedy}")
     return dict(table)
 
 
@@ -56,14 +59,19 @@ def model_of(scene: Mapping, path: Path, folder: str | Path | None, parameters: 
         return model_from(*built(scene, path.stem, parameters))
     made = read_manifest(Path(folder))["scene"]
     for key in MADE_OF:
-        if key in scene and not _same(_in_radians(key, scene[key]), made.get(key)):
+        if key in scene and not _same(_in_radians(key, scene[key]), made.get(key, UNSAID.get(key))):
             raise ModelError(
                 f"{folder} has {key} = {made.get(key)!r}, {path} has {shown(scene[key])}: generate "
                 "it again, or leave the folder out"
             )
-    if made["baked"]:
+    if made["baked"] or "body" in scene:  # it has the scene's own
         return load(folder, parameters)
     return load(folder, merged(_own_parameters(scene), parameters))
+
+
+def size_of(model: Model) -> dict[str, float]:
+    """Return what becomes of each "kg", "m" and "s" that its scene names; empty where they stay."""
+    return dict(model.manifest.get("size", {}))
 
 
 def _own_parameters(scene: Mapping) -> Mapping:

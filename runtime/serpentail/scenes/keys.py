@@ -3,13 +3,14 @@
 The JSON Schema for editors is made of the same.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from ..checks import Refusals, needed, none_of, shown
 from ..magnitudes import warn_of_unusual
-from ..units import in_unit
+from ..units import dimensions, in_unit
 
 
 @dataclass(frozen=True)
@@ -96,3 +97,32 @@ def _read_numbers(value: Any, key: Key, where: str, part: Part) -> Any:
     if key.usual:
         warn_of_unusual(where, numbers, key.unit)
     return numbers
+
+
+def sized(value: Any, key: Key, size: Mapping[str, float]) -> Any:
+    """Return what was read of a key, all numbers in the size of a body.
+
+    size: by what each "kg", "m" and "s" is multiplied, as a manifest has it; empty: by 1.
+    """
+    if not size:
+        return value
+    if isinstance(value, Mapping):
+        key = key.kinds.get(value.get("kind", ""), key)
+        return {k: sized(x, key.keys[k], size) if k in key.keys else x for k, x in value.items()}
+    if key.each and isinstance(value, list):
+        return [sized(x, key.each, size) for x in value]
+    return _in_size(value, key.unit, size) if key.unit else value
+
+
+def _in_size(value: Any, unit: str | Sequence[str], size: Mapping[str, float]) -> Any:
+    """Return numbers of a unit, or of one each, in the size of a body."""
+    if isinstance(value, list | tuple):
+        units = [unit] if isinstance(unit, str) else unit
+        each = [units[min(k, len(units) - 1)] for k in range(len(value))]
+        return [_in_size(x, u, size) for x, u in zip(value, each, strict=True)]
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return value
+    powers = zip(
+        ("kg", "m", "s"), dimensions(unit if isinstance(unit, str) else unit[0]), strict=True
+    )
+    return value * math.prod(size[base] ** power for base, power in powers)

@@ -10,11 +10,12 @@ from ..errors import PlanningError
 from ..planning.planner import plan
 from ..planning.problem import Bounds, Goal
 from ..planning.result.plan import Plan
-from .file import model_of, read_scene, subtable
-from .keys import read
+from .file import model_of, read_scene, size_of, subtable
+from .keys import read, sized
 from .plan_keys import FREE, PLAN
 
 ELSEWHERE = "programs can give others, to serpentail.plan"
+UNSIZED: Mapping[str, float] = {}
 CODE_ONLY = ("guess", "path", "legs")  # what no file can hold
 
 
@@ -27,35 +28,55 @@ def planned(path: str, folder: str | None = None) -> Plan:
     """
     extras.needed("casadi", "plan")  # before the model is built
     tables, place = read_scene(path, PlanningError)
-    arguments = plan_arguments(subtable(tables, "plan", place, PlanningError))
-    return plan(model_of(tables, place, folder, {}), **arguments)
+    table = subtable(tables, "plan", place, PlanningError)
+    plan_arguments(table)  # what is wrong is told before a model is built
+    model = model_of(tables, place, folder, {})
+    return plan(model, **plan_arguments(table, size_of(model)))
 
 
-def plan_arguments(table: Mapping) -> dict[str, Any]:
-    """Return the arguments of ``plan`` that a table [plan] has.
+def plan_arguments(table: Mapping, size: Mapping[str, float] = UNSIZED) -> dict[str, Any]:
+    """Return the arguments of ``plan`` that a table [plan] has, in the size of a body.
 
     PlanningError has a line for each key that is wrong.
     """
     refused = Refusals(PlanningError)
-    _check_keys(table, refused)
+    for name, needs in (("start", "q and v"), ("duration", "seconds")):
+        if name not in table:
+            refused.add(name, f"plan.{name}: no value: needs {needs}")
+    arguments = arguments_but_start(table, "plan", refused, size)
+    start = table.get("start")
+    if isinstance(start, Mapping) and not {"q", "v"} <= set(start):
+        known = {name: value for name, value in start.items() if name in ("q", "v")}
+        refused.add("start", needed("plan.start", known, "q and v"))
+    refused.tell()
+    start = arguments["start"]
+    return arguments | {"start": (start["q"], start["v"])}
+
+
+def arguments_but_start(
+    table: Mapping, where: str, refused: Refusals, size: Mapping[str, float]
+) -> dict[str, Any]:
+    """Return the arguments of ``plan`` that a table of a scene has, in the size of a body, its
+    start as it is there.
+
+    Notes each key that is wrong.
+    """
+    for name in CODE_ONLY:
+        if name in table:
+            remedy = "only programs can give it; call serpentail.plan"
+            refused.add(name, f"{where}.{name}: value {shown(table[name])}: {remedy}")
     own = {name: value for name, value in table.items() if name not in CODE_ONLY}
-    table = read(own, PLAN, "plan", refused)
+    table = dict(sized(read(own, PLAN, where, refused), PLAN, size))
     solver = table.get("solver", "ipopt"), table.get("options", {})
     refused.attempt("solver", _check_solver, *solver)
-    start = table.get("start", {})
-    if isinstance(start, Mapping) and "start" in own and set(start) != {"q", "v"}:
-        refused.add("start", needed("plan.start", dict(start), "q and v"))
-    refused.tell()
+    if refused.lines:
+        return {}
 
-    # tables of their own are start, goal and bounds; the others are as they are, but for "free"
+    # tables of their own are goal and bounds; the others are as they are, but for "free"
     goal = table.get("goal", {})
     if isinstance(goal, Mapping):
         goal = Goal(**{key: _free(value) for key, value in goal.items()})
-    arguments = table | {
-        "start": (start["q"], start["v"]),
-        "goal": goal,
-        "bounds": Bounds(**table.get("bounds", {})),
-    }
+    arguments = table | {"goal": goal, "bounds": Bounds(**table.get("bounds", {}))}
     return {name: None if _is_free(value) else value for name, value in arguments.items()}
 
 
@@ -73,17 +94,6 @@ def _check_solver(solver: Any, options: Any) -> None:
         if not own or not isinstance(value, int | float | str):
             needs = f"numbers and words of the solver, such as ipopt.max_iter; {ELSEWHERE}"
             raise refusal(f"plan.options.{name}".rstrip("."), value, needs, PlanningError)
-
-
-def _check_keys(table: Mapping, refused: Refusals) -> None:
-    """Note keys that no file can have, and those that are missing."""
-    for name in CODE_ONLY:
-        if name in table:
-            remedy = "only programs can give it; call serpentail.plan"
-            refused.add(name, f"plan.{name}: value {shown(table[name])}: {remedy}")
-    for name, needs in (("start", "q and v"), ("duration", "seconds")):
-        if name not in table:
-            refused.add(name, f"plan.{name}: no value: needs {needs}")
 
 
 def _free(value: Any) -> Any:

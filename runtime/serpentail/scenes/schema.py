@@ -1,4 +1,5 @@
-"""The JSON Schema of scene files: the generator's, and what belongs in [simulate] and [plan]."""
+"""The JSON Schema of scene files: the generator's, and what belongs in [simulate], [[phase]] and
+[plan]."""
 
 import json
 import subprocess
@@ -7,6 +8,7 @@ from typing import Any
 from ..building.generator import command
 from ..units import MEASURES, choices, pattern, plain
 from .keys import Key
+from .phase_keys import PHASES
 from .plan_keys import PLAN
 from .simulate_keys import SIMULATE
 
@@ -17,7 +19,7 @@ def scene_schema() -> dict[str, Any]:
         [*command(), "--schema"], capture_output=True, text=True, check=True
     ).stdout
     schema: dict[str, Any] = json.loads(said)
-    for name, key in (("simulate", SIMULATE), ("plan", PLAN)):
+    for name, key in (("simulate", SIMULATE), ("phase", PHASES), ("plan", PLAN)):
         schema["properties"][name] |= key_schema(key)
     return schema
 

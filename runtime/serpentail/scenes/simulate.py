@@ -8,23 +8,26 @@ from typing import Any, overload
 import numpy as np
 
 from ..brief import brief
-from ..checks import Refusals, finite_array, none_of, number, one_of, refusal, shown
+from ..checks import Refusals, did_you_mean, finite_array, none_of, number, refusal, shown
 from ..errors import SimulationError
 from ..model.layout import OMEGA, VELOCITY
 from ..model.model import Model
 from ..motion.summary import Summary, summary
 from ..motion.trajectory import Trajectory
-from ..simulation.controllers import Controller, Damping, Phases, TorqueTable
+from ..sequence.phase import Phase
+from ..sequence.sequence import Sequence, SequenceRun
+from ..simulation.controllers import Controller
 from ..simulation.methods import SETTINGS
-from ..simulation.pfl import KD, KP, Pfl
 from ..simulation.rollouts import Rollouts
 from ..simulation.schedules import Legs, Reference, shared_among_links
 from ..simulation.settle import check_settling, settle
 from ..simulation.simulate import simulate
-from .file import model_of, read_scene, subtable
-from .keys import read
+from .acting import controller_of, legs_of, reference_of
+from .file import model_of, read_scene, size_of, subtable
+from .keys import read, sized
 from .overrides import changed
-from .simulate_keys import ANGLES, LAWS, NUMBERS, SIMULATE
+from .phases import phases_of, refuse_beside_phases
+from .simulate_keys import ANGLES, NUMBERS, SIMULATE
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +35,7 @@ class Scenario:
     """A motion to simulate: a model, its start (q0, v0), and what else ``st.simulate`` takes.
 
     duration (s) from t = 0 on; controller, legs as in ``simulate``; settings: the rest of its
-    arguments.
+    arguments.  phases: of a sequence, see ``Sequence``; the controller acts in those without one.
     """
 
     model: Model
@@ -42,6 +45,7 @@ class Scenario:
     controller: Controller = None
     legs: Legs | None = None
     settings: dict[str, Any] = field(default_factory=dict)
+    phases: tuple[Phase, ...] = ()
     __repr__ = brief
 
     @overload
@@ -53,12 +57,27 @@ class Scenario:
     def simulate(self, **changes: Any) -> Trajectory | Rollouts:
         """Return the motion; changes replace arguments of ``st.simulate``.
 
-        They may give parameters of many runs, whose motions are Rollouts.
+        They may give parameters of many runs, whose motions are Rollouts.  Of a sequence nothing
+        can be changed here.
         """
+        if self.phases:
+            if changes:
+                remedy = "change the scene's values, see ``scenario``"
+                raise SimulationError(f"{next(iter(changes))}: this scene has phases: {remedy}")
+            return self.sequence().trajectory
         arguments = {"controller": self.controller, "t_span": self.duration} | self.settings
         if self.legs is not None:
             arguments["legs"] = self.legs
         return simulate(self.model, self.q0, self.v0, **arguments | changes)
+
+    def sequence(self) -> SequenceRun:
+        """Return the motion of the scene's phases, and how each went."""
+        settings, angles = dict(self.settings), {}
+        bristles = settings.pop("bristles0", None)
+        if self.legs is not None:
+            angles = dict(zip(("gamma", "delta"), self.legs.curve.at(0.0)[0], strict=False))
+        sequence = Sequence(self.model, self.phases, settings=settings, **angles)
+        return sequence.simulate(self.q0, self.v0, bristles)
 
     def summary(self, motion: Trajectory) -> Summary:
         """Return the numbers of a motion by name: leap, landing, forces, books, effort; SI."""
@@ -68,12 +87,12 @@ class Scenario:
 def scenario(
     path: str | Path, folder: str | Path | None = None, changes: Mapping | None = None
 ) -> Scenario:
-    """Return what a scene file's table [simulate] describes.
+    """Return what a scene file's table [simulate], and its tables [[phase]], describe.
 
     path: a scene file, or the name of an example; see ``examples``.
     folder: of its model, where that was generated; None: it is built, or was.
     changes: new values by name, of parameters of the model, or of keys below [simulate], such as
-    "duration", "start.pitch" or "legs.moves.0.rate".
+    "duration", "start.pitch" or "legs.moves.0.rate", or of phases, such as "phase.0.duration".
     Raises SimulationError with field, value and remedy, ModelError where parameters are wrong or
     the folder is of another scene.
     """
@@ -85,40 +104,61 @@ def scenario(
     of_table = {
         name: value for name, value in values.items() if name.split(".")[0] in SIMULATE.keys
     }
-    parameters = {name: value for name, value in values.items() if name not in of_table}
-    for name in parameters:
-        if "." in name:
-            raise SimulationError(
-                f"change {shown(name)}: unknown; needs a parameter, or a key below [simulate]"
-            )
+    of_phases = {name: value for name, value in values.items() if name.split(".")[0] == "phase"}
+    of_tables = of_table.keys() | of_phases.keys()
+    parameters = {name: value for name, value in values.items() if name not in of_tables}
+    _check_changes(parameters)
     model = model_of(scene, path, folder, parameters)
-    return scenario_of(model, changed(table, of_table), path.parent)
+    phases = changed({"phase": scene.get("phase", [])}, of_phases)["phase"]
+    return scenario_of(model, changed(table, of_table), path.parent, phases)
 
 
-def scenario_of(model: Model, table: Mapping, parent: Path) -> Scenario:
-    """Return the scenario of a table [simulate]; files in it are relative to ``parent``.
+def _check_changes(parameters: Mapping) -> None:
+    """Refuse names of what can be no parameters, before any model is made."""
+    refused = Refusals(SimulationError)
+    for name in parameters:
+        near = did_you_mean(
+            name.split(".")[0], [*SIMULATE.keys, "phase"]
+        )  # no parameter is called so
+        if near or "." in name:
+            remedy = near or "needs a parameter, or a key below [simulate]"
+            refused.add(name, f"change {shown(name)}: unknown; {remedy}")
+    refused.tell()
+
+
+def scenario_of(model: Model, table: Mapping, parent: Path, phases: Any = ()) -> Scenario:
+    """Return the scenario of a table [simulate], and of tables [[phase]]; files in them are
+    relative to ``parent``.
 
     SimulationError has a line for each thing that is wrong.
     """
     refused = Refusals(SimulationError)
-    table = read(table, SIMULATE, "simulate", refused)
+    table = sized(read(table, SIMULATE, "simulate", refused), SIMULATE, size_of(model))
     settings = {name: table[name] for name in ("method", *NUMBERS) if name in table}
     _check_settings(settings, refused)
-    if "duration" not in table:
+    duration: float | None = 0.0  # of phases, each has its own
+    if phases:
+        refuse_beside_phases(table, refused)
+    elif "duration" not in table:
         refused.add("duration", "simulate.duration: no value: needs seconds")
-    duration = refused.attempt("duration", _positive, "simulate.duration", table.get("duration"))
+    else:
+        duration = refused.attempt("duration", _positive, "simulate.duration", table["duration"])
 
     # what acts; a straight tail stands in for a reference that is refused, so that the rest is told
-    legs = refused.attempt("legs", _legs, table["legs"]) if "legs" in table else None
+    legs = refused.attempt("legs", legs_of, table["legs"]) if "legs" in table else None
     reference = None
     if "reference" in table:
         straight = Reference([0.0, 1.0], np.zeros((2, model.layout.nt)))
-        found = refused.attempt("reference", _reference, model, table["reference"], parent)
+        where = "simulate.reference"
+        found = refused.attempt("reference", reference_of, where, model, table["reference"], parent)
         reference = found or straight
     law = table.get("controller", {"kind": "none"})
-    controller = refused.attempt("controller", _controller, model, law, reference)
+    controller = refused.attempt(
+        "controller", controller_of, "simulate.controller", model, law, reference
+    )
     start = table.get("start", {})
     state = refused.attempt("start", _start, model, start, reference)
+    found_phases = phases_of(model, phases, (controller, parent), refused)
     refused.tell()
     assert duration is not None and state is not None  # all has been told
 
@@ -128,7 +168,7 @@ def scenario_of(model: Model, table: Mapping, parent: Path) -> Scenario:
         acting |= {"controller": controller} | ({} if legs is None else {"legs": legs})
         q0, v0, settings["bristles0"] = settle(model, state[0], **acting | dict(start["settle"]))
         state = q0, v0
-    return Scenario(model, *state, duration, controller, legs, settings)
+    return Scenario(model, *state, duration, controller, legs, settings, found_phases)
 
 
 def _check_settings(settings: Mapping[str, Any], refused: Refusals) -> None:
@@ -144,72 +184,6 @@ def _check_settings(settings: Mapping[str, Any], refused: Refusals) -> None:
 def _positive(field: str, value: Any) -> float:
     """Return a number above 0."""
     return number(field, value, SimulationError, above=0)
-
-
-def _legs(table: Mapping) -> Legs:
-    missing = [name for name in ("gamma", "delta") if name not in table]
-    if missing or {"moves", "times"} <= set(table):
-        raise SimulationError(
-            f"simulate.legs: value {shown(dict(table))}: needs gamma, delta, and moves or times, "
-            "not both"
-        )
-    if "times" in table:
-        return Legs(table["times"], table["gamma"], table["delta"])
-    gamma, delta = (
-        number(f"simulate.legs.{name}", table[name], SimulationError) for name in ("gamma", "delta")
-    )
-    return Legs.moves(gamma, delta, table.get("moves", []))
-
-
-def _reference(model: Model, table: Mapping, parent: Path) -> Reference | Trajectory:
-    """A Reference, or the Trajectory that `serpentail plan --save` wrote."""
-    if set(table) == {"file"}:
-        try:
-            return Trajectory.load(parent / str(table["file"]))
-        except (OSError, ValueError) as error:
-            raise SimulationError(
-                f"simulate.reference.file: value {shown(table['file'])}: {error}"
-            ) from error
-    if not {"times", "bends"} <= set(table) or "file" in table:
-        raise SimulationError(
-            f"simulate.reference: value {shown(dict(table))}: needs times and bends, or a file"
-        )
-    return Reference.of_bends(model, table["times"], table["bends"], table.get("blend", "quintic"))
-
-
-def _controller(model: Model, value: Any, reference: Any) -> Controller:
-    """One controller of a table, or of an array of tables with `begin` one after another."""
-    if isinstance(value, Mapping):
-        return _law(model, "simulate.controller", value, reference)
-    if not isinstance(value, list) or not value:
-        remedy = "needs a table, or tables under lines [[simulate.controller]], with begin"
-        raise SimulationError(f"simulate.controller: value {shown(value)}: {remedy}")
-    pairs = []
-    for index, table in enumerate(value):
-        where = f"simulate.controller[{index}]"
-        if not isinstance(table, Mapping) or "begin" not in table:
-            raise SimulationError(f"{where}: value {shown(table)}: needs a table with begin (s)")
-        law = {name: value for name, value in table.items() if name != "begin"}
-        begin = number(f"{where}.begin", table["begin"], SimulationError)
-        pairs.append((begin, _law(model, where, law, reference)))
-    return Phases(tuple(pairs))
-
-
-def _law(model: Model, where: str, table: Mapping, reference: Any) -> Controller:
-    """The controller of a table, by its kind."""
-    kind = one_of(f"{where}.kind", table.get("kind"), LAWS, SimulationError)
-    values = {name: value for name, value in table.items() if name != "kind"}
-    if kind == "none":
-        return None
-    if kind == "damping":
-        return Damping(**values)
-    if kind == "torques":
-        return TorqueTable(**{"times": None, "torques": None} | values)
-    if reference is None:
-        raise SimulationError(
-            f"{where}: kind 'pfl' tracks a reference: add a table [simulate.reference]"
-        )
-    return Pfl(model, reference, **{"kp": KP, "kd": KD} | values)
 
 
 def _start(model: Model, table: Mapping, reference: Any) -> tuple[np.ndarray, np.ndarray]:

@@ -38,7 +38,12 @@ REFERENCE = {
 LAWS = {  # kinds of controllers and what each has
     "none": {},
     "damping": {"damping": DAMPING},
-    "pfl": {"kp": Key("1/s^2"), "kd": Key("1/s"), "feedforward": FLAG},
+    "pfl": {
+        "kp": Key("1/s^2"),
+        "kd": Key("1/s"),
+        "feedforward": FLAG,
+        "torque": Key("N m", depth=1),
+    },
     "torques": {"times": TIMES, "torques": Key("N m", depth=2), "damping": DAMPING},
 }
 
@@ -51,6 +56,7 @@ def _controllers(more: dict[str, Key]) -> dict[str, Key]:
     }
 
 
+LAWS_OF_ONE = _controllers({})
 SIMULATE = Key(
     keys={
         "duration": SECONDS,
@@ -59,7 +65,7 @@ SIMULATE = Key(
         "start": Key(keys=START),
         "legs": Key(keys=LEGS, needs=("gamma", "delta")),
         "reference": Key(keys=REFERENCE),
-        "controller": Key(kinds=_controllers({}), each=Key(kinds=_controllers({"begin": SECONDS}))),
+        "controller": Key(kinds=LAWS_OF_ONE, each=Key(kinds=_controllers({"begin": SECONDS}))),
     },
-    needs=("duration",),
+    needs=(),  # a duration, but for scenes with phases
 )

@@ -1,0 +1,19 @@
+"""Kicks that the tail rights in the air, onto the feet: how many land, planned and passive.
+
+Kicks are made side by side, as many as $SERPENTAIL_THREADS says or there are cores, and each is
+kept in FOLDER/parts: a study that was stopped goes on.
+"""
+
+from examples import front
+
+
+def main(folder) -> None:
+    """Do the study."""
+    from examples.studies.landing_study import study
+
+    study(folder)
+
+
+if __name__ == "__main__":
+    given = front.parser(__doc__, "output/studies/landing").parse_args()
+    front.run(main, given.folder, after=front.GOES_ON)

@@ -1,0 +1,59 @@
+"""Motions one after another as one."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from .trajectory import ARRAYS, Trajectory
+
+COUNTS = ("steps", "rejected", "evaluations", "factorisations", "unfelt", "seconds", "cpu_seconds")
+BOOKS = ("work_J", "impulse_N_s")
+
+
+def joined(parts: Sequence[Trajectory]) -> Trajectory:
+    """Return motions of one model, each of which begins where the one before ends, as one.
+
+    Samples at which two meet are those of the earlier.  Counts, works and impulses are added up;
+    the imbalance is the sum, its relative size the largest of one part.
+    """
+    arrays: dict[str, Any] = {
+        name: _end_to_end([getattr(part, name) for part in parts]) for name in ARRAYS
+    }
+    contact = parts[0].contact
+    if contact is not None:
+        own = [part.contact.arrays for part in parts if part.contact]
+        points: dict[str, Any] = {
+            name: _end_to_end([each[name] for each in own]) for name in contact.arrays
+        }
+        contact = replace(contact, **points)
+    return replace(parts[0], **arrays, info=_info([part.info for part in parts]), contact=contact)
+
+
+def _end_to_end(arrays: Sequence[np.ndarray]) -> np.ndarray:
+    """Samples one after another, each once."""
+    return np.concatenate([arrays[0], *(array[1:] for array in arrays[1:])])
+
+
+def _info(parts: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """What the parts tell, as of one run."""
+    info = dict(parts[-1])
+    for name in COUNTS:
+        if name in info:
+            info[name] = sum(part.get(name, 0) for part in parts)
+    if all("events" in part for part in parts):
+        info["events"] = [event for part in parts for event in part["events"]]
+    info["warnings"] = list(dict.fromkeys(w for part in parts for w in part.get("warnings", [])))
+    if all("imbalance" in part for part in parts):
+        for name in BOOKS:
+            info[name] = {
+                of: np.sum([part[name][of] for part in parts], axis=0).tolist() for of in info[name]
+            }
+        found = [part["imbalance"] for part in parts]
+        info["imbalance"] = {
+            "energy_J": sum(each["energy_J"] for each in found),
+            "momentum_N_s": np.sum([each["momentum_N_s"] for each in found], axis=0).tolist(),
+            "relative": max(each["relative"] for each in found),
+        }
+    return info

@@ -1,0 +1,84 @@
+"""What acts in a scene's simulation: its tables of controllers, references and legs."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from ..checks import number, one_of, shown
+from ..errors import SimulationError
+from ..model.model import Model
+from ..motion.trajectory import Trajectory
+from ..simulation.controllers import Controller, Damping, Phases, TorqueTable
+from ..simulation.pfl import KD, KP, Pfl
+from ..simulation.schedules import Legs, Reference
+from .simulate_keys import LAWS
+
+
+def legs_of(table: Mapping) -> Legs:
+    """Return the legs of a table [simulate.legs]."""
+    missing = [name for name in ("gamma", "delta") if name not in table]
+    if missing or {"moves", "times"} <= set(table):
+        raise SimulationError(
+            f"simulate.legs: value {shown(dict(table))}: needs gamma, delta, and moves or times, "
+            "not both"
+        )
+    if "times" in table:
+        return Legs(table["times"], table["gamma"], table["delta"])
+    gamma, delta = (
+        number(f"simulate.legs.{name}", table[name], SimulationError) for name in ("gamma", "delta")
+    )
+    return Legs.moves(gamma, delta, table.get("moves", []))
+
+
+def reference_of(where: str, model: Model, table: Mapping, parent: Path) -> Reference | Trajectory:
+    """Return a Reference, or the Trajectory that `serpentail plan --save` wrote."""
+    if set(table) == {"file"}:
+        try:
+            return Trajectory.load(parent / str(table["file"]))
+        except (OSError, ValueError) as error:
+            raise SimulationError(f"{where}.file: value {shown(table['file'])}: {error}") from error
+    if not {"times", "bends"} <= set(table) or "file" in table:
+        raise SimulationError(
+            f"{where}: value {shown(dict(table))}: needs times and bends, or a file"
+        )
+    return Reference.of_bends(model, table["times"], table["bends"], table.get("blend", "quintic"))
+
+
+def controller_of(where: str, model: Model, value: Any, reference: Any) -> Controller:
+    """Return the controller of a table, or of an array of tables with `begin` one after another."""
+    if isinstance(value, Mapping):
+        return law_of(where, model, value, reference)
+    if not isinstance(value, list) or not value:
+        remedy = f"needs a table, or tables under lines [[{where}]], with begin"
+        raise SimulationError(f"{where}: value {shown(value)}: {remedy}")
+    pairs = []
+    for index, table in enumerate(value):
+        place = f"{where}[{index}]"
+        if not isinstance(table, Mapping) or "begin" not in table:
+            raise SimulationError(f"{place}: value {shown(table)}: needs a table with begin (s)")
+        law = {name: value for name, value in table.items() if name != "begin"}
+        begin = number(f"{place}.begin", table["begin"], SimulationError)
+        pairs.append((begin, law_of(place, model, law, reference)))
+    return Phases(tuple(pairs))
+
+
+def law_of(where: str, model: Model, table: Mapping, reference: Any) -> Controller:
+    """Return the controller of a table, by its kind."""
+    kind = one_of(f"{where}.kind", table.get("kind"), LAWS, SimulationError)
+    values = {name: value for name, value in table.items() if name != "kind"}
+    if kind == "none":
+        return None
+    if kind == "damping":
+        return Damping(**values)
+    if kind == "torques":
+        return TorqueTable(**{"times": None, "torques": None} | values)
+    if reference is None:
+        raise SimulationError(
+            f"{where}: kind 'pfl' tracks a reference: add a table [{beside(where)}.reference]"
+        )
+    return Pfl(model, reference, **{"kp": KP, "kd": KD} | values)
+
+
+def beside(where: str) -> str:
+    """Return the table that a controller's table is in."""
+    return where.split(".controller", maxsplit=1)[0]
