@@ -22,6 +22,9 @@ ARGUMENTS = {
     "forward_dynamics_jvp": ("q", "v", "tau", "dq", "dv", "dtau"),
     "forward_dynamics_vjp": ("q", "v", "tau", "multiplier"),
     "inverse_dynamics_hessian": ("q", "v", "v_dot", "multiplier"),
+    "airborne_rates": ("x", "tau", "angular"),
+    "airborne_rates_derivatives": ("x", "tau", "angular"),
+    "airborne_rates_hessian": ("x", "tau", "angular", "weights"),
 }
 
 
@@ -37,6 +40,8 @@ def states(model, count, seed=0):
     rng = np.random.default_rng(seed)
     sizes = {"q": model.nq, "v": model.nv, "v_dot": model.nv, "tau": model.nv - 6}
     sizes |= {"multiplier": model.nv, "dq": model.nv, "dv": model.nv, "dtau": model.nv - 6}
+    tail = model.nv - 6
+    sizes |= {"x": 4 + 2 * tail, "angular": 3, "weights": 7 + 2 * tail}
     return {name: rng.normal(size=(count, size)) for name, size in sizes.items()}
 
 

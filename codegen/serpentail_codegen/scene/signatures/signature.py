@@ -11,6 +11,7 @@ CONTACT = "contact"  # scenes with contacts alone have them
 CONTROL = "control"
 IMPLICIT = "implicit"
 SIMULATION = "simulation"
+PLANNING = "planning"
 
 # When a function is emitted.
 ALWAYS = "always"  # unless the scene chooses its functions

@@ -4,12 +4,17 @@ The rules for scenes, the catalogue of assemblies, the manifest, the runtime's l
 documentation of functions are made of this table. Its order is that of emitted code.
 """
 
-from . import derivatives, simulation, values
-from .signature import ALWAYS, CALLED, DERIVATIVE, GROUND, VALUE
+from . import airborne, derivatives, simulation, values
+from .signature import ALWAYS, CALLED, DERIVATIVE, GROUND, PLANNING, VALUE
 
 SIGNATURES = {
     signature.name: signature
-    for signature in (*values.SIGNATURES, *derivatives.SIGNATURES, *simulation.SIGNATURES)
+    for signature in (
+        *values.SIGNATURES,
+        *derivatives.SIGNATURES,
+        *simulation.SIGNATURES,
+        *airborne.SIGNATURES,
+    )
 }
 
 
@@ -28,6 +33,14 @@ DEFAULT = emitted(ALWAYS)
 DEFAULT_ON_GROUND = emitted(GROUND)
 VALUES = in_group(VALUE)
 DERIVATIVES = in_group(DERIVATIVE)
+# of a tail on a fixed base
+FIXED = (
+    *("mass_matrix", "bias_force", "inverse_dynamics", "forward_dynamics"),
+    *("energy", "tail_points"),
+    *("inverse_dynamics_derivatives", "forward_dynamics_derivatives"),
+    *("inverse_dynamics_parameter_derivatives", "forward_dynamics_parameter_derivatives"),
+)
+AIRBORNE = in_group(PLANNING)
 NEEDS = {name: signature.needs for name, signature in SIGNATURES.items() if signature.needs}
 # functions that first, then second derivatives of a compiled function are made of
 EXACT_DERIVATIVES = {

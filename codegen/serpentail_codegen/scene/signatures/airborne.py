@@ -1,0 +1,49 @@
+"""Functions of a plan's nodes: airborne motion without drift and omega among the unknowns."""
+
+from .arguments import ANGULAR, TAU, Argument
+from .signature import NAMED, PLANNING, Signature
+
+X = Argument(
+    "x",
+    ("airborne_state",),
+    "airborne state: quaternion w x y z of any norm, tail coordinates (rad), their rates (rad/s)",
+)
+WEIGHTS = Argument("weights", ("airborne_results",), "of the rows of y")
+Y = Argument(
+    "y",
+    ("airborne_results",),
+    "rates of x, then omega (rad/s, body), which the angular momentum determines",
+)
+J = Argument("J", ("airborne_results", "airborne_arguments"), "d(y)/d(x, tau)")
+HESSIAN = Argument(
+    "hessian",
+    ("airborne_arguments", "airborne_arguments"),
+    "second derivatives of weights^T y with respect to (x, tau), both triangles",
+)
+STATE = (X, TAU, ANGULAR)
+SIGNATURES = (
+    Signature(
+        "airborne_rates",
+        "rates of an airborne state, translation and omega eliminated",
+        STATE,
+        (Y,),
+        PLANNING,
+        NAMED,
+    ),
+    Signature(
+        "airborne_rates_derivatives",
+        "the same with its Jacobian",
+        STATE,
+        (Y, J),
+        PLANNING,
+        NAMED,
+    ),
+    Signature(
+        "airborne_rates_hessian",
+        "the same with its Jacobian and the Hessian of weights^T y",
+        (*STATE, WEIGHTS),
+        (Y, J, HESSIAN),
+        PLANNING,
+        NAMED,
+    ),
+)

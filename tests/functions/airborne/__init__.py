@@ -1,0 +1,1 @@
+"""Rates of airborne motion, and their derivatives."""
