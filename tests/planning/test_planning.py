@@ -11,7 +11,7 @@ import pytest
 
 import serpentail as st
 from serpentail.attitude import angle_deg, from_angles, rotation_matrix
-from serpentail.planning import rounds
+from serpentail.planning import ways
 from serpentail.planning.nlp.blas_threads import _blas, one_thread
 from serpentail.planning.nlp.coordinates import Attitude
 from serpentail.planning.nlp.multipliers import carried
@@ -136,7 +136,7 @@ def test_refinement_goes_on_from_the_multipliers(monkeypatch):
     model, settings = rat(), AGAIN | {"intervals": 8, "tolerance": 1e-4}
     iterations = []
     for carry in (carried, lambda *_: None):
-        monkeypatch.setattr(rounds, "carried", carry)
+        monkeypatch.setattr(ways, "SPARSE", replace(ways.SPARSE, carried=carry))
         plan = st.plan(model, start=start(model), **settings)
         assert plan.success and plan.report["rounds"] > 1
         iterations.append(plan.report["iterations"])

@@ -9,7 +9,7 @@ import pytest
 
 import serpentail as st
 from serpentail.attitude import from_angles
-from serpentail.planning import rounds
+from serpentail.planning import rounds, ways
 from serpentail.planning.nlp import interrupt, solver, transcription
 from tests.support.models import model_folder
 from tests.support.tumbling import AGAIN, FUNCTIONS, planned, rat, start
@@ -39,7 +39,7 @@ def test_a_plan_of_the_same_size_lends_its_multipliers_and_no_other(monkeypatch)
         begun.append(guess)
         return solver.solver(nlp, name, options, guess)
 
-    monkeypatch.setattr(rounds, "solver", noted)
+    monkeypatch.setattr(ways, "solver", noted)
     plan = st.plan(model, start=start(model), intervals=4, **AGAIN)
     for settings, guess in (({}, "warm"), ({"rule": "lobatto"}, "close")):
         del begun[:]

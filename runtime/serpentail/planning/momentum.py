@@ -25,7 +25,8 @@ def refuse_impossible(model: Model, problem: PlanningProblem) -> None:
     if goal.torso_rate is None or size == 0:
         return
     told = f"flight conserves the angular momentum {np.array2string(h, precision=3)} kg m^2/s"
-    if not np.any(goal.torso_rate) and _all_are(goal.tail_rate, 0.0):
+    tail_rests = goal.tail_rate is not None and not np.any(goal.tail_rate)
+    if tail_rests and not np.any(goal.torso_rate):
         raise PlanningError(
             f"goal: torso and tail at rest, but {told}: leave torso_rate or tail_rate free"
         )
@@ -38,10 +39,6 @@ def refuse_impossible(model: Model, problem: PlanningProblem) -> None:
             f"{left / size:.1%} of what they must carry: {told}: leave torso_rate, or entries of "
             "tail or tail_rate, free"
         )
-
-
-def _all_are(values: np.ndarray | None, wanted: float) -> bool:
-    return values is not None and bool(np.all(values == wanted))
 
 
 def _least_left(model: Model, problem: PlanningProblem, h: np.ndarray) -> float:

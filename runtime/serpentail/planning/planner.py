@@ -99,7 +99,8 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
     no demand.  Between nodes, bounds hold to 1e-3 of them.
 
     The solver
-    solver, options: of ``casadi.nlpsol``.
+    solver, options: "ipopt", or another of ``casadi.nlpsol``; "fatrop", on stages, takes airborne
+    plans alone.
     dynamics: "auto", "compiled", "symbolic".
     time_limit: s, of the search.
 
@@ -119,6 +120,7 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
     "plan".
     """
     extras.needed("casadi", "plan")
+    model.refuse_fixed("plan")
     refused = Refusals(PlanningError)
     for name in unknown:
         refused.add(name, none_of("setting", name, NAMES))
@@ -157,7 +159,7 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
     }
     task = (
         start,
-        Goal() if goal is None else goal,
+        goal,
         duration,
         Bounds() if bounds is None else bounds,
     )
@@ -178,17 +180,21 @@ def _found(
     if missing:
         raise model.without(*missing)
     refuse_impossible(model, problem)
-    begun, goes_before = time.perf_counter(), []
+    begun, easier = time.perf_counter(), None
     with forks_wait(), Stage("plan", model.name) as stage:
         equations = equations_of_motion(model, settings.dynamics)
         with stoppable(settings.time_limit, stage.tell):
             if problem.objective in SOFTENING and settings.guess is None:
                 # from passive flight these are seldom solved
-                easier = Search(model, replace(problem, objective="effort"), settings, equations)
-                goes_before, found = [easier], _rounds(easier, stage)
+                calm, untracked = (
+                    replace(problem, objective="effort"),
+                    replace(settings, track=False),
+                )
+                easier = Search(model, calm, untracked, equations)
+                found = _rounds(easier, stage)
                 guess = easier.plan(easier.best(found), len(found), 0.0)
                 settings = replace(settings, guess=guess)
-            search = Search(model, problem, settings, equations, goes_before)
+            search = Search(model, problem, settings, equations, easier)
             rounds = _rounds(search, stage, watch, begun)
         return search.plan(search.best(rounds), len(rounds), time.perf_counter() - begun)
 

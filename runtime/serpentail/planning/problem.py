@@ -12,6 +12,7 @@ from ..checks import Refusals, number, numbers, numbers_in, one_of, refusal, sho
 from ..errors import PlanningError
 from ..model.layout import QUATERNION, TAIL_Q, TAIL_V
 from ..model.model import Model
+from ..model.passive import behind_stops
 from ..simulation.schedules import Legs
 from .nlp.coordinates import KINDS
 from .nlp.node import FORMULATIONS
@@ -89,7 +90,8 @@ def checked_problem(
     """
     # start, goal and bounds, and whether these allow the others
     attempt, tail = refused.attempt, model.layout.nt
-    start, goal = attempt("start", _start, model, task[0]), attempt("goal", _goal, task[1], tail)
+    start = attempt("start", _start, model, task[0])
+    goal = attempt("goal", checked_goal, task[1], tail)
     duration, bounds = (
         attempt("duration", _duration, task[2]),
         attempt("bounds", _bounds, task[3], tail),
@@ -97,6 +99,10 @@ def checked_problem(
     if start is not None and bounds is not None:
         attempt("bounds.angle", _start_inside, start[0][TAIL_Q], bounds.angle, "angle", "rad")
         attempt("bounds.rate", _start_inside, start[1][TAIL_V], bounds.rate, "rate", "rad/s")
+    if start is not None:
+        attempt("start", _between_stops, "start", model, start[0][TAIL_Q])
+    if goal is not None and goal.tail is not None:
+        attempt("goal.tail", _between_stops, "goal.tail", model, goal.tail)
     if goal is not None and bounds is not None:
         attempt("goal.tail", _goal_inside, "tail", goal.tail, bounds.angle)
         attempt("goal.tail_rate", _goal_inside, "tail_rate", goal.tail_rate, bounds.rate)
@@ -136,7 +142,10 @@ def _start(model: Model, start: Any) -> tuple[np.ndarray, np.ndarray]:
     return q0, v0
 
 
-def _goal(goal: Any, tail: int) -> Goal:
+def checked_goal(goal: Any, tail: int) -> Goal:
+    """Return a goal for 2m tail coordinates with arrays; None is upright and at rest."""
+    if goal is None:
+        goal = Goal()
     if isinstance(goal, str):
         goal = GOALS[one_of("goal", goal, GOALS, PlanningError)]
     if not isinstance(goal, Goal):
@@ -204,6 +213,12 @@ def _start_inside(values: np.ndarray, bound: np.ndarray | None, name: str, unit:
             f"bounds.{name}: the start's tail coordinate {k} has {values[k]:.6g} {unit}, beyond "
             f"{bound[k]:.6g}: widen the bound, or start inside it"
         )
+
+
+def _between_stops(name: str, model: Model, angles: np.ndarray) -> None:
+    behind = behind_stops(model.parameters, angles[None])
+    if behind:
+        raise PlanningError(f"{name}: {behind}")
 
 
 def _goal_inside(name: str, values: np.ndarray | None, bound: np.ndarray | None) -> None:

@@ -5,7 +5,7 @@ does something else than planned are split for the next round.
 """
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -14,16 +14,16 @@ import numpy as np
 from ..model.layout import OMEGA, POSITION, TAIL_Q, TAIL_V, VELOCITY
 from ..model.model import Model
 from ..motion.trajectory import Trajectory
-from .nlp.bounds import limits
 from .nlp.coordinates import attitude
 from .nlp.guess import Motion, of_trajectory, passive, pushes, unknowns
 from .nlp.interrupt import stop_reason
 from .nlp.mesh import Mesh, refined, uniform
-from .nlp.multipliers import Multipliers, carried
+from .nlp.multipliers import Multipliers
 from .nlp.node import Equations
+from .nlp.program import Program
 from .nlp.rules import collocation_rule
-from .nlp.solver import Solution, solve, solver
-from .nlp.transcription import Transcription, torque_unit, transcription_of
+from .nlp.solver import Solution
+from .nlp.transcription import torque_unit
 from .problem import PlanningProblem
 from .result.curve import Curve, curve
 from .result.excess import SLACK, Excess, exceeded, excess, largest
@@ -32,6 +32,7 @@ from .result.plan import Plan, sampled
 from .result.report import report
 from .result.truth import end_errors, local_errors, open_loop
 from .settings import PlanSettings
+from .ways import Begin, way_of
 
 FIRST_PUSH = 0.05  # of the torques' unit: takes the first guess out of a plane of symmetry
 # what softens an objective, see ``cost``, in the first rounds, and the last in all others: from
@@ -49,12 +50,11 @@ class Round:
     softening: of the objective.
     """
 
-    nlp: Transcription
+    nlp: Program
     solution: Solution
     curve: Curve
     planned: tuple[np.ndarray, np.ndarray]
     true: tuple[np.ndarray, np.ndarray]
-
     errors: dict[str, float]
     excess: Excess
     softening: float
@@ -64,7 +64,7 @@ class Round:
 
 
 class Search:
-    """What stays the same in all rounds, and what they have cost, and searches before."""
+    """What stays the same in all rounds, and what they have cost, with a search before."""
 
     def __init__(
         self,
@@ -72,21 +72,21 @@ class Search:
         problem: PlanningProblem,
         settings: PlanSettings,
         equations: Equations,
-        before: "Sequence[Search]" = (),
+        before: "Search | None" = None,
     ):
         self.model, self.problem, self.settings = model, problem, settings
         self.equations, self.rule = equations, collocation_rule(settings.rule, settings.degree)
         self.start = (problem.q0, problem.v0)
         momentum, com = model.momentum(*self.start)[1], com_at_start(model, self.start)
         self.conserved = np.concatenate([momentum, *com])
+        self.way = way_of(self)
         self.softening = _softening(problem, settings.guess)
         self.attitude = attitude(problem.attitude)
         self.spent = dict.fromkeys(("derive_s", "solve_cpu_s", "truth_s"), 0.0)
         self.iterations = self.attempts = 0
-        for search in before:
-            self.spent = {name: x + search.spent[name] for name, x in self.spent.items()}
-            self.iterations += search.iterations
-            self.attempts += search.attempts
+        if before is not None:
+            self.spent = dict(before.spent)
+            self.iterations, self.attempts = before.iterations, before.attempts
         self.stopped: str | None = None
 
     @property
@@ -122,7 +122,7 @@ class Search:
             self.softening = self.softening[1:] or self.softening
             nlp = self._transcribed(mesh)
             motion = Motion(last.curve.duration, last.curve.at)
-            multipliers = carried(last.solution.multipliers, last.nlp, nlp)
+            multipliers = self.way.carried(last.solution.multipliers, last.nlp, nlp)
             last = self._round(nlp, self._solved_near(nlp, motion, multipliers))
             yield last
 
@@ -180,11 +180,11 @@ class Search:
         yield
         self.spent[name] += time.perf_counter() - begun
 
-    def _transcribed(self, mesh: Mesh) -> Transcription:
+    def _transcribed(self, mesh: Mesh) -> Program:
         with self._timed("derive_s"):
-            return transcription_of(self.model, self.problem, mesh, self.rule, self.equations)
+            return self.way.program(self, mesh)
 
-    def _solved_given(self, nlp: Transcription) -> Solution:
+    def _solved_given(self, nlp: Program) -> Solution:
         """Solve from the user's guess, or from passive flight."""
         guess = self.settings.guess
         if guess is None:
@@ -206,7 +206,7 @@ class Search:
         return self._solved_near(nlp, motion, multipliers if same_size else None)
 
     def _solved_near(
-        self, nlp: Transcription, motion: Motion, multipliers: Multipliers | None
+        self, nlp: Program, motion: Motion, multipliers: Multipliers | None
     ) -> Solution:
         """Solve from a motion that is close to a solution; as from afar if that fails."""
         guess = "close" if multipliers is None else "warm"
@@ -223,18 +223,17 @@ class Search:
 
     def _solved(
         self,
-        nlp: Transcription,
+        nlp: Program,
         motion: Motion,
         guess: str = "far",
         multipliers: Multipliers | None = None,
     ) -> Solution:
         """Solve from a motion that is far from a solution, close to one, or has multipliers."""
         with self._timed("derive_s"):
-            engine = solver(nlp, self.settings.solver, self.settings.options, guess)
+            engine = self.way.engine(self, nlp, guess)
         w = unknowns(motion, nlp, float(np.clip(motion.duration, *self.problem.duration)))
         angles = motion.at(np.array([motion.duration]))["attitude"][0]
-        bounds = limits(nlp, self._start_blocks(), angles)
-        solution = solve(engine, bounds, w, self.parameters, multipliers)
+        solution = self.way.solved(self, nlp, engine, Begin(w, guess, angles, multipliers))
         self.spent["solve_cpu_s"] += solution.cpu_s
         self.iterations += solution.iterations
         self.attempts += 1
@@ -242,7 +241,8 @@ class Search:
             self._stopped()
         return solution
 
-    def _start_blocks(self) -> dict[str, np.ndarray]:
+    def start_blocks(self) -> dict[str, np.ndarray]:
+        """Return the start's blocks, SI."""
         q, v = self.start
         return {
             "position": q[POSITION],
@@ -253,7 +253,7 @@ class Search:
             "tail_rate": v[TAIL_V],
         }
 
-    def _round(self, nlp: Transcription, solution: Solution) -> Round:
+    def _round(self, nlp: Program, solution: Solution) -> Round:
         """Return a round: the solution's curve, and its truth."""
         motion = curve(nlp, solution.w, self.parameters)
         with self._timed("truth_s"):

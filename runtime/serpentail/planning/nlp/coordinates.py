@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 KINDS = {"quaternion": 4, "euler": 3}  # name -> number of coordinates
 IDENTITY_POSE = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])  # in q: at the origin, not rotated
+COM_ENTRIES = ((1, 5), (2, 3), (0, 4))  # of H: the COM from B, body axes, times the mass
 
 
 @dataclass(frozen=True)

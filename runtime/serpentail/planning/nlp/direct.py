@@ -51,7 +51,7 @@ def direct_rows(
         else:
             rows.append(_step_rows(indices, rate, mesh, rule))
     return DirectRows(
-        vstack([part.matrix for part in rows]).tocoo(),
+        _stacked([part.matrix for part in rows]).tocoo(),
         np.concatenate([part.least for part in rows]),
         np.concatenate([part.most for part in rows]),
     )
@@ -93,7 +93,7 @@ def _shared_rows(
         ahead = rule.basis(1 + rule.nodes * mesh.widths[k + 1] / mesh.widths[k])
         now = _of_nodes(indices, np.array([k + 1]), np.eye(len(rule.nodes))[own], rule)
         parts.append(now - _of_nodes(indices, np.array([k]), ahead[own], rule))
-    return _zero(vstack(parts))
+    return _zero(_stacked(parts))
 
 
 def _straight_rows(indices: Indices, mesh: Mesh, rule: CollocationRule) -> DirectRows:
@@ -155,7 +155,7 @@ def _within_rate(rows: Any, largest: np.ndarray) -> DirectRows:
     count, size = rows.shape
     duration = _sparse(largest, np.arange(count), np.zeros(count, int), (count, size))
     free = np.full(2 * count, -np.inf)
-    return DirectRows(vstack([rows - duration, -rows - duration]), free, np.zeros(2 * count))
+    return DirectRows(_stacked([rows - duration, -rows - duration]), free, np.zeros(2 * count))
 
 
 def _of_nodes(
@@ -174,11 +174,11 @@ def _of_nodes(
     return _sparse(values.ravel(), rows.ravel(), columns.ravel(), shape)
 
 
-def vstack(parts: list) -> Any:
+def _stacked(parts: list) -> Any:
     """Rows below each other."""
-    from scipy.sparse import vstack as stacked
+    from scipy.sparse import vstack
 
-    return stacked(parts)
+    return vstack(parts)
 
 
 def _sparse(values: np.ndarray, rows: np.ndarray, columns: np.ndarray, shape: tuple) -> Any:

@@ -14,7 +14,7 @@ from ...simulation.controllers import TorqueTable
 from ..flight import flight
 from ..problem import PlanningProblem
 from .coordinates import Attitude, attitude
-from .transcription import Transcription
+from .program import Program
 
 PUSH_SAMPLES = 33  # of a random push
 PUSH_WAVES = 3  # sines that it sums
@@ -82,7 +82,7 @@ def _linear(t: np.ndarray, values: np.ndarray, times: np.ndarray) -> np.ndarray:
     return np.column_stack([np.interp(times, t, column) for column in values.T])
 
 
-def unknowns(motion: Motion, nlp: Transcription, duration: float) -> np.ndarray:
+def unknowns(motion: Motion, nlp: Program, duration: float) -> np.ndarray:
     """Return w: the motion, stretched to a duration (s), at the points of a mesh."""
     variables, indices = nlp.variables, nlp.indices
     blocks = motion.at(nlp.fractions * motion.duration)

@@ -14,9 +14,9 @@ from ...model.kept import kept
 from ...model.layout import OMEGA, TAIL_V, VELOCITY
 from ...model.model import Model
 from ...model.parameters import total_mass
-from .coordinates import IDENTITY_POSE, Attitude, rotated
+from .coordinates import Attitude, rotated
 from .node_calls import NodeCall, NodeDerivatives, linear_call
-from .point import Point, asked, point_of
+from .point import Point, asked, at_identity, point_of
 
 if TYPE_CHECKING:
     import casadi as ca
@@ -186,7 +186,7 @@ def _calls(
     import casadi as ca
 
     more = equations.parameters
-    q = ca.vertcat(ca.DM(IDENTITY_POSE), point.tail)
+    q = at_identity(point)
     v = ca.vertcat(ca.DM.zeros(3), point.torso_rate, point.tail_rate)
     applied = point.torque - problem.damping * point.tail_rate
     calls = [linear_call(equations.forward, zeta, [q, v, applied, *more])]

@@ -8,9 +8,8 @@ import numpy as np
 
 from ...checks import did_you_mean
 from ...errors import PlanningError
-from ...model.layout import OMEGA, TORSO_NV
 from ...model.model import Model
-from .coordinates import IDENTITY_POSE, rotated
+from .coordinates import COM_ENTRIES, IDENTITY_POSE, rotated
 
 if TYPE_CHECKING:
     import casadi as ca
@@ -69,7 +68,7 @@ def point_of(
         return point.center_of_mass - _offset(model, point)
 
     def tail_points(point: Point) -> "ca.SX":
-        own = model.casadi.tail_points(_at_identity(point))
+        own = model.casadi.tail_points(at_identity(point))
         rows = [point.position + rotated(point.quaternion, own[k, :].T) for k in range(own.size1())]
         return ca.horzcat(*rows).T
 
@@ -95,7 +94,7 @@ def point_of(
     return Point(makers=makers, parameters=dict(model.parameters), **blocks)
 
 
-def _at_identity(point: Point) -> "ca.SX":
+def at_identity(point: Point) -> "ca.SX":
     """q of the tail on a torso at the origin that is not rotated."""
     import casadi as ca
 
@@ -103,9 +102,8 @@ def _at_identity(point: Point) -> "ca.SX":
 
 
 def _offset(model: Model, point: Point) -> "ca.SX":
-    """The COM from B, world: H's block for (p_ddot, omega_dot) is -mass skew(COM)."""
+    """The COM from B, world."""
     import casadi as ca
 
-    H = model.casadi.mass_matrix(_at_identity(point))
-    x, y, z = OMEGA.start, OMEGA.start + 1, TORSO_NV - 1
-    return rotated(point.quaternion, ca.vertcat(H[1, z], H[2, x], H[0, y]) / H[0, 0])
+    H = model.casadi.mass_matrix(at_identity(point))
+    return rotated(point.quaternion, ca.vertcat(*(H[i, j] for i, j in COM_ENTRIES)) / H[0, 0])

@@ -48,6 +48,10 @@ class Transcription:
         """Points (P,) as fractions of the duration."""
         return self.mesh.points(self.rule)
 
+    def rates(self, w: np.ndarray, p: np.ndarray) -> np.ndarray:
+        """Rates (N, nx) of the states at the nodes, in units, times the duration; p: parameters."""
+        return np.array(self.functions["values"](w, p)).T[:, : self.node.rates]
+
 
 def transcription_of(
     model: Model,

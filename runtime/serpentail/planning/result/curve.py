@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...brief import brief
+from ..nlp.program import Program
 from ..nlp.rules import CollocationRule
-from ..nlp.transcription import Transcription
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +61,7 @@ class Curve:
         }
 
 
-def curve(nlp: Transcription, w: np.ndarray, p: np.ndarray) -> Curve:
+def curve(nlp: Program, w: np.ndarray, p: np.ndarray) -> Curve:
     """Return the curve of the unknowns w; p: the program's parameters."""
     indices, rule, variables, mesh = nlp.indices, nlp.rule, nlp.variables, nlp.mesh
     scale = variables.scale(variables.states)
@@ -69,8 +69,7 @@ def curve(nlp: Transcription, w: np.ndarray, p: np.ndarray) -> Curve:
 
     # states where intervals start, and what their rates at the nodes add
     states = w[indices.states[: -1 : rule.steps]] * scale
-    values = np.array(nlp.functions["values"](w, p)).T
-    rates = values[:, : nlp.node.rates] * scale
+    rates = nlp.rates(w, p) * scale
     increments = rates[at_nodes] * mesh.widths[:, None, None]
 
     # torques and algebraic unknowns at the nodes

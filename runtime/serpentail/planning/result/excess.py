@@ -3,6 +3,7 @@
 import numpy as np
 
 from ..nlp.node import Node
+from ..nlp.program import Program
 from ..nlp.transcription import Transcription
 from .curve import Curve
 from .truth import planned_torques
@@ -13,7 +14,7 @@ SLACK = 1e-3  # of a bound, by which a plan that is called true may exceed it
 Excess = dict[str, np.ndarray]
 
 
-def excess(nlp: Transcription, curve: Curve, p: np.ndarray) -> Excess:
+def excess(nlp: Program, curve: Curve, p: np.ndarray) -> Excess:
     """Return by what part (N,) of a bound each interval exceeds it, by name; 0 or less inside it.
 
     Names: "torque", "torque_rate", "angle", "rate", "path", those that are bounded.  A path
@@ -33,7 +34,7 @@ def excess(nlp: Transcription, curve: Curve, p: np.ndarray) -> Excess:
     }
     if bounds.torque_rate is not None:
         found["torque_rate"] = _beyond(_slopes(nlp, curve, k, s) / bounds.torque_rate, N)
-    if nlp.problem.path:
+    if isinstance(nlp, Transcription) and nlp.problem.path:
         times = curve.ends[k] + s * np.diff(curve.ends)[k]
         found["path"] = _path(nlp, curve.duration, times, blocks, p)
     return found
@@ -56,7 +57,7 @@ def _beyond(ratios: np.ndarray, intervals: int) -> np.ndarray:
     return np.abs(ratios).reshape(intervals, -1).max(axis=1) - 1
 
 
-def _slopes(nlp: Transcription, curve: Curve, k: np.ndarray, s: np.ndarray) -> np.ndarray:
+def _slopes(nlp: Program, curve: Curve, k: np.ndarray, s: np.ndarray) -> np.ndarray:
     """Slopes of torques (N SAMPLES, 2m), N m/s; of torques that are constant in intervals, their
     steps over the distance of nodes.
     """

@@ -9,7 +9,7 @@ import numpy as np
 from ...attitude import rotation_matrix
 from ...model.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TAIL_V, TORSO_NV, VELOCITY
 from ...model.model import Model
-from ..nlp.coordinates import IDENTITY_POSE, Attitude
+from ..nlp.coordinates import COM_ENTRIES, IDENTITY_POSE, Attitude
 
 State = tuple[np.ndarray, np.ndarray]  # q, v
 
@@ -91,4 +91,4 @@ def _com(H: np.ndarray) -> np.ndarray:
 
     The block of H (K, nv, nv) for (p_ddot, omega_dot) is -mass skew(COM).
     """
-    return np.column_stack([H[:, 1, 5], H[:, 2, 3], H[:, 0, 4]]) / H[:, 0, 0][:, None]
+    return np.column_stack([H[:, i, j] for i, j in COM_ENTRIES]) / H[:, 0, 0][:, None]

@@ -107,10 +107,14 @@ class Plan:
         return [self.trajectory, *(self._flown(model, law) for law in laws)]
 
     def _flown(self, model: Model, law: Controller) -> Trajectory:
-        """The motion under a law, or what there is of it where it fails."""
+        """The motion under a law at the plan's samples, or what there is of it where it fails.
+
+        A page interpolates nothing: samples of other times would look like errors.
+        """
         start = self.problem.q0, self.problem.v0
         try:
-            return flight(model, start, law, self.duration, method="rk4")
+            motion = flight(model, start, law, self.duration, method="rk4")
+            return motion.resample(self.trajectory.t)
         except SimulationError as error:
             if error.trajectory is None:
                 raise

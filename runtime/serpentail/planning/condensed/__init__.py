@@ -1,0 +1,1 @@
+"""Programs of stages, each of which solves its collocation inside, for FATROP."""

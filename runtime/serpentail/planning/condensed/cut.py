@@ -1,0 +1,52 @@
+"""How a mesh is cut into stages, and the polynomials that torques are in them."""
+
+from dataclasses import dataclass
+from math import comb
+
+import numpy as np
+
+from ..nlp.mesh import Mesh
+from ..nlp.rules import CollocationRule
+from ..problem import PlanningProblem
+
+
+@dataclass(frozen=True, eq=False)
+class Cut:
+    """How a mesh is cut into stages, one a control interval.
+
+    ends (N + 1,) of the stages, fractions of the duration; first (N + 1,): their first intervals;
+    basis (I, K, C): torques at the nodes of each interval, of the Bernstein coefficients.
+    """
+
+    ends: np.ndarray
+    first: np.ndarray
+    basis: np.ndarray
+
+    @property
+    def stages(self) -> int:
+        """Number of stages."""
+        return len(self.ends) - 1
+
+
+def cut(mesh: Mesh, rule: CollocationRule, coefficients: int) -> Cut:
+    """Return the stages of a mesh whose torques have so many coefficients in each."""
+    controls = np.arange(mesh.intervals) if mesh.controls is None else mesh.controls
+    first = np.append(np.flatnonzero(np.diff(controls, prepend=-1)), mesh.intervals)
+    ends = mesh.ends[first]
+    stage = np.repeat(np.arange(len(first) - 1), np.diff(first))
+    nodes = mesh.ends[:-1, None] + mesh.widths[:, None] * rule.nodes
+    s = (nodes - ends[stage, None]) / np.diff(ends)[stage, None]
+    return Cut(ends, first, bernstein(s, coefficients))
+
+
+def bernstein(s: np.ndarray, coefficients: int) -> np.ndarray:
+    """Return the Bernstein polynomials (..., C) at s (...) in [0, 1]."""
+    degree, s = coefficients - 1, s[..., None]
+    j = np.arange(coefficients)
+    return np.array([comb(degree, k) for k in j]) * s**j * (1 - s) ** (degree - j)
+
+
+def coefficients_of(problem: PlanningProblem, rule: CollocationRule) -> int:
+    """Return how many coefficients a torque has in a stage: two in plans of least time."""
+    nodes = len(rule.nodes)
+    return min(nodes, 2) if problem.objective == "time" else nodes

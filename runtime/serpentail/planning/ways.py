@@ -1,0 +1,112 @@
+"""The two ways to solve a problem on a mesh: sparse programs by IPOPT, or another of CasADi's
+solvers, and stages by FATROP.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import PlanningError
+from .condensed.fatrop import options_of, solve_stages
+from .condensed.node import lacking
+from .condensed.stages import Stages, stages_of
+from .nlp.bounds import limits
+from .nlp.mesh import Mesh
+from .nlp.multipliers import Multipliers, carried
+from .nlp.program import Program
+from .nlp.solver import Solution, solve, solver
+from .nlp.transcription import Transcription, transcription_of
+
+if TYPE_CHECKING:
+    from .rounds import Search
+
+FATROP = "fatrop"
+
+
+@dataclass(frozen=True, eq=False)
+class Begin:
+    """Where a solve begins: unknowns, how near they are to a solution ("far", "close", "warm"),
+    Euler angles (3,) at the end, and multipliers if it is "warm".
+    """
+
+    w: np.ndarray
+    guess: str
+    angles: np.ndarray
+    multipliers: Multipliers | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Way:
+    """How to make the program of a mesh, to make its solver, to solve it, and to carry multipliers
+    to another mesh.
+    """
+
+    program: "Callable[[Search, Mesh], Any]"
+    engine: "Callable[[Search, Any, str], Any]"
+    solved: "Callable[[Search, Any, Any, Begin], Solution]"
+    carried: Callable[[Multipliers, Any, Any], Multipliers | None]
+
+
+def way_of(search: "Search") -> Way:
+    """Return the way of a search's solver; PlanningError where it does not take the problem."""
+    if search.settings.solver != FATROP:
+        return SPARSE
+    reason = _beyond(search)
+    if reason is not None:
+        raise PlanningError(f"solver: value 'fatrop': {reason}, or take solver='ipopt'")
+    return STAGED
+
+
+def _beyond(search: "Search") -> str | None:
+    """Return what stages lack for a problem, and the remedy; None where they take it."""
+    problem, settings = search.problem, search.settings
+    needed = {
+        "formulation": (problem.formulation, "airborne"),
+        "attitude": (problem.attitude, "quaternion"),
+        "rule": (settings.rule, "radau"),
+    }
+    for field, (value, only) in needed.items():
+        if value != only:
+            return f"{field} is {value!r}: it takes {only!r}"
+    if callable(problem.objective):
+        return "objective is a function: it takes 'effort', 'energy' and 'time'"
+    if problem.path:
+        return "path is given: it takes bounds alone, so leave it out"
+    if problem.bounds.torque_rate is not None:
+        return "bounds.torque_rate is given: leave it out"
+    return lacking(search.model)
+
+
+def _sparse_program(search: "Search", mesh: Mesh) -> Transcription:
+    return transcription_of(search.model, search.problem, mesh, search.rule, search.equations)
+
+
+def _sparse_engine(search: "Search", nlp: Transcription, guess: str) -> Any:
+    return solver(nlp, search.settings.solver, search.settings.options, guess)
+
+
+def _sparse_solved(search: "Search", nlp: Transcription, engine: Any, begin: Begin) -> Solution:
+    bounds = limits(nlp, search.start_blocks(), begin.angles)
+    return solve(engine, bounds, begin.w, search.parameters, begin.multipliers)
+
+
+def _staged_program(search: "Search", mesh: Mesh) -> Stages:
+    return stages_of(search.model, search.problem, mesh, search.rule)
+
+
+def _staged_engine(search: "Search", _stages: Stages, guess: str) -> Any:
+    return options_of(search.settings.options, guess)
+
+
+def _staged_solved(search: "Search", stages: Stages, engine: Any, begin: Begin) -> Solution:
+    return solve_stages(stages, search.start_blocks(), begin.w, search.parameters, engine)
+
+
+def _not_carried(_multipliers: Multipliers, _old: Program, _new: Program) -> None:
+    """FATROP's interface takes no multipliers."""
+
+
+SPARSE = Way(_sparse_program, _sparse_engine, _sparse_solved, carried)
+STAGED = Way(_staged_program, _staged_engine, _staged_solved, _not_carried)
