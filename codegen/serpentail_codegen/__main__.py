@@ -10,7 +10,7 @@ from typing import Any
 
 from .scene.naming import suffix
 from .scene.parse import load_scene, parse_scene, scene_for, scene_to_dict
-from .scene.problems import SceneError
+from .scene.problems import Problem, SceneError
 from .scene.scene import KINDS, Scene
 from .scene.schema import scene_schema
 from .scene.signatures.table import ALL
@@ -19,7 +19,7 @@ from .stamp import is_made, key_of, note
 
 def parser() -> argparse.ArgumentParser:
     """Return the argument parser."""
-    p = argparse.ArgumentParser(prog="python -m serpentail_codegen", description=__doc__)
+    p = argparse.ArgumentParser(prog="serpentail generate", description=__doc__)
     p.add_argument(
         "scene",
         nargs="?",
@@ -69,7 +69,8 @@ def _with_options(arguments: argparse.Namespace, chosen: dict[str, Any]) -> tupl
         return parse_scene(scene_to_dict(own) | chosen, own.name), own
     size = (arguments.tail, arguments.segments, arguments.links)
     if None in size[:2]:
-        raise SystemExit("give a scene file, or --tail and --segments (and --links): see --help")
+        missing = "give a scene file, or --tail and --segments (and --links): see --help"
+        raise SceneError([Problem("scene", None, missing)])
     return scene_for(*size, **chosen), scene_for(*size)
 
 

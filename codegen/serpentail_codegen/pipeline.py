@@ -4,7 +4,7 @@ from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
 
 from . import __version__
-from .functions.catalogue import CATALOGUE
+from .functions.catalogue import CATALOGUE, function_of
 from .functions.function import Function
 from .functions.tail import Tail
 from .scene.scene import Scene
@@ -26,7 +26,7 @@ def generate(scene: Scene, output: Path, tell: Tell | None = None) -> list[str]:
     tell: called as each function is begun for each target.
     """
     tail = tail_of(scene)
-    functions = [CATALOGUE[name].of(tail) for name in needed(scene.functions, bool(scene.contacts))]
+    functions = [function_of(name, tail) for name in needed(scene.functions, bool(scene.contacts))]
     emissions = []
     for k, name in enumerate(scene.targets):
         one_by_one = told(functions, tell, (k, len(scene.targets)))
@@ -66,7 +66,15 @@ def tail_of(scene: Scene) -> Tail:
     pieces = scene.links if scene.kind == "articulated" else scene.samples
     polar = scene.coordinates == "polar"
     return Tail(
-        scene.segments, pieces, scene.kind, scene.bend_range, polar, scene.contacts, scene.friction
+        segments=scene.segments,
+        links=pieces,
+        kind=scene.kind,
+        bend_range=scene.bend_range,
+        polar=polar,
+        contacts=scene.contacts,
+        friction=scene.friction,
+        shape=scene.shape,
+        passive=scene.passive,
     )
 
 

@@ -55,6 +55,12 @@ def test_coordinates_of_the_other_tail_are_refused(tail, links, coordinates):
     assert ('needs "joint"' if links else 'needs "bend" or "polar"') in problem.remedy
 
 
+@pytest.mark.parametrize("name", ["airborne_rates", "forward_dynamics_derivatives"])
+def test_polar_coordinates_have_no_functions_of_nodes_and_no_derivatives(name):
+    with pytest.raises(SceneError, match=f"has no derivatives, such as {name}"):
+        scene_for("continuum", 1, coordinates="polar", functions=[name])
+
+
 def test_polar_is_a_choice_of_a_continuum_only():
     assert scene_for("continuum", 1).coordinates == "bend"
     scene = scene_for("continuum", 1, coordinates="polar")

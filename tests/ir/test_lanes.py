@@ -2,8 +2,6 @@
 
 from fractions import Fraction
 
-import pytest
-
 from serpentail_codegen.ir.builder import Builder
 from serpentail_codegen.ir.interpret import Run
 from serpentail_codegen.targets.c.loops import in_loops
@@ -41,9 +39,22 @@ def test_c_steps_read_scalars_that_lie_apart():
     assert "const real r0 = x[2];" in routine_lines(routine, "double", "rat")
 
 
-def test_c_steps_read_no_rows_that_lie_apart():
+def test_c_steps_read_rows_that_lie_apart():
     b = Builder("apart", "A stride.")
     x, u = b.wide("x", 4, 3), b.wide("u", 2, 3)
     b.apply(SWAP, {"x": x.part(0, 2, 2)}, x=u[0])
-    with pytest.raises(ValueError, match="swap reads wide scalars that lie apart"):
-        in_loops(b.finish(), "double", "rat")
+    (routine,) = in_loops(b.finish(), "double", "rat").routines
+    text = "\n".join(routine_lines(routine, "double", "rat"))
+    assert "LOAD(&x[0] + c)" in text
+    assert "LOAD(&x[16] + c)" in text
+
+
+def test_c_clears_rows_that_lie_apart_alone():
+    b = Builder("apart", "A stride.")
+    x = b.wide("x", 4, 3)
+    b.fill(x.part(0, 2, 2), 0)
+    lines = in_loops(b.finish(), "double", "rat").lines
+    assert [line for line in lines if "fill" in line or "clear" in line] == [
+        "rat_fill_rows(8, 0.0, x);",
+        "rat_fill_rows(8, 0.0, x + 16);",
+    ]

@@ -7,7 +7,7 @@ import mpmath
 import pytest
 
 from serpentail_codegen.ir.interpret import Numbers
-from serpentail_codegen.ir.tape import BINARY, UNARY, Tape, exact_quotient, replay
+from serpentail_codegen.ir.tape import BINARY, UNARY, Tape, exact_quotient, lanes_of, replay
 from tests.support.algebras import FLOATS, RATIONAL
 from tests.support.random_tapes import INPUTS, SEEDS, grow
 
@@ -137,9 +137,12 @@ def test_selection_folds_where_the_choice_is_known_or_makes_no_difference(tape):
     assert tape.max(a, a) == a and tape.value(tape.max(tape.const(2), tape.const(3))) == 3
 
 
-def test_selection_takes_no_wide_operands(tape):
-    with pytest.raises(ValueError, match="select takes no wide operands"):
-        tape.select(0, 1, tape.unit(0, 3))
+def test_selection_is_as_wide_as_its_operands(tape):
+    wide = tape.unit(0, 3)
+    lanes = [0] * len(tape.nodes)
+    lanes[wide] = 3
+    assert lanes_of(("select", 0, 1, wide), lanes) == lanes_of(("select", wide, 0, 1), lanes) == 3
+    assert lanes_of(("select", 0, 1, 2), lanes) == 0
 
 
 def test_operands_of_sums_and_products_are_ordered_by_node(tape):

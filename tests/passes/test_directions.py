@@ -14,7 +14,13 @@ from serpentail_codegen.ir.tape import operation_count
 from serpentail_codegen.passes.directions import directions_in_turn
 from serpentail_codegen.passes.unread import without_unread_fills
 
-WIDE = ("inverse_dynamics_derivatives", "forward_dynamics_derivatives", "inverse_dynamics_hessian")
+WIDE = (
+    "inverse_dynamics_derivatives",
+    "forward_dynamics_derivatives",
+    "inverse_dynamics_hessian",
+    "airborne_rates_derivatives",  # these two write single lanes, too
+    "airborne_rates_hessian",
+)
 TAILS = {
     "m1_n3": Tail(1, 3),
     "m3_n4": Tail(3, 4),

@@ -44,7 +44,8 @@ def test_all_problems_are_reported_at_once(refuse):
 )
 def test_counts_are_whole_numbers_from_1(refuse, key, value):
     text = "".join(f"{k} = {value if k == key else 1}\n" for k in ("segments", "links"))
-    assert set(refuse('kind = "articulated"\n' + text)) == {key}
+    field = "segments[0]" if (key, value) == ("segments", "[3]") else key
+    assert set(refuse('kind = "articulated"\n' + text)) == {field}
 
 
 @pytest.mark.parametrize("key", ["kind", "segments", "links"])

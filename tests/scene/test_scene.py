@@ -81,10 +81,12 @@ def test_the_paper_rats(segments, links):
 
 def test_the_full_scene_file_shows_every_key():
     text = "".join(
-        (SCENES / f"{name}_m1_n3.toml").read_text() for name in ("kangaroo_rat", "contact")
+        (SCENES / f"{name}.toml").read_text()
+        for name in ("kangaroo_rat_m1_n3", "contact_m1_n3", "tapered_tail")
     )
+    tables = {"name", "parameters", "plan", "simulate", "phase", "taper", "body"}
     words = [
-        *(set(KEYS) - {"name", "parameters", "plan", "simulate", *ONLY["continuum"].keys}),
+        *(set(KEYS) - {*tables, *ONLY["continuum"].keys}),
         *(p.name for p in PARAMETERS),
     ]
     assert [word for word in words if f"{word} =" not in text] == []
@@ -99,3 +101,11 @@ def test_tables_of_motions_are_left_to_the_runtime(refuse, name):
     assert (SCENES / "righting_m1_n3.toml").is_file() and load_scene(
         SCENES / "righting_m1_n3.toml"
     ).links == 3
+
+
+def test_tables_of_phases_are_left_to_the_runtime(refuse):
+    alone = {"kind": "articulated", "segments": 1, "links": 3}
+    assert parse_scene(alone | {"phase": [{"anything": 1}]}, "rat") == parse_scene(alone, "rat")
+    for value in ("3", "[3]", "{name = 1}"):
+        wrong = refuse(f'kind = "articulated"\nsegments = 1\nlinks = 1\nphase = {value}\n')
+        assert "under lines [[phase]]" in str(wrong["phase"])

@@ -44,6 +44,10 @@ class Drawn:
             "gravity": 9.8,
         }
 
+    @property
+    def joints_each(self):
+        return np.full(self.segments, self.links or 1)
+
     def tail_points(self, q):
         return tail_points(q, self.links)[:, 1:]
 

@@ -13,6 +13,7 @@ EXACT = sorted(
     {part for name, orders in EXACT_DERIVATIVES.items() for part in (name, *orders[0], *orders[1])}
 )
 FUNCTIONS = [*EXACT, "bias_force", "pfl", "energy", "momentum", "rollout", "tail_points"]
+NODE = ["airborne_rates", "airborne_rates_derivatives", "airborne_rates_hessian"]
 DURATION = 0.4  # s
 AGAIN = {
     "duration": DURATION,
@@ -26,7 +27,7 @@ AGAIN = {
 def rat(segments: int = 1, links: int | None = 3, exact: bool = True) -> st.Model:
     """Return a model; without its exact second derivatives, plans take its SX functions."""
     functions = (
-        FUNCTIONS
+        [*NODE, *FUNCTIONS]
         if exact
         else ["mass_matrix", "forward_dynamics", "inverse_dynamics", *FUNCTIONS[-4:]]
     )

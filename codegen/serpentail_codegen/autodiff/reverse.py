@@ -77,11 +77,11 @@ def iterations(loops: Loops) -> tuple[Index, int]:
     """Return the number of the current iteration of nested loops, and how many there are."""
     number, count = as_index(0), 1
     for loop in reversed(loops):
-        if loop.start.terms or loop.stop.terms or loop.start.offset:
-            raise ValueError(
-                f"loop {loop.var} is no rectangle from 0 on: its iterations cannot be numbered"
-            )
-        number, count = number + count * Index(((loop.var, 1),)), count * loop.stop.offset
+        if loop.start.terms or loop.stop.terms:
+            raise ValueError(f"loop {loop.var} is no rectangle: its iterations cannot be numbered")
+        first = loop.start.offset
+        number = number + count * (Index(((loop.var, 1),)) + -first)
+        count *= loop.stop.offset - first
     return number, count
 
 

@@ -1,11 +1,13 @@
 """All functions that can be emitted: every signature with its assembly, in the table's order."""
 
 from ..scene.signatures.table import SIGNATURES
-from . import contact, pfl
+from . import contact, fixed_base, pfl
+from .airborne import curvature as airborne
 from .derivatives import by_parameters, hessian, jacobians
-from .function import signed
+from .function import Function, signed
 from .implicit import functions as implicit
 from .plain import FUNCTIONS
+from .tail import Tail
 
 _FOUND = FUNCTIONS | signed(
     jacobians.ASSEMBLIES
@@ -14,7 +16,15 @@ _FOUND = FUNCTIONS | signed(
     | contact.ASSEMBLIES
     | pfl.ASSEMBLIES
     | implicit.ASSEMBLIES
+    | airborne.ASSEMBLIES
 )
 # A signature without outputs stands for others: nothing is assembled for it.
 CATALOGUE = {name: _FOUND[name] for name, s in SIGNATURES.items() if s.outputs}
+
+
+def function_of(name: str, tail: Tail) -> Function:
+    """Return a function of a tail, with the arguments that it has there."""
+    return (fixed_base.FUNCTIONS if tail.shape.fixed else CATALOGUE)[name].of(tail)
+
+
 SYMBOLIC = {name for name in CATALOGUE if SIGNATURES[name].symbolic}  # in the CasADi module

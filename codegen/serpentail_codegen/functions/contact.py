@@ -9,8 +9,9 @@ from .draft import Draft
 from .dynamics import accelerate_by_segments, copied_torques
 from .factored import factored_dynamics
 from .layout import coordinates
+from .passive import net_torques
 from .scope import State, Torso, Vectors
-from .sweeps.pieces import attitude, mechanism, torso_pose
+from .sweeps.pieces import attitude, each_point, mechanism, torso_pose
 from .tail import Tail
 from .tails.mechanism import Segments
 
@@ -102,14 +103,13 @@ def place_tail(draft: Draft, torso: Torso, samples: Segments, points: Points) ->
     it.
     """
     # fixed samples of an arc, not its one lowest point (Eqs. 38, 39), which jumps from end to end
-    tail, steps, S = draft.tail, mechanism(draft), points.columns
+    steps, S = mechanism(draft), points.columns
     pose = torso_pose(draft, torso.R, name="point")
     twist = draft.store(contact.torso_twist, torso, turn=3, slide=3)
     added = {f"{name}_": ref for name, ref in twist.named.items()}
-    with draft.loop("i", tail.segments) as i, draft.loop("j", tail.links) as j:
-        g = tail.links * i + j
-        draft.step(steps.twist, pose, samples.at(i), S=S[g])
-        draft.step(steps.pose, pose, samples.at(i), **pose)
+    for i, g in each_point(draft):
+        draft.step(steps.twist, pose, samples.at(i, g), S=S[g])
+        draft.step(steps.pose, pose, samples.at(i, g), **pose)
         draft.step(contact.carried_twist, {"S": S[g]}, samples.motion(i), **added)
         motion = points.motion(g + points.first["tail"])
         draft.step(contact.point_on_tail, pose, twist, **motion)
@@ -168,11 +168,7 @@ def gather_contact_loads(
         draft.step(contact.load_about_torso, reads, load_=load)
 
     if points.S:
-        with (
-            draft.loop("i", draft.tail.segments, downward=True) as i,
-            draft.loop("j", draft.tail.links, downward=True) as j,
-        ):
-            g = draft.tail.links * i + j
+        for i, g in each_point(draft, downward=True):
             add(g + points.first["tail"])
             reads = {"S": points.S[g], "F_beyond": load}
             draft.step(loads.joint_load, reads, torque_=coordinates(torques, i))
@@ -193,7 +189,7 @@ def contact_load(
     press(draft, state.torso(R), points, arrays)
     if "powers" in arrays:
         balance_powers(draft, state.torso(R), points, arrays)
-    torques = copied_torques(draft, arrays["tau"])
+    torques = copied_torques(draft, net_torques(draft, state, arrays["tau"]))
     return gather_contact_loads(draft, R, points, arrays["forces"], torques), torques
 
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from ..ir.builder import Builder, narrowed
-from ..ir.program import Ref
-from ..ir.step import Step
+from ..ir.program import Index, Ref
+from ..ir.step import Step, specialised
 from ..ir.tape import Number
 from ..mechanics.lower import declared_shapes, derive
 from ..scene.parameters import Parameter
@@ -33,6 +33,10 @@ class Draft(Builder):
         refs = {p.name: self.array(p.name, p.size, role="parameters")[0] for p in parameters}
         self.parameters = MappingProxyType(refs)
 
+    def entry(self, name: str, k: Index, size: int) -> Ref:
+        """Return the numbers of piece k of a parameter that has some for each piece."""
+        return self.parameters[name].array.part(size * k, size)
+
     def step(self, function: Callable[..., dict] | Step, *reads: Reads, **writes: Ref) -> None:
         """Apply a step, or the one derived from a function of mechanics.
 
@@ -40,6 +44,8 @@ class Draft(Builder):
         it declares, from a plain dictionary it must read everything.
         """
         step = function if isinstance(function, Step) else derive(function)
+        if self.tail.shape.weightless and ("gravity", 1) in step.inputs:
+            function = step = specialised(step, f"{step.name}_weightless", gravity=(0,))
         declared = set(dict(step.inputs) if function is step else declared_shapes(function))
         refs = self._refs(step.name, declared, reads)
 
@@ -91,6 +97,11 @@ class Draft(Builder):
     def vectors(self, **sizes: int) -> Vectors:
         """Declare local vectors."""
         return Vectors({name: self.vector(name, size) for name, size in sizes.items()})
+
+    def scratch(self, **sizes: int) -> Vectors:
+        """Return local vectors that each stretch of segments uses anew; they are declared once."""
+        found = {a.name: a[0] for a in self.arrays if a.name in sizes and a.role == "local"}
+        return Vectors({n: found.get(n) or self.vector(n, size) for n, size in sizes.items()})
 
     def fixed(self, name: str, values: Iterable[Number]) -> Ref:
         """Return a constant, which is declared once."""

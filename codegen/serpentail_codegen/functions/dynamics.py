@@ -10,6 +10,7 @@ from .draft import Draft
 from .factored import FactoredDynamics, factored_dynamics
 from .function import Assembly, Function, assemble
 from .layout import OMEGA, TORSO_NV, VELOCITY, block, segment_v
+from .passive import add_elastic_energy, add_passive_forces, net_torques
 from .scope import Motion, State, Vectors
 from .sweeps.inertia import column_of, tail_inertia
 from .sweeps.loads import gather_loads
@@ -74,6 +75,7 @@ def assemble_inverse_dynamics(draft: Draft, arrays: dict[str, Array], world: boo
     a = draft.store(torso.torso_acceleration, {"R": R, "p_ddot": p_ddot}, a=3)["a"]
     motion = Motion(state.omega, block(v_dot, OMEGA) if v_dot else unmoved, a)
     inertial_forces(draft, segments, motion, v_dot, force)
+    add_passive_forces(draft, state, lambda i: segment_v(force, i))
 
     # forces on p_dot act in world axes
     for part in (VELOCITY, OMEGA) if world else (VELOCITY,):
@@ -132,18 +134,19 @@ def assemble_segment_dynamics(draft: Draft, arrays: dict[str, Array]) -> None:
 
 def applied_load(draft: Draft, arrays: dict[str, Array], R: Ref) -> tuple[Vectors, Array]:
     """Return ``load_force, load_moment`` from outside, at B in torso axes, and the torques of
-    actuators and loads together.
+    actuators and loads together, less those of the passive tail.
     """
+    tau = net_torques(draft, State(arrays["q"], arrays["v"]), arrays["tau"])
     if "f_ext" not in arrays:
         unloaded = draft.fixed("unloaded", [0, 0, 0])
-        return Vectors(dict.fromkeys(("load_force", "load_moment"), unloaded)), arrays["tau"]
-    torques = copied_torques(draft, arrays["tau"])
+        return Vectors(dict.fromkeys(("load_force", "load_moment"), unloaded)), tau
+    torques = copied_torques(draft, tau)
     state = State(arrays["q"])
     return gather_loads(draft, state, R, arrays["f_ext"], torques), torques
 
 
 def copied_torques(draft: Draft, tau: Array) -> Array:
-    """Return a copy of the actuators' torques, for others to be added."""
+    """Return a copy of torques, for others to be added."""
     torques = draft.array("applied", draft.tail.nt)
     with draft.loop("k", draft.tail.nt) as k:
         draft.copy(torques.part(k, 1), tau.part(k, 1))
@@ -164,12 +167,13 @@ def assemble_momentum(draft: Draft, arrays: dict[str, Array]) -> None:
 
 
 def assemble_energy(draft: Draft, arrays: dict[str, Array]) -> None:
-    """Kinetic energy link by link, potential energy of the COM's height."""
+    """Kinetic energy link by link, potential energy of the COM's height and of the passive tail."""
     state = State(arrays["q"], arrays["v"])
     R = attitude(draft, state)
     moment = gather_kinetic(draft, state, R, arrays["kinetic"][0])
     potential = arrays["potential"][0]
     draft.step(torso.potential_energy, state.torso(R), moment, potential=potential)
+    add_elastic_energy(draft, state, potential)
 
 
 SEGMENT_DYNAMICS = Function(

@@ -139,7 +139,8 @@ class FactoredDynamics:
             reads = {"column": column_of(self.columns, k), "acceleration": tail_v(x, k)}
             draft.step(translation.column_acceleration, reads, tail_force_=tail_force)
         reads = {"net": net, "tail_force": tail_force, "w_dot": w_dot}
-        gravity = Instead({"gravity": loads.gravity} if loads.gravity else {})
+        given = None if draft.tail.shape.weightless else loads.gravity
+        gravity = Instead({"gravity": given} if given else {})
         step, p_ddot = translation.base_acceleration, block(x, VELOCITY)
         draft.step(step, self.body, reads, gravity, p_ddot=p_ddot)
 

@@ -10,7 +10,7 @@ from ..scene.signatures.table import SIGNATURES
 from .draft import Draft
 from .tail import Tail, struct_parameters
 
-Assembly = Callable[[Draft, dict[str, Array]], None]
+Assembly = Callable[[Draft, dict[str, Array]], object]
 
 
 @dataclass(frozen=True)
@@ -47,6 +47,8 @@ def assemble(function: Function, tail: Tail, dynamics: str = "composite") -> Pro
     What they do not apply to is the same in all.
     """
     dynamics = dynamics if tail.kind == "articulated" else "composite"
+    if dynamics == "segments" and not tail.uniform:
+        dynamics = "lanes"  # what goes by segments takes as many, and equal, links in each
     draft = Draft(function.name, function.doc, tail=tail, dynamics=dynamics)
     # parameters first, then arguments: the program keeps the order of its arrays
     draft.declare_parameters(struct_parameters(tail))

@@ -6,19 +6,26 @@ from .draft import Draft
 from .layout import OMEGA, TORSO_NV, coordinate, tail_v
 from .scope import State
 from .sweeps.inertia import column_of, forward_roots, gather_inertia, segment_roots
-from .sweeps.pieces import attitude, mechanism, torso_pose
+from .sweeps.pieces import (
+    attitude,
+    each_point,
+    each_segment,
+    mechanism,
+    points_of,
+    torso_pose,
+)
 
 
 def assemble_tail_points(draft: Draft, arrays: dict[str, Array]) -> None:
     """The joints and the tip (Eqs. 14, 15), or equally spaced samples of every segment."""
-    points, tail, state = arrays["points"], draft.tail, State(arrays["q"])
+    points, state = arrays["points"], State(arrays["q"])
     R = attitude(draft, state)
     samples = mechanism(draft).prepare_samples(draft, state, None)
     pose = torso_pose(draft, R, state.position)
     draft.copy(points.part(0, 3), pose.P)
-    with draft.loop("i", tail.segments) as i, draft.loop("j", tail.links) as j:
-        draft.step(mechanism(draft).pose, pose, samples.at(i), **pose)
-        draft.copy(points.part(3 * (tail.links * i + j + 1), 3), pose.P)
+    for i, g in each_point(draft):
+        draft.step(mechanism(draft).pose, pose, samples.at(i, g), **pose)
+        draft.copy(points.part(3 * (g + 1), 3), pose.P)
 
 
 def assemble_tail_point_jacobians(draft: Draft, arrays: dict[str, Array]) -> None:
@@ -45,12 +52,12 @@ def assemble_tail_point_jacobians(draft: Draft, arrays: dict[str, Array]) -> Non
         draft.step(loads.point_jacobian_base, reads, **rows(point, OMEGA.start, 3))
 
     base_rows(Index())
-    with draft.loop("i", tail.segments) as i:
+    for stretch, i in each_segment(draft):
         draft.fill(S[i], 0)
-        with draft.loop("j", tail.links) as j:
-            draft.step(mechanism(draft).twist, pose, samples.at(i), S_=S[i])
-            draft.step(mechanism(draft).pose, pose, samples.at(i), **pose)
-            point = tail.links * i + j + 1
+        with points_of(draft, stretch, i) as g:
+            draft.step(mechanism(draft).twist, pose, samples.at(i, g), S_=S[i])
+            draft.step(mechanism(draft).pose, pose, samples.at(i, g), **pose)
+            point = g + 1
             base_rows(point)
             with draft.loop("l", i + 1) as segment:
                 reads = {"S": S[segment], "arm": pose.P}

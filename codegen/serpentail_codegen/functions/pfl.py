@@ -4,6 +4,7 @@ from ..ir.program import Array, padded
 from ..mechanics import rotations, torso, translation
 from .draft import Draft
 from .layout import OMEGA, VELOCITY, block, coordinates, tail_v
+from .passive import add_passive_forces
 from .scope import Motion, State, Vectors
 from .sweeps.inertia import column_of, forward_roots, gather_inertia, segment_roots
 from .sweeps.pieces import attitude, mechanism, torso_pose
@@ -32,6 +33,7 @@ def assemble_pfl(draft: Draft, arrays: dict[str, Array]) -> None:
         draft.copy(tail_v(v_dot, k), arrays["accelerations"].part(k, 1))
     wrench = tail_alone(draft, segments, v_dot, tau)
     motion = free_torso(draft, composite, wrench)
+    add_passive_forces(draft, state, lambda i: coordinates(tau, i))
     with draft.loop("k", tail.nt) as k:
         column = {"column": column_of(columns, k)}
         draft.step(translation.coupling_torque, motion, column, torque_=tau.part(k, 1))

@@ -1,12 +1,13 @@
 """The sizes of a tail, by which arrays are declared and the shapes of arguments are known."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi
 
 from ..ir.program import padded
 from ..scene.parameters import Parameter
 from ..scene.resolve import parameters_of
 from ..scene.scene import Scene
+from ..scene.shape import EQUAL, Shape, Stretch, stretches_of
 from .layout import LOAD, Layout
 
 SPRING = 18  # numbers of a point's linearised contact
@@ -15,7 +16,7 @@ SPRING = 18  # numbers of a point's linearised contact
 @dataclass(frozen=True)
 class Tail(Layout):
     """Sizes of a tail of m segments: n links each, or a continuum with n samples each, bent by
-    bend_range at most.
+    bend_range at most; ``shape`` tells in what segments and links differ.
     """
 
     links: int
@@ -24,11 +25,38 @@ class Tail(Layout):
     polar: bool = False  # a continuum in the paper's coordinates
     contacts: tuple[str, ...] = ()  # groups of points that can touch the ground
     friction: str = "cone"
+    shape: Shape = EQUAL
+    passive: tuple[str, ...] = ()  # springs, damping, stops
+
+    @property
+    def stretches(self) -> tuple[Stretch, ...]:
+        """Segments of one kind and as many links that follow each other."""
+        return stretches_of(self.segments, self.links, self.kind, self.shape)
+
+    @property
+    def uniform(self) -> bool:
+        """Tell if all links are equal, as many in each segment, on axes of a free torso."""
+        return replace(self.shape, weightless=False) == EQUAL
+
+    @property
+    def nq(self) -> int:
+        """Numbers of a configuration: of the tail alone on a fixed base."""
+        return self.nt if self.shape.fixed else super().nq
+
+    @property
+    def nv(self) -> int:
+        """Numbers of a velocity."""
+        return self.nt if self.shape.fixed else super().nv
 
     @property
     def total(self) -> int:
         """N = m n links or samples: tail points but the first."""
-        return self.segments * self.links
+        return self.stretches[-1].points_before(self.segments)
+
+    @property
+    def pieces(self) -> int:
+        """Links, and arcs."""
+        return self.stretches[-1].pieces_before(self.segments)
 
     @property
     def tail_points(self) -> int:
@@ -44,6 +72,11 @@ class Tail(Layout):
     def parameter_numbers(self) -> int:
         """Numbers in the parameter struct."""
         return sum(p.size for p in struct_parameters(self))
+
+    @property
+    def elastic(self) -> bool:
+        """Whether forces follow the tail coordinates themselves."""
+        return "spring" in self.passive or "stops" in self.passive
 
     @property
     def groups(self) -> dict[str, int]:
@@ -69,6 +102,21 @@ class Tail(Layout):
         return 8 if "feet" in self.contacts else 0
 
     @property
+    def airborne_state(self) -> int:
+        """Numbers of an airborne state: a quaternion, tail coordinates, their rates."""
+        return 4 + 2 * self.nt
+
+    @property
+    def airborne_arguments(self) -> int:
+        """An airborne state's numbers, then torques."""
+        return self.airborne_state + self.nt
+
+    @property
+    def airborne_results(self) -> int:
+        """Rates of an airborne state, then omega."""
+        return self.airborne_state + 3
+
+    @property
     def weights(self) -> int:
         """Numbers that weight an implicit method's Jacobian: with contacts one more for friction's
         bound.
@@ -82,6 +130,8 @@ class Tail(Layout):
         if self.contacts:
             blocks |= {"S_turned": (padded(self.nv), self.nv)}
         blocks |= {"H_tail": (self.nt, self.nt), "damped": (1, self.nt)}
+        if self.elastic:
+            blocks |= {"sprung": (1, self.nt)}
         blocks |= dict.fromkeys(["gain_q", "gain_v", "weight"], (1, 1))
         if self.contacts:
             blocks |= {"R": (9, 1), "relax": (1, 1), "depth": (1, self.points)}
@@ -107,4 +157,5 @@ class Tail(Layout):
 
 def struct_parameters(model: Tail | Scene) -> tuple[Parameter, ...]:
     """Return the parameters that the functions of a model read: the fields of its struct."""
-    return tuple(p for p in parameters_of(model.kind, model.contacts) if p.name != "link_radius")
+    own = parameters_of(model.kind, model.contacts, model.shape, model.passive, model.segments)
+    return tuple(p for p in own if p.name != "link_radius")

@@ -74,12 +74,16 @@ class Numbers:
         a[lane] = value
         return a
 
+    @staticmethod
+    def select(c: Any, a: Any, b: Any) -> Any:
+        """Return a where c > 0, else b; of an array lane by lane."""
+        return (c > 0).choose((b, a)) if getattr(c, "ndim", 0) else a if c > 0 else b
+
     add = staticmethod(lambda a, b: a + b)
     sub = staticmethod(lambda a, b: a - b)
     mul = staticmethod(lambda a, b: a * b)
     div = staticmethod(lambda a, b: a / b)
     neg = staticmethod(lambda a: -a)
-    select = staticmethod(lambda c, a, b: a if c > 0 else b)
     decide = staticmethod(lambda c: c > 0)
 
 

@@ -246,8 +246,6 @@ def lanes_of(node: Node, lanes: Lanes, inputs: Lanes = ()) -> int:
 
     # an operation is as wide as its wide operands, which agree
     widths = {lanes[a] for a in args} - {0}
-    if widths and op in TERNARY:
-        raise ValueError(f"{op} takes no wide operands")
     if len(widths) > 1:
         raise ValueError(f"{op} joins operands of {sorted(widths)} lanes")
     return max(widths, default=0)

@@ -17,6 +17,11 @@ def section_properties(let, tail_mass: V1, tail_length: V1, share: V1) -> dict:
     return {"section": Matrix([tail_mass[0], tail_length[0]]) * share[0]}
 
 
+def own_section_properties(let, arc_masses: V1, arc_lengths: V1, share: V1) -> dict:
+    """Mass and length of a share of a segment by itself."""
+    return {"section": Matrix([arc_masses[0], arc_lengths[0]]) * share[0]}
+
+
 def geometry(let, angles) -> tuple:
     """Return a, b, k = (a, 0, b), u = (b, 0, -a), and du/da, du/db."""
     a, b = angles

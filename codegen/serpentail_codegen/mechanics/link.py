@@ -1,10 +1,10 @@
 """The steps of one link: its motion, wrench and momentum, and the composite inertia beyond it.
 
-A link is given by ``link`` = (m, L, m L / 2, I_x, I_y, I_z), the moments of inertia taken about its
-joint; it lies along -y of its frame (Eq. 15), which a universal joint rotates about x, then about z
-(Eq. 11).  A body set is given by its mass, first moment ``h`` = sum m r, and ``I`` = (xx, yy, zz,
-xy, xz, yz) about the frame's origin.  A wrench or momentum ``F`` = (force or momentum, its moment
-about the origin).
+A link is given by ``link`` = (m, L, b, I_x, I_y, I_z): b is m times the COM's distance from the
+joint, m L / 2 of an even link, and the moments of inertia are taken about the joint.  It lies along
+-y of its frame (Eq. 15), which a universal joint rotates about x, then about z (Eq. 11).  A body
+set is given by its mass, first moment ``h`` = sum m r, and ``I`` = (xx, yy, zz, xy, xz, yz) about
+the frame's origin.  A wrench or momentum ``F`` = (force or momentum, its moment about the origin).
 """
 
 from sympy import Matrix, cos, sin, zeros
@@ -23,6 +23,18 @@ def link_properties(let, tail_mass: V1, tail_length: V1, link_inertia: V3, share
     steiner = let("steiner", half_moment * length / 2)
     Ix, Iy, Iz = link_inertia
     return {"link": Matrix([m, length, half_moment, Ix + steiner, Iy, Iz + steiner])}
+
+
+def own_link_properties(
+    let, link_masses: V1, link_lengths: V1, link_centers: V1, link_inertias: V3
+) -> dict:
+    """Properties of a link by itself, its COM ``link_centers`` from the joint (Eqs. 13, 15)."""
+    m, center = link_masses[0], link_centers[0]
+    first_moment = let("b", m * center)
+    steiner = let("steiner", first_moment * center)
+    Ix, Iy, Iz = link_inertias
+    inertia = [Ix + steiner, Iy, Iz + steiner]
+    return {"link": Matrix([m, link_lengths[0], first_moment, *inertia])}
 
 
 def link_wrench(let, link: V6, w: V3, w_dot: V3, a_joint: V3, swing: V3) -> dict:

@@ -56,6 +56,12 @@ def has_directions(program: Program) -> bool:
     return any(a.lanes for a in inlined(program).arrays)
 
 
+def places_lanes(program: Program) -> bool:
+    """Tell if a program writes single lanes, which no line of wide operations can express."""
+    body = inlined(program).body
+    return any(ref.lane and ref.array.lanes for s, _ in statements(body) for ref in writes(s))
+
+
 class _Turns:
     """Rewrites statements on wide arrays as loops over directions.
 
@@ -124,6 +130,9 @@ class _Turns:
             whole = target.array.whole()
             yield Fill(whole, fill.values[:1] * whole.size)
             return
+        if not fill.target.lanes:  # single lanes
+            yield replace(fill, target=target)
+            return
         yield self.each(fill.target.lanes, replace(fill, target=target))
 
     def unit(self, unit: Unit) -> Iterator[Statement]:
@@ -155,6 +164,10 @@ class _Turns:
         inputs, outputs = call.inputs(), call.outputs()
         adds = dict(zip(outputs, call.adds, strict=True))
         wide = frozenset(n for n, ref in (inputs | outputs).items() if ref.lanes)
+        if not wide:  # single lanes of what is wide
+            read, written = tuple(map(self.at, call.reads)), tuple(map(self.at, call.writes))
+            yield replace(call, reads=read, writes=written)
+            return
         overwritten = names(ref for name, ref in outputs.items() if name not in wide)
         kept = frozenset(n for n, ref in inputs.items() if ref.array.name in overwritten)
         parts = parted(call.step, wide, kept)

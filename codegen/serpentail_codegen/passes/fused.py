@@ -48,7 +48,8 @@ def _at(call: Apply, variable: str, value: int) -> Apply:
         return Index(kept, index.offset + value * dict(index.terms).get(variable, 0))
 
     def at(ref: Ref) -> Ref:
-        return replace(ref, offset=moved(ref.offset))
+        lane = None if ref.lane is None else moved(ref.lane)
+        return replace(ref, offset=moved(ref.offset), lane=lane)
 
     reads, writes = tuple(map(at, call.reads)), tuple(map(at, call.writes))
     columns = None if call.columns is None else moved(call.columns)

@@ -5,6 +5,7 @@ from collections.abc import Collection, Mapping
 from typing import Any
 
 from .parameters import PARAMETERS, SINGLE, Parameter, Value
+from .passive import PARTS, PASSIVE_NAMES
 from .problems import Problem, suggest
 from .scene import (
     COUNT,
@@ -17,7 +18,7 @@ from .scene import (
     Only,
     is_whole,
 )
-from .signatures.table import ALL, DERIVATIVES, NEEDS
+from .signatures.table import AIRBORNE, ALL, DERIVATIVES, FIXED, NEEDS
 
 
 def plain(value: Value) -> float | list[float]:
@@ -32,12 +33,12 @@ def fits(parameter: Parameter, value: Any) -> bool:
     numbers = value if parameter.size > 1 else [value]
     return (
         len(numbers) == parameter.size
-        and all(map(_is_finite, numbers))
+        and all(map(is_finite, numbers))
         and parameter.check.holds(numbers)
     )
 
 
-def _is_finite(x: Any) -> bool:
+def is_finite(x: Any) -> bool:
     """Tell if x is a number that a float can hold."""
     return (is_whole(x) or isinstance(x, float)) and abs(x) <= sys.float_info.max
 
@@ -48,7 +49,10 @@ def number_problem(parameter: Parameter, value: object) -> Problem:
         "a finite number" if parameter.size == 1 else f"an array of {parameter.size} finite numbers"
     )
     default = "computed" if parameter.default is None else plain(parameter.default)
-    remedy = f"needs {shape}{parameter.check.text}, in {parameter.unit} (default: {default})"
+    hint = f"(default: {default})"
+    if parameter.needs in PARTS:
+        shape, hint = f"{shape} or one for all", "(one for each tail coordinate)"
+    remedy = f"needs {shape}{parameter.check.text}, in {parameter.unit} {hint}"
     return Problem(f"parameters.{parameter.name}", value, remedy)
 
 
@@ -79,7 +83,7 @@ def size_problems(values: Mapping[str, Any]) -> list[Problem]:
 
 def kind_problems(table: Mapping[str, Any], rules: Only) -> list[Problem]:
     """Return a problem for all that the tail's kind does not have."""
-    problems, parameters = [], _parameters_in(table)
+    problems, parameters = [], parameters_in(table)
 
     # keys and parameters of the other kinds
     remedy = "this kind of tail has none; remove it, or choose another kind"
@@ -97,6 +101,10 @@ def kind_problems(table: Mapping[str, Any], rules: Only) -> list[Problem]:
     elif table.get("coordinates") == "polar" and derivatives:
         remedy = f'has no derivatives, such as {derivatives[0]}: use "bend", which has'
         problems.append(Problem("coordinates", "polar", remedy))
+    if table.get("coordinates") == "polar":
+        remedy = 'polar coordinates have no springs, damping or stops: use "bend"'
+        wrong = [name for name in PASSIVE_NAMES if name in parameters]
+        problems += [Problem(f"parameters.{name}", parameters[name], remedy) for name in wrong]
     return problems
 
 
@@ -111,7 +119,7 @@ def contact_problems(
     table: Mapping[str, Any], values: Mapping[str, Any], contacts: Collection[str]
 ) -> list[Problem]:
     """Return a problem for all that needs contacts which the scene does not have."""
-    problems, parameters = [], _parameters_in(table)
+    problems, parameters = [], parameters_in(table)
 
     # parameters of groups that do not touch the ground
     lacks = {p.name: lacking(p.needs, contacts) for p in PARAMETERS if p.name in parameters}
@@ -134,16 +142,34 @@ def contact_problems(
     return problems
 
 
-def _parameters_in(table: Mapping[str, Any]) -> Mapping[str, Any]:
+def fixed_problems(values: Mapping[str, Any], contacts: Collection[str]) -> list[Problem]:
+    """Return a problem for all that a tail on a fixed base does not have."""
+    if values["base"] != "fixed":
+        return []
+    remedy = 'a fixed base has none; remove it, or set base = "free"'
+    problems = [Problem("contacts", list(contacts), remedy)] if contacts else []
+    wanted = values["functions"] if isinstance(values["functions"], list | tuple) else ()
+    others = [name for name in wanted if name in ALL and name not in FIXED]
+    return problems + [Problem("functions", name, remedy) for name in others]
+
+
+def parameters_in(table: Mapping[str, Any]) -> Mapping[str, Any]:
     """Return the table of parameters; an empty one where it is none, which another check tells."""
     parameters = table.get("parameters", {})
     return parameters if isinstance(parameters, Mapping) else {}
 
 
+def airborne_problems(wanted: Any, plain_tail: bool) -> list[Problem]:
+    """Return a problem for each function of a plan's node that a tail does not have."""
+    names = wanted if isinstance(wanted, list | tuple) and not plain_tail else ()
+    remedy = "is for equal links without springs, damping, stops and mount_angles: remove it"
+    return [Problem("functions", name, remedy) for name in names if name in AIRBORNE]
+
+
 def _derivatives_in(wanted: Any) -> list[str]:
     """Return the derivatives among wanted functions."""
     names = ALL if wanted == "all" else wanted if isinstance(wanted, list | tuple) else ()
-    return [name for name in names if name in DERIVATIVES]
+    return [name for name in names if name in (*DERIVATIVES, *AIRBORNE)]
 
 
 def single_problems(parameters: Mapping[str, Value]) -> list[Problem]:
@@ -156,6 +182,12 @@ def single_problems(parameters: Mapping[str, Value]) -> list[Problem]:
         if any(x and not least <= abs(x) <= largest for x in numbers):
             problems.append(Problem(f"parameters.{name}", plain(value), remedy))
     return problems
+
+
+def segments_in(values: Mapping[str, Any]) -> int:
+    """m, or 1 where it is wrong, and at most what can be generated."""
+    m = values["segments"]
+    return min(m, MOST_SEGMENTS) if COUNT.holds(m) else 1
 
 
 def tail_pieces(values: Mapping[str, Any], key: str = "links") -> int:

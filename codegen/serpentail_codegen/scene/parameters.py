@@ -35,7 +35,9 @@ class Parameter:
     """One physical parameter: `size` numbers in `unit`; no default: computed from the others.
 
     ``needs`` is a group of contact points, or "contacts" for any of them; empty: every scene has
-    the parameter.
+    the parameter.  ``tail`` tells of what tails it is: "equal", of equal pieces; "link" or "arc",
+    of pieces with values of their own, ``size`` numbers for each; "tilted"; "free", of a torso that
+    moves; "weight", of all but the weightless; empty: of all.
     """
 
     name: str
@@ -45,6 +47,7 @@ class Parameter:
     check: Rule
     meaning: str
     needs: str = ""
+    tail: str = ""
 
 
 # The defaults are the kangaroo rat of the paper's Table 1. B is the torso frame, at the torso COM.
@@ -56,8 +59,9 @@ PARAMETERS = (
         "m/s^2",
         NOT_NEGATIVE,
         "gravitational acceleration, along -z of the world",
+        tail="weight",
     ),
-    Parameter("torso_mass", 1, 0.10572, "kg", POSITIVE, "mass of the torso"),
+    Parameter("torso_mass", 1, 0.10572, "kg", POSITIVE, "mass of the torso", tail="free"),
     Parameter(
         "torso_inertia",
         3,
@@ -65,6 +69,7 @@ PARAMETERS = (
         "kg m^2",
         BODY_INERTIA,
         "principal moments of inertia of the torso about its COM, axes of B",
+        tail="free",
     ),
     Parameter(
         "tail_mount",
@@ -74,8 +79,17 @@ PARAMETERS = (
         ANY,
         "root of the tail from the torso COM, in B",
     ),
-    Parameter("tail_mass", 1, 0.00351, "kg", POSITIVE, "mass of the whole tail"),
-    Parameter("tail_length", 1, 0.19466, "m", POSITIVE, "length of the whole tail"),
+    Parameter(
+        "mount_angles",
+        3,
+        None,
+        "rad",
+        ANY,
+        "pitch, roll and yaw of the tail's root axes in B; the tail begins along their -y",
+        tail="tilted",
+    ),
+    Parameter("tail_mass", 1, 0.00351, "kg", POSITIVE, "mass of the whole tail", tail="equal"),
+    Parameter("tail_length", 1, 0.19466, "m", POSITIVE, "length of the whole tail", tail="equal"),
     Parameter(
         "link_radius",
         1,
@@ -83,6 +97,7 @@ PARAMETERS = (
         "m",
         NOT_NEGATIVE,
         "radius of the ellipsoid that gives link_inertia",
+        tail="equal",
     ),
     Parameter(
         "link_inertia",
@@ -91,13 +106,36 @@ PARAMETERS = (
         "kg m^2",
         NOT_NEGATIVE,
         "principal moments of inertia of one link about its COM, y along the link",
+        tail="equal",
     ),
+    Parameter("link_masses", 1, None, "kg", POSITIVE, "mass of each link", tail="link"),
+    Parameter("link_lengths", 1, None, "m", POSITIVE, "length of each link", tail="link"),
+    Parameter(
+        "link_centers",
+        1,
+        None,
+        "m",
+        ANY,
+        "COM of each link from its joint, along the link",
+        tail="link",
+    ),
+    Parameter(
+        "link_inertias",
+        3,
+        None,
+        "kg m^2",
+        NOT_NEGATIVE,
+        "principal moments of inertia of each link about its COM, y along the link",
+        tail="link",
+    ),
+    Parameter("arc_masses", 1, None, "kg", POSITIVE, "mass of each segment", tail="arc"),
+    Parameter("arc_lengths", 1, None, "m", POSITIVE, "length of each segment", tail="arc"),
     Parameter("K_n", 1, 1000.0, "N/m^1.5", POSITIVE, "stiffness of the ground", "contacts"),
     Parameter(
         "D_n",
         1,
         0.75,
-        "s/m",
+        "s",
         NOT_NEGATIVE,
         "damping of the ground, over its stiffness",
         "contacts",

@@ -1,5 +1,6 @@
 """Reads scene files and tables; what comes back is a checked, frozen Scene."""
 
+import json
 import re
 from collections.abc import Collection, Mapping
 from contextlib import suppress
@@ -7,21 +8,39 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+from .body import OF_TORSO, body_of, scaled
 from .checks import (
+    airborne_problems,
     contact_problems,
+    fixed_problems,
     function_problems,
     key_problems,
     kind_problems,
     lacking,
+    parameters_in,
     plain,
+    segments_in,
     single_problems,
     tail_pieces,
     unknown_keys,
 )
+from .described import tail_described
+from .parameters import PARAMETERS
+from .passive import parts_of
 from .problems import Problem, SceneError
 from .resolve import resolve_parameters
 from .scene import CONTACTS, GROUPS, KEYS, MOST_LINKS, ONLY, TARGETS, Only, Scene
-from .signatures.table import ALL, DEFAULT, DEFAULT_ON_GROUND, DERIVATIVES, NEEDS
+from .segments import are_tables, tell_values
+from .shape import EQUAL
+from .signatures.table import (
+    AIRBORNE,
+    ALL,
+    DEFAULT,
+    DEFAULT_ON_GROUND,
+    DERIVATIVES,
+    FIXED,
+    NEEDS,
+)
 from .source import tables_of
 from .units import in_unit
 
@@ -52,20 +71,35 @@ def parse_scene(table: Mapping[str, Any], name: str) -> Scene:
     rules = ONLY[kind]
     values = _with_defaults(table, name, rules)
     contacts = tuple(values["contacts"]) if CONTACTS.holds(values["contacts"]) else ()
-    values["functions"] = _chosen_functions(table, values["coordinates"], contacts)
+    values["functions"] = _chosen_functions(table, values, contacts)
     with suppress(ValueError):  # the rule for the key refuses a text
         values["bend_range"] = in_unit(values["bend_range"], "rad")
 
     # everything that is wrong with keys and functions
-    problems = unknown_keys(table, "", KEYS) + key_problems(values) + kind_problems(table, rules)
+    problems = unknown_keys(table, "", KEYS)
+    tail = tail_described(kind, values)
+    values |= tail.values
+    plain_tail = tail.shape == EQUAL and not parts_of(parameters_in(table))
+    if table.get("functions") == "all" and not plain_tail:
+        values["functions"] = tuple(f for f in values["functions"] if f not in AIRBORNE)
+    problems += airborne_problems(values["functions"], plain_tail)
+    problems += [*tail.problems, *key_problems(values), *kind_problems(table, rules)]
     problems += function_problems(values["functions"]) + contact_problems(table, values, contacts)
+    problems += fixed_problems(values, contacts)
 
     # parameters: which there are follows from the kind and the contacts
-    links = min(tail_pieces(values), MOST_LINKS)
+    links = min(sum(tail.shape.counts) or tail_pieces(values), MOST_LINKS)
+    body = body_of(values["body"], values["parameters"])
+    named = body.completed(values["parameters"], contacts)
+    problems += body.problems
+    values["body"] = "" if values["body"] is None else json.dumps(values["body"], default=str)
     try:
-        values["parameters"] = resolve_parameters(values["parameters"], links, kind, contacts)
+        resolved = resolve_parameters(named, links, kind, contacts, tail.shape, segments_in(values))
+        values["parameters"] = resolved
     except SceneError as error:
         problems += error.problems
+    if not problems:
+        values |= scaled(body, values["parameters"])
     if not problems and values["real"] == "float":
         problems += single_problems(values["parameters"])
     if problems:
@@ -88,22 +122,29 @@ def _with_defaults(table: Mapping[str, Any], name: str, rules: Only) -> dict[str
     """Return a table with the default of every key that it leaves out, None where it is needed."""
     values = {key: default for key, (default, _) in KEYS.items()}
     values |= {"name": name, "coordinates": rules.coordinates[0]}
-    values |= dict.fromkeys(rules.required)
+    values |= dict.fromkeys(rules.required) | {"shape": EQUAL, "tables": ""}
+    values |= {"unscaled": None, "size": Scene.size}
     return values | dict(table)
 
 
-def _chosen_functions(table: Mapping[str, Any], coordinates: str, contacts: Collection[str]) -> Any:
+def _chosen_functions(
+    table: Mapping[str, Any], values: Mapping[str, Any], contacts: Collection[str]
+) -> Any:
     """Return the functions that a scene means by naming them, by "all", or by leaving them out."""
     chosen = table.get("functions")
     if "functions" in table and chosen != "all":
         return chosen
 
-    # all that the scene can have, or the usual ones
+    # all that the scene can have, or the usual ones; a passive tail may be stiff
     names = DEFAULT + DEFAULT_ON_GROUND if contacts else DEFAULT
+    if not contacts and parts_of(parameters_in(table)):
+        names += ("implicit",)
     if chosen == "all":
         names = ALL
-    elif coordinates == "polar":
+    elif values["coordinates"] == "polar":
         names = tuple(name for name in names if name not in DERIVATIVES)
+    if values["base"] == "fixed":
+        names = tuple(name for name in names if name in FIXED)
     return tuple(name for name in names if not lacking(NEEDS.get(name, ""), contacts))
 
 
@@ -112,11 +153,22 @@ def scene_to_dict(scene: Scene) -> dict[str, Any]:
     # keys that this kind of tail, or a flight, does not have
     foreign = {key for kind, only in ONLY.items() if kind != scene.kind for key in only.keys}
     foreign |= set() if scene.contacts else {"contacts", "friction"}
+    foreign |= {"shape", "tables", "body", "unscaled", "size"}  # follow from what is written
+    foreign |= {name for name in ("base", "weightless") if getattr(scene, name) == KEYS[name][0]}
     names = [field.name for field in fields(Scene) if field.name not in foreign]
     table = {name: getattr(scene, name) for name in names}
+    written = json.loads(scene.tables or "{}")
+    table |= written | ({"body": json.loads(scene.body)} if scene.body else {})
+    if are_tables(table["segments"]):
+        table.pop("links", None)
     table |= {key: list(table[key]) for key in ("functions", "contacts", "targets") if key in table}
 
-    # an inertia that follows from link_radius is computed again
-    computed = "link_inertia" if "link_radius" in scene.parameters else ""
-    parameters = {n: plain(value) for n, value in scene.parameters.items() if n != computed}
+    # an inertia that follows from link_radius is computed again, and so is what tables tell
+    computed = {"link_inertia"} if "link_radius" in scene.parameters else set()
+    if written and tell_values(written):
+        computed |= {p.name for p in PARAMETERS if p.tail in ("link", "arc")}
+    if "torso" in table.get("body", {}):
+        computed |= set(OF_TORSO)
+    described = scene.unscaled or scene.parameters
+    parameters = {n: plain(value) for n, value in described.items() if n not in computed}
     return table | {"parameters": parameters}

@@ -2,20 +2,51 @@
 
 import math
 from collections.abc import Collection, Mapping
+from dataclasses import replace
 from typing import Any
 
-from .checks import fits, number_problem, unknown_keys
+from .checks import fits, number_problem, plain, unknown_keys
+from .cone import ellipsoid, single
 from .parameters import PARAMETERS, Parameter, Parameters, Value
+from .passive import (
+    for_all,
+    lacking_passive,
+    parts_of,
+    passive_parameters,
+    stop_problems,
+)
 from .problems import Problem, SceneError
 from .scene import NAMES, ONLY
+from .segments import RADIUS, flattened
+from .shape import EQUAL, Shape
 from .units import in_unit
 
+HAS_NOT = {  # why a tail or a base has no such parameters
+    "equal": "each piece of this tail has a value of its own",
+    "free": "a fixed base does not move",
+    "weight": "this scene is weightless",
+}
+OPTIONAL = ("link_centers", "link_inertias")  # of what single links may leave out
 
-def parameters_of(kind: str, contacts: Collection[str] = ()) -> tuple[Parameter, ...]:
-    """Return the parameters that a kind of tail has, with those of its contacts."""
+
+def parameters_of(
+    kind: str,
+    contacts: Collection[str] = (),
+    shape: Shape = EQUAL,
+    passive: Collection[str] = (),
+    segments: int = 1,
+) -> tuple[Parameter, ...]:
+    """Return the parameters that a kind of tail has, with those of its contacts and of the passive
+    parts of so many segments.
+
+    Those of single links or arcs have as many numbers as all of these together.
+    """
     foreign = {name for other, only in ONLY.items() if other != kind for name in only.parameters}
     present = {"", *contacts, *(["contacts"] if contacts else [])}
-    return tuple(p for p in PARAMETERS if p.name not in foreign and p.needs in present)
+    found = [p for p in PARAMETERS if p.name not in foreign and p.needs in present]
+    counted = [(p, shape.numbers_of(p.tail)) for p in found]
+    own = tuple(replace(p, size=p.size * count) for p, count in counted if count)
+    return own + passive_parameters(passive, segments)
 
 
 def resolve_parameters(
@@ -23,6 +54,8 @@ def resolve_parameters(
     tail_links: int,
     kind: str = "articulated",
     contacts: Collection[str] = (),
+    shape: Shape = EQUAL,
+    segments: int = 1,
 ) -> Parameters:
     """Check the named parameters and fill in the others, for N = m n links; raises SceneError."""
     if not isinstance(named, Mapping):
@@ -32,38 +65,81 @@ def resolve_parameters(
     if "link_inertia" in named and "link_radius" in named:
         remedy = "given together with link_radius, which it overrides; remove one of the two"
         problems.append(Problem("parameters.link_inertia", named["link_inertia"], remedy))
-    given = {}
-    for p in [p for p in PARAMETERS if p.name in named]:
+    given: dict[str, Any] = {}
+    passive = parts_of(named)
+    problems += lacking_passive(named, passive)
+    own = parameters_of(kind, contacts, shape, passive, segments)
+    sized = {p.name: p for p in (*PARAMETERS, *own)}
+    for p in [p for p in sized.values() if p.name in named]:
         try:
-            given[p.name] = in_unit(named[p.name], p.unit)
+            given[p.name] = of_pieces(p, in_unit(named[p.name], p.unit))
         except ValueError as error:
             problems.append(Problem(f"parameters.{p.name}", named[p.name], str(error)))
             continue
+        if p.needs in passive:
+            given[p.name] = for_all(p, given[p.name])
         if not fits(p, given[p.name]):
             problems.append(number_problem(p, named[p.name]))
+    problems += [] if problems else own_problems(given, shape)
+    if not problems and "stops" in passive:
+        problems += stop_problems(given)
     if problems:
         raise SceneError(problems)
 
     # defaults for what is not named; the link's inertia follows from its radius, or replaces it
     unused = "link_radius" if "link_inertia" in named else "link_inertia"
-    values = {p.name: p.default for p in parameters_of(kind, contacts) if p.name != unused}
-    resolved = {name: _floats(value) for name, value in (values | given).items()}
+    values = {p.name: p.default for p in own if p.name != unused}
+    values |= given if not shape.links else completed(given, shape.links)
+    resolved = {name: _floats(value) for name, value in values.items()}
     if "link_radius" in resolved:
         resolved["link_inertia"] = _ellipsoid_inertia(resolved, tail_links)
     return Parameters(tuple((name, resolved[name]) for name in NAMES if name in resolved))
 
 
 def _ellipsoid_inertia(parameters: Mapping[str, Any], tail_links: int) -> tuple[float, ...]:
-    """I = m/5 [L^2/4 + r^2, 2 r^2, L^2/4 + r^2]: uniform ellipsoid, semi-axes (r, L/2, r)."""
+    """Return the moments of inertia of one of N equal links."""
     m, L = parameters["tail_mass"] / tail_links, parameters["tail_length"] / tail_links
-    r = parameters["link_radius"]
-    across, along = m / 5 * (L * L / 4 + r * r), m / 5 * (2 * r * r)
+    across, along, _ = ellipsoid(m, L, parameters["link_radius"])
     if not math.isfinite(across + along):
         remedy = (
             "computed from tail_mass, tail_length and link_radius, but not finite; use kg and m"
         )
         raise SceneError([Problem("parameters.link_inertia", [across, along, across], remedy)])
     return (across, along, across)
+
+
+def of_pieces(parameter: Parameter, value: Any) -> Any:
+    """Return a value of single links or arcs as one array: a moment of each may be one of its
+    own.
+    """
+    if parameter.tail not in ("link", "arc") or not isinstance(value, list | tuple):
+        return value
+    numbers = list(flattened(value))
+    return numbers[0] if parameter.size == len(numbers) == 1 else numbers
+
+
+def own_problems(given: Mapping[str, Any], shape: Shape) -> list[Problem]:
+    """Return a problem for what single links or arcs lack, and what this tail or base has not."""
+    problems = []
+    for p in PARAMETERS:
+        lacks = p.default is None and p.tail and p.name not in OPTIONAL
+        if p.tail in HAS_NOT and not shape.numbers_of(p.tail) and p.name in given:
+            remedy = f"{HAS_NOT[p.tail]}; remove it"
+            problems.append(Problem(f"parameters.{p.name}", plain(given[p.name]), remedy))
+        elif shape.own and lacks and shape.numbers_of(p.tail) and p.name not in given:
+            sized = replace(p, size=p.size * shape.numbers_of(p.tail))
+            problems.append(number_problem(sized, None))
+    return problems
+
+
+def completed(given: Mapping[str, Any], links: int) -> dict[str, Any]:
+    """Return the values of single links with those that nothing tells: COM in the middle, and the
+    inertia of an ellipsoid.
+    """
+    masses, lengths = (tuple(flattened(given[name])) for name in ("link_masses", "link_lengths"))
+    default = single(masses, lengths, tuple(length / 2 for length in lengths), (), RADIUS)
+    centers = default.centers if links > 1 else default.centers[0]
+    return {"link_centers": centers, "link_inertias": default.inertias, **given}
 
 
 def _floats(value: Any) -> Value:

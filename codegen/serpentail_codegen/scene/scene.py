@@ -7,11 +7,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from .parameters import ANY, PARAMETERS, Parameters, Rule
+from .passive import PASSIVE_NAMES, parts_of
+from .shape import EQUAL, Shape
 from .signatures.table import DEFAULT
 
 KINDS = ("articulated", "continuum")
 GROUPS = ("feet", "tail", "torso")  # of contact points, in their order
 FRICTION = ("cone", "box", "smooth", "paper")
+BASES = ("free", "fixed")  # of the tail: a torso that moves, or one that never does
 TARGETS = ("c", "casadi")  # languages to emit, in their order
 # a model of such a name would hide the system's header
 C_HEADERS = (
@@ -47,6 +50,11 @@ COUNT = Rule(
     "a whole number, 1 or above",
     lambda x: is_whole(x) and x >= 1,
     {"type": "integer", "minimum": 1},
+)
+SEGMENTS = Rule(
+    f"{COUNT.text}, or an array of tables, one for each segment",
+    lambda x: COUNT.holds(x) or (isinstance(x, list | tuple) and len(x) > 0),
+    {"anyOf": [COUNT.schema, {"type": "array", "items": {"type": "object"}, "minItems": 1}]},
 )
 TEXT = Rule('a text, in "quotes"', lambda x: isinstance(x, str), {"type": "string"})
 # the prefix of C symbols, a file's and a folder's name
@@ -90,6 +98,13 @@ def _table(name: str) -> Rule:
     return Rule(text, lambda x: isinstance(x, Mapping), {"type": "object"})
 
 
+TABLES = Rule(
+    "tables, under lines [[phase]]",
+    lambda x: isinstance(x, list | tuple) and all(isinstance(each, Mapping) for each in x),
+    {"type": "array", "items": {"type": "object"}},
+)
+
+
 @dataclass(frozen=True)
 class Scene:
     """What to generate: a tail, its parameters, the functions, and in which form."""
@@ -114,6 +129,18 @@ class Scene:
     ] = ()  # groups of points that can touch the ground, in the order of GROUPS
     friction: str = "cone"
     targets: tuple[str, ...] = TARGETS  # in that order
+    base: str = "free"  # or "fixed": the torso never moves
+    weightless: bool = False
+    shape: Shape = EQUAL  # in what segments and links differ
+    body: str = ""  # `body` as it is written, as JSON
+    unscaled: Parameters | None = None  # as the scene describes it, where `body` scales it
+    size: tuple[float, float, float] = (1.0, 1.0, 1.0)  # what becomes of each kg, m and s
+    tables: str = ""  # `segments` and `taper` as they are written, as JSON; empty: a count
+
+    @property
+    def passive(self) -> tuple[str, ...]:
+        """Parts of the passive tail that it has."""
+        return parts_of(self.parameters)
 
 
 # The keys of a scene file: default (None: required) and rule; ANY where a function of its own
@@ -122,7 +149,7 @@ KEYS: dict[str, tuple[Any, Rule]] = {
     "name": (None, NAME),
     "description": ("", TEXT),
     "kind": (None, _one_of(KINDS)),
-    "segments": (None, COUNT),
+    "segments": (None, SEGMENTS),
     "links": (1, COUNT),
     "samples": (Scene.samples, COUNT),
     "bend_range": (Scene.bend_range, BEND),
@@ -141,8 +168,13 @@ KEYS: dict[str, tuple[Any, Rule]] = {
         _table("plan"),
     ),  # a motion to plan, and one to simulate: for the runtime, which checks them
     "simulate": ({}, _table("simulate")),
+    "phase": ((), TABLES),  # of a motion of several, likewise
+    "taper": (None, ANY),
+    "body": (None, ANY),  # how large it is
+    "base": (Scene.base, _one_of(BASES)),
+    "weightless": (Scene.weightless, FLAG),
 }
-NAMES = tuple(parameter.name for parameter in PARAMETERS)
+NAMES = (*(parameter.name for parameter in PARAMETERS), *PASSIVE_NAMES)
 
 
 @dataclass(frozen=True)
@@ -156,6 +188,16 @@ class Only:
 
 
 ONLY = {
-    "articulated": Only(("links",), ("links",), ("link_radius", "link_inertia"), ("joint",)),
-    "continuum": Only(("samples", "bend_range"), (), (), ("bend", "polar")),
+    "articulated": Only(
+        ("links",),
+        ("links",),
+        (
+            *("link_radius", "link_inertia"),
+            *("link_masses", "link_lengths", "link_centers", "link_inertias"),
+        ),
+        ("joint",),
+    ),
+    "continuum": Only(
+        ("samples", "bend_range"), (), ("arc_masses", "arc_lengths"), ("bend", "polar")
+    ),
 }

@@ -1,6 +1,7 @@
 """The JSON Schema of scene files, from the tables that scenes are checked against.
 
-The tables [plan] and [simulate] are any tables here: the runtime knows what belongs in them.
+The tables [plan], [simulate] and [[phase]] are any tables here: the runtime knows what belongs in
+them.
 """
 
 from collections.abc import Mapping
@@ -8,7 +9,9 @@ from typing import Any
 
 from .checks import plain as as_data
 from .parameters import PARAMETERS, Parameter
-from .scene import KEYS, ONLY
+from .passive import PASSIVE
+from .scene import COUNT, KEYS, ONLY
+from .segments import TAPER, VALUES, Key
 from .signatures.table import ALL
 from .units import MEASURES, choices, pattern, plain
 
@@ -23,10 +26,18 @@ def scene_schema() -> dict[str, Any]:
     keys["functions"] = {"anyOf": [{"const": "all"}, names]}
     coordinates = [name for only in ONLY.values() for name in only.coordinates]
     keys["coordinates"] = {"enum": coordinates}
-    keys["parameters"] = _table({p.name: _parameter(p) for p in PARAMETERS}, [])
+    keys["parameters"] = _table(
+        {p.name: _parameter(p) for p in PARAMETERS}
+        | {p.name: _of_each_coordinate(p) for p in PASSIVE},
+        [],
+    )
+    of_segment = {"links": dict(COUNT.schema)} | {n: _key(key) for n, key in VALUES.items()}
+    tables = {"type": "array", "items": _table(of_segment, []), "minItems": 1}
+    keys["segments"] = {"anyOf": [dict(COUNT.schema), tables]}
+    keys["taper"] = _table({name: _key(key) for name, key in TAPER.items()}, ["radii"])
     for name, (_, rule) in KEYS.items():
         keys[name] |= {"description": rule.text} if rule.text else {}
-    of_kinds = [_of_kind(kind) for kind in ONLY]
+    of_kinds = [rule for kind in ONLY for rule in _of_kind(kind)]
     head = {"$schema": DRAFT, "title": "A scene of serpentail"}
     return head | _table(keys, ["kind", "segments"]) | {"allOf": of_kinds}
 
@@ -37,15 +48,37 @@ def _table(keys: Mapping[str, Any], required: list[str]) -> dict[str, Any]:
     return table | {"required": required}
 
 
-def _of_kind(kind: str) -> dict[str, Any]:
-    """Return what a tail of a kind needs, and what it has not."""
+def _of_kind(kind: str) -> list[dict[str, Any]]:
+    """Return what a tail of a kind has not, and what it needs where its segments are counted."""
     foreign = [key for other, only in ONLY.items() if other != kind for key in only.keys]
     has_not = [name for other, only in ONLY.items() if other != kind for name in only.parameters]
     keys: dict[str, Any] = dict.fromkeys(foreign, False)
     keys["coordinates"] = {"enum": list(ONLY[kind].coordinates)}
     keys["parameters"] = {"properties": dict.fromkeys(has_not, False)}
-    then = {"required": list(ONLY[kind].required), "properties": keys}
-    return {"if": {"properties": {"kind": {"const": kind}}}, "then": then}
+    of_kind = {"kind": {"const": kind}}
+    counted = of_kind | {"segments": {"type": "integer"}}
+    return [
+        {"if": {"properties": of_kind}, "then": {"properties": keys}},
+        {"if": {"properties": counted}, "then": {"required": list(ONLY[kind].required)}},
+    ]
+
+
+def _key(key: Key) -> dict[str, Any]:
+    """Return the schema of a key of a segment's table: one number, some, or some of each link."""
+    one = _numbers(key.rule.schema, key.unit)
+    if key.size == 1 and not key.of_links:
+        return one
+    return _array(one, key.unit, None if key.of_links else key.size)
+
+
+def _array(one: dict[str, Any], unit: str, size: int | None) -> dict[str, Any]:
+    """Return the schema of so many numbers in a unit, or of any number, three in one perhaps."""
+    bounds = {"minItems": size, "maxItems": size} if size else {"minItems": 1}
+    entry = one if size else {"anyOf": [one, {"type": "array", "items": one}]}
+    forms: list[dict[str, Any]] = [{"type": "array", "items": entry} | bounds]
+    if plain(unit) in MEASURES:
+        forms.append(_text(unit, size))
+    return {"anyOf": forms}
 
 
 def _parameter(parameter: Parameter) -> dict[str, Any]:
@@ -54,13 +87,19 @@ def _parameter(parameter: Parameter) -> dict[str, Any]:
     meaning: dict[str, Any] = {"description": f"{parameter.meaning} ({parameter.unit})"}
     if parameter.default is not None:
         meaning["default"] = as_data(parameter.default)
+    if parameter.tail in ("link", "arc"):
+        return _array(one, parameter.unit, None) | meaning
     if parameter.size == 1:
         return one | meaning
-    size = {"minItems": parameter.size, "maxItems": parameter.size}
-    forms: list[dict[str, Any]] = [{"type": "array", "items": one} | size]
-    if plain(parameter.unit) in MEASURES:
-        forms.append(_text(parameter.unit, parameter.size))
-    return {"anyOf": forms} | meaning
+    return _array(one, parameter.unit, parameter.size) | meaning
+
+
+def _of_each_coordinate(parameter: Parameter) -> dict[str, Any]:
+    """Return the schema of a parameter of the passive tail: one number, or one a coordinate."""
+    one = _numbers(parameter.check.schema, parameter.unit)
+    each = {"type": "array", "items": one, "minItems": 2}
+    meaning = {"description": f"{parameter.meaning} ({parameter.unit})"}
+    return {"anyOf": [one, each]} | meaning
 
 
 def _numbers(bounds: Mapping[str, Any], unit: str) -> dict[str, Any]:
@@ -69,10 +108,10 @@ def _numbers(bounds: Mapping[str, Any], unit: str) -> dict[str, Any]:
     return {"anyOf": [number, _text(unit)]} if plain(unit) in MEASURES else number
 
 
-def _text(unit: str, size: int = 1) -> dict[str, Any]:
-    """Return the schema of a text of numbers with a unit."""
+def _text(unit: str, size: int | None = 1) -> dict[str, Any]:
+    """Return the schema of a text of so many numbers with a unit, or of any number."""
     return {
         "type": "string",
-        "pattern": pattern(unit, f"{{{size - 1}}}"),
+        "pattern": pattern(unit, "*" if size is None else f"{{{size - 1}}}"),
         "description": choices(unit),
     }

@@ -33,6 +33,7 @@ class Dialect:
     wide_functions: dict[str, str] = field(default_factory=dict)  # of wide arguments
     real: str = "double"
     select: str = "{c} > {zero} ? {a} : {b}"
+    wide_select: str = ""  # of wide operands
     sincos: str = ""  # defines sine and cosine of one argument at once; empty: by two functions
     wide_sincos: str = ""  # the same of a wide argument
     wide: str = ""  # defines a wide scalar: one number in each lane
@@ -134,8 +135,7 @@ class Scalars:
         if op == "neg":
             return f"-{self._operand(args[0], op)}"
         if op == "select":
-            c, a, b = (self.text[n] for n in args)
-            return self.dialect.select.format(c=c, a=a, b=b, zero=self.dialect.literal(0))
+            return self._selection(args)
         if op == "lane":
             return f"work[{self.stored[args[0]] + args[1]}]"
         if op in LEAVES:
@@ -143,6 +143,16 @@ class Scalars:
         wide = self.lanes[args[0]]
         functions = self.dialect.wide_functions if wide else self.dialect.functions
         return f"{functions[op]}({self.text[args[0]]})"
+
+    def _selection(self, args) -> str:
+        texts = [self.text[n] for n in args]
+        form = self.dialect.select
+        if any(self.lanes[n] for n in args):  # narrow operands are the same in all lanes
+            widened = zip(texts, args, strict=True)
+            texts = [text if self.lanes[n] else f"WIDE({text})" for text, n in widened]
+            form = self.dialect.wide_select
+        c, a, b = texts
+        return form.format(c=c, a=a, b=b, zero=self.dialect.literal(0))
 
     def _leaf(self, op: str, args) -> str:
         if op == "const":
@@ -158,7 +168,7 @@ class Scalars:
 
 def called(nodes, inputs=()) -> set[str]:
     """Return the helpers that nodes call, from the lanes of their inputs."""
-    if not any(node[0] in ("sin", "cos", "sqrt") for node in nodes):
+    if not any(node[0] in ("sin", "cos", "sqrt", "select") for node in nodes):
         return set()
     lanes: list[int] = []
     helpers = set()
@@ -168,4 +178,6 @@ def called(nodes, inputs=()) -> set[str]:
             helpers |= {"sincos", "wide_sincos"} if lanes[args[0]] else {"sincos"}
         if op == "sqrt" and lanes[args[0]]:
             helpers.add("wide_sqrt")
+        if op == "select" and lanes[-1]:
+            helpers.add("wide_select")
     return helpers

@@ -11,6 +11,7 @@ from ..functions.function import Function
 from ..functions.tail import Tail
 from ..scene.parameters import ANY, BODY_INERTIA, NOT_NEGATIVE, POSITIVE, Parameter
 from ..scene.parse import scene_to_dict
+from ..scene.passive import PARTS
 from ..scene.resolve import parameters_of
 from ..scene.scene import Scene
 from ..scene.signatures.arguments import Argument
@@ -35,38 +36,59 @@ def manifest(
         "prefix": scene.name,
         "real": scene.real,
         "scene": scene_to_dict(scene),
-        "dimensions": {name: getattr(tail, name) for name in sizes},
+        "dimensions": {name: getattr(tail, name) for name in sizes} | own_counts(tail),
         "contacts": [{"group": name, "count": count} for name, count in tail.groups.items()],
         "parameters": [
-            parameter_entry(scene, p) for p in parameters_of(scene.kind, scene.contacts)
+            parameter_entry(scene, p)
+            for p in parameters_of(
+                scene.kind, scene.contacts, scene.shape, scene.passive, scene.segments
+            )
         ],
         "functions": {f.name: function_entry(f, tail, emissions) for f in functions},
     }
+    if scene.unscaled:  # what becomes of each kg, m and s that the scene names
+        described["size"] = dict(zip(("kg", "m", "s"), scene.size, strict=True))
     for emission in emissions:
         described |= emission.entries
     return described
 
 
+def own_counts(tail: Tail) -> dict[str, Any]:
+    """Return the links of each segment, where they are not as many in all."""
+    return {"links": list(tail.shape.counts)} if tail.shape.counts else {}
+
+
 def parameter_entry(scene: Scene, parameter: Parameter) -> dict[str, Any]:
-    """Return what a caller must know of a parameter; the default is null where it is computed."""
+    """Return what a caller must know of a parameter; the default is null where it is computed.
+
+    pieces: of how many links or arcs it has numbers of their own, one array for all.
+    """
     value = scene.parameters.get(parameter.name)
-    return {
+    own = parameter.tail in ("link", "arc")
+    pieces = {"pieces": scene.shape.numbers_of(parameter.tail)} if own else {}
+    default: Any = list(value) if isinstance(value, tuple) else value
+    if own and not isinstance(default, list):  # of a single piece
+        default = [default]
+    entry = pieces | {
         "name": parameter.name,
         "size": parameter.size,
         "unit": parameter.unit,
         "meaning": parameter.meaning,
         "check": CHECKS[parameter.check],
-        "default": list(value) if isinstance(value, tuple) else value,
+        "default": default,
         "in_struct": parameter.name != "link_radius",
     }
+    # one number may stand for all of them
+    return entry | ({"per": "coordinate"} if parameter.needs in PARTS else {})
 
 
 def function_entry(function: Function, tail: Tail, emissions: Sequence[Emission]) -> dict[str, Any]:
     """Return what a caller must know of a function."""
+    exact = EXACT_DERIVATIVES.get(function.name, ())
     entry = {
         "doc": function.doc,
         "group": SIGNATURES[function.name].group,
-        "exact_derivatives": list(map(list, EXACT_DERIVATIVES.get(function.name, ()))),
+        "exact_derivatives": [] if tail.shape.fixed else list(map(list, exact)),
         "inputs": [argument_entry(a, tail) for a in function.inputs],
         "outputs": [argument_entry(a, tail) for a in function.outputs],
     }

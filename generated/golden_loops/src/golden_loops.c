@@ -1117,9 +1117,9 @@ INLINE real golden_loops_zero_times(int size, const real *x)
 }
 
 /* Whether R(q) can be computed: the quaternion's squared norm neither vanishes nor overflows. */
-INLINE int golden_loops_has_attitude(const real *q)
+INLINE int golden_loops_has_attitude(const real *c)
 {
-  const real square = q[3] * q[3] + q[4] * q[4] + q[5] * q[5] + q[6] * q[6];
+  const real square = c[0] * c[0] + c[1] * c[1] + c[2] * c[2] + c[3] * c[3];
   return square >= DBL_MIN && square <= DBL_MAX;
 }
 #undef INLINE
@@ -1128,7 +1128,7 @@ INLINE int golden_loops_has_attitude(const real *q)
 int golden_loops_bias_force(const golden_loops_parameters *parameters, const golden_loops_real *q,
                             const golden_loops_real *v, golden_loops_real *force, golden_loops_real *work)
 {
-  if (!(golden_loops_has_attitude(q) && golden_loops_zero_times(11, q) + golden_loops_zero_times(10, v) == 0.0)) {
+  if (!(golden_loops_has_attitude(q + 3) && golden_loops_zero_times(11, q) + golden_loops_zero_times(10, v) == 0.0)) {
     return STATUS_NOT_FINITE;
   }
   const int status = golden_loops_unchecked_bias_force(parameters, q, v, force, work);
@@ -1142,7 +1142,7 @@ int golden_loops_forward_dynamics(const golden_loops_parameters *parameters, con
                                   const golden_loops_real *v, const golden_loops_real *tau, golden_loops_real *v_dot,
                                   golden_loops_real *work)
 {
-  if (!(golden_loops_has_attitude(q) && golden_loops_zero_times(11, q) + golden_loops_zero_times(10, v) + golden_loops_zero_times(4, tau) == 0.0)) {
+  if (!(golden_loops_has_attitude(q + 3) && golden_loops_zero_times(11, q) + golden_loops_zero_times(10, v) + golden_loops_zero_times(4, tau) == 0.0)) {
     return STATUS_NOT_FINITE;
   }
   const int status = golden_loops_unchecked_forward_dynamics(parameters, q, v, tau, v_dot, work);

@@ -263,17 +263,17 @@ STEP golden_loops_transpose(int rows, int columns, const real *from, int apart, 
   }
 }
 
-/* rows[k][b] = states[b][k]; where fewer than STATES are left, the last one is repeated. */
-STEP golden_loops_gather(int size, size_t count, const real *states, real *rows)
+/* rows[k][b] = states[b][k], states being so far apart; where fewer than STATES are left, the last one is repeated. */
+STEP golden_loops_gather(int size, size_t count, const real *states, int apart, real *rows)
 {
   if (count == STATES) {
-    golden_loops_transpose(STATES, size, states, size, rows, STATES);
+    golden_loops_transpose(STATES, size, states, apart, rows, STATES);
     return;
   }
   const int last = (int)count - 1;
   for (int b = 0; b < STATES; ++b) {
     for (int k = 0; k < size; ++k) {
-      rows[k * STATES + b] = states[(b < last ? b : last) * size + k];
+      rows[k * STATES + b] = states[(b < last ? b : last) * apart + k];
     }
   }
 }
@@ -310,13 +310,13 @@ static inline int golden_loops_rows_finite(int rows, const real *x)
 }
 
 /* Whether the quaternions' squared norms neither vanish nor overflow. */
-static inline int golden_loops_rows_have_attitude(const real *q)
+static inline int golden_loops_rows_have_attitude(const real *quaternion)
 {
   int sound = 1;
   for (int c = 0; c < STATES; c += LANES) {
     lanes sum = WIDE(0.0);
-    for (int k = 3; k < 7; ++k) {
-      sum += LOAD(q + k * STATES + c) * LOAD(q + k * STATES + c);
+    for (int k = 0; k < 4; ++k) {
+      sum += LOAD(quaternion + k * STATES + c) * LOAD(quaternion + k * STATES + c);
     }
     sound &= golden_loops_everywhere((sum >= DBL_MIN) & (sum <= DBL_MAX));
   }
@@ -1547,9 +1547,10 @@ static int golden_loops_bias_force_rows(const golden_loops_parameters *parameter
   return STATUS_OK;
 }
 
-/* On an error `failed` is the first of the states that it may concern. */
-int golden_loops_side_by_side_bias_force(golden_loops_call *call);
-int golden_loops_side_by_side_bias_force(golden_loops_call *call)
+/* `apart`: numbers from one state to the next of each array, 0 where an input is the same for all of them.  On an error
+ * `failed` is the first of the states that it may concern. */
+int golden_loops_side_by_side_bias_force_apart(golden_loops_call *call, const size_t *apart);
+int golden_loops_side_by_side_bias_force_apart(golden_loops_call *call, const size_t *apart)
 {
   real *const q = call->work;
   real *const v = q + STATES * 11;
@@ -1558,9 +1559,9 @@ int golden_loops_side_by_side_bias_force(golden_loops_call *call)
   for (size_t first = 0; first < call->count; first += STATES) {
     const size_t count = call->count - first < STATES ? call->count - first : STATES;
     call->failed = first;
-    golden_loops_gather(11, count, call->arrays[0] + first * 11, q);
-    golden_loops_gather(10, count, call->arrays[1] + first * 10, v);
-    if (!(golden_loops_rows_have_attitude(q) && golden_loops_rows_finite(21, q))) {
+    golden_loops_gather(11, count, call->arrays[0] + first * apart[0], (int)apart[0], q);
+    golden_loops_gather(10, count, call->arrays[1] + first * apart[1], (int)apart[1], v);
+    if (!(golden_loops_rows_have_attitude(q + 3 * STATES) && golden_loops_rows_finite(21, q))) {
       return GOLDEN_LOOPS_NOT_FINITE;
     }
     const int status = golden_loops_bias_force_rows(call->parameters, q, v, force, work);
@@ -1570,9 +1571,17 @@ int golden_loops_side_by_side_bias_force(golden_loops_call *call)
     if (!golden_loops_rows_finite(10, force)) {
       return GOLDEN_LOOPS_NOT_FINITE;
     }
-    golden_loops_scatter(10, count, force, call->arrays[2] + first * 10, 10);
+    golden_loops_scatter(10, count, force, call->arrays[2] + first * apart[2], (int)apart[2]);
   }
   return STATUS_OK;
+}
+
+/* The same where each array's states follow each other. */
+int golden_loops_side_by_side_bias_force(golden_loops_call *call);
+int golden_loops_side_by_side_bias_force(golden_loops_call *call)
+{
+  static const size_t packed[] = { 11, 10, 10 };
+  return golden_loops_side_by_side_bias_force_apart(call, packed);
 }
 
 /* v_dot from Eq. 1 */
@@ -1703,9 +1712,10 @@ static int golden_loops_forward_dynamics_rows(const golden_loops_parameters *par
   return STATUS_OK;
 }
 
-/* On an error `failed` is the first of the states that it may concern. */
-int golden_loops_side_by_side_forward_dynamics(golden_loops_call *call);
-int golden_loops_side_by_side_forward_dynamics(golden_loops_call *call)
+/* `apart`: numbers from one state to the next of each array, 0 where an input is the same for all of them.  On an error
+ * `failed` is the first of the states that it may concern. */
+int golden_loops_side_by_side_forward_dynamics_apart(golden_loops_call *call, const size_t *apart);
+int golden_loops_side_by_side_forward_dynamics_apart(golden_loops_call *call, const size_t *apart)
 {
   real *const q = call->work;
   real *const v = q + STATES * 11;
@@ -1715,10 +1725,10 @@ int golden_loops_side_by_side_forward_dynamics(golden_loops_call *call)
   for (size_t first = 0; first < call->count; first += STATES) {
     const size_t count = call->count - first < STATES ? call->count - first : STATES;
     call->failed = first;
-    golden_loops_gather(11, count, call->arrays[0] + first * 11, q);
-    golden_loops_gather(10, count, call->arrays[1] + first * 10, v);
-    golden_loops_gather(4, count, call->arrays[2] + first * 4, tau);
-    if (!(golden_loops_rows_have_attitude(q) && golden_loops_rows_finite(25, q))) {
+    golden_loops_gather(11, count, call->arrays[0] + first * apart[0], (int)apart[0], q);
+    golden_loops_gather(10, count, call->arrays[1] + first * apart[1], (int)apart[1], v);
+    golden_loops_gather(4, count, call->arrays[2] + first * apart[2], (int)apart[2], tau);
+    if (!(golden_loops_rows_have_attitude(q + 3 * STATES) && golden_loops_rows_finite(25, q))) {
       return GOLDEN_LOOPS_NOT_FINITE;
     }
     const int status = golden_loops_forward_dynamics_rows(call->parameters, q, v, tau, v_dot, work);
@@ -1728,9 +1738,17 @@ int golden_loops_side_by_side_forward_dynamics(golden_loops_call *call)
     if (!golden_loops_rows_finite(10, v_dot)) {
       return GOLDEN_LOOPS_NOT_FINITE;
     }
-    golden_loops_scatter(10, count, v_dot, call->arrays[3] + first * 10, 10);
+    golden_loops_scatter(10, count, v_dot, call->arrays[3] + first * apart[3], (int)apart[3]);
   }
   return STATUS_OK;
+}
+
+/* The same where each array's states follow each other. */
+int golden_loops_side_by_side_forward_dynamics(golden_loops_call *call);
+int golden_loops_side_by_side_forward_dynamics(golden_loops_call *call)
+{
+  static const size_t packed[] = { 11, 10, 4, 10 };
+  return golden_loops_side_by_side_forward_dynamics_apart(call, packed);
 }
 
 #undef ROW

@@ -615,9 +615,9 @@ INLINE real golden_straight_zero_times(int size, const real *x)
 }
 
 /* Whether R(q) can be computed: the quaternion's squared norm neither vanishes nor overflows. */
-INLINE int golden_straight_has_attitude(const real *q)
+INLINE int golden_straight_has_attitude(const real *c)
 {
-  const real square = q[3] * q[3] + q[4] * q[4] + q[5] * q[5] + q[6] * q[6];
+  const real square = c[0] * c[0] + c[1] * c[1] + c[2] * c[2] + c[3] * c[3];
   return square >= DBL_MIN && square <= DBL_MAX;
 }
 #undef INLINE
@@ -626,7 +626,7 @@ INLINE int golden_straight_has_attitude(const real *q)
 int golden_straight_mass_matrix(const golden_straight_parameters *parameters, const golden_straight_real *q,
                                 golden_straight_real *H, golden_straight_real *work)
 {
-  if (!(golden_straight_has_attitude(q) && golden_straight_zero_times(9, q) == 0.0)) {
+  if (!(golden_straight_has_attitude(q + 3) && golden_straight_zero_times(9, q) == 0.0)) {
     return STATUS_NOT_FINITE;
   }
   const int status = golden_straight_unchecked_mass_matrix(parameters, q, H, work);
@@ -640,7 +640,7 @@ int golden_straight_forward_dynamics(const golden_straight_parameters *parameter
                                      const golden_straight_real *v, const golden_straight_real *tau,
                                      golden_straight_real *v_dot, golden_straight_real *work)
 {
-  if (!(golden_straight_has_attitude(q) && golden_straight_zero_times(9, q) + golden_straight_zero_times(8, v) + golden_straight_zero_times(2, tau) == 0.0)) {
+  if (!(golden_straight_has_attitude(q + 3) && golden_straight_zero_times(9, q) + golden_straight_zero_times(8, v) + golden_straight_zero_times(2, tau) == 0.0)) {
     return STATUS_NOT_FINITE;
   }
   const int status = golden_straight_unchecked_forward_dynamics(parameters, q, v, tau, v_dot, work);

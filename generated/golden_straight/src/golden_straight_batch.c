@@ -242,17 +242,17 @@ STEP golden_straight_transpose(int rows, int columns, const real *from, int apar
   }
 }
 
-/* rows[k][b] = states[b][k]; where fewer than STATES are left, the last one is repeated. */
-STEP golden_straight_gather(int size, size_t count, const real *states, real *rows)
+/* rows[k][b] = states[b][k], states being so far apart; where fewer than STATES are left, the last one is repeated. */
+STEP golden_straight_gather(int size, size_t count, const real *states, int apart, real *rows)
 {
   if (count == STATES) {
-    golden_straight_transpose(STATES, size, states, size, rows, STATES);
+    golden_straight_transpose(STATES, size, states, apart, rows, STATES);
     return;
   }
   const int last = (int)count - 1;
   for (int b = 0; b < STATES; ++b) {
     for (int k = 0; k < size; ++k) {
-      rows[k * STATES + b] = states[(b < last ? b : last) * size + k];
+      rows[k * STATES + b] = states[(b < last ? b : last) * apart + k];
     }
   }
 }
@@ -289,13 +289,13 @@ static inline int golden_straight_rows_finite(int rows, const real *x)
 }
 
 /* Whether the quaternions' squared norms neither vanish nor overflow. */
-static inline int golden_straight_rows_have_attitude(const real *q)
+static inline int golden_straight_rows_have_attitude(const real *quaternion)
 {
   int sound = 1;
   for (int c = 0; c < STATES; c += LANES) {
     lanes sum = WIDE(0.0);
-    for (int k = 3; k < 7; ++k) {
-      sum += LOAD(q + k * STATES + c) * LOAD(q + k * STATES + c);
+    for (int k = 0; k < 4; ++k) {
+      sum += LOAD(quaternion + k * STATES + c) * LOAD(quaternion + k * STATES + c);
     }
     sound &= golden_straight_everywhere((sum >= DBL_MIN) & (sum <= DBL_MAX));
   }
@@ -831,9 +831,10 @@ static int golden_straight_mass_matrix_rows(const golden_straight_parameters *pa
   return STATUS_OK;
 }
 
-/* On an error `failed` is the first of the states that it may concern. */
-int golden_straight_side_by_side_mass_matrix(golden_straight_call *call);
-int golden_straight_side_by_side_mass_matrix(golden_straight_call *call)
+/* `apart`: numbers from one state to the next of each array, 0 where an input is the same for all of them.  On an error
+ * `failed` is the first of the states that it may concern. */
+int golden_straight_side_by_side_mass_matrix_apart(golden_straight_call *call, const size_t *apart);
+int golden_straight_side_by_side_mass_matrix_apart(golden_straight_call *call, const size_t *apart)
 {
   real *const q = call->work;
   real *const H = q + STATES * 9;
@@ -841,8 +842,8 @@ int golden_straight_side_by_side_mass_matrix(golden_straight_call *call)
   for (size_t first = 0; first < call->count; first += STATES) {
     const size_t count = call->count - first < STATES ? call->count - first : STATES;
     call->failed = first;
-    golden_straight_gather(9, count, call->arrays[0] + first * 9, q);
-    if (!(golden_straight_rows_have_attitude(q) && golden_straight_rows_finite(9, q))) {
+    golden_straight_gather(9, count, call->arrays[0] + first * apart[0], (int)apart[0], q);
+    if (!(golden_straight_rows_have_attitude(q + 3 * STATES) && golden_straight_rows_finite(9, q))) {
       return GOLDEN_STRAIGHT_NOT_FINITE;
     }
     const int status = golden_straight_mass_matrix_rows(call->parameters, q, H, work);
@@ -852,9 +853,17 @@ int golden_straight_side_by_side_mass_matrix(golden_straight_call *call)
     if (!golden_straight_rows_finite(64, H)) {
       return GOLDEN_STRAIGHT_NOT_FINITE;
     }
-    golden_straight_scatter(64, count, H, call->arrays[1] + first * 64, 64);
+    golden_straight_scatter(64, count, H, call->arrays[1] + first * apart[1], (int)apart[1]);
   }
   return STATUS_OK;
+}
+
+/* The same where each array's states follow each other. */
+int golden_straight_side_by_side_mass_matrix(golden_straight_call *call);
+int golden_straight_side_by_side_mass_matrix(golden_straight_call *call)
+{
+  static const size_t packed[] = { 9, 64 };
+  return golden_straight_side_by_side_mass_matrix_apart(call, packed);
 }
 
 /* v_dot from Eq. 1 */
@@ -869,9 +878,10 @@ static int golden_straight_forward_dynamics_rows(const golden_straight_parameter
   return STATUS_OK;
 }
 
-/* On an error `failed` is the first of the states that it may concern. */
-int golden_straight_side_by_side_forward_dynamics(golden_straight_call *call);
-int golden_straight_side_by_side_forward_dynamics(golden_straight_call *call)
+/* `apart`: numbers from one state to the next of each array, 0 where an input is the same for all of them.  On an error
+ * `failed` is the first of the states that it may concern. */
+int golden_straight_side_by_side_forward_dynamics_apart(golden_straight_call *call, const size_t *apart);
+int golden_straight_side_by_side_forward_dynamics_apart(golden_straight_call *call, const size_t *apart)
 {
   real *const q = call->work;
   real *const v = q + STATES * 9;
@@ -881,10 +891,10 @@ int golden_straight_side_by_side_forward_dynamics(golden_straight_call *call)
   for (size_t first = 0; first < call->count; first += STATES) {
     const size_t count = call->count - first < STATES ? call->count - first : STATES;
     call->failed = first;
-    golden_straight_gather(9, count, call->arrays[0] + first * 9, q);
-    golden_straight_gather(8, count, call->arrays[1] + first * 8, v);
-    golden_straight_gather(2, count, call->arrays[2] + first * 2, tau);
-    if (!(golden_straight_rows_have_attitude(q) && golden_straight_rows_finite(19, q))) {
+    golden_straight_gather(9, count, call->arrays[0] + first * apart[0], (int)apart[0], q);
+    golden_straight_gather(8, count, call->arrays[1] + first * apart[1], (int)apart[1], v);
+    golden_straight_gather(2, count, call->arrays[2] + first * apart[2], (int)apart[2], tau);
+    if (!(golden_straight_rows_have_attitude(q + 3 * STATES) && golden_straight_rows_finite(19, q))) {
       return GOLDEN_STRAIGHT_NOT_FINITE;
     }
     const int status = golden_straight_forward_dynamics_rows(call->parameters, q, v, tau, v_dot, work);
@@ -894,9 +904,17 @@ int golden_straight_side_by_side_forward_dynamics(golden_straight_call *call)
     if (!golden_straight_rows_finite(8, v_dot)) {
       return GOLDEN_STRAIGHT_NOT_FINITE;
     }
-    golden_straight_scatter(8, count, v_dot, call->arrays[3] + first * 8, 8);
+    golden_straight_scatter(8, count, v_dot, call->arrays[3] + first * apart[3], (int)apart[3]);
   }
   return STATUS_OK;
+}
+
+/* The same where each array's states follow each other. */
+int golden_straight_side_by_side_forward_dynamics(golden_straight_call *call);
+int golden_straight_side_by_side_forward_dynamics(golden_straight_call *call)
+{
+  static const size_t packed[] = { 9, 8, 2, 8 };
+  return golden_straight_side_by_side_forward_dynamics_apart(call, packed);
 }
 
 #undef ROW

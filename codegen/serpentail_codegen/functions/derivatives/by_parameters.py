@@ -24,8 +24,10 @@ def assemble_forward_dynamics_parameter_derivatives(draft: Draft, arrays: dict[s
     arguments = {name: arrays[name] for name in ("q", "v")} | motion
     rows = parameter_tangents(draft, CORE, arguments)
     x = draft.wide("x", draft.tail.nv, count)
-    gravity = draft.wide("d_gravity_z", 1, count)[0]
-    draft.unit(gravity, 0)  # it is the first parameter: p_b_ddot falls by as much
+    gravity = None
+    if "gravity" in draft.parameters:
+        gravity = draft.wide("d_gravity_z", 1, count)[0]
+        draft.unit(gravity, 0)  # it is the first parameter: p_b_ddot falls by as much
     factored.solve(draft, minus(draft, rows, gravity=gravity), x)
     spread_parameters(draft, x, arrays["dparameters"])
 

@@ -19,6 +19,7 @@ from ...scene.signatures.arguments import V_DOT, Argument, Q, V
 from ..draft import Draft
 from ..function import Function, assemble
 from ..layout import OMEGA, PER_SEGMENT, VELOCITY, block, coordinate, segment_v
+from ..passive import add_passive_slopes, net_torques
 from ..scope import Motion, State, Vectors
 from ..sweeps.pieces import mechanism
 from ..sweeps.segments import Freed, forward_dynamics
@@ -44,6 +45,10 @@ class Slopes:
         sizes = {"tip": 9 * draft.tail.segments, "force": FORCES * draft.tail.segments}
         return cls(*(draft.declare(Array(n, role, s, lanes=OWN)) for n, s in sizes.items()))
 
+    def torque(self, i: Index) -> Ref:
+        """Slopes of the torques of segment i."""
+        return self.force.part(FORCES * i + 6, PER_SEGMENT)
+
     def by_omega(self, i: Index) -> dict[str, Ref]:
         """Slopes by omega of the base: of w_dot and a of the tip, and of wrench and torques."""
         rows = {f"tip_{r}": self.tip.lane(9 * i + 3 + r, 0, 3) for r in range(6)}
@@ -55,7 +60,8 @@ def derivatives_by_segments(draft: Draft, arrays: dict[str, Array]) -> None:
     tail, nv = draft.tail, draft.tail.nv
     state, v_dot = State(arrays["q"], arrays["v"]), draft.array("acceleration", nv)
     unloaded = draft.constant("unloaded", [0] * 6)
-    freed = forward_dynamics(draft, state, unloaded, arrays["tau"], v_dot, again=True)
+    torques = net_torques(draft, state, arrays["tau"])
+    freed = forward_dynamics(draft, state, unloaded, torques, v_dot, again=True)
 
     # the torso accelerates by R^T (p_b_ddot + g z)
     reads = {"R": freed.R, "p_ddot": block(v_dot, VELOCITY)}
@@ -141,7 +147,7 @@ class Links:
         draft.fill(total["F_next"], 0)
         gather = moved(link.gather_wrench, "F", "F_next")
         with draft.loop("i", draft.tail.segments, downward=True) as i:
-            d_torque = force.part(FORCES * i + 6, PER_SEGMENT)
+            d_torque = self.slopes.torque(i)
             draft.fill(d_total, 0)
             draft.fill(d_torque, 0)
             with draft.loop("j", n, downward=True) as j:
@@ -167,6 +173,7 @@ def assemble_segment_slopes(draft: Draft, arrays: dict[str, Array]) -> None:
     links = Links(draft, segments, slopes, wrench, d_wrench, own)
     links.outward(Motion(state.omega, block(v_dot, OMEGA), arrays["a_torso"][0]), v_dot)
     links.inward()
+    add_passive_slopes(draft, state, own, slopes.torque)
 
 
 SLOPES = Function(

@@ -8,7 +8,8 @@ from ...scene.signatures.arguments import FORCE, MULTIPLIER, V_DOT, Argument, Q,
 from ..draft import Draft
 from ..dynamics import inertial_forces
 from ..function import Function
-from ..layout import OMEGA, block
+from ..layout import OMEGA, block, segment_v
+from ..passive import add_passive_forces, add_passive_power
 from ..scope import Motion, State, Vectors
 from ..sweeps.momentum import gather_moment
 from ..sweeps.pieces import mechanism
@@ -24,6 +25,7 @@ def assemble_core(draft: Draft, arrays: dict[str, Array]) -> None:
     """H v_dot + C in torso axes throughout: no attitude, no gravity."""
     state = State(arrays["q"], arrays["v"])
     core_forces(draft, state, state.omega, arrays)
+    add_passive_forces(draft, state, lambda i: segment_v(arrays["force"], i))
 
 
 def assemble_inertia(draft: Draft, arrays: dict[str, Array]) -> None:
@@ -59,6 +61,7 @@ def assemble_virtual_power(draft: Draft, arrays: dict[str, Array]) -> None:
     virtual = {"w_virtual": block(multiplier, OMEGA), "u_virtual": arrays["u"][0]}
     start = Vectors(motion | virtual)
     virtual_power(draft, segments, start, multiplier, v_dot, arrays["power"][0])
+    add_passive_power(draft, state, multiplier, arrays["power"][0])
 
 
 CORE = Function("core", "H v_dot + C in torso axes", (Q, V, V_DOT, A), (FORCE,), assemble_core)

@@ -1,11 +1,14 @@
 """Second derivatives: the Hessian of lambda^T (H v_dot + C)."""
 
+from collections.abc import Mapping
+from types import MappingProxyType
+
 from ...autodiff.forward import tangent_program
 from ...autodiff.reverse import adjoint_program
-from ...ir.program import Array
+from ...ir.program import Array, Ref
 from ...mechanics import rotations, turns
 from ..draft import Draft
-from ..function import assemble
+from ..function import Function, assemble
 from ..layout import OMEGA, TORSO_NV, VELOCITY, block
 from ..scope import Vectors
 from .differentiated import MOMENT, VIRTUAL_POWER
@@ -26,9 +29,10 @@ def assemble_inverse_dynamics_hessian(draft: Draft, arrays: dict[str, Array]) ->
     axes = torso_axes(draft, arrays["q"], arrays["v_dot"], arrays["multiplier"])
     gradient = {name: draft.array(f"b_{name}", 3) for name in ("a", "u")}
     given = {name: arrays[name] for name in ("q", "v", "v_dot", "multiplier")} | axes.arrays()
+    given["b_power"] = draft.fixed("one", [1]).array
     d_q, d_v = of_q.tangents(draft), of_v.tangents(draft)
-    by_q = tangents_of_gradient(draft, of_q, given | d_q, BY_Q, gradient)
-    by_v = tangents_of_gradient(draft, of_v, given | d_v, BY_V, {})
+    by_q = tangents_of_gradient(draft, VIRTUAL_POWER, of_q, given | d_q, BY_Q, gradient)
+    by_v = tangents_of_gradient(draft, VIRTUAL_POWER, of_v, given | d_v, BY_V)
     blocks = HessianBlocks(draft, of_q, of_v, arrays)
     blocks.clear()
     blocks.of_motion(by_q["q"], by_q["v"], by_v["v"])
@@ -50,23 +54,25 @@ def assemble_inverse_dynamics_hessian(draft: Draft, arrays: dict[str, Array]) ->
 
 def tangents_of_gradient(
     draft: Draft,
+    function: Function,
     directions: Directions,
     arguments: dict[str, Array],
     wanted: tuple[str, ...],
-    gradients: dict[str, Array],
+    gradients: Mapping[str, Array] = MappingProxyType({}),
 ) -> dict[str, Array]:
-    """Return wide rows of tangents of the wanted gradients, and store some of the gradients."""
+    """Return wide rows of tangents of the wanted gradients of ``power``, and store some of the
+    gradients; its weight is the argument ``b_power``.
+    """
     tail, lanes = draft.tail, directions.count
-    inner = adjoint_program(assemble(VIRTUAL_POWER, tail), wanted, ("power",))
+    inner = adjoint_program(assemble(function, tail), wanted, ("power",))
     active = [name for name in ("q", "v") if f"d_{name}" in arguments]
     kept = {f"b_{name}": array for name, array in gradients.items()}
     inner = tangent_program(inner, active, lanes, directions.outward, kept)
 
-    sizes = {"q": tail.nq, "v": tail.nv, "v_dot": tail.nv, "a": 3, "u": 3}
-    label, one = directions.label, draft.fixed("one", [1]).array
+    sizes, label = {a.name: a.length(tail) for a in function.inputs}, directions.label
     tangents = {n: draft.wide(f"d_b_{n}_{label}", sizes[n], lanes) for n in wanted}
     outputs = {f"d_b_{name}": array for name, array in tangents.items()}
-    draft.call(inner, b_power=one, **arguments, **outputs, **kept)
+    draft.call(inner, **arguments, **outputs, **kept)
     return tangents
 
 
@@ -87,12 +93,25 @@ def turned_twice(
 
     gradients = {f"b_{name}": array[0] for name, array in gradient.items()}
     turned = Vectors({**axes.vectors(), **gradients, "h": h[0], "R": axes.R})
-    draft.step(turns.turn_curvature, turned, **blocks.columns_of_turns("qq", OMEGA.start, 3))
-    draft.step(turns.turned_momentum, turned, **blocks.columns_of_turns("aq", 0, TORSO_NV))
+    own = own_tail_mass(draft)
+    draft.step(turns.turn_curvature, turned, own, **blocks.columns_of_turns("qq", OMEGA.start, 3))
+    draft.step(turns.turned_momentum, turned, own, **blocks.columns_of_turns("aq", 0, TORSO_NV))
     by_turn = draft.wide("by_turn", 3, of_q.count)
     change = {"gradient": d_h[0], "vector": axes.u[0]}
     draft.step(turns.term_by_turn, change, turn=by_turn[0])
     blocks.of_turned_inertia(by_turn)
+
+
+def own_tail_mass(draft: Draft) -> dict[str, Ref]:
+    """Return the mass of a tail whose links or arcs have masses of their own; else nothing."""
+    if not draft.tail.shape.own:
+        return {}
+    mass = draft.vector("tail_mass", 1)
+    draft.fill(mass, 0)
+    for name in [name for name in ("link_masses", "arc_masses") if name in draft.parameters]:
+        with draft.loop("g", draft.parameters[name].size) as g:
+            draft.copy(mass, draft.entry(name, g, 1), adds=True)
+    return {"tail_mass": mass}
 
 
 ASSEMBLIES = {"inverse_dynamics_hessian": assemble_inverse_dynamics_hessian}

@@ -1,30 +1,34 @@
 """Factoring 1 - w J for implicit integrators.
 
-J is the Jacobian of the rates of (q in its tangent space, v, bristles), of contact, joint damping
-and tracking gains alone.  With k_q = r_q + w k_v and the bristles eliminated, S (k_v - r_v) =
-forces is left, S = H + stiffness, symmetric and positive definite but for points that slide: there
-friction follows the load, and S takes two triangles. Eliminating translation is what the first
-three pivots of S do.
+J is the Jacobian of the rates of (q in its tangent space, v, bristles), of contact, joint damping,
+the passive tail and tracking gains alone.  With k_q = r_q + w k_v and the bristles eliminated,
+S (k_v - r_v) = forces is left, S = H + stiffness, symmetric and positive definite but for points
+that slide: there friction follows the load, and S takes two triangles. Eliminating translation is
+what the first three pivots of S do.
 """
 
 from dataclasses import dataclass
 
 from ...ir.program import Array, Index, Ref, padded
 from ...ir.step import Step
-from ...mechanics import contact, loads
+from ...mechanics import contact, loads, passive
 from ...mechanics import contact_stiffness as stiffness
 from ...mechanics.lower import derive
 from ..contact import Points, gather_points
 from ..draft import Draft
 from ..dynamics import fill_mass_matrix
-from ..layout import TORSO_NV, coordinate
+from ..layout import TORSO_NQ, TORSO_NV, coordinate
+from ..passive import SLOPES, passive_parameters
 from ..scope import State, Torso, Vectors
+from ..sweeps.pieces import each_segment, points_of
 from ..tails.mechanism import Segments
 from .layout import Factors, each_contact, first_tail_point
 
 
 def assemble_factor(draft: Draft, arrays: dict[str, Array]) -> None:
-    """S = H + tail damping and gains + J^T G J of the points in the ground, and its LDL^T."""
+    """S = H + tail damping, stiffness and gains + J^T G J of the points in the ground, and its
+    LDL^T.
+    """
     f, nv = Factors(arrays["factors"], draft.tail), draft.tail.nv
     state, weight = State(arrays["q"], arrays["v"]), {"weight": arrays["weight"].part(0, 1)}
     segments, R = fill_mass_matrix(draft, state, f.array, padded(nv))
@@ -40,6 +44,7 @@ def assemble_factor(draft: Draft, arrays: dict[str, Array]) -> None:
     with draft.loop("k", draft.tail.nt) as k:
         damping = {"damping": arrays["damping"].part(k, 1)}
         draft.step(stiffness.damped, weight, damping, damped=f("damped", k))
+        add_passive_stiffness(draft, f, state, k)
         draft.copy(f.tail_entry(k, k), f("damped", k), adds=True)
 
     # the ground
@@ -49,6 +54,26 @@ def assemble_factor(draft: Draft, arrays: dict[str, Array]) -> None:
         draft.factor_pair(f.array, nv)
     else:
         draft.factor(f.array, nv)
+
+
+def add_passive_stiffness(draft: Draft, f: Factors, state: State, k: Index) -> None:
+    """Springs, damping and stops of coordinate k, which tracking leaves nothing of."""
+    weights = {"weight": f("weight"), "gain_v": f("gain_v")}
+
+    def own(array: Array) -> Ref:
+        return array.part(k, 1)
+
+    if "damping" in draft.tail.passive:
+        parameters = passive_parameters(draft, passive.damped_coordinate, own)
+        draft.step(passive.damped_coordinate, weights, parameters, damped_=f("damped", k))
+    if draft.tail.elastic:
+        slope = draft.vector("slope", 1)
+        draft.fill(slope, 0)
+        for step in (SLOPES[name] for name in draft.tail.passive if name in SLOPES):
+            reads = Vectors({"angle": state.q.part(TORSO_NQ + k, 1)})
+            draft.step(step, reads, passive_parameters(draft, step, own), slope_=slope)
+        writes = {"damped_": f("damped", k), "sprung": f("sprung", k)}
+        draft.step(passive.sprung_coordinate, weights, {"slope": slope}, **writes)
 
 
 def add_gains(draft: Draft, f: Factors, weights: dict[str, Ref]) -> None:
@@ -130,10 +155,9 @@ def add_tail_contacts(draft: Draft, f: Factors, ground: Ground) -> None:
     """Tail points: as those of the torso, and their columns of the tail's coordinates."""
     tail, points = draft.tail, ground.points
     S, force = draft.array("S_segment", 12, tail.segments), draft.vector("force_column", 3)
-    with draft.loop("i", tail.segments) as i:
+    for stretch, i in each_segment(draft):
         draft.fill(S[i], 0)
-        with draft.loop("j", tail.links) as j:
-            g = tail.links * i + j
+        with points_of(draft, stretch, i) as g:
             number = g + points.first["tail"]
             draft.copy(S[i], points.columns[g], adds=True)
             keep_point(draft, f, ground, number)

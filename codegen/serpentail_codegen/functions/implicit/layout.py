@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from ...ir.program import Array, Index, Ref
 from ..draft import Draft
 from ..layout import PER_SEGMENT, TORSO_NV
+from ..sweeps.pieces import each_point
 from ..tail import Tail
 
 
@@ -57,8 +58,8 @@ def each_contact(draft: Draft, respond: Callable[[Index, Index | None], None]) -
     first, tail = 0, draft.tail
     for group, count in tail.groups.items():
         if group == "tail":
-            with draft.loop("i", tail.segments) as i, draft.loop("j", tail.links) as j:
-                respond(tail.links * i + j + first, i)
+            for i, g in each_point(draft):
+                respond(g + first, i)
         else:
             with draft.loop("j", count) as j:
                 respond(j + first, None)

@@ -7,7 +7,7 @@ for the bristles, k_q, k_v and k_u the solution.
 from dataclasses import dataclass
 
 from ...ir.program import Array, Index, Ref
-from ...mechanics import contact
+from ...mechanics import contact, passive
 from ...mechanics import contact_stiffness as stiffness
 from ..draft import Draft
 from ..layout import OMEGA, TORSO_NV, VELOCITY, block, coordinate, tail_v
@@ -44,11 +44,14 @@ def assemble_solve(draft: Draft, arrays: dict[str, Array]) -> None:
 
 
 def tail_response(draft: Draft, f: Factors, arrays: dict[str, Array]) -> None:
-    """Forces of damping and gains for the right-hand sides."""
+    """Forces of damping, stiffness and gains for the right-hand sides."""
     r_q, r_v, x = arrays["r_q"], arrays["r_v"], arrays["k_v"]
     with draft.loop("k", draft.tail.nt) as k:
         reads = {"damped": f("damped", k), "rate": tail_v(r_v, k)}
         draft.step(stiffness.damped_response, reads, rhs=tail_v(x, k))
+        if draft.tail.elastic:
+            reads = {"sprung": f("sprung", k), "angle": tail_v(r_q, k)}
+            draft.step(passive.sprung_response, reads, rhs_=tail_v(x, k))
     gains = {name: f(name) for name in ("gain_q", "gain_v")}
     with (
         draft.when(f("gain_v")),

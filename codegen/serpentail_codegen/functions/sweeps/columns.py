@@ -8,13 +8,13 @@ vectors hold several numbers: a column is a lane.
 from collections.abc import Callable
 
 from ...ir.program import Array, Ref
-from ...mechanics import link_columns, torso, translation
+from ...mechanics import link_columns, mount, torso, translation
 from ..draft import Draft
 from ..layout import OMEGA, VELOCITY, block, coordinate, tail_v
 from ..scope import Motion, State, Vectors
 from ..tails.mechanism import Segments, Wrenches
 from .inertia import column_of, columns_of
-from .pieces import each_piece, mechanism
+from .pieces import across, each_piece, mechanism
 from .wrenches import forward_wrenches
 
 
@@ -34,6 +34,8 @@ def factored_dynamics_by_columns(
     wrenches = forward_wrenches(draft, segments, motion, None)
     F_columns, rows = draft.wide("F_lanes", 6, nt + 1)[0], draft.wide("H_rows", nt, nt + 1)
     composite, own_joints = _gather(draft, segments, wrenches, F_columns, rows)
+    across(draft, mount.composite_at_mount, composite.only("h", "I").named)
+    across(draft, mount.lanes_at_mount, F_lanes=F_columns)
     draft.step(torso.torso_composite, composite, **composite)
     draft.copy(arrays["first_moment"].part(0, 3), composite["h"])
     draft.step(link_columns.lanes_at_torso, {"F_lanes": F_columns}, F_lanes=F_columns)
@@ -74,14 +76,14 @@ def _gather(
     for ref in composite.named.values():
         draft.fill(ref, 0)
     joint = Vectors({name: draft.vector(f"{name}_link", 6) for name in ("pitch", "yaw")})
-    with each_piece(draft, downward=True) as (i, g):
+    for i, g in each_piece(draft, downward=True):
         pitch, yaw = coordinate(i), coordinate(i, 1)
         places = {
             "at_bias": at.part(tail.nt, 1),
             "at_pitch": at.part(pitch, 1),
             "at_yaw": at.part(yaw, 1),
         }
-        piece, lanes_of = segments.at(i), {"F_lanes": F_columns}
+        piece, lanes_of = segments.at(i, g), {"F_lanes": F_columns}
         gather = link_columns.gather_composite
         draft.step(gather, piece, composite, **composite, **joint, own_=own_joints[i])
         draft.step(

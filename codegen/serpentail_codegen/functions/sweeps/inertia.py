@@ -3,12 +3,12 @@
 from collections.abc import Callable
 
 from ...ir.program import Array, Index, Ref, as_index
-from ...mechanics import torso
+from ...mechanics import mount, torso
 from ..draft import Draft
 from ..layout import coordinate
 from ..scope import Pose, State, Vectors
 from ..tails.mechanism import Segments
-from .pieces import mechanism, torso_pose
+from .pieces import across, each_segment, mechanism, pieces_of, torso_pose
 
 Block = Callable[..., Ref]  # entries of H, by the numbers of two tail coordinates and how many
 
@@ -27,17 +27,19 @@ def gather_inertia(
     momenta = draft.vectors(pitch=6, yaw=6)
     for ref in composite.named.values():
         draft.fill(ref, 0)
-    with draft.loop("i", draft.tail.segments, downward=True) as i:
+    for stretch, i in each_segment(draft, downward=True):
         # the segment's own block of H and its columns start anew, what is beyond goes on
         own = _own_block(H_tail, i) if H_tail else {}
         for ref in (*momenta.named.values(), *own.values()):
             draft.fill(ref, 0)
-        with draft.loop("j", mechanism(draft).pieces(draft.tail), downward=True):
+        with pieces_of(draft, stretch, i, downward=True) as g:
             step = mechanism(draft).gather
-            draft.step(step, segments.at(i), composite, momenta, **composite, **momenta, **own)
+            draft.step(step, segments.at(i, g), composite, momenta, **composite, **momenta, **own)
         root = {name: array[i] for name, array in roots.items()}
         draft.step(torso.column_at_torso, root, momenta, columns=columns_of(columns, i))
-    draft.step(torso.torso_composite, composite, **composite)
+    across(draft, mount.composite_at_mount, composite.only("h", "I").named)
+    if not draft.tail.shape.fixed:
+        draft.step(torso.torso_composite, composite, **composite)
     return composite
 
 
@@ -73,14 +75,14 @@ def forward_roots(
         for name, array in roots.items():
             draft.copy(array[i], pose[name])
 
-    with draft.loop("i", last) as i:
+    for stretch, i in each_segment(draft, stop=last):
         copy_pose(i)
         if S:
             draft.fill(S[i], 0)
-        with draft.loop("j", steps.pieces(draft.tail)):
+        with pieces_of(draft, stretch, i) as g:
             if S:
-                draft.step(steps.twist, pose, segments.at(i), S_=S[i])
-            draft.step(steps.pose, pose, segments.at(i), **pose)
+                draft.step(steps.twist, pose, segments.at(i, g), S_=S[i])
+            draft.step(steps.pose, pose, segments.at(i, g), **pose)
     copy_pose(as_index(last))
 
 

@@ -5,7 +5,7 @@ from ...mechanics import loads
 from ..draft import Draft
 from ..layout import LOAD, coordinates
 from ..scope import State, Vectors
-from .pieces import mechanism, torso_pose
+from .pieces import each_point, mechanism, torso_pose
 
 
 def sample_joints(draft: Draft, state: State) -> tuple[Array, Array]:
@@ -15,10 +15,9 @@ def sample_joints(draft: Draft, state: State) -> tuple[Array, Array]:
     S, points = draft.array("S_joint", 12, tail.total), draft.array("tail_point", 3, tail.total + 1)
     pose = torso_pose(draft, name="joint")
     draft.copy(points[0], pose.P)
-    with draft.loop("i", tail.segments) as i, draft.loop("j", tail.links) as j:
-        g = tail.links * i + j
-        draft.step(steps.twist, pose, samples.at(i), S=S[g])
-        draft.step(steps.pose, pose, samples.at(i), **pose)
+    for i, g in each_point(draft):
+        draft.step(steps.twist, pose, samples.at(i, g), S=S[g])
+        draft.step(steps.pose, pose, samples.at(i, g), **pose)
         draft.copy(points[g + 1], pose.P)
     return S, points
 
@@ -36,11 +35,7 @@ def gather_loads(draft: Draft, state: State, R: Ref, f_ext: Array, torques: Arra
         reads = {"R": R, "P": points[point], "f_point": force}
         draft.step(loads.load_at_point, reads, beyond, **beyond)
 
-    with (
-        draft.loop("i", draft.tail.segments, downward=True) as i,
-        draft.loop("j", draft.tail.links, downward=True) as j,
-    ):
-        g = draft.tail.links * i + j
+    for i, g in each_point(draft, downward=True):
         add_load(g + 1)
         draft.step(loads.joint_load, {"S": S[g]}, beyond, torque_=coordinates(torques, i))
     add_load(Index())

@@ -1,11 +1,11 @@
 """Sweeps of momentum: mass and first moment, momentum or kinetic energy."""
 
 from ...ir.program import Ref
-from ...mechanics import torso
+from ...mechanics import mount, torso
 from ..draft import Draft
 from ..scope import State, Vectors
 from ..tails.mechanism import Segments, Wrenches
-from .pieces import each_piece, mechanism
+from .pieces import across, each_piece, mechanism
 from .wrenches import gather_wrenches
 
 
@@ -15,9 +15,9 @@ def gather_momentum(draft: Draft, state: State, R: Ref, p_dot: Ref) -> Vectors:
     """
     segments, moment, velocity, u_torso = _begin_momentum(draft, state, R, p_dot)
     tail = mechanism(draft)
-    momenta = Wrenches(draft.array("momenta", 6, draft.tail.segments * tail.pieces(draft.tail)))
-    with each_piece(draft) as (i, g):
-        tail.momentum(draft, segments, i, velocity, momenta.at(i, g).named)
+    momenta = Wrenches(draft.array("momenta", 6, draft.tail.pieces))
+    for place in each_piece(draft):
+        tail.momentum(draft, segments, place, velocity, momenta.at(*place).named)
     total = gather_wrenches(draft, segments, momenta)
     reads = u_torso, {"w": state.omega}, total
     momentum = draft.store(torso.torso_momentum, *reads, force=3, moment=3)
@@ -28,8 +28,8 @@ def gather_kinetic(draft: Draft, state: State, R: Ref, kinetic: Ref) -> Vectors:
     """``mass`` and first moment ``h`` of the animal; sums its energy in ``kinetic``."""
     segments, moment, velocity, u_torso = _begin_momentum(draft, state, R, state.velocity)
     draft.fill(kinetic, 0)
-    with each_piece(draft) as (i, _):
-        mechanism(draft).momentum(draft, segments, i, velocity, {"kinetic_": kinetic})
+    for place in each_piece(draft):
+        mechanism(draft).momentum(draft, segments, place, velocity, {"kinetic_": kinetic})
     draft.step(torso.torso_momentum, u_torso, {"w": state.omega}, kinetic_=kinetic)
     return moment
 
@@ -46,17 +46,20 @@ def _begin_momentum(
     draft.copy(u_torso["u_torso"], velocity["u"])
     draft.copy(velocity["w"], state.omega)
     draft.step(torso.mount_velocity, velocity, u=velocity["u"])
+    across(draft, mount.velocity_at_root, velocity.named)
     return segments, moment, velocity, u_torso
 
 
 def gather_moment(draft: Draft, segments: Segments) -> Vectors:
-    """Mass and first moment of the tail at its mount, then with the torso at B, in ``mass`` and
-    ``h``.
+    """Mass and first moment of the tail at its mount, then with a torso that moves at B, in
+    ``mass`` and ``h``.
     """
     moment = draft.vectors(mass=1, h=3)
     for ref in moment.named.values():
         draft.fill(ref, 0)
-    with each_piece(draft, downward=True) as (i, _):
-        draft.step(mechanism(draft).gather_moment, segments.at(i), moment, **moment)
-    draft.step(torso.torso_moment, moment, **moment)
+    for place in each_piece(draft, downward=True):
+        draft.step(mechanism(draft).gather_moment, segments.at(*place), moment, **moment)
+    across(draft, mount.moment_at_mount, h=moment["h"])
+    if not draft.tail.shape.fixed:
+        draft.step(torso.torso_moment, moment, **moment)
     return moment

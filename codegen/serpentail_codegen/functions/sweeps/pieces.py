@@ -5,11 +5,12 @@ segments, ``g`` pieces or tail points.  What a sweep carries from piece to piece
 place.
 """
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
 
 from ...ir.program import Index, Ref
-from ...mechanics import rotations, torso
+from ...mechanics import mount, rotations, torso
+from ...scene.shape import Stretch
 from ..draft import Draft
 from ..scope import Pose, State
 from ..tails.mechanism import Mechanism
@@ -29,17 +30,61 @@ def attitude(draft: Draft, state: State) -> Ref:
     return draft.store(rotations.quaternion_rotation, reads, R=9)["R"]
 
 
+def each_segment(
+    draft: Draft, downward: bool = False, stop: int | None = None
+) -> Iterator[tuple[Stretch, Index]]:
+    """Open a loop over the segments of each stretch, up to segment ``stop``; yields both.
+
+    What a for statement does with them is recorded once for each stretch.
+    """
+    end = draft.tail.segments if stop is None else stop
+    stretches = [stretch for stretch in draft.tail.stretches if stretch.first < end]
+    for stretch in reversed(stretches) if downward else stretches:
+        with draft.loop("i", min(stretch.stop, end), downward, start=stretch.first) as i:
+            yield stretch, i
+
+
+def pieces_of(
+    draft: Draft, stretch: Stretch, i: Index, downward: bool = False
+) -> AbstractContextManager[Index]:
+    """Open a loop over the pieces of segment i; yields the number of the piece."""
+    return _numbered(
+        draft, stretch.pieces, stretch.first_piece - stretch.pieces * stretch.first, i, downward
+    )
+
+
+def points_of(
+    draft: Draft, stretch: Stretch, i: Index, downward: bool = False
+) -> AbstractContextManager[Index]:
+    """Open a loop over the tail points of segment i; yields the number of those before each."""
+    return _numbered(
+        draft, stretch.points, stretch.first_point - stretch.points * stretch.first, i, downward
+    )
+
+
 @contextmanager
+def _numbered(draft: Draft, count: int, first: int, i: Index, downward: bool) -> Iterator[Index]:
+    """Open a loop over so many of each segment; yields their number along the tail."""
+    with draft.loop("j", count, downward) as j:
+        yield count * i + j + first
+
+
 def each_piece(draft: Draft, downward: bool = False) -> Iterator[tuple[Index, Index]]:
     """Open the loops over segments and their pieces; yields the segment and the number of the
     piece.
     """
-    pieces = mechanism(draft).pieces(draft.tail)
-    with (
-        draft.loop("i", draft.tail.segments, downward) as i,
-        draft.loop("j", pieces, downward) as j,
-    ):
-        yield i, pieces * i + j
+    for stretch, i in each_segment(draft, downward):
+        with pieces_of(draft, stretch, i, downward) as g:
+            yield i, g
+
+
+def each_point(draft: Draft, downward: bool = False) -> Iterator[tuple[Index, Index]]:
+    """Open the loops over segments and their tail points; yields the segment, and how many points
+    of the tail are before this one, but the first.
+    """
+    for stretch, i in each_segment(draft, downward):
+        with points_of(draft, stretch, i, downward) as g:
+            yield i, g
 
 
 def torso_pose(
@@ -49,11 +94,36 @@ def torso_pose(
     attitude R in world axes from an origin.
     """
     pose = Pose(draft.vector(f"R_{name}", 9), draft.vector(f"P_{name}", 3))
+    axes = mount_axes(draft)
     if R:
         draft.copy(pose.R, R)
         start = origin or draft.fixed("origin", [0, 0, 0])
         draft.step(torso.mount_position, {"R": R, "p": start}, P=pose.P)
+        across(draft, mount.mounted_frame, R=pose.R)
+        return pose
+    if axes:
+        draft.copy(pose.R, axes["mount"])
     else:
         draft.fill(pose.R, *IDENTITY)
-        draft.copy(pose.P, draft.parameters["tail_mount"])
+    draft.copy(pose.P, draft.parameters["tail_mount"])
     return pose
+
+
+def mount_axes(draft: Draft) -> dict[str, Ref]:
+    """Return the rotation from the tail's root axes to the torso's; nothing where they are one."""
+    if not draft.tail.shape.tilted:
+        return {}
+    known = [array[0] for array in draft.arrays if array.name == "mount"]
+    return {"mount": known[0] if known else draft.store(mount.mount_rotation, mount=9)["mount"]}
+
+
+def across(
+    draft: Draft,
+    function: Callable[..., dict],
+    vectors: Mapping[str, Ref] | None = None,
+    **more: Ref,
+) -> None:
+    """Take vectors across the mount, in place, where the tail begins in axes of its own."""
+    axes, vectors = mount_axes(draft), {**(vectors or {}), **more}
+    if axes:
+        draft.step(function, axes, vectors, **vectors)

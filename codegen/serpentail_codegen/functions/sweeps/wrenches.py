@@ -3,12 +3,12 @@
 from collections.abc import Callable
 
 from ...ir.program import Array, Index, Ref
-from ...mechanics import torso
+from ...mechanics import mount, torso
 from ..draft import Draft
 from ..layout import OMEGA, VELOCITY, block, segment_v
 from ..scope import Motion, Vectors
 from ..tails.mechanism import Segments, Wrenches
-from .pieces import each_piece, mechanism
+from .pieces import across, each_piece, each_segment, mechanism, pieces_of
 
 
 def forward_wrenches(
@@ -20,14 +20,15 @@ def forward_wrenches(
     ``start`` is the torso's motion; ``v_dot`` None means that the tail does not accelerate.
     """
     tail = mechanism(draft)
-    wrench = draft.array("wrench", 6, draft.tail.segments * tail.pieces(draft.tail))
+    wrench = draft.array("wrench", 6, draft.tail.pieces)
     motion = Motion(*(draft.vector(f"{name}_here", 3) for name in ("w", "w_dot", "a")))
     draft.copy(motion.w, start.w)
     draft.copy(motion.w_dot, start.w_dot)
     draft.step(torso.mount_acceleration, start, a_mount=motion.a)
+    across(draft, mount.motion_at_root, motion.vectors())
     wrenches = Wrenches(wrench, tail.declare_torques(draft))
-    with each_piece(draft) as (i, g):
-        tail.move(draft, segments, i, motion, v_dot, wrenches.at(i, g))
+    for i, g in each_piece(draft):
+        tail.move(draft, segments, (i, g), motion, v_dot, wrenches.at(i, g))
     return wrenches
 
 
@@ -37,22 +38,22 @@ def gather_wrenches(
     wrenches: Wrenches,
     torque: Callable[[Index], Ref] | None = None,
 ) -> Vectors:
-    """Sum wrenches (or momenta) from the tip to the tail mount, in ``F_next``; torques add up per
-    segment.
+    """Sum wrenches (or momenta) from the tip to the tail mount, in ``F_next``, torso axes; torques
+    add up per segment.
 
     Of inertial wrenches this is the sum of Eq. 4.
     """
-    total, pieces = draft.vectors(F_next=6), mechanism(draft).pieces(draft.tail)
+    total = draft.vectors(F_next=6)
     draft.fill(total["F_next"], 0)
-    with draft.loop("i", draft.tail.segments, downward=True) as i:
+    for stretch, i in each_segment(draft, downward=True):
         writes = dict(total.named)
         if torque:
             draft.fill(torque(i), 0)
             writes["torque_"] = torque(i)
-        with draft.loop("j", pieces, downward=True) as j:
-            wrench = wrenches.at(i, pieces * i + j)
+        with pieces_of(draft, stretch, i, downward=True) as g:
             step = mechanism(draft).gather_wrench
-            draft.step(step, segments.at(i), wrench, total, **writes)
+            draft.step(step, segments.at(i, g), wrenches.at(i, g), total, **writes)
+    across(draft, mount.wrench_at_mount, total.named)
     return total
 
 
@@ -103,8 +104,12 @@ def virtual_power(
     for name in ("w", "w_dot", "w_virtual"):
         draft.copy(carried[name], start[name])
 
+    # into the tail's root axes
+    across(draft, mount.motion_at_root, carried.only("w", "w_dot", "a").named)
+    across(draft, mount.virtual_velocity_at_root, carried.only("w_virtual", "u_virtual").named)
+
     # from the mount to the tip
-    with each_piece(draft) as (i, _):
+    for i, g in each_piece(draft):
         rates = segments.motion(i, v_dot), {"virtual_rates": segment_v(multiplier, i)}
         step = mechanism(draft).power
-        draft.step(step, segments.at(i), *rates, carried, power_=power, **carried)
+        draft.step(step, segments.at(i, g), *rates, carried, power_=power, **carried)

@@ -3,11 +3,21 @@
 from collections.abc import Mapping
 from fractions import Fraction
 
-from ...ir.program import Array, Index, Ref
-from ...mechanics import link
+from ...ir.program import Array, Ref
+from ...mechanics import airborne_power, link
 from ..draft import Draft
-from ..scope import Motion, State, Vectors
-from .mechanism import Mechanism, Segments, simplified
+from ..scope import Instead, Motion, State, Vectors
+from .mechanism import Mechanism, Place, Segments, simplified
+
+
+def own_links(draft: Draft) -> Array:
+    """Store the properties of every link from its own mass, length, COM and inertia."""
+    names = ("link_masses", "link_lengths", "link_centers", "link_inertias")
+    array = draft.array("link", 6, draft.tail.pieces)
+    with draft.loop("g", draft.tail.pieces) as g:
+        own = {name: draft.entry(name, g, 3 if name == "link_inertias" else 1) for name in names}
+        draft.step(link.own_link_properties, Instead(own), link=array[g])
+    return array
 
 
 def link_properties(draft: Draft) -> Vectors:
@@ -18,7 +28,9 @@ def link_properties(draft: Draft) -> Vectors:
 
 def prepare_links(draft: Draft, state: State, doubled: bool = False) -> Segments:
     """Link properties, and the trigonometry of every segment's joint."""
-    properties = link_properties(draft)
+    own = draft.tail.shape.own
+    each = {"link": own_links(draft)} if own else {}
+    shared = {} if own else link_properties(draft).named
     arrays = {"joint": draft.array("joint", 4, draft.tail.segments)}
     if doubled:
         arrays["twice"] = draft.array("twice", 10, draft.tail.segments)
@@ -27,7 +39,7 @@ def prepare_links(draft: Draft, state: State, doubled: bool = False) -> Segments
         draft.step(link.joint_trigonometry, {"angles": state.angles(i)}, joint=joint)
         if doubled:
             draft.step(link.double_angles, {"joint": joint}, twice=arrays["twice"][i])
-    return Segments(state, arrays, properties.named)
+    return Segments(state, arrays, shared, each)
 
 
 def prepare_link_samples(draft: Draft, state: State, segments: Segments | None) -> Segments:
@@ -43,38 +55,38 @@ def no_torques(draft: Draft) -> Array | None:
 def move_link(
     draft: Draft,
     segments: Segments,
-    i: Index,
+    place: Place,
     motion: Motion,
     v_dot: Array | None,
     wrench: Vectors,
 ) -> None:
     """Carry ``w, w_dot, a`` over one link and store its inertial wrench."""
-    joint = draft.vectors(a_joint=3, swing=3)
+    joint = draft.scratch(a_joint=3, swing=3)
+    piece = segments.at(*place)
     draft.step(
         simplified(link.link_motion, segments.state, v_dot is not None),
-        segments.at(i),
-        segments.motion(i, v_dot),
+        piece,
+        segments.motion(place[0], v_dot),
         motion,
         **joint,
         **motion,
     )
     inertial = simplified(link.link_wrench, segments.state)
-    draft.step(inertial, segments.at(i), motion, joint, F=wrench["F"])
+    draft.step(inertial, piece, motion, joint, F=wrench["F"])
 
 
 def link_momentum(
-    draft: Draft, segments: Segments, i: Index, velocity: Vectors, writes: Mapping[str, Ref]
+    draft: Draft, segments: Segments, place: Place, velocity: Vectors, writes: Mapping[str, Ref]
 ) -> None:
     """Carry ``w, u`` over one link and give its momentum or kinetic energy."""
-    piece, rates = segments.at(i), segments.motion(i)
-    joint = draft.vectors(u_joint=3)
+    piece, rates = segments.at(*place), segments.motion(place[0])
+    joint = draft.scratch(u_joint=3)
     draft.step(link.link_angular_velocity, piece, rates, velocity, w=velocity["w"])
     draft.step(link.link_linear_velocity, piece, velocity, u=velocity["u"], **joint)
     draft.step(link.link_momentum, piece, velocity, joint, **writes)
 
 
 ARTICULATED = Mechanism(
-    pieces=lambda tail: tail.links,
     prepare=prepare_links,
     prepare_samples=prepare_link_samples,
     declare_torques=no_torques,
@@ -86,4 +98,5 @@ ARTICULATED = Mechanism(
     gather_wrench=link.gather_wrench,
     gather_moment=link.gather_moment,
     power=link.link_power,
+    power_and_momentum=airborne_power.link_power_and_momentum,
 )

@@ -1,16 +1,16 @@
 """The continuum tail: arc by arc, in the frames of the arcs' roots."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from fractions import Fraction
 from math import ceil, log2
 
 from ...ir.program import Array, Index, Ref
 from ...ir.step import Step
-from ...mechanics import arc, arc_inertia, arc_shape, arc_wrench
+from ...mechanics import airborne_power, arc, arc_inertia, arc_shape, arc_wrench
 from ...mechanics.lower import derive
 from ..draft import Draft
-from ..scope import Motion, State, Vectors
-from .mechanism import Mechanism, Segments, simplified
+from ..scope import Instead, Motion, State, Vectors
+from .mechanism import Mechanism, Place, Segments, simplified
 
 ARC = {"tip": 8, "shape": 16, "E": 9, "r": 3, "bend": 12}
 OWN = {"h_own": 3, "I_own": 6, "pitch_own": 6, "yaw_own": 6, "H_own": 3}
@@ -27,18 +27,30 @@ def bend_range(draft: Draft) -> dict[str, Ref]:
     return {"bend_range": draft.fixed("bend_range", [draft.tail.bend_range])}
 
 
-def section_properties(draft: Draft) -> Vectors:
-    """Store the properties of a segment, all being equal."""
+def own_sections(draft: Draft, name: str, part: Fraction) -> Array:
+    """Store mass and length of a part of every segment, from the segment's own."""
+    array = draft.array(name, 2, draft.tail.segments)
+    share = {"share": draft.fixed(f"part_of_{name}", [part])}
+    with draft.loop("i", draft.tail.segments) as i:
+        own = {key: draft.entry(key, i, 1) for key in ("arc_masses", "arc_lengths")}
+        draft.step(arc.own_section_properties, Instead(own), share, section=array[i])
+    return array
+
+
+def section_properties(draft: Draft) -> tuple[dict[str, Array], Mapping[str, Ref]]:
+    """Store the properties of every segment, or of one, all being equal: as arrays, or shared."""
+    if draft.tail.shape.own:
+        return {"section": own_sections(draft, "section", Fraction(1))}, {}
     share = draft.fixed("share", [Fraction(1, draft.tail.segments)])
-    return draft.store(arc.section_properties, {"share": share}, section=2)
+    return {}, draft.store(arc.section_properties, {"share": share}, section=2).named
 
 
 def prepare_arcs(draft: Draft, state: State, doubled: bool = False) -> Segments:
     """Shape, tip and own inertia of every segment."""
     del doubled
-    section, count = section_properties(draft), draft.tail.segments
+    (own, shared), count = section_properties(draft), draft.tail.segments
     arrays = {name: draft.array(name, size, count) for name, size in (ARC | OWN).items()}
-    segments = Segments(state, arrays, section.named)
+    segments = Segments(state, arrays | own, shared)
     limit, margin = bend_range(draft), draft.vector("margin", 1)
     with draft.loop("i", count) as i:
         piece = segments.at(i)
@@ -51,14 +63,17 @@ def prepare_arcs(draft: Draft, state: State, doubled: bool = False) -> Segments:
     return segments
 
 
-def sample_section(draft: Draft) -> tuple[dict[str, Ref], dict[str, Ref]]:
-    """Store the properties of one n-th of a segment; return the fraction, and them."""
+def sample_section(draft: Draft) -> tuple[dict[str, Ref], Callable[[Index], dict[str, Ref]]]:
+    """Store the properties of one n-th of a segment; return the fraction, and them by segment."""
     part = Fraction(1, draft.tail.links)
     fraction = {"fraction": draft.fixed("fraction", [part])}
+    if draft.tail.shape.own:
+        own = own_sections(draft, "section_sample", part)
+        return fraction, lambda i: {"section": own[i]}
     share = draft.fixed("share_sample", [part / draft.tail.segments])
     section = draft.vector("section_sample", 2)
     draft.step(arc.section_properties, {"share": share}, section=section)
-    return fraction, {"section": section}
+    return fraction, lambda i: {"section": section}
 
 
 def sample_arrays(draft: Draft) -> dict[str, Array]:
@@ -86,7 +101,7 @@ def prepare_arc_samples(draft: Draft, state: State, segments: Segments | None) -
         draft.step(arc_shape.bend_margin, angles, limit, margin=margin)
         draft.guard(margin, "OUT_OF_RANGE", tip)
         bent = {"angles": part, "tip": tip}
-        draft.step(arc.segment_tip, bent, section, **sample.only("E", "r", "bend"))
+        draft.step(arc.segment_tip, bent, section(i), **sample.only("E", "r", "bend"))
         draft.step(arc.columns_of_bend, sample, fraction, bend=sample["bend"])
     return samples
 
@@ -99,7 +114,7 @@ def bending_torques(draft: Draft) -> Array | None:
 def move_arc(
     draft: Draft,
     segments: Segments,
-    i: Index,
+    place: Place,
     motion: Motion,
     v_dot: Array | None,
     wrench: Vectors,
@@ -107,23 +122,22 @@ def move_arc(
     """Store the inertial wrench of one arc and its generalised forces, then carry ``w, w_dot, a``
     to its tip.
     """
-    reads = segments.at(i), segments.motion(i, v_dot), motion
+    reads = segments.at(*place), segments.motion(place[0], v_dot), motion
     forced = v_dot is not None
     draft.step(simplified(arc_wrench.segment_wrench, segments.state, forced), *reads, **wrench)
     draft.step(simplified(arc.segment_motion, segments.state, forced), *reads, **motion)
 
 
 def arc_momentum(
-    draft: Draft, segments: Segments, i: Index, velocity: Vectors, writes: Mapping[str, Ref]
+    draft: Draft, segments: Segments, place: Place, velocity: Vectors, writes: Mapping[str, Ref]
 ) -> None:
     """Give the momentum or kinetic energy of one arc, then carry ``w, u`` to its tip."""
-    reads = segments.at(i), segments.motion(i), velocity
+    reads = segments.at(*place), segments.motion(place[0]), velocity
     draft.step(arc_inertia.segment_momentum, *reads, **writes)
     draft.step(arc.segment_velocity, *reads, **velocity)
 
 
 CONTINUUM = Mechanism(
-    pieces=lambda tail: 1,
     prepare=prepare_arcs,
     prepare_samples=prepare_arc_samples,
     declare_torques=bending_torques,
@@ -135,4 +149,5 @@ CONTINUUM = Mechanism(
     gather_wrench=arc_wrench.gather_segment_wrench,
     gather_moment=arc_inertia.gather_segment_moment,
     power=arc_wrench.segment_power,
+    power_and_momentum=airborne_power.segment_power_and_momentum,
 )

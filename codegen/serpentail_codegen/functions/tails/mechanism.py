@@ -13,25 +13,28 @@ from ...mechanics.lower import derive
 from ..draft import Draft
 from ..layout import segment_v
 from ..scope import Motion, State, Vectors
-from ..tail import Tail
 
 StepFunction = Callable[..., dict]  # a function of mechanics, from which a step is derived
+Place = tuple[Index, Index]  # a segment, and a piece
 
 
 @dataclass(frozen=True)
 class Segments:
-    """What describes the pieces of all segments: arrays with an entry a segment, and vectors that
-    all of them share.
+    """What describes the pieces of all segments: arrays with an entry a segment, vectors that all
+    of them share, and arrays with an entry a piece.
     """
 
     state: State
     arrays: dict[str, Array]
     shared: Mapping[str, Ref] = field(default_factory=dict)
+    each: Mapping[str, Array] = field(default_factory=dict)
 
-    def at(self, i: Index) -> Vectors:
-        """Return what describes the pieces of segment i, and its coordinates."""
+    def at(self, i: Index, g: Index | None = None) -> Vectors:
+        """Return what describes piece g of segment i, and the segment's coordinates."""
         entries = {name: array[i] for name, array in self.arrays.items()}
-        return Vectors(entries | dict(self.shared) | {"angles": self.state.angles(i)})
+        own = {} if g is None else {name: array[g] for name, array in self.each.items()}
+        shared = dict(self.shared) | {"angles": self.state.angles(i)}
+        return Vectors(entries | own | shared)
 
     def motion(self, i: Index, v_dot: Array | None = None) -> Vectors:
         """Return the rates of segment i if it moves, and its accelerations if there are any."""
@@ -63,23 +66,24 @@ class Mechanism:
     ``prepare(draft, state, doubled)`` stores what describes the pieces, ``prepare_samples`` what
     lies between two tail points, given what describes the pieces if that is there.
     ``declare_torques`` declares what ``move`` stores a bend's own generalised forces in.
-    ``move(draft, segments, i, motion, v_dot, wrench)`` carries the motion over a piece and stores
-    its inertial wrench; ``momentum(draft, segments, i, velocity, writes)`` carries angular and
-    linear velocity ``w, u`` and gives momentum or kinetic energy.  The others are steps.
+    ``move(draft, segments, place, motion, v_dot, wrench)`` carries the motion over a piece and
+    stores its inertial wrench; ``momentum(draft, segments, place, velocity, writes)`` carries
+    angular and linear velocity ``w, u`` and gives momentum or kinetic energy; the place is a
+    segment and a piece of it.  The others are steps.
     """
 
-    pieces: Callable[[Tail], int]
     prepare: Callable[[Draft, State, bool], Segments]
     prepare_samples: Callable[[Draft, State, Segments | None], Segments]
     declare_torques: Callable[[Draft], Array | None]
-    move: Callable[[Draft, Segments, Index, Motion, Array | None, Vectors], None]
-    momentum: Callable[[Draft, Segments, Index, Vectors, Mapping[str, Ref]], None]
+    move: Callable[[Draft, Segments, Place, Motion, Array | None, Vectors], None]
+    momentum: Callable[[Draft, Segments, Place, Vectors, Mapping[str, Ref]], None]
     pose: StepFunction
     twist: StepFunction
     gather: StepFunction
     gather_wrench: StepFunction
     gather_moment: StepFunction
     power: StepFunction
+    power_and_momentum: StepFunction
 
 
 def simplified(function: StepFunction, state: State, forced: bool = True) -> Step:

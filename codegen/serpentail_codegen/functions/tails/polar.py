@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from ...ir.program import Array, Index, Ref
+from ...ir.program import Array, Ref
 from ...mechanics import polar_arc
 from ..draft import Draft
 from ..scope import Motion, State, Vectors
@@ -15,7 +15,7 @@ from .continuum import (
     sample_section,
     section_properties,
 )
-from .mechanism import Segments, simplified
+from .mechanism import Place, Segments, simplified
 
 POLAR_OWN = {"trig": 4, "E_v": 15, "Q_v": 10, "loading": 27}
 
@@ -30,10 +30,10 @@ def guard_polar(draft: Draft, angles: Ref, limit: dict[str, Ref], *protects: Ref
 def prepare_polar_arcs(draft: Draft, state: State, doubled: bool = False) -> Segments:
     """Integrals over the slices, tip and own inertia of every segment."""
     del doubled
-    section, count = section_properties(draft), draft.tail.segments
+    (own, shared), count = section_properties(draft), draft.tail.segments
     sizes = {name: ARC[name] for name in ("E", "r", "bend")} | OWN | POLAR_OWN
     arrays = {name: draft.array(name, size, count) for name, size in sizes.items()}
-    segments, limit = Segments(state, arrays, section.named), bend_range(draft)
+    segments, limit = Segments(state, arrays | own, shared), bend_range(draft)
     with draft.loop("i", count) as i:
         piece = segments.at(i)
         draft.step(polar_arc.segment_trigonometry, piece, trig=piece["trig"])
@@ -56,7 +56,7 @@ def prepare_polar_samples(draft: Draft, state: State, segments: Segments | None)
         draft.step(polar_arc.segment_trigonometry, {"angles": part}, trig=trig)
         guard_polar(draft, angles, limit, trig)
         bent = {"angles": part, "trig": trig}
-        draft.step(polar_arc.segment_tip, bent, section, **sample.only("E", "r", "bend"))
+        draft.step(polar_arc.segment_tip, bent, section(i), **sample.only("E", "r", "bend"))
         draft.step(polar_arc.columns_of_arc, sample, fraction, bend=sample["bend"])
     return samples
 
@@ -64,7 +64,7 @@ def prepare_polar_samples(draft: Draft, state: State, segments: Segments | None)
 def move_polar_arc(
     draft: Draft,
     segments: Segments,
-    i: Index,
+    place: Place,
     motion: Motion,
     v_dot: Array | None,
     wrench: Vectors,
@@ -72,8 +72,8 @@ def move_polar_arc(
     """Store the inertial wrench of one arc and its generalised forces, then carry ``w, w_dot, a``
     to its tip.
     """
-    piece, state, forced = segments.at(i), segments.state, v_dot is not None
-    reads = piece, segments.motion(i, v_dot), motion
+    piece, state, forced = segments.at(*place), segments.state, v_dot is not None
+    reads = piece, segments.motion(place[0], v_dot), motion
     loading = simplified(polar_arc.segment_loading, state, forced)
     draft.step(loading, *reads, loading=piece["loading"])
     draft.step(polar_arc.segment_wrench, piece, **wrench)

@@ -12,16 +12,17 @@ from ...passes.batch import batched, unrolled_step
 from ...passes.directions import directions_in_turn, has_directions
 from ...passes.unrolled_ldl import unrolled_ldl
 from ...scene.scene import Scene
+from ...scene.signatures.table import AIRBORNE
 from ..templating import render
 from .form import UNROLLED_ROWS, PrintedFunction, baked_values
 from .loops import in_loops
 from .routine import CFunction
-from .views import ArgumentView, callee_view, step_views
+from .views import ArgumentView, callee_view, quaternion_in, step_views
 
 STATES = {"double": 8, "float": 16}  # side by side: lanes of the widest vector
 # nodes: beyond, loops are hardly slower, and compile in a quarter of the time
-STRAIGHT_UP_TO = 10000
-MOST_APPLIED = 22000  # nodes: of more, no line is that short without its zeros
+STRAIGHT_UP_TO = 11000
+MOST_APPLIED = 28000  # nodes: of more, no line is that short without its zeros
 # by the source that they lie in: each is compiled when it is first needed
 PARTS = {
     "batch": ("mass_matrix", "bias_force", "inverse_dynamics", "forward_dynamics"),
@@ -33,6 +34,7 @@ PARTS = {
         "forward_dynamics_vjp",
         "inverse_dynamics_hessian",
     ),
+    "batch_airborne": AIRBORNE,
 }
 BATCHED = {name: part for part, names in PARTS.items() for name in names}
 
@@ -104,6 +106,7 @@ class BatchView:
         )
         self.inputs = [ArgumentView(a, tail) for a in function.inputs]
         self.outputs = [ArgumentView(a, tail) for a in function.outputs]
+        self.quaternion = quaternion_in(function.inputs[0].name, " * STATES")
         self.names = ", ".join(a.name for a in self.inputs + self.outputs)
         self.arguments_work = batch.arguments_work
 

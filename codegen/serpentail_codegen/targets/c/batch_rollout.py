@@ -13,8 +13,9 @@ from ..templating import render
 from .batch import STATES, straight
 from .form import PrintedFunction, baked_values
 from .loops import in_loops
-from .records import fields, typed
+from .records import fields, member_views
 from .routine import CFunction
+from .simulation import own_damping
 from .views import callee_view, step_views
 
 RECORD = fields(
@@ -123,36 +124,38 @@ def batch_rollout_file(
 def rollout_context(scene: Scene, rollout: BatchRollout) -> dict[str, Any]:
     """Return what the template lays out other than the model's does."""
     # states and torques have names of their own; parameters lie at the begin of the workspace
-    arguments, place = [], 0
+    arguments, place, places = [], 0, {}
     for array in rollout.program.of_role("input"):
         if array.name in ("q", "v", "tau"):
             arguments.append(array.name)
         else:
             arguments.append(f"own + STATES * {place}")
+            places[array.name] = place
             place += array.length
 
-    record = [
-        {"type": typed(f.type, scene.name), "name": f.name, "meaning": f.meaning} for f in RECORD
-    ]
     return {
         "states": rollout.states,
         "widest": rollout.states,
         "lanes_function": callee_view(rollout.program, rollout.body, scene.name),
         "arguments": ", ".join(arguments),
-        "record": record,
+        "record": member_views(RECORD, scene.name),
+        "damped_in_lanes": damped_in_lanes(scene, places),
         "parameter_count": rollout.parameters,
         "given": rollout.given,
         "state": rollout.state,
         "slots": SLOTS,
-        "rollouts_record": [
-            {"type": f.type if f.type.endswith("*") else f"{f.type} ", "name": f.name}
-            | {"meaning": f.meaning}
-            for f in ROLLOUTS
-        ],
+        "rollouts_record": member_views(ROLLOUTS, scene.name),
         "inner": rollout.inner,
         "steps": step_views([rollout], scene.real, scene.name),
         "helpers": sorted(rollout.body.helpers | {"lanes", "all_lanes"}),
     }
+
+
+def damped_in_lanes(scene: Scene, places: dict[str, int]) -> str:
+    """Print the tail's own damping of coordinate k, where parameters lie in these places."""
+    if scene.baked:
+        return f"WIDE({own_damping(scene)}[k])"
+    return f"LOAD(own + ({places.get('tail_damping')} + k) * STATES + c)"
 
 
 def batch_rollout_entry(rollout: BatchRollout | None) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from ...functions.sweeps.doubling import is_doubled
 from ...functions.tail import Tail, struct_parameters
 from ...ir.cost import applied, branches
 from ...ir.program import Program
-from ...passes.directions import has_directions
+from ...passes.directions import directions_in_turn, has_directions, places_lanes
 from ...passes.still import without_still
 from ...passes.unrolled_ldl import unrolled_ldl
 from ...scene.scene import Scene
@@ -50,6 +50,8 @@ def printed_function(scene: Scene, tail: Tail, function: Function) -> PrintedFun
     )
     if form == "loops" and has_directions(program):
         program = without_still(program)
+    if form == "straight" and places_lanes(program):
+        program = directions_in_turn(program)
     printer = straight_line if form == "straight" else in_loops
     return PrintedFunction(function, printer(program, scene.real, scene.name, fixed), form)
 
@@ -62,7 +64,7 @@ def fastest(function: Function, tail: Tail) -> tuple[str, Program]:
     """
     # sweeps by segments, where the tail or a segment is long
     several = tail.segments > 1 and tail.nt * tail.total >= SEGMENTS_FROM
-    long = several or is_doubled(tail)
+    long = tail.uniform and (several or is_doubled(tail))
     form, swept = in_form("segments" if long else "lanes", function, tail)
     if form == "segments" or function.name in ALWAYS_IN_LOOPS:
         return form, swept

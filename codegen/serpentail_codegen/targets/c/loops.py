@@ -106,7 +106,7 @@ class LoopPrinter:
         ]
 
     def _fill_wide(self, target: Ref, values) -> list[str]:
-        if not any(values):
+        if target.stride == 1 and not any(values):
             return [
                 f"{self._helper('clear_rows')}({target.size * target.array.row}, "
                 f"{pointer(target)});"
@@ -269,11 +269,6 @@ class LoopPrinter:
         written = zip(outputs.items(), call.adds, strict=True)
         adds = {name for (name, ref), added in written if added and ref.stride == 1}
         apart = tuple((name, ref.stride) for name, ref in inputs.items() if ref.stride > 1)
-        if any(name in wide for name, _ in apart):
-            raise UnprintableStatement(
-                f"{call.step.name} reads wide scalars that lie apart, which a pointer cannot show"
-            )
-
         routine = Routine(call.step, frozenset(wide), pitch, frozenset(adds), apart)
         if self.routines.setdefault(routine.name, routine) != routine:
             raise ValueError(f"two steps are called {routine.name}")

@@ -70,8 +70,10 @@ def c_context(
 def model_context(scene: Scene, tail: Tail) -> dict[str, Any]:
     """Return what the templates say of the model as a whole: names, sizes, types, parameters."""
     pieces, single = PIECES[scene.kind], scene.real == "float"
+    own = tail.shape.counts
+    counts = f"of {', '.join(map(str, own))}" if own else f"x {tail.links}"
     return {
-        "title": f"{scene.kind} tail, {tail.segments} segments x {tail.links} {pieces}",
+        "title": f"{scene.kind} tail, {tail.segments} segments {counts} {pieces}",
         "pieces": pieces,
         "prefix": scene.name,
         "upper": scene.name.upper(),

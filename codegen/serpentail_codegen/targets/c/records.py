@@ -6,6 +6,7 @@ made of it.
 """
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from .simulation_features import SimulationFeatures
@@ -79,6 +80,7 @@ CONTROLLER = fields(
     ("torques", "const piecewise *", "of NT channels (N m), added; NULL: none"),
     ("function", "torque", "added; NULL: none"),
     ("context", "void *", "its first argument"),
+    ("clock", "real", "s, the run's time at which the clock of `function` is at 0"),
 )
 PFL = fields(
     (
@@ -89,6 +91,7 @@ PFL = fields(
     ("kp", "real", "1/s^2"),
     ("kd", "real", "1/s"),
     ("feedforward", "int", "whether the reference's acceleration is asked for"),
+    ("limit", "const real *", "[NT] N m, the most that tracking gives; NULL: no limit"),
 )
 DRIVE = fields(
     ("phases", "int", "number of controllers"),
@@ -175,15 +178,15 @@ def contact_samples(has: SimulationFeatures) -> list[Field]:
 
 def record_views(prefix: str, has: SimulationFeatures) -> dict[str, list[dict]]:
     """Return the records with the C types that this model's header gives them."""
-    return {
-        record: [
-            {"type": typed(f.type, prefix), "name": f.name, "meaning": f.meaning} for f in members
-        ]
-        for record, members in records(has).items()
-    }
+    return {record: member_views(of, prefix) for record, of in records(has).items()}
 
 
-def typed(text: str, prefix: str) -> str:
+def member_views(members: Sequence[Field], prefix: str) -> list[dict]:
+    """Return the members of one record with their C types."""
+    return [{"type": _typed(f.type, prefix), "name": f.name, "meaning": f.meaning} for f in members]
+
+
+def _typed(text: str, prefix: str) -> str:
     """Return a C type with the model's prefix, ready for a name to follow."""
     full = re.sub(TYPES, lambda name: f"{prefix}_{name.group()}", text)
     return full if full.endswith("*") else full + " "

@@ -60,6 +60,7 @@ def dialect(real: str, prefix: str = "") -> Dialect:
         {"sqrt": "sqrtf" if real == "float" else "sqrt"},
         {"sqrt": f"{prefix}_sqrt_row"},
         real,
+        wide_select=f"{prefix}_select_row({{c}}, {{a}}, {{b}})",
         sincos=f"real {{sine}}, {{cosine}}; {prefix}_sincos{both}",
         wide_sincos=f"lanes {{sine}}, {{cosine}}; {prefix}_sincos_row{both}",
         wide="const lanes {name} = {text};",
@@ -75,8 +76,8 @@ def begin(ref: Ref) -> Index:
 def pointer(ref: Ref) -> str:
     """Print the address of a reference's first scalar."""
     name = argument_name(ref.array)
-    if ref.array.role == "parameters":
-        return name if ref.array.length > 1 else f"&{name}"
+    if ref.array.role == "parameters" and ref.array.length == 1:
+        return f"&{name}"
     offset = index_text(begin(ref))
     return name if offset == "0" else f"{name} + {offset}"
 
@@ -145,11 +146,12 @@ def input_names(routine: Routine) -> tuple[list[str], dict[int, int]]:
     lanes: dict[int, int] = {}
     strides = dict(routine.apart)
     for name, size in routine.step.inputs:
+        stride = strides.get(name, 1)
         if name in routine.wide:
             lanes |= {len(names) + k: routine.pitch for k in range(size)}
-            names += [f"&{name}[{k * routine.pitch}]" for k in range(size)]
+            names += [f"&{name}[{k * stride * routine.pitch}]" for k in range(size)]
         else:
-            names += [f"{name}[{k * strides.get(name, 1)}]" for k in range(size)]
+            names += [f"{name}[{k * stride}]" for k in range(size)]
     return names, lanes
 
 

@@ -22,6 +22,13 @@ MACROS = (
 )
 
 
+def own_damping(scene: Scene) -> str:
+    """Print where a run has the damping of the tail itself; empty where it has none."""
+    if "damping" not in scene.passive:
+        return ""
+    return f"{scene.name}_tail_damping" if scene.baked else "run->parameters->tail_damping"
+
+
 def simulation_context(
     scene: Scene, tail: Tail, has: SimulationFeatures, works: dict[str, int]
 ) -> dict[str, Any]:
@@ -37,10 +44,12 @@ def simulation_context(
         "has": has,
         "values": scene.parameters,  # where they are folded in
         "articulated": tail.kind == "articulated",
+        "own_lengths": own_lengths(scene),
         "part": 1.0
         if tail.kind == "articulated"
         else 1 / tail.links,  # of a segment's turn, a piece
         "ledger": ledger,
+        "damped": own_damping(scene),
         "looks": LOOKS,
         "resolution": resolution,
         "level": level,
@@ -59,3 +68,10 @@ def simulation_context(
         "rk4": RK4,
         "ros34pw2": transformed(ROS34PW2),
     }
+
+
+def own_lengths(scene: Scene) -> tuple[float, ...]:
+    """Return the lengths of links or arcs that have their own; else nothing."""
+    names = [name for name in ("link_lengths", "arc_lengths") if name in scene.parameters]
+    value = scene.parameters[names[0]] if names else ()
+    return value if isinstance(value, tuple) else (value,)

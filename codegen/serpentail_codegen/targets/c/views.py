@@ -17,6 +17,8 @@ INLINED_OPERATIONS = 100
 # results: vectors of fewer would be loaded before all that they hold is stored
 STORED_ONE_BY_ONE = 16
 
+QUATERNIONS = {"q": 3, "x": 0}  # where they begin, by the first argument's name
+
 
 class HasBody(Protocol):
     """What has a C function body: a printed function, a batch, a batch rollout."""
@@ -49,7 +51,7 @@ class FunctionView:
         self.unchecked = f"{prefix}_unchecked_{self.name}(parameters, {self.names}, work)"
 
         # factors are many, and what solves with them reads them: its results tell
-        self.has_attitude = self.inputs[0].name == "q"
+        self.quaternion = "" if tail.shape.fixed else quaternion_in(self.inputs[0].name)
         read = [a for a in self.inputs if a.name != FACTORS.name]
         self.arguments = zero_where_finite(f"{prefix}_zero_times", read)
         few = sum(a.length for a in self.outputs) < STORED_ONE_BY_ONE
@@ -63,6 +65,14 @@ class FunctionView:
         arguments += [f"{real} *{a.name}" for a in self.outputs]
         head = f"const {prefix}_parameters *parameters"
         return wrapped(f"int {symbol}(", [head, *arguments, f"{real} *work"])
+
+
+def quaternion_in(name: str, states: str = "") -> str:
+    """Print the address of the quaternion in a function's first argument, if it has one."""
+    start = QUATERNIONS.get(name)
+    if start is None:
+        return ""
+    return f"{name} + {start}{states}" if start else name
 
 
 class UncheckedView:

@@ -25,7 +25,8 @@ def externals(scene: Scene, tail: Tail, works: dict[str, int]) -> list[External]
 
     for name in works:
         plain(begin(name), name, sizes)
-    for f in DYNAMICS:
+    # derivatives by CasADi's q are made for a torso that turns
+    for f in () if tail.shape.fixed else DYNAMICS:
         for kind, make in (("jac_", jacobian), ("adj1_", adjoint), ("jac_adj1_", hessian)):
             if f.has(works, kind):
                 make(begin(f.name, kind), f, sizes)

@@ -1,13 +1,13 @@
 """Functions of the model as they are, with dense inputs and outputs."""
 
-from ....functions.catalogue import CATALOGUE
+from ....functions.catalogue import function_of
 from .dynamics import DYNAMICS
 from .ports import External, Port, pattern
 
 
 def plain(e: External, name: str, sizes: dict[str, int]) -> None:
     """Make a function of the model with dense ports."""
-    function = CATALOGUE[name].of(e.tail)
+    function = function_of(name, e.tail)
     names = [a.name for a in (*function.inputs, *function.outputs)]
     e.call(name, *names)
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from ....functions.catalogue import CATALOGUE
+from ....functions.catalogue import function_of
 from ....functions.tail import Tail
 
 VECTOR = 8  # doubles in a cache line
@@ -62,7 +62,7 @@ class External:
 
     def call(self, name: str, *arguments: str) -> None:
         """Call a function of the model."""
-        function = CATALOGUE[name].of(self.tail)
+        function = function_of(name, self.tail)
         for a, array in zip((*function.inputs, *function.outputs), arguments, strict=True):
             self.arrays.setdefault(array, a.length(self.tail))
         self.inner_work = max(self.inner_work, self.works[name])

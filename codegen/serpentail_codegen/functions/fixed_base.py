@@ -1,0 +1,238 @@
+"""Functions of a tail on a base that never moves: q, v and all forces are those of the tail alone.
+
+The torso is at rest, B at the world's origin with the world's axes; of its mass, its motion and the
+momentum of the whole nothing is computed.
+"""
+
+from dataclasses import replace
+
+from ..autodiff.forward import tangent_program
+from ..ir.program import Array, Index, Ref, padded
+from ..mechanics import resting
+from .derivatives.by_parameters import parameter_tangents, spread_parameters
+from .draft import Draft
+from .function import Function, assemble, signed
+from .layout import (
+    POSITION,
+    QUATERNION,
+    TORSO_NQ,
+    TORSO_NV,
+    block,
+    coordinates,
+)
+from .scope import Motion, State
+from .sweeps.inertia import tail_inertia
+from .sweeps.momentum import gather_moment
+from .sweeps.pieces import each_piece, each_point, mechanism, torso_pose
+from .sweeps.wrenches import forward_wrenches, gather_wrenches
+from .tails.mechanism import Segments
+
+MEANINGS = {
+    "q": "tail coordinates (rad)",
+    "v": "their rates (rad/s)",
+    "v_dot": "their accelerations (rad/s^2)",
+    "force": "forces on the tail coordinates (N m)",
+}
+
+
+# ---- the whole from the tail ---------------------------------------------------------------------
+
+
+def whole_v(draft: Draft, tail: Array) -> Array:
+    """Return rates, or accelerations, of the whole: the torso's are zero."""
+    whole = draft.array(f"{tail.name}_whole", TORSO_NV + draft.tail.nt)
+    draft.fill(whole.part(0, TORSO_NV), 0)
+    draft.copy(whole.part(TORSO_NV, draft.tail.nt), tail.part(0, draft.tail.nt))
+    return whole
+
+
+def whole_state(draft: Draft, arrays: dict[str, Array]) -> State:
+    """Return the state of the whole, its torso at rest at the origin."""
+    q = draft.array("q_whole", TORSO_NQ + draft.tail.nt)
+    draft.fill(block(q, POSITION), 0)
+    draft.fill(block(q, QUATERNION), 1, 0, 0, 0)
+    draft.copy(q.part(TORSO_NQ, draft.tail.nt), arrays["q"].part(0, draft.tail.nt))
+    return State(q, whole_v(draft, arrays["v"]) if "v" in arrays else None)
+
+
+# ---- equation of motion --------------------------------------------------------------------------
+
+
+def fill_inertia(draft: Draft, state: State, H: Array, row: int) -> Segments:
+    """Fill the lower triangle of H of the tail, its rows ``row`` apart; return the segments."""
+
+    def H_tail(k: Index, other: Index, size: int = 1) -> Ref:
+        return H.part(k * row + other, size)
+
+    columns = draft.array("columns", 12, draft.tail.segments)
+    return tail_inertia(draft, state, H_tail, columns)[0]
+
+
+def fill_forces(draft: Draft, segments: Segments, v_dot: Array | None, force: Array) -> None:
+    """Fill H v_dot + C of the tail, or C."""
+    zero = draft.zero(3)
+    motion = Motion(zero, zero, draft.store(resting.resting_acceleration, a=3)["a"])
+    wrenches = forward_wrenches(draft, segments, motion, v_dot)
+    gather_wrenches(draft, segments, wrenches, lambda i: coordinates(force, i))
+
+
+def assemble_mass_matrix(draft: Draft, arrays: dict[str, Array]) -> None:
+    """H of the tail (Eq. 16), both triangles."""
+    nt, H = draft.tail.nt, arrays["H"]
+    fill_inertia(draft, whole_state(draft, arrays), H, nt)
+    with draft.loop("k", nt) as k, draft.loop("l", k) as other:
+        draft.copy(H.part(nt * other + k, 1), H.part(nt * k + other, 1))
+
+
+def assemble_inverse_dynamics(draft: Draft, arrays: dict[str, Array]) -> None:
+    """H v_dot + C of the tail (Eq. 4); C without ``v_dot`` among the arguments."""
+    segments = mechanism(draft).prepare(draft, whole_state(draft, arrays), False)
+    v_dot = whole_v(draft, arrays["v_dot"]) if "v_dot" in arrays else None
+    fill_forces(draft, segments, v_dot, arrays["force"])
+
+
+def assemble_forward_dynamics(draft: Draft, arrays: dict[str, Array]) -> None:
+    """v_dot of H v_dot + C = tau."""
+    accelerate(draft, arrays)
+
+
+def accelerate(draft: Draft, arrays: dict[str, Array]) -> Array:
+    """Store v_dot of H v_dot + C = tau, by LDL^T; return the factored H."""
+    nt = draft.tail.nt
+    A, bias = draft.array("A", padded(nt), nt), draft.array("bias", nt)
+    segments = fill_inertia(draft, whole_state(draft, arrays), A, padded(nt))
+    fill_forces(draft, segments, None, bias)
+    subtract(draft, arrays["tau"], bias, arrays["v_dot"])
+    draft.factor(A, nt)
+    draft.solve(A, arrays["v_dot"].part(0, nt))
+    return A
+
+
+def subtract(draft: Draft, tau: Array | None, force: Array, rest: Array) -> None:
+    """Store torques minus forces, in all lanes; tau None is zero."""
+    with draft.loop("k", draft.tail.nt) as k:
+        torque = tau.part(k, 1) if tau else draft.zero(1)
+        reads = {"tau": torque, "inertial": force.part(k, 1)}
+        draft.step(resting.net_torque, reads, rest=rest.part(k, 1))
+
+
+# ---- energy and places ---------------------------------------------------------------------------
+
+
+def assemble_energy(draft: Draft, arrays: dict[str, Array]) -> None:
+    """Energies of the tail; the torso does not move, and its height is zero."""
+    segments = mechanism(draft).prepare(draft, whole_state(draft, arrays), False)
+    moment, velocity = gather_moment(draft, segments), draft.vectors(w=3, u=3)
+    kinetic = arrays["kinetic"][0]
+    for ref in (*velocity.named.values(), kinetic):
+        draft.fill(ref, 0)
+    for place in each_piece(draft):
+        mechanism(draft).momentum(draft, segments, place, velocity, {"kinetic_": kinetic})
+    draft.step(resting.resting_potential, moment, potential=arrays["potential"][0])
+
+
+def assemble_tail_points(draft: Draft, arrays: dict[str, Array]) -> None:
+    """The joints and the tip (Eqs. 14, 15), or equally spaced samples of every segment."""
+    points = arrays["points"]
+    samples = mechanism(draft).prepare_samples(draft, whole_state(draft, arrays), None)
+    pose = torso_pose(draft)
+    draft.copy(points.part(0, 3), pose.P)
+    for i, g in each_point(draft):
+        draft.step(mechanism(draft).pose, pose, samples.at(i, g), **pose)
+        draft.copy(points.part(3 * (g + 1), 3), pose.P)
+
+
+# ---- derivatives ---------------------------------------------------------------------------------
+
+
+def force_tangents(draft: Draft, arguments: dict[str, Array]) -> Array:
+    """Return tangents of H v_dot + C: a lane for each coordinate, then for each rate."""
+    nt = draft.tail.nt
+    tangents = {f"d_{name}": draft.wide(f"d_{name}_unit", nt, 2 * nt) for name in ("q", "v")}
+    for first, array in zip((0, nt), tangents.values(), strict=True):
+        draft.unit(array.part(0, nt), first)
+    inner = assemble(FUNCTIONS["inverse_dynamics"], draft.tail)
+    rows = draft.wide("rows", nt, 2 * nt)
+    inner = tangent_program(inner, ("q", "v"), 2 * nt)
+    draft.call(inner, **arguments, **tangents, d_force=rows)
+    return rows
+
+
+def spread(draft: Draft, rows: Array, arrays: dict[str, Array]) -> None:
+    """Copy lanes of rows to the matrices by q and by v."""
+    nt = draft.tail.nt
+    with draft.loop("row", nt) as row:
+        for first, name in ((0, "dq"), (nt, "dv")):
+            draft.copy(arrays[name].part(nt * row, nt), rows.lane(row, first, nt))
+
+
+def assemble_inverse_dynamics_derivatives(draft: Draft, arrays: dict[str, Array]) -> None:
+    """Tangents of H v_dot + C along all directions at once."""
+    arguments = {name: arrays[name] for name in ("q", "v", "v_dot")}
+    spread(draft, force_tangents(draft, arguments), arrays)
+
+
+def assemble_forward_dynamics_derivatives(draft: Draft, arrays: dict[str, Array]) -> None:
+    """-H^-1 times the tangents of H v_dot + C at fixed v_dot; with respect to tau, H^-1."""
+    nt, v_dot = draft.tail.nt, draft.array("acceleration", draft.tail.nt)
+    A = accelerate(draft, arrays | {"v_dot": v_dot})
+    arguments = {"q": arrays["q"], "v": arrays["v"], "v_dot": v_dot}
+    x, inverse = draft.wide("x", nt, 2 * nt), draft.wide("inverse", nt, nt)
+    subtract(draft, None, force_tangents(draft, arguments), x)
+    draft.solve(A, x.part(0, nt))
+    spread(draft, x, arrays)
+    draft.unit(inverse.part(0, nt), 0)
+    draft.solve(A, inverse.part(0, nt))
+    with draft.loop("row", nt) as row:
+        draft.copy(arrays["dtau"].part(nt * row, nt), inverse.lane(row, 0, nt))
+
+
+def assemble_inverse_dynamics_parameter_derivatives(draft: Draft, arrays: dict[str, Array]) -> None:
+    """Tangents of H v_dot + C with respect to every parameter."""
+    arguments = {name: arrays[name] for name in ("q", "v", "v_dot")}
+    rows = parameter_tangents(draft, FUNCTIONS["inverse_dynamics"], arguments)
+    spread_parameters(draft, rows, arrays["dparameters"])
+
+
+def assemble_forward_dynamics_parameter_derivatives(draft: Draft, arrays: dict[str, Array]) -> None:
+    """-H^-1 times the tangents of H v_dot + C with respect to every parameter."""
+    nt, v_dot = draft.tail.nt, draft.array("acceleration", draft.tail.nt)
+    A = accelerate(draft, arrays | {"v_dot": v_dot})
+    arguments = {"q": arrays["q"], "v": arrays["v"], "v_dot": v_dot}
+    x = draft.wide("x", nt, draft.tail.parameter_numbers)
+    rows = parameter_tangents(draft, FUNCTIONS["inverse_dynamics"], arguments)
+    subtract(draft, None, rows, x)
+    draft.solve(A, x.part(0, nt))
+    spread_parameters(draft, x, arrays["dparameters"])
+
+
+def _named(function: Function) -> Function:
+    """Return a function whose arguments are described as those of the tail alone."""
+    inputs, outputs = (
+        tuple(replace(a, meaning=MEANINGS.get(a.name, a.meaning)) for a in arguments)
+        for arguments in (function.inputs, function.outputs)
+    )
+    return replace(function, inputs=inputs, outputs=outputs)
+
+
+FUNCTIONS = {
+    name: _named(function)
+    for name, function in signed(
+        {
+            "mass_matrix": assemble_mass_matrix,
+            "bias_force": assemble_inverse_dynamics,
+            "inverse_dynamics": assemble_inverse_dynamics,
+            "forward_dynamics": assemble_forward_dynamics,
+            "energy": assemble_energy,
+            "tail_points": assemble_tail_points,
+            "inverse_dynamics_derivatives": assemble_inverse_dynamics_derivatives,
+            "forward_dynamics_derivatives": assemble_forward_dynamics_derivatives,
+            "inverse_dynamics_parameter_derivatives": (
+                assemble_inverse_dynamics_parameter_derivatives
+            ),
+            "forward_dynamics_parameter_derivatives": (
+                assemble_forward_dynamics_parameter_derivatives
+            ),
+        }
+    ).items()
+}

@@ -1,0 +1,102 @@
+"""Springs, damping and stops of the tail's coordinates, where a scene has them.
+
+They act on the coordinates alone: their forces are added to H v_dot + C, or taken from the torques.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from functools import partial
+
+from ..autodiff.step import tangent
+from ..ir.program import Array, Index, Ref
+from ..mechanics import passive
+from ..mechanics.lower import declared_shapes, derive
+from .draft import Draft
+from .layout import coordinates, segment_v
+from .scope import Instead, State, Vectors
+from .tails.mechanism import StepFunction
+
+FORCES: dict[str, StepFunction] = {
+    "spring": passive.spring_force,
+    "damping": passive.damping_force,
+    "stops": passive.stop_force,
+}
+ENERGIES: dict[str, StepFunction] = {"spring": passive.spring_energy, "stops": passive.stop_energy}
+SLOPES: dict[str, StepFunction] = {"spring": passive.spring_slope, "stops": passive.stop_slope}
+
+
+def passive_parameters(draft: Draft, step: StepFunction, part: Callable[[Array], Ref]) -> Instead:
+    """Return the parameters that a step reads, of some coordinates alone."""
+    names = [name for name in draft.parameters if name in declared_shapes(step)]
+    return Instead({name: part(draft.parameters[name].array) for name in names})
+
+
+@contextmanager
+def each_passive_force(draft: Draft, state: State) -> Iterator[tuple[Index, Ref]]:
+    """Open a loop over segments; yields the segment and what its passive parts ask for."""
+    force = draft.vector("passive", 2)
+    with draft.loop("i", draft.tail.segments) as i:
+        draft.fill(force, 0)
+        _add_forces(draft, state, i, force)
+        yield i, force
+
+
+def _add_forces(draft: Draft, state: State, i: Index, force: Ref) -> None:
+    reads = Vectors({"angles": state.angles(i), "rates": state.rates(i)})
+    for name in draft.tail.passive:
+        step = FORCES[name]
+        own = passive_parameters(draft, step, partial(coordinates, i=i))
+        draft.step(step, reads, own, passive_=force)
+
+
+def add_passive_forces(draft: Draft, state: State, force: Callable[[Index], Ref]) -> None:
+    """Add what the passive parts ask for to the force on each segment."""
+    if draft.tail.passive:
+        with draft.loop("i", draft.tail.segments) as i:
+            _add_forces(draft, state, i, force(i))
+
+
+def add_passive_power(draft: Draft, state: State, multiplier: Array, power: Ref) -> None:
+    """Add the power of what the passive parts ask for, when the tail moves with a multiplier."""
+    if draft.tail.passive:
+        with each_passive_force(draft, state) as (i, passive_force):
+            reads = {"passive": passive_force, "virtual_rates": segment_v(multiplier, i)}
+            draft.step(passive.virtual_power, reads, power_=power)
+
+
+def net_torques(draft: Draft, state: State, tau: Array) -> Array:
+    """Return the torques less what the passive parts ask for: what is left for the dynamics."""
+    if not draft.tail.passive:
+        return tau
+    net = draft.array("net_torques", draft.tail.nt)
+    with each_passive_force(draft, state) as (i, passive_force):
+        reads = {"tau": coordinates(tau, i), "passive": passive_force}
+        draft.step(passive.net_torque, reads, net=coordinates(net, i))
+    return net
+
+
+def add_passive_slopes(
+    draft: Draft, state: State, own: Mapping[str, Ref], slopes: Callable[[Index], Ref]
+) -> None:
+    """Add how the passive parts of each segment follow its own ``angles`` and ``rates``, whose
+    directions are ``own``.
+    """
+    for name in draft.tail.passive:
+        function = FORCES[name]
+        active = sorted({"angles", "rates"} & declared_shapes(function).keys())
+        step = tangent(derive(function), frozenset(active))
+        turning = {f"d_{each}": own[each] for each in active}
+        with draft.loop("i", draft.tail.segments) as i:
+            moving = Vectors({"angles": state.angles(i), "rates": state.rates(i)}).only(*active)
+            parameters = passive_parameters(draft, function, partial(coordinates, i=i))
+            draft.step(step, moving, parameters, turning, d_passive_=slopes(i))
+
+
+def add_elastic_energy(draft: Draft, state: State, potential: Ref) -> None:
+    """Add the energy that springs and stops store."""
+    for name in draft.tail.passive:
+        if name in ENERGIES:
+            step = ENERGIES[name]
+            with draft.loop("i", draft.tail.segments) as i:
+                own = passive_parameters(draft, step, partial(coordinates, i=i))
+                draft.step(step, {"angles": state.angles(i)}, own, potential_=potential)

@@ -1,0 +1,129 @@
+"""Springs, damping and stops of a tail's coordinates: forces that ask for torques, and energies.
+
+A stop's stiffness grows from zero to its own on the way w into it, as S(s) = 3 s^2 - 2 s^3 of
+s = way / w, so that its force k w (s^3 - s^4 / 2) has two continuous derivatives; beyond, it is
+that of a spring.
+"""
+
+from sympy import Matrix, Piecewise
+
+from .shapes import V1, V2
+
+
+def spring_force(let, tail_stiffness: V2, tail_rest: V2, angles: V2) -> dict:
+    """k (q - rest)."""
+    return {"passive": tail_stiffness.multiply_elementwise(angles - tail_rest)}
+
+
+def damping_force(let, tail_damping: V2, rates: V2) -> dict:
+    """d q_dot."""
+    return {"passive": tail_damping.multiply_elementwise(rates)}
+
+
+def stop_force(
+    let,
+    tail_stop_lower: V2,
+    tail_stop_upper: V2,
+    tail_stop_stiffness: V2,
+    tail_stop_width: V2,
+    angles: V2,
+) -> dict:
+    """Force of the stops: below zero beneath the lower one, above zero beyond the upper one."""
+    forces = []
+    for k in range(2):
+        w = tail_stop_width[k]
+        under, over = ways_into(let, tail_stop_lower[k], tail_stop_upper[k], w, angles[k])
+        pushes = [s**3 - s**4 / 2 + beyond for s, beyond in (under, over)]
+        forces.append(tail_stop_stiffness[k] * w * let("push", pushes[1] - pushes[0]))
+    return {"passive": Matrix(forces)}
+
+
+def ways_into(let, lower, upper, width, angle) -> list[tuple]:
+    """How far a coordinate is in the lower stop and in the upper one, in widths: up to one, and
+    beyond.
+    """
+    ways = []
+    for way in (lower - angle, angle - upper):
+        x = let("way", way / width)
+        beyond = let("beyond", Piecewise((x - 1, x > 1), (0, True)))
+        ways.append((let("within", Piecewise((x - beyond, x > 0), (0, True))), beyond))
+    return ways
+
+
+def spring_energy(let, tail_stiffness: V2, tail_rest: V2, angles: V2) -> dict:
+    """k (q - rest)^2 / 2, of both coordinates."""
+    stretch = let("stretch", angles - tail_rest)
+    squares = stretch.multiply_elementwise(stretch)
+    return {"potential": [tail_stiffness.dot(squares) / 2]}
+
+
+def stop_energy(
+    let,
+    tail_stop_lower: V2,
+    tail_stop_upper: V2,
+    tail_stop_stiffness: V2,
+    tail_stop_width: V2,
+    angles: V2,
+) -> dict:
+    """The integral of the stops' forces over the way into them."""
+    total = 0
+    for k in range(2):
+        w, parts = tail_stop_width[k], 0
+        for s, beyond in ways_into(let, tail_stop_lower[k], tail_stop_upper[k], w, angles[k]):
+            parts += s**4 / 4 - s**5 / 10 + beyond * (beyond + 1) / 2
+        total += tail_stop_stiffness[k] * w**2 * let("part", parts)
+    return {"potential": [total]}
+
+
+def net_torque(let, tau: V2, passive: V2) -> dict:
+    """Torques that are left to accelerate the tail."""
+    return {"net": tau - passive}
+
+
+def virtual_power(let, passive: V2, virtual_rates: V2) -> dict:
+    """Power that the passive parts ask for at virtual rates."""
+    return {"power": [passive.dot(virtual_rates)]}
+
+
+# ---- linearised, for implicit integrators --------------------------------------------------------
+
+
+def spring_slope(let, tail_stiffness: V1) -> dict:
+    """k."""
+    return {"slope": tail_stiffness}
+
+
+def stop_slope(
+    let,
+    tail_stop_lower: V1,
+    tail_stop_upper: V1,
+    tail_stop_stiffness: V1,
+    tail_stop_width: V1,
+    angle: V1,
+) -> dict:
+    """Stiffness of the stops where a coordinate is."""
+    w = tail_stop_width[0]
+    both = ways_into(let, tail_stop_lower[0], tail_stop_upper[0], w, angle[0])
+    shares = [s * s * (3 - 2 * s) for s, _ in both]
+    return {"slope": [tail_stop_stiffness[0] * sum(shares)]}
+
+
+def damped_coordinate(let, tail_damping: V1, weight: V1, gain_v: V1) -> dict:
+    """w times the tail's own damping, which a tracked tail is rid of."""
+    return {"damped": [untracked(gain_v, weight[0] * tail_damping[0])]}
+
+
+def sprung_coordinate(let, weight: V1, gain_v: V1, slope: V1) -> dict:
+    """w times the stiffness, and w times that, which acts as damping does."""
+    sprung = let("sprung", untracked(gain_v, weight[0] * slope[0]))
+    return {"sprung": [sprung], "damped": [weight[0] * sprung]}
+
+
+def untracked(gain_v, value):
+    """A value, or 0 where tracking makes up for all forces of the tail."""
+    return Piecewise((0, gain_v[0] > 0), (value, True))
+
+
+def sprung_response(let, sprung: V1, angle: V1) -> dict:
+    """Force of a stiffness for the right-hand side of a coordinate."""
+    return {"rhs": [-sprung[0] * angle[0]]}

@@ -1,0 +1,21 @@
+"""The steps of a base that never moves: B at the world's origin, with the world's axes."""
+
+from sympy import Matrix
+
+from .rotations import Z
+from .shapes import V1, V3
+
+
+def resting_acceleration(let, gravity: V1) -> dict:
+    """What gravity is to bodies on a base at rest: an acceleration of the base, upward."""
+    return {"a": gravity[0] * Z}
+
+
+def net_torque(let, tau: V1, inertial: V1) -> dict:
+    """A torque less the force that velocities and gravity ask for."""
+    return {"rest": Matrix([tau[0] - inertial[0]])}
+
+
+def resting_potential(let, gravity: V1, tail_mount: V3, mass: V1, h: V3) -> dict:
+    """g times the tail's first moment along z, ``h`` being about its mount."""
+    return {"potential": [gravity[0] * (h[2] + mass[0] * tail_mount[2])]}

@@ -1,0 +1,188 @@
+"""The table `body`: how large an animal is, and a torso of a simple shape.
+
+All that a scene says is of the animal at scale 1; `body` scales it, by the units of its numbers.
+"""
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from math import pi, prod
+from typing import Any
+
+from .checks import is_finite
+from .parameters import PARAMETERS, Parameters, Value
+from .passive import PASSIVE
+from .problems import Problem, suggest
+from .units import dimensions, in_unit
+
+# Exponents of the body mass: bone lengths of legs, Alexander, Jayes, Maloiy & Wathuta, J. Zool. 189
+# (1979) 305-314; times of a stride at equivalent speeds, Heglund & Taylor, J. Exp. Biol. 138 (1988)
+# 301-318; all else keeps its shape.
+LENGTH, LEG, TIME = 1 / 3, 0.35, 0.15
+LEG_BONES = "L_"  # how the names of their lengths begin
+TORSOS = {"ellipsoid": "semi_axes", "box": "sides"}  # shape -> its three lengths
+OF_TORSO = ("torso_mass", "torso_inertia", "torso_semi_axes")  # what a torso's shape tells
+KEYS = ("scale", "mass", "torso")
+LARGEST = 1e3  # scale; 1 over it is the least
+
+
+@dataclass(frozen=True)
+class Size:
+    """By what numbers are multiplied for each kilogram, metre and second of their unit, and lengths
+    of leg bones.
+    """
+
+    mass: float = 1.0
+    length: float = 1.0
+    time: float = 1.0
+    leg: float = 1.0
+
+    def of(self, name: str, unit: str, value: Any) -> Any:
+        """Return the numbers of a parameter, scaled; the earth's pull stays what it is."""
+        if name == "gravity" or self == SAME:
+            return value
+        length = self.leg if name.startswith(LEG_BONES) else self.length
+        powers = zip((self.mass, length, self.time), dimensions(unit), strict=True)
+        factor = prod(base**power for base, power in powers)
+        return tuple(x * factor for x in value) if isinstance(value, tuple) else value * factor
+
+
+SAME = Size()
+
+
+@dataclass(frozen=True)
+class Body:
+    """A checked table `body`: scale or mass (kg), the torso's parameters, and what is wrong."""
+
+    scale: float | None = None
+    mass: float | None = None
+    torso: Mapping[str, Value] | None = None
+    problems: tuple[Problem, ...] = ()
+
+    def completed(self, named: Any, contacts: Collection[str]) -> Any:
+        """Return a table of parameters with those that the torso's shape tells."""
+        if not self.torso or not isinstance(named, Mapping):
+            return named
+        touches = "torso" in contacts
+        return {**named, **{n: x for n, x in self.torso.items() if touches or n != OF_TORSO[2]}}
+
+    def size(self, total_mass: float) -> Size:
+        """Return the size of an animal of this total mass (kg) at scale 1.
+
+        A scale keeps the shape, and the Froude number: times go with the root of lengths.
+        """
+        if self.mass is not None:
+            ratio = self.mass / total_mass
+            return Size(ratio, ratio**LENGTH, ratio**TIME, ratio**LEG)
+        if self.scale is not None:
+            return Size(self.scale**3, self.scale, self.scale**0.5, self.scale)
+        return SAME
+
+
+def body_of(table: Any, parameters: Any) -> Body:
+    """Return a scene's table `body`, checked; parameters: its table of these."""
+    if table is None:
+        return Body()
+    named = parameters if isinstance(parameters, Mapping) else {}
+    if not isinstance(table, Mapping):
+        return Body(problems=(Problem("body", table, "needs a table: scale or mass, torso"),))
+    problems = [Problem(f"body.{key}", table[key], _unknown(key)) for key in set(table) - {*KEYS}]
+    if "scale" in table and "mass" in table:
+        remedy = "given together with scale: each decides the size; remove one of the two"
+        problems.append(Problem("body.mass", table["mass"], remedy))
+    scale = _number("body.scale", table.get("scale"), "1", (1 / LARGEST, LARGEST), problems)
+    mass = _number("body.mass", table.get("mass"), "kg", (1e-9, 1e9), problems)
+    torso = _torso(table["torso"], named, problems) if "torso" in table else None
+    return Body(scale, mass, torso, tuple(problems))
+
+
+def _unknown(key: object) -> str:
+    """Say what a table `body` may have."""
+    return suggest(str(key), KEYS) or f"unknown; needs {', '.join(KEYS)}"
+
+
+def _number(
+    field: str, value: Any, unit: str, bounds: tuple[float, float], problems: list[Problem]
+) -> float | None:
+    """Return a number between bounds; None where there is none, or it is wrong."""
+    if value is None:
+        return None
+    try:
+        number = in_unit(value, unit)
+    except ValueError as error:
+        problems.append(Problem(field, value, str(error)))
+        return None
+    if not is_finite(number) or not bounds[0] <= number <= bounds[1]:
+        remedy = f"needs a number from {bounds[0]:g} to {bounds[1]:g}, in {unit}"
+        problems.append(Problem(field, value, remedy))
+        return None
+    return float(number)
+
+
+def _torso(
+    table: Any, named: Mapping[str, Any], problems: list[Problem]
+) -> Mapping[str, Value] | None:
+    """Return mass, inertia and contact ellipsoid of a torso of one density."""
+    shape = table.get("shape") if isinstance(table, Mapping) else None
+    if shape not in TORSOS:
+        names = " or ".join(map(repr, TORSOS))
+        remedy = f"needs a table with shape ({names}), its lengths, and density"
+        problems.append(Problem("body.torso", table, remedy))
+        return None
+    lengths_name, before = TORSOS[shape], len(problems)
+    keys = ("shape", lengths_name, "density")
+    for key in set(table) - set(keys):
+        remedy = suggest(str(key), keys) or f"unknown; needs {', '.join(keys)}"
+        problems.append(Problem(f"body.torso.{key}", table[key], remedy))
+    lengths = _lengths(f"body.torso.{lengths_name}", table.get(lengths_name), problems)
+    density_field = "body.torso.density"
+    if table.get("density") is None:
+        problems.append(Problem(density_field, None, "needs a number, in kg/m^3"))
+    density = _number(density_field, table.get("density"), "kg/m^3", (1e-3, 1e5), problems)
+    if len(problems) > before or density is None:
+        return None
+    found = _shaped(shape, lengths, density)
+    for name in found.keys() & named.keys():
+        remedy = "body.torso tells it: remove one of the two"
+        problems.append(Problem(f"parameters.{name}", named[name], remedy))
+    return found
+
+
+def _lengths(field: str, value: Any, problems: list[Problem]) -> tuple[float, ...]:
+    """Return three lengths above 0 (m)."""
+    try:
+        lengths = in_unit(value, "m")
+    except ValueError as error:
+        problems.append(Problem(field, value, str(error)))
+        return ()
+    sound = isinstance(lengths, list | tuple) and len(lengths) == 3
+    if not sound or not all(is_finite(x) and x > 0 for x in lengths):
+        problems.append(Problem(field, value, "needs three lengths above 0, in m"))
+        return ()
+    return tuple(map(float, lengths))
+
+
+def _shaped(shape: str, lengths: tuple[float, ...], density: float) -> dict[str, Value]:
+    """Return the parameters of a uniform ellipsoid with semi-axes, or of a box with sides."""
+    round_ = shape == "ellipsoid"
+    volume, share = prod(lengths) * (4 / 3 * pi if round_ else 1.0), 5 if round_ else 12
+    mass = density * volume
+    x2, y2, z2 = (length**2 for length in lengths)
+    inertia = tuple(mass / share * each for each in (y2 + z2, x2 + z2, x2 + y2))
+    semi_axes = lengths if round_ else tuple(length / 2 for length in lengths)
+    return dict(zip(OF_TORSO, (mass, inertia, semi_axes), strict=True))
+
+
+def scaled(body: Body, described: Parameters) -> dict[str, Any]:
+    """Return parameters in the size of a body, what they were, and that size, as a Scene has it."""
+    tail = next(described[n] for n in ("tail_mass", "link_masses", "arc_masses") if n in described)
+    masses = tail if isinstance(tail, tuple) else (tail,)
+    size = body.size(float(described.get("torso_mass", 0.0)) + sum(masses))  # type: ignore[arg-type]
+    if size == SAME:
+        return {}
+    units = {p.name: p.unit for p in (*PARAMETERS, *PASSIVE)}
+    entries = tuple((name, size.of(name, units[name], x)) for name, x in described.entries)
+    return {
+        "parameters": Parameters(entries),
+        "unscaled": described,
+        "size": (size.mass, size.length, size.time),
+    }

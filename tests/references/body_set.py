@@ -1,0 +1,251 @@
+"""Any torso with any tail as a set of rigid bodies, in 60 digits: links and arcs of their own, any
+mount.
+
+Nothing is derived: places and attitudes of all bodies are functions of time along a motion, and
+their velocities and accelerations are differences of these, exact to 20 digits and more.  Arcs are
+point masses at Gauss-Legendre nodes.  It shares no formula with the recursions under test.
+"""
+
+from dataclasses import dataclass
+
+import mpmath
+import numpy as np
+
+MP = mpmath.mp.clone()
+MP.dps = 60
+STEP = MP.mpf(10) ** -15
+NODES = 24  # of an arc bent by less than pi
+
+
+@dataclass(frozen=True)
+class Link:
+    """A rigid link along -y of its frame: kg, m, COM from the joint (m), moments about the COM."""
+
+    mass: float
+    length: float
+    center: float
+    inertia: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Arc:
+    """A segment of constant curvature without inertia of its sections: kg, m."""
+
+    mass: float
+    length: float
+    samples: int = 5
+
+
+@dataclass(frozen=True)
+class Animal:
+    """A torso and a tail: each segment is a list of links, or an arc."""
+
+    segments: tuple
+    torso_mass: float
+    torso_inertia: tuple[float, float, float]
+    tail_mount: tuple[float, float, float]
+    gravity: float = 9.8
+    mount_angles: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    # ---- places ----------------------------------------------------------------------------
+
+    def bodies(self, q):
+        """Mass, COM, attitude and moments of all bodies in the world, and the tail's points."""
+        place, R = q[:3], rotation(q[3:7])
+        found = [(MP.mpf(self.torso_mass), place, R, exact(self.torso_inertia))]
+        joint = place + R.dot(exact(self.tail_mount))
+        pitch, roll, yaw = exact(self.mount_angles)
+        frame = R.dot(about(2, yaw)).dot(about(0, pitch)).dot(about(1, roll))
+        points = [joint]
+        for i, segment in enumerate(self.segments):
+            first, second = q[7 + 2 * i], q[8 + 2 * i]
+            if isinstance(segment, Arc):
+                for x, weight in nodes():
+                    local, _ = bent(first * x, second * x, segment.length * x)
+                    mass = MP.mpf(segment.mass) * weight
+                    found.append((mass, joint + frame.dot(local), frame, exact([0, 0, 0])))
+                for k in range(1, segment.samples + 1):
+                    x = MP.mpf(k) / segment.samples
+                    local, turn = bent(first * x, second * x, segment.length * x)
+                    points.append(joint + frame.dot(local))
+                joint, frame = points[-1], frame.dot(turn)
+                continue
+            for link in segment:
+                frame = frame.dot(about(0, first)).dot(about(2, second))
+                com = joint - frame[:, 1] * MP.mpf(link.center)
+                found.append((MP.mpf(link.mass), com, frame, exact(link.inertia)))
+                joint = joint - frame[:, 1] * MP.mpf(link.length)
+                points.append(joint)
+        return found, points
+
+    # ---- motions ---------------------------------------------------------------------------
+
+    def _rates(self, q, v):
+        """Velocity of the COM and angular velocity of each body, world axes."""
+        ahead, behind = (self.bodies(moved(q, v, h))[0] for h in (STEP, -STEP))
+        rates = []
+        for (_, p1, R1, _), (_, p0, R0, _) in zip(ahead, behind, strict=True):
+            rates.append(((p1 - p0) / (2 * STEP), spin((R1 - R0) / (2 * STEP), (R1 + R0) / 2)))
+        return rates
+
+    def _jacobians(self, q):
+        columns = [self._rates(q, unit) for unit in np.eye(6 + 2 * len(self.segments))]
+        return [
+            list(zip(*(column[k] for column in columns), strict=True))
+            for k in range(len(columns[0]))
+        ]
+
+    def mass_matrix(self, q):
+        """H for (p_dot world, omega body, q_t_dot)."""
+        q, size = exact(q), 6 + 2 * len(self.segments)
+        H = np.full((size, size), MP.mpf(0))
+        for (mass, _, R, moments), (linear, angular) in zip(
+            self.bodies(q)[0], self._jacobians(q), strict=True
+        ):
+            J, W = np.array(linear).T, np.array(angular).T
+            H = H + mass * J.T.dot(J) + W.T.dot(R * moments).dot(R.T.dot(W))
+        return H.astype(float)
+
+    def inverse_dynamics(self, q, v, v_dot):
+        """H v_dot + C: forces and moments of all bodies through their Jacobians."""
+        q, v, v_dot = exact(q), exact(v), exact(v_dot)
+        force = np.full(len(v), MP.mpf(0))
+        before, now, after = (
+            self.bodies(moved(q, v, h, v_dot))[0] for h in (-STEP, 0 * STEP, STEP)
+        )
+        spins = [self._rates(moved(q, v, h, v_dot), v + v_dot * h) for h in (-STEP, 0 * STEP, STEP)]
+        for k, (linear, angular) in enumerate(self._jacobians(q)):
+            mass, place, R, moments = now[k]
+            a = (after[k][1] - 2 * place + before[k][1]) / STEP**2
+            a = a + exact([0, 0, self.gravity])
+            w, w_dot = spins[1][k][1], (spins[2][k][1] - spins[0][k][1]) / (2 * STEP)
+            tensor = (R * moments).dot(R.T)
+            moment = tensor.dot(w_dot) + crossed(w, tensor.dot(w))
+            force = force + np.array(
+                [mass * J.dot(a) + W.dot(moment) for J, W in zip(linear, angular, strict=True)]
+            )
+        return force
+
+    def force(self, q, v, v_dot):
+        """H v_dot + C in float64."""
+        return self.inverse_dynamics(q, v, v_dot).astype(float)
+
+    def energy(self, q, v):
+        """Kinetic and potential energy."""
+        q, v = exact(q), exact(v)
+        kinetic = potential = MP.mpf(0)
+        for (mass, place, R, moments), (u, w) in zip(
+            self.bodies(q)[0], self._rates(q, v), strict=True
+        ):
+            kinetic += mass * u.dot(u) / 2 + (R.T.dot(w) * moments).dot(R.T.dot(w)) / 2
+            potential += mass * MP.mpf(self.gravity) * place[2]
+        return float(kinetic), float(potential)
+
+    def momentum(self, q, v):
+        """Momentum, and angular momentum about the COM, world axes."""
+        q, v = exact(q), exact(v)
+        bodies, rates = self.bodies(q)[0], self._rates(q, v)
+        total = sum(mass for mass, *_ in bodies)
+        com = sum(mass * place for mass, place, *_ in bodies) / total
+        linear = sum(b[0] * u for b, (u, _) in zip(bodies, rates, strict=True))
+        angular = sum(
+            mass * crossed(place - com, u) + (R * moments).dot(R.T).dot(w)
+            for (mass, place, R, moments), (u, w) in zip(bodies, rates, strict=True)
+        )
+        return linear.astype(float), angular.astype(float)
+
+    def tail_points(self, q):
+        """The tail's points in the world."""
+        return np.array(self.bodies(exact(q))[1]).astype(float)
+
+
+# ---- vectors, rotations ----------------------------------------------------------------
+
+
+def exact(values):
+    """Numbers as they are, in 60 digits."""
+    return np.array([x if isinstance(x, MP.mpf) else MP.mpf(float(x)) for x in values])
+
+
+def crossed(a, b):
+    """a x b."""
+    return np.array(
+        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    )
+
+
+def about(axis, angle):
+    """Rotation about a coordinate axis."""
+    c, s, R = MP.cos(angle), MP.sin(angle), np.full((3, 3), MP.mpf(0))
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    R[axis, axis], R[i, i], R[j, j], R[i, j], R[j, i] = MP.mpf(1), c, c, -s, s
+    return R
+
+
+def rotation(quaternion):
+    """R of (w, x, y, z) of any norm, column by column: q e q*."""
+    w, e = quaternion[0], quaternion[1:]
+    square = w * w + e.dot(e)
+    columns = []
+    for unit in np.eye(3, dtype=int):
+        u = exact(unit)
+        columns.append((u * (w * w - e.dot(e)) + 2 * e * e.dot(u) + 2 * w * crossed(e, u)) / square)
+    return np.array(columns).T
+
+
+def turned(quaternion, turn):
+    """Quaternion times that of a rotation vector in body axes."""
+    angle = MP.sqrt(turn.dot(turn))
+    c, s = MP.cos(angle / 2), (MP.sin(angle / 2) / angle if angle else MP.mpf(1) / 2)
+    w, e, f = quaternion[0], quaternion[1:], turn * s
+    return np.array([w * c - e.dot(f), *(w * f + c * e + crossed(e, f))])
+
+
+def moved(q, v, t, v_dot=None):
+    """The configuration a time t later: velocities change by v_dot, turns by their series.
+
+    Up to t^2: omega turns about itself, so w t + w_dot t^2 / 2 is the rotation to that order.
+    """
+    v, half = exact(v), (exact(v_dot) * t / 2 if v_dot is not None else 0)
+    go = (v + half) * t
+    return np.array([*(q[:3] + go[:3]), *turned(q[3:7], go[3:6]), *(q[7:] + go[6:])])
+
+
+def spin(R_dot, R):
+    """omega in world axes of R_dot = skew(omega) R."""
+    W = R_dot.dot(R.T)
+    return np.array([W[2, 1] - W[1, 2], W[0, 2] - W[2, 0], W[1, 0] - W[0, 1]]) / 2
+
+
+def bent(a, b, length):
+    """Place and attitude of the end of an arc of a bend, in its root's frame.
+
+    The frame turns evenly about (a, 0, b), and goes along its own -y.
+    """
+    axis = np.array([a, MP.mpf(0), b])
+    angle = MP.sqrt(axis.dot(axis))
+    y, length = exact([0, 1, 0]), MP.mpf(length)
+    if angle == 0:
+        return -y * length, np.array([exact(row) for row in np.eye(3)])
+    k = axis / angle
+    s, c = MP.sin(angle), MP.cos(angle)
+    K = np.array([[0 * s, -k[2], k[1]], [k[2], 0 * s, -k[0]], [-k[1], k[0], 0 * s]])
+    one = np.array([exact(row) for row in np.eye(3)])
+    turn = one + s * K + (1 - c) * K.dot(K)
+    mean = one + (1 - c) / angle * K + (1 - s / angle) * K.dot(K)
+    return -mean.dot(y) * length, turn
+
+
+_NODES: list = []
+
+
+def nodes():
+    """Gauss-Legendre nodes and weights on [0, 1]."""
+    if not _NODES:
+        x, _ = np.polynomial.legendre.leggauss(NODES)
+        for guess in x:
+            root = MP.findroot(lambda s: MP.legendre(NODES, s), MP.mpf(guess))
+            slope = NODES * (root * MP.legendre(NODES, root) - MP.legendre(NODES - 1, root))
+            slope /= root * root - 1
+            _NODES.append(((root + 1) / 2, 1 / ((1 - root * root) * slope * slope)))
+    return _NODES
