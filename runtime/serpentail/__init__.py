@@ -28,12 +28,15 @@ _HOME = {
     **dict.fromkeys(["Goal", "Bounds"], "planning.problem"),
     "Plan": "planning.result.plan",
     "Pfl": "simulation.pfl",
+    **dict.fromkeys(["Sequence", "SequenceRun"], "sequence.sequence"),
+    **dict.fromkeys(["Phase", "Tracking"], "sequence.phase"),
     "film": "pictures.film",
     "filmstrip": "pictures.filmstrip",
     "leg_joints": "pictures.skeleton",
     "plot": "pictures.plot",
     "view": "viewer.view",
     "live": "watching.live",
+    "export": "exporting.export",
     **dict.fromkeys(
         [
             "SerpentailError",
@@ -46,6 +49,7 @@ _HOME = {
             "ExtraMissing",
             "NotWritten",
             "ViewError",
+            "ExportError",
             "UnlikeBodies",
             "UnusualSize",
         ],

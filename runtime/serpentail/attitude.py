@@ -12,6 +12,7 @@ from .model.layout import QUATERNION, TORSO_NQ
 
 Array = NDArray[np.float64]
 Entries = Sequence[Any] | Array  # numbers, arrays or CasADi expressions, one after another
+TURN = 2 * np.pi
 
 
 def product(a: Entries, b: Entries) -> list[Any]:
@@ -105,27 +106,30 @@ def _continued(angles: Array) -> Array:
         raise ValueError(
             f"q of {angles.ndim} dimensions cannot be unwrapped: give (K, 7 + 2m), time first"
         )
-    followed = angles.copy()
-    followed[:1] = [_upright(first) for first in angles[:1]]
-    for k in range(1, len(angles)):
-        followed[k] = _nearest(angles[k], followed[k - 1])
-    return followed
+    if not len(angles):
+        return angles
+    # both branches lie as far from those of the sample before: the same two ways, stay or change
+    first, second = branches = _branches(angles)
+    stay, change = (np.abs(_less_turns(b[1:] - first[:-1])).sum(axis=1) for b in branches)
+    changes = np.concatenate([[_upright(branches[:, 0])], change < stay])
+    followed = np.where(np.cumsum(changes)[:, None] % 2, second, first)
+    # whole turns are counted, so that rounding does not add up; the first sample has the least
+    turns = np.round(np.diff(followed, axis=0, prepend=0) / TURN)
+    turns[0, 0] = 0  # its pitch stays
+    return followed - TURN * np.cumsum(turns, axis=0)
 
 
 def _branches(angles: Array) -> Array:
-    """Both Euler branches of one attitude: (x, y, z) and (pi - x, y + pi, z + pi), (2, 3)."""
+    """Both Euler branches (2, K, 3) of attitudes: (x, y, z) and (pi - x, y + pi, z + pi)."""
     return np.stack([angles, angles * (-1, 1, 1) + np.pi])
 
 
-def _upright(angles: Array) -> Array:
-    """Angles of one attitude with the least roll and yaw, so that a somersault is pitch."""
-    branches = _branches(angles)
-    branches[:, 1:] -= 2 * np.pi * np.round(branches[:, 1:] / (2 * np.pi))
-    return np.asarray(branches[np.argmin(np.abs(branches[:, 1:]).sum(axis=1))])
+def _upright(branches: Array) -> bool:
+    """Tell if the second branch has less roll and yaw, so that a somersault is pitch."""
+    first, second = np.abs(_less_turns(branches[:, 1:])).sum(axis=1)
+    return bool(second < first)
 
 
-def _nearest(angles: Array, reference: Array) -> Array:
-    """Angles of one attitude, of both branches and plus whole turns, closest to a reference."""
-    branches = _branches(angles)
-    branches += 2 * np.pi * np.round((reference - branches) / (2 * np.pi))
-    return np.asarray(branches[np.argmin(np.abs(branches - reference).sum(axis=1))])
+def _less_turns(angles: Array) -> Array:
+    """Angles within half a turn of zero."""
+    return angles - TURN * np.round(angles / TURN)

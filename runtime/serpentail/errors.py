@@ -51,6 +51,10 @@ class ViewError(SerpentailError, ValueError):
     """A page, a film or a figure that cannot be drawn as asked."""
 
 
+class ExportError(SerpentailError, ValueError):
+    """A model that another tool's file cannot hold, or a file that cannot be one."""
+
+
 class UnlikeBodies(UserWarning):
     """Torso and tail are so unlike in size that moments cancel in H, which loses digits."""
 

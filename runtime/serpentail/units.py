@@ -17,6 +17,7 @@ DEGREE = Fraction(math.pi) / 180  # of the double pi, so that 30 deg are math.pi
 # The unit of a field, powers without "^" -> what it measures, and what else may be written there:
 # how much of the field's unit each unit is.
 MEASURES: dict[str, tuple[str, dict[str, Fraction]]] = {
+    "kg/m3": ("a density", {"kg/m3": ONE, "g/cm3": KILO}),
     "kg": ("a mass", {"kg": ONE, "g": MILLI, "mg": MICRO}),
     "m": ("a length", {"m": ONE, "cm": CENTI, "mm": MILLI, "um": MICRO}),
     "s": ("a time", {"s": ONE, "ms": MILLI, "us": MICRO}),
@@ -35,12 +36,16 @@ MEASURES: dict[str, tuple[str, dict[str, Fraction]]] = {
         "a damping of joints",
         {"N m s": ONE, "mN m s": MILLI, "N m s/rad": ONE, "mN m s/rad": MILLI},
     ),
+    "N m/rad": (
+        "a stiffness of joints",
+        {"N m/rad": ONE, "mN m/rad": MILLI, "N mm/rad": MILLI, "N m/deg": 1 / DEGREE},
+    ),
     "N/m": ("a stiffness", {"N/m": ONE, "kN/m": KILO, "N/mm": KILO}),
     "N/m1.5": ("a stiffness of contact", {"N/m1.5": ONE, "kN/m1.5": KILO}),
-    "s/m": ("a time per length", {"s/m": ONE}),
     "1/s": ("a gain per time", {"1/s": ONE}),
     "1/s2": ("a gain per time squared", {"1/s2": ONE}),
 }
+BASE = {"kg": (1, 0, 0), "m": (0, 1, 0), "s": (0, 0, 1), "N": (1, 1, -2)}  # angles have none
 DEEPEST = 4  # arrays in arrays that are looked into
 NUMBER = r"[+-]?(?:[0-9]{1,40}(?:\.[0-9]{0,40})?|\.[0-9]{1,40})(?:[eE][+-]?[0-9]{1,3})?"
 TEXT = re.compile(rf"\s*({NUMBER}(?:\s*,\s*{NUMBER})*)(?:\s*([^\W\d_].*)|\s+(1/.*))", re.DOTALL)
@@ -76,6 +81,19 @@ def plain(unit: str) -> str:
     return re.sub(r"\s*/\s*", "/", " ".join(unit.split()))
 
 
+@lru_cache(256)
+def dimensions(unit: str) -> tuple[float, float, float]:
+    """Return the powers of kg, m and s in a unit, such as (1, 2, -2) of "N m"."""
+    powers = [0.0, 0.0, 0.0]
+    above, *below = plain(unit).split("/")
+    for part, sign in ((above, 1), *((each, -1) for each in below)):
+        for factor in part.split():
+            name, power = re.fullmatch(r"([A-Za-z]*)([0-9.]*)", factor).groups()  # type: ignore[union-attr]
+            for k, each in enumerate(BASE.get(name, (0, 0, 0))):
+                powers[k] += sign * each * float(power or 1)
+    return powers[0], powers[1], powers[2]
+
+
 def choices(unit: str) -> str:
     """Return what may be written in a field of a unit."""
     return f"{', '.join(MEASURES[plain(unit)][1])} or a plain number in {unit}"
@@ -87,7 +105,7 @@ def pattern(unit: str, others: str = "{0}") -> str:
     others: how many, as regular expressions say it.
     """
     names = [name.replace(".", "[.]") for name in MEASURES[plain(unit)][1]]
-    spelled = "|".join(re.sub("([ms])([12])", r"\1\^?\2", name) for name in names)
+    spelled = "|".join(re.sub("([ms])([123])", r"\1\^?\2", name) for name in names)
     gap = r"\s+" if spelled.startswith("1") else r"\s*"
     return rf"^\s*{NUMBER}(?:\s*,\s*{NUMBER}){others}{gap}(?:{spelled})\s*$"
 

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.model.parameters import ellipsoid, flat, resolve
+from serpentail.model.parameters import RunParameters, ellipsoid, flat, resolve
 from serpentail_codegen.scene.parameters import PARAMETERS
 from serpentail_codegen.scene.resolve import resolve_parameters
+from serpentail_codegen.scene.shape import EQUAL
 from tests.support.models import model_folder
 
 SEGMENTS, LINKS = 2, 3
@@ -72,7 +73,8 @@ def test_link_radius_replaces_a_scenes_link_inertia(thick):
 
 def test_flat_is_the_struct(manifest):
     values = resolve(manifest, {"tail_mount": (1, 2, 3)})
-    own = [p.name for p in PARAMETERS if p.name != "link_radius" and not p.needs]
+    of_equal = [p for p in PARAMETERS if EQUAL.numbers_of(p.tail) and not p.needs]
+    own = [p.name for p in of_equal if p.name != "link_radius"]
     assert flat(manifest, values) == np.hstack([values[name] for name in own]).tolist()
     assert flat(manifest, values)[5:8] == [1.0, 2.0, 3.0]
 
@@ -163,3 +165,54 @@ def test_the_struct_of_a_model_cannot_be_written_to():
 def test_masked_values_are_refused(manifest):
     inertia = np.ma.masked_array(INERTIA, [False, True, False])
     assert "link_inertia: value masked_array" in refusal(manifest, {"link_inertia": inertia})
+
+
+ELASTIC = {"tail_stiffness": 0.01, "tail_stop_lower": -1, "tail_stop_upper": [1, 2, 1, 2]}
+ELASTIC |= {"tail_stop_stiffness": "0.1 N m/rad"}
+
+
+@pytest.fixture(scope="module")
+def elastic():
+    """The manifest of a tail with springs and stops."""
+    return made(parameters=ELASTIC)
+
+
+def test_one_number_stands_for_all_tail_coordinates(elastic):
+    values = resolve(elastic, {"tail_stiffness": "20 mN m/rad", "tail_rest": [0, "30 deg", 0, 1]})
+    assert values["tail_stiffness"] == (0.02,) * 4
+    assert values["tail_rest"] == pytest.approx((0, np.pi / 6, 0, 1))
+    assert values["tail_stop_upper"] == (1.0, 2.0, 1.0, 2.0)
+    assert dict(resolve(elastic, None)) == dict(resolve_parameters(ELASTIC, 6, segments=2))
+
+
+def test_runs_have_one_number_or_one_a_coordinate_each(elastic):
+    values = resolve(elastic, None)
+    for given in ([0.02, 0.03, 0.04], np.outer([0.02, 0.03, 0.04], np.ones(4))):
+        runs = RunParameters.checked(elastic, values, {"tail_stiffness": given}, 3)
+        assert (runs.changes["tail_stiffness"] == np.outer([0.02, 0.03, 0.04], np.ones(4))).all()
+
+
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        (
+            {"tail_stiffness": -1e-9},
+            "tail_stiffness: value -1e-09: needs 4 finite numbers, or",
+        ),
+        ({"tail_stiffness": [1, 1, 1]}, "4 finite numbers, or one for all"),
+        ({"tail_stiffness": float("nan")}, "tail_stiffness: value nan"),
+        ({"tail_stop_stiffness": 0}, "above 0"),
+        ({"tail_stop_lower": 1.5}, "tail_stop_lower 1.5 is not below tail_stop_upper 1 of tail"),
+        ({"tail_damping": 1e-3}, "tail_damping: no such parameter"),
+        ({"tail_rest": "3 N m"}, "a torque where an angle is needed"),
+    ],
+)
+def test_values_of_the_passive_tail_that_cannot_be(elastic, changes, says):
+    assert says in refusal(elastic, changes)
+
+
+def test_stops_of_a_run_that_exclude_each_other(elastic):
+    values = resolve(elastic, None)
+    with pytest.raises(st.ModelError, match="is not below tail_stop_upper 2 of tail coordinate 1"):
+        lower = np.array([[0, 0, 0, 0], [0, 3, 0, 0]])
+        RunParameters.checked(elastic, values, {"tail_stop_lower": lower}, 2)

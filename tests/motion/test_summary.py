@@ -38,6 +38,7 @@ OF_THE_GROUND = [
     "peak_foot_force_N",
     "peak_tail_force_N",
     "ground_impulse_N_s",
+    "impulse_N_s",
 ]
 
 
@@ -111,6 +112,14 @@ def test_markdown_has_a_row_for_every_number(kick):
     assert len(lines) == len(told) + 2 and len({line.count("|") for line in lines}) == 1
     assert lines[0] == "| number | value | unit | meaning |"
     assert any(line.startswith("| apex_m | 0.631") and "highest B" in line for line in lines)
+
+
+def test_json_may_have_units_and_meanings(kick):
+    told = summary(kick.model, kick)
+    described = strict(told.described())
+    assert {name: each["value"] for name, each in described.items()} == strict(told)
+    assert described["apex_m"]["unit"] == "m" and "highest B" in described["apex_m"]["meaning"]
+    assert described["body_weight_N"]["unit"] == "N"
 
 
 # Runs of other kinds.

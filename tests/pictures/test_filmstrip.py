@@ -7,6 +7,7 @@ import dataclasses
 import matplotlib
 import numpy as np
 import pytest
+from PIL import Image
 
 import serpentail as st
 from serpentail.pictures.filmstrip import strip_of
@@ -71,6 +72,18 @@ def test_panels_key_and_labels_do_not_overlap(speed, frames, height):
         for other in boxes[:k]:
             shared = matplotlib.transforms.Bbox.intersection(box, other)
             assert shared is None or min(shared.width, shared.height) < 2
+
+
+def test_joints_leave_the_tail_s_colour_in_sight(tmp_path):
+    """Of 4, 12 and 20 links of a tail of one length: dots in ink on a line in vermilion."""
+    seen = []
+    for segments in (1, 3, 5):
+        motion = flight(SPEEDS["still"], segments=segments)
+        motion.filmstrip(tmp_path / "strip.png", frames=1, views=("side",))
+        pixels = np.asarray(Image.open(tmp_path / "strip.png").convert("RGB"), int)
+        animal = pixels[: int(0.8 * len(pixels))]  # above the key
+        seen.append((np.abs(animal - [0xD5, 0x5E, 0x00]).max(axis=2) < 12).sum())
+    assert min(seen) > 0.8 * seen[0] > 0
 
 
 def test_motions_are_rows_at_the_same_times():

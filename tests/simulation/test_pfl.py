@@ -106,3 +106,6 @@ def test_torques_keep_their_limit(method):
     assert np.abs(free.tau).max() > 4e-3
     np.testing.assert_allclose(wide.q, free.q, atol=1e-6)
     assert np.abs(tight.tau).max(axis=0) == pytest.approx([1e-3, 2e-3])
+    law = st.Pfl(model, reference, torque=(1e-3, 2e-3))
+    wanted = [law(*state) for state in zip(tight.t, tight.q, tight.v, strict=True)]
+    np.testing.assert_allclose(tight.tau[1:-1], wanted[1:-1], rtol=1e-9, atol=1e-12)

@@ -191,7 +191,7 @@ FAULTS = {
         "forward dynamics needs the torques it was given",
     ),
     "height": ("energy", heavier_at_height, "energy changes by the power of the torques"),
-    "stretched": ("tail_points", stretched, "links have equal length"),
+    "stretched": ("tail_points", stretched, "links have their length"),
     "stretched columns": ("tail_points", stretched, "jacobians are the derivatives of the points"),
     "swapped": ("tail_point_jacobians", swapped, "jacobians are the derivatives of the points"),
     "loads": ("forward_dynamics_external", unloaded, "loads accelerate by their generalised force"),

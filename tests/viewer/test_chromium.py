@@ -1,18 +1,22 @@
 """The page in a real browser: it needs nothing else, seeks, switches, obeys keys, fits a phone."""
 
 import time
+from io import BytesIO
 
+import numpy as np
 import pytest
+from PIL import Image
 from selenium.webdriver import ActionChains
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.ui import WebDriverWait
 
 import serpentail as st
+from benchmarks.pages import FRAMES
 from tests.support import chromium
-from tests.support.chromium import opened, requests
+from tests.support.chromium import opened, processor_seconds, requests
 from tests.support.page import need
 
-from .conftest import simulated
+from .conftest import flown, model_of, simulated
 
 PHONE = (375, 740)
 SETTLED = 0.1  # s, for what is drawn when a frame comes
@@ -120,6 +124,19 @@ def test_runs_switch_on_and_off(browser, pages):
     assert not any(box.is_selected() for box in boxes)
 
 
+def test_where_runs_are_in_one_place_the_first_is_seen(browser, pages):
+    driver = opened(browser, pages["two"])
+    seek(driver, 0.0)
+    both = picture(driver)
+    press(driver, "2")
+    first, second = (
+        np.asarray(Image.open(BytesIO(each)).convert("RGB"), float)
+        for each in (both, picture(driver))
+    )
+    other = np.abs(first - second).max(axis=2) > 40
+    assert other.mean() < 0.005  # the path of the other's centre of mass
+
+
 def test_keys(browser, pages, kick):
     driver = opened(browser, pages["kick"])
     begin, end = Keys.HOME, Keys.END
@@ -157,6 +174,17 @@ def test_space_plays_and_pauses(browser, pages):
     assert text(driver, "play") == "Pause"
 
 
+@pytest.mark.slow
+def test_two_cores_play_40_bodies_at_15_frames_a_second(browser, tmp_path):
+    """By processor time, which other work on the machine hardly changes."""
+    path = flown(model_of(4, 10), samples=600).view(tmp_path / "long.html")
+    driver = opened(browser, path)
+    begun = processor_seconds(driver)
+    frames = 3.0 * driver.execute_async_script(FRAMES, 3.0)
+    assert text(driver, "play") == "Pause" and 0 < value(driver) < 0.2
+    assert frames > 3 and (processor_seconds(driver) - begun) / frames < 2 / 15
+
+
 def test_controls_are_focusable_and_named(browser, pages):
     driver = opened(browser, pages["two"])
     unnamed = """
@@ -186,6 +214,17 @@ def test_without_webgl_all_but_the_animal_is_there(pages):
         before = text(driver, "plots")
         press(driver, Keys.END)
         assert value(driver) == pytest.approx(1.2) and text(driver, "plots") != before
+
+
+def test_warnings_open_by_a_click_and_leave_plots_in_sight(browser, pages, kick):
+    driver = opened(browser, pages["kick"], (1280, 800))
+    box = driver.find_element("id", "warnings")
+    assert box.text == "5 warnings"
+    assert driver.find_element("css selector", ".u-over").rect["y"] < 800 - 100
+    box.find_element("css selector", "summary").click()
+    assert all(each in box.text for each in kick.warnings)
+    opened(browser, pages["two"])
+    assert "whole: tail: " in text(browser, "warnings")
 
 
 def test_the_licences_are_in_it(browser, pages):

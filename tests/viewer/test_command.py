@@ -41,7 +41,7 @@ def test_a_simulation_that_fails_has_a_page_up_to_there(run):
     status, out, err = run("simulate", KICK, "--view", "kick.html", *few)
     assert (status, out) == (2, "") and "t = " in err
     data = data_of(Path("kick.html"))
-    assert data["notes"][0] == f"run: the run failed, and ends here: {err.strip()}"
+    assert data["notes"][0] == f"the run failed, and ends here: {err.strip()}"
     assert 1 < data["runs"][0]["rows"] < 1201
 
 

@@ -160,3 +160,10 @@ def test_a_browser_sees_it(view):
             lambda browser: "t = 0.1000 s" in browser.execute_script(words)
         )
         assert seen and rat().name in driver.execute_script(words)
+
+
+def test_a_model_that_can_touch_the_ground_stands_on_it(view):
+    assert view.server.scene.get_handle_by_name("/ground") is not None
+    flier = st.load(model_folder(1, 2, functions=["tail_points"]))
+    with st.live(flier, port=free_port()) as alone:
+        assert alone.server.scene.get_handle_by_name("/ground") is None

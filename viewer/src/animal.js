@@ -20,12 +20,21 @@ const from = new Vector3();
 const to = new Vector3();
 const force = new Vector3();
 
+// Where runs are in one place the first is seen, not spots of each.
+const ghost = (k) => ({
+  transparent: true,
+  opacity: 0.5,
+  polygonOffset: true,
+  polygonOffsetFactor: k,
+  polygonOffsetUnits: 4 * k,
+});
+
 export class Animal {
   constructor(run, k, alone, scale) {
     Object.assign(this, { run, k, alone, scale, group: new Group() });
-    const opacity = k === 0 ? 1 : 0.5;
-    const lambert = () => new MeshLambertMaterial({ transparent: opacity < 1, opacity });
-    this.torso = new Torso(run.body.semi_axes, opacity);
+    const look = k === 0 ? {} : ghost(k);
+    const lambert = () => new MeshLambertMaterial(look);
+    this.torso = new Torso(run.body.semi_axes, look);
     this.materials = { tail: lambert(), joint: lambert(), leg: lambert(), force: lambert() };
 
     const links = Math.max(run.points - 1, 0);
@@ -91,11 +100,10 @@ export class Animal {
     this.showForces(row);
   }
 
-  // Thinner towards the tip.
   showTail(row) {
     const { points, body } = this.run;
     for (let j = 0; j + 1 < points; j++) {
-      const radius = body.tail_radius * (1.15 - (0.5 * j) / points);
+      const radius = body.tail_radii[j];
       this.run.point("tail", row, j, from);
       this.run.point("tail", row, j + 1, to);
       this.tail.place(j, from, to, radius);

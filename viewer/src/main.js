@@ -1,6 +1,6 @@
 // The page of runs: reads its data, puts stage, plots and numbers together, and obeys the keyboard.
 import { Run } from "./data.js";
-import { addNotes, addNumbers, addSwitches } from "./panel.js";
+import { addNotes, addNumbers, addSwitches, addWarnings } from "./panel.js";
 import { Player } from "./player.js";
 import { Plots } from "./plots.js";
 import { Stage } from "./stage.js";
@@ -25,6 +25,7 @@ async function open() {
   const meta = JSON.parse(find("data").textContent);
   const runs = await Promise.all(meta.runs.map((run) => Run.of(run)));
   addNotes(find("notes"), meta.notes);
+  addWarnings(find("warnings"), meta.warnings);
   addNumbers(find("numbers"), runs);
 
   const stage = stageOf(find("view"), runs, meta);

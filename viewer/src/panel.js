@@ -9,6 +9,13 @@ export function addNotes(holder, notes) {
   holder.hidden = !notes.length;
 }
 
+// Folded, since plots and numbers come after them.
+export function addWarnings(holder, warnings) {
+  const count = `${warnings.length} warning${warnings.length === 1 ? "" : "s"}`;
+  holder.querySelector("summary").textContent = count;
+  addNotes(holder, warnings);
+}
+
 // One switch a run; returns them.
 export function addSwitches(holder, runs, change) {
   const switches = runs.map((run, k) => {

@@ -13,8 +13,7 @@ import { BALL } from "./shapes.js";
 const BELLY = [-0.22, -0.08]; // heights, in semi-axes, between which the coat turns pale
 
 export class Torso {
-  constructor([a, b, c], opacity) {
-    const look = { transparent: opacity < 1, opacity };
+  constructor([a, b, c], look) {
     this.coat = new MeshLambertMaterial({ ...look, vertexColors: true });
     this.fur = new MeshLambertMaterial(look);
     this.dark = new MeshLambertMaterial(look);

@@ -30,7 +30,16 @@ from .generator import generate, identity
 from .options import Options, separated
 from .scene_text import scene_text
 
-LEFT_OUT = ("plan", "simulate", "description")  # of a scene: no generated code depends on them
+# parameters of single links or arcs
+PIECES = {
+    *("link_masses", "link_lengths", "link_centers", "link_inertias"),
+    *("arc_masses", "arc_lengths"),
+}
+# parameters of springs, damping and stops
+PASSIVE = {"tail_stiffness", "tail_rest", "tail_damping"} | {
+    f"tail_stop_{name}" for name in ("lower", "upper", "stiffness", "width")
+}
+LEFT_OUT = ("plan", "simulate", "phase", "description")  # no generated code depends on them
 
 
 def build(
@@ -74,9 +83,25 @@ def built(
     """
     scene = {key: value for key, value in tables.items() if key not in LEFT_OUT}
     own = scene.get("parameters", {})
-    if scene.get("baked") is True and parameters and isinstance(own, Mapping):
+    if not isinstance(own, Mapping):
+        return generated(scene, name), parameters or None
+    if scene.get("baked") is True and parameters:
         return generated(scene | {"parameters": merged(own, parameters)}, name), None
-    return generated(scene, name), parameters or None
+    shaping = {n: x for n, x in parameters.items() if _shapes(n, scene, own)}
+    if shaping:
+        scene |= {"parameters": merged(own, shaping)}
+    return generated(scene, name), {n: x for n, x in parameters.items() if n not in shaping} or None
+
+
+def _shapes(name: str, scene: Mapping[str, Any], own: Mapping[str, Any]) -> bool:
+    """Tell if a parameter makes another tail of a scene's, whose code has no such parameter."""
+    if name == "mount_angles" or name in PASSIVE:
+        return name not in own
+    if name not in PIECES or name in own:
+        return False
+    segments = scene.get("segments")
+    tables = segments if isinstance(segments, list | tuple) else []
+    return "taper" not in scene and all(set(table) <= {"links"} for table in tables)
 
 
 def generated(scene: Mapping[str, Any], name: str) -> CheckedFolder:
@@ -130,5 +155,7 @@ def _note(cache: Path, key: str) -> Path:
 def _name(keys: Mapping[str, Any]) -> str:
     """Return what a model without a scene file is called: ``make model`` calls it so, too."""
     size = f"_n{keys['links']}" if "links" in keys else ""
-    name = f"{keys.get('kind', 'tail')}_m{keys.get('segments', '')}{size}"
+    segments = keys.get("segments", "")
+    count = len(segments) if isinstance(segments, list | tuple) else segments
+    name = f"{keys.get('kind', 'tail')}_m{count}{size}"
     return re.sub("[^a-z0-9_]", "_", name.lower())[:63]

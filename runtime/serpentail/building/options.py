@@ -1,12 +1,13 @@
 """What a model can be built from: the keys of a scene, and the parameters of its body."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, TypedDict
 
 from ..checks import did_you_mean, shown
 from ..errors import ModelError
 
 Three = Sequence[float]
+OneOrEach = float | Sequence[float]  # of all tail coordinates, or of each
 
 
 class Parameters(TypedDict, total=False):
@@ -19,10 +20,17 @@ class Parameters(TypedDict, total=False):
     torso_mass: float
     torso_inertia: Three
     tail_mount: Three
+    mount_angles: Three
     tail_mass: float
     tail_length: float
     link_radius: float
     link_inertia: Three
+    link_masses: Sequence[float]
+    link_lengths: Sequence[float]
+    link_centers: Sequence[float]
+    link_inertias: Sequence[Three]
+    arc_masses: Sequence[float]
+    arc_lengths: Sequence[float]
     K_n: float
     D_n: float
     K_f: float
@@ -36,13 +44,22 @@ class Parameters(TypedDict, total=False):
     delta_m: float
     hip: Three
     torso_semi_axes: Three
+    tail_stiffness: OneOrEach
+    tail_rest: OneOrEach
+    tail_damping: OneOrEach
+    tail_stop_lower: OneOrEach
+    tail_stop_upper: OneOrEach
+    tail_stop_stiffness: OneOrEach
+    tail_stop_width: OneOrEach
 
 
 class SceneKeys(TypedDict, total=False):
     """Keys of a scene that generated code depends on; ``tail`` is a scene's ``kind``."""
 
     tail: str
-    segments: int
+    segments: int | Sequence[Mapping[str, Any]]
+    taper: Mapping[str, Any]
+    body: Mapping[str, Any]
     links: int
     samples: int
     functions: Sequence[str] | str
@@ -54,6 +71,8 @@ class SceneKeys(TypedDict, total=False):
     emission: str
     profile: str
     baked: bool
+    base: str
+    weightless: bool
     targets: Sequence[str]
     name: str
 

@@ -87,8 +87,13 @@ def _of_models(verbs: argparse._SubParsersAction) -> None:
     """Add the verbs about models."""
     info = verbs.add_parser("info", help="what a model is: sizes, functions, costs")
     verify = verbs.add_parser("verify", help="check the laws that a model must obey")
-    for verb in (info, verify):
+    export = verbs.add_parser("export", help="write a model to a file that other tools take")
+    kinds = "urdf, mjcf: articulated tails; bundle: its generated folder; fmu: FMI 2.0"
+    export.add_argument("kind", choices=["urdf", "mjcf", "bundle", "fmu"], help=kinds)
+    for verb in (info, verify, export):
         verb.add_argument("model", help="a generated folder, a scene file or an example's name")
+    file = "the file, ending in .urdf, .xml, .zip or .fmu; by default named after the model, here"
+    export.add_argument("-o", "--output", metavar="FILE", help=file)
 
 
 def _of_this_machine(verbs: argparse._SubParsersAction) -> None:

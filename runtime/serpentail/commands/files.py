@@ -1,6 +1,7 @@
 """Files that options ask for: refused before the work where they cannot be, written after it."""
 
 import argparse
+import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -9,6 +10,7 @@ from ..errors import SerpentailError
 from ..files import refuse_unwritable
 
 OPTIONS = ("save", "film", "view")
+SEPARATORS = ("/", os.sep)
 
 
 def refuse_targets(arguments: argparse.Namespace) -> None:
@@ -20,6 +22,8 @@ def refuse_targets(arguments: argparse.Namespace) -> None:
     for option in OPTIONS:
         path = getattr(arguments, option, None)
         try:
+            if path is not None and path.endswith(SEPARATORS):
+                raise IsADirectoryError(f"{path} is a folder")
             if path is not None:
                 refuse_unwritable(target(option, path))
         except (OSError, ValueError) as error:

@@ -1,4 +1,6 @@
-"""The verbs about models: what one is, whether it obeys its laws, what the cache holds."""
+"""The verbs about models: what one is, whether it obeys its laws, how other tools take it, what the
+cache holds.
+"""
 
 import argparse
 from pathlib import Path
@@ -38,6 +40,17 @@ def verify(arguments: argparse.Namespace) -> Outcome:
     model = model_of(arguments.model)
     checks = laws(model)
     return Outcome(summary(model, checks), told(model, checks), all(c.passed for c in checks))
+
+
+def export(arguments: argparse.Namespace) -> Outcome:
+    """Write a model to a file of another tool's kind, and return where it is."""
+    from ..exporting.export import checked_path
+    from ..exporting.export import export as written
+
+    if arguments.output is not None:
+        checked_path(arguments.kind, arguments.output)  # before the work
+    path = written(model_of(arguments.model), arguments.kind, arguments.output)
+    return Outcome({"file": str(path)}, str(path))
 
 
 def cache(arguments: argparse.Namespace) -> Outcome:

@@ -34,9 +34,20 @@ def simulate(arguments: argparse.Namespace) -> Outcome:
 
     scene = scenario(arguments.scene, arguments.folder, parsed(arguments.changes))
     motion, stopped = _motion(scene, arguments.view)
-    report = scene.summary(motion) | stopped
+    report = scene.summary(motion) | _phases(motion) | stopped
     files: Files = {"save": partial(save, motion), "film": motion.film, "view": motion.view}
     return Outcome(report, as_text(report, UNITS), True, files)
+
+
+def _phases(motion: "Trajectory") -> dict[str, dict]:
+    """Return how the phases of a sequence went, by name; nothing of other motions."""
+    told = {}
+    for phase in motion.info.get("phases", []):
+        seen = {"begin_s": phase["begin"], "end_s": phase["end"], "ended_by": phase["ended_by"]}
+        if "plan" in phase:
+            seen["plan_is_true"] = phase["plan"]["success"]
+        told[phase["name"]] = seen
+    return {"phases": told} if told else {}
 
 
 def _motion(scene: "Scenario", page: str | None) -> tuple["Trajectory", dict[str, str]]:

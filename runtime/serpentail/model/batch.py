@@ -6,6 +6,7 @@ It takes a second or two to compile, so it is compiled when it is first worth th
 import ctypes
 import threading
 from collections.abc import Callable
+from typing import Any
 from weakref import WeakSet
 
 from .kept import kept
@@ -15,7 +16,7 @@ from .workers import after_fork
 
 MIN_BATCH = 1000  # states: from here on a batch pays for compiling
 # sources of a model that are compiled when they are needed
-LAZY_SOURCES = ("batch", "batch_derivatives", "flights")
+LAZY_SOURCES = ("batch", "batch_derivatives", "batch_airborne", "flights")
 NO_BATCH: dict = {"states": 1, "work": {}, "parts": {}}  # of models without C
 RecordFunction = Callable[[int], int]  # takes the address of a record, returns a status
 
@@ -81,6 +82,16 @@ class BatchLibrary:
         self.parts: dict[str, str] = batch["parts"]
         self.sources = {part: LazyLibrary(checked, profile, part) for part in LAZY_SOURCES}
         self.rollouts = self.sources["flights"]
+
+    def address(self, name: str) -> int:
+        """Return the address of the C function for states that lie apart, for kernels in C.
+
+        It takes the record of a call and the numbers from state to state of each of its arrays;
+        KeyError where the model has no batches of that function.
+        """
+        source = self.sources[self.parts[name]]
+        function: Any = source.function(f"{self.prefix}_side_by_side_{name}_apart")
+        return ctypes.cast(function, ctypes.c_void_p).value or 0
 
     def entry(self, name: str, count: int) -> RecordFunction | None:
         """Return the C function for a batch of so many states, None where it is not worth it."""

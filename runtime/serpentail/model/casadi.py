@@ -65,6 +65,9 @@ class CasadiFunctions:
         sizes = {"x": layout.nq + layout.nv, "u": layout.nt, "p": self.parameter_vector.numel()}
         x, u, p = inputs = [kind.sym(name, size) for name, size in sizes.items()]
         q, v = casadi.vertsplit(x, [0, layout.nq, sizes["x"]])
+        if layout.fixed:
+            rates = casadi.vertcat(v, forward_dynamics(q, v, u, p))
+            return casadi.Function("x_dot", inputs, [rates], [*sizes], ["x_dot"])
         quaternion, omega = q[QUATERNION], v[OMEGA]
         scalar, vector = quaternion[0], quaternion[1:]
         turning = casadi.vertcat(

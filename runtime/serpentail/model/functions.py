@@ -59,7 +59,8 @@ class Functions(ABC):
         """
         q, v = split(self.layout, finite_array("x", x))
         v_dot = self.forward_dynamics(q, v, u)
-        kinematics = np.broadcast_to(q_dot(q, v), (*v_dot.shape[:-1], q.shape[-1]))
+        rates = v if self.layout.fixed else q_dot(q, v)
+        kinematics = np.broadcast_to(rates, (*v_dot.shape[:-1], q.shape[-1]))
         return np.concatenate([kinematics, v_dot], axis=-1)
 
     def x_dot_derivatives(self, x: ArrayLike, u: ArrayLike) -> tuple[Array, Array]:
@@ -251,6 +252,25 @@ class Functions(ABC):
     def momentum_derivatives(self, q: ArrayLike, v: ArrayLike) -> tuple[Array, Array, Array, Array]:
         """(linear_dq, linear_dv, angular_dq, angular_dv) (3, nv): Jacobians of ``momentum``."""
         return self.kernel("momentum_derivatives")(q, v)
+
+    def airborne_rates(self, x: ArrayLike, tau: ArrayLike, angular: ArrayLike) -> Array:
+        """y (7 + 4m,): rates of x = (quaternion, q_t, q_t_dot) in flight, then omega (rad/s, body).
+
+        angular (3,) is the angular momentum about the COM (kg m^2/s, world), which gives omega.
+        """
+        return self.kernel("airborne_rates")(x, tau, angular)
+
+    def airborne_rates_derivatives(
+        self, x: ArrayLike, tau: ArrayLike, angular: ArrayLike
+    ) -> tuple[Array, Array]:
+        """(y, J (7 + 4m, 4 + 6m)): ``airborne_rates`` and its Jacobian by (x, tau)."""
+        return self.kernel("airborne_rates_derivatives")(x, tau, angular)
+
+    def airborne_rates_hessian(
+        self, x: ArrayLike, tau: ArrayLike, angular: ArrayLike, weights: ArrayLike
+    ) -> tuple[Array, Array, Array]:
+        """(y, J, H (4 + 6m, 4 + 6m)): the same, and second derivatives of weights^T y."""
+        return self.kernel("airborne_rates_hessian")(x, tau, angular, weights)
 
     crba = mass_matrix
     nle = bias_force

@@ -32,11 +32,8 @@ def info(model: Model) -> dict[str, Any]:
 
 def described(model: Model) -> str:
     """Return what a model is as text: its sizes, its functions, their arguments with units."""
-    shape = f"{model.segments} continuum segments"
-    if model.links:
-        shape = f"{model.segments} segments x {model.links} links"
     real = model.manifest["real"]
-    lines = [f"{model.name}: {shape}, nq {model.nq}, nv {model.nv}, {real}"]
+    lines = [f"{model.name}: {model.tail_words()}, nq {model.nq}, nv {model.nv}, {real}"]
 
     # each function, then its arguments; columns as wide as their widest entry
     functions = model.manifest["functions"]

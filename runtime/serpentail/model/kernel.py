@@ -15,11 +15,12 @@ from ..checks import real_array, refuse_not_finite
 from ..errors import StateError
 from .batch import BatchLibrary, RecordFunction
 from .calls import Call, call_of, declined
-from .layout import FIRST_Q, QUATERNION, SECOND_Q
+from .layout import PER_SEGMENT, QUATERNION
 from .library import NOT_POSITIVE_DEFINITE, OUT_OF_RANGE
 from .workers import shared
 
 MOST_ARRAYS = 10
+QUATERNIONS = {"q": QUATERNION, "x": slice(0, 4)}  # where they are, by the first argument's name
 Arrays = Sequence[ndarray]
 Shapes = Sequence[tuple[int, ...]]
 
@@ -252,7 +253,7 @@ class Kernel:
         for name, array in zip(self.names, arrays, strict=True):
             refuse_not_finite(f"{self.name}: {name}", array[index], StateError, state)
         q = arrays[0][index].astype(float)
-        if self.names[0] == "q":
+        if self.names[0] in QUATERNIONS:
             self._check_attitude(q, state)
         # else what the C function found
         if status == OUT_OF_RANGE:
@@ -263,16 +264,22 @@ class Kernel:
 
     def _check_attitude(self, q: ndarray, state: str) -> None:
         """Refuse a quaternion that gives no attitude."""
-        limits, norm = np.finfo(self.dtype), math.hypot(*q[QUATERNION])
+        limits, name = np.finfo(self.dtype), self.names[0]
+        where = QUATERNIONS[name]
+        norm = math.hypot(*q[where])
         if not limits.tiny <= norm * norm <= limits.max:
             words = f"has norm {norm:.3g}" if norm else "is zero"
+            place = f"{name}[{where.start}:{where.stop}]"
             raise StateError(
-                f"{self.name}: the quaternion q[3:7]{state} {words}: upright is (1, 0, 0, 0)"
+                f"{self.name}: the quaternion {place}{state} {words}: upright is (1, 0, 0, 0)"
             )
 
     def _out_of_range(self, q: ndarray, state: str) -> str:
         """Say which segment has a bend that the model does not cover, and what to do."""
-        first, second = q[FIRST_Q], q[SECOND_Q]
+        tail = q[QUATERNIONS[self.names[0]].stop :]
+        if self.names[0] == "x":  # the rates are there, too
+            tail = tail[: len(tail) // 2]
+        first, second = tail[::PER_SEGMENT], tail[1::PER_SEGMENT]
         bends = abs(second) if self.polar else np.hypot(first, second)
         least, worst = int(bends.argmin()), int(bends.argmax())
         if self.polar and bends[worst] <= self.bend_range:

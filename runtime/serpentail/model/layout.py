@@ -16,9 +16,13 @@ FIRST_Q, SECOND_Q = slice(TORSO_NQ, None, PER_SEGMENT), slice(TORSO_NQ + 1, None
 
 @dataclass(frozen=True)
 class Layout:
-    """The layout of a model of m segments: q (nq,), v (nv,), tau (nt,)."""
+    """The layout of a model of m segments: q (nq,), v (nv,), tau (nt,).
+
+    fixed: on a base that never moves, so that q and v are those of the tail alone.
+    """
 
     segments: int
+    fixed: bool = False
 
     @classmethod
     def of_width(cls, nq: int) -> "Layout | None":
@@ -34,12 +38,12 @@ class Layout:
     @property
     def nq(self) -> int:
         """Numbers of a configuration."""
-        return TORSO_NQ + self.nt
+        return self.nt + (0 if self.fixed else TORSO_NQ)
 
     @property
     def nv(self) -> int:
         """Numbers of a velocity."""
-        return TORSO_NV + self.nt
+        return self.nt + (0 if self.fixed else TORSO_NV)
 
     def segment_q(self, i: int) -> slice:
         """Where the coordinates of segment i (from 0) lie in q."""

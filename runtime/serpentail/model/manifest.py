@@ -99,9 +99,8 @@ def _read(folder: Path) -> CheckedFolder:
 
 def _no_folder(folder: Path) -> ModelError:
     return ModelError(
-        f"{folder} is no generated folder (it has no manifest.json): make one, as by `make "
-        "model TAIL=articulated "
-        "M=3 N=4`, or python -m serpentail_codegen SCENE.toml"
+        f"{folder} is no generated folder (it has no manifest.json): make one, as by "
+        "`serpentail generate SCENE.toml`, or `make model TAIL=articulated M=3 N=4`"
     )
 
 

@@ -135,10 +135,16 @@ class Model(Functions):
         self.name: str = manifest["prefix"]
         self.kind: str = manifest["scene"]["kind"]
         self.segments: int = manifest["dimensions"]["segments"]
-        pieces: int = manifest["dimensions"]["links"]
-        self.links = pieces if self.kind == "articulated" else None
-        self.samples = None if self.kind == "articulated" else pieces
-        self.layout = Layout(self.segments)
+        pieces: int | list[int] = manifest["dimensions"]["links"]
+        counts = pieces if isinstance(pieces, int) else tuple(pieces)
+        self.links = counts if self.kind == "articulated" else None
+        self.samples: int | None = (
+            None if self.kind == "articulated" else manifest["dimensions"]["links"]
+        )
+        # how many joints turn by the coordinates of each segment (m,); 1 of an arc
+        self.joints_each = np.broadcast_to(1 if self.links is None else self.links, self.segments)
+        self.fixed: bool = manifest["scene"].get("base") == "fixed"
+        self.layout = Layout(self.segments, self.fixed)
         self.nq, self.nv = self.layout.nq, self.layout.nv
         self.contacts = {entry["group"]: entry["count"] for entry in manifest["contacts"]}
         # its functions, as compiled
@@ -152,8 +158,15 @@ class Model(Functions):
                 self.kernels[name] = Kernel(libraries, manifest, name, self.parameter_vector)
 
     def __repr__(self) -> str:
-        pieces = f" x {self.links} links" if self.links else " continuum segments"
-        return f"<serpentail.Model {self.name}: {self.segments}{pieces}, nv = {self.nv}>"
+        return f"<serpentail.Model {self.name}: {self.tail_words()}, nv = {self.nv}>"
+
+    def tail_words(self) -> str:
+        """Return what the tail is made of, in words."""
+        if self.links is None:
+            return f"{self.segments} continuum segments"
+        if isinstance(self.links, tuple):
+            return f"{self.segments} segments of {', '.join(map(str, self.links))} links"
+        return f"{self.segments} x {self.links} links"
 
     def with_parameters(self, **changes: ArrayLike) -> "Model":
         """Return this model with other parameters; nothing is compiled.  Warns as ``load`` does."""
@@ -185,7 +198,7 @@ class Model(Functions):
         """Return the parameters that the others follow from; none where they are baked."""
         if self.manifest["scene"]["baked"]:
             return {}
-        return independent(self.parameters)
+        return independent(self.manifest, self.parameters)
 
     def __reduce__(self) -> tuple[Any, ...]:
         with suppress(SerpentailError):  # a folder that is as it was serves too
@@ -214,6 +227,14 @@ class Model(Functions):
         if kernel is None:
             raise self.without(name)
         return kernel
+
+    def refuse_fixed(self, what: str) -> None:
+        """Raise ModelError where the base is fixed: only a free torso has what is asked for."""
+        if self.fixed:
+            raise ModelError(
+                f"{what}: {self.name} has a fixed base: integrate model.x_dot, which has its exact "
+                'derivatives, or generate it again with base = "free"'
+            )
 
     def without(self, *names: str) -> ModelError:
         """Return the error that functions are not there."""

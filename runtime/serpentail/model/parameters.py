@@ -12,7 +12,13 @@ from ..errors import ModelError
 from ..units import in_unit
 
 Value = float | tuple[float, ...]
-Values = Mapping[str, Any]  # name -> number or 3 numbers, SI; of many runs (k,) or (k, 3)
+Values = Mapping[str, Any]  # name -> number or numbers, SI; of many runs (k,) or (k, size)
+# of a tail whose links or arcs have values of their own: what follows from these
+UNITS = {"tail_mass": "kg", "tail_length": "m", "gravity": "m/s^2"}
+TOTALS = {
+    "tail_mass": ("link_masses", "arc_masses"),
+    "tail_length": ("link_lengths", "arc_lengths"),
+}
 CHECKS = {  # of rows (K, size), for each one
     "positive": (lambda x: (x > 0).all(axis=1), "above 0"),
     "not_negative": (lambda x: (x >= 0).all(axis=1), "0 or above"),
@@ -78,8 +84,8 @@ def real_type(manifest: dict) -> type[np.floating]:
 
 
 def total_mass(values: Values) -> Any:
-    """Return the mass (kg) of torso and tail, or one of each run."""
-    return values["torso_mass"] + values["tail_mass"]
+    """Return the mass (kg) of torso and tail, or one of each run; of the tail on a fixed base."""
+    return values.get("torso_mass", 0.0) + values["tail_mass"]
 
 
 def merged(values: Values, changes: Values) -> dict[str, Any]:
@@ -89,26 +95,55 @@ def merged(values: Values, changes: Values) -> dict[str, Any]:
     return {name: x for name, x in values.items() if name not in replaced} | dict(changes)
 
 
-def independent(values: Values) -> dict[str, Any]:
+def independent(manifest: dict, values: Values) -> dict[str, Any]:
     """Return the values that others follow from."""
+    own = {p["name"] for p in manifest["parameters"]}
     computed = "link_inertia" if "link_radius" in values else ""
-    return {name: value for name, value in values.items() if name != computed}
+    return {name: x for name, x in values.items() if name in own and name != computed}
+
+
+def totals(values: Values) -> dict[str, Any]:
+    """Return mass and length of a tail whose links or arcs have their own, of each run."""
+    found = {}
+    for name, parts in TOTALS.items():
+        own = [np.sum(values[part], axis=-1) for part in parts if part in values]
+        if own:
+            found[name] = sum(own)
+    return found
 
 
 def completed(manifest: dict, values: Values) -> dict[str, Any]:
-    """Return the values with link_inertia, of each run, where it follows from link_radius;
-    ModelError where the weight is no finite number.
+    """Return the values, of each run, with those that follow: link_inertia from link_radius, mass
+    and length of a tail from those of its links or arcs.  ModelError where the weight is no finite
+    number, or stops leave no room.
     """
+    absent = {"gravity": 0.0} if manifest["scene"].get("weightless") else {}
+    values = {**absent, **values, **totals(values)}
     with np.errstate(over="ignore"):
         weight = np.asarray(total_mass(values)) * values["gravity"]
     if not np.isfinite(weight).all():
         raise ModelError(
             "parameters: torso_mass, tail_mass and gravity give no finite weight: use kg and m/s^2"
         )
+    _refuse_stops_without_room(values)
     if "link_radius" not in values:
         return dict(values)
     moments = np.broadcast_arrays(*ellipsoid(values, manifest["dimensions"]["total"]))
     return dict(values) | {"link_inertia": np.stack(moments, axis=-1)}
+
+
+def _refuse_stops_without_room(values: Values) -> None:
+    """ModelError where a lower stop is not below the upper one."""
+    if "tail_stop_lower" not in values:
+        return
+    lower, upper = (np.asarray(values[f"tail_stop_{end}"]) for end in ("lower", "upper"))
+    wrong = np.argwhere(~(lower < upper))
+    if len(wrong):
+        lower, upper = (each[tuple(wrong[0])] for each in np.broadcast_arrays(lower, upper))
+        raise ModelError(
+            f"parameters: tail_stop_lower {lower:.6g} is not below tail_stop_upper {upper:.6g} of "
+            f"tail coordinate {wrong[0][-1]}: stops exclude each other, move them apart"
+        )
 
 
 def _checked_changes(manifest: dict, changes: object, runs: int | None) -> dict[str, np.ndarray]:
@@ -165,19 +200,29 @@ def flat(manifest: dict, values: Mapping[str, Value]) -> list[float]:
 def _checked(fields: dict, name: str, value: object, runs: int | None) -> np.ndarray | str:
     """Return the value, of every run where there are many, or what is wrong with it."""
     if name not in fields:
+        parts = [part for part in TOTALS.get(name, ()) if part in fields]
         remedy = did_you_mean(name, fields) or f"there are {', '.join(fields)}"
+        remedy = f"it is the sum of {parts[0]}, change these" if parts else remedy
         return f"{name}: no such parameter; {remedy}"
     # what the value must be, in words and as a shape
     size, unit = fields[name]["size"], fields[name]["unit"]
     holds, words = CHECKS[fields[name]["check"]]
+    pieces = fields[name].get("pieces")
     kind = "a finite number" if size == 1 else f"{size} finite numbers"
-    needs, shape = f"needs {kind} ({unit}), {words}", (size,) if size > 1 else ()
+    kind += f", {size // pieces} of each piece of the tail" if pieces else ""
+    of_all = "per" in fields[name]  # one number may stand for those of all coordinates
+    kind += ", or one for all," if of_all else ""
+    needs, shape = f"needs {kind} ({unit}), {words}", (size,) if size > 1 or pieces else ()
     if runs is not None:
         needs, shape = f"{needs}, for each of {runs} runs", (runs, *shape)
     try:
         numbers = numbers_in(in_unit(value, unit))
     except ValueError as error:
         return f"{name}: value {shown(value)}: {error}"
+    if numbers is not None and pieces and numbers.shape == (*shape[:-1], pieces, size // pieces):
+        numbers = numbers.reshape(shape)
+    if of_all and numbers is not None and numbers.shape == shape[:-1]:
+        numbers = np.repeat(numbers[..., None], size, axis=-1)
     if numbers is None or numbers.shape != shape:
         return f"{name}: value {shown(value)}: {needs}"
     # the first run of which it does not hold

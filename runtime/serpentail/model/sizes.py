@@ -8,7 +8,7 @@ import numpy as np
 
 from ..errors import UnlikeBodies, UnusualSize
 from ..magnitudes import warn_of_unusual
-from .parameters import Values
+from .parameters import UNITS, Values
 
 UNLIKE = 1e4  # from here on H may be off by 1e-12 of its diagonal: docs/stability.md
 SMALLEST = {"torso_mass": (1e-4, "0.1 g"), "tail_length": (1e-3, "1 mm")}
@@ -20,18 +20,20 @@ def warn_of_sizes(manifest: dict, values: Values, calls: int = 2) -> None:
 
     UnusualSize: no animal or robot has them.  UnlikeBodies: H loses digits.
     """
-    units = {p["name"]: p["unit"] for p in manifest["parameters"]}
+    units = UNITS | {p["name"]: p["unit"] for p in manifest["parameters"]}
     for name, value in values.items():
         largest = float(np.max(np.abs(value), initial=0.0))
         warn_of_unusual(name, largest, units[name], calls + 1)
-    for told in (*_too_small(values, units), *_too_dense(values)):
+    free = "torso_inertia" in values
+    for told in (*_too_small(values, units), *(_too_dense(values) if free else ())):
         warnings.warn(told, UnusualSize, stacklevel=calls + 1)
-    warn_of_unlike(values, calls + 1)
+    if free:
+        warn_of_unlike(values, calls + 1)
 
 
 def _too_small(values: Values, units: dict[str, str]) -> Iterator[str]:
     """Yield what to tell of parameters that are too small."""
-    for name, (least, words) in SMALLEST.items():
+    for name, (least, words) in [each for each in SMALLEST.items() if each[0] in values]:
         smallest = np.min(values[name])
         if smallest < least:
             told = f"{name}: value {smallest:.6g} {units[name]}: below {words}, which no animal or"

@@ -62,7 +62,7 @@ def snapshot(checked: CheckedFolder, cache: Path) -> Path:
     SerpentailError where it cannot be written.
     """
     place = cache / MODELS / checked.manifest_hash
-    content = _content(checked)
+    content = contents(checked)
     try:
         if not _holds(place, content):
             with workshop(cache) as part:
@@ -100,7 +100,7 @@ def restored(manifest_hash: str, folder: Path) -> CheckedFolder:
     return found
 
 
-def _content(checked: CheckedFolder) -> dict[str, bytes]:
+def contents(checked: CheckedFolder) -> dict[str, bytes]:
     """Return the files of a snapshot; equal manifests, however laid out, give the same text."""
     return {**checked.files, "manifest.json": json.dumps(checked.manifest, sort_keys=True).encode()}
 

@@ -44,6 +44,16 @@ def product_matrix(quaternion: Array) -> Array:
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
+def jacobians_of_tail(nt: int, of_v_dot: tuple[Array, Array, Array]) -> tuple[Array, Array]:
+    """Return the same of a tail on a fixed base: its rates move its coordinates."""
+    by_q, by_v, by_tau = of_v_dot
+    none, one = np.zeros_like(by_v), np.broadcast_to(np.eye(nt), by_v.shape)
+    A = np.concatenate(
+        [np.concatenate([none, one], axis=-1), np.concatenate([by_q, by_v], axis=-1)], axis=-2
+    )
+    return A, np.concatenate([np.zeros_like(by_tau), by_tau], axis=-2)
+
+
 def jacobians(
     layout: Layout, q: Array, v: Array, of_v_dot: tuple[Array, Array, Array]
 ) -> tuple[Array, Array]:
@@ -51,6 +61,8 @@ def jacobians(
 
     of_v_dot: those of v_dot by turns of the torso and shifts (..., nv, nv), by v, by tau.
     """
+    if layout.fixed:
+        return jacobians_of_tail(layout.nt, of_v_dot)
     by_turns, by_v, by_tau = of_v_dot
     quaternion, shape = q[..., QUATERNION], by_v.shape[:-2]
     products, square = product_matrix(quaternion), (quaternion**2).sum(-1)[..., None, None]

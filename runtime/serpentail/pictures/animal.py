@@ -12,7 +12,10 @@ from .views import TOP, View
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+WIDTH = 1.4  # points, of the tail
+THIN, THICK = 0.4, 2.5  # of a tail of its own: least and largest width over that
 MOST_DOTS = 20  # more tail points than this are drawn without dots
+LARGE_DOTS = 8  # more than this have small ones, which leave the tail's colour in sight
 LEG, FORCE = "#009e73", "#cc79a7"  # Okabe and Ito
 SHADE, SHADOW = "#ecebe6", "#c9c7bf"  # the ground
 PALE = 0.3  # how much is seen of what is below it
@@ -148,10 +151,24 @@ def draw_animal(pen: Pen) -> None:
     pen.torso()
     for leg in pen.frame.legs:
         pen.line(leg, color=LEG, linewidth=1.4)
-    pen.line(pen.frame.tail, color=TAIL, linewidth=1.4)
-    if len(pen.frame.tail) <= MOST_DOTS + 1:
-        pen.dots(pen.frame.tail[1:], color=INK, markersize=2.4, markeredgewidth=0)
+    draw_tail(pen)
+    count = len(pen.frame.tail) - 1
+    if count <= MOST_DOTS:
+        size = 2.4 if count <= LARGE_DOTS else 1.2
+        pen.dots(pen.frame.tail[1:], color=INK, markersize=size, markeredgewidth=0)
     pen.arrows(pen.frame.arrows)
+
+
+def draw_tail(pen: Pen) -> None:
+    """The tail, of one width or as thick as its links are."""
+    tail, thickness = pen.frame.tail, pen.frame.body.thickness
+    if not thickness:
+        pen.line(tail, color=TAIL, linewidth=WIDTH)
+        return
+    pen.line(tail[:2], color=TAIL, linewidth=WIDTH)
+    for k, thick in enumerate(thickness, 1):
+        width = WIDTH * min(max(thick, THIN), THICK)
+        pen.line(tail[k : k + 2], color=TAIL, linewidth=width)
 
 
 def draw_marks(pen: Pen) -> None:

@@ -11,7 +11,7 @@ from ..model.layout import POSITION
 from ..model.model import Model
 from ..motion.body import centre_of_mass, leg_points
 from ..motion.trajectory import Trajectory
-from ..viewer.shape import shape
+from ..viewer.shape import shape, tail_radii
 from .style import Array
 from .views import View
 
@@ -21,10 +21,14 @@ MOVING = 6.0  # times as much as the time that passed counts the way that was go
 
 @dataclass(frozen=True)
 class Body:
-    """The drawn torso: its ellipsoid's semi-axes and the tail's root, in the torso frame, m."""
+    """The drawn torso: its ellipsoid's semi-axes and the tail's root, in the torso frame, m.
+
+    thickness: of the tail from each point to the next, over its mean; empty where all are equal.
+    """
 
     semi_axes: tuple[float, float, float]
     tail_mount: tuple[float, float, float]
+    thickness: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +92,9 @@ def body_of(model: Model) -> Body:
     """The torso as the page of a run has it, and the tail's root."""
     a, b, c = shape(model)["semi_axes"]
     x, y, z = (float(length) for length in model.parameters["tail_mount"])
-    return Body((a, b, c), (x, y, z))
+    own = {"link_masses", "arc_masses"} & model.parameters.keys()
+    radii = tail_radii(model) if own else np.zeros(0)
+    return Body((a, b, c), (x, y, z), tuple((radii / (radii.mean() if own else 1)).tolist()))
 
 
 def frames(model: Model, motion: Trajectory, rows: Iterable[int], largest: float) -> list[Frame]:

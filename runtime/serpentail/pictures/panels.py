@@ -9,6 +9,7 @@ import numpy as np
 from ..attitude import pitch_roll_yaw, tilt_deg
 from ..model.layout import OMEGA
 from ..model.model import Model
+from ..motion.body import bends
 from ..motion.trajectory import Trajectory
 from .style import INK, TAIL, Array
 
@@ -67,9 +68,11 @@ def tail(motion: Trajectory, model: Model | None) -> Panel:
     no model tells how many links there are.
     """
     names, styles, order = _of_segments(motion)
-    links = 1 if model is None else model.links or 1
-    told = "tail coord.\n[deg]" if model is None else "bend of\nsegment [deg]"
-    return Panel(told, np.degrees(links * motion.tail[:, order]), names, styles, 1.0)
+    if model is None:
+        told, angles = "tail coord.\n[deg]", motion.tail
+    else:
+        told, angles = "bend of\nsegment [deg]", bends(model, motion.tail)
+    return Panel(told, np.degrees(angles[:, order]), names, styles, 1.0)
 
 
 def torque(motion: Trajectory, model: Model | None) -> Panel:

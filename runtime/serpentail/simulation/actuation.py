@@ -25,7 +25,8 @@ class Actuation:
         # phases, each by its parts
         phases = phases_of(controller)
         begins = [begin for begin, _ in phases]
-        self.parts = [self._available(parts_of(each, self.nt)) for _, each in phases]
+        own = [parts_of(each, self.nt).since(begin) for begin, each in phases]
+        self.parts = [*map(self._available, own)]
         self.legs = legs
         if self.of_python:  # the user's: SciPy's methods work with their own
             self.float_errors = np.geterr()
@@ -82,8 +83,10 @@ class Actuation:
             law = parts.pfl
             members |= {"reference": self._table(law.curve), "kp": law.kp, "kd": law.kd}
             members["feedforward"] = law.feedforward
+            if law.torque is not None:
+                members["limit"] = self.records.array(law.torque)
         if parts.native is not None:
-            members |= _native(parts.native)
+            members |= _native(parts.native) | {"clock": parts.clock}
         if parts.user is not None:
             members["function"] = self._callback(parts.user)
         return self.records.record("controller", **members)

@@ -1,7 +1,6 @@
 """Runs with adaptive steps, of which the generated C makes several at once: one in each lane."""
 
 import ctypes
-import time
 from collections.abc import Iterator
 from threading import Event
 from typing import Any
@@ -10,11 +9,11 @@ import numpy as np
 
 from ..model.kernel import address_of, aligned
 from .acting import Acting
-from .compiled_run import COUNTS, PAUSE, PAUSE_S, PAUSED, CompiledRun, Memory
+from .batched_runs import shared_out
+from .compiled_run import PAUSE, PAUSED, CompiledRun, Memory, called
 from .methods import IntegrationMethod
+from .outcomes import told_by
 from .records import structure
-
-AT_ONCE = 64  # vectors of runs that a thread takes up at once
 
 
 def adaptive_in_lanes(memory: Memory, acting: Acting, method: IntegrationMethod) -> bool:
@@ -39,9 +38,7 @@ class AdaptiveRuns:
 
     def parts(self, runs: range, threads: int) -> list[range]:
         """Return which of some runs a thread makes at once."""
-        vectors = max(1, min(AT_ONCE, len(runs) // (2 * threads * self.states)))
-        size = self.states * vectors
-        return [runs[first : first + size] for first in range(0, len(runs), size)]
+        return shared_out(runs, self.states, threads)
 
     def go(self, runs: range, ended: Event) -> Iterator[tuple[np.ndarray, dict[str, Any] | None]]:
         """Make runs; yield numbers of them and what they came to, None of those to make alone."""
@@ -54,12 +51,7 @@ class AdaptiveRuns:
         record: Any = self.record(count=len(runs), pause=PAUSE, **places)
         on_their_way = len(runs)
         while on_their_way and not ended.is_set():
-            begun = time.perf_counter()
-            on_their_way = self.function(ctypes.addressof(record))
-            if time.perf_counter() - begun < PAUSE_S:
-                record.pause *= 2
+            on_their_way = called(self.function, record)
         numbers, sound = np.array(runs), statuses == 0
-        told = {name: records[name][sound] for name in (*COUNTS, "done")}
-        told |= {"ends": records["t"][sound], "ledger": self.memory.state["ledger"][numbers[sound]]}
-        yield numbers[sound], told
+        yield numbers[sound], told_by(records[sound], self.memory, numbers[sound])
         yield numbers[(statuses != 0) & (statuses != PAUSED)], None

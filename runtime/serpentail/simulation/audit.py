@@ -65,7 +65,8 @@ def audited(
 ) -> Audit:
     """Return the audit of runs with these parameters and ledgers (..., entries), of a span (s).
 
-    ends, at the start and at the end: kinetic, potential (..., 2), linear_momentum (..., 2, 3).
+    ends, at the start and at the end: kinetic, potential and the part of it that the tail stores
+    (..., 2), linear_momentum (..., 2, 3).
     """
     work, impulses = named(model, ledger)
     kinetic, potential, momentum = (
@@ -79,6 +80,7 @@ def audited(
 
     # over what was moved, an animal at rest by its weight
     energies = kinetic.max(axis=-1) + weight * values["tail_length"]
+    energies = energies + ends["stored"].max(axis=-1)
     energies = energies + sum(np.abs(each) for each in work.values())
     momenta = np.linalg.norm(momentum, axis=-1).max(axis=-1) + weight * span
     momenta = momenta + sum(np.linalg.norm(each, axis=-1) for each in impulses.values())

@@ -1,7 +1,5 @@
 """Many runs with the same steps, of which the generated C makes several at once, in lanes."""
 
-import ctypes
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from threading import Event
@@ -15,7 +13,7 @@ from ..model.layout import TAIL_V
 from ..model.model import Model
 from .acting import Acting
 from .actuation import Actuation
-from .compiled_run import PAUSE, PAUSE_S, Memory
+from .compiled_run import PAUSE, Memory, called
 from .methods import IntegrationMethod, step_counts
 from .piecewise import Piecewise, constant
 from .records import structure
@@ -123,6 +121,13 @@ def worth_batching(model: Model, runs: int, steps: int) -> bool:
     return source.missed >= COMPILE_S_PER_BYTE * source.bytes
 
 
+def shared_out(runs: range, states: int, threads: int, most: int = AT_ONCE) -> list[range]:
+    """Return which of some runs a thread makes at once: groups of states, at most so many."""
+    groups = -(-len(runs) // states)
+    size = states * max(1, min(most, groups // (2 * threads)))
+    return [runs[first : first + size] for first in range(0, len(runs), size)]
+
+
 @dataclass(frozen=True, eq=False)
 class Laws:
     """What acts in runs, or in all of them where there is one row.
@@ -165,11 +170,11 @@ class BatchedRuns:
 
     def parts(self, runs: range, threads: int) -> list[range]:
         """Return which of some runs a thread makes at once, whole groups where it can be."""
-        groups, most = -(-len(runs) // self.states), AT_ONCE
-        if not self.acting.alike:  # torques at each step of each run are to be held
-            most = min(most, MAX_SHARED_STEPS // (self.states * len(self.lengths)))
-        size = self.states * max(1, min(most, groups // (2 * threads)))
-        return [runs[first : first + size] for first in range(0, len(runs), size)]
+        if self.acting.alike:
+            return shared_out(runs, self.states, threads)
+        # torques at each step of each run are to be held
+        most = MAX_SHARED_STEPS // (self.states * len(self.lengths))
+        return shared_out(runs, self.states, threads, min(AT_ONCE, most))
 
     def go(self, runs: range, ended: Event) -> Iterator[tuple[np.ndarray, dict[str, Any] | None]]:
         """Make runs; yield numbers of them and what they came to, None of those to make alone."""
@@ -179,10 +184,8 @@ class BatchedRuns:
         told: dict[str, Any] = {"steps": steps, "evaluations": 4 * steps}
         told |= {"done": start.intervals + 1, "ends": start.end}
         while record.first < record.count and not ended.is_set():
-            first, begun = record.first, time.perf_counter()
-            failed = self.function(ctypes.addressof(record))
-            if time.perf_counter() - begun < PAUSE_S:
-                record.pause *= 2
+            first = record.first
+            failed = called(self.function, record)
             last = min(record.first, record.count)
             # of those that have ended, only the last ones may have failed
             sound = (last - 1) // self.states * self.states if failed else last

@@ -128,6 +128,15 @@ class Memory:
         return sampled(self.start.times, {name: a[k] for name, a in self.out.items()}, outcome)
 
 
+def called(function: Callable[[int], int], record: Any) -> int:
+    """Call a function of C that goes on until it pauses; it pauses later where that was soon."""
+    begun = time.perf_counter()
+    answer = function(ctypes.addressof(record))
+    if time.perf_counter() - begun < PAUSE_S:
+        record.pause *= 2
+    return answer
+
+
 class CompiledRun:
     """A record of the generated C that takes up runs one after another; for one thread."""
 
@@ -202,10 +211,7 @@ class CompiledRun:
         try:
             with self.actuation.ctrl_c.waits(self.actuation.of_python):
                 while status == PAUSED and not (ended and ended.is_set()):
-                    begun = time.perf_counter()
-                    status = self.rollout(self.address)
-                    if time.perf_counter() - begun < PAUSE_S:
-                        self.record.pause *= 2
+                    status = called(self.rollout, self.record)
                     if look is not None:
                         look()
         except KeyboardInterrupt as stop:  # ends the run, whose motion until then is kept

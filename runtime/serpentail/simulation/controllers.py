@@ -1,7 +1,7 @@
 """Torque laws of the tail that a user can give, checked and split into what each adds up."""
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import repeat
 from typing import Any
 
@@ -22,13 +22,30 @@ CHOICES = (
 
 @dataclass(frozen=True, eq=False)
 class Parts:
-    """What one controller adds up; damping (2m,) in N m s, functions of C and of Python."""
+    """What one controller adds up; damping (2m,) in N m s, functions of C and of Python.
+
+    clock: s, the run's time at which that of the function of C is 0.
+    """
 
     damping: np.ndarray | None = None
     torques: Piecewise | None = None
     pfl: Pfl | None = None
     native: "NativeTorque | None" = None
     user: TorqueFunction | None = None
+    clock: float = 0.0
+
+    def since(self, begin: float) -> "Parts":
+        """Return the parts with a clock that is at 0 at the time ``begin`` (s) of the run."""
+        if begin == 0:
+            return self
+        user = self.user
+        return replace(
+            self,
+            torques=None if self.torques is None else self.torques.later(begin),
+            pfl=None if self.pfl is None else self.pfl.later(begin),
+            user=None if user is None else lambda t, q, v: user(t - begin, q, v),
+            clock=begin,
+        )
 
     def kinks(self) -> list[float]:
         """Times at which these torques jump or have a kink."""
@@ -88,8 +105,9 @@ class TorqueCurve:
 class NativeTorque:
     """A compiled function, which returns 0 for success.
 
-    ``int f(void *context, real t, const real *q, const real *v, real *tau)``.  function: a ctypes
-    function, or an address; context: an address, or None.  The caller keeps both alive.
+    ``int f(void *context, real t, const real *q, const real *v, real *tau)``.  t: s, on the clock
+    of its phase.  function: a ctypes function, or an address; context: an address, or None.  The
+    caller keeps both alive.
     """
 
     function: Any
@@ -102,7 +120,11 @@ class NativeTorque:
 
 @dataclass(frozen=True, eq=False)
 class Phases:
-    """Controllers one after another: pairs of an increasing time (s) and what acts from then on."""
+    """Controllers one after another: pairs of an increasing time (s) and what acts from then on.
+
+    Each has a clock of its own, which is at 0 where its phase begins: a plan for the state at 0.4 s
+    is tracked by ``Phases([(0.0, None), (0.4, Pfl(model, plan))])``.
+    """
 
     phases: Iterable[tuple[float, "Controller"]]
     __repr__ = brief
@@ -178,7 +200,7 @@ def parts_of(controller: Controller, nt: int) -> Parts:
     """Return the parts of one controller for 2m tail coordinates; SimulationError if it is none."""
     if controller is None:
         return Parts()
-    if isinstance(controller, Pfl) and controller.torque is None:
+    if isinstance(controller, Pfl):
         return Parts(pfl=controller)
     if isinstance(controller, Damping | TorqueTable | TorqueCurve | NativeTorque):
         return controller.parts(nt)

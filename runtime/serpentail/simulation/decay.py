@@ -1,16 +1,17 @@
-"""How fast joint damping lets a tail decay: what makes a flight stiff."""
+"""How fast damping and springs move a tail: what makes a flight stiff."""
 
 import numpy as np
 
 from ..errors import StateError
 from ..model.kernel import RunKernel
 from ..model.layout import TAIL_V
-from ..model.parameters import RunParameters
+from ..model.parameters import RunParameters, Values
 from .acting import Acting
 
 
 class FastestDecay:
-    """The largest eigenvalue (1/s) of K (H^-1)_tt at starts q0 (runs, nq), K being joint damping.
+    """The fastest rate (1/s) of tails at starts q0 (runs, nq): the largest eigenvalue of
+    K (H^-1)_tt, K being joint damping; with springs the largest modulus of those of both.
 
     For one thread.
     """
@@ -19,9 +20,15 @@ class FastestDecay:
         model, nt = acting.model, acting.model.layout.nt
         parts = [parts for each in acting.distinct for parts in each.parts]
         laws = [each.damping for each in parts if each.damping is not None]
-        damping = np.max(laws, axis=0) if laws else np.zeros(nt)
-        self.damped, self.scale = bool(damping.any()), np.sqrt(np.outer(damping, damping))
-        if not self.damped:
+        acted = np.max(laws, axis=0) if laws else np.zeros(nt)
+        # a tail that is always tracked is rid of what it asks for itself
+        tracked = bool(parts) and all(each.pfl is not None for each in parts)
+        values = {} if tracked else parameters.values
+        self.damping = acted + own(values, "tail_damping", (runs, nt))
+        self.stiffness = own(values, "tail_stiffness", (runs, nt))
+        self.sprung = bool(self.stiffness.any())
+        self.moved = self.sprung or bool(self.damping.any())
+        if not self.moved:
             return
         # without torque and with unit torques: the differences are columns of H^-1
         kernel = model.kernel("forward_dynamics")
@@ -35,13 +42,17 @@ class FastestDecay:
         self.evaluate = RunKernel(kernel, parameters.vectors, (self.q, v, tau), (self.v_dot,))
 
     def __call__(self, q0: np.ndarray) -> float:
-        """Return it; 0 without damping, or where no start has accelerations."""
-        if not self.damped:
+        """Return it; 0 without damping and springs, or where no start has accelerations."""
+        if not self.moved:
             return 0.0
         self.q[...] = q0[:, None]
         sound = [k for k in range(self.runs) if self._evaluated(k)]
-        tail = self.v_dot[sound, :, TAIL_V]
-        columns = (tail[:, 1:] - tail[:, :1]) * self.scale
+        tail = self.v_dot[sound, :, TAIL_V].astype(float)
+        mobility = tail[:, 1:] - tail[:, :1]
+        if self.sprung:
+            return fastest(mobility, self.stiffness[sound], self.damping[sound])
+        root = np.sqrt(self.damping[sound])
+        columns = mobility * root[:, :, None] * root[:, None, :]
         return float(np.linalg.eigvalsh(columns).max(initial=0.0))
 
     def _evaluated(self, k: int) -> bool:
@@ -51,3 +62,20 @@ class FastestDecay:
         except StateError:
             return False
         return True
+
+
+def own(values: Values, name: str, shape: tuple[int, int]) -> np.ndarray:
+    """Return a parameter of the passive tail in each run (runs, 2m), zeros where it has none."""
+    return np.broadcast_to(np.asarray(values.get(name, 0.0), float), shape)
+
+
+def fastest(mobility: np.ndarray, stiffness: np.ndarray, damping: np.ndarray) -> float:
+    """Return the largest modulus (1/s) of the rates of q_ddot = -mobility (stiffness q + damping
+    q_dot), mobility (runs, n, n).
+    """
+    n = mobility.shape[-1]
+    rates = np.zeros((len(mobility), 2 * n, 2 * n))
+    rates[:, :n, n:] = np.eye(n)
+    rates[:, n:, :n] = -mobility * stiffness[:, None, :]
+    rates[:, n:, n:] = -mobility * damping[:, None, :]
+    return float(np.abs(np.linalg.eigvals(rates)).max(initial=0.0))

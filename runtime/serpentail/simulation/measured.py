@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 
 from ..errors import SimulationError, StateError
+from ..model.layout import TAIL_Q
 from ..model.model import Model
+from ..model.passive import stored_energy
 from ..motion.origin import origin
 from ..motion.trajectory import Trajectory
 from .audit import BALANCED, audited, warnings_of
@@ -120,9 +122,11 @@ class Measures:
         return info | books.info() | {"warnings": warnings_of(books, info, eps)}
 
     def _ends(self) -> dict[str, np.ndarray]:
-        """Return energies (2,) and linear momentum (2, 3) at the start and at the end."""
+        """Return energies (2,), linear momentum (2, 3), stored energy at start and end."""
         rows = []
         for q, v in zip(self.samples.q[[0, -1]], self.samples.v[[0, -1]], strict=True):
             rows.append((*self.model.energy(q, v), self.model.momentum(q, v)[0]))
         columns = zip(*rows, strict=True)
-        return {name: np.array(each, float) for name, each in zip(BALANCED, columns, strict=True)}
+        ends = {name: np.array(each, float) for name, each in zip(BALANCED, columns, strict=True)}
+        tails = self.samples.q[[0, -1]][:, TAIL_Q]
+        return ends | {"stored": stored_energy(self.model.parameters, tails)}

@@ -8,6 +8,8 @@ import numpy as np
 
 from ..errors import SimulationError, StateError
 from ..model.kernel import RunKernel
+from ..model.layout import TAIL_Q
+from ..model.passive import stored_energy
 from ..model.workers import in_turn
 from ..motion.trajectory import Trajectory
 from .audit import BALANCED, Audit, audited, warnings_of
@@ -122,6 +124,9 @@ class MeasuredRuns:
         for name in BALANCED:
             array = self.arrays[name]
             ends[name] = np.stack([array[:, 0], array[each, last]], axis=1).astype(float)
+        q, values = self.memory.out["q"], self.memory.parameters.values
+        tails = (q[:, 0, TAIL_Q], q[each, last, TAIL_Q])
+        ends["stored"] = np.stack([stored_energy(values, tail) for tail in tails], axis=1)
         ends["kinetic"][list(self.outcomes.failures)] = np.nan
         for k, stop in self.outcomes.stops.items():  # between samples
             if k not in self.outcomes.failures:
@@ -129,7 +134,6 @@ class MeasuredRuns:
                 ends["kinetic"][k, 1], ends["potential"][k, 1] = model.energy(*state)
                 ends["linear_momentum"][k, 1] = model.momentum(*state)[0]
         span = self.outcomes.ends - self.memory.start.start
-        values = self.memory.parameters.values
         return audited(self.model, values, self.outcomes.ledger, span, ends)
 
     def _warnings(self, books: Audit) -> list[list[str]]:

@@ -84,7 +84,9 @@ def _defaults(name: str, single: bool, chosen: dict[str, float]) -> dict[str, fl
 def chosen(
     settings: dict[str, Any], available: Collection[str], decay: float | None
 ) -> tuple[str, str]:
-    """Return the method of "auto" and why; ``decay`` (1/s) is the damping's, None on the ground."""
+    """Return the method of "auto" and why; ``decay`` (1/s) is that of damping and springs, None on
+    the ground.
+    """
     if "step" in settings:
         implicit = decay is None and "implicit_euler" in available
         name = "implicit_euler" if implicit else "rk4"
@@ -94,9 +96,9 @@ def chosen(
             return "ros34pw2", "contact with the ground: stiff"
         lack = "the scene has no `implicit` for a method that suits it"
         return "tsit5", f"contact with the ground, but {lack}"
-    # in flight, damping alone is stiff
+    # in flight, damping and springs alone are stiff
     if decay > STIFF_DECAY and "ros34pw2" in available:
-        return "ros34pw2", f"joint damping decays at {decay:.2g} 1/s: stiff"
+        return "ros34pw2", f"damping and springs act at {decay:.2g} 1/s: stiff"
     if decay:
-        return "tsit5", f"flight, joint damping decays at {decay:.2g} 1/s"
+        return "tsit5", f"flight, damping and springs act at {decay:.2g} 1/s"
     return "tsit5", "flight"

@@ -9,6 +9,12 @@ from ..errors import SimulationError
 from .compiled_run import COUNTS, Memory, Outcome
 
 
+def told_by(records: np.ndarray, memory: Memory, runs: np.ndarray) -> dict[str, Any]:
+    """Return what the C records of some runs tell, as ``keep_all`` takes it."""
+    told = {name: records[name] for name in (*COUNTS, "done")}
+    return told | {"ends": records["t"], "ledger": memory.state["ledger"][runs]}
+
+
 class Outcomes:
     """What runs came to: samples written ``done``, ``ends`` (s), ledgers and counts by run.
 

@@ -16,10 +16,10 @@ from ..stages import Stage
 from .acting import Acting
 from .adaptive_runs import AdaptiveRuns, adaptive_in_lanes
 from .batched_runs import BatchedRuns, shared_steps, worth_batching
-from .compiled_run import COUNTS, PAUSED, CompiledRun, Memory, Outcome, failed
+from .compiled_run import PAUSED, CompiledRun, Memory, Outcome, failed
 from .measured_runs import MeasuredRuns, read_only
 from .methods import SCIPY, IntegrationMethod
-from .outcomes import Outcomes
+from .outcomes import Outcomes, told_by
 from .rollouts import Rollouts, Source
 from .runs_in_turn import RunsInTurn
 
@@ -102,8 +102,7 @@ class ParallelRuns:
         measure, most = self.measures.of_thread(), len(self.outcomes) // (4 * self.threads) + 1
         while taken := list(islice(numbers, min(runs.at_once, most))):
             found = runs.make([first + number for number in taken], ended)
-            told = {name: found.records[name] for name in (*COUNTS, "done")}
-            told |= {"ends": found.records["t"], "ledger": self.memory.state["ledger"][found.runs]}
+            told = told_by(found.records, self.memory, found.runs)
             self.outcomes.keep_all(found.runs, told)
             wrong = np.flatnonzero(found.statuses)
             for row in wrong.tolist():

@@ -1,6 +1,7 @@
 """Torques that make a tail follow a reference motion, by partial feedback linearisation."""
 
-from typing import Any
+from copy import copy
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,8 +23,7 @@ class Pfl:
     Reference, a Plan, a Trajectory, or (times (K,) s, tail coordinates (K, 2m) rad); of the last
     three a cubic spline; after it the last value at rest.  kp (1/s^2), kd (1/s): gains, one number
     each.  feedforward: use q_t_ddot_r, which the paper leaves out.  torque: N m, the most that the
-    tail's motors give, one number or one a coordinate, None for no limit; with a limit, compiled
-    methods call back to Python.
+    tail's motors give, one number or one a coordinate, None for no limit.
 
     Called with (t, q, v) it returns tau (2m,) in N m.  Needs pfl of the model, or its
     inverse_dynamics and mass_matrix.  Raises SimulationError where an argument is wrong.
@@ -44,6 +44,12 @@ class Pfl:
         self.curve = _curve(reference, model.layout.nt)
         self.feedforward = bool(feedforward)
         self.torque = None if torque is None else _limit(torque, model.layout.nt)
+
+    def later(self, delay: float) -> Self:
+        """Return the same law for a motion that begins later, by a delay (s)."""
+        law = copy(self)
+        law.curve = self.curve.later(delay)
+        return law
 
     def reference(self, t: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return tail coordinates, rates and accelerations (2m,) wanted at t (s)."""

@@ -1,6 +1,7 @@
 """Functions of time as polynomials piece by piece, which the generated C can evaluate, too."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -33,6 +34,16 @@ class Piecewise:
     def never_changes(self) -> bool:
         """Whether it is one constant a channel."""
         return self.coefficients.shape[::2] == (1, 1)
+
+    def later(self, delay: float) -> Self:
+        """Return the same functions, later by a delay (s); SimulationError where that rounds
+        different times to one.
+        """
+        times = self.times + delay
+        if not (np.diff(times) > 0).all():
+            needs = "a time at which those of the controller still differ"
+            raise refusal("Phases: times", delay, needs, SimulationError)
+        return replace(self, times=times)
 
     def at(self, t: ArrayLike) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Values, rates, accelerations at t or t (K,), s: (channels,) or (K, channels) each.

@@ -63,7 +63,7 @@ def shared_among_links(model: Model, bends: np.ndarray) -> np.ndarray:
             f"bends has shape {bends.shape}: give {shape}: pitch, or pitch and yaw, of each segment"
         )
     both = bends if bends.ndim == 3 else np.stack([bends, 0 * bends], axis=-1)
-    return both.reshape(len(bends), model.layout.nt) / (model.links or 1)
+    return both.reshape(len(bends), model.layout.nt) / np.repeat(model.joints_each, 2)
 
 
 @dataclass(frozen=True, eq=False)

@@ -30,6 +30,7 @@ def settle(
     do before the time ``at`` (s), where schedules hold their first values.  settings: those of
     ``simulate``, such as legs.  Raises what it raises.
     """
+    model.refuse_fixed("settle")
     if np.ndim(q0) != 1:
         raise StateError(
             f"q0 has shape {np.shape(q0)}, not ({model.nq},): settle one start state after another"

@@ -82,6 +82,7 @@ def simulate(
     With a function of Python, or SciPy's methods, runs are made one after another in the calling
     thread, and what the function raises, unless it is a SimulationError, ends all.
     """
+    model.refuse_fixed("simulate")
     missing = [name for name in ("rollout", "energy", "momentum") if name not in model.generated]
     if missing:
         raise model.without(*missing)
@@ -155,6 +156,7 @@ def prepared(
             "parameters: one start only: give q0 or v0 a row a run, or use model.with_parameters"
         )
     parameters = model.parameters_of_runs(changes, start.runs)
+    start.refuse_behind_stops(parameters.values)
     ground = Ground.checked(model, start, parameters, settings)
     acting = Acting(Records(model), controller, start, ground.legs.curve if ground.legs else None)
     choice = choose(acting, start, parameters, method, settings)

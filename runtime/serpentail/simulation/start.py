@@ -9,8 +9,10 @@ from numpy.typing import ArrayLike
 from ..checks import finite_array, number, real_array, refusal, refuse_not_finite
 from ..errors import SimulationError, StateError
 from ..model.kept import kept
-from ..model.layout import QUATERNION
+from ..model.layout import QUATERNION, TAIL_Q
 from ..model.model import Model
+from ..model.parameters import Values
+from ..model.passive import behind_stops
 from .limits import refuse_overfull
 
 MOST_SAMPLES = 10_000_000  # of all runs: more are a slip, and fill the memory
@@ -57,6 +59,12 @@ class Start:
             )
         refuse_overfull(model, checked.runs, checked.intervals + 1)
         return checked
+
+    def refuse_behind_stops(self, values: Values) -> None:
+        """StateError where a tail begins behind its stops, from parameters of the runs."""
+        behind = behind_stops(values, self.q0[:, TAIL_Q])
+        if behind:
+            raise StateError(f"q0: {behind}")
 
     @property
     def runs(self) -> int:

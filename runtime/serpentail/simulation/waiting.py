@@ -58,7 +58,8 @@ def taken(
 ) -> CompiledRun | None:
     """Return a run that was asked for before, at its new start; None where none waits.
 
-    StateError where the start is wrong, SimulationError where it is deep in the ground.
+    StateError where the start is wrong or behind the tail's stops, SimulationError where it is deep
+    in the ground.
     """
     runs = None if asked is None else _waiting.get(model)
     if not runs or asked not in runs:
@@ -67,8 +68,10 @@ def taken(
     run = None if many else runs.pop(asked, None)
     if run is None:
         return None
+    start, parameters = replace(run.start, q0=q0, v0=v0), run.memory.parameters
+    start.refuse_behind_stops(parameters.values)
     if run.ground.points:
-        run.ground.refuse_deep(model, replace(run.start, q0=q0, v0=v0), run.memory.parameters)
+        run.ground.refuse_deep(model, start, parameters)
     run.again(q0, v0)
     return run
 

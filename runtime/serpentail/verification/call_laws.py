@@ -7,7 +7,16 @@ import numpy as np
 from ..model.model import Model
 from .errors import differences, differing, differing_outputs, is_derivative
 from .law import VALUE_LIMIT, Errors, Law, registry
-from .states import State, arguments, casadi_outputs, named, outputs, scaled, state_functions
+from .states import (
+    State,
+    arguments,
+    called_functions,
+    casadi_outputs,
+    named,
+    outputs,
+    scaled,
+    state_functions,
+)
 
 LAWS: list[Law] = []
 law = registry(LAWS)
@@ -17,7 +26,7 @@ law = registry(LAWS)
 def calls_repeat(model: Model, s: State) -> Errors:
     """The same call gives the same bits, at once and after another call."""
     errors = {}
-    for name in state_functions(model):
+    for name in called_functions(model):
         first, second, _, last = (outputs(model, name, case) for case in (s, s, scaled(s, 0.5), s))
         errors[name] = differing_outputs(first, second) + differing_outputs(first, last)
     return errors
@@ -28,7 +37,7 @@ def batches_are_singles(model: Model, s: State) -> Errors:
     """A batch of nine states gives the bits of nine calls."""
     cases = [scaled(s, 1 - k / 16) for k in range(9)]
     errors = {}
-    for name in state_functions(model):
+    for name in called_functions(model):
         batches = zip(*(arguments(model, name, case) for case in cases), strict=True)
         whole = named(model, name, model.kernel(name)(*map(np.stack, batches)))
         singles = [outputs(model, name, case) for case in cases]
@@ -53,7 +62,7 @@ def casadi_functions_agree(model: Model, s: State) -> Errors:
 def casadi_externals_are_the_compiled_code(model: Model, s: State) -> Errors:
     """casadi.external on the compiled C gives the bits of the model's own call."""
     errors = {}
-    for name in state_functions(model):
+    for name in called_functions(model):
         results = casadi_outputs(
             model, name, model.casadi.external(name), s, model.casadi.parameter_vector
         )

@@ -8,7 +8,7 @@ import numpy as np
 from ..model.layout import OMEGA, TAIL_V
 from ..model.model import Model
 from .errors import block_error, relative, worst
-from .law import SLOPE_LIMIT, Errors, Law, fastest, moved, registry, slope
+from .law import PIECEWISE, SLOPE_LIMIT, Errors, Law, fastest, moved, registry, slope
 from .states import State, at_origin
 
 LAWS: list[Law] = []
@@ -39,7 +39,7 @@ def block_slope_error(x: np.ndarray, expected: tuple[np.ndarray, np.ndarray]) ->
     return block_error(x, change, np.abs(change) + largest)
 
 
-@law("inverse_dynamics", "inverse_dynamics_derivatives", units=SLOPE_LIMIT)
+@law("inverse_dynamics", "inverse_dynamics_derivatives", units=SLOPE_LIMIT, without=PIECEWISE)
 def inverse_dynamics_changes_by_its_jacobians(model: Model, s: State) -> Errors:
     """dq, dv times a direction are the slope of H v_dot + C along it."""
     dq, dv = model.inverse_dynamics_derivatives(s.q, s.v, s.v_dot)
@@ -55,6 +55,7 @@ def inverse_dynamics_changes_by_its_jacobians(model: Model, s: State) -> Errors:
     "forward_dynamics",
     "forward_dynamics_derivatives",
     units=SLOPE_LIMIT,
+    without=PIECEWISE,
 )
 def forward_dynamics_changes_by_its_jacobians(model: Model, s: State) -> Errors:
     """H times the change of v_dot is that of tau less the slope of H v_dot + C at fixed v_dot; H
@@ -105,7 +106,7 @@ def gradient_is_the_product_with_the_jacobians(model: Model, s: State) -> Errors
     return product_error(vjp, s.multiplier, [j.astype(float) for j in J])
 
 
-@law("inverse_dynamics_vjp", "inverse_dynamics_hessian", units=SLOPE_LIMIT)
+@law("inverse_dynamics_vjp", "inverse_dynamics_hessian", units=SLOPE_LIMIT, without=PIECEWISE)
 def gradient_changes_by_the_hessian(model: Model, s: State) -> Errors:
     """The Hessian times a direction is the slope of the gradient along it; turns in q commute by
     half a bracket.
@@ -126,7 +127,7 @@ def gradient_changes_by_the_hessian(model: Model, s: State) -> Errors:
     return errors
 
 
-@law("energy", "energy_derivatives", "mass_matrix", units=SLOPE_LIMIT)
+@law("energy", "energy_derivatives", "mass_matrix", units=SLOPE_LIMIT, without=PIECEWISE)
 def energies_change_by_their_gradients(model: Model, s: State) -> Errors:
     """The gradients of both energies times a direction are their slopes; that of kinetic energy in
     v is H v.

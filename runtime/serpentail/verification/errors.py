@@ -39,6 +39,7 @@ def differences(model: Model, name: str, state: State, references: Iterable[Arra
         else:
             errors.append(difference(model, state.q, output, x, reference))
     solved = name.startswith("forward_dynamics_") and is_derivative(model, name)
+    solved |= name.startswith("airborne_")
     return worst(errors) / (sensitivity(model, state.q) if solved else 1.0)
 
 
@@ -83,7 +84,8 @@ def worst(errors: Iterable[float]) -> float:
 
 def relative(x: ArrayLike, reference: ArrayLike, scale: ArrayLike | None = None) -> float:
     """Return max|x - reference| / max|scale|, by default of the reference."""
-    size = np.max(np.abs(reference if scale is None else scale), initial=np.finfo(float).tiny)
+    sizes = np.abs(np.asarray(reference if scale is None else scale, float))  # tiny is a double's
+    size = np.max(sizes, initial=np.finfo(float).tiny)
     return float(np.max(np.abs(np.subtract(x, reference, dtype=float)), initial=0.0) / size)
 
 

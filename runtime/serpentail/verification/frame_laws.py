@@ -100,15 +100,18 @@ def quaternion_has_no_norm_and_no_sign(model: Model, s: State) -> Errors:
 
 
 @law("tail_points", units=VALUE_LIMIT, only="articulated")
-def links_have_equal_length(model: Model, s: State) -> Errors:
-    """The first tail point is the mount, and each is L_t / N from the next."""
+def links_have_their_length(model: Model, s: State) -> Errors:
+    """The first tail point is the mount, and each is a link from the next: L_t / N, or its own
+    length.
+    """
     points = model.tail_points(s.q).astype(float)
     mount = s.q[POSITION] + rotation_matrix(s.q[QUATERNION]) @ model.parameters["tail_mount"]
     lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    length = model.parameters["tail_length"] / len(lengths)
+    even = model.parameters["tail_length"] / len(lengths)
+    own = np.array(model.parameters.get("link_lengths", np.full(len(lengths), even)))
     return {
         "mount": relative(points[0], mount, points),
-        "lengths": relative(lengths, np.full(len(lengths), length), points),
+        "lengths": relative(lengths, own, points),
     }
 
 

@@ -1,5 +1,6 @@
 """What a law is, and the numerical derivatives along motions that laws use."""
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -7,14 +8,17 @@ from typing import Any
 import numpy as np
 
 from ..attitude import product
+from ..errors import UnusualSize
 from ..model.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TAIL_V, VELOCITY
 from ..model.model import Model
+from ..model.passive import idle
 from .errors import rounding
 from .states import State
 
 # limits in roundings (eps of the model's real type)
 VALUE_LIMIT = 450  # 1e-13 in double
 SLOPE_LIMIT = 10 * VALUE_LIMIT  # a slope divides rounding by its step
+PIECEWISE = ("stops",)  # of the passive tail: their forces have no slopes by wide differences
 FEW_LINKS = 8  # in a segment: with more of them, rounding grows
 
 Errors = float | dict[str, float]  # one, or one a place
@@ -33,14 +37,15 @@ class Law:
     floor: float = 0.0  # limit of what has other reasons than rounding
     only: str = ""  # real type or kind of tail of the models that it holds for
     casadi: bool = False  # whether it evaluates CasADi functions
+    without: tuple[str, ...] = ()  # parts of the passive tail that it holds without
 
     def limit(self, model: Model) -> float:
         """Return the limit, which grows with the links of a segment.
 
         An entry of H sums n^2 pairs of links, which cancel where the tail is folded.
         """
-        units, pieces = self.units, model.links or model.samples or 0
-        if units and pieces > FEW_LINKS:
+        units, pieces = self.units, int(max(model.joints_each)) if model.links else model.samples
+        if units and pieces and pieces > FEW_LINKS:
             units = max(units, model.segments * pieces**2)
         return self.floor + units * rounding(model)
 
@@ -62,6 +67,14 @@ def registry(laws: list[Law]) -> Callable[..., Callable[[LawFunction], LawFuncti
         return register
 
     return law
+
+
+def rid_of(model: Model, parts: tuple[str, ...]) -> Model:
+    """Return a model without these parts of a passive tail."""
+    changes = idle(model.parameters, parts)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UnusualSize)  # stops go out of reach
+        return model.with_parameters(**changes) if changes else model
 
 
 # Motions and derivatives
@@ -92,4 +105,5 @@ def moved(q: np.ndarray, v: np.ndarray, time: float) -> np.ndarray:
 
 def fastest(model: Model, v: np.ndarray) -> float:
     """Return a bound on the angular velocity of every link (rad/s)."""
-    return float(np.linalg.norm(v[OMEGA]) + (model.links or 1) * np.sum(abs(v[TAIL_V])))
+    turning = np.repeat(model.joints_each, 2) * abs(v[TAIL_V])
+    return float(np.linalg.norm(v[OMEGA]) + np.sum(turning))

@@ -13,8 +13,17 @@ import numpy as np
 from ..errors import ExtraMissing, SerpentailError
 from ..extras import needed
 from ..model.model import Model
-from . import call_laws, contact_laws, derivative_laws, frame_laws, value_laws
-from .law import Law
+from ..model.passive import PARTS, idle
+from . import (
+    airborne_laws,
+    call_laws,
+    contact_laws,
+    derivative_laws,
+    frame_laws,
+    passive_laws,
+    value_laws,
+)
+from .law import Law, rid_of
 from .states import State, states
 
 LAWS = (
@@ -23,6 +32,8 @@ LAWS = (
     *call_laws.LAWS,
     *derivative_laws.LAWS,
     *contact_laws.LAWS,
+    *passive_laws.LAWS,
+    *airborne_laws.LAWS,
 )
 STATUSES = ("passed", "failed", "not checked")
 
@@ -65,6 +76,7 @@ class Check:
 
 def laws(model: Model) -> list[Check]:
     """Return a check of every law, over seeded states of all kinds."""
+    model.refuse_fixed("verify")
     cases = list(states(model))
     return [check(entry, model, cases) for entry in LAWS]
 
@@ -72,6 +84,7 @@ def laws(model: Model) -> list[Check]:
 def check(entry: Law, model: Model, cases: list[State]) -> Check:
     """Check one law; one that speaks of functions the scene left out says so."""
     limit, reason = entry.limit(model), unchecked(entry, model)
+    model = model if reason else rid_of(model, entry.without)
     errors = [] if reason else [pair for case in cases for pair in errors_at(entry, model, case)]
     if not errors:
         omitted = reason or "not generated: any function it speaks of"
@@ -84,6 +97,7 @@ def unchecked(entry: Law, model: Model) -> str:
     """Return why a law cannot be checked, or nothing."""
     kinds = ["", model.manifest["real"], model.manifest["scene"]["kind"]]
     kinds += ["contact"] if model.contacts else []
+    kinds += ["passive"] if idle(model.parameters, PARTS) else []
     if entry.only not in kinds:
         return f"only for {entry.only} models"
     if entry.casadi:
@@ -91,6 +105,9 @@ def unchecked(entry: Law, model: Model) -> str:
             needed("casadi", "plan")
         except ExtraMissing as missing:
             return str(missing)
+    changed = entry.only == "passive" or idle(model.parameters, entry.without)
+    if changed and model.manifest["scene"]["baked"]:
+        return "the passive tail cannot be left out: parameters are baked"
     absent = ", ".join(name for name in entry.needs if name not in model.generated)
     return f"not generated: {absent}" if absent else ""
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import ModelError
-from ..model.layout import OMEGA, POSITION, QUATERNION, TAIL_V
+from ..model.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TAIL_V
 from ..model.model import Model
 from ..model.parameters import total_mass
 
@@ -33,6 +33,21 @@ class State:
     def accelerations(self) -> np.ndarray:
         """Wanted accelerations of the tail coordinates."""
         return self.v_dot[TAIL_V]
+
+    @property
+    def x(self) -> np.ndarray:
+        """The airborne state: quaternion, tail coordinates, their rates."""
+        return np.concatenate([self.q[QUATERNION], self.q[TAIL_Q], self.v[TAIL_V]])
+
+    @property
+    def angular(self) -> np.ndarray:
+        """An angular momentum (kg m^2/s, world): the loads' moment, for 0.05 s."""
+        return self.f_ext[OMEGA] / 20
+
+    @property
+    def weights(self) -> np.ndarray:
+        """Weights of an airborne state's rates and of omega."""
+        return np.resize(self.multiplier, len(self.x) + 3)
 
 
 def states(model: Model, count: int = 4, seed: int = 1) -> Iterator[State]:
@@ -124,10 +139,20 @@ def scaled(s: State, factor: float) -> State:
 
 def state_functions(model: Model) -> list[str]:
     """Return the functions of a state alone; those of contact and implicit steps take more."""
+    return functions_of(model, "accelerations", *(field.name for field in fields(State)))
+
+
+def called_functions(model: Model) -> list[str]:
+    """Return those, and functions of an airborne state."""
+    known = {*vars(State), *(field.name for field in fields(State))}
+    return functions_of(model, *known)
+
+
+def functions_of(model: Model, *known: str) -> list[str]:
+    """Return the functions that take such arguments alone."""
     functions = model.manifest["functions"]
-    known = {"accelerations", *(field.name for field in fields(State))}
     inputs = {name: {a["name"] for a in functions[name]["inputs"]} for name in model.kernels}
-    return [name for name in model.kernels if inputs[name] <= known]
+    return [name for name in model.kernels if inputs[name] <= {*known}]
 
 
 def outputs(model: Model, name: str, state: State) -> dict[str, np.ndarray]:

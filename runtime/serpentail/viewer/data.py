@@ -1,4 +1,4 @@
-"""What the page reads: runs with their samples, numbers and events, plots, and notes."""
+"""What the page reads: runs with their samples, numbers, events; plots, notes and warnings."""
 
 from typing import Any
 
@@ -21,19 +21,21 @@ def page_data(
     motions: list[Trajectory], names: list[str], models: list[Model], most: int
 ) -> dict[str, Any]:
     """Return what the page reads, ready for JSON; most: samples of a run that it has."""
-    shown, notes, runs = [], [], []
+    shown, notes, warnings, runs = [], [], [], []
     for motion, name, model in zip(motions, names, models, strict=True):
         few, step = thinned(motion, most)
         shown.append(few)
-        notes += [*_notes(name, motion, step), *_warnings(name, model, motion)]
-        numbers = [*figures(model, motion), ("samples", str(len(motion.t)))]
         prefix = f"{name}: " if len(motions) > 1 else ""
+        notes += [prefix + each for each in _notes(motion, step)]
+        warnings += [prefix + each for each in warnings_of(model, motion)]
+        numbers = [*figures(model, motion), ("samples", str(len(motion.t)))]
         words = {"name": name, "numbers": numbers, "events": events(motion, prefix)}
         runs.append(_run(few, model) | words)
     weight = max(map(weight_of, models))
     return {
         "runs": runs,
         "notes": notes,
+        "warnings": warnings,
         "plots": panels(names, shown, weight or 1.0),
         "length": max(map(length, models)),
         "force_scale": _common_force(shown) or weight or 1.0,
@@ -54,21 +56,14 @@ def _run(motion: Trajectory, model: Model) -> dict[str, Any]:
     }
 
 
-def _notes(name: str, motion: Trajectory, step: int) -> list[str]:
+def _notes(motion: Trajectory, step: int) -> list[str]:
     """What a reader of the page has to know of a run."""
     notes = []
     if "failure" in motion.info:
-        notes.append(f"{name}: the run failed, and ends here: {motion.info['failure']}")
+        notes.append(f"the run failed, and ends here: {motion.info['failure']}")
     if step > 1:
-        notes.append(
-            f"{name}: one of {step} samples is shown; the numbers are of all {len(motion.t)}."
-        )
+        notes.append(f"one of {step} samples is shown; the numbers are of all {len(motion.t)}.")
     return notes
-
-
-def _warnings(name: str, model: Model, motion: Trajectory) -> list[str]:
-    """What to mind about a run."""
-    return [f"{name}: {each}" for each in warnings_of(model, motion)]
 
 
 def _common_force(motions: list[Trajectory]) -> float:

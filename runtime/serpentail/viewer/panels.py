@@ -15,7 +15,7 @@ def panels(
     titles = {
         "height": "height of the torso (m)",
         "tilt": "tilt of the back (deg)",
-        "coordinates": "tail coordinates (deg)",
+        "bends": "bends of the tail's segments (deg)",
         "torque": "joint torques (N m)",
         "force": "force of the ground (N), scale compressed",
         "energy": "energy (J)",
@@ -35,7 +35,7 @@ def panels(
 
 def _columns(array: str, motion: Trajectory) -> Sequence[str]:
     """The names of an array's columns, none where a motion does not have it."""
-    if array in ("coordinates", "torque"):
+    if array in ("bends", "torque"):
         return [f"{bend} {i + 1}" for i in range(motion.segments) for bend in ("pitch", "yaw")]
     if array == "force":
         return list(motion.contact.groups) if motion.contact else []

@@ -8,7 +8,7 @@ import numpy as np
 from ..attitude import Array, tilt_deg
 from ..model.layout import TORSO_NQ
 from ..model.model import Model
-from ..motion.body import centre_of_mass, leg_points
+from ..motion.body import bends, centre_of_mass, leg_points
 from ..motion.trajectory import ARRAYS, Trajectory
 
 
@@ -37,7 +37,7 @@ def samples(model: Model, motion: Trajectory) -> dict[str, Array]:
         "com": centre_of_mass(model, motion.q, motion.v),
         "height": motion.q[:, 2],
         "tilt": tilt_deg(motion.attitude),
-        "coordinates": np.degrees(motion.tail),
+        "bends": np.degrees(bends(model, motion.tail)),
         "torque": motion.tau,
         "energy": np.stack([motion.energy, motion.kinetic, motion.potential], axis=1),
     }

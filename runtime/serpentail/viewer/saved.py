@@ -39,4 +39,6 @@ def model_of(motion: Trajectory, folder: str | None = None) -> Model:
             f"{GENERATED / name}: give its generated folder, --folder FOLDER"
         ) from error
     baked = checked.manifest["scene"]["baked"]
-    return model_from(checked, None if baked else independent(motion.info.get("parameters", {})))
+    return model_from(
+        checked, None if baked else independent(checked.manifest, motion.info.get("parameters", {}))
+    )

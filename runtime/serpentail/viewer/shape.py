@@ -4,26 +4,53 @@ from typing import Any
 
 import numpy as np
 
+from ..attitude import Array
 from ..model.model import Model
 from ..motion.body import semi_axes
 
 THINNEST = 0.15  # a semi-axis that is drawn, over the largest
 SLENDER = 0.015  # radius over length of a tail whose radius no parameter tells
+THICKER = 1.15  # at the root, over the radius
+WATER = 1e3  # kg/m^3
 MOST_JOINTS = 60  # that are marked on a tail
 
 
 def shape(model: Model) -> dict[str, Any]:
-    """Return semi-axes of the torso and radius of the tail, m, and whether its joints are marked.
+    """Return semi-axes of the torso and radii of the tail, m, one from each of its points to the
+    next, and whether its joints are marked.
 
     The torso is that of ``motion.body``, no semi-axis too thin to be seen.
     """
-    p, axes = model.parameters, semi_axes(model)
+    axes = semi_axes(model)
     return {
         "semi_axes": np.maximum(axes, THINNEST * axes.max()).tolist(),
-        "tail_radius": float(p.get("link_radius") or SLENDER * p["tail_length"]),
+        "tail_radii": tail_radii(model).tolist(),
         "jointed": model.kind == "articulated"
         and model.manifest["dimensions"]["total"] <= MOST_JOINTS,
     }
+
+
+def tail_radii(model: Model) -> Array:
+    """Return the radius (m) of the tail from each of its points to the next.
+
+    Links with an inertia of their own are as thick as cylinders of it, arcs of their own as their
+    mass is of water.  Other tails are drawn thinner towards the tip.
+    """
+    p, count = model.parameters, model.manifest["dimensions"]["total"]
+    usual = usual_radius(model)
+    if "link_masses" in p:
+        along, masses = np.reshape(p["link_inertias"], (-1, 3))[:, 1], np.array(p["link_masses"])
+        return np.where(along > 0, np.sqrt(2 * along / masses), usual)
+    if "arc_masses" in p:
+        sections = np.array(p["arc_masses"]) / p["arc_lengths"] / WATER
+        return np.repeat(np.sqrt(sections / np.pi), count // model.segments)
+    return usual * (THICKER - np.arange(count) / (2 * count + 2))
+
+
+def usual_radius(model: Model) -> float:
+    """Return the radius (m) of a tail whose links are all alike."""
+    p = model.parameters
+    return float(p.get("link_radius") or SLENDER * p["tail_length"])
 
 
 def length(model: Model) -> float:

@@ -39,7 +39,7 @@ def animal(model: Model, q: Array, legs: Array | None) -> dict[str, Instances]:
     look = shape(model)
     semi_axes = np.array(look["semi_axes"])
     found = {name: _ball(q, semi_axes, name) for name in PARTS}
-    found["tail"] = rods(model.tail_points(q), look["tail_radius"])
+    found["tail"] = rods(model.tail_points(q), np.array(look["tail_radii"]))
     joints = leg_points(model, q, legs)
     if joints is not None:
         found["legs"] = rods(joints.reshape(2 * len(q), 6, 3), LEG_RADIUS * semi_axes.min())
@@ -53,12 +53,13 @@ def _ball(q: Array, semi_axes: Array, name: str) -> Instances:
     return Instances(places, q[:, QUATERNION], np.tile(size, (len(q), 1)))
 
 
-def rods(points: Array, radius: float) -> Instances:
-    """Return rods between following points of chains (n, k, 3), m, of a radius (m)."""
+def rods(points: Array, radii: Array | float) -> Instances:
+    """Return rods between following points of chains (n, k, 3), m, of one radius, or of k - 1."""
     begins, ends = points[:, :-1].reshape(-1, 3), points[:, 1:].reshape(-1, 3)
     lengths = np.linalg.norm(ends - begins, axis=1)
     along = (ends - begins) / np.maximum(lengths, SHORTEST)[:, None]
-    scales = np.column_stack([np.full((len(lengths), 2), radius), lengths])
+    thick = np.broadcast_to(radii, (len(points), points.shape[1] - 1)).ravel()
+    scales = np.column_stack([thick, thick, lengths])
     return Instances((begins + ends) / 2, from_z(along), scales)
 
 

@@ -13,6 +13,8 @@ SEGMENTS, LINKS = 2, 1
 NQ, NV, NT, POINTS = 7 + 2 * SEGMENTS, 6 + 2 * SEGMENTS, 2 * SEGMENTS, SEGMENTS * LINKS + 1
 SIZES = {"q": NQ, "v": NV, "v_dot": NV, "tau": NT, "f_ext": 6 + 3 * POINTS}
 SIZES |= {"dq": NV, "dv": NV, "dtau": NT, "multiplier": NV, "accelerations": NT}
+NX, NY = 4 + 2 * NT, 7 + 2 * NT
+SIZES |= {"x": NX, "angular": 3, "weights": NY}
 # Every function: its arguments and the shapes of what it returns.
 CALLS = {
     "mass_matrix": (["q"], [(NV, NV)]),
@@ -38,6 +40,12 @@ CALLS = {
     "energy_derivatives": (["q", "v"], [(NV,), (NV,), (NV,)]),
     "momentum_derivatives": (["q", "v"], [(3, NV)] * 4),
     "pfl": (["q", "v", "accelerations"], [(NT,)]),
+    "airborne_rates": (["x", "tau", "angular"], [(NY,)]),
+    "airborne_rates_derivatives": (["x", "tau", "angular"], [(NY,), (NY, NX + NT)]),
+    "airborne_rates_hessian": (
+        ["x", "tau", "angular", "weights"],
+        [(NY,), (NY, NX + NT), (NX + NT, NX + NT)],
+    ),
 }
 every_function = pytest.mark.parametrize("name", CALLS)
 folder = partial(model_folder, SEGMENTS, LINKS, name="tail", functions="all")

@@ -72,7 +72,7 @@ def test_wrong_shape_is_named_with_the_right_one(model, name):
             (size - 1,),
             (size + 1,),
             (3, size - 1),
-            (size, 3),
+            (size, 2),
             (2, 2, size),
             (size, 1),
             (1, 0),
@@ -110,13 +110,15 @@ def test_not_finite_entry_is_named_with_its_place(model, name, bad):
 )
 def test_quaternion_without_direction_is_named(model, name, norm, words):
     one, batch = state(), states(9)
-    one["q"][3:7] = batch["q"][6, 3:7] = 0, norm, 0, 0
+    argument = CALLS[name][0][0]
+    where_it_is, place = {"q": (slice(3, 7), "3:7"), "x": (slice(0, 4), "0:4")}[argument]
+    one[argument][where_it_is] = batch[argument][6, where_it_is] = 0, norm, 0, 0
     for arguments, where in ((one, ""), (batch, " of state 6")):
         with pytest.raises(st.StateError) as caught:
             call(model, name, arguments)
         assert (
             str(caught.value)
-            == f"{name}: the quaternion q[3:7]{where} {words}: upright is (1, 0, 0, 0)"
+            == f"{name}: the quaternion {argument}[{place}]{where} {words}: upright is (1, 0, 0, 0)"
         )
 
 

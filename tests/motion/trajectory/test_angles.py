@@ -2,6 +2,8 @@
 inversion.
 """
 
+import time
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -73,6 +75,33 @@ def test_unwrapped_angles_are_continuous_and_still_the_attitude():
     unwrapped = pitch_roll_yaw(configurations(attitude), unwrap=True)
     assert np.abs(np.diff(unwrapped, axis=0)).max() < 0.1
     np.testing.assert_allclose(euler(unwrapped), rotation_matrix(attitude), rtol=0, atol=2e-14)
+
+
+@pytest.mark.parametrize("step", [0.05, 0.4, 4.0])
+def test_unwrapped_angles_are_the_nearest_to_those_before(step):
+    walk = np.cumsum(step * np.random.default_rng(7).normal(size=(200, 4)), axis=0)
+    unwrapped = pitch_roll_yaw(configurations(walk), unwrap=True)
+    once = pitch_roll_yaw(configurations(walk))
+    turns = 2 * np.pi * np.arange(-9, 10)
+    for before, angles, found in zip(unwrapped, once[1:], unwrapped[1:], strict=False):
+        other = [np.pi - angles[0], angles[1] + np.pi, angles[2] + np.pi]
+        ways = [np.add.outer(branch, turns) - before[:, None] for branch in (angles, other)]
+        nearest = min(np.abs(way).min(axis=1).sum() for way in ways)
+        assert np.abs(found - before).sum() == pytest.approx(nearest, abs=1e-9)
+    np.testing.assert_allclose(euler(unwrapped), rotation_matrix(walk), rtol=0, atol=1e-13)
+
+
+def test_many_samples_are_unwrapped_at_once():
+    angle = np.linspace(0, 3e4, 300_000)
+    quaternion = np.stack([np.cos(angle / 2), np.sin(angle / 2), 0 * angle, 0 * angle], axis=1)
+    begun = time.process_time()
+    pitch = pitch_roll_yaw(configurations(quaternion), unwrap=True)[:, 0]
+    assert time.process_time() - begun < 3.0
+    np.testing.assert_allclose(pitch, angle, rtol=0, atol=1e-9)
+
+
+def test_no_sample_is_no_angle():
+    assert pitch_roll_yaw(np.zeros((0, 9)), unwrap=True).shape == (0, 3)
 
 
 def test_unwrapping_needs_a_time_axis():

@@ -47,8 +47,11 @@ def test_table_is_linear_in_between_and_held_outside(fly, settings, damping):
         flight.tau, interpolated(flight.t) - flight.v[:, 6:] * damping, rtol=0, atol=1e-17
     )
     assert (flight.tau[0] != flight.tau[30]).all()
-    function = lambda t, q, v: interpolated(t) - damping * v[6:]  # noqa: E731
-    user = fly(controller=st.Phases([(t, function) for t in (2.0, *NODES)]), **span, **settings)
+    laws = [
+        (begin, lambda t, q, v, begin=begin: interpolated(begin + t) - damping * v[6:])
+        for begin in (2.0, *NODES)
+    ]
+    user = fly(controller=st.Phases(laws), **span, **settings)
     np.testing.assert_allclose(user.q, flight.q, rtol=0, atol=1e-9)
 
 

@@ -1,0 +1,81 @@
+"""What springs, damping and stops of a tail ask for and store, from a model's parameters."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+PARTS = ("spring", "damping", "stops")
+# tail coordinates (rad) that no motion reaches: stops there are as good as none
+OUT_OF_REACH = 1e6
+ENDS = (("tail_stop_lower", -1), ("tail_stop_upper", 1))
+
+
+def passive_force(values: Mapping[str, Any], angles: Any, rates: Any) -> Any:
+    """Return what the passive parts ask of the torques (..., 2m), N m, at coordinates and rates."""
+    force = np.zeros(np.shape(angles))
+    if "tail_stiffness" in values:
+        force = force + np.asarray(values["tail_stiffness"]) * (angles - _of(values, "tail_rest"))
+    if "tail_damping" in values:
+        force = force + np.asarray(values["tail_damping"]) * rates
+    for way, sign in _ways(values, angles):
+        s, beyond = np.clip(way, 0, 1), np.maximum(way - 1, 0)
+        push = _of(values, "tail_stop_stiffness") * _of(values, "tail_stop_width")
+        force = force + sign * push * (s**3 * (1 - s / 2) + beyond)
+    return force
+
+
+def stored_energy(values: Mapping[str, Any], angles: Any) -> Any:
+    """Return the energy (...), J, that springs and stops store at tail coordinates (..., 2m)."""
+    energy = np.zeros(np.shape(angles))
+    if "tail_stiffness" in values:
+        stretch = angles - _of(values, "tail_rest")
+        energy = energy + _of(values, "tail_stiffness") * stretch**2 / 2
+    for way, _ in _ways(values, angles):
+        s, beyond = np.clip(way, 0, 1), np.maximum(way - 1, 0)
+        scale = _of(values, "tail_stop_stiffness") * _of(values, "tail_stop_width") ** 2
+        energy = energy + scale * (s**4 * (5 - 2 * s) / 20 + beyond * (1 + beyond) / 2)
+    return energy.sum(axis=-1)
+
+
+def behind_stops(values: Mapping[str, Any], angles: Any) -> str:
+    """Return which of the tail coordinates (k, 2m) is first more than a stop's width beyond it;
+    empty where none is.
+    """
+    for (name, _), (way, _) in zip(ENDS, _ways(values, angles), strict=False):
+        wrong = np.argwhere(way > 1)
+        if len(wrong):
+            run, coordinate = wrong[0]
+            stop = np.broadcast_to(_of(values, name), np.shape(angles))[run, coordinate]
+            width = np.broadcast_to(_of(values, "tail_stop_width"), np.shape(angles))
+            return (
+                f"tail coordinate {coordinate} is {angles[run, coordinate]:.6g} rad, behind "
+                f"{name} {stop:.6g} by more than tail_stop_width {width[run, coordinate]:.6g}: "
+                "give one between the stops, or move them"
+            )
+    return ""
+
+
+def idle(values: Mapping[str, Any], parts: tuple[str, ...]) -> dict[str, float]:
+    """Return changes of parameters under which "stops", "damping" and "spring" do nothing."""
+    changes: dict[str, float] = {}
+    if "stops" in parts and "tail_stop_lower" in values:
+        changes |= {name: sign * OUT_OF_REACH for name, sign in ENDS}
+    for part, name in (("damping", "tail_damping"), ("spring", "tail_stiffness")):
+        if part in parts and name in values:
+            changes[name] = 0.0
+    return changes
+
+
+def _of(values: Mapping[str, Any], name: str) -> np.ndarray:
+    return np.asarray(values[name], float)
+
+
+def _ways(values: Mapping[str, Any], angles: Any) -> list[tuple[Any, int]]:
+    """How far coordinates are in the lower and in the upper stop, in its width, and which way a
+    stop's force on the torques goes.
+    """
+    if "tail_stop_lower" not in values:
+        return []
+    width = _of(values, "tail_stop_width")
+    return [(sign * (angles - _of(values, name)) / width, sign) for name, sign in ENDS]

@@ -1,0 +1,102 @@
+"""Laws of the passive tail: its springs, damping and stops, against the same tail without them."""
+
+from typing import Any
+
+import numpy as np
+
+from ..model.layout import TAIL_Q, TAIL_V
+from ..model.model import Model
+from ..model.passive import PARTS, passive_force, stored_energy
+from .contact_laws import HEIGHT, bristles, legs, raised
+from .errors import relative, sensitivity
+from .law import PIECEWISE, VALUE_LIMIT, Errors, Law, registry, rid_of
+from .states import State
+
+LAWS: list[Law] = []
+law = registry(LAWS)
+
+
+@law("inverse_dynamics", units=VALUE_LIMIT, only="passive")
+def the_tail_itself_asks_for_torques(model: Model, s: State) -> Errors:
+    """H v_dot + C has the forces of springs, damping and stops on the tail's coordinates alone."""
+    bare = rid_of(model, PARTS)
+    force = model.inverse_dynamics(s.q, s.v, s.v_dot).astype(float)
+    expected = bare.inverse_dynamics(s.q, s.v, s.v_dot).astype(float)
+    size = np.abs(force) + np.abs(expected)
+    expected[TAIL_V] += passive_force(model.parameters, s.q[TAIL_Q], s.v[TAIL_V])
+    return relative(force, expected, size + np.abs(expected))
+
+
+@law("energy", units=VALUE_LIMIT, only="passive")
+def springs_and_stops_store_potential_energy(model: Model, s: State) -> Errors:
+    """Potential energy is that of the height, and what the tail stores; kinetic energy is as it
+    was.
+    """
+    bare = rid_of(model, PARTS)
+    kinetic, potential = model.energy(s.q, s.v)
+    own, height = bare.energy(s.q, s.v)
+    stored = float(stored_energy(model.parameters, s.q[TAIL_Q]))
+    return {
+        "kinetic": relative(kinetic, own),
+        "potential": relative(potential, height + stored, abs(float(height)) + stored),
+    }
+
+
+@law("energy_derivatives", units=VALUE_LIMIT, only="passive")
+def stored_energy_changes_by_its_forces(model: Model, s: State) -> Errors:
+    """The gradient of potential energy has the forces of springs and stops, without damping."""
+    bare = rid_of(model, PARTS)
+    gradient = model.energy_derivatives(s.q, s.v)[2].astype(float)
+    expected = bare.energy_derivatives(s.q, s.v)[2].astype(float)
+    size = np.abs(gradient) + np.abs(expected)
+    expected[TAIL_V] += passive_force(model.parameters, s.q[TAIL_Q], 0 * s.v[TAIL_V])
+    return relative(gradient, expected, size)
+
+
+@law("forward_dynamics", units=VALUE_LIMIT, only="passive")
+def torques_that_make_up_for_it_rid_a_tail_of_it(model: Model, s: State) -> Errors:
+    """Under torques greater by what the tail itself asks for, v_dot is that of a tail without."""
+    bare = rid_of(model, PARTS)
+    own = passive_force(model.parameters, s.q[TAIL_Q], s.v[TAIL_V])
+    expected = bare.inverse_dynamics(s.q, s.v, bare.forward_dynamics(s.q, s.v, s.tau))
+    found = bare.inverse_dynamics(s.q, s.v, model.forward_dynamics(s.q, s.v, s.tau + own))
+    scale = np.abs(own).max() + np.abs(expected).max() + np.abs(found).max()
+    return relative(found, expected, scale)
+
+
+@law(
+    "implicit_factor",
+    "implicit_solve",
+    "mass_matrix",
+    units=VALUE_LIMIT,
+    only="passive",
+    without=PIECEWISE,
+)
+def implicit_steps_know_the_passive_tail(model: Model, s: State) -> Errors:
+    """High up and untracked, (1 - w J) k = r with J of springs and both dampings, relative to
+    cond(H).
+    """
+    w, damping, values = 1e-3, np.linspace(1e-3, 2e-3, len(s.tau)), model.parameters
+    H = model.mass_matrix(s.q).astype(float)
+    k_q, k_v = implicit_step(model, s, damping, w)
+
+    # H (k_v - r_v) = -w (D k_v + K k_q)
+    own = damping + np.asarray(values.get("tail_damping", 0.0))
+    stiffness, load = np.asarray(values.get("tail_stiffness", 0.0)), np.zeros(model.nv)
+    load[TAIL_V] = -w * (own * k_v[TAIL_V] + stiffness * k_q[TAIL_V])
+    scale = np.sqrt(np.diag(H))
+    return {
+        "v": relative(H @ (k_v - s.dv) / scale, load / scale) / sensitivity(model, s.q),
+        "q": relative(k_q, s.dq + w * k_v),
+    }
+
+
+def implicit_step(model: Model, s: State, damping: np.ndarray, w: float) -> tuple[Any, Any]:
+    """Return k_q and k_v of right-hand sides dq and dv, far from the ground."""
+    u = (bristles(model),) if model.contacts else ()
+    weight = [w, 1.0] if u else [w]
+    ground = (*u, *legs(model)) if u else ()
+    high, gains = raised(s.q, HEIGHT), np.zeros(2)
+    factors = model.kernel("implicit_factor")(high, s.v, damping, gains, weight, *ground)
+    k_q, k_v, *_ = model.kernel("implicit_solve")(factors, s.dq, s.dv, *u)
+    return k_q.astype(float), k_v.astype(float)
