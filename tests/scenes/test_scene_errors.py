@@ -118,7 +118,11 @@ def test_what_is_wrong_is_named(scene, replaced, added, words):
         ({"Kn": 0.5}, "Kn: no such parameter; did you mean 'K_n'?"),
         ({"nu": 0.5}, "nu: no such parameter; there are gravity, "),
         ({"contacts": ["feet"]}, "contacts: no such parameter"),
-        ({"parameters.mu": 1}, "change 'parameters.mu': unknown"),
+        ({"parameters.mu": 1}, "change 'parameters.mu': unknown; needs a parameter"),
+        (
+            {"duraton": 1, "strat.pitch": 1},
+            "'duraton': unknown; did you mean 'duration'(?s:.*)'start'",
+        ),
         ({"legs.moves.0.rate": 1}, "change 'legs.moves.0.rate': 'moves' is not in "),
         ({"duration.x": 1}, "change 'duration.x': 'x' is not in 0.02"),
         ({"method": "euler"}, "method: value 'euler': needs 'auto' or 'rk4'"),
@@ -145,5 +149,7 @@ def test_scene_without_a_motion(scene):
     path.write_text(path.read_text().split("[simulate]")[0])
     with pytest.raises(st.SimulationError, match=r"has no table \[simulate\]; add one"):
         st.scenario(path)
+    with pytest.raises(st.SimulationError, match="or try `serpentail plan`"):
+        st.scenario("righting_m1_n3")
     with pytest.raises(st.SimulationError, match="cannot be read"):
         st.scenario("nowhere.toml")

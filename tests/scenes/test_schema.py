@@ -14,6 +14,7 @@ from serpentail.errors import SerpentailError
 from serpentail.scenes.plan import plan_arguments
 from serpentail_codegen.scene.parameters import PARAMETERS
 from serpentail_codegen.scene.parse import parse_scene
+from serpentail_codegen.scene.passive import PASSIVE
 from serpentail_codegen.scene.problems import SceneError
 from tests.scenes.test_random_tables import GENERATE, PLAN, SIMULATE
 
@@ -50,6 +51,30 @@ def test_json_is_the_same_schema(printed, capsys):
     assert cli.main(["schema", "--json", "-"]) == 0
     out = capsys.readouterr().out
     assert out.count("\n") == 1 and json.loads(out) == json.loads(printed)
+
+
+LINK = {"links": 2, "length": "1 cm", "mass": 0.001}
+
+
+@pytest.mark.parametrize(
+    ("keys", "sound"),
+    [
+        ({"segments": [LINK, LINK | {"link_radius": "1 mm"}]}, True),
+        ({"segments": [{"links": 2}], "taper": {"radii": "4, 1 mm", "density": 1000}}, True),
+        ({"segments": 1, "links": 2, "parameters": {"link_masses": "1, 2 g"}}, True),
+        ({"segments": 1, "links": 1, "parameters": {"link_inertias": [[1, 1, 1]]}}, True),
+        ({"segments": 1, "links": 1, "base": "fixed", "weightless": True}, True),
+        ({"segments": 1}, False),
+        ({"segments": [LINK | {"mass": 0}]}, False),
+        ({"segments": [LINK | {"colour": 1}]}, False),
+        ({"segments": [LINK | {"radii": [0.1]}]}, False),
+        ({"segments": [LINK], "taper": {"density": 1000}}, False),
+        ({"segments": 1, "links": 2, "parameters": {"link_masses": 1}}, False),
+        ({"segments": 1, "links": 2, "base": "floating"}, False),
+    ],
+)
+def test_segments_of_their_own(valid, keys, sound):
+    assert valid({"kind": "articulated", **keys}) is sound
 
 
 def with_value(path, value):
@@ -164,6 +189,6 @@ def test_a_wrong_goal_is_told_both_forms():
 
 def test_editors_show_what_each_parameter_is(printed):
     shown = json.loads(printed)["properties"]["parameters"]["properties"]
-    assert set(shown) == {p.name for p in PARAMETERS}
-    for p in PARAMETERS:
+    assert set(shown) == {p.name for p in (*PARAMETERS, *PASSIVE)}
+    for p in (*PARAMETERS, *PASSIVE):
         assert shown[p.name]["description"] == f"{p.meaning} ({p.unit})"

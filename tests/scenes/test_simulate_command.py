@@ -117,6 +117,7 @@ def test_a_flight_is_a_scene_too(tmp_path, monkeypatch, capsys):
     [
         ("--save", "simple.toml/a.npz", "simple.toml is no folder"),
         ("--save", ".", ". is a folder"),
+        ("--save", "motions/", "motions/ is a folder"),
         ("--save", "a.dat", "its name ends in .dat, which is none of .npz, .csv, .nc"),
         ("--save", "a.csv/a.v2", "its name ends in .v2"),
         ("--film", "simple.toml/deep/a.png", "simple.toml is no folder"),
