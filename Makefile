@@ -39,7 +39,7 @@ GENERATE := $(PY) -m serpentail_codegen
 FOLDER   := "$$($(GENERATE) --print-folder $(WANTED))"
 PAGE     := $(wildcard hatch_build.py viewer/*.* viewer/src/*)
 
-.PHONY: help setup demo test test-portable test-all model verify bench stress mutants embedded size-report studies study-models study-righting study-contact wheels lint golden clean
+.PHONY: help setup demo test test-portable test-all model verify bench stress mutants embedded size-report studies study-models study-righting study-contact study-landing wheels lint golden clean
 .DELETE_ON_ERROR:
 
 help:
@@ -64,6 +64,7 @@ help:
 	@echo "  make study-models                          the paper's Fig. 8: both tails compared, and what each costs"
 	@echo "  make study-righting                        the paper's Figs. 9 to 13, Table 2: righting, planned and true"
 	@echo "  make study-contact                         kick, jump from the tail, self-recovery: films, plots, a table"
+	@echo "  make study-landing                         kicks that the tail rights onto the feet, planned and passive"
 	@echo "  make studies                               all; STARTS=200 random starts in the second"
 	@echo "  make wheels                                builds wheel and sdist, installs the wheel for each Python that is here"
 	@echo "  make lint                                  style, import rules, types, lengths of files"
@@ -160,7 +161,10 @@ study-righting: $(READY)
 study-contact: $(READY)
 	$(PY) -m examples.studies.contact
 
-studies: study-models study-righting study-contact
+study-landing: $(READY)
+	$(PY) -m examples.studies.landing
+
+studies: study-models study-righting study-contact study-landing
 
 wheels: $(READY)
 	$(PY) -m tests.packaging.wheels

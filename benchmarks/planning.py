@@ -18,7 +18,7 @@ import numpy as np
 
 import serpentail as st
 from examples import righting
-from serpentail.planning import rounds
+from serpentail.planning import ways
 from serpentail.planning.nlp.node import equations_of_motion
 from serpentail.planning.problem import SMOOTHING
 from serpentail_codegen.scene.parse import scene_for
@@ -166,18 +166,18 @@ def captured(rat: st.Model) -> tuple:
     """The paper's program, its limits, passive flight as the guess and the parameters, as
     ``plan`` has them.
     """
-    seen, solve = [], rounds.solve
+    seen, solve = [], ways.solve
 
     def note(engine, limits, w, p, multipliers=None):
         seen.append((limits, np.clip(w, limits.lbx, limits.ubx), p))
         return solve(engine, limits, w, p, multipliers)
 
-    rounds.solve = note
+    ways.solve = note
     try:
         found = plan(rat, **PAPER)
     finally:
-        rounds.solve = solve
-    transcription = rounds.transcription_of(
+        ways.solve = solve
+    transcription = ways.transcription_of(
         rat, found.problem, found.mesh, found.rule, equations_of_motion(rat)
     )
     return transcription, *seen[0]

@@ -5,8 +5,10 @@ The controller's tail is a fifth lighter than the one that flies; the tilt of th
 
 from __future__ import annotations  # those of serpentail would import it
 
+import argparse
+import sys
+
 import serpentail as st
-from examples import front
 
 STEP, HORIZON, FLIGHT = 0.02, 12, 20  # s, steps that are planned, steps that are flown
 TORQUE = 0.02  # N m, the largest
@@ -69,5 +71,9 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    front.parser(__doc__).parse_args()
-    front.run(main)
+    argparse.ArgumentParser(description=__doc__).parse_args()
+    try:
+        with st.progress():
+            main()
+    except KeyboardInterrupt:
+        sys.exit("interrupted: nothing is kept")

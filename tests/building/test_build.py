@@ -190,3 +190,17 @@ def test_a_cache_that_cannot_be_written_is_told(tmp_path, monkeypatch):
     monkeypatch.setenv("SERPENTAIL_CACHE", str(Path(os.devnull) / "cache"))
     with pytest.raises(st.SerpentailError, match="set SERPENTAIL_CACHE to a folder you can write"):
         st.build(**TINY)
+
+
+def test_springs_are_built_into_the_dynamics():
+    """A parameter of the passive tail is of the scene: it makes other code, and can be changed."""
+    tiny = TINY | {"functions": ["forward_dynamics"]}
+    plain, elastic = st.build(**tiny), st.build(**tiny, tail_stiffness=0.02)
+    q = np.zeros(plain.nq)
+    q[3], q[7:] = 1.0, 0.1
+    v = np.zeros(plain.nv)
+    wanted = plain.forward_dynamics(q, v, [-0.002] * (plain.nv - 6))
+    found = elastic.forward_dynamics(q, v, [0.0] * (plain.nv - 6))
+    np.testing.assert_allclose(found, wanted, rtol=1e-12)
+    softer = elastic.with_parameters(tail_stiffness=0.01)
+    assert np.abs(softer.forward_dynamics(q, v, [0.0] * (plain.nv - 6)) - found).max() > 1e-3

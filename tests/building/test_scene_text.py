@@ -12,6 +12,7 @@ import serpentail as st
 from serpentail.building.options import Parameters, SceneKeys
 from serpentail.building.scene_text import scene_text
 from serpentail_codegen.scene.parameters import PARAMETERS
+from serpentail_codegen.scene.passive import PASSIVE
 from serpentail_codegen.scene.scene import KEYS
 
 TEXTS = some.text(some.characters(codec="utf-8"))
@@ -55,6 +56,7 @@ def test_what_is_nested_without_end_is_refused():
 
 def test_options_are_what_the_generator_knows():
     keys = {"tail" if key == "kind" else key for key in KEYS}
-    left = {"description", "parameters", "plan", "simulate"}
+    left = {"description", "parameters", "plan", "simulate", "phase"}
     assert set(SceneKeys.__annotations__) == keys - left
-    assert list(Parameters.__annotations__) == [parameter.name for parameter in PARAMETERS]
+    names = [parameter.name for parameter in (*PARAMETERS, *PASSIVE)]
+    assert list(Parameters.__annotations__) == names

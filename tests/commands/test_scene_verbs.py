@@ -91,6 +91,24 @@ def test_generate_is_the_generator(run):
     assert run("generate", "none.toml")[0] == 2
 
 
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--help"], "usage: serpentail generate"),
+        ([], "scene: no value: give a scene file, or --tail and --segments"),
+        (["--tail", "continuum"], "give a scene file, or --tail and --segments"),
+        (["--tail", "continuum", "--segments", "1", "--links", "3"], "links: value 3"),
+        (["kick", "--functions", "energi"], "did you mean 'energy'"),
+    ],
+)
+def test_generate_says_what_it_needs(capfd, monkeypatch, tmp_path, arguments, words):
+    monkeypatch.chdir(tmp_path)
+    status = cli.main(["generate", *arguments])
+    assert status == (0 if "--help" in arguments else 2)
+    told = capfd.readouterr()
+    assert words in (told.err or told.out) and "Traceback" not in told.err
+
+
 def test_the_version(capsys):
     with pytest.raises(SystemExit) as ended:
         cli.main(["--version"])

@@ -48,7 +48,7 @@ def test_info_is_a_table(run, folder):
     status, out, err = run("info", folder)
     head, *lines = out.splitlines()
     assert (status, besides_progress(err)) == (0, "")
-    assert head == "tail: 1 segments x 1 links, nq 9, nv 8, double"
+    assert head == "tail: 1 x 1 links, nq 9, nv 8, double"
     rows = [line for line in lines if not line.startswith("    ")]
     assert [row.split()[0] for row in rows] == [*MADE]
     for row in rows:

@@ -124,7 +124,7 @@ def test_second_make_rebuilds_nothing(tree, make):
     first = make("model", *ORDER)
     assert (first.returncode, first.stderr) == (0, "")
     assert re.search(rf"generated/{NAME}: \d+ files written", first.stdout)
-    assert f"{NAME}: 1 segments x 1 links, nq 9, nv 8, double" in first.stdout
+    assert f"{NAME}: 1 x 1 links, nq 9, nv 8, double" in first.stdout
     before = built(tree)
     for path in (tree / "codegen").rglob("*"):
         path.touch()
@@ -208,7 +208,7 @@ def test_an_older_scene_that_is_restored_rebuilds(tree, make):
         place.write_text(scene)
         os.utime(place, (0, 0))
         done = make("model", f"SCENE={place.relative_to(tree)}")
-        assert done.returncode == 0 and f"own: 1 segments x {links} links" in done.stdout
+        assert done.returncode == 0 and f"own: 1 x {links} links" in done.stdout
         assert manifest(tree, "own")["dimensions"]["links"] == links
 
 

@@ -28,7 +28,7 @@ WORKS = (  # without any extra
     ["serpentail", "examples"],
     ["serpentail", "simulate", "kick", "--json", "-", "--save", "kick.npz"],
     ["serpentail", "view", "kick.npz"],
-    ["serpentail", "verify", "righting_m1_n3"],
+    ["serpentail", "verify", "kick"],
     ["serpentail", "info", "righting_m1_n3"],
     ["serpentail", *TINY],
     ["python", "-c", PROGRAM],
