@@ -31,8 +31,8 @@ def test_energy_balances_over_long_runs_and_better_with_tolerance(name, method, 
         assert left == pytest.approx(run.info["imbalance"]["energy_J"], abs=1e-12)
         assert (work["damping"] < -1e-4) == (part == "all") and work["torques"] == 0
         errors.append(abs(left) / moved)
-    # over the kinetic energy of the start: springs move more than that
-    assert errors[-1] < 2e-4 and errors[-1] < 0.1 * errors[0]
+    # over the kinetic energy of the start: springs move more than that; below 1e-9 is rounding
+    assert errors[-1] < 2e-4 and errors[-1] < max(0.1 * errors[0], 1e-9)
 
 
 def test_damping_of_the_tail_and_of_a_controller_add_up():
