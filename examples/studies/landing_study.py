@@ -10,6 +10,8 @@ import numpy as np
 
 import serpentail as st
 from examples.front import ROOT
+from examples.studies.landing_judged import LANDING, SETTINGS, judged, model_of
+from examples.studies.landing_jumps import FLIGHTS, OPTIONS, PUSHES, jump, told
 from examples.studies.parts import Part, digest, made
 
 KICKS, SEED, SPREAD = 20, 11, 0.1
@@ -17,15 +19,14 @@ VARIED = ("torso_mass", "torso_inertia", "tail_mass", "tail_length")
 PITCHES = (-50.0, -30.0, -10.0, 10.0, 20.0)  # deg, at the landing: where the one wanted is not true
 TORQUE = 0.02  # N m
 GAMMA, DELTA = radians(210), radians(-15)
-LANDING = {"gamma": radians(230), "delta": radians(-20), "duration": 0.1}
+QUICK = {"track": False, "retries": 2}
 KICK = {"at": 0.4, "delta": radians(-75), "rate": 70.0}
-SETTINGS = {"rtol": 1e-5, "output_step": 2e-3}
-SOURCES = ("codegen", "runtime")
+SOURCES = ("codegen", "runtime", "examples/studies")
 
 
 @dataclass(frozen=True)
 class Tail:
-    """A tail of the study: what it is, how far a coordinate may go, and its goal (deg)."""
+    """A tail of the study: what it is, how far a coordinate may go (rad), and its goal (deg)."""
 
     options: dict
     angle: float
@@ -35,20 +36,13 @@ class Tail:
 TAILS = {
     "articulated_1x3": Tail({"tail": "articulated", "segments": 1, "links": 3}, pi / 3, -20.0),
     "continuum_2": Tail({"tail": "continuum", "segments": 2}, 2 * pi / 3, -30.0),
+    "continuum_3": Tail({"tail": "continuum", "segments": 3}, 2 * pi / 3, -20.0),
 }
-
-
-def model_of(tail: Tail) -> st.Model:
-    """Return a model with all that lands, and exact derivatives for its plans."""
-    functions = st.scenario("kick_and_land").model.generated
-    inner = ("contact_rates", "implicit_factor", "implicit_solve")  # come with others
-    wanted = [*(name for name in functions if name not in inner), "implicit"]
-    return st.build(**tail.options, contacts=["feet", "tail", "torso"], functions=wanted)
 
 
 def kick(tail: Tail, number: int) -> dict:
     """Return what becomes of one animal, whose flight is planned, and with a passive tail."""
-    random, model = np.random.default_rng([SEED, number]), model_of(tail)
+    random, model = np.random.default_rng([SEED, number]), model_of(tail.options)
     factors = {name: random.uniform(1 - SPREAD, 1 + SPREAD) for name in VARIED}
     changes = {
         name: (np.asarray(model.parameters[name]) * factor).tolist()
@@ -84,7 +78,7 @@ def planned(tail: Tail, pitch: float) -> st.Phase:
     pitches = [pitch, *sorted(PITCHES, key=lambda other: abs(other - pitch))]
     bounds = st.Bounds(angle=tail.angle, torque=TORQUE)
     plans = [
-        {"goal": goal(tail, each), "bounds": bounds, "track": False, "retries": 2}
+        {"goal": goal(tail, each), "bounds": bounds, "time_limit": 60.0, **QUICK}
         for each in pitches
     ]
     moves = [{"before_landing": 0.2} | LANDING]
@@ -108,31 +102,20 @@ def passive() -> st.Phase:
     return st.Phase("fly", 1.5, until="landing", controller=st.Damping(1e-3), moves=moves)
 
 
-def judged(model: st.Model, run: st.SequenceRun) -> dict:
-    """Return the numbers of a landing, and whether it counts: see docs/sequences.md."""
-    found, motion = st.summary(model, run.trajectory), run.trajectory
-    names = ("standing_end", "landing_group", "least_upright_landing", "turned_landing_rad")
-    told = {name: found[name] for name in names}
-    flight = run.phases[1]
-    inside = (motion.t > flight.begin) & (motion.t < flight.end)
-    told["torque_N_m"] = float(np.abs(motion.tau[inside]).max())
-    told["plan_s"] = None if flight.plan is None else flight.plan.report["wall_s"]
-    stands = told["standing_end"] and told["landing_group"] == "feet"
-    told["lands"] = bool(
-        stands and told["least_upright_landing"] > 0.5 and told["turned_landing_rad"] < 2
-    )
-    return told
-
-
 def study(folder: Path) -> None:
-    """Make all kicks, write summary.json and print a table."""
-    of = {"program": digest(Path(__file__), *(ROOT / source for source in SOURCES))}
-    for tail in TAILS.values():
-        model_of(tail)
+    """Make all kicks and jumps (of landing_jumps), write summary.json and print two tables."""
+    of = {"program": digest(*(ROOT / source for source in SOURCES))}
+    for options in (*(tail.options for tail in TAILS.values()), OPTIONS):
+        model_of(options)
     parts = {
         f"{name}_{number}": Part(partial(kick, tail, number), of | {"kick": number})
         for name, tail in TAILS.items()
         for number in range(KICKS)
+    }
+    parts |= {
+        f"jump_{push}_{flight}": Part(partial(jump, push, flight), of | {"jump": [push, flight]})
+        for push in PUSHES
+        for flight in FLIGHTS
     }
     found = made("landing", folder / "parts", parts)
     (folder / "summary.json").write_text(json.dumps(found, indent=1) + "\n")
@@ -141,3 +124,7 @@ def study(folder: Path) -> None:
         rows = [found[f"{name}_{number}"] for number in range(KICKS)]
         counts = (sum(row[how]["lands"] for row in rows) for how in ("planned", "passive"))
         print(f"| {name} | " + " | ".join(f"{count} of {KICKS}" for count in counts) + " |")
+    print("| push | " + " | ".join(FLIGHTS) + " |\n|---|" + "---|" * len(FLIGHTS))
+    for push in PUSHES:
+        words = (told(found[f"jump_{push}_{flight}"]) for flight in FLIGHTS)
+        print(f"| {push} rad | " + " | ".join(words) + " |")
