@@ -12,6 +12,7 @@ from tests.support.tumbling import FUNCTIONS, rat, start
 DURATION = 0.3
 SETTINGS = {"duration": DURATION, "goal": st.Goal(torso_rate=None), "intervals": 10}
 LEGS = st.Legs.fixed(3.6, -0.3)
+FEET = 6  # points of the feet, which come first
 
 
 @cache
@@ -60,13 +61,39 @@ def test_feet_without_legs_have_no_points():
         st.plan(footed(), start=start(footed()), legs=3, **SETTINGS)
 
 
-def _heights(model, plan):
-    """Heights (K,) of the lowest point."""
+def _heights(model, plan, first=0):
+    """Heights (K,) of the lowest point, or of the lowest from the first on."""
     q, v = plan.trajectory.q, plan.trajectory.v
     legs = np.append(LEGS.curve.at(0.0)[0], np.zeros(4))
-    return model.contact_points(q, v, np.tile(legs, (len(q), 1)))[0][:, :, 2].min(axis=1)
+    return model.contact_points(q, v, np.tile(legs, (len(q), 1)))[0][:, first:, 2].min(axis=1)
 
 
 def _ramp(point):
     """1 m at the start, which may be low, to nothing at half the time."""
     return 0.5 * (1 - 2 * point.time / DURATION + abs(1 - 2 * point.time / DURATION))
+
+
+def test_clearance_keeps_tail_and_torso_above_the_ground():
+    """Where the plan without it dips below; the feet, which land, have none."""
+    model, low = footed(), start(footed())
+    low[0][2], low[1][2] = 0.3, 0.93
+    free = st.plan(model, start=low, **SETTINGS)
+    heights = _heights(model, free, FEET)
+    assert free.success
+    least = heights[0] - 0.001
+    assert heights.min() < least - 0.002
+    plan = st.plan(model, start=low, clearance=least, guess=free, **SETTINGS)
+    assert plan.success
+    assert _heights(model, plan, FEET).min() >= least - 1e-4
+
+
+def test_clearance_is_refused_where_it_cannot_be():
+    low = start(footed())
+    low[0][2] = 0.05
+    for model, clearance, words in (
+        (rat(), 0.01, "has no points of tail or torso that touch: add 'tail' or 'torso'"),
+        (footed(), -0.01, "clearance: value -0.01: needs"),
+        (footed(), 0.1, "clearance: value 0.1: at the start the lowest point .* begin later"),
+    ):
+        with pytest.raises(st.PlanningError, match=words):
+            st.plan(model, start=low, clearance=clearance, **SETTINGS)

@@ -129,6 +129,19 @@ def test_own_objective_and_path_constraint():
     assert bend[0] < bend[1]
 
 
+def test_path_constraints_of_several_sizes_keep_their_own_bounds():
+    """Two bends between wide limits, then one rate's least: as with that rate alone."""
+    settings = {"tolerance": None, "intervals": 8}
+    rate = (_first_rate, -4.0, 9.0)
+    both = planned(path=((lambda point: point.tail, -50.0, 50.0), rate), **settings)
+    alone = planned(path=(rate,), **settings)
+    assert both.report["converged"] and alone.report["converged"]
+    for plan in (both, alone):
+        assert plan.curve.at(plan.curve.ends)["tail_rate"][1:, 0].min() >= -4.0 - 1e-5
+    assert both.report["objective"] == pytest.approx(alone.report["objective"], rel=1e-4)
+    assert both.report["bound_excess"] == pytest.approx(alone.report["bound_excess"], abs=0.02)
+
+
 def _bend(point):
     return casadi.sumsqr(point.tail) + 1e-3 * casadi.sumsqr(point.torque / 1e-3)
 

@@ -40,6 +40,7 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
     smoothing: float = SMOOTHING,
     damping: float = 0.0,
     path: Sequence[PathConstraint] = (),
+    clearance: float | None = None,
     legs: Legs | None = None,
     formulation: str = "airborne",
     attitude: str = "quaternion",
@@ -83,7 +84,9 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
     damping: N m s (Eq. 47), in addition to the planned torques.
     path: rows (function of a point, least, most).  A point has the CasADi blocks tail, tail_rate,
     torso_rate, torque, attitude, quaternion, time, duration, position, height, tip, tail_points,
-    center_of_mass in SI, parameters by name, and the blocks of its formulation.
+    center_of_mass, contact_points, body_points in SI, parameters by name, and the blocks of its
+    formulation.
+    clearance: m, of all points of tail and torso that may touch the ground, in the whole flight.
     legs: of a model with feet, for path constraints on its contact_points; as they are at 0 s.
     formulation: "airborne" (angular momentum conserved by construction), "translation-free",
     "full".
@@ -153,6 +156,7 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
         "smoothing": smoothing,
         "damping": damping,
         "path": path,
+        "clearance": clearance,
         "legs": legs,
         "formulation": formulation,
         "attitude": attitude,

@@ -1,6 +1,6 @@
 """What a user asks of a plan, checked field by field before anything is derived."""
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, fields
 from functools import partial
 from typing import Any
@@ -16,6 +16,7 @@ from ..model.passive import behind_stops
 from ..simulation.schedules import Legs
 from .nlp.coordinates import KINDS
 from .nlp.node import FORMULATIONS
+from .paths import PathConstraint, checked_clearance, checked_path, clear_of_ground
 
 OBJECTIVES = ("effort", "energy", "time")
 # N m s: the effort counts a tail's rates as torques, or a plan whirls a light tail at no cost
@@ -57,9 +58,6 @@ class Bounds:
     rate: Any = None
     torque: Any = 0.02
     torque_rate: Any = None
-
-
-PathConstraint = tuple[Callable[[Any], Any], float, float]  # function of a point, least, most
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,6 +109,10 @@ def checked_problem(
     checked: dict[str, Any] = {
         name: attempt(name, SETTINGS[name], value) for name, value in settings.items()
     }
+    clearance = checked.pop("clearance")
+    if clearance is not None and start is not None:
+        row = attempt("clearance", clear_of_ground, model, start, clearance)
+        checked["path"] = (*(checked["path"] or ()), row)
     if refused.lines or start is None or goal is None or duration is None or bounds is None:
         return None
     return PlanningProblem(*start, goal, duration, bounds, **checked)
@@ -251,26 +253,6 @@ def _objective(objective: Any) -> str | Callable[[Any], Any]:
     return objective
 
 
-def _path(path: Sequence[Any]) -> tuple[PathConstraint, ...]:
-    if not isinstance(path, tuple | list):
-        needs = "rows (function of a point, least, most)"
-        raise refusal("path", path, needs, PlanningError)
-    constraints = []
-    for k, row in enumerate(path):
-        if not isinstance(row, tuple | list) or len(row) != 3 or not callable(row[0]):
-            raise PlanningError(
-                f"path[{k}]: value {shown(row)}: needs (function of a point, least, most)"
-            )
-        bounds = numbers_in(row[1:])
-        if bounds is None or bounds.shape != (2,):
-            raise PlanningError(f"path[{k}]: bounds {shown(row[1:])}: needs two numbers")
-        least, most = bounds.tolist()
-        if not least <= most:
-            raise PlanningError(f"path[{k}]: bounds ({least}, {most}): needs least <= most")
-        constraints.append((row[0], least, most))
-    return tuple(constraints)
-
-
 def _legs(legs: Any) -> Legs | None:
     if legs is not None and not isinstance(legs, Legs):
         raise refusal("legs", legs, "Legs, such as st.Legs.fixed(gamma, delta)", PlanningError)
@@ -291,7 +273,8 @@ SETTINGS: dict[str, Callable[[Any], Any]] = {  # of the problem, and their check
     "objective": _objective,
     "smoothing": _work("smoothing"),
     "damping": _work("damping"),
-    "path": _path,
+    "path": checked_path,
+    "clearance": checked_clearance,
     "legs": _legs,
     "formulation": _name("formulation", FORMULATIONS),
     "attitude": _name("attitude", KINDS),

@@ -73,7 +73,7 @@ def _beyond(search: "Search") -> str | None:
     if callable(problem.objective):
         return "objective is a function: it takes 'effort', 'energy' and 'time'"
     if problem.path:
-        return "path is given: it takes bounds alone, so leave it out"
+        return "path or clearance is given: it takes bounds alone, so leave it out"
     if problem.bounds.torque_rate is not None:
         return "bounds.torque_rate is given: leave it out"
     return lacking(search.model)

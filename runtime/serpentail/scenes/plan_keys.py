@@ -53,6 +53,7 @@ PLAN = Key(
         "objective": one_word(*OBJECTIVES),
         "smoothing": WORK,
         "damping": WORK,
+        "clearance": Key("m"),
         "formulation": one_word(*FORMULATIONS),
         "attitude": one_word(*KINDS),
         # of the search

@@ -13,6 +13,7 @@ from ..problem import Goal, PlanningProblem
 from .coordinates import Attitude
 from .direct import goal_matrix
 from .indices import columns_of
+from .node import Node
 from .transcription import Transcription
 
 
@@ -75,7 +76,7 @@ def _constraint_bounds(nlp: Transcription, angles: np.ndarray) -> tuple[np.ndarr
     """Bounds of the constraints, in the order of the transcription's rows."""
     problem, indices, node = nlp.problem, nlp.indices, nlp.node
     defects = np.zeros((len(indices.states) - 1) * indices.states.shape[1])
-    one_node = np.column_stack([np.zeros((2, node.residuals)), _path(problem, node.path)])
+    one_node = np.column_stack([np.zeros((2, node.residuals)), _path(problem, node)])
     at_nodes = np.tile(one_node, len(indices.others))
     goal = _goal_values(problem.goal, nlp.attitude, angles)
     least, most = nlp.direct.least.copy(), nlp.direct.most.copy()
@@ -86,13 +87,10 @@ def _constraint_bounds(nlp: Transcription, angles: np.ndarray) -> tuple[np.ndarr
     )
 
 
-def _path(problem: PlanningProblem, size: int) -> np.ndarray:
-    """Bounds (2, size) of path constraints, one pair for all entries of one function."""
-    if not problem.path:
-        return np.zeros((2, 0))
-    entries = size // len(problem.path)
-    least, most = zip(*((least, most) for _, least, most in problem.path), strict=True)
-    return np.repeat([least, most], entries, axis=1)
+def _path(problem: PlanningProblem, node: Node) -> np.ndarray:
+    """Bounds (2, path) of path constraints, one pair for all entries of one function."""
+    limits = np.array([row[1:] for row in problem.path]).reshape(-1, 2)
+    return node.each_path(limits.T)
 
 
 def _goal_values(goal: Goal, coordinates: Attitude, angles: np.ndarray) -> np.ndarray:

@@ -112,19 +112,28 @@ class Node:
     zeta: [duration, states, algebraic unknowns, torques] in units.  p: parameters, first the
     angular momentum about the COM (kg m^2/s, world), which the airborne formulation conserves.
     y: duration * rates of the states, algebraic residuals, path constraints, duration * objective,
-    all in units; rates, residuals and path are the numbers of them.
+    all in units; rates and residuals are the numbers of them, paths those of each constraint.
     """
 
     function: "ca.Function"
     calls: tuple[NodeCall, ...]
     rates: int
     residuals: int
-    path: int
+    paths: tuple[int, ...]
 
     @kept
     def derivatives(self) -> NodeDerivatives:
         """Exact derivatives, which programs on all meshes share."""
         return NodeDerivatives(self)
+
+    @property
+    def path(self) -> int:
+        """Entries of all path constraints."""
+        return sum(self.paths)
+
+    def each_path(self, numbers: Any) -> np.ndarray:
+        """Return one number of each path constraint (.., k) at all entries of it (.., path)."""
+        return np.repeat(np.asarray(numbers, float), self.paths, axis=-1)
 
     @property
     def size(self) -> int:
@@ -169,7 +178,8 @@ def node_function(
         duration * cost(problem, point, p[PARAMETERS - 1], variables.units["torque"]),
     )
     function = ca.Function("node", [zeta, p, *results], [y])
-    return Node(function, tuple(calls), states, residuals.size1(), path.size1())
+    paths = tuple(rows.size1() for rows in constraints)
+    return Node(function, tuple(calls), states, residuals.size1(), paths)
 
 
 def _calls(

@@ -23,7 +23,8 @@ class Point(SimpleNamespace):
 
     Made of them when first asked for, in world axes, m: center_of_mass (3,), position (3,) of B and
     its height, tail_points (K, 3) as the model has them, the last of them, tip (3,), and of models
-    with contacts contact_points (K, 3), for which those with feet need the plan's legs.
+    with contacts contact_points (K, 3), for which those with feet need the plan's legs, and
+    body_points (K, 3), those of tail and torso alone.
     """
 
     def __getattr__(self, name: str) -> Any:
@@ -82,6 +83,12 @@ def point_of(
         still = () if legs is None else (np.append(legs.curve.at(0.0)[0], np.zeros(4)),)
         return model.casadi.contact_points(q, np.zeros(model.nv), *still)[0]
 
+    def body_points(point: Point) -> "ca.SX":
+        unit = point.quaternion / ca.norm_2(point.quaternion)
+        q = ca.vertcat(point.position, unit, point.tail)
+        points = model.casadi.contact_points(q, np.zeros(model.nv), *any_legs(model))[0]
+        return points[model.contacts.get("feet", 0) :, :]
+
     makers = {
         "center_of_mass": center_of_mass,
         "position": position,
@@ -90,8 +97,18 @@ def point_of(
     if "tail_points" in model.generated:
         makers |= {"tail_points": tail_points, "tip": lambda point: point.tail_points[-1, :].T}
     if model.contacts:
-        makers["contact_points"] = contact_points
+        makers |= {"contact_points": contact_points, "body_points": body_points}
     return Point(makers=makers, parameters=dict(model.parameters), **blocks)
+
+
+def any_legs(model: Model) -> tuple[np.ndarray, ...]:
+    """Return angles and rates of the legs for calls whose feet do not matter."""
+    return (np.zeros(8),) if "feet" in model.contacts else ()
+
+
+def body_heights(point: Point) -> "ca.SX":
+    """Heights (K,) of the points of tail and torso that may touch the ground."""
+    return point.body_points[:, 2]
 
 
 def at_identity(point: Point) -> "ca.SX":

@@ -83,8 +83,7 @@ def _path(
     zeta = np.column_stack([np.full(count, duration), *parts])
     own = np.column_stack([np.tile(p, (count, 1)), times / duration])
     values = _path_values(node, zeta, own)
-    limits = np.array([row[1:] for row in nlp.problem.path])
-    least, most = np.repeat(limits, node.path // len(limits), axis=0).T
+    least, most = node.each_path(np.array([row[1:] for row in nlp.problem.path]).T)
     sizes = np.where(np.isfinite([least, most]), np.abs([least, most]), 0).max(axis=0)
     over = np.maximum(values - most, least - values) / np.where(sizes > 0, sizes, 1.0)
     return over.reshape(nlp.mesh.intervals, -1).max(axis=1)

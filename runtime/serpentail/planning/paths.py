@@ -1,0 +1,58 @@
+"""Path constraints of a plan: checked rows, and clearance of the ground."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ..checks import number, numbers_in, refusal, shown
+from ..errors import PlanningError
+from ..model.model import Model
+from .nlp.point import any_legs, body_heights
+
+PathConstraint = tuple[Callable[[Any], Any], float, float]  # function of a point, least, most
+
+
+def checked_path(path: Any) -> tuple[PathConstraint, ...]:
+    """Return checked rows of path constraints."""
+    if not isinstance(path, tuple | list):
+        needs = "rows (function of a point, least, most)"
+        raise refusal("path", path, needs, PlanningError)
+    constraints = []
+    for k, row in enumerate(path):
+        if not isinstance(row, tuple | list) or len(row) != 3 or not callable(row[0]):
+            raise PlanningError(
+                f"path[{k}]: value {shown(row)}: needs (function of a point, least, most)"
+            )
+        bounds = numbers_in(row[1:])
+        if bounds is None or bounds.shape != (2,):
+            raise PlanningError(f"path[{k}]: bounds {shown(row[1:])}: needs two numbers")
+        least, most = bounds.tolist()
+        if not least <= most:
+            raise PlanningError(f"path[{k}]: bounds ({least}, {most}): needs least <= most")
+        constraints.append((row[0], least, most))
+    return tuple(constraints)
+
+
+def checked_clearance(value: Any) -> float | None:
+    """Return a clearance (m), or None."""
+    return None if value is None else number("clearance", value, PlanningError, least=0)
+
+
+def clear_of_ground(model: Model, start: tuple[Any, Any], clearance: float) -> PathConstraint:
+    """Return the constraint that keeps tail and torso so high (m); PlanningError where they have no
+    points that touch, or are too low at the start.
+    """
+    if not set(model.contacts) - {"feet"}:
+        remedy = "add 'tail' or 'torso' to its scene's contacts, or leave it out"
+        raise PlanningError(
+            f"clearance: {model.name} has no points of tail or torso that touch: {remedy}"
+        )
+    points, _ = model.contact_points(*start, *any_legs(model))
+    lowest = points[model.contacts.get("feet", 0) :, 2].min()
+    if lowest < clearance:
+        raise PlanningError(
+            f"clearance: value {clearance:.6g}: at the start the lowest point of tail and torso is "
+            f"at {lowest:.3g} m: begin later, or give less"
+        )
+    return body_heights, clearance, np.inf
