@@ -5,6 +5,7 @@ import pytest
 
 import serpentail as st
 from serpentail.simulation import batched_runs, parallel_runs
+from serpentail.simulation.adaptive_runs import AdaptiveRuns
 from tests.references.metrics import block_error
 
 from ...support.models import model_folder
@@ -131,6 +132,34 @@ def test_a_run_that_fails_loses_no_other(threads):
             assert np.isfinite(found.q[k]).all() and np.isfinite(found.v[k]).all()
     failed = {k for k in range(20) if found.errors[k]}
     assert failed >= {2, 5, 11} and len(failed) < 10
+
+
+@pytest.mark.usefixtures("any_number_is_many")
+def test_runs_that_go_well_are_not_made_again_alone(monkeypatch):
+    go, again = AdaptiveRuns.go, []
+
+    def told(self, runs, ended):
+        for numbers, outcome in go(self, runs, ended):
+            again.extend([] if outcome else numbers)
+            yield numbers, outcome
+
+    monkeypatch.setattr(AdaptiveRuns, "go", told)
+    found = st.simulate(tail(), *unlike(21), **FLIGHT)
+    assert again == [] and found.errors == [None] * 21
+
+
+@pytest.mark.usefixtures("any_number_is_many")
+def test_a_quaternion_that_overflows_ends_the_run_in_a_lane_as_alone():
+    """A roll so fast that its step is finite, but the square of its quaternion is not."""
+    model = tail().with_parameters(gravity=0)
+    q, v = np.zeros((3, model.nq)), np.zeros((3, model.nv))
+    q[:, 3], v[1, 4] = 1, 1e20
+    times = {"t_span": 1e12, "first_step": 1e12, "output_step": 1e12}
+    settings = times | {"method": "tsit5", "rtol": 1e6, "most_steps": 20}
+    found = st.simulate(model, q, v, **settings)
+    with pytest.raises(st.SimulationError) as alone:
+        st.simulate(model, q[1], v[1], **settings)
+    assert [error and str(error) for error in found.errors] == [None, str(alone.value), None]
 
 
 @pytest.mark.usefixtures("any_number_is_many")
