@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import serpentail as st
 from embedded import misra
 from tests.c.target.emitted import C99, Library, Model, bits, needs, run, states_of
 from tests.support.models import model_folder
@@ -59,6 +60,21 @@ def test_makefile_builds_library_and_example(package, name):
     )
     run("make", "-s", "clean", cwd=folder, env=BARE)
     assert not (folder / "build").exists()
+
+
+def test_the_control_loop_brings_the_tail_straight(package):
+    """Its torques are those of the accelerations that its stiffness and damping ask for."""
+    folder = package("contact")
+    run("make", "-s", "example", cwd=folder, env=BARE)
+    lines = run(folder / "build" / "example").splitlines()
+    model = st.load(folder)
+    for tick, line in enumerate(lines):
+        q, v = np.zeros(model.nq), np.zeros(model.nv)
+        q[3], q[7:] = 1, 0.5 / (1 + tick)
+        expected = model.pfl(q, v, -400 * q[7:] - 40 * v[6:])
+        found = [float(number) for number in line.partition("tau = ")[2].split()]
+        np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-12)
+    assert len(lines) == 5
 
 
 @pytest.mark.parametrize("name", ["m4", "m7"])

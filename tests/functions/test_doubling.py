@@ -13,7 +13,7 @@ from serpentail_codegen.functions.plain import FUNCTIONS
 from serpentail_codegen.functions.sweeps.doubling import is_doubled
 from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.ir.interpret import Numbers, Run
-from serpentail_codegen.targets.c.form import fastest
+from serpentail_codegen.targets.c.form import RULE, fastest
 from tests.functions.test_columns import arguments
 from tests.references.exact_chain import ExactChain
 from tests.references.metrics import block_error, equilibrated_condition
@@ -91,6 +91,14 @@ def test_doubling_is_chosen_where_it_is_faster(size, doubled):
 
 def test_one_long_segment_goes_by_doubling():
     assert fastest(FUNCTIONS[FUNCTION], Tail(1, 96))[0] == "segments"
+
+
+@pytest.mark.parametrize("size", [(2, 15), (2, 16), (4, 3), (4, 4), (7, 1), (8, 1)])
+def test_several_segments_are_swept_one_by_one_from_the_work_that_the_rule_names(size):
+    """Columns of the tail in H, times links: 128 in three of these sizes."""
+    columns, links = 2 * size[0], size[0] * size[1]
+    long = columns * links >= RULE["segments_from"]
+    assert fastest(FUNCTIONS[FUNCTION], Tail(*size))[0] == ("segments" if long else "lanes")
     assert fastest(FUNCTIONS["mass_matrix"], Tail(1, 96))[0] == "loops"
 
 

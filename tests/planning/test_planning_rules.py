@@ -143,3 +143,10 @@ def test_refinement_splits_where_errors_are_and_obeys_the_most():
     mesh = refined(uniform(4), errors, 0.1, 5, 100)
     assert mesh.intervals > 4 and np.count_nonzero(mesh.widths < 0.25) == mesh.intervals - 3
     assert refined(uniform(4), errors, 1e-9, 5, 6).intervals <= 6
+
+
+def test_guards_are_for_the_intervals_beside_too_and_stay():
+    third, last = (np.arange(8) == k for k in (2, 7))
+    mesh = uniform(8).with_guards(third)
+    assert np.flatnonzero(mesh.guarded).tolist() == [1, 2, 3]
+    assert np.flatnonzero(mesh.with_guards(last).guarded).tolist() == [1, 2, 3, 6, 7]

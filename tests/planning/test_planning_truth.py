@@ -117,3 +117,16 @@ def test_success_asks_for_tail_and_rates_too(name):
 
 def _first_rate(point):
     return point.tail_rate[0]
+
+
+def test_errors_of_tracking_are_those_of_a_simulation_that_tracks():
+    """From the first sample to the last, by Tsit5 where the report has SciPy's DOP853."""
+    model, bounds = rat(), st.Bounds(angle=np.pi / 3)
+    begin = {"start": start(model), "duration": DURATION}
+    plan = st.plan(model, **begin, bounds=bounds, intervals=8, tolerance=None)
+    law = st.Pfl(model, plan, torque=plan.problem.bounds.torque)
+    how = {"t_span": DURATION, "method": "tsit5", "rtol": 1e-9, "output_step": 1e-4}
+    run = st.simulate(model, *start(model), controller=law, **how)
+    tail = np.column_stack([np.interp(plan.trajectory.t, run.t, angle) for angle in run.tail.T])
+    error = np.abs(tail - plan.trajectory.tail).max()
+    assert plan.report["tracked_tail_error_rad"] == pytest.approx(error, rel=0.01)

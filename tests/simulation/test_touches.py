@@ -9,6 +9,7 @@ import pytest
 
 import serpentail as st
 from serpentail.motion.summary import summary
+from serpentail.simulation.piecewise import Piecewise
 from tests.support.models import model_folder
 
 FUNCTIONS = ["energy", "momentum", "rollout", "implicit"]
@@ -165,3 +166,42 @@ def test_a_step_that_fails_on_a_touch_ends_there(method, rtol, most):
     how = {"t_span": 0.2, "controller": PASSIVE, "legs": LEGS, "method": method, "rtol": rtol}
     infos = [st.simulate(animal(), *dropped(k), **how).info for k in range(5)]
     assert sum(info["rejected"] for info in infos) < most * sum(info["steps"] for info in infos)
+
+
+@pytest.mark.parametrize("height", [0.05, 0.07, 0.11])
+def test_a_touch_in_a_long_step_is_told_to_rounding(height):
+    """A slow fall for 8 s, late on the clock, in one step, on ground that does not press."""
+    model = animal().with_parameters(gravity=5e-3, K_n=1e-18)
+    q, v = np.zeros(model.nq), np.zeros(model.nv)
+    q[2:4] = 1, 1
+    begin = st.simulate(model, q, v, legs=LEGS, t_span=1e-3).contact.points[0, :, 2].min()
+    q[2] -= begin - height
+    late = {"t_span": (1e4, 1e4 + 8), "output_step": 8}
+    run = st.simulate(model, q, v, legs=LEGS, method="rk4", step=8, **late)
+    assert run.info["steps"] == 1
+    after = run.events[0]["time"] - 1e4
+    assert after == pytest.approx(np.sqrt(2 * height / 5e-3), rel=0, abs=1e-11)
+
+
+def test_a_foot_that_dips_within_a_step_is_seen():
+    """Shanks swing by 0.01 rad there and back, on a parabola, in one step of a body at rest."""
+    model, T = animal().with_parameters(gravity=0), 0.05
+    swing = np.zeros((1, 4, 3))
+    swing[0, :, 0] = np.radians([210, -50, 210, -50])
+    swing[0, 1::2, 1:] = -0.04 / T, 0.04 / T**2
+    legs = st.Legs.fixed(0, 0)
+    object.__setattr__(legs, "curve", Piecewise(np.array([0, T]), swing))  # C takes any degree
+    q, v, times = np.zeros(model.nq), np.zeros(model.nv), np.linspace(0, T, 2001)
+    q[2:4] = 1, 1
+    angles = [np.append(legs.curve.at(t)[0], np.zeros(4)) for t in times]
+    feet = np.min([model.contact_points(q, v, each)[0][:6, 2] for each in angles], axis=1)
+    dip = feet[0] - feet.min()
+    assert dip > 1e-4 and feet[-1] == pytest.approx(feet[0], abs=1e-12)
+    q[2] -= feet[0] - dip / 2
+    once = {"step": T, "t_span": T, "output_step": T}
+    run = st.simulate(model, q, v, legs=legs, method="implicit_euler", **once)
+    assert run.info["steps"] == 1
+    under, (down, off) = times[feet < feet[0] - dip / 2], run.events
+    assert (down["kind"], off["kind"]) == ("touch_down", "take_off")
+    assert down["time"] == pytest.approx(under[0], abs=1e-4)
+    assert down["time"] < off["time"] < under[-1]  # a point that rises ceases to press before

@@ -98,6 +98,9 @@ def test_the_kick_s_numbers_and_events(tmp_path, kick, kick_scene):
         "force of the ground",
         "energy",
     ]
+    scales = {name: plot["compressed"] for name, plot in zip(titles, data["plots"], strict=True)}
+    assert scales.pop("force of the ground") == pytest.approx(weight)
+    assert set(scales.values()) == {0}  # all others are linear
 
 
 def test_a_flight_has_no_ground_and_no_legs(tmp_path, flight):

@@ -5,6 +5,7 @@ import pytest
 
 import serpentail as st
 from serpentail.simulation import batched_runs, parallel_runs
+from serpentail.simulation.adaptive_runs import AdaptiveRuns
 from tests.references.metrics import block_error
 
 from ...support.models import model_folder
@@ -131,6 +132,20 @@ def test_a_run_that_fails_loses_no_other(threads):
             assert np.isfinite(found.q[k]).all() and np.isfinite(found.v[k]).all()
     failed = {k for k in range(20) if found.errors[k]}
     assert failed >= {2, 5, 11} and len(failed) < 10
+
+
+@pytest.mark.usefixtures("any_number_is_many")
+def test_runs_that_go_well_are_not_made_again_alone(monkeypatch):
+    go, again = AdaptiveRuns.go, []
+
+    def told(self, runs, ended):
+        for numbers, outcome in go(self, runs, ended):
+            again.extend([] if outcome else numbers)
+            yield numbers, outcome
+
+    monkeypatch.setattr(AdaptiveRuns, "go", told)
+    found = st.simulate(tail(), *unlike(21), **FLIGHT)
+    assert again == [] and found.errors == [None] * 21
 
 
 @pytest.mark.usefixtures("any_number_is_many")
