@@ -34,7 +34,9 @@ def airborne(model: st.Model):
     turn = ca.solve(own, left)
     v_dot = model.casadi.forward_dynamics(q, ca.vertcat(np.zeros(3), turn, rate), tau)
     w, a, b, d = ca.vertsplit(c)
-    E = ca.vertcat(*(ca.horzcat(*row) for row in ((-a, -b, -d), (w, -d, b), (d, w, -a), (-b, a, w))))
+    E = ca.vertcat(
+        *(ca.horzcat(*row) for row in ((-a, -b, -d), (w, -d, b), (d, w, -a), (-b, a, w)))
+    )
     x_dot = ca.vertcat(E @ turn / 2, rate, v_dot[6:])
     return ca.Function("airborne", [x, tau, h], [x_dot, turn])
 
@@ -108,7 +110,9 @@ class Reference:
         """Of the correction: torques keep theirs at all ends of steps."""
         parts = np.arange(self.steps + 1) / self.steps
         rows = [
-            np.concatenate([self._planned(self.begin + (j + s) * self.width)["torque"] for s in parts])
+            np.concatenate(
+                [self._planned(self.begin + (j + s) * self.width)["torque"] for s in parts]
+            )
             for j in range(self.N)
         ]
         rows = np.stack(rows)
@@ -122,8 +126,8 @@ class Reference:
         return d + found.x
 
 
-def correction_of(mpc: st.Mpc, begin: float, width: float) -> np.ndarray:
-    """Return the correction (N, 2m) that a controller has."""
-    middles = begin + (np.arange(mpc.settings.intervals) + 0.5) * width
-    planned = mpc.plan.torque(middles)
-    return np.array([mpc.torque(t) for t in middles]) - planned
+def correction_of(mpc: st.Mpc) -> np.ndarray:
+    """Return the correction (N 2m,) of the last tick that did not fail."""
+    size = mpc.settings.intervals * mpc.model.layout.nt
+    first = size * mpc._own.run.state.newest
+    return mpc._own.memory[first : first + size].copy()

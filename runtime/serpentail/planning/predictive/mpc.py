@@ -1,13 +1,12 @@
 """``Mpc``: a controller that plans the rest of a flight anew at each tick."""
 
 import ctypes
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from ...brief import brief
-from ...checks import finite_array, refusal
+from ...checks import refusal
 from ...errors import SimulationError
 from ...model.kernel import aligned
 from ...model.layout import TAIL_V
@@ -19,8 +18,6 @@ from .settings import checked_settings, refuse_unable
 from .task import MpcTask, task_of
 
 RATE = 100.0  # Hz
-INTERVALS = 6
-STEP = 5e-3  # s
 COUNTS = ("ticks", "failed", "set_changes")
 
 
@@ -37,9 +34,10 @@ class Mpc:
     plan: of ``st.plan``, its attitude a quaternion.
     rate: Hz, of the ticks.  horizon: s, so far each tick looks ahead; by default to the plan's end,
     and never beyond it.  A shorter one ends at the plan's state of that time.
-    intervals: of the correction.  delay: s, from a tick until its torques act: what computing takes.
-    iterations: Gauss-Newton steps a tick.  step: s, the longest of Runge-Kutta's steps.
-    rest: s before the plan's end within which there are no ticks; by default the time between two.
+    settings: intervals of the correction (6); delay (0 s), from a tick until its torques act: what
+    computing takes; iterations (1), Gauss-Newton steps a tick; step (0.005 s), the longest of
+    Runge-Kutta's steps; rest (s), the time before the plan's end within which there are no ticks,
+    by default that between two.
 
     Called with (t, q, v), t in s from the plan's begin, it returns tau (2m,) in N m, and takes q
     and v as measured where a tick is due; in simulations each run has a memory of its own.  After
@@ -54,15 +52,10 @@ class Mpc:
         *,
         rate: float = RATE,
         horizon: float | None = None,
-        intervals: int = INTERVALS,
-        delay: float = 0.0,
-        iterations: int = 1,
-        step: float = STEP,
-        rest: float | None = None,
+        **settings: Any,
     ):
         refuse_unable(model, plan)
-        given = {"rate": rate, "horizon": horizon, "intervals": intervals, "delay": delay}
-        given |= {"iterations": iterations, "step": step, "rest": rest}
+        given = {"rate": rate, "horizon": horizon} | settings
         self.model, self.plan = model, plan
         self.settings = checked_settings(plan, given)
         self.task = task_of(model, plan, self.settings)

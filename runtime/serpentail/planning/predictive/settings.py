@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from ...checks import number, refusal, shown
+from ...checks import none_of, number, refusal, shown
 from ...errors import PlanningError
 from ...model.model import Model
 from ..result.plan import Plan
@@ -14,6 +14,8 @@ from .kernel import FUNCTIONS
 NEEDED = dict(
     zip(FUNCTIONS, ("airborne_rates", "airborne_rates_derivatives", "momentum"), strict=True)
 )
+DEFAULTS = {"intervals": 6, "delay": 0.0, "iterations": 1, "step": 5e-3, "rest": None}
+NAMES = ("rate", "horizon", *DEFAULTS)
 MOST = 1000  # intervals, Gauss-Newton steps, Runge-Kutta steps of an interval
 
 
@@ -31,7 +33,12 @@ class Settings:
 
 
 def checked_settings(plan: Plan, given: dict[str, Any]) -> Settings:
-    """Return the settings; PlanningError where one is wrong."""
+    """Return the settings, those that are not given by default; PlanningError where one is wrong."""
+    for name in given:
+        unknown = none_of("Mpc: setting", name, NAMES)
+        if unknown:
+            raise PlanningError(unknown)
+    given = DEFAULTS | given
     rate = _number("rate", given["rate"], above=0)
     delay = _number("delay", given["delay"], least=0)
     if delay > 1 / rate:

@@ -1,4 +1,4 @@
-"""A plan, its goal and its bounds as the controller's C takes them: ``mpc_task`` of native/mpc.h."""
+"""A plan, its goal and its bounds as the controller's C takes them (native/mpc.h)."""
 
 import ctypes
 from dataclasses import dataclass
@@ -112,7 +112,11 @@ def _most_angle(problem: PlanningProblem, size: int) -> np.ndarray:
 def _goal(problem: PlanningProblem, size: int) -> dict[str, np.ndarray]:
     """Return the goal's numbers, 0 with a weight of 0 where it is free."""
     goal = problem.goal
-    parts = ((goal.tail, size, ANGLE), (goal.tail_rate, size, RATE), (goal.torso_rate, 3, TURN_RATE))
+    parts = (
+        (goal.tail, size, ANGLE),
+        (goal.tail_rate, size, RATE),
+        (goal.torso_rate, 3, TURN_RATE),
+    )
     values = np.concatenate(
         [np.full(count, np.nan) if part is None else part for part, count, _ in parts]
     )
