@@ -1,11 +1,12 @@
 """``Mpc``: a controller that plans the rest of a flight anew at each tick."""
 
 import ctypes
+from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ...brief import brief
 from ...checks import refusal
 from ...errors import SimulationError
 from ...model.kernel import aligned
@@ -13,6 +14,7 @@ from ...model.layout import TAIL_V
 from ...model.model import Model
 from ...simulation.controllers import NativeTorque, OwnState, Parts
 from ..result.plan import Plan
+from .emission import write_c
 from .kernel import Simulation, kernel
 from .settings import checked_settings, refuse_unable
 from .task import MpcTask, task_of
@@ -61,7 +63,10 @@ class Mpc:
         self.task = task_of(model, plan, self.settings)
         self._own = Memory(self.task)
 
-    __repr__ = brief
+    def __repr__(self) -> str:
+        """Of what, how often, how far ahead."""
+        rate, ahead = self.settings.rate, self.task.numbers["horizon"]
+        return f"Mpc({self.model.name}, {rate:g} Hz, {ahead:.4g} s in {self.settings.intervals})"
 
     @property
     def info(self) -> dict[str, int]:
@@ -69,6 +74,11 @@ class Mpc:
         active set in one.  Of calls alone: those of a simulation are in its ``info["mpc"]``.
         """
         return self._own.info()
+
+    @property
+    def memory_size(self) -> int:
+        """Doubles that the controller works on."""
+        return len(self._own.memory)
 
     def begin(self) -> None:
         """Forget all ticks."""
@@ -98,6 +108,14 @@ class Mpc:
         native = NativeTorque(kernel().mpc_simulated, ctypes.addressof(memory.run))
         own = OwnState(memory.begin_run, lambda: {"mpc": memory.info()}, self.stops())
         return Parts(np.full(nt, self.plan.problem.damping), native=native, own=own)
+
+    def write_c(self, folder: str | PathLike[str] = ".") -> list[Path]:
+        """Write the controller and its plan as C99, <model>_mpc.h and .c; return their paths.
+
+        They need the model's generated C, allocate nothing, and compute what this one does; the
+        header tells how they are called.  Raises PlanningError where there is no such folder.
+        """
+        return write_c(self.model, self.task, self.memory_size, folder)
 
     def stops(self) -> list[float]:
         """Return the times (s) at which the torques jump, or are computed."""

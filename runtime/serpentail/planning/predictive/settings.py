@@ -33,7 +33,7 @@ class Settings:
 
 
 def checked_settings(plan: Plan, given: dict[str, Any]) -> Settings:
-    """Return the settings, those that are not given by default; PlanningError where one is wrong."""
+    """Return the settings, of which some may be left out; PlanningError where one is wrong."""
     for name in given:
         unknown = none_of("Mpc: setting", name, NAMES)
         if unknown:
