@@ -48,7 +48,8 @@ static int call_slopes(const void *parameters, const double *x, const double *ta
 static int call_momentum(const void *parameters, const double *q, const double *v, double *linear,
                          double *angular, double *work)
 {{
-    return {prefix}_{momentum}((const {prefix}_parameters *)parameters, q, v, linear, angular, work);
+    return {prefix}_{momentum}((const {prefix}_parameters *)parameters, q, v, linear, angular,
+                               work);
 }}
 """
 
