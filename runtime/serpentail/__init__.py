@@ -27,6 +27,7 @@ _HOME = {
     "plan": "planning.planner",
     **dict.fromkeys(["Goal", "Bounds"], "planning.problem"),
     "Plan": "planning.result.plan",
+    "Mpc": "planning.predictive.mpc",
     "Pfl": "simulation.pfl",
     **dict.fromkeys(["Sequence", "SequenceRun"], "sequence.sequence"),
     **dict.fromkeys(["Phase", "Tracking"], "sequence.phase"),

@@ -24,14 +24,17 @@ class Acting:
     ):
         self.records = records
         given = controllers_of(controller, start.runs if start.many else None)
-        # of one object that acts in several runs there is one record
+        if len(given) == 1 and start.runs > 1 and self._of(given[0], legs, None).keeps:
+            given = given * start.runs
+        # of one object that acts in several runs there is one record, unless it keeps something
         made: dict[int, Actuation] = {}
+        self._each = []
         for k, each in enumerate(given):
-            if id(each) not in made:
+            if id(each) not in made or made[id(each)].keeps:
                 made[id(each)] = self._of(each, legs, k if len(given) > 1 else None)
-        self.distinct = [*made.values()]
+            self._each.append(made[id(each)])
+        self.distinct = [*dict.fromkeys(self._each)]
         self.alike = len(self.distinct) == 1
-        self._each = self.distinct if self.alike else [made[id(each)] for each in given]
         drives = [ctypes.addressof(each.record) for each in self._each]
         self.drives = np.broadcast_to(np.array(drives, np.uintp), start.runs)
 
@@ -52,6 +55,11 @@ class Acting:
     def of(self, k: int) -> Actuation:
         """Return what acts in run k."""
         return self.distinct[0] if self.alike else self._each[k]
+
+    @property
+    def keeps(self) -> bool:
+        """Whether one of them keeps something of a run."""
+        return any(each.keeps for each in self.distinct)
 
     @property
     def of_python(self) -> bool:

@@ -57,6 +57,25 @@ class Actuation:
         """Whether a function of Python acts."""
         return any(parts.user is not None for parts in self.parts)
 
+    @property
+    def keeps(self) -> bool:
+        """Whether one of them keeps something of a run, so that no two share it."""
+        return any(parts.own is not None for parts in self.parts)
+
+    def begin(self, run: ctypes.Structure) -> None:
+        """Let what keeps something of a run begin with another, by its record."""
+        for parts in self.parts:
+            if parts.own is not None:
+                parts.own.begin(run, parts.clock)
+
+    def told(self) -> dict[str, Any]:
+        """Return what they have to tell of a run."""
+        told: dict[str, Any] = {}
+        for parts in self.parts:
+            if parts.own is not None:
+                told |= parts.own.told()
+        return told
+
     def _available(self, parts: Parts) -> Parts:
         """Return the parts as this model has them: PFL in Python where its C is missing."""
         if parts.pfl is None or self.records.has("controller", "reference"):

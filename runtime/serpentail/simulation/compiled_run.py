@@ -208,6 +208,7 @@ class CompiledRun:
         look: called at each pause.
         """
         status = PAUSED
+        self.actuation.begin(self.record)
         try:
             with self.actuation.ctrl_c.waits(self.actuation.of_python):
                 while status == PAUSED and not (ended and ended.is_set()):
@@ -221,7 +222,7 @@ class CompiledRun:
     def outcome(self, status: int) -> Outcome:
         """Return what the run came to, and what a status means."""
         record = self.record
-        info = {name: getattr(record, name) for name in COUNTS}
+        info = {name: getattr(record, name) for name in COUNTS} | self.actuation.told()
         if self.ground.points:
             count = min(record.events, MOST_EVENTS)
             times, kinds = self.event_times[:count].tolist(), self.event_kinds[:count].tolist()

@@ -21,10 +21,23 @@ CHOICES = (
 
 
 @dataclass(frozen=True, eq=False)
+class OwnState:
+    """What a function of C keeps of a run.
+
+    begin: called with the record of a run that begins, and the controller's clock (s).  told: what
+    the run's info has of it.  stops: times (s) at which steps must end.
+    """
+
+    begin: Callable[[Any, float], None]
+    told: Callable[[], dict[str, Any]]
+    stops: list[float]
+
+
+@dataclass(frozen=True, eq=False)
 class Parts:
     """What one controller adds up; damping (2m,) in N m s, functions of C and of Python.
 
-    clock: s, the run's time at which that of the function of C is 0.
+    clock: s, the run's time at which that of the function of C is 0; own: what that keeps.
     """
 
     damping: np.ndarray | None = None
@@ -33,6 +46,7 @@ class Parts:
     native: "NativeTorque | None" = None
     user: TorqueFunction | None = None
     clock: float = 0.0
+    own: OwnState | None = None
 
     def since(self, begin: float) -> "Parts":
         """Return the parts with a clock that is at 0 at the time ``begin`` (s) of the run."""
@@ -54,6 +68,8 @@ class Parts:
             times += self.torques.kinks(2).tolist()
         if self.pfl is not None:
             times += self.pfl.curve.kinks(3).tolist()
+        if self.own is not None:
+            times += [self.clock + stop for stop in self.own.stops]
         return times
 
 
@@ -202,8 +218,9 @@ def parts_of(controller: Controller, nt: int) -> Parts:
         return Parts()
     if isinstance(controller, Pfl):
         return Parts(pfl=controller)
-    if isinstance(controller, Damping | TorqueTable | TorqueCurve | NativeTorque):
-        return controller.parts(nt)
+    if hasattr(controller, "parts"):
+        parts: Parts = controller.parts(nt)
+        return parts
     if callable(controller):
         return Parts(user=controller)
     raise refusal("controller", controller, CHOICES, SimulationError)

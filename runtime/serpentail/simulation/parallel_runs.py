@@ -65,11 +65,16 @@ class ParallelRuns:
         if self.batched is not None:
             self.parts = self.batched.parts(range(first, runs), self.threads)
             self._share(len(self.parts), self._run_batches, stage)
-        elif self.method.name in SCIPY or self.acting.of_python or self.memory.ground.points:
+        elif self._looked_after():
             self._share(runs, self._run_singly, stage)
         else:
             rest = partial(self._run_in_turn, first=first)
             self._share(runs - first, rest, stage)
+
+    def _looked_after(self) -> bool:
+        """Tell whether Python has something to do for each run."""
+        of_python = self.method.name in SCIPY or self.acting.of_python or self.acting.keeps
+        return of_python or bool(self.memory.ground.points)
 
     def _pays(self, runs: int, steps: int) -> bool:
         """Tell whether runs of about so many steps are to be made abreast."""

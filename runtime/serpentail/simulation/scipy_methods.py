@@ -91,6 +91,7 @@ def integrate_by_scipy(
     run: CompiledRun, method: IntegrationMethod, watched: Watched | None = None
 ) -> Samples:
     """Return the samples of a run, made from stop to stop, and what ended it before its end."""
+    run.actuation.begin(run.record)
     rate = StateRate(run, method.name == "dop853")  # which takes a step with NaN again, shorter
     samples, counts = SampleWriter(rate, run.start.times, watched), {"steps": 0, "evaluations": 0}
     ends = [*(t for t in run.actuation.stops if run.start.start < t < run.start.end), run.start.end]
@@ -107,7 +108,8 @@ def integrate_by_scipy(
         if not samples.states:
             raise
         failure = error
-    return replace(samples.part(0), info=counts, failure=failure)
+    info = counts | run.actuation.told()
+    return replace(samples.part(0), info=info, failure=failure)
 
 
 def _smooth_part(

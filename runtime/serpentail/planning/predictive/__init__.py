@@ -1,0 +1,1 @@
+"""Model-predictive control of planned flights, computed in C that also runs on microcontrollers."""

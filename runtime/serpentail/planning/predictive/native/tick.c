@@ -1,0 +1,319 @@
+/* Ticks: from a measured state to a correction of the plan's torques, and the torques in between. */
+
+#include <math.h>
+#include <string.h>
+
+#include "inside.h"
+
+static const double NEVER = 1e300, SAME = 1e-6; /* of a period: times that are one */
+static const double ROUNDING = 1e-9;            /* of a sum of squares */
+enum { HALVINGS = 4 };
+
+/* What a tick works on. */
+typedef struct {
+    mpc_motion motion;
+    mpc_program program;
+    double *x0, *fresh, *trial, *lower, *upper, *d, *factors;
+    int *set;
+} workspace;
+
+static double *next(double **memory, size_t count)
+{
+    double *own = *memory;
+    if (own != NULL) {
+        *memory += count;
+    }
+    return own;
+}
+
+/* Lay a tick's arrays out behind the two corrections (memory NULL: only count). */
+static size_t lay_out(const mpc_task *task, double *memory, workspace *w)
+{
+    const size_t m = (size_t)task->tail, n = m * (size_t)task->intervals;
+    const size_t x = (size_t)states_of(task), y = x + MPC_TURN, z = x + m;
+    const size_t counts[] = {2 * n, x, x * n, x, x * n, x, x * n, x * n, y, y * z, m, z, n,
+                             (size_t)task->work, n, n * n, x, n, n, n, n, n, n * (n + 3),
+                             (n * sizeof(int) + sizeof(double) - 1) / sizeof(double)};
+    mpc_motion *motion = &w->motion;
+    double *corrections, *set;
+    double **arrays[] = {&corrections, &motion->x, &motion->S, &motion->x_at, &motion->S_at,
+                         &motion->sum, &motion->S_sum, &motion->K, &motion->y, &motion->J,
+                         &motion->tau, &motion->table, &motion->row, &motion->work,
+                         &w->program.g, &w->program.H, &w->x0, &w->fresh, &w->trial, &w->lower, &w->upper,
+                         &w->d, &w->factors, &set};
+    size_t sum = 0;
+    for (size_t k = 0; k < sizeof counts / sizeof *counts; k++) {
+        *arrays[k] = next(&memory, counts[k]);
+        sum += counts[k];
+    }
+    w->set = (int *)(void *)set;
+    motion->task = task;
+    motion->variables = (int)n;
+    return sum;
+}
+
+size_t mpc_memory_size(const mpc_task *task)
+{
+    workspace w;
+    return lay_out(task, NULL, &w);
+}
+
+void mpc_begin(mpc_state *state, const mpc_task *task, double *memory)
+{
+    memset(memory, 0, mpc_memory_size(task) * sizeof *memory);
+    state->task = task;
+    state->memory = memory;
+    state->tick = -1;
+    state->ticks = state->failed = 0;
+    state->set_changes = state->newest = 0;
+    state->begin[0] = state->begin[1] = NEVER;
+    state->width[0] = state->width[1] = 1.0;
+    state->cost = 0.0;
+}
+
+static double *correction_of(const mpc_state *state, int which)
+{
+    const mpc_task *task = state->task;
+    return state->memory + (size_t)which * (size_t)(task->intervals * task->tail);
+}
+
+/* Which correction acts at a time, -1 for none yet. */
+static int acting(const mpc_state *state, double clock)
+{
+    const double late = clock + SAME * state->task->period;
+    if (state->begin[state->newest] <= late) {
+        return state->newest;
+    }
+    return state->begin[1 - state->newest] <= late ? 1 - state->newest : -1;
+}
+
+/* Add to tau the correction that acts at t, of those known at the clock. */
+static void add_correction(const mpc_state *state, double clock, double t, double *tau)
+{
+    const mpc_task *task = state->task;
+    const int which = acting(state, clock);
+    if (which < 0) {
+        return;
+    }
+    const double place = (t - state->begin[which]) / state->width[which];
+    if (place < task->intervals * (1 + SAME)) {
+        int k = place > 0.0 ? (int)place : 0;
+        k = k < task->intervals ? k : task->intervals - 1;
+        const double *row = correction_of(state, which) + k * task->tail;
+        for (int a = 0; a < task->tail; a++) {
+            tau[a] += row[a];
+        }
+    }
+}
+
+void mpc_torque(const mpc_state *state, double clock, double t, double *tau)
+{
+    const mpc_task *task = state->task;
+    const int over = t > task->end + SAME * task->period;
+    mpc_planned(task, clock + SAME * task->period, t, 0, task->tail, tau);
+    add_correction(state, clock, t, tau);
+    for (int a = 0; a < task->tail; a++) {
+        const double most = task->most_torque[a];
+        tau[a] = over ? 0.0 : tau[a] > most ? most : tau[a] < -most ? -most : tau[a];
+    }
+}
+
+/* x of q, v, its quaternion of norm 1, and the angular momentum; 0 where all is finite. */
+static int measured(workspace *w, const double *q, const double *v)
+{
+    const mpc_task *task = w->motion.task;
+    const int m = task->tail;
+    double linear[3], size = 0.0, sum = 0.0;
+    for (int i = 0; i < MPC_ATTITUDE; i++) {
+        size += q[3 + i] * q[3 + i];
+    }
+    if (!(size > 0.0)) {
+        return 1;
+    }
+    size = sqrt(size);
+    for (int i = 0; i < MPC_ATTITUDE; i++) {
+        w->x0[i] = q[3 + i] / size;
+    }
+    memcpy(w->x0 + MPC_ATTITUDE, q + 7, (size_t)m * sizeof *q);
+    memcpy(w->x0 + MPC_ATTITUDE + m, v + 6, (size_t)m * sizeof *v);
+    const int failed = task->momentum(task->parameters, q, v, linear, w->motion.h, w->motion.work);
+    for (int i = 0; i < states_of(task); i++) {
+        sum += fabs(w->x0[i]);
+    }
+    sum += fabs(w->motion.h[0]) + fabs(w->motion.h[1]) + fabs(w->motion.h[2]);
+    return failed || !isfinite(sum);
+}
+
+/* x0 where the motion is after the delay, under the torques that act meanwhile. */
+static int foretell(const mpc_state *state, workspace *w, double t)
+{
+    const mpc_task *task = state->task;
+    const size_t states = (size_t)states_of(task);
+    memcpy(w->motion.x, w->x0, states * sizeof(double));
+    for (int k = 0; k < task->late_steps; k++) {
+        const double h = task->delay / task->late_steps, at = t + k * h;
+        memset(w->trial, 0, (size_t)task->tail * sizeof(double));
+        add_correction(state, t, at, w->trial);
+        if (mpc_step(&w->motion, at, h, w->trial, 0, 0) != 0) {
+            return 1;
+        }
+    }
+    memcpy(w->x0, w->motion.x, states * sizeof(double));
+    return 0;
+}
+
+/* Bounds of each number of the correction: those of the torque less the plan's, at all ends of
+   Runge-Kutta's steps in its interval. */
+static void write_bounds(workspace *w)
+{
+    const mpc_motion *motion = &w->motion;
+    const mpc_task *task = motion->task;
+    const int m = task->tail;
+    for (int j = 0; j < task->intervals; j++) {
+        double *lower = w->lower + j * m, *upper = w->upper + j * m;
+        for (int a = 0; a < m; a++) {
+            lower[a] = -NEVER;
+            upper[a] = NEVER;
+        }
+        for (int i = 0; i <= task->steps; i++) {
+            const double part = (double)i / task->steps;
+            const double t = motion->begin + (j + part) * motion->width;
+            mpc_planned(task, t, t, 0, m, motion->table);
+            for (int a = 0; a < m; a++) {
+                const double down = -task->most_torque[a] - motion->table[a];
+                const double up = task->most_torque[a] - motion->table[a];
+                lower[a] = down > lower[a] ? down : lower[a];
+                upper[a] = up < upper[a] ? up : upper[a];
+            }
+        }
+        for (int a = 0; a < m; a++) { /* a plan that is beyond its bounds itself */
+            if (lower[a] > upper[a]) {
+                lower[a] = upper[a] = 0.5 * (lower[a] + upper[a]);
+            }
+        }
+    }
+}
+
+static double between(double value, double lower, double upper)
+{
+    return value < lower ? lower : value > upper ? upper : value;
+}
+
+/* The last correction where the new one's intervals are in the middle, within bounds. */
+static void write_guess(const mpc_state *state, workspace *w, double *correction)
+{
+    const mpc_task *task = state->task;
+    memset(correction, 0, (size_t)w->motion.variables * sizeof(double));
+    for (int j = 0; j < task->intervals; j++) {
+        const double middle = w->motion.begin + (j + 0.5) * w->motion.width;
+        add_correction(state, w->motion.begin, middle, correction + j * task->tail);
+    }
+    for (int i = 0; i < w->motion.variables; i++) {
+        correction[i] = between(correction[i], w->lower[i], w->upper[i]);
+    }
+}
+
+/* Lower the sum of squares by one Gauss-Newton step from the correction; 0: done. */
+static int improve(mpc_state *state, workspace *w, double *correction)
+{
+    const int n = w->motion.variables;
+    mpc_program trial = {0.0, NULL, NULL};
+    w->motion.correction = correction;
+    if (mpc_program_of(&w->motion, w->x0, &w->program) != 0) {
+        return 1;
+    }
+    for (int i = 0; i < n; i++) {
+        w->lower[i] -= correction[i];
+        w->upper[i] -= correction[i];
+    }
+    const int changes = mpc_quadratic(n, w->program.H, w->program.g, w->lower, w->upper, w->d,
+                                      w->set, w->factors);
+    for (int i = 0; i < n; i++) {
+        w->lower[i] += correction[i];
+        w->upper[i] += correction[i];
+    }
+    if (changes < 0) {
+        return 1;
+    }
+    state->set_changes = changes > state->set_changes ? changes : state->set_changes;
+    double part = 1.0;
+    w->motion.correction = w->trial;
+    for (int k = 0; k <= HALVINGS; k++, part /= 2) {
+        for (int i = 0; i < n; i++) {
+            w->trial[i] = between(correction[i] + part * w->d[i], w->lower[i], w->upper[i]);
+        }
+        if (mpc_program_of(&w->motion, w->x0, &trial) == 0
+            && trial.cost <= w->program.cost * (1 + ROUNDING)) {
+            memcpy(correction, w->trial, (size_t)n * sizeof *correction);
+            state->cost = trial.cost;
+            return 0;
+        }
+    }
+    return 1;
+}
+
+/* Compute the correction from q, v at t, to w->fresh; 0: done. */
+static int computed(mpc_state *state, workspace *w, double t, const double *q, const double *v)
+{
+    const mpc_task *task = state->task;
+    mpc_motion *motion = &w->motion;
+    if (measured(w, q, v) != 0 || foretell(state, w, t) != 0) {
+        return 1;
+    }
+    const double rest = task->end - (t + task->delay);
+    motion->begin = t + task->delay;
+    motion->width = (rest < task->horizon ? rest : task->horizon) / task->intervals;
+    if (!(motion->width > 0.0)) {
+        return 1;
+    }
+    write_bounds(w);
+    write_guess(state, w, w->fresh);
+    if (improve(state, w, w->fresh) != 0) {
+        return 1;
+    }
+    for (int k = 1; k < task->iterations; k++) { /* that cannot be improved: it is the best */
+        if (improve(state, w, w->fresh) != 0) {
+            break;
+        }
+    }
+    return 0;
+}
+
+int mpc_tick(mpc_state *state, double t, const double *q, const double *v)
+{
+    workspace w;
+    lay_out(state->task, state->memory, &w);
+    state->ticks++;
+    if (computed(state, &w, t, q, v) != 0) {
+        state->failed++;
+        return 1;
+    }
+    /* in place of the correction that does not act */
+    const int place = acting(state, t) == state->newest ? 1 - state->newest : state->newest;
+    memcpy(correction_of(state, place), w.fresh, (size_t)w.motion.variables * sizeof(double));
+    state->begin[place] = w.motion.begin;
+    state->width[place] = w.motion.width;
+    state->newest = place;
+    return 0;
+}
+
+void mpc_control(mpc_state *state, double clock, double t, const double *q, const double *v,
+                 double *tau)
+{
+    const mpc_task *task = state->task;
+    const double late = SAME * task->period;
+    const long tick = (long)((clock + late) / task->period);
+    if (tick > state->tick && clock <= task->last + late) {
+        state->tick = tick;
+        (void)mpc_tick(state, clock, q, v);
+    }
+    mpc_torque(state, clock, t, tau);
+}
+
+int mpc_simulated(void *context, double t, const double *q, const double *v, double *tau)
+{
+    mpc_simulation *run = context;
+    const double clock = run->step_begin == NULL ? t : *run->step_begin - run->clock;
+    mpc_control(&run->state, clock < t ? clock : t, t, q, v, tau);
+    return 0;
+}

@@ -1,0 +1,268 @@
+"""Predictive control: its program and its steps against CasADi and SciPy, its clock, its effect."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import lsq_linear
+
+import serpentail as st
+from serpentail.attitude import quaternion_rate, tilt_deg
+from serpentail.planning.predictive.kernel import kernel
+from serpentail.planning.result.truth import planned_torques
+from tests.support.predictive import TORQUE, Reference, correction_of, plan_of
+from tests.support.tumbling import DURATION, rat, start
+
+
+@pytest.fixture(scope="module")
+def plan():
+    return plan_of(1)
+
+
+def disturbed(size: float = 1.0, seed: int = 1):
+    """A start that turns and is bent otherwise than planned."""
+    q, v = start(rat(), seed)
+    q[7:] += 0.05 * size
+    v[3:6] += size * np.array([0.3, -0.2, 0.4])
+    v[6:] += 0.2 * size
+    return q, v
+
+
+def quadratic(H, g, lower, upper):
+    """The solution by the controller's C, and what it returned."""
+    n = len(g)
+    d, chosen, memory = np.zeros(n), np.zeros(n, np.intc), np.zeros(n * (n + 3))
+    arrays = [np.ascontiguousarray(a, float) for a in (H, g, lower, upper)]
+    places = [a.ctypes.data for a in (*arrays, d, chosen, memory)]
+    return d, kernel().mpc_quadratic(n, *places)
+
+
+@pytest.mark.parametrize("n", [1, 2, 12, 36])
+def test_quadratic_programs_are_solved_as_by_scipy(n):
+    random, active = np.random.default_rng(n), 0
+    for _ in range(30):
+        A, b = random.normal(size=(n + 3, n)), random.normal(size=n + 3)
+        size = random.uniform(0.01, 1)
+        lower, upper = -size * random.uniform(0, 1, n), size * random.uniform(0, 1, n)
+        lower[0] = 0.0
+        wanted = lsq_linear(A, b, (lower, upper + 1e-12), method="bvls", tol=1e-15).x
+        found, changes = quadratic(A.T @ A, -A.T @ b, lower, upper)
+        assert changes >= 0
+        np.testing.assert_allclose(found, wanted, atol=1e-8)
+        active += int(((found == lower) | (found == upper)).sum())
+    assert active > 10
+
+
+@pytest.mark.parametrize("H", [-np.eye(2), np.full((2, 2), np.nan), np.zeros((2, 2))])
+def test_quadratic_programs_without_a_minimum_are_refused(H):
+    assert quadratic(H, np.ones(2), -np.ones(2), np.ones(2))[1] == -1
+
+
+GOALS = {
+    "upright": {},
+    "at rest": {"goal": st.Goal()},
+    "tail, damped": {
+        "goal": st.Goal("upright", None, (0.1, None), (None, 0.0)),
+        "damping": 1e-4,
+    },
+}
+
+
+@pytest.mark.parametrize(
+    ("goal", "t", "size", "bound", "settings"),
+    [
+        ("upright", 0.003, 1.0, False, {}),
+        ("upright", 0.003, 8.0, True, {}),
+        ("at rest", 0.103, 0.1, False, {"intervals": 2}),
+        ("tail, damped", 0.311, 0.1, True, {"intervals": 4}),
+        ("upright", 0.053, 0.1, True, {"horizon": 0.15}),
+        ("upright", 0.307, 0.1, True, {"horizon": 0.15}),  # of which 0.1 s are left
+    ],
+)
+def test_a_tick_is_the_gauss_newton_step_of_casadi_and_scipy(goal, t, size, bound, settings):
+    plan = plan_of(0, **GOALS[goal])
+    mpc = st.Mpc(rat(), plan, **({"intervals": 3, "step": 0.021} | settings))
+    q, v = disturbed(size, 0)
+    end = min(t + settings.get("horizon", 1.0), DURATION)
+    reference = Reference(mpc, t, q, v, end)
+    wanted = reference.step(np.zeros(reference.N * 2))
+    assert mpc.tick(t, q, v)
+    found = correction_of(mpc)
+    assert bool(mpc.info["set_changes"]) == bound
+    # a step that does not lower the sum of squares is halved, at most four times
+    part = min(2.0 ** -np.arange(5), key=lambda part: np.abs(found - part * wanted).max())
+    assert part == 1 or bound
+    np.testing.assert_allclose(found, part * wanted, atol=1e-8 * TORQUE)
+
+
+def test_more_steps_end_where_none_lowers_the_sum_any_more():
+    mpc = st.Mpc(rat(), plan_of(0), intervals=3, step=0.021, iterations=60)
+    q, v = disturbed(1.0, 0)
+    reference = Reference(mpc, 0.003, q, v, DURATION)
+    assert mpc.tick(0.003, q, v)
+    found = correction_of(mpc)
+    np.testing.assert_allclose(reference.step(found), found, atol=1e-5 * TORQUE)
+
+
+WRONG = {
+    "tail heavier": {"tail_mass": 1.15},
+    "tail lighter": {"tail_mass": 0.85},
+    "torso slower": {"torso_inertia": 1.15},
+    "torso faster": {"torso_inertia": 0.85},
+}
+
+
+def other(changes) -> st.Model:
+    """A body unlike the controller's: parameters by factors."""
+    model = rat()
+    return model.with_parameters(
+        **{name: factor * np.array(model.parameters[name]) for name, factor in changes.items()}
+    )
+
+
+def tilt(motion) -> float:
+    return float(tilt_deg(motion.q[-1, 3:7]))
+
+
+@pytest.mark.parametrize("changes", WRONG.values(), ids=WRONG)
+def test_a_body_unlike_the_planned_one_ends_upright(plan, changes):
+    body, span = other(changes), {"t_span": DURATION}
+    law = st.TorqueCurve(planned_torques(plan.curve))
+    open_loop = st.simulate(body, *start(rat(), 1), controller=law, **span)
+    controlled = st.simulate(body, *start(rat(), 1), controller=st.Mpc(rat(), plan), **span)
+    assert tilt(open_loop) > 1.0 > 20 * tilt(controlled)
+    assert np.abs(controlled.tau).max() <= TORQUE
+    assert controlled.info["mpc"]["ticks"] == 40 and controlled.info["mpc"]["failed"] == 0
+
+
+def test_the_planned_body_flies_as_planned(plan):
+    motion = st.simulate(rat(), *start(rat(), 1), controller=st.Mpc(rat(), plan), t_span=DURATION)
+    np.testing.assert_allclose(motion.q[-1, 3:], plan.trajectory.q[-1, 3:], atol=5e-3)
+
+
+def flown(mpc: st.Mpc, body: st.Model, ticks: int, rate: float):
+    """q, v after some ticks, by SciPy, torques asked for one by one."""
+
+    def slope(t, y):
+        q, v = y[: body.nq], y[body.nq :]
+        tau = mpc.torque(t) - mpc.plan.problem.damping * v[6:]
+        q_dot = np.concatenate([v[:3], quaternion_rate(q[3:7], v[3:6]), v[6:]])
+        return np.concatenate([q_dot, body.forward_dynamics(q, v, tau)])
+
+    y, sizes = np.concatenate(start(rat(), 1)), [body.nq]
+    for k in range(ticks):
+        mpc.tick(k / rate, *np.split(y, sizes))
+        ends = (k / rate, np.nextafter((k + 1) / rate, 0))
+        y = solve_ivp(slope, ends, y, "DOP853", rtol=1e-10, atol=1e-12, max_step=2e-3).y[:, -1]
+    return np.split(y, sizes)
+
+
+@pytest.mark.parametrize("method", ["tsit5", "dop853", "rk4"])
+def test_ticks_measure_the_state_at_their_times(plan, method):
+    """Whatever a method tries in between: as one tick after another, by hand."""
+    body, mpc = other(WRONG["torso slower"]), st.Mpc(rat(), plan, rate=40)
+    q, v = flown(mpc, body, 6, 40)
+    for law in (mpc, st.Phases([(0.0, mpc)])):
+        settings = {"controller": law, "method": method, "t_span": 0.15}
+        motion = st.simulate(body, *start(rat(), 1), **settings)
+        np.testing.assert_allclose(motion.q[-1, 3:], q[3:], atol=2e-6)
+        np.testing.assert_allclose(motion.v[-1, 3:], v[3:], atol=2e-5)
+
+
+def test_a_phase_has_a_clock_of_its_own(plan):
+    body, mpc = other(WRONG["torso slower"]), st.Mpc(rat(), plan)
+    early = st.simulate(body, *start(rat(), 1), controller=mpc, t_span=0.2)
+    late = st.simulate(
+        body, *start(rat(), 1), controller=st.Phases([(0.1, mpc)]), t_span=(0.1, 0.3)
+    )
+    np.testing.assert_allclose(late.q[-1], early.q[-1], atol=1e-8)
+    assert late.info["mpc"] == early.info["mpc"]
+
+
+def test_torques_act_after_the_delay_on_what_is_foretold(plan):
+    """The correction is the one that a tick without delay computes where the body will be."""
+    late, prompt = st.Mpc(rat(), plan, delay=8e-3), st.Mpc(rat(), plan)
+    q, v = disturbed()
+    assert late.tick(0.1, q, v)
+    np.testing.assert_allclose(late.torque(0.1079), plan.torque(0.1079)[0], atol=1e-12)
+    law = st.TorqueCurve(planned_torques(plan.curve))
+    motion = st.simulate(rat(), q, v, controller=st.Phases([(0.0, law)]), t_span=(0.1, 0.108))
+    assert prompt.tick(0.108, motion.q[-1], motion.v[-1])
+    for t in (0.108001, 0.2, 0.39):
+        assert np.abs(prompt.torque(t) - plan.torque(t)).max() > 1e-5
+        np.testing.assert_allclose(late.torque(t), prompt.torque(t), atol=1e-9)
+
+
+def test_runs_that_share_a_controller_have_memories_of_their_own(plan):
+    q, v = start(rat(), 1)
+    turns = v + np.outer([0.0, 0.4, -0.8], np.eye(len(v))[3])
+    mpc = st.Mpc(rat(), plan)
+    settings = {"controller": mpc, "t_span": 0.2, "method": "tsit5"}
+    runs = st.simulate(rat(), q, turns, threads=2, **settings)
+    for k, own in enumerate(turns):
+        alone = st.simulate(rat(), q, own, **settings)
+        np.testing.assert_array_equal(runs.q[k], alone.q)
+        assert runs[k].info["mpc"]["ticks"] == 20
+    assert np.abs(runs.tau[0] - runs.tau[1]).max() > 1e-4 and mpc.info["ticks"] == 0
+
+
+@pytest.mark.parametrize("wrong", [np.nan, np.inf, 1e200])
+def test_a_tick_that_fails_is_counted_and_changes_nothing(plan, wrong):
+    mpc = st.Mpc(rat(), plan)
+    q, v = disturbed()
+    assert mpc.tick(0.0, q, v)
+    before = mpc.torque(0.2)
+    assert not mpc.tick(0.01, q, np.where(np.arange(len(v)) == 4, wrong, v))
+    assert not mpc.tick(0.01, np.where(np.arange(len(q)) == 3, wrong, q), v)
+    assert not mpc.tick(0.01, 0 * q, v)
+    np.testing.assert_array_equal(mpc.torque(0.2), before)
+    assert mpc.info["ticks"] == 4 and mpc.info["failed"] == 3
+    mpc.begin()
+    assert mpc.info["ticks"] == mpc.info["failed"] == 0
+    np.testing.assert_allclose(mpc.torque(0.2), plan.torque(0.2)[0], rtol=1e-12)
+
+
+def test_called_by_hand_it_ticks_by_its_clock(plan):
+    mpc = st.Mpc(rat(), plan, rate=50)
+    q, v = disturbed()
+    for t in (0.0, 0.001, 0.0199, 0.02, 0.021, 0.3795, 0.3801, 0.39, 0.45):
+        tau = mpc(t, q, v)
+    assert mpc.info["ticks"] == 3  # none in the last 20 ms
+    np.testing.assert_array_equal(tau, 0 * tau)
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"rate": 0}, "rate"),
+        ({"rate": np.nan}, "rate"),
+        ({"horizon": -1}, "horizon"),
+        ({"intervals": 0}, "intervals: value 0: needs a whole number from 1 to 1000"),
+        ({"intervals": 2.5}, "intervals"),
+        ({"iterations": True}, "iterations"),
+        ({"delay": 0.02}, "delay: value 0.02: needs at most the time between ticks, 0.01 s"),
+        ({"delay": -1e-3}, "delay"),
+        ({"rest": 0.4}, "rest"),
+        ({"step": 1e-9}, "step"),
+        ({"intervalls": 3}, "did you mean 'intervals'"),
+    ],
+)
+def test_wrong_settings_are_refused(plan, settings, words):
+    with pytest.raises(st.PlanningError, match=words):
+        st.Mpc(rat(), plan, **settings)
+
+
+def test_models_and_plans_that_do_not_fit_are_refused(plan):
+    with pytest.raises(st.PlanningError, match="lacks airborne_rates, airborne_rates_derivatives"):
+        st.Mpc(rat(exact=False), plan)
+    with pytest.raises(st.PlanningError, match="needs what"):
+        st.Mpc(rat(), plan.trajectory)
+    with pytest.raises(st.PlanningError, match="has 2 tail coordinates, the model 6"):
+        st.Mpc(rat(3, 2), plan)
+    with pytest.raises(st.PlanningError, match="attitude='quaternion'"):
+        st.Mpc(rat(), plan_of(attitude="euler"))
+    mpc = st.Mpc(rat(), plan)
+    with pytest.raises(st.SimulationError, match="q: value"):
+        mpc(0.0, np.zeros(3), np.zeros(8))
+    other = rat(3, 2)
+    with pytest.raises(st.SimulationError, match="tail coordinates"):
+        st.simulate(other, np.r_[np.zeros(3), 1, np.zeros(9)], np.zeros(12), controller=mpc)

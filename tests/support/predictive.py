@@ -1,0 +1,133 @@
+"""The program of a predictive controller's tick in CasADi, which shares the model's functions of
+CasADi with the controller, and nothing else.
+"""
+
+import casadi as ca
+import numpy as np
+from scipy.optimize import lsq_linear
+
+import serpentail as st
+from serpentail.planning.predictive import task as weights
+from tests.support.tumbling import DURATION, rat, start
+
+TORQUE = 0.02  # N m
+
+
+def plan_of(seed: int = 0, **settings) -> st.Plan:
+    """Return a plan on a coarse mesh."""
+    model = rat()
+    common = {"duration": DURATION, "intervals": 11, "tolerance": None, "track": False}
+    common |= {"goal": st.Goal(torso_rate=None), "bounds": st.Bounds(angle=np.pi / 3)}
+    return st.plan(model, start=start(model, seed), **(common | settings))
+
+
+def airborne(model: st.Model):
+    """(x, tau, h) -> (x_dot, omega): omega carries what the tail leaves of h."""
+    nt = model.layout.nt
+    x, tau, h = ca.SX.sym("x", 4 + 2 * nt), ca.SX.sym("tau", nt), ca.SX.sym("h", 3)
+    c, tail, rate = ca.vertsplit(x, [0, 4, 4 + nt, 4 + 2 * nt])
+    q = ca.vertcat(np.zeros(3), c / ca.norm_2(c), tail)
+    omega = ca.SX.sym("omega", 3)
+    angular = model.casadi.momentum(q, ca.vertcat(np.zeros(3), omega, rate))[1]
+    own = ca.jacobian(angular, omega)
+    left = ca.substitute(h - angular, omega, np.zeros(3))
+    turn = ca.solve(own, left)
+    v_dot = model.casadi.forward_dynamics(q, ca.vertcat(np.zeros(3), turn, rate), tau)
+    w, a, b, d = ca.vertsplit(c)
+    E = ca.vertcat(
+        *(ca.horzcat(*row) for row in ((-a, -b, -d), (w, -d, b), (d, w, -a), (-b, a, w)))
+    )
+    x_dot = ca.vertcat(E @ turn / 2, rate, v_dot[6:])
+    return ca.Function("airborne", [x, tau, h], [x_dot, turn])
+
+
+class Reference:
+    """Residuals of a tick at t from q, v by the correction (N m), their slopes, and its bounds."""
+
+    def __init__(self, mpc: st.Mpc, t: float, q, v, end: float):
+        model, plan, settings = mpc.model, mpc.plan, mpc.settings
+        self.plan, self.nt, self.N = plan, model.layout.nt, settings.intervals
+        self.rates, self.h = airborne(model), model.momentum(q, v)[1]
+        self.begin, self.width = t, (end - t) / self.N
+        horizon = min(settings.horizon, plan.duration)
+        self.steps = int(np.ceil(horizon / self.N / settings.step - 1e-9))
+        d = ca.SX.sym("d", self.N * self.nt)
+        r = self._residuals(np.concatenate([q[3:7], q[7:], v[6:]]), d, end)
+        self.of = ca.Function("residuals", [d], [r, ca.jacobian(r, d)])
+
+    def _planned(self, t):
+        return self.plan.curve.at(np.array([t]))
+
+    def _residuals(self, x, d, end):
+        plan, nt, h = self.plan, self.nt, self.width / self.steps
+        smoothing, duration = plan.problem.smoothing, plan.duration
+        rows = [np.sqrt(self.width / duration) / TORQUE * d]
+        for j in range(self.N):
+            own = d[j * nt : (j + 1) * nt]
+            for i in range(self.steps):
+                t = self.begin + j * self.width + i * h
+                x = self._step(x, own, t, h)
+                off = x[4 + nt :] - self._planned(t + h)["tail_rate"][0]
+                rows.append(np.sqrt(h / duration) * smoothing / TORQUE * off)
+            over = ca.fmax(ca.fabs(x[4 : 4 + nt]) - np.pi / 3, 0)
+            rows.append(over / weights.BEYOND)
+        rows.append(self._end(x, d[(self.N - 1) * nt :], end))
+        return ca.vertcat(*rows)
+
+    def _step(self, x, own, t, h):
+        def rate(t, x):
+            tau = self._planned(t)["torque"][0] + own - self.plan.problem.damping * x[-self.nt :]
+            return self.rates(x, tau, self.h)[0]
+
+        # the controller's own times at ends of pieces, where torques jump
+        k1 = rate(t, x)
+        k2 = rate(t + h / 2, x + h / 2 * k1)
+        k3 = rate(t + h / 2, x + h / 2 * k2)
+        k4 = rate(t + h, x + h * k3)
+        return x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+
+    def _end(self, x, own, end):
+        plan, nt = self.plan, self.nt
+        if end < plan.duration:
+            there = self._planned(end)
+            w, a, b, d = there["attitude"][0]
+            conj = np.array([[-a, w, d, -b], [-b, -d, w, a], [-d, b, -a, w]])
+            wanted = np.concatenate([there["tail"][0], there["tail_rate"][0]])
+            off = (x[4:] - wanted) / np.repeat([weights.ANGLE, weights.RATE], nt)
+            return ca.vertcat(2 * conj @ x[:4] / weights.TURN, off)
+        goal, rows = plan.problem.goal, [2 * x[1:3] / weights.TURN]
+        if goal.torso_rate is not None:
+            turn = self.rates(x, own, self.h)[1]
+            rows.append((turn - goal.torso_rate) / weights.TURN_RATE)
+        parts = ((goal.tail, 4, weights.ANGLE), (goal.tail_rate, 4 + nt, weights.RATE))
+        for wanted, first, unit in parts:
+            for a in range(nt if wanted is not None else 0):
+                if np.isfinite(wanted[a]):
+                    rows.append((x[first + a] - wanted[a]) / unit)
+        return ca.vertcat(*rows)
+
+    def bounds(self):
+        """Of the correction: torques keep theirs at all ends of steps."""
+        parts = np.arange(self.steps + 1) / self.steps
+        rows = [
+            np.concatenate(
+                [self._planned(self.begin + (j + s) * self.width)["torque"] for s in parts]
+            )
+            for j in range(self.N)
+        ]
+        rows = np.stack(rows)
+        return (-TORQUE - rows).max(axis=1).ravel(), (TORQUE - rows).min(axis=1).ravel()
+
+    def step(self, d):
+        """Return the correction after a Gauss-Newton step, by SciPy."""
+        r, J = (np.array(part) for part in self.of(d))
+        lower, upper = self.bounds()
+        found = lsq_linear(J, -r.ravel(), (lower - d, upper - d), method="bvls", tol=1e-15)
+        return d + found.x
+
+
+def correction_of(mpc: st.Mpc) -> np.ndarray:
+    """Return the correction (N 2m,) of the last tick that did not fail."""
+    size = mpc.settings.intervals * mpc.model.layout.nt
+    first = size * mpc._own.run.state.newest
+    return mpc._own.memory[first : first + size].copy()
