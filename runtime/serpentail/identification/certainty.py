@@ -119,16 +119,21 @@ def certainty(unknowns: Unknowns, fit: Fit, noise: tuple[float, float]) -> Certa
         for s, direction in zip(singular, Vt, strict=True):
             std = np.inf if s <= NULL * singular[0] else 1 / s
             if std > WIDE:
-                combinations.append(Combination(_parts(unknowns, free, direction), float(std)))
+                combinations.append(Combination(_parts(unknowns, fit, free, direction), float(std)))
         touched = free[(np.abs(Vt[null]) > TOUCHED).any(axis=0)]
         covariance[touched, touched] = np.inf
     covariance *= np.outer(unknowns.sizes, unknowns.sizes)
     return Certainty(scale, freedom, covariance, singular, tuple(combinations))
 
 
-def _parts(unknowns: Unknowns, free: np.ndarray, direction: np.ndarray) -> dict[str, float]:
-    """Return the parts of a direction by name, the largest 1."""
-    shares = direction / direction[np.abs(direction).argmax()]
+def _parts(
+    unknowns: Unknowns, fit: Fit, free: np.ndarray, direction: np.ndarray
+) -> dict[str, float]:
+    """Return the parts of a direction by name, over what was estimated, the largest 1."""
+    values, sizes = np.abs(fit.point.values[free]), unknowns.sizes[free]
+    moving = np.array([not unknowns.each[k].is_offset for k in free]) & (values > 0)
+    shares = direction * np.where(moving, sizes / np.where(moving, values, 1), 1)
+    shares = shares / shares[np.abs(shares).argmax()]
     return {
         unknowns.each[k].name: float(share)
         for k, share in zip(free, shares, strict=True)
@@ -154,7 +159,8 @@ def from_prior_alone(
         before = float(np.sqrt(direction @ C[np.ix_(free, free)] @ direction))
         # the prior's width passes on whole where nothing else is known
         if before > 0 and value * before < 30 / FLAT:
-            found.append(Combination(_parts(unknowns, free, direction), before, by_prior=True))
+            parts = _parts(unknowns, fit, free, direction)
+            found.append(Combination(parts, before, by_prior=True))
     return tuple(found)
 
 

@@ -11,10 +11,12 @@ from .placement import Placements
 from .start import fitted
 from .tracks import MarkerTracks
 
-FRAMES = 7  # at which swaps of a whole trial are looked for
+FRAMES = 3  # at which swaps of a whole trial are looked for
+LOOSE = 0.01  # of the tail's length: a misfit from which on swaps are looked for
 HALF = 0.5  # of the misfit that must be left once a swap is undone
 CLEAR = 8.0  # times the usual residual that a swapped marker is off
 WORSE = 4.0  # times the others' residual from which on a marker is told of
+SMALL = 1e-3  # of the markers' extent: less is not told of
 FEWEST = 3  # markers that are seen at once
 
 
@@ -42,6 +44,8 @@ def tell_of_swaps(
     rows = rows[np.linspace(0, len(rows) - 1, min(FRAMES, len(rows))).astype(int)]
     positions = tracks.positions[rows]
     before = np.median(fitted(model, placed, positions, q[rows])[1])
+    if before < LOOSE * float(model.parameters["tail_length"]):  # type: ignore[arg-type]
+        return
     best, pair = before, None
     for a, b in combinations(range(len(tracks.names)), 2):
         changed = positions.copy()
@@ -82,9 +86,10 @@ def tell_of_residuals(tracks: MarkerTracks, modelled: np.ndarray) -> None:
                 f"in {len(swapped)} frames from {first:g} to {last:g} s: exchange them there"
             )
     rms = np.sqrt(np.nanmean(off**2, axis=0))
+    extent = float(np.linalg.norm(np.ptp(modelled, axis=1), axis=-1).max())
     for k, name in enumerate(tracks.names):
         others = np.median(np.delete(rms, k)) if len(rms) > 1 else np.inf
-        if rms[k] > WORSE * others:
+        if rms[k] > max(WORSE * others, SMALL * extent):
             _tell(
                 f"{tracks.source}: marker {name!r} is off by {1e3 * rms[k]:.3g} mm, others by "
                 f"{1e3 * others:.3g} mm: check its name and its placement, or estimate "

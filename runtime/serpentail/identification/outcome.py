@@ -1,6 +1,7 @@
 """Makes the result of the best fit: estimates, intervals, motions, torques."""
 
 import time
+from dataclasses import replace
 
 import numpy as np
 
@@ -39,10 +40,15 @@ def told(task: Task, found: Fit, confidence: float, began: float) -> Identificat
     refuse_unseen(model, task, found)
     scale, freedom = spread_of_noise(wanted, task.trials, found)
     weighs = task.noise_known or any(trial.unknown_torques for trial in task.trials)
-    sure = certainty(wanted, found, (1.0 if weighs else scale, freedom))
+    noise_scale = 1.0 if weighs else scale
+    sure = certainty(wanted, found, (noise_scale, freedom))
     reach = quantile(confidence, freedom, task.noise_known)
     alone = from_prior_alone(wanted, found, task.trials, _wider(task, found))
     std = np.sqrt(np.diag(sure.covariance))
+    if found.pinned.any():  # how far up they may be: as if they were free
+        free = replace(found, pinned=np.zeros_like(found.pinned))
+        loose = certainty(wanted, free, (noise_scale, freedom))
+        std = np.where(found.pinned, np.sqrt(np.diag(loose.covariance)), std)
     values = found.point.values
     estimates = tuple(
         Estimate(each.name, float(x), float(s), *_interval(x, s * reach, bool(pinned)),

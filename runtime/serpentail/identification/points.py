@@ -171,6 +171,12 @@ def body_points(
     return BodyPoints(none, axes.real[..., 0, :, :, :], by[..., :nt], by_geometry)
 
 
+def body_positions(shape: Geometry, tail: np.ndarray, placed: Placements) -> np.ndarray:
+    """Return markers in B at tail coordinates (..., 2m), (..., M, 3) m."""
+    origins, axes = frames(shape, shape.numbers, tail, placed)
+    return origins + (axes @ placed.offset[..., None])[..., 0]
+
+
 def on_torso(placed: Placements) -> np.ndarray:
     """Tell which markers are on the torso, (M,)."""
     return placed.piece == TORSO

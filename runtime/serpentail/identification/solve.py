@@ -21,6 +21,7 @@ ITERATIONS = 60
 CLOSE = 1e-4  # last step, in standard deviations of the estimates
 ROUNDING = 1e-9  # last step over the size of the data
 NULL = 1e-9  # singular values below, over the largest, are of what no data can tell
+DEPENDENT = 1e-5  # of a column's length that is left: below, columns depend on each other
 ARMIJO, SHORTEST = 1e-4, 1e-6
 KEPT = 0.2  # of a positive number that a step must leave
 PINNED = 1e-3  # of its size: from here a number that wants below 0 is put there
@@ -106,9 +107,24 @@ def _decomposed(
 
 
 def triangle(rows: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Return R (C+1, C+1) of the decomposition of [rows, right]; rows of zeros where few are."""
+    """Return R (C+1, C+1) of the decomposition of [rows, right]; rows of zeros where few are.
+
+    Two Cholesky decompositions are as accurate as Householder's (Yamamoto et al., 2015) and take a
+    tenth of the time, unless columns almost depend on each other.
+    """
     both = np.column_stack([rows, right])
     size = both.shape[1]
+    scale = np.linalg.norm(both, axis=0)
+    if len(both) > size and scale.all():
+        Q = both / scale
+        try:
+            first = np.linalg.cholesky(Q.T @ Q).T
+            diagonal = np.diag(first)
+            if diagonal.min() > DEPENDENT:
+                Q = solve_triangular(first, Q.T, trans="T").T
+                return np.linalg.cholesky(Q.T @ Q).T @ first * scale
+        except np.linalg.LinAlgError:  # dependent columns
+            pass
     R = np.linalg.qr(both, mode="r")
     return np.vstack([R, np.zeros((max(size - len(R), 0), size))])
 

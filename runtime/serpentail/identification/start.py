@@ -6,12 +6,13 @@ from ..attitude import rotation_matrix, sign_continuous
 from ..model.layout import OMEGA, QUATERNION, TAIL_Q
 from ..model.model import Model
 from .placement import Placements
-from .points import CROSS, body_points, geometry_of, on_torso
+from .points import CROSS, body_points, body_positions, geometry_of, on_torso
 from .stages import difference, moved
 from .tracks import MarkerTracks
 from .trial import world_points
 
 ITERATIONS = 25
+CLOSE = 1e-5  # m and rad: the last step of a fit
 RIDGE = 1e-3  # of turns, over the length of the tail: holds what a frame's markers do not show
 ENOUGH = 0.5  # of the markers that a frame needs to be looked at by itself
 WINDOW = 7  # frames of a local parabola
@@ -82,7 +83,7 @@ def fitted(
         better = after <= before
         q[better], before[better] = new[better], after[better]
         ridge = np.where(better, np.maximum(ridge / 4, RIDGE**2), ridge * 8)
-        if np.abs(step[better]).max(initial=0.0) < 1e-7:
+        if better.all() and np.abs(step).max() < CLOSE:
             break
     return q, np.sqrt(before / np.maximum(weight.sum(axis=1), 1))
 
@@ -101,7 +102,7 @@ def _begin(model: Model, placed: Placements, tracks: MarkerTracks) -> np.ndarray
     """
     frames = len(tracks.times)
     q = np.zeros((frames, model.nq))
-    body = body_points(geometry_of(model), q[:1, TAIL_Q], placed, np.zeros(0, int)).points[0]
+    body = body_positions(geometry_of(model), q[:1, TAIL_Q], placed)[0]
     torso = on_torso(placed)
     use = torso if torso.sum() >= 3 else np.ones_like(torso)
     q[:, QUATERNION] = (1, 0, 0, 0)

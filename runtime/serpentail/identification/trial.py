@@ -16,7 +16,7 @@ from ..model.layout import OMEGA, QUATERNION, TAIL_Q
 from ..model.model import Model
 from . import stages as radau
 from .placement import Placements
-from .points import CROSS, body_points, geometry_of
+from .points import CROSS, body_points, body_positions, geometry_of
 from .torques import Known, TorquePrior, knots_of, prior_rows
 from .tracks import MarkerTracks
 from .unknowns import Unknowns
@@ -137,7 +137,7 @@ def seen_points(model: Model, placed: Placements, trial: Trial, states: np.ndarr
 
 def world_points(model: Model, placed: Placements, q: np.ndarray) -> np.ndarray:
     """Return where the model has the markers at configurations (F, nq), (F, M, 3) m."""
-    body = body_points(geometry_of(model), q[:, TAIL_Q], placed, np.zeros(0, int)).points
+    body = body_positions(geometry_of(model), q[:, TAIL_Q], placed)
     return q[:, None, :3] + np.einsum("fij,fmj->fmi", rotation_matrix(q[:, QUATERNION]), body)
 
 
