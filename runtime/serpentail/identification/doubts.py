@@ -71,7 +71,7 @@ def tell_of_residuals(tracks: MarkerTracks, modelled: np.ndarray) -> None:
     modelled (F, M, 3): where the fit has the markers.
     """
     off = np.linalg.norm(tracks.positions - modelled, axis=2)
-    usual = float(np.nanmedian(off))
+    usual, told = float(np.nanmedian(off)), set[int]()
     for a, b in combinations(range(len(tracks.names)), 2):
         crossed = np.hypot(
             np.linalg.norm(tracks.positions[:, a] - modelled[:, b], axis=1),
@@ -80,6 +80,7 @@ def tell_of_residuals(tracks: MarkerTracks, modelled: np.ndarray) -> None:
         own = np.hypot(off[:, a], off[:, b])
         swapped = np.flatnonzero((crossed < HALF * own) & (own > CLEAR * usual))
         if len(swapped):
+            told |= {a, b}
             first, last = tracks.times[swapped[[0, -1]]]
             _tell(
                 f"{tracks.source}: markers {tracks.names[a]!r} and {tracks.names[b]!r} look swapped "
@@ -89,7 +90,7 @@ def tell_of_residuals(tracks: MarkerTracks, modelled: np.ndarray) -> None:
     extent = float(np.linalg.norm(np.ptp(modelled, axis=1), axis=-1).max())
     for k, name in enumerate(tracks.names):
         others = np.median(np.delete(rms, k)) if len(rms) > 1 else np.inf
-        if rms[k] > max(WORSE * others, SMALL * extent):
+        if k not in told and rms[k] > max(WORSE * others, SMALL * extent):
             _tell(
                 f"{tracks.source}: marker {name!r} is off by {1e3 * rms[k]:.3g} mm, others by "
                 f"{1e3 * others:.3g} mm: check its name and its placement, or estimate "

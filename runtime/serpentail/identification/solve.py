@@ -62,7 +62,7 @@ def fit(unknowns: Unknowns, each: tuple[Trial, ...], start: Point, stage: Stage 
     for iteration in range(1, ITERATIONS + 1):
         linear, triangles = _decomposed(unknowns, each, point)
         step, steps = _step(unknowns, point, triangles, pinned)
-        length = _change(linear, triangles, step, steps, point)
+        length = _change(each, linear, step, steps)
         if stage is not None:
             stage.tell(iteration / ITERATIONS)
         if length < 1:
@@ -184,23 +184,21 @@ def own_step(R: np.ndarray, count: int, step: np.ndarray) -> np.ndarray:
 
 
 def _change(
+    each: tuple[Trial, ...],
     linear: tuple[Linear, ...],
-    triangles: tuple[np.ndarray, ...],
     step: np.ndarray,
     steps: list[np.ndarray],
-    point: Point,
 ) -> float:
     """Return how far the step moves the model's markers, over what counts as converged."""
-    total, rows, square = 0.0, 0, 0.0
-    for each, own in zip(linear, steps, strict=True):
-        change = each.rows @ np.concatenate([own, step]) + each.residual - each.right
+    total, rows, square, floor = 0.0, 0, 0.0, 0.0
+    for trial, of_trial, own in zip(each, linear, steps, strict=True):
+        change = of_trial.rows @ np.concatenate([own, step]) + of_trial.residual - of_trial.right
         total += change @ change
-        square += each.residual @ each.residual
+        square += of_trial.residual @ of_trial.residual
         rows += len(change)
+        floor += (ROUNDING * np.nanmax(np.abs(trial.tracks.positions)) / trial.noise.min()) ** 2
     scale = np.sqrt(square / max(rows, 1))
-    reach = max(float(np.abs(iterate.states).max()) for iterate in point.iterates)
-    floor = ROUNDING * reach * max(float(np.abs(each.rows).max()) for each in linear)
-    return float(np.sqrt(total) / (CLOSE * scale + floor))
+    return float(np.sqrt(total) / (CLOSE * scale + np.sqrt(floor)))
 
 
 def _to_pin(unknowns: Unknowns, point: Point, step: np.ndarray) -> np.ndarray:
