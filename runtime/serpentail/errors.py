@@ -39,6 +39,10 @@ class PlanningError(SerpentailError, ValueError):
     """A planning problem that cannot be posed."""
 
 
+class IdentificationError(SerpentailError, ValueError):
+    """Markers that cannot be read, or parameters that cannot be estimated as asked."""
+
+
 class ExtraMissing(SerpentailError, ImportError):
     """A library is not installed; the message names the extra that brings it."""
 
@@ -61,3 +65,7 @@ class UnlikeBodies(UserWarning):
 
 class UnusualSize(UserWarning):
     """A mass, length, angle or other number that no animal or robot has: mostly a slip of units."""
+
+
+class DoubtfulMarkers(UserWarning):
+    """Marker tracks that fit badly, as those of swapped markers do."""

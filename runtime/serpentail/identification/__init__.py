@@ -1,0 +1,1 @@
+"""Motion, torques and parameters from marker tracks, with their confidence intervals."""

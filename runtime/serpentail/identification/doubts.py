@@ -1,0 +1,103 @@
+"""Looks for markers that were swapped, or that fit worse than the others."""
+
+import warnings
+from itertools import combinations
+
+import numpy as np
+
+from ..errors import DoubtfulMarkers, IdentificationError
+from ..model.model import Model
+from .placement import Placements
+from .start import fitted
+from .tracks import MarkerTracks
+
+FRAMES = 3  # at which swaps of a whole trial are looked for
+LOOSE = 0.01  # of the tail's length: a misfit from which on swaps are looked for
+HALF = 0.5  # of the misfit that must be left once a swap is undone
+CLEAR = 8.0  # times the usual residual that a swapped marker is off
+WORSE = 4.0  # times the others' residual from which on a marker is told of
+SMALL = 1e-3  # of the markers' extent: less is not told of
+FEWEST = 3  # markers that are seen at once
+
+
+def refuse_too_few(placed: Placements, tracks: MarkerTracks, nq: int) -> None:
+    """IdentificationError where no frame shows enough markers that are not on a line."""
+    seen = tracks.seen.sum(axis=1)
+    best = int(seen.argmax())
+    if seen[best] >= FEWEST:
+        here = tracks.positions[best, tracks.seen[best]]
+        spread = np.linalg.svd(here - here.mean(axis=0), compute_uv=False)
+        if spread[1] > 1e-3 * spread[0]:
+            return
+    raise IdentificationError(
+        f"data: too few markers: {tracks.source} shows at most {seen[best]} at once"
+        f"{', on a line' if seen[best] >= FEWEST else ''}: a configuration has {nq - 1} numbers; "
+        "it needs three markers or more that are not on a line, some of them on the tail"
+    )
+
+
+def tell_of_swaps(
+    model: Model, placed: Placements, tracks: MarkerTracks, q: np.ndarray
+) -> None:
+    """Warn of two markers whose exchange makes frames of the whole trial fit much better."""
+    rows = np.flatnonzero(tracks.seen.sum(axis=1) == tracks.seen.sum(axis=1).max())
+    rows = rows[np.linspace(0, len(rows) - 1, min(FRAMES, len(rows))).astype(int)]
+    positions = tracks.positions[rows]
+    before = np.median(fitted(model, placed, positions, q[rows])[1])
+    if before < LOOSE * float(model.parameters["tail_length"]):  # type: ignore[arg-type]
+        return
+    best, pair = before, None
+    for a, b in combinations(range(len(tracks.names)), 2):
+        changed = positions.copy()
+        changed[:, [a, b]] = positions[:, [b, a]]
+        begin = q[rows].copy()
+        begin[:, 7:] = 0
+        after = min(np.median(fitted(model, placed, changed, at)[1]) for at in (begin, q[rows]))
+        if after < best:
+            best, pair = after, (a, b)
+    if pair is not None and best < HALF * before:
+        a, b = (tracks.names[k] for k in pair)
+        warnings.warn(
+            f"{tracks.source}: markers {a!r} and {b!r} look swapped throughout: with them exchanged "
+            f"the frames fit to {1e3 * best:.3g} mm in place of {1e3 * before:.3g} mm",
+            DoubtfulMarkers,
+            stacklevel=5,
+        )
+
+
+def tell_of_residuals(tracks: MarkerTracks, modelled: np.ndarray) -> None:
+    """Warn of markers that are where others should be, in some frames, and of those that fit badly.
+
+    modelled (F, M, 3): where the fit has the markers.
+    """
+    off = np.linalg.norm(tracks.positions - modelled, axis=2)
+    usual, told = float(np.nanmedian(off)), set[int]()
+    for a, b in combinations(range(len(tracks.names)), 2):
+        crossed = np.hypot(
+            np.linalg.norm(tracks.positions[:, a] - modelled[:, b], axis=1),
+            np.linalg.norm(tracks.positions[:, b] - modelled[:, a], axis=1),
+        )
+        own = np.hypot(off[:, a], off[:, b])
+        swapped = np.flatnonzero((crossed < HALF * own) & (own > CLEAR * usual))
+        if len(swapped):
+            told |= {a, b}
+            first, last = tracks.times[swapped[[0, -1]]]
+            _tell(
+                f"{tracks.source}: markers {tracks.names[a]!r} and {tracks.names[b]!r} look swapped "
+                f"in {len(swapped)} frames from {first:g} to {last:g} s: exchange them there"
+            )
+    rms = np.sqrt(np.nanmean(off**2, axis=0))
+    extent = float(np.linalg.norm(np.ptp(modelled, axis=1), axis=-1).max())
+    for k, name in enumerate(tracks.names):
+        others = np.median(np.delete(rms, k)) if len(rms) > 1 else np.inf
+        if k not in told and rms[k] > max(WORSE * others, SMALL * extent):
+            _tell(
+                f"{tracks.source}: marker {name!r} is off by {1e3 * rms[k]:.3g} mm, others by "
+                f"{1e3 * others:.3g} mm: check its name and its placement, or estimate "
+                f'"marker:{name}"'
+            )
+
+
+def _tell(words: str) -> None:
+    """Warn who called ``identify``."""
+    warnings.warn(words, DoubtfulMarkers, stacklevel=5)

@@ -1,0 +1,168 @@
+"""``identify``: motion, torques and parameters from marker tracks."""
+
+import time
+from collections.abc import Mapping, Sequence
+from os import PathLike
+from typing import Any, TypedDict, Unpack
+
+import numpy as np
+
+from ..checks import number, refusal
+from ..errors import IdentificationError, ModelError
+from ..model.model import Model
+from ..stages import Stage
+from . import trial as trials
+from .doubts import refuse_too_few, tell_of_swaps
+from .outcome import told
+from .placement import Marker, Placements, placements
+from .readers import read_markers
+from .result import Identification
+from .search import Task, first_iterate, refined
+from .solve import Point
+from .start import motion_shown
+from .torques import Known, TorquePrior, checked_prior, known_torques
+from .tracks import MarkerTracks
+from .unknowns import unknowns
+
+LONGEST = 0.01  # s: of the intervals of the first mesh
+FIRST_NOISE = 1e-3  # m
+FUNCTIONS = ("forward_dynamics", "forward_dynamics_derivatives", "energy", "momentum")
+Data = MarkerTracks | str | PathLike[str]
+
+
+class Settings(TypedDict, total=False):
+    """Settings of ``identify`` beyond the model, the data, the markers and what is estimated."""
+
+    torques: Any
+    noise: float | Mapping[str, float] | None
+    confidence: float
+    unit: str | None
+    axes: str
+    zeros: str
+
+
+def identify(
+    model: Model,
+    data: Data | Sequence[Data],
+    markers: Mapping[str, Marker],
+    estimate: Sequence[str] | Mapping[str, float | None] = (),
+    **settings: Unpack[Settings],
+) -> Identification:
+    """Return motion, torques and parameters that fit marker tracks in flight best, with intervals.
+
+    model: with the parameters to begin with; its scene names "forward_dynamics_derivatives" and,
+    where parameters are estimated, "forward_dynamics_parameter_derivatives".
+    data: tracks, or the path of a TRC, CSV or C3D file; several are trials of one animal.
+    markers: where each marker is; markers of the data without a place are left out.
+    estimate: names: of parameters, "tail_mass", "torso_inertia" (each of its numbers),
+    "torso_inertia[0]", "tail_damping[same]" (one number for all); "marker:NAME", its offset.  Or
+    name -> standard deviation of a normal prior about the model's value, None for no prior.
+    torques: what acts: None (nothing), 2m numbers, (times, values), a function of the time, a
+    Trajectory; or a TorquePrior, and they are estimated, too.  A list has one of each trial.
+    noise: standard deviation (m) of a marker's coordinates, or of those of each by name; None: it
+    is estimated, one for all.
+    confidence: of the intervals, 0.95.  unit, axes, zeros: of files, as of ``read_markers``.
+
+    Between frames the motion obeys the equations of motion.  With known torques and no priors this
+    is maximum likelihood, and the intervals are those of the Fisher information; with a TorquePrior
+    or priors on parameters it is the most likely motion a posteriori, with Laplace's covariance.
+    Raises IdentificationError with field, value and remedy, ModelError where the model lacks a
+    function.  Warns DoubtfulMarkers of markers that look swapped or fit badly.
+    """
+    began = time.perf_counter()
+    known = set(Settings.__annotations__)
+    for name in settings:
+        if name not in known:
+            raise IdentificationError(f"{name}: no such setting; there are {', '.join(sorted(known))}")
+    confidence = number("confidence", settings.get("confidence", 0.95), IdentificationError, above=0)
+    if confidence >= 1:
+        raise refusal("confidence", confidence, "a number below 1", IdentificationError)
+    check_model(model, estimate)
+    placed = placements(model, markers)
+    wanted = unknowns(model, placed, estimate)
+    tracks = tracks_of(data, placed, settings)
+    torques = torques_of(settings.get("torques"), len(tracks), model.layout.nt)
+    noises, noise_known = noises_of(settings.get("noise"), tracks)
+    with Stage("identify", model.name) as stage:
+        begun = [begin(model, placed, each) for each in tracks]
+        each = tuple(
+            trials.trial_of(track, noise, torque, (model.layout.nt, LONGEST))
+            for track, noise, torque in zip(tracks, noises, torques, strict=True)
+        )
+        task = Task(wanted, each, torques, noise_known)
+        start = Point(
+            wanted.start,
+            tuple(
+                first_iterate(model, trial, states)
+                for trial, states in zip(each, begun, strict=True)
+            ),
+        )
+        task, found = refined(task, start, stage)
+    return told(task, found, confidence, began)
+
+
+def check_model(model: Any, estimate: Any) -> None:
+    """Raise where a model cannot be identified: its kind, or functions that it lacks."""
+    if not isinstance(model, Model):
+        raise refusal("model", model, "a Model, as serpentail.load returns", IdentificationError)
+    model.refuse_fixed("identify")
+    if model.manifest["scene"].get("coordinates") == "polar":
+        raise ModelError(
+            f'identify: {model.name} has coordinates = "polar": generate it with those of bends'
+        )
+    if model.manifest["real"] != "double":
+        raise ModelError(f'identify: {model.name} has real = "float": generate it with "double"')
+    for name in FUNCTIONS:
+        model.kernel(name)
+    names = list(estimate) if isinstance(estimate, Mapping | Sequence) else []
+    if any(not str(name).startswith("marker:") for name in names):
+        model.kernel("forward_dynamics_parameter_derivatives")
+
+
+def tracks_of(data: Any, placed: Placements, settings: Mapping[str, Any]) -> list[MarkerTracks]:
+    """Return the tracks of the placed markers of each trial."""
+    listed = list(data) if isinstance(data, list | tuple) else [data]
+    if not listed:
+        raise IdentificationError("data: none: needs marker tracks, or files of them")
+    how = {name: settings[name] for name in ("axes", "zeros") if name in settings}  # type: ignore[literal-required]
+    found = [
+        each if isinstance(each, MarkerTracks) else read_markers(each, settings.get("unit"), **how)
+        for each in listed
+    ]
+    return [each.of(placed.names) for each in found]
+
+
+def torques_of(torques: Any, count: int, nt: int) -> tuple[Known | TorquePrior, ...]:
+    """Return what is known of the torques of each trial."""
+    several = isinstance(torques, list) and any(not np.isscalar(each) for each in torques)
+    if several and len(torques) != count:
+        raise IdentificationError(f"torques: {len(torques)} entries: needs one of {count} trials")
+    listed = torques if several else [torques] * count
+    return tuple(
+        checked_prior(each) if isinstance(each, TorquePrior) else known_torques(each, nt)
+        for each in listed
+    )
+
+
+def noises_of(noise: Any, tracks: list[MarkerTracks]) -> tuple[list[np.ndarray], bool]:
+    """Return the noise (F, M) of each trial, m, and whether it is known."""
+    if noise is None:
+        return [np.full(each.seen.shape, FIRST_NOISE) for each in tracks], False
+    names = tracks[0].names
+    values = noise if isinstance(noise, Mapping) else dict.fromkeys(names, noise)
+    lacking = [name for name in names if name not in values]
+    if lacking:
+        raise IdentificationError(f"noise: none of {lacking[0]!r}: give one of each marker (m)")
+    each = [
+        number(f"noise.{name}", values[name], IdentificationError, above=0, most=1.0)
+        for name in names
+    ]
+    return [np.broadcast_to(np.array(each), track.seen.shape) for track in tracks], True
+
+
+def begin(model: Model, placed: Placements, tracks: MarkerTracks) -> np.ndarray:
+    """Return the states (F, nx) that a trial's markers show, once they are enough."""
+    refuse_too_few(placed, tracks, model.nq)
+    states = motion_shown(model, placed, tracks)
+    tell_of_swaps(model, placed, tracks, states[:, : model.nq])
+    return states

@@ -1,0 +1,132 @@
+"""Inverse dynamics of marker tracks: from positions to joint torques, power and what is left over.
+
+This is the usual way of biomechanics: configurations are fitted to each frame, smoothed,
+differentiated twice, and put into the equations of motion.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import BSpline
+from scipy.linalg import solveh_banded
+
+from ..attitude import sign_continuous
+from ..checks import number
+from ..errors import IdentificationError
+from ..model.layout import QUATERNION
+from ..model.model import Model
+from ..model.state_space import product_matrix
+from ..motion.trajectory import Trajectory
+from .doubts import refuse_too_few, tell_of_residuals
+from .placement import Marker, placements
+from .result import trajectory_of
+from .start import configurations
+from .tracks import MarkerTracks
+from .trial import world_points
+
+DEGREE = 5
+ROUGH = 3  # the derivative whose square is penalised
+
+
+@dataclass(frozen=True, eq=False)
+class JointTorques:
+    """Inverse dynamics at the frames of marker tracks.
+
+    times (F,) s; tau (F, 2m) N m, conjugate to the tail coordinates; power (F, 2m) W, tau times
+    the coordinate's rate; residual_force (F, 3) N, world, and residual_moment (F, 3) N m about B,
+    body axes: what would have to act on the torso besides gravity for the motion to be true, zero
+    in flight but for errors; trajectory: the smoothed motion; modelled (F, M, 3) m: where it has
+    the markers.
+    """
+
+    times: np.ndarray
+    tau: np.ndarray
+    power: np.ndarray
+    residual_force: np.ndarray
+    residual_moment: np.ndarray
+    trajectory: Trajectory
+    modelled: np.ndarray
+
+
+def joint_torques(
+    model: Model, tracks: MarkerTracks, markers: Mapping[str, Marker], *, cutoff: float
+) -> JointTorques:
+    """Return the joint torques and powers of a motion that markers show, by inverse dynamics.
+
+    tracks, markers: as of ``identify``.  cutoff: Hz; the coordinates are smoothed by quintic
+    splines, which pass half the amplitude of an oscillation of that frequency, 1 / (1 + (f /
+    cutoff)^6) at f, without delay, at any times and over gaps.  Torques contain second derivatives:
+    noise in them grows with the cutoff, and what is quicker is lost.
+    Raises IdentificationError; warns DoubtfulMarkers of markers that fit badly.
+    """
+    cutoff = number("cutoff", cutoff, IdentificationError, above=0)
+    model.refuse_fixed("joint_torques")
+    placed = placements(model, markers)
+    if not isinstance(tracks, MarkerTracks):
+        raise IdentificationError(
+            f"tracks: type {type(tracks).__name__}: needs what read_markers or marker_tracks returns"
+        )
+    tracks = tracks.of(placed.names)
+    refuse_too_few(placed, tracks, model.nq)
+    q = configurations(model, placed, tracks)
+    q[:, QUATERNION] = sign_continuous(q[:, QUATERNION])
+    q, first, second = smoothed(tracks.times, q, cutoff)
+    v, v_dot = rates(q, first, second)
+    q[:, QUATERNION] /= np.linalg.norm(q[:, QUATERNION], axis=1, keepdims=True)
+    force = model.inverse_dynamics(q, v, v_dot)
+    tau = force[:, 6:]
+    modelled = world_points(model, placed, q)
+    tell_of_residuals(tracks, modelled)
+    motion = trajectory_of(model, tracks.times, np.column_stack([q, v]), tau)
+    return JointTorques(
+        tracks.times, tau, tau * v[:, 6:], force[:, :3], force[:, 3:6], motion, modelled
+    )
+
+
+def smoothed(
+    times: np.ndarray, values: np.ndarray, cutoff: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return values (F, C) smoothed, and their first two derivatives.
+
+    The spline minimises the sum of squares, each times the span it stands for, and (2 pi
+    cutoff)^-6 times the integral of the squared third derivative.
+    """
+    knots = np.concatenate([[times[0]] * DEGREE, times, [times[-1]] * DEGREE])
+    count = len(knots) - DEGREE - 1
+    spans = np.gradient(times)
+    B = BSpline.design_matrix(times, knots, DEGREE).toarray()
+    # the third derivative is of degree 2: three Gauss points a span are exact
+    nodes, weights = np.polynomial.legendre.leggauss(3)
+    half, middle = np.diff(times) / 2, (times[1:] + times[:-1]) / 2
+    at = (middle[:, None] + half[:, None] * nodes).ravel()
+    each = BSpline(knots, np.eye(count), DEGREE).derivative(ROUGH)(at)
+    W = (half[:, None] * weights).ravel()
+    penalty = (each.T * W) @ each * (2 * np.pi * cutoff) ** (-2 * ROUGH)
+    square = (B.T * spans) @ B + penalty
+    banded = np.zeros((DEGREE + 1, count))
+    for k in range(DEGREE + 1):
+        banded[k, : count - k] = np.diag(square, -k)
+    spline = BSpline(knots, solveh_banded(banded, (B.T * spans) @ values, lower=True), DEGREE)
+    return spline(times), spline.derivative(1)(times), spline.derivative(2)(times)
+
+
+def rates(
+    q: np.ndarray, first: np.ndarray, second: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return v and v_dot (F, nv) of configurations (F, nq) and their derivatives.
+
+    omega = 2 vec(conj(Q) Q_dot) / |Q|^2, of a quaternion Q whose norm need not be 1.
+    """
+    Q, Q1, Q2 = (each[:, QUATERNION] for each in (q, first, second))
+    square = (Q**2).sum(axis=1, keepdims=True)
+
+    def vector(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        return (np.swapaxes(product_matrix(a), -1, -2) @ b[..., None])[..., 0]
+
+    omega = 2 * vector(Q, Q1) / square
+    growth = 2 * (Q * Q1).sum(axis=1, keepdims=True) / square
+    omega_dot = 2 * (vector(Q, Q2) + vector(Q1, Q1)) / square - growth * omega
+    v = np.concatenate([first[:, :3], omega, first[:, 7:]], axis=1)
+    v_dot = np.concatenate([second[:, :3], omega_dot, second[:, 7:]], axis=1)
+    return v, v_dot

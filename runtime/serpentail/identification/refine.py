@@ -1,0 +1,48 @@
+"""Cuts the mesh of a trial where its integration is not exact beside the noise."""
+
+import numpy as np
+
+from ..model.model import Model
+from . import stages as radau
+from .stages import difference
+from .trial import Iterate, Trial
+
+SHARE = 0.05  # of the noise that all intervals together may err
+ORDER = 6  # of the local error
+MOST = 8  # parts into which one interval is cut at once
+
+
+def parts_needed(model: Model, trial: Trial, iterate: Iterate) -> np.ndarray | None:
+    """Return into how many parts each interval must be cut, (K,); None where none must be.
+
+    The error of an interval is what two half steps differ by from the whole one.
+    """
+    half = trial.spans / 2
+    torques = iterate.over(model, trial)
+    begin = iterate.states[:-1]
+    ends = []
+    for part in (0, 1):
+        nodes = (radau.NODES + part) / 2
+        over = _at(torques, nodes)
+        guess = np.repeat(begin[:, None], 3, axis=1)
+        found = radau.solved(model, half, begin, over, guess)
+        if found is None:
+            return np.full(len(half), 2)
+        begin = found[:, -1]
+        ends.append(begin)
+    error = np.abs(difference(model, ends[1], iterate.stages[:, -1]))
+    reach = float(model.parameters["tail_length"])  # type: ignore[arg-type]
+    duration = trial.times[-1] - trial.times[0]
+    sizes = np.concatenate([np.full(3, 1.0), np.full(model.nv - 3, reach)])
+    moved = (error * np.concatenate([sizes, duration * sizes])).sum(axis=1)
+    allowed = SHARE * float(np.median(trial.noise)) / len(half)
+    if moved.sum() <= SHARE * float(np.median(trial.noise)):
+        return None
+    parts = np.ceil((moved / allowed) ** (1 / ORDER))
+    return np.clip(parts, 1, MOST).astype(int)
+
+
+def _at(torques: np.ndarray, nodes: np.ndarray) -> np.ndarray:
+    """Return torques (K, 3, 2m) at other nodes, by the parabola through those at the stages."""
+    V = np.vander(radau.NODES, 3)
+    return np.einsum("ij,kjt->kit", np.vander(nodes, 3) @ np.linalg.inv(V), torques)

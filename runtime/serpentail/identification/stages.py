@@ -1,0 +1,187 @@
+"""Integrates all intervals of a mesh side by side, with exact derivatives.
+
+Each interval is a step of the three-stage Radau IIA method (order 5), the collocation that plans
+use: its equations are solved by Newton's method, and differentiated by the implicit function
+theorem, so the derivatives are those of the numbers that come out.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..model.layout import OMEGA, QUATERNION, TAIL_Q
+from ..model.model import Model
+from ..model.state_space import product_matrix
+
+ROOT = np.sqrt(6.0)
+NODES = np.array([(4 - ROOT) / 10, (4 + ROOT) / 10, 1.0])  # of an interval
+WEIGHTS = np.array(
+    [
+        [(88 - 7 * ROOT) / 360, (296 - 169 * ROOT) / 1800, (-2 + 3 * ROOT) / 225],
+        [(296 + 169 * ROOT) / 1800, (88 + 7 * ROOT) / 360, (-2 - 3 * ROOT) / 225],
+        [(16 - ROOT) / 36, (16 + ROOT) / 36, 1 / 9],
+    ]
+)  # Butcher's A
+ITERATIONS = 12
+TOLERANCE = 1e-11  # of the last Newton step, over the sizes of the states
+
+
+@dataclass(frozen=True, eq=False)
+class Steps:
+    """What K intervals come to: stages (K, 3, nx); derivatives of their ends in tangent numbers by
+    the states they begin with (K, 2nv, 2nv), by the torques at both ends (K, 2, 2nv, 2m), by the
+    parameters (K, 2nv, P).
+    """
+
+    stages: np.ndarray
+    by_state: np.ndarray
+    by_torque: np.ndarray
+    by_parameters: np.ndarray
+
+    @property
+    def ends(self) -> np.ndarray:
+        """States at the ends (K, nx)."""
+        return self.stages[:, -1]
+
+
+def solved(
+    model: Model, spans: np.ndarray, begin: np.ndarray, torques: np.ndarray, guess: np.ndarray
+) -> np.ndarray | None:
+    """Return the stages (K, 3, nx) of intervals of spans (K,) s that begin at states (K, nx).
+
+    torques (K, 3, 2m): at the stages.  guess (K, 3, nx).  None where Newton's method fails.
+    """
+    count, nx = begin.shape
+    X, scale = guess.copy(), 1 + np.abs(begin).max(axis=0)
+    left = np.arange(count)  # intervals that are not solved yet
+    for _ in range(ITERATIONS):
+        here, h = X[left], spans[left, None, None]
+        flat, u = here.reshape(-1, nx), torques[left].reshape(len(left) * 3, -1)
+        f = model.x_dot(flat, u).reshape(here.shape)
+        if not np.isfinite(f).all():
+            return None
+        residual = here - begin[left, None] - h * (WEIGHTS @ f)
+        J = model.x_dot_derivatives(flat, u)[0].reshape(*here.shape, nx)
+        step = np.linalg.solve(_matrix(J, spans[left]), residual.reshape(len(left), -1, 1))
+        X[left] = here - step.reshape(here.shape)
+        size = np.abs(step.reshape(here.shape) / scale).max(axis=(1, 2))
+        if not np.isfinite(size).all():
+            return None
+        left = left[size > TOLERANCE]
+        if not len(left):
+            return X
+    return None
+
+
+def _matrix(J: np.ndarray, spans: np.ndarray) -> np.ndarray:
+    """Return the Newton matrix I - h A x J (K, 3nx, 3nx)."""
+    count, stages, nx = J.shape[:3]
+    blocks = -spans[:, None, None, None, None] * WEIGHTS[:, None, :, None] * (
+        J.transpose(0, 2, 1, 3)[:, None]
+    )
+    return blocks.reshape(count, stages * nx, stages * nx) + np.eye(stages * nx)
+
+
+def differentiated(
+    model: Model, spans: np.ndarray, begin: np.ndarray, torques: np.ndarray, parts: tuple
+) -> Steps:
+    """Return solved intervals with their derivatives.
+
+    parts: stages as ``solved`` returns them; d(parameter struct) / d(unknowns); whether the torques
+    are unknown.
+    """
+    stages, by_unknowns, unknown_torques = parts
+    count, nx = begin.shape
+    nq, nt = model.nq, model.layout.nt
+    flat, u = stages.reshape(-1, nx), torques.reshape(count * 3, -1)
+    J, B = model.x_dot_derivatives(flat, u)
+    J, B = J.reshape(count, 3, nx, nx), B.reshape(count, 3, nx, nt)
+    # right-hand sides: a state at the beginning, torques at both ends, parameters
+    sides = [np.broadcast_to(tangents(model, begin)[:, None], (count, 3, nx, 2 * model.nv))]
+    weighted = spans[:, None, None, None] * WEIGHTS
+    if unknown_torques:
+        for share in (1 - NODES, NODES):
+            sides.append(np.einsum("kij,j,kjab->kiab", weighted[:, 0], share, B))
+    if by_unknowns.any():
+        by_struct = model.forward_dynamics_parameter_derivatives(flat[:, :nq], flat[:, nq:], u)
+        C = (by_struct @ by_unknowns).reshape(count, 3, model.nv, -1)
+        side = np.zeros((count, 3, nx, by_unknowns.shape[1]))
+        side[:, :, nq:] = np.einsum("kij,kjab->kiab", weighted[:, 0], C)
+        sides.append(side)
+    side = np.concatenate(sides, axis=-1)
+    found = np.linalg.solve(_matrix(J, spans), side.reshape(count, 3 * nx, -1))
+    last = cotangents(model, stages[:, -1]) @ found[:, -nx:]
+    return _split(last, model, (count, by_unknowns, unknown_torques), stages)
+
+
+def _split(
+    last: np.ndarray, model: Model, sizes: tuple[int, np.ndarray, bool], stages: np.ndarray
+) -> Steps:
+    """Return derivatives of the ends by what they are of."""
+    count, by_unknowns, unknown_torques = sizes
+    states, nt = 2 * model.nv, model.layout.nt
+    by_torque = np.zeros((count, 2, states, nt))
+    by_parameters = np.zeros((count, states, by_unknowns.shape[1]))
+    at = states
+    if unknown_torques:
+        by_torque[:, 0] = last[..., at : at + nt]
+        by_torque[:, 1] = last[..., at + nt : at + 2 * nt]
+        at += 2 * nt
+    if by_unknowns.any():
+        by_parameters = last[..., at:]
+    return Steps(stages, last[..., :states], by_torque, by_parameters)
+
+
+def tangents(model: Model, x: np.ndarray) -> np.ndarray:
+    """Return dx / d(tangent) (..., nx, 2nv): shifts, turns in the body frame, tail, rates."""
+    nq, nv = model.nq, model.nv
+    T = np.zeros((*x.shape[:-1], nq + nv, 2 * nv))
+    T[..., :3, :3] = np.eye(3)
+    T[..., QUATERNION, OMEGA] = product_matrix(x[..., QUATERNION]) / 2
+    T[..., TAIL_Q.start : nq, 6:nv] = np.eye(nv - 6)
+    T[..., nq:, nv:] = np.eye(nv)
+    return T
+
+
+def cotangents(model: Model, x: np.ndarray) -> np.ndarray:
+    """Return d(tangent) / dx (..., 2nv, nx), which undoes ``tangents``."""
+    T = np.swapaxes(tangents(model, x), -1, -2).copy()
+    square = (x[..., QUATERNION] ** 2).sum(-1)[..., None, None]
+    T[..., OMEGA, QUATERNION] *= 4 / square
+    return T
+
+
+def moved(model: Model, x: np.ndarray, step: np.ndarray) -> np.ndarray:
+    """Return states (..., nx) after steps (..., 2nv) in their tangent spaces, quaternions unit."""
+    nq, nv = model.nq, model.nv
+    new = x.copy()
+    new[..., :3] += step[..., :3]
+    turn = step[..., OMEGA]
+    angle = np.linalg.norm(turn, axis=-1, keepdims=True)
+    part = np.sinc(angle / (2 * np.pi)) / 2
+    quaternion = x[..., QUATERNION]
+    new[..., QUATERNION] = np.cos(angle / 2) * quaternion + part * (
+        product_matrix(quaternion) @ turn[..., None]
+    )[..., 0]
+    new[..., QUATERNION] /= np.linalg.norm(new[..., QUATERNION], axis=-1, keepdims=True)
+    new[..., TAIL_Q.start : nq] += step[..., 6:nv]
+    new[..., nq:] += step[..., nv:]
+    return new
+
+
+def difference(model: Model, to: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Return the steps (..., 2nv) from states x to others; turns as rotation vectors."""
+    nq, nv = model.nq, model.nv
+    step = np.zeros((*x.shape[:-1], 2 * nv))
+    step[..., :3] = to[..., :3] - x[..., :3]
+    a, b = x[..., QUATERNION], to[..., QUATERNION]
+    vector = (np.swapaxes(product_matrix(a), -1, -2) @ b[..., None])[..., 0]
+    scalar = (a * b).sum(-1, keepdims=True)
+    vector, scalar = np.where(scalar < 0, -vector, vector), np.abs(scalar)
+    size = np.linalg.norm(vector, axis=-1, keepdims=True)
+    angle = 2 * np.arctan2(size, scalar)
+    factor = np.where(size > 1e-9, angle / np.where(size > 0, size, 1), 2 / scalar)
+    step[..., OMEGA] = factor * vector
+    step[..., 6:nv] = to[..., TAIL_Q.start : nq] - x[..., TAIL_Q.start : nq]
+    step[..., nv:] = to[..., nq:] - x[..., nq:]
+    return step

@@ -1,0 +1,112 @@
+"""What is known of the torques: all, or a prior on how large they are and how fast they change."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..checks import finite_array, number, refusal
+from ..errors import IdentificationError
+from ..motion.trajectory import Trajectory
+
+PER_TIME = 4  # knots in each correlation time
+
+
+@dataclass(frozen=True)
+class TorquePrior:
+    """What is believed of unknown joint torques: each is a stationary Ornstein-Uhlenbeck process.
+
+    std: standard deviation (N m) at any time; time: of correlation (s), so that torques t apart
+    correlate as exp(-t / time).  The mean is zero.  Torques are linear between knots a quarter of
+    that time apart, whose values have exactly these correlations.
+    """
+
+    std: float
+    time: float
+
+
+def checked_prior(prior: Any) -> TorquePrior:
+    """Return a prior; IdentificationError where it is none."""
+    if not isinstance(prior, TorquePrior):
+        needs = "a TorquePrior(std, time), which says how large the torques may be, and how quick"
+        raise refusal("torques", prior, needs, IdentificationError)
+    return TorquePrior(
+        number("torques.std", prior.std, IdentificationError, above=0),
+        number("torques.time", prior.time, IdentificationError, above=0),
+    )
+
+
+Known = Callable[[np.ndarray], np.ndarray]  # times (...) -> torques (..., 2m)
+
+
+def known_torques(torques: Any, nt: int) -> Known:
+    """Return known torques as a function of time; IdentificationError where they are unsound.
+
+    torques: None, for none; numbers (2m,), constant; a Trajectory; a function of the time (s).
+    """
+    if torques is None:
+        return lambda times: np.zeros((*times.shape, nt))
+    if isinstance(torques, Trajectory):
+        return _sampled(torques.t, torques.tau, nt)
+    if isinstance(torques, tuple) and len(torques) == 2:
+        t, tau = (finite_array(f"torques[{k}]", x, IdentificationError)
+                  for k, x in enumerate(torques))
+        return _sampled(t, tau, nt)
+    if callable(torques):
+        return _called(torques, nt)
+    constant = finite_array("torques", torques, IdentificationError)
+    if constant.shape != (nt,):
+        needs = f"None, {nt} numbers, (times, values), a function, a Trajectory or a TorquePrior"
+        raise refusal("torques", torques, needs, IdentificationError)
+    return lambda times: np.broadcast_to(constant, (*times.shape, nt))
+
+
+def _sampled(t: np.ndarray, tau: np.ndarray, nt: int) -> Known:
+    """Return torques between samples, linear."""
+    if t.ndim != 1 or len(t) < 2 or tau.shape != (len(t), nt) or (np.diff(t) <= 0).any():
+        raise IdentificationError(
+            f"torques: times have shape {t.shape}, values {tau.shape}: needs times (K,) that "
+            f"increase and values (K, {nt})"
+        )
+
+    def torque(times: np.ndarray) -> np.ndarray:
+        if times.min() < t[0] - 1e-9 or times.max() > t[-1] + 1e-9:
+            raise IdentificationError(
+                f"torques: known from {t[0]:g} to {t[-1]:g} s: the markers are from "
+                f"{times.min():g} to {times.max():g} s"
+            )
+        return np.stack([np.interp(times, t, tau[:, k]) for k in range(nt)], axis=-1)
+
+    return torque
+
+
+def _called(function: Callable[[float], Any], nt: int) -> Known:
+    """Return torques of a user's function, checked."""
+
+    def torque(times: np.ndarray) -> np.ndarray:
+        found = np.zeros((times.size, nt))
+        for k, t in enumerate(times.ravel()):
+            value = finite_array(f"torques({t:g})", function(float(t)), IdentificationError)
+            if value.shape != (nt,):
+                raise IdentificationError(f"torques({t:g}) has shape {value.shape}, not ({nt},)")
+            found[k] = value
+        return found.reshape(*times.shape, nt)
+
+    return torque
+
+
+def knots_of(times: np.ndarray, prior: TorquePrior) -> np.ndarray:
+    """Return indices of the mesh's times that are knots, about a quarter of the time apart."""
+    spans = max(int(np.ceil((times[-1] - times[0]) * PER_TIME / prior.time)), 1)
+    even = np.linspace(times[0], times[-1], spans + 1)
+    return np.unique(np.abs(times[:, None] - even).argmin(axis=0))
+
+
+def prior_rows(times: np.ndarray, prior: TorquePrior) -> np.ndarray:
+    """Return W (U, U): W u are independent with variance 1 if u (U,) at knots obeys the prior."""
+    decay = np.exp(-np.diff(times) / prior.time)
+    fresh = np.sqrt(-np.expm1(-2 * np.diff(times) / prior.time))
+    W = np.diag(np.concatenate([[1.0], 1 / fresh]))
+    W[range(1, len(times)), range(len(times) - 1)] = -decay / fresh
+    return W / prior.std

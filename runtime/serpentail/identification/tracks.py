@@ -1,0 +1,175 @@
+"""Marker tracks: where each marker was seen at each time, in the world, nan where it was not."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..checks import finite_array, needed, one_of, real_array, refusal, shown
+from ..errors import IdentificationError
+from ..units import MEASURES, plain
+
+UNITS: dict[str, Fraction] = MEASURES["m"][1]
+ZEROS = ("refuse", "gap")
+FEWEST = 4  # frames
+
+
+@dataclass(frozen=True, eq=False)
+class MarkerTracks:
+    """Seen markers: times (F,) s, increasing; positions (F, M, 3) m, world, nan in gaps; M names.
+
+    Made by ``marker_tracks`` or ``read_markers``, which check them.
+    """
+
+    times: np.ndarray
+    positions: np.ndarray
+    names: tuple[str, ...]
+    source: str = "arrays"
+
+    @property
+    def seen(self) -> np.ndarray:
+        """Whether each marker was seen at each time, (F, M)."""
+        return np.isfinite(self.positions).all(axis=2)
+
+    def of(self, names: Sequence[str]) -> "MarkerTracks":
+        """Return the tracks of these markers in this order; IdentificationError where one lacks."""
+        for name in names:
+            one_of(f"markers of {self.source}", name, self.names, IdentificationError)
+        columns = [self.names.index(name) for name in names]
+        return MarkerTracks(self.times, self.positions[:, columns], tuple(names), self.source)
+
+
+def marker_tracks(
+    times: ArrayLike,
+    positions: ArrayLike,
+    names: Sequence[str],
+    *,
+    unit: str,
+    axes: str = "xyz",
+    zeros: str = "refuse",
+) -> MarkerTracks:
+    """Return checked marker tracks of arrays.
+
+    times (F,): s, increasing, at any rate, even or uneven.  positions (F, M, 3): nan where a marker
+    was not seen.  names: of the M markers.
+    unit: of the positions, such as "mm"; there is no default, since a wrong guess would go unseen.
+    axes: which axes of the data point right, forward and up, which are x, y and z of the world;
+    "zxy" for OpenSim's y up and x forward; a minus turns one, "-xz y" without spaces.
+    zeros: "refuse" markers at exactly (0, 0, 0), which some programs write in gaps, or take them as
+    "gap".  Raises IdentificationError.
+    """
+    return checked_tracks(times, positions, names, (unit, axes, zeros), "arrays")
+
+
+def checked_tracks(
+    times: Any, positions: Any, names: Any, how: tuple[Any, Any, Any], source: str
+) -> MarkerTracks:
+    """Return tracks of arrays, once each is sound; how: unit, axes and zeros; source: for errors."""
+    unit, axes, zeros = how
+    factor = float(UNITS[checked_unit(unit, source)])
+    t = checked_times(times, source)
+    names = checked_names(names, source)
+    where = real_array(f"{source}: positions", positions, IdentificationError)
+    if where.shape != (len(t), len(names), 3):
+        raise IdentificationError(
+            f"{source}: positions have shape {where.shape}: needs ({len(t)}, {len(names)}, 3), "
+            "of times, names and x, y, z"
+        )
+    if np.isinf(where).any():
+        raise IdentificationError(f"{source}: positions: a value is infinite: use nan for a gap")
+    one_of("zeros", zeros, ZEROS, IdentificationError)
+    where = without_zeros(where, names, zeros, source)
+    columns, signs = checked_axes(axes)
+    where = where[..., columns] * signs * factor
+    part = np.isfinite(where)
+    where = np.where(part.all(axis=2, keepdims=True), where, np.nan)
+    unseen = [name for k, name in enumerate(names) if not part[:, k].all(axis=-1).any()]
+    if unseen:
+        raise IdentificationError(f"{source}: never seen: {', '.join(unseen)}: leave these out")
+    return MarkerTracks(t, where, names, source)
+
+
+def checked_unit(unit: Any, source: str) -> str:
+    """Return a unit of length as MEASURES spells it; the error asks for one."""
+    if unit is None:
+        raise IdentificationError(
+            f'{source}: unit: none is stated: give unit="mm", or whichever of '
+            f"{', '.join(UNITS)} it is"
+        )
+    spelled = plain(unit) if isinstance(unit, str) else unit
+    if not isinstance(spelled, str) or spelled not in UNITS:
+        raise refusal(f"{source}: unit", unit, f"one of {', '.join(UNITS)}", IdentificationError)
+    return spelled
+
+
+def checked_times(times: Any, source: str) -> np.ndarray:
+    """Return the times; IdentificationError unless they are finite and increase."""
+    t = finite_array(f"{source}: times", times, IdentificationError)
+    if t.ndim != 1 or len(t) < FEWEST:
+        raise IdentificationError(
+            f"{source}: times have shape {t.shape}: needs {FEWEST} frames or more"
+        )
+    wrong = np.flatnonzero(np.diff(t) <= 0)
+    if len(wrong):
+        k = int(wrong[0])
+        word = "repeated" if t[k + 1] == t[k] else "before the last"
+        raise IdentificationError(
+            f"{source}: times: frame {k + 1} (from 0) has {t[k + 1]:g} s, {word} ({t[k]:g} s): "
+            "needs times that increase; remove frames that are doubled"
+        )
+    return t.copy()
+
+
+def checked_names(names: Any, source: str) -> tuple[str, ...]:
+    """Return names of markers; IdentificationError unless they are texts that differ."""
+    listed = tuple(names) if isinstance(names, list | tuple) else ()
+    if not listed or not all(isinstance(name, str) and name.strip() for name in listed):
+        raise refusal(f"{source}: names", names, "a name of each marker", IdentificationError)
+    twice = [name for name in listed if listed.count(name) > 1]
+    if twice:
+        raise IdentificationError(f"{source}: two markers are called {twice[0]!r}: rename one")
+    return listed
+
+
+def without_zeros(
+    where: np.ndarray, names: Sequence[str], zeros: str, source: str
+) -> np.ndarray:
+    """Return positions with nan in place of exact zeros, or refuse these."""
+    empty = (where == 0).all(axis=2)
+    if not empty.any():
+        return where
+    if zeros == "refuse":
+        k = int(np.flatnonzero(empty.any(axis=0))[0])
+        raise IdentificationError(
+            f"{source}: marker {names[k]!r} is at exactly (0, 0, 0) in {int(empty[:, k].sum())} "
+            'frames, as some programs write gaps: give zeros="gap" to read them as gaps'
+        )
+    return np.where(empty[..., None], np.nan, where)
+
+
+def checked_axes(axes: Any) -> tuple[list[int], np.ndarray]:
+    """Return columns and signs of the data's axes that point right, forward and up."""
+    words = axes if isinstance(axes, str) else ""
+    columns: list[int] = []
+    signs: list[float] = []
+    sign = 1.0
+    for letter in words:
+        if letter == "-" and sign > 0:
+            sign = -1.0
+        elif letter in "xyz":
+            columns.append("xyz".index(letter))
+            signs.append(sign)
+            sign = 1.0
+        else:
+            columns = []
+            break
+    turn = np.zeros((3, 3))
+    if sorted(columns) == [0, 1, 2]:
+        turn[range(3), columns] = signs
+    if np.linalg.det(turn) < 0.5:
+        needs = 'x, y and z in some order that is right-handed, such as "xyz", "zxy" or "-yxz"'
+        raise IdentificationError(needed("axes", shown(axes).strip("'"), needs))
+    return columns, np.array(signs)

@@ -1,0 +1,228 @@
+"""What is estimated besides the motion: parameters of the model and offsets of markers."""
+
+import re
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..checks import did_you_mean, needed, number, refusal
+from ..errors import IdentificationError, UnlikeBodies, UnusualSize
+from ..model.model import Model
+from ..model.parameters import ellipsoid, flat, independent
+from .placement import Placements
+from .points import STEP
+
+MARKER = "marker:"
+SAME = "same"
+NAME = re.compile(r"([A-Za-z_]\w*)(?:\[(\d+|same)\])?")
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """One estimated number: a name, its unit, the parameter or the marker that it is of, which
+    entries of that it sets, its size for relative changes, and the spread of a prior on it.
+    """
+
+    name: str
+    unit: str
+    of: str
+    entries: tuple[int, ...]
+    size: float
+    spread: float | None = None
+
+    @property
+    def is_offset(self) -> bool:
+        """Tell whether it is of a marker."""
+        return self.of.startswith(MARKER)
+
+
+@dataclass(frozen=True, eq=False)
+class Unknowns:
+    """All estimated numbers of a model and its markers, and what they begin with, ``start`` (P,)."""
+
+    model: Model
+    placed: Placements
+    each: tuple[Unknown, ...]
+    start: np.ndarray
+
+    @property
+    def sizes(self) -> np.ndarray:
+        """The size of each, by which changes of different units are compared, (P,)."""
+        return np.array([each.size for each in self.each])
+
+    def model_at(self, values: np.ndarray) -> Model:
+        """Return the model with these parameters; ModelError where they are unphysical."""
+        changes = independent(self.model.manifest, self.model.parameters)
+        own = {each.of for each in self.each if not each.is_offset}
+        new = {name: np.array(changes[name], float) for name in own}
+        for each, value in zip(self.each, values, strict=True):
+            if not each.is_offset:
+                new[each.of] = _with(new[each.of], each.entries, value)
+        if not new:
+            return self.model
+        with warnings.catch_warnings():  # an iterate may be unusual; the result is looked at
+            warnings.simplefilter("ignore", UnusualSize)
+            warnings.simplefilter("ignore", UnlikeBodies)
+            return self.model.with_parameters(**new)
+
+    def placed_at(self, values: np.ndarray) -> Placements:
+        """Return the markers with these offsets."""
+        offset = self.placed.offset.copy()
+        for marker, axis, k in self.offsets():
+            offset[marker, axis] = values[k]
+        return self.placed.moved(offset)
+
+    def offsets(self) -> list[tuple[int, int, int]]:
+        """Return marker, axis and index of each number that is an offset."""
+        return [
+            (self.placed.names.index(each.of[len(MARKER) :]), each.entries[0], k)
+            for k, each in enumerate(self.each)
+            if each.is_offset
+        ]
+
+    def struct_jacobian(self, model: Model) -> np.ndarray:
+        """Return d(parameter struct) / d(unknowns), (scalars, P), at a model's parameters."""
+        jacobian = np.zeros((len(model.parameter_vector), len(self.each)))
+        for k, each in enumerate(self.each):
+            if not each.is_offset:
+                jacobian[:, k] = _struct_direction(model, each)
+        return jacobian
+
+    def geometry_jacobian(self, model: Model, numbers: int) -> np.ndarray:
+        """Return d(mount, angles, lengths) / d(unknowns), (numbers, P)."""
+        jacobian = np.zeros((numbers, len(self.each)))
+        for k, each in enumerate(self.each):
+            rows = _geometry_rows(each.of, numbers - 6)
+            if each.of == "tail_length":
+                jacobian[rows, k] = 1 / len(rows)  # of equal pieces
+            elif rows:
+                jacobian[[rows[entry] for entry in each.entries], k] = 1.0
+        return jacobian
+
+
+def _geometry_rows(of: str, pieces: int) -> list[int]:
+    """Return which numbers of the geometry a parameter's entries are."""
+    lengths = list(range(6, 6 + pieces))
+    known = {"tail_mount": [0, 1, 2], "mount_angles": [3, 4, 5], "tail_length": lengths}
+    return known.get(of, lengths if of in ("link_lengths", "arc_lengths") else [])
+
+
+def _with(values: np.ndarray, entries: tuple[int, ...], value: float) -> Any:
+    """Return a parameter with entries of another value."""
+    if values.ndim == 0:
+        return float(value)
+    values = values.copy()
+    values[list(entries)] = value
+    return values
+
+
+def _struct_direction(model: Model, unknown: Unknown) -> np.ndarray:
+    """Return how the parameter struct moves with a number; link_inertia may follow from it."""
+    values: dict[str, Any] = dict(model.parameters)
+    moved = np.array(values[unknown.of], complex)
+    if moved.ndim:
+        moved[list(unknown.entries)] += 1j * STEP
+    else:
+        moved = moved + 1j * STEP
+    values[unknown.of] = moved
+    if "link_radius" in values:
+        pieces = int(np.sum(model.joints_each))
+        values["link_inertia"] = np.array(ellipsoid(values, pieces))
+    as_tuples = {name: tuple(np.atleast_1d(x)) for name, x in values.items()}
+    return np.array(flat(model.manifest, as_tuples)).imag / STEP
+
+
+def unknowns(model: Model, placed: Placements, estimate: Any) -> Unknowns:
+    """Return what is to be estimated; IdentificationError with each name that is none.
+
+    estimate: names, or name -> spread of a prior about the value to begin with.
+    """
+    if isinstance(estimate, Mapping):
+        wanted = dict(estimate)
+    elif isinstance(estimate, Sequence) and not isinstance(estimate, str):
+        wanted = dict.fromkeys(estimate)
+    else:
+        needs = 'names of parameters and markers, such as ["tail_mass", "marker:head"]'
+        raise refusal("estimate", estimate, needs, IdentificationError)
+    found: list[Unknown] = []
+    start: list[float] = []
+    for name, spread in wanted.items():
+        for each, value in _of_name(model, placed, name, spread):
+            if any(_overlap(each, other) for other in found):
+                raise IdentificationError(f"estimate: {each.name} is named twice")
+            found.append(each)
+            start.append(value)
+    if any(not each.is_offset for each in found) and model.manifest["scene"]["baked"]:
+        raise IdentificationError(
+            f"estimate: the parameters are baked into {model.name}: set `baked = false` in its "
+            "scene and generate it again"
+        )
+    return Unknowns(model, placed, tuple(found), np.array(start, float))
+
+
+def _overlap(a: Unknown, b: Unknown) -> bool:
+    """Tell whether two are of the same entry."""
+    return a.of == b.of and bool(set(a.entries) & set(b.entries))
+
+
+def _of_name(
+    model: Model, placed: Placements, name: Any, spread: Any
+) -> list[tuple[Unknown, float]]:
+    """Return the unknowns that a name stands for, and their values."""
+    if spread is not None:
+        spread = number(f"estimate.{name}", spread, IdentificationError, above=0)
+    if isinstance(name, str) and name.startswith(MARKER):
+        return _of_marker(model, placed, name, spread)
+    fields = independent(model.manifest, model.parameters)
+    match = NAME.fullmatch(name) if isinstance(name, str) else None
+    if match is None or match[1] not in fields:
+        remedy = did_you_mean(match[1] if match else name, fields)
+        remedy = remedy or f"needs marker:NAME, or one of {', '.join(fields)}"
+        raise IdentificationError(f"estimate: value {name!r:.80}: {remedy}")
+    values = np.atleast_1d(np.asarray(fields[match[1]], float))
+    units = {p["name"]: p["unit"] for p in model.manifest["parameters"]}
+    # a part that is zero is as large as the largest
+    sizes = np.where(values != 0, np.abs(values), np.abs(values).max(initial=0.0) or 1.0)
+    groups = _groups(name, match[2], values)
+    return [
+        (Unknown(word, units[match[1]], match[1], entries, float(sizes[entries[0]]), spread),
+         float(values[entries[0]]))
+        for word, entries in groups
+    ]
+
+
+def _groups(
+    name: str, chosen: str | None, values: np.ndarray
+) -> list[tuple[str, tuple[int, ...]]]:
+    """Return names of numbers and the entries of a parameter that each sets."""
+    if chosen == SAME:
+        if len(set(values.tolist())) > 1:
+            needs = "entries that are equal to begin with"
+            raise IdentificationError(needed(f"estimate: {name}", values.tolist(), needs))
+        return [(name, tuple(range(len(values))))]
+    if chosen is not None:
+        if int(chosen) >= len(values):
+            raise IdentificationError(f"estimate: {name}: there are entries 0 to {len(values) - 1}")
+        return [(name, (int(chosen),))]
+    if len(values) == 1:
+        return [(name, (0,))]
+    return [(f"{name}[{k}]", (k,)) for k in range(len(values))]
+
+
+def _of_marker(
+    model: Model, placed: Placements, name: str, spread: float | None
+) -> list[tuple[Unknown, float]]:
+    """Return the three offsets of a marker."""
+    marker = name[len(MARKER) :]
+    if marker not in placed.names:
+        remedy = did_you_mean(marker, placed.names) or f"there are {', '.join(placed.names)}"
+        raise IdentificationError(f"estimate: {name}: no such marker; {remedy}")
+    offset = placed.offset[placed.names.index(marker)]
+    size = float(model.parameters["tail_length"])  # type: ignore[arg-type]
+    return [
+        (Unknown(f"{name}.{axis}", "m", name, (k,), 0.1 * size, spread), float(offset[k]))
+        for k, axis in enumerate("xyz")
+    ]

@@ -1,0 +1,88 @@
+"""Flights with markers, made without the room that they test: SciPy integrates, points are placed
+by SciPy's rotations or lie on the model's own tail points.
+"""
+
+from functools import cache
+
+import numpy as np
+from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
+
+import serpentail as st
+from tests.support.models import model_folder
+
+FUNCTIONS = [
+    *("mass_matrix", "bias_force", "inverse_dynamics", "forward_dynamics", "tail_points"),
+    *("energy", "momentum", "forward_dynamics_derivatives"),
+    "forward_dynamics_parameter_derivatives",
+]
+TORSO = {
+    "nose": (0.0, 0.05, 0.015),
+    "left": (-0.025, -0.02, 0.02),
+    "right": (0.025, -0.02, 0.02),
+    "back": (0.0, 0.0, 0.03),
+}
+
+
+@cache
+def elastic(segments=1, links=3, **options):
+    """Return a model with an elastic tail; links None: a continuum."""
+    parameters = {"tail_stiffness": 2e-3, "tail_damping": 5e-5, "tail_rest": 0.0}
+    return st.load(
+        model_folder(segments, links, functions=FUNCTIONS, parameters=parameters, **options)
+    )
+
+
+def start(model, seed=0):
+    """Return a tumbling state with a bent tail."""
+    rng = np.random.default_rng(seed)
+    q = np.zeros(model.nq)
+    q[2] = 0.5
+    quaternion = np.array([1.0, 0, 0, 0]) + 0.2 * rng.standard_normal(4)
+    q[3:7] = quaternion / np.linalg.norm(quaternion)
+    q[7:] = 0.25 * rng.standard_normal(model.nq - 7)
+    v = np.concatenate(
+        [[0.3, 0.5, 1.5], 3 * rng.standard_normal(3), 4 * rng.standard_normal(model.nq - 7)]
+    )
+    return np.concatenate([q, v])
+
+
+def flown(model, times, x0, torque=None):
+    """Return states (F, nx) of a flight under torques, a function of the time."""
+    nt = model.nq - 7
+    tau = torque or (lambda _t: np.zeros(nt))
+    solution = solve_ivp(
+        lambda t, x: model.x_dot(x, tau(t)),
+        (times[0], times[-1]),
+        x0,
+        method="DOP853",
+        t_eval=times,
+        rtol=1e-10,
+        atol=1e-12,
+        max_step=0.005,
+    )
+    return solution.y.T
+
+
+def seen(model, states):
+    """Return positions (F, M, 3) of the markers: four on the torso, one at each tail point."""
+    q = states[:, : model.nq]
+    turn = Rotation.from_quat(q[:, [4, 5, 6, 3]])
+    torso = [turn.apply(np.array(place)) + q[:, :3] for place in TORSO.values()]
+    return np.concatenate([np.stack(torso, axis=1), model.tail_points(q)[:, 1:]], axis=1)
+
+
+def placed(model):
+    """Return where those markers are."""
+    points = len(model.tail_points(np.eye(1, model.nq, 3)[0])) - 1
+    tail = {f"tail{k}": st.Marker(tail=k / points) for k in range(1, points + 1)}
+    return {name: st.Marker(torso=place) for name, place in TORSO.items()} | tail
+
+
+def tracks(model, times, states, noise=0.0, seed=1, gaps=0.0):
+    """Return tracks of a flight, with noise (m) and a share of gaps."""
+    rng = np.random.default_rng(seed)
+    positions = seen(model, states)
+    positions = positions + noise * rng.standard_normal(positions.shape)
+    positions[rng.random(positions.shape[:2]) < gaps] = np.nan
+    return st.marker_tracks(times, positions, list(placed(model)), unit="m")

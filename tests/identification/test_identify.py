@@ -1,0 +1,174 @@
+"""What ``identify`` finds in generated flights, and how certain it says that it is."""
+
+import numpy as np
+import pytest
+
+import serpentail as st
+from serpentail.identification import torques as room
+from tests.identification.flights import elastic, flown, placed, seen, start, tracks
+
+TIMES = np.linspace(0, 0.2, 41)
+WANTED = ["tail_mass", "tail_length", "tail_stiffness[same]", "tail_damping[same]"]
+
+
+def truth(model):
+    p = model.parameters
+    return np.array(
+        [p["tail_mass"], p["tail_length"], p["tail_stiffness"][0], p["tail_damping"][0]]
+    )
+
+
+def off(model):
+    """The model with parameters that are wrong."""
+    return model.with_parameters(
+        tail_mass=0.0042, tail_length=0.185, tail_stiffness=3e-3, tail_damping=2e-5
+    )
+
+
+@pytest.mark.parametrize(("segments", "links"), [(1, 3), (2, 2), (1, None)])
+def test_exact_tracks_give_the_exact_parameters(segments, links):
+    model = elastic(segments, links)
+    states = flown(model, TIMES, start(model))
+    found = st.identify(off(model), tracks(model, TIMES, states), placed(model), WANTED)
+    assert found.success
+    values = [each.value for each in found.parameters]
+    np.testing.assert_allclose(values, truth(model), rtol=2e-4)
+    np.testing.assert_allclose(found.trajectory.q, states[:, : model.nq], atol=1e-5)
+    assert found.noise < 2e-6
+
+
+def test_covariance_is_the_inverse_of_the_fisher_information():
+    """The reference flies single shots from changed states and parameters, by differences."""
+    model = elastic(1, 3)
+    noise, x0 = 3e-4, start(model)
+    data = tracks(model, TIMES, flown(model, TIMES, x0), noise, gaps=0.1)
+    names = ["tail_mass", "tail_length", "tail_damping[same]", "torso_inertia[0]"]
+    found = st.identify(model, data, placed(model), names, noise=noise)
+    values = np.array([each.value for each in found.parameters])
+    q0 = np.concatenate([found.trajectory.q[0], found.trajectory.v[0]])
+
+    def shot(change):
+        own = values * (1 + change[2 * model.nv :])
+        inertia = np.array(model.parameters["torso_inertia"])
+        inertia[0] = own[3]
+        other = model.with_parameters(
+            tail_mass=own[0], tail_length=own[1], tail_damping=own[2], torso_inertia=inertia
+        )
+        x = q0 + np.concatenate([change[:3], np.zeros(4), change[6 : 2 * model.nv]])
+        w, u = q0[3], q0[4:7]
+        turn = change[3:6] / 2
+        x[3:7] = q0[3:7] + np.concatenate([[-u @ turn], w * turn + np.cross(u, turn)])
+        x[3:7] /= np.linalg.norm(x[3:7])
+        return seen(other, flown(other, TIMES, x))[data.seen].ravel()
+
+    size = 2 * model.nv + len(names)
+    h = 1e-5
+    J = np.stack([(shot(h * e) - shot(-h * e)) / (2 * h) for e in np.eye(size)], axis=1)
+    C = np.linalg.inv(J.T @ J)[2 * model.nv :, 2 * model.nv :] * noise**2
+    C *= np.outer(values, values)
+    std = np.sqrt(np.diag(C))
+    np.testing.assert_allclose(
+        found.covariance / np.outer(std, std), C / np.outer(std, std), atol=2e-3
+    )
+    reach = [(each.high - each.low) / 2 for each in found.parameters]
+    np.testing.assert_allclose(reach, 1.959964 * std, rtol=2e-3)
+
+
+def test_several_trials_share_the_parameters():
+    model = elastic(1, 3)
+    data = [
+        tracks(model, TIMES, flown(model, TIMES, start(model, seed)), 5e-4, seed=seed)
+        for seed in (0, 1)
+    ]
+    alone = [st.identify(model, each, placed(model), WANTED, noise=5e-4) for each in data]
+    both = st.identify(model, data, placed(model), WANTED, noise=5e-4)
+    # information adds up
+    added = sum(np.linalg.inv(each.covariance) for each in alone)
+    scale = np.sqrt(np.diag(added))
+    np.testing.assert_allclose(
+        np.linalg.inv(both.covariance) / np.outer(scale, scale),
+        added / np.outer(scale, scale),
+        atol=0.05,
+    )
+    assert len(both.trials) == 2
+
+
+def test_without_torques_the_scale_of_all_masses_is_undetermined():
+    """Masses, inertias and damping times any factor move alike: H, C and the tail's forces scale."""
+    model = elastic(1, 3)
+    data = tracks(model, TIMES, flown(model, TIMES, start(model)), 3e-4)
+    names = ["torso_mass", "torso_inertia", "tail_mass", "tail_stiffness[same]", "tail_damping[same]"]
+    found = st.identify(model, data, placed(model), names)
+    (combination,) = [each for each in found.undetermined if np.isinf(each.std)]
+    assert set(combination.parts) == {each.name for each in found.parameters}
+    np.testing.assert_allclose(list(combination.parts.values()), 1.0, rtol=0.05)
+    assert all(np.isinf(each.std) for each in found.parameters)
+    assert "not determined" in str(combination) and "tail_mass" in str(combination)
+    # known torques determine it
+    torque = np.array([1e-3, -5e-4])
+    driven = flown(model, TIMES, start(model), lambda _t: torque)
+    found = st.identify(
+        model, tracks(model, TIMES, driven, 3e-4), placed(model), names, torques=torque
+    )
+    assert all(np.isfinite(each.std) for each in found.parameters)
+
+
+def test_a_prior_on_torques_has_the_stated_correlations():
+    prior = st.TorquePrior(std=2e-3, time=0.03)
+    times = np.array([0.0, 0.01, 0.05, 0.06, 0.2])
+    W = room.prior_rows(times, prior)
+    wanted = prior.std**2 * np.exp(-np.abs(times[:, None] - times) / prior.time)
+    np.testing.assert_allclose(np.linalg.inv(W.T @ W), wanted, rtol=1e-12)
+
+
+@pytest.mark.parametrize(("segments", "links"), [(1, 3), (1, None)])
+def test_unknown_torques_are_found_with_parameters(segments, links):
+    model = elastic(segments, links)
+
+    def torque(t):
+        return 2e-3 * np.array([np.sin(40 * t), np.cos(30 * t)])
+
+    states = flown(model, TIMES, start(model), torque)
+    found = st.identify(
+        model.with_parameters(tail_length=0.185),
+        tracks(model, TIMES, states, 2e-4),
+        placed(model),
+        ["tail_length", "marker:tail1"],
+        torques=st.TorquePrior(std=2e-3, time=0.05),
+    )
+    assert found.success
+    bands = found.trials[0].torques
+    wanted = np.array([torque(t) for t in bands.times])
+    inside = (bands.low < wanted) & (wanted < bands.high)
+    assert inside.mean() > 0.8
+    assert found["tail_length"].low < model.parameters["tail_length"] < found["tail_length"].high
+    assert 1.7e-4 < found.noise < 2.3e-4
+    np.testing.assert_allclose(
+        found.trials[0].power, found.trajectory.tau * found.trajectory.v[:, 6:]
+    )
+
+
+def test_a_prior_on_a_parameter_holds_what_the_data_do_not_tell():
+    model = elastic(1, 3)
+    data = tracks(model, TIMES, flown(model, TIMES, start(model)), 3e-4)
+    names = {"torso_mass": 1e-3, "torso_inertia": None, "tail_mass": None}
+    names |= {"tail_stiffness[same]": None, "tail_damping[same]": None}
+    found = st.identify(model, data, placed(model), names)
+    assert found["torso_mass"].std == pytest.approx(1e-3, rel=0.02)
+    assert found["torso_mass"].value == pytest.approx(model.parameters["torso_mass"], rel=1e-3)
+
+
+def test_damping_that_is_not_there_is_at_its_bound():
+    """Noise drives it below zero in half of all cases; then it is 0, up to some upper end."""
+    model = elastic(1, 3)
+    still = model.with_parameters(tail_damping=0.0)
+    states = flown(still, TIMES, start(model))
+    bound = []
+    for seed in range(6):
+        data = tracks(still, TIMES, states, 5e-4, seed=seed)
+        found = st.identify(model, data, placed(model), ["tail_damping[same]"])["tail_damping[same]"]
+        assert found.low <= 0 <= found.high or found.low < 2e-7
+        bound.append(found.at_bound)
+        if found.at_bound:
+            assert found.value == found.low == 0 < found.high
+    assert any(bound) and not all(bound)
