@@ -115,5 +115,5 @@ def test_parameters_made_before_are_of_as_many_runs(sound):
 
 
 def test_a_folder_of_an_older_generator_is_to_be_made_again():
-    with pytest.raises(st.ModelError, match="has no C function tail_hops, an older .*generate"):
+    with pytest.raises(st.ModelError, match=r"has no C function tail_hops, an older .*generate"):
         tail().batch_library.rollouts.function("tail_hops")

@@ -213,8 +213,7 @@ def _outputs(
     for name, array in zip(names, out, strict=True):
         size = arrays[name].shape[-1]
         shape = (size,) if runs is None else (runs, size)
-        sound = isinstance(array, np.ndarray) and array.dtype == dtype and array.shape == shape
-        if not (sound and array.flags.carray):
+        if not (isinstance(array, np.ndarray) and _serves(array, dtype, shape)):
             needs = f"a writeable C array of {dtype} of shape {shape}"
             raise refusal(f"step: out: {name}", array, needs, StateError)
         if array is not arrays[name]:
@@ -223,13 +222,17 @@ def _outputs(
     return moved
 
 
+def _serves(array: np.ndarray, dtype: np.dtype, shape: tuple[int, ...]) -> bool:
+    """Tell whether the C can write to an array of this type and shape."""
+    return array.dtype == dtype and array.shape == shape and array.flags.carray
+
+
 def _statuses(given: object, runs: int) -> np.ndarray:
     """Return where the C writes how runs went: a new array, or the caller's."""
     if given is None:
         return np.zeros(runs, np.intc)
-    integers = isinstance(given, np.ndarray) and given.dtype == np.intc and given.flags.carray
-    if integers and np.shape(given) == (runs,):
-        return np.asarray(given)
+    if isinstance(given, np.ndarray) and _serves(given, np.dtype(np.intc), (runs,)):
+        return given
     needs = f"a writeable C array of {np.dtype(np.intc)} of shape ({runs},)"
     raise refusal("step: statuses", given, needs, StateError)
 
