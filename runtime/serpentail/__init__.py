@@ -44,6 +44,8 @@ _HOME = {
     "view": "viewer.view",
     "live": "watching.live",
     "export": "exporting.export",
+    **dict.fromkeys(["environment", "environments"], "learning.make"),
+    **dict.fromkeys(["jax_functions", "torch_functions"], "differentiable.make"),
     **dict.fromkeys(
         [
             "SerpentailError",

@@ -4,6 +4,7 @@ error, which names the field, the value and what the field needs.
 
 from collections.abc import Callable, Collection
 from difflib import get_close_matches
+from operator import index
 from typing import Any, TypeVar
 
 import numpy as np
@@ -121,6 +122,17 @@ def number(
     if numbers is None or numbers.shape != () or not _within(numbers, bounds):
         raise refusal(field, value, f"a {_words('number', bounds)}", error)
     return float(numbers)
+
+
+def whole_number(field: str, value: object, error: Error, *, least: int, most: int) -> int:
+    """Return a whole number within bounds."""
+    try:
+        number = most + 1 if isinstance(value, bool | np.bool_) else index(value)  # type: ignore
+    except TypeError:
+        number = most + 1
+    if not least <= number <= most:
+        raise refusal(field, value, f"a whole number from {least} to {most}", error)
+    return number
 
 
 def numbers(

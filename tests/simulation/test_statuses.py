@@ -3,7 +3,6 @@
 import re
 
 from serpentail.model import library
-from serpentail.simulation import compiled_run
 from tests.support.models import model_folder
 
 KNOWN = (
@@ -34,6 +33,6 @@ def test_statuses_differ_and_the_runtime_knows_them():
     found = statuses(model, prefix) | (runs := statuses(header.read_text(), prefix))
     assert len(runs) == 8 and len(set(found.values())) == len(found) > 9
     assert {name: int(runs[name]) for name in KNOWN} == {
-        name: getattr(compiled_run, name) for name in KNOWN
+        name: getattr(library, name) for name in KNOWN
     }
     assert int(found["NOT_FINITE"]) == library.NOT_FINITE

@@ -9,8 +9,9 @@ from collections.abc import Callable
 from typing import Any
 from weakref import WeakSet
 
+from ..errors import ModelError
 from .kept import kept
-from .manifest import CheckedFolder
+from .manifest import CheckedFolder, remedy
 from .snapshot import library_in_cache, model_library
 from .workers import after_fork
 
@@ -51,7 +52,12 @@ class LazyLibrary:
             if self.library is None:
                 path = model_library(self.checked, [self.source], self.profile)
                 self.library = ctypes.CDLL(str(path))
-        function = getattr(self.library, name)
+        function = getattr(self.library, name, None)
+        if function is None:
+            raise ModelError(
+                f"{self.checked.folder} has no C function {name}, an older generator made it: "
+                f"{remedy(self.checked.folder)}"
+            )
         function.argtypes = [ctypes.c_void_p]
         return function
 

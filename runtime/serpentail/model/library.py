@@ -8,6 +8,30 @@ from .manifest import CheckedFolder, remedy
 from .snapshot import model_library
 
 NOT_POSITIVE_DEFINITE, NOT_FINITE, OUT_OF_RANGE = 1, 2, 3
+PAUSED, STEP_TOO_SMALL, TOO_MANY_STEPS, STOPPED_AT_EVENT, TORQUE_FAILED = range(32, 37)
+STEP_TOO_LONG, BAD_TIMES = 38, 39
+WHY = {  # a run cannot go on
+    NOT_FINITE: (
+        "the state is not finite any more: is the step too long, or a velocity or torque too large?"
+    ),
+    NOT_POSITIVE_DEFINITE: (
+        "the inertia matrix is not positive definite: is the step too long, or a torque too large?"
+    ),
+    OUT_OF_RANGE: (
+        "a segment is bent beyond the scene's bend_range: is the torque "
+        "too large, or the range too small?"
+    ),
+    STEP_TOO_SMALL: (
+        "the tolerance would need steps that are too short: is the motion stiff, or rtol too small?"
+    ),
+    TOO_MANY_STEPS: "most_steps were not enough: is the motion stiff, or rtol too small?",
+    STEP_TOO_LONG: (
+        "a step turns the torso too far to tell what it touches: is it too long, or omega too "
+        "large?"
+    ),
+    BAD_TIMES: "the samples are too close: in the model's numbers their times do not increase",
+    TORQUE_FAILED: "the compiled torque function did not return 0: what has it refused?",
+}
 
 
 def open_library(checked: CheckedFolder, profile: str) -> ctypes.CDLL:

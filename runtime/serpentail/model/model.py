@@ -15,7 +15,7 @@ from ..extras import needed
 from .batch import BatchLibrary
 from .cache import cache_folder
 from .cores import checked_threads
-from .functions import Functions
+from .functions import Array, Functions
 from .kept import kept
 from .kernel import Kernel
 from .layout import Layout
@@ -35,6 +35,7 @@ from .snapshot import restored, snapshot
 
 if TYPE_CHECKING:
     from .casadi import CasadiFunctions
+    from .stepping.step import Stepping
 
 
 def load(
@@ -245,6 +246,36 @@ class Model(Functions):
             f"{self.name} was generated without {', '.join(map(repr, names))} (it has {has}): add "
             "it to `functions` of the scene, then generate it again"
         )
+
+    def step(
+        self, q: ArrayLike, v: ArrayLike, tau: ArrayLike, h: float, **settings: Any
+    ) -> tuple[Array, ...]:
+        """(q, v) after a step of h (s) under torques tau (2m,) (N m) that stay; or of k runs.
+
+        q (nq,) or (k, nq), v, tau likewise: each run has torques of its own.  In flight by "rk4",
+        with contacts by "implicit_euler", whose state has bristles, too: (q, v, bristles).
+        steps: how many, of h each, 1 by default.  out: arrays that the results are written to,
+        which may be q and v themselves: then nothing is allocated.  parameters: name -> (k,) or
+        (k, 3), or what ``parameters_of_runs`` made of it before.  bristles (2K,), legs (8,), of
+        all or of each: as in ``contact_dynamics``; legs move on at their rates.  method: "rk4" or
+        "implicit_euler".  threads: at most so many; None: the model's, see ``load``.
+        statuses (k,) of ``numpy.intc``: is told how each run went, 0 well, and no run raises.
+
+        Eight flights or more are made in lanes, whose C is compiled at the first such call.
+        Raises StateError (shapes, values), SimulationError (h and other settings; a run that
+        cannot go on: it stays where it came to, the others are stepped), ModelError (the scene
+        left out rollout, or implicit on the ground).
+        """
+        from .stepping.step import step
+
+        return step(self, (q, v, tau), h, settings)
+
+    @kept
+    def stepping(self) -> "Stepping":
+        """What ``step`` keeps between calls."""
+        from .stepping.step import Stepping
+
+        return Stepping(self)
 
     @kept
     def casadi(self) -> "CasadiFunctions":

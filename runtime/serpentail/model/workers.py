@@ -16,7 +16,8 @@ from .cores import threads as allowed
 
 POLL_S = 0.1  # s between looks at signals, such as Ctrl-C
 MIN_STATES_PER_THREAD = 256  # states: the least that is worth a thread
-FIRST_PIECE, LEAST_PIECE = 2048, 64  # states between looks at signals: at first, and at least
+# states between looks at signals, at first, and at least, over those that are worth a thread
+FIRST_PIECE, LEAST_PIECE = 8, 1 / 4
 PIECE_S = 0.05  # s between looks: pieces grow or shrink to that
 
 
@@ -35,24 +36,28 @@ def pool(size: int) -> ThreadPoolExecutor:
 after_fork(pool.cache_clear)
 
 
-def shared(count: int, threads: int | None, run: Callable[[int, int], None]) -> None:
+def shared(
+    count: int,
+    threads: int | None,
+    run: Callable[[int, int], None],
+    least: int = MIN_STATES_PER_THREAD,
+) -> None:
     """Call ``run(first, last)`` for pieces of a batch, in several threads where it is large.
 
-    threads: at most so many, None for as many as this process may use.  Of states that fail the
-    first one raises.  Ctrl-C ends all after the pieces in work.
+    threads: at most so many, None for as many as this process may use.  least: states that are
+    worth a thread.  Of states that fail the first one raises.  Ctrl-C ends all after the pieces in
+    work.
     """
-    if count < 2 * MIN_STATES_PER_THREAD:
+    if count < 2 * least:
         run(0, count)
         return
     most, ended = allowed(threads), threading.Event()
-    shares = min(most, count // MIN_STATES_PER_THREAD)
+    shares = min(most, count // least)
     if shares == 1:
-        _in_pieces(run, 0, count, ended)
+        _in_pieces(run, (0, count), least, ended)
         return
     ends = [count * k // shares for k in range(shares + 1)]
-    waiting = [
-        pool(most).submit(_in_pieces, run, first, last, ended) for first, last in pairwise(ends)
-    ]
+    waiting = [pool(most).submit(_in_pieces, run, part, least, ended) for part in pairwise(ends)]
     try:
         for future in waiting:
             future.result()
@@ -62,16 +67,16 @@ def shared(count: int, threads: int | None, run: Callable[[int, int], None]) -> 
 
 
 def _in_pieces(
-    run: Callable[[int, int], None], first: int, last: int, ended: threading.Event
+    run: Callable[[int, int], None], part: tuple[int, int], least: int, ended: threading.Event
 ) -> None:
     """Call ``run`` for pieces that take a moment each, until ``ended`` is set."""
-    size = FIRST_PIECE
+    first, last, size = *part, FIRST_PIECE * least
     while first < last and not ended.is_set():
         begun, after = time.perf_counter(), min(first + size, last)
         run(first, after)
         first = after
         quick = time.perf_counter() - begun < PIECE_S
-        size = 2 * size if quick else max(size // 2, LEAST_PIECE)
+        size = 2 * size if quick else max(size // 2, int(LEAST_PIECE * least), 1)
 
 
 def in_turn(

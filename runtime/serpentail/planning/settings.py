@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import Refusals, needed, number, one_of, refusal, shown
+from ..checks import Refusals, needed, number, one_of, shown, whole_number
 from ..errors import PlanningError
 from ..model.model import Model
 from ..motion.trajectory import Trajectory
@@ -83,9 +83,7 @@ def check_settings(model: Model, settings: PlanSettings, refused: Refusals) -> N
 
 def _check_whole(name: str, value: Any, least: int, most: int) -> None:
     """PlanningError unless a value is a whole number within bounds."""
-    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
-    if not whole or not least <= value <= most:
-        raise refusal(name, value, f"a whole number from {least} to {most}", PlanningError)
+    whole_number(name, value, PlanningError, least=least, most=most)
 
 
 def _check_positive(name: str, value: Any) -> None:

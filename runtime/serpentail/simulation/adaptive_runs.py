@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 
 from ..model.kernel import address_of, aligned
+from ..model.library import PAUSED
+from ..model.structures import structure
 from .acting import Acting
 from .batched_runs import shared_out
-from .compiled_run import PAUSE, PAUSED, CompiledRun, Memory, called
+from .compiled_run import PAUSE, CompiledRun, Memory, called
 from .methods import IntegrationMethod
 from .outcomes import told_by
-from .records import structure
 
 
 def adaptive_in_lanes(memory: Memory, acting: Acting, method: IntegrationMethod) -> bool:

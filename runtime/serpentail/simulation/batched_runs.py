@@ -11,12 +11,12 @@ from ..model.cores import threads as allowed
 from ..model.kernel import aligned
 from ..model.layout import TAIL_V
 from ..model.model import Model
+from ..model.structures import structure
 from .acting import Acting
 from .actuation import Actuation
 from .compiled_run import PAUSE, Memory, called
 from .methods import IntegrationMethod, step_counts
 from .piecewise import Piecewise, constant
-from .records import structure
 from .start import Start
 
 MAX_SHARED_STEPS = 1_000_000  # steps of one run: beyond, what all runs share fills the memory

@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import SimulationError
 from ..model.kept import kept
 from ..model.kernel import address_of, aligned
-from ..model.library import NOT_FINITE, NOT_POSITIVE_DEFINITE, OUT_OF_RANGE
+from ..model.library import PAUSED, STOPPED_AT_EVENT, WHY
 from ..model.model import Model
 from ..model.parameters import RunParameters
 from .acting import Acting
@@ -22,34 +22,10 @@ from .methods import IntegrationMethod
 from .records import Records
 from .start import Start
 
-PAUSED, STEP_TOO_SMALL, TOO_MANY_STEPS, STOPPED_AT_EVENT, TORQUE_FAILED = range(32, 37)
-STEP_TOO_LONG, BAD_TIMES = 38, 39
 MOST_STEPS = 2**31 - 1  # that the C interface counts
 PAUSE = 100  # steps before the first look at signals, such as Ctrl-C
 PAUSE_S = 0.05  # s between looks: pauses grow to that
 COUNTS = ("steps", "rejected", "evaluations", "factorisations")
-WHY = {
-    NOT_FINITE: (
-        "the state is not finite any more: is the step too long, or a velocity or torque too large?"
-    ),
-    NOT_POSITIVE_DEFINITE: (
-        "the inertia matrix is not positive definite: is the step too long, or a torque too large?"
-    ),
-    OUT_OF_RANGE: (
-        "a segment is bent beyond the scene's bend_range: is the torque "
-        "too large, or the range too small?"
-    ),
-    STEP_TOO_SMALL: (
-        "the tolerance would need steps that are too short: is the motion stiff, or rtol too small?"
-    ),
-    TOO_MANY_STEPS: "most_steps were not enough: is the motion stiff, or rtol too small?",
-    STEP_TOO_LONG: (
-        "a step turns the torso too far to tell what it touches: is it too long, or omega too "
-        "large?"
-    ),
-    BAD_TIMES: "the samples are too close: in the model's numbers their times do not increase",
-    TORQUE_FAILED: "the compiled torque function did not return 0: what has it refused?",
-}
 
 
 @dataclass(frozen=True, eq=False)

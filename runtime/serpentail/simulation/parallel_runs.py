@@ -10,13 +10,14 @@ import numpy as np
 
 from ..errors import SimulationError
 from ..model.cores import threads as allowed
+from ..model.library import PAUSED
 from ..model.workers import in_turn
 from ..motion.derived import made
 from ..stages import Stage
 from .acting import Acting
 from .adaptive_runs import AdaptiveRuns, adaptive_in_lanes
 from .batched_runs import BatchedRuns, shared_steps, worth_batching
-from .compiled_run import PAUSED, CompiledRun, Memory, Outcome, failed
+from .compiled_run import CompiledRun, Memory, Outcome, failed
 from .measured_runs import MeasuredRuns, read_only
 from .methods import SCIPY, IntegrationMethod
 from .outcomes import Outcomes, told_by

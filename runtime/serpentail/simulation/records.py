@@ -1,7 +1,6 @@
 """The structures that the generated C takes, as ctypes has them, with all that they point to."""
 
 import ctypes
-from functools import lru_cache
 from typing import Any, cast
 from weakref import WeakKeyDictionary, ref
 
@@ -10,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from ..model.kernel import address_of
 from ..model.model import Model
+from ..model.structures import REALS, structure
 
 CFunction: Any = type(ctypes.CFUNCTYPE(None)()).__mro__[1]  # of all functions that ctypes makes
 
@@ -18,7 +18,6 @@ _types: WeakKeyDictionary[Model, dict[str, type[ctypes.Structure]]] = WeakKeyDic
 
 
 OF_MEMORY = ctypes.Structure, ctypes.Array
-REALS = {np.dtype(real): real for real in (ctypes.c_float, ctypes.c_double)}
 
 
 class Records:
@@ -77,17 +76,3 @@ class Records:
         if isinstance(value, OF_MEMORY):
             return ctypes.addressof(value)
         return ctypes.cast(value, ctypes.c_void_p) if isinstance(value, CFunction) else value
-
-
-@lru_cache(maxsize=64)
-def structure(name: str, members: tuple, real: type) -> type[ctypes.Structure]:
-    """Return the structure type of members, pairs of name and kind; making one takes 40 us."""
-    kinds: dict[str, type] = {
-        "pointer": ctypes.c_void_p,
-        "int": ctypes.c_int,
-        "long": ctypes.c_long,
-        "size_t": ctypes.c_size_t,
-        "real": real,
-    }
-    fields = [(member, kinds[kind]) for member, kind in members]
-    return type(name, (ctypes.Structure,), {"_fields_": fields})

