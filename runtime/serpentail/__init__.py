@@ -37,6 +37,8 @@ _HOME = {
     "view": "viewer.view",
     "live": "watching.live",
     "export": "exporting.export",
+    **dict.fromkeys(["sweep", "Sweep"], "sweeps.sweep"),
+    **dict.fromkeys(["grid", "random", "latin", "sobol"], "sweeps.axes"),
     **dict.fromkeys(
         [
             "SerpentailError",
@@ -50,6 +52,7 @@ _HOME = {
             "NotWritten",
             "ViewError",
             "ExportError",
+            "SweepError",
             "UnlikeBodies",
             "UnusualSize",
         ],
