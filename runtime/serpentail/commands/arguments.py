@@ -90,7 +90,9 @@ def _add_sweep(verbs: argparse._SubParsersAction) -> None:
     sweep.add_argument("--status", action="store_true", help="tell how far it is, and run nothing")
     sweep.add_argument("--retry-failed", action="store_true", help="run again what failed")
     sweep.add_argument("--export", metavar="FILE", help="write rows to a .parquet, .csv, .nc file")
-    sweep.add_argument("--row", type=int, default=0, metavar="K", help="the point that --view shows")
+    sweep.add_argument(
+        "--row", type=int, default=0, metavar="K", help="the point that --view shows"
+    )
     sweep.add_argument("--view", metavar="PAGE", help="show a point's motion in this .html file")
 
 

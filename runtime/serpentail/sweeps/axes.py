@@ -2,8 +2,8 @@
 
 import json
 import math
-from contextlib import suppress
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import product
 from typing import Any
@@ -99,7 +99,9 @@ def _spread(way: str, low: Any, high: Any, law: str) -> Spread:
         )
     if (lows > highs).any() or (law == "log" and (lows <= 0).any()):
         least = "above 0 and " if law == "log" else ""
-        raise refusal(f"{way}: low", low, f"numbers {least}not above high, {shown(high)}", SweepError)
+        raise refusal(
+            f"{way}: low", low, f"numbers {least}not above high, {shown(high)}", SweepError
+        )
     return Spread(way, lows, highs, law)
 
 
@@ -111,7 +113,7 @@ def plain(field: str, value: Any) -> Any:
         return json.loads(json.dumps(value, allow_nan=False, default=_listed))
     except (TypeError, ValueError) as reason:
         raise SweepError(
-            f"{field}: value {shown(value)}: needs finite numbers, texts, lists or tables ({reason})"
+            f"{field}: value {shown(value)}: needs numbers, texts, lists or tables ({reason})"
         ) from None
 
 
@@ -188,6 +190,8 @@ def axes_of(over: Any, points: Any, seed: Any) -> Axes:
     spreads: dict[str, Spread] = {}
     for names, axis in over.items():
         key = _names(names)
+        if key in grids or key[0] in spreads:
+            raise SweepError(f"over: {key[0]!r} twice: needs one axis a name")
         if isinstance(axis, Grid):
             for value in axis.values:
                 _entries(key, value)
@@ -211,7 +215,9 @@ def _checked(axes: Axes) -> Axes:
     if twice:
         raise SweepError(f"over: {min(twice)!r} twice: needs one axis a name")
     if len(axes) > MOST_POINTS:
-        raise SweepError(f"over: {len(axes)} points: needs at most {MOST_POINTS}: make several sweeps")
+        raise SweepError(
+            f"over: {len(axes)} points: needs at most {MOST_POINTS}: make several sweeps"
+        )
     return axes
 
 
@@ -232,9 +238,9 @@ def _numbers(spreads: Mapping, points: Any, seed: Any) -> tuple[int, int]:
 
 def whole(field: str, value: Any, least: int, most: int) -> int:
     """Return a whole number within bounds; SweepError where it is none."""
-    if isinstance(value, int | np.integer) and not isinstance(value, bool):
-        if least <= value <= most:
-            return int(value)
+    is_whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    if is_whole and least <= value <= most:
+        return int(value)
     raise refusal(field, value, f"a whole number from {least} to {most}", SweepError)
 
 

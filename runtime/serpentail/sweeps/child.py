@@ -53,7 +53,7 @@ def _listen(link: Connection, tasks: queue.SimpleQueue) -> None:
 
 def _as_main(script: str | None) -> None:
     """Have the functions of the program that the driver runs, as multiprocessing does."""
-    if script is None or "__mp_main__" in sys.modules:
+    if script is None or getattr(sys.modules["__main__"], "__file__", None) == script:
         return
     module = types.ModuleType("__mp_main__")
     module.__dict__.update(runpy.run_path(script, run_name="__mp_main__"))

@@ -40,8 +40,13 @@ def place_of(executor: Any) -> Iterator[Place]:
         kind, _, rest = executor.partition(":")
         if kind == "processes":
             asked = rest or None
-            count = checked_threads("executor: processes", int(rest) if rest.isdecimal() else rest,
-                                    SweepError) if asked else threads()
+            count = (
+                checked_threads(
+                    "executor: processes", int(rest) if rest.isdecimal() else rest, SweepError
+                )
+                if asked
+                else threads()
+            )
             with _processes(count) as place:
                 yield place
             return
@@ -86,8 +91,8 @@ def _dask(address: str) -> Iterator[Place]:
         client = distributed.Client(**where, timeout=PATIENCE_S)
     except (OSError, ValueError) as reason:
         raise SweepError(
-            f"executor: no scheduler of Dask at {address!r} ({reason}): start `dask scheduler`, and "
-            "give its address or its file"
+            f"executor: no scheduler of Dask at {address!r} ({reason}): start `dask scheduler`, "
+            "and give its address or its file"
         ) from None
     try:
         pool = client.get_executor(pure=False, retries=RETRIES)

@@ -57,7 +57,9 @@ def entries_of(what: Any, axes: Axes, job: Job, of: Any) -> list[Entry]:
         own, bundle, told = find(point)
         key = hashlib.sha256(f"{told}\n{as_json(of)}\n{as_json(point)}".encode()).hexdigest()[:32]
         if key in found:
-            raise SweepError(f"over: point {number} is there twice, {shown(point)}: needs each once")
+            raise SweepError(
+                f"over: point {number} is there twice, {shown(point)}: needs each once"
+            )
         found[key] = Entry(key, point, own, bundle)
     return list(found.values())
 

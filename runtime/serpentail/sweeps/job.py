@@ -52,8 +52,8 @@ class Job:
             return pickle.dumps(self)
         except Exception as reason:  # whatever a part of it raises
             raise SweepError(
-                f"run, settings: they cannot be sent to another process ({reason}): take a function "
-                "at the top of a module, and settings that can be pickled"
+                f"run, settings: they cannot be sent to another process ({reason}): take a "
+                "function at the top of a module, and settings that can be pickled"
             ) from None
 
     def identity(self) -> str:

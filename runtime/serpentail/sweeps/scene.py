@@ -50,7 +50,9 @@ def axis_of(where: str, value: Any) -> Grid | Spread:
     if isinstance(value, list):
         return grid(value)
     if not isinstance(value, Mapping):
-        raise refusal(where, value, "a list of values, or a table such as {random = [0, 1]}", SweepError)
+        raise refusal(
+            where, value, "a list of values, or a table such as {random = [0, 1]}", SweepError
+        )
     ways = [name for name in value if name != "law"]
     if len(ways) != 1 or any(name not in AXIS for name in value):
         raise refusal(where, dict(value), "one of grid, random, latin and sobol", SweepError)
@@ -60,4 +62,4 @@ def axis_of(where: str, value: Any) -> Grid | Spread:
     bounds = value[way]
     if not isinstance(bounds, list) or len(bounds) != 2:
         raise SweepError(f"{where}.{way}: value {shown(bounds)}: needs two bounds, [low, high]")
-    return WAYS[way](*bounds, law=value.get("law", "uniform"))
+    return WAYS[way](bounds[0], bounds[1], value.get("law", "uniform"))

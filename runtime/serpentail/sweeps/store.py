@@ -92,7 +92,8 @@ class Store:
 
     def rows(self, keys: Iterable[str]) -> dict[str, Row]:
         """Return the rows that there are of some keys."""
-        wanted, found = list(keys), {}
+        wanted = list(keys)
+        found: dict[str, Row] = {}
         for first in range(0, len(wanted), IN_ONE_QUERY):
             part = wanted[first : first + IN_ONE_QUERY]
             marks = ",".join("?" * len(part))

@@ -13,8 +13,8 @@ from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from typing import Any, NamedTuple
 
-from ..model.cores import VARIABLE
 from ..errors import SweepError
+from ..model.cores import VARIABLE
 from .axes import Point
 from .bundles import Bundle
 from .runs import Told

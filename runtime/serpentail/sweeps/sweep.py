@@ -37,7 +37,9 @@ class Status:
 
     def __str__(self) -> str:
         left = self.points - self.done
-        return f"{self.done} of {self.points} points done, {self.failed} of them failed, {left} left"
+        return (
+            f"{self.done} of {self.points} points done, {self.failed} of them failed, {left} left"
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,7 +228,9 @@ def _settings(settings: Any, run: Any) -> dict[str, Any]:
         raise refusal("settings", settings, "a table of arguments by name", SweepError)
     own = dict(settings or {})
     if own and not isinstance(run, str):
-        raise SweepError("settings: a function takes none: give it what it needs by functools.partial")
+        raise SweepError(
+            "settings: a function takes none: give it what it needs by functools.partial"
+        )
     for name in WITHOUT:
         if name in own:
             raise SweepError(f"settings: {name}: the sweep's own to give: leave it out")
@@ -242,7 +246,9 @@ def _outputs(outputs: Any, run: Any) -> tuple[str, ...]:
 
     if run != "simulate":
         if outputs is not None:
-            raise SweepError(f"outputs: value {shown(outputs)}: only simulations choose: leave it out")
+            raise SweepError(
+                f"outputs: value {shown(outputs)}: only simulations choose: leave it out"
+            )
         return ()
     if outputs is None:
         return ENDS

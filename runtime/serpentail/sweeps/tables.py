@@ -2,6 +2,7 @@
 
 import csv
 import math
+from contextlib import suppress
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,17 +27,19 @@ Rows = list[dict[str, Any]]
 
 
 def checked(path: str | PathLike[str]) -> Path:
-    """Return the path of a file of rows; SweepError where its ending is unknown, or it cannot be."""
+    """Return the path of a file of rows; SweepError where it cannot be one."""
     target = Path(path)
     if target.suffix not in ENDINGS:
-        raise SweepError(f"export: value {shown(str(path))}: needs a name that ends in .parquet, .csv or .nc")
+        raise SweepError(
+            f"export: value {shown(str(path))}: needs a name that ends in .parquet, .csv or .nc"
+        )
     for module, extra, ending in (
         ("pyarrow", "parquet", ".parquet"),
         ("pandas", "parquet", ".parquet"),
         ("xarray", "xarray", ".nc"),
     ):
         if ending == target.suffix:
-            _ = needed(module, extra)
+            needed(module, extra)
     try:
         refuse_unwritable(target)
     except OSError as reason:
@@ -99,11 +102,12 @@ def dataset(axes: Axes, count: int, rows: Rows) -> "xarray.Dataset":
         dims, sizes = [*dims, SAMPLE], [*sizes, axes.points]
         for name, numbers in axes.samples().items():
             coordinates |= _entries(name, np.array(numbers))
-    columns = {name: [row.get(name) for row in found] for found in [_placed(count, rows)]
-               for name in dict.fromkeys(key for row in rows for key in flat(row))}
+    placed = _placed(count, rows)
+    filled = dict.fromkeys(name for row in placed for name in row)
+    columns = {name: [row.get(name) for row in placed] for name in filled}
     given = set(axes.names) | {"number"}
     variables = {
-        name: (dims, _array(values).reshape(sizes))
+        name: (dims, _array(name, values).reshape(sizes))
         for name, values in columns.items()
         if not any(name == one or name.startswith(f"{one}_") for one in given)
     }
@@ -140,9 +144,9 @@ def _entries(name: str, numbers: np.ndarray) -> dict[str, Any]:
     return {f"{name}_{k}": (SAMPLE, column) for k, column in enumerate(columns.T)}
 
 
-def _array(values: list[Any]) -> np.ndarray:
+def _array(name: str, values: list[Any]) -> np.ndarray:
     """Return a column as numbers, NaN where there are none, or else as texts."""
-    try:
-        return np.array([math.nan if x is None else float(x) for x in values])
-    except (TypeError, ValueError):
-        return np.array(["" if x is None else str(x) for x in values])
+    with suppress(TypeError, ValueError):
+        if name != "error":
+            return np.array([math.nan if x is None else float(x) for x in values])
+    return np.array(["" if x is None else str(x) for x in values])
