@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from dataclasses import dataclass, field
 from math import ceil
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..errors import SweepError
 from ..stages import Stage
@@ -15,7 +15,7 @@ from .bundles import Bundle, model_of
 from .executors import Place, place_of
 from .job import Job
 from .runs import run_points
-from .store import Row, Store, as_json
+from .store import Row, Store
 from .supervision import Block, Ran, run_block
 
 BLOCK_S = 1.0  # s of work that a block is to have
@@ -27,13 +27,24 @@ LOOK_S = 0.2  # s between looks at blocks
 HERE_S = 3.0  # s of work of flights that is not worth other processes
 
 
+class Task(NamedTuple):
+    """A point that is to be run: the key of its row, and the point as JSON too."""
+
+    key: str
+    text: str
+    point: Point
+
+
+Work = tuple["Group", list[Task], int]  # points of a group, and how often they were sent in vain
+
+
 @dataclass
 class Group:
     """Points of one model that are still to be run; pace: seconds a point, where that is known."""
 
     bundle: Bundle | None
     job: Job
-    left: deque[tuple[str, Point]]
+    left: deque[Task]
     pace: float | None = None
     last: int = 0  # points of the largest block that came back
 
@@ -44,7 +55,7 @@ class Group:
         most = min(GROWTH * self.last, ceil(len(self.left) / workers), MOST_IN_BLOCK)
         return max(1, min(most, round(BLOCK_S / max(self.pace, 1e-9))))
 
-    def take(self, workers: int) -> list[tuple[str, Point]]:
+    def take(self, workers: int) -> list[Task]:
         """Return the points of the next block."""
         return [self.left.popleft() for _ in range(min(self.size(workers), len(self.left)))]
 
@@ -101,19 +112,19 @@ class Driver:
                 return
             model = model_of(group.bundle, group.job)
             while group.left and time.perf_counter() - begun < HERE_S:
-                keyed, clock = group.take(1), time.perf_counter()
-                points = [point for _, point in keyed]
+                tasks, clock = group.take(1), time.perf_counter()
+                points = [task.point for task in tasks]
                 told = [each for part in run_points(group.job, model, points) for each in part]
                 ran = Ran(told, None, time.perf_counter() - clock)
-                self._keep(group, keyed, ran)
+                self._keep(group, tasks, ran)
                 self._tell(stage)
 
     # ---- in others -------------------------------------------------------------------------------
 
     def _elsewhere(self, place: Place, stage: Stage) -> None:
         """Keep all workers at work until no point is left."""
-        waiting: dict[Future, tuple[Group, list[tuple[str, Point]], int]] = {}
-        lost: deque[tuple[Group, list[tuple[str, Point]], int]] = deque()
+        waiting: dict[Future, Work] = {}
+        lost: deque[Work] = deque()
         jobs = {id(group): group.job.pickled() for group in self.groups}
         blocks = self._blocks(place)
         try:
@@ -141,7 +152,7 @@ class Driver:
             for future in waiting:
                 future.cancel()
 
-    def _blocks(self, place: Place) -> Iterator[tuple[Group, list[tuple[str, Point]], int]]:
+    def _blocks(self, place: Place) -> Iterator[Work]:
         """Yield points of the groups in turn."""
         while True:
             left = [group for group in self.groups if group.left]
@@ -151,10 +162,10 @@ class Driver:
                 if group.left:
                     yield group, group.take(place.workers()), 0
 
-    def _block(self, work: tuple, jobs: dict[int, bytes]) -> Block:
+    def _block(self, work: Work, jobs: dict[int, bytes]) -> Block:
         """Return points as they travel."""
-        group, keyed, _ = work
-        points = [point for _, point in keyed]
+        group, tasks, _ = work
+        points = [task.point for task in tasks]
         together = group.job.run == "simulate"
         return Block(jobs[id(group)], self.script, group.bundle, points, self.limit, together)
 
@@ -169,16 +180,16 @@ class Driver:
 
     # ---- rows ------------------------------------------------------------------------------------
 
-    def _keep(self, group: Group, keyed: list[tuple[str, Point]], ran: Ran) -> None:
+    def _keep(self, group: Group, tasks: list[Task], ran: Ran) -> None:
         """Write the rows of a block."""
         if ran.refused is not None:
             raise SweepError(f"run: no process can run it: {ran.refused}")
         rows = [
-            Row(key, as_json(point), told.outcome, told.error, told.seconds)
-            for (key, point), told in zip(keyed, ran.told, strict=True)
+            Row(task.key, task.text, told.outcome, told.error, told.seconds)
+            for task, told in zip(tasks, ran.told, strict=True)
         ]
         self.store.add(rows)
-        group.learn(len(keyed), sum(row.seconds for row in rows))
+        group.learn(len(tasks), sum(row.seconds for row in rows))
         self.done += len(rows)
         self.failed += sum(row.error is not None for row in rows)
         self.spent.points += len(rows)

@@ -19,7 +19,7 @@ from ..scenes.plan_keys import PLAN
 from ..scenes.simulate_keys import SIMULATE
 from .axes import Axes, Point
 from .bundles import Bundle
-from .driver import Group
+from .driver import Group, Task
 from .job import STARTS, Job
 from .store import as_json
 
@@ -32,9 +32,10 @@ NO_SHAPE = "a model is of one shape: give the sweep a scene, or a function witho
 
 @dataclass(frozen=True)
 class Entry:
-    """A point, the key of its row, and which job and model it is of."""
+    """A point, also as JSON, the key of its row, and which job and model it is of."""
 
     key: str
+    text: str
     point: Point
     job: Job
     bundle: Bundle | None
@@ -53,14 +54,16 @@ def entries_of(what: Any, axes: Axes, job: Job, of: Any) -> list[Entry]:
     else:
         find = _of_scene(what, axes, job)
     found: dict[str, Entry] = {}
+    besides = as_json(of)
     for number, point in enumerate(axes):
         own, bundle, told = find(point)
-        key = hashlib.sha256(f"{told}\n{as_json(of)}\n{as_json(point)}".encode()).hexdigest()[:32]
+        text = as_json(point)
+        key = hashlib.sha256(f"{told}\n{besides}\n{text}".encode()).hexdigest()[:32]
         if key in found:
             raise SweepError(
                 f"over: point {number} is there twice, {shown(point)}: needs each once"
             )
-        found[key] = Entry(key, point, own, bundle)
+        found[key] = Entry(key, text, point, own, bundle)
     return list(found.values())
 
 
@@ -72,7 +75,7 @@ def groups_of(entries: list[Entry], done: Mapping[str, bool]) -> list[Group]:
             continue
         name = each.bundle.manifest_hash if each.bundle else ""
         group = groups.setdefault((name, id(each.job)), Group(each.bundle, each.job, deque()))
-        group.left.append((each.key, each.point))
+        group.left.append(Task(each.key, each.text, each.point))
     return list(groups.values())
 
 

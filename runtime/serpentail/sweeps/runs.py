@@ -132,6 +132,7 @@ def _side_by_side(
         }
         if not job.keys:  # a row a run tells that they are many
             both["q0"] = np.broadcast_to(both["q0"], (len(points), model.nq))
+        fixed |= _samples(job, fixed, fixed.get("t_span", (0.0, 1.0)))
         found = simulate(model, both["q0"], both["v0"], parameters=runs, **fixed)
     else:
         start = job.table.get("start")
@@ -147,9 +148,23 @@ def _side_by_side(
             q0 = np.broadcast_to(q0, (len(points), model.nq))
             v0 = np.broadcast_to(v0, (len(points), model.nv))
         first = Scenario(model, q0, v0, scenes[0].duration, scenes[0].controller, scenes[0].legs)
-        found = first.simulate(**scenes[0].settings | job.settings | {"parameters": runs})
+        fixed = scenes[0].settings | job.settings
+        fixed |= _samples(job, fixed, fixed.get("t_span", first.duration))
+        found = first.simulate(**fixed | {"parameters": runs})
     assert isinstance(found, Rollouts)
     return _outcomes(found, job.outputs)
+
+
+def _samples(job: Job, settings: dict[str, Any], t_span: Any) -> dict[str, Any]:
+    """Return the setting by which only ends are sampled, where nothing else is asked for."""
+    ends = np.asarray(t_span, float)
+    if (
+        "output_step" in settings
+        or not set(job.outputs) <= set(ENDS)
+        or ends.shape not in ((), (2,))
+    ):
+        return {}
+    return {"output_step": float(np.ptp(np.append(0.0, ends) if ends.ndim == 0 else ends))}
 
 
 def _outcomes(found: Rollouts, outputs: Sequence[str]) -> list[tuple[str | None, str | None]]:

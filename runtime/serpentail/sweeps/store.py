@@ -127,4 +127,7 @@ class Store:
 
 def as_json(value: Any) -> str:
     """Return plain data as JSON, the same text for the same data."""
-    return json.dumps(value, sort_keys=True, separators=(",", ":"))
+    return _ENCODER.encode(value)
+
+
+_ENCODER = json.JSONEncoder(sort_keys=True, separators=(",", ":"))
