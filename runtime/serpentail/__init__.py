@@ -46,6 +46,8 @@ _HOME = {
     "export": "exporting.export",
     **dict.fromkeys(["environment", "environments"], "learning.make"),
     **dict.fromkeys(["jax_functions", "torch_functions"], "differentiable.make"),
+    **dict.fromkeys(["sweep", "Sweep"], "sweeps.sweep"),
+    **dict.fromkeys(["grid", "random", "latin", "sobol"], "sweeps.axes"),
     **dict.fromkeys(
         [
             "SerpentailError",
@@ -60,6 +62,7 @@ _HOME = {
             "NotWritten",
             "ViewError",
             "ExportError",
+            "SweepError",
             "UnlikeBodies",
             "UnusualSize",
             "DoubtfulMarkers",

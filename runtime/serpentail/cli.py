@@ -17,6 +17,7 @@ INTERRUPTED = 130  # status of a command that Ctrl-C ended: 128 and the signal's
 ROOMS = {  # modules of `commands`, each with a function of the name of each verb
     "scenes": ("examples", "new", "generate", "schema", "completion"),
     "motions": ("simulate", "plan", "view"),
+    "sweeps": ("sweep",),
     "models": ("info", "verify", "export", "cache"),
 }
 

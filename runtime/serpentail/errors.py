@@ -59,6 +59,10 @@ class ExportError(SerpentailError, ValueError):
     """A model that another tool's file cannot hold, or a file that cannot be one."""
 
 
+class SweepError(SerpentailError, ValueError):
+    """A sweep that cannot be posed, or whose workers are gone."""
+
+
 class UnlikeBodies(UserWarning):
     """Torso and tail are so unlike in size that moments cancel in H, which loses digits."""
 

@@ -169,6 +169,7 @@ KEYS: dict[str, tuple[Any, Rule]] = {
     ),  # a motion to plan, and one to simulate: for the runtime, which checks them
     "simulate": ({}, _table("simulate")),
     "phase": ((), TABLES),  # of a motion of several, likewise
+    "sweep": ({}, _table("sweep")),  # of many runs, likewise
     "taper": (None, ANY),
     "body": (None, ANY),  # how large it is
     "base": (Scene.base, _one_of(BASES)),

@@ -1,6 +1,7 @@
 """The arguments of the command line."""
 
 import argparse
+from pathlib import Path
 
 from .. import __version__
 
@@ -71,10 +72,28 @@ def _of_motions(verbs: argparse._SubParsersAction) -> None:
     for verb in (plan, simulate):
         verb.add_argument("--save", help="write the motion to this .npz, .csv or .nc file")
         verb.add_argument("--view", metavar="PAGE", help="show it in a page, this .html file")
+    _add_sweep(verbs)
     view = verbs.add_parser("view", help="show saved motions in a page, over each other")
     view.add_argument("files", nargs="+", help="what --save wrote: .npz files")
     view.add_argument("--folder", help=FOLDER.replace("one that is built", "what is"))
     view.add_argument("--output", help="the page, by default the first file's name with .html")
+
+
+def _add_sweep(verbs: argparse._SubParsersAction) -> None:
+    """Add the verb that makes many runs."""
+    told = "make the runs of a scene's table [sweep]; the same command goes on where it stopped"
+    sweep = verbs.add_parser("sweep", help=told)
+    sweep.add_argument("scene", help="a scene file with a table [sweep], such as study.toml")
+    sweep.add_argument("--store", type=Path, metavar="FILE", help="where rows are kept: a .db file")
+    where = "processes:4, dask (on this machine), dask:tcp://host:8786 or dask:scheduler.json"
+    sweep.add_argument("--executor", metavar="WHERE", help=f"{where}; by default processes")
+    sweep.add_argument("--status", action="store_true", help="tell how far it is, and run nothing")
+    sweep.add_argument("--retry-failed", action="store_true", help="run again what failed")
+    sweep.add_argument("--export", metavar="FILE", help="write rows to a .parquet, .csv, .nc file")
+    sweep.add_argument(
+        "--row", type=int, default=0, metavar="K", help="the point that --view shows"
+    )
+    sweep.add_argument("--view", metavar="PAGE", help="show a point's motion in this .html file")
 
 
 def _add_scene(verb: argparse.ArgumentParser, example: str) -> None:

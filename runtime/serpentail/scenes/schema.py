@@ -1,5 +1,5 @@
-"""The JSON Schema of scene files: the generator's, and what belongs in [simulate], [[phase]] and
-[plan]."""
+"""The JSON Schema of scene files: the generator's, and what belongs in [simulate], [[phase]],
+[plan] and [sweep]."""
 
 import json
 import subprocess
@@ -11,6 +11,7 @@ from .keys import Key
 from .phase_keys import PHASES
 from .plan_keys import PLAN
 from .simulate_keys import SIMULATE
+from .sweep_keys import SWEEP
 
 
 def scene_schema() -> dict[str, Any]:
@@ -19,7 +20,7 @@ def scene_schema() -> dict[str, Any]:
         [*command(), "--schema"], capture_output=True, text=True, check=True
     ).stdout
     schema: dict[str, Any] = json.loads(said)
-    for name, key in (("simulate", SIMULATE), ("phase", PHASES), ("plan", PLAN)):
+    for name, key in (("simulate", SIMULATE), ("phase", PHASES), ("plan", PLAN), ("sweep", SWEEP)):
         schema["properties"][name] |= key_schema(key)
     return schema
 

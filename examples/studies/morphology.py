@@ -1,0 +1,23 @@
+"""What a tail is worth: plans of righting for tails of many shapes, from many tumbles.
+
+Each plan is a row of FOLDER/rows.db; the same command goes on where it was stopped.  --executor
+takes the workers of a cluster: see docs/sweeps.md.
+"""
+
+from examples import front
+
+
+def main(folder, points: int, executor: str | None) -> None:
+    """Do the study."""
+    from examples.studies.morphology_study import study
+
+    study(folder, points, executor)
+
+
+if __name__ == "__main__":
+    parser = front.parser(__doc__, "output/studies/morphology")
+    told = "tails and tumbles, each with three numbers of segments and two objectives"
+    parser.add_argument("--points", type=front.count, default=4096, help=f"{told} (default: 4096)")
+    parser.add_argument("--executor", help="where to run, such as processes:4 or dask:HOST:PORT")
+    given = parser.parse_args()
+    front.run(main, given.folder, given.points, given.executor, after=front.GOES_ON)

@@ -1,0 +1,42 @@
+"""The verb that makes many runs: sweep."""
+
+import argparse
+from typing import Any
+
+from ..errors import SweepError
+from .outcome import Outcome
+
+LATER = ("executor", "retry_failed", "limit")  # of running alone
+
+
+def sweep(arguments: argparse.Namespace) -> Outcome:
+    """Return how far a scene's sweep is, after running what is missing."""
+    from ..sweeps.scene import arguments_of
+    from ..sweeps.sweep import posed
+    from ..sweeps.sweep import sweep as swept
+    from ..sweeps.tables import checked
+
+    if arguments.export is not None:
+        checked(arguments.export)
+    given = arguments_of(arguments.scene)
+    if arguments.store is not None:
+        given["store"] = arguments.store
+    if arguments.status:
+        if not given["store"].exists():
+            raise SweepError(f"store: {given['store']} is not there yet: run it without --status")
+        found = posed(**{name: value for name, value in given.items() if name not in LATER})
+    else:
+        found = swept(**given, executor=arguments.executor, retry_failed=arguments.retry_failed)
+    status = found.status()
+    report: dict[str, Any] = {"points": status.points, "done": status.done}
+    report |= {"failed": status.failed, "store": str(given["store"])}
+    text = f"{status}\nstore: {given['store']}"
+    first = next((row for row in found.rows() if row["error"]), None) if status.failed else None
+    if first is not None:
+        report["first_failure"] = {"number": first["number"], "error": first["error"]}
+        text += f"\nfirst failure, point {first['number']}: {first['error']}"
+    if arguments.export is not None:
+        text += f"\nwritten: {found.save(arguments.export)}"
+    if arguments.view is not None:
+        text += f"\npage of point {arguments.row}: {found.view(arguments.row, arguments.view)}"
+    return Outcome(report, text, status.failed == 0)

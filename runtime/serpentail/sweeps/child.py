@@ -1,0 +1,64 @@
+"""A process that runs points: what hangs or crashes in it is ended with it, and nothing else is."""
+
+import importlib
+import os
+import pickle
+import queue
+import runpy
+import signal
+import sys
+import threading
+import types
+from multiprocessing.connection import Connection
+
+from ..errors import SerpentailError
+from .bundles import model_of
+from .job import Job
+from .runs import run_points
+
+
+def main(descriptor: int) -> None:
+    """Run blocks that come through a socket, until it is closed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the driver's to answer
+    os.dup2(2, 1)  # what functions print is no report of ours
+    link: Connection = Connection(descriptor)
+    tasks: queue.SimpleQueue = queue.SimpleQueue()
+    threading.Thread(target=_listen, args=(link, tasks), daemon=True).start()
+    jobs: dict[bytes, Job] = {}
+    while True:
+        script, data, bundle, points = tasks.get()
+        try:
+            if data not in jobs:
+                jobs.clear()
+                _as_main(script)
+                jobs[data] = pickle.loads(data)
+            model = model_of(bundle, jobs[data])
+        except (SerpentailError, ImportError, AttributeError, OSError) as reason:
+            link.send(("refused", f"{reason}"))
+            continue
+        link.send(("ready", None))
+        for told in run_points(jobs[data], model, points):
+            link.send(("told", told))
+        link.send(("end", None))
+
+
+def _listen(link: Connection, tasks: queue.SimpleQueue) -> None:
+    """Take what comes; end the process when nobody is there any more."""
+    try:
+        while True:
+            tasks.put(link.recv())
+    except (EOFError, OSError):
+        os._exit(1)
+
+
+def _as_main(script: str | None) -> None:
+    """Have the functions of the program that the driver runs, as multiprocessing does."""
+    if script is None or getattr(sys.modules["__main__"], "__file__", None) == script:
+        return
+    module = types.ModuleType("__mp_main__")
+    module.__dict__.update(runpy.run_path(script, run_name="__mp_main__"))
+    sys.modules["__main__"] = sys.modules["__mp_main__"] = module
+
+
+if __name__ == "__main__":
+    importlib.import_module("serpentail.sweeps.child").main(int(sys.argv[1]))

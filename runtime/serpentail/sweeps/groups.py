@@ -1,0 +1,173 @@
+"""The points of a sweep by their models, each with the key of its row."""
+
+import hashlib
+from collections import deque
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from .. import __version__
+from ..building.build import built
+from ..checks import Refusals, did_you_mean, shown
+from ..errors import PlanningError, SimulationError, SweepError
+from ..model.model import Model
+from ..model.parameters import independent
+from ..scenes.file import MADE_OF, read_scene, subtable
+from ..scenes.keys import Key, read
+from ..scenes.overrides import changed
+from ..scenes.plan_keys import PLAN
+from ..scenes.simulate_keys import SIMULATE
+from .axes import Axes, Point
+from .bundles import Bundle
+from .driver import Group, Task
+from .job import STARTS, Job
+from .store import as_json
+
+TABLES: Mapping[str, tuple[Key, type[Exception]]] = {
+    "simulate": (SIMULATE, SimulationError),
+    "plan": (PLAN, PlanningError),
+}
+NO_SHAPE = "a model is of one shape: give the sweep a scene, or a function without a model"
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A point, also as JSON, the key of its row, and which job and model it is of."""
+
+    key: str
+    text: str
+    point: Point
+    job: Job
+    bundle: Bundle | None
+
+
+def entries_of(what: Any, axes: Axes, job: Job, of: Any) -> list[Entry]:
+    """Return all points with their keys, in order; SweepError where two are the same.
+
+    what: a model, a scene's path or example, or None for a function of points alone.  of: what
+    rows depend on besides.
+    """
+    if what is None:
+        find = _without_model(job)
+    elif isinstance(what, Model):
+        find = _of_model(what, axes, job)
+    else:
+        find = _of_scene(what, axes, job)
+    found: dict[str, Entry] = {}
+    besides = as_json(of)
+    for number, point in enumerate(axes):
+        own, bundle, told = find(point)
+        text = as_json(point)
+        key = hashlib.sha256(f"{told}\n{besides}\n{text}".encode()).hexdigest()[:32]
+        if key in found:
+            raise SweepError(
+                f"over: point {number} is there twice, {shown(point)}: needs each once"
+            )
+        found[key] = Entry(key, text, point, own, bundle)
+    return list(found.values())
+
+
+def groups_of(entries: list[Entry], done: Mapping[str, bool]) -> list[Group]:
+    """Return what is still to be run, by model."""
+    groups: dict[tuple[str, int], Group] = {}
+    for each in entries:
+        if each.key in done:
+            continue
+        name = each.bundle.manifest_hash if each.bundle else ""
+        group = groups.setdefault((name, id(each.job)), Group(each.bundle, each.job, deque()))
+        group.left.append(Task(each.key, each.text, each.point))
+    return list(groups.values())
+
+
+Find = Callable[[Point], tuple[Job, Bundle | None, str]]  # job, model, and what the key is of
+
+
+def _without_model(job: Job) -> Find:
+    """Points of a function that takes nothing else."""
+    if isinstance(job.run, str):
+        raise SweepError(f"model: None: run = {job.run!r} needs a model or a scene")
+    told = f"{__version__}\n{job.identity()}"
+    return lambda point: (job, None, told)
+
+
+def _of_model(model: Model, axes: Axes, job: Job) -> Find:
+    """Points that change parameters, the start or settings of one model."""
+    known = {entry["name"] for entry in model.manifest["parameters"]}
+    others = frozenset(name for name in axes.names if name not in known)
+    for name in others:
+        if name in MADE_OF:
+            raise SweepError(f"over: {name}: {NO_SHAPE}")
+    if isinstance(job.run, str):
+        missing = [name for name in STARTS if name not in {*job.settings, *others}]
+        if missing:
+            raise SweepError(
+                f"settings: no {' and no '.join(missing)}: needs where a motion starts, here or in "
+                "over"
+            )
+    baked = model.manifest["scene"]["baked"]
+    parameters = {} if baked else independent(model.manifest, model.parameters)
+    own = replace(job, keys=others, parameters=parameters, profile=model.profile)
+    bundle = Bundle.of(model.checked)
+    told = f"{__version__}\n{bundle.manifest_hash}\n{own.identity()}"
+    return lambda point: (own, bundle, told)
+
+
+def _of_scene(scene: Any, axes: Axes, job: Job) -> Find:
+    """Points that change parameters, what the model is made of, or keys of the scene's table."""
+    tables, path = read_scene(scene, SweepError)
+    first = next(iter(axes))
+    shape = [name for name in axes.names if name in MADE_OF]
+    keys: list[str] = []
+    if isinstance(job.run, str):
+        key, error = TABLES[job.run]
+        job = replace(job, table=subtable(tables, job.run, path, error))
+        keys = [name for name in axes.names if name.split(".")[0] in key.keys]
+        _refuse_keys(job, {name: first[name] for name in keys})
+
+    # which of the others are parameters, and which of these there is other code for
+    others = [name for name in axes.names if name not in {*keys, *shape}]
+    made = tables | {name: first[name] for name in shape}
+    checked, left = built(made, path.stem, {name: first[name] for name in others})
+    known = {entry["name"] for entry in checked.manifest["parameters"]}
+    if isinstance(job.run, str):
+        _refuse_unknown([name for name in others if name not in known], job.run, known)
+    else:
+        keys = [name for name in others if name not in known]
+    making = [name for name in others if name not in keys and name not in (left or {})]
+
+    own = replace(
+        job,
+        phases=tables.get("phase", []) if job.run == "simulate" else (),
+        parent=str(path.parent.absolute()),
+        keys=frozenset(keys),
+        built=frozenset((*shape, *making)),
+    )
+    models: dict[str, tuple[Job, Bundle, str]] = {}
+
+    def find(point: Point) -> tuple[Job, Bundle, str]:
+        name = as_json([point[each] for each in (*shape, *making)])
+        if name not in models:
+            made = tables | {each: point[each] for each in shape}
+            checked, _ = built(made, path.stem, {each: point[each] for each in making})
+            bundle = Bundle.of(checked)
+            told = f"{__version__}\n{bundle.manifest_hash}\n{own.identity()}"
+            models[name] = own, bundle, told
+        return models[name]
+
+    return find
+
+
+def _refuse_keys(job: Job, values: Mapping[str, Any]) -> None:
+    """SweepError where a key of the table is unknown, before a model is built."""
+    assert isinstance(job.run, str) and job.table is not None
+    refused = Refusals(SweepError)
+    read(changed(job.table, values), TABLES[job.run][0], job.run, refused)
+    refused.tell()
+
+
+def _refuse_unknown(names: list[str], run: str, known: Collection[str]) -> None:
+    """SweepError where there is a name that is neither a parameter nor a key of the table."""
+    for name in names:
+        near = did_you_mean(name.split(".")[0], [*known, *MADE_OF, *TABLES[run][0].keys])
+        remedy = near or f"the parameters are {', '.join(sorted(known))}"
+        raise SweepError(f"over: {shown(name)}: no parameter and no key of [{run}]; {remedy}")

@@ -1,0 +1,62 @@
+"""Functions that sweeps run in tests, and a program that makes a sweep and can be killed."""
+
+import ctypes
+import os
+import signal
+import sys
+import time
+from functools import partial
+from pathlib import Path
+
+import serpentail as st
+
+POINTS, HANGS, CRASHES, RAISES = 60, (5, 33), (9, 40), (12,)
+
+
+def square(point):
+    """A closed form."""
+    return {"square": point["x"] ** 2}
+
+
+def troubled(pause, log, point):
+    """Return twice a number; some numbers hang, crash or raise."""
+    number = point["number_of"]
+    with Path(log).open("a") as stream:
+        stream.write(f"{number}\n")
+    if number in HANGS:
+        time.sleep(1000)
+    if number == CRASHES[0]:
+        ctypes.string_at(0)
+    if number in CRASHES:
+        os._exit(3)
+    if number in RAISES:
+        raise ValueError("no such number")
+    time.sleep(pause)
+    return {"twice": 2 * number}
+
+
+def fly(model, point):
+    """A motion, and the model's mass, which the point changes."""
+    q = [0, 0, 0.3, 1, 0, 0, 0, *[0] * (model.nq - 7)]
+    motion = st.simulate(model, q, [0] * model.nv, t_span=point["span"])
+    return {
+        "fallen": motion.q[0, 2] - motion.q[-1, 2],
+        "mass": model.parameters["tail_mass"],
+        "motion": motion,
+    }
+
+
+def main(folder, executor, pause):
+    """Make the troubled sweep, and print how far it is."""
+    run = partial(troubled, pause, str(folder / "log"))
+    over = {"number_of": st.grid(range(POINTS))}
+    found = st.sweep(None, over, run, store=folder / "s.db", limit=1.0, executor=executor)
+    print(found.status())
+
+
+if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        main(Path(sys.argv[1]), sys.argv[2], float(sys.argv[3]))
+    except st.SerpentailError as error:
+        sys.exit(str(error))

@@ -1,0 +1,131 @@
+"""Sweeps of scenes, from Python and from the command line, and their files."""
+
+import csv
+import json
+import re
+import tomllib
+
+import numpy as np
+import pandas
+import pytest
+import xarray
+from jsonschema import Draft7Validator
+
+import serpentail as st
+from serpentail import cli
+
+SCENE = """
+kind = "articulated"
+segments = 1
+links = 2
+
+[simulate]
+duration = 0.1
+start = { height = 0.34, velocity = [0, 0, 2], rate = [10, 0, 0] }
+controller = { kind = "damping", damping = 1e-3 }
+
+[sweep]
+outputs = ["tilt_end_deg", "q_end"]
+points = 4
+seed = 2
+
+[sweep.over]
+"start.pitch" = { latin = ["-30 deg", "30 deg"] }
+tail_mass = { grid = ["3 g", 0.005] }
+"""
+
+
+@pytest.fixture
+def study(tmp_path):
+    path = tmp_path / "study.toml"
+    path.write_text(SCENE)
+    return path
+
+
+def told(capsys, *arguments):
+    status = cli.main(["sweep", *map(str, arguments), "--json", "-"])
+    out, err = capsys.readouterr()
+    return status, json.loads(out) if out else None, err
+
+
+def test_the_command_makes_the_rows_of_a_scene_and_goes_on(study, capsys):
+    status, _, err = told(capsys, study, "--status")
+    assert status == 2 and "is not there yet" in err
+    wanted = {"points": 8, "done": 8, "failed": 0, "store": str(study.with_suffix(".db"))}
+    assert told(capsys, study) == (0, wanted, "")
+    rows, page = study.with_name("rows.csv"), study.with_name("page.html")
+    extra = ("--export", rows, "--row", 5, "--view", page)
+    assert told(capsys, study, "--status", *extra)[:2] == (0, wanted)
+    assert page.read_text(encoding="utf-8").startswith("<!")
+    found = list(csv.DictReader(rows.read_text().splitlines()))
+    assert [float(row["tail_mass"]) for row in found] == [0.003] * 4 + [0.005] * 4
+    for row in found[::3]:
+        changes = {"tail_mass": float(row["tail_mass"]), "start.pitch": float(row["start.pitch"])}
+        scene = st.scenario(study, changes=changes)
+        motion = scene.simulate()
+        assert float(row["tilt_end_deg"]) == pytest.approx(scene.summary(motion)["tilt_end_deg"])
+        assert float(row["q_end_2"]) == pytest.approx(motion.q[-1, 2], abs=1e-9)
+    assert cli.main(["sweep", str(study), "--status"]) == 0
+    assert capsys.readouterr().out.startswith("8 of 8 points done")
+
+
+def test_rows_are_saved_for_other_tools(study):
+    axes = {"start.pitch": st.latin(-0.5, 0.5), "tail_mass": st.grid([0.003, -1])}
+    found = st.sweep(study, axes, points=3, seed=1, outputs=["end_s", "q_end"])
+    folder, rows = study.parent, found.rows()
+    table = pandas.read_parquet(found.save(folder / "rows.parquet"))
+    assert table["tail_mass"].tolist() == [row["tail_mass"] for row in rows]
+    np.testing.assert_array_equal(table["q_end_2"][:3], [row["q_end"][2] for row in rows[:3]])
+    assert table["error"].isna().tolist() == [True] * 3 + [False] * 3
+    found.save(folder / "rows.nc")
+    with xarray.open_dataset(folder / "rows.nc") as data:
+        assert dict(data.sizes) == {"tail_mass": 2, "sample": 3}
+        np.testing.assert_array_equal(data["start.pitch"], [row["start.pitch"] for row in rows[:3]])
+        np.testing.assert_array_equal(data["end_s"].sel(tail_mass=0.003), [0.1] * 3)
+        assert np.isnan(data["end_s"].sel(tail_mass=-1)).all()
+    with pytest.raises(st.SweepError, match=r"ends in \.parquet"):
+        found.save(folder / "rows.xlsx")
+
+
+def test_shapes_and_parameters_of_links_make_models_of_their_own(study):
+    axes = {("segments", "links"): st.grid([(1, 2), (2, 1)]), "start.height": st.grid([0.1, 0.2])}
+    found = st.sweep(study, axes, outputs=["q_end"])
+    assert [len(row["q_end"]) for row in found.rows()] == [9, 9, 11, 11]
+    first = found[0]["q_end"][2]
+    assert found[1]["q_end"][2] == pytest.approx(first + 0.1, abs=1e-6)
+    axes = {"tail_damping": st.grid([1e-5, 1e-3])}  # there is other code for these
+    rows = st.sweep(study, axes).rows()
+    assert [row["error"] for row in rows] == [None, None]
+    assert rows[0]["q_end"] != rows[1]["q_end"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("points = 4", "", "points: no value"),
+        ("points = 4", "points = 0", "points: value 0"),
+        ("points = 4", "pionts = 4", "did you mean 'points'"),
+        ("seed = 2", 'run = "fly"', "sweep.run: value 'fly'"),
+        ("latin = [", "latin = [1, ", "needs two bounds"),
+        ("latin", "normal", "needs one of grid, random"),
+        ('"start.pitch"', '"start.pich"', "did you mean 'pitch'"),
+        ("tail_mass", "tail_mas", "did you mean 'tail_mass'"),
+        ('{ grid = ["3 g", 0.005] }', "3", "needs a list of values"),
+        ('outputs = ["tilt_end_deg", "q_end"]', 'outputs = ["tilt"]', "outputs: value 'tilt'"),
+    ],
+)
+def test_slips_in_a_scene_are_told(study, capsys, old, new, words):
+    assert old in SCENE
+    study.write_text(SCENE.replace(old, new))
+    status, out, err = told(capsys, study)
+    assert status == 2 and out is None
+    assert re.search(words, err), err
+
+
+def test_the_schema_knows_sweeps(study, capsys):
+
+    assert cli.main(["schema"]) == 0
+    valid = Draft7Validator(json.loads(capsys.readouterr().out)).is_valid
+    assert valid(tomllib.loads(SCENE))
+    assert not valid(tomllib.loads(SCENE.replace("points = 4", "points = 0")))
+    assert not valid(tomllib.loads(SCENE.replace("points = 4", "pionts = 4")))

@@ -1,0 +1,161 @@
+"""Rows of sweeps are what the runs themselves return, however and wherever they are made."""
+
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from multiprocessing import get_context
+
+import numpy as np
+import pytest
+
+import serpentail as st
+from serpentail.sweeps.sweep import Status
+from tests.support import swept
+
+Q0 = [0, 0, 0.34, 1, 0, 0, 0, 0.2, 0]
+LOW, HIGH = [0, 0, 1, -9, -9, -9, 0, 0], [0, 0, 2, 9, 9, 9, 0, 0]
+SETTINGS = {"q0": Q0, "t_span": 0.05, "controller": st.Damping(1e-3)}
+
+
+def over(count=3):
+    return {"tail_mass": st.grid([0.003, 0.005]), "v0": st.sobol(LOW, HIGH)}, count
+
+
+def flights(model, count, **settings):
+    axes, points = over(count)
+    return st.sweep(model, axes, points=points, settings=SETTINGS, **settings)
+
+
+def close(row, motion):
+    assert row["error"] is None and row["end_s"] == motion.t[-1]
+    for name, array in (("q_end", motion.q), ("v_end", motion.v)):
+        np.testing.assert_allclose(row[name], array[-1], rtol=0, atol=1e-9)
+    energies = row["kinetic_end_J"] + row["potential_end_J"]
+    assert energies == pytest.approx(motion.energy[-1], abs=1e-12)
+
+
+def test_rows_are_those_of_single_runs(model):
+    found = flights(model, 8)
+    assert len(found) == 16 and found.spent.points == 16
+    for k in (0, 7, 15):
+        row = found[k]
+        own = model.with_parameters(tail_mass=row["tail_mass"])
+        close(row, st.simulate(own, Q0, row["v0"], t_span=0.05, controller=st.Damping(1e-3)))
+        np.testing.assert_array_equal(found.motion(k).v[0], row["v0"])
+    assert [row["tail_mass"] for row in found.rows()] == [0.003] * 8 + [0.005] * 8
+    assert {row["number"] for row in found.rows()} == set(range(16))
+
+
+@pytest.mark.parametrize("kind", ["processes", "threads", "pool"])
+def test_all_executors_make_the_same_rows(model, kind):
+    wanted = flights(model, 2).rows()
+    if kind == "processes":
+        found = flights(model, 2, executor="processes:2")
+    elif kind == "threads":
+        with ThreadPoolExecutor(2) as executor:
+            found = flights(model, 2, executor=executor)
+    else:
+        with ProcessPoolExecutor(1, get_context("spawn")) as executor:
+            found = flights(model, 2, executor=executor)
+    for row, other in zip(found.rows(), wanted, strict=True):
+        np.testing.assert_allclose(row["q_end"], other["q_end"], rtol=0, atol=1e-9)
+
+
+def test_a_second_call_runs_what_is_missing_only(model, tmp_path):
+    store = tmp_path / "rows.db"
+    first = flights(model, 2, store=store)
+    again = flights(model, 2, store=store)
+    assert again.spent.points == 0 and again.rows() == first.rows()
+    more = flights(model, 4, store=store)  # Sobol's first points stay
+    assert more.spent.points == 4 and more.status() == Status(8, 8, 0)
+    other = st.sweep(
+        model.with_parameters(torso_mass=0.2), over()[0], points=2, settings=SETTINGS, store=store
+    )
+    assert other.spent.points == 4  # the model is another
+
+
+def test_failures_are_rows_and_can_be_run_again(model, tmp_path):
+    axes = {"tail_mass": st.grid([0.003, -1.0]), "v0": st.random(LOW, HIGH)}
+    given = {"points": 4, "settings": SETTINGS, "store": tmp_path / "rows.db"}
+    found = st.sweep(model, axes, **given)
+    assert found.status() == Status(8, 8, 4)
+    assert str(found.status()) == "8 of 8 points done, 4 of them failed, 0 left"
+    assert "tail_mass: value -1" in found[5]["error"] and "q_end" not in found[5]
+    close(found[1], found.motion(1))
+    assert st.sweep(model, axes, **given).spent.points == 0
+    assert st.sweep(model, axes, **given, retry_failed=True).spent.points == 4
+
+
+def test_functions_are_run_with_and_without_a_model(model, tmp_path):
+    found = st.sweep(None, {"x": st.grid([3, 4])}, swept.square, executor="processes:1")
+    assert [row["square"] for row in found.rows()] == [9, 16]
+    axes = {"tail_mass": st.grid([0.002]), "span": st.grid([0.1, 0.2])}
+    found = st.sweep(model, axes, swept.fly, executor="processes:1")
+    for row in found.rows():
+        assert row["mass"] == 0.002 and "motion" not in row
+        # the centre of mass falls so, and the torso, whose tail is light, nearly so
+        assert row["fallen"] == pytest.approx(9.81 * row["span"] ** 2 / 2, rel=0.1)
+    page = found.view(1, tmp_path / "page.html")
+    assert page.read_text(encoding="utf-8").startswith("<!")
+    with pytest.raises(st.SweepError, match="returned no motion"):
+        st.sweep(None, {"x": st.grid([3])}, swept.square, executor="processes:1").motion(0)
+
+
+def test_what_function_rows_depend_on_is_part_of_their_keys(tmp_path):
+    given = {"store": tmp_path / "s.db", "executor": "processes:1"}
+    axes = {"x": st.grid([1])}
+    assert st.sweep(None, axes, swept.square, of="1", **given).spent.points == 1
+    assert st.sweep(None, axes, swept.square, of="1", **given).spent.points == 0
+    assert st.sweep(None, axes, swept.square, of="2", **given).spent.points == 1
+
+
+def test_plans_are_rows(model):
+    axes = {"duration": st.grid([0.4, 0.5])}
+    settings = {"q0": Q0, "v0": [0, 0, 1, 2, 0, 0, 0, 0], "goal": st.Goal(torso_rate=None)}
+    settings["intervals"] = 8
+    found = st.sweep(model, axes, "plan", settings=settings | {"track": False, "tolerance": None})
+    assert [row["duration_s"] for row in found.rows()] == [0.4, 0.5]
+    assert all(row["error"] is None and "success" in row for row in found.rows())
+
+
+def test_no_process_is_left(model):
+    flights(model, 2, executor="processes:2")
+    from serpentail.sweeps import supervision
+
+    assert not supervision._all and not supervision._idle
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"run": "fly"}, "run: value 'fly'"),
+        ({"run": lambda point: {}, "settings": None}, "run: value .*needs .simulate"),
+        ({"settings": {"q0": Q0}}, "settings: no v0: needs where a motion starts"),
+        ({"settings": {"watch": print}}, "settings: watch"),
+        ({"settings": 3}, "settings: value 3"),
+        ({"outputs": ["height"]}, "outputs: value 'height'"),
+        ({"outputs": "end_s"}, "outputs: value 'end_s': needs a list"),
+        ({"limit": 0}, "limit: value 0"),
+        ({"executor": "slurm"}, "executor: value 'slurm': needs None"),
+        ({"executor": "processes:0"}, "executor: processes: value 0"),
+        ({"over": {"segments": st.grid([1, 2])}}, "over: segments: a model is of one shape"),
+        ({"over": {"tail_mass": st.grid([0.003, 0.003])}}, "point 1 is there twice"),
+        ({"model": None}, "model: None"),
+        ({"model": "no_such_scene"}, "no_such_scene"),
+        ({"of": {1, 2}}, "of: value"),
+        ({"run": swept.square, "settings": {"rtol": 1}}, "settings: a function takes none"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_one_line(model, changes, words):
+    given = {"model": model, "over": {"tail_mass": st.grid([0.003])}, "run": "simulate"}
+    given |= {"settings": SETTINGS | {"v0": LOW}} | changes
+    with pytest.raises(st.SweepError, match=words) as caught:
+        st.sweep(**given)
+    assert "\n" not in str(caught.value)
+
+
+def test_progress_tells_how_many_are_left():
+    told = []
+    with st.progress(told.append):
+        st.sweep(None, {"x": st.grid(range(40))}, swept.square, executor="processes:1")
+    told = [each for each in told if each.stage == "sweep"]
+    assert told[-1].ended and any("of 40" in each.what for each in told)
+    assert any(each.left is not None for each in told[:-1])
