@@ -12,7 +12,7 @@ from serpentail_codegen.functions.plain import FUNCTIONS
 from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.scene.shape import Shape
 from tests.functions.test_columns import arguments, outputs
-from tests.references.body_set import MP, exact, moved
+from tests.references.body_set import MP, Arc, exact, moved
 from tests.references.metrics import block_error, force_error, mass_matrix_error
 from tests.support.own_tails import TAILS, animal, folder, folder_of_tables, states
 
@@ -76,10 +76,12 @@ def with_number(bodies, name, k, shift):
     field = {"es": "mass", "hs": "length", "rs": "center", "as": "inertia"}[name[-2:]]
     segments = [list(s) if isinstance(s, list) else s for s in bodies.segments]
     if name.startswith("arc_"):
-        segments[k] = replace(segments[k], **{field: MP.mpf(getattr(segments[k], field)) + shift})
+        i = [i for i, s in enumerate(segments) if isinstance(s, Arc)][k]
+        segments[i] = replace(segments[i], **{field: MP.mpf(getattr(segments[i], field)) + shift})
         return replace(bodies, segments=tuple(segments))
     size = 3 if field == "inertia" else 1
-    place = [(i, j) for i, s in enumerate(segments) for j in range(len(s))][k // size]
+    links = [(i, s) for i, s in enumerate(segments) if isinstance(s, list)]
+    place = [(i, j) for i, s in links for j in range(len(s))][k // size]
     link = segments[place[0]][place[1]]
     value = getattr(link, field)
     if size == 3:

@@ -44,9 +44,8 @@ def test_scene_for_make_model():
     )
     assert (scene.name, scene.segments, scene.links) == ("articulated_m3_n4", 3, 4)
     assert (scene.baked, scene.functions, scene.parameters["gravity"]) == (True, ("energy",), 0.0)
-    with pytest.raises(
-        SceneError, match=r"^kind: value 'Elastic-2': needs \"articulated\" or \"continuum\"$"
-    ):
+    words = r"needs \"articulated\" or \"continuum\" or \"mixed\"$"
+    with pytest.raises(SceneError, match=rf"^kind: value 'Elastic-2': {words}"):
         scene_for("Elastic-2", 3, 4)
 
 

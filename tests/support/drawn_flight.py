@@ -29,6 +29,8 @@ class Drawn:
     links: int = 4
     name: str = "drawn"
     kind: str = "articulated"
+    fixed: bool = False
+    samples: int | None = None
     kernels: dict = field(default_factory=dict)
 
     def __post_init__(self):

@@ -42,9 +42,18 @@ LINK_BODIES = (
     [Link(1e-4, 0.01, 0.005, (2e-9, 1e-9, 2e-9))] * 2,
 )
 ARC_BODIES = (Arc(1.5e-3, 0.06, 3), Arc(1.1e-3, 0.09, 3))
+# links and arcs in turn, so that the numbers of each kind are no numbers of segments
+BOTH = [
+    {"kind": "continuum", **ARCS[0]},
+    {"kind": "articulated", **LINKS[1]},
+    {"kind": "continuum", **ARCS[1]},
+    {"kind": "articulated", **LINKS[0]},
+]
+BOTH_BODIES = (ARC_BODIES[0], LINK_BODIES[1], ARC_BODIES[1], LINK_BODIES[0])
 TAILS: dict[str, tuple[dict[str, Any], tuple]] = {
     "links": ({"kind": "articulated", "segments": LINKS}, LINK_BODIES),
     "arcs": ({"kind": "continuum", "segments": ARCS, "samples": 3}, ARC_BODIES),
+    "both": ({"kind": "mixed", "segments": BOTH, "samples": 3}, BOTH_BODIES),
 }
 
 

@@ -103,13 +103,13 @@ def place_tail(draft: Draft, torso: Torso, samples: Segments, points: Points) ->
     it.
     """
     # fixed samples of an arc, not its one lowest point (Eqs. 38, 39), which jumps from end to end
-    steps, S = mechanism(draft), points.columns
+    S = points.columns
     pose = torso_pose(draft, torso.R, name="point")
     twist = draft.store(contact.torso_twist, torso, turn=3, slide=3)
     added = {f"{name}_": ref for name, ref in twist.named.items()}
     for i, g in each_point(draft):
-        draft.step(steps.twist, pose, samples.at(i, g), S=S[g])
-        draft.step(steps.pose, pose, samples.at(i, g), **pose)
+        draft.step(mechanism(draft).twist, pose, samples.at(i, g), S=S[g])
+        draft.step(mechanism(draft).pose, pose, samples.at(i, g), **pose)
         draft.step(contact.carried_twist, {"S": S[g]}, samples.motion(i), **added)
         motion = points.motion(g + points.first["tail"])
         draft.step(contact.point_on_tail, pose, twist, **motion)

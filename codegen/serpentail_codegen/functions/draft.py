@@ -10,6 +10,7 @@ from ..ir.step import Step, specialised
 from ..ir.tape import Number
 from ..mechanics.lower import declared_shapes, derive
 from ..scene.parameters import Parameter
+from ..scene.shape import Stretch
 from .scope import Instead, Scope, Vectors
 from .tail import Tail
 
@@ -27,6 +28,7 @@ class Draft(Builder):
     tail: Tail
     dynamics: str = "composite"
     parameters: Mapping[str, Ref] = field(default_factory=dict, init=False)
+    stretch: Stretch | None = field(default=None, init=False)  # whose segments a loop is over
 
     def declare_parameters(self, parameters: Iterable[Parameter]) -> None:
         """Declare the parameter struct: steps find its numbers by their names."""

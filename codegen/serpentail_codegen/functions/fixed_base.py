@@ -5,6 +5,7 @@ momentum of the whole nothing is computed.
 """
 
 from dataclasses import replace
+from functools import partial
 
 from ..autodiff.forward import tangent_program
 from ..ir.program import Array, Index, Ref, padded
@@ -12,6 +13,8 @@ from ..mechanics import resting
 from .derivatives.by_parameters import parameter_tangents, spread_parameters
 from .draft import Draft
 from .function import Function, assemble, signed
+from .implicit.factor import assemble_factor
+from .implicit.solve import assemble_solve
 from .layout import (
     POSITION,
     QUATERNION,
@@ -20,18 +23,23 @@ from .layout import (
     block,
     coordinates,
 )
-from .scope import Motion, State
+from .passive import add_elastic_energy, add_passive_forces
+from .scope import Motion, State, Vectors
 from .sweeps.inertia import tail_inertia
 from .sweeps.momentum import gather_moment
 from .sweeps.pieces import each_piece, each_point, mechanism, torso_pose
 from .sweeps.wrenches import forward_wrenches, gather_wrenches
-from .tails.mechanism import Segments
+from .tails.mechanism import Segments, Wrenches
 
 MEANINGS = {
     "q": "tail coordinates (rad)",
     "v": "their rates (rad/s)",
     "v_dot": "their accelerations (rad/s^2)",
     "force": "forces on the tail coordinates (N m)",
+    "linear": "momentum of the tail (kg m/s, world)",
+    "angular": "angular momentum of the tail about its own centre of mass (kg m^2/s, world)",
+    "r_q": "right-hand side for q",
+    "k_q": "solution",
 }
 
 
@@ -69,11 +77,12 @@ def fill_inertia(draft: Draft, state: State, H: Array, row: int) -> Segments:
 
 
 def fill_forces(draft: Draft, segments: Segments, v_dot: Array | None, force: Array) -> None:
-    """Fill H v_dot + C of the tail, or C."""
+    """Fill H v_dot + C of the tail, or C, with what its passive parts ask for."""
     zero = draft.zero(3)
     motion = Motion(zero, zero, draft.store(resting.resting_acceleration, a=3)["a"])
     wrenches = forward_wrenches(draft, segments, motion, v_dot)
     gather_wrenches(draft, segments, wrenches, lambda i: coordinates(force, i))
+    add_passive_forces(draft, segments.state, lambda i: coordinates(force, i))
 
 
 def assemble_mass_matrix(draft: Draft, arrays: dict[str, Array]) -> None:
@@ -116,19 +125,63 @@ def subtract(draft: Draft, tau: Array | None, force: Array, rest: Array) -> None
         draft.step(resting.net_torque, reads, rest=rest.part(k, 1))
 
 
+# ---- tracking, and implicit methods --------------------------------------------------------------
+
+
+def assemble_pfl(draft: Draft, arrays: dict[str, Array]) -> None:
+    """Torques H v_dot + C: on a base that holds still they give exactly the wanted v_dot.
+
+    With ``v_dot`` among the arguments it is these accelerations.
+    """
+    segments = mechanism(draft).prepare(draft, whole_state(draft, arrays), False)
+    fill_forces(draft, segments, whole_v(draft, arrays["accelerations"]), arrays["tau"])
+    if "v_dot" in arrays:
+        nt = draft.tail.nt
+        draft.copy(arrays["v_dot"].part(0, nt), arrays["accelerations"].part(0, nt))
+
+
+def resting_inertia(
+    draft: Draft, arrays: dict[str, Array], A: Array, row: int
+) -> tuple[State, Segments, None]:
+    """Fill H of the tail for implicit methods; return state and segments."""
+    state = whole_state(draft, arrays)
+    return state, fill_inertia(draft, state, A, row), None
+
+
 # ---- energy and places ---------------------------------------------------------------------------
+
+
+def resting_root(draft: Draft) -> Vectors:
+    """Return velocities to be carried along the tail, from a root at rest."""
+    velocity = draft.vectors(w=3, u=3)
+    for ref in velocity.named.values():
+        draft.fill(ref, 0)
+    return velocity
 
 
 def assemble_energy(draft: Draft, arrays: dict[str, Array]) -> None:
     """Energies of the tail; the torso does not move, and its height is zero."""
-    segments = mechanism(draft).prepare(draft, whole_state(draft, arrays), False)
-    moment, velocity = gather_moment(draft, segments), draft.vectors(w=3, u=3)
-    kinetic = arrays["kinetic"][0]
-    for ref in (*velocity.named.values(), kinetic):
-        draft.fill(ref, 0)
+    state = whole_state(draft, arrays)
+    segments = mechanism(draft).prepare(draft, state, False)
+    moment, velocity = gather_moment(draft, segments), resting_root(draft)
+    kinetic, potential = arrays["kinetic"][0], arrays["potential"][0]
+    draft.fill(kinetic, 0)
     for place in each_piece(draft):
         mechanism(draft).momentum(draft, segments, place, velocity, {"kinetic_": kinetic})
-    draft.step(resting.resting_potential, moment, potential=arrays["potential"][0])
+    draft.step(resting.resting_potential, moment, potential=potential)
+    add_elastic_energy(draft, state, potential)
+
+
+def assemble_momentum(draft: Draft, arrays: dict[str, Array]) -> None:
+    """Momentum of the tail, and its angular momentum about its own centre of mass."""
+    segments = mechanism(draft).prepare(draft, whole_state(draft, arrays), False)
+    moment, velocity = gather_moment(draft, segments), resting_root(draft)
+    momenta = Wrenches(draft.array("momenta", 6, draft.tail.pieces))
+    for place in each_piece(draft):
+        mechanism(draft).momentum(draft, segments, place, velocity, momenta.at(*place).named)
+    total = gather_wrenches(draft, segments, momenta)
+    writes = {name: arrays[name][0] for name in ("linear", "angular")}
+    draft.step(resting.resting_momentum, moment, total, **writes)
 
 
 def assemble_tail_points(draft: Draft, arrays: dict[str, Array]) -> None:
@@ -224,7 +277,12 @@ FUNCTIONS = {
             "inverse_dynamics": assemble_inverse_dynamics,
             "forward_dynamics": assemble_forward_dynamics,
             "energy": assemble_energy,
+            "momentum": assemble_momentum,
             "tail_points": assemble_tail_points,
+            "pfl": assemble_pfl,
+            "tracked_dynamics": assemble_pfl,
+            "implicit_factor": partial(assemble_factor, inertia=resting_inertia),
+            "implicit_solve": assemble_solve,
             "inverse_dynamics_derivatives": assemble_inverse_dynamics_derivatives,
             "forward_dynamics_derivatives": assemble_forward_dynamics_derivatives,
             "inverse_dynamics_parameter_derivatives": (

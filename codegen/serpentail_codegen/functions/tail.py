@@ -7,7 +7,7 @@ from ..ir.program import padded
 from ..scene.parameters import Parameter
 from ..scene.resolve import parameters_of
 from ..scene.scene import Scene
-from ..scene.shape import EQUAL, Shape, Stretch, stretches_of
+from ..scene.shape import EQUAL, Run, Shape, Stretch, runs_of, stretches_of
 from .layout import LOAD, Layout
 
 SPRING = 18  # numbers of a point's linearised contact
@@ -16,7 +16,8 @@ SPRING = 18  # numbers of a point's linearised contact
 @dataclass(frozen=True)
 class Tail(Layout):
     """Sizes of a tail of m segments: n links each, or a continuum with n samples each, bent by
-    bend_range at most; ``shape`` tells in what segments and links differ.
+    bend_range at most, or "mixed" of both, whose arcs have n samples; ``shape`` tells in what
+    segments and links differ.
     """
 
     links: int
@@ -33,6 +34,10 @@ class Tail(Layout):
         """Segments of one kind and as many links that follow each other."""
         return stretches_of(self.segments, self.links, self.kind, self.shape)
 
+    def runs(self, kind: str) -> tuple[Run, ...]:
+        """Segments of one kind, links or arcs, that follow each other; all of them in most."""
+        return runs_of(self.stretches, kind)
+
     @property
     def uniform(self) -> bool:
         """Tell if all links are equal, as many in each segment, on axes of a free torso."""
@@ -47,6 +52,11 @@ class Tail(Layout):
     def nv(self) -> int:
         """Numbers of a velocity."""
         return self.nt if self.shape.fixed else super().nv
+
+    @property
+    def torso_nv(self) -> int:
+        """Numbers of a velocity before those of the tail."""
+        return self.nv - self.nt
 
     @property
     def total(self) -> int:

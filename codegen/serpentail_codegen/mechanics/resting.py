@@ -3,7 +3,7 @@
 from sympy import Matrix
 
 from .rotations import Z
-from .shapes import V1, V3
+from .shapes import V1, V3, V6
 
 
 def resting_acceleration(let, gravity: V1) -> dict:
@@ -19,3 +19,11 @@ def net_torque(let, tau: V1, inertial: V1) -> dict:
 def resting_potential(let, gravity: V1, tail_mount: V3, mass: V1, h: V3) -> dict:
     """g times the tail's first moment along z, ``h`` being about its mount."""
     return {"potential": [gravity[0] * (h[2] + mass[0] * tail_mount[2])]}
+
+
+def resting_momentum(let, mass: V1, h: V3, F_next: V6) -> dict:
+    """The tail's momentum, and its moment about the tail's centre of mass, from those at the mount,
+    about which ``h`` is, too.
+    """
+    force, moment = F_next[0:3, :], F_next[3:6, :]
+    return {"linear": force, "angular": moment - h.cross(force) / mass[0]}

@@ -15,7 +15,7 @@ from .scene import (
     MOST_STRAIGHT,
     NAMES,
     ONLY,
-    Only,
+    foreign_to,
     is_whole,
 )
 from .signatures.table import AIRBORNE, ALL, DERIVATIVES, FIXED, NEEDS
@@ -81,16 +81,16 @@ def size_problems(values: Mapping[str, Any]) -> list[Problem]:
     return problems
 
 
-def kind_problems(table: Mapping[str, Any], rules: Only) -> list[Problem]:
+def kind_problems(table: Mapping[str, Any], kind: str) -> list[Problem]:
     """Return a problem for all that the tail's kind does not have."""
-    problems, parameters = [], parameters_in(table)
+    problems, parameters, rules = [], parameters_in(table), ONLY[kind]
 
     # keys and parameters of the other kinds
     remedy = "this kind of tail has none; remove it, or choose another kind"
-    for only in (only for only in ONLY.values() if only is not rules):
-        problems += [Problem(key, table[key], remedy) for key in only.keys if key in table]
-        wrong = [key for key in only.parameters if key in parameters]
-        problems += [Problem(f"parameters.{key}", parameters[key], remedy) for key in wrong]
+    keys, names = foreign_to(kind)
+    problems += [Problem(key, table[key], remedy) for key in keys if key in table]
+    wrong = [key for key in names if key in parameters]
+    problems += [Problem(f"parameters.{key}", parameters[key], remedy) for key in wrong]
 
     # coordinates, and what polar ones do not have
     derivatives = _derivatives_in(table.get("functions"))
@@ -128,6 +128,10 @@ def contact_problems(
         problems.append(Problem(f"parameters.{name}", parameters[name], remedy))
     if contacts and values["coordinates"] == "polar":
         remedy = 'polar coordinates have no contacts: use "bend"'
+        problems.append(Problem("contacts", list(contacts), remedy))
+
+    if "tail" in contacts and values["kind"] == "mixed":
+        remedy = "a tail of links and arcs touches nothing so far: remove the group"
         problems.append(Problem("contacts", list(contacts), remedy))
 
     # what no flight has: friction, and functions of the ground; some need one group of points

@@ -27,17 +27,24 @@ def tail_described(kind: str, values: Mapping[str, Any]) -> TailDescribed:
     """Return what `segments`, `links`, `taper` and parameters of single pieces say of a tail."""
     segments, taper = values["segments"], values["taper"]
     rest = Shape(fixed=values["base"] == "fixed", weightless=values["weightless"] is True)
-    each = values["links" if kind == "articulated" else "samples"]
+    pieces = {"articulated": values["links"], "continuum": values["samples"]}
+    if kind == "mixed":
+        del pieces["articulated"]  # each table tells its own
+        rest = replace(rest, kinds=("articulated", "continuum"))
+    each = pieces.get(kind)
     counted = COUNT.holds(segments) and COUNT.holds(each)
+    if kind == "mixed" and SEGMENTS.holds(segments) and not are_tables(segments):
+        remedy = "needs an array of tables, one for each segment, each with a kind"
+        return TailDescribed({"shape": rest}, rest, (Problem("segments", segments, remedy),))
     if not SEGMENTS.holds(segments) or not (counted or are_tables(segments)):
         return TailDescribed({"shape": rest}, rest)  # the rules of these keys tell
     if not are_tables(segments) and segments * each > MOST_LINKS:
         return TailDescribed({"shape": rest}, rest)  # a rule of sizes tells
 
-    found = described(kind, segments, each, taper)
     named = values["parameters"] if isinstance(values["parameters"], Mapping) else {}
+    found = described(kind, segments, pieces, taper, named)
     problems = (*found.problems, *_given_twice(named, found))
-    shape = _shape(kind, {**named, **found.parameters}, found.counts, rest)
+    shape = _shape(kind, {**named, **found.parameters}, found, rest)
     follows: dict[str, Any] = {"segments": len(found.counts), "shape": shape}
     follows |= {"links": max(found.counts)} if kind == "articulated" else {}
     if isinstance(values["parameters"], Mapping):
@@ -59,14 +66,16 @@ def _given_twice(named: Mapping[str, Any], found: Described) -> list[Problem]:
     ]
 
 
-def _shape(kind: str, named: Collection[str], counts: tuple[int, ...], rest: Shape) -> Shape:
-    """Return the shape of a tail with these parameters, and as many links or samples."""
-    jointed = kind == "articulated"
-    own = any(OWN.get(name) == ("link" if jointed else "arc") for name in named)
+def _shape(kind: str, named: Collection[str], found: Described, rest: Shape) -> Shape:
+    """Return the shape of a tail with these parameters, and segments as they were found."""
+    links = sum(n for n, own in zip(found.counts, found.kinds, strict=True) if own != "continuum")
+    arcs, mixed = found.kinds.count("continuum"), kind == "mixed"
+    tails = {OWN[name] for name in named if name in OWN}
     return replace(
         rest,
-        counts=counts if len(set(counts)) > 1 else (),
-        links=sum(counts) if own and jointed else 0,
-        arcs=len(counts) if own and not jointed else 0,
+        counts=found.counts if mixed or len(set(found.counts)) > 1 else (),
+        kinds=found.kinds if mixed else (),
+        links=links if mixed or "link" in tails else 0,
+        arcs=arcs if mixed or "arc" in tails else 0,
         tilted="mount_angles" in named,
     )

@@ -29,7 +29,17 @@ from .parameters import PARAMETERS
 from .passive import parts_of
 from .problems import Problem, SceneError
 from .resolve import resolve_parameters
-from .scene import CONTACTS, GROUPS, KEYS, MOST_LINKS, ONLY, TARGETS, Only, Scene
+from .scene import (
+    CONTACTS,
+    GROUPS,
+    KEYS,
+    MOST_LINKS,
+    ONLY,
+    TARGETS,
+    Only,
+    Scene,
+    foreign_to,
+)
 from .segments import are_tables, tell_values
 from .shape import EQUAL
 from .signatures.table import (
@@ -83,7 +93,7 @@ def parse_scene(table: Mapping[str, Any], name: str) -> Scene:
     if table.get("functions") == "all" and not plain_tail:
         values["functions"] = tuple(f for f in values["functions"] if f not in AIRBORNE)
     problems += airborne_problems(values["functions"], plain_tail)
-    problems += [*tail.problems, *key_problems(values), *kind_problems(table, rules)]
+    problems += [*tail.problems, *key_problems(values), *kind_problems(table, kind)]
     problems += function_problems(values["functions"]) + contact_problems(table, values, contacts)
     problems += fixed_problems(values, contacts)
 
@@ -151,7 +161,7 @@ def _chosen_functions(
 def scene_to_dict(scene: Scene) -> dict[str, Any]:
     """Return the table that parse_scene turns into this scene again: JSON-ready, floats exact."""
     # keys that this kind of tail, or a flight, does not have
-    foreign = {key for kind, only in ONLY.items() if kind != scene.kind for key in only.keys}
+    foreign = {*foreign_to(scene.kind)[0]}
     foreign |= set() if scene.contacts else {"contacts", "friction"}
     foreign |= {"shape", "tables", "body", "unscaled", "size"}  # follow from what is written
     foreign |= {name for name in ("base", "weightless") if getattr(scene, name) == KEYS[name][0]}

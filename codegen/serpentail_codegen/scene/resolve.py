@@ -16,8 +16,9 @@ from .passive import (
     stop_problems,
 )
 from .problems import Problem, SceneError
-from .scene import NAMES, ONLY
-from .segments import RADIUS, flattened
+from .scene import NAMES, foreign_to
+from .segment_tables import flattened
+from .segments import RADIUS
 from .shape import EQUAL, Shape
 from .units import in_unit
 
@@ -25,6 +26,10 @@ HAS_NOT = {  # why a tail or a base has no such parameters
     "equal": "each piece of this tail has a value of its own",
     "free": "a fixed base does not move",
     "weight": "this scene is weightless",
+}
+MEANINGS = {  # in a tail of both kinds
+    "arc_masses": "mass of each arc",
+    "arc_lengths": "length of each arc",
 }
 OPTIONAL = ("link_centers", "link_inertias")  # of what single links may leave out
 
@@ -41,11 +46,13 @@ def parameters_of(
 
     Those of single links or arcs have as many numbers as all of these together.
     """
-    foreign = {name for other, only in ONLY.items() if other != kind for name in only.parameters}
+    foreign = foreign_to(kind)[1]
     present = {"", *contacts, *(["contacts"] if contacts else [])}
     found = [p for p in PARAMETERS if p.name not in foreign and p.needs in present]
     counted = [(p, shape.numbers_of(p.tail)) for p in found]
     own = tuple(replace(p, size=p.size * count) for p, count in counted if count)
+    if kind == "mixed":
+        own = tuple(replace(p, meaning=MEANINGS.get(p.name, p.meaning)) for p in own)
     return own + passive_parameters(passive, segments)
 
 

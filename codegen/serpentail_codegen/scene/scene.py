@@ -11,7 +11,7 @@ from .passive import PASSIVE_NAMES, parts_of
 from .shape import EQUAL, Shape
 from .signatures.table import DEFAULT
 
-KINDS = ("articulated", "continuum")
+KINDS = ("articulated", "continuum", "mixed")
 GROUPS = ("feet", "tail", "torso")  # of contact points, in their order
 FRICTION = ("cone", "box", "smooth", "paper")
 BASES = ("free", "fixed")  # of the tail: a torso that moves, or one that never does
@@ -112,7 +112,7 @@ class Scene:
     name: str  # prefix of every C symbol and generated file
     kind: str
     segments: int  # m
-    links: int  # n, in each segment; 1 for a continuum
+    links: int  # n, in each segment; 1 for a continuum, and for tails of both kinds
     functions: tuple[str, ...]  # in the order of their table
     parameters: Parameters
     coordinates: str = (
@@ -201,4 +201,23 @@ ONLY = {
     "continuum": Only(
         ("samples", "bend_range"), (), ("arc_masses", "arc_lengths"), ("bend", "polar")
     ),
+    "mixed": Only(
+        ("samples", "bend_range"),
+        (),
+        (
+            *("link_masses", "link_lengths", "link_centers", "link_inertias"),
+            *("arc_masses", "arc_lengths"),
+        ),
+        ("mixed",),
+    ),
 }
+
+
+def foreign_to(kind: str) -> tuple[list[str], list[str]]:
+    """Return keys, and parameters, that tails of other kinds have and this one has not."""
+    own = ONLY[kind]
+    keys = [key for only in ONLY.values() for key in only.keys if key not in own.keys]
+    names = [
+        name for only in ONLY.values() for name in only.parameters if name not in own.parameters
+    ]
+    return [*dict.fromkeys(keys)], [*dict.fromkeys(names)]

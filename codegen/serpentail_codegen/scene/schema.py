@@ -10,8 +10,8 @@ from typing import Any
 from .checks import plain as as_data
 from .parameters import PARAMETERS, Parameter
 from .passive import PASSIVE
-from .scene import COUNT, KEYS, ONLY
-from .segments import TAPER, VALUES, Key
+from .scene import COUNT, KEYS, ONLY, foreign_to
+from .segment_tables import TAPER, VALUES, Key
 from .signatures.table import ALL
 from .units import MEASURES, choices, pattern, plain
 
@@ -31,7 +31,8 @@ def scene_schema() -> dict[str, Any]:
         | {p.name: _of_each_coordinate(p) for p in PASSIVE},
         [],
     )
-    of_segment = {"links": dict(COUNT.schema)} | {n: _key(key) for n, key in VALUES.items()}
+    of_segment = {"kind": {"enum": ["articulated", "continuum"]}, "links": dict(COUNT.schema)}
+    of_segment |= {name: _key(key) for name, key in VALUES.items()}
     tables = {"type": "array", "items": _table(of_segment, []), "minItems": 1}
     keys["segments"] = {"anyOf": [dict(COUNT.schema), tables]}
     keys["taper"] = _table({name: _key(key) for name, key in TAPER.items()}, ["radii"])
@@ -50,8 +51,7 @@ def _table(keys: Mapping[str, Any], required: list[str]) -> dict[str, Any]:
 
 def _of_kind(kind: str) -> list[dict[str, Any]]:
     """Return what a tail of a kind has not, and what it needs where its segments are counted."""
-    foreign = [key for other, only in ONLY.items() if other != kind for key in only.keys]
-    has_not = [name for other, only in ONLY.items() if other != kind for name in only.parameters]
+    foreign, has_not = foreign_to(kind)
     keys: dict[str, Any] = dict.fromkeys(foreign, False)
     keys["coordinates"] = {"enum": list(ONLY[kind].coordinates)}
     keys["parameters"] = {"properties": dict.fromkeys(has_not, False)}

@@ -1,55 +1,40 @@
 """The tables of `segments` and `taper`: what each segment is made of, checked, link by link."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from .checks import is_finite
 from .cone import Links, cut, single, volume
-from .parameters import ANY, NOT_NEGATIVE, POSITIVE, Rule
-from .problems import Problem, suggest
-from .scene import COUNT, MOST_LINKS
-from .units import in_unit
+from .problems import Problem
+from .scene import MOST_LINKS
+from .segment_tables import (
+    INERTIAS,
+    LENGTHS,
+    MASSES,
+    TAPER,
+    VALUES,
+    Numbers,
+    count_of,
+    kind_of,
+    numbers_of,
+    table_of,
+)
 
-Numbers = Mapping[str, tuple[float, ...]]  # of a table, by its keys, SI
+OWN = {
+    *("link_masses", "link_lengths", "link_centers", "link_inertias"),
+    *("arc_masses", "arc_lengths"),
+}
 RADIUS = 0.0029  # m, of links whose inertia no key tells: that of Table 1's tail
 
 
 @dataclass(frozen=True)
-class Key:
-    """What a key of a table holds: so many numbers in a unit, or so many of each link."""
-
-    unit: str
-    rule: Rule
-    size: int = 1
-    of_links: bool = False
-
-
-LENGTHS = {"length": Key("m", POSITIVE), "link_lengths": Key("m", POSITIVE, of_links=True)}
-MASSES = {
-    "mass": Key("kg", POSITIVE),
-    "link_masses": Key("kg", POSITIVE, of_links=True),
-    "density": Key("kg/m^3", POSITIVE),
-}
-INERTIAS = {
-    "link_radius": Key("m", NOT_NEGATIVE),
-    "link_inertia": Key("kg m^2", NOT_NEGATIVE, 3),
-    "link_inertias": Key("kg m^2", NOT_NEGATIVE, 3, of_links=True),
-    "radii": Key("m", POSITIVE, 2),
-}
-CENTERS = {"link_centers": Key("m", ANY, of_links=True)}
-VALUES = LENGTHS | MASSES | INERTIAS | CENTERS
-OF_LINKS = {name for name in VALUES if name.startswith("link_")}  # that no arc has
-TAPER = {name: VALUES[name] for name in ("length", "radii", "density", "mass")}
-
-
-@dataclass(frozen=True)
 class Described:
-    """What tables say: links, or samples, of each segment, values of all links or arcs by the names
-    of parameters, and what is wrong.
+    """What tables say: links, or samples, of each segment, and its kind; values of all links or
+    arcs by the names of parameters, and what is wrong.
     """
 
     counts: tuple[int, ...]
+    kinds: tuple[str, ...]
     parameters: Numbers = field(default_factory=dict)
     problems: tuple[Problem, ...] = ()
 
@@ -63,37 +48,46 @@ def tell_values(written: Mapping[str, Any]) -> bool:
     """Tell if the tables `segments` and `taper` say more than how many links there are."""
     segments: Any = written.get("segments")
     counted = not are_tables(segments)
-    return "taper" in written or not (counted or all(set(t) <= {"links"} for t in segments))
+    return "taper" in written or not (counted or all(set(t) <= {"kind", "links"} for t in segments))
 
 
-def described(kind: str, segments: Any, links: Any, taper: Any) -> Described:
-    """Return what the keys `segments`, `links` (or samples) and `taper` of a scene say.
+def described(
+    kind: str, segments: Any, pieces: Mapping[str, Any], taper: Any, named: Collection[str] = ()
+) -> Described:
+    """Return what the keys `segments`, `links`, `samples` and `taper` of a scene say.
 
-    segments: how many, or a table for each.
+    segments: how many, or a table for each.  pieces: links and samples of each segment, by kinds,
+    where its table tells none.  named: parameters that the scene gives beside.
     """
     problems: list[Problem] = []
-    jointed = kind == "articulated"
     tables = list(segments) if are_tables(segments) else [{} for _ in range(segments)]
-    read = [_table(f"segments[{k}]", t, jointed, problems) for k, t in enumerate(tables)]
-    counts = [_count(f"segments[{k}]", t, links, problems) for k, t in enumerate(tables)]
+    places = [f"segments[{k}]" for k in range(len(tables))]
+    each = list(zip(places, tables, strict=True))
+    kinds = tuple(kind_of(*entry, kind, problems) for entry in each)
+    read = [table_of(*entry, own, problems) for entry, own in zip(each, kinds, strict=True)]
+    counts = tuple(
+        count_of(*entry, own, pieces, problems) for entry, own in zip(each, kinds, strict=True)
+    )
     if sum(counts) > MOST_LINKS:
         remedy = f"more than {MOST_LINKS} links or samples in all; choose fewer"
         problems.append(Problem("segments", sum(counts), remedy))
-    whole = {} if taper is None else _numbers("taper", taper, TAPER, 1, problems)
+    if kind == "mixed" and len(set(kinds)) == 1:
+        remedy = f'all segments are of one kind: set kind = "{kinds[0]}" above the tables'
+        problems.append(Problem("kind", kind, remedy))
+    whole = {} if taper is None else numbers_of("taper", taper, TAPER, 1, problems)
     if problems:
-        return Described(tuple(counts), problems=tuple(problems))
+        return Described(counts, kinds, problems=tuple(problems))
 
-    # equal pieces, unless anything says what they are
-    if taper is None and not any(read):
-        return Described(tuple(counts))
-    pieces = [count if jointed else 1 for count in counts]
-    places = [f"segments[{k}]" for k in range(len(counts))]
+    # equal pieces, unless anything says what they are; those of both kinds have no equals
+    if taper is None and not any(read) and (kind != "mixed" or OWN & set(named)):
+        return Described(counts, kinds)
+    sizes = [n if own == "articulated" else 1 for n, own in zip(counts, kinds, strict=True)]
     values = [
-        _numbers(place, table, VALUES, n, problems)
-        for place, table, n in zip(places, read, pieces, strict=True)
+        numbers_of(place, table, VALUES, n, problems)
+        for place, table, n in zip(places, read, sizes, strict=True)
     ]
     if problems:
-        return Described(tuple(counts), problems=tuple(problems))
+        return Described(counts, kinds, problems=tuple(problems))
     if taper is None:
         for place, given in zip(places, values, strict=True):
             problems += _lacking(place, given)
@@ -101,12 +95,13 @@ def described(kind: str, segments: Any, links: Any, taper: Any) -> Described:
         problems += _beside_taper(places, values, whole)
     try:
         if not problems:
-            made = _all_links(values, pieces, None if taper is None else whole)
-            return Described(tuple(counts), _parameters(made, jointed))
+            made = _all_links(values, sizes, None if taper is None else whole)
+            owners = [own for own, n in zip(kinds, sizes, strict=True) for _ in range(n)]
+            return Described(counts, kinds, _parameters(made, owners))
     except (ZeroDivisionError, OverflowError):
         remedy = "gives no finite masses and inertias: use kg and m"
         problems.append(Problem("segments" if taper is None else "taper", segments, remedy))
-    return Described(tuple(counts), problems=tuple(problems))
+    return Described(counts, kinds, problems=tuple(problems))
 
 
 def _all_links(values: list[Numbers], pieces: list[int], taper: Numbers | None) -> Links:
@@ -117,81 +112,23 @@ def _all_links(values: list[Numbers], pieces: list[int], taper: Numbers | None) 
     return sum(found[1:], found[0])
 
 
-def _parameters(links: Links, jointed: bool) -> dict[str, tuple[float, ...]]:
-    """Return the values of all links, or arcs, by the names of parameters."""
-    if not jointed:
-        return {"arc_masses": links.masses, "arc_lengths": links.lengths}
-    return {
-        "link_masses": links.masses,
-        "link_lengths": links.lengths,
-        "link_centers": links.centers,
-        "link_inertias": links.inertias,
-    }
-
-
-# ---- reading -------------------------------------------------------------------------------------
-
-
-def _table(place: str, table: Any, jointed: bool, problems: list[Problem]) -> dict[str, Any]:
-    """Return the values of one segment as they are written, without its number of links."""
-    if not isinstance(table, Mapping):
-        problems.append(Problem(place, table, "needs a table, such as {links = 4}"))
-        return {}
-    known = [*(["links"] if jointed else []), *(k for k in VALUES if jointed or k not in OF_LINKS)]
-    for key in [key for key in table if key not in known]:
-        problems.append(Problem(f"{place}.{key}", table[key], f"unknown; {suggest(key, known)}"))
-    return {key: value for key, value in table.items() if key in VALUES}
-
-
-def _count(place: str, table: Any, links: Any, problems: list[Problem]) -> int:
-    """Return the number of links of a segment, by default that of the scene."""
-    own = isinstance(table, Mapping) and "links" in table
-    count = table["links"] if own else links
-    if COUNT.holds(count):
-        return int(count)
-    problems.append(Problem(f"{place}.links" if own else "links", count, f"needs {COUNT.text}"))
-    return 1
-
-
-def _numbers(
-    place: str, table: Any, keys: Mapping[str, Key], links: int, problems: list[Problem]
-) -> Numbers:
-    """Return the numbers of a table, SI; what cannot be becomes a problem."""
-    if not isinstance(table, Mapping):
-        remedy = "needs a table, such as {length = 0.2, radii = [0.004, 0.001], density = 1000}"
-        problems.append(Problem(place, table, remedy))
-        return {}
-    found = {}
-    for name, value in table.items():
-        if name not in keys:
-            problems.append(Problem(f"{place}.{name}", value, f"unknown; {suggest(name, keys)}"))
-            continue
-        key = keys[name]
-        count = key.size * (links if key.of_links else 1)
-        try:
-            numbers = tuple(flattened(in_unit(value, key.unit)))
-        except ValueError as error:
-            problems.append(Problem(f"{place}.{name}", value, str(error)))
-            continue
-        sound = len(numbers) == count and all(map(is_finite, numbers)) and key.rule.holds(numbers)
-        if sound:
-            found[name] = tuple(float(x) + 0.0 for x in numbers)
-            continue
-        each = f", {key.size} for each of {links} links" if key.of_links else ""
-        words = "a finite number" if count == 1 else f"{count} finite numbers{each}"
-        problems.append(
-            Problem(f"{place}.{name}", value, f"needs {words}{key.rule.text}, in {key.unit}")
-        )
+def _parameters(made: Links, kinds: list[str]) -> dict[str, tuple[float, ...]]:
+    """Return the values of all pieces, of these kinds, by the names of parameters."""
+    links = [k for k, kind in enumerate(kinds) if kind == "articulated"]
+    arcs = [k for k, kind in enumerate(kinds) if kind == "continuum"]
+    found: dict[str, tuple[float, ...]] = {}
+    if links:
+        inertias = (made.inertias[3 * k : 3 * k + 3] for k in links)
+        found = {
+            "link_masses": tuple(made.masses[k] for k in links),
+            "link_lengths": tuple(made.lengths[k] for k in links),
+            "link_centers": tuple(made.centers[k] for k in links),
+            "link_inertias": tuple(x for moments in inertias for x in moments),
+        }
+    if arcs:
+        found["arc_masses"] = tuple(made.masses[k] for k in arcs)
+        found["arc_lengths"] = tuple(made.lengths[k] for k in arcs)
     return found
-
-
-def flattened(value: Any) -> Iterable[Any]:
-    """Yield the entries of arrays in arrays, or the value itself."""
-    if isinstance(value, list | tuple):
-        for entry in value:
-            yield from flattened(entry)
-    else:
-        yield value
 
 
 # ---- what belongs together -----------------------------------------------------------------------

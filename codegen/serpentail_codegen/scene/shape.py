@@ -9,6 +9,7 @@ class Shape:
     """In what segments and links differ, and what does not move or pull.
 
     counts: links, or samples, of each segment where they are not as many in all.
+    kinds: of each segment, where there are links in some and arcs in others; counts are told then.
     links, arcs: how many have a mass, a length and an inertia of their own; 0: all are equal.
     tilted: the tail begins in axes of its own, not in those of the torso.
     fixed: the torso never moves.
@@ -16,6 +17,7 @@ class Shape:
     """
 
     counts: tuple[int, ...] = ()
+    kinds: tuple[str, ...] = ()
     links: int = 0
     arcs: int = 0
     tilted: bool = False
@@ -42,7 +44,8 @@ EQUAL = Shape()
 class Stretch:
     """Segments ``first`` to ``stop`` - 1, which have as many pieces and points each.
 
-    first_piece, first_point: how many all segments before have.
+    first_piece, first_point: how many all segments before have; others: pieces of the other kind
+    before.
     """
 
     kind: str
@@ -52,6 +55,7 @@ class Stretch:
     points: int
     first_piece: int = 0
     first_point: int = 0
+    others: int = 0
 
     def pieces_before(self, segment: int) -> int:
         """Pieces of all segments before one of this stretch, or before its end."""
@@ -64,15 +68,48 @@ class Stretch:
 
 def stretches_of(segments: int, links: int, kind: str, shape: Shape) -> tuple[Stretch, ...]:
     """Return the stretches of a tail: one, where all segments have as many links or samples."""
-    counts = shape.counts or (links,) * segments
+    kinds, counts = shape.kinds or (kind,) * segments, shape.counts or (links,) * segments
     stretches: list[Stretch] = []
-    for points, members in groupby(counts):
+    for (own, points), members in groupby(zip(kinds, counts, strict=True)):
         first = stretches[-1].stop if stretches else 0
-        pieces = points if kind == "articulated" else 1
+        pieces = points if own == "articulated" else 1
         before = (
             (stretches[-1].pieces_before(first), stretches[-1].points_before(first))
             if stretches
             else (0, 0)
         )
-        stretches.append(Stretch(kind, first, first + len(list(members)), pieces, points, *before))
+        others = sum(s.pieces * (s.stop - s.first) for s in stretches if s.kind != own)
+        stop = first + len(list(members))
+        stretches.append(Stretch(own, first, stop, pieces, points, *before, others))
     return tuple(stretches)
+
+
+@dataclass(frozen=True)
+class Run:
+    """Segments ``first`` to ``stop`` - 1 of one kind, and their pieces.
+
+    other_pieces, other_points, other_segments: of the other kind, before.
+    """
+
+    first: int
+    stop: int
+    first_piece: int
+    stop_piece: int
+    other_pieces: int = 0
+    other_points: int = 0
+    other_segments: int = 0
+
+
+def runs_of(stretches: tuple[Stretch, ...], kind: str) -> tuple[Run, ...]:
+    """Return the runs of segments of a kind, each as long as it can be."""
+    runs, points, before = [], 0, 0
+    for own, members in groupby(stretches, lambda stretch: stretch.kind):
+        found = list(members)
+        first, last = found[0], found[-1]
+        if own == kind:
+            pieces = first.first_piece, last.pieces_before(last.stop)
+            runs.append(Run(first.first, last.stop, *pieces, first.others, points, before))
+        else:
+            points += last.points_before(last.stop) - first.first_point
+            before += last.stop - first.first
+    return tuple(runs)

@@ -54,8 +54,9 @@ def manifest(
 
 
 def own_counts(tail: Tail) -> dict[str, Any]:
-    """Return the links of each segment, where they are not as many in all."""
-    return {"links": list(tail.shape.counts)} if tail.shape.counts else {}
+    """Return the links of each segment, where they are not as many in all; and kinds of both."""
+    counts = {"links": list(tail.shape.counts)} if tail.shape.counts else {}
+    return counts | ({"kinds": list(tail.shape.kinds)} if tail.shape.kinds else {})
 
 
 def parameter_entry(scene: Scene, parameter: Parameter) -> dict[str, Any]:

@@ -59,7 +59,8 @@ def build(
     """Return a model that is generated, compiled and loaded; what was made before is found again.
 
     scene: a scene file, or the name of an example (see ``examples``); without one, options
-    describe the tail: ``tail`` ("articulated" or "continuum"), ``segments`` (m) and ``links`` (n).
+    describe the tail: ``tail`` ("articulated", "continuum" or "mixed"), ``segments`` (m, or a
+    table for each) and ``links`` (n).
     options: keys of a scene, which replace those of the file: functions (names, or "all"),
     contacts, samples, friction, coordinates, bend_range (rad), real, emission, profile, baked,
     targets, name; and parameters by name, SI, such as torso_mass=0.06, which need no new code.
@@ -107,7 +108,7 @@ def _shapes(name: str, scene: Mapping[str, Any], own: Mapping[str, Any]) -> bool
         return False
     segments = scene.get("segments")
     tables = segments if isinstance(segments, list | tuple) else []
-    return "taper" not in scene and all(set(table) <= {"links"} for table in tables)
+    return "taper" not in scene and all(set(table) <= {"kind", "links"} for table in tables)
 
 
 def generated(scene: Mapping[str, Any], name: str) -> CheckedFolder:

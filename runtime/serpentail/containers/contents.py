@@ -62,7 +62,8 @@ def contents(motion: Trajectory | Rollouts) -> Contents:
     if isinstance(motion, Rollouts):
         return _of_runs(motion)
     segments = motion.segments
-    labels: dict[str, Any] = {"time": motion.t} | _labels(joints(segments, motion.model))
+    names = joints(segments, motion.model)
+    labels: dict[str, Any] = {"time": motion.t} | _labels(names, motion.layout.fixed)
     variables, groups = _states(motion, labels, ("time",)), _groups(motion.contact)
     if motion.contact is not None:
         labels |= _touch_labels(motion.contact)
@@ -75,7 +76,7 @@ def _of_runs(runs: Rollouts) -> Contents:
     """What rollouts hold: of each run also when it ended, its error, and its own parameters."""
     leading, model = ("run", "time"), runs.source.model
     labels: dict[str, Any] = {"run": np.arange(len(runs)), "time": runs.t}
-    labels |= _labels(joints(model.segments, model))
+    labels |= _labels(joints(model.segments, model), model.fixed)
     variables = _states(runs, labels, leading)
     contact, touching = _contacts(runs)
     if contact is not None:
@@ -98,8 +99,9 @@ def _states(
 ) -> dict[str, Variable]:
     """States, torques and measures, which both kinds have under the same names."""
     tail = len(labels.get("joint", ()))
-    q_units = [*TORSO_Q.values(), *["rad"] * tail]
-    v_units = [*TORSO_V.values(), *["rad/s"] * tail]
+    of_torso = len(labels["coordinate"]) > tail
+    q_units = [*(TORSO_Q.values() if of_torso else ()), *["rad"] * tail]
+    v_units = [*(TORSO_V.values() if of_torso else ()), *["rad/s"] * tail]
     found = {
         "q": Variable((*leading, "coordinate"), motion.q, q_units, "configuration"),
         "v": Variable((*leading, "rate"), motion.v, v_units, "velocity"),
@@ -119,11 +121,11 @@ def _variable(
     return Variable((*leading, *dims), array, units, words)
 
 
-def _labels(tail: list[str]) -> dict[str, Any]:
-    """Labels of the dimensions that every motion has."""
+def _labels(tail: list[str], fixed: bool) -> dict[str, Any]:
+    """Labels of the dimensions that every motion has; none of a torso on a fixed base."""
     return {
-        "coordinate": [*TORSO_Q, *tail],
-        "rate": [*TORSO_V, *(f"{name}_dot" for name in tail)],
+        "coordinate": [*(() if fixed else TORSO_Q), *tail],
+        "rate": [*(() if fixed else TORSO_V), *(f"{name}_dot" for name in tail)],
         "axis": AXES,
     } | ({"joint": tail} if tail else {})
 

@@ -16,19 +16,21 @@ TORSO_V = {
 }
 AXES = ("x", "y", "z")
 LEGS = ("gamma_right", "delta_right", "gamma_left", "delta_left")
-# of a segment, by the coordinates of the scene; of a motion without its model by what they bend
-TAILS = {"joint": ("alpha", "beta"), "bend": ("a", "b"), "polar": ("phi", "theta")}
+# of a segment, by its kind; of a motion without its model by what they bend
+TAILS = {"articulated": ("alpha", "beta"), "continuum": ("a", "b")}
+POLAR = ("phi", "theta")
 WITHOUT_MODEL = ("pitch", "yaw")
 FOOT = ("right_A", "right_M", "right_T", "left_A", "left_M", "left_T")
 
 
 def joints(segments: int, model: Model | None) -> list[str]:
     """Return the names (2m,) of the tail coordinates, such as alpha_1, beta_1."""
-    pair = WITHOUT_MODEL
+    pairs = [WITHOUT_MODEL] * segments
     if model is not None:
-        pair = TAILS[model.manifest["scene"]["coordinates"]]
-    assert len(pair) == PER_SEGMENT
-    return [f"{name}_{i + 1}" for i in range(segments) for name in pair]
+        polar = model.manifest["scene"]["coordinates"] == "polar"
+        pairs = [POLAR if polar else TAILS[kind] for kind in model.kinds]
+    assert all(len(pair) == PER_SEGMENT for pair in pairs)
+    return [f"{name}_{i + 1}" for i, pair in enumerate(pairs) for name in pair]
 
 
 def points(groups: Mapping[str, int]) -> list[str]:

@@ -94,7 +94,7 @@ def chain_of(model: Model, kind: str) -> Chain:
 def _refuse_other(model: Model, kind: str) -> None:
     """ExportError where a model is no free chain of rigid links that torques alone move."""
     needs, remedy = "", 'export an "fmu"'
-    if model.links is None:
+    if model.kind != "articulated":
         needs, remedy = (
             "an articulated tail, and a continuum is no chain of rigid links",
             'generate a scene with kind = "articulated" and some links, or export an "fmu"',

@@ -162,8 +162,8 @@ def _torques(model: Model) -> Iterator[Variable]:
 
 def _coordinates(model: Model) -> Iterator[str]:
     """Yield the names of the tail coordinates."""
-    pair = ("alpha", "beta") if model.links else ("a", "b")
-    for segment in range(1, model.segments + 1):
+    for segment, kind in enumerate(model.kinds, 1):
+        pair = ("alpha", "beta") if kind == "articulated" else ("a", "b")
         yield from (f"{name}_{segment}" for name in pair)
 
 

@@ -40,6 +40,8 @@ def fmu(model: Model) -> bytes:
 def _refuse_others(model: Model) -> None:
     """Refuse what no FMU can be of."""
     scene = model.manifest["scene"]
+    if model.fixed:
+        raise _refused(model, "base", "fixed", 'FMUs are of a torso that moves: give "free" to')
     if scene["coordinates"] == "polar":
         words = 'polar angles have no rates where a segment is straight: give "bend" to'
         raise _refused(model, "coordinates", "polar", words)

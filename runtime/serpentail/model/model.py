@@ -107,13 +107,22 @@ def _without_c(manifest: Mapping[str, Any]) -> ModelError:
     )
 
 
+def _links(pieces: int | list[int], kinds: tuple[str, ...]) -> int | tuple[int, ...] | None:
+    """Return the links of the segments, 0 of an arc; None of a continuum."""
+    if "articulated" not in kinds:
+        return None
+    if isinstance(pieces, int):
+        return pieces
+    return tuple(n if kind == "articulated" else 0 for n, kind in zip(pieces, kinds, strict=True))
+
+
 class Model(Functions):
     """Equations of motion H(q) v_dot + C(q, v) = [0 (6); tau] + J^T f of one tail, SI units.
 
     q (nq = 7 + 2m): position of B in the world, quaternion (w, x, y, z) of any norm but 0, tail
-    coordinates: joint angles (alpha_i, beta_i) of an articulated tail, bend components (a_i, b_i)
-    of a continuum, or polar angles (phi_i, theta_i) of one whose scene has coordinates = "polar",
-    which is for comparison only. v (nv = 6 + 2m): velocity of B in the world, angular velocity in
+    coordinates: joint angles (alpha_i, beta_i) of links, bend components (a_i, b_i) of arcs, or
+    polar angles (phi_i, theta_i) of a continuum whose scene has coordinates = "polar", which is for
+    comparison only. v (nv = 6 + 2m): velocity of B in the world, angular velocity in
     the body frame, rates of the tail coordinates. Every method also takes arrays with a leading
     batch axis; a single state is repeated over a batch.  All raise StateError on a wrong shape or a
     value that is not finite, ModelError where the scene left the function out. With the profile
@@ -136,14 +145,16 @@ class Model(Functions):
         self.name: str = manifest["prefix"]
         self.kind: str = manifest["scene"]["kind"]
         self.segments: int = manifest["dimensions"]["segments"]
-        pieces: int | list[int] = manifest["dimensions"]["links"]
-        counts = pieces if isinstance(pieces, int) else tuple(pieces)
-        self.links = counts if self.kind == "articulated" else None
-        self.samples: int | None = (
-            None if self.kind == "articulated" else manifest["dimensions"]["links"]
+        # of each segment: its kind, and its links, 0 of an arc
+        self.kinds: tuple[str, ...] = tuple(
+            manifest["dimensions"].get("kinds") or (self.kind,) * self.segments
         )
+        self.links = _links(manifest["dimensions"]["links"], self.kinds)
+        jointed = self.kind == "articulated"
+        self.samples: int | None = None if jointed else manifest["scene"]["samples"]
         # how many joints turn by the coordinates of each segment (m,); 1 of an arc
-        self.joints_each = np.broadcast_to(1 if self.links is None else self.links, self.segments)
+        links = np.broadcast_to(0 if self.links is None else self.links, self.segments)
+        self.joints_each = np.maximum(links, 1)
         self.fixed: bool = manifest["scene"].get("base") == "fixed"
         self.layout = Layout(self.segments, self.fixed)
         self.nq, self.nv = self.layout.nq, self.layout.nv
@@ -165,6 +176,11 @@ class Model(Functions):
         """Return what the tail is made of, in words."""
         if self.links is None:
             return f"{self.segments} continuum segments"
+        if self.kind == "mixed":
+            each = (
+                f"{n} links" if n else "an arc" for n in np.broadcast_to(self.links, self.segments)
+            )
+            return f"{self.segments} segments: {', '.join(each)}"
         if isinstance(self.links, tuple):
             return f"{self.segments} segments of {', '.join(map(str, self.links))} links"
         return f"{self.segments} x {self.links} links"
@@ -233,8 +249,8 @@ class Model(Functions):
         """Raise ModelError where the base is fixed: only a free torso has what is asked for."""
         if self.fixed:
             raise ModelError(
-                f"{what}: {self.name} has a fixed base: integrate model.x_dot, which has its exact "
-                'derivatives, or generate it again with base = "free"'
+                f"{what}: {self.name} has a fixed base, which neither flies nor lands: generate it "
+                'again with base = "free"'
             )
 
     def without(self, *names: str) -> ModelError:

@@ -29,6 +29,8 @@ def account(motion: "Trajectory") -> str:
 
 def tail_of(model: Model) -> str:
     """Return what a model's tail is made of."""
+    if model.kind == "mixed":
+        return model.tail_words()
     if isinstance(model.links, tuple):
         return f"{model.kind}, {', '.join(map(str, model.links))} links"
     if model.links:
@@ -58,7 +60,7 @@ def framed(lines: list[str]) -> str:
 def _touched(motion: "Trajectory") -> str:
     """What touches the ground, and how often that changes."""
     if motion.contact is None:
-        return "in flight"
+        return "on a fixed base" if motion.layout.fixed else "in flight"
     points = [f"{count} of the {group}" for group, count in motion.contact.groups.items()]
     events = _listed(motion.info, "events")
     return f"on the ground by points: {', '.join(points)}; {len(events)} events"

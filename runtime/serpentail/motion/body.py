@@ -10,7 +10,7 @@ from ..model.polar import polar_to_bend
 
 
 def weight(model: Model) -> float:
-    """Return the weight (N) of torso and tail; 0 without gravity."""
+    """Return the weight (N) of torso and tail, of the tail on a fixed base; 0 without gravity."""
     return float(total_mass(model.parameters) * model.parameters["gravity"])
 
 
@@ -18,8 +18,11 @@ def semi_axes(model: Model) -> Array:
     """Return the semi-axes (3,) of the torso, m, along its own axes.
 
     The torso is the ellipsoid that touches the ground, else the homogeneous one of its inertia.
+    A fixed base has none: zeros.
     """
     p = model.parameters
+    if model.fixed:
+        return np.zeros(3)
     if "torso_semi_axes" in p:
         return np.array(p["torso_semi_axes"], float)
     spread = np.sum(p["torso_inertia"]) - 2 * np.array(p["torso_inertia"])
@@ -27,9 +30,9 @@ def semi_axes(model: Model) -> Array:
 
 
 def centre_of_mass(model: Model, q: Array, v: Array) -> Array:
-    """Return (K, 3), m; of the torso where the scene left out the function ``center_of_mass``."""
+    """Return (K, 3), m; of the torso, or the base, where the scene has no ``center_of_mass``."""
     if "center_of_mass" not in model.kernels:
-        return q[:, POSITION]
+        return model.layout.pose(q)[:, POSITION]
     return np.asarray(model.center_of_mass(q, v)[0])
 
 

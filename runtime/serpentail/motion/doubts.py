@@ -10,7 +10,7 @@ import numpy as np
 
 from ..attitude import Array, rotation_matrix
 from ..errors import StateError
-from ..model.layout import FIRST_Q, POSITION, QUATERNION, SECOND_Q
+from ..model.layout import PER_SEGMENT, POSITION, QUATERNION
 from ..model.model import Model
 from .body import semi_axes, weight
 from .through_torso import sunk
@@ -136,7 +136,7 @@ def _blows(model: Model, motion: "Trajectory") -> list[str]:
 
 def _bends(model: Model, motion: "Trajectory") -> list[str]:
     """Segments that are bent by clearly more than half a turn."""
-    bends = _bend(model, motion.q)
+    bends = _bend(model, motion.tail)
     told = []
     for segment, k in enumerate(bends.argmax(axis=0)):
         if bends[k, segment] > MOST_BEND:
@@ -148,13 +148,14 @@ def _bends(model: Model, motion: "Trajectory") -> list[str]:
     return told
 
 
-def _bend(model: Model, q: Array) -> Array:
+def _bend(model: Model, tail: Array) -> Array:
     """How far the segments are bent, (K, m), rad: of joints the larger of pitch and yaw."""
-    first, second = q[:, FIRST_Q], q[:, SECOND_Q]
-    if model.links is not None:
-        return model.joints_each * np.maximum(np.abs(first), np.abs(second))
-    polar = model.manifest["scene"]["coordinates"] == "polar"
-    return np.abs(second) if polar else np.hypot(first, second)
+    first, second = (tail[:, k::PER_SEGMENT] for k in range(PER_SEGMENT))
+    if model.manifest["scene"]["coordinates"] == "polar":
+        return np.abs(second)
+    of_joints = model.joints_each * np.maximum(np.abs(first), np.abs(second))
+    jointed = np.array(model.kinds) == "articulated"
+    return np.where(jointed, of_joints, np.hypot(first, second))
 
 
 def _largest(motion: "Trajectory", measure: Measure) -> Moment:

@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..attitude import pitch_roll_yaw, tilt_deg
-from ..model.layout import TAIL_Q
 from ..model.model import Model
 from ..model.passive import stored_energy
 from .body import weight
@@ -45,8 +44,13 @@ class Number(NamedTuple):
 def com_rise(model: Model, motion: Trajectory) -> float | None:
     """Highest rise (m) of the centre of mass, by the potential energy M g z; None without g."""
     whole = weight(model)
-    lifted = motion.potential - stored_energy(model.parameters, motion.q[:, TAIL_Q])
+    lifted = motion.potential - stored_energy(model.parameters, motion.tail)
     return float((lifted.max() - lifted[0]) / whole) if whole else None
+
+
+def _of_torso(measure: Callable[[Trajectory], Any]) -> Callable[[Model, Trajectory], Any]:
+    """What a torso that moves does; None on a fixed base."""
+    return lambda model, motion: None if model.fixed else measure(motion)
 
 
 def _told(name: str) -> Callable[[Model, Trajectory], Any]:
@@ -86,7 +90,7 @@ NUMBERS = (
     ),
     Number(
         "apex_m", "m", "highest B, the torso's centre of mass",
-        lambda model, motion: float(motion.q[:, 2].max()),
+        _of_torso(lambda motion: float(motion.q[:, 2].max())),
     ),
     Number("com_rise_m", "m", "highest centre of mass, over its start", com_rise),
     Number(
@@ -100,19 +104,19 @@ NUMBERS = (
     # the attitude, and whether it was a landing or a tumble
     Number(
         "pitch_at_end_rad", "rad", "pitch, turns counted",
-        lambda model, motion: float(pitch_roll_yaw(motion.q, unwrap=True)[-1, 0]),
+        _of_torso(lambda motion: float(pitch_roll_yaw(motion.q, unwrap=True)[-1, 0])),
     ),
     Number(
         "tilt_max_deg", "deg", "largest angle of the torso's z axis off the vertical",
-        lambda model, motion: float(tilt_deg(motion.attitude).max()),
+        _of_torso(lambda motion: float(tilt_deg(motion.attitude).max())),
     ),
     Number(
         "tilt_end_deg", "deg", "the same at the end",
-        lambda model, motion: float(tilt_deg(motion.attitude[-1])),
+        _of_torso(lambda motion: float(tilt_deg(motion.attitude[-1]))),
     ),
     Number(
         "upright_end", "", "z of the torso's z axis at the end: 1 level, -1 on its back",
-        lambda model, motion: upright(motion),
+        _of_torso(upright),
     ),
     Number(
         "least_upright_landing", "", "least such z from the landing on: below 0 it was on its back",
@@ -134,7 +138,7 @@ NUMBERS = (
     ),
     # the ground
     Number(
-        "body_weight_N", "N", "weight of torso and tail",
+        "body_weight_N", "N", "weight of torso and tail, of the tail on a fixed base",
         lambda model, motion: weight(model) or None,
     ),
     Number(

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..attitude import Array, quaternion_rate, sign_continuous
-from ..model.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TAIL_V, VELOCITY
+from ..model.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TAIL_V, VELOCITY, Layout
 
 
 def inside(times: Array, span: Array) -> Array:
@@ -53,8 +53,10 @@ class Interpolation:
         return start + s**2 * ((3 - 2 * s) * values[self.after] + (s - 1) * h * rates[self.after])
 
 
-def hermite_q(rows: Interpolation, q: Array, v: Array) -> Array:
+def hermite_q(rows: Interpolation, q: Array, v: Array, layout: Layout) -> Array:
     """Configurations between the samples q with velocities v."""
+    if layout.fixed:
+        return rows.hermite(q, v)
     attitude = sign_continuous(q[:, QUATERNION])
     turning = np.stack(quaternion_rate(attitude.T, v[:, OMEGA].T), axis=-1)
     positions = np.hstack([q[:, POSITION], attitude, q[:, TAIL_Q]])

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from ..attitude import Array
 from ..checks import finite_array
-from ..model.layout import PER_SEGMENT, QUATERNION, TAIL_Q, TORSO_NQ, Layout
+from ..model.layout import QUATERNION, Layout
 from ..model.model import Model
 from . import archive
 from .account import account
@@ -29,10 +29,11 @@ UNIT_TOLERANCE = 1e-3  # how far a stored quaternion's norm may drift from 1
 class Trajectory(Exports):
     """K samples of a motion with m tail segments, SI, in read-only arrays; ValueError if unsound.
 
-    t (K,) s, increasing; q (K, 7+2m), v (K, 6+2m); tau (K, 2m) N m; kinetic, potential (K,) J; in
-    the world linear_momentum (K, 3) kg m/s and, about the COM, angular_momentum (K, 3) kg m2/s;
-    info: JSON-ready dict; contact: points, forces and bristles of a motion on the ground, None in
-    flight; model: what moved, which no file and no pickle keeps: None there.
+    t (K,) s, increasing; q (K, 7+2m), v (K, 6+2m), on a fixed base both (K, 2m); tau (K, 2m) N m;
+    kinetic, potential (K,) J; in the world linear_momentum (K, 3) kg m/s and, about the COM,
+    angular_momentum (K, 3) kg m2/s, of the tail alone on a fixed base; info: JSON-ready dict;
+    contact: points, forces and bristles of a motion on the ground, None in flight; model: what
+    moved, which no file and no pickle keeps: None there.
     """
 
     t: Array
@@ -51,7 +52,7 @@ class Trajectory(Exports):
         """Freeze private copies of the fields once each has been found sound."""
         for name in ARRAYS:
             object.__setattr__(self, name, _real(name, getattr(self, name)))
-        for name, shape in _shapes(self.t, self.q).items():
+        for name, shape in _shapes(self.t, self.q, (self.v, self.tau)).items():
             actual = getattr(self, name).shape
             if actual != shape:
                 raise ValueError(
@@ -102,17 +103,32 @@ class Trajectory(Exports):
     @property
     def segments(self) -> int:
         """Number of tail segments m."""
-        return (self.q.shape[1] - TORSO_NQ) // PER_SEGMENT
+        return self.layout.segments
+
+    @property
+    def layout(self) -> Layout:
+        """Where the numbers of q, v and tau lie."""
+        return _layout(self.q)
+
+    @property
+    def pose(self) -> Array:
+        """Place (m) and quaternion of the torso, (K, 7); a fixed base is at the origin."""
+        return self.layout.pose(self.q)
 
     @property
     def attitude(self) -> Array:
         """Torso quaternions (w, x, y, z), torso to world, (K, 4)."""
-        return self.q[:, QUATERNION]
+        return self.pose[:, QUATERNION]
 
     @property
     def tail(self) -> Array:
         """Tail coordinates q_t, (K, 2m), rad."""
-        return self.q[:, TAIL_Q]
+        return self.q[:, self.layout.tail_q]
+
+    @property
+    def tail_rate(self) -> Array:
+        """Their rates, (K, 2m), rad/s."""
+        return self.v[:, self.layout.tail_v]
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write one npz file (suffix added if absent), whole or not at all, and return its path;
@@ -184,7 +200,7 @@ class Trajectory(Exports):
             name: monotone(self.t, getattr(self, name), times) for name in MONOTONE
         }
         cubics["v"] = (monotone if self.contact else smooth)(self.t, self.v, times)
-        q = hermite_q(rows, self.q, self.v)
+        q = hermite_q(rows, self.q, self.v, self.layout)
         contact = self.contact.mapped(rows.linear) if self.contact else None
         return dataclasses.replace(
             self, t=times, q=q, tau=rows.linear(self.tau), contact=contact, **cubics
@@ -209,16 +225,25 @@ def _real(name: str, value: ArrayLike) -> Array:
     return array
 
 
-def _shapes(t: Array, q: Array) -> dict[str, tuple[int, ...]]:
-    """The shape each array must have, from the number of samples of t and the columns of q."""
+def _layout(q: Array) -> Layout:
+    """The layout of configurations (K, nq) that have one."""
+    layout = Layout.of_width(q.shape[1])
+    assert layout is not None
+    return layout
+
+
+def _shapes(t: Array, q: Array, like: tuple[Array, ...]) -> dict[str, tuple[int, ...]]:
+    """The shape each array must have, from the number of samples of t and the columns of q; on a
+    fixed base v and tau are like q.
+    """
     samples = len(t) if t.ndim == 1 else 0
     if not samples:
         raise ValueError(f"t has shape {t.shape}: give one row of at least one time")
     layout = Layout.of_width(q.shape[1]) if q.ndim == 2 else None
-    if layout is None:
+    if layout is None or (layout.fixed and any(each.shape != q.shape for each in like)):
         raise ValueError(
             f"q has shape {q.shape}: give ({samples}, 7 + 2m), position, quaternion and 2m tail "
-            "coordinates"
+            f"coordinates, or ({samples}, 2m) of a tail on a fixed base"
         )
     return {
         "q": (samples, layout.nq),

@@ -172,7 +172,12 @@ def draw_tail(pen: Pen) -> None:
 
 
 def draw_marks(pen: Pen) -> None:
-    """The back's midline and tick, and the head: a dot on the near side, a ring on the far one."""
+    """The back's midline and tick, and the head: a dot on the near side, a ring on the far one.
+
+    None on a fixed base.
+    """
+    if not pen.frame.body.marked:
+        return
     _, length, height = pen.frame.body.semi_axes
     angle = np.linspace(0, np.pi, 61)
     back = pen.frame.world(

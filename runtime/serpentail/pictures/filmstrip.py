@@ -36,6 +36,7 @@ KEY: dict[str, dict[str, Any]] = {
     "tail": {"color": TAIL, "linewidth": 1.4},
     "path of the COM": {"color": QUIET, "linestyle": ":"},
 }
+OF_TORSO = ("head", "head, far side", "back", "path of the COM")  # which a fixed base has not
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +87,9 @@ class Strip:
         under = any(frame.lowest < -2e-3 for frame in self.every)
         pale: dict[str, Any] = {"color": TAIL, "linewidth": 1.4, "alpha": 0.3}
         below = {"below the ground": pale} if self.grounded and under else {}
-        return KEY | legs | forces | below
+        torsos = any(frame.body.marked for frame in self.every)
+        own = {name: look for name, look in KEY.items() if torsos or name not in OF_TORSO}
+        return own | legs | forces | below
 
 
 def filmstrip(

@@ -24,11 +24,13 @@ class Body:
     """The drawn torso: its ellipsoid's semi-axes and the tail's root, in the torso frame, m.
 
     thickness: of the tail from each point to the next, over its mean; empty where all are equal.
+    marked: whether it has a head and a back; a fixed base has not.
     """
 
     semi_axes: tuple[float, float, float]
     tail_mount: tuple[float, float, float]
     thickness: tuple[float, ...] = ()
+    marked: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,18 +96,19 @@ def body_of(model: Model) -> Body:
     x, y, z = (float(length) for length in model.parameters["tail_mount"])
     own = {"link_masses", "arc_masses"} & model.parameters.keys()
     radii = tail_radii(model) if own else np.zeros(0)
-    return Body((a, b, c), (x, y, z), tuple((radii / (radii.mean() if own else 1)).tolist()))
+    thickness = tuple((radii / (radii.mean() if own else 1)).tolist())
+    return Body((a, b, c), (x, y, z), thickness, not model.fixed)
 
 
 def frames(model: Model, motion: Trajectory, rows: Iterable[int], largest: float) -> list[Frame]:
     """The frames of samples; `largest` (N) is the force whose arrow is LONGEST, 0 draws none."""
     rows, body = list(rows), body_of(model)
-    q = motion.q[rows]
+    q, poses = motion.q[rows], motion.pose[rows]
     points, com = model.tail_points(q), centre_of_mass(model, q, motion.v[rows])
     rotations, legs = rotation_matrix(motion.attitude[rows]), _legs(model, motion, rows)
     found = []
     for k, row in enumerate(rows):
-        torso = q[k, POSITION]
+        torso = poses[k, POSITION]
         tail = np.vstack([torso + rotations[k] @ body.tail_mount, points[k]])
         arrows = _arrows(motion, row, largest)
         time = float(motion.t[row])
@@ -145,7 +148,7 @@ def way(model: Model, motion: Trajectory) -> Array:
     """How far (K,), m, head, back and tail have gone by each sample, on the average."""
     body, rotations = body_of(model), rotation_matrix(motion.attitude)
     marks = np.array([[0, body.semi_axes[1], 0], [0, 0, body.semi_axes[2]]])
-    torso = motion.q[:, None, POSITION] + np.einsum("kij,nj->kni", rotations, marks)
+    torso = motion.pose[:, None, POSITION] + np.einsum("kij,nj->kni", rotations, marks)
     points = np.concatenate([torso, model.tail_points(motion.q)], axis=1)
     steps = np.linalg.norm(np.diff(points, axis=0), axis=2).mean(axis=1)
     return np.concatenate([[0.0], np.cumsum(steps)])

@@ -46,12 +46,12 @@ class Panel:
 
 def height(motion: Trajectory, model: Model | None) -> Panel:
     """Height of B."""
-    return Panel("height of\ntorso [mm]", 1e3 * motion.q[:, 2:3], ("torso",), ((INK, "-"),), 1.0)
+    return Panel("height of\ntorso [mm]", 1e3 * motion.pose[:, 2:3], ("torso",), ((INK, "-"),), 1.0)
 
 
 def attitude(motion: Trajectory, model: Model | None) -> Panel:
     """Euler angles, turns counted; roll and yaw have gaps where the torso points up or down."""
-    angles = pitch_roll_yaw(motion.q, unwrap=True)
+    angles = pitch_roll_yaw(motion.pose, unwrap=True)
     angles[np.abs(np.cos(angles[:, 0])) < SINGULAR, 1:] = np.nan
     names = (r"pitch $\phi_x$", r"roll $\phi_y$", r"yaw $\phi_z$")
     return Panel("attitude [deg]", np.degrees(angles), names, TRIPLE, 1.0)
@@ -95,7 +95,9 @@ def force(motion: Trajectory, model: Model | None) -> Panel:
 def rate(motion: Trajectory, model: Model | None) -> Panel:
     """Angular velocity of the torso in its own frame."""
     names = (r"$\omega_x$", r"$\omega_y$", r"$\omega_z$")
-    return Panel("torso rate\n[rad/s]", motion.v[:, OMEGA], names, TRIPLE, 0.1)
+    fixed = motion.layout.fixed
+    curves = np.zeros((len(motion.t), 3)) if fixed else motion.v[:, OMEGA]
+    return Panel("torso rate\n[rad/s]", curves, names, TRIPLE, 0.1)
 
 
 def energy(motion: Trajectory, model: Model | None) -> Panel:

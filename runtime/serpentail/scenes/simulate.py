@@ -188,7 +188,16 @@ def _positive(field: str, value: Any) -> float:
 
 def _start(model: Model, table: Mapping, reference: Any) -> tuple[np.ndarray, np.ndarray]:
     """Return q0 and v0, before it settles."""
-    q = np.concatenate([_pose(table), _tail(model, table, reference)])
+    tail = _tail(model, table, reference)
+    if model.fixed:
+        of_torso = [f"simulate.start.{name}" for name in table if name != "bends"]
+        if of_torso:
+            raise SimulationError(
+                f"{of_torso[0]}: this scene has a fixed base, whose start has `bends` alone: "
+                'remove it, or set base = "free"'
+            )
+        return tail, np.zeros(model.nv)
+    q = np.concatenate([_pose(table), tail])
     v = np.zeros(model.nv)
     v[VELOCITY] = _three("simulate.start.velocity", table.get("velocity", (0, 0, 0)))
     v[OMEGA] = _three("simulate.start.rate", table.get("rate", (0, 0, 0)))

@@ -77,6 +77,7 @@ def audited(
     pull = np.zeros((*energy.shape, 3))
     pull[..., 2] = -weight * span
     moved = momentum[..., 1, :] - momentum[..., 0, :] - pull - sum(impulses.values())
+    moved = 0 * moved if model.fixed else moved  # its base gives a tail any momentum
 
     # over what was moved, an animal at rest by its weight
     energies = kinetic.max(axis=-1) + weight * values["tail_length"]

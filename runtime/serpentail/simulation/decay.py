@@ -4,7 +4,6 @@ import numpy as np
 
 from ..errors import StateError
 from ..model.kernel import RunKernel
-from ..model.layout import TAIL_V
 from ..model.parameters import RunParameters, Values
 from .acting import Acting
 
@@ -31,7 +30,7 @@ class FastestDecay:
         if not self.moved:
             return
         # without torque and with unit torques: the differences are columns of H^-1
-        kernel = model.kernel("forward_dynamics")
+        kernel, self.tail = model.kernel("forward_dynamics"), model.layout.tail_v
         self.runs, self.columns = runs, nt + 1
         torques = np.eye(self.columns, nt, -1, kernel.dtype)
         tau = np.tile(torques, (runs, 1, 1))
@@ -47,7 +46,7 @@ class FastestDecay:
             return 0.0
         self.q[...] = q0[:, None]
         sound = [k for k in range(self.runs) if self._evaluated(k)]
-        tail = self.v_dot[sound, :, TAIL_V].astype(float)
+        tail = self.v_dot[sound, :, self.tail].astype(float)
         mobility = tail[:, 1:] - tail[:, :1]
         if self.sprung:
             return fastest(mobility, self.stiffness[sound], self.damping[sound])

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from ..errors import SimulationError, StateError
-from ..model.layout import TAIL_Q
 from ..model.model import Model
 from ..model.passive import stored_energy
 from ..motion.origin import origin
@@ -128,5 +127,5 @@ class Measures:
             rows.append((*self.model.energy(q, v), self.model.momentum(q, v)[0]))
         columns = zip(*rows, strict=True)
         ends = {name: np.array(each, float) for name, each in zip(BALANCED, columns, strict=True)}
-        tails = self.samples.q[[0, -1]][:, TAIL_Q]
+        tails = self.samples.q[[0, -1]][:, self.model.layout.tail_q]
         return ends | {"stored": stored_energy(self.model.parameters, tails)}

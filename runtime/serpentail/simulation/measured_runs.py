@@ -8,7 +8,6 @@ import numpy as np
 
 from ..errors import SimulationError, StateError
 from ..model.kernel import RunKernel
-from ..model.layout import TAIL_Q
 from ..model.passive import stored_energy
 from ..model.workers import in_turn
 from ..motion.trajectory import Trajectory
@@ -125,7 +124,8 @@ class MeasuredRuns:
             array = self.arrays[name]
             ends[name] = np.stack([array[:, 0], array[each, last]], axis=1).astype(float)
         q, values = self.memory.out["q"], self.memory.parameters.values
-        tails = (q[:, 0, TAIL_Q], q[each, last, TAIL_Q])
+        tail = self.model.layout.tail_q
+        tails = (q[:, 0, tail], q[each, last, tail])
         ends["stored"] = np.stack([stored_energy(values, tail) for tail in tails], axis=1)
         ends["kinetic"][list(self.outcomes.failures)] = np.nan
         for k, stop in self.outcomes.stops.items():  # between samples

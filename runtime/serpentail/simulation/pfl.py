@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from ..checks import number, numbers, refusal
 from ..errors import SimulationError
-from ..model.layout import TAIL_Q, TAIL_V, TORSO_NV, TORSO_V
+from ..model.layout import TORSO_V
 from ..model.model import Model
 from .piecewise import Piecewise, checked_nodes, spline
 from .schedules import Reference
@@ -57,19 +57,28 @@ class Pfl:
         return angles, rates, accelerations if self.feedforward else 0 * accelerations
 
     def __call__(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Return tau (2m,), N m: X^-1 (S H^-1 C + a), X = S H^-1 [0; I], within its limit."""
+        """Return tau (2m,), N m: X^-1 (S H^-1 C + a), X = S H^-1 [0; I], within its limit.
+
+        On a fixed base that is H a + C.
+        """
         angles, rates, accelerations = self.reference(t)
-        wanted = accelerations + self.kd * (rates - v[TAIL_V]) + self.kp * (angles - q[TAIL_Q])
+        layout = self.model.layout
+        off = angles - q[layout.tail_q], rates - v[layout.tail_v]
+        wanted = accelerations + self.kd * off[1] + self.kp * off[0]
         exact = self.model.pfl if "pfl" in self.model.kernels else self._eliminated
         tau = exact(q, v, wanted)
         return tau if self.torque is None else np.clip(tau, -self.torque, self.torque)
 
     def _eliminated(self, q: np.ndarray, v: np.ndarray, wanted: np.ndarray) -> np.ndarray:
         """The same by H and C: the base's accelerations solve its rows of Eq. 1."""
-        v_dot = np.concatenate([np.zeros(TORSO_NV), wanted])
-        H, force = self.model.mass_matrix(q), self.model.inverse_dynamics(q, v, v_dot)
+        tail = self.model.layout.tail_v
+        v_dot = np.concatenate([np.zeros(tail.start), wanted])
+        force = self.model.inverse_dynamics(q, v, v_dot)
+        if self.model.fixed:
+            return force
+        H = self.model.mass_matrix(q)
         base = np.linalg.solve(H[TORSO_V, TORSO_V], -force[TORSO_V])
-        return force[TAIL_V] + H[TAIL_V, TORSO_V] @ base
+        return force[tail] + H[tail, TORSO_V] @ base
 
 
 def _limit(torque: Any, size: int) -> np.ndarray:
@@ -100,7 +109,7 @@ def _nodes(reference: Any) -> tuple[ArrayLike, ArrayLike, object]:
     motion = getattr(reference, "trajectory", reference)
     if hasattr(motion, "tail") and hasattr(motion, "t"):
         if motion is reference:
-            return motion.t, motion.tail, tuple((1, motion.v[k, TAIL_V]) for k in (0, -1))
+            return motion.t, motion.tail, tuple((1, motion.tail_rate[k]) for k in (0, -1))
         # a plan: its accelerations, as a spline's own, fed forward, are least exact at the ends
         slopes = reference.curve.slopes(motion.t[[0, -1]])["tail_rate"]
         return motion.t, motion.tail, tuple((2, row) for row in slopes)

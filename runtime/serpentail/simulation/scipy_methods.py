@@ -61,9 +61,10 @@ class SampleWriter:
         self.torques: list[np.ndarray] = []
 
     def write(self, t: float, y: np.ndarray) -> None:
-        """Write one sample, its quaternion normalised."""
+        """Write one sample, its quaternion, if there is one, normalised."""
         y = y.copy()
-        y[QUATERNION] /= np.linalg.norm(y[QUATERNION])
+        if not self.rate.run.model.fixed:
+            y[QUATERNION] /= np.linalg.norm(y[QUATERNION])
         self.torques.append(self.rate.torque(t, y))
         self.states.append(y)
 
@@ -135,7 +136,7 @@ def _smooth_part(
         for at in samples.due(solver.t):
             samples.write(at, interpolant(at) if at < solver.t else solver.y)
         samples.look()
-        if method.name == "dop853":
+        if method.name == "dop853" and not rate.run.model.fixed:
             norm = np.linalg.norm(solver.y[QUATERNION])
             solver.y[QUATERNION] /= norm
             solver.f[QUATERNION] /= norm

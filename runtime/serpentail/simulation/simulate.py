@@ -41,7 +41,8 @@ def simulate(
     method: str = "auto",
     **settings: Any,
 ) -> Trajectory | Rollouts:
-    """Simulate a motion: H v_dot + C = [0; tau], the quaternion kept on the unit sphere.
+    """Simulate a motion: H v_dot + C = [0; tau], the quaternion kept on the unit sphere; on a fixed
+    base H v_dot + C = tau of the tail alone.
 
     q0 (nq,), v0 (nv,): start; its quaternion is normalised; (k, nq), (k, nv), or one of both: k
     starts, see below.
@@ -82,7 +83,6 @@ def simulate(
     With a function of Python, or SciPy's methods, runs are made one after another in the calling
     thread, and what the function raises, unless it is a SimulationError, ends all.
     """
-    model.refuse_fixed("simulate")
     missing = [name for name in ("rollout", "energy", "momentum") if name not in model.generated]
     if missing:
         raise model.without(*missing)

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from ..checks import finite_array, number, real_array, refusal, refuse_not_finite
 from ..errors import SimulationError, StateError
 from ..model.kept import kept
-from ..model.layout import QUATERNION, TAIL_Q
+from ..model.layout import QUATERNION
 from ..model.model import Model
 from ..model.parameters import Values
 from ..model.passive import behind_stops
@@ -30,6 +30,7 @@ class Start:
     end: float
     intervals: int
     many: bool
+    tail: slice  # of q
 
     @classmethod
     def checked(
@@ -51,7 +52,9 @@ class Start:
             raise SimulationError(
                 f"output_step {step:.3g}: more than {MOST_SAMPLES} samples{whose}: {remedy}"
             )
-        checked = cls(q0, v0, start, end, max(1, round((end - start) / step)), many)
+        checked = cls(
+            q0, v0, start, end, max(1, round((end - start) / step)), many, model.layout.tail_q
+        )
         least = max(SHORTEST, EPS * max(abs(start), abs(end)))
         if checked.interval < least:
             raise SimulationError(
@@ -62,7 +65,7 @@ class Start:
 
     def refuse_behind_stops(self, values: Values) -> None:
         """StateError where a tail begins behind its stops, from parameters of the runs."""
-        behind = behind_stops(values, self.q0[:, TAIL_Q])
+        behind = behind_stops(values, self.q0[:, self.tail])
         if behind:
             raise StateError(f"q0: {behind}")
 
@@ -105,6 +108,8 @@ def checked_starts(
     v0 = checked_states("v0", state[1], model.nv)
     many = q0.ndim == 2 or v0.ndim == 2
     q0, v0 = _paired(q0, v0)
+    if model.fixed:
+        return q0, v0, many
     norms = [math.hypot(*quaternion) for quaternion in q0[:, QUATERNION].tolist()]
     if not all(norms):
         where = f" of run {norms.index(0.0)}" if many else ""

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..model.layout import POSITION, TAIL_V, TORSO_NV, VELOCITY
+from ..model.layout import POSITION, TORSO_NV, VELOCITY
 from ..model.model import Model
 from .errors import relative, sensitivity, worst
 from .law import PIECEWISE, SLOPE_LIMIT, VALUE_LIMIT, Errors, Law, fastest, moved, registry, slope
-from .states import State, at_origin
+from .states import State, at_origin, is_fixed
 
 DEPTH = 3e-3  # m, of the lowest point in the ground
 HEIGHT = 100.0  # m: far from the ground
@@ -38,7 +38,9 @@ def sunk(model: Model, s: State) -> State:
 
 
 def raised(q: np.ndarray, height: float) -> np.ndarray:
-    """Return the configuration with B higher by a height (m)."""
+    """Return the configuration with B higher by a height (m), unless it is fixed."""
+    if is_fixed(q):
+        return q
     q = q.copy()
     q[2] += height
     return q
@@ -49,7 +51,7 @@ def raised(q: np.ndarray, height: float) -> np.ndarray:
 def tail_gets_the_accelerations_that_torques_are_for(model: Model, s: State) -> Errors:
     """Torques of partial feedback linearisation give wanted accelerations, relative to cond(H)."""
     v_dot = model.forward_dynamics(s.q, s.v, model.pfl(s.q, s.v, s.accelerations))
-    return relative(v_dot[TAIL_V], s.accelerations, v_dot) / sensitivity(model, s.q)
+    return relative(v_dot[model.layout.tail_v], s.accelerations, v_dot) / sensitivity(model, s.q)
 
 
 @law("tracked_dynamics", "pfl", "forward_dynamics", units=VALUE_LIMIT, without=PIECEWISE)
@@ -77,10 +79,11 @@ def implicit_steps_solve_their_system(model: Model, s: State) -> Errors:
     factors = model.kernel("implicit_factor")(high, s.v, damping, GAINS, weight, *ground)
     k_q, k_v, *k_u = model.kernel("implicit_solve")(factors, s.dq, s.dv, *u)
 
-    # what k has to be: here q is in the tangent space, so that rates of the tail are at TAIL_V
+    # what k has to be: here q is in the tangent space, so that angles of the tail lie as rates do
     change, load = k_v.astype(float) - s.dv, np.zeros(model.nv)
-    tracked = H[TAIL_V, TAIL_V] @ (GAINS @ [k_q[TAIL_V], k_v[TAIL_V]])
-    load[TAIL_V] = -w * (tracked + damping * k_v[TAIL_V])
+    tail = model.layout.tail_v
+    tracked = H[tail, tail] @ (GAINS @ [k_q[tail], k_v[tail]])
+    load[tail] = -w * (tracked + damping * k_v[tail])
     scale = np.sqrt(np.diag(H))
     relaxed = [u[0] / (1 + w / model.parameters["D_f"])] if u else []
     return {

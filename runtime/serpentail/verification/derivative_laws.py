@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..model.layout import OMEGA, TAIL_V
+from ..model.layout import OMEGA
 from ..model.model import Model
-from .errors import block_error, relative, worst
+from .errors import block_error, blocks_of, relative, worst
 from .law import PIECEWISE, SLOPE_LIMIT, Errors, Law, fastest, moved, registry, slope
 from .states import State, at_origin
 
@@ -33,10 +33,12 @@ def slopes(
     return change, rate * largest
 
 
-def block_slope_error(x: np.ndarray, expected: tuple[np.ndarray, np.ndarray]) -> float:
+def block_slope_error(
+    model: Model, x: np.ndarray, expected: tuple[np.ndarray, np.ndarray]
+) -> float:
     """Return the error of a generalised force's derivative against a slope, block by block."""
     change, largest = expected
-    return block_error(x, change, np.abs(change) + largest)
+    return block_error(x, change, np.abs(change) + largest, blocks_of(model))
 
 
 @law("inverse_dynamics", "inverse_dynamics_derivatives", units=SLOPE_LIMIT, without=PIECEWISE)
@@ -44,6 +46,7 @@ def inverse_dynamics_changes_by_its_jacobians(model: Model, s: State) -> Errors:
     """dq, dv times a direction are the slope of H v_dot + C along it."""
     dq, dv = model.inverse_dynamics_derivatives(s.q, s.v, s.v_dot)
     return block_slope_error(
+        model,
         dq @ s.dq + dv @ s.dv,
         slopes(model, s, lambda at: model.inverse_dynamics(at.q, at.v, s.v_dot)),
     )
@@ -64,11 +67,11 @@ def forward_dynamics_changes_by_its_jacobians(model: Model, s: State) -> Errors:
     v_dot, H = model.forward_dynamics(s.q, s.v, s.tau), model.mass_matrix(s.q).astype(float)
     dq, dv, dtau = (x.astype(float) for x in model.forward_dynamics_derivatives(s.q, s.v, s.tau))
     change, largest = slopes(model, s, lambda at: model.inverse_dynamics(at.q, at.v, v_dot))
-    unit = np.eye(model.nv)[:, TAIL_V]
+    unit = np.eye(model.nv)[:, model.layout.tail_v]
     # what H times the change sums up
     terms = np.abs(H) @ (np.abs(dq) @ np.abs(s.dq) + np.abs(dv) @ np.abs(s.dv))
     return {
-        "dq, dv": block_slope_error(-H @ (dq @ s.dq + dv @ s.dv), (change, largest + terms)),
+        "dq, dv": block_slope_error(model, -H @ (dq @ s.dq + dv @ s.dv), (change, largest + terms)),
         "dtau": relative(H @ dtau, unit, np.abs(H) @ np.abs(dtau)),
     }
 

@@ -12,6 +12,7 @@ from ..model.parameters import total_mass
 from .states import State, outputs
 
 BLOCKS = (VELOCITY, OMEGA, TAIL_V)  # of forces and accelerations: B's translation, rotation, tail
+Blocks = tuple[slice, ...]
 NEGLIGIBLE = 1e-6  # a block this much smaller than the largest is scaled by the largest
 
 
@@ -49,6 +50,8 @@ def cancelling_size(model: Model, output: str, state: State) -> float:
     Rotating the torso does not change how B moves.  The terms by which the whole mass moves with B
     cancel in derivatives by rotations, and leave their rounding.
     """
+    if model.fixed:
+        return 0.0
     speed, weights = (float(np.linalg.norm(x[VELOCITY])) for x in (state.v, state.multiplier))
     load = float(np.linalg.norm(state.v_dot[VELOCITY])) + model.parameters["gravity"]
     sizes = {"kinetic_dq": speed**2, "qq": load * weights, "aq": weights}
@@ -89,11 +92,16 @@ def relative(x: ArrayLike, reference: ArrayLike, scale: ArrayLike | None = None)
     return float(np.max(np.abs(np.subtract(x, reference, dtype=float)), initial=0.0) / size)
 
 
-def block_error(x: Any, reference: Any, scale: Any = None) -> float:
-    """Return the largest relative error of the three blocks of a force or an acceleration."""
+def blocks_of(model: Model) -> Blocks:
+    """Return the blocks of forces and accelerations: a tail on a fixed base is one."""
+    return (slice(None),) if model.fixed else BLOCKS
+
+
+def block_error(x: Any, reference: Any, scale: Any = None, blocks: Blocks = BLOCKS) -> float:
+    """Return the largest relative error of the blocks of a force or an acceleration."""
     scale = np.abs(reference if scale is None else scale)
     floor = NEGLIGIBLE * np.max(scale)
-    return worst(relative(x[b], reference[b], np.maximum(scale[b], floor)) for b in BLOCKS)
+    return worst(relative(x[b], reference[b], np.maximum(scale[b], floor)) for b in blocks)
 
 
 def matrix_error(H: np.ndarray, reference: np.ndarray) -> float:
@@ -121,7 +129,7 @@ def sensitivity(model: Model, q: np.ndarray) -> float:
     tau = np.eye(tail + 1, tail, -1)  # none, then each torque alone
     load = None if "forward_dynamics" in model.kernels else model.external_force()
     v_dot = model.forward_dynamics(q, np.zeros(model.nv), tau, load)
-    return condition((v_dot[1:] - v_dot[0])[:, TAIL_V])
+    return condition((v_dot[1:] - v_dot[0])[:, model.layout.tail_v])
 
 
 def difference(
@@ -132,12 +140,12 @@ def difference(
     if output == "H":
         return matrix_error(x, reference)
     if output == "force":
-        return block_error(x, reference)
+        return block_error(x, reference, blocks=blocks_of(model))
     if output == "v_dot":
-        return block_error(x, reference) / sensitivity(model, q)
+        return block_error(x, reference, blocks=blocks_of(model)) / sensitivity(model, q)
     if output == "potential":
         mount = np.linalg.norm(model.parameters["tail_mount"])
-        height = abs(q[2]) + model.parameters["tail_length"] + mount
+        height = abs(model.layout.pose(q)[2]) + model.parameters["tail_length"] + mount
         return relative(
             x, reference, total_mass(model.parameters) * model.parameters["gravity"] * height
         )

@@ -45,7 +45,7 @@ def changed_axes(top: np.ndarray, middle: np.ndarray, size: int) -> np.ndarray:
     return X
 
 
-@law(units=VALUE_LIMIT)
+@law(units=VALUE_LIMIT, only="free")
 def pose_in_the_world_turns_all_alike(model: Model, s: State) -> Errors:
     """Turning the world about z and shifting it turns and shifts every result."""
     angle, shift = 1.1, np.array([0.3, -0.7, 0.5])
@@ -81,7 +81,7 @@ def turned_outputs(model: Model, results: dict, X: np.ndarray, shift: np.ndarray
     return {key: turn[key](x) if key in turn else turned_array(x, X) for key, x in results.items()}
 
 
-@law()
+@law(only="free")
 def position_and_speed_of_the_torso_do_not_matter(model: Model, s: State) -> Errors:
     """H, C, v_dot and Jacobians do not change with B's position and velocity, bit for bit."""
     q, v = s.q.copy(), s.v.copy()
@@ -91,7 +91,7 @@ def position_and_speed_of_the_torso_do_not_matter(model: Model, s: State) -> Err
     return same_bits(model, names, s, replace(s, q=q, v=v))
 
 
-@law()
+@law(only="free")
 def quaternion_has_no_norm_and_no_sign(model: Model, s: State) -> Errors:
     """The quaternion times -2 is the same attitude: the same results, bit for bit."""
     q = s.q.copy()
@@ -105,7 +105,8 @@ def links_have_their_length(model: Model, s: State) -> Errors:
     length.
     """
     points = model.tail_points(s.q).astype(float)
-    mount = s.q[POSITION] + rotation_matrix(s.q[QUATERNION]) @ model.parameters["tail_mount"]
+    pose = model.layout.pose(s.q)
+    mount = pose[POSITION] + rotation_matrix(pose[QUATERNION]) @ model.parameters["tail_mount"]
     lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
     even = model.parameters["tail_length"] / len(lengths)
     own = np.array(model.parameters.get("link_lengths", np.full(len(lengths), even)))

@@ -13,7 +13,7 @@ from ..model.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TAIL_V, VELOCITY
 from ..model.model import Model
 from ..model.passive import idle
 from .errors import rounding
-from .states import State
+from .states import State, is_fixed
 
 # limits in roundings (eps of the model's real type)
 VALUE_LIMIT = 450  # 1e-13 in double
@@ -35,7 +35,7 @@ class Law:
     needs: tuple[str, ...] = ()  # functions of the model
     units: float = 0.0  # limit, in roundings (eps) of the model's real type
     floor: float = 0.0  # limit of what has other reasons than rounding
-    only: str = ""  # real type or kind of tail of the models that it holds for
+    only: str = ""  # real type or kind of tail of the models that it holds for; "free" torsos
     casadi: bool = False  # whether it evaluates CasADi functions
     without: tuple[str, ...] = ()  # parts of the passive tail that it holds without
 
@@ -96,6 +96,8 @@ def slope(f: Callable[[float], np.ndarray], rate: float) -> tuple[np.ndarray, np
 
 def moved(q: np.ndarray, v: np.ndarray, time: float) -> np.ndarray:
     """Return the configuration that the constant velocity v leads to."""
+    if is_fixed(q):
+        return q + time * v
     omega = v[OMEGA]
     angle = np.linalg.norm(omega) * time / 2
     turn = np.concatenate([[np.cos(angle)], np.sinc(angle / np.pi) * time / 2 * omega])
@@ -105,5 +107,6 @@ def moved(q: np.ndarray, v: np.ndarray, time: float) -> np.ndarray:
 
 def fastest(model: Model, v: np.ndarray) -> float:
     """Return a bound on the angular velocity of every link (rad/s)."""
-    turning = np.repeat(model.joints_each, 2) * abs(v[TAIL_V])
-    return float(np.linalg.norm(v[OMEGA]) + np.sum(turning))
+    turning = np.repeat(model.joints_each, 2) * abs(v[model.layout.tail_v])
+    of_torso = 0.0 if model.fixed else np.linalg.norm(v[OMEGA])
+    return float(of_torso + np.sum(turning))

@@ -4,7 +4,6 @@ from typing import Any
 
 import numpy as np
 
-from ..model.layout import TAIL_Q, TAIL_V
 from ..model.model import Model
 from ..model.passive import PARTS, passive_force, stored_energy
 from .contact_laws import HEIGHT, bristles, legs, raised
@@ -23,7 +22,9 @@ def the_tail_itself_asks_for_torques(model: Model, s: State) -> Errors:
     force = model.inverse_dynamics(s.q, s.v, s.v_dot).astype(float)
     expected = bare.inverse_dynamics(s.q, s.v, s.v_dot).astype(float)
     size = np.abs(force) + np.abs(expected)
-    expected[TAIL_V] += passive_force(model.parameters, s.q[TAIL_Q], s.v[TAIL_V])
+    expected[model.layout.tail_v] += passive_force(
+        model.parameters, s.q[model.layout.tail_q], s.v[model.layout.tail_v]
+    )
     return relative(force, expected, size + np.abs(expected))
 
 
@@ -35,7 +36,7 @@ def springs_and_stops_store_potential_energy(model: Model, s: State) -> Errors:
     bare = rid_of(model, PARTS)
     kinetic, potential = model.energy(s.q, s.v)
     own, height = bare.energy(s.q, s.v)
-    stored = float(stored_energy(model.parameters, s.q[TAIL_Q]))
+    stored = float(stored_energy(model.parameters, s.q[model.layout.tail_q]))
     return {
         "kinetic": relative(kinetic, own),
         "potential": relative(potential, height + stored, abs(float(height)) + stored),
@@ -49,7 +50,9 @@ def stored_energy_changes_by_its_forces(model: Model, s: State) -> Errors:
     gradient = model.energy_derivatives(s.q, s.v)[2].astype(float)
     expected = bare.energy_derivatives(s.q, s.v)[2].astype(float)
     size = np.abs(gradient) + np.abs(expected)
-    expected[TAIL_V] += passive_force(model.parameters, s.q[TAIL_Q], 0 * s.v[TAIL_V])
+    expected[model.layout.tail_v] += passive_force(
+        model.parameters, s.q[model.layout.tail_q], 0 * s.v[model.layout.tail_v]
+    )
     return relative(gradient, expected, size)
 
 
@@ -57,7 +60,7 @@ def stored_energy_changes_by_its_forces(model: Model, s: State) -> Errors:
 def torques_that_make_up_for_it_rid_a_tail_of_it(model: Model, s: State) -> Errors:
     """Under torques greater by what the tail itself asks for, v_dot is that of a tail without."""
     bare = rid_of(model, PARTS)
-    own = passive_force(model.parameters, s.q[TAIL_Q], s.v[TAIL_V])
+    own = passive_force(model.parameters, s.q[model.layout.tail_q], s.v[model.layout.tail_v])
     expected = bare.inverse_dynamics(s.q, s.v, bare.forward_dynamics(s.q, s.v, s.tau))
     found = bare.inverse_dynamics(s.q, s.v, model.forward_dynamics(s.q, s.v, s.tau + own))
     scale = np.abs(own).max() + np.abs(expected).max() + np.abs(found).max()
@@ -83,7 +86,8 @@ def implicit_steps_know_the_passive_tail(model: Model, s: State) -> Errors:
     # H (k_v - r_v) = -w (D k_v + K k_q)
     own = damping + np.asarray(values.get("tail_damping", 0.0))
     stiffness, load = np.asarray(values.get("tail_stiffness", 0.0)), np.zeros(model.nv)
-    load[TAIL_V] = -w * (own * k_v[TAIL_V] + stiffness * k_q[TAIL_V])
+    tail = model.layout.tail_v
+    load[tail] = -w * (own * k_v[tail] + stiffness * k_q[tail])
     scale = np.sqrt(np.diag(H))
     return {
         "v": relative(H @ (k_v - s.dv) / scale, load / scale) / sensitivity(model, s.q),

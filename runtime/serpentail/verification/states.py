@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import ModelError
-from ..model.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TAIL_V
+from ..model.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TAIL_V, Layout
 from ..model.model import Model
 from ..model.parameters import total_mass
 
@@ -32,7 +32,7 @@ class State:
     @property
     def accelerations(self) -> np.ndarray:
         """Wanted accelerations of the tail coordinates."""
-        return self.v_dot[TAIL_V]
+        return self.v_dot[-len(self.tau) :]
 
     @property
     def x(self) -> np.ndarray:
@@ -82,6 +82,8 @@ def random_arrays(model: Model, rng: np.random.Generator, kind: str, k: int) -> 
     tau = rng.uniform(-torque, torque, tail)
     f_ext = total_mass(model.parameters) * rng.uniform(-1, 1, len(model.external_force()))
     f_ext[OMEGA] *= length
+    if model.fixed:
+        q, v, v_dot = (x[-tail:] for x in (q, v, v_dot))
 
     # directions of derivatives
     return [q, v, v_dot, tau, f_ext, *(rng.uniform(-1, 1, len(x)) for x in (v, v, tau, v))]
@@ -105,11 +107,14 @@ def tail_angles(model: Model, rng: np.random.Generator, kind: str, k: int) -> np
         return np.zeros(size)
     if kind == "random":
         return rng.uniform(-1, 1, size) * min(1, reach / 4)
-    if model.manifest["scene"]["kind"] == "continuum":
+    bent, turned = np.zeros(size), np.zeros(size)
+    if "continuum" in model.kinds:
         bends = [rng.uniform(0.3, 0.6) * reach * direction(rng, 2) for _ in range(model.segments)]
-        return np.concatenate(bends)
-    near_pi = rng.choice([-np.pi, np.pi], size) + rng.uniform(-0.01, 0.01, size)
-    return near_pi if k % 2 == 0 else rng.uniform(-2 * np.pi, 2 * np.pi, size)
+        bent = np.concatenate(bends)
+    if "articulated" in model.kinds:
+        near_pi = rng.choice([-np.pi, np.pi], size) + rng.uniform(-0.01, 0.01, size)
+        turned = near_pi if k % 2 == 0 else rng.uniform(-2 * np.pi, 2 * np.pi, size)
+    return np.where(np.repeat(model.kinds, 2) == "continuum", bent, turned)
 
 
 def blocks(rng: np.random.Generator, tail: int, scales: tuple[float, float, float]) -> np.ndarray:
@@ -120,15 +125,24 @@ def blocks(rng: np.random.Generator, tail: int, scales: tuple[float, float, floa
 
 def at_origin(s: State) -> State:
     """Return the state with B at the origin."""
+    if is_fixed(s.q):
+        return s
     q = s.q.copy()
     q[POSITION] = 0
     return replace(s, q=q)
 
 
+def is_fixed(q: np.ndarray) -> bool:
+    """Tell if a configuration is that of a tail on a fixed base."""
+    layout = Layout.of_width(len(q))
+    return layout is not None and layout.fixed
+
+
 def scaled(s: State, factor: float) -> State:
     """Return another state: all but the attitude times a factor."""
     q = s.q * factor
-    q[QUATERNION] = s.q[QUATERNION]
+    if not is_fixed(q):
+        q[QUATERNION] = s.q[QUATERNION]
     return replace(
         s, q=q, v=s.v * factor, v_dot=s.v_dot * factor, tau=s.tau * factor, f_ext=s.f_ext * factor
     )

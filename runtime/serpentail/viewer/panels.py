@@ -35,6 +35,8 @@ def panels(
 
 def _columns(array: str, motion: Trajectory) -> Sequence[str]:
     """The names of an array's columns, none where a motion does not have it."""
+    if array in ("height", "tilt") and motion.layout.fixed:
+        return []
     if array in ("bends", "torque"):
         return [f"{bend} {i + 1}" for i in range(motion.segments) for bend in ("pitch", "yaw")]
     if array == "force":

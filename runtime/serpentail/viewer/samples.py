@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 
 from ..attitude import Array, tilt_deg
-from ..model.layout import TORSO_NQ
 from ..model.model import Model
 from ..motion.body import bends, centre_of_mass, leg_points
 from ..motion.trajectory import ARRAYS, Trajectory
@@ -32,10 +31,10 @@ def samples(model: Model, motion: Trajectory) -> dict[str, Array]:
     t = motion.t.astype(np.float32)
     arrays = {
         "t": np.stack([t, motion.t - t], axis=1),
-        "pose": motion.q[:, :TORSO_NQ],
+        "pose": motion.pose,
         "tail": model.tail_points(motion.q),
         "com": centre_of_mass(model, motion.q, motion.v),
-        "height": motion.q[:, 2],
+        "height": motion.pose[:, 2],
         "tilt": tilt_deg(motion.attitude),
         "bends": np.degrees(bends(model, motion.tail)),
         "torque": motion.tau,

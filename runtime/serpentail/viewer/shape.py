@@ -3,6 +3,7 @@
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..attitude import Array
 from ..model.model import Model
@@ -19,9 +20,13 @@ def shape(model: Model) -> dict[str, Any]:
     """Return semi-axes of the torso and radii of the tail, m, one from each of its points to the
     next, and whether its joints are marked.
 
-    The torso is that of ``motion.body``, no semi-axis too thin to be seen.
+    The torso is that of ``motion.body``, no semi-axis too thin to be seen; a fixed base is drawn as
+    a ball that the tail begins in.
     """
     axes = semi_axes(model)
+    if model.fixed:
+        reach = float(np.linalg.norm(model.parameters["tail_mount"]))
+        axes = np.full(3, max(reach, 2 * usual_radius(model)))
     return {
         "semi_axes": np.maximum(axes, THINNEST * axes.max()).tolist(),
         "tail_radii": tail_radii(model).tolist(),
@@ -37,14 +42,23 @@ def tail_radii(model: Model) -> Array:
     mass is of water.  Other tails are drawn thinner towards the tip.
     """
     p, count = model.parameters, model.manifest["dimensions"]["total"]
-    usual = usual_radius(model)
+    usual, found = usual_radius(model), np.zeros(count)
+    jointed = jointed_points(model)
     if "link_masses" in p:
         along, masses = np.reshape(p["link_inertias"], (-1, 3))[:, 1], np.array(p["link_masses"])
-        return np.where(along > 0, np.sqrt(2 * along / masses), usual)
+        found[jointed] = np.where(along > 0, np.sqrt(2 * along / masses), usual)
     if "arc_masses" in p:
         sections = np.array(p["arc_masses"]) / p["arc_lengths"] / WATER
-        return np.repeat(np.sqrt(sections / np.pi), count // model.segments)
+        found[~jointed] = np.repeat(np.sqrt(sections / np.pi), model.samples or 1)
+    if {"link_masses", "arc_masses"} & p.keys():
+        return found
     return usual * (THICKER - np.arange(count) / (2 * count + 2))
+
+
+def jointed_points(model: Model) -> NDArray[np.bool_]:
+    """Return of each tail point but the first whether a link leads to it, not a part of an arc."""
+    links = np.broadcast_to(0 if model.links is None else model.links, model.segments)
+    return np.repeat(links > 0, np.where(links > 0, links, model.samples or 1))
 
 
 def usual_radius(model: Model) -> float:

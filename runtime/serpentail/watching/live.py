@@ -82,7 +82,7 @@ class Live:
     def _show(self, q: Array, legs: Array | None, text: str) -> None:
         """Show poses (n, nq), as one change of the scene."""
         if not self.nodes:
-            self._aim(q[0, POSITION])
+            self._aim(self.model.layout.pose(q)[0, POSITION])
         with self.server.atomic():
             for name, instances in animal(self.model, q, legs).items():
                 self._place(name, instances)

@@ -38,7 +38,7 @@ def animal(model: Model, q: Array, legs: Array | None) -> dict[str, Instances]:
     """
     look = shape(model)
     semi_axes = np.array(look["semi_axes"])
-    found = {name: _ball(q, semi_axes, name) for name in PARTS}
+    found = {name: _ball(model.layout.pose(q), semi_axes, name) for name in PARTS}
     found["tail"] = rods(model.tail_points(q), np.array(look["tail_radii"]))
     joints = leg_points(model, q, legs)
     if joints is not None:

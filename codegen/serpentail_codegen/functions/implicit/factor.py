@@ -7,6 +7,7 @@ that slide: there friction follows the load, and S takes two triangles. Eliminat
 what the first three pivots of S do.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from ...ir.program import Array, Index, Ref, padded
@@ -24,14 +25,27 @@ from ..sweeps.pieces import each_segment, points_of
 from ..tails.mechanism import Segments
 from .layout import Factors, each_contact, first_tail_point
 
+# fills H, its rows so far apart; returns the state, segments, and the attitude of a free torso
+Inertia = Callable[[Draft, dict[str, Array], Array, int], tuple[State, Segments, Ref | None]]
 
-def assemble_factor(draft: Draft, arrays: dict[str, Array]) -> None:
+
+def free_inertia(
+    draft: Draft, arrays: dict[str, Array], A: Array, row: int
+) -> tuple[State, Segments, Ref]:
+    """Fill H; return state, segments and attitude."""
+    state = State(arrays["q"], arrays["v"])
+    return state, *fill_mass_matrix(draft, state, A, row)
+
+
+def assemble_factor(
+    draft: Draft, arrays: dict[str, Array], inertia: Inertia = free_inertia
+) -> None:
     """S = H + tail damping, stiffness and gains + J^T G J of the points in the ground, and its
     LDL^T.
     """
     f, nv = Factors(arrays["factors"], draft.tail), draft.tail.nv
-    state, weight = State(arrays["q"], arrays["v"]), {"weight": arrays["weight"].part(0, 1)}
-    segments, R = fill_mass_matrix(draft, state, f.array, padded(nv))
+    weight = {"weight": arrays["weight"].part(0, 1)}
+    state, segments, R = inertia(draft, arrays, f.array, padded(nv))
 
     # what fills up the rows of S
     room = padded(nv) - nv
@@ -48,7 +62,7 @@ def assemble_factor(draft: Draft, arrays: dict[str, Array]) -> None:
         draft.copy(f.tail_entry(k, k), f("damped", k), adds=True)
 
     # the ground
-    if draft.tail.contacts:
+    if draft.tail.contacts and R:
         add_contacts(draft, f, state, R, segments, arrays)
         add_sliding(draft, f, R)
         draft.factor_pair(f.array, nv)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from ...ir.program import Array, Index, Ref
 from ..draft import Draft
-from ..layout import PER_SEGMENT, TORSO_NV
+from ..layout import PER_SEGMENT
 from ..sweeps.pieces import each_point
 from ..tail import Tail
 
@@ -36,7 +36,8 @@ class Factors:
 
     def tail_entry(self, k: Index, other: Index) -> Ref:
         """The number of S for two tail coordinates."""
-        return self.entry("S", TORSO_NV + k, TORSO_NV + other)
+        first = self.tail.torso_nv
+        return self.entry("S", first + k, first + other)
 
     def row(self, point: Index | int, axis: int, segment: Index | int) -> Ref:
         """How a tail point moves along an axis with the two coordinates of a segment."""

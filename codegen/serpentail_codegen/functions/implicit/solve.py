@@ -46,12 +46,16 @@ def assemble_solve(draft: Draft, arrays: dict[str, Array]) -> None:
 def tail_response(draft: Draft, f: Factors, arrays: dict[str, Array]) -> None:
     """Forces of damping, stiffness and gains for the right-hand sides."""
     r_q, r_v, x = arrays["r_q"], arrays["r_v"], arrays["k_v"]
+
+    def of_tail(v: Array, k: Index) -> Ref:
+        return v.part(draft.tail.torso_nv + k, 1)
+
     with draft.loop("k", draft.tail.nt) as k:
-        reads = {"damped": f("damped", k), "rate": tail_v(r_v, k)}
-        draft.step(stiffness.damped_response, reads, rhs=tail_v(x, k))
+        reads = {"damped": f("damped", k), "rate": of_tail(r_v, k)}
+        draft.step(stiffness.damped_response, reads, rhs=of_tail(x, k))
         if draft.tail.elastic:
-            reads = {"sprung": f("sprung", k), "angle": tail_v(r_q, k)}
-            draft.step(passive.sprung_response, reads, rhs_=tail_v(x, k))
+            reads = {"sprung": f("sprung", k), "angle": of_tail(r_q, k)}
+            draft.step(passive.sprung_response, reads, rhs_=of_tail(x, k))
     gains = {name: f(name) for name in ("gain_q", "gain_v")}
     with (
         draft.when(f("gain_v")),
@@ -60,10 +64,10 @@ def tail_response(draft: Draft, f: Factors, arrays: dict[str, Array]) -> None:
     ):
         reads = {
             "entry": f.entry("H_tail", k, other),
-            "angle": tail_v(r_q, other),
-            "rate": tail_v(r_v, other),
+            "angle": of_tail(r_q, other),
+            "rate": of_tail(r_v, other),
         }
-        draft.step(stiffness.gain_response, gains, reads, rhs_=tail_v(x, k))
+        draft.step(stiffness.gain_response, gains, reads, rhs_=of_tail(x, k))
 
 
 @dataclass(frozen=True)

@@ -69,7 +69,7 @@ def forward_roots(
     """Pose of every segment's root, and spatial columns of all segments but the last, from a pose
     on.
     """
-    last, steps = draft.tail.segments - 1, mechanism(draft)
+    last = draft.tail.segments - 1
 
     def copy_pose(i: Index) -> None:
         for name, array in roots.items():
@@ -81,8 +81,8 @@ def forward_roots(
             draft.fill(S[i], 0)
         with pieces_of(draft, stretch, i) as g:
             if S:
-                draft.step(steps.twist, pose, segments.at(i, g), S_=S[i])
-            draft.step(steps.pose, pose, segments.at(i, g), **pose)
+                draft.step(mechanism(draft).twist, pose, segments.at(i, g), S_=S[i])
+            draft.step(mechanism(draft).pose, pose, segments.at(i, g), **pose)
     copy_pose(as_index(last))
 
 

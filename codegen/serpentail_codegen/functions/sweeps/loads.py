@@ -10,14 +10,13 @@ from .pieces import each_point, mechanism, torso_pose
 
 def sample_joints(draft: Draft, state: State) -> tuple[Array, Array]:
     """Spatial columns between tail points, and all tail points, in torso axes from B."""
-    tail, steps = draft.tail, mechanism(draft)
-    samples = steps.prepare_samples(draft, state, None)
+    tail, samples = draft.tail, mechanism(draft).prepare_samples(draft, state, None)
     S, points = draft.array("S_joint", 12, tail.total), draft.array("tail_point", 3, tail.total + 1)
     pose = torso_pose(draft, name="joint")
     draft.copy(points[0], pose.P)
     for i, g in each_point(draft):
-        draft.step(steps.twist, pose, samples.at(i, g), S=S[g])
-        draft.step(steps.pose, pose, samples.at(i, g), **pose)
+        draft.step(mechanism(draft).twist, pose, samples.at(i, g), S=S[g])
+        draft.step(mechanism(draft).pose, pose, samples.at(i, g), **pose)
         draft.copy(points[g + 1], pose.P)
     return S, points
 

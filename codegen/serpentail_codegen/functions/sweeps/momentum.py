@@ -14,10 +14,9 @@ def gather_momentum(draft: Draft, state: State, R: Ref, p_dot: Ref) -> Vectors:
     which moves with p_dot.
     """
     segments, moment, velocity, u_torso = _begin_momentum(draft, state, R, p_dot)
-    tail = mechanism(draft)
     momenta = Wrenches(draft.array("momenta", 6, draft.tail.pieces))
     for place in each_piece(draft):
-        tail.momentum(draft, segments, place, velocity, momenta.at(*place).named)
+        mechanism(draft).momentum(draft, segments, place, velocity, momenta.at(*place).named)
     total = gather_wrenches(draft, segments, momenta)
     reads = u_torso, {"w": state.omega}, total
     momentum = draft.store(torso.torso_momentum, *reads, force=3, moment=3)

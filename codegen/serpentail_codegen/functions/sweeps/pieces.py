@@ -20,8 +20,10 @@ IDENTITY = (1, 0, 0, 0, 1, 0, 0, 0, 1)
 
 
 def mechanism(draft: Draft) -> Mechanism:
-    """Return the steps of the draft's tail."""
-    return mechanism_of(draft.tail)
+    """Return the steps of the draft's tail; of a mixed one those of the segments that a loop is
+    over, and outside of such loops what describes all of them.
+    """
+    return mechanism_of(draft.tail, draft.stretch.kind if draft.stretch else "")
 
 
 def attitude(draft: Draft, state: State) -> Ref:
@@ -40,8 +42,10 @@ def each_segment(
     end = draft.tail.segments if stop is None else stop
     stretches = [stretch for stretch in draft.tail.stretches if stretch.first < end]
     for stretch in reversed(stretches) if downward else stretches:
+        draft.stretch = stretch
         with draft.loop("i", min(stretch.stop, end), downward, start=stretch.first) as i:
             yield stretch, i
+        draft.stretch = None
 
 
 def pieces_of(

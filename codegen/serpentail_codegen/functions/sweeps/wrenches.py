@@ -19,16 +19,15 @@ def forward_wrenches(
 
     ``start`` is the torso's motion; ``v_dot`` None means that the tail does not accelerate.
     """
-    tail = mechanism(draft)
     wrench = draft.array("wrench", 6, draft.tail.pieces)
     motion = Motion(*(draft.vector(f"{name}_here", 3) for name in ("w", "w_dot", "a")))
     draft.copy(motion.w, start.w)
     draft.copy(motion.w_dot, start.w_dot)
     draft.step(torso.mount_acceleration, start, a_mount=motion.a)
     across(draft, mount.motion_at_root, motion.vectors())
-    wrenches = Wrenches(wrench, tail.declare_torques(draft))
+    wrenches = Wrenches(wrench, mechanism(draft).declare_torques(draft))
     for i, g in each_piece(draft):
-        tail.move(draft, segments, (i, g), motion, v_dot, wrenches.at(i, g))
+        mechanism(draft).move(draft, segments, (i, g), motion, v_dot, wrenches.at(i, g))
     return wrenches
 
 

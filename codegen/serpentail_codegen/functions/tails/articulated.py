@@ -1,23 +1,33 @@
 """The articulated tail: link by link, in the frames of the links."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from fractions import Fraction
 
 from ...ir.program import Array, Ref
 from ...mechanics import airborne_power, link
+from ...scene.shape import Run
 from ..draft import Draft
 from ..scope import Instead, Motion, State, Vectors
 from .mechanism import Mechanism, Place, Segments, simplified
 
+SIZES = {"link_inertias": 3}  # numbers of each link, of parameters that have more than one
+
 
 def own_links(draft: Draft) -> Array:
-    """Store the properties of every link from its own mass, length, COM and inertia."""
-    names = ("link_masses", "link_lengths", "link_centers", "link_inertias")
+    """Store the properties of every link from its own mass, length, COM and inertia, by pieces."""
     array = draft.array("link", 6, draft.tail.pieces)
-    with draft.loop("g", draft.tail.pieces) as g:
-        own = {name: draft.entry(name, g, 3 if name == "link_inertias" else 1) for name in names}
-        draft.step(link.own_link_properties, Instead(own), link=array[g])
+    fill_links(draft, array, lambda run: run.other_pieces)
     return array
+
+
+def fill_links(draft: Draft, array: Array, others: Callable[[Run], int]) -> None:
+    """Store the properties of every link; ``others``: entries of the array before, of arcs."""
+    names = ("link_masses", "link_lengths", "link_centers", "link_inertias")
+    for run in draft.tail.runs("articulated"):
+        with draft.loop("g", run.stop_piece, start=run.first_piece) as g:
+            k = g + -run.other_pieces
+            own = {name: draft.entry(name, k, SIZES.get(name, 1)) for name in names}
+            draft.step(link.own_link_properties, Instead(own), link=array[k + others(run)])
 
 
 def link_properties(draft: Draft) -> Vectors:
@@ -34,11 +44,12 @@ def prepare_links(draft: Draft, state: State, doubled: bool = False) -> Segments
     arrays = {"joint": draft.array("joint", 4, draft.tail.segments)}
     if doubled:
         arrays["twice"] = draft.array("twice", 10, draft.tail.segments)
-    with draft.loop("i", draft.tail.segments) as i:
-        joint = arrays["joint"][i]
-        draft.step(link.joint_trigonometry, {"angles": state.angles(i)}, joint=joint)
-        if doubled:
-            draft.step(link.double_angles, {"joint": joint}, twice=arrays["twice"][i])
+    for run in draft.tail.runs("articulated"):
+        with draft.loop("i", run.stop, start=run.first) as i:
+            joint = arrays["joint"][i]
+            draft.step(link.joint_trigonometry, {"angles": state.angles(i)}, joint=joint)
+            if doubled:
+                draft.step(link.double_angles, {"joint": joint}, twice=arrays["twice"][i])
     return Segments(state, arrays, shared, each)
 
 

@@ -31,9 +31,11 @@ def own_sections(draft: Draft, name: str, part: Fraction) -> Array:
     """Store mass and length of a part of every segment, from the segment's own."""
     array = draft.array(name, 2, draft.tail.segments)
     share = {"share": draft.fixed(f"part_of_{name}", [part])}
-    with draft.loop("i", draft.tail.segments) as i:
-        own = {key: draft.entry(key, i, 1) for key in ("arc_masses", "arc_lengths")}
-        draft.step(arc.own_section_properties, Instead(own), share, section=array[i])
+    for run in draft.tail.runs("continuum"):
+        with draft.loop("i", run.stop, start=run.first) as i:
+            k = i + -run.other_segments
+            own = {key: draft.entry(key, k, 1) for key in ("arc_masses", "arc_lengths")}
+            draft.step(arc.own_section_properties, Instead(own), share, section=array[i])
     return array
 
 
@@ -52,14 +54,15 @@ def prepare_arcs(draft: Draft, state: State, doubled: bool = False) -> Segments:
     arrays = {name: draft.array(name, size, count) for name, size in (ARC | OWN).items()}
     segments = Segments(state, arrays | own, shared)
     limit, margin = bend_range(draft), draft.vector("margin", 1)
-    with draft.loop("i", count) as i:
-        piece = segments.at(i)
-        shape = shape_step(draft.tail.bend_range)
-        draft.step(shape, piece, **piece.only("tip", "shape"))
-        draft.step(arc_shape.bend_margin, piece, limit, margin=margin)
-        draft.guard(margin, "OUT_OF_RANGE", piece["tip"], piece["shape"])
-        draft.step(arc.segment_tip, piece, **piece.only("E", "r", "bend"))
-        draft.step(arc_inertia.segment_inertia, piece, **piece.only(*OWN))
+    for run in draft.tail.runs("continuum"):
+        with draft.loop("i", run.stop, start=run.first) as i:
+            piece = segments.at(i)
+            shape = shape_step(draft.tail.bend_range)
+            draft.step(shape, piece, **piece.only("tip", "shape"))
+            draft.step(arc_shape.bend_margin, piece, limit, margin=margin)
+            draft.guard(margin, "OUT_OF_RANGE", piece["tip"], piece["shape"])
+            draft.step(arc.segment_tip, piece, **piece.only("E", "r", "bend"))
+            draft.step(arc_inertia.segment_inertia, piece, **piece.only(*OWN))
     return segments
 
 
@@ -91,18 +94,19 @@ def prepare_arc_samples(draft: Draft, state: State, segments: Segments | None) -
     samples = Segments(state, sample_arrays(draft))
     part, tip = draft.vector("part", 2), draft.vector("tip_sample", 8)
     margin, limit = draft.vector("margin_sample", 1), bend_range(draft)
-    with draft.loop("i", draft.tail.segments) as i:
-        sample, angles = samples.at(i), {"angles": state.angles(i)}
-        shape = shape_step(draft.tail.bend_range / draft.tail.links)
-        draft.step(arc.part_of_bend, angles, fraction, part=part)
-        draft.step(shape, {"angles": part}, tip=tip)
+    for run in draft.tail.runs("continuum"):
+        with draft.loop("i", run.stop, start=run.first) as i:
+            sample, angles = samples.at(i), {"angles": state.angles(i)}
+            shape = shape_step(draft.tail.bend_range / draft.tail.links)
+            draft.step(arc.part_of_bend, angles, fraction, part=part)
+            draft.step(shape, {"angles": part}, tip=tip)
 
-        # the range is one of whole segments
-        draft.step(arc_shape.bend_margin, angles, limit, margin=margin)
-        draft.guard(margin, "OUT_OF_RANGE", tip)
-        bent = {"angles": part, "tip": tip}
-        draft.step(arc.segment_tip, bent, section(i), **sample.only("E", "r", "bend"))
-        draft.step(arc.columns_of_bend, sample, fraction, bend=sample["bend"])
+            # the range is one of whole segments
+            draft.step(arc_shape.bend_margin, angles, limit, margin=margin)
+            draft.guard(margin, "OUT_OF_RANGE", tip)
+            bent = {"angles": part, "tip": tip}
+            draft.step(arc.segment_tip, bent, section(i), **sample.only("E", "r", "bend"))
+            draft.step(arc.columns_of_bend, sample, fraction, bend=sample["bend"])
     return samples
 
 

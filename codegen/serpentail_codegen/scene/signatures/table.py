@@ -36,9 +36,10 @@ DERIVATIVES = in_group(DERIVATIVE)
 # of a tail on a fixed base
 FIXED = (
     *("mass_matrix", "bias_force", "inverse_dynamics", "forward_dynamics"),
-    *("energy", "tail_points"),
+    *("energy", "momentum", "tail_points"),
     *("inverse_dynamics_derivatives", "forward_dynamics_derivatives"),
     *("inverse_dynamics_parameter_derivatives", "forward_dynamics_parameter_derivatives"),
+    *("pfl", "implicit", "rollout"),
 )
 AIRBORNE = in_group(PLANNING)
 NEEDS = {name: signature.needs for name, signature in SIGNATURES.items() if signature.needs}

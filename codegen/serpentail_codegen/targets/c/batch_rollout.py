@@ -94,8 +94,8 @@ class BatchRollout:
 def batch_rollout(
     scene: Scene, tail: Tail, printed: Sequence[PrintedFunction]
 ) -> BatchRollout | None:
-    """Return the batch rollout of a scene that has a rollout and touches nothing."""
-    if "rollout" not in scene.functions or scene.contacts:
+    """Return the batch rollout of a scene that has a rollout, a free torso, and touches nothing."""
+    if "rollout" not in scene.functions or scene.contacts or tail.shape.fixed:
         return None
     (dynamics,) = (f.function for f in printed if f.function.name == "forward_dynamics")
     fixed, states = baked_values(scene), STATES[scene.real]

@@ -27,9 +27,10 @@ from .views import (
 COORDINATES = {
     "joint": "alpha_1, beta_1, ... of the joints",
     "bend": "a_1, b_1, ... of the segments' bend",
+    "mixed": "of each segment alpha, beta of its joints, or a, b of its bend",
     "polar": "phi_1, theta_1, ... of the segments' bend",
 }
-PIECES = {"articulated": "links", "continuum": "samples"}
+PIECES = {"articulated": "links", "continuum": "samples", "mixed": "parts"}
 
 
 def abi_hash(scene: Scene, views: list[FunctionView], simulation: SimulationFeatures | None) -> str:
@@ -73,7 +74,7 @@ def model_context(scene: Scene, tail: Tail) -> dict[str, Any]:
     own = tail.shape.counts
     counts = f"of {', '.join(map(str, own))}" if own else f"x {tail.links}"
     return {
-        "title": f"{scene.kind} tail, {tail.segments} segments {counts} {pieces}",
+        "title": f"{scene.kind} tail, {tail.segments} segments {counts} {pieces}{words_of(tail)}",
         "pieces": pieces,
         "prefix": scene.name,
         "upper": scene.name.upper(),
@@ -94,6 +95,12 @@ def model_context(scene: Scene, tail: Tail) -> dict[str, Any]:
         "vector": VECTOR,
         "widest": VECTOR,
     }
+
+
+def words_of(tail: Tail) -> str:
+    """Return what the parts of a mixed tail are, in words."""
+    kinds = {"articulated": "links", "continuum": "samples of an arc"}
+    return f": {', '.join(kinds[kind] for kind in tail.shape.kinds)}" if tail.shape.kinds else ""
 
 
 def function_context(

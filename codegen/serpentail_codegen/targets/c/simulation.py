@@ -43,6 +43,9 @@ def simulation_context(
         "eps": "FLT_EPSILON" if single else "DBL_EPSILON",
         "has": has,
         "values": scene.parameters,  # where they are folded in
+        # of an index that counts the tail's numbers of q, of v
+        "before_q": "" if tail.shape.fixed else "7 + ",
+        "before_v": "" if tail.shape.fixed else "6 + ",
         "articulated": tail.kind == "articulated",
         "own_lengths": own_lengths(scene),
         "part": 1.0

@@ -1,0 +1,75 @@
+"""A tail of both kinds: what describes its links and its arcs, side by side.
+
+Each stretch of segments has the steps of its own kind; frames, motions, wrenches and composites go
+from one to the next as between two links, since both kinds hand them on at their tips.
+"""
+
+from dataclasses import replace
+from typing import Any
+
+from ..draft import Draft
+from ..scope import State
+from .articulated import ARTICULATED, fill_links, prepare_links
+from .continuum import CONTINUUM, bending_torques, prepare_arc_samples, prepare_arcs
+from .mechanism import Mechanism, Segments
+
+
+def both(links: Segments, arcs: Segments) -> Segments:
+    """Return what describes the links, and what describes the arcs, the latter where both would."""
+    return Segments(
+        links.state,
+        links.arrays | arcs.arrays,
+        {**links.shared, **arcs.shared},
+        {**links.each, **arcs.each},
+    )
+
+
+def prepare_both(draft: Draft, state: State, doubled: bool = False) -> Segments:
+    """Link properties and trigonometry of joints; shape, tip and own inertia of arcs."""
+    return both(prepare_links(draft, state, doubled), prepare_arcs(draft, state))
+
+
+def prepare_both_samples(draft: Draft, state: State, segments: Segments | None) -> Segments:
+    """Links by the numbers of their points, and one n-th of each arc, whose frames take the place
+    of whole arcs'.
+    """
+    links = segments or prepare_links(draft, state)
+    array = draft.array("link_point", 6, draft.tail.total)
+    fill_links(draft, array, lambda run: run.other_points)
+    found = both(links, prepare_arc_samples(draft, state, None))
+    return replace(found, each={"link": array})
+
+
+def of_no_segment(*_: Any, **__: Any) -> Any:
+    """Refuse to be a step: there are those of the stretches alone."""
+    raise ValueError("a mixed tail has steps within loops over its segments alone")
+
+
+def with_both(kind: Mechanism) -> Mechanism:
+    """Return the steps of segments of a kind, with what describes all segments."""
+    return replace(
+        kind,
+        prepare=prepare_both,
+        prepare_samples=prepare_both_samples,
+        declare_torques=bending_torques,
+    )
+
+
+MIXED = {
+    "articulated": with_both(ARTICULATED),
+    "continuum": with_both(CONTINUUM),
+    "": Mechanism(
+        prepare=prepare_both,
+        prepare_samples=prepare_both_samples,
+        declare_torques=bending_torques,
+        move=of_no_segment,
+        momentum=of_no_segment,
+        pose=of_no_segment,
+        twist=of_no_segment,
+        gather=of_no_segment,
+        gather_wrench=of_no_segment,
+        gather_moment=of_no_segment,
+        power=of_no_segment,
+        power_and_momentum=of_no_segment,
+    ),
+}

@@ -1,0 +1,129 @@
+"""Reads the tables `segments` and `taper` of a scene: keys, counts, numbers with units."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from .checks import is_finite
+from .parameters import ANY, NOT_NEGATIVE, POSITIVE, Rule
+from .problems import Problem, suggest
+from .scene import COUNT
+from .units import in_unit
+
+Numbers = Mapping[str, tuple[float, ...]]  # of a table, by its keys, SI
+PIECES = {"articulated": "links", "continuum": "samples"}
+
+
+@dataclass(frozen=True)
+class Key:
+    """What a key of a table holds: so many numbers in a unit, or so many of each link."""
+
+    unit: str
+    rule: Rule
+    size: int = 1
+    of_links: bool = False
+
+
+LENGTHS = {"length": Key("m", POSITIVE), "link_lengths": Key("m", POSITIVE, of_links=True)}
+MASSES = {
+    "mass": Key("kg", POSITIVE),
+    "link_masses": Key("kg", POSITIVE, of_links=True),
+    "density": Key("kg/m^3", POSITIVE),
+}
+INERTIAS = {
+    "link_radius": Key("m", NOT_NEGATIVE),
+    "link_inertia": Key("kg m^2", NOT_NEGATIVE, 3),
+    "link_inertias": Key("kg m^2", NOT_NEGATIVE, 3, of_links=True),
+    "radii": Key("m", POSITIVE, 2),
+}
+CENTERS = {"link_centers": Key("m", ANY, of_links=True)}
+VALUES = LENGTHS | MASSES | INERTIAS | CENTERS
+OF_LINKS = {name for name in VALUES if name.startswith("link_")}  # that no arc has
+TAPER = {name: VALUES[name] for name in ("length", "radii", "density", "mass")}
+
+
+def table_of(place: str, table: Any, kind: str, problems: list[Problem]) -> dict[str, Any]:
+    """Return the values of one segment as they are written, without its kind and its links."""
+    if not isinstance(table, Mapping):
+        problems.append(Problem(place, table, "needs a table, such as {links = 4}"))
+        return {}
+    jointed = kind == "articulated"
+    of_links = {"links", *OF_LINKS}
+    known = [key for key in ("kind", "links", *VALUES) if jointed or key not in of_links]
+    for key in [key for key in table if key not in known]:
+        remedy = f"unknown; {suggest(key, known)}"
+        if key in of_links:
+            remedy = "an arc has no links: remove it, or choose another kind"
+        problems.append(Problem(f"{place}.{key}", table[key], remedy))
+    return {key: value for key, value in table.items() if key in VALUES}
+
+
+def kind_of(place: str, table: Any, kind: str, problems: list[Problem]) -> str:
+    """Return the kind of one segment: its scene's, or its own in a mixed tail."""
+    given = table.get("kind") if isinstance(table, Mapping) else None
+    if kind == "mixed":
+        if given in ("articulated", "continuum"):
+            return str(given)
+        remedy = 'needs "articulated" or "continuum", as the tail is mixed'
+        problems.append(Problem(f"{place}.kind", given, remedy))
+        return "articulated"
+    if given is not None and given != kind:
+        remedy = f'this scene is "{kind}": remove it, or set kind = "mixed" above the tables'
+        problems.append(Problem(f"{place}.kind", given, remedy))
+    return kind
+
+
+def count_of(
+    place: str, table: Any, kind: str, pieces: Mapping[str, Any], problems: list[Problem]
+) -> int:
+    """Return the number of links of a segment, or samples, by default those of the scene; a mixed
+    tail has no links in common.
+    """
+    own = isinstance(table, Mapping) and "links" in table and kind == "articulated"
+    count: Any = table["links"] if own else pieces.get(kind)
+    if COUNT.holds(count):
+        return int(count)
+    field = f"{place}.links" if own or kind not in pieces else PIECES[kind]
+    problems.append(Problem(field, count, f"needs {COUNT.text}"))
+    return 1
+
+
+def numbers_of(
+    place: str, table: Any, keys: Mapping[str, Key], links: int, problems: list[Problem]
+) -> Numbers:
+    """Return the numbers of a table, SI; what cannot be becomes a problem."""
+    if not isinstance(table, Mapping):
+        remedy = "needs a table, such as {length = 0.2, radii = [0.004, 0.001], density = 1000}"
+        problems.append(Problem(place, table, remedy))
+        return {}
+    found = {}
+    for name, value in table.items():
+        if name not in keys:
+            problems.append(Problem(f"{place}.{name}", value, f"unknown; {suggest(name, keys)}"))
+            continue
+        key = keys[name]
+        count = key.size * (links if key.of_links else 1)
+        try:
+            numbers = tuple(flattened(in_unit(value, key.unit)))
+        except ValueError as error:
+            problems.append(Problem(f"{place}.{name}", value, str(error)))
+            continue
+        sound = len(numbers) == count and all(map(is_finite, numbers)) and key.rule.holds(numbers)
+        if sound:
+            found[name] = tuple(float(x) + 0.0 for x in numbers)
+            continue
+        each = f", {key.size} for each of {links} links" if key.of_links else ""
+        words = "a finite number" if count == 1 else f"{count} finite numbers{each}"
+        problems.append(
+            Problem(f"{place}.{name}", value, f"needs {words}{key.rule.text}, in {key.unit}")
+        )
+    return found
+
+
+def flattened(value: Any) -> Iterable[Any]:
+    """Yield the entries of arrays in arrays, or the value itself."""
+    if isinstance(value, list | tuple):
+        for entry in value:
+            yield from flattened(entry)
+    else:
+        yield value
