@@ -91,9 +91,11 @@ def test_none_of_a_thousand_is_missed(how):
     assert missed("articulated", MANY, how) == []
 
 
-@pytest.mark.parametrize("rtol", [1e-3, 1e-4, 1e-5, 1e-6])
-def test_a_tail_that_dips_in_between_stages_is_felt(rtol):
-    """4 ms in the ground: two events and 5.95 mN s."""
+@pytest.mark.parametrize(("rtol", "most"), [(1e-3, 16), (1e-4, 13), (1e-5, 22), (1e-6, 26)])
+def test_a_tail_that_dips_in_between_stages_is_felt(rtol, most):
+    """4 ms in the ground: two events, 5.95 mN s, and few steps that are taken again: of a quarter
+    of the dip.
+    """
     q, v = np.zeros(11), np.zeros(10)
     q[2:5] = 0.243967, -0.455276, 0.890351
     v[2:4] = 0.27784, -29.6167
@@ -104,7 +106,7 @@ def test_a_tail_that_dips_in_between_stages_is_felt(rtol):
     ]
     assert run.events[0]["time"] == pytest.approx(0.081858, abs=1e-4)
     assert run.info["impulse_N_s"]["tail"][2] == pytest.approx(5.95e-3, rel=0.15)
-    assert run.warnings == []
+    assert run.warnings == [] and run.info["rejected"] <= most
 
 
 def test_a_touch_that_fixed_steps_jump_over_is_told():

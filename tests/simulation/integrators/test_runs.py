@@ -178,3 +178,18 @@ def test_torques_of_a_long_tail_spoil_no_factors():
     table = st.TorqueTable([0.0, 0.2], 1e-5 * np.random.default_rng(2).normal(size=(2, 8)), 1e-2)
     flight = fly(m, controller=table, method="ros34pw2", rtol=1e-8)
     assert apart(flight, fly(m, controller=table, method="dop853", rtol=1e-11)) < 5e-8
+
+
+@pytest.mark.parametrize("method", ["tsit5", "ros34pw2"])
+def test_the_last_two_steps_are_equal(method):
+    """14 ms in steps of 10 ms or less: rates are asked for in the middle, and never beyond."""
+    times, h = [], 0.01
+
+    def law(t, q, v):
+        times.append(t)
+        return np.zeros(4)
+
+    steps = {"first_step": h, "most_step": h, "t_span": 1.4 * h, "output_step": 1.4 * h}
+    flight = fly(controller=law, method=method, **steps, **ONE_LENGTH)
+    assert flight.info["steps"] == 2 and max(times) == 1.4 * h
+    assert np.abs(np.array(times) - 0.7 * h).min() < 1e-12
