@@ -4,6 +4,7 @@ import json
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -111,7 +112,7 @@ def flown(body: st.Model, plan: st.Plan, law: tuple, trial: Trial, seed: int) ->
     sizes = np.repeat(NOISE, [3, 3, len(q) - 7, len(q) - 7]) * trial.noise
     axis = random.normal(size=3)
     pushed = (len(edges) - 1) // 2
-    for k, (begin, end) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
+    for k, (begin, end) in enumerate(pairwise(edges)):
         if k == pushed:
             v = v.copy()
             v[3:6] += trial.push * axis / np.linalg.norm(axis)
