@@ -251,6 +251,16 @@ def test_wrong_settings_are_refused(plan, settings, words):
         st.Mpc(rat(), plan, **settings)
 
 
+def test_the_c_goes_to_a_folder_that_is_there(plan, tmp_path):
+    mpc = st.Mpc(rat(), plan)
+    for folder in (tmp_path / "none", 3):
+        with pytest.raises(st.PlanningError, match="write_c: folder: value .* needs a folder"):
+            mpc.write_c(folder)
+    first = [path.read_bytes() for path in mpc.write_c(tmp_path)]
+    assert [path.read_bytes() for path in st.Mpc(rat(), plan).write_c(tmp_path)] == first
+    assert repr(mpc) == f"Mpc({rat().name}, 100 Hz, 0.4 s in 6)"
+
+
 def test_models_and_plans_that_do_not_fit_are_refused(plan):
     with pytest.raises(st.PlanningError, match="lacks airborne_rates, airborne_rates_derivatives"):
         st.Mpc(rat(exact=False), plan)
