@@ -39,7 +39,7 @@ GENERATE := $(PY) -m serpentail_codegen
 FOLDER   := "$$($(GENERATE) --print-folder $(WANTED))"
 PAGE     := $(wildcard hatch_build.py viewer/*.* viewer/src/*)
 
-.PHONY: help setup demo test test-portable test-all model verify bench stress mutants embedded size-report studies study-models study-righting study-contact study-landing study-morphology wheels lint golden clean
+.PHONY: help setup demo test test-portable test-all model verify bench stress mutants embedded size-report studies study-models study-righting study-contact study-landing study-morphology study-replanning wheels lint golden clean
 .DELETE_ON_ERROR:
 
 help:
@@ -66,6 +66,7 @@ help:
 	@echo "  make study-contact                         kick, jump from the tail, self-recovery: films, plots, a table"
 	@echo "  make study-landing                         kicks that the tail rights onto the feet, planned and passive"
 	@echo "  make study-morphology                      what a tail is worth: 24576 plans of righting, against its shape"
+	@echo "  make study-replanning                      bodies unlike the planned one: open loop, PFL, predictive control"
 	@echo "  make studies                               all; STARTS=200 random starts in the second"
 	@echo "  make wheels                                builds wheel and sdist, installs the wheel for each Python that is here"
 	@echo "  make lint                                  style, import rules, types, lengths of files"
@@ -168,7 +169,10 @@ study-landing: $(READY)
 study-morphology: $(READY)
 	$(PY) -m examples.studies.morphology
 
-studies: study-models study-righting study-contact study-landing study-morphology
+study-replanning: $(READY)
+	$(PY) -m examples.studies.replanning
+
+studies: study-models study-righting study-contact study-landing study-morphology study-replanning
 
 wheels: $(READY)
 	$(PY) -m tests.packaging.wheels

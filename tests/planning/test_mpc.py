@@ -251,6 +251,16 @@ def test_wrong_settings_are_refused(plan, settings, words):
         st.Mpc(rat(), plan, **settings)
 
 
+def test_the_c_goes_to_a_folder_that_is_there(plan, tmp_path):
+    mpc = st.Mpc(rat(), plan)
+    for folder in (tmp_path / "none", 3):
+        with pytest.raises(st.PlanningError, match="write_c: folder: value .* needs a folder"):
+            mpc.write_c(folder)
+    first = [path.read_bytes() for path in mpc.write_c(tmp_path)]
+    assert [path.read_bytes() for path in st.Mpc(rat(), plan).write_c(tmp_path)] == first
+    assert repr(mpc) == f"Mpc({rat().name}, 100 Hz, 0.4 s in 6)"
+
+
 def test_models_and_plans_that_do_not_fit_are_refused(plan):
     with pytest.raises(st.PlanningError, match="lacks airborne_rates, airborne_rates_derivatives"):
         st.Mpc(rat(exact=False), plan)
@@ -266,3 +276,25 @@ def test_models_and_plans_that_do_not_fit_are_refused(plan):
     other = rat(3, 2)
     with pytest.raises(st.SimulationError, match="tail coordinates"):
         st.simulate(other, np.r_[np.zeros(3), 1, np.zeros(9)], np.zeros(12), controller=mpc)
+
+
+def test_a_phase_of_a_sequence_is_controlled_predictively():
+    """From a state that nobody planned for, as by the plan of that state and its controller."""
+    right = {
+        "intervals": 11,
+        "duration": 0.3,
+        "goal": st.Goal(torso_rate=None),
+        "tolerance": None,
+        "track": False,
+    }
+    tracking = st.Tracking(mpc={"rate": 50, "intervals": 4})
+    fall, planned = st.Phase("fall", 0.05), st.Phase("right", 0.3, plan=right, tracking=tracking)
+    run = st.Sequence(rat(), [fall, planned]).simulate(*start(rat(), 1))
+    mpc = st.Mpc(rat(), run.phases[1].plan, rate=50, intervals=4)
+    alone = st.simulate(rat(), mpc.plan.problem.q0, mpc.plan.problem.v0, controller=mpc, t_span=0.3)
+    np.testing.assert_allclose(run.trajectory.q[-1], alone.q[-1], atol=1e-4)
+    assert run.trajectory.info["mpc"] == alone.info["mpc"]
+    again = st.Sequence(rat(), [fall, planned, st.Phase("after", 0.01)])
+    assert again.simulate(*start(rat(), 1)).trajectory.info["mpc"]["ticks"] == 15
+    with pytest.raises(st.SimulationError, match="Tracking: mpc: value 3"):
+        st.Tracking(mpc=3)

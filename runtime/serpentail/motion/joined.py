@@ -42,6 +42,9 @@ def _info(parts: Sequence[dict[str, Any]]) -> dict[str, Any]:
     for name in COUNTS:
         if name in info:
             info[name] = sum(part.get(name, 0) for part in parts)
+    controlled = [part["mpc"] for part in parts if "mpc" in part]
+    if controlled:
+        info["mpc"] = {name: sum(each[name] for each in controlled) for name in controlled[0]}
     if all("events" in part for part in parts):
         info["events"] = [event for part in parts for event in part["events"]]
     info["warnings"] = list(dict.fromkeys(w for part in parts for w in part.get("warnings", [])))

@@ -24,17 +24,22 @@ class Tracking:
     """How a planned flight is tracked, and when it ends.
 
     kp (1/s^2), kd (1/s): gains of Pfl, whose torques keep to the plan's bound; early: s before the
-    landing that the plan ends, where it is given no duration.
+    landing that the plan ends, where it is given no duration.  mpc: settings of ``Mpc``, such as
+    {"rate": 100}, which controls the flight in place of Pfl.
     """
 
     kp: float = KP
     kd: float = KD
     early: float = EARLY
+    mpc: Mapping[str, Any] | None = None
 
     def __post_init__(self) -> None:
         """Refuse numbers that cannot be."""
         for name in ("kp", "kd", "early"):
             number(f"Tracking: {name}", getattr(self, name), SimulationError, least=0)
+        if not isinstance(self.mpc, Mapping | None):
+            needs = "a mapping of st.Mpc's settings, or None"
+            raise refusal("Tracking: mpc", self.mpc, needs, SimulationError)
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,6 +14,7 @@ from ..model.model import Model
 from ..motion.joined import joined
 from ..motion.trajectory import Trajectory
 from ..planning.planner import plan as planned
+from ..planning.predictive.mpc import Mpc
 from ..planning.problem import checked_goal
 from ..planning.result.plan import Plan
 from ..simulation.controllers import Controller, Phases, parts_of
@@ -21,7 +22,7 @@ from ..simulation.pfl import Pfl
 from ..simulation.schedules import Legs
 from ..simulation.simulate import simulate
 from .ballistic import landing_time
-from .phase import AIRBORNE, BEFORE, Phase
+from .phase import AIRBORNE, BEFORE, Phase, Tracking
 
 SAMPLES = 400  # of a phase that is looked through for where it is clear of the ground
 State = tuple[np.ndarray, np.ndarray]  # q, v
@@ -142,8 +143,7 @@ class Sequence:
             if found[-1][0].success:
                 break
         plan, landing = min(found, key=lambda pair: _off(pair[0]))
-        tracking, torque = phase.tracking, plan.problem.bounds.torque
-        law = Pfl(self.model, plan, tracking.kp, tracking.kd, torque=torque)
+        law = _tracking(self.model, plan, phase.tracking)
         return law, plan, [_at(move, begin, landing) for move in phase.moves]
 
     def _planned(
@@ -193,6 +193,13 @@ class Sequence:
         motion = simulate(self.model, q, v, t_span=(begin, end), **settings)
         assert isinstance(motion, Trajectory)
         return motion, _ended_by(motion, events, end)
+
+
+def _tracking(model: Model, plan: Plan, tracking: Tracking) -> Controller:
+    """Return what flies a plan."""
+    if tracking.mpc is not None:
+        return Mpc(model, plan, **tracking.mpc)
+    return Pfl(model, plan, tracking.kp, tracking.kd, torque=plan.problem.bounds.torque)
 
 
 def _off(plan: Plan) -> float:

@@ -16,7 +16,8 @@ from .piecewise import Piecewise, checked_nodes, linear
 
 TorqueFunction = Callable[[float, np.ndarray, np.ndarray], ArrayLike]  # (t, q, v) -> tau
 CHOICES = (
-    "None, Damping, TorqueTable, TorqueCurve, Pfl, Phases, NativeTorque or a function (t, q, v)"
+    "None, Damping, TorqueTable, TorqueCurve, Pfl, Mpc, Phases, NativeTorque or a function "
+    "(t, q, v)"
 )
 
 

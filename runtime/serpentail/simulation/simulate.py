@@ -46,7 +46,7 @@ def simulate(
 
     q0 (nq,), v0 (nv,): start; its quaternion is normalised; (k, nq), (k, nv), or one of both: k
     starts, see below.
-    controller: None (no torque), Damping, TorqueTable, TorqueCurve, Pfl, Phases of these,
+    controller: None (no torque), Damping, TorqueTable, TorqueCurve, Pfl, Mpc, Phases of these,
     NativeTorque, or a function (t (s), q, v) -> tau (2m,) in N m.
     legs, bristles0, stop_at (models with contacts): Legs, where there are feet; stretch (points, 2)
     of the friction springs in m, zero by default; events to stop at, pairs such as ("take_off",

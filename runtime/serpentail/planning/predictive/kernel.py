@@ -37,8 +37,8 @@ class State(ctypes.Structure):
     _fields_ = (
         ("task", _pointer),
         ("memory", _pointer),
-        *((name, ctypes.c_long) for name in ("tick", "ticks", "failed")),
-        *((name, _int) for name in ("set_changes", "newest")),
+        *((name, ctypes.c_long) for name in ("tick", "ticks", "failed", "set_changes")),
+        ("newest", _int),
         ("begin", _double * 2),
         ("width", _double * 2),
         ("cost", _double),

@@ -70,8 +70,9 @@ class Mpc:
 
     @property
     def info(self) -> dict[str, int]:
-        """Counts since the last begin: ticks, how many of them failed, and the most changes of the
-        active set in one.  Of calls alone: those of a simulation are in its ``info["mpc"]``.
+        """Counts since the last begin: ticks, how many of them failed, and changes of active sets.
+
+        Of calls alone: those of a simulation are in its ``info["mpc"]``.
         """
         return self._own.info()
 

@@ -70,7 +70,7 @@ typedef struct {
     double *memory;      /* mpc_memory_size(task) doubles */
     long tick;           /* the last, counted from the plan's begin; -1: none yet */
     long ticks, failed;  /* how many there were, and how many of them failed */
-    int set_changes;     /* of the active set, the most of one tick */
+    long set_changes;    /* of the active set, in all ticks */
     int newest;          /* which of two corrections is the newest */
     double begin[2];     /* s, of the corrections; above all times where there is none */
     double width[2];     /* s, of their intervals */

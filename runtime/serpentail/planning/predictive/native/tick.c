@@ -64,8 +64,8 @@ void mpc_begin(mpc_state *state, const mpc_task *task, double *memory)
     state->task = task;
     state->memory = memory;
     state->tick = -1;
-    state->ticks = state->failed = 0;
-    state->set_changes = state->newest = 0;
+    state->ticks = state->failed = state->set_changes = 0;
+    state->newest = 0;
     state->begin[0] = state->begin[1] = NEVER;
     state->width[0] = state->width[1] = 1.0;
     state->cost = 0.0;
@@ -235,7 +235,7 @@ static int improve(mpc_state *state, workspace *w, double *correction)
     if (changes < 0) {
         return 1;
     }
-    state->set_changes = changes > state->set_changes ? changes : state->set_changes;
+    state->set_changes += changes;
     double part = 1.0;
     w->motion.correction = w->trial;
     for (int k = 0; k <= HALVINGS; k++, part /= 2) {

@@ -1,0 +1,21 @@
+"""Flights of bodies unlike the planned one, with noise, delay and pushes: the plan's torques as
+they are, PFL along the plan, and predictive control.
+
+Each start is kept in FOLDER/parts: a study that was stopped goes on.
+"""
+
+from examples import front
+
+
+def main(folder, starts) -> None:
+    """Do the study."""
+    from examples.studies.replanning_study import study
+
+    study(folder, starts)
+
+
+if __name__ == "__main__":
+    parser = front.parser(__doc__, "output/studies/replanning")
+    parser.add_argument("--starts", type=front.count, default=12, help="how many (default: 12)")
+    given = parser.parse_args()
+    front.run(main, given.folder, given.starts, after=front.GOES_ON)
