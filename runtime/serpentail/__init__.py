@@ -36,6 +36,8 @@ _HOME = {
     **dict.fromkeys(["MarkerTracks", "marker_tracks"], "identification.tracks"),
     "read_markers": "identification.readers",
     "TorquePrior": "identification.torques",
+    **dict.fromkeys(["joint_torques", "JointTorques"], "identification.inverse"),
+    **dict.fromkeys(["fisher_information", "Information"], "identification.design"),
     "film": "pictures.film",
     "filmstrip": "pictures.filmstrip",
     "leg_joints": "pictures.skeleton",
