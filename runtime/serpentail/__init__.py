@@ -35,6 +35,8 @@ _HOME = {
     "Marker": "identification.placement",
     **dict.fromkeys(["MarkerTracks", "marker_tracks"], "identification.tracks"),
     "read_markers": "identification.readers",
+    "write_markers": "identification.writers",
+    "marker_positions": "identification.positions",
     "TorquePrior": "identification.torques",
     **dict.fromkeys(["joint_torques", "JointTorques"], "identification.inverse"),
     **dict.fromkeys(["fisher_information", "Information"], "identification.design"),

@@ -39,7 +39,13 @@ PIECES = {
 PASSIVE = {"tail_stiffness", "tail_rest", "tail_damping"} | {
     f"tail_stop_{name}" for name in ("lower", "upper", "stiffness", "width")
 }
-LEFT_OUT = ("plan", "simulate", "phase", "description")  # no generated code depends on them
+LEFT_OUT = (
+    "plan",
+    "simulate",
+    "identify",
+    "phase",
+    "description",
+)  # no generated code depends on them
 
 
 def build(

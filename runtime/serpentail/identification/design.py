@@ -114,12 +114,11 @@ def fisher_information(
 
 def _flown(model: Model, trial: Trial, iterate: Iterate) -> Iterate:
     """Return the flight from an iterate's first state: each pass makes one more interval exact."""
-    for _ in range(len(trial.times)):
+    while True:
         done = solved(model, trial, iterate)
         if done is None:
             raise IdentificationError("motion: cannot be integrated under its torques")
         after = np.concatenate([done.states[:1], done.ends])
         if np.allclose(after, done.states, rtol=1e-9, atol=1e-11):
-            break
+            return done
         iterate = done.followed(after)
-    return done

@@ -15,6 +15,7 @@ from .tracks import MarkerTracks, checked_tracks, checked_unit
 
 LARGEST = 2**30  # bytes of a file that is read
 RATE_TOLERANCE = 0.02  # by how much the times may deviate from a stated rate
+AXES = "^(-?[xyz]){3}$"
 Read = tuple[np.ndarray, np.ndarray, list[str], str | None]  # times, positions, names, unit
 
 

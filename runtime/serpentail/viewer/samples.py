@@ -4,6 +4,7 @@ import dataclasses
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..attitude import Array, tilt_deg
 from ..model.layout import TORSO_NQ
@@ -12,7 +13,7 @@ from ..motion.body import bends, centre_of_mass, leg_points
 from ..motion.trajectory import ARRAYS, Trajectory
 
 
-def thinned_rows(count: int, most: int) -> tuple[Array, int]:
+def thinned_rows(count: int, most: int) -> tuple[NDArray[np.intp], int]:
     """Return every n-th of so many rows, the last one too, at most so many; and n."""
     step = max(-(-(count - 1) // (most - 1)), 1)
     if step == 1:
