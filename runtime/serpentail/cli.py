@@ -16,7 +16,7 @@ from .stages import progress
 INTERRUPTED = 130  # status of a command that Ctrl-C ended: 128 and the signal's number
 ROOMS = {  # modules of `commands`, each with a function of the name of each verb
     "scenes": ("examples", "new", "generate", "schema", "completion"),
-    "motions": ("simulate", "plan", "view"),
+    "motions": ("simulate", "plan", "identify", "view"),
     "sweeps": ("sweep",),
     "models": ("info", "verify", "export", "cache"),
 }

@@ -26,6 +26,7 @@ HOMES = {  # where alone a library of an extra may be imported, behind the room'
     "matplotlib": ("pictures/",),
     "PIL": ("pictures/",),
     "imageio_ffmpeg": ("pictures/encode.py",),
+    "ezc3d": ("identification/readers.py",),
 }
 
 

@@ -94,10 +94,16 @@ def test_several_trials_share_the_parameters():
 
 
 def test_without_torques_the_scale_of_all_masses_is_undetermined():
-    """Masses, inertias and damping times any factor move alike: H, C and the tail's forces scale."""
+    """Masses, inertias, stiffness and damping times any factor: the same motion."""
     model = elastic(1, 3)
     data = tracks(model, TIMES, flown(model, TIMES, start(model)), 3e-4)
-    names = ["torso_mass", "torso_inertia", "tail_mass", "tail_stiffness[same]", "tail_damping[same]"]
+    names = [
+        "torso_mass",
+        "torso_inertia",
+        "tail_mass",
+        "tail_stiffness[same]",
+        "tail_damping[same]",
+    ]
     found = st.identify(model, data, placed(model), names)
     (combination,) = [each for each in found.undetermined if np.isinf(each.std)]
     assert set(combination.parts) == {each.name for each in found.parameters}
@@ -166,7 +172,9 @@ def test_damping_that_is_not_there_is_at_its_bound():
     bound = []
     for seed in range(6):
         data = tracks(still, TIMES, states, 5e-4, seed=seed)
-        found = st.identify(model, data, placed(model), ["tail_damping[same]"])["tail_damping[same]"]
+        found = st.identify(model, data, placed(model), ["tail_damping[same]"])[
+            "tail_damping[same]"
+        ]
         assert found.low <= 0 <= found.high or found.low < 2e-7
         bound.append(found.at_bound)
         if found.at_bound:

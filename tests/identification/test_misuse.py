@@ -97,7 +97,7 @@ def test_too_few_markers_are_refused(flight):
     model, states = flight
     data = tracks(model, TIMES, states, 1e-4)
     two = {name: placed(model)[name] for name in ("nose", "tail3")}
-    with pytest.raises(st.IdentificationError, match="too few markers: .* at most 2 at once"):
+    with pytest.raises(st.IdentificationError, match=r"too few markers: .* at most 2 at once"):
         st.identify(model, data, two)
 
 
@@ -106,14 +106,17 @@ def test_a_tail_that_nothing_shows_is_refused(flight):
     model, states = flight
     data = tracks(model, TIMES, states, 1e-2)
     torso = {name: placed(model)[name] for name in ("nose", "left", "right")}
-    with pytest.raises(st.IdentificationError, match="leave open.*tail coordinate"):
+    with pytest.raises(st.IdentificationError, match=r"leave open.*tail coordinate"):
         st.identify(model, data, torso, torques=st.TorquePrior(0.5, 0.02))
 
 
 def swapped(data, a, b, frames=slice(None)):
     positions = data.positions.copy()
     i, j = data.names.index(a), data.names.index(b)
-    positions[frames, i], positions[frames, j] = data.positions[frames, j], data.positions[frames, i]
+    positions[frames, i], positions[frames, j] = (
+        data.positions[frames, j],
+        data.positions[frames, i],
+    )
     return st.marker_tracks(data.times, positions, data.names, unit="m")
 
 

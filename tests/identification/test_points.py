@@ -85,8 +85,7 @@ def test_derivatives_are_central_differences(name):
         ahead = body_points(shape, tail + step, placed, none).points
         behind = body_points(shape, tail - step, placed, none).points
         np.testing.assert_allclose(found.by_tail[..., k], (ahead - behind) / (2 * h), atol=1e-9)
-    longer = model.with_parameters(tail_mount=np.array(model.parameters["tail_mount"]) + [h, 0, 0])
+    mount = np.array(model.parameters["tail_mount"])
+    longer = model.with_parameters(tail_mount=mount + h * np.eye(3)[0])
     ahead = body_points(geometry_of(longer), tail, placed, none).points
-    np.testing.assert_allclose(
-        found.by_geometry[..., 0], (ahead - found.points) / h, atol=1e-8
-    )
+    np.testing.assert_allclose(found.by_geometry[..., 0], (ahead - found.points) / h, atol=1e-8)

@@ -83,7 +83,7 @@ def test_the_full_scene_file_shows_every_key():
         (SCENES / f"{name}.toml").read_text()
         for name in ("kangaroo_rat_m1_n3", "contact_m1_n3", "tapered_tail")
     )
-    tables = {"name", "parameters", "plan", "simulate", "phase", "taper", "body"}
+    tables = {"name", "parameters", "plan", "simulate", "identify", "phase", "taper", "body"}
     words = [
         *(set(KEYS) - {*tables, *ONLY["continuum"].keys}),
         *(p.name for p in PARAMETERS),
@@ -91,7 +91,7 @@ def test_the_full_scene_file_shows_every_key():
     assert [word for word in words if f"{word} =" not in text] == []
 
 
-@pytest.mark.parametrize("name", ["plan", "simulate"])
+@pytest.mark.parametrize("name", ["plan", "simulate", "identify"])
 def test_tables_of_motions_are_left_to_the_runtime(refuse, name):
     alone = {"kind": "articulated", "segments": 1, "links": 3}
     assert parse_scene(alone | {name: {"anything": 1}}, "rat") == parse_scene(alone, "rat")

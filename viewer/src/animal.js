@@ -47,9 +47,18 @@ export class Animal {
     this.group.add(this.torso.group);
     for (const parts of [this.tail, this.joints, this.legs, this.knees, this.shafts, this.tips])
       this.group.add(parts.mesh);
+    this.addMarkers();
     this.addCentre();
     this.addShadow();
     this.paint();
+  }
+
+  // Where markers were seen, through all that is before them.
+  addMarkers() {
+    this.materials.marker = new MeshBasicMaterial({ depthTest: false, transparent: true });
+    this.markers = new Balls(this.materials.marker, this.run.markers ?? 0);
+    this.markers.mesh.renderOrder = 2;
+    this.group.add(this.markers.mesh);
   }
 
   // The centre of mass is seen through the torso.
@@ -81,6 +90,7 @@ export class Animal {
     this.materials.joint.color.set(colour("eye"));
     this.materials.leg.color.set(this.alone ? colour("leg") : own);
     this.materials.force.color.set(colour("force"));
+    this.materials.marker.color.set(colour("marker"));
     this.centre.material.color.set(colour("centre"));
     this.path.material.color.set(this.alone ? colour("path") : own);
   }
@@ -98,6 +108,17 @@ export class Animal {
     this.showTail(row);
     this.showLegs(row);
     this.showForces(row);
+    this.showMarkers(row);
+  }
+
+  // Those in gaps are not there.
+  showMarkers(row) {
+    const radius = 0.05 * Math.max(...this.run.body.semi_axes);
+    for (let m = 0; m < (this.run.markers ?? 0); m++) {
+      if (Number.isNaN(this.run.value("markers", row, 3 * m))) this.markers.hide(m);
+      else this.markers.place(m, this.run.point("markers", row, m, to), radius);
+    }
+    this.markers.placed();
   }
 
   showTail(row) {

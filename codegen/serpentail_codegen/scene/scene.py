@@ -168,6 +168,7 @@ KEYS: dict[str, tuple[Any, Rule]] = {
         _table("plan"),
     ),  # a motion to plan, and one to simulate: for the runtime, which checks them
     "simulate": ({}, _table("simulate")),
+    "identify": ({}, _table("identify")),
     "phase": ((), TABLES),  # of a motion of several, likewise
     "sweep": ({}, _table("sweep")),  # of many runs, likewise
     "taper": (None, ANY),

@@ -1,7 +1,7 @@
 """The JSON Schema of scene files, from the tables that scenes are checked against.
 
-The tables [plan], [simulate] and [[phase]] are any tables here: the runtime knows what belongs in
-them.
+The tables [plan], [simulate], [identify] and [[phase]] are any tables here: the runtime knows what
+belongs in them.
 """
 
 from collections.abc import Mapping

@@ -42,6 +42,7 @@ PASSIVE = {"tail_stiffness", "tail_rest", "tail_damping"} | {
 LEFT_OUT = (
     "plan",
     "simulate",
+    "identify",
     "phase",
     "sweep",
     "description",

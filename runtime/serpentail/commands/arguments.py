@@ -69,7 +69,11 @@ def _of_motions(verbs: argparse._SubParsersAction) -> None:
     simulate.add_argument("--film", help=film)
     plan = verbs.add_parser("plan", help="plan the motion of a scene's table [plan]")
     _add_scene(plan, "scenes/righting_m1_n3.toml")
-    for verb in (plan, simulate):
+    words = "estimate parameters and torques from marker tracks, as the table [identify] says"
+    identify = verbs.add_parser("identify", help=words)
+    _add_scene(identify, "scenes/elastic_tail.toml")
+    identify.add_argument("data", nargs="+", help="trials: .trc, .csv or .c3d files of markers")
+    for verb in (plan, simulate, identify):
         verb.add_argument("--save", help="write the motion to this .npz, .csv or .nc file")
         verb.add_argument("--view", metavar="PAGE", help="show it in a page, this .html file")
     _add_sweep(verbs)

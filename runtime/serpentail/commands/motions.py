@@ -1,4 +1,4 @@
-"""The verbs that make motions, or show them: plan, simulate, view."""
+"""The verbs that make motions, or show them: plan, simulate, identify, view."""
 
 import argparse
 from functools import partial
@@ -37,6 +37,22 @@ def simulate(arguments: argparse.Namespace) -> Outcome:
     report = scene.summary(motion) | _phases(motion) | stopped
     files: Files = {"save": partial(save, motion), "film": motion.film, "view": motion.view}
     return Outcome(report, as_text(report, UNITS), True, files)
+
+
+def identify(arguments: argparse.Namespace) -> Outcome:
+    """Return parameters, motion and torques that marker tracks show, and whether that converged."""
+    from ..containers.files import save
+    from ..scenes.identify import identified
+
+    found = identified(arguments.scene, arguments.data, arguments.folder)
+    files: Files = {"save": partial(save, found.trajectory), "view": found.view}
+    text = "\n".join(each for each in (found.table, as_text(_rest(found.report))) if each)
+    return Outcome(found.report, text, found.success, files)
+
+
+def _rest(report: dict) -> dict:
+    """Return a report without what its table has."""
+    return {name: value for name, value in report.items() if name != "parameters"}
 
 
 def _phases(motion: "Trajectory") -> dict[str, dict]:

@@ -6,7 +6,8 @@ import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.special import ndtri, stdtrit
 
-from .solve import NULL, Fit, prior_rows, shared_rows
+from .point import prior_rows
+from .solve import NULL, Fit, shared_rows
 from .trial import Trial
 from .unknowns import Unknowns
 

@@ -36,15 +36,13 @@ def refuse_too_few(placed: Placements, tracks: MarkerTracks, nq: int) -> None:
     )
 
 
-def tell_of_swaps(
-    model: Model, placed: Placements, tracks: MarkerTracks, q: np.ndarray
-) -> None:
+def tell_of_swaps(model: Model, placed: Placements, tracks: MarkerTracks, q: np.ndarray) -> None:
     """Warn of two markers whose exchange makes frames of the whole trial fit much better."""
     rows = np.flatnonzero(tracks.seen.sum(axis=1) == tracks.seen.sum(axis=1).max())
     rows = rows[np.linspace(0, len(rows) - 1, min(FRAMES, len(rows))).astype(int)]
     positions = tracks.positions[rows]
     before = np.median(fitted(model, placed, positions, q[rows])[1])
-    if before < LOOSE * float(model.parameters["tail_length"]):  # type: ignore[arg-type]
+    if before < LOOSE * float(model.parameters["tail_length"]):
         return
     best, pair = before, None
     for a, b in combinations(range(len(tracks.names)), 2):
@@ -56,10 +54,10 @@ def tell_of_swaps(
         if after < best:
             best, pair = after, (a, b)
     if pair is not None and best < HALF * before:
-        a, b = (tracks.names[k] for k in pair)
+        first, second = (tracks.names[k] for k in pair)
         warnings.warn(
-            f"{tracks.source}: markers {a!r} and {b!r} look swapped throughout: with them exchanged "
-            f"the frames fit to {1e3 * best:.3g} mm in place of {1e3 * before:.3g} mm",
+            f"{tracks.source}: markers {first!r} and {second!r} look swapped throughout: with them "
+            f"exchanged the frames fit to {1e3 * best:.3g} mm in place of {1e3 * before:.3g} mm",
             DoubtfulMarkers,
             stacklevel=5,
         )
@@ -83,8 +81,8 @@ def tell_of_residuals(tracks: MarkerTracks, modelled: np.ndarray) -> None:
             told |= {a, b}
             first, last = tracks.times[swapped[[0, -1]]]
             _tell(
-                f"{tracks.source}: markers {tracks.names[a]!r} and {tracks.names[b]!r} look swapped "
-                f"in {len(swapped)} frames from {first:g} to {last:g} s: exchange them there"
+                f"{tracks.source}: markers {tracks.names[a]!r} and {tracks.names[b]!r} look "
+                f"swapped in {len(swapped)} frames from {first:g} to {last:g} s: exchange them"
             )
     rms = np.sqrt(np.nanmean(off**2, axis=0))
     extent = float(np.linalg.norm(np.ptp(modelled, axis=1), axis=-1).max())

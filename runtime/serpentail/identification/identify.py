@@ -15,10 +15,10 @@ from . import trial as trials
 from .doubts import refuse_too_few, tell_of_swaps
 from .outcome import told
 from .placement import Marker, Placements, placements
+from .point import Point
 from .readers import read_markers
 from .result import Identification
 from .search import Task, first_iterate, refined
-from .solve import Point
 from .start import motion_shown
 from .torques import Known, TorquePrior, checked_prior, known_torques
 from .tracks import MarkerTracks
@@ -73,8 +73,12 @@ def identify(
     known = set(Settings.__annotations__)
     for name in settings:
         if name not in known:
-            raise IdentificationError(f"{name}: no such setting; there are {', '.join(sorted(known))}")
-    confidence = number("confidence", settings.get("confidence", 0.95), IdentificationError, above=0)
+            raise IdentificationError(
+                f"{name}: no such setting; there are {', '.join(sorted(known))}"
+            )
+    confidence = number(
+        "confidence", settings.get("confidence", 0.95), IdentificationError, above=0
+    )
     if confidence >= 1:
         raise refusal("confidence", confidence, "a number below 1", IdentificationError)
     check_model(model, estimate)
@@ -124,7 +128,7 @@ def tracks_of(data: Any, placed: Placements, settings: Mapping[str, Any]) -> lis
     listed = list(data) if isinstance(data, list | tuple) else [data]
     if not listed:
         raise IdentificationError("data: none: needs marker tracks, or files of them")
-    how = {name: settings[name] for name in ("axes", "zeros") if name in settings}  # type: ignore[literal-required]
+    how = {name: settings[name] for name in ("axes", "zeros") if name in settings}
     found = [
         each if isinstance(each, MarkerTracks) else read_markers(each, settings.get("unit"), **how)
         for each in listed

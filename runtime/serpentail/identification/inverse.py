@@ -65,7 +65,7 @@ def joint_torques(
     placed = placements(model, markers)
     if not isinstance(tracks, MarkerTracks):
         raise IdentificationError(
-            f"tracks: type {type(tracks).__name__}: needs what read_markers or marker_tracks returns"
+            f"tracks: type {type(tracks).__name__}: needs what read_markers returns"
         )
     tracks = tracks.of(placed.names)
     refuse_too_few(placed, tracks, model.nq)
@@ -111,9 +111,7 @@ def smoothed(
     return spline(times), spline.derivative(1)(times), spline.derivative(2)(times)
 
 
-def rates(
-    q: np.ndarray, first: np.ndarray, second: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def rates(q: np.ndarray, first: np.ndarray, second: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return v and v_dot (F, nv) of configurations (F, nq) and their derivatives.
 
     omega = 2 vec(conj(Q) Q_dot) / |Q|^2, of a quaternion Q whose norm need not be 1.

@@ -51,8 +51,15 @@ def told(task: Task, found: Fit, confidence: float, began: float) -> Identificat
         std = np.where(found.pinned, np.sqrt(np.diag(loose.covariance)), std)
     values = found.point.values
     estimates = tuple(
-        Estimate(each.name, float(x), float(s), *_interval(x, s * reach, bool(pinned)),
-                 each.unit, float(first), bool(pinned))
+        Estimate(
+            each.name,
+            float(x),
+            float(s),
+            *_interval(x, s * reach, bool(pinned)),
+            each.unit,
+            float(first),
+            bool(pinned),
+        )
         for each, x, s, first, pinned in zip(
             wanted.each, values, std, wanted.start, found.pinned, strict=True
         )
@@ -120,9 +127,7 @@ def _wider(task: Task, found: Fit) -> tuple[np.ndarray, ...]:
     return tuple(wide)
 
 
-def _torque_std(
-    wanted: Unknowns, trial: Trial, R: np.ndarray, C: np.ndarray
-) -> np.ndarray | None:
+def _torque_std(wanted: Unknowns, trial: Trial, R: np.ndarray, C: np.ndarray) -> np.ndarray | None:
     """Return standard deviations of the torques at the knots, flat; None where they are known."""
     if not trial.unknown_torques:
         return None

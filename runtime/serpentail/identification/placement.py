@@ -51,7 +51,7 @@ def piece_lengths(model: Model) -> np.ndarray:
     if own is not None:
         return np.atleast_1d(np.asarray(own, float))
     pieces = int(np.sum(model.joints_each))
-    return np.full(pieces, float(p["tail_length"]) / pieces)  # type: ignore[arg-type]
+    return np.full(pieces, float(p["tail_length"]) / pieces)
 
 
 def placements(model: Model, markers: Any) -> Placements:

@@ -15,6 +15,7 @@ from .tracks import MarkerTracks, checked_tracks, checked_unit
 
 LARGEST = 2**30  # bytes of a file that is read
 RATE_TOLERANCE = 0.02  # by how much the times may deviate from a stated rate
+AXES = "^(-?[xyz]){3}$"
 Read = tuple[np.ndarray, np.ndarray, list[str], str | None]  # times, positions, names, unit
 
 
@@ -69,7 +70,9 @@ def _trc(source: Path) -> Read:
     """Read a TRC file: three lines of header, two of names, then frames."""
     lines = _lines(source)
     if len(lines) < 6 or not lines[0].startswith("PathFileType"):
-        raise IdentificationError(f"{source}: is no whole TRC file: its first line needs PathFileType")
+        raise IdentificationError(
+            f"{source}: is no whole TRC file: its first line needs PathFileType"
+        )
     header = dict(zip(lines[1].split("\t"), lines[2].split("\t"), strict=False))
     header = {key.strip(): value.strip() for key, value in header.items()}
     lacking = [key for key in ("NumFrames", "NumMarkers", "Units") if key not in header]

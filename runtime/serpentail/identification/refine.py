@@ -31,7 +31,7 @@ def parts_needed(model: Model, trial: Trial, iterate: Iterate) -> np.ndarray | N
         begin = found[:, -1]
         ends.append(begin)
     error = np.abs(difference(model, ends[1], iterate.stages[:, -1]))
-    reach = float(model.parameters["tail_length"])  # type: ignore[arg-type]
+    reach = float(model.parameters["tail_length"])
     duration = trial.times[-1] - trial.times[0]
     sizes = np.concatenate([np.full(3, 1.0), np.full(model.nv - 3, reach)])
     moved = (error * np.concatenate([sizes, duration * sizes])).sum(axis=1)

@@ -115,7 +115,7 @@ class Identification:
     @property
     def report(self) -> dict[str, Any]:
         """What came out, ready for JSON; intervals of what the data do not tell are null."""
-        told = {
+        told: dict[str, Any] = {
             "success": self.success,
             "iterations": self.iterations,
             "seconds": self.seconds,
@@ -130,7 +130,9 @@ class Identification:
             name = "rms_m" if len(self.trials) == 1 else f"rms_m of trial {k + 1}"
             told[name] = dict(zip(trial.tracks.names, rms.tolist(), strict=True))
             if trial.torques is not None:
-                told.setdefault("peak_torque_Nm", []).append(float(np.abs(trial.trajectory.tau).max()))
+                told.setdefault("peak_torque_Nm", []).append(
+                    float(np.abs(trial.trajectory.tau).max())
+                )
                 told.setdefault("peak_power_W", []).append(float(np.abs(trial.power).max()))
         return {name: value for name, value in told.items() if value != {}}
 
@@ -191,12 +193,12 @@ def _row(each: Estimate) -> dict[str, Any]:
     return finite | {"unit": each.unit, "begin": each.begin, "at_bound": each.at_bound}
 
 
-def trajectory_of(model: Model, times: np.ndarray, states: np.ndarray, tau: np.ndarray) -> Trajectory:
+def trajectory_of(
+    model: Model, times: np.ndarray, states: np.ndarray, tau: np.ndarray
+) -> Trajectory:
     """Return states (F, nx) and torques (F, 2m) at times as a motion."""
     q, v = states[:, : model.nq], states[:, model.nq :]
     kinetic, potential = model.energy(q, v)
     linear, angular = model.momentum(q, v)
     info = {"kind": "identified"} | origin(model)
-    return Trajectory(
-        times, q, v, tau, kinetic, potential, linear, angular, info, model=model
-    )
+    return Trajectory(times, q, v, tau, kinetic, potential, linear, angular, info, model=model)

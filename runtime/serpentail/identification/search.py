@@ -9,8 +9,9 @@ from ..model.model import Model
 from ..stages import Stage
 from . import trial as trials
 from .certainty import spread_of_noise
+from .point import Point
 from .refine import parts_needed
-from .solve import Fit, Point, fit
+from .solve import Fit, fit
 from .start import on_mesh
 from .torques import Known, TorquePrior
 from .trial import Iterate, Trial
@@ -71,9 +72,7 @@ def cut(
         int(needed[a:b].max()) * (b - a)
         for a, b in zip(trial.frames[:-1], trial.frames[1:], strict=True)
     ]
-    finer = trials.meshed(
-        trial.tracks, trial.noise, torques, (model.layout.nt, np.array(each))
-    )
+    finer = trials.meshed(trial.tracks, trial.noise, torques, (model.layout.nt, np.array(each)))
     mesh = on_mesh(model, iterate.states, trial.times, finer.times)
     return finer, Iterate(mesh, iterate.torques, np.repeat(mesh[:-1, None], 3, axis=1))
 

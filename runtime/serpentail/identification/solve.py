@@ -10,11 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from ..errors import IdentificationError, ModelError
+from ..errors import IdentificationError
 from ..stages import Stage
 from . import trial as trials
-from .stages import moved
-from .trial import Iterate, Linear, Trial
+from .descent import search, to_pin
+from .point import Point, integrated, prior_rows
+from .trial import Linear, Trial
 from .unknowns import Unknowns
 
 ITERATIONS = 60
@@ -22,17 +23,6 @@ CLOSE = 1e-4  # last step, in standard deviations of the estimates
 ROUNDING = 1e-9  # last step over the size of the data
 NULL = 1e-9  # singular values below, over the largest, are of what no data can tell
 DEPENDENT = 1e-5  # of a column's length that is left: below, columns depend on each other
-ARMIJO, SHORTEST = 1e-4, 1e-6
-KEPT = 0.2  # of a positive number that a step must leave
-PINNED = 1e-3  # of its size: from here a number that wants below 0 is put there
-
-
-@dataclass(frozen=True, eq=False)
-class Point:
-    """Values of the unknowns (P,) and an iterate of each trial."""
-
-    values: np.ndarray
-    iterates: tuple[Iterate, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +42,7 @@ class Fit:
 def fit(unknowns: Unknowns, each: tuple[Trial, ...], start: Point, stage: Stage | None) -> Fit:
     """Return the best fit near a start; IdentificationError where no step can be made."""
     pinned = np.zeros(len(unknowns.each), bool)
-    point = _integrated(unknowns, each, start)
+    point = integrated(unknowns, each, start)
     if point is None:
         raise IdentificationError(
             "data: the model cannot be integrated from the motion that the markers show: check "
@@ -68,30 +58,15 @@ def fit(unknowns: Unknowns, each: tuple[Trial, ...], start: Point, stage: Stage 
         if length < 1:
             converged = True
             break
-        pinned |= _to_pin(unknowns, point, step)
-        advanced, weight = _search(unknowns, each, (point, linear, weight), (step, steps))
+        pinned |= to_pin(unknowns, point, step)
+        advanced, weight = search(unknowns, each, (point, linear, weight), (step, steps))
         if advanced is None:
             break
         point = advanced
         if pinned.any():
             point = Point(np.where(pinned, 0.0, point.values), point.iterates)
-            point = _integrated(unknowns, each, point) or advanced
+            point = integrated(unknowns, each, point) or advanced
     return Fit(point, linear, triangles, pinned, iteration, converged)
-
-
-def _integrated(unknowns: Unknowns, each: tuple[Trial, ...], point: Point) -> Point | None:
-    """Return a point with its intervals integrated; None where that fails."""
-    try:
-        model = unknowns.model_at(point.values)
-    except ModelError:
-        return None
-    found = []
-    for trial, iterate in zip(each, point.iterates, strict=True):
-        solved = trials.solved(model, trial, iterate)
-        if solved is None:
-            return None
-        found.append(solved)
-    return Point(point.values, tuple(found))
 
 
 def _decomposed(
@@ -137,19 +112,6 @@ def shared_rows(unknowns: Unknowns, triangles: tuple[np.ndarray, ...]) -> np.nda
     count = len(unknowns.each)
     rows = np.vstack([R[-1 - count : -1, -1 - count :] for R in triangles])
     rows[:, :count] *= unknowns.sizes
-    return rows
-
-
-def prior_rows(unknowns: Unknowns, values: np.ndarray) -> np.ndarray:
-    """Return the rows of priors on shared unknowns, right-hand side last."""
-    spread = [
-        (k, each.size / each.spread, (unknowns.start[k] - values[k]) / each.spread)
-        for k, each in enumerate(unknowns.each)
-        if each.spread is not None
-    ]
-    rows = np.zeros((len(spread), len(unknowns.each) + 1))
-    for row, (k, weight, off) in zip(rows, spread, strict=True):
-        row[k], row[-1] = weight, off
     return rows
 
 
@@ -199,121 +161,3 @@ def _change(
         floor += (ROUNDING * np.nanmax(np.abs(trial.tracks.positions)) / trial.noise.min()) ** 2
     scale = np.sqrt(square / max(rows, 1))
     return float(np.sqrt(total) / (CLOSE * scale + np.sqrt(floor)))
-
-
-def _to_pin(unknowns: Unknowns, point: Point, step: np.ndarray) -> np.ndarray:
-    """Tell which numbers that cannot be negative are almost 0 and want below it."""
-    checks = {p["name"]: p["check"] for p in unknowns.model.manifest["parameters"]}
-    return np.array(
-        [
-            checks.get(each.of) == "not_negative"
-            and value <= PINNED * each.size
-            and value + change < 0
-            for each, value, change in zip(unknowns.each, point.values, step, strict=True)
-        ],
-        bool,
-    )
-
-
-def _longest(unknowns: Unknowns, values: np.ndarray, step: np.ndarray) -> float:
-    """Return how much of a step leaves positive numbers positive."""
-    checks = {p["name"]: p["check"] for p in unknowns.model.manifest["parameters"]}
-    most = 1.0
-    for each, value, change in zip(unknowns.each, values, step, strict=True):
-        if checks.get(each.of, "finite") != "finite" and change < 0 < value:
-            least = 0.0 if value <= PINNED * each.size else KEPT
-            most = min(most, (1 - least) * value / -change)
-    return most
-
-
-State = tuple[Point, tuple[Linear, ...], float]
-
-
-def _search(
-    unknowns: Unknowns,
-    each: tuple[Trial, ...],
-    state: State,
-    direction: tuple[np.ndarray, list[np.ndarray]],
-) -> tuple[Point | None, float]:
-    """Return the point along a step that lowers cost and defects together, and their weight.
-
-    The weight of the defects' sizes is large enough for the step to go down (Nocedal and Wright,
-    Eq. 18.36).
-    """
-    point, linear, weight = state
-    step, steps = direction
-    moves = [
-        each_linear.states(trial, own, step)
-        for each_linear, trial, own in zip(linear, each, steps, strict=True)
-    ]
-    # slope of the cost, and the size of the defects
-    believed = prior_rows(unknowns, point.values)
-    slope = -float(believed[:, -1] @ (believed[:, :-1] @ (step / unknowns.sizes)))
-    for each_linear, own in zip(linear, steps, strict=True):
-        change = each_linear.rows @ np.concatenate([own, step])
-        change += each_linear.residual - each_linear.right
-        slope -= float(each_linear.residual @ change)
-    scales = [_scales(move) for move in moves]
-    off = sum(float((np.abs(lin.defects) * s).sum()) for lin, s in zip(linear, scales, strict=True))
-    if off > 0:
-        weight = max(weight, 2 * max(slope, 0.0) / off)
-    before = _cost(unknowns, point, linear) + weight * off
-    expected = slope - weight * off
-    length = _longest(unknowns, point.values, step)
-    while length > SHORTEST:
-        found = _at(unknowns, each, point, (length, step, steps, moves))
-        if found is not None:
-            after = _merit(unknowns, each, found, (weight, scales))
-            if after <= before + ARMIJO * length * expected + 1e-12 * abs(before):
-                return found, weight
-        length /= 2
-    return None, weight
-
-
-def _scales(move: np.ndarray) -> np.ndarray:
-    """Return by what defects are multiplied so that numbers of different units compare."""
-    return 1 / np.maximum(np.abs(move).max(axis=0), 1e-12)
-
-
-def _at(
-    unknowns: Unknowns,
-    each: tuple[Trial, ...],
-    point: Point,
-    direction: tuple[float, np.ndarray, list[np.ndarray], list[np.ndarray]],
-) -> Point | None:
-    """Return the point at some length along a step, integrated; None where that fails."""
-    length, step, steps, moves = direction
-    model, found = unknowns.model, []
-    for trial, iterate, own, move in zip(each, point.iterates, steps, moves, strict=True):
-        states = moved(model, iterate.states, length * move)
-        torques = iterate.torques + length * own[move.shape[1] :].reshape(iterate.torques.shape)
-        shift = (states - iterate.states)[:-1, None]
-        stages = iterate.stages + shift
-        found.append(Iterate(states, torques, stages))
-    return _integrated(unknowns, each, Point(point.values + length * step, tuple(found)))
-
-
-def _cost(unknowns: Unknowns, point: Point, linear: tuple[Linear, ...]) -> float:
-    """Return half the sum of squares."""
-    own = float((prior_rows(unknowns, point.values)[:, -1] ** 2).sum())
-    return (own + sum(float(each.residual @ each.residual) for each in linear)) / 2
-
-
-def _merit(
-    unknowns: Unknowns,
-    each: tuple[Trial, ...],
-    point: Point,
-    weights: tuple[float, list[np.ndarray]],
-) -> float:
-    """Return the cost and the weighed sizes of the defects at a point."""
-    weight, scales = weights
-    model = unknowns.model_at(point.values)
-    placed = unknowns.placed_at(point.values)
-    total = float((prior_rows(unknowns, point.values)[:, -1] ** 2).sum()) / 2
-    for trial, iterate, scale in zip(each, point.iterates, scales, strict=True):
-        r = trials.residuals(model, placed, trial, iterate.states)
-        total += float((r**2).sum()) / 2
-        believed = trial.prior @ iterate.torques
-        total += float((believed**2).sum()) / 2
-        total += weight * float((np.abs(trials.defects(model, iterate)) * scale).sum())
-    return total

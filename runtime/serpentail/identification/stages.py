@@ -76,8 +76,10 @@ def solved(
 def _matrix(J: np.ndarray, spans: np.ndarray) -> np.ndarray:
     """Return the Newton matrix I - h A x J (K, 3nx, 3nx)."""
     count, stages, nx = J.shape[:3]
-    blocks = -spans[:, None, None, None, None] * WEIGHTS[:, None, :, None] * (
-        J.transpose(0, 2, 1, 3)[:, None]
+    blocks = (
+        -spans[:, None, None, None, None]
+        * WEIGHTS[:, None, :, None]
+        * (J.transpose(0, 2, 1, 3)[:, None])
     )
     return blocks.reshape(count, stages * nx, stages * nx) + np.eye(stages * nx)
 
@@ -160,9 +162,10 @@ def moved(model: Model, x: np.ndarray, step: np.ndarray) -> np.ndarray:
     angle = np.linalg.norm(turn, axis=-1, keepdims=True)
     part = np.sinc(angle / (2 * np.pi)) / 2
     quaternion = x[..., QUATERNION]
-    new[..., QUATERNION] = np.cos(angle / 2) * quaternion + part * (
-        product_matrix(quaternion) @ turn[..., None]
-    )[..., 0]
+    new[..., QUATERNION] = (
+        np.cos(angle / 2) * quaternion
+        + part * (product_matrix(quaternion) @ turn[..., None])[..., 0]
+    )
     new[..., QUATERNION] /= np.linalg.norm(new[..., QUATERNION], axis=-1, keepdims=True)
     new[..., TAIL_Q.start : nq] += step[..., 6:nv]
     new[..., nq:] += step[..., nv:]

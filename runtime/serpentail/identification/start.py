@@ -20,7 +20,7 @@ FAR = 4.0  # times the usual misfit: such a frame is not what others begin with
 
 
 def motion_shown(model: Model, placed: Placements, tracks: MarkerTracks) -> np.ndarray:
-    """Return states (F, nx) at the frames: configurations that fit each, velocities by parabolas."""
+    """Return states (F, nx) at the frames: fitted configurations, velocities by parabolas."""
     q = configurations(model, placed, tracks)
     return np.column_stack([q, velocities(model, tracks.times, q)])
 
@@ -51,11 +51,11 @@ def configurations(model: Model, placed: Placements, tracks: MarkerTracks) -> np
 def fitted(
     model: Model, placed: Placements, positions: np.ndarray, begin: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return configurations (F, nq) near others that fit positions (F, M, 3), and the misfit (F,) m.
+    """Return configurations (F, nq) near others that fit positions (F, M, 3), and misfits (F,) m.
 
     Levenberg-Marquardt steps of all frames side by side; turns are held a little where they are.
     """
-    nv, reach = model.nv, float(model.parameters["tail_length"])  # type: ignore[arg-type]
+    nv, reach = model.nv, float(model.parameters["tail_length"])
     weight = np.isfinite(positions).all(axis=2)
     q, ridge = begin.copy(), np.full(len(begin), RIDGE)
     shape, none = geometry_of(model), np.zeros(0, int)
@@ -153,7 +153,7 @@ def _between(times: np.ndarray, q: np.ndarray, rows: np.ndarray) -> np.ndarray:
 
 
 def velocities(model: Model, times: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Return velocities (F, nv) of configurations (F, nq): slopes of parabolas through neighbours."""
+    """Return velocities (F, nv) of configurations (F, nq): slopes of local parabolas."""
     count, none = len(times), np.zeros((1, model.nv))
     v, width = np.zeros((count, model.nv)), min(WINDOW, count)
     for k in range(count):

@@ -50,8 +50,9 @@ def known_torques(torques: Any, nt: int) -> Known:
     if isinstance(torques, Trajectory):
         return _sampled(torques.t, torques.tau, nt)
     if isinstance(torques, tuple) and len(torques) == 2:
-        t, tau = (finite_array(f"torques[{k}]", x, IdentificationError)
-                  for k, x in enumerate(torques))
+        t, tau = (
+            finite_array(f"torques[{k}]", x, IdentificationError) for k, x in enumerate(torques)
+        )
         return _sampled(t, tau, nt)
     if callable(torques):
         return _called(torques, nt)

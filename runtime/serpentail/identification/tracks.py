@@ -67,7 +67,7 @@ def marker_tracks(
 def checked_tracks(
     times: Any, positions: Any, names: Any, how: tuple[Any, Any, Any], source: str
 ) -> MarkerTracks:
-    """Return tracks of arrays, once each is sound; how: unit, axes and zeros; source: for errors."""
+    """Return tracks of arrays, once each is sound; how: unit, axes, zeros; source: for errors."""
     unit, axes, zeros = how
     factor = float(UNITS[checked_unit(unit, source)])
     t = checked_times(times, source)
@@ -134,9 +134,7 @@ def checked_names(names: Any, source: str) -> tuple[str, ...]:
     return listed
 
 
-def without_zeros(
-    where: np.ndarray, names: Sequence[str], zeros: str, source: str
-) -> np.ndarray:
+def without_zeros(where: np.ndarray, names: Sequence[str], zeros: str, source: str) -> np.ndarray:
     """Return positions with nan in place of exact zeros, or refuse these."""
     empty = (where == 0).all(axis=2)
     if not empty.any():

@@ -60,6 +60,16 @@ class Iterate:
     torques: np.ndarray
     stages: np.ndarray
 
+    @property
+    def ends(self) -> np.ndarray:
+        """States (K, nx) in which the intervals end."""
+        return self.stages[:, -1]
+
+    def followed(self, states: np.ndarray) -> "Iterate":
+        """Return these torques with other states; stages move with them."""
+        shift = (states - self.states)[:-1, None]
+        return Iterate(states, self.torques, self.stages + shift)
+
     def over(self, model: Model, trial: Trial) -> np.ndarray:
         """Return torques (K, 3, 2m) at the stages."""
         if not trial.unknown_torques:
@@ -120,7 +130,7 @@ def solved(model: Model, trial: Trial, iterate: Iterate) -> Iterate | None:
 
 def defects(model: Model, iterate: Iterate) -> np.ndarray:
     """Return what the ends of the intervals and the next states differ by, (K, 2nv)."""
-    return radau.difference(model, iterate.stages[:, -1], iterate.states[1:])
+    return radau.difference(model, iterate.ends, iterate.states[1:])
 
 
 def residuals(model: Model, placed: Placements, trial: Trial, states: np.ndarray) -> np.ndarray:

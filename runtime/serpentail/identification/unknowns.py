@@ -41,7 +41,7 @@ class Unknown:
 
 @dataclass(frozen=True, eq=False)
 class Unknowns:
-    """All estimated numbers of a model and its markers, and what they begin with, ``start`` (P,)."""
+    """All estimated numbers of a model and its markers; start (P,): what they begin with."""
 
     model: Model
     placed: Placements
@@ -188,15 +188,15 @@ def _of_name(
     sizes = np.where(values != 0, np.abs(values), np.abs(values).max(initial=0.0) or 1.0)
     groups = _groups(name, match[2], values)
     return [
-        (Unknown(word, units[match[1]], match[1], entries, float(sizes[entries[0]]), spread),
-         float(values[entries[0]]))
+        (
+            Unknown(word, units[match[1]], match[1], entries, float(sizes[entries[0]]), spread),
+            float(values[entries[0]]),
+        )
         for word, entries in groups
     ]
 
 
-def _groups(
-    name: str, chosen: str | None, values: np.ndarray
-) -> list[tuple[str, tuple[int, ...]]]:
+def _groups(name: str, chosen: str | None, values: np.ndarray) -> list[tuple[str, tuple[int, ...]]]:
     """Return names of numbers and the entries of a parameter that each sets."""
     if chosen == SAME:
         if len(set(values.tolist())) > 1:
@@ -221,7 +221,7 @@ def _of_marker(
         remedy = did_you_mean(marker, placed.names) or f"there are {', '.join(placed.names)}"
         raise IdentificationError(f"estimate: {name}: no such marker; {remedy}")
     offset = placed.offset[placed.names.index(marker)]
-    size = float(model.parameters["tail_length"])  # type: ignore[arg-type]
+    size = float(model.parameters["tail_length"])
     return [
         (Unknown(f"{name}.{axis}", "m", name, (k,), 0.1 * size, spread), float(offset[k]))
         for k, axis in enumerate("xyz")

@@ -28,6 +28,12 @@ MADE_OF = (
     "base",
     "weightless",
 )
+# tables of verbs, and what each needs
+NEEDS = {
+    "simulate": "start and duration",
+    "plan": "start and duration",
+    "identify": "tables [[identify.marker]]",
+}
 UNSAID = {"base": "free", "weightless": False}  # of manifests, which leave out these
 
 
@@ -43,9 +49,9 @@ def subtable(scene: Mapping, name: str, path: Path, error: type[Exception]) -> d
     """Return a table of a scene; ``error`` where it has none."""
     table = scene.get(name)
     if not isinstance(table, Mapping):
-        others = [verb for verb in ("simulate", "plan") if verb != name and verb in scene]
+        others = [verb for verb in NEEDS if verb != name and verb in scene]
         remedy = "".join(f", or try `serpentail {verb}`" for verb in others)
-        raise error(f"{path} has no table [{name}]; add one, with start and duration{remedy}")
+        raise error(f"{path} has no table [{name}]; add one, with {NEEDS[name]}{remedy}")
     return dict(table)
 
 

@@ -1,5 +1,4 @@
-"""The JSON Schema of scene files: the generator's, and what belongs in [simulate], [[phase]],
-[plan] and [sweep]."""
+"""The JSON Schema of scene files: the generator's, and what belongs in tables of the runtime."""
 
 import json
 import subprocess
@@ -7,6 +6,7 @@ from typing import Any
 
 from ..building.generator import command
 from ..units import MEASURES, choices, pattern, plain
+from .identify_keys import IDENTIFY
 from .keys import Key
 from .phase_keys import PHASES
 from .plan_keys import PLAN
@@ -20,7 +20,14 @@ def scene_schema() -> dict[str, Any]:
         [*command(), "--schema"], capture_output=True, text=True, check=True
     ).stdout
     schema: dict[str, Any] = json.loads(said)
-    for name, key in (("simulate", SIMULATE), ("phase", PHASES), ("plan", PLAN), ("sweep", SWEEP)):
+    tables = {
+        "simulate": SIMULATE,
+        "phase": PHASES,
+        "plan": PLAN,
+        "identify": IDENTIFY,
+        "sweep": SWEEP,
+    }
+    for name, key in tables.items():
         schema["properties"][name] |= key_schema(key)
     return schema
 

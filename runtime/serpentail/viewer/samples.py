@@ -4,6 +4,7 @@ import dataclasses
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..attitude import Array, tilt_deg
 from ..model.model import Model
@@ -11,12 +12,19 @@ from ..motion.body import bends, centre_of_mass, leg_points
 from ..motion.trajectory import ARRAYS, Trajectory
 
 
+def thinned_rows(count: int, most: int) -> tuple[NDArray[np.intp], int]:
+    """Return every n-th of so many rows, the last one too, at most so many; and n."""
+    step = max(-(-(count - 1) // (most - 1)), 1)
+    if step == 1:
+        return np.arange(count), 1
+    return np.append(np.arange(0, count - 1, step), count - 1), step
+
+
 def thinned(motion: Trajectory, most: int) -> tuple[Trajectory, int]:
     """Return every n-th sample of a motion, the last one too, at most so many; and n."""
-    step = max(-(-(len(motion.t) - 1) // (most - 1)), 1)
+    rows, step = thinned_rows(len(motion.t), most)
     if step == 1:
         return motion, 1
-    rows = np.append(np.arange(0, len(motion.t) - 1, step), len(motion.t) - 1)
     arrays: dict[str, Any] = {name: getattr(motion, name)[rows] for name in ARRAYS}
     contact = motion.contact and motion.contact.mapped(lambda samples: samples[rows])
     return dataclasses.replace(motion, contact=contact, **arrays), step

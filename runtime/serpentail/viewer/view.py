@@ -8,11 +8,14 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+from ..checks import real_array
 from ..errors import ViewError
 from ..files import replacing
 from ..model.model import Model
 from ..motion.trajectory import Trajectory
 from .data import page_data
+from .packing import packed
+from .samples import thinned_rows
 
 MOST = 2400  # samples of a run in a page
 PAGE = Path(__file__).with_name("page.html")  # made of the sources in viewer/ when this is built
@@ -24,17 +27,19 @@ def view(
     *,
     names: Sequence[str] | None = None,
     model: Model | None = None,
+    markers: Sequence[Any] | None = None,
 ) -> Path:
     """Write a page that shows motions over each other; return its path.
 
     motions: a Trajectory, or several.  path: an .html file; it is complete in itself, fetches
     nothing, and replaces what was there once it is whole.  names: of the motions, by default what
     each is.  model: of motions that were loaded from files; others know theirs.
+    markers: of each motion, where markers were seen at its samples, (K, M, 3) m, nan in gaps.
     More than 2400 samples are thinned, which the page says, as it says that a run failed.  Raises
     ViewError with argument, value and remedy, ModelError where the model lacks ``tail_points``.
     """
     target = checked_path(path)
-    text = page_text(motions, names, model)
+    text = page_text(motions, names, model, markers=markers)
     try:
         with replacing(target) as part:
             part.write_text(text, encoding="utf-8")
@@ -48,18 +53,30 @@ def page_text(
     names: Sequence[str] | None = None,
     model: Model | None = None,
     most: int = MOST,
+    markers: Sequence[Any] | None = None,
 ) -> str:
     """Return the page of motions as a text, with at most so many samples of each; see ``view``."""
     motions = checked_motions(motions)
     names = checked_names(names, motions)
     models = [model_of(k, motion, model) for k, motion in enumerate(motions)]
     page, data = template(), page_data(motions, names, models, most)
+    for run, motion, seen in zip(data["runs"], motions, markers or (), strict=bool(markers)):
+        run["arrays"]["markers"], run["markers"] = packed_markers(motion, seen, most)
+
     parts = {
         "<!--TITLE-->": escape(", ".join(dict.fromkeys(each.name for each in models))),
         "/*DATA*/": json.dumps(data, allow_nan=False).replace("<", "\\u003c"),
     }
     marks = re.compile("|".join(map(re.escape, parts)))
     return marks.sub(lambda mark: parts[mark[0]], page)
+
+
+def packed_markers(motion: Trajectory, seen: Any, most: int) -> tuple[str, int]:
+    """Return where markers were seen at the samples that a page has, as text, and how many."""
+    places = real_array("markers", seen, ViewError)
+    if places.ndim != 3 or places.shape[::2] != (len(motion.t), 3):
+        raise ViewError(f"markers: shape {places.shape}: needs ({len(motion.t)}, M, 3)")
+    return packed(places[thinned_rows(len(motion.t), most)[0]]), places.shape[1]
 
 
 def checked_motions(motions: Any) -> list[Trajectory]:

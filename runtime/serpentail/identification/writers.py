@@ -1,0 +1,58 @@
+"""Writes marker tracks to TRC and CSV files, as ``read_markers`` reads them."""
+
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import IdentificationError
+from ..files import replacing
+from .tracks import MarkerTracks
+
+
+def write_markers(tracks: MarkerTracks, path: str | PathLike[str]) -> Path:
+    """Write tracks to a .trc file in mm, or to a .csv file in m; return its path.
+
+    Gaps are empty cells.  The file is written whole or not at all.
+    """
+    target = Path(path)
+    if target.suffix not in (".trc", ".csv"):
+        raise IdentificationError(f"path: value {str(path)!r}: needs a name ending in .trc or .csv")
+    lines = _trc(tracks, target.name) if target.suffix == ".trc" else _csv(tracks)
+    with replacing(target) as part:
+        part.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return target
+
+
+def _trc(tracks: MarkerTracks, name: str) -> list[str]:
+    """Return the lines of a TRC file."""
+    frames, count = tracks.seen.shape
+    rate = f"{1 / np.median(np.diff(tracks.times)):.6g}"
+    axes = [f"{axis}{k + 1}" for k in range(count) for axis in "XYZ"]
+    names = [cell for each in tracks.names for cell in (each, "", "")]
+    head = "DataRate CameraRate NumFrames NumMarkers Units OrigDataRate OrigDataStartFrame "
+    head += "OrigNumFrames"
+    values = [rate, rate, str(frames), str(count), "mm", rate, "1", str(frames)]
+    return [
+        f"PathFileType\t4\t(X/Y/Z)\t{name}",
+        "\t".join(head.split()),
+        "\t".join(values),
+        "\t".join(["Frame#", "Time", *names]),
+        "\t".join(["", "", *axes]),
+        *(
+            "\t".join([str(k + 1), f"{t:.9g}", *_cells(1e3 * row)])
+            for k, (t, row) in enumerate(zip(tracks.times, tracks.positions, strict=True))
+        ),
+    ]
+
+
+def _csv(tracks: MarkerTracks) -> list[str]:
+    """Return the lines of a CSV file."""
+    head = ["time", *(f"{name}_{axis}" for name in tracks.names for axis in "xyz")]
+    rows = zip(tracks.times, tracks.positions, strict=True)
+    return [",".join(head), *(",".join([f"{t:.9g}", *_cells(row)]) for t, row in rows)]
+
+
+def _cells(row: np.ndarray) -> list[str]:
+    """Return numbers to a hundredth of a micrometre and finer, empty in gaps."""
+    return ["" if np.isnan(x) else f"{x:.8g}" for x in row.ravel()]

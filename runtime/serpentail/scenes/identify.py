@@ -1,0 +1,82 @@
+"""The identification that a scene file's table [identify] asks for."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from ..checks import Refusals, needed
+from ..errors import IdentificationError
+from ..identification.identify import identify
+from ..identification.placement import Marker
+from ..identification.readers import read_markers
+from ..identification.result import Identification
+from ..identification.torques import TorquePrior
+from .file import model_of, read_scene, size_of, subtable
+from .identify_keys import IDENTIFY
+from .keys import read, sized
+
+# functions that an identification calls, beside those that scenes have by default
+NEEDS = ("forward_dynamics_derivatives", "forward_dynamics_parameter_derivatives")
+USES = ("forward_dynamics", "energy", "momentum", "tail_points", "mass_matrix", "bias_force")
+UNSIZED: Mapping[str, float] = {}
+READ = ("unit", "axes", "zeros")  # keys that tell how files are read
+
+
+def identified(path: str, data: Sequence[str], folder: str | None = None) -> Identification:
+    """Return what a scene file's table [identify] makes of files of marker tracks.
+
+    path: a scene file, or the name of an example; data: TRC, CSV or C3D files, trials of one
+    animal; folder: of its model, where that was generated; None: it is built, or was, with the
+    derivatives that are needed.  Raises IdentificationError with field, value and remedy.
+    """
+    tables, place = read_scene(path, IdentificationError)
+    table = subtable(tables, "identify", place, IdentificationError)
+    given = identify_arguments(table)  # what is wrong is told before a model is built
+    files = {name: given.pop(name) for name in READ if name in given}
+    unit = files.pop("unit", None)
+    tracks = [read_markers(each, unit, **files) for each in data]
+    if folder is None:
+        own = tables.get("functions", ())
+        named = own if isinstance(own, list) else USES
+        tables = dict(tables) | {"functions": list(dict.fromkeys([*named, *USES, *NEEDS]))}
+    model = model_of(tables, place, folder, {})
+    given = identify_arguments(table, size_of(model))
+    for name in READ:
+        given.pop(name, None)
+    return identify(model, tracks, given.pop("markers"), given.pop("estimate", ()), **given)
+
+
+def identify_arguments(table: Mapping, size: Mapping[str, float] = UNSIZED) -> dict[str, Any]:
+    """Return the arguments of ``identify`` that a table [identify] has, in the size of a body.
+
+    IdentificationError has a line for each key that is wrong.
+    """
+    refused = Refusals(IdentificationError)
+    found = dict(sized(read(table, IDENTIFY, "identify", refused), IDENTIFY, size))
+    markers = _markers(found.pop("marker", None), refused)
+    torques = found.pop("torques", "none")
+    if isinstance(torques, Mapping):
+        if set(torques) == {"std", "time"}:
+            found["torques"] = TorquePrior(**torques)
+        else:
+            refused.add("torques", needed("identify.torques", dict(torques), "std and time"))
+    elif torques != "none":
+        refused.add("torques", needed("identify.torques", torques, 'std and time, or "none"'))
+    refused.tell()
+    return found | {"markers": markers}
+
+
+def _markers(rows: Any, refused: Refusals) -> dict[str, Marker]:
+    """Return markers by name of tables [[identify.marker]]."""
+    markers: dict[str, Marker] = {}
+    if not isinstance(rows, list) or not rows:
+        needs = 'tables [[identify.marker]], such as name = "nose", torso = "0, 50, 15 mm"'
+        refused.add("marker", needed("identify.marker", rows, needs))
+        return markers
+    for k, row in enumerate(rows):
+        name = row.get("name") if isinstance(row, Mapping) else None
+        if not isinstance(name, str) or name in markers:
+            needs = "a table with a name that no other marker has"
+            refused.add("marker", needed(f"identify.marker[{k}]", row, needs))
+        elif set(row) <= {"name", "torso", "tail", "offset"}:
+            markers[name] = Marker(**{key: row[key] for key in row if key != "name"})
+    return markers
