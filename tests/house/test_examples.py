@@ -5,7 +5,13 @@ import shutil
 import subprocess
 import sys
 
-from examples import mpc
+import numpy as np
+import pytest
+
+import serpentail as st
+from examples import learning, mpc
+
+from ..support.models import model_folder
 
 
 def test_predictive_control_rights_the_rat(capsys):
@@ -24,3 +30,12 @@ def test_predictive_control_is_a_file_of_its_own(tmp_path):
         check=False,
     )
     assert (done.returncode, done.stderr) == (0, "") and "the tail rights" in done.stdout
+
+
+@pytest.mark.slow
+def test_a_policy_learns_to_right_the_rat(capsys):
+    rat = st.load(model_folder(1, 3, functions=["forward_dynamics", "rollout"]))
+    worlds = st.environments(rat, "righting", 1024)
+    _, tilts = learning.learn(worlds, rounds=70)
+    assert tilts[0] > 35 and np.mean(tilts[-10:]) < 0.8 * np.mean(tilts[:10])
+    assert "round  70: the backs are tilted by" in capsys.readouterr().out
