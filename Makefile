@@ -16,6 +16,7 @@ WORKERS ?= -n auto --dist worksteal
 CALLS ?= 2000
 MUTANTS ?= 200
 SEED ?= 1
+EXTRAS ?= dev,peers
 JOBS ?= 2
 CPU    ?= m4
 ifneq ($(filter embedded,$(MAKECMDGOALS)),)
@@ -99,7 +100,7 @@ $(PAGED): $(PAGE) | $(DRAWS)
 	@touch $@
 
 $(READY): $(DRAWS) $(PAGE)
-	$(INSTALL) --editable '.[dev,peers]'
+	$(INSTALL) --editable '.[$(EXTRAS)]'
 	@$(TELL_PAGE)
 	@touch $(PAGED) $@
 

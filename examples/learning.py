@@ -1,6 +1,6 @@
 """A small policy learns to right a falling rat by its tail, with an evolution strategy in NumPy.
 
-4096 rats fall at once; the tilt of their backs at the end is printed as it shrinks.
+2048 rats fall at once; the tilt of their backs at the end is printed as it shrinks.
 """
 
 from __future__ import annotations  # those of serpentail would import it
@@ -10,8 +10,8 @@ import sys
 
 import serpentail as st
 
-RATS, PAIRS, HIDDEN = 4096, 64, 16  # at once; mirrored pairs of policies; units of a policy
-ROUNDS, SPREAD, RATE = 150, 0.1, 0.05
+RATS, PAIRS, HIDDEN = 2048, 32, 16  # at once; mirrored pairs of policies; units of a policy
+ROUNDS, SPREAD, RATE = 200, 0.2, 0.1
 SCALE = [1, 1, 1, 20, 20, 20, 1, 3, 1, 1, 50, 50, 1]  # of what is seen
 
 

@@ -27,6 +27,9 @@ HOMES = {  # where alone a library of an extra may be imported, behind the room'
     "PIL": ("pictures/",),
     "imageio_ffmpeg": ("pictures/encode.py",),
     "ezc3d": ("identification/readers.py",),
+    "gymnasium": ("learning/environments.py",),
+    "jax": ("differentiable/jax_calls.py", "differentiable/jax_functions.py"),
+    "torch": ("differentiable/torch_functions.py",),
 }
 
 
@@ -68,7 +71,7 @@ def test_libraries_of_extras_are_imported_in_their_rooms_alone(library):
 def test_users_get_all_extras_by_one_name():
     (text,) = EXTRAS["all"]
     listed = set(re.search(r"\[(.*)\]", text)[1].split(","))
-    assert listed == set(EXTRAS) - {"all", "dev", "peers", "soromox", "zig"}
+    assert listed == set(EXTRAS) - {"all", "dev", "jax", "peers", "soromox", "torch", "zig"}
 
 
 def test_the_core_has_neither_casadi_nor_matplotlib():

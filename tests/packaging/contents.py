@@ -10,7 +10,7 @@ ROOT = Path(__file__).parents[2]
 PAGE = "serpentail/viewer/page.html"
 PARTS = {  # where the sources of a wheel's folders are, and which files of them it has
     "serpentail_codegen": (ROOT / "codegen" / "serpentail_codegen", ("*.py", "*.jinja", "*.typed")),
-    "serpentail": (ROOT / "runtime" / "serpentail", ("*.py", "*.[ch]", "*.typed")),
+    "serpentail": (ROOT / "runtime" / "serpentail", ("*.py", "*.[ch]", "*.cc", "*.typed")),
     "serpentail/examples": (ROOT / "scenes", ("*.toml",)),
 }
 LICENCES = ("MIT License", "three.js authors", "Leon Sorokin")  # ours, and of the page's libraries
