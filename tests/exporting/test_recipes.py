@@ -47,7 +47,7 @@ def state(model):
 def test_every_kind_of_block_is_there():
     kinds = [(kind, *words) for kind, words, _ in RUNS]
     assert kinds.count(("python",)) == 5 and kinds.count(("sh",)) == 3
-    assert ("cmake", "CMakeLists.txt") in kinds and ("cpp", "tail.cpp") in kinds
+    assert ("cmake", "CMakeLists.txt") in kinds and ("cpp", "node.cpp") in kinds
     for kind, _, text in BLOCKS:  # those that cannot be run are Python at least
         if kind == "python":
             ast.parse(text)
