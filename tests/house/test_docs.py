@@ -29,7 +29,9 @@ DOCUMENTS = [
 README = DOCUMENTS[0].read_text(encoding="utf-8")
 CODEGEN, RUNTIME = ROOT / "codegen" / "serpentail_codegen", ROOT / "runtime" / "serpentail"
 MADE = ("generated/", "output/", "include/", "src/", "example/")  # folders that commands make
-YOURS = ("fall.c", "articulated_m3_n4.h", "rat.toml", "drop.toml")  # files that commands make
+# files that commands make
+YOURS = ("fall.c", "articulated_m3_n4.h", "rat.toml", "drop.toml", "study.toml")
+YOURS += ("f.c", "rat.c", "rat_host.c", "rat.h")
 
 every_document = pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
 

@@ -184,7 +184,7 @@ def sweep(  # noqa: PLR0913 - the public face names all that it takes
             found.store.forget(key for key, good in known.items() if not good)
             known = {key: good for key, good in known.items() if good}
         failed = sum(not good for good in known.values())
-        name = model.name if isinstance(model, Model) else Path(model or "points").stem
+        name = model.name if isinstance(model, Model) else Path(model or _function(run)).stem
         driver = Driver(
             found.store,
             groups_of(list(found.entries), known),
@@ -259,6 +259,13 @@ def _outputs(outputs: Any, run: Any) -> tuple[str, ...]:
         if wrong:
             raise SweepError(wrong)
     return tuple(outputs)
+
+
+def _function(run: Any) -> str:
+    """Return the name of a function."""
+    while isinstance(run, partial):
+        run = run.func
+    return str(getattr(run, "__name__", "points"))
 
 
 def _script(run: Any) -> str | None:
