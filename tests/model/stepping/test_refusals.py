@@ -108,6 +108,12 @@ def test_a_model_without_what_it_needs_says_which(lacking):
         model.step(np.zeros(model.nq), np.zeros(model.nv), np.zeros(2), H)
 
 
+def test_a_model_that_is_not_compiled_says_so(sound):
+    model = st.load(tail().folder, compiled=False)
+    with pytest.raises(st.ModelError, match="was loaded with compiled=False"):
+        model.step(**sound)
+
+
 def test_parameters_made_before_are_of_as_many_runs(sound):
     made = tail().parameters_of_runs({"tail_mass": np.full(3, 0.01)}, 3)
     with pytest.raises(st.StateError, match="parameters of 3 runs, not of 9"):

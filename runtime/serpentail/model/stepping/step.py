@@ -48,9 +48,10 @@ class Stepping:
             return np.ascontiguousarray(given.vectors)
         if given:
             return model.parameters_of_runs(given, runs).vectors  # type: ignore[arg-type]
-        if len(self.alike) < runs:
-            self.alike = np.tile(model.parameter_vector, (runs, 1))
-        return self.alike[:runs]
+        alike = self.alike  # which another thread may replace
+        if len(alike) < runs:
+            self.alike = alike = np.tile(model.parameter_vector, (runs, 1))
+        return alike[:runs]
 
     def maker(self, model: "Model", held: Held) -> tuple[SingleSteps | LaneSteps, int]:
         """Return what makes steps of runs, and how many of these are worth a thread."""
@@ -128,6 +129,8 @@ def _method(model: "Model", asked: object) -> str:
     name = "implicit_euler" if model.contacts else "rk4"
     if asked is not None:
         name = one_of("step: method", asked, METHODS, SimulationError)
+    if model.library is None:
+        model.kernel("rollout")  # raises what there is to do
     needs = ["rollout"] + ["implicit"] * (name == "implicit_euler")
     has = {"rollout": "rollout" in model.generated, "implicit": _implicit(model)}
     missing = [each for each in needs if not has[each]]
