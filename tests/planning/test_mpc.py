@@ -235,8 +235,9 @@ def test_called_by_hand_it_ticks_by_its_clock(plan):
     [
         ({"rate": 0}, "rate"),
         ({"rate": np.nan}, "rate"),
+        ({"rate": 1e9}, "rate: value 1000000000.0: needs at most 2.5e"),
         ({"horizon": -1}, "horizon"),
-        ({"intervals": 0}, "intervals: value 0: needs a whole number from 1 to 1000"),
+        ({"intervals": 0}, "intervals: value 0: needs a whole number from 1 to 100"),
         ({"intervals": 2.5}, "intervals"),
         ({"iterations": True}, "iterations"),
         ({"delay": 0.02}, "delay: value 0.02: needs at most the time between ticks, 0.01 s"),
