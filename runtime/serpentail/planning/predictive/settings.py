@@ -16,7 +16,9 @@ NEEDED = dict(
 )
 DEFAULTS = {"intervals": 6, "delay": 0.0, "iterations": 1, "step": 5e-3, "rest": None}
 NAMES = ("rate", "horizon", *DEFAULTS)
-MOST = 1000  # intervals, Gauss-Newton steps, Runge-Kutta steps of an interval
+MOST = 100  # intervals, Gauss-Newton steps
+MOST_STEPS = 1000  # of Runge-Kutta, in an interval
+MOST_TICKS = 100_000
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,9 @@ def checked_settings(plan: Plan, given: dict[str, Any]) -> Settings:
             raise PlanningError(unknown)
     given = DEFAULTS | given
     rate = _number("rate", given["rate"], above=0)
+    if rate * plan.duration > MOST_TICKS:
+        needs = f"at most {MOST_TICKS / plan.duration:.3g} Hz: {MOST_TICKS} ticks"
+        raise refusal("Mpc: rate", rate, needs, PlanningError)
     delay = _number("delay", given["delay"], least=0)
     if delay > 1 / rate:
         needs = f"at most the time between ticks, {1 / rate:.3g} s: or take a lower rate"
@@ -51,8 +56,8 @@ def checked_settings(plan: Plan, given: dict[str, Any]) -> Settings:
         raise refusal("Mpc: rest", rest, needs, PlanningError)
     step = _number("step", given["step"], above=0)
     intervals = _count("intervals", given["intervals"])
-    if min(horizon, plan.duration) / intervals / step > MOST:
-        needs = f"no more than {MOST} in an interval: make it longer"
+    if max(min(horizon, plan.duration) / intervals, delay) / step > MOST_STEPS:
+        needs = f"no more than {MOST_STEPS} in an interval: make it longer"
         raise refusal("Mpc: step", step, needs, PlanningError)
     iterations = _count("iterations", given["iterations"])
     return Settings(rate, horizon, intervals, delay, iterations, step, rest)
