@@ -10,7 +10,7 @@ from ..checks import finite_array, number, refusal
 from ..errors import IdentificationError
 from ..motion.trajectory import Trajectory
 
-PER_TIME = 4  # knots in each correlation time
+PER_TIME = 8  # knots in each correlation time
 
 
 @dataclass(frozen=True)
