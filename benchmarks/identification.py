@@ -1,7 +1,7 @@
 """Times identification against opty's approach: the midpoint rule, IPOPT without exact Hessians.
 
-opty itself takes SymPy's equations, which a tail has none of; so its nonlinear program is built here
-in CasADi: states at nodes, the midpoint rule between them, IPOPT with its limited-memory Hessian.
+opty itself takes SymPy's equations, which no tail here has; so its nonlinear program is built in
+CasADi: states at nodes, the midpoint rule between them, IPOPT with its limited-memory Hessian.
 Both get the same exact tracks (without noise: the error left is the method's own), the same wrong
 parameters and the same first motion. The rule is tried with 1 and 4 intervals a frame.
 """
@@ -26,7 +26,7 @@ BEGIN = np.array([4.2e-3, 0.185, 3e-3, 3e-5])
 TRUE = np.array([0.00351, 0.19466, 2e-3, 5e-5])
 PARTS = (1, 4)  # intervals a frame of the midpoint rule
 DURATION, FRAMES = 0.15, 31
-MOST = 500  # iterations of IPOPT
+MOST = 3000  # iterations of IPOPT
 
 
 def identification_times(folder: Path) -> list[dict]:
