@@ -17,6 +17,7 @@ from benchmarks import (
     contact_shares,
     continuum_forms,
     derivatives,
+    identification,
     long_tails,
     nodes,
     operations,
@@ -75,6 +76,7 @@ MEASURES = {
     "continuum_form_times": Measure(continuum_forms.form_times),
     "planning": Measure(planning.planning),
     "page_speed": Measure(pages.page_speed),
+    "identification_times": Measure(identification.identification_times),
 }
 # a process that keeps to a lesser processor: a folder, then names of measures
 CHILD = """
