@@ -18,6 +18,7 @@ from benchmarks import (
     continuum_forms,
     derivatives,
     environments,
+    identification,
     long_tails,
     nodes,
     operations,
@@ -77,6 +78,7 @@ MEASURES = {
     "continuum_form_times": Measure(continuum_forms.form_times),
     "planning": Measure(planning.planning),
     "page_speed": Measure(pages.page_speed),
+    "identification_times": Measure(identification.identification_times),
 }
 # a process that keeps to a lesser processor: a folder, then names of measures
 CHILD = """

@@ -46,9 +46,8 @@ def main(arguments: argparse.Namespace) -> None:
         q, v = [0, 0, 0.3, 1, 0, 0, 0, 0, 0], [0, 0, 1.5, 0, 0, 0, 0, 0]
         flight = st.simulate(rat, q, v, controller=wave, t_span=DURATION, output_step=5e-4)
         told = st.fisher_information(rat, flight, markers, WANTED, noise=NOISE, rate=RATE)
-        part = {
-            name: 100 * s / x for (name, s), x in zip(told.std.items(), told.values, strict=True)
-        }
+        of = zip(told.std.items(), told.values, strict=True)
+        part = {name: 100 * std / value for (name, std), value in of}
         rows.append({"path": path, "Hz": frequency, "D": told.d_optimality} | part)
     rows.sort(key=lambda row: -row["D"])
     arguments.folder.mkdir(parents=True, exist_ok=True)

@@ -101,40 +101,47 @@ def seen(model, markers, times, states, rng):
 
 def trials(count: int, case: str, size: tuple[int, int | None], folder: Path) -> dict:
     """Return coverage, spread and time of so many trials, which go on from what is kept."""
+    from serpentail.stages import Stage
+
+    model, markers = scene(*size)
+    names = KNOWN if case == "known" else UNKNOWN
+    kept = folder / f"{case}_{'x'.join(map(str, size))}.jsonl"
+    rows = [json.loads(line) for line in kept.read_text().splitlines()] if kept.exists() else []
+    with Stage("trials", case) as stage:
+        for seed in range(len(rows), count):
+            stage.tell(seed / count)
+            rows.append(trial(model, markers, case, seed))
+            with kept.open("a") as file:
+                file.write(json.dumps(rows[-1]) + "\n")
+    return judged(rows[:count], [each.name for each in found_names(model, markers, names)], model)
+
+
+def trial(model, markers, case: str, seed: int) -> dict:
+    """Return estimates, their standard deviations and the processor time of one trial."""
     import numpy as np
 
     import serpentail as st
 
-    model, markers = scene(*size)
+    rng, nt = np.random.default_rng([seed, 20]), model.nq - 7
     times = np.arange(FRAMES) / RATE
     fine = np.linspace(0, times[-1], 10 * (FRAMES - 1) + 1)
-    still = np.zeros((len(fine), model.nq - 7))
-    passive = flown(model, times, still, fine)
-    names = KNOWN if case == "known" else UNKNOWN
-    prior = None if case == "known" else st.TorquePrior(STD, TIME)
-    kept = folder / f"{case}_{'x'.join(map(str, size))}.jsonl"
-    rows = [json.loads(line) for line in kept.read_text().splitlines()] if kept.exists() else []
-    for seed in range(len(rows), count):
-        rng = np.random.default_rng([seed, 20])
-        tau = still if prior is None else drawn(fine, model.nq - 7, rng)
-        states = passive if prior is None else flown(model, times, tau, fine)
-        data = seen(model, markers, times, states, rng)
-        begun = time.process_time()
-        found = st.identify(model, data, markers, names, torques=prior, noise=NOISE)
-        row = {
-            "seconds": time.process_time() - begun,
-            "success": found.success,
-            "values": [each.value for each in found.parameters],
-            "std": [each.std for each in found.parameters],
-        }
-        if prior is not None:
-            bands = found.trials[0].torques
-            true = np.stack([np.interp(bands.times, fine, each) for each in tau.T], axis=1)
-            row["torques"] = float(((bands.low < true) & (true < bands.high)).mean())
-        rows.append(row)
-        with kept.open("a") as file:
-            file.write(json.dumps(row) + "\n")
-    return judged(rows[:count], [each.name for each in found_names(model, markers, names)], model)
+    known = case == "known"
+    tau = np.zeros((len(fine), nt)) if known else drawn(fine, nt, rng)
+    data = seen(model, markers, times, flown(model, times, tau, fine), rng)
+    prior, names = (None, KNOWN) if known else (st.TorquePrior(STD, TIME), UNKNOWN)
+    begun = time.process_time()
+    found = st.identify(model, data, markers, names, torques=prior, noise=NOISE)
+    row = {
+        "seconds": time.process_time() - begun,
+        "success": found.success,
+        "values": [each.value for each in found.parameters],
+        "std": [each.std for each in found.parameters],
+    }
+    if prior is not None:
+        bands = found.trials[0].torques
+        true = np.stack([np.interp(bands.times, fine, each) for each in tau.T], axis=1)
+        row["torques"] = float(((bands.low < true) & (true < bands.high)).mean())
+    return row
 
 
 def found_names(model, markers, names):

@@ -58,10 +58,10 @@ def test_driven_tails_tell_the_scale_of_masses_and_limp_ones_do_not():
     ]
     how = {"noise": 3e-4, "rate": 200.0}
     limp = st.fisher_information(model, motion(model)[0], placed(model), names, **how)
-    assert limp.d_optimality < -20 or np.isinf(limp.d_optimality) or limp.undetermined
+    assert limp.d_optimality == -np.inf and len(limp.undetermined) == 1
     driven, _ = motion(model, lambda t: 2e-3 * np.array([np.sin(40 * t), np.cos(30 * t)]))
     told = st.fisher_information(model, driven, placed(model), names, **how)
-    assert np.isfinite(told.covariance).all() and np.isinf(limp.covariance).all()
+    assert np.isfinite(told.covariance).all() and np.isinf(np.diag(limp.covariance)).all()
 
 
 @pytest.mark.parametrize(

@@ -47,6 +47,8 @@ class Information:
         """Logarithm of the determinant of the information about relative changes: the more, the
         smaller the volume in which the parameters are; -inf where one is undetermined.
         """
+        if any(np.isinf(each.std) for each in self.undetermined):
+            return -np.inf
         with np.errstate(divide="ignore"):
             return float(2 * np.log(self.singular_values).sum())
 

@@ -10,7 +10,7 @@ from ..checks import finite_array, number, refusal
 from ..errors import IdentificationError
 from ..motion.trajectory import Trajectory
 
-PER_TIME = 4  # knots in each correlation time
+PER_TIME = 8  # knots in each correlation time
 
 
 @dataclass(frozen=True)
@@ -18,8 +18,8 @@ class TorquePrior:
     """What is believed of unknown joint torques: each is a stationary Ornstein-Uhlenbeck process.
 
     std: standard deviation (N m) at any time; time: of correlation (s), so that torques t apart
-    correlate as exp(-t / time).  The mean is zero.  Torques are linear between knots a quarter of
-    that time apart, whose values have exactly these correlations.
+    correlate as exp(-t / time).  The mean is zero.  Torques are linear between knots
+    an eighth of that time apart, or a frame where frames are sparser, with these correlations.
     """
 
     std: float

@@ -60,7 +60,10 @@ def page_text(
     names = checked_names(names, motions)
     models = [model_of(k, motion, model) for k, motion in enumerate(motions)]
     page, data = template(), page_data(motions, names, models, most)
-    for run, motion, seen in zip(data["runs"], motions, markers or (), strict=bool(markers)):
+    if markers is not None and len(markers) != len(motions):
+        needs = f"needs one of each of {len(motions)} motions"
+        raise ViewError(f"markers: {len(markers)} entries: {needs}")
+    for run, motion, seen in zip(data["runs"], motions, markers or (), strict=False):
         run["arrays"]["markers"], run["markers"] = packed_markers(motion, seen, most)
 
     parts = {

@@ -1,0 +1,62 @@
+"""What is drawn of an identification: markers on its page, residuals, torques and power."""
+
+import base64
+import gzip
+import json
+import re
+
+import numpy as np
+import pytest
+
+import serpentail as st
+from tests.identification.flights import elastic, flown, placed, start, tracks
+
+TIMES = np.linspace(0, 0.1, 21)
+
+
+@pytest.fixture(scope="module")
+def found():
+    model = elastic(1, 3)
+    data = tracks(model, TIMES, flown(model, TIMES, start(model)), 3e-4, gaps=0.1)
+    return st.identify(model, data, placed(model), torques=st.TorquePrior(1e-3, 0.05))
+
+
+def unpacked(text, rows):
+    """Columns of floats, as viewer/src/data.js reads them."""
+    planes = np.frombuffer(gzip.decompress(base64.b64decode(text)), np.uint8).reshape(4, -1)
+    steps = sum(planes[k].astype(np.uint32) << np.uint32(8 * k) for k in range(4))
+    bits = np.cumsum(steps.reshape(-1, rows), axis=1, dtype=np.uint32)
+    return bits.view(np.float32).T
+
+
+def test_the_page_has_the_measured_markers_and_their_gaps(found, tmp_path):
+    page = found.view(tmp_path / "page.html").read_text()
+    data = json.loads(re.search(r'<script[^>]*id="data"[^>]*>(.*?)</script>', page, re.DOTALL)[1])
+    (run,) = data["runs"]
+    assert run["markers"] == 7
+    seen = found.trials[0].tracks.positions
+    assert np.isnan(seen).any()
+    columns = unpacked(run["arrays"]["markers"], run["rows"])
+    np.testing.assert_allclose(columns, seen.reshape(len(TIMES), -1), rtol=1e-6)
+
+
+def test_markers_of_another_shape_are_refused(found, tmp_path):
+    with pytest.raises(st.ViewError, match=r"markers: shape \(3, 2\): needs \(21, M, 3\)"):
+        st.view(found.trajectory, tmp_path / "page.html", markers=[np.zeros((3, 2))])
+
+
+def test_a_page_needs_markers_of_each_motion(found, tmp_path):
+    with pytest.raises(st.ViewError, match="markers: 2 entries: needs one of each of 1 motions"):
+        st.view(found.trajectory, tmp_path / "page.html", markers=[np.zeros((21, 1, 3))] * 2)
+
+
+def test_the_figure_has_residuals_torques_and_power(found, tmp_path):
+    _, axes = found.plot(tmp_path / "residuals.png")
+    assert [each.get_ylabel() for each in axes] == ["residual [mm]", "torque [mN m]", "power [mW]"]
+    curves = [line.get_ydata() for line in axes[0].lines[:-1]]
+    distance = 1e3 * np.linalg.norm(found.trials[0].residuals, axis=2)
+    np.testing.assert_allclose(np.array(curves).T, distance)
+    np.testing.assert_allclose(axes[2].lines[1].get_ydata(), 1e3 * found.trials[0].power[:, 1])
+    assert (tmp_path / "residuals.png").stat().st_size > 1000
+    with pytest.raises(st.IdentificationError, match="trial: value 1: needs 0 to 0"):
+        found.plot(trial=1)
