@@ -17,10 +17,10 @@ LINKS = 6  # of every tail
 SEGMENTS = (1, 2, 3)
 LENGTH, MASS = 0.19466, 0.00351  # m, kg: the kangaroo rat's
 DENSITY = 1000.0  # kg/m^3
-FLIGHTS = (0.2, 0.3, 0.4, righting.FLIGHT)  # s
-INTERVALS = 8
-ITERATIONS, LIMIT = 120, 60.0  # of a plan's search, and s that a row may take
-UPRIGHT = 10.0  # deg off upright at the landing, when the torques are applied
+FLIGHTS = (0.3, righting.FLIGHT)  # s
+INTERVALS = 6
+ITERATIONS, LIMIT = 200, 60.0  # of a plan's search, and s that a row may take
+UPRIGHT = 15.0  # deg off upright at the landing, when the torques are applied
 TAPERED = {
     "length": LENGTH,
     "radii": [0.003, 0.001],
