@@ -66,7 +66,7 @@ help:
 	@echo "  make study-righting                        the paper's Figs. 9 to 13, Table 2: righting, planned and true"
 	@echo "  make study-contact                         kick, jump from the tail, self-recovery: films, plots, a table"
 	@echo "  make study-landing                         kicks that the tail rights onto the feet, planned and passive"
-	@echo "  make study-morphology                      what a tail is worth: 24576 plans of righting, against its shape"
+	@echo "  make study-morphology                      what a tail is worth: 20400 plans of righting, against its shape"
 	@echo "  make study-replanning                      bodies unlike the planned one: open loop, PFL, predictive control"
 	@echo "  make studies                               all; STARTS=200 random starts in the second"
 	@echo "  make wheels                                builds wheel and sdist, installs the wheel for each Python that is here"

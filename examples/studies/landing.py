@@ -1,7 +1,7 @@
 """Kicks that the tail rights in the air, onto the feet: how many land, planned and passive.
 
 Kicks are made side by side, as many as $SERPENTAIL_THREADS says or there are cores, and each is
-kept in FOLDER/parts: a study that was stopped goes on.
+a row of a store in FOLDER/parts: a study that was stopped goes on.
 """
 
 from examples import front

@@ -1,7 +1,7 @@
 """The paper's comparison of tail models (Sect. 4.1): one motion by both tails, Fig. 8 and its cost.
 
 Tails are built side by side, as many as $SERPENTAIL_THREADS says or there are cores, then timed
-alone; each result is kept in FOLDER/parts: a study that was stopped goes on.
+alone; each result is a row of a store in FOLDER/parts: a study that was stopped goes on.
 """
 
 import sys

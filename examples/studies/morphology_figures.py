@@ -1,5 +1,6 @@
 """Draws the figure of the morphology study."""
 
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -15,29 +16,30 @@ AXES = {
     "taper": "radius of the tip over the base's",
 }
 BINS = 8
-FEWEST = 4  # plans of which a median is drawn
-KINDS = ("effort", "effort", "time")  # objectives of the rows of panels
-LABELS = ("righted [%]", "energy [mJ]", "least time [ms]")
+FEWEST = 4  # plans in a bin
+LONGEST, SHORTER = 0.58, 0.3  # s, flights that are shown
+PANELS = (("righted in 0.58 s [%]", LONGEST), ("righted in 0.3 s [%]", SHORTER))
+PANELS += (("energy in 0.58 s [mJ]", LONGEST),)
+ENERGY = 2  # the line of panels that shows it
 
 
 def draw(rows: list[dict], path: Path) -> tuple[Figure, np.ndarray]:
-    """Righted share with its standard error, energy and least time against what a tail is.
+    """Righted shares with their standard errors, and energies, against what a tail is.
 
-    Medians with quartiles, of the plans that right; all else varies in each bin as it does in all.
+    Energies are medians with quartiles, of the plans that right; all else varies in each bin as it
+    does in all.
     """
 
     def make() -> tuple[Figure, np.ndarray]:
         figure = Figure(figsize=(7.2, 6.4), layout="constrained")
         axes = figure.subplots(3, len(AXES), sharey="row", sharex="col")
         for column, (name, label) in enumerate(AXES.items()):
-            for segments, color in COLORS.items():
-                for line, objective in enumerate(KINDS):
-                    own = [
-                        r for r in rows if (r["segments"], r["objective"]) == (segments, objective)
-                    ]
-                    _draw(axes[line, column], own, name, line, color, f"{segments}")
+            for (segments, color), line in product(COLORS.items(), range(len(PANELS))):
+                wanted = segments, PANELS[line][1]
+                own = [row for row in rows if (row["segments"], row["flight"]) == wanted]
+                _draw(axes[line, column], own, name, line == ENERGY, (color, f"{segments}"))
             axes[-1, column].set_xlabel(label)
-        for line, label in enumerate(LABELS):
+        for line, (label, _) in enumerate(PANELS):
             axes[line, 0].set_ylabel(label)
         for panel in axes.flat:
             panel.grid(color="#e6e6e6", linewidth=0.6)
@@ -50,31 +52,22 @@ def draw(rows: list[dict], path: Path) -> tuple[Figure, np.ndarray]:
     return drawn(make, path)
 
 
-def _draw(panel: Axes, rows: list[dict], name: str, line: int, color: str, label: str) -> None:
-    """Draw one curve: of shares, or of medians."""
+def _draw(panel: Axes, rows: list[dict], name: str, energy: bool, look: tuple[str, str]) -> None:
+    """Draw one curve: of shares, or of energies."""
     x = np.array([row[name] for row in rows])
     good = np.array([bool(row.get("righted")) for row in rows])
-    if not len(x):
-        return
-    edges = np.quantile(x, np.linspace(0, 1, BINS + 1))
-    place = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, BINS - 1)
-    values = np.array([_value(row, line) for row in rows])
+    values = np.array([1e3 * (row.get("energy_J") or np.nan) for row in rows])
+    bins = min(BINS, len(rows) // FEWEST)
     found = []
-    for k in range(BINS):
-        here = place == k
-        if line == 0 and here.any():
-            share = good[here].mean()
-            error = np.sqrt(share * (1 - share) / here.sum())
-            found.append((np.median(x[here]), *(100 * (share + e) for e in (0, -error, error))))
-        elif line and (here & good).sum() >= FEWEST:
-            found.append((np.median(x[here]), *np.percentile(values[here & good], [50, 25, 75])))
+    for here in np.array_split(np.argsort(x), bins) if bins else []:
+        middle, share, righted = np.median(x[here]), good[here].mean(), values[here][good[here]]
+        if not energy:
+            error = np.sqrt(share * (1 - share) / len(here))
+            found.append((middle, *(100 * (share + e) for e in (0, -error, error))))
+        elif len(righted) >= FEWEST:
+            found.append((middle, *np.percentile(righted, [50, 25, 75])))
     if found:
-        middle, height, low, high = np.array(found).T
-        panel.fill_between(middle, low, high, color=color, alpha=0.15, linewidth=0)
-        panel.plot(middle, height, "o-", color=color, markersize=3, linewidth=1.2, label=label)
-
-
-def _value(row: dict, line: int) -> float:
-    """Return what of a row a line of panels shows, in mJ or ms."""
-    value = row.get("energy_J" if line == 1 else "duration_s")
-    return np.nan if value is None else 1e3 * value
+        middles, height, low, high = np.array(found).T
+        color, label = look
+        panel.fill_between(middles, low, high, color=color, alpha=0.15, linewidth=0)
+        panel.plot(middles, height, "o-", color=color, markersize=3, linewidth=1.2, label=label)

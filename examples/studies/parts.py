@@ -1,27 +1,18 @@
-"""Parts of long studies: made side by side in processes, each kept as a file, and made anew only
-where what it depends on changed.
+"""Parts of long studies as the rows of a sweep: each is made anew only where what it depends on
+changed.
 """
 
 import hashlib
 import json
-import multiprocessing
-import os
-import signal
-import threading
-from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from contextlib import suppress
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from filelock import FileLock, Timeout
 
 import serpentail as st
-from serpentail.files import replacing
-from serpentail.model.cores import VARIABLE, threads
 from serpentail.motion.trajectory import ARRAYS
-from serpentail.stages import Stage
+from serpentail.sweeps.sweep import posed
 
 Result = dict | list
 
@@ -39,92 +30,40 @@ class Part:
     files: tuple[Path, ...] = ()
 
 
-def made(study: str, folder: Path, parts: Mapping[str, Part]) -> dict[str, Result]:
-    """Return the results of parts by title; those that the folder has not are made, in as many
-    processes as this one may use threads, and each is written at once: whole or not at all.
+@dataclass(frozen=True)
+class Maker:
+    """Makes the part that a point of a sweep names."""
 
-    SerpentailError where another process makes parts in the folder; what a part raises.
+    makes: Mapping[str, Callable[[], Result]]
+
+    def __call__(self, point: dict) -> dict[str, str]:
+        """Return the part's result as JSON, which has NaN here."""
+        return {"result": json.dumps(self.makes[point["part"]]())}
+
+
+def made(study: str, folder: Path, parts: Mapping[str, Part]) -> dict[str, Result]:
+    """Return the results of parts by title; those that FOLDER/STUDY.db has not are made, in as many
+    processes as this one may use threads, and each is a row of it when it is finished.
+
+    SerpentailError where a part failed, and where another process makes parts in the folder.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    try:
-        with FileLock(folder / ".lock", timeout=0):
-            return _made(study, folder, parts)
-    except Timeout:
-        raise st.SerpentailError(
-            f"{folder}: another process makes parts of this study there: wait for its end, or give "
-            "another folder"
-        ) from None
+    over = {("part", "of"): st.grid([(title, part.of) for title, part in parts.items()])}
+    run = Maker({title: part.make for title, part in parts.items()})
+    store = folder / f"{study}.db"
+    _forget_without_files(posed(None, over, run, store), parts)
+    rows = st.sweep(None, over, run, store=store, executor="processes", retry_failed=True).rows()
+    for row in rows:
+        if row["error"]:
+            raise st.SerpentailError(f"{row['part']}: {row['error']}")
+    return {row["part"]: json.loads(row["result"]) for row in rows}
 
 
-def _made(study: str, folder: Path, parts: Mapping[str, Part]) -> dict[str, Result]:
-    """Return the results of parts in a folder in which no other process makes any."""
-    for left in folder.glob(".*.part"):  # by a process that was killed as it wrote
-        left.unlink()
-    paths = {title: folder / f"{title}.json" for title in parts}
-    results = {title: _kept(paths[title], part) for title, part in parts.items()}
-    missing = {paths[title]: part for title, part in parts.items() if results[title] is None}
-    with Stage(study) as stage:
-        for done, (path, result) in enumerate(_each(missing), 1):
-            results[path.stem] = result
-            stage.tell(done / len(missing), f"{path.stem} done")
-    return results
-
-
-def _each(missing: Mapping[Path, Part]) -> Iterator[tuple[Path, Result]]:
-    """Make parts, and yield each as it is ready."""
-    workers = min(threads(), len(missing))
-    if workers < 2:
-        yield from ((path, _written(path, part)) for path, part in missing.items())
-        return
-    # no fork: what runs in other threads, and what they have locked, would be copied
-    spawn = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, spawn, _begin) as pool:
-        waiting = {pool.submit(_written, path, part): path for path, part in missing.items()}
-        try:
-            for future in as_completed(waiting):
-                yield waiting[future], future.result()
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            for worker in multiprocessing.active_children():
-                worker.terminate()
-            raise
-
-
-def _begin() -> None:
-    """Make a process one that works for its parent: in one thread, and no longer than it lives."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to answer
-    os.environ[VARIABLE] = "1"
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    multiprocessing.parent_process().join()
-    os._exit(1)
-
-
-def _written(path: Path, part: Part) -> Result:
-    """Make a part and write it."""
-    result = json.loads(json.dumps(part.make()))
-    with replacing(path) as new:
-        new.write_text(json.dumps({"of": part.of, "result": result}) + "\n")
-    return result
-
-
-def _kept(path: Path, part: Part) -> Result | None:
-    """Return the result that a file has, where that was made of the same and all else is there."""
-    with suppress(OSError, ValueError, KeyError, TypeError):  # none, or not a part
-        found = json.loads(path.read_text())
-        if found["of"] == json.loads(json.dumps(part.of)) and all(f.exists() for f in part.files):
-            return found["result"]
-    return None
-
-
-def planned(model: st.Model, **settings) -> st.Plan:
-    """Return a plan; KeyboardInterrupt where Ctrl-C ended its search: a part is whole or none."""
-    plan = st.plan(model, **settings)
-    if plan.report["stopped"] == "interrupt":
-        raise KeyboardInterrupt
-    return plan
+def _forget_without_files(found: st.Sweep, parts: Mapping[str, Part]) -> None:
+    """Have those parts made again whose files are gone."""
+    gone = {title for title, part in parts.items() if not all(f.exists() for f in part.files)}
+    found.store.forget(each.key for each in found.entries if each.point["part"] in gone)
+    found.store.close()
 
 
 def digest(*sources: Path) -> str:

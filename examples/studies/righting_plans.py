@@ -7,7 +7,7 @@ import numpy as np
 
 import serpentail as st
 from examples import righting
-from examples.studies.parts import as_lists, planned
+from examples.studies.parts import as_lists
 
 EXAMPLE = 4  # the random start of Fig. 11: both ways of planning converge on it
 RAT = (1, 3)
@@ -28,7 +28,7 @@ def section_4_2() -> dict:
     model = rat(*RAT)
     start, limits = righting.kicked(model), righting.bounds(model)
     given = {"start": start, "bounds": limits, "duration": (0.3, righting.FLIGHT)}
-    plan = planned(model, retries=8, time_limit=LIMIT, **given)
+    plan = st.plan(model, retries=8, time_limit=LIMIT, **given)
     flights = {"planned": plan.trajectory, "tracked": righting.tracked(model, plan)}
     flights["passive"] = righting.passive(model, start, plan.duration)
     at = np.clip(plan.trajectory.t, 0, flights["tracked"].t[-1])
@@ -45,7 +45,7 @@ def example(settings: dict) -> dict:
     model = rat(*RAT)
     common = {"start": righting.tumbling(model, EXAMPLE), "bounds": righting.bounds(model)}
     return righting.row(
-        planned(model, duration=righting.FLIGHT, time_limit=LIMIT, **common, **settings)
+        st.plan(model, duration=righting.FLIGHT, time_limit=LIMIT, **common, **settings)
     )
 
 
@@ -54,7 +54,7 @@ def true(size: tuple) -> dict:
     model = rat(*size)
     start, limits = righting.kicked(model), righting.bounds(model, 2 * np.pi)
     given = {"start": start, "bounds": limits, "duration": (0.3, righting.FLIGHT)}
-    plan = planned(model, retries=8, time_limit=LIMIT, **given)
+    plan = st.plan(model, retries=8, time_limit=LIMIT, **given)
     return {"row": righting.row(plan), "flight": as_lists(plan.trajectory)}
 
 
@@ -63,7 +63,7 @@ def paper(size: tuple) -> dict:
     model = rat(*size)
     start, limits = righting.kicked(model), righting.bounds(model, 2 * np.pi)
     given = {"start": start, "bounds": limits, "duration": righting.FLIGHT}
-    plan = planned(model, **righting.PAPER, intervals=58, time_limit=LIMIT, **given)
+    plan = st.plan(model, **righting.PAPER, intervals=58, time_limit=LIMIT, **given)
     return righting.row(plan)
 
 
@@ -78,6 +78,6 @@ def block(size: tuple, starts: list[int], any_rate: bool, settings: dict) -> lis
         given["goal"] = st.Goal(torso_rate=None)
     for k in starts:
         begun = time.process_time()
-        plan = planned(model, start=righting.tumbling(model, k), track=False, **given, **settings)
+        plan = st.plan(model, start=righting.tumbling(model, k), track=False, **given, **settings)
         rows.append(righting.row(plan) | {"start": k, "cpu_s": time.process_time() - begun})
     return rows

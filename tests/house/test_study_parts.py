@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections import Counter
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -29,53 +30,43 @@ def one(folder, of, make, files=()):
     return made("study", folder, {"one": Part(make, of, files)})["one"]
 
 
-def test_parts_are_made_once(tmp_path):
-    path, ran = tmp_path / "parts" / "one.json", []
+def runs(folder):
+    """How often the part was made."""
+    path = folder / "ended"
+    return len(path.read_text().splitlines()) if path.exists() else 0
 
-    def make():
-        ran.append(len(ran))
-        return {"rows": list(ran), "lost": float("nan")}
 
-    first, again = (one(path.parent, {"starts": (1, 2)}, make) for _ in range(2))
-    assert first["rows"] == again["rows"] == [0] and np.isnan(again["lost"])
-    assert one(path.parent, {"starts": (1, 3)}, make)["rows"] == [0, 1]
-    path.write_text(path.read_text()[:-9])
-    assert one(path.parent, {"starts": (1, 3)}, make)["rows"] == [0, 1, 2]
-    assert [p.name for p in path.parent.glob("*") if p.name != ".lock"] == ["one.json"]
+def test_parts_are_made_once_and_again_where_they_depend_on_something_else(tmp_path):
+    make = partial(tiny_study.square, 3, tmp_path)
+    for of, count in (({"starts": (1, 2)}, 1), ({"starts": (1, 2)}, 1), ({"starts": (1, 3)}, 2)):
+        found = one(tmp_path / "parts", of, make)
+        assert found == {"number": 3, "square": 9, "third": 1.0} and runs(tmp_path) == count
 
 
 def test_a_part_is_made_anew_where_a_file_of_it_is_missing(tmp_path):
-    picture, ran = tmp_path / "picture.png", []
-
-    def make():
-        picture.write_bytes(b"")
-        ran.append(None)
-        return []
-
-    for _ in range(2):
+    make, picture = partial(tiny_study.square, 3, tmp_path), tmp_path / "picture.png"
+    for count in (1, 1, 2):
+        if count == 2:
+            picture.unlink()
         one(tmp_path / "parts", {}, make, (picture,))
-    assert len(ran) == 1
-    picture.unlink()
-    one(tmp_path / "parts", {}, make, (picture,))
-    assert len(ran) == 2 and picture.exists()
+        picture.touch()
+        assert runs(tmp_path) == count
 
 
-def test_a_part_that_fails_leaves_no_file(tmp_path):
-    with pytest.raises(ZeroDivisionError):
-        one(tmp_path, {}, lambda: 1 / 0)
-    assert not list(tmp_path.glob("*.json"))
+def test_numbers_that_are_none_stay_so(tmp_path):
+    assert np.isnan(one(tmp_path, {}, tiny_study.lost)["lost"])
 
 
-def test_what_a_killed_process_left_is_removed(tmp_path):
-    (tmp_path / ".one.json.0badcafe.part").write_text("half a p")
-    assert one(tmp_path, {}, lambda: [1]) == [1]
-    assert not list(tmp_path.glob(".*.part"))
+def test_a_part_that_fails_is_told_and_tried_again(tmp_path):
+    with pytest.raises(st.SerpentailError, match="one: ZeroDivisionError: no such part"):
+        one(tmp_path, {}, tiny_study.wrong)
+    assert tiny_study.titles(tmp_path / "study.db") == []
 
 
 def test_two_runs_in_one_folder_are_refused(tmp_path):
-    lock = FileLock(tmp_path / ".lock")
-    with lock, pytest.raises(st.SerpentailError, match="another process makes parts"):
-        one(tmp_path, {}, lambda: [1])
+    lock = FileLock(tmp_path / ".study.db.lock")
+    with lock, pytest.raises(st.SerpentailError, match="another process writes"):
+        one(tmp_path, {}, tiny_study.ones)
 
 
 @pytest.fixture
@@ -125,7 +116,7 @@ def test_a_study_that_is_killed_goes_on_and_makes_no_part_twice(tmp_path, result
         process.communicate(timeout=PATIENCE)  # ends when the workers have, which hold its pipes
         counts = ended(folder)[0]
         assert {k: counts[k] for k in kept} == kept
-        whole = [int(path.stem.split()[1]) for path in (folder / "parts").glob("*.json")]
+        whole = [int(title.split()[1]) for title in tiny_study.titles(folder / "parts" / "tiny.db")]
         kept = {k: counts[k] for k in whole}
     printed, errors = started(folder).communicate(timeout=PATIENCE)
     assert printed == results + "\n", errors
@@ -137,7 +128,7 @@ def test_a_study_that_is_killed_goes_on_and_makes_no_part_twice(tmp_path, result
 def test_ctrl_c_ends_all_in_one_line(tmp_path, whole):
     folder = tmp_path / "many"
     process = started(folder, start_new_session=True)
-    while not list((folder / "parts").glob("*.json")):
+    while not tiny_study.titles(folder / "parts" / "tiny.db"):
         time.sleep(0.02)
     (os.killpg if whole else os.kill)(process.pid, signal.SIGINT)
     asked = time.monotonic()
@@ -146,7 +137,7 @@ def test_ctrl_c_ends_all_in_one_line(tmp_path, whole):
     assert process.returncode == 130 and printed == ""
     *told, last = errors.splitlines()
     assert last == "interrupted: the same command goes on from here"
-    assert all(line.startswith("tiny") for line in told)
+    assert all(line.startswith("sweep") for line in told)
 
 
 def test_digests_follow_the_sources(tmp_path):

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import serpentail as st
+from tests.support.tiny_study import titles
 from tests.support.told import besides_progress
 from tests.support.tumbling import rat
 
@@ -216,17 +217,11 @@ STUDY = """
 import sys
 from pathlib import Path
 from examples.front import GOES_ON, run
-from examples.studies.parts import Part, made, planned
-from tests.support.tumbling import rat, start, AGAIN
-
-def endless():
-    print("ready", flush=True)
-    stubborn = {"ipopt.tol": 1e-300, "ipopt.acceptable_iter": 0, "ipopt.max_iter": 10**6}
-    while True:
-        planned(rat(), start=start(rat()), intervals=30, options=stubborn, **AGAIN)
+from examples.studies.parts import made
+from tests.support.tiny_study import plans_without_end
 
 def main(folder):
-    made("study", folder, {"first": Part(lambda: [1], {}), "second": Part(endless, {})})
+    made("study", folder, plans_without_end(folder))
 
 run(main, Path(sys.argv[1]), after=GOES_ON)
 """
@@ -235,9 +230,9 @@ run(main, Path(sys.argv[1]), after=GOES_ON)
 def test_a_study_keeps_its_parts_and_no_plan_that_was_stopped(tmp_path):
     rat()
     process = child(STUDY, tmp_path, env=os.environ | {"SERPENTAIL_THREADS": "1"})
-    assert process.stdout.readline() == "ready\n"
+    until((tmp_path / "ready").exists)
     _, errors, _ = ended(process, after=3.0)
     assert process.returncode == 130
     assert errors.splitlines()[-1] == "interrupted: the same command goes on from here"
     assert "Traceback" not in errors
-    assert [path.name for path in tmp_path.glob("*.json")] == ["first.json"]
+    assert titles(tmp_path / "study.db") == ["first"]

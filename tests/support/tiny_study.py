@@ -3,12 +3,15 @@
 Each part that ends writes a line into FOLDER/ended, so that a test counts them.
 """
 
+import json
 import os
+import sqlite3
 import sys
 import time
 from functools import partial
 from pathlib import Path
 
+import serpentail as st
 from examples.front import GOES_ON, run
 from examples.studies.parts import Part, made
 
@@ -26,6 +29,49 @@ def square(number: int, folder: Path) -> dict:
 def parts(folder: Path) -> dict[str, Part]:
     """Return the parts of the study."""
     return {f"part {k}": Part(partial(square, k, folder), {"number": k}) for k in range(PARTS)}
+
+
+def ones() -> list:
+    """Take no time."""
+    return [1]
+
+
+def lost() -> dict:
+    """Return what is no number."""
+    return {"lost": float("nan")}
+
+
+def wrong() -> list:
+    """Fail."""
+    raise ZeroDivisionError("no such part")
+
+
+def endless(folder: Path) -> None:
+    """Plan for ever, by a search that does not end."""
+    from tests.support.tumbling import AGAIN, rat, start
+
+    (folder / "ready").touch()
+    stubborn = {"ipopt.tol": 1e-300, "ipopt.acceptable_iter": 0, "ipopt.max_iter": 10**6}
+    while True:
+        st.plan(rat(), start=start(rat()), intervals=30, options=stubborn, **AGAIN)
+
+
+def plans_without_end(folder: Path) -> dict[str, Part]:
+    """Return a part that is made, and one that never is."""
+    return {"first": Part(ones, {}), "second": Part(partial(endless, folder), {})}
+
+
+def titles(store: Path) -> list[str]:
+    """Return the parts that a store has."""
+    if not store.exists():
+        return []
+    base = sqlite3.connect(f"file:{store}?mode=ro", uri=True, timeout=10)
+    try:
+        rows = base.execute("select point from rows where error is null").fetchall()
+    except sqlite3.OperationalError:  # it is being made
+        rows = []
+    base.close()
+    return sorted(json.loads(point)["part"] for (point,) in rows)
 
 
 def main(folder: Path) -> None:

@@ -76,7 +76,8 @@ def _named(run: Any) -> Any:
         return run
     if isinstance(run, partial):
         return [_named(run.func), _identified([list(run.args), run.keywords])]
-    name = f"{getattr(run, '__module__', '')}.{getattr(run, '__qualname__', '')}"
+    where = run if hasattr(run, "__qualname__") else type(run)  # an object that is called
+    name = f"{where.__module__}.{where.__qualname__}"
     if not callable(run) or "<" in name:  # a lambda, or a function in a function
         raise SweepError(
             f'run: value {shown(run)}: needs "simulate", "plan", or a function at the top of a '

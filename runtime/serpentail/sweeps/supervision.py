@@ -54,7 +54,7 @@ class Child:
         here, there = Pipe()
         paths = [path or os.getcwd() for path in sys.path]
         environment = os.environ | {"PYTHONPATH": os.pathsep.join(dict.fromkeys(paths))}
-        environment.setdefault(VARIABLE, "1")
+        environment |= {VARIABLE: "1"}  # its siblings use the other cores
         command = [sys.executable, "-m", "serpentail.sweeps.child", str(there.fileno())]
         self.process = subprocess.Popen(command, env=environment, pass_fds=[there.fileno()])
         there.close()

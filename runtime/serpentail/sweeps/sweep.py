@@ -189,7 +189,7 @@ def sweep(  # noqa: PLR0913 - the public face names all that it takes
             found.store,
             groups_of(list(found.entries), known),
             limit,
-            _script(run),
+            _script(found.entries[0].job.pickled()),
             name,
             total=len(found),
             done=len(known),
@@ -265,14 +265,12 @@ def _function(run: Any) -> str:
     """Return the name of a function."""
     while isinstance(run, partial):
         run = run.func
-    return str(getattr(run, "__name__", "points"))
+    return str(getattr(run, "__name__", type(run).__name__))
 
 
-def _script(run: Any) -> str | None:
-    """Return the program whose function is run, where it is the main one."""
-    while isinstance(run, partial):
-        run = run.func
-    if getattr(run, "__module__", "") != "__main__":
+def _script(data: bytes) -> str | None:
+    """Return the main program where a pickled job has functions of it, else None."""
+    if b"__main__" not in data:
         return None
     script = getattr(sys.modules["__main__"], "__file__", None)
     if script is None:
