@@ -32,6 +32,7 @@ from .parameters import (
 )
 from .sizes import warn_of_sizes
 from .snapshot import restored, snapshot
+from .tail import links_of, words_of
 
 if TYPE_CHECKING:
     from .casadi import CasadiFunctions
@@ -107,15 +108,6 @@ def _without_c(manifest: Mapping[str, Any]) -> ModelError:
     )
 
 
-def _links(pieces: int | list[int], kinds: tuple[str, ...]) -> int | tuple[int, ...] | None:
-    """Return the links of the segments, 0 of an arc; None of a continuum."""
-    if "articulated" not in kinds:
-        return None
-    if isinstance(pieces, int):
-        return pieces
-    return tuple(n if kind == "articulated" else 0 for n, kind in zip(pieces, kinds, strict=True))
-
-
 class Model(Functions):
     """Equations of motion H(q) v_dot + C(q, v) = [0 (6); tau] + J^T f of one tail, SI units.
 
@@ -149,7 +141,7 @@ class Model(Functions):
         self.kinds: tuple[str, ...] = tuple(
             manifest["dimensions"].get("kinds") or (self.kind,) * self.segments
         )
-        self.links = _links(manifest["dimensions"]["links"], self.kinds)
+        self.links = links_of(manifest["dimensions"]["links"], self.kinds)
         jointed = self.kind == "articulated"
         self.samples: int | None = None if jointed else manifest["scene"]["samples"]
         # how many joints turn by the coordinates of each segment (m,); 1 of an arc
@@ -174,16 +166,7 @@ class Model(Functions):
 
     def tail_words(self) -> str:
         """Return what the tail is made of, in words."""
-        if self.links is None:
-            return f"{self.segments} continuum segments"
-        if self.kind == "mixed":
-            each = (
-                f"{n} links" if n else "an arc" for n in np.broadcast_to(self.links, self.segments)
-            )
-            return f"{self.segments} segments: {', '.join(each)}"
-        if isinstance(self.links, tuple):
-            return f"{self.segments} segments of {', '.join(map(str, self.links))} links"
-        return f"{self.segments} x {self.links} links"
+        return words_of(self.links, self.segments)
 
     def with_parameters(self, **changes: ArrayLike) -> "Model":
         """Return this model with other parameters; nothing is compiled.  Warns as ``load`` does."""
