@@ -1,5 +1,6 @@
 """Tails of links and arcs: limits, convergence, flights, and what scenes of them may say."""
 
+import zipfile
 from functools import cache
 
 import numpy as np
@@ -200,6 +201,33 @@ def test_other_formats_have_no_arcs(kind, tmp_path):
         st.export(
             model_of(LINKS, ARC), kind, tmp_path / f"both.{'xml' if kind == 'mjcf' else kind}"
         )
+
+
+@pytest.mark.slow
+def test_plans_bend_both_kinds():
+    """A turn by half a radian of yaw, from rest to rest."""
+    model = st.build(tail="mixed", segments=[LINKS, ARC])
+    q, half = np.zeros(11), 0.25
+    q[3] = 1
+    goal = st.Goal(attitude=(np.cos(half), 0, 0, np.sin(half)))
+    plan = st.plan(model, start=(q, np.zeros(10)), goal=goal, duration=0.5)
+    assert plan.success
+    assert np.abs(plan.trajectory.tail).max(axis=0)[[1, 3]].min() > 1e-3
+
+
+def test_units_of_other_simulators_have_both_kinds(tmp_path):
+    functions = [
+        "forward_dynamics",
+        "forward_dynamics_derivatives",
+        "rollout",
+        "energy",
+        "momentum",
+    ]
+    path = st.export(model_of(LINKS, ARC, functions=functions), "fmu", tmp_path / "both.fmu")
+    with zipfile.ZipFile(path) as unit:
+        text = unit.read("modelDescription.xml").decode()
+    assert "torque on beta_1" in text
+    assert "torque on a_2" in text
 
 
 @pytest.mark.slow

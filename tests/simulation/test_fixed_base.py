@@ -120,6 +120,18 @@ def test_a_single_link_is_a_pendulum():
     np.testing.assert_allclose(run.tail[:, 0], 1e-4 * np.cos(w * run.t), rtol=0, atol=1e-10)
 
 
+def test_without_weight_the_centre_of_mass_flies_straight():
+    table = {"kind": "articulated", "segments": 1, "links": 2, "weightless": True}
+    model = st.load(folder_of(parse_scene(table, "orbit")))
+    run = st.simulate(model, [*REST, 0.3, -0.2], np.arange(8.0), t_span=0.2, rtol=1e-10)
+    places, speeds = model.center_of_mass(run.q, run.v)[:2]
+    straight = places[0] + np.outer(run.t, speeds[0])
+    np.testing.assert_allclose(places, straight, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(run.energy, run.energy[0], rtol=1e-8)
+    assert np.all(run.potential == 0)
+    assert not run.warnings
+
+
 # ---- controllers ---------------------------------------------------------------------------------
 
 

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from serpentail.attitude import rotation_matrix
+from serpentail.model.layout import Layout
 from serpentail.motion.trajectory import Trajectory
 
 SEMI_AXES = np.array([0.0315, 0.0495, 0.027])
@@ -34,7 +35,8 @@ class Drawn:
     kernels: dict = field(default_factory=dict)
 
     def __post_init__(self):
-        self.nq = 7 + 2 * self.segments
+        self.layout = Layout(self.segments)
+        self.nq = self.layout.nq
         self.manifest = {"dimensions": {"total": self.segments * self.links}}
         self.parameters = {
             "torso_mass": 0.1,

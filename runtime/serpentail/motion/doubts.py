@@ -151,9 +151,11 @@ def _bends(model: Model, motion: "Trajectory") -> list[str]:
 def _bend(model: Model, tail: Array) -> Array:
     """How far the segments are bent, (K, m), rad: of joints the larger of pitch and yaw."""
     first, second = (tail[:, k::PER_SEGMENT] for k in range(PER_SEGMENT))
+    of_joints = model.joints_each * np.maximum(np.abs(first), np.abs(second))
+    if model.kind == "articulated":
+        return of_joints
     if model.manifest["scene"]["coordinates"] == "polar":
         return np.abs(second)
-    of_joints = model.joints_each * np.maximum(np.abs(first), np.abs(second))
     jointed = np.array(model.kinds) == "articulated"
     return np.where(jointed, of_joints, np.hypot(first, second))
 
