@@ -3,7 +3,7 @@
 opty itself takes SymPy's equations, which no tail here has; so its nonlinear program is built in
 CasADi: states at nodes, the midpoint rule between them, IPOPT with its limited-memory Hessian.
 Both get the same exact tracks (without noise: the error left is the method's own), the same wrong
-parameters and the same first motion. The rule is tried with 1 and 4 intervals a frame.
+parameters and the same first motion. The rule is tried with an exact Hessian, too.
 """
 
 if __name__ == "__main__":
@@ -24,7 +24,7 @@ from serpentail.identification.start import motion_shown, on_mesh
 NAMES = ("tail_mass", "tail_length", "tail_stiffness[same]", "tail_damping[same]")
 BEGIN = np.array([4.2e-3, 0.185, 3e-3, 3e-5])
 TRUE = np.array([0.00351, 0.19466, 2e-3, 5e-5])
-PARTS = (1, 4)  # intervals a frame of the midpoint rule
+PARTS = 1  # intervals a frame of the midpoint rule
 DURATION, FRAMES = 0.15, 31
 MOST = 3000  # iterations of IPOPT
 
@@ -48,8 +48,8 @@ def identification_times(folder: Path) -> list[dict]:
     ours = np.array([each.value for each in found.parameters])
     rows = [_row("ours", time.process_time() - begun, found.iterations, ours)]
     first = motion_shown(wrong, placements(wrong, markers), tracks)
-    for parts in PARTS:
-        rows.append(midpoint(model, (times, seen, first), list(torso.values()), parts))
+    for exact in (False, True):
+        rows.append(midpoint(model, (times, seen, first), list(torso.values()), exact))
     return rows
 
 
@@ -59,11 +59,11 @@ def _row(name: str, seconds: float, iterations: int, values: np.ndarray) -> dict
     return {"method": name, "cpu_s": seconds, "iterations": iterations, "error": error}
 
 
-def midpoint(model: st.Model, data: tuple, torso: list, parts: int) -> dict:
-    """Return the row of the midpoint rule with so many intervals a frame."""
+def midpoint(model: st.Model, data: tuple, torso: list, exact: bool) -> dict:
+    """Return the row of the midpoint rule, with opty's or with an exact Hessian."""
     import casadi as ca
 
-    times, seen, first = data
+    (times, seen, first), parts = data, PARTS
     begun = time.process_time()
     mesh = np.interp(np.arange(parts * (len(times) - 1) + 1), parts * np.arange(len(times)), times)
     theta = ca.MX.sym("theta", 4)  # over what they begin with
@@ -87,7 +87,7 @@ def midpoint(model: st.Model, data: tuple, torso: list, parts: int) -> dict:
         cost += ca.sumsqr(modelled(X[:, parts * f], theta) - row.T)
     program = {"x": ca.vertcat(theta, ca.vec(X)), "f": 1e6 * cost, "g": ca.vertcat(*rules)}
     options = {
-        "ipopt.hessian_approximation": "limited-memory",
+        "ipopt.hessian_approximation": "exact" if exact else "limited-memory",
         "ipopt.max_iter": MOST,
         "ipopt.print_level": 0,
         "print_time": False,
@@ -97,7 +97,8 @@ def midpoint(model: st.Model, data: tuple, torso: list, parts: int) -> dict:
     done = solver(x0=np.concatenate([np.ones(4), guess.ravel()]), lbg=0, ubg=0)
     values = done["x"].full().ravel()[:4] * BEGIN
     count = solver.stats()["iter_count"]
-    return _row(f"midpoint, {parts} a frame", time.process_time() - begun, count, values)
+    name = f"midpoint, {'exact' if exact else 'limited-memory'} Hessian"
+    return _row(name, time.process_time() - begun, count, values)
 
 
 def _struct(model: st.Model, values):

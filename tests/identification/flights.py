@@ -47,7 +47,7 @@ def start(model, seed=0):
     return np.concatenate([q, v])
 
 
-def flown(model, times, x0, torque=None):
+def flown(model, times, x0, torque=None, rtol=1e-10):
     """Return states (F, nx) of a flight under torques, a function of the time."""
     nt = model.nq - 7
     tau = torque or (lambda _t: np.zeros(nt))
@@ -57,8 +57,8 @@ def flown(model, times, x0, torque=None):
         x0,
         method="DOP853",
         t_eval=times,
-        rtol=1e-10,
-        atol=1e-12,
+        rtol=rtol,
+        atol=1e-2 * rtol,
         max_step=0.005,
     )
     return solution.y.T

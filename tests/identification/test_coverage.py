@@ -19,7 +19,7 @@ PRIOR = st.TorquePrior(1e-3, 0.03)
 
 def drawn(prior, count, rng):
     """Torques of the prior, an exact Ornstein-Uhlenbeck process, as a function of time."""
-    fine = np.linspace(TIMES[0], TIMES[-1], 301)
+    fine = np.linspace(TIMES[0], TIMES[-1], 121)
     decay = np.exp(-(fine[1] - fine[0]) / prior.time)
     tau = prior.std * rng.standard_normal((len(fine), count))
     for k in range(1, len(fine)):
@@ -40,7 +40,7 @@ def squares(model, names, trials, prior=None):
     for seed in range(trials):
         rng = np.random.default_rng([seed, 5])
         torque = None if prior is None else drawn(prior, model.nq - 7, rng)
-        states = passive if torque is None else flown(model, TIMES, start(model), torque)
+        states = passive if torque is None else flown(model, TIMES, start(model), torque, rtol=1e-6)
         data = tracks(model, TIMES, states, 5e-4, seed=[seed, 6], gaps=0.1)
         result = st.identify(model, data, placed(model), names, torques=prior, noise=5e-4)
         assert result.success
