@@ -16,8 +16,8 @@ def main(folder, points: int, executor: str | None) -> None:
 
 if __name__ == "__main__":
     parser = front.parser(__doc__, "output/studies/morphology")
-    told = "tails and tumbles, each with three numbers of segments and two times of flight"
-    parser.add_argument("--points", type=front.count, default=3400, help=f"{told} (default: 3400)")
+    told = "tails and tumbles, each with three numbers of segments"
+    parser.add_argument("--points", type=front.count, default=6800, help=f"{told} (default: 6800)")
     parser.add_argument("--executor", help="where to run, such as processes:4 or dask:HOST:PORT")
     given = parser.parse_args()
     front.run(main, given.folder, given.points, given.executor, after=front.GOES_ON)

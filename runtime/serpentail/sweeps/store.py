@@ -18,7 +18,7 @@ TABLE = (
     "create table if not exists rows (key text primary key, point text not null, outcome text, "
     "error text, seconds real not null) without rowid"
 )
-INSERT = "insert or ignore into rows values (?, ?, ?, ?, ?)"
+INSERT = "insert into rows values (?, ?, ?, ?, ?) on conflict (key) do nothing"
 IN_ONE_QUERY = 500
 
 
