@@ -56,7 +56,7 @@ def test_what_is_nested_without_end_is_refused():
 
 def test_options_are_what_the_generator_knows():
     keys = {"tail" if key == "kind" else key for key in KEYS}
-    left = {"description", "parameters", "plan", "simulate", "phase"}
+    left = {"description", "parameters", "plan", "simulate", "phase", "identify", "sweep"}
     assert set(SceneKeys.__annotations__) == keys - left
     names = [parameter.name for parameter in (*PARAMETERS, *PASSIVE)]
     assert list(Parameters.__annotations__) == names

@@ -142,7 +142,7 @@ def test_planning_again_from_a_plan_takes_fewer_iterations():
         ({"attitude": "euler"}, "attitude is 'euler': it takes 'quaternion'"),
         ({"rule": "lobatto"}, "rule is 'lobatto': it takes 'radau'"),
         ({"objective": lambda point: point.tail[0] ** 2}, "objective is a function"),
-        ({"path": ((lambda point: point.height, 0.0, np.inf),)}, "path is given"),
+        ({"path": ((lambda point: point.height, 0.0, np.inf),)}, "path or clearance is given"),
         ({"bounds": st.Bounds(torque_rate=1.0)}, "bounds.torque_rate is given: leave it out"),
         ({"options": {"fatrop.max_itr": 5}}, "'fatrop.max_itr': FATROP has no such setting"),
         ({"options": {"ipopt.max_iter": 5}}, "'ipopt.max_iter': FATROP has no such setting"),
@@ -204,7 +204,14 @@ def _run(**changes):
     model = rat()
     refused = Refusals(st.PlanningError)
     task = (start(model), st.Goal(), DURATION, st.Bounds(angle=np.pi / 3))
-    settings = {"objective": "effort", "smoothing": 3e-4, "damping": 0.0, "path": (), "legs": None}
+    settings = {
+        "objective": "effort",
+        "smoothing": 3e-4,
+        "damping": 0.0,
+        "path": (),
+        "legs": None,
+        "clearance": None,
+    }
     forms = {"formulation": "airborne", "attitude": "quaternion"}
     problem = checked_problem(model, task, settings | forms, refused)
     stages = stages_of(model, problem, uniform(6), collocation_rule("radau", 3))

@@ -90,7 +90,7 @@ def oscillator() -> tuple[Variables, Node]:
     call = linear_call(f, zeta, [zeta[1:3], zeta[3]])
     result = casadi.SX.sym("result", 2)
     y = casadi.vertcat(zeta[0] * result, zeta[0] * zeta[3] ** 2)
-    node = Node(casadi.Function("node", [zeta, p, result], [y]), (call,), 2, 0, 0)
+    node = Node(casadi.Function("node", [zeta, p, result], [y]), (call,), 2, 0, ())
     return Variables((("x", 2),), (), {"x": np.ones(2), "torque": np.ones(1)}), node
 
 

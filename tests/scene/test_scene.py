@@ -83,7 +83,17 @@ def test_the_full_scene_file_shows_every_key():
         (SCENES / f"{name}.toml").read_text()
         for name in ("kangaroo_rat_m1_n3", "contact_m1_n3", "tapered_tail")
     )
-    tables = {"name", "parameters", "plan", "simulate", "identify", "phase", "taper", "body"}
+    tables = {
+        "name",
+        "parameters",
+        "plan",
+        "simulate",
+        "identify",
+        "phase",
+        "sweep",
+        "taper",
+        "body",
+    }
     words = [
         *(set(KEYS) - {*tables, *ONLY["continuum"].keys}),
         *(p.name for p in PARAMETERS),

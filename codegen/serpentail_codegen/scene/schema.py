@@ -97,9 +97,10 @@ def _parameter(parameter: Parameter) -> dict[str, Any]:
 def _of_each_coordinate(parameter: Parameter) -> dict[str, Any]:
     """Return the schema of a parameter of the passive tail: one number, or one a coordinate."""
     one = _numbers(parameter.check.schema, parameter.unit)
-    each = {"type": "array", "items": one, "minItems": 2}
-    meaning = {"description": f"{parameter.meaning} ({parameter.unit})"}
-    return {"anyOf": [one, each]} | meaning
+    forms = [one, {"type": "array", "items": one, "minItems": 2}]
+    if plain(parameter.unit) in MEASURES:
+        forms.append(_text(parameter.unit, None))
+    return {"anyOf": forms, "description": f"{parameter.meaning} ({parameter.unit})"}
 
 
 def _numbers(bounds: Mapping[str, Any], unit: str) -> dict[str, Any]:

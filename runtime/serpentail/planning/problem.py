@@ -72,7 +72,8 @@ class PlanningProblem:
     objective: str | Callable[[Any], Any]
     smoothing: float
     damping: float
-    path: tuple[PathConstraint, ...]
+    path: tuple[PathConstraint, ...]  # with that of the clearance
+    clearance: float | None
     legs: Legs | None
     formulation: str
     attitude: str
@@ -109,9 +110,8 @@ def checked_problem(
     checked: dict[str, Any] = {
         name: attempt(name, SETTINGS[name], value) for name, value in settings.items()
     }
-    clearance = checked.pop("clearance")
-    if clearance is not None and start is not None:
-        row = attempt("clearance", clear_of_ground, model, start, clearance)
+    if checked["clearance"] is not None and start is not None:
+        row = attempt("clearance", clear_of_ground, model, start, checked["clearance"])
         checked["path"] = (*(checked["path"] or ()), row)
     if refused.lines or start is None or goal is None or duration is None or bounds is None:
         return None
