@@ -36,7 +36,6 @@ class Tail:
 TAILS = {
     "articulated_1x3": Tail({"tail": "articulated", "segments": 1, "links": 3}, pi / 3, -20.0),
     "continuum_2": Tail({"tail": "continuum", "segments": 2}, 2 * pi / 3, -30.0),
-    "continuum_3": Tail({"tail": "continuum", "segments": 3}, 2 * pi / 3, -20.0),
 }
 
 

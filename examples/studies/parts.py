@@ -34,7 +34,13 @@ class Part:
 class Maker:
     """Makes the part that a point of a sweep names."""
 
+    study: str
     makes: Mapping[str, Callable[[], Result]]
+
+    @property
+    def __name__(self) -> str:
+        """What is told while parts are made."""
+        return self.study
 
     def __call__(self, point: dict) -> dict[str, str]:
         """Return the part's result as JSON, which has NaN here."""
@@ -49,7 +55,7 @@ def made(study: str, folder: Path, parts: Mapping[str, Part]) -> dict[str, Resul
     """
     folder.mkdir(parents=True, exist_ok=True)
     over = {("part", "of"): st.grid([(title, part.of) for title, part in parts.items()])}
-    run = Maker({title: part.make for title, part in parts.items()})
+    run = Maker(study, {title: part.make for title, part in parts.items()})
     store = folder / f"{study}.db"
     _forget_without_files(posed(None, over, run, store), parts)
     rows = st.sweep(None, over, run, store=store, executor="processes", retry_failed=True).rows()
