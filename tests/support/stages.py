@@ -54,6 +54,7 @@ def problem(model, **changes) -> PlanningProblem:
         "smoothing": 3e-4,
         "damping": 0.0,
         "path": (),
+        "clearance": None,
         "legs": None,
         "formulation": "airborne",
         "attitude": "quaternion",
