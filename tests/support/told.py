@@ -2,7 +2,9 @@
 
 import re
 
-PROGRESS = re.compile(r"(?m)^(?:derive|compile|simulate|plan) .*: .*\d s(?: so far| left)?\n")
+PROGRESS = re.compile(
+    r"(?m)^(?:derive|compile|simulate|plan|identify|sweep) .*: .*\d s(?: so far| left)?\n"
+)
 
 
 def besides_progress(words):

@@ -13,6 +13,7 @@ from jsonschema import Draft7Validator
 
 import serpentail as st
 from serpentail import cli
+from tests.support.told import besides_progress
 
 SCENE = """
 kind = "articulated"
@@ -45,7 +46,7 @@ def study(tmp_path):
 def told(capsys, *arguments):
     status = cli.main(["sweep", *map(str, arguments), "--json", "-"])
     out, err = capsys.readouterr()
-    return status, json.loads(out) if out else None, err
+    return status, json.loads(out) if out else None, besides_progress(err)
 
 
 def test_the_command_makes_the_rows_of_a_scene_and_goes_on(study, capsys):

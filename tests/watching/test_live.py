@@ -123,13 +123,6 @@ def test_rods_lie_between_their_points():
     assert from_z(np.array([[0, 0, -1.0]])).tolist() == [[0, 1, 0, 0]]
 
 
-def test_it_prints_nothing(capfd):
-    """What a program prints is its own."""
-    with st.live(rat(), port=free_port()):
-        pass
-    assert capfd.readouterr().out == ""
-
-
 def test_it_says_where_it_is(view):
     assert view.url.startswith("http://127.0.0.1:")
     assert repr(view) == f"<serpentail live view of {rat().name} at {view.url}>"
