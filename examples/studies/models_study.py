@@ -59,7 +59,7 @@ def measured(folder: Path) -> dict:
     holds.
     """
     of = {"program": digest(Path(__file__), *(ROOT / source for source in SOURCES))}
-    titles = {links: f"{links} links" if links else "continuum" for links in (None, *LINKS)}
+    titles = {links: f"links {links}" if links else "continuum" for links in (None, *LINKS)}
     parts = {title: Part(partial(motion, links), of) for links, title in titles.items()}
     moved = made("tails", folder / "parts", dict(reversed(parts.items())))  # the longest first
     # alone, as what else runs costs time
