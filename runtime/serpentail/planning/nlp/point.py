@@ -78,16 +78,11 @@ def point_of(
             raise PlanningError(
                 "contact_points: give the plan `legs`, such as st.Legs.fixed(gamma, delta)"
             )
-        unit = point.quaternion / ca.norm_2(point.quaternion)
-        q = ca.vertcat(point.position, unit, point.tail)
         still = () if legs is None else (np.append(legs.curve.at(0.0)[0], np.zeros(4)),)
-        return model.casadi.contact_points(q, np.zeros(model.nv), *still)[0]
+        return _touching(model, point, still)
 
     def body_points(point: Point) -> "ca.SX":
-        unit = point.quaternion / ca.norm_2(point.quaternion)
-        q = ca.vertcat(point.position, unit, point.tail)
-        points = model.casadi.contact_points(q, np.zeros(model.nv), *any_legs(model))[0]
-        return points[model.contacts.get("feet", 0) :, :]
+        return _touching(model, point, any_legs(model))[model.contacts.get("feet", 0) :, :]
 
     makers = {
         "center_of_mass": center_of_mass,
@@ -116,6 +111,15 @@ def at_identity(point: Point) -> "ca.SX":
     import casadi as ca
 
     return ca.vertcat(ca.DM(IDENTITY_POSE), point.tail)
+
+
+def _touching(model: Model, point: Point, legs: tuple[np.ndarray, ...]) -> "ca.SX":
+    """Points (K, 3) that may touch the ground, world."""
+    import casadi as ca
+
+    unit = point.quaternion / ca.norm_2(point.quaternion)
+    q = ca.vertcat(point.position, unit, point.tail)
+    return model.casadi.contact_points(q, np.zeros(model.nv), *legs)[0]
 
 
 def _offset(model: Model, point: Point) -> "ca.SX":
