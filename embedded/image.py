@@ -13,33 +13,15 @@ from embedded.states import stored_states
 
 LONGEST_REPORT = 3000  # characters of what a compiler says
 C_LINES = ("-std=gnu11", "-I", str(HERE))  # the harness alone: attributes, assembly
-HEAD = """/* Stored states of {prefix}, and its functions by one signature. */
-#ifndef CASES_H
-#define CASES_H
-
-#include <stdint.h>
-
-#include "{prefix}.h"
-
-typedef {prefix}_real real;
-#define REAL_IS_FLOAT {single}
-enum {{ STATES = {states}, INPUTS = {inputs}, OUTPUTS = {outputs} }};
-enum {{ WORK = {work}, CASES = {cases} }};
-
-struct a_case {{
+# what the programs of all checks begin with
+CASE = """struct a_case {{
   const char *name;
   int (*call)(const real *state, real *outputs, real *work);
   int outputs;
 }};
 
-static {prefix}_parameters parameters;
-
-static void prepare(void)
-{{
-  {prefix}_default_parameters(&parameters);
-}}
-
-static int call_nothing(const real *state, real *outputs, real *work)
+"""
+BARE = """static int call_nothing(const real *state, real *outputs, real *work)
 {{
   (void)state;
   (void)outputs;
@@ -57,6 +39,32 @@ static int call_room(const real *state, real *outputs, real *work)
   return call_nothing(state, outputs, work);
 }}
 """
+HEAD = (
+    """/* Stored states of {prefix}, and its functions by one signature. */
+#ifndef CASES_H
+#define CASES_H
+
+#include <stdint.h>
+
+#include "{prefix}.h"
+
+typedef {prefix}_real real;
+#define REAL_IS_FLOAT {single}
+enum {{ STATES = {states}, INPUTS = {inputs}, OUTPUTS = {outputs} }};
+enum {{ WORK = {work}, CASES = {cases} }};
+
+"""
+    + CASE
+    + """static {prefix}_parameters parameters;
+
+static void prepare(void)
+{{
+  {prefix}_default_parameters(&parameters);
+}}
+
+"""
+    + BARE
+)
 CALL = """
 static int call_{name}(const real *state, real *outputs, real *work)
 {{

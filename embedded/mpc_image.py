@@ -7,12 +7,13 @@ import numpy as np
 
 import serpentail as st
 from embedded.boards import BOARDS, HERE, PROFILES, WARNINGS, Board
-from embedded.image import C_LINES, Image, command, compiled, manifest_of
+from embedded.image import BARE, C_LINES, CASE, Image, command, compiled, manifest_of
 from embedded.results import run
 
 TIMES = (0.0, 0.1, 0.2)  # s, of the ticks
 SHOWN = 4  # times of each tick's torques
-HEAD = """/* States at which ticks are computed: t, then q, v and those of the tick after. */
+HEAD = (
+    """/* States at which ticks are computed: t, then q, v and those of the tick after. */
 #ifndef CASES_H
 #define CASES_H
 
@@ -26,37 +27,18 @@ typedef double real;
 enum {{ STATES = {states}, NQ = {nq}, NV = {nv}, NT = NV - 6, INPUTS = 1 + 2 * (NQ + NV) }};
 enum {{ SHOWN = {shown}, OUTPUTS = SHOWN * NT, WORK = 1, CASES = 4 }};
 
-struct a_case {{
-  const char *name;
-  int (*call)(const real *state, real *outputs, real *work);
-  int outputs;
-}};
-
-static double memory[{upper}_MPC_MEMORY];
+"""
+    + CASE
+    + """static double memory[{upper}_MPC_MEMORY];
 static {prefix}_mpc_state controller;
 
 static void prepare(void)
 {{
 }}
 
-static int call_nothing(const real *state, real *outputs, real *work)
-{{
-  (void)state;
-  (void)outputs;
-  (void)work;
-  return 0;
-}}
-
-/* A known depth of stack, for comparison. */
-static int call_room(const real *state, real *outputs, real *work)
-{{
-  volatile uint32_t room[32];
-  for (int k = 0; k < 32; ++k) {{
-    room[k] = 0;
-  }}
-  return call_nothing(state, outputs, work);
-}}
-
+"""
+    + BARE
+    + """
 /* Torques from t to the plan's end. */
 static int torques(real t, real *outputs)
 {{
@@ -95,6 +77,7 @@ static const struct a_case cases[CASES] = {{
 
 static const real states[STATES][INPUTS] = {{
 """
+)
 
 
 @dataclass(frozen=True)
