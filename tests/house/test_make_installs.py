@@ -22,8 +22,8 @@ def tree(tmp_path):
 
 
 def planned(tree, target, **more):
-    """What make would do for a target, away from a make that runs these tests."""
-    own = {k: v for k, v in os.environ.items() if k != "UV" and not re.match("MAKE|MFLAGS", k)}
+    """What make would do for a target, away from a make that runs these tests and its choices."""
+    own = {k: v for k, v in os.environ.items() if not re.match("MAKE|MFLAGS|UV$|EXTRAS$", k)}
     command = ["make", "-n", target]
     done = subprocess.run(
         command, cwd=tree, env=own | more, capture_output=True, text=True, check=True
