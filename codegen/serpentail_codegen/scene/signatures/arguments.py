@@ -52,26 +52,19 @@ Q = Argument(
     "configuration: position of B (m, world), quaternion w x y z, tail coordinates (rad)",
 )
 V = nv_numbers(
-    "v",
-    "velocity: velocity of B (m/s, world), omega of the torso (rad/s, body), rates of the tail "
-    "coordinates (rad/s)",
+    "v", "velocity of B (m/s, world), omega (rad/s, body), rates of the tail coordinates (rad/s)"
 )
-V_DOT = nv_numbers(
-    "v_dot",
-    "time derivative of v: acceleration of B (m/s^2, world), omega_dot (rad/s^2, body), "
-    "accelerations of the tail coordinates (rad/s^2)",
-)
+V_DOT = nv_numbers("v_dot", "acceleration: time derivative of v (m/s^2, rad/s^2)")
 TAU = Argument("tau", ("nt",), "torques conjugate to the tail coordinates (N m)")
 F_EXT = Argument(
     "f_ext",
     ("loads",),
-    "external loads: force at B (N, world), moment on the torso (N m, body), then a force (N, "
-    "world) at each of the N + 1 tail points",
+    "force at B (N, world), moment (N m, body), then a force (N, world) at each of the N + 1 tail "
+    "points",
 )
 FORCE = nv_numbers(
     "force",
-    "generalised force: force at B (N, world), moment on the torso (N m, body), torques conjugate "
-    "to the tail coordinates (N m)",
+    "generalised force: at B (N, world), moment (N m, body), torques of the tail coordinates (N m)",
 )
 ACCELERATIONS = Argument(
     "accelerations", ("nt",), "desired accelerations of the tail coordinates (rad/s^2)"
