@@ -147,7 +147,7 @@ STEP golden_loops_quaternion_rotation(const real *quaternion, real *R_out)
   R_out[8] = t19;
 }
 
-/* Properties of one of N equal links, ``share`` = 1 / N: m_at = m_t / N, L_j2c = L_j2j / 2 (Sect. 4). */
+/* Properties of one of N equal links, `share` = 1 / N: m_at = m_t / N, L_j2c = L_j2j / 2 (Sect. 4). */
 STEP golden_loops_link_properties(const real *tail_mass, const real *tail_length, const real *link_inertia, const real *share, real *link_out)
 {
   const real t0 = tail_mass[0] * share[0];
@@ -191,7 +191,7 @@ STEP golden_loops_torso_acceleration(const real *R, const real *p_ddot, const re
   a_out[2] = t6;
 }
 
-/* v_dot_1,jnt of A11 in the torso frame; ``a`` is R_b^T (p_b_ddot + g), gravity being an acceleration of B. */
+/* v_dot_1,jnt of A11 in the torso frame; `a` is R_b^T (p_b_ddot + g), gravity being an acceleration of B. */
 STEP golden_loops_mount_acceleration(const real *w, const real *w_dot, const real *a, const real *tail_mount, real *a_mount_out)
 {
   const real t0 = w[1] * tail_mount[2];
@@ -320,7 +320,7 @@ STEP golden_loops_gather_wrench_add_torque(const real *joint, const real *link, 
   torque_out[1] += t8;
 }
 
-/* Inertial wrench of torso and tail at B (Eq. 3), ``F_next`` being the tail's at its mount. */
+/* Inertial wrench of torso and tail at B (Eq. 3), `F_next` being the tail's at its mount. */
 STEP golden_loops_torso_wrench(const real *tail_mount, const real *torso_mass, const real *torso_inertia, const real *w, const real *w_dot, const real *a, const real *F_next, real *force_out, real *moment_out)
 {
   const real t0 = torso_inertia[0] * w[0];
@@ -623,7 +623,7 @@ static void golden_loops_gather_links_add_H_pp_H_py_H_yy(const real *joint, cons
   H_yy_out[0] += t54;
 }
 
-/* Momentum columns of a segment, from its root frame at ``P`` to the torso frame at B. */
+/* Momentum columns of a segment, from its root frame at `P` to the torso frame at B. */
 STEP golden_loops_column_at_torso(const real *R, const real *P, const real *pitch, const real *yaw, real *columns_out)
 {
   const real t0 = R[0] * pitch[0] + R[1] * pitch[1];

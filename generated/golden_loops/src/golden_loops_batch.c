@@ -370,7 +370,7 @@ STEP golden_loops_quaternion_rotation_rows_of_8(const real *quaternion, real *R_
   }
 }
 
-/* Properties of one of N equal links, ``share`` = 1 / N: m_at = m_t / N, L_j2c = L_j2j / 2 (Sect. 4). */
+/* Properties of one of N equal links, `share` = 1 / N: m_at = m_t / N, L_j2c = L_j2j / 2 (Sect. 4). */
 STEP golden_loops_link_properties(const real *tail_mass, const real *tail_length, const real *link_inertia, const real *share, real *link_out)
 {
   const real t0 = tail_mass[0] * share[0];
@@ -429,7 +429,7 @@ STEP golden_loops_torso_acceleration_rows_of_8_gravity_p_ddot(const real *R, con
   }
 }
 
-/* v_dot_1,jnt of A11 in the torso frame; ``a`` is R_b^T (p_b_ddot + g), gravity being an acceleration of B. */
+/* v_dot_1,jnt of A11 in the torso frame; `a` is R_b^T (p_b_ddot + g), gravity being an acceleration of B. */
 STEP golden_loops_mount_acceleration_rows_of_8_tail_mount_w_dot(const real *w, const real *w_dot, const real *a, const real *tail_mount, real *a_mount_out, int count)
 {
   const real t0 = w_dot[1] * tail_mount[2];
@@ -621,7 +621,7 @@ STEP golden_loops_gather_wrench_rows_of_8_link_add_torque(const real *joint, con
   }
 }
 
-/* Inertial wrench of torso and tail at B (Eq. 3), ``F_next`` being the tail's at its mount. */
+/* Inertial wrench of torso and tail at B (Eq. 3), `F_next` being the tail's at its mount. */
 STEP golden_loops_torso_wrench_rows_of_8_tail_mount_torso_inertia_torso_mass_w_dot(const real *tail_mount, const real *torso_mass, const real *torso_inertia, const real *w, const real *w_dot, const real *a, const real *F_next, real *force_out, real *moment_out, int count)
 {
   const real t0 = torso_inertia[0] * w_dot[0];
@@ -957,7 +957,7 @@ static void golden_loops_gather_links_rows_of_8_link_add_H_pp_H_py_H_yy(const re
   }
 }
 
-/* Momentum columns of a segment, from its root frame at ``P`` to the torso frame at B. */
+/* Momentum columns of a segment, from its root frame at `P` to the torso frame at B. */
 STEP golden_loops_column_at_torso_rows_of_8(const real *R, const real *P, const real *pitch, const real *yaw, real *columns_out, int count)
 {
   for (int c = 0; c < count; c += LANES) {
@@ -1145,7 +1145,7 @@ STEP golden_loops_segment_coupling_rows_of_8(const real *S, const real *columns,
   }
 }
 
-/* v_dot_1,jnt of A11 in the torso frame; ``a`` is R_b^T (p_b_ddot + g), gravity being an acceleration of B. */
+/* v_dot_1,jnt of A11 in the torso frame; `a` is R_b^T (p_b_ddot + g), gravity being an acceleration of B. */
 STEP golden_loops_mount_acceleration_rows_of_8_a_tail_mount_w_dot(const real *w, const real *w_dot, const real *a, const real *tail_mount, real *a_mount_out, int count)
 {
   const real t0 = w_dot[1] * tail_mount[2];
@@ -1188,7 +1188,7 @@ STEP golden_loops_mount_acceleration_rows_of_8_a_tail_mount_w_dot(const real *w,
   }
 }
 
-/* Inertial wrench of torso and tail at B (Eq. 3), ``F_next`` being the tail's at its mount. */
+/* Inertial wrench of torso and tail at B (Eq. 3), `F_next` being the tail's at its mount. */
 STEP golden_loops_torso_wrench_rows_of_8_a_tail_mount_torso_inertia_torso_mass_w_dot(const real *tail_mount, const real *torso_mass, const real *torso_inertia, const real *w, const real *w_dot, const real *a, const real *F_next, real *force_out, real *moment_out, int count)
 {
   const real t0 = torso_mass[0] * a[0];
