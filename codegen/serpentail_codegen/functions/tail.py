@@ -70,7 +70,7 @@ class Tail(Layout):
 
     @property
     def tail_points(self) -> int:
-        """Number of tail points, N + 1: the N joints or samples of the tail, and the tip."""
+        """Number of tail points, N + 1: N joints and the tip, or the root and N samples of arcs."""
         return self.total + 1
 
     @property
