@@ -11,7 +11,8 @@ from embedded.image import Image, build, manifest_of
 from embedded.results import Result, blocks, run
 from embedded.stack import deepest
 
-BOUND = 1e4  # largest difference of the fast profile, in units in the last place of an output's largest entry
+# ulp of an output's largest entry: largest difference of the fast profile
+BOUND = 1e4
 
 
 @dataclass(frozen=True)
