@@ -24,7 +24,10 @@ def test_energy_balances_over_long_runs_and_better_with_tolerance(name, method, 
     errors = []
     for rtol in METHODS[method]:
         run = st.simulate(model, q, v, t_span=5.0, method=method, rtol=rtol)
-        assert run.info["warnings"] == []
+        share = run.info["imbalance"]["relative"]  # of the energy about the centre of mass
+        assert share < (0.5 if rtol == 1e-3 else 0.01) and bool(run.info["warnings"]) == (
+            share > 0.1
+        )
         work = run.info["work_J"]
         moved = model.energy(q, v)[0] + abs(work["damping"])
         left = run.energy[-1] - run.energy[0] - work["damping"] - work["torques"]
