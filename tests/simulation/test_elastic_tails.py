@@ -25,9 +25,9 @@ def test_energy_balances_over_long_runs_and_better_with_tolerance(name, method, 
     for rtol in METHODS[method]:
         run = st.simulate(model, q, v, t_span=5.0, method=method, rtol=rtol)
         share = run.info["imbalance"]["relative"]  # of the energy about the centre of mass
-        assert share < (0.5 if rtol == 1e-3 else 0.01) and bool(run.info["warnings"]) == (
-            share > 0.1
-        )
+        most = 500 if method == "ros34pw2" else 100  # which is of low order, and the run is long
+        assert share < most * rtol
+        assert bool(run.info["warnings"]) == (share > 100 * rtol)
         work = run.info["work_J"]
         moved = model.energy(q, v)[0] + abs(work["damping"])
         left = run.energy[-1] - run.energy[0] - work["damping"] - work["torques"]
