@@ -33,13 +33,13 @@ from .tails.mechanism import Segments, Wrenches
 
 MEANINGS = {
     "q": "tail coordinates (rad)",
-    "v": "their rates (rad/s)",
-    "v_dot": "their accelerations (rad/s^2)",
-    "force": "forces on the tail coordinates (N m)",
-    "linear": "momentum of the tail (kg m/s, world)",
+    "v": "rates of the tail coordinates (rad/s)",
+    "v_dot": "accelerations of the tail coordinates (rad/s^2)",
+    "force": "generalised forces on the tail coordinates (N m)",
+    "linear": "linear momentum of the tail (kg m/s, world)",
     "angular": "angular momentum of the tail about its own centre of mass (kg m^2/s, world)",
     "r_q": "right-hand side for q",
-    "k_q": "solution",
+    "k_q": "solution for q",
 }
 
 

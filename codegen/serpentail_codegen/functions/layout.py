@@ -57,7 +57,7 @@ class Layout:
 
     @property
     def nt(self) -> int:
-        """Tail coordinates, and torques."""
+        """Number of tail coordinates and of torques, 2m for m segments."""
         return PER_SEGMENT * self.segments
 
     @property

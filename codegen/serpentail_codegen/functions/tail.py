@@ -45,12 +45,12 @@ class Tail(Layout):
 
     @property
     def nq(self) -> int:
-        """Numbers of a configuration: of the tail alone on a fixed base."""
+        """Length of q, 7 + nt; with a fixed base nt, the tail coordinates alone."""
         return self.nt if self.shape.fixed else super().nq
 
     @property
     def nv(self) -> int:
-        """Numbers of a velocity."""
+        """Length of v, 6 + nt; with a fixed base nt, the rates of the tail coordinates alone."""
         return self.nt if self.shape.fixed else super().nv
 
     @property
@@ -70,17 +70,17 @@ class Tail(Layout):
 
     @property
     def tail_points(self) -> int:
-        """N + 1 tail points."""
+        """Number of tail points, N + 1: N joints and the tip, or the root and N samples of arcs."""
         return self.total + 1
 
     @property
     def loads(self) -> int:
-        """Scalars of loads: a force and a moment at B, a force at each tail point."""
+        """Length of f_ext: a force and a moment at B, then a force at each tail point."""
         return LOAD + 3 * self.tail_points
 
     @property
     def parameter_numbers(self) -> int:
-        """Numbers in the parameter struct."""
+        """Number of values in the parameter struct of the C code."""
         return sum(p.size for p in struct_parameters(self))
 
     @property
@@ -98,32 +98,32 @@ class Tail(Layout):
 
     @property
     def points(self) -> int:
-        """Points that can touch the ground."""
+        """Number of points that can touch the ground."""
         return sum(self.groups.values())
 
     @property
     def bristles(self) -> int:
-        """Stretches of the points' friction springs, along x and y."""
+        """Number of bristle deflections: x and y of each point that can touch the ground."""
         return 2 * self.points
 
     @property
     def leg_numbers(self) -> int:
-        """Angles and rates of both legs."""
+        """Number of leg angles and their rates, 8 for both legs; 0 in scenes without feet."""
         return 8 if "feet" in self.contacts else 0
 
     @property
     def airborne_state(self) -> int:
-        """Numbers of an airborne state: a quaternion, tail coordinates, their rates."""
+        """Length of an airborne state: a quaternion, the tail coordinates, their rates."""
         return 4 + 2 * self.nt
 
     @property
     def airborne_arguments(self) -> int:
-        """An airborne state's numbers, then torques."""
+        """Length of (x, tau): an airborne state and the torques."""
         return self.airborne_state + self.nt
 
     @property
     def airborne_results(self) -> int:
-        """Rates of an airborne state, then omega."""
+        """Length of y: the rates of an airborne state, then omega (3)."""
         return self.airborne_state + 3
 
     @property

@@ -20,7 +20,7 @@ PASSIVE = (
         None,
         "N m/rad",
         NOT_NEGATIVE,
-        "stiffness of the tail coordinates' springs",
+        "stiffness of the springs of the tail coordinates",
         "spring",
     ),
     Parameter(
@@ -29,7 +29,7 @@ PASSIVE = (
         0.0,
         "rad",
         ANY,
-        "tail coordinates at which their springs rest",
+        "tail coordinates at which the springs are relaxed",
         "spring",
     ),
     Parameter(
@@ -38,7 +38,7 @@ PASSIVE = (
         None,
         "N m s",
         NOT_NEGATIVE,
-        "damping of the tail coordinates by the tail itself",
+        "passive damping of the tail coordinates",
         "damping",
     ),
     Parameter(
@@ -65,7 +65,7 @@ PASSIVE = (
         None,
         "N m/rad",
         POSITIVE,
-        "stiffness of the stops from tail_stop_width on",
+        "stiffness of the stops beyond tail_stop_width",
         "stops",
     ),
     Parameter(
@@ -74,7 +74,7 @@ PASSIVE = (
         0.1,
         "rad",
         POSITIVE,
-        "way into a stop on which its stiffness grows from zero to its own",
+        "angle beyond a stop over which its stiffness grows from zero to tail_stop_stiffness",
         "stops",
     ),
 )

@@ -5,9 +5,9 @@
 #include <math.h>
 #include <stddef.h>
 
-/* Statuses tell what is no finite number: compilers must not take for granted that there is none such. */
+/* The checks look for NaN and infinity, so the compiler must not assume that they never occur. */
 #if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__)
-#error "golden_loops tells numbers from what is none: compile it without -ffast-math, -Ofast and -ffinite-math-only"
+#error "golden_loops checks for NaN and infinity: compile it without -ffast-math, -Ofast and -ffinite-math-only"
 #endif
 
 #define real golden_loops_real
@@ -39,8 +39,9 @@ void golden_loops_default_parameters(golden_loops_parameters *parameters)
   parameters->link_inertia[2] = 1.0538433762187502e-07;
 }
 
-/* sin x and cos x within 1.5 ulp, without a branch on the quadrant; by libm where |x| > 1e5.  x - n pi/2 is taken in
- * three exact parts; the polynomials interpolate (sin r - r) / r^3 and (cos r - 1 + r^2/2) / r^4 at Chebyshev nodes. */
+/* sin x and cos x to within 1.5 ulp, without branching on the quadrant; by libm if |x| > 1e5.
+ * r = x - n pi/2 uses pi/2 in three exact parts.  The polynomials interpolate
+ * (sin r - r) / r^3 and (cos r - 1 + r^2/2) / r^4 at Chebyshev nodes. */
 STEP golden_loops_sincos(real x, real *sine, real *cosine)
 {
   if (!(x >= -1e5 && x <= 1e5)) {
@@ -84,7 +85,7 @@ STEP golden_loops_copy(int size, const real *source, real *target)
   }
 }
 
-/* Rows: one number for each direction of differentiation, LANES of them in turn. */
+/* SIMD vectors of LANES numbers.  A row holds one number per direction of differentiation, column of H, or state. */
 #if defined(__GNUC__) && defined(__AVX512F__)
 #define LANES 8
 #elif defined(__GNUC__) && defined(__AVX__)
@@ -104,7 +105,7 @@ typedef real golden_loops_lanes;
 #define lanes golden_loops_lanes
 #define LOAD(p) (*(const lanes *)(p))
 #define STORE(p, x) (*(lanes *)(p) = (x))
-#define ROW(size) (((size) + 7) / 8 * 8) /* numbers from one row of a matrix to the next */
+#define ROW(size) (((size) + 7) / 8 * 8) /* numbers from one matrix row to the next */
 
 /* R_b from (w, x, y, z); only the direction of the quaternion counts, so it need not be normalised. */
 STEP golden_loops_quaternion_rotation(const real *quaternion, real *R_out)
@@ -146,7 +147,7 @@ STEP golden_loops_quaternion_rotation(const real *quaternion, real *R_out)
   R_out[8] = t19;
 }
 
-/* Properties of one of N equal links, ``share`` = 1 / N: m_at = m_t / N, L_j2c = L_j2j / 2 (Sect. 4). */
+/* Properties of one of N equal links, `share` = 1 / N: m_at = m_t / N, L_j2c = L_j2j / 2 (Sect. 4). */
 STEP golden_loops_link_properties(const real *tail_mass, const real *tail_length, const real *link_inertia, const real *share, real *link_out)
 {
   const real t0 = tail_mass[0] * share[0];
@@ -190,7 +191,7 @@ STEP golden_loops_torso_acceleration(const real *R, const real *p_ddot, const re
   a_out[2] = t6;
 }
 
-/* v_dot_1,jnt of A11 in the torso frame; ``a`` is R_b^T (p_b_ddot + g), gravity being an acceleration of B. */
+/* v_dot_1,jnt of A11 in the torso frame; `a` is R_b^T (p_b_ddot + g), gravity being an acceleration of B. */
 STEP golden_loops_mount_acceleration(const real *w, const real *w_dot, const real *a, const real *tail_mount, real *a_mount_out)
 {
   const real t0 = w[1] * tail_mount[2];
@@ -319,7 +320,7 @@ STEP golden_loops_gather_wrench_add_torque(const real *joint, const real *link, 
   torque_out[1] += t8;
 }
 
-/* Inertial wrench of torso and tail at B (Eq. 3), ``F_next`` being the tail's at its mount. */
+/* Inertial wrench of torso and tail at B (Eq. 3), `F_next` being the tail's at its mount. */
 STEP golden_loops_torso_wrench(const real *tail_mount, const real *torso_mass, const real *torso_inertia, const real *w, const real *w_dot, const real *a, const real *F_next, real *force_out, real *moment_out)
 {
   const real t0 = torso_inertia[0] * w[0];
@@ -622,7 +623,7 @@ static void golden_loops_gather_links_add_H_pp_H_py_H_yy(const real *joint, cons
   H_yy_out[0] += t54;
 }
 
-/* Momentum columns of a segment, from its root frame at ``P`` to the torso frame at B. */
+/* Momentum columns of a segment, from its root frame at `P` to the torso frame at B. */
 STEP golden_loops_column_at_torso(const real *R, const real *P, const real *pitch, const real *yaw, real *columns_out)
 {
   const real t0 = R[0] * pitch[0] + R[1] * pitch[1];
@@ -802,8 +803,8 @@ STEP golden_loops_pair_without_translation_add_A_entry(const real *inverse_mass,
   A_entry_out[0] += r0;
 }
 
-/* Factor A = L^T D L in place without pivoting (lower triangle, row-major): L below 1 / D on the diagonal.  From the last
- * row up, because then all that a row takes from another one lies side by side.
+/* Factor A = L^T D L in place without pivoting (lower triangle, row-major): L, with 1 / D on the diagonal.  It works
+ * from the last row up, because a row then reads contiguous numbers of another row.
  */
 static int golden_loops_ldl_factor(int size, real *A)
 {
@@ -829,7 +830,7 @@ static int golden_loops_ldl_factor(int size, real *A)
   return STATUS_OK;
 }
 
-/* Solve L^T D L x = x in place. */
+/* Solve L^T D L x = b in place; x holds b at first. */
 static void golden_loops_ldl_solve(int size, const real *A, real *x)
 {
   const int row = ROW(size);
@@ -975,7 +976,7 @@ static int golden_loops_balance(const golden_loops_parameters *parameters, const
   return STATUS_OK;
 }
 
-/* C(q, v) of Eq. 3, gravity included */
+/* bias force C(q, v), Eq. 3: centrifugal and Coriolis terms, gravity, the passive tail */
 int golden_loops_unchecked_bias_force(const golden_loops_parameters *parameters, const golden_loops_real *q,
                                       const golden_loops_real *v, golden_loops_real *force, golden_loops_real *work)
 {
@@ -1024,7 +1025,7 @@ int golden_loops_unchecked_bias_force(const golden_loops_parameters *parameters,
   return STATUS_OK;
 }
 
-/* v_dot from Eq. 1 */
+/* acceleration v_dot under joint torques, Eq. 1 */
 int golden_loops_unchecked_forward_dynamics(const golden_loops_parameters *parameters, const golden_loops_real *q,
                                             const golden_loops_real *v, const golden_loops_real *tau,
                                             golden_loops_real *v_dot, golden_loops_real *work)
@@ -1061,7 +1062,7 @@ int golden_loops_unchecked_forward_dynamics(const golden_loops_parameters *param
 }
 
 #if defined(__GNUC__) && defined(__AVX__)
-#define BYTES 32 /* not more: wider vectors slow down the scalar code around them */
+#define BYTES 32 /* not 64: wider vectors would slow down the scalar code around them */
 #elif defined(__GNUC__) && (defined(__SSE2__) || defined(__aarch64__))
 #define BYTES 16
 #endif
@@ -1071,7 +1072,7 @@ int golden_loops_unchecked_forward_dynamics(const golden_loops_parameters *param
 #define INLINE static inline
 #endif
 
-/* The sum of 0 times numbers: 0 if all of them are finite, else none. */
+/* Sum of 0 * x[k]: 0 if all numbers are finite, otherwise NaN. */
 INLINE real golden_loops_zero_times_each(int size, const real *x)
 {
   real even = 0.0, odd = 0.0;
@@ -1083,7 +1084,7 @@ INLINE real golden_loops_zero_times_each(int size, const real *x)
   return k < size ? even + odd + x[k] * 0.0 : even + odd;
 }
 
-/* The same by whole vectors, for what has not just been written number by number. */
+/* The same with SIMD vectors, for arrays that have not just been written one number at a time. */
 INLINE real golden_loops_zero_times(int size, const real *x)
 {
 #ifdef BYTES
@@ -1116,7 +1117,7 @@ INLINE real golden_loops_zero_times(int size, const real *x)
   return golden_loops_zero_times_each(size, x);
 }
 
-/* Whether R(q) can be computed: the quaternion's squared norm neither vanishes nor overflows. */
+/* Whether the rotation R(q) can be computed: the quaternion's squared norm neither underflows nor overflows. */
 INLINE int golden_loops_has_attitude(const real *c)
 {
   const real square = c[0] * c[0] + c[1] * c[1] + c[2] * c[2] + c[3] * c[3];

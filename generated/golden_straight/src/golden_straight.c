@@ -5,9 +5,9 @@
 #include <math.h>
 #include <stddef.h>
 
-/* Statuses tell what is no finite number: compilers must not take for granted that there is none such. */
+/* The checks look for NaN and infinity, so the compiler must not assume that they never occur. */
 #if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__)
-#error "golden_straight tells numbers from what is none: compile it without -ffast-math, -Ofast and -ffinite-math-only"
+#error "golden_straight checks for NaN and infinity: compile it without -ffast-math, -Ofast and -ffinite-math-only"
 #endif
 
 #define real golden_straight_real
@@ -39,8 +39,9 @@ void golden_straight_default_parameters(golden_straight_parameters *parameters)
   parameters->link_inertia[2] = 6.6560403078000015e-06;
 }
 
-/* sin x and cos x within 1.5 ulp, without a branch on the quadrant; by libm where |x| > 1e5.  x - n pi/2 is taken in
- * three exact parts; the polynomials interpolate (sin r - r) / r^3 and (cos r - 1 + r^2/2) / r^4 at Chebyshev nodes. */
+/* sin x and cos x to within 1.5 ulp, without branching on the quadrant; by libm if |x| > 1e5.
+ * r = x - n pi/2 uses pi/2 in three exact parts.  The polynomials interpolate
+ * (sin r - r) / r^3 and (cos r - 1 + r^2/2) / r^4 at Chebyshev nodes. */
 STEP golden_straight_sincos(real x, real *sine, real *cosine)
 {
   if (!(x >= -1e5 && x <= 1e5)) {
@@ -70,7 +71,7 @@ STEP golden_straight_sincos(real x, real *sine, real *cosine)
   *cosine = (quadrant + 1) & 2 ? -b : b;
 }
 
-/* H(q) of Eq. 2 */
+/* inertia matrix H(q), Eq. 2 */
 int golden_straight_unchecked_mass_matrix(const golden_straight_parameters *parameters, const golden_straight_real *q,
                                           golden_straight_real *H, golden_straight_real *work)
 {
@@ -249,7 +250,7 @@ int golden_straight_unchecked_mass_matrix(const golden_straight_parameters *para
   return STATUS_OK;
 }
 
-/* v_dot from Eq. 1 */
+/* acceleration v_dot under joint torques, Eq. 1 */
 int golden_straight_unchecked_forward_dynamics(const golden_straight_parameters *parameters,
                                                const golden_straight_real *q, const golden_straight_real *v,
                                                const golden_straight_real *tau, golden_straight_real *v_dot,
@@ -559,7 +560,7 @@ int golden_straight_unchecked_forward_dynamics(const golden_straight_parameters 
 }
 
 #if defined(__GNUC__) && defined(__AVX__)
-#define BYTES 32 /* not more: wider vectors slow down the scalar code around them */
+#define BYTES 32 /* not 64: wider vectors would slow down the scalar code around them */
 #elif defined(__GNUC__) && (defined(__SSE2__) || defined(__aarch64__))
 #define BYTES 16
 #endif
@@ -569,7 +570,7 @@ int golden_straight_unchecked_forward_dynamics(const golden_straight_parameters 
 #define INLINE static inline
 #endif
 
-/* The sum of 0 times numbers: 0 if all of them are finite, else none. */
+/* Sum of 0 * x[k]: 0 if all numbers are finite, otherwise NaN. */
 INLINE real golden_straight_zero_times_each(int size, const real *x)
 {
   real even = 0.0, odd = 0.0;
@@ -581,7 +582,7 @@ INLINE real golden_straight_zero_times_each(int size, const real *x)
   return k < size ? even + odd + x[k] * 0.0 : even + odd;
 }
 
-/* The same by whole vectors, for what has not just been written number by number. */
+/* The same with SIMD vectors, for arrays that have not just been written one number at a time. */
 INLINE real golden_straight_zero_times(int size, const real *x)
 {
 #ifdef BYTES
@@ -614,7 +615,7 @@ INLINE real golden_straight_zero_times(int size, const real *x)
   return golden_straight_zero_times_each(size, x);
 }
 
-/* Whether R(q) can be computed: the quaternion's squared norm neither vanishes nor overflows. */
+/* Whether the rotation R(q) can be computed: the quaternion's squared norm neither underflows nor overflows. */
 INLINE int golden_straight_has_attitude(const real *c)
 {
   const real square = c[0] * c[0] + c[1] * c[1] + c[2] * c[2] + c[3] * c[3];

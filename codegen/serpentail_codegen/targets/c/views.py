@@ -2,11 +2,13 @@
 
 import re
 from collections.abc import Iterable, Sequence
+from itertools import groupby
 from typing import Any, Protocol
 
 from ...functions.tail import Tail, struct_parameters
 from ...ir.program import Program
 from ...ir.tape import operation_count
+from ...passes.fused import AFTER
 from ...scene.scene import Scene
 from ...scene.signatures.arguments import FACTORS, Argument
 from .form import PrintedFunction, values
@@ -128,12 +130,21 @@ def step_views(printed: Sequence[HasBody], real: str, prefix: str) -> list[dict[
             "kind": "STEP"
             if operation_count(routine.step.nodes, routine.step.results) < INLINED_OPERATIONS
             else "static void",
-            "doc": routine.step.doc,
+            "doc": comment(routine.step.doc),
             "lines": routine_lines(routine, real, prefix),
             "arguments": routine_arguments(routine),
         }
         for routine in routines.values()
     ]
+
+
+def comment(doc: str) -> str:
+    """Return a step's description as a comment, each repeated part of it once, with a count."""
+    parts = []
+    for part, alike in groupby(doc.replace("``", "`").split(AFTER)):
+        count = len(list(alike))
+        parts.append(f"{part} ({count} times)" if count > 1 else part)
+    return AFTER.join(parts)
 
 
 def callees_of(printed: Sequence[HasBody]) -> list[tuple[Program, CFunction]]:

@@ -10,6 +10,13 @@ from .plain import plain
 from .ports import External
 from .second_derivatives import hessian
 
+MEANINGS = {  # prefixes of CasADi's names -> what such a function returns
+    "": "{}",
+    "jac_": "Jacobian of {}",
+    "adj1_": "Gradient of the weighted outputs of {}",
+    "jac_adj1_": "Jacobian of the gradient of the weighted outputs of {}",
+}
+
 
 def externals(scene: Scene, tail: Tail, works: dict[str, int]) -> list[External]:
     """Return every function that CasADi can call, derivatives after what they are of."""
@@ -19,7 +26,8 @@ def externals(scene: Scene, tail: Tail, works: dict[str, int]) -> list[External]
     made: list[External] = []
 
     def begin(name: str, kind: str = "") -> External:
-        symbol, doc = f"{kind}{scene.name}_casadi_{name}", f"{kind}{name}"
+        symbol = f"{kind}{scene.name}_casadi_{name}"
+        doc = MEANINGS[kind].format(name)
         made.append(External(symbol, doc, tail, scene.name, callable_for(scene, name, works)))
         return made[-1]
 
