@@ -1,5 +1,5 @@
-"""The steps of the torso: its contribution to inertia, wrench and momentum, and the motion of the
-tail mount (Eqs. 2, 3, 14, 16).
+"""The steps of the torso: what it adds to the tail's inertia, wrench and momentum, and how the tail
+mount moves with it (Eqs. 2, 3, 14, 16).
 
 ``mass``, ``h`` and ``I`` are mass, first moment and inertia about B; ``F_next`` is a wrench or a
 momentum at the tail mount.
@@ -48,8 +48,8 @@ def segment_coupling(let, S: V12, columns: V12) -> dict:
 def torso_composite(
     let, tail_mount: V3, torso_mass: V1, torso_inertia: V3, mass: V1, h: V3, I: V6
 ) -> dict:
-    """Mass, first moment and inertia of the whole animal at B, from those of the tail at its mount
-    (Eq. 2).
+    """Mass, first moment and inertia of the whole animal at B, from the tail's at its mount (Eq.
+    2).
     """
     r = tail_mount
     h_B = let("h_B", h + mass[0] * r)
@@ -66,9 +66,7 @@ def torso_moment(let, tail_mount: V3, torso_mass: V1, mass: V1, h: V3) -> dict:
 def torso_wrench(
     let, tail_mount: V3, torso_mass: V1, torso_inertia: V3, w: V3, w_dot: V3, a: V3, F_next: V6
 ) -> dict:
-    """Inertial wrench of torso and tail at B (Eq. 3); ``F_next`` is that of the tail at its
-    mount.
-    """
+    """Inertial wrench of torso and tail at B (Eq. 3), ``F_next`` being the tail's at its mount."""
     force, moment = F_next[0:3, :], F_next[3:6, :]
     I_w = let("I_w", torso_inertia.multiply_elementwise(w))
     euler = torso_inertia.multiply_elementwise(w_dot) + w.cross(I_w)
@@ -97,8 +95,8 @@ def potential_energy(let, gravity: V1, R: M33, p: V3, mass: V1, h: V3) -> dict:
 
 
 def momentum_at_com(let, R: M33, p_dot: V3, mass: V1, h: V3, force: V3, moment: V3) -> dict:
-    """Momentum, and angular momentum about the COM, world axes; ``force, moment`` are those for B
-    at rest.
+    """Momentum, and angular momentum about the COM, world axes; ``force, moment`` taken at rest of
+    B.
     """
     return {
         "linear": mass[0] * p_dot + R * force,
@@ -119,9 +117,7 @@ def com_at_base(let, R: M33, p: V3, p_dot: V3, omega: V3, mass: V1, h: V3) -> di
 
 
 def com_of_coordinate(let, R: M33, inverse_mass: V1, column: V6, rate: V1) -> dict:
-    """Velocity of the COM per rate of one tail coordinate, R f_k / M; and the contribution of its
-    rate.
-    """
+    """Velocity of the COM per rate of one tail coordinate, R f_k / M; and what its rate adds."""
     J = let("J", R * column[0:3, :] * inverse_mass[0])
     return {"J_column": J, "velocity": J * rate[0]}
 
@@ -155,14 +151,12 @@ def mount_velocity(let, u: V3, w: V3, tail_mount: V3) -> dict:
 
 
 def mount_acceleration(let, w: V3, w_dot: V3, a: V3, tail_mount: V3) -> dict:
-    """v_dot_1,jnt of A11 in the torso frame; ``a`` is R_b^T (p_b_ddot + g), with gravity as an
+    """v_dot_1,jnt of A11 in the torso frame; ``a`` is R_b^T (p_b_ddot + g), gravity being an
     acceleration of B.
     """
     return {"a_mount": a + w_dot.cross(tail_mount) + w.cross(let("r", w.cross(tail_mount)))}
 
 
 def torso_acceleration(let, R: M33, p_ddot: V3, gravity: V1) -> dict:
-    """a = R_b^T (p_b_ddot + g z): the whole effect of gravity and translation in flight (Eqs. 3,
-    17).
-    """
+    """a = R_b^T (p_b_ddot + g z): all that gravity and translation do in flight (Eqs. 3, 17)."""
     return {"a": R.T * (p_ddot + gravity[0] * Z)}

@@ -1,7 +1,7 @@
-"""Eliminates translation from the equation of motion, and computes accelerations afterwards.
+"""Eliminating translation from the equation of motion, and what follows for accelerations.
 
-A column is the momentum of the animal, with B at rest, per unit rate of one tail coordinate: f_k,
-and its moment n_k about B.
+A column is the momentum of the animal, at rest of B, per unit rate of one tail coordinate: f_k, and
+its moment n_k about B.
 """
 
 from sympy import Matrix, eye
@@ -27,7 +27,7 @@ def column_without_translation(let, com: V3, column: V6) -> dict:
 
 
 def pair_without_translation(let, inverse_mass: V1, column: V6, other: V6) -> dict:
-    """Term that elimination of translation subtracts from H_kl: f_k . f_l / M."""
+    """What eliminating translation takes from H_kl: f_k . f_l / M."""
     return {"A_entry": [-inverse_mass[0] * column[0:3, :].dot(other[0:3, :])]}
 
 
@@ -47,7 +47,7 @@ def tail_load(let, inverse_mass: V1, net: V3, column: V6, inertial: V1, tau: V1)
 
 
 def column_acceleration(let, column: V6, acceleration: V1) -> dict:
-    """f_k q_ddot_k: the rate of momentum by one tail coordinate, with B at rest."""
+    """f_k q_ddot_k: the momentum rate that one tail coordinate gives at rest of B."""
     return {"tail_force": column[0:3, :] * acceleration[0]}
 
 
@@ -60,23 +60,25 @@ def base_acceleration(
 
 
 def free_acceleration(let, inverse_mass: V1, com: V3, net: V3, w_dot: V3) -> dict:
-    """Acceleration of B, minus gravity, by a net force: net / M - omega_dot x c, torso axes."""
+    """Acceleration of B, gravity taken off, of what a net force moves: net / M - omega_dot x c,
+    torso axes.
+    """
     return {"a": inverse_mass[0] * net - w_dot.cross(com)}
 
 
 def coupling_torque(let, column: V6, a: V3, w_dot: V3) -> dict:
-    """Contribution of the torso's accelerations to the torque of one tail coordinate."""
+    """What accelerations of the torso add to the torque of one tail coordinate."""
     return {"torque": [column[0:3, :].dot(a) + column[3:6, :].dot(w_dot)]}
 
 
 def turned_acceleration(let, R: M33, a: V3) -> dict:
-    """Change of p_b_ddot = R_b a - g z with a rotation of the torso in body axes: columns R_b (e_k
-    x a), row by row.
+    """How p_b_ddot = R_b a - g z moves with a turn of the torso in body axes: columns R_b (e_k x
+    a), row by row.
     """
     columns = [R * axis.cross(a) for axis in (X, Y, Z)]
     return {f"row_{r}": Matrix([column[r] for column in columns]) for r in range(3)}
 
 
 def turning_acceleration(let, R: M33, a: V3, turn: V3, p_ddot: V3) -> dict:
-    """Add the change of p_b_ddot = R_b a - g z with a rotation of the torso in body axes."""
+    """Add what a turn of the torso in body axes does to p_b_ddot = R_b a - g z."""
     return {"p_ddot": p_ddot + R * let("swept", turn.cross(a))}
