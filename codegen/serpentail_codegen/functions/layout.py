@@ -1,6 +1,6 @@
-"""Where the numbers of q, v and tau lie: the generator's twin of serpentail.model.layout.
+"""The positions of numbers in q, v and tau; the runtime has the same in serpentail.model.layout.
 
-A velocity, its derivative and a generalised force have one layout, and so have the rows of H.
+A velocity, its derivative, a generalised force and a row of H have the same layout.
 """
 
 from dataclasses import dataclass

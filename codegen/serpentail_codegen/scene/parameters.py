@@ -11,7 +11,7 @@ Value = float | tuple[float, ...]
 
 @dataclass(frozen=True)
 class Rule:
-    """What a value must fulfil: in words that complete "needs ...", as a test, as JSON Schema."""
+    """A condition on a value: as words that complete "needs ...", as a test, and as JSON Schema."""
 
     text: str
     holds: Callable[[Any], bool]
@@ -32,12 +32,13 @@ BODY_INERTIA = Rule(
 
 @dataclass(frozen=True)
 class Parameter:
-    """One physical parameter: `size` numbers in `unit`; no default: computed from the others.
+    """One physical parameter: `size` numbers in `unit`; without a default it is computed from the
+    others.
 
     ``needs`` is a group of contact points, or "contacts" for any of them; empty: every scene has
-    the parameter.  ``tail`` tells of what tails it is: "equal", of equal pieces; "link" or "arc",
-    of pieces with values of their own, ``size`` numbers for each; "tilted"; "free", of a torso that
-    moves; "weight", of all but the weightless; empty: of all.
+    the parameter.  ``tail`` says which tails have it: "equal", tails of equal pieces; "link" or
+    "arc", tails whose pieces have their own values, ``size`` numbers each; "tilted", tails on
+    turned axes; "free", tails of a torso that moves; "weight", all but weightless ones; empty: all.
     """
 
     name: str
@@ -220,7 +221,7 @@ PARAMETERS = (
 
 @dataclass(frozen=True, eq=False)
 class Parameters(Mapping[str, Value]):
-    """Parameters with values, in the order of PARAMETERS; no link_radius where a scene names
+    """Parameters with values, in the order of PARAMETERS; without link_radius if a scene names
     link_inertia.
     """
 

@@ -1,4 +1,4 @@
-"""Functions of a plan's nodes: airborne motion without drift and omega among the unknowns."""
+"""Functions of a plan's nodes: airborne motion, with drift and omega eliminated."""
 
 from .arguments import ANGULAR, TAU, Argument
 from .signature import NAMED, PLANNING, Signature

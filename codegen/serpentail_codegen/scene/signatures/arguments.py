@@ -1,7 +1,7 @@
-"""The arguments of functions: their names, shapes, and what their numbers mean.
+"""The arguments of functions: their names, shapes and meanings.
 
-A shape is made of numbers and of names of sizes, such as ("nv", "nv"): what these are, a tail says
-(`functions.tail.Tail` has a property of each name).
+A shape consists of numbers and names of sizes, such as ("nv", "nv"). `functions.tail.Tail` has a
+property for each name.
 """
 
 from dataclasses import dataclass

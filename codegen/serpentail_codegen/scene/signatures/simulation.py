@@ -1,4 +1,4 @@
-"""Functions that simulations are made of: contact, tracking, implicit methods, and whole runs."""
+"""Functions for simulations: contact, tracking, implicit methods, and whole runs."""
 
 from .arguments import (
     ACCELERATIONS,

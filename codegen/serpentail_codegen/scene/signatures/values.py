@@ -1,4 +1,4 @@
-"""Functions of one state: the terms of the equations of motion, energy, momentum and places."""
+"""Functions of one state: terms of the equations of motion, energy, momentum and positions."""
 
 from .arguments import (
     ANGULAR,

@@ -56,7 +56,7 @@ ROLLOUTS = fields(
     ("work", "real *", "workspace; it contains the flights between calls"),
 )
 SLOTS = 10  # states in the workspace: start, seven rates, end, error of an adaptive step
-LEDGER = 2  # numbers that a flight adds up behind its state
+LEDGER = 2  # numbers that a flight sums up, stored behind its state
 
 
 @dataclass(frozen=True)
@@ -72,17 +72,17 @@ class BatchRollout:
 
     @property
     def given(self) -> int:
-        """Where torques lie in the workspace: behind the parameters."""
+        """Return the position of torques in the workspace: behind the parameters."""
         return self.states * self.parameters
 
     @property
     def state(self) -> int:
-        """Where the states lie: behind given torques, damping and torques in all."""
+        """Return the position of the states: behind given torques, damping and total torques."""
         return self.given + 3 * self.states * self.nt
 
     @property
     def inner(self) -> int:
-        """Where the workspace of forward dynamics begins."""
+        """Return the position of the workspace of forward dynamics."""
         return padded(self.state + SLOTS * self.states * self.size)
 
     @property
@@ -94,7 +94,7 @@ class BatchRollout:
 def batch_rollout(
     scene: Scene, tail: Tail, printed: Sequence[PrintedFunction]
 ) -> BatchRollout | None:
-    """Return the batch rollout of a scene that has a rollout, a free torso, and touches nothing."""
+    """Return the batch rollout of a scene with rollout and a free torso, but without contacts."""
     if "rollout" not in scene.functions or scene.contacts or tail.shape.fixed:
         return None
     (dynamics,) = (f.function for f in printed if f.function.name == "forward_dynamics")
@@ -122,8 +122,8 @@ def batch_rollout_file(
 
 
 def rollout_context(scene: Scene, rollout: BatchRollout) -> dict[str, Any]:
-    """Return what the template lays out other than the model's does."""
-    # states and torques have names of their own; parameters lie at the begin of the workspace
+    """Return the values that differ from those of the model's template."""
+    # states and torques have their own names; parameters are at the start of the workspace
     arguments, place, places = [], 0, {}
     for array in rollout.program.of_role("input"):
         if array.name in ("q", "v", "tau"):

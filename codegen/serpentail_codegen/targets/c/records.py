@@ -1,8 +1,9 @@
-"""The records of a simulation: C structs that its caller fills in, and that keep it between calls.
+"""The records of a simulation: C structs that the caller fills in, and that hold its state between
+calls.
 
-One table says for each record which members it has, with their C types and meanings.  The header's
-structs and the manifest's list of members, by which the runtime builds the same structs, are both
-made of it.
+One table lists the members of each record, with their C types and meanings. The header's structs
+and the manifest's list of members follow from it; the runtime builds the same structs from the
+manifest.
 """
 
 import re
@@ -24,7 +25,7 @@ class Field:
 
     @property
     def kind(self) -> str:
-        """What a caller in another language stores there."""
+        """Return what a caller in another language stores in it."""
         return "pointer" if "*" in self.type or self.type == "torque" else self.type
 
 
@@ -185,7 +186,7 @@ KEPT = fields(
 
 
 def contact_samples(has: SimulationFeatures) -> list[Field]:
-    """Return the members that a run with contact has."""
+    """Return the members that a run with contacts has."""
     return BRISTLES[1:] + EVENT_FIELDS if has.contacts else []
 
 

@@ -1,4 +1,4 @@
-"""All functions of a scene for CasADi, and what the templates lay out of them."""
+"""All functions of a scene for CasADi, and the values for their templates."""
 
 from typing import Any
 
@@ -19,7 +19,7 @@ MEANINGS = {  # prefixes of CasADi's names -> what such a function returns
 
 
 def externals(scene: Scene, tail: Tail, works: dict[str, int]) -> list[External]:
-    """Return every function that CasADi can call, derivatives after what they are of."""
+    """Return every function that CasADi can call, each derivative after its function."""
     sizes = {"q": tail.nq, "v": tail.nv, "v_dot": tail.nv, "force": tail.nv, "tau": tail.nt}
     sizes["parameters"] = sum(p.size for p in struct_parameters(scene))
 
@@ -33,7 +33,7 @@ def externals(scene: Scene, tail: Tail, works: dict[str, int]) -> list[External]
 
     for name in works:
         plain(begin(name), name, sizes)
-    # derivatives by CasADi's q are made for a torso that turns
+    # derivatives by CasADi's q exist only for a free torso
     for f in () if tail.shape.fixed else DYNAMICS:
         for kind, make in (("jac_", jacobian), ("adj1_", adjoint), ("jac_adj1_", hessian)):
             if f.has(works, kind):
@@ -42,7 +42,7 @@ def externals(scene: Scene, tail: Tail, works: dict[str, int]) -> list[External]
 
 
 def callable_for(scene: Scene, name: str, works: dict[str, int]) -> dict[str, int]:
-    """Return what a function may be made of: no derivatives by parameters that are folded in."""
+    """Return the functions that may be used: no derivatives by parameters that are folded in."""
     suffix = "_parameter_derivatives"
     return {
         other: work
@@ -52,7 +52,7 @@ def callable_for(scene: Scene, name: str, works: dict[str, int]) -> dict[str, in
 
 
 def casadi_context(scene: Scene, tail: Tail, works: dict[str, int]) -> dict[str, Any]:
-    """Return what the templates of ``casadi.external`` lay out."""
+    """Return the values for the templates of ``casadi.external``."""
     made = externals(scene, tail, works) if scene.real == "double" else []
     ports = [port for e in made for port in (*e.inputs, *e.outputs)]
     patterns = sorted({port.pattern for port in ports})
