@@ -31,7 +31,9 @@ tilt = np.degrees(np.arccos(np.clip(upright, -1, 1)))
 plt.style.use("seaborn-v0_8-colorblind")
 figure, axes = plt.subplots(3, 1, figsize=(7, 5.4), sharex=True, layout="constrained")
 axes[0].plot(motion.t, motion.q[:, 2])
-axes[0].set(ylabel="height (m)", title="A planned swing of the tail ends upright, just before the landing")
+axes[0].set(
+    ylabel="height (m)", title="A planned swing of the tail ends upright, just before the landing"
+)
 axes[1].plot(motion.t, tilt, color="C1")
 axes[1].set(ylabel="tilt (deg)", yticks=[0, 90, 180])
 axes[2].plot(motion.t, 1e3 * motion.tau, label=["pitch", "yaw"])

@@ -59,8 +59,9 @@ def view(
     motions: a Trajectory, or several.  path: an .html file; it is complete in itself, fetches
     nothing, and replaces what was there once it is whole.  With ``None`` nothing is written: the
     result is the page itself, which a notebook shows (at most 600 samples of each motion).
-    names: of the motions, by default what each is.  model: of motions that were loaded from files; others know theirs.
-    markers: of each motion, where markers were seen at its samples, (K, M, 3) m, nan in gaps.
+    names: of the motions, by default what each is.  model: of motions that were loaded from
+    files; others know theirs.  markers: of each motion, where markers were seen at its samples,
+    (K, M, 3) m, nan in gaps.
     More than 2400 samples are thinned, which the page says, as it says that a run failed.  Raises
     ViewError with argument, value and remedy, ModelError where the model lacks ``tail_points``.
     """
