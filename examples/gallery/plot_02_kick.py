@@ -25,7 +25,7 @@ for name in ("take_off_s", "apex_m", "recontact_s", "body_weight_N"):
 plt.style.use("seaborn-v0_8-colorblind")
 figure, (left, right) = plt.subplots(1, 2, figsize=(7, 3.4), layout="constrained")
 left.plot(motion.t, motion.q[:, 2])
-left.axhline(0, color="C3", linewidth=0.8)
+left.axhline(0, color="0.5", linewidth=0.8)
 for name, word in [("take_off_s", "take-off"), ("recontact_s", "landing")]:
     time = numbers[name]
     height = np.interp(time, motion.t, motion.q[:, 2])

@@ -23,7 +23,8 @@ functions = "mass_matrix bias_force inverse_dynamics forward_dynamics tail_point
 functions += " momentum rollout forward_dynamics_derivatives"
 functions += " forward_dynamics_parameter_derivatives"
 model = st.build("identify_tail", functions=functions.split())
-truth = dict(tail_mass=3.51e-3, tail_length=0.19466, tail_stiffness=2e-3, tail_damping=5e-5)
+truth = {"tail_mass": 3.51e-3, "tail_length": 0.19466}
+truth |= {"tail_stiffness": 2e-3, "tail_damping": 5e-5}
 torso = {"nose": (0, 50, 10), "left": (-25, -20, 20), "right": (25, -20, 20), "back": (0, 0, 30)}
 markers = {name: st.Marker(torso=1e-3 * np.array(place)) for name, place in torso.items()}
 markers |= {f"tail{k}": st.Marker(tail=k / 4, offset=(0, 0, 3e-3)) for k in (1, 2, 3, 4)}
@@ -49,13 +50,12 @@ print(found.table)
 # Each bar is a 95 % interval about the estimate, in per cent of the truth. The search
 # began with the numbers of the scene, some of them far away.
 
-plt.style.use("seaborn-v0_8-colorblind")
 figure, ax = plt.subplots(figsize=(7, 2.8), layout="constrained")
 for k, (each, true) in enumerate(zip(found.parameters, truth.values(), strict=True)):
     numbers = np.array([each.low, each.value, each.high, each.begin])
     low, value, high, begin = 100 * (numbers / true - 1)
     ax.errorbar(value, k, xerr=[[value - low], [high - value]], fmt="o", capsize=4, color="C0")
-    ax.plot(begin, k, "x", color="C2")
+    ax.plot(begin, k, "x", color="C1")
     ax.annotate("begin", (begin, k), (0, 5), textcoords="offset points", ha="center")
 ax.grid(axis="x")
 ax.set_yticks(range(4), ["mass", "length", "stiffness", "damping"])

@@ -50,7 +50,12 @@ ax.set_title("Long and heavy tails turn the torso most")
 plt.show()
 
 # %%
-# The same idea with 20400 plans instead of 121 swings is the study of the page *What a
-# tail is worth*: how many tumbles does a tail right? Here is the motion of one point.
+# The page *What a tail is worth* asks a larger question in the same way, with a plan at
+# each point: how many tumbles does a tail right?
+#
+# .. image:: /images/morphology.png
+#    :alt: Righted share, energy and duration against length, mass and taper of the tail
+#
+# Here is the motion of one point of our sweep.
 
 sweep.motion(60)

@@ -34,7 +34,7 @@ def tip(motion):
 
 # %%
 # The first joint bends at the very root of the tail, where an arc has not bent yet. This
-# difference, and that of the motions, halves when the number of links doubles.
+# difference, and that of the motions, about halves when the number of links doubles.
 
 plt.style.use("seaborn-v0_8-colorblind")
 figure, (left, right) = plt.subplots(1, 2, figsize=(7, 3.4), layout="constrained")
