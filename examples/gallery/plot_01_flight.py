@@ -4,7 +4,7 @@ What a tumbling animal keeps in flight
 
 A kangaroo rat tumbles in the air. Only gravity acts from outside, and gravity
 has no moment about the centre of mass. Therefore the angular momentum stays
-constant, whatever the tail does. The total energy stays constant only if no
+constant, whatever the tail does. The total energy stays constant, too, if no
 torque acts at the joints of the tail.
 
 We simulate the same start twice: with a free tail, and with a damper at each
@@ -52,6 +52,6 @@ print(f"energy of the free tail: {np.abs(free.energy - free.energy[0]).max():.0e
 print(f"angular momentum of the damped tail: {momentum:.0e} kg m^2/s")
 
 # %%
-# Both flights over each other. Press the space bar to stop them.
+# Both flights over each other. Click *Play*, or drag the slider.
 
 st.view([free, damped], None, names=["free tail", "damped tail"])

@@ -32,8 +32,8 @@ for name, plan in plans.items():
     print(f"{name}: found {plan.success}, {plan.duration:.3f} s, {plan.report['energy_J']:.2g} J")
 
 # %%
-# The plan of least time works at the torque limits. Its tail turns fast and costs
-# sixty times the energy of the cheapest plan.
+# The plan of least time begins at the torque limit of 20 mN m. Its tail turns fast,
+# and it needs sixty times the energy of the cheapest plan.
 
 plt.style.use("seaborn-v0_8-colorblind")
 figure, (top, bottom) = plt.subplots(2, 1, figsize=(7, 4.6), sharex=True, layout="constrained")
