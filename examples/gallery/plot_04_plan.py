@@ -34,11 +34,13 @@ plain = st.plan(model, **task)  # least effort, any power
 
 
 def straight(point):
+    """Small torques, a straight tail."""
     return casadi.sumsqr(point.torque / 0.02) + casadi.sumsqr(point.tail)
 
 
 def power(point):
-    return casadi.dot(point.torque, point.tail_rate) / 0.03  # of 30 mW
+    """All motors together, as a part of 30 mW."""
+    return casadi.dot(point.torque, point.tail_rate) / 0.03
 
 
 own = st.plan(model, **task, objective=straight, path=[(power, -1, 1)], intervals=24)

@@ -1,6 +1,6 @@
 """
-Learning to fall on the feet
-============================
+Learning to turn upright in a fall
+==================================
 
 ``st.environments`` makes many Gymnasium environments that are simulated together.
 Here 1024 rats fall at once, with random tilt and spin. A linear policy learns to right

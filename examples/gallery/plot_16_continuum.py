@@ -17,6 +17,7 @@ functions = ["forward_dynamics", "rollout", "tail_points", "energy", "momentum"]
 
 
 def flight(model, links=1):
+    """Return a flight that begins with the same bend, shared by all links."""
     q = [0, 0, 0.3, 1, 0, 0, 0, BEND / links, 0.5 / links]
     settings = {"t_span": 0.3, "output_step": 1e-3, "rtol": 1e-9}
     return st.simulate(model, q, [0, 0, 1.5, *SPIN, 0, 0], **settings)
@@ -29,6 +30,7 @@ linked = [flight(st.build(**tail, links=n), n) for n in counts]
 
 
 def tip(motion):
+    """Return where the tip of the tail is at each time (m)."""
     return np.array([motion.model.tail_points(q)[-1] for q in motion.q])
 
 

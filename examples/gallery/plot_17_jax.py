@@ -23,7 +23,8 @@ q0 = np.r_[0, 0, 1, np.cos(0.4), np.sin(0.4), np.zeros(4)]  # pitched up by 0.8 
 v0 = np.r_[0, 0, 1.5, np.zeros(5)]
 
 
-def step(x, u):  # classical Runge-Kutta
+def step(x, u):
+    """One step of the classical Runge-Kutta method."""
     k1 = rat.x_dot(x, u)
     k2 = rat.x_dot(x + STEP / 2 * k1, u)
     k3 = rat.x_dot(x + STEP / 2 * k2, u)
@@ -32,7 +33,8 @@ def step(x, u):  # classical Runge-Kutta
     return x, x[7:9]
 
 
-def loss(torques):  # (COUNT, 2) mN m
+def loss(torques):
+    """Tilt at the end, and bends of the tail, under torques (COUNT, 2) in mN m."""
     x, bends = jax.lax.scan(step, jnp.r_[q0, v0], 1e-3 * torques)
     return 2 * jnp.sum(x[4:6] ** 2) + 0.1 * jnp.mean(bends**2)  # 1 - z of the back, bends
 

@@ -32,7 +32,8 @@ def view(
     names: Sequence[str] | None = None,
     model: Model | None = None,
     markers: Sequence[Any] | None = None,
-) -> Path: ...
+) -> Path:
+    """Write a page that shows motions over each other; return its path."""
 
 
 @overload
@@ -43,7 +44,8 @@ def view(
     names: Sequence[str] | None = None,
     model: Model | None = None,
     markers: Sequence[Any] | None = None,
-) -> "Page": ...
+) -> "Page":
+    """Return a page that shows motions over each other, for a notebook."""
 
 
 def view(
