@@ -3,6 +3,7 @@
 import ast
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -20,6 +21,18 @@ EXTRAS = {"casadi": "plan", "jax": "jax", "jax.numpy": "jax"}
 OF_NAMES = {"plan": "plan", "Mpc": "plan", "environments": "gym", "jax_functions": "jax"}
 STILL = {"plot_14_board", "plot_15_learning"}  # nothing that moves is shown
 QUICK = {"plot_08_robot", "plot_09_elastic_tail", "plot_12_sweep"}  # others: over 5 s from nothing
+
+# What scripts print where their story is true.
+SAID = {
+    "plot_03_sequence": "landed on its feet: True",
+    "plot_04_plan": "links: success",
+    "plot_05_objectives": r"(found True.*\s+.*){3}",
+    "plot_06_mpc": r"(?s)PFL: tilted by \d\d.* deg.*MPC: tilted by [01]\.\d deg",
+    "plot_07_gecko": "links: success",
+    "plot_12_sweep": "121 of 121 points done, 0 of them failed",
+    "plot_13_casadi_mpc": r"68\.8 deg at the start, 0\.\d+ deg at the end",
+    "plot_17_jax": r"tilt 45\.8, then \d\.\d deg",
+}
 
 # Runs a script as the site does: the value of the last expression is what the page shows.
 DRIVER = """
@@ -89,7 +102,7 @@ def is_private(node: ast.AST) -> bool:
 
 def test_there_are_a_dozen_or_more():
     assert len(SCRIPTS) >= 12
-    assert {path.stem for path in SCRIPTS} >= STILL | QUICK
+    assert {path.stem for path in SCRIPTS} >= STILL | QUICK | SAID.keys()
     assert [path for path in FOLDER.glob("*.py") if path not in SCRIPTS] == []
     header = (FOLDER / "GALLERY_HEADER.rst").read_text(encoding="utf-8").splitlines()
     assert header[0] == "Gallery" and header[1] == "=" * len(header[0])
@@ -136,7 +149,8 @@ def run(script: Path, folder: Path) -> dict:
     )
     assert (done.returncode, done.stderr) == (0, "")
     assert list(place.iterdir()) == []
-    return json.loads(done.stdout.splitlines()[-1])
+    *printed, told = done.stdout.splitlines()
+    return json.loads(told) | {"printed": "\n".join(printed)}
 
 
 def marked(script: Path):
@@ -150,6 +164,7 @@ def test_a_script_runs_anywhere_and_draws(script, tmp_path):
     assert told["figures"] >= 1 and told["width"] <= WIDEST
     assert any(title for title, _, _ in told["axes"])
     assert all(across or up for _, across, up in told["axes"])
+    assert re.search(SAID.get(script.stem, ""), told["printed"])
     moving = "<iframe" in told["shown"]
     assert moving == (script.stem not in STILL), told["shown"][:300]
     assert "Without the page" not in told["shown"]
