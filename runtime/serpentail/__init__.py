@@ -5,7 +5,8 @@ from typing import Any
 
 __version__ = "0.1.0"
 _HOME = {
-    **dict.fromkeys(["load", "Model"], "model.model"),
+    "load": "model.load",
+    "Model": "model.model",
     "build": "building.build",
     "examples": "building.examples",
     **dict.fromkeys(["progress", "Progress"], "stages"),

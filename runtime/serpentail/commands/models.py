@@ -26,7 +26,7 @@ def model_of(place: str) -> "Model":
     """Return the model of a generated folder, else of a scene file or an example."""
     from ..building.build import build
     from ..building.examples import example_paths
-    from ..model.model import load
+    from ..model.load import load
 
     scene = Path(place).suffix == ".toml" or (place in example_paths() and not Path(place).exists())
     return build(place) if scene else load(place)

@@ -9,8 +9,9 @@ from ..building.build import built
 from ..building.examples import tables_of_scene
 from ..checks import refusal, shown
 from ..errors import ModelError, SerpentailError
+from ..model.load import load, model_from
 from ..model.manifest import read_manifest
-from ..model.model import Model, load, model_from
+from ..model.model import Model
 from ..model.parameters import merged
 from ..units import in_unit
 

@@ -13,8 +13,9 @@ from typing import Any
 from ..errors import SerpentailError
 from ..exporting.bundle import zipped
 from ..model.cache import MODELS, cache_folder, refuse_others, workshop
+from ..model.load import model_from
 from ..model.manifest import CheckedFolder, read_folder
-from ..model.model import Model, model_from
+from ..model.model import Model
 from ..model.snapshot import contents, snapshot
 from .job import Job
 

@@ -4,8 +4,9 @@ import dataclasses
 from pathlib import Path
 
 from ..errors import ModelError, ViewError
+from ..model.load import model_from
 from ..model.manifest import read_folder
-from ..model.model import Model, model_from
+from ..model.model import Model
 from ..model.parameters import independent
 from ..model.snapshot import restored
 from ..motion.trajectory import Trajectory
