@@ -8,8 +8,9 @@ import numpy as np
 from ..checks import numbers_in, refusal
 from ..errors import SimulationError
 from ..model.model import Model
-from .controllers import Controller, NativeTorque, Parts, TorqueFunction, parts_of, phases_of
+from .controllers import Controller, NativeTorque, parts_of, phases_of
 from .ctrl_c import CtrlC
+from .parts import Parts, TorqueFunction
 from .piecewise import Piecewise
 from .records import CFunction, Records
 
