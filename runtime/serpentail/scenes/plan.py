@@ -7,8 +7,8 @@ from typing import Any
 from .. import extras
 from ..checks import Refusals, needed, refusal, shown
 from ..errors import PlanningError
+from ..planning.goal import Bounds, Goal
 from ..planning.planner import plan
-from ..planning.problem import Bounds, Goal
 from ..planning.result.plan import Plan
 from .file import model_of, read_scene, size_of, subtable
 from .keys import read, sized

@@ -7,7 +7,7 @@ import numpy as np
 from ..errors import SimulationError
 from ..model.layout import QUATERNION, TAIL_Q
 from ..model.model import Model
-from ..planning.problem import Goal
+from ..planning.goal import Goal
 from ..planning.result.full_state import com_at_start
 
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])

@@ -9,7 +9,8 @@ import numpy as np
 
 from ...attitude import pitch_roll_yaw
 from ...model.layout import POSITION
-from ..problem import Goal, PlanningProblem
+from ..goal import Goal
+from ..problem import PlanningProblem
 from .coordinates import Attitude
 from .direct import goal_matrix
 from .indices import columns_of

@@ -1,4 +1,4 @@
-"""What a user asks of a predictive controller, checked field by field."""
+"""Settings of ``Mpc``, checked one by one."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -35,7 +35,7 @@ class Settings:
 
 
 def checked_settings(plan: Plan, given: dict[str, Any]) -> Settings:
-    """Return the settings, of which some may be left out; PlanningError where one is wrong."""
+    """Return the settings, with defaults for those left out; PlanningError if one is wrong."""
     for name in given:
         unknown = none_of("Mpc: setting", name, NAMES)
         if unknown:
@@ -64,7 +64,7 @@ def checked_settings(plan: Plan, given: dict[str, Any]) -> Settings:
 
 
 def refuse_unable(model: Model, plan: Plan) -> None:
-    """PlanningError where a model or a plan cannot be controlled."""
+    """PlanningError if the model or the plan cannot be controlled."""
     model.refuse_fixed("Mpc")
     missing = [name for name in NEEDED.values() if name not in model.generated]
     if missing:
