@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.sweeps.sweep import Status
+from serpentail.sweeps.result import Status
 from tests.support import swept
 
 Q0 = [0, 0, 0.34, 1, 0, 0, 0, 0.2, 0]

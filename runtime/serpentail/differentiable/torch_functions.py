@@ -1,4 +1,4 @@
-"""A model's functions as PyTorch's operators, which autograd differentiates."""
+"""A model's functions as PyTorch operators, which autograd differentiates."""
 
 from typing import Any
 from weakref import WeakValueDictionary

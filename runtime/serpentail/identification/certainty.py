@@ -1,4 +1,4 @@
-"""How certain estimates are: noise, covariance, intervals, and what the data cannot determine."""
+"""Certainty of estimates: noise, covariance, intervals, and what the data cannot determine."""
 
 from dataclasses import dataclass
 
@@ -19,8 +19,10 @@ FLAT = 1e3  # by how much a wider prior on torques tells what is known from the 
 
 @dataclass(frozen=True)
 class Combination:
-    """Unknowns that change together: the relative change of each by name, the standard deviation of
-    that, relative, too (inf where nothing tells it), and whether a prior alone determines it.
+    """Parameters that change together without much effect on the data.
+
+    parts: relative change of each parameter; std: relative standard deviation of the combination,
+    inf if no data determine it; by_prior: only a prior determines it.
     """
 
     parts: dict[str, float]

@@ -18,14 +18,9 @@ from .certainty import (
     spread_of_noise,
 )
 from .doubts import tell_of_residuals
+from .estimates import Estimate, EstimatedTorques, IdentifiedTrial
 from .placement import Placements
-from .result import (
-    Estimate,
-    EstimatedTorques,
-    Identification,
-    IdentifiedTrial,
-    trajectory_of,
-)
+from .result import Identification, trajectory_of
 from .search import Task
 from .solve import Fit, triangle
 from .torques import Known, TorquePrior

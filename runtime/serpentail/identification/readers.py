@@ -1,4 +1,4 @@
-"""Reads marker tracks from files: TRC, CSV and C3D."""
+"""``read_markers``: reads marker tracks from TRC, CSV and C3D files."""
 
 import csv
 import io
@@ -26,12 +26,38 @@ def read_markers(
     axes: str = "xyz",
     zeros: str = "refuse",
 ) -> MarkerTracks:
-    """Return the marker tracks of a TRC, CSV or C3D file; C3D needs the extra "c3d".
+    """Read marker tracks from a TRC, CSV or C3D file.
 
-    unit: of a file that states none, as CSV; one that a file states must be this one.  axes, zeros:
-    as of ``marker_tracks``.
-    A CSV file has a line of names, ``time``, then ``NAME_x``, ``NAME_y``, ``NAME_z`` of each
-    marker; empty cells and nan are gaps.  Raises IdentificationError with the line of the file.
+    Parameters
+    ----------
+    path : str or path
+        The file. C3D needs the extra "c3d".
+    unit : str, optional
+        Unit of a file that states none, such as a CSV file. If the file states a unit, it must
+        be the same.
+    axes, zeros : str
+        As of ``marker_tracks``.
+
+    Returns
+    -------
+    MarkerTracks
+        The tracks.
+
+    Raises
+    ------
+    IdentificationError
+        The file cannot be read; the message names the line.
+    ExtraMissing
+        A C3D file is read without the extra "c3d".
+
+    Notes
+    -----
+    The first line of a CSV file names the columns: ``time``, then ``NAME_x``, ``NAME_y`` and
+    ``NAME_z`` of each marker. Empty cells and nan are gaps.
+
+    Examples
+    --------
+    >>> tracks = st.read_markers("flight.csv", unit="mm", axes="zxy")  # doctest: +SKIP
     """
     try:
         source = Path(path)
@@ -107,7 +133,7 @@ def _whole(source: Path, header: dict[str, str], key: str) -> int:
 
 
 def _check_rate(source: Path, times: np.ndarray, stated: str | None) -> None:
-    """IdentificationError where the times have another rate than a file states."""
+    """IdentificationError if the times do not have the rate that the file states."""
     try:
         rate = float(stated or "nan")
     except ValueError:
@@ -122,7 +148,7 @@ def _check_rate(source: Path, times: np.ndarray, stated: str | None) -> None:
 
 
 def _cells(source: Path, line: int, cells: list[str], count: int) -> list[float]:
-    """Return the numbers of a line, nan in empty cells; IdentificationError where some lack."""
+    """Return the numbers of a line, nan in empty cells; IdentificationError if some are missing."""
     cells = [cell.strip() for cell in cells]
     while len(cells) > count and not cells[-1]:
         cells.pop()
@@ -152,7 +178,7 @@ def _csv(source: Path) -> Read:
 
 
 def _c3d(source: Path) -> Read:
-    """Read a C3D file through ezc3d, where markers that were not seen are nan."""
+    """Read a C3D file with ezc3d, which gives nan for markers that were not seen."""
     ezc3d = needed("ezc3d", "c3d")
     try:
         content = ezc3d.c3d(str(source))

@@ -7,8 +7,8 @@ import numpy as np
 
 from .animal import Pen, draw_animal, draw_ground, draw_marks, draw_shadow
 from .encode import Picture
-from .filmstrip import Strip
 from .page import drawn_points, window_around
+from .strip import Strip
 from .style import INK, QUIET, STYLE, Array
 from .views import View
 

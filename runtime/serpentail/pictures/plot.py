@@ -1,4 +1,4 @@
-"""``plot``: panels over time, such as height, attitude, tail and forces, on one time axis."""
+"""``plot``: panels over time, such as height, attitude, tail and forces."""
 
 import math
 import os
@@ -36,14 +36,41 @@ def plot(
     path: str | os.PathLike[str] | None = None,
     model: Model | None = None,
 ) -> tuple["Figure", Any]:
-    """Draw panels over time; return figure and axes, an array of them unless `ax` is one.
+    """Draw panels of a motion over time.
 
-    panels: names out of "height", "attitude", "tilt", "tail", "torque", "force", "rate", "energy",
-    "momentum", "angular_momentum"; by default all that do not stay zero.  ax: axes to draw on, as
-    many as panels; without them a figure of its own.  path: also write the figure to this .pdf,
-    .png or .svg file, whole or not at all.  model: of a motion from a file, so that the bends of
-    its segments are known.  Vertical lines are touch-downs (solid) and take-offs (dashed).
-    Raises ViewError with argument, value and remedy, ExtraMissing without the extra "plot".
+    Vertical lines are touch-downs (solid) and take-offs (dashed).
+
+    Parameters
+    ----------
+    motion : Trajectory
+        The motion.
+    *panels : str
+        Names: "height", "attitude", "tilt", "tail", "torque", "force", "rate", "energy",
+        "momentum", "angular_momentum". Default: all that do not stay zero.
+    ax : matplotlib.axes.Axes or sequence of these, optional
+        Axes to draw on, as many as panels. Default: a new figure.
+    path : str or path, optional
+        A .pdf, .png or .svg file to write the new figure to, whole or not at all.
+    model : Model, optional
+        The model of a motion that was read from a file; it is needed for the bends of segments.
+
+    Returns
+    -------
+    figure : matplotlib.figure.Figure
+        The figure.
+    axes : matplotlib.axes.Axes or ndarray of these
+        The given axes, else an array of the new ones.
+
+    Raises
+    ------
+    ViewError
+        An argument is wrong.
+    ExtraMissing
+        Matplotlib is not installed; it comes with the extra "plot".
+
+    Examples
+    --------
+    >>> figure, axes = st.plot(motion, "height", "tail")  # doctest: +SKIP
     """
     needed("matplotlib", "plot")
     names = [one_of(f"panels[{k}]", name, PANELS, ViewError) for k, name in enumerate(panels)]

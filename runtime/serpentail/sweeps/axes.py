@@ -1,138 +1,29 @@
-"""What a sweep goes over: grids of values, and points at random or spread evenly."""
+"""The axes of a sweep together: which points they give."""
 
-import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
 import numpy as np
 
-from ..checks import finite_array, needed, one_of, refusal, shown
+from ..checks import needed, refusal, shown
 from ..errors import SweepError
-from ..units import MEASURES, in_unit
+from .axis import Grid, Spread
 
 MOST_POINTS = 10_000_000
 MOST_SEED = 2**63 - 1
-LAWS = ("uniform", "log")
 Point = dict[str, Any]  # name -> plain data
 Names = str | tuple[str, ...]
 
 
-@dataclass(frozen=True)
-class Grid:
-    """Values that a sweep takes one after another."""
-
-    values: tuple[Any, ...]
-
-
-@dataclass(frozen=True)
-class Spread:
-    """Numbers between two bounds, of any shape; way: how points are spread in them."""
-
-    way: str
-    low: np.ndarray
-    high: np.ndarray
-    law: str
-
-    def at(self, unit: np.ndarray) -> np.ndarray:
-        """Return the numbers (k, ...) at places (k, size) from 0 to 1 between the bounds."""
-        places = unit.reshape(-1, *self.low.shape)
-        if self.law == "log":
-            return np.exp(np.log(self.low) + places * (np.log(self.high) - np.log(self.low)))
-        return self.low + places * (self.high - self.low)
-
-
-def grid(values: Any) -> Grid:
-    """Return an axis of a sweep that takes each of these values: numbers, arrays, texts, tables.
-
-    Several grids give all their combinations.  A grid may belong to several names at once, as
-    ``over={("segments", "links"): st.grid([(1, 6), (2, 3)])}``: its values are then rows, one entry
-    a name.  Raises SweepError where there are none.
-    """
-    if isinstance(values, str | Mapping) or not hasattr(values, "__iter__"):
-        raise refusal("grid", values, "a list of values", SweepError)
-    found = tuple(in_si("grid", plain("grid", value)) for value in values)
-    if not found:
-        raise SweepError("grid: no values: needs one or more")
-    return Grid(found)
-
-
-def random(low: Any, high: Any, law: str = "uniform") -> Spread:
-    """Return an axis of independent random numbers between two bounds, numbers or arrays.
-
-    law: "uniform", or "log" for numbers above 0 whose logarithms are uniform.  How many points
-    there are, and their seed, is the sweep's to say: see ``sweep``.  All axes that are spread make
-    points together, and these are combined with all grids.  Raises SweepError.
-    """
-    return _spread("random", low, high, law)
-
-
-def latin(low: Any, high: Any, law: str = "uniform") -> Spread:
-    """Return an axis whose points are a Latin hypercube: each of k equal parts of it has one.
-
-    Arguments and errors as of ``random``; scipy.stats.qmc.LatinHypercube makes the points.
-    """
-    return _spread("latin", low, high, law)
-
-
-def sobol(low: Any, high: Any, law: str = "uniform") -> Spread:
-    """Return an axis whose points are Sobol's, scrambled: even in all axes together.
-
-    Take a power of two of them.  Arguments and errors as of ``random``; scipy.stats.qmc.Sobol makes
-    the points.
-    """
-    return _spread("sobol", low, high, law)
-
-
-def _spread(way: str, low: Any, high: Any, law: str) -> Spread:
-    lows, highs = (
-        finite_array(f"{way}: {name}", in_si(f"{way}: {name}", x), SweepError)
-        for name, x in (("low", low), ("high", high))
-    )
-    one_of(f"{way}: law", law, LAWS, SweepError)
-    if lows.shape != highs.shape:
-        raise SweepError(
-            f"{way}: low is {lows.shape}, high is {highs.shape}: needs bounds of one shape"
-        )
-    if (lows > highs).any() or (law == "log" and (lows <= 0).any()):
-        least = "above 0 and " if law == "log" else ""
-        raise refusal(
-            f"{way}: low", low, f"numbers {least}not above high, {shown(high)}", SweepError
-        )
-    return Spread(way, lows, highs, law)
-
-
-def plain(field: str, value: Any) -> Any:
-    """Return a value as JSON has it: numbers, texts, lists and tables."""
-    if isinstance(value, np.ndarray | np.generic):
-        value = value.tolist()
-    try:
-        return json.loads(json.dumps(value, allow_nan=False, default=_listed))
-    except (TypeError, ValueError) as reason:
-        raise SweepError(
-            f"{field}: value {shown(value)}: needs numbers, texts, lists or tables ({reason})"
-        ) from None
-
-
-def in_si(field: str, value: Any) -> Any:
-    """Return a value with each text such as "2 g", in lists too, as a number in SI."""
-    if isinstance(value, list):
-        return [in_si(field, each) for each in value]
-    if not isinstance(value, str):
-        return value
-    for unit in MEASURES:
-        with suppress(ValueError):
-            return in_unit(value, unit)
-    raise refusal(field, value, "a unit that a scene may have, such as g, cm or deg", SweepError)
-
-
-def _listed(value: Any) -> Any:
-    if isinstance(value, np.ndarray | np.generic):
-        return value.tolist()
-    raise TypeError(f"{type(value).__name__} is none of these")
+def whole(field: str, value: Any, least: int, most: int) -> int:
+    """Return a whole number within bounds; SweepError otherwise."""
+    is_whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    if is_whole and least <= value <= most:
+        return int(value)
+    raise refusal(field, value, f"a whole number from {least} to {most}", SweepError)
 
 
 @dataclass(frozen=True)
@@ -234,14 +125,6 @@ def _numbers(spreads: Mapping, points: Any, seed: Any) -> tuple[int, int]:
         whole("points", points, 1, MOST_POINTS) if spreads else 1,
         whole("seed", seed, 0, MOST_SEED),
     )
-
-
-def whole(field: str, value: Any, least: int, most: int) -> int:
-    """Return a whole number within bounds; SweepError where it is none."""
-    is_whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
-    if is_whole and least <= value <= most:
-        return int(value)
-    raise refusal(field, value, f"a whole number from {least} to {most}", SweepError)
 
 
 def _names(names: Any) -> tuple[str, ...]:

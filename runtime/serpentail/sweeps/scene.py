@@ -8,7 +8,7 @@ from ..checks import Refusals, none_of, refusal, shown
 from ..errors import SweepError
 from ..scenes.file import read_scene, subtable
 from ..scenes.sweep_keys import SWEEP
-from .axes import Grid, Spread, grid, latin, random, sobol
+from .axis import Grid, Spread, grid, latin, random, sobol
 
 WAYS = {"random": random, "latin": latin, "sobol": sobol}
 AXIS = ("grid", *WAYS, "law")

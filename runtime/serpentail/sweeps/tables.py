@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-    from .sweep import Sweep
+    from .result import Sweep
 
 ENDINGS = (".parquet", ".csv", ".nc")
 SAMPLE = "sample"
