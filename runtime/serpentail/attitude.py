@@ -129,8 +129,8 @@ def pitch_roll_yaw(q: ArrayLike, unwrap: bool = False) -> Array:
     >>> import numpy as np
     >>> import serpentail as st
     >>> q = [0, 0, 0, np.cos(0.1), np.sin(0.1), 0, 0]
-    >>> np.round(st.pitch_roll_yaw(q), 6)
-    array([0.2, 0. , 0. ])
+    >>> round(float(st.pitch_roll_yaw(q)[0]), 6)
+    0.2
     """
     q = finite_array("q", q)
     if q.ndim == 0 or q.shape[-1] < TORSO_NQ:
