@@ -72,7 +72,7 @@ def told(arguments: argparse.Namespace, outcome: Outcome) -> int:
     tell(json.dumps(outcome.report) if getattr(arguments, "json", None) else outcome.text)
     written = [write(arguments, *entry) for entry in outcome.files.items()]
     if outcome.report.get("stopped") == "interrupt":
-        print("serpentail: interrupted; this is what there was until then", file=sys.stderr)
+        print("serpentail: interrupted; this is the result until then", file=sys.stderr)
         return INTERRUPTED
     return 0 if outcome.good and all(written) else 1
 

@@ -22,8 +22,8 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
         part.replace(target)
     except OSError as reason:
         raise NotWritten(
-            f"{str(target)!r} is not written ({reason.strerror or reason}): make room, or give the "
-            "name of a file that may be written"
+            f"{str(target)!r} is not written ({reason.strerror or reason}): make room, or name "
+            "another file"
         ) from reason
     finally:
         with contextlib.suppress(OSError):  # where there is no folder for it
@@ -44,6 +44,6 @@ def refuse_unusable(folder: str | os.PathLike[str]) -> None:
     while not place.exists():  # those are made
         place = place.parent
     if not place.is_dir():
-        raise NotADirectoryError(f"{place} is no folder")
+        raise NotADirectoryError(f"{place} is not a folder")
     if not os.access(place, os.W_OK | os.X_OK):
         raise PermissionError(f"{place} cannot be written to")

@@ -90,7 +90,7 @@ def test_an_example_is_a_scene_too(cache, tmp_path, monkeypatch):
         (None, {**TINY, "contacts": {1j}}, "contacts: value {1j}: needs a text"),
         (None, {**TINY, "name": "../x"}, "name: value '../x'"),
         (None, {**TINY, "threads": 0}, "threads: value 0"),
-        ("kik", {}, "is no file, and no example; did you mean 'kick'"),
+        ("kik", {}, "is neither a file nor an example; did you mean 'kick'"),
         ("none.toml", {}, "none.toml.*cannot be read"),
         (3, {}, "value 3: needs a path, or the name of an example"),
     ],

@@ -126,7 +126,7 @@ def test_what_is_no_sequence_is_refused():
         (lambda: sequence(kick(), gamma=None), "gamma: value None"),
         (lambda: sequence(kick(until=[("take_off", "hands")], clearance=0.0)), "'hands'"),
         (lambda: st.Sequence(flier, [st.Phase("a", 1.0)], gamma=1.0), "has no legs"),
-        (lambda: st.Sequence(flier, [kick(moves=())]), "touches nothing"),
+        (lambda: st.Sequence(flier, [kick(moves=())]), "has no contacts"),
         (lambda: st.Sequence(flier, [st.Phase("a", 1.0, moves=[KICK])]), "has no legs"),
         (lambda: sequence(st.Phase("a", 1.0, controller=st.Damping(-1))), "phase 'a': damping"),
         (lambda: st.Tracking(kp=-1), "kp: value -1"),

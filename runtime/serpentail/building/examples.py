@@ -59,7 +59,7 @@ def scene_path(scene: str | PathLike[str]) -> Path:
         return known[str(path)]
     remedy = did_you_mean(str(path), known) or f"the examples are {', '.join(known)}"
     raise SerpentailError(
-        f"scene file: value {shown(str(path))}: is no file, and no example; {remedy}"
+        f"scene file: value {shown(str(path))}: is neither a file nor an example; {remedy}"
     )
 
 

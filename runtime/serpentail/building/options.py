@@ -102,5 +102,5 @@ def _unknown(name: str, value: object) -> ModelError:
     known = Options.__annotations__
     remedy = did_you_mean(name, known) or f"give some of {', '.join(known)}"
     return ModelError(
-        f"{name}: value {shown(value)}: is no key of a scene and no parameter; {remedy}"
+        f"{name}: value {shown(value)}: is neither a scene key nor a parameter; {remedy}"
     )

@@ -96,7 +96,7 @@ def _refuse_other(model: Model, kind: str) -> None:
     needs, remedy = "", 'export an "fmu"'
     if model.kind != "articulated":
         needs, remedy = (
-            "an articulated tail, and a continuum is no chain of rigid links",
+            "an articulated tail, because a continuum tail is not a chain of rigid links",
             'generate a scene with kind = "articulated" and some links, or export an "fmu"',
         )
     elif "torso_mass" not in model.parameters:

@@ -152,7 +152,7 @@ def check_model(model: Any, estimate: Any) -> None:
     model.refuse_fixed("identify")
     if model.manifest["scene"].get("coordinates") == "polar":
         raise ModelError(
-            f'identify: {model.name} has coordinates = "polar": generate it with those of bends'
+            f'identify: {model.name} has coordinates = "polar": generate it with "bend"'
         )
     if model.manifest["real"] != "double":
         raise ModelError(f'identify: {model.name} has real = "float": generate it with "double"')
@@ -196,7 +196,9 @@ def noises_of(noise: Any, tracks: list[MarkerTracks]) -> tuple[list[np.ndarray],
     values = noise if isinstance(noise, Mapping) else dict.fromkeys(names, noise)
     lacking = [name for name in names if name not in values]
     if lacking:
-        raise IdentificationError(f"noise: none of {lacking[0]!r}: give one of each marker (m)")
+        raise IdentificationError(
+            f"noise: no value for {lacking[0]!r}: give one for each marker (m)"
+        )
     each = [
         number(f"noise.{name}", values[name], IdentificationError, above=0, most=1.0)
         for name in names

@@ -106,8 +106,8 @@ def refuse_unseen(model: Model, task: Task, found: Fit) -> None:
         open_ones = [name for name, off in zip(names, blind, strict=False) if off]
         if open_ones:
             raise IdentificationError(
-                f"data: too few markers in {trial.tracks.source}: they leave open, by more than 1 "
-                f"rad, {', '.join(open_ones)}: add markers there, or fill their gaps"
+                f"data: too few markers in {trial.tracks.source}: they do not determine "
+                f"{', '.join(open_ones)} to 1 rad: add markers there, or fill their gaps"
             )
 
 

@@ -89,7 +89,7 @@ def _lines(source: Path) -> list[str]:
     try:
         return source.read_text(encoding="utf-8-sig").splitlines()
     except UnicodeDecodeError as error:
-        raise IdentificationError(f"{source}: is no text file ({error.reason})") from error
+        raise IdentificationError(f"{source}: is not a text file ({error.reason})") from error
 
 
 def _trc(source: Path) -> Read:
@@ -97,13 +97,13 @@ def _trc(source: Path) -> Read:
     lines = _lines(source)
     if len(lines) < 6 or not lines[0].startswith("PathFileType"):
         raise IdentificationError(
-            f"{source}: is no whole TRC file: its first line needs PathFileType"
+            f"{source}: is not a complete TRC file: its first line needs PathFileType"
         )
     header = dict(zip(lines[1].split("\t"), lines[2].split("\t"), strict=False))
     header = {key.strip(): value.strip() for key, value in header.items()}
     lacking = [key for key in ("NumFrames", "NumMarkers", "Units") if key not in header]
     if lacking:
-        raise IdentificationError(f"{source}: line 3 has no {lacking[0]}: is the header whole?")
+        raise IdentificationError(f"{source}: line 3 has no {lacking[0]}: is the header complete?")
     names = [name.strip() for name in lines[3].split("\t")[2:] if name.strip()]
     count, frames = (_whole(source, header, key) for key in ("NumMarkers", "NumFrames"))
     if len(names) != count:
@@ -192,7 +192,7 @@ def _c3d(source: Path) -> Read:
         raise
     except Exception as error:  # ezc3d tells of a damaged file by errors of many kinds
         raise IdentificationError(
-            f"{source}: is no whole C3D file ({type(error).__name__}: {error!s:.100})"
+            f"{source}: is not a complete C3D file ({type(error).__name__}: {error!s:.100})"
         ) from error
     times = (first + np.arange(len(positions))) / rate
     return times, positions, names[: positions.shape[1]], str(units[0]) if units else None

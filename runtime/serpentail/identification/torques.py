@@ -41,7 +41,7 @@ class TorquePrior:
 def checked_prior(prior: Any) -> TorquePrior:
     """Return a checked prior; IdentificationError otherwise."""
     if not isinstance(prior, TorquePrior):
-        needs = "a TorquePrior(std, time), which says how large the torques may be, and how quick"
+        needs = "a TorquePrior: its standard deviation (N m) and correlation time (s)"
         raise refusal("torques", prior, needs, IdentificationError)
     return TorquePrior(
         number("torques.std", prior.std, IdentificationError, above=0),

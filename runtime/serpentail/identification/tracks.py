@@ -180,7 +180,7 @@ def checked_names(names: Any, source: str) -> tuple[str, ...]:
     """Return the names of markers; IdentificationError unless they are different texts."""
     listed = tuple(names) if isinstance(names, list | tuple) else ()
     if not listed or not all(isinstance(name, str) and name.strip() for name in listed):
-        raise refusal(f"{source}: names", names, "a name of each marker", IdentificationError)
+        raise refusal(f"{source}: names", names, "a name for each marker", IdentificationError)
     twice = [name for name in listed if listed.count(name) > 1]
     if twice:
         raise IdentificationError(f"{source}: two markers are called {twice[0]!r}: rename one")

@@ -117,4 +117,4 @@ def spaces_of(worlds: Worlds) -> tuple[spaces.Box, spaces.Box]:
 def _refuse_options(options: dict[str, Any] | None) -> None:
     """SimulationError if a reset is given options; it has none."""
     if options:
-        raise refusal("options", options, "none: settings are the environment's", SimulationError)
+        raise refusal("options", options, "none: pass settings to st.environment", SimulationError)

@@ -68,7 +68,7 @@ def refuse_others(*paths: Path) -> None:
 def _unsafe(path: Path, fault: str, remedy: str) -> SerpentailError:
     """Return the error that others could have put libraries into the cache."""
     return SerpentailError(
-        f"the cache of compiled models: {path} {fault}, who could have you run what they like: "
+        f"the cache of compiled models: {path} {fault}, who could make you run their code: "
         f"{remedy}set SERPENTAIL_CACHE to a folder of your own"
     )
 

@@ -195,7 +195,8 @@ class Kernel:
             return self._one(arrays)
         if len(counts) > 1:
             raise StateError(
-                f"{self.name}: batch sizes differ ({', '.join(map(str, sorted(counts)))}): give one"
+                f"{self.name}: batch sizes differ ({', '.join(map(str, sorted(counts)))}): give "
+                "one size"
             )
         return self._batch(counts.pop(), arrays)
 

@@ -30,7 +30,7 @@ WHY = {  # a run cannot go on
         "large?"
     ),
     BAD_TIMES: "the samples are too close: in the model's numbers their times do not increase",
-    TORQUE_FAILED: "the compiled torque function did not return 0: what has it refused?",
+    TORQUE_FAILED: "the compiled torque function returned an error status, not 0: check it",
 }
 
 

@@ -87,7 +87,9 @@ def _read(folder: Path) -> CheckedFolder:
             except ModelError as error:
                 if opened.is_there():
                     raise
-                raise Exchanged(f"{folder} is exchanged all the time: load it later") from error
+                raise Exchanged(
+                    f"{folder} keeps changing while it is read: load it later"
+                ) from error
     except (FileNotFoundError, NotADirectoryError, ValueError) as error:
         raise _no_folder(folder) from error
     except OSError as error:
@@ -99,7 +101,7 @@ def _read(folder: Path) -> CheckedFolder:
 
 def _no_folder(folder: Path) -> ModelError:
     return ModelError(
-        f"{folder} is no generated folder (it has no manifest.json): make one, as by "
+        f"{folder} is not a generated folder (it has no manifest.json): make one by "
         "`serpentail generate SCENE.toml`, or `make model TAIL=articulated M=3 N=4`"
     )
 

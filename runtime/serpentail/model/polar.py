@@ -112,8 +112,8 @@ def _finite_results(*results: Array) -> Four:
     """Return results; StateError if one is too large for a number."""
     if not all(np.isfinite(x).all() for x in results):
         raise StateError(
-            "the converted state is beyond numbers: is an angle or a rate too large, or theta too "
-            "small?"
+            "the converted state is too large for numbers: is an angle or a rate too large, or "
+            "theta too small?"
         )
     first, second, third, fourth = results
     return first, second, third, fourth

@@ -75,6 +75,7 @@ def warn_of_unlike(values: Values, calls: int = 2) -> None:
     if ratio > UNLIKE:
         sizes = "tail_mass, tail_length, tail_mount, torso_inertia"
         words = (
-            f"torso and tail are unlike by {ratio:.1e} ({sizes}): H may be off by as many roundings"
+            f"torso and tail differ by a factor of {ratio:.1e} ({sizes}): H may be off by as many "
+            "roundings"
         )
         warnings.warn(f"{words}; are the units kg and m?", UnlikeBodies, stacklevel=calls + 1)

@@ -94,8 +94,8 @@ def restored(manifest_hash: str, folder: Path) -> CheckedFolder:
     if found.manifest_hash != manifest_hash:
         raise ModelError(
             f"{folder} was generated again since the model was pickled (its manifest was "
-            f"{manifest_hash:.12}, now {found.manifest_hash:.12}), and the cache has the pickled "
-            "one no longer: generate it again as it was, or load and pickle the model anew"
+            f"{manifest_hash:.12}, now {found.manifest_hash:.12}), and the cache no longer has "
+            "the pickled one: generate it again as it was, or load and pickle the model anew"
         )
     return found
 

@@ -47,7 +47,7 @@ def arrays_of(motion: Any) -> str:
 def how_made(info: dict[str, Any]) -> str:
     """Return how a motion was made, as far as its info says so."""
     if "method" not in info:
-        return "planned" if info.get("kind") == "plan" else "by no method that it tells"
+        return "planned" if info.get("kind") == "plan" else "by an unknown method"
     counts = [f"{info[name]} {name}" for name in ("steps", "rejected") if name in info]
     return f"by {info['method']}: {', '.join(counts)}"
 

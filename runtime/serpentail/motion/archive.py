@@ -50,7 +50,7 @@ def read(path: str | os.PathLike[str], arrays: Iterable[str]) -> tuple[Path, dic
     try:
         return source, _parsed(fields)
     except ValueError as error:
-        raise ValueError(f"{str(source)!r} holds no sound trajectory: {error}") from error
+        raise ValueError(f"{str(source)!r} does not hold a valid trajectory: {error}") from error
 
 
 def _npz(path: str | os.PathLike[str]) -> Path:

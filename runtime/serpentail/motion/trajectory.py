@@ -121,7 +121,7 @@ class Trajectory(Exports, Showable):
         if self.contact is not None and "events" not in self.info:
             method = self.info.get("method", "how it was made")
             raise ValueError(
-                f"events: {method} looks for none: simulate by a compiled method, such as ros34pw2"
+                f"events: {method} detects none: simulate by a compiled method, such as ros34pw2"
             )
         return self.info.get("events", [])
 
@@ -214,7 +214,9 @@ class Trajectory(Exports, Showable):
         try:
             return cls(**fields)
         except ValueError as error:
-            raise ValueError(f"{str(source)!r} holds no sound trajectory: {error}") from error
+            raise ValueError(
+                f"{str(source)!r} does not hold a valid trajectory: {error}"
+            ) from error
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave out the model, whose compiled code belongs to one machine."""

@@ -75,7 +75,7 @@ def film(
     every = checked_motions(motions)
     begin, end = max(m.t[0] for m in every), min(m.t[-1] for m in every)
     if begin >= end:
-        raise ViewError("motions: no time that all of them have: a moving film needs some")
+        raise ViewError("motions: they have no time in common, which a moving film needs")
     slowness = _slowness(speed, end - begin)
     times = _times(begin, end, RATE * slowness)
     moved = [motion.resample(times) for motion in every]

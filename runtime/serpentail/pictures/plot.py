@@ -92,7 +92,7 @@ def drawn_on(
     if len(every) != len(chosen):
         raise ViewError(f"ax: {len(every)} axes for {len(chosen)} panels: name one panel for each")
     if path is not None:
-        raise ViewError("path: goes with a figure of its own: leave ax out, or save ax.figure")
+        raise ViewError("path: is for a new figure only: leave ax out, or save ax.figure")
     _draw(every, motion, chosen)
     return every[0].figure, ax
 

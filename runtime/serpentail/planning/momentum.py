@@ -35,8 +35,8 @@ def refuse_impossible(model: Model, problem: PlanningProblem) -> None:
     left = _least_left(model, problem, h)
     if left > SMALL * size:
         raise PlanningError(
-            f"goal: with this tail and torso_rate, rates of the tail within their bounds leave "
-            f"{left / size:.1%} of what they must carry: {told}: leave torso_rate, or entries of "
+            f"goal: with this tail and torso_rate, tail rates within their bounds cannot carry "
+            f"{left / size:.1%} of the angular momentum: {told}: leave torso_rate, or entries of "
             "tail or tail_rate, free"
         )
 

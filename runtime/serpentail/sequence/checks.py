@@ -24,7 +24,7 @@ def check_phase(model: Model, phase: Phase) -> None:
     where = f"phase {phase.name!r}"
     if phase.until is not None and not model.contacts:
         remedy = "add `contacts` to its scene, or leave it out"
-        raise SimulationError(f"{where}: until: {model.name} touches nothing: {remedy}")
+        raise SimulationError(f"{where}: until: {model.name} has no contacts: {remedy}")
     for kind, group in phase.stop_at(model):
         if group not in model.contacts:
             choices = ", ".join(map(repr, model.contacts))

@@ -68,10 +68,10 @@ def whole(parts: list[Trajectory], runs: list[PhaseRun], phases: Iterable[Phase]
     warnings = list(motion.info.get("warnings", []))
     for run, phase in zip(runs, phases, strict=False):
         if run.plan is not None and not run.plan.success:
-            warnings.append(f"the plan of phase {run.name!r} is not true: see its report")
+            warnings.append(f"the plan of phase {run.name!r} did not succeed: see its report")
         if phase.until is not None and run.ended_by == "duration":
             warnings.append(
-                f"phase {run.name!r} met no {phase.words} within {phase.duration:.6g} s"
+                f"phase {run.name!r} ended without {phase.words} within {phase.duration:.6g} s"
             )
     told = {"phases": [run.info() for run in runs], "warnings": warnings}
     return replace(motion, info=motion.info | told)

@@ -118,7 +118,7 @@ def warnings_of(audit: Audit, info: Mapping[str, Any], eps: float) -> list[str]:
         )
     if info.get("unfelt"):
         found.append(
-            f"{info['unfelt']} touches were shorter than a step and may not have been felt: take a "
+            f"{info['unfelt']} touches were shorter than a step and may have been missed: take a "
             "shorter step, or an adaptive method"
         )
     return found

@@ -27,7 +27,8 @@ def prepared(
     changes = settings.pop("parameters", None)
     if changes is not None and not start.many:
         raise ModelError(
-            "parameters: one start only: give q0 or v0 a row a run, or use model.with_parameters"
+            "parameters: one start only: give q0 or v0 one row for each run, or use "
+            "model.with_parameters"
         )
     parameters = model.parameters_of_runs(changes, start.runs)
     start.refuse_behind_stops(parameters.values)
@@ -36,7 +37,7 @@ def prepared(
     choice = choose(acting, start, parameters, method, settings)
     if ground.stop_at and choice.name in SCIPY:
         raise SimulationError(
-            f"stop_at: {choice.name} does not look for events: take tsit5 or ros34pw2"
+            f"stop_at: {choice.name} does not detect events: use tsit5 or ros34pw2"
         )
     return Memory(acting.records, start, ground, parameters), acting, choice
 

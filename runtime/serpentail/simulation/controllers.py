@@ -178,14 +178,14 @@ def controllers_of(controller: object, runs: int | None) -> list[Any]:
     number differs from that of the runs.
     """
     if runs is None and isinstance(controller, list | tuple):
-        remedy = "give one controller, or q0 or v0 a row a run"
+        remedy = "give one controller, or q0 or v0 one row for each run"
         raise SimulationError(f"controller: a list of {len(controller)}, one start: {remedy}")
     given = None if runs is None else _rows(controller)
     if given is None:
         return [controller]
     if len(given) != runs:
         raise SimulationError(
-            f"controller: {len(given)} controllers for {runs} runs: give one, or one a run"
+            f"controller: {len(given)} controllers for {runs} runs: give one, or one for each run"
         )
     return given
 

@@ -45,7 +45,7 @@ class Ground:
                 if value is not None:
                     remedy = "leave it out, or add `contacts` to the scene"
                     raise SimulationError(
-                        f"{name} {value!r}: {model.name} touches nothing: {remedy}"
+                        f"{name} {value!r}: {model.name} has no contacts: {remedy}"
                     )
             return cls()
         legs = _legs(groups, choices["legs"])

@@ -64,7 +64,8 @@ def checked_method(
         least = MIN_ROUNDINGS * np.finfo(np.float32 if single and name not in SCIPY else float).eps
         if checked["rtol"] < least:
             raise SimulationError(
-                f"rtol {checked['rtol']:.3g}: too near to rounding: give {least:.2g} or more"
+                f"rtol {checked['rtol']:.3g}: too close to rounding errors: give {least:.2g} or "
+                "more"
             )
     return IntegrationMethod(name, "", _defaults(name, single, checked))
 
@@ -94,7 +95,7 @@ def chosen(
     if decay is None:
         if "ros34pw2" in available:
             return "ros34pw2", "contact with the ground: stiff"
-        lack = "the scene has no `implicit` for a method that suits it"
+        lack = "the scene lacks `implicit`, which suitable methods need"
         return "tsit5", f"contact with the ground, but {lack}"
     # in flight, damping and springs alone are stiff
     if decay > STIFF_DECAY and "ros34pw2" in available:

@@ -85,5 +85,5 @@ def check_settling(model: Model, rounds: object = 1, duration: object = 1.5) -> 
         raise refusal("rounds", rounds, "a whole number from 1", SimulationError)
     if not model.contacts:
         raise SimulationError(
-            f"{model.name} touches nothing, so it cannot settle: add `contacts` to its scene"
+            f"{model.name} has no contacts, so it cannot settle: add `contacts` to its scene"
         )

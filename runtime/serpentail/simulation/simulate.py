@@ -166,8 +166,8 @@ def _threads(model: Model, start: Start, asked: int | None) -> int | None:
         return model.batch_library.threads
     if not start.many:
         raise SimulationError(
-            f"threads: value {asked!r:.60}: one start only, which takes one: leave it out, or give "
-            "q0 or v0 a row a run"
+            f"threads: value {asked!r:.60}: one start only, which uses one: leave it out, or give "
+            "q0 or v0 one row for each run"
         )
     return checked_threads("threads", asked, SimulationError)
 

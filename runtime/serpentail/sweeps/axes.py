@@ -82,7 +82,7 @@ def axes_of(over: Any, points: Any, seed: Any) -> Axes:
     for names, axis in over.items():
         key = _names(names)
         if key in grids or key[0] in spreads:
-            raise SweepError(f"over: {key[0]!r} twice: needs one axis a name")
+            raise SweepError(f"over: {key[0]!r} twice: needs one axis for each name")
         if isinstance(axis, Grid):
             for value in axis.values:
                 _entries(key, value)
@@ -100,11 +100,11 @@ def _checked(axes: Axes) -> Axes:
     ways = {each.way for each in axes.spreads.values()}
     if len(ways) > 1:
         raise SweepError(
-            f"over: {' and '.join(sorted(ways))} together: needs one way to spread points"
+            f"over: {' and '.join(sorted(ways))} together: needs one of them for all axes"
         )
     twice = {name for name in axes.names if axes.names.count(name) > 1}
     if twice:
-        raise SweepError(f"over: {min(twice)!r} twice: needs one axis a name")
+        raise SweepError(f"over: {min(twice)!r} twice: needs one axis for each name")
     if len(axes) > MOST_POINTS:
         raise SweepError(
             f"over: {len(axes)} points: needs at most {MOST_POINTS}: make several sweeps"
@@ -116,11 +116,11 @@ def _numbers(spreads: Mapping, points: Any, seed: Any) -> tuple[int, int]:
     """Return how many points are spread, 1 where no axis is, and their seed."""
     if not spreads and points is not None:
         raise SweepError(
-            f"points: value {shown(points)}: no axis is spread: leave it out, or give st.random, "
+            f"points: value {shown(points)}: no axis is random: leave it out, or give st.random, "
             "st.latin or st.sobol"
         )
     if spreads and points is None:
-        raise SweepError("points: no value: needs how many points the axes that are spread have")
+        raise SweepError("points: no value: needs the number of points of the random axes")
     return (
         whole("points", points, 1, MOST_POINTS) if spreads else 1,
         whole("seed", seed, 0, MOST_SEED),

@@ -201,4 +201,6 @@ class Driver:
         stage.tell(self.done / self.total, f"{self.name}: {self.done} of {self.total}{failed}")
 
 
-GONE = "executor: its workers are gone: what was done is kept, and the same call goes on from there"
+GONE = (
+    "executor: its workers are gone: finished rows are kept, and the same call resumes from there"
+)

@@ -27,7 +27,7 @@ TABLES: Mapping[str, tuple[Key, type[Exception]]] = {
     "simulate": (SIMULATE, SimulationError),
     "plan": (PLAN, PlanningError),
 }
-NO_SHAPE = "a model is of one shape: give the sweep a scene, or a function without a model"
+NO_SHAPE = "the shape of a model is fixed: give the sweep a scene, or a function without a model"
 
 
 @dataclass(frozen=True)
@@ -60,9 +60,7 @@ def entries_of(what: Any, axes: Axes, job: Job, of: Any) -> list[Entry]:
         text = as_json(point)
         key = hashlib.sha256(f"{told}\n{besides}\n{text}".encode()).hexdigest()[:32]
         if key in found:
-            raise SweepError(
-                f"over: point {number} is there twice, {shown(point)}: needs each once"
-            )
+            raise SweepError(f"over: point {number} occurs twice, {shown(point)}: needs each once")
         found[key] = Entry(key, text, point, own, bundle)
     return list(found.values())
 

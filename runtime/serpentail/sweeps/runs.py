@@ -204,7 +204,7 @@ def as_text(outcome: dict[str, Any]) -> str:
     try:
         return json.dumps(_ready(outcome), allow_nan=False)
     except (TypeError, ValueError) as reason:
-        raise SweepError(f"run: its outcome is no plain data ({reason})") from None
+        raise SweepError(f"run: its outcome is not plain data ({reason})") from None
 
 
 def _ready(value: Any) -> Any:

@@ -75,8 +75,8 @@ class Store:
                 yield
         except Timeout:
             raise SweepError(
-                f"store: another process writes {self.path}: wait for its end, look with --status, "
-                "or name another file"
+                f"store: another process is writing {self.path}: wait for its end, look with "
+                "--status, or name another file"
             ) from None
 
     def add(self, rows: Iterable[Row]) -> None:
@@ -118,10 +118,10 @@ class Store:
         except sqlite3.DatabaseError as reason:
             name = getattr(reason, "sqlite_errorname", "")
             if name == "SQLITE_NOTADB":
-                raise SweepError(f"store: {self.path} is no store: name another file") from None
+                raise SweepError(f"store: {self.path} is not a store: name another file") from None
             raise NotWritten(
                 f"store: {self.path} is not written ({reason}): make room, or mend the disk; its "
-                "rows are whole, and the same call goes on from them"
+                "rows are intact, and the same call resumes from them"
             ) from reason
 
 

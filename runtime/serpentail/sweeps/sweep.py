@@ -153,12 +153,10 @@ def _settings(settings: Any, run: Any) -> dict[str, Any]:
         raise refusal("settings", settings, "a table of arguments by name", SweepError)
     own = dict(settings or {})
     if own and not isinstance(run, str):
-        raise SweepError(
-            "settings: a function takes none: give it what it needs by functools.partial"
-        )
+        raise SweepError("settings: a function has none: pass what it needs by functools.partial")
     for name in WITHOUT:
         if name in own:
-            raise SweepError(f"settings: {name}: the sweep's own to give: leave it out")
+            raise SweepError(f"settings: {name}: is set by the sweep: leave it out")
     for name in STARTS:
         if name in own:
             own[name] = plain(f"settings: {name}", own[name])
@@ -172,7 +170,7 @@ def _outputs(outputs: Any, run: Any) -> tuple[str, ...]:
     if run != "simulate":
         if outputs is not None:
             raise SweepError(
-                f"outputs: value {shown(outputs)}: only simulations choose: leave it out"
+                f"outputs: value {shown(outputs)}: only run='simulate' has a choice: leave it out"
             )
         return ()
     if outputs is None:

@@ -93,7 +93,7 @@ def test_misuse_is_named(controller, words):
 @pytest.mark.parametrize("name", ["legs", "bristles0", "stop_at"])
 def test_flight_has_no_ground(name):
     with pytest.raises(
-        st.SimulationError, match=f"^{name} .* touches nothing: leave it out, or add `contacts`"
+        st.SimulationError, match=f"^{name} .* has no contacts: leave it out, or add `contacts`"
     ):
         fly(**{name: [1]})
 

@@ -59,8 +59,8 @@ class Evaluated:
         kernel = self.kernels.get(name)
         if kernel is None and self.library is None:
             raise ModelError(
-                f"{self.name} was loaded with compiled=False: only model.casadi evaluates; load it "
-                "again"
+                f"{self.name} was loaded with compiled=False: only model.casadi can evaluate; "
+                "load it again"
             )
         if kernel is None:
             raise self.without(name)

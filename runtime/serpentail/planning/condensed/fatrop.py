@@ -100,7 +100,7 @@ def library() -> ctypes.CDLL:
         except OSError:
             continue
     raise PlanningError(
-        f"solver: value 'fatrop': CasADi {ca.CasadiMeta.version()} brings no libfatrop: take "
+        f"solver: value 'fatrop': CasADi {ca.CasadiMeta.version()} comes without libfatrop: use "
         "solver='ipopt'"
     )
 

@@ -41,7 +41,7 @@ def lacking(model: Model) -> str | None:
     if missing:
         return f"the model lacks {', '.join(missing)}: add them to the scene's functions"
     if model.manifest["real"] != "double":
-        return f"the model's numbers are {model.manifest['real']}: it takes double"
+        return f"the model computes with {model.manifest['real']}: it needs double"
     if model.library is None:
         return "the model was loaded with compiled=False: load it again to use its C"
     return None

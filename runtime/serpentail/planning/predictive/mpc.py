@@ -222,7 +222,7 @@ class Memory:
     def begin_run(self, record: Any, clock: float) -> None:
         """Begin a run of the generated C whose time is ``clock`` (s) at the controller's time 0."""
         if type(record).t.size != ctypes.sizeof(ctypes.c_double):
-            raise SimulationError("Mpc: the simulated model's numbers are float: it needs double")
+            raise SimulationError("Mpc: the simulated model computes with float: needs double")
         self.begin()
         self.run.step_begin = ctypes.addressof(record) + type(record).t.offset
         self.run.clock = clock

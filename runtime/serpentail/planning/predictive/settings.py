@@ -52,12 +52,12 @@ def checked_settings(plan: Plan, given: dict[str, Any]) -> Settings:
     horizon = np.inf if given["horizon"] is None else _number("horizon", given["horizon"], above=0)
     rest = 1 / rate if given["rest"] is None else _number("rest", given["rest"], least=0)
     if rest + delay >= plan.duration:
-        needs = f"with the delay less than the plan's {plan.duration:.4g} s: nothing is left else"
+        needs = f"to be less than the plan's {plan.duration:.4g} s, together with the delay"
         raise refusal("Mpc: rest", rest, needs, PlanningError)
     step = _number("step", given["step"], above=0)
     intervals = _count("intervals", given["intervals"])
     if max(min(horizon, plan.duration) / intervals, delay) / step > MOST_STEPS:
-        needs = f"no more than {MOST_STEPS} in an interval: make it longer"
+        needs = f"at most {MOST_STEPS} steps in an interval: make it longer"
         raise refusal("Mpc: step", step, needs, PlanningError)
     iterations = _count("iterations", given["iterations"])
     return Settings(rate, horizon, intervals, delay, iterations, step, rest)
@@ -72,7 +72,7 @@ def refuse_unable(model: Model, plan: Plan) -> None:
             f"Mpc: the model lacks {', '.join(missing)}: add them to the scene's functions"
         )
     if model.manifest["real"] != "double":
-        raise PlanningError(f"Mpc: the model's numbers are {model.manifest['real']}: needs double")
+        raise PlanningError(f"Mpc: the model computes with {model.manifest['real']}: needs double")
     if model.library is None:
         raise PlanningError("Mpc: the model was loaded with compiled=False: load it again with C")
     if not isinstance(plan, Plan):

@@ -84,7 +84,7 @@ class Plan:
                 f"{self.duration:.6g} s, {self.mesh.intervals} intervals by {self.rule.name} of "
                 f"degree {self.rule.degree}, {len(self.trajectory.t)} samples; {UNITS}",
                 f"effort {effort} N^2 m^2 s, energy {energy} J, peak power {power} W",
-                f"attitude its torques lead to: {to_plan} deg to the plan, {to_goal} to the goal",
+                f"true attitude at the end: {to_plan} deg from the plan, {to_goal} from the goal",
                 f"{told['rounds']} rounds, {told['iterations']} iterations, {told['wall_s']:.3g} s",
             ]
         )
