@@ -1,4 +1,4 @@
-"""Files that are written whole or not at all, and a check of where they go before work begins."""
+"""Writes files whole or not at all, and checks before the work that they can be written."""
 
 import contextlib
 import os
@@ -11,8 +11,9 @@ from .errors import NotWritten
 
 @contextlib.contextmanager
 def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Lend a file to write, which replaces path on success and is removed on failure; NotWritten
-    where the system refuses.
+    """Provide a temporary file that replaces ``path`` on success and is removed on failure.
+
+    NotWritten if the system refuses.
     """
     target = Path(path)
     part = target.with_name(f".{target.name}.{secrets.token_hex(4)}.part")
@@ -31,7 +32,7 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 
 def refuse_unwritable(path: str | os.PathLike[str]) -> None:
-    """OSError where a file cannot be written: its name is a folder's, or its folder is none."""
+    """OSError if a file cannot be written: it is a folder, or its folder cannot be used."""
     target = Path(path)
     if target.is_dir():
         raise IsADirectoryError(f"{path} is a folder")
@@ -39,7 +40,7 @@ def refuse_unwritable(path: str | os.PathLike[str]) -> None:
 
 
 def refuse_unusable(folder: str | os.PathLike[str]) -> None:
-    """OSError where no file can be written into a folder, which need not be there yet."""
+    """OSError if no file can be written into a folder; the folder need not exist yet."""
     place = Path(folder).absolute()
     while not place.exists():  # those are made
         place = place.parent

@@ -1,4 +1,4 @@
-"""Calls of a model's C from XLA: compiles what XLA calls, and enters functions of models there."""
+"""Calls of a model's C from XLA: compiles the code that XLA calls, and registers functions."""
 
 import ctypes
 import hashlib
@@ -25,7 +25,7 @@ kept: dict[str, Any] = {}  # by the names of entries: what these point to
 
 
 class Entry(ctypes.Structure):
-    """A function of a model, as the C++ has it."""
+    """A function of a model, as the C++ code knows it."""
 
     _fields_ = (
         *((name, ctypes.c_void_p) for name in ("single", "together", "parameters")),
@@ -36,7 +36,7 @@ class Entry(ctypes.Structure):
 
 @cache
 def library() -> ctypes.CDLL:
-    """Return what XLA calls, compiled once for a compiler and a version of JAX."""
+    """Return the code that XLA calls, compiled once for a compiler and a version of JAX."""
     version = f'-DJAX_VERSION="{jax.__version__}"'
     flags = ("-std=c++17", "-I", jax.ffi.include_dir(), version, *LIBRARIES)
     try:

@@ -121,7 +121,7 @@ def _fake_jacobians(
 
 
 def _kept(ctx: Any, inputs: tuple[Any, ...], output: Tensor) -> None:
-    """Keep what the derivative needs."""
+    """Save what the derivative needs."""
     ctx.save_for_backward(*inputs[:3])
     ctx.key, ctx.name = inputs[3:]
 
@@ -160,7 +160,7 @@ def _vmap(info: Any, in_dims: tuple, a: Tensor, b: Tensor, c: Tensor, *names: st
 
 
 def _q_dot(q: Tensor, v: Tensor) -> Tensor:
-    """Return dq/dt (..., nq), as ``serpentail.model.state_space`` has it."""
+    """Return dq/dt (..., nq), as ``serpentail.model.state_space`` does."""
     quaternion, omega = q[..., 3:7], v[..., OMEGA]
     w, x = q[..., 3:4], q[..., 4:7]
     scalar = -(x * omega).sum(-1, keepdim=True)

@@ -20,8 +20,10 @@ HIDDEN = ("-fvisibility=hidden",)  # several units in one process share no funct
 
 
 def fmu(model: Model) -> bytes:
-    """Return the file; ExportError where the model is none that an FMU can be of, ModelError where
-    its scene left out a function, CompilerNotFound and CompileFailed as ``st.load``.
+    """Return the file.
+
+    ExportError if no FMU can be made of the model, ModelError if its scene left out a function,
+    CompilerNotFound and CompileFailed as ``st.load``.
     """
     _refuse_others(model)
     sources = _sources(model)
@@ -38,7 +40,7 @@ def fmu(model: Model) -> bytes:
 
 
 def _refuse_others(model: Model) -> None:
-    """Refuse what no FMU can be of."""
+    """Refuse models that an FMU cannot hold."""
     scene = model.manifest["scene"]
     if model.fixed:
         raise _refused(model, "base", "fixed", 'FMUs are of a torso that moves: give "free" to')
@@ -66,7 +68,7 @@ def _refused(model: Model, field: str, value: object, words: str) -> ExportError
 
 
 def _sources(model: Model) -> dict[str, bytes]:
-    """Return the C by the names of files: the model's, ours, and what ours must know of it."""
+    """Return the C by file name: the model's, the unit's, and what the unit needs to know."""
     files, native = model.checked.files, sorted(NATIVE.glob("*.[ch]"))
     sources = {PurePosixPath(n).name: text for n, text in files.items() if n.endswith(".h")}
     for name in (f"{model.name}.c", f"{model.name}_simulation.c"):

@@ -1,5 +1,7 @@
-"""MJCF of an articulated model: joint equalities tie the joints of a segment to those of its first
-link, and motors on these have the model's torques.
+"""MJCF of an articulated model.
+
+Joint equalities couple the joints of a segment to those of its first link, and motors on these
+apply the model's torques.
 """
 
 from xml.etree import ElementTree as Xml
@@ -29,9 +31,7 @@ STIFF = {"solref": "0.004 1", "solimp": "0.9999 0.9999 0.001"}
 
 
 def mjcf(model: Model) -> bytes:
-    """Return the file; ExportError where the tail is no chain of rigid links, or one that MuJoCo
-    does not take.
-    """
+    """Return the file; ExportError if the tail is not a chain of links that MuJoCo can read."""
     chain, p = chain_of(model, "mjcf"), model.parameters
     if len(chain.links) > MOST_LINKS:
         raise ExportError(
@@ -117,7 +117,7 @@ def _quaternion(turn: Vector) -> Vector:
 
 
 def _add_ties(root: Xml.Element, chain: Chain) -> None:
-    """Tie the joints of each segment, and give those of its first link their motors."""
+    """Couple the joints of each segment, and add motors to those of its first link."""
     equality = Xml.SubElement(root, "equality")
     actuator = Xml.SubElement(root, "actuator")
     for link in chain.links:

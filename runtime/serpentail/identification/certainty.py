@@ -89,7 +89,7 @@ def own_root(unknowns: Unknowns, R: np.ndarray, C: np.ndarray) -> np.ndarray:
 def relative_covariance(unknowns: Unknowns, fit: Fit) -> np.ndarray:
     """Return the covariance of the unknowns over their sizes with the assumed noise, (P, P).
 
-    What no data tell has none: see ``certainty``.
+    Directions that no data determine are left out: see ``certainty``.
     """
     free = np.flatnonzero(~fit.pinned)
     C = np.zeros((len(fit.pinned),) * 2)
@@ -132,7 +132,7 @@ def certainty(unknowns: Unknowns, fit: Fit, noise: tuple[float, float]) -> Certa
 def _parts(
     unknowns: Unknowns, fit: Fit, free: np.ndarray, direction: np.ndarray
 ) -> dict[str, float]:
-    """Return the parts of a direction by name, over what was estimated, the largest 1."""
+    """Return the parts of a direction by name, relative to the estimates; the largest is 1."""
     values, sizes = np.abs(fit.point.values[free]), unknowns.sizes[free]
     moving = np.array([not unknowns.each[k].is_offset for k in free]) & (values > 0)
     shares = direction * np.where(moving, sizes / np.where(moving, values, 1), 1)
@@ -168,6 +168,6 @@ def from_prior_alone(
 
 
 def quantile(confidence: float, freedom: float, known_noise: bool) -> float:
-    """Return how many standard deviations an interval reaches to each side."""
+    """Return the half width of an interval in standard deviations."""
     upper = (1 + confidence) / 2
     return float(ndtri(upper) if known_noise else stdtrit(freedom, upper))

@@ -21,7 +21,7 @@ FEWEST = 3  # markers that are seen at once
 
 
 def refuse_too_few(placed: Placements, tracks: MarkerTracks, nq: int) -> None:
-    """IdentificationError where no frame shows enough markers that are not on a line."""
+    """IdentificationError if no frame shows enough markers that are not on a line."""
     seen = tracks.seen.sum(axis=1)
     best = int(seen.argmax())
     if seen[best] >= FEWEST:
@@ -64,9 +64,9 @@ def tell_of_swaps(model: Model, placed: Placements, tracks: MarkerTracks, q: np.
 
 
 def tell_of_residuals(tracks: MarkerTracks, modelled: np.ndarray) -> None:
-    """Warn of markers that are where others should be, in some frames, and of those that fit badly.
+    """Warn of markers that look swapped in some frames, and of markers that fit badly.
 
-    modelled (F, M, 3): where the fit has the markers.
+    modelled (F, M, 3): positions of the markers by the fit.
     """
     off = np.linalg.norm(tracks.positions - modelled, axis=2)
     usual, told = float(np.nanmedian(off)), set[int]()
@@ -97,5 +97,5 @@ def tell_of_residuals(tracks: MarkerTracks, modelled: np.ndarray) -> None:
 
 
 def _tell(words: str) -> None:
-    """Warn who called ``identify``."""
+    """Issue a warning at the line that calls ``identify``."""
     warnings.warn(words, DoubtfulMarkers, stacklevel=5)

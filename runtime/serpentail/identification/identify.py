@@ -177,7 +177,7 @@ def tracks_of(data: Any, placed: Placements, settings: Mapping[str, Any]) -> lis
 
 
 def torques_of(torques: Any, count: int, nt: int) -> tuple[Known | TorquePrior, ...]:
-    """Return what is known of the torques of each trial."""
+    """Return the known torques, or their prior, for each trial."""
     several = isinstance(torques, list) and any(not np.isscalar(each) for each in torques)
     if several and len(torques) != count:
         raise IdentificationError(f"torques: {len(torques)} entries: needs one of {count} trials")

@@ -91,7 +91,7 @@ def _interval(value: float, reach: float, pinned: bool) -> tuple[float, float]:
 
 
 def refuse_unseen(model: Model, task: Task, found: Fit) -> None:
-    """IdentificationError where the markers leave a turn or a tail coordinate open."""
+    """IdentificationError if the markers do not determine a rotation or a tail coordinate."""
     count = len(task.unknowns.each)
     names = ["x", "y", "z", *(f"turn about {axis}" for axis in "xyz")]
     names += [f"tail coordinate {k}" for k in range(model.layout.nt)]
@@ -123,7 +123,7 @@ def _wider(task: Task, found: Fit) -> tuple[np.ndarray, ...]:
 
 
 def _torque_std(wanted: Unknowns, trial: Trial, R: np.ndarray, C: np.ndarray) -> np.ndarray | None:
-    """Return standard deviations of the torques at the knots, flat; None where they are known."""
+    """Return standard deviations of the torques at the knots, flat; None if these are known."""
     if not trial.unknown_torques:
         return None
     std = np.sqrt((own_root(wanted, R, C) ** 2).sum(axis=1))
@@ -137,7 +137,7 @@ def _trial(
     std: np.ndarray | None,
     reach: float,
 ) -> IdentifiedTrial:
-    """Return what came out of a trial."""
+    """Return the results of a trial."""
     trial, iterate, known = parts
     states = iterate.states[trial.frames]
     torques = None

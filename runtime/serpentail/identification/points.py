@@ -86,10 +86,10 @@ def frames(
 def _along(
     arcs: bool, first: np.ndarray, second: np.ndarray, x: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return where a point at x of a piece of length 1 is, (..., 3, 1), and its axes (..., 3, 3).
+    """Return the point at x of a piece of length 1, (..., 3, 1), and its axes (..., 3, 3).
 
-    A link turns at its joint by R = Rx(alpha) Rz(beta) and is straight along -y (Eq. 13).  An arc
-    turns by Exp(x [a, 0, b]) as it goes.
+    A link turns at its joint by R = Rx(alpha) Rz(beta) and is straight along -y (Eq. 13). Along an
+    arc the axes turn by Exp(x [a, 0, b]).
     """
     if not arcs:
         R = _exponential(first, 0) @ _exponential(second, 2)

@@ -33,7 +33,7 @@ class Identification:
         Each estimated number: ``name``, ``value``, ``std``, the interval ``low`` to ``high``,
         ``unit``, ``begin``, ``at_bound``.
     covariance : ndarray, shape (P, P)
-        Covariance of the parameters, SI; inf where the data determine nothing.
+        Covariance of the parameters, SI; inf if the data determine nothing.
     singular_values : ndarray, shape (P,)
         Singular values of the information on relative changes; each is 1 over a relative
         standard deviation.

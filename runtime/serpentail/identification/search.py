@@ -1,4 +1,4 @@
-"""Fits on meshes that are fine enough, with a noise that is estimated where it is unknown."""
+"""Fits on refined meshes, and estimates the noise if it is unknown."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -39,7 +39,7 @@ def first_iterate(model: Model, trial: Trial, states: np.ndarray) -> Iterate:
 
 
 def refined(task: Task, start: Point, stage: Stage) -> tuple[Task, Fit]:
-    """Return the best fit on meshes that are fine enough, with the noise where that is unknown."""
+    """Return the best fit on meshes that are fine enough, with the noise if that is unknown."""
     task, found = with_noise(task, start, stage)
     for _ in range(ROUNDS):
         model = task.unknowns.model_at(found.point.values)

@@ -51,9 +51,10 @@ def configurations(model: Model, placed: Placements, tracks: MarkerTracks) -> np
 def fitted(
     model: Model, placed: Placements, positions: np.ndarray, begin: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return configurations (F, nq) near others that fit positions (F, M, 3), and misfits (F,) m.
+    """Return configurations (F, nq) that fit positions (F, M, 3), and misfits (F,) m.
 
-    Levenberg-Marquardt steps of all frames side by side; turns are held a little where they are.
+    They begin at given ones. Levenberg-Marquardt steps of all frames side by side; a small weight
+    holds rotations where they are.
     """
     nv, reach = model.nv, float(model.parameters["tail_length"])
     weight = np.isfinite(positions).all(axis=2)
@@ -142,7 +143,7 @@ def quaternion_of(R: np.ndarray) -> np.ndarray:
 
 
 def _between(times: np.ndarray, q: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Return configurations with those of frames that showed too little put between the others."""
+    """Return configurations in which frames with too few markers are interpolated."""
     q = q.copy()
     kept = q[rows]
     kept[:, QUATERNION] = sign_continuous(kept[:, QUATERNION])
@@ -168,7 +169,7 @@ def velocities(model: Model, times: np.ndarray, q: np.ndarray) -> np.ndarray:
 
 
 def on_mesh(model: Model, frames: np.ndarray, times: np.ndarray, mesh: np.ndarray) -> np.ndarray:
-    """Return states (K+1, nx) at a mesh between those of frames at times."""
+    """Return states (K+1, nx) at a mesh, interpolated from those of frames at times."""
     states = frames.copy()
     states[:, QUATERNION] = sign_continuous(states[:, QUATERNION])
     found = np.stack([np.interp(mesh, times, column) for column in states.T], axis=1)

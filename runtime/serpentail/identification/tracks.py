@@ -1,4 +1,4 @@
-"""``MarkerTracks``: positions of markers over time, nan where a marker was not seen."""
+"""``MarkerTracks``: positions of markers over time, nan if a marker was not seen."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ class MarkerTracks:
     times : ndarray, shape (F,)
         Increasing times (s).
     positions : ndarray, shape (F, M, 3)
-        Positions (m, world); nan where a marker was not seen.
+        Positions (m, world); nan if a marker was not seen.
     names : tuple of str
         Names of the markers.
     source : str
@@ -83,7 +83,7 @@ def marker_tracks(
     times : array_like, shape (F,)
         Increasing times (s), four or more, evenly spaced or not.
     positions : array_like, shape (F, M, 3)
-        Positions; nan where a marker was not seen.
+        Positions; nan if a marker was not seen.
     names : sequence of str
         Names of the M markers.
     unit : str

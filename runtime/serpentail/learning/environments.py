@@ -88,7 +88,7 @@ class Environments(VectorEnv):
         return self.worlds.seen(), rewards, terminated, truncated, {}
 
     def _restart(self, which: np.ndarray) -> None:
-        """Begin episodes anew, each from its own generator."""
+        """Begin new episodes, each from its own generator."""
         draws = np.array([self.generators[k].random(DRAWS) for k in which.tolist()])
         self.worlds.restart(which, draws)
         self.over[which] = False

@@ -1,4 +1,4 @@
-"""The tasks of environments: where an episode starts, and what a model needs for it."""
+"""The tasks of environments: the starts of episodes, and what a model needs for them."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

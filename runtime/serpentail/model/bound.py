@@ -1,4 +1,4 @@
-"""Keeps the cache of compiled models within its size, and tells what is in it."""
+"""Keeps the cache of compiled models within its size, and lists its content."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Entry:
 
 
 def limit() -> int:
-    """Return the size in bytes that the cache may have; SerpentailError where it is no size."""
+    """Return the largest size of the cache in bytes; SerpentailError if the setting is wrong."""
     text = os.environ.get("SERPENTAIL_CACHE_SIZE") or DEFAULT_SIZE
     found = re.fullmatch(r"(\d{1,9})([KMGT]?)", text.strip(), re.IGNORECASE | re.ASCII)
     if found is None:
@@ -68,7 +68,7 @@ def _size(path: Path) -> int:
 
 
 def bound(cache: Path, most: int) -> None:
-    """Delete what killed builds left, then what was not used for longest, down to most bytes."""
+    """Delete leftovers of killed builds, then the oldest entries, down to ``most`` bytes."""
     now = time.time()
     for lost in entries(cache, PARTS, LOCKS):
         if now - lost.used > LOST_S:
@@ -83,7 +83,7 @@ def bound(cache: Path, most: int) -> None:
 
 
 def contents(cache: Path) -> dict[str, str | int]:
-    """Return where the cache is, how many entries of each kind it has, and bytes."""
+    """Return the folder of the cache, the number of entries of each kind, and their bytes."""
     found = list(entries(cache, *OURS))
     counts = {kind: sum(entry.kind == kind for entry in found) for kind in KINDS}
     size = sum(entry.size for entry in found)
@@ -91,12 +91,12 @@ def contents(cache: Path) -> dict[str, str | int]:
 
 
 def empty(cache: Path) -> None:
-    """Delete all that is in the cache; what a process has loaded, it keeps."""
+    """Delete all entries of the cache; processes keep what they have loaded."""
     for entry in entries(cache, *OURS):
         _delete(entry.path, cache)
 
 
 def _delete(path: Path, cache: Path) -> None:
-    """Delete an entry, unless another process does; one that cannot be deleted stays."""
+    """Delete an entry; ignore one that cannot be deleted, or that another process deletes."""
     with contextlib.suppress(OSError):
         discard(path, cache)

@@ -1,4 +1,4 @@
-"""The cache of compiled models: where it is, whose it is, and how an entry gets in whole."""
+"""The cache of compiled models: its folder, its owner, and how entries are added whole."""
 
 from __future__ import annotations
 
@@ -48,9 +48,9 @@ def digest(data: object) -> str:
 
 
 def refuse_others(*paths: Path) -> None:
-    """Raise SerpentailError where others than the user and root own or may write what is there.
+    """Raise SerpentailError if others than the user and root own it or may write to it.
 
-    Windows tells neither owners nor rights in this way: a cache there is as safe as its folder.
+    Windows has no such owners and rights: there a cache is as safe as its folder.
     """
     if not hasattr(os, "geteuid"):
         return
@@ -82,7 +82,7 @@ def unwritable(cache: Path, error: OSError) -> SerpentailError:
 
 
 def own_folder(cache: Path, kind: str) -> Path:
-    """Return a folder of the cache, for the user alone, made where it is missing."""
+    """Return a folder of the cache that is private to the user; make it if it is missing."""
     for path in (cache, cache / kind):
         path.mkdir(0o700, parents=True, exist_ok=True)
     refuse_others(cache, cache / kind)
@@ -110,7 +110,7 @@ def library_name(path: Path) -> str:
 
 
 def mark_used(place: Path) -> None:
-    """Note the time, by which entries that nobody uses are told."""
+    """Store the time of use, by which unused entries are found."""
     with contextlib.suppress(OSError):
         os.utime(place)
 
@@ -127,7 +127,7 @@ def workshop(cache: Path) -> Iterator[Path]:
 
 
 def publish(part: Path, place: Path, whole: Callable[[Path], object]) -> None:
-    """Put an entry in its place by one rename; a whole one that is there stays, another goes."""
+    """Put an entry in its place by one rename; keep a whole one that is there, replace another."""
     own_folder(place.parents[1], place.parent.name)
     try:
         part.rename(place)

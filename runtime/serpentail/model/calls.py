@@ -29,7 +29,7 @@ class Memory(Protocol):
 
 
 def call_of(function: Any, own: Memory) -> Call:
-    """Return what calls a function of the generated C, as ctypes has it, on one state."""
+    """Return a fast call of a generated C function on one state."""
     library = extension()
     if library is None:
         return declined
@@ -38,12 +38,12 @@ def call_of(function: Any, own: Memory) -> Call:
 
 
 def declined(*_: Any) -> None:
-    """Serve in place of such a call where ctypes makes all."""
+    """Stand in for such a call if ctypes makes all calls."""
 
 
 @cache
 def extension() -> ctypes.PyDLL | None:
-    """Return the extension, compiled once for a compiler and a Python; None where it cannot be."""
+    """Return the extension, compiled once for a compiler and a Python; None if that fails."""
     import sysconfig
 
     headers = Path(sysconfig.get_path("include"))

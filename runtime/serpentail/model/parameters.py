@@ -31,7 +31,7 @@ CHECKS = {  # of rows (K, size), for each one
 
 
 def resolve(manifest: dict, changes: Mapping[str, object] | None) -> MappingProxyType[str, Value]:
-    """Return name -> float or tuple (SI) of all parameters; ModelError lists all that is wrong."""
+    """Return name -> float or tuple (SI) of all parameters; ModelError lists all errors."""
     defaults = {p["name"]: p["default"] for p in manifest["parameters"]}
     defaults = {name: value for name, value in defaults.items() if value is not None}
     values = completed(manifest, merged(defaults, _checked_changes(manifest, changes, None)))
@@ -51,7 +51,7 @@ def json_ready(values: Mapping[str, Value]) -> dict[str, float | list[float]]:
 
 @dataclass(frozen=True, eq=False)
 class RunParameters:
-    """Parameters of k runs: what is changed, all values by name, and the C structs (k, scalars)."""
+    """Parameters of k runs: the changes, all values by name, and the C structs (k, scalars)."""
 
     changes: dict[str, np.ndarray]
     values: Values
@@ -113,9 +113,10 @@ def totals(values: Values) -> dict[str, Any]:
 
 
 def completed(manifest: dict, values: Values) -> dict[str, Any]:
-    """Return the values, of each run, with those that follow: link_inertia from link_radius, mass
-    and length of a tail from those of its links or arcs.  ModelError where the weight is no finite
-    number, or stops leave no room.
+    """Return the values of each run, with those that follow from them.
+
+    These are link_inertia from link_radius, and mass and length of a tail from those of its links
+    or arcs. ModelError if the weight is not finite, or stops exclude each other.
     """
     absent = {"gravity": 0.0} if manifest["scene"].get("weightless") else {}
     values = {**absent, **values, **totals(values)}
@@ -133,7 +134,7 @@ def completed(manifest: dict, values: Values) -> dict[str, Any]:
 
 
 def _refuse_stops_without_room(values: Values) -> None:
-    """ModelError where a lower stop is not below the upper one."""
+    """ModelError unless each lower stop is below the upper one."""
     if "tail_stop_lower" not in values:
         return
     lower, upper = (np.asarray(values[f"tail_stop_{end}"]) for end in ("lower", "upper"))
@@ -198,7 +199,7 @@ def flat(manifest: dict, values: Mapping[str, Value]) -> list[float]:
 
 
 def _checked(fields: dict, name: str, value: object, runs: int | None) -> np.ndarray | str:
-    """Return the value, of every run where there are many, or what is wrong with it."""
+    """Return the value, of each run if there are several, or the error about it."""
     if name not in fields:
         parts = [part for part in TOTALS.get(name, ()) if part in fields]
         remedy = did_you_mean(name, fields) or f"there are {', '.join(fields)}"

@@ -12,7 +12,7 @@ ENDS = (("tail_stop_lower", -1), ("tail_stop_upper", 1))
 
 
 def passive_force(values: Mapping[str, Any], angles: Any, rates: Any) -> Any:
-    """Return what the passive parts ask of the torques (..., 2m), N m, at coordinates and rates."""
+    """Return the torques (..., 2m), N m, of springs, damping and stops at coordinates and rates."""
     force = np.zeros(np.shape(angles))
     if "tail_stiffness" in values:
         force = force + np.asarray(values["tail_stiffness"]) * (angles - _of(values, "tail_rest"))
@@ -72,9 +72,7 @@ def _of(values: Mapping[str, Any], name: str) -> np.ndarray:
 
 
 def _ways(values: Mapping[str, Any], angles: Any) -> list[tuple[Any, int]]:
-    """How far coordinates are in the lower and in the upper stop, in its width, and which way a
-    stop's force on the torques goes.
-    """
+    """Return how far coordinates are in both stops, in widths, and the signs of their forces."""
     if "tail_stop_lower" not in values:
         return []
     width = _of(values, "tail_stop_width")

@@ -13,7 +13,7 @@ def links_of(pieces: int | list[int], kinds: tuple[str, ...]) -> Links:
 
 
 def words_of(links: Links, segments: int) -> str:
-    """Return what a tail of so many segments is made of."""
+    """Return in words what a tail is made of."""
     if links is None:
         return f"{segments} continuum segments"
     if isinstance(links, int):

@@ -42,11 +42,11 @@ def shared(
     run: Callable[[int, int], None],
     least: int = MIN_STATES_PER_THREAD,
 ) -> None:
-    """Call ``run(first, last)`` for pieces of a batch, in several threads where it is large.
+    """Call ``run(first, last)`` for pieces of a batch, in several threads if it is large.
 
-    threads: at most so many, None for as many as this process may use.  least: states that are
-    worth a thread.  Of states that fail the first one raises.  Ctrl-C ends all after the pieces in
-    work.
+    threads: their largest number, None for as many as this process may use. least: states that are
+    worth a thread. If states fail, the first one raises the error. Ctrl-C ends the work after the
+    pieces that are running.
     """
     if count < 2 * least:
         run(0, count)

@@ -1,4 +1,4 @@
-"""What a REPL shows of a motion: on a few lines what moved, when, how it was made, how it ended."""
+"""The text of a motion in a REPL: what moved, when, how it was made, how it ended."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -28,7 +28,7 @@ def account(motion: "Trajectory") -> str:
 
 
 def tail_of(model: Model) -> str:
-    """Return what a model's tail is made of."""
+    """Return in words what a model's tail is made of."""
     if model.kind == "mixed":
         return model.tail_words()
     if isinstance(model.links, tuple):

@@ -11,23 +11,23 @@ Later = Callable[[str], dict[str, Any]]
 
 
 def made(kind: type[T], fields: Mapping[str, Any], later: Later) -> T:
-    """Return a motion with these fields, all others of which are derived later."""
+    """Return a motion with these fields; all others are derived later."""
     motion = object.__new__(kind)
     vars(motion).update(fields, **{LATER: later})
     return motion
 
 
 def settled(motion: Any, names: Iterable[str]) -> dict[str, Any]:
-    """Return what a motion consists of when fields of these names have been derived."""
+    """Return the state of a motion after deriving the fields of these names."""
     state = vars(motion) | {name: getattr(motion, name) for name in names}
     state.pop(LATER, None)
     return state
 
 
 class Derived:
-    """A field that its motion derives once and keeps; where it was given, this is not asked.
+    """A field that its motion derives once and keeps, unless it was given.
 
-    In a race of threads the first one's values stay.
+    If threads race, the first one's values stay.
     """
 
     def __init__(self, name: str):

@@ -33,7 +33,7 @@ from .trajectory import Trajectory
 
 
 class Number(NamedTuple):
-    """A number of a run: ``of`` returns it ready for JSON, or None where there is none."""
+    """A number of a run: ``of`` returns it ready for JSON, or None if it does not exist."""
 
     name: str
     unit: str
@@ -54,12 +54,12 @@ def _of_torso(measure: Callable[[Trajectory], Any]) -> Callable[[Model, Trajecto
 
 
 def _told(name: str) -> Callable[[Model, Trajectory], Any]:
-    """What the run itself told in its info."""
+    """Return an entry of the run's info."""
     return lambda model, motion: motion.info.get(name)
 
 
 def _ground_impulse(motion: Trajectory) -> list[float] | None:
-    """The sum of the groups' impulses; None in flight, and where no run added them up."""
+    """Return the sum of the groups' impulses; None in flight, and if no run added them up."""
     impulses = motion.info.get("impulse_N_s")
     return np.sum(list(impulses.values()), axis=0).tolist() if impulses else None
 

@@ -43,7 +43,7 @@ def summary(model: Model, motion: Trajectory) -> Summary:
     Returns
     -------
     Summary
-        A dict of numbers by name, SI unless the name gives a unit; None where a number does not
+        A dict of numbers by name, SI unless the name gives a unit; None if a number does not
         exist. ``described()`` adds units and meanings, ``markdown()`` gives a table.
 
     Notes

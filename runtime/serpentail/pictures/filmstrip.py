@@ -170,7 +170,7 @@ def _draw_row(
 
 
 def _label(k: int, film: list[Frame]) -> str:
-    """Number and time of frame k, with the decimals that tell the frames apart."""
+    """Return number and time of frame k, with enough decimals to distinguish the frames."""
     step = min(np.diff([frame.time for frame in film]), default=1.0)
     decimals = max(0, math.ceil(-math.log10(1e3 * step)))
     return rf"$\mathbf{{{k + 1}}}$  {1e3 * film[k].time:.{decimals}f} ms"

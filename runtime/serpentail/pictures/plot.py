@@ -87,7 +87,7 @@ def plot(
 def drawn_on(
     ax: Any, motion: Trajectory, chosen: list[Panel], path: str | os.PathLike[str] | None
 ) -> tuple["Figure", Any]:
-    """Draw on axes that are given, in the look that they have."""
+    """Draw on given axes, without changing their style."""
     every = np.atleast_1d(np.asarray(ax, dtype=object)).ravel()
     if len(every) != len(chosen):
         raise ViewError(f"ax: {len(every)} axes for {len(chosen)} panels: name one panel for each")
@@ -153,9 +153,9 @@ def _limits(panel: Panel) -> tuple[float, float]:
 
 
 def _legend_rows(panel: Panel, width: float) -> tuple[int, int]:
-    """Rows and columns of a legend on axes of a width in inches; none where one curve needs none.
+    """Return rows and columns of a legend on axes of a width in inches; none for a single curve.
 
-    A panel's label tells what its only curve is.
+    The panel's label then names the curve.
     """
     labels = [*panel.names, *([f"{_listed(panel.still)}: 0"] if panel.still else [])]
     if len(labels) < 2:

@@ -19,7 +19,7 @@ YAWS = np.linspace(0.0, 2 * np.pi, 73)
 
 
 def refuse_impossible(model: Model, problem: PlanningProblem) -> None:
-    """PlanningError where no end of a flight can have the rates that the goal asks for."""
+    """PlanningError if no end of a flight can have the rates that the goal asks for."""
     goal, h = problem.goal, model.momentum(problem.q0, problem.v0)[1]
     size = float(np.linalg.norm(h))
     if goal.torso_rate is None or size == 0:

@@ -135,7 +135,7 @@ def checked_goal(goal: Any, tail: int) -> Goal:
 
 
 def _partly_free(field: str, value: Any, size: int) -> np.ndarray | None:
-    """Return numbers (size,), nan where they are free; None where all are."""
+    """Return numbers (size,), nan for free ones; None if all are free."""
     if value is None:
         return None
     if np.ma.is_masked(value):

@@ -47,7 +47,7 @@ def read_scene(path: str | Path, error: type[Exception]) -> tuple[dict[str, Any]
 
 
 def subtable(scene: Mapping, name: str, path: Path, error: type[Exception]) -> dict:
-    """Return a table of a scene; ``error`` where it has none."""
+    """Return a table of a scene; ``error`` if it is missing."""
     table = scene.get(name)
     if not isinstance(table, Mapping):
         others = [verb for verb in NEEDS if verb != name and verb in scene]
@@ -59,8 +59,8 @@ def subtable(scene: Mapping, name: str, path: Path, error: type[Exception]) -> d
 def model_of(scene: Mapping, path: Path, folder: str | Path | None, parameters: Mapping) -> Model:
     """Return the model of a scene, with the scene's parameters, then those given here.
 
-    folder: where it was generated; None: the model is built, or was.  ModelError where the folder
-    is of another scene.
+    folder: the generated folder; None: the model is built, or taken from the cache. ModelError if
+    the folder belongs to another scene.
     """
     if folder is None:
         return model_from(*built(scene, path.stem, parameters))
@@ -77,7 +77,7 @@ def model_of(scene: Mapping, path: Path, folder: str | Path | None, parameters: 
 
 
 def size_of(model: Model) -> dict[str, float]:
-    """Return what becomes of each "kg", "m" and "s" that its scene names; empty where they stay."""
+    """Return the factors of each "kg", "m" and "s" of a scaled scene; empty without scaling."""
     return dict(model.manifest.get("size", {}))
 
 
@@ -90,14 +90,14 @@ def _own_parameters(scene: Mapping) -> Mapping:
 
 
 def _same(value: Any, made: Any) -> bool:
-    """Tell whether a scene's value is that of a manifest; the order of a list means nothing."""
+    """Tell whether a scene's value equals that of a manifest; the order of a list is ignored."""
     if isinstance(value, list) and isinstance(made, list):
         return all(value.count(x) == made.count(x) for x in (*value, *made))
     return bool(value == made)
 
 
 def _in_radians(key: str, value: Any) -> Any:
-    """Return the value of a key, of an angle as a number where it has a unit."""
+    """Return the value of a key; an angle with a unit as a number in rad."""
     with suppress(ValueError):  # it is not what the model was made with, then
         return in_unit(value, "rad") if key == "bend_range" else value
     return value

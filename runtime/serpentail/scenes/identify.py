@@ -22,11 +22,11 @@ READ = ("unit", "axes", "zeros")  # keys that tell how files are read
 
 
 def identified(path: str, data: Sequence[str], folder: str | None = None) -> Identification:
-    """Return what a scene file's table [identify] makes of files of marker tracks.
+    """Return the identification that a scene's table [identify] describes, for marker files.
 
     path: a scene file, or the name of an example; data: TRC, CSV or C3D files, trials of one
-    animal; folder: of its model, where that was generated; None: it is built, or was, with the
-    derivatives that are needed.  Raises IdentificationError with field, value and remedy.
+    animal; folder: the model's generated folder; None: the model is built with the derivatives that
+    are needed, or taken from the cache. Raises IdentificationError with field, value and remedy.
     """
     tables, place = read_scene(path, IdentificationError)
     table = subtable(tables, "identify", place, IdentificationError)

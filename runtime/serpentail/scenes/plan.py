@@ -20,11 +20,11 @@ CODE_ONLY = ("guess", "path", "legs")  # what no file can hold
 
 
 def planned(path: str, folder: str | None = None) -> Plan:
-    """Return the plan that a scene file asks for.
+    """Return the plan that a scene file describes.
 
-    path: a scene file, or the name of an example; folder: of its model, where that was generated;
-    None: it is built, or was.  Raises PlanningError with field, value and
-    remedy, ModelError where the folder is of another scene, ExtraMissing without the extra "plan".
+    path: a scene file, or the name of an example; folder: the model's generated folder; None: the
+    model is built, or taken from the cache. Raises PlanningError with field, value and remedy,
+    ModelError if the folder belongs to another scene, ExtraMissing without the extra "plan".
     """
     extras.needed("casadi", "plan")  # before the model is built
     tables, place = read_scene(path, PlanningError)
@@ -86,7 +86,7 @@ def _is_free(value: Any) -> bool:
 
 
 def _check_solver(solver: Any, options: Any) -> None:
-    """PlanningError where a solver could be made to load libraries, run code or write files."""
+    """PlanningError for a solver that could load libraries, run code or write files."""
     if not isinstance(solver, str) or not re.fullmatch("[a-z]+", solver):
         raise refusal("plan.solver", solver, f"a name of a-z; {ELSEWHERE}", PlanningError)
     for name, value in options.items() if isinstance(options, Mapping) else [("", options)]:

@@ -184,7 +184,7 @@ def _plans(where: str, plan: Any) -> tuple[Mapping[str, Any], ...]:
 
 
 def _check_acting(where: str, controller: Any, planned: bool) -> None:
-    """SimulationError where what is no controller, or a plan and a controller, would act."""
+    """SimulationError for a wrong controller, or for both a controller and a plan."""
     if planned and controller is not None:
         raise SimulationError(
             f"{where}: has a controller and a plan: the plan is tracked: leave one out"

@@ -1,4 +1,4 @@
-"""Whether a run's books balance: energy against work, momentum against impulses.
+"""Checks whether energy and momentum of a run balance with work and impulses.
 
 Work and impulses are added up inside the integrator, by the same weights as the state, so what does
 not balance is an error of the integration.
@@ -26,11 +26,11 @@ Arrays = dict[str, np.ndarray]
 
 @dataclass(frozen=True, eq=False)
 class Audit:
-    """The books of runs; arrays have the leading axis of the runs, or none.
+    """Work, impulses, and what they do not explain; arrays have the runs' axis, or none.
 
-    work (J) of torques, damping, the ground on what touches it, and the drives of the legs;
-    impulses (..., 3) in N s, world, of the ground on each group of points; energy (J) and momentum
-    (..., 3) in N s: what changed without these and gravity; relative: the larger of both over what
+    work (J): of torques, damping, the ground on the points, and the drives of the legs. impulses
+    (..., 3), N s, world: of the ground on each group of points. energy (J) and momentum (..., 3), N
+    s: changes that these and gravity do not explain. relative: the larger of both relative to what
     was moved.
     """
 
@@ -104,7 +104,7 @@ def named(model: Model, ledger: np.ndarray) -> tuple[Arrays, Arrays]:
 
 
 def warnings_of(audit: Audit, info: Mapping[str, Any], eps: float) -> list[str]:
-    """Say what does not balance, and which touches were not felt; audit and info of one run."""
+    """Return warnings about imbalance and missed touches, from the audit and info of one run."""
     found = []
     allowed, remedy = FIXED_STEPS, "take a shorter step"
     if "rtol" in info:

@@ -1,7 +1,7 @@
-"""Ctrl-C in runs in which a function of Python acts.
+"""Ctrl-C in runs with a Python function as controller.
 
-What it raises at the moment when C enters Python would be lost, and the run would go on: it waits
-until the function is entered.
+KeyboardInterrupt raised while C enters Python would be lost, and the run would continue. It is
+therefore held back until the function is entered.
 """
 
 import signal

@@ -123,7 +123,7 @@ def _limit(torque: Any, size: int) -> np.ndarray:
 
 
 def _curve(reference: object, size: int) -> Piecewise:
-    """Return what the user gave as a function of time."""
+    """Return the reference that the user gave as a function of time."""
     if isinstance(reference, Reference):
         if reference.curve.channels != size:
             raise SimulationError(
@@ -138,7 +138,7 @@ def _curve(reference: object, size: int) -> Piecewise:
 
 
 def _nodes(reference: Any) -> tuple[ArrayLike, ArrayLike, object]:
-    """Return times, angles and what a spline does at its ends."""
+    """Return times, angles and the end conditions of a spline through them."""
     motion = getattr(reference, "trajectory", reference)
     if hasattr(motion, "tail") and hasattr(motion, "t"):
         if motion is reference:

@@ -1,4 +1,4 @@
-"""The structures that the generated C takes, as ctypes has them, with all that they point to."""
+"""The C structures of simulations, for ctypes, with all that they point to."""
 
 import ctypes
 from typing import Any, cast

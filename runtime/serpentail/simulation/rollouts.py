@@ -115,7 +115,7 @@ class Rollouts(Exports):
         return settled(self, LATER)
 
     def __repr__(self) -> str:
-        """On at most six lines what they are, and which failed."""
+        """At most six lines: number of runs, samples, method, and which failed."""
         model, failed = self.source.model, [k for k, e in enumerate(self.errors) if e is not None]
         lines = [
             f"Rollouts of {model.name}, {tail_of(model)}: {len(self)} runs of "

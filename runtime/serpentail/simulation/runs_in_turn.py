@@ -25,7 +25,7 @@ class Ended:
 
 
 class RunsInTurn:
-    """Takes up runs, so many at a time that Python may look around now and then; for one thread."""
+    """Makes runs, a few at a time, so that Python can react in between; for one thread."""
 
     def __init__(self, memory: Memory, acting: Acting, method: IntegrationMethod):
         self.run = CompiledRun(memory, acting, method)

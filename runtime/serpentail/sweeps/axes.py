@@ -44,7 +44,7 @@ class Axes:
         return math.prod(len(each.values) for each in self.grids.values()) * self.points
 
     def samples(self) -> dict[str, list]:
-        """Return the numbers of each axis that is spread, one a point."""
+        """Return the numbers of each random axis, one for each point."""
         if not self.spreads:
             return {}
         sizes = [each.low.size for each in self.spreads.values()]
@@ -73,7 +73,7 @@ class Axes:
 
 
 def axes_of(over: Any, points: Any, seed: Any) -> Axes:
-    """Return the axes of a sweep; SweepError where they are none, or too many."""
+    """Return the axes of a sweep; SweepError if one is wrong, or there are too many points."""
     if not isinstance(over, Mapping) or not over:
         needs = 'a table of axes by name, such as {"tail_mass": st.grid([0.002, 0.003])}'
         raise refusal("over", over, needs, SweepError)
@@ -96,7 +96,7 @@ def axes_of(over: Any, points: Any, seed: Any) -> Axes:
 
 
 def _checked(axes: Axes) -> Axes:
-    """Return axes whose names and ways agree, and whose points can be counted."""
+    """Return axes after checking their names, their kinds and the number of points."""
     ways = {each.way for each in axes.spreads.values()}
     if len(ways) > 1:
         raise SweepError(
@@ -113,7 +113,7 @@ def _checked(axes: Axes) -> Axes:
 
 
 def _numbers(spreads: Mapping, points: Any, seed: Any) -> tuple[int, int]:
-    """Return how many points are spread, 1 where no axis is, and their seed."""
+    """Return the number of points of the random axes, 1 without any, and their seed."""
     if not spreads and points is not None:
         raise SweepError(
             f"points: value {shown(points)}: no axis is random: leave it out, or give st.random, "

@@ -1,5 +1,5 @@
-"""Models on their way: a hashed bundle of the generated folder, unpacked and compiled once a
-machine.
+"""Models that are sent to workers: a hashed bundle of the generated folder, unpacked and compiled
+once for each machine.
 """
 
 import io
@@ -39,7 +39,7 @@ _models: OrderedDict[tuple[str, str], Model] = OrderedDict()
 
 
 def model_of(bundle: Bundle | None, job: Job) -> Model | None:
-    """Return the model of a bundle as a job has it, compiled where this machine has not yet."""
+    """Return the model of a bundle for a job, compiled if this machine has not yet done so."""
     if bundle is None:
         return None
     key = bundle.manifest_hash, job.identity()
@@ -52,7 +52,7 @@ def model_of(bundle: Bundle | None, job: Job) -> Model | None:
 
 
 def unpacked(bundle: Bundle) -> CheckedFolder:
-    """Return the folder of a bundle in this machine's cache, put there where it is missing."""
+    """Return the folder of a bundle in this machine's cache; unpack it if it is missing."""
     cache = cache_folder(None)
     place = cache / MODELS / bundle.manifest_hash
     with suppress(SerpentailError):

@@ -1,4 +1,4 @@
-"""A process that runs points: what hangs or crashes in it is ended with it, and nothing else is."""
+"""A process that runs points, so that a crash or a hang in a point ends this process only."""
 
 import importlib
 import os
@@ -43,7 +43,7 @@ def main(descriptor: int) -> None:
 
 
 def _listen(link: Connection, tasks: queue.SimpleQueue) -> None:
-    """Take what comes; end the process when nobody is there any more."""
+    """Receive tasks; end the process when the parent is gone."""
     try:
         while True:
             tasks.put(link.recv())

@@ -1,4 +1,4 @@
-"""Sends the points of a sweep as blocks of about a second, and writes what comes back."""
+"""Sends the points of a sweep in blocks of about one second, and writes their rows."""
 
 import time
 from collections import deque
@@ -40,7 +40,7 @@ Work = tuple["Group", list[Task], int]  # points of a group, and how often they 
 
 @dataclass
 class Group:
-    """Points of one model that are still to be run; pace: seconds a point, where that is known."""
+    """Points of one model that are still to be run; pace: seconds for a point, if known."""
 
     bundle: Bundle | None
     job: Job
@@ -66,7 +66,7 @@ class Group:
 
 @dataclass
 class Spent:
-    """What a sweep took: seconds by the wall and of all workers, blocks, points, workers."""
+    """What a sweep took: elapsed seconds, seconds of all workers, blocks, points, workers."""
 
     wall_s: float = 0.0
     busy_s: float = 0.0
@@ -90,7 +90,7 @@ class Driver:
     spent: Spent = field(default_factory=Spent)
 
     def drive(self, executor: Any) -> Spent:
-        """Run all; NotWritten where rows cannot be kept, SweepError where no worker is left."""
+        """Run all points; NotWritten if rows cannot be written, SweepError if no worker is left."""
         begun = time.perf_counter()
         with Stage("sweep", self.name) as stage:
             self._tell(stage)
@@ -170,7 +170,7 @@ class Driver:
         return Block(jobs[id(group)], self.script, group.bundle, points, self.limit, together)
 
     def _result(self, future: Future, tries: int, place: Place) -> Ran | None:
-        """Return what came of a block; None where it is to be sent again."""
+        """Return the results of a block; None if it is to be sent again."""
         try:
             return future.result()
         except (Exception, CancelledError) as reason:  # whatever an executor loses work by

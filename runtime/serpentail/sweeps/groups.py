@@ -42,10 +42,10 @@ class Entry:
 
 
 def entries_of(what: Any, axes: Axes, job: Job, of: Any) -> list[Entry]:
-    """Return all points with their keys, in order; SweepError where two are the same.
+    """Return all points with their keys, in order; SweepError if two are the same.
 
-    what: a model, a scene's path or example, or None for a function of points alone.  of: what
-    rows depend on besides.
+    what: a model, a scene's path or example, or None for a function of points alone. of: what else
+    rows depend on.
     """
     if what is None:
         find = _without_model(job)
@@ -66,7 +66,7 @@ def entries_of(what: Any, axes: Axes, job: Job, of: Any) -> list[Entry]:
 
 
 def groups_of(entries: list[Entry], done: Mapping[str, bool]) -> list[Group]:
-    """Return what is still to be run, by model."""
+    """Return the points that are still to be run, by model."""
     groups: dict[tuple[str, int], Group] = {}
     for each in entries:
         if each.key in done:
@@ -111,7 +111,7 @@ def _of_model(model: Model, axes: Axes, job: Job) -> Find:
 
 
 def _of_scene(scene: Any, axes: Axes, job: Job) -> Find:
-    """Points that change parameters, what the model is made of, or keys of the scene's table."""
+    """Return points that change parameters, keys of the model, or keys of the scene's table."""
     tables, path = read_scene(scene, SweepError)
     first = next(iter(axes))
     shape = [name for name in axes.names if name in MADE_OF]
@@ -156,7 +156,7 @@ def _of_scene(scene: Any, axes: Axes, job: Job) -> Find:
 
 
 def _refuse_keys(job: Job, values: Mapping[str, Any]) -> None:
-    """SweepError where a key of the table is unknown, before a model is built."""
+    """SweepError for an unknown key of the table, before a model is built."""
     assert isinstance(job.run, str) and job.table is not None
     refused = Refusals(SweepError)
     read(changed(job.table, values), TABLES[job.run][0], job.run, refused)
@@ -164,7 +164,7 @@ def _refuse_keys(job: Job, values: Mapping[str, Any]) -> None:
 
 
 def _refuse_unknown(names: list[str], run: str, known: Collection[str]) -> None:
-    """SweepError where there is a name that is neither a parameter nor a key of the table."""
+    """SweepError for a name that is neither a parameter nor a key of the table."""
     for name in names:
         near = did_you_mean(name.split(".")[0], [*known, *MADE_OF, *TABLES[run][0].keys])
         remedy = near or f"the parameters are {', '.join(sorted(known))}"

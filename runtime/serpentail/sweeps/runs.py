@@ -30,7 +30,7 @@ SHARED = (type(None), Damping, TorqueTable, TorqueCurve)  # controllers that any
 
 
 class Told(NamedTuple):
-    """What came of a point: its place in the block, outcome (JSON) or error, seconds."""
+    """Result of a point: its place in the block, outcome (JSON) or error, seconds."""
 
     place: int
     outcome: str | None
@@ -39,7 +39,7 @@ class Told(NamedTuple):
 
 
 def run_points(job: Job, model: Model | None, points: Sequence[Point]) -> Iterator[list[Told]]:
-    """Yield what came of points, in their order: one at a time, or of all at once."""
+    """Yield the results of points, in their order: one at a time, or all at once."""
     if len(points) >= FEW and model is not None and job.run == "simulate":
         begun = time.perf_counter()
         try:
@@ -115,7 +115,7 @@ def _scenario(job: Job, model: Model, point: Point) -> Scenario:
 def _side_by_side(
     job: Job, model: Model, points: Sequence[Point]
 ) -> list[tuple[str | None, str | None]] | None:
-    """Return outcomes and errors of flights that differ in parameters and starts alone; None where
+    """Return outcomes and errors of flights that differ in parameters and starts alone; None if
     these differ in more.
     """
     parameters = [job.own_parameters(point) for point in points]
@@ -200,7 +200,7 @@ def outcome_of(motion: Trajectory, outputs: Sequence[str]) -> dict[str, Any]:
 
 
 def as_text(outcome: dict[str, Any]) -> str:
-    """Return an outcome as JSON; SweepError where it is not plain data."""
+    """Return an outcome as JSON; SweepError if it is not plain data."""
     try:
         return json.dumps(_ready(outcome), allow_nan=False)
     except (TypeError, ValueError) as reason:
@@ -208,7 +208,7 @@ def as_text(outcome: dict[str, Any]) -> str:
 
 
 def _ready(value: Any) -> Any:
-    """Return a value as JSON has it: None for what no number holds."""
+    """Return a value for JSON: None for a number that is not finite."""
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
     if isinstance(value, dict):
@@ -219,5 +219,5 @@ def _ready(value: Any) -> Any:
 
 
 def error_text(reason: BaseException) -> str:
-    """Return what a row tells of a failure."""
+    """Return the text of a failure in a row."""
     return f"{type(reason).__name__}: {reason}"[:MOST_TEXT]

@@ -15,10 +15,9 @@ AXIS = ("grid", *WAYS, "law")
 
 
 def arguments_of(path: str) -> dict[str, Any]:
-    """Return the arguments of ``sweep`` that the table [sweep] of a scene file has.
+    """Return the arguments of ``sweep`` from the table [sweep] of a scene file.
 
-    Its store is beside the file unless it says where; SweepError has a line for each key that is
-    wrong.
+    By default its store is next to the file. SweepError has a line for each wrong key.
     """
     tables, place = read_scene(path, SweepError)
     table = subtable(tables, "sweep", place, SweepError)

@@ -1,4 +1,4 @@
-"""The rows of a sweep in a file of SQLite: each once, by a key made of all that it depends on."""
+"""The rows of a sweep in an SQLite file; each has a key made of all that it depends on."""
 
 import json
 import sqlite3
@@ -23,7 +23,7 @@ IN_ONE_QUERY = 500
 
 
 class Row(NamedTuple):
-    """What a point came to: its outcome, or the error in place of it; seconds that it took."""
+    """Result of a point: its outcome, or the error in place of it; seconds that it took."""
 
     key: str
     point: str  # JSON
@@ -33,9 +33,9 @@ class Row(NamedTuple):
 
 
 class Store:
-    """Rows in a file, or in memory where the path is None.
+    """Rows in a file, or in memory if the path is None.
 
-    One process writes at a time, any number may read.  A row that is there stays.
+    One process writes at a time, any number may read. An existing row is never replaced.
     """
 
     def __init__(self, path: str | PathLike[str] | None):
@@ -65,7 +65,7 @@ class Store:
 
     @contextmanager
     def writing(self) -> Iterator[None]:
-        """Be the one process that writes; SweepError where another is."""
+        """Be the one process that writes; SweepError if another is."""
         if self.path is None:
             yield
             return
@@ -80,7 +80,7 @@ class Store:
             ) from None
 
     def add(self, rows: Iterable[Row]) -> None:
-        """Write rows, all or none of them; NotWritten where the disk refuses."""
+        """Write rows, all or none of them; NotWritten if the disk refuses."""
         with self._told(), self.base:
             self.base.executemany(INSERT, rows)
 
@@ -102,17 +102,17 @@ class Store:
         return found
 
     def forget(self, keys: Iterable[str]) -> None:
-        """Delete rows, which are then made anew."""
+        """Delete rows, so that they are made again."""
         with self._told(), self.base:
             self.base.executemany("delete from rows where key = ?", [(key,) for key in keys])
 
     def close(self) -> None:
-        """Close the file; what waits beside it is put into it."""
+        """Close the file, after writing SQLite's log into it."""
         self.base.close()
 
     @contextmanager
     def _told(self) -> Iterator[None]:
-        """Tell what the system refuses in one line."""
+        """Turn errors of SQLite into one line."""
         try:
             yield
         except sqlite3.DatabaseError as reason:

@@ -19,7 +19,7 @@ law = registry(LAWS)
 
 
 def legs(model: Model, time: float = 0.0) -> tuple[np.ndarray, ...]:
-    """Return the legs at a time, where the model has legs."""
+    """Return the legs at a time, if the model has legs."""
     if "feet" not in model.contacts:
         return ()
     angles, rates = LEGS[:4], LEGS[4:]

@@ -42,7 +42,7 @@ class Law:
     def limit(self, model: Model) -> float:
         """Return the limit, which grows with the links of a segment.
 
-        An entry of H sums n^2 pairs of links, which cancel where the tail is folded.
+        An entry of H sums n^2 pairs of links, which cancel if the tail is folded.
         """
         units, pieces = self.units, int(max(model.joints_each)) if model.links else model.samples
         if units and pieces and pieces > FEW_LINKS:
@@ -53,8 +53,8 @@ class Law:
 def registry(laws: list[Law]) -> Callable[..., Callable[[LawFunction], LawFunction]]:
     """Return a decorator that adds a function (model, state) -> error, or errors by place, to laws.
 
-    The function's name and docstring are the law's; the decorator takes what the law needs, and its
-    limits.
+    The function's name and docstring are the law's; the decorator takes the functions that the law
+    needs, and its limits.
     """
 
     def law(*needs: str, **limits: Any) -> Callable[[LawFunction], LawFunction]:

@@ -64,7 +64,7 @@ class Check:
 
     @property
     def ratio(self) -> float:
-        """Error over limit: inf where it is not a number, 0 where nothing is checked or allowed."""
+        """Error divided by limit: inf for nan, 0 if nothing is checked or allowed."""
         if self.omitted or not self.limit:
             return 0.0
         return float(np.nan_to_num(self.error / self.limit, nan=np.inf))
@@ -114,7 +114,7 @@ def unchecked(entry: Law, model: Model) -> str:
 
 
 def errors_at(entry: Law, model: Model, state: State) -> Iterator[tuple[str, float]]:
-    """Yield (place, error) of one state; nan where the model refuses to compute."""
+    """Yield (place, error) of one state; nan if the model refuses to compute."""
     try:
         with np.errstate(all="ignore"):  # what is no number fails
             errors = entry.error(model, state)
@@ -130,7 +130,7 @@ def counts(checks: list[Check]) -> dict[str, int]:
 
 
 def summary(model: Model, checks: list[Check]) -> dict[str, Any]:
-    """Return the checks as plain data for JSON; an error that is no finite number is null."""
+    """Return the checks as plain data for JSON; an error that is not finite is null."""
     rows = []
     for entry in checks:
         error = entry.error if np.isfinite(entry.error) and not entry.omitted else None
@@ -173,7 +173,7 @@ def _overview(model: Model, checks: list[Check]) -> list[str]:
 
 
 def _table(checks: list[Check], shown: Callable[[Check], bool]) -> list[str]:
-    """Lines: name, error, limit and place of the checks to show, what failed with its law."""
+    """Return lines with name, error, limit and place of checks; failed ones with their law."""
     rows = [c for c in checks if shown(c)]
     if not rows:
         return []

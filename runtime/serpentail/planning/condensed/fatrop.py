@@ -80,7 +80,7 @@ class Option(ctypes.Structure):
 
 
 class Outcome(ctypes.Structure):
-    """How a solve ended, and the wall clock (s) of evaluations and of all."""
+    """How a solve ended, and the elapsed times (s) of evaluations and in total."""
 
     _fields_ = (
         *((name, ctypes.c_int) for name in ("status", "iterations", "said")),
@@ -90,7 +90,7 @@ class Outcome(ctypes.Structure):
 
 @cache
 def library() -> ctypes.CDLL:
-    """FATROP's library; PlanningError where this CasADi brings none."""
+    """FATROP's library; PlanningError if this CasADi brings none."""
     import casadi as ca
 
     folder = Path(ca.__file__).parent
@@ -107,7 +107,7 @@ def library() -> ctypes.CDLL:
 
 @cache
 def kernel() -> ctypes.CDLL:
-    """The stages in C, compiled once; PlanningError where no compiler works."""
+    """The stages in C, compiled once; PlanningError if no compiler works."""
     import casadi as ca
 
     headers = Path(ca.__file__).parent / "include"
@@ -134,7 +134,7 @@ def kernel() -> ctypes.CDLL:
 
 @cache
 def called() -> Library:
-    """Addresses of what is called of FATROP."""
+    """Return the addresses of the functions of FATROP that are called."""
     found = library()
     return Library(
         **{
@@ -145,7 +145,7 @@ def called() -> Library:
 
 
 def options_of(asked: Mapping[str, Any], guess: str) -> Any:
-    """Return the settings, an array of Option; PlanningError where one is unknown, or no number."""
+    """Return the settings, an array of Option; PlanningError if one is unknown or not a number."""
     settings: dict[str, Any] = {}
     for name, value in asked.items():
         own = name.removeprefix(PREFIX)
@@ -166,7 +166,10 @@ def options_of(asked: Mapping[str, Any], guess: str) -> Any:
 
 @dataclass
 class _Stopping:
-    """Asks at every iteration whether to stop; what is raised then is kept for afterwards."""
+    """Checks at every iteration whether to stop.
+
+    Keeps an exception until the solver has returned.
+    """
 
     raised: BaseException | None = None
 

@@ -1,7 +1,7 @@
 """The program's objective, constraints and exact derivatives, assembled from those of its nodes.
 
-Everything outside the nodes is linear, so that each derivative is a sparse matrix times the
-entries of the nodes' derivatives.
+Everything outside the nodes is linear, so each derivative is a sparse matrix times the entries of
+the nodes' derivatives.
 """
 
 from dataclasses import dataclass

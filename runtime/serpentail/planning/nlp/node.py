@@ -1,6 +1,6 @@
-"""One node of the nonlinear program: the equations of motion at one instant, in the plan's units.
+"""One node of the nonlinear program: the equations of motion at one time, in the plan's units.
 
-Every node of every mesh evaluates the same CasADi function, of which the program is then built.
+Every node of every mesh evaluates the same CasADi function, from which the program is built.
 """
 
 from collections.abc import Iterable
@@ -58,7 +58,7 @@ class Equations:
 
 
 def equations_of_motion(model: Model, source: str = "auto") -> Equations:
-    """Return the compiled functions where the scene has their second derivatives, else SX ones."""
+    """Return compiled functions if the scene has their second derivatives, else SX ones."""
     names = ("forward_dynamics", "inverse_dynamics")
     if source != "symbolic":
         try:
@@ -107,12 +107,13 @@ def variables_of(
 
 @dataclass(frozen=True, eq=False)
 class Node:
-    """A node's function y(zeta, p, results of calls), the calls, whose inputs are linear in zeta.
+    """A node's function y(zeta, p, results of calls), and the calls.
 
-    zeta: [duration, states, algebraic unknowns, torques] in units.  p: parameters, first the
-    angular momentum about the COM (kg m^2/s, world), which the airborne formulation conserves.
-    y: duration * rates of the states, algebraic residuals, path constraints, duration * objective,
-    all in units; rates and residuals are the numbers of them, paths those of each constraint.
+    Their inputs are linear in zeta. zeta: [duration, states, algebraic unknowns, torques] in units.
+    p: parameters, first the angular momentum about the COM (kg m^2/s, world), which the airborne
+    formulation conserves. y: duration * rates of the states, algebraic residuals, path constraints,
+    duration * objective, all in units. rates, residuals: their numbers; paths: number of entries of
+    each path constraint.
     """
 
     function: "ca.Function"
@@ -128,11 +129,11 @@ class Node:
 
     @property
     def path(self) -> int:
-        """Entries of all path constraints."""
+        """Number of entries of all path constraints."""
         return sum(self.paths)
 
     def each_path(self, numbers: Any) -> np.ndarray:
-        """Return one number of each path constraint (.., k) at all entries of it (.., path)."""
+        """Return one number for each path constraint (.., k) at all its entries (.., path)."""
         return np.repeat(np.asarray(numbers, float), self.paths, axis=-1)
 
     @property

@@ -57,7 +57,7 @@ static int call_momentum(const void *parameters, const double *q, const double *
 def write_c(model: Model, task: MpcTask, memory: int, folder: str | os.PathLike[str]) -> list[Path]:
     """Write <model>_mpc.h and .c to a folder; return their paths; memory: in doubles.
 
-    PlanningError where there is no such folder, NotWritten where the system refuses a file.
+    PlanningError if there is no such folder, NotWritten if the system refuses a file.
     """
     try:
         target = Path(folder)
@@ -108,7 +108,7 @@ def _renamed(text: str, prefix: str) -> str:
 
 
 def _array(name: str, values: np.ndarray) -> str:
-    """Return an array; of an empty one a single 0, which nothing reads."""
+    """Return an array as C; an empty one as a single 0 that is never read."""
     flat = [repr(float(value)) for value in values.ravel()] or ["0.0"]
     rows = (", ".join(flat[k : k + A_LINE]) for k in range(0, len(flat), A_LINE))
     return f"static const double {name}[{len(flat)}] = {{\n    " + ",\n    ".join(rows) + "};\n"

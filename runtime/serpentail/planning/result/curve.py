@@ -1,4 +1,4 @@
-"""The motion that the unknowns of a solved program mean, at any time."""
+"""The motion of a solved program, at any time."""
 
 from dataclasses import dataclass
 
@@ -13,8 +13,8 @@ from ..nlp.rules import CollocationRule
 class Curve:
     """Collocation polynomials of all intervals, by block, SI.
 
-    ends (N + 1,): s.  starts (N, size): states where intervals start; increments (N, K, size):
-    their rates at the nodes times the interval's duration; nodes (N, K, size): torques and
+    ends (N + 1,): s. starts (N, size): states at the beginning of intervals; increments (N, K,
+    size): their rates at the nodes times the interval's duration; nodes (N, K, size): torques and
     algebraic unknowns.
     """
 
