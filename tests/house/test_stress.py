@@ -123,7 +123,8 @@ UNLIKE = {
 @pytest.mark.parametrize("change", UNLIKE.values(), ids=UNLIKE)
 def test_bodies_of_unlike_size_are_told(lying, change):
     with pytest.warns(
-        st.UnlikeBodies, match=r"unlike by .*: H may be off by as many roundings; are the"
+        st.UnlikeBodies,
+        match=r"differ by a factor of .*: H may be off by as many roundings; are the",
     ):
         other = lying.with_parameters(**change)
     with pytest.warns(st.UnlikeBodies):

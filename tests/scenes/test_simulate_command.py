@@ -125,7 +125,7 @@ def test_a_flight_is_a_scene_too(tmp_path, monkeypatch, capsys):
         ("--film", "simple.toml/deep/a.png", "simple.toml is not a folder"),
         ("--film", "a.avi", "has suffix '.avi': use one of .gif, .html, .mp4, .pdf, .png, .svg"),
         ("--film", "a", "has suffix '': use one of"),
-        ("--save", "/proc/a.npz", "could not be written|cannot be written to|no folder"),
+        ("--save", "/proc/a.npz", "could not be written|cannot be written to|not a folder"),
     ],
 )
 def test_a_target_that_cannot_be_is_refused_before_the_run(
