@@ -161,7 +161,7 @@ def _continued(angles: Array) -> Array:
         )
     if not len(angles):
         return angles
-    # both branches lie as far from those of the sample before: the same two ways, stay or change
+    # for either branch there are the same two choices: stay on it, or change to the other
     first, second = branches = _branches(angles)
     stay, change = (np.abs(_less_turns(b[1:] - first[:-1])).sum(axis=1) for b in branches)
     changes = np.concatenate([[_upright(branches[:, 0])], change < stay])

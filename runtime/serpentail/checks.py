@@ -88,7 +88,9 @@ def real_array(
         )
     if array.dtype.kind not in "fiu":
         raise error(f"{field}: type {array.dtype}: needs real numbers")
-    with np.errstate(over="ignore"):  # what float cannot hold becomes inf, which is refused later
+    with np.errstate(
+        over="ignore"
+    ):  # numbers too large for float become inf, which is refused later
         return np.asarray(array, dtype, order="C")
 
 

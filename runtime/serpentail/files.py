@@ -27,7 +27,7 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
             "another file"
         ) from reason
     finally:
-        with contextlib.suppress(OSError):  # where there is no folder for it
+        with contextlib.suppress(OSError):  # its folder may be missing
             part.unlink(missing_ok=True)
 
 

@@ -8,7 +8,7 @@ from contextvars import ContextVar
 from dataclasses import dataclass
 from typing import Any, TextIO
 
-PATIENCE_S = 1.0  # s of a stage after which it is worth a line
+PATIENCE_S = 1.0  # s: longer stages are reported
 PERIOD_S = 10.0  # s between lines in a pipe or a file
 
 
@@ -112,7 +112,7 @@ class Stage:
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         _depth.set(self.depth)
         now = self._now(ended=True)
-        logging: Any = sys.modules.get("logging")  # nobody listens who has not imported it
+        logging: Any = sys.modules.get("logging")  # without it, nobody receives log records
         if logging is not None:
             words = "%s" if kind is None else "%s, ended by " + kind.__name__
             logging.getLogger("serpentail").info(words, now)

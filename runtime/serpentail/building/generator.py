@@ -14,7 +14,7 @@ from ..model.commands import run_all
 from ..stages import Stage
 
 PACKAGE = "serpentail_codegen"
-TOOLS = ("sympy", "jinja2")  # another version of which may print another text
+TOOLS = ("sympy", "jinja2")  # other versions of these may print other texts
 REMEDY = "pip install serpentail, or generate where it is and give the folder to st.load"
 
 
@@ -55,7 +55,7 @@ def generate(scene: Path, output: Path) -> Path:
 def command() -> list[str]:
     """Return the command of the generator, without its arguments."""
     _home()
-    return [sys.executable, "-P", "-m", PACKAGE]  # -P: not what lies in the working folder
+    return [sys.executable, "-P", "-m", PACKAGE]  # -P: do not import from the working folder
 
 
 def _tell(stage: Stage, noted: Path) -> None:

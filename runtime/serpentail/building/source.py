@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 MOST_BYTES = 1_000_000
-MOST_DOTS = 100  # in a line, besides those of numbers: the parser's work grows as their square
+MOST_DOTS = 100  # in a line, without those of numbers: the parser's work grows with their square
 DECIMAL = re.compile(r"(?<![\w.])\d[\d_]*\.\d[\d_]*(?:[eE][+-]?\d+)?(?![\w.])")
 
 

@@ -16,7 +16,7 @@ def parser() -> argparse.ArgumentParser:
     verbs = root.add_subparsers(dest="verb", required=True, metavar="VERB")
     for add in (_of_scenes, _of_motions, _of_models, _of_this_machine):
         add(verbs)
-    # what each can print for programs
+    # output for programs
     for name, verb in verbs.choices.items():
         if name not in ("generate", "completion"):
             text = "print one JSON object on stdout instead of text"

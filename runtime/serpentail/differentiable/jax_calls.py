@@ -21,7 +21,7 @@ from ..model.workers import MIN_STATES_PER_THREAD
 SOURCE = Path(__file__).with_name("native") / "jax_calls.cc"
 TARGET = "serpentail_call"
 LIBRARIES = ("-Wl,--no-as-needed,-lstdc++", "-pthread")
-kept: dict[str, Any] = {}  # by the names of entries: what these point to
+kept: dict[str, Any] = {}  # objects that entries point to, by the entries' names
 
 
 class Entry(ctypes.Structure):

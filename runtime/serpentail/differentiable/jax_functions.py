@@ -14,7 +14,7 @@ from ..model.state_space import RATE
 from .jax_calls import TARGET, entered, library
 from .rules import RULES, Rule
 
-Array = Any  # a jax.Array, or what JAX makes one of
+Array = Any  # a jax.Array, or anything that JAX converts to one
 
 
 class JaxFunctions:

@@ -80,7 +80,7 @@ def _numbers(arrays: tuple[Tensor, ...], key: str, name: str) -> tuple[Tensor, .
     return tuple(torch.from_numpy(each).reshape(*lead, *each.shape[1:]) for each in outputs)
 
 
-# operators by their schemas: `custom_op` would check at each call what is so here
+# operators by their schemas: `custom_op` would check these at each call
 FUNCTION, JACOBIANS = "serpentail::function", "serpentail::jacobians"
 ARGUMENTS = "Tensor a, Tensor b, Tensor c, str key, str name"
 torch.library.define(FUNCTION, f"({ARGUMENTS}) -> Tensor")

@@ -9,7 +9,7 @@ from ..model.model import Model
 from ..model.parameters import resolve
 from ..model.snapshot import contents
 
-BEGINNING = (1980, 1, 1, 0, 0, 0)  # of a zip's time: no date of ours
+BEGINNING = (1980, 1, 1, 0, 0, 0)  # earliest time of a zip: no real date is stored
 RIGHTS = 0o100644 << 16  # a plain file that all may read
 UNIX = 3  # whose rights they are
 

@@ -8,7 +8,7 @@ from .. import __version__
 from ..model.model import Model
 from ..viewer.shape import length
 
-# FMI's unit of each of ours: its name, and exponents of SI's base units
+# our unit -> FMI's: its name, and exponents of SI's base units
 UNITS: dict[str, tuple[str, dict[str, int] | None]] = {
     "1": ("1", {}),
     "m": ("m", {"m": 1}),

@@ -14,7 +14,7 @@ from .description import description, height, legs
 
 FLYING = ("forward_dynamics", "forward_dynamics_derivatives", "rollout")
 TOUCHING = ("contact_dynamics", "contact_points", "rollout")
-NATIVE = Path(__file__).with_name("native")  # names with hyphens, as no model has
+NATIVE = Path(__file__).with_name("native")  # names with hyphens, which no model can have
 PLATFORMS = {("Linux", "x86_64"): "linux64"}  # the standard's names of those that this runs on
 HIDDEN = ("-fvisibility=hidden",)  # several units in one process share no function
 
@@ -34,7 +34,7 @@ def fmu(model: Model) -> bytes:
     files = {f"sources/{name}": content for name, content in sources.items()}
     files["modelDescription.xml"] = description(model, guid, names)
     place = PLATFORMS.get((platform.system(), platform.machine()))
-    if place is not None:  # elsewhere the sources are what there is
+    if place is not None:  # on other platforms there are only the sources
         files[f"binaries/{place}/{model.name}.so"] = _library(sources, names)
     return zipped(files)
 

@@ -23,7 +23,7 @@ from .chain import (
 )
 
 LEAST = 1e-15  # kg, kg m^2: MuJoCo takes none of a moving body that is not above it (mjMINVAL)
-MARGIN = 1e-12  # of the sum of two moments, by which what is rounded may miss the third
+MARGIN = 1e-12  # tolerance of the sum of two moments, because of rounding
 MOST_LINKS = 480  # MuJoCo reads no deeper than 500 elements
 # MuJoCo's equalities are soft.  As stiff as its own time step of 2 ms allows, joints of a segment
 # differ by 1e-4 rad in fast motions; by default, 0.1 rad.
@@ -47,7 +47,7 @@ def mjcf(model: Model) -> bytes:
     root.append(Xml.Comment(origin(model)))
     Xml.SubElement(root, "compiler", angle="radian", inertiafromgeom="false", autolimits="true")
     Xml.SubElement(root, "option", gravity=text((0.0, 0.0, -p.get("gravity", 0.0))))
-    # what floor a user adds is touched, and the animal does not touch itself
+    # it touches a floor that a user adds, but not itself
     default = Xml.SubElement(root, "default")
     Xml.SubElement(default, "geom", contype="0", conaffinity="1")
     Xml.SubElement(default, "equality", STIFF)

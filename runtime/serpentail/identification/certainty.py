@@ -12,9 +12,9 @@ from .trial import Trial
 from .unknowns import Unknowns
 
 SHARE = 0.05  # of the largest part of a combination: smaller parts are not named
-TOUCHED = 1e-6  # part of an unknown in what no data tell, from which on it has no interval
-WIDE = 1.0  # relative standard deviation from which on a combination counts as undetermined
-FLAT = 1e3  # by how much a wider prior on torques tells what is known from the prior alone
+TOUCHED = 1e-6  # an unknown with this part in an undetermined direction has no interval
+WIDE = 1.0  # relative standard deviation at which a combination counts as undetermined
+FLAT = 1e3  # factor of a wider prior on torques, to find what only the prior determines
 
 
 @dataclass(frozen=True)

@@ -11,12 +11,12 @@ from .placement import Placements
 from .start import fitted
 from .tracks import MarkerTracks
 
-FRAMES = 3  # at which swaps of a whole trial are looked for
-LOOSE = 0.01  # of the tail's length: a misfit from which on swaps are looked for
+FRAMES = 3  # frames at which swaps during a whole trial are checked
+LOOSE = 0.01  # of the tail's length: swaps are checked for larger misfits
 HALF = 0.5  # of the misfit that must be left once a swap is undone
 CLEAR = 8.0  # times the usual residual that a swapped marker is off
-WORSE = 4.0  # times the others' residual from which on a marker is told of
-SMALL = 1e-3  # of the markers' extent: less is not told of
+WORSE = 4.0  # a marker is reported if its residual is so many times the others'
+SMALL = 1e-3  # of the markers' extent: smaller residuals are not reported
 FEWEST = 3  # markers that are seen at once
 
 

@@ -190,7 +190,7 @@ def _c3d(source: Path) -> Read:
         first = int(content["header"]["points"]["first_frame"])
     except OSError:
         raise
-    except Exception as error:  # ezc3d tells of a damaged file by errors of many kinds
+    except Exception as error:  # ezc3d raises errors of many kinds for damaged files
         raise IdentificationError(
             f"{source}: is not a complete C3D file ({type(error).__name__}: {error!s:.100})"
         ) from error

@@ -7,7 +7,7 @@ from . import stages as radau
 from .stages import difference
 from .trial import Iterate, Trial
 
-SHARE = 0.05  # of the noise that all intervals together may err
+SHARE = 0.05  # allowed error of all intervals together, relative to the noise
 ORDER = 6  # of the local error
 MOST = 8  # parts into which one interval is cut at once
 

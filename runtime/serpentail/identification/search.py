@@ -18,7 +18,7 @@ from .trial import Iterate, Trial
 from .unknowns import Unknowns
 
 ROUNDS = 4  # of refinement
-NOISE_ROUNDS, SETTLED = 15, 0.003  # of estimating the noise beside priors
+NOISE_ROUNDS, SETTLED = 15, 0.003  # rounds that estimate the noise if there are priors
 
 
 @dataclass(frozen=True, eq=False)

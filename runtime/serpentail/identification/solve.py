@@ -21,7 +21,7 @@ from .unknowns import Unknowns
 ITERATIONS = 60
 CLOSE = 1e-4  # last step, in standard deviations of the estimates
 ROUNDING = 1e-9  # last step over the size of the data
-NULL = 1e-9  # singular values below, over the largest, are of what no data can tell
+NULL = 1e-9  # directions with smaller singular values (relative) are undetermined
 DEPENDENT = 1e-5  # of a column's length that is left: below, columns depend on each other
 
 

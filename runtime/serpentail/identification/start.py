@@ -13,10 +13,10 @@ from .trial import world_points
 
 ITERATIONS = 25
 CLOSE = 1e-5  # m and rad: the last step of a fit
-RIDGE = 1e-3  # of turns, over the length of the tail: holds what a frame's markers do not show
-ENOUGH = 0.5  # of the markers that a frame needs to be looked at by itself
+RIDGE = 1e-3  # weight of rotations, over the tail's length: holds undetermined directions
+ENOUGH = 0.5  # part of the markers that a frame needs to be fitted by itself
 WINDOW = 7  # frames of a local parabola
-FAR = 4.0  # times the usual misfit: such a frame is not what others begin with
+FAR = 4.0  # times the usual misfit: other frames do not begin from such a frame
 
 
 def motion_shown(model: Model, placed: Placements, tracks: MarkerTracks) -> np.ndarray:

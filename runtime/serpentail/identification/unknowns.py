@@ -63,7 +63,7 @@ class Unknowns:
                 new[each.of] = _with(new[each.of], each.entries, value)
         if not new:
             return self.model
-        with warnings.catch_warnings():  # an iterate may be unusual; the result is looked at
+        with warnings.catch_warnings():  # an iterate may be unusual; only the result is checked
             warnings.simplefilter("ignore", UnusualSize)
             warnings.simplefilter("ignore", UnlikeBodies)
             return self.model.with_parameters(**new)

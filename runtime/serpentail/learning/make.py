@@ -121,5 +121,7 @@ def _worlds(model: Model, task: str, count: int, settings: dict[str, Any]) -> Wo
     model.refuse_fixed(chosen.name)
     checked = chosen.checked(model, settings)
     worlds = Worlds(model, chosen, count, checked)
-    worlds.act(np.zeros((count, model.layout.nt)))  # compiles, or tells what the scene left out
+    worlds.act(
+        np.zeros((count, model.layout.nt))
+    )  # compiles, or raises the error about a missing function
     return worlds

@@ -11,7 +11,7 @@ from ..model.model import Model
 from .tasks import DRAWS, Task, standing_legs
 
 EFFORT = 0.01  # of a reward, that full torques cost
-# bounds of what is seen, which is cut there: m, m/s, rad/s
+# bounds of observations, which are clipped: m, m/s, rad/s
 FAR, FAST, SPIN, WHIRL = 100.0, 100.0, 1000.0, 1e5
 
 Array = np.ndarray

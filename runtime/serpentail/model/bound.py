@@ -15,10 +15,10 @@ from .cache import BUILDS, COMPILERS, LIBRARIES, LOCKS, MODELS, PARTS, discard
 
 DEFAULT_SIZE = "1G"
 UNITS = {"": 1, "K": 2**10, "M": 2**20, "G": 2**30, "T": 2**40}
-IN_USE_S = 600.0  # s: what was used so lately stays, since its user may not have opened it yet
-LOST_S = 3600.0  # s after which a part is that of a build that was killed
+IN_USE_S = 600.0  # s: recently used entries stay, because a process may be about to open them
+LOST_S = 3600.0  # s: older parts are from builds that were killed
 KINDS = (LIBRARIES, MODELS, BUILDS, COMPILERS)
-# Names of entries and of parts: what else lies in a folder that a user chose is not the cache's.
+# Names of entries and parts: other files in the user's folder do not belong to the cache.
 OURS = {
     **dict.fromkeys((LIBRARIES, MODELS), re.compile(r"[0-9a-f]{64}")),
     **dict.fromkeys((BUILDS, COMPILERS), re.compile(r"[0-9a-f]{64}\.json")),

@@ -16,13 +16,13 @@ from .reading import regular_bytes
 
 CACHE_FORMAT = 2  # part of every name in the cache: raise it when the meaning of a name changes
 REMEDY_CACHE = "set SERPENTAIL_CACHE to a folder you can write"
-ROOT = 0  # user id of whom nothing can be kept from
+ROOT = 0  # user id of the administrator, who may read everything
 
 # Folders of the cache. An entry is made in PARTS, and one rename puts it in its place.
 LIBRARIES = "libraries"  # <key>/<digest of the library>.so: each has the proof of its content
 MODELS = "models"  # <manifest hash>/: generated folders as they were checked
-BUILDS = "builds"  # <key>.json: which of the models a scene became
-COMPILERS = "compilers"  # <key>.json: what a compiler said of itself
+BUILDS = "builds"  # <key>.json: the model that was made of a scene
+COMPILERS = "compilers"  # <key>.json: properties of a compiler
 LOCKS = "locks"
 PARTS = "parts"
 
@@ -44,7 +44,7 @@ def digest(data: object) -> str:
     return hashlib.sha256(json.dumps([CACHE_FORMAT, data]).encode()).hexdigest()
 
 
-# Whose it is.  A library in the cache is run, so nobody else may have put it there.
+# Owner. Libraries in the cache are executed, so nobody else may be able to put them there.
 
 
 def refuse_others(*paths: Path) -> None:
@@ -60,7 +60,9 @@ def refuse_others(*paths: Path) -> None:
             if status.st_uid not in (os.geteuid(), ROOT):
                 raise _unsafe(path, f"belongs to user {status.st_uid}", "")
             if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
-                private = not status.st_mode & stat.S_ISVTX  # no folder for all, as /tmp is
+                private = (
+                    not status.st_mode & stat.S_ISVTX
+                )  # not a folder for all users, such as /tmp
                 mend = f"`chmod -R go-w {path}` if all in it is yours, or " if private else ""
                 raise _unsafe(path, "is writable by others", mend)
 

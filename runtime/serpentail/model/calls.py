@@ -15,7 +15,7 @@ from ..errors import SerpentailError
 from .compiler import compile_library
 
 SOURCE = Path(__file__).with_name("native") / "calls.c"
-# what an extension needs of a linker that asks for every symbol
+# for linkers that ask for every symbol of an extension
 LINKING = ("-Wl,-undefined,dynamic_lookup",) if sys.platform == "darwin" else ()
 Call = Callable[..., Any]  # takes arguments, returns outputs, or None where it does not serve
 

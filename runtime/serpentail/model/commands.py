@@ -6,7 +6,7 @@ import subprocess
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 
-TICK_S = 0.2  # s between looks at how far a command is
+TICK_S = 0.2  # s between checks of a command's progress
 GRACE_S = 0.5  # s that a command has to remove its temporary files
 
 
@@ -38,7 +38,7 @@ def _running(
         stderr=subprocess.PIPE,
         encoding="utf-8",
         errors="replace",
-        process_group=0,  # Windows has none, and overlooks it
+        process_group=0,  # Windows has no sessions, and ignores it
     ) as process:
         try:
             yield process

@@ -12,7 +12,7 @@ from ..checks import refusal
 from ..errors import SerpentailError
 
 VARIABLE = "SERPENTAIL_THREADS"  # of the environment
-MOST_THREADS = 1024  # of which a number beyond is a mistake
+MOST_THREADS = 1024  # larger numbers are mistakes
 
 
 def threads(asked: int | None = None) -> int:

@@ -45,7 +45,7 @@ def argument_record(
     return ArgumentRecord(address_of(parameters), count, 0, address_of(work), addresses)
 
 
-# reals that a function works on: one of more takes so long that other threads should run meanwhile
+# numbers in a function's arrays; above, calls are so long that other threads should run meanwhile
 MOST_HELD = 8192
 
 
@@ -249,14 +249,14 @@ class Kernel:
 
     def fail(self, status: int, index: int, arrays: Arrays) -> NoReturn:
         """Raise the error that a status means for one state of the arrays."""
-        # an argument that is no number, or a quaternion that is none
+        # an argument that is not finite, or a quaternion without direction
         state = f" of state {index}" if len(arrays[0]) > 1 else ""
         for name, array in zip(self.names, arrays, strict=True):
             refuse_not_finite(f"{self.name}: {name}", array[index], StateError, state)
         q = arrays[0][index].astype(float)
         if self.names[0] in QUATERNIONS:
             self._check_attitude(q, state)
-        # else what the C function found
+        # otherwise the error of the C function
         if status == OUT_OF_RANGE:
             raise StateError(f"{self.name}: {self._out_of_range(q, state)}")
         indefinite = f"the inertia matrix{state} is not positive definite"

@@ -95,7 +95,7 @@ def model_from(
     """Return the model of a folder that was checked; arguments and errors as of ``load``."""
     manifest = checked.manifest
     values = resolve(manifest, parameters)
-    warn_of_sizes(manifest, values, 3)  # who calls st.load
+    warn_of_sizes(manifest, values, 3)  # 3: the caller of st.load
     profile = manifest["scene"]["profile"] if profile is None else profile
     if not isinstance(compiled, bool | np.bool_):
         raise ModelError(f"compiled: value {compiled!r:.60}: needs True or False")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from .cache import LOCKS, mark_used, own_folder
 
-PATIENCE_S = 600.0  # s to wait for another process, which may have been stopped
+PATIENCE_S = 600.0  # s to wait for another process, because that may be suspended
 
 
 @contextlib.contextmanager

@@ -136,7 +136,7 @@ class Model(Functions, StepMethods):
         manifest = checked.manifest
         self.checked, self.folder, self.manifest = checked, checked.folder, manifest
         self.parameters, self.library, self.profile = parameters, library, profile
-        # what the tail is made of
+        # the tail
         self.name: str = manifest["prefix"]
         self.kind: str = manifest["scene"]["kind"]
         self.segments: int = manifest["dimensions"]["segments"]
@@ -154,7 +154,7 @@ class Model(Functions, StepMethods):
         self.layout = Layout(self.segments, self.fixed)
         self.nq, self.nv = self.layout.nq, self.layout.nv
         self.contacts = {entry["group"]: entry["count"] for entry in manifest["contacts"]}
-        # its functions, as compiled
+        # its compiled functions
         self.parameter_vector = np.array(flat(manifest, parameters), real_type(manifest))
         self.parameter_vector.setflags(write=False)  # with_parameters makes another model
         self.batch_library = batch_library or BatchLibrary(checked, profile)
@@ -233,7 +233,7 @@ class Model(Functions, StepMethods):
             vectors = vector[None] if runs == 1 else np.broadcast_to(vector, (runs, len(vector)))
             return RunParameters({}, self.parameters, vectors)
         parameters = RunParameters.checked(self.manifest, self._independent(), changes, runs)
-        warn_of_sizes(self.manifest, parameters.values, 4)  # who calls st.simulate
+        warn_of_sizes(self.manifest, parameters.values, 4)  # 4: the caller of st.simulate
         return parameters
 
     def _independent(self) -> dict[str, Value]:

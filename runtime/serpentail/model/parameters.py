@@ -13,7 +13,7 @@ from ..units import in_unit
 
 Value = float | tuple[float, ...]
 Values = Mapping[str, Any]  # name -> number or numbers, SI; of many runs (k,) or (k, size)
-# of a tail whose links or arcs have values of their own: what follows from these
+# parameters that follow from the values of single links or arcs
 UNITS = {"tail_mass": "kg", "tail_length": "m", "gravity": "m/s^2"}
 TOTALS = {
     "tail_mass": ("link_masses", "arc_masses"),
@@ -155,7 +155,7 @@ def _checked_changes(manifest: dict, changes: object, runs: int | None) -> dict[
         )
     fields = {p["name"]: p for p in manifest["parameters"]}
     problems, sound = [], {}
-    # each by itself, then what they are together
+    # each by itself, then all together
     for name, value in (changes or {}).items():
         checked = _checked(fields, str(name), value, runs)
         if isinstance(checked, str):
@@ -205,13 +205,13 @@ def _checked(fields: dict, name: str, value: object, runs: int | None) -> np.nda
         remedy = did_you_mean(name, fields) or f"there are {', '.join(fields)}"
         remedy = f"it is the sum of {parts[0]}, change these" if parts else remedy
         return f"{name}: no such parameter; {remedy}"
-    # what the value must be, in words and as a shape
+    # the required value, in words and as a shape
     size, unit = fields[name]["size"], fields[name]["unit"]
     holds, words = CHECKS[fields[name]["check"]]
     pieces = fields[name].get("pieces")
     kind = "a finite number" if size == 1 else f"{size} finite numbers"
     kind += f", {size // pieces} of each piece of the tail" if pieces else ""
-    of_all = "per" in fields[name]  # one number may stand for those of all coordinates
+    of_all = "per" in fields[name]  # one number may be given for all coordinates
     kind += ", or one for all," if of_all else ""
     needs, shape = f"needs {kind} ({unit}), {words}", (size,) if size > 1 or pieces else ()
     if runs is not None:
@@ -226,7 +226,7 @@ def _checked(fields: dict, name: str, value: object, runs: int | None) -> np.nda
         numbers = np.repeat(numbers[..., None], size, axis=-1)
     if numbers is None or numbers.shape != shape:
         return f"{name}: value {shown(value)}: {needs}"
-    # the first run of which it does not hold
+    # the first run with a wrong value
     rows = numbers.reshape(-1, size)
     with np.errstate(over="ignore"):
         wrong = np.flatnonzero(~(np.isfinite(rows).all(axis=1) & holds(rows)))

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 PARTS = ("spring", "damping", "stops")
-# tail coordinates (rad) that no motion reaches: stops there are as good as none
+# tail coordinates (rad) that no motion reaches: stops there have no effect
 OUT_OF_REACH = 1e6
 ENDS = (("tail_stop_lower", -1), ("tail_stop_upper", 1))
 

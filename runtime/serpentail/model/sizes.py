@@ -12,7 +12,7 @@ from .parameters import UNITS, Values
 
 UNLIKE = 1e4  # from here on H may be off by 1e-12 of its diagonal: docs/stability.md
 SMALLEST = {"torso_mass": (1e-4, "0.1 g"), "tail_length": (1e-3, "1 mm")}
-DENSEST = 1e6  # kg/m^3: 44 times osmium, as studies may change a mass and leave its inertia
+DENSEST = 1e6  # kg/m^3: 44 times osmium, because studies may change a mass but not its inertia
 
 
 def warn_of_sizes(manifest: dict, values: Values, calls: int = 2) -> None:

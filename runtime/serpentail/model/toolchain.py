@@ -67,7 +67,7 @@ def check_profile(profile: str) -> None:
     one_of("profile", profile, PROFILES, SerpentailError)
 
 
-# The compiler: which one, and what it resolves its flags to.
+# The compiler, and what its flags resolve to.
 
 
 def candidates() -> Iterator[tuple[str, ...]]:
@@ -179,7 +179,7 @@ def kept_surroundings() -> dict[str, str]:
     }
 
 
-# Notes: what a compiler said, kept so that a warm call starts no process.
+# Notes: properties of a compiler, kept so that later calls start no process.
 
 
 def recall(profile: str, folder: Path) -> Toolchain | None:

@@ -14,11 +14,11 @@ from itertools import pairwise
 
 from .cores import threads as allowed
 
-POLL_S = 0.1  # s between looks at signals, such as Ctrl-C
+POLL_S = 0.1  # s between checks for signals, such as Ctrl-C
 MIN_STATES_PER_THREAD = 256  # states: the least that is worth a thread
-# states between looks at signals, at first, and at least, over those that are worth a thread
+# states between checks for signals, at first and at least, relative to those worth a thread
 FIRST_PIECE, LEAST_PIECE = 8, 1 / 4
-PIECE_S = 0.05  # s between looks: pieces grow or shrink to that
+PIECE_S = 0.05  # s between checks: pieces grow or shrink to this
 
 
 def after_fork(renew: Callable[[], object]) -> None:
@@ -98,7 +98,7 @@ def in_turn(
     with ThreadPoolExecutor(threads, thread_name_prefix="serpentail") as crew:
         try:
             waiting = {crew.submit(work, _taken(numbers), ended) for _ in range(threads)}
-            while waiting:  # looks at signals now and then
+            while waiting:  # checks for signals now and then
                 done, waiting = wait(waiting, POLL_S, FIRST_EXCEPTION)
                 for future in done:
                     future.result()

@@ -5,8 +5,8 @@ from typing import Any, TypeVar
 
 T = TypeVar("T")
 
-LATER = "later"  # what derives them, in a motion that has it
-# the name of a field -> that one, and what else comes with it, by name
+LATER = "later"  # attribute of a motion that holds the function deriving its fields
+# the name of a field -> this field and related ones, by name
 Later = Callable[[str], dict[str, Any]]
 
 

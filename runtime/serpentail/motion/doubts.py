@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 DEEP = 0.1  # of the torso's length, below the ground: as deep as a torso rests in it by contact
 SUNK = 0.1  # of the way from the torso's centre to its surface
-MOST_WEIGHTS = 20.0  # body weights of the ground's force beyond which it is a blow: our choice
+MOST_WEIGHTS = 20.0  # body weights: a larger force of the ground counts as an impact; our choice
 # rad, of a segment: beyond half a turn its end points back into it, and plans may go just so far
 MOST_BEND = 1.02 * np.pi
 KNEES = 3  # hip, D and knee come first in a leg, and are no contacts

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import Any
 
-DECIMALS = 12  # what is smaller is rounding
+DECIMALS = 12  # smaller numbers are rounding
 WIDEST = 32  # the column of values: long texts, such as reasons, make it no wider
 NO_UNITS: Mapping[str, str] = MappingProxyType({})
 Row = tuple[str, str, str]  # name, value, unit

@@ -15,10 +15,10 @@ if TYPE_CHECKING:
 WIDTH = 1.4  # points, of the tail
 THIN, THICK = 0.4, 2.5  # of a tail of its own: least and largest width over that
 MOST_DOTS = 20  # more tail points than this are drawn without dots
-LARGE_DOTS = 8  # more than this have small ones, which leave the tail's colour in sight
+LARGE_DOTS = 8  # more joints than this get small marks, so that the tail's colour stays visible
 LEG, FORCE = "#009e73", "#cc79a7"  # Okabe and Ito
 SHADE, SHADOW = "#ecebe6", "#c9c7bf"  # the ground
-PALE = 0.3  # how much is seen of what is below it
+PALE = 0.3  # opacity of parts below it
 GRIDS = np.array([0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10])  # m, between lines on the ground
 LINES = 8  # of the ground's grid that are seen, about
 SLIVER = 0.05  # rad, of the torso's cap above the ground that is not drawn
@@ -43,7 +43,7 @@ class Pen:
         """World points (..., 3) on the axes, (..., 2)."""
         return self.view.of(world - self.origin)[..., :2]
 
-    # artists are made here, since Axes.plot and Axes.fill take thrice as long: they look for limits
+    # Axes.plot and Axes.fill take three times as long, because they update limits
 
     def plot(self, world: Array, mark: str, zorder: float, **look: Any) -> None:
         """World points (n, 3), joined by a line ("-", ":") or each a dot ("o")."""

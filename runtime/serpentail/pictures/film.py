@@ -20,7 +20,7 @@ from .views import views_of
 
 MOVING = {".gif": write_gif, ".mp4": write_mp4}
 MOST = 10_000  # frames
-LASTS = 4.0  # s, a film whose speed is not told: slow motion, never faster than life
+LASTS = 4.0  # s, of a film without given speed: slow motion, never faster than real time
 
 
 def film(

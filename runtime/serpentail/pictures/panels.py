@@ -16,7 +16,7 @@ from .style import INK, TAIL, Array
 # Okabe and Ito, dashed for grey prints
 TRIPLE = (("#0072b2", "-"), ("#d55e00", "--"), ("#009e73", "-."))
 WORLD = ("right $x$", "forward $y$", "up $z$")
-SINGULAR = 0.15  # |cos(pitch)| below which roll and yaw mean little: 9 degrees about the vertical
+SINGULAR = 0.15  # |cos(pitch)| below which roll and yaw are not drawn: 9 degrees about the vertical
 SEEN = 1e-3  # of a panel's least span
 
 

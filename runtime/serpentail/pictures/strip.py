@@ -21,7 +21,7 @@ KEY: dict[str, dict[str, Any]] = {
     "tail": {"color": TAIL, "linewidth": 1.4},
     "path of the COM": {"color": QUIET, "linestyle": ":"},
 }
-OF_TORSO = ("head", "head, far side", "back", "path of the COM")  # which a fixed base has not
+OF_TORSO = ("head", "head, far side", "back", "path of the COM")  # not drawn for a fixed base
 
 
 @dataclass(frozen=True, eq=False)

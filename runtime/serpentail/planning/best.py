@@ -34,7 +34,7 @@ def best_plan(
         equations = equations_of_motion(model, settings.dynamics)
         with stoppable(settings.time_limit, stage.tell):
             if problem.objective in SOFTENING and settings.guess is None:
-                # from passive flight these are seldom solved
+                # these objectives are seldom solved from passive flight
                 calm, untracked = (
                     replace(problem, objective="effort"),
                     replace(settings, track=False),

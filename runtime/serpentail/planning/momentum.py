@@ -14,7 +14,7 @@ from ..model.model import Model
 from .nlp.coordinates import IDENTITY_POSE
 from .problem import PlanningProblem
 
-SMALL = 1e-3  # of the angular momentum: what the end may be off before it is refused
+SMALL = 1e-3  # of the angular momentum: largest difference at the end that is not refused
 YAWS = np.linspace(0.0, 2 * np.pi, 73)
 
 

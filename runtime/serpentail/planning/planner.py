@@ -54,7 +54,7 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
     multi_start: int = 1,
     retries: int = 4,
     seed: int = 0,
-    # what is told
+    # output
     track: bool = True,
     watch: Callable[[Plan], object] | None = None,
     **unknown: Never,
@@ -228,7 +228,7 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
     )
     problem = checked_problem(model, task, of_problem, refused)
     refused.tell()
-    assert problem is not None  # all has been told
+    assert problem is not None  # otherwise tell() has raised
     return best_plan(model, problem, settings, watch)
 
 

@@ -38,7 +38,7 @@ class PlanningProblem:
     objective: str | Callable[[Any], Any]
     smoothing: float
     damping: float
-    path: tuple[PathConstraint, ...]  # with that of the clearance
+    path: tuple[PathConstraint, ...]  # including that of the clearance
     clearance: float | None
     legs: Legs | None
     formulation: str
@@ -53,7 +53,7 @@ def checked_problem(
 
     ``refused`` collects each field that is wrong, its value and the remedy.
     """
-    # start, goal and bounds, and whether these allow the others
+    # start, goal and bounds, and whether the bounds allow start and goal
     attempt, tail = refused.attempt, model.layout.nt
     start = attempt("start", _start, model, task[0])
     goal = attempt("goal", checked_goal, task[1], tail)

@@ -29,13 +29,13 @@ MADE_OF = (
     "base",
     "weightless",
 )
-# tables of verbs, and what each needs
+# tables of verbs, and the keys that each needs
 NEEDS = {
     "simulate": "start and duration",
     "plan": "start and duration",
     "identify": "tables [[identify.marker]]",
 }
-UNSAID = {"base": "free", "weightless": False}  # of manifests, which leave out these
+UNSAID = {"base": "free", "weightless": False}  # manifests leave these out
 
 
 def read_scene(path: str | Path, error: type[Exception]) -> tuple[dict[str, Any], Path]:
@@ -98,6 +98,6 @@ def _same(value: Any, made: Any) -> bool:
 
 def _in_radians(key: str, value: Any) -> Any:
     """Return the value of a key; an angle with a unit as a number in rad."""
-    with suppress(ValueError):  # it is not what the model was made with, then
+    with suppress(ValueError):  # then it differs from what the model was made with
         return in_unit(value, "rad") if key == "bend_range" else value
     return value

@@ -14,11 +14,11 @@ from .file import model_of, read_scene, size_of, subtable
 from .identify_keys import IDENTIFY
 from .keys import read, sized
 
-# functions that an identification calls, beside those that scenes have by default
+# functions that an identification calls besides the default ones of scenes
 NEEDS = ("forward_dynamics_derivatives", "forward_dynamics_parameter_derivatives")
 USES = ("forward_dynamics", "energy", "momentum", "tail_points", "mass_matrix", "bias_force")
 UNSIZED: Mapping[str, float] = {}
-READ = ("unit", "axes", "zeros")  # keys that tell how files are read
+READ = ("unit", "axes", "zeros")  # keys for reading files
 
 
 def identified(path: str, data: Sequence[str], folder: str | None = None) -> Identification:
@@ -30,7 +30,7 @@ def identified(path: str, data: Sequence[str], folder: str | None = None) -> Ide
     """
     tables, place = read_scene(path, IdentificationError)
     table = subtable(tables, "identify", place, IdentificationError)
-    given = identify_arguments(table)  # what is wrong is told before a model is built
+    given = identify_arguments(table)  # errors are raised before a model is built
     files = {name: given.pop(name) for name in READ if name in given}
     unit = files.pop("unit", None)
     tracks = [read_markers(each, unit, **files) for each in data]

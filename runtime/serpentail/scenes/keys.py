@@ -60,7 +60,9 @@ def read(table: Mapping, key: Key, where: str, refused: Refusals, part: str = ""
     return found
 
 
-Part = tuple[Refusals, str]  # where refusals of a value are noted, and what they are part of
+Part = tuple[
+    Refusals, str
+]  # where errors about a value are collected, and the part that they belong to
 
 
 def _read(value: Any, key: Key, where: str, part: Part) -> Any:

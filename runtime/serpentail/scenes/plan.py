@@ -16,7 +16,7 @@ from .plan_keys import FREE, PLAN
 
 ELSEWHERE = "programs can give others, to serpentail.plan"
 UNSIZED: Mapping[str, float] = {}
-CODE_ONLY = ("guess", "path", "legs")  # what no file can hold
+CODE_ONLY = ("guess", "path", "legs")  # values that no file can hold
 
 
 def planned(path: str, folder: str | None = None) -> Plan:
@@ -29,7 +29,7 @@ def planned(path: str, folder: str | None = None) -> Plan:
     extras.needed("casadi", "plan")  # before the model is built
     tables, place = read_scene(path, PlanningError)
     table = subtable(tables, "plan", place, PlanningError)
-    plan_arguments(table)  # what is wrong is told before a model is built
+    plan_arguments(table)  # errors are raised before a model is built
     model = model_of(tables, place, folder, {})
     return plan(model, **plan_arguments(table, size_of(model)))
 
@@ -72,7 +72,7 @@ def arguments_but_start(
     if refused.lines:
         return {}
 
-    # tables of their own are goal and bounds; the others are as they are, but for "free"
+    # goal and bounds are tables; other values are passed on, except "free"
     goal = table.get("goal", {})
     if isinstance(goal, Mapping):
         goal = Goal(**{key: _free(value) for key, value in goal.items()})

@@ -216,7 +216,7 @@ def scenario_of(model: Model, table: Mapping, parent: Path, phases: Any = ()) ->
     else:
         duration = refused.attempt("duration", _positive, "simulate.duration", table["duration"])
 
-    # what acts; a straight tail stands in for a reference that is refused, so that the rest is told
+    # actuation; a straight tail replaces a refused reference, so that further errors are found
     legs = refused.attempt("legs", legs_of, table["legs"]) if "legs" in table else None
     reference = None
     if "reference" in table:
@@ -232,10 +232,10 @@ def scenario_of(model: Model, table: Mapping, parent: Path, phases: Any = ()) ->
     state = refused.attempt("start", start_of, model, start, reference)
     found_phases = phases_of(model, phases, (controller, parent), refused)
     refused.tell()
-    assert duration is not None and state is not None  # all has been told
+    assert duration is not None and state is not None  # otherwise tell() has raised
 
     if "settle" in start:
-        # what acts while a start settles
+        # actuation while a start settles
         acting = {name: value for name, value in settings.items() if name != "output_step"}
         acting |= {"controller": controller} | ({} if legs is None else {"legs": legs})
         q0, v0, settings["bristles0"] = settle(model, state[0], **acting | dict(start["settle"]))

@@ -25,7 +25,7 @@ from .checks import check_legs, check_phase
 from .phase import AIRBORNE, BEFORE, Phase, Tracking
 from .run import PhaseRun, SequenceRun, so_far, told, whole
 
-SAMPLES = 400  # of a phase that is looked through for where it is clear of the ground
+SAMPLES = 400  # of a phase, to find when it is clear of the ground
 State = tuple[np.ndarray, np.ndarray]  # q, v
 
 

@@ -31,7 +31,7 @@ class Actuation:
         self.legs = legs
         if self.of_python:  # the user's: SciPy's methods work with their own
             self.float_errors = np.geterr()
-        # times at which something is not smooth, where steps end
+        # times at which something is not smooth; steps end there
         stops = {*self._kinks(begins)}
         members = {}
         if legs is not None:

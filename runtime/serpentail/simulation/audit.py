@@ -14,13 +14,12 @@ from ..brief import brief
 from ..model.model import Model
 from ..model.parameters import total_mass
 
-# An imbalance over what was moved is reported from so many times a method's relative tolerance on,
-# from so many roundings on, and where steps are fixed from this part on: docs/contact.md has what
-# runs come to.
-TOLERANCES = 100.0
-ROUNDINGS = 1e5
+# An imbalance relative to what was moved is reported if it exceeds the larger of the first two, or
+# the third with steps of a fixed length. docs/contact.md has measured imbalances.
+TOLERANCES = 100.0  # times a method's relative tolerance
+ROUNDINGS = 1e5  # rounding errors
 FIXED_STEPS = 0.05
-BALANCED = ("kinetic", "potential", "linear_momentum")  # what an audit needs of both ends
+BALANCED = ("kinetic", "potential", "linear_momentum")  # values at both ends that an audit needs
 Arrays = dict[str, np.ndarray]
 
 
@@ -79,7 +78,7 @@ def audited(
     moved = momentum[..., 1, :] - momentum[..., 0, :] - pull - sum(impulses.values())
     moved = 0 * moved if model.fixed else moved  # its base gives a tail any momentum
 
-    # over what was moved, an animal at rest by its weight
+    # relative to what was moved; for an animal at rest, to its weight
     energies = kinetic.max(axis=-1) + weight * values["tail_length"]
     energies = energies + ends["stored"].max(axis=-1)
     energies = energies + sum(np.abs(each) for each in work.values())

@@ -19,10 +19,10 @@ from .methods import IntegrationMethod, step_counts
 from .piecewise import Piecewise, constant
 from .start import Start
 
-MAX_SHARED_STEPS = 1_000_000  # steps of one run: beyond, what all runs share fills the memory
+MAX_SHARED_STEPS = 1_000_000  # steps of one run: with more, shared arrays would fill the memory
 AT_ONCE = 64  # groups of runs that a thread takes up at once
-# What compiling takes, and what a step saves in lanes, for tails from (1, 3) to (8, 16): about the
-# less favourable of what AVX2 and AVX-512 showed
+# Time to compile, and time that lanes save in a step, for tails from (1, 3) to (8, 16): about the
+# less favourable of measurements with AVX2 and with AVX-512
 COMPILE_S_PER_BYTE = 25e-6  # of C
 STEP_SAVES_S, OPERATION_SAVES_S = 4e-7, 2e-10  # each step; each operation of forward dynamics
 
@@ -45,7 +45,7 @@ class Steps:
         edges = _edges(start, actuation)
         spans, slack = _spans(edges)
         counts = step_counts(spans, slack, step)
-        # of each step: between which edges it lies, and which one it is there
+        # for each step: the edges that enclose it, and its number between them
         span = np.repeat(np.arange(len(spans)), counts)
         within = np.arange(len(span)) - np.repeat(np.cumsum(counts) - counts, counts)
         last = within + 1 == counts[span]
@@ -93,7 +93,7 @@ def shared_steps(memory: Memory, acting: Acting, method: IntegrationMethod) -> i
     if method.name != "rk4" or "flights" not in memory.records.model.manifest:
         return 0
     for each in acting.distinct:
-        # a single phase of damping and torques, which end steps where those of the others do
+        # a single phase of damping and torques, with kinks at the same times as in other runs
         parts = each.parts[0]
         others = (parts.pfl, parts.native, parts.user)
         if len(each.parts) > 1 or any(part is not None for part in others):

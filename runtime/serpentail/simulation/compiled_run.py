@@ -23,8 +23,8 @@ from .records import Records
 from .start import Start
 
 MOST_STEPS = 2**31 - 1  # that the C interface counts
-PAUSE = 100  # steps before the first look at signals, such as Ctrl-C
-PAUSE_S = 0.05  # s between looks: pauses grow to that
+PAUSE = 100  # steps before the first check for signals, such as Ctrl-C
+PAUSE_S = 0.05  # s between checks: the time between pauses grows to this
 COUNTS = ("steps", "rejected", "evaluations", "factorisations")
 
 
@@ -78,7 +78,7 @@ class Memory:
             name: np.zeros((start.runs, start.intervals + 1, size), dtype)
             for name, size in sizes.items()
         }
-        # where the arrays of the first run lie, and how far apart those of two runs are
+        # addresses of the first run's arrays, and the distances between those of two runs
         arrays = {"parameters": parameters.vectors} | self.state
         arrays |= {f"{name}_out": array for name, array in self.out.items()}
         self.places = []
@@ -118,7 +118,7 @@ class CompiledRun:
         records, start, ground = memory.records, memory.start, memory.ground
         self.memory, self.records, self.acting = memory, records, acting
         self.method, self.start, self.ground = method, start, ground
-        # what all runs share
+        # shared by all runs
         members = dict(start_members(method), pause=PAUSE, samples=start.intervals + 1)
         members["times"] = records.array(start.times)
         if ground.points:

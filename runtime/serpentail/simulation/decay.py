@@ -20,7 +20,7 @@ class FastestDecay:
         parts = [parts for each in acting.distinct for parts in each.parts]
         laws = [each.damping for each in parts if each.damping is not None]
         acted = np.max(laws, axis=0) if laws else np.zeros(nt)
-        # a tail that is always tracked is rid of what it asks for itself
+        # tracking compensates the passive tail's own torques
         tracked = bool(parts) and all(each.pfl is not None for each in parts)
         values = {} if tracked else parameters.values
         self.damping = acted + own(values, "tail_damping", (runs, nt))

@@ -7,7 +7,7 @@ from ..errors import SimulationError
 from ..model.model import Model
 
 MOST_STEPS = 1e9  # of one run: hours
-COPIES = 3  # of every sample: as the C writes it, as a trajectory has it, and what is measured
+COPIES = 3  # of every sample: written by the C, stored in a trajectory, and derived
 
 
 def refuse_endless(name: str, step: float, span: float, most_steps: float = MOST_STEPS) -> None:

@@ -21,8 +21,8 @@ SETTINGS = {
 }
 # 1/s: a fastest decay beyond this limits the steps of an explicit method, not their accuracy
 STIFF_DECAY = 5e3
-MIN_ROUNDINGS = 100  # roundings that a relative tolerance must allow, as SciPy's methods ask
-# tolerances, unless others are asked for
+MIN_ROUNDINGS = 100  # rounding errors that a relative tolerance must allow, as in SciPy's methods
+# default tolerances
 SINGLE_RTOL = {"tsit5": 1e-4, "ros34pw2": 1e-3}
 DOUBLE_RTOL = {"tsit5": 1e-8, "ros34pw2": 1e-4}
 

@@ -25,7 +25,7 @@ class Outcomes:
     def __init__(self, memory: Memory):
         runs = memory.start.runs
         self.ended = np.zeros(runs, bool)
-        self.count = 0  # of those that ended, for who looks how far they are
+        self.count = 0  # number of runs that ended, for progress
         self.done = np.zeros(runs, int)
         self.ends = np.full(runs, memory.start.start)
         self.ledger = np.zeros_like(memory.state["ledger"])

@@ -24,7 +24,7 @@ from .outcomes import Outcomes, told_by
 from .rollouts import Rollouts, Source
 from .runs_in_turn import RunsInTurn
 
-PILOTS = 64  # runs that tell how long others take before anything is compiled for these
+PILOTS = 64  # runs that are timed before code is compiled for the others
 
 
 class ParallelRuns:
@@ -38,11 +38,11 @@ class ParallelRuns:
         self.batched: BatchedRuns | AdaptiveRuns | None = None
         of_python = method.name in SCIPY or acting.of_python
         self.threads = 1 if of_python else min(allowed(threads), runs)
-        # what they come to
+        # their outcomes
         self.outcomes = Outcomes(memory)
         self.source = Source(model, memory.parameters, memory.ground, self.outcomes, method.info)
         self.measures = MeasuredRuns(memory, method, self.source, self.threads)
-        self.stop: KeyboardInterrupt | None = None  # what ended all before their end
+        self.stop: KeyboardInterrupt | None = None  # what ended all runs early
 
     @property
     def part_done(self) -> float:
@@ -57,7 +57,7 @@ class ParallelRuns:
             self.batched = BatchedRuns(*told)
         elif adaptive_in_lanes(*told):
             if not self._pays(runs, 0):
-                # how long the others will take is known of some
+                # the first runs show how long the others will take
                 first = min(PILOTS, runs)
                 self._share(first, self._run_in_turn, stage)
             steps = int(self.outcomes.counts["steps"][:first].sum()) // max(first, 1)

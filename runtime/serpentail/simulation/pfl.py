@@ -143,7 +143,7 @@ def _nodes(reference: Any) -> tuple[ArrayLike, ArrayLike, object]:
     if hasattr(motion, "tail") and hasattr(motion, "t"):
         if motion is reference:
             return motion.t, motion.tail, tuple((1, motion.tail_rate[k]) for k in (0, -1))
-        # a plan: its accelerations, as a spline's own, fed forward, are least exact at the ends
+        # a plan: its own accelerations at the ends, because a spline's are least exact there
         slopes = reference.curve.slopes(motion.t[[0, -1]])["tail_rate"]
         return motion.t, motion.tail, tuple((2, row) for row in slopes)
     try:

@@ -88,7 +88,7 @@ class Piecewise:
         value, rate, acceleration = (_horner(_derived(c, order), x) for order in range(3))
         return value, np.where(held, 0.0, rate), np.where(held, 0.0, acceleration)
 
-    @np.errstate(over="ignore", invalid="ignore")  # a run refuses what is beyond numbers
+    @np.errstate(over="ignore", invalid="ignore")  # a run refuses numbers that are not finite
     def kinks(self, orders: int) -> np.ndarray:
         """Return the times at which a derivative of order below ``orders`` jumps, and both ends."""
         if self.never_changes:
@@ -97,7 +97,7 @@ class Piecewise:
         for order in range(orders):
             c = _derived(self.coefficients, order)
             widths = np.diff(self.times)[:, None]
-            # each piece at both its ends, beside what is held outside
+            # each piece at both its ends, and the values held outside
             starts, ends, sizes = _horner(c, 0.0), _horner(c, widths), _horner(np.abs(c), widths)
             held = [starts[:1], ends[-1:]] if order == 0 else np.zeros((2, 1, self.channels))
             left, right = np.vstack([held[0], ends]), np.vstack([starts, held[1]])

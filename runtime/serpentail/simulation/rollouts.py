@@ -21,7 +21,7 @@ from .ground import Ground
 from .measured import trajectory_or_error
 from .outcomes import Outcomes
 
-LATER = (*MONOTONE, "audit", "warnings")  # what is derived when somebody asks
+LATER = (*MONOTONE, "audit", "warnings")  # fields that are derived when they are first used
 SHOWN = 3  # runs that a notebook shows over each other
 
 

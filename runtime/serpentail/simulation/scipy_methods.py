@@ -93,7 +93,7 @@ def integrate_by_scipy(
 ) -> Samples:
     """Return the samples of a run, made from stop to stop, and the error that ended it, if any."""
     run.actuation.begin(run.record)
-    rate = StateRate(run, method.name == "dop853")  # which takes a step with NaN again, shorter
+    rate = StateRate(run, method.name == "dop853")  # a step with NaN is repeated, shorter
     samples, counts = SampleWriter(rate, run.start.times, watched), {"steps": 0, "evaluations": 0}
     ends = [*(t for t in run.actuation.stops if run.start.start < t < run.start.end), run.start.end]
     y, t = np.concatenate([*run.state.values()]).astype(float), run.start.start

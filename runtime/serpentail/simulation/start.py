@@ -15,7 +15,7 @@ from ..model.parameters import Values
 from ..model.passive import behind_stops
 from .limits import refuse_overfull
 
-MOST_SAMPLES = 10_000_000  # of all runs: more are a slip, and fill the memory
+MOST_SAMPLES = 10_000_000  # of all runs: more are a mistake, and would fill the memory
 SHORTEST = 1e-100  # s: between samples; methods multiply times
 EPS = float(np.finfo(float).eps)
 

@@ -20,7 +20,7 @@ from .runs import run_points
 def main(descriptor: int) -> None:
     """Run blocks that come through a socket, until it is closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the driver's to answer
-    os.dup2(2, 1)  # what functions print is no report of ours
+    os.dup2(2, 1)  # output of functions must not mix with reports
     link: Connection = Connection(descriptor)
     tasks: queue.SimpleQueue = queue.SimpleQueue()
     threading.Thread(target=_listen, args=(link, tasks), daemon=True).start()

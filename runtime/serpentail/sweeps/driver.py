@@ -23,7 +23,7 @@ GROWTH = 8  # times more points than in the block before
 MOST_IN_BLOCK = 20_000
 AHEAD = 2  # blocks a worker, so that none waits
 TRIES = 4  # of a block whose worker is gone
-LOOK_S = 0.2  # s between looks at blocks
+LOOK_S = 0.2  # s between checks of blocks
 HERE_S = 3.0  # s of work of flights that is not worth other processes
 
 

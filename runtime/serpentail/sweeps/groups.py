@@ -77,7 +77,7 @@ def groups_of(entries: list[Entry], done: Mapping[str, bool]) -> list[Group]:
     return list(groups.values())
 
 
-Find = Callable[[Point], tuple[Job, Bundle | None, str]]  # job, model, and what the key is of
+Find = Callable[[Point], tuple[Job, Bundle | None, str]]  # job, model, and what the key is made of
 
 
 def _without_model(job: Job) -> Find:
@@ -122,7 +122,7 @@ def _of_scene(scene: Any, axes: Axes, job: Job) -> Find:
         keys = [name for name in axes.names if name.split(".")[0] in key.keys]
         _refuse_keys(job, {name: first[name] for name in keys})
 
-    # which of the others are parameters, and which of these there is other code for
+    # which other names are parameters, and which of these need other code
     others = [name for name in axes.names if name not in {*keys, *shape}]
     made = tables | {name: first[name] for name in shape}
     checked, left = built(made, path.stem, {name: first[name] for name in others})

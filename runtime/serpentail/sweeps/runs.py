@@ -44,7 +44,7 @@ def run_points(job: Job, model: Model | None, points: Sequence[Point]) -> Iterat
         begun = time.perf_counter()
         try:
             found = _side_by_side(job, model, points)
-        except SerpentailError:  # of one of them: which, each tells by itself
+        except SerpentailError:  # about one of them; running them one by one shows which
             found = None
         if found is not None:
             each = (time.perf_counter() - begun) / len(points)
@@ -130,7 +130,7 @@ def _side_by_side(
             name: [p[name] for p in points] if name in job.keys else fixed.pop(name)
             for name in STARTS
         }
-        if not job.keys:  # a row a run tells that they are many
+        if not job.keys:  # one row for each run, because they are many
             both["q0"] = np.broadcast_to(both["q0"], (len(points), model.nq))
         fixed |= _samples(job, fixed, fixed.get("t_span", (0.0, 1.0)))
         found = simulate(model, both["q0"], both["v0"], parameters=runs, **fixed)

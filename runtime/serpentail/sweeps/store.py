@@ -47,7 +47,7 @@ class Store:
             except OSError as reason:
                 raise SweepError(f"store: {reason}: name another file") from None
         with self._told():
-            # blocks are finished in any thread, of which one at a time writes
+            # blocks finish in any thread, but one thread at a time writes
             self.base = sqlite3.connect(self.path or ":memory:", check_same_thread=False)
             (found,) = self.base.execute("pragma application_id").fetchone()
             (tables,) = self.base.execute("select count(*) from sqlite_master").fetchone()

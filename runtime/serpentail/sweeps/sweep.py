@@ -141,7 +141,7 @@ def _posed(model: Any, over: Any, run: Any, rest: tuple, store: Any) -> Sweep:
     axes = axes_of(over, points, seed)
     own = _settings(settings, run)
     job = Job(run, own, _outputs(outputs, run))
-    job.identity()  # refuses functions that nobody else could find
+    job.identity()  # refuses functions that other processes cannot import
     job.pickled()
     entries = entries_of(model, axes, job, plain("of", of))
     return Sweep(axes, entries, Store(store), Spent())

@@ -79,7 +79,7 @@ def implicit_steps_solve_their_system(model: Model, s: State) -> Errors:
     factors = model.kernel("implicit_factor")(high, s.v, damping, GAINS, weight, *ground)
     k_q, k_v, *k_u = model.kernel("implicit_solve")(factors, s.dq, s.dv, *u)
 
-    # what k has to be: here q is in the tangent space, so that angles of the tail lie as rates do
+    # the expected k; q is in the tangent space, so tail angles have the places of their rates
     change, load = k_v.astype(float) - s.dv, np.zeros(model.nv)
     tail = model.layout.tail_v
     tracked = H[tail, tail] @ (GAINS @ [k_q[tail], k_v[tail]])
@@ -173,7 +173,7 @@ def simulations_ask_what_users_do(model: Model, s: State) -> Errors:
     v_dot, rates, forces, heights, powers = model.kernel("contact_rates")(*arguments)
     positions, speeds = model.contact_points(s.q, s.v, *legs(model))
     expected = model.contact_dynamics(*arguments)
-    # the legs' drives hold what their own drift does against the forces
+    # the legs' drives balance the power of the forces on moving legs
     still = model.contact_points(s.q, s.v, *(x * (np.arange(8) < 4) for x in legs(model)))[1]
     work = [float((forces * each).sum(dtype=float)) for each in (speeds, still - speeds)]
     scale = np.abs(forces * np.abs(speeds).max(initial=1)).sum(dtype=float)

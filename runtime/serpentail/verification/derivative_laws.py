@@ -68,7 +68,7 @@ def forward_dynamics_changes_by_its_jacobians(model: Model, s: State) -> Errors:
     dq, dv, dtau = (x.astype(float) for x in model.forward_dynamics_derivatives(s.q, s.v, s.tau))
     change, largest = slopes(model, s, lambda at: model.inverse_dynamics(at.q, at.v, v_dot))
     unit = np.eye(model.nv)[:, model.layout.tail_v]
-    # what H times the change sums up
+    # terms of H times the change
     terms = np.abs(H) @ (np.abs(dq) @ np.abs(s.dq) + np.abs(dv) @ np.abs(s.dv))
     return {
         "dq, dv": block_slope_error(model, -H @ (dq @ s.dq + dv @ s.dv), (change, largest + terms)),

@@ -25,7 +25,7 @@ from .law import VALUE_LIMIT, Errors, Law, fastest, moved, registry, slope
 from .states import State, at_origin, outputs, state_functions
 
 WORLD = ("mass_matrix_world", "bias_force_world")
-# what position and velocity of B enter
+# results that depend on position and velocity of B
 PLACED = (
     "energy",
     "energy_derivatives",

@@ -21,7 +21,7 @@ SLOPE_LIMIT = 10 * VALUE_LIMIT  # a slope divides rounding by its step
 PIECEWISE = ("stops",)  # of the passive tail: their forces have no slopes by wide differences
 FEW_LINKS = 8  # in a segment: with more of them, rounding grows
 
-Errors = float | dict[str, float]  # one, or one a place
+Errors = float | dict[str, float]  # one error, or one for each place
 LawFunction = Callable[[Model, State], Errors]
 
 
@@ -34,7 +34,7 @@ class Law:
     error: LawFunction
     needs: tuple[str, ...] = ()  # functions of the model
     units: float = 0.0  # limit, in roundings (eps) of the model's real type
-    floor: float = 0.0  # limit of what has other reasons than rounding
+    floor: float = 0.0  # limit of errors with other causes than rounding
     only: str = ""  # real type or kind of tail of the models that it holds for; "free" torsos
     casadi: bool = False  # whether it evaluates CasADi functions
     without: tuple[str, ...] = ()  # parts of the passive tail that it holds without
@@ -73,7 +73,7 @@ def rid_of(model: Model, parts: tuple[str, ...]) -> Model:
     """Return a model without these parts of a passive tail."""
     changes = idle(model.parameters, parts)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UnusualSize)  # stops go out of reach
+        warnings.simplefilter("ignore", UnusualSize)  # move stops out of reach
         return model.with_parameters(**changes) if changes else model
 
 

@@ -116,7 +116,7 @@ def unchecked(entry: Law, model: Model) -> str:
 def errors_at(entry: Law, model: Model, state: State) -> Iterator[tuple[str, float]]:
     """Yield (place, error) of one state; nan if the model refuses to compute."""
     try:
-        with np.errstate(all="ignore"):  # what is no number fails
+        with np.errstate(all="ignore"):  # nan fails
             errors = entry.error(model, state)
     except (SerpentailError, ValueError, ArithmeticError) as refusal:
         errors = {f"{refusal}".partition("\n")[0]: np.nan}

@@ -18,7 +18,7 @@ from .states import State
 
 FLIGHT, STEPS = 0.2, 2000  # s
 SWING = 0.02  # s, of a tail on a fixed base, which gravity folds and whips
-CLEAR = 10.0  # m: more than a flight falls, or a tail reaches down
+CLEAR = 10.0  # m: more than a flight falls, or than a tail's length
 LAWS: list[Law] = []
 law = registry(LAWS)
 

@@ -6,7 +6,7 @@ from html import escape
 from ..motion.trajectory import Trajectory
 from .view import page_text
 
-MOST = 600  # samples of a run: what a notebook keeps of it is small
+MOST = 600  # samples of a run: notebooks stay small
 HEIGHT = 620  # px, of the frame
 
 

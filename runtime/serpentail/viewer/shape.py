@@ -10,7 +10,7 @@ from ..model.model import Model
 from ..motion.body import semi_axes
 
 THINNEST = 0.15  # a semi-axis that is drawn, over the largest
-SLENDER = 0.015  # radius over length of a tail whose radius no parameter tells
+SLENDER = 0.015  # radius over length of a tail without a parameter for its radius
 THICKER = 1.15  # at the root, over the radius
 WATER = 1e3  # kg/m^3
 MOST_JOINTS = 60  # that are marked on a tail

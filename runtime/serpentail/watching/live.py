@@ -115,7 +115,7 @@ class Live:
 
     def _aim(self, at: Array) -> None:
         """Point the cameras at a place (3,), m, so that the whole body is seen."""
-        begin = self.server.initial_camera  # of those who come later
+        begin = self.server.initial_camera  # for later clients
         for camera in (begin, *(client.camera for client in self.server.get_clients().values())):
             camera.position = at + length(self.model) * EYE
             camera.look_at = at

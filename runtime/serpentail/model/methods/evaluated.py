@@ -76,7 +76,7 @@ class Evaluated:
 
     def without(self, *names: str) -> ModelError:
         """Return the ModelError about functions that the model was generated without."""
-        if set(names) & set(self.manifest["scene"]["functions"]):  # what only C can do
+        if set(names) & set(self.manifest["scene"]["functions"]):  # functions that only the C has
             return without_c(self.manifest)
         has = ", ".join(self.generated)
         return ModelError(

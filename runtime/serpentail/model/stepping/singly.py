@@ -32,7 +32,7 @@ class SingleSteps:
     def make(self, held: Held, first: int, last: int) -> None:
         """Step runs [first, last), and write how each went to their statuses."""
         times = np.array([0, held.h * held.steps], self.dtype)
-        # torques and legs that hold over the whole call, and what acts: a record of each run
+        # torques and legs, constant during the call, and actuation: a record for each run
         acting = {"torques": self._tables(held.tau[first:last], 0, times)}
         controllers = self._records("controller", torques=_places(acting["torques"]))
         drive: dict[str, Any] = {"phases": 1, "begins": address_of(times)}

@@ -22,10 +22,10 @@ if TYPE_CHECKING:
     from ..model import Model
 
 METHODS = ("rk4", "implicit_euler")
-MOST_STEPS = 10_000  # of one call: more are `simulate`'s, which looks at signals in between
+MOST_STEPS = 10_000  # in one call; for more, `simulate` checks for signals in between
 LEGS = 8  # angles (rad) and rates (rad/s) of both legs
 SINGLY_LEAST = 32  # steps that are worth a thread, made singly
-LANES_LEAST = 4 * MIN_STATES_PER_THREAD  # of a batch's states, of which a step has four
+LANES_LEAST = 4 * MIN_STATES_PER_THREAD  # states of a batch; a step evaluates four
 
 
 class Stepping:
@@ -99,7 +99,7 @@ def step(
     threads = model.batch_library.threads
     if asked.threads is not None:
         threads = checked_threads("step: threads", asked.threads, SimulationError)
-    # arrays of all runs, those that move copied to where they end
+    # arrays of all runs; those that change are copied to the results
     arrays, runs, many = _states(model, given, asked)
     if asked.statuses is None:
         _refuse_unsound(arrays, many)
@@ -130,7 +130,7 @@ def _method(model: "Model", asked: object) -> str:
     if asked is not None:
         name = one_of("step: method", asked, METHODS, SimulationError)
     if model.library is None:
-        model.kernel("rollout")  # raises what there is to do
+        model.kernel("rollout")  # raises the error with the remedy
     needs = ["rollout"] + ["implicit"] * (name == "implicit_euler")
     has = {"rollout": "rollout" in model.generated, "implicit": _implicit(model)}
     missing = [each for each in needs if not has[each]]

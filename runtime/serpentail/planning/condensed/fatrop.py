@@ -31,7 +31,7 @@ CALLED = {  # of FATROP's C interface, by the names of Library in native/fatrop.
     "dual": "get_dual",
     "stats": "get_stats",
 }
-# of native/fatrop.c; what FATROP says itself where it says it
+# statuses of native/fatrop.c; FATROP's own message if it gives one
 SOLVED, SAID, STOPPED, MEMORY = 0, 1, 2, 6
 STATUSES = {
     2: "User_Requested_Stop",
@@ -49,8 +49,8 @@ SAYINGS = (
     "Error_In_Step_Computation",
     "Unknown",
 )
-# of the objective, tried in turn: FATROP adds bounds to the Hessians of stages, where those with
-# large multipliers may drown in rounding what torques cost
+# of the objective, tried in turn: FATROP adds bounds to the Hessians of stages, and if their
+# multipliers are large, the cost of torques may be lost in rounding
 SCALES = (0.1, 1.0)
 PREFIX = "fatrop."  # of its options
 OPTIONS = {
@@ -58,7 +58,7 @@ OPTIONS = {
     "max_iter": 300,
     # never: small steps in a row are no solution
     "acceptable_iter": 10_000,
-    # its trial steps may leave what can be collocated
+    # its trial steps may leave the region where collocation has a solution
     "watchdog_shortened_iter_trigger": 0,
 }
 # for guesses that are close to a solution
@@ -198,7 +198,7 @@ def solve_stages(
         success = outcome.status == SOLVED and bool(np.isfinite(found).all())
         if success or outcome.status == STOPPED:
             break
-    # what went astray may end where stages have no collocation
+    # a diverged solve may end where the collocation of stages has no solution
     ended = all(np.isfinite(part).all() for part in (found, *nodes.values()))
     return Solution(
         w=unpacked(stages, found, nodes | {"start": first}) if ended else w,

@@ -13,8 +13,8 @@ from .node import NodeCode
 from .stages import Stages
 
 EFFORT, ENERGY = 0, 1  # costs of a node
-# of the objective: FATROP adds bounds to a stage's Hessian, where those with large multipliers
-# would drown what the torques cost
+# of the objective: FATROP adds bounds to a stage's Hessian, and if their multipliers are large,
+# they would make the cost of torques negligible
 SCALE = 0.1
 GIVE = 1e8  # what squares of the goal's rows cost
 _pointer = ctypes.c_void_p

@@ -23,7 +23,7 @@ class Indices:
     states: np.ndarray
     others: np.ndarray
     algebraic: int  # na
-    first: int  # the point that is the first node: 0, or 1 where the start is none
+    first: int  # the point that is the first node: 0, or 1 if the start is not a node
 
     @property
     def controls(self) -> np.ndarray:

@@ -15,7 +15,7 @@ from types import SimpleNamespace
 from ...model.workers import after_fork
 from .fork_gate import let_forks_pass
 
-# Ctrl-C as all threads see it: how often it was noted, by which thread, and who heard it before
+# Ctrl-C for all threads: its count, the thread that receives it, and the handler before
 _ctrl_c = SimpleNamespace(noted=0, listener=None, before=None)
 
 

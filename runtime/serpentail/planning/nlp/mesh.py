@@ -86,7 +86,7 @@ def refined(mesh: Mesh, errors: np.ndarray, factor: float, order: int, most: int
     Errors are spread evenly; the error of an interval of width h falls as h^(order + 1).
     """
     # how many pieces each interval needs for its part of the error
-    order = min(order, 4)  # what an optimiser's controls leave of it
+    order = min(order, 4)  # the order that is left with an optimiser's controls
     target = max(factor * errors.sum(), 1e-300) / mesh.intervals
     wanted = np.ceil((errors / target) ** (1 / (order + 1)))
     pieces = np.clip(np.nan_to_num(wanted, nan=2, posinf=MOST_PIECES), 1, MOST_PIECES).astype(int)

@@ -31,7 +31,7 @@ FORMULATIONS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "translation-free": (("attitude", "tail", "torso_rate", "tail_rate"), ()),
     "full": (("position", "attitude", "tail", "velocity", "torso_rate", "tail_rate"), ()),
 }
-# units in which unknowns are of the order of 1
+# units that make unknowns of the order of 1
 UNITS = {
     "position": 0.1,
     "attitude": 1.0,
@@ -53,7 +53,7 @@ class Equations:
 
     forward: "ca.Function"
     inverse: "ca.Function"
-    parameters: tuple  # what they take after their usual inputs
+    parameters: tuple  # further inputs after the usual ones
     source: str
 
 
@@ -156,7 +156,7 @@ def node_function(
     """
     import casadi as ca
 
-    # symbols of the unknowns, and of what the calls give
+    # symbols of the unknowns, and of the results of calls
     states, algebraic, controls = variables.sizes()
     zeta, p = ca.SX.sym("zeta", 1 + states + algebraic + controls), ca.SX.sym("p", PARAMETERS + 1)
     point = _point(model, zeta, p, variables, attitude, problem.legs)

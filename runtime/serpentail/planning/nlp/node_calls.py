@@ -56,7 +56,7 @@ class NodeDerivatives:
         self.zeta, self.p, *self.results = node.function.sx_in()
         self.y = node.function.call([self.zeta, self.p, *self.results])[0]
 
-        # derivatives of the calls, of the objective, which is the last of y, and of all y
+        # derivatives of the calls, of the objective (the last entry of y), and of all of y
         self.jacobians_of_calls = [call.function.jacobian() for call in node.calls]
         self.hessians_of_calls = [call.function.reverse(1).jacobian() for call in node.calls]
         self.cost = ca.Function("cost", [self.zeta, self.p], [self.y[-1]])

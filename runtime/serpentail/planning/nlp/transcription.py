@@ -66,7 +66,7 @@ def transcription_of(
         problem.formulation, coordinates, model.layout.nt, torque_unit(problem)
     )
 
-    # what a node's function depends on, and what the whole program does
+    # dependencies of a node's function, and of the whole program
     goal, bounds = problem.goal.attitude, problem.bounds
     arrays = (goal, bounds.torque, bounds.torque_rate)
     key: tuple[Any, ...] = tuple(None if x is None else tuple(x) for x in arrays)
@@ -174,7 +174,7 @@ def _node_rows(node: Node, mesh: Mesh, rule: CollocationRule, nodes: int) -> Any
     entries = values.ravel(), (rows.ravel(), columns.ravel())
     defects = coo_matrix(entries, (N * S * nx, nodes * node.size))
 
-    # what holds at every node
+    # constraints of every node
     extra = node.residuals + node.path
     chosen = (np.arange(nodes)[:, None] * node.size + nx + np.arange(extra)).ravel()
     ones = np.ones(chosen.size), (np.arange(chosen.size), chosen)

@@ -211,7 +211,7 @@ class Memory:
         self.place = ctypes.addressof(task.record)
         self.memory = aligned(self.code.mpc_memory_size(self.place), np.dtype(float))
         self.run = Simulation()
-        self.state = ctypes.addressof(self.run)  # of which its state is the first member
+        self.state = ctypes.addressof(self.run)  # its first member is the controller's state
         self.tau = np.zeros(task.record.tail)
         self.begin()
 

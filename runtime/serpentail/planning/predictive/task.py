@@ -15,7 +15,7 @@ from ..result.plan import Plan
 from .kernel import FUNCTIONS, Task
 from .settings import NEEDED, Settings
 
-# what is worth as much, at the end, as a correction as large as the largest torque all the time
+# errors at the end that weigh as much as a correction by the largest torque all the time
 TURN, TURN_RATE = 1e-3, 0.1  # rad, rad/s: of the torso
 ANGLE, RATE = 1e-2, 1.0  # rad, rad/s: of the tail
 BEYOND = 1e-2  # rad beyond an angle's bound

@@ -67,7 +67,7 @@ def curve(nlp: Program, w: np.ndarray, p: np.ndarray) -> Curve:
     scale = variables.scale(variables.states)
     at_nodes = np.arange(mesh.intervals)[:, None] * rule.steps + np.arange(len(rule.nodes))
 
-    # states where intervals start, and what their rates at the nodes add
+    # states at the beginning of intervals, and the increments by their rates at the nodes
     states = w[indices.states[: -1 : rule.steps]] * scale
     rates = nlp.rates(w, p) * scale
     increments = rates[at_nodes] * mesh.widths[:, None, None]

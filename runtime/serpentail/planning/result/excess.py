@@ -9,7 +9,7 @@ from .curve import Curve
 from .truth import planned_torques
 
 SAMPLES = 33  # of an interval, its ends among them
-SLACK = 1e-3  # of a bound, by which a plan that is called true may exceed it
+SLACK = 1e-3  # of a bound: a successful plan may exceed it by this part
 
 Excess = dict[str, np.ndarray]
 

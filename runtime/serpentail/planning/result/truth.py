@@ -32,7 +32,7 @@ def applied(
     law = TorqueCurve(torques, damping)
     try:
         return end_of_flight(model, (q, v), law, duration, step)
-    except SimulationError:  # bent or whirled beyond what the model describes
+    except SimulationError:  # bent or rotating beyond the model's range
         return np.full_like(q, np.nan), np.full_like(v, np.nan)
 
 
