@@ -78,7 +78,7 @@ def cut(
 
 
 def with_noise(task: Task, start: Point, stage: Stage) -> tuple[Task, Fit]:
-    """Return the best fit; an unknown noise is estimated in turn with it, where priors weigh."""
+    """Return the best fit; with priors, fit and estimate of an unknown noise alternate."""
     found = fit(task.unknowns, task.trials, start, stage)
     believed = any(each.spread is not None for each in task.unknowns.each)
     weighs = believed or any(trial.unknown_torques for trial in task.trials)

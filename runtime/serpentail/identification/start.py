@@ -97,9 +97,9 @@ def turned(model: Model, q: np.ndarray, step: np.ndarray) -> np.ndarray:
 
 
 def _begin(model: Model, placed: Placements, tracks: MarkerTracks) -> np.ndarray:
-    """Return configurations with a straight tail whose torsos lie as the torso's markers do.
+    """Return configurations with a straight tail, and torsos placed by the torso's markers.
 
-    Where the torso has too few, all markers count; a frame without any is as the one before.
+    If these are too few, all markers count; a frame without any is like the one before.
     """
     frames = len(tracks.times)
     q = np.zeros((frames, model.nq))

@@ -1,5 +1,6 @@
-"""Calls of compiled functions through a small extension in C, where this Python has the headers
-that it needs; where not, ctypes calls them.
+"""Calls of compiled functions through a small C extension.
+
+By ctypes if Python's headers are missing.
 """
 
 import ctypes

@@ -58,8 +58,8 @@ def _own_quota() -> float:
 def quota(root: Path) -> float:
     """Return the cores' worth of time that control groups grant this process; inf without a limit.
 
-    root: of the file system, in which proc/self and sys/fs/cgroup lie.  The least limit counts, of
-    the process's own group and of those around it.
+    root: of the file system, with proc/self and sys/fs/cgroup. The smallest limit counts, of the
+    process's own group and of the groups around it.
     """
     least = math.inf
     for line in _lines(root / "proc/self/cgroup"):

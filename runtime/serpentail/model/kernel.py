@@ -60,7 +60,7 @@ CACHE_LINE = 64  # bytes, and the widest vector
 
 
 def aligned(count: int, dtype: DTypeLike) -> ndarray:
-    """Return a workspace that begins at a cache line, so that no vector in it lies across two."""
+    """Return a workspace that begins at a cache line, so that no vector in it crosses one."""
     size = (count + 1) * np.dtype(dtype).itemsize
     memory = np.zeros(size + CACHE_LINE, np.uint8)
     first = -address_of(memory) % CACHE_LINE
@@ -68,8 +68,9 @@ def aligned(count: int, dtype: DTypeLike) -> ndarray:
 
 
 def aligned_rows(shape: tuple[int, ...], dtype: DTypeLike) -> ndarray:
-    """Return an array to be filled that begins at a cache line: vectors are stored in half the
-    time where none lies across two.
+    """Return an uninitialised array that begins at a cache line.
+
+    Storing vectors takes half the time if none of them crosses a cache line.
     """
     size = math.prod(shape) * np.dtype(dtype).itemsize
     memory = np.empty(size + CACHE_LINE, np.uint8)
@@ -163,7 +164,7 @@ class Kernel:
         return Buffers(self.dtype, self.shapes, self.out_shapes, self.work, self.parameters)
 
     def _by_ctypes(self, arrays: Sequence[ArrayLike]) -> Any:
-        """Return outputs for whatever was given."""
+        """Return outputs for any arguments."""
         if len(arrays) != len(self.names):
             raise TypeError(f"{self.name} takes {', '.join(self.names)}")
         dtype = self.dtype

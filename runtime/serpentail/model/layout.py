@@ -1,4 +1,4 @@
-"""Where the numbers of a state lie: the one place that knows how q, v and tau are laid out."""
+"""The layout of q, v and tau; no other place depends on it."""
 
 from dataclasses import dataclass
 from typing import Any

@@ -30,7 +30,7 @@ MOST_READS = 100  # of a folder that is exchanged again and again while it is re
 
 @dataclass(frozen=True, eq=False)
 class CheckedFolder:
-    """A generated folder as it was when it was checked, whatever becomes of the folder.
+    """A generated folder as it was when it was checked; later changes of the folder do not matter.
 
     files: the content of each file that the manifest names, by that name.
     """

@@ -39,8 +39,9 @@ def stored_energy(values: Mapping[str, Any], angles: Any) -> Any:
 
 
 def behind_stops(values: Mapping[str, Any], angles: Any) -> str:
-    """Return which of the tail coordinates (k, 2m) is first more than a stop's width beyond it;
-    empty where none is.
+    """Return the first tail coordinate of (k, 2m) that is more than a stop's width beyond it.
+
+    The text is empty if there is none.
     """
     for (name, _), (way, _) in zip(ENDS, _ways(values, angles), strict=False):
         wrong = np.argwhere(way > 1)

@@ -1,4 +1,4 @@
-"""What a tail is made of: links of its segments, 0 where a segment is an arc."""
+"""The links of a tail's segments; 0 for a segment that is an arc."""
 
 Links = int | tuple[int, ...] | None  # of all segments, or of each; None of a continuum
 

@@ -75,6 +75,6 @@ def _ended(motion: "Trajectory") -> list[str]:
 
 
 def _listed(info: dict[str, Any], name: str) -> list[Any]:
-    """A list in an info, which is whatever its maker gave."""
+    """Return a list of an info; empty if the entry is something else."""
     found = info.get(name)
     return found if isinstance(found, list) else []

@@ -1,4 +1,4 @@
-"""Files of motions: arrays in one npz, read again only where every checksum is right."""
+"""Files of motions: arrays in one npz, which is read only if every checksum is right."""
 
 import json
 import os

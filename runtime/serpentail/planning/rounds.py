@@ -36,7 +36,7 @@ from .ways import Begin, way_of
 
 FIRST_PUSH = 0.05  # of the torques' unit: takes the first guess out of a plane of symmetry
 # Softening of an objective, see ``cost``, in the first rounds; the last value holds in all others.
-# The exact objectives are seldom solved from a distant guess. "energy": in mean powers of the guess.
+# The exact ones are seldom solved from a distant guess. "energy": in mean powers of the guess.
 SOFTENING = {"energy": (3.0, 0.3, 0.03), "time": (1.0, 0.3)}
 USUAL_POWER = 0.01  # W, of a guess without torques
 DURATIONS = (1.0, 0.5, 0.75, 0.25)  # of guesses, in turn, from the least (0) to the most (1)

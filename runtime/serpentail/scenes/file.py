@@ -39,7 +39,10 @@ UNSAID = {"base": "free", "weightless": False}  # manifests leave these out
 
 
 def read_scene(path: str | Path, error: type[Exception]) -> tuple[dict[str, Any], Path]:
-    """Return the tables of a scene file or example, and its path; ``error`` where none is read."""
+    """Return the tables of a scene file or example, and its path.
+
+    ``error`` if it cannot be read.
+    """
     try:
         return tables_of_scene(path)
     except SerpentailError as reason:

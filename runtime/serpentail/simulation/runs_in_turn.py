@@ -33,7 +33,7 @@ class RunsInTurn:
         self.pause, self.at_once = PAUSE, 1
 
     def make(self, runs: list[int], ended: Event) -> Ended:
-        """Make runs; return those that came to an end, fewer where ``ended`` is set."""
+        """Make runs; return those that ended, fewer if ``ended`` is set."""
         numbers, records = np.array(runs), self.run.records_of(runs)
         statuses, done = np.zeros(len(runs), np.intc), 0
         while done < len(runs) and not ended.is_set():

@@ -60,7 +60,7 @@ def run_points(job: Job, model: Model | None, points: Sequence[Point]) -> Iterat
 
 
 def run_point(job: Job, model: Model | None, point: Point) -> tuple[dict[str, Any], Any]:
-    """Return the outcome of a point, and its motion, plan or whatever has a page; None without."""
+    """Return the outcome of a point, and its motion, plan or other object with a page, or None."""
     if job.run == "simulate":
         assert model is not None
         motion = _simulated(job, model, point)
@@ -156,7 +156,7 @@ def _side_by_side(
 
 
 def _samples(job: Job, settings: dict[str, Any], t_span: Any) -> dict[str, Any]:
-    """Return the setting by which only ends are sampled, where nothing else is asked for."""
+    """Return the setting to sample only the ends, if the outputs need no more."""
     ends = np.asarray(t_span, float)
     if (
         "output_step" in settings

@@ -61,7 +61,7 @@ class Child:
         self.link: Connection[Any, Any] = here
 
     def end(self) -> int:
-        """End the process, whatever it does; return its status."""
+        """End the process in any case; return its status."""
         self.process.kill()
         self.link.close()
         return self.process.wait()

@@ -56,7 +56,7 @@ def tail_gets_the_accelerations_that_torques_are_for(model: Model, s: State) -> 
 
 @law("tracked_dynamics", "pfl", "forward_dynamics", units=VALUE_LIMIT, without=PIECEWISE)
 def tracking_moves_as_its_torques_do(model: Model, s: State) -> Errors:
-    """Torques and v_dot of one call are those of two calls, relative to cond(H)."""
+    """Torques and v_dot of one call equal those of two calls, relative to cond(H)."""
     tau, v_dot = model.kernel("tracked_dynamics")(s.q, s.v, s.accelerations)
     expected = model.forward_dynamics(s.q, s.v, tau)
     torques = model.pfl(s.q, s.v, s.accelerations)
@@ -112,7 +112,7 @@ def velocities_are_the_rates_of_the_points(model: Model, s: State) -> Errors:
 
 @law("contact_points", units=VALUE_LIMIT, only="contact")
 def points_are_carried_by_the_torso(model: Model, s: State) -> Errors:
-    """Another place and velocity of B are added to those of every point."""
+    """A change of B's position and velocity is added to those of every point."""
     move = np.array([0.5, -0.25, 1.0])
     first = model.contact_points(s.q, s.v, *legs(model))
     q, v = s.q.copy(), s.v.copy()
@@ -149,8 +149,9 @@ def legs_have_their_lengths(model: Model, s: State) -> Errors:
     only="contact",
 )
 def the_ground_accelerates_by_its_generalised_force(model: Model, s: State) -> Errors:
-    """H v_dot + C = [0; tau] + J^T f, where a column of J is what one speed more adds to
-    velocities, cond(H) aside.
+    """H v_dot + C = [0; tau] + J^T f, relative to cond(H).
+
+    A column of J is the change of the points' velocities by one entry of v.
     """
     s = sunk(model, s)
     v_dot, _, forces = model.contact_dynamics(s.q, s.v, s.tau, bristles(model), *legs(model))
@@ -165,8 +166,9 @@ def the_ground_accelerates_by_its_generalised_force(model: Model, s: State) -> E
 
 @law("contact_rates", "contact_points", "contact_dynamics", units=VALUE_LIMIT, only="contact")
 def simulations_ask_what_users_do(model: Model, s: State) -> Errors:
-    """Heights are those of the points, accelerations and forces those of contact_dynamics, and the
-    ground's power is of forces on moving points.
+    """Heights equal those of the points, accelerations and forces those of contact_dynamics.
+
+    The ground's power is that of its forces on the moving points.
     """
     s = sunk(model, s)
     arguments = (s.q, s.v, s.tau, bristles(model), *legs(model))

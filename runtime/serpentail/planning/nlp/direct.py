@@ -98,7 +98,7 @@ def _shared_rows(
 
 
 def _straight_rows(indices: Indices, mesh: Mesh, rule: CollocationRule) -> DirectRows:
-    """Second differences of Bernstein coefficients, which are zero where torques are straight."""
+    """Return second differences of Bernstein coefficients, zero if torques are straight lines."""
     k = np.arange(mesh.intervals)
     if mesh.controls is not None:  # the first of each control interval; others share its polynomial
         k = np.flatnonzero(np.diff(mesh.controls, prepend=-1))

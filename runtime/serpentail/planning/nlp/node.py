@@ -244,9 +244,10 @@ def _rates(model: Model, point: Point, attitude: Attitude, v_dot: "ca.SX") -> di
 
 
 def _momentum(model: Model, point: Point, h: "ca.SX", momentum: "ca.SX") -> "ca.SX":
-    """H v of the motion relative to the COM less (0, R^T h), in units: zero where omega carries h.
+    """Return H v of the motion relative to the COM less (0, R^T h), in units.
 
-    Where the linear momentum is zero, the angular momentum about B is that about the COM.
+    It is zero if omega carries h. If the linear momentum is zero, the angular momentum about B is
+    that about the COM.
     """
     import casadi as ca
 

@@ -1,4 +1,4 @@
-"""Collocation rules: where the equations hold in an interval, and how states are integrated."""
+"""Collocation rules: the nodes of an interval, and how states are integrated over it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
