@@ -43,12 +43,12 @@ def _refuse_others(model: Model) -> None:
     """Refuse models that an FMU cannot hold."""
     scene = model.manifest["scene"]
     if model.fixed:
-        raise _refused(model, "base", "fixed", 'FMUs are of a torso that moves: give "free" to')
+        raise _refused(model, "base", "fixed", 'an FMU needs a torso that moves: give "free" to')
     if scene["coordinates"] == "polar":
         words = 'polar angles have no rates where a segment is straight: give "bend" to'
         raise _refused(model, "coordinates", "polar", words)
     if model.manifest["real"] != "double":
-        raise _refused(model, "real", model.manifest["real"], 'FMI has doubles: give "double" to')
+        raise _refused(model, "real", model.manifest["real"], 'FMI uses double: give "double" to')
     needs = _needs(model)
     absent = [name for name in needs if name not in model.generated]
     if absent or "c" not in scene["targets"]:

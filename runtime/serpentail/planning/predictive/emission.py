@@ -26,13 +26,14 @@ USE = """/* The predictive controller of {prefix}, for one plan.
    static double memory[{upper}_MPC_MEMORY];
    static {prefix}_mpc_state state;
 
-   {prefix}_mpc_begin(&state, &{prefix}_mpc_plan, memory); where the flight begins, then, t s later,
-   {prefix}_mpc_control(&state, t, t, q, v, tau); as often as the motors take torques, which may be
-   oftener than there are ticks.  Joint damping is not among them: it is the body's own. */
+   At the start of the flight call {prefix}_mpc_begin(&state, &{prefix}_mpc_plan, memory).  Then, at
+   the time t (s) from there, call {prefix}_mpc_control(&state, t, t, q, v, tau) as often as the
+   motors take torques, which may be more often than the ticks.  tau does not contain joint damping,
+   which belongs to the body. */
 
 """
 DATA = """
-/* the model's functions, as the controller calls them */
+/* the model's functions, with the arguments that the controller passes */
 static int call_rates(const void *parameters, const double *x, const double *tau, const double *h,
                       double *y, double *work)
 {{
