@@ -5,7 +5,8 @@ from typing import Any
 
 __version__ = "0.2.0"
 _HOME = {
-    **dict.fromkeys(["load", "Model"], "model.model"),
+    "load": "model.load",
+    "Model": "model.model",
     "build": "building.build",
     "examples": "building.examples",
     **dict.fromkeys(["progress", "Progress"], "stages"),
@@ -25,11 +26,12 @@ _HOME = {
     **dict.fromkeys(["pitch_roll_yaw", "rotation_matrix"], "attitude"),
     **dict.fromkeys(["polar_to_bend", "bend_to_polar"], "model.polar"),
     "plan": "planning.planner",
-    **dict.fromkeys(["Goal", "Bounds"], "planning.problem"),
+    **dict.fromkeys(["Goal", "Bounds"], "planning.goal"),
     "Plan": "planning.result.plan",
     "Mpc": "planning.predictive.mpc",
     "Pfl": "simulation.pfl",
-    **dict.fromkeys(["Sequence", "SequenceRun"], "sequence.sequence"),
+    "Sequence": "sequence.sequence",
+    "SequenceRun": "sequence.run",
     **dict.fromkeys(["Phase", "Tracking"], "sequence.phase"),
     **dict.fromkeys(["identify"], "identification.identify"),
     "Identification": "identification.result",
@@ -50,8 +52,9 @@ _HOME = {
     "export": "exporting.export",
     **dict.fromkeys(["environment", "environments"], "learning.make"),
     **dict.fromkeys(["jax_functions", "torch_functions"], "differentiable.make"),
-    **dict.fromkeys(["sweep", "Sweep"], "sweeps.sweep"),
-    **dict.fromkeys(["grid", "random", "latin", "sobol"], "sweeps.axes"),
+    "sweep": "sweeps.sweep",
+    "Sweep": "sweeps.result",
+    **dict.fromkeys(["grid", "random", "latin", "sobol"], "sweeps.axis"),
     **dict.fromkeys(
         [
             "SerpentailError",

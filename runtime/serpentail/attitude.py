@@ -1,4 +1,4 @@
-"""Rotations: quaternions, rotation matrices and angles, and how they become each other."""
+"""Rotations: quaternions, rotation matrices and angles, and conversions between them."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -31,7 +31,7 @@ def quaternion_rate(quaternion: Entries, omega: Entries) -> list[Any]:
 
 
 def from_angles(angles: Array) -> Array:
-    """Return quaternions (..., 4) of pitch, roll and yaw (..., 3), rad, as `pitch_roll_yaw`."""
+    """Return quaternions (..., 4) of pitch, roll and yaw (..., 3), rad."""
     c, s = np.cos(angles / 2), np.sin(angles / 2)
     zero = np.zeros_like(c[..., 0])
     pitch = [c[..., 0], s[..., 0], zero, zero]
@@ -49,14 +49,41 @@ def angle_deg(a: ArrayLike, b: ArrayLike) -> Array:
 
 
 def tilt_deg(quaternion: ArrayLike) -> Array:
-    """Return angles (...) in degrees of the torso's z axis off the world's; unit quaternions."""
+    """Return angles (...) in degrees between the torso's and the world's z axis.
+
+    The quaternions (..., 4) have norm 1.
+    """
     q = np.asarray(quaternion)
     level = np.hypot(q[..., 1], q[..., 2])
     return np.degrees(2 * np.arctan2(level, np.hypot(q[..., 0], q[..., 3])))
 
 
 def rotation_matrix(quaternion: ArrayLike) -> Array:
-    """R, torso to world, (..., 3, 3), of quaternions (w, x, y, z), (..., 4), of any norm but 0."""
+    """Return rotation matrices from body to world axes.
+
+    Parameters
+    ----------
+    quaternion : array_like, shape (..., 4)
+        Quaternions (w, x, y, z) of any norm but 0.
+
+    Returns
+    -------
+    ndarray, shape (..., 3, 3)
+        Rotation matrices R.
+
+    Raises
+    ------
+    StateError
+        The shape is wrong, a value is not finite, or a quaternion is zero.
+
+    Examples
+    --------
+    >>> import serpentail as st
+    >>> st.rotation_matrix([1, 0, 0, 0])
+    array([[1., 0., 0.],
+           [0., 1., 0.],
+           [0., 0., 1.]])
+    """
     quaternion = finite_array("quaternion", quaternion)
     if quaternion.shape[-1:] != (4,):
         raise StateError(f"quaternion has shape {quaternion.shape}, not (4,) or (..., 4)")
@@ -74,10 +101,36 @@ def rotation_matrix(quaternion: ArrayLike) -> Array:
 
 
 def pitch_roll_yaw(q: ArrayLike, unwrap: bool = False) -> Array:
-    """Angles (phi_x, phi_y, phi_z), (..., 3), rad, R = Rz(phi_z) Rx(phi_x) Ry(phi_y).
+    """Return pitch, roll and yaw of configurations, with R = Rz(yaw) Rx(pitch) Ry(roll).
 
-    q: (..., 7 + 2m).  |phi_x| <= pi/2; at pi/2 itself one of the valid answers.  unwrap, for
-    q (K, 7 + 2m): continued along time over whole turns and through phi_x = +-pi/2.
+    Parameters
+    ----------
+    q : array_like, shape (..., 7 + 2m)
+        Configurations; the tail coordinates may be left out.
+    unwrap : bool, default False
+        For ``q`` of shape (K, 7 + 2m): follow the angles continuously over time, over whole
+        turns and through a pitch of 90 degrees.
+
+    Returns
+    -------
+    ndarray, shape (..., 3)
+        Angles (phi_x, phi_y, phi_z), rad. Without ``unwrap`` the pitch is between -pi/2 and pi/2;
+        at either limit roll and yaw are not unique, and one valid pair is returned.
+
+    Raises
+    ------
+    StateError
+        The shape is wrong, a value is not finite, or a quaternion is zero.
+    ValueError
+        ``unwrap`` is True and ``q`` is not two-dimensional.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import serpentail as st
+    >>> q = [0, 0, 0, np.cos(0.1), np.sin(0.1), 0, 0]
+    >>> round(float(st.pitch_roll_yaw(q)[0]), 6)
+    0.2
     """
     q = finite_array("q", q)
     if q.ndim == 0 or q.shape[-1] < TORSO_NQ:
@@ -94,21 +147,21 @@ def pitch_roll_yaw(q: ArrayLike, unwrap: bool = False) -> Array:
 
 
 def sign_continuous(quaternion: Array) -> Array:
-    """The same rotations, each quaternion in the half-space of the one before it."""
+    """Return the same rotations, each quaternion with the sign nearest to the one before."""
     flips = np.sum(quaternion[1:] * quaternion[:-1], axis=1) < 0
     signs = np.cumprod(np.where(flips, -1.0, 1.0), dtype=np.float64)
     return np.vstack([quaternion[:1], signs[:, None] * quaternion[1:]])
 
 
 def _continued(angles: Array) -> Array:
-    """Angles (K, 3) followed along time over whole turns and both Euler branches."""
+    """Return angles (K, 3) followed over time, over whole turns and both Euler branches."""
     if angles.ndim != 2:
         raise ValueError(
             f"q of {angles.ndim} dimensions cannot be unwrapped: give (K, 7 + 2m), time first"
         )
     if not len(angles):
         return angles
-    # both branches lie as far from those of the sample before: the same two ways, stay or change
+    # for either branch there are the same two choices: stay on it, or change to the other
     first, second = branches = _branches(angles)
     stay, change = (np.abs(_less_turns(b[1:] - first[:-1])).sum(axis=1) for b in branches)
     changes = np.concatenate([[_upright(branches[:, 0])], change < stay])
@@ -120,7 +173,7 @@ def _continued(angles: Array) -> Array:
 
 
 def _branches(angles: Array) -> Array:
-    """Both Euler branches (2, K, 3) of attitudes: (x, y, z) and (pi - x, y + pi, z + pi)."""
+    """Return both Euler branches (2, K, 3): (x, y, z) and (pi - x, y + pi, z + pi)."""
     return np.stack([angles, angles * (-1, 1, 1) + np.pi])
 
 
@@ -131,5 +184,5 @@ def _upright(branches: Array) -> bool:
 
 
 def _less_turns(angles: Array) -> Array:
-    """Angles within half a turn of zero."""
+    """Return angles less the nearest whole number of turns."""
     return angles - TURN * np.round(angles / TURN)

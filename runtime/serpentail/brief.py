@@ -13,15 +13,15 @@ FEW = 7  # numbers that are shown as they are: an attitude, a vector, a small ro
 def brief(thing: Any) -> str:
     """Return a dataclass on one line, such as ``Contact(points=(1201, 6, 3), ...)``.
 
-    It is a ``__repr__``: arrays of more than FEW numbers are told by their shapes, and what is long
-    is cut.
+    It serves as ``__repr__``: arrays of more than FEW numbers are shown by their shapes, and long
+    values are cut.
     """
     told = [f"{each.name}={_value(getattr(thing, each.name))}" for each in fields(thing)]
     return f"{type(thing).__name__}({', '.join(told)})"
 
 
 def cut(text: str, most: int = MOST) -> str:
-    """Return a text on one line of at most so many characters."""
+    """Return a text on one line of at most ``most`` characters."""
     line = " ".join(text.split())
     return line if len(line) <= most else line[: most - 3] + "..."
 

@@ -1,5 +1,7 @@
-"""Checks of what users give. Each returns the value in a form to work with, or raises the given
-error, which names the field, the value and what the field needs.
+"""Checks of values that users give.
+
+Each returns the value in a form to work with, or raises the given error. The error names the field,
+the value and what the field needs.
 """
 
 from collections.abc import Callable, Collection
@@ -17,17 +19,17 @@ T = TypeVar("T")
 
 
 class Refusals:
-    """What is refused of a table, part by part, so that all of it is told at once."""
+    """Collects the errors about the parts of a table, to raise them all at once."""
 
     def __init__(self, error: Error) -> None:
         self.error, self.lines = error, dict[str, list[str]]()
 
     def add(self, part: str, line: str) -> None:
-        """Note what is wrong with a part."""
+        """Add a line about a part."""
         self.lines.setdefault(part, []).append(line)
 
     def attempt(self, part: str, make: Callable[..., T], *arguments: Any) -> T | None:
-        """Return what is made; None where a part was refused before, or is refused now."""
+        """Return ``make(*arguments)``; None if the part is refused now or was refused before."""
         if part in self.lines:
             return None
         try:
@@ -37,7 +39,7 @@ class Refusals:
             return None
 
     def tell(self) -> None:
-        """Raise the error about all that was refused, a line for each."""
+        """Raise the error about all refused parts, one line for each."""
         if self.lines:
             raise self.error("\n".join(line for lines in self.lines.values() for line in lines))
 
@@ -53,7 +55,7 @@ def needed(field: str, value: object, needs: str) -> str:
 
 
 def shown(value: object) -> str:
-    """Return a value as Python writes it, on one line and shortened where it is long."""
+    """Return a value as Python writes it, on one line and shortened if it is long."""
     try:
         text = repr(value)
     except (ValueError, RecursionError):  # repr refuses integers of more than 4300 digits
@@ -86,7 +88,9 @@ def real_array(
         )
     if array.dtype.kind not in "fiu":
         raise error(f"{field}: type {array.dtype}: needs real numbers")
-    with np.errstate(over="ignore"):  # what float cannot hold becomes inf, which is refused later
+    with np.errstate(
+        over="ignore"
+    ):  # numbers too large for float become inf, which is refused later
         return np.asarray(array, dtype, order="C")
 
 
@@ -152,7 +156,7 @@ def numbers(
 
 
 def numbers_in(value: object) -> NDArray[np.float64] | None:
-    """Return real numbers of any shape as an array, or None where the value is something else."""
+    """Return real numbers of any shape as an array; None if the value is something else."""
     try:
         return real_array("", value, ValueError)
     except ValueError:
@@ -170,7 +174,7 @@ def _within(numbers: NDArray[np.float64], bounds: Bounds) -> bool:
 
 
 def _words(noun: str, bounds: Bounds) -> str:
-    """Return what `_within` demands, in words."""
+    """Return in words what `_within` checks."""
     above, least, most = bounds
     to = f" to {most:g}" if most < np.inf else ""
     if above > -np.inf:
@@ -179,7 +183,7 @@ def _words(noun: str, bounds: Bounds) -> str:
 
 
 def one_of(field: str, value: object, names: Collection[str], error: Error) -> str:
-    """Return a value that is one of the names; the error has the nearest one."""
+    """Return a value if it is one of the names; the error suggests the nearest one."""
     line = none_of(field, value, names)
     if line:
         raise error(line)
@@ -187,7 +191,7 @@ def one_of(field: str, value: object, names: Collection[str], error: Error) -> s
 
 
 def none_of(field: str, value: object, names: Collection[str]) -> str:
-    """Return a line about a value that is none of the names, with the nearest; else ""."""
+    """Return a line about a value that is not one of the names, with the nearest; else ""."""
     if isinstance(value, str) and value in names:
         return ""
     remedy = did_you_mean(value, names) or f"needs {' or '.join(map(repr, names))}"
@@ -195,6 +199,6 @@ def none_of(field: str, value: object, names: Collection[str]) -> str:
 
 
 def did_you_mean(value: object, names: Collection[str]) -> str:
-    """Return the question whether one of the names was meant; "" where none is near."""
+    """Return a question with the nearest name; "" if no name is near."""
     near = get_close_matches(value, names, 1) if isinstance(value, str) else []
     return f"did you mean {near[0]!r}?" if near else ""

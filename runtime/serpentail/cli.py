@@ -45,7 +45,7 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def arguments_of(argv: list[str] | None) -> argparse.Namespace:
-    """Return the arguments; those of ``generate``, which the generator reads, as words."""
+    """Return the arguments; those of ``generate`` as words, because the generator reads them."""
     root = parser()
     arguments, words = root.parse_known_args(argv)
     if words and arguments.verb != "generate":
@@ -60,7 +60,7 @@ def tell_warning(message: Warning | str, *_: Any, **__: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> Outcome | int:
-    """Return the outcome of a verb, or the status of one that prints by itself."""
+    """Return the outcome of a verb; the status if the verb prints its own output."""
     (room,) = (room for room, verbs in ROOMS.items() if arguments.verb in verbs)
     module = import_module(f".commands.{room}", __package__)
     outcome: Outcome | int = getattr(module, arguments.verb)(arguments)
@@ -72,7 +72,7 @@ def told(arguments: argparse.Namespace, outcome: Outcome) -> int:
     tell(json.dumps(outcome.report) if getattr(arguments, "json", None) else outcome.text)
     written = [write(arguments, *entry) for entry in outcome.files.items()]
     if outcome.report.get("stopped") == "interrupt":
-        print("serpentail: interrupted; this is what there was until then", file=sys.stderr)
+        print("serpentail: interrupted; this is the result until then", file=sys.stderr)
         return INTERRUPTED
     return 0 if outcome.good and all(written) else 1
 

@@ -1,4 +1,4 @@
-"""The exceptions of the runtime: each names what is wrong and what to do about it."""
+"""The exceptions and warnings of the runtime; each message gives the value and a remedy."""
 
 from __future__ import annotations
 
@@ -6,15 +6,25 @@ from typing import Any
 
 
 class SerpentailError(Exception):
-    """Anything that the runtime refuses; the base of all its exceptions."""
+    """Base class of all exceptions of this package."""
 
 
 class CompilerNotFound(SerpentailError):
-    """No C compiler works here; the message names what was tried."""
+    """No C compiler works on this machine; the message names those that were tried."""
 
 
 class CompileFailed(SerpentailError):
-    """The C compiler failed; `command`, `returncode` and `stderr` are its own words."""
+    """The C compiler reported an error.
+
+    Attributes
+    ----------
+    command : tuple of str
+        The command that failed.
+    returncode : int
+        Its exit status.
+    stderr : str
+        What the compiler wrote.
+    """
 
     command: tuple[str, ...] = ()
     returncode: int = 0
@@ -22,54 +32,64 @@ class CompileFailed(SerpentailError):
 
 
 class ModelError(SerpentailError):
-    """A generated folder is stale, tampered with, incomplete or of another ABI."""
+    """A generated folder, a scene key or a parameter is wrong.
+
+    For instance: a folder is stale, changed, incomplete or of another version; a parameter is
+    unknown or unphysical; the scene left out a function.
+    """
 
 
 class StateError(SerpentailError, ValueError):
-    """A state, rate, torque or force has a wrong shape or a value that is not finite."""
+    """A state, rate, torque or force has a wrong shape, or a value that is not finite."""
 
 
 class SimulationError(SerpentailError):
-    """A simulation cannot go on; `trajectory` is the motion until then, None if it never began."""
+    """A setting of a simulation is wrong, or a simulation cannot go on.
+
+    Attributes
+    ----------
+    trajectory : Trajectory or None
+        The motion up to the failure; None if it never began.
+    """
 
     trajectory: Any = None  # a Trajectory
 
 
 class PlanningError(SerpentailError, ValueError):
-    """A planning problem that cannot be posed."""
+    """A planning problem is not well posed, or a setting of a plan or of ``Mpc`` is wrong."""
 
 
 class IdentificationError(SerpentailError, ValueError):
-    """Markers that cannot be read, or parameters that cannot be estimated as asked."""
+    """Markers cannot be read, or parameters cannot be estimated as asked."""
 
 
 class ExtraMissing(SerpentailError, ImportError):
-    """A library is not installed; the message names the extra that brings it."""
+    """A library is not installed; the message names the extra that installs it."""
 
 
 class NotWritten(SerpentailError, OSError):
-    """A file cannot be written; what was there before is there still."""
+    """A file cannot be written; a file that was there before is unchanged."""
 
 
 class ViewError(SerpentailError, ValueError):
-    """A page, a film or a figure that cannot be drawn as asked."""
+    """A page, a film or a figure cannot be drawn as asked."""
 
 
 class ExportError(SerpentailError, ValueError):
-    """A model that another tool's file cannot hold, or a file that cannot be one."""
+    """A file format cannot hold the model, or a file cannot have that name."""
 
 
 class SweepError(SerpentailError, ValueError):
-    """A sweep that cannot be posed, or whose workers are gone."""
+    """A sweep is not well posed, or its worker processes are gone."""
 
 
 class UnlikeBodies(UserWarning):
-    """Torso and tail are so unlike in size that moments cancel in H, which loses digits."""
+    """Warning: torso and tail differ so much in size that the inertia matrix H loses digits."""
 
 
 class UnusualSize(UserWarning):
-    """A mass, length, angle or other number that no animal or robot has: mostly a slip of units."""
+    """Warning: a number has a size that no animal or robot has; most often a unit is wrong."""
 
 
 class DoubtfulMarkers(UserWarning):
-    """Marker tracks that fit badly, as those of swapped markers do."""
+    """Warning: marker tracks fit badly; swapped markers are a common cause."""

@@ -1,4 +1,4 @@
-"""Files that are written whole or not at all, and a check of where they go before work begins."""
+"""Writes files whole or not at all, and checks before the work that they can be written."""
 
 import contextlib
 import os
@@ -11,8 +11,9 @@ from .errors import NotWritten
 
 @contextlib.contextmanager
 def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Lend a file to write, which replaces path on success and is removed on failure; NotWritten
-    where the system refuses.
+    """Provide a temporary file that replaces ``path`` on success and is removed on failure.
+
+    NotWritten if the system refuses.
     """
     target = Path(path)
     part = target.with_name(f".{target.name}.{secrets.token_hex(4)}.part")
@@ -22,16 +23,16 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
         part.replace(target)
     except OSError as reason:
         raise NotWritten(
-            f"{str(target)!r} is not written ({reason.strerror or reason}): make room, or give the "
-            "name of a file that may be written"
+            f"{str(target)!r} is not written ({reason.strerror or reason}): make room, or name "
+            "another file"
         ) from reason
     finally:
-        with contextlib.suppress(OSError):  # where there is no folder for it
+        with contextlib.suppress(OSError):  # its folder may be missing
             part.unlink(missing_ok=True)
 
 
 def refuse_unwritable(path: str | os.PathLike[str]) -> None:
-    """OSError where a file cannot be written: its name is a folder's, or its folder is none."""
+    """OSError if a file cannot be written: it is a folder, or its folder cannot be used."""
     target = Path(path)
     if target.is_dir():
         raise IsADirectoryError(f"{path} is a folder")
@@ -39,11 +40,11 @@ def refuse_unwritable(path: str | os.PathLike[str]) -> None:
 
 
 def refuse_unusable(folder: str | os.PathLike[str]) -> None:
-    """OSError where no file can be written into a folder, which need not be there yet."""
+    """OSError if no file can be written into a folder; the folder need not exist yet."""
     place = Path(folder).absolute()
     while not place.exists():  # those are made
         place = place.parent
     if not place.is_dir():
-        raise NotADirectoryError(f"{place} is no folder")
+        raise NotADirectoryError(f"{place} is not a folder")
     if not os.access(place, os.W_OK | os.X_OK):
         raise PermissionError(f"{place} cannot be written to")

@@ -20,7 +20,7 @@ LARGEST = {  # unit -> most, in words, and the unit that may have been meant
 
 
 def warn_of_unusual(field: str, value: Any, unit: str | Sequence[str], calls: int = 1) -> None:
-    """Warn who called so many calls above of numbers larger than any animal or robot has them."""
+    """Warn of numbers larger than any animal or robot has; ``calls``: frames above the caller's."""
     for place, number, its_unit in _numbers(value, unit, DEEPEST):
         most, words, meant = LARGEST.get(plain(its_unit), (math.inf, "", ""))
         if most < abs(number) < 1e300:

@@ -1,4 +1,4 @@
-"""How far long work is: stages tell a function of the user's, the log, or a person who waits."""
+"""Progress of long work: stages report to a function of the user's, the log or the terminal."""
 
 import sys
 import time
@@ -8,17 +8,28 @@ from contextvars import ContextVar
 from dataclasses import dataclass
 from typing import Any, TextIO
 
-PATIENCE_S = 1.0  # s of a stage after which it is worth a line
+PATIENCE_S = 1.0  # s: longer stages are reported
 PERIOD_S = 10.0  # s between lines in a pipe or a file
 
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a stage is.
+    """How far a stage of long work is; what ``progress`` passes to its function.
 
-    stage: such as "compile"; what: of what, such as a model's name; done: part from 0 to 1, None
-    where that is not known; seconds: since its begin; ended: whether it is over; depth: how many
-    other stages it is a part of.
+    Attributes
+    ----------
+    stage : str
+        Name of the stage, such as "compile", "simulate" or "plan".
+    what : str
+        What it works on, such as a model's name.
+    done : float or None
+        Part that is done, from 0 to 1; None if unknown.
+    seconds : float
+        Time since the stage began (s).
+    ended : bool
+        Whether the stage is over.
+    depth : int
+        Number of stages that this one is part of.
     """
 
     stage: str
@@ -30,7 +41,7 @@ class Progress:
 
     @property
     def left(self) -> float | None:
-        """Estimated seconds until the end; None where nothing tells."""
+        """Estimated time until the end (s); None if unknown."""
         if self.ended:
             return 0.0
         return self.seconds * (1 - self.done) / self.done if self.done else None
@@ -51,13 +62,26 @@ _depth: ContextVar[int] = ContextVar("serpentail.depth", default=0)
 
 @contextmanager
 def progress(hook: Hook | None = None) -> Iterator[None]:
-    """Let all long work inside ``with serpentail.progress():`` tell how far it is.
+    """Report the progress of all long work inside a ``with`` block.
 
-    hook: a function of a Progress, which each stage (derive, compile, simulate, plan and so on)
-    calls as it goes on and at its end; what it raises ends the work.  None: stages that take more
-    than a second and are part of no other are told on stderr, as one line that is written over on a
-    terminal, else as lines.  Without it nothing is told; the log "serpentail" has the end of each
-    stage either way.
+    Parameters
+    ----------
+    hook : callable, optional
+        Function of a ``Progress``. Each stage (derive, compile, simulate, plan and others) calls
+        it repeatedly and at its end. An exception that it raises ends the work. Default: stages
+        that take more than one second and are not part of another stage are shown on stderr, as
+        one line that is updated on a terminal, else as separate lines.
+
+    Notes
+    -----
+    Without this context manager nothing is shown. The logger "serpentail" receives the end of
+    each stage in any case, at level INFO.
+
+    Examples
+    --------
+    >>> import serpentail as st
+    >>> with st.progress():  # doctest: +SKIP
+    ...     plan = st.plan(model, start=(q0, v0), duration=0.3)
     """
     token = _hook.set(hook or Told(sys.stderr))
     try:
@@ -80,7 +104,7 @@ class Stage:
         return self
 
     def tell(self, done: float | None = None, what: str | None = None) -> None:
-        """Tell which part of the stage is done, and what it is about now."""
+        """Report which part of the stage is done, and what it works on now."""
         if self.hook is not None:
             self.done, self.what = done, self.what if what is None else what
             self.hook(self._now())
@@ -88,7 +112,7 @@ class Stage:
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         _depth.set(self.depth)
         now = self._now(ended=True)
-        logging: Any = sys.modules.get("logging")  # nobody listens who has not imported it
+        logging: Any = sys.modules.get("logging")  # without it, nobody receives log records
         if logging is not None:
             words = "%s" if kind is None else "%s, ended by " + kind.__name__
             logging.getLogger("serpentail").info(words, now)
@@ -103,7 +127,7 @@ class Stage:
 
 
 class Told:
-    """Writes what is worth it: over one line of a terminal, or line by line."""
+    """Writes progress to a stream: one line that is updated on a terminal, else separate lines."""
 
     def __init__(self, stream: TextIO):
         self.stream, self.over = stream, stream.isatty()
@@ -111,7 +135,7 @@ class Told:
         self.shown = ""  # on the terminal's line
 
     def __call__(self, now: Progress) -> None:
-        """Write a line, where the stage has gone on for long enough."""
+        """Write a line if the stage has taken long enough."""
         if now.depth:
             return
         if now.seconds < PATIENCE_S or (self.over and now.ended):
@@ -130,7 +154,7 @@ class Told:
         self.stream.flush()
 
     def _clear(self) -> None:
-        """Leave the terminal's line empty."""
+        """Clear the terminal's line."""
         if self.shown:
             self.stream.write("\r" + " " * len(self.shown) + "\r")
             self.stream.flush()

@@ -81,7 +81,7 @@ def test_an_example_is_a_scene_too(cache, tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("scene", "options", "words"),
     [
-        (None, {"segmens": 3}, "segmens: value 3: is no key .* did you mean 'segments'?"),
+        (None, {"segmens": 3}, "segmens: value 3: is neither .* did you mean 'segments'?"),
         (None, {**TINY, "torso_mas": 1}, "did you mean 'torso_mass'"),
         (None, {**TINY, "torso_mass": -1}, "torso_mass: value -1"),
         (None, {**TINY, "mu": 1}, "mu: no such parameter"),
@@ -90,7 +90,7 @@ def test_an_example_is_a_scene_too(cache, tmp_path, monkeypatch):
         (None, {**TINY, "contacts": {1j}}, "contacts: value {1j}: needs a text"),
         (None, {**TINY, "name": "../x"}, "name: value '../x'"),
         (None, {**TINY, "threads": 0}, "threads: value 0"),
-        ("kik", {}, "is no file, and no example; did you mean 'kick'"),
+        ("kik", {}, "is neither a file nor an example; did you mean 'kick'"),
         ("none.toml", {}, "none.toml.*cannot be read"),
         (3, {}, "value 3: needs a path, or the name of an example"),
     ],

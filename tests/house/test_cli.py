@@ -127,7 +127,9 @@ def test_failed_check_is_status_1(run, folder, monkeypatch, form):
 def test_missing_folder_is_status_2(run, tmp_path, verb, form):
     status, out, err = run(verb, str(tmp_path / "nowhere"), *form)
     assert (status, out) == (2, "")
-    assert err.startswith(f"{tmp_path / 'nowhere'} is no generated folder") and "make model" in err
+    assert (
+        err.startswith(f"{tmp_path / 'nowhere'} is not a generated folder") and "make model" in err
+    )
 
 
 @pytest.mark.parametrize("folder", ["a" * 5000, "a\0b", "/dev/null", "/dev/zero/a"])
@@ -175,4 +177,4 @@ def test_installed_program(program, folder, tmp_path):
     )
     assert (good.returncode, besides_progress(good.stderr)) == (0, "")
     assert json.loads(good.stdout)["name"] == "tail"
-    assert (bad.returncode, bad.stdout) == (2, "") and "is no generated folder" in bad.stderr
+    assert (bad.returncode, bad.stdout) == (2, "") and "is not a generated folder" in bad.stderr

@@ -82,7 +82,7 @@ def test_folders_that_cannot_be_used_are_refused_before_work(script, tmp_path):
     (tmp_path / "file").write_text("")
     for folder in ("file", "file/below"):
         refused = run(tmp_path, script, folder)
-        assert refused.returncode == 2 and "no folder" in refused.stderr, refused.stderr
+        assert refused.returncode == 2 and "not a folder" in refused.stderr, refused.stderr
     if os.geteuid():  # root may write anywhere
         (tmp_path / "locked").mkdir(mode=stat.S_IRUSR)
         refused = run(tmp_path, script, "locked/below")

@@ -65,7 +65,7 @@ def test_a_part_that_fails_is_told_and_tried_again(tmp_path):
 
 def test_two_runs_in_one_folder_are_refused(tmp_path):
     lock = FileLock(tmp_path / ".study.db.lock")
-    with lock, pytest.raises(st.SerpentailError, match="another process writes"):
+    with lock, pytest.raises(st.SerpentailError, match="another process is writing"):
         one(tmp_path, {}, tiny_study.ones)
 
 

@@ -55,7 +55,7 @@ TRC = [
     (lambda x: x[:-2], "has 4 frames, its header says 6: the file is cut off"),
     (lambda x: [*x[:-1], x[-1][:40]], r"line 11 has \d of 8 columns: is the file cut off"),
     (lambda x: [*x[:-1], x[-1].replace("\t", "\tx", 3)], "line 11: could not convert"),
-    (lambda x: x[:4], "is no whole TRC file"),
+    (lambda x: x[:4], "is not a complete TRC file"),
     (lambda x: [x[0], x[1].replace("Units", "Unit"), *x[2:]], "line 3 has no Units"),
     (lambda x: [*x[:2], x[2].replace("mm", "inch"), *x[3:]], "unit: value 'inch'"),
     (lambda x: [*x[:2], x[2].replace("200", "100"), *x[3:]], "DataRate is 100 Hz, but the times"),
@@ -94,5 +94,5 @@ def test_files_that_are_none_are_refused(tmp_path, name):
     with pytest.raises(st.IdentificationError, match="cannot be read"):
         st.read_markers(path)
     path.write_bytes(b"\x00\xff" * 300)
-    with pytest.raises(st.IdentificationError, match=r"is no text file|valid c3d file"):
+    with pytest.raises(st.IdentificationError, match=r"is not a text file|valid c3d file"):
         st.read_markers(path)

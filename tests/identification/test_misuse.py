@@ -71,7 +71,7 @@ def test_axes_turn_the_world():
         ({"estimate": "tail_mass"}, "estimate: value 'tail_mass': needs names"),
         ({"estimate": {"tail_mass": -1.0}}, "estimate.tail_mass: value -1.0"),
         ({"noise": 0.0}, "noise.nose: value 0.0: needs a number above 0"),
-        ({"noise": {"nose": 1e-3}}, "noise: none of 'left'"),
+        ({"noise": {"nose": 1e-3}}, "noise: no value for 'left'"),
         ({"confidence": 1.0}, "confidence: value 1.0: needs a number below 1"),
         ({"torques": [1.0, 2.0, 3.0]}, "torques: value .*needs None, 2 numbers"),
         ({"torques": st.TorquePrior(0.0, 0.1)}, "torques.std: value 0.0"),
@@ -106,7 +106,7 @@ def test_a_tail_that_nothing_shows_is_refused(flight):
     model, states = flight
     data = tracks(model, TIMES, states, 1e-2)
     torso = {name: placed(model)[name] for name in ("nose", "left", "right")}
-    with pytest.raises(st.IdentificationError, match=r"leave open.*tail coordinate"):
+    with pytest.raises(st.IdentificationError, match=r"do not determine.*tail coordinate"):
         st.identify(model, data, torso, torques=st.TorquePrior(0.5, 0.02))
 
 

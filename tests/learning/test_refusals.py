@@ -36,7 +36,7 @@ def test_what_is_wrong_is_named(flyer, changed, error, line):
 
 
 def test_a_flight_is_of_a_model_without_contacts(walker):
-    with pytest.raises(st.ModelError, match=r"righting: .* needs none, it is a flight"):
+    with pytest.raises(st.ModelError, match=r"righting: .* needs none, because it is a flight"):
         st.environment(walker, "righting")
 
 

@@ -74,7 +74,7 @@ def test_intact_copy_loads(folder):
 def test_folder_without_manifest_says_how_to_make_one(folder, tmp_path, place):
     message = refusal(tmp_path / place)
     assert message.startswith(
-        f"{tmp_path / place} is no generated folder (it has no manifest.json)"
+        f"{tmp_path / place} is not a generated folder (it has no manifest.json)"
     )
     assert "make model TAIL=articulated M=3 N=4" in message
 

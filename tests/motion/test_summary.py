@@ -111,14 +111,19 @@ def test_markdown_has_a_row_for_every_number(kick):
     lines = told.markdown().splitlines()
     assert len(lines) == len(told) + 2 and len({line.count("|") for line in lines}) == 1
     assert lines[0] == "| number | value | unit | meaning |"
-    assert any(line.startswith("| apex_m | 0.631") and "highest B" in line for line in lines)
+    assert any(
+        line.startswith("| apex_m | 0.631") and "largest height of B" in line for line in lines
+    )
 
 
 def test_json_may_have_units_and_meanings(kick):
     told = summary(kick.model, kick)
     described = strict(told.described())
     assert {name: each["value"] for name, each in described.items()} == strict(told)
-    assert described["apex_m"]["unit"] == "m" and "highest B" in described["apex_m"]["meaning"]
+    assert (
+        described["apex_m"]["unit"] == "m"
+        and "largest height of B" in described["apex_m"]["meaning"]
+    )
     assert described["body_weight_N"]["unit"] == "N"
 
 

@@ -173,7 +173,7 @@ def test_the_last_frame_lies_in_the_motion(tmp_path, monkeypatch):
 
 
 def test_a_motion_without_time_makes_no_film(tmp_path):
-    with pytest.raises(st.ViewError, match="no time that all of them have"):
+    with pytest.raises(st.ViewError, match="they have no time in common"):
         flight(samples=1).film(tmp_path / "a.gif")
 
 

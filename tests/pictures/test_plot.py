@@ -56,7 +56,7 @@ def test_axes_and_panels_must_be_as_many(panels):
 
 
 def test_a_path_and_axes_are_refused(tmp_path):
-    with pytest.raises(st.ViewError, match="path: goes with a figure of its own"):
+    with pytest.raises(st.ViewError, match="path: is for a new figure only"):
         flight().plot("tail", ax=Figure().subplots(), path=tmp_path / "a.png")
     assert not list(tmp_path.iterdir())
 

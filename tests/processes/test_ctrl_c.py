@@ -151,9 +151,7 @@ def test_a_command_ends_in_one_line_and_writes_what_there_is(tmp_path, verb, tab
     process = command(tmp_path, verb, tables, "--save", tmp_path / "motion.npz")
     said, errors, _ = ended(process, after=4.0)
     assert process.returncode == 130
-    assert (
-        besides_progress(errors) == "serpentail: interrupted; this is what there was until then\n"
-    )
+    assert besides_progress(errors) == "serpentail: interrupted; this is the result until then\n"
     assert json.loads(said)["stopped"] == "interrupt"
     motion = st.Trajectory.load(tmp_path / "motion.npz")
     assert len(motion.t) > 1 and np.isfinite(motion.q).all()

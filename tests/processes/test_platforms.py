@@ -72,7 +72,7 @@ for place in sys.argv[1:]:
     (tmp_path / "file").touch()
     (tmp_path / "empty").mkdir()
     places = [tmp_path / name for name in ("none", "file", "empty")]
-    expected = ["FOLDER is no generated folder (it has no manifest.json)"] * 3
+    expected = ["FOLDER is not a generated folder (it has no manifest.json)"] * 3
     assert printed(system, program, *places).splitlines() == expected
 
 

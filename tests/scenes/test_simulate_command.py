@@ -117,15 +117,15 @@ def test_a_flight_is_a_scene_too(tmp_path, monkeypatch, capsys):
 @pytest.mark.parametrize(
     ("option", "path", "words"),
     [
-        ("--save", "simple.toml/a.npz", "simple.toml is no folder"),
+        ("--save", "simple.toml/a.npz", "simple.toml is not a folder"),
         ("--save", ".", ". is a folder"),
         ("--save", "motions/", "motions/ is a folder"),
         ("--save", "a.dat", "its name ends in .dat, which is none of .npz, .csv, .nc"),
         ("--save", "a.csv/a.v2", "its name ends in .v2"),
-        ("--film", "simple.toml/deep/a.png", "simple.toml is no folder"),
+        ("--film", "simple.toml/deep/a.png", "simple.toml is not a folder"),
         ("--film", "a.avi", "has suffix '.avi': use one of .gif, .html, .mp4, .pdf, .png, .svg"),
         ("--film", "a", "has suffix '': use one of"),
-        ("--save", "/proc/a.npz", "could not be written|cannot be written to|no folder"),
+        ("--save", "/proc/a.npz", "could not be written|cannot be written to|not a folder"),
     ],
 )
 def test_a_target_that_cannot_be_is_refused_before_the_run(

@@ -93,7 +93,7 @@ def test_of_several_plans_the_first_true_one_is_taken():
     assert run.phases[1].plan.success and run.phases[1].plan.duration > 0.5
     run = sequence(kick(), st.Phase("right", 0.02, plan=hopeless)).simulate(*settled())
     assert not run.phases[1].plan.success
-    assert "the plan of phase 'right' is not true: see its report" in run.trajectory.warnings
+    assert "the plan of phase 'right' did not succeed: see its report" in run.trajectory.warnings
 
 
 def test_a_plan_that_cannot_be_names_its_phase():

@@ -70,11 +70,11 @@ def test_an_end_that_never_comes_ends_the_motion_and_says_so():
     first = kick(moves=(), duration=0.1)
     run = sequence(first, st.Phase("fly", 0.1)).simulate(*settled())
     assert not run.complete and [phase.name for phase in run.phases] == ["kick"]
-    words = "phase 'kick' met no flight clear of the ground within 0.1 s"
+    words = "phase 'kick' ended without flight clear of the ground within 0.1 s"
     assert words in run.trajectory.warnings
     last = kick(moves=(), duration=0.1, until=[("take_off", "feet"), ("take_off", "tail")])
     run = sequence(last).simulate(*settled())
-    assert not run.complete and "met no take_off of feet or take_off of tail" in str(
+    assert not run.complete and "ended without take_off of feet or take_off of tail" in str(
         run.trajectory.warnings
     )
 
@@ -126,7 +126,7 @@ def test_what_is_no_sequence_is_refused():
         (lambda: sequence(kick(), gamma=None), "gamma: value None"),
         (lambda: sequence(kick(until=[("take_off", "hands")], clearance=0.0)), "'hands'"),
         (lambda: st.Sequence(flier, [st.Phase("a", 1.0)], gamma=1.0), "has no legs"),
-        (lambda: st.Sequence(flier, [kick(moves=())]), "touches nothing"),
+        (lambda: st.Sequence(flier, [kick(moves=())]), "has no contacts"),
         (lambda: st.Sequence(flier, [st.Phase("a", 1.0, moves=[KICK])]), "has no legs"),
         (lambda: sequence(st.Phase("a", 1.0, controller=st.Damping(-1))), "phase 'a': damping"),
         (lambda: st.Tracking(kp=-1), "kp: value -1"),

@@ -133,10 +133,10 @@ def test_a_force_that_comes_again_in_the_ground_is_no_new_touch():
 @pytest.mark.parametrize("method", ["dop853", "lsoda"])
 def test_methods_that_look_for_no_events_say_so(method):
     q, v, _ = grazes("articulated", QUICK)[0]
-    with pytest.raises(st.SimulationError, match=f"stop_at: {method} does not look for events"):
+    with pytest.raises(st.SimulationError, match=f"stop_at: {method} does not detect events"):
         flown(animal(), q, v, method=method, stop_at=[("touch_down", "tail")])
     run = flown(animal(), q, v, method=method, rtol=1e-6, atol=1e-6)
-    with pytest.raises(ValueError, match=f"events: {method} looks for none"):
+    with pytest.raises(ValueError, match=f"events: {method} detects none"):
         _ = run.events
     assert summary(animal(), run)["take_off_s"] is None
 

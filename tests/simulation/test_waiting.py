@@ -152,7 +152,7 @@ def test_what_was_found_before_stays(model):
         ({"most": 3}, "no setting 'most'"),
         ({"threads": 2}, "one start only"),
         ({"watch": 1}, "watch: value 1"),
-        ({"legs": 3}, "touches nothing"),
+        ({"legs": 3}, "has no contacts"),
         ({"method": "euler"}, "method: value 'euler'"),
     ],
 )

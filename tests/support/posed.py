@@ -9,6 +9,6 @@ from serpentail.planning import planner
 def posed(model, **arguments):
     """The problem and the settings of a plan."""
     with patch.object(
-        planner, "_found", lambda model, problem, settings, watch: (problem, settings)
+        planner, "best_plan", lambda model, problem, settings, watch: (problem, settings)
     ):
         return st.plan(model, **arguments)

@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import kstest
 
 import serpentail as st
-from serpentail.sweeps.points import axes_of
+from serpentail.sweeps.axes import axes_of
 
 LAWS = {"random": st.random, "latin": st.latin, "sobol": st.sobol}
 
@@ -93,7 +93,7 @@ def test_sobol_points_may_be_any_number():
             "latin and random together",
         ),
         (lambda: points({"a": st.random(0, 1)}), "points: no value"),
-        (lambda: points({"a": st.grid([1])}, 3), "points: value 3: no axis is spread"),
+        (lambda: points({"a": st.grid([1])}, 3), "points: value 3: no axis is random"),
         (lambda: points({"a": st.random(0, 1)}, 0), "points: value 0: needs a whole number"),
         (lambda: points({"a": st.random(0, 1)}, 3, -1), "seed: value -1"),
         (lambda: points({"a": st.random(0, 1)}, 10**9), "points: value 1000000000"),

@@ -35,7 +35,7 @@ def test_rows_are_written_all_or_none(tmp_path):
 def test_one_process_writes(tmp_path):
     first, second = Store(tmp_path / "s.db"), Store(tmp_path / "s.db")
     with first.writing():
-        with pytest.raises(st.SweepError, match="another process writes"), second.writing():
+        with pytest.raises(st.SweepError, match="another process is writing"), second.writing():
             pass
         first.add([ROW])
         assert second.known("k") == {"k": True}  # who reads may
@@ -47,7 +47,7 @@ def test_one_process_writes(tmp_path):
 
 def test_other_files_are_refused(tmp_path):
     (tmp_path / "text.db").write_text("no database at all, but a text of some length\n" * 50)
-    with pytest.raises(st.SweepError, match="is no store"):
+    with pytest.raises(st.SweepError, match="is not a store"):
         Store(tmp_path / "text.db")
     other = sqlite3.connect(tmp_path / "other.db")
     other.execute("create table t (x)")

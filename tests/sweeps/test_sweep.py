@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.sweeps.sweep import Status
+from serpentail.sweeps.result import Status
 from tests.support import swept
 
 Q0 = [0, 0, 0.34, 1, 0, 0, 0, 0.2, 0]
@@ -136,14 +136,14 @@ def test_no_process_is_left(model):
         ({"limit": 0}, "limit: value 0"),
         ({"executor": "slurm"}, "executor: value 'slurm': needs None"),
         ({"executor": "processes:0"}, "executor: processes: value 0"),
-        ({"over": {"segments": st.grid([1, 2])}}, "over: segments: a model is of one shape"),
-        ({"over": {"tail_mass": st.grid([0.003, 0.003])}}, "point 1 is there twice"),
+        ({"over": {"segments": st.grid([1, 2])}}, "over: segments: the shape of a model is fixed"),
+        ({"over": {"tail_mass": st.grid([0.003, 0.003])}}, "point 1 occurs twice"),
         ({"over": {"tail_mass": st.grid(["3 s"])}}, "over: tail_mass: value '3 s': a time where"),
         ({"run": "identify"}, "settings: no data and no markers: needs tracks"),
         ({"model": None}, "model: None"),
         ({"model": "no_such_scene"}, "no_such_scene"),
         ({"of": {1, 2}}, "of: value"),
-        ({"run": swept.square, "settings": {"rtol": 1}}, "settings: a function takes none"),
+        ({"run": swept.square, "settings": {"rtol": 1}}, "settings: a function has none"),
     ],
 )
 def test_what_cannot_be_is_refused_in_one_line(model, changes, words):

@@ -1,1 +1,1 @@
-"""Making models from Python: the generator, run in a process of its own, and what it made, kept."""
+"""Makes models from Python: runs the generator in its own process, and caches the results."""

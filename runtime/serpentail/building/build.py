@@ -1,4 +1,4 @@
-"""`build` makes a model in one line: it generates, compiles and loads, or finds what it made."""
+"""``build`` makes a model in one call: it generates, compiles and loads it, or uses the cache."""
 
 import re
 from collections.abc import Mapping
@@ -19,9 +19,10 @@ from ..model.cache import (
     unwritable,
     workshop,
 )
+from ..model.load import model_from
 from ..model.locks import alone
 from ..model.manifest import CheckedFolder, read_folder
-from ..model.model import Model, model_from
+from ..model.model import Model
 from ..model.parameters import merged
 from ..model.reading import regular_bytes
 from ..model.snapshot import restored, snapshot
@@ -57,21 +58,53 @@ def build(
     threads: int | None = None,
     **options: Unpack[Options],
 ) -> Model:
-    """Return a model that is generated, compiled and loaded; what was made before is found again.
+    """Generate, compile and load a model; results are cached.
 
-    scene: a scene file, or the name of an example (see ``examples``); without one, options
-    describe the tail: ``tail`` ("articulated", "continuum" or "mixed"), ``segments`` (m, or a
-    table for each) and ``links`` (n).
-    options: keys of a scene, which replace those of the file: functions (names, or "all"),
-    contacts, samples, friction, coordinates, bend_range (rad), real, emission, profile, baked,
-    targets, name; and parameters by name, SI, such as torso_mass=0.06, which need no new code.
-    compiled, threads: as of ``load``.
+    Parameters
+    ----------
+    scene : str or path, optional
+        A scene file, or the name of an example (see ``examples``). Without it, the options
+        describe the tail.
+    compiled : bool, default True
+        As of ``load``.
+    threads : int, optional
+        As of ``load``.
+    **options
+        Keys of a scene, which replace those of the file, and parameters by name (SI). Common keys
+        are ``tail`` ("articulated", "continuum" or "mixed"), ``segments`` (m, or one table for
+        each segment), ``links`` (n), ``functions`` (names, or "all"), ``contacts``, ``samples``,
+        ``friction``, ``coordinates``, ``bend_range`` (rad), ``real``, ``emission``, ``profile``,
+        ``baked``, ``base``, ``targets`` and ``name``. Parameters such as ``torso_mass=0.06`` need
+        no new code.
 
-    The generator runs in a process of its own, for seconds; its results are kept in the cache by
-    the content of the scene and of the generator, so a second call takes milliseconds.  Any number
-    of processes may build at once: each model is made by one of them.
-    Raises ModelError (a key or parameter that is unknown or cannot be; no generator), and what
-    ``load`` raises.
+    Returns
+    -------
+    Model
+        The loaded model.
+
+    Raises
+    ------
+    ModelError
+        A key or parameter is unknown or has a wrong value, or the generator is not installed.
+    CompilerNotFound, CompileFailed
+        As of ``load``.
+
+    Warns
+    -----
+    UnusualSize, UnlikeBodies
+        As of ``load``.
+
+    Notes
+    -----
+    The generator runs in its own process for some seconds. Its results are cached under a hash
+    of the scene and of the generator, so a second call takes milliseconds. Several processes may
+    build at once: each model is made by one of them.
+
+    Examples
+    --------
+    >>> import serpentail as st
+    >>> model = st.build(tail="articulated", segments=3, links=4)  # doctest: +SKIP
+    >>> heavy = st.build("righting_m1_n3", torso_mass=0.06)  # doctest: +SKIP
     """
     keys, parameters = separated(options)
     if scene is None:
@@ -87,7 +120,7 @@ def built(
 ) -> tuple[CheckedFolder, Mapping[str, object] | None]:
     """Return the checked files of a scene's model, and the parameters to load it with.
 
-    The model is called ``name`` unless the tables have a name.
+    ``name`` is the model's name unless the tables give one.
     """
     scene = {key: value for key, value in tables.items() if key not in LEFT_OUT}
     own = scene.get("parameters", {})
@@ -102,7 +135,7 @@ def built(
 
 
 def _shapes(name: str, scene: Mapping[str, Any], own: Mapping[str, Any]) -> bool:
-    """Tell if a parameter makes another tail of a scene's, whose code has no such parameter."""
+    """Tell if a parameter that the scene lacks needs other code, because it changes the tail."""
     if name == "mount_angles" or name in PASSIVE:
         return name not in own
     if name not in PIECES or name in own:
@@ -124,7 +157,7 @@ def generated(scene: Mapping[str, Any], name: str) -> CheckedFolder:
 
 
 def _made(cache: Path, key: str, text: str, name: str) -> CheckedFolder:
-    """Generate a model, put its files into the cache, and note under a key which they are."""
+    """Generate a model, put its files into the cache, and store their hash under a key."""
     refuse_others(cache)
     try:
         with workshop(cache) as part:
@@ -140,7 +173,7 @@ def _made(cache: Path, key: str, text: str, name: str) -> CheckedFolder:
 
 
 def _noted(cache: Path, key: str) -> CheckedFolder | None:
-    """Return the model that was made under a key, if the cache still has it whole."""
+    """Return the model stored under a key; None if the cache does not have it whole."""
     path = _note(cache, key)
     try:
         manifest_hash = regular_bytes(path).decode("ascii")
@@ -156,12 +189,12 @@ def _noted(cache: Path, key: str) -> CheckedFolder | None:
 
 
 def _note(cache: Path, key: str) -> Path:
-    """Return where it is noted what was made under a key."""
+    """Return the file that holds the hash of the model stored under a key."""
     return cache / BUILDS / f"{key}.json"
 
 
 def _name(keys: Mapping[str, Any]) -> str:
-    """Return what a model without a scene file is called: ``make model`` calls it so, too."""
+    """Return the name of a model without a scene file; ``make model`` gives the same one."""
     size = f"_n{keys['links']}" if "links" in keys else ""
     segments = keys.get("segments", "")
     count = len(segments) if isinstance(segments, list | tuple) else segments

@@ -1,4 +1,4 @@
-"""Scenes that come with the package, and where a scene of a name or a path is."""
+"""Example scenes of the package, and the paths of scenes by name."""
 
 from os import PathLike
 from pathlib import Path
@@ -13,10 +13,23 @@ CHECKOUT = Path(__file__).parents[3] / "scenes"
 
 
 def examples() -> dict[str, str]:
-    """Return the names of the scenes that come with the package, and what each is.
+    """Return the example scenes that come with the package.
 
-    Wherever a scene file is asked for, such a name will do: ``st.scenario("kick")``,
+    Returns
+    -------
+    dict of str to str
+        Name and description of each scene.
+
+    Notes
+    -----
+    Wherever a scene file is expected, such a name is accepted too: ``st.scenario("kick")``,
     ``st.build("kick")``, ``serpentail simulate kick``.
+
+    Examples
+    --------
+    >>> import serpentail as st
+    >>> "kick" in st.examples()
+    True
     """
     return {
         name: str(tables_of(path).get("description", "")) for name, path in example_paths().items()
@@ -24,14 +37,14 @@ def examples() -> dict[str, str]:
 
 
 def example_paths() -> dict[str, Path]:
-    """Return the paths of these scenes by their names; none of them is read."""
+    """Return the paths of the example scenes by name; no file is read."""
     return {path.stem: path for path in sorted(_folder().glob("*.toml"))}
 
 
 def scene_path(scene: str | PathLike[str]) -> Path:
-    """Return the path of a scene file, or of the example of that name where there is no such file.
+    """Return the path of a scene file, or of the example of that name.
 
-    SerpentailError where it is neither.
+    SerpentailError if neither exists.
     """
     try:
         path = Path(scene)
@@ -46,14 +59,14 @@ def scene_path(scene: str | PathLike[str]) -> Path:
         return known[str(path)]
     remedy = did_you_mean(str(path), known) or f"the examples are {', '.join(known)}"
     raise SerpentailError(
-        f"scene file: value {shown(str(path))}: is no file, and no example; {remedy}"
+        f"scene file: value {shown(str(path))}: is neither a file nor an example; {remedy}"
     )
 
 
 def tables_of_scene(scene: str | PathLike[str]) -> tuple[dict[str, Any], Path]:
     """Return the tables of a scene file or example, and its path.
 
-    SerpentailError where it cannot be read.
+    SerpentailError if it cannot be read.
     """
     path = scene_path(scene)
     try:
@@ -63,5 +76,5 @@ def tables_of_scene(scene: str | PathLike[str]) -> tuple[dict[str, Any], Path]:
 
 
 def _folder() -> Path:
-    """Return where the examples are: in an installed package, else in the checkout."""
+    """Return the folder of the examples: in an installed package, else in the checkout."""
     return PACKAGE if PACKAGE.is_dir() else CHECKOUT

@@ -1,4 +1,4 @@
-"""The generator, in a process of its own: this package never imports it, nor what it imports."""
+"""Runs the generator in its own process: this package imports neither it nor its libraries."""
 
 import hashlib
 import os
@@ -14,13 +14,14 @@ from ..model.commands import run_all
 from ..stages import Stage
 
 PACKAGE = "serpentail_codegen"
-TOOLS = ("sympy", "jinja2")  # another version of which may print another text
+TOOLS = ("sympy", "jinja2")  # other versions of these may print other texts
 REMEDY = "pip install serpentail, or generate where it is and give the folder to st.load"
 
 
 def identity() -> str:
-    """Return the digest of all but a scene that generated text depends on; ModelError without a
-    generator.
+    """Return a digest of all that generated text depends on besides the scene.
+
+    ModelError without a generator.
     """
     home = _home()
     content = hashlib.sha256()
@@ -36,7 +37,7 @@ def identity() -> str:
 def generate(scene: Path, output: Path) -> Path:
     """Generate the model of a scene file below a folder, and return the model's own folder.
 
-    ModelError has the generator's words where it refuses.
+    ModelError has the generator's message if it refuses the scene.
     """
     noted = output.with_name("progress")
     options = ["--output", str(output), "--progress", str(noted)]
@@ -52,13 +53,13 @@ def generate(scene: Path, output: Path) -> Path:
 
 
 def command() -> list[str]:
-    """Return the command of the generator, of which its arguments follow."""
+    """Return the command of the generator, without its arguments."""
     _home()
-    return [sys.executable, "-P", "-m", PACKAGE]  # -P: not what lies in the working folder
+    return [sys.executable, "-P", "-m", PACKAGE]  # -P: do not import from the working folder
 
 
 def _tell(stage: Stage, noted: Path) -> None:
-    """Tell how far the generator has noted that it is."""
+    """Report the progress that the generator has written down."""
     with suppress(OSError, ValueError):
         part, function = noted.read_text().split()
         return stage.tell(float(part), f"{stage.subject}: {function}")

@@ -98,7 +98,7 @@ def new_scene(
 
 
 def _pieces(tail: str, links: int | None) -> str:
-    """Return the line about what a segment is made of."""
+    """Return the line about the links or samples of a segment."""
     if tail == "continuum":
         return SAMPLED.format(samples=SAMPLES)
     return LINKED.format(links=links or LINKS)

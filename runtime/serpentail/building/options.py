@@ -1,4 +1,4 @@
-"""What a model can be built from: the keys of a scene, and the parameters of its body."""
+"""What ``build`` accepts: the keys of a scene, and the parameters of the body."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, TypedDict
@@ -11,9 +11,9 @@ OneOrEach = float | Sequence[float]  # of all tail coordinates, or of each
 
 
 class Parameters(TypedDict, total=False):
-    """Parameters by name, SI; the scene's, or else those of the paper's kangaroo rat, by default.
+    """Parameters by name, SI; by default the scene's values, else the paper's kangaroo rat.
 
-    They have the meaning that [docs/theory.md] and scene files give them; not every tail has all.
+    docs/theory.md describes them; not every tail has all of them.
     """
 
     gravity: float
@@ -54,7 +54,7 @@ class Parameters(TypedDict, total=False):
 
 
 class SceneKeys(TypedDict, total=False):
-    """Keys of a scene that generated code depends on; ``tail`` is a scene's ``kind``."""
+    """Keys of a scene that the generated code depends on; ``tail`` is the scene's key ``kind``."""
 
     tail: str
     segments: int | Sequence[Mapping[str, Any]]
@@ -78,13 +78,13 @@ class SceneKeys(TypedDict, total=False):
 
 
 class Options(SceneKeys, Parameters, total=False):
-    """All that ``serpentail.build`` takes by name."""
+    """All keyword arguments of ``serpentail.build`` for scenes and bodies."""
 
 
 def separated(options: Options) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return the keys of the scene, as scene files call them, and the parameters.
+    """Return the keys of the scene, as scene files name them, and the parameters.
 
-    ModelError names what is neither.
+    ModelError names an option that is neither.
     """
     keys, parameters = {}, {}
     for name, value in options.items():
@@ -98,9 +98,9 @@ def separated(options: Options) -> tuple[dict[str, Any], dict[str, Any]]:
 
 
 def _unknown(name: str, value: object) -> ModelError:
-    """Return the error about a name that is neither a key nor a parameter."""
+    """Return the error about a name that is neither a scene key nor a parameter."""
     known = Options.__annotations__
     remedy = did_you_mean(name, known) or f"give some of {', '.join(known)}"
     return ModelError(
-        f"{name}: value {shown(value)}: is no key of a scene and no parameter; {remedy}"
+        f"{name}: value {shown(value)}: is neither a scene key nor a parameter; {remedy}"
     )

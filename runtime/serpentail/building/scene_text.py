@@ -12,7 +12,7 @@ from ..errors import ModelError
 
 
 def scene_text(tables: Mapping[str, Any]) -> str:
-    """Return the text of a scene file with these tables; ModelError where TOML cannot say it."""
+    """Return the text of a scene file with these tables; ModelError if TOML cannot say it."""
     try:
         text = "".join(f"{_key(name)} = {literal(name, tables[name])}\n" for name in tables)
         text.encode()
@@ -24,7 +24,7 @@ def scene_text(tables: Mapping[str, Any]) -> str:
 
 
 def literal(name: str, value: Any) -> str:
-    """Return a value as TOML writes it; ModelError names what is none."""
+    """Return a value as TOML writes it; ModelError if TOML has no such value."""
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
     if isinstance(value, bool | str):

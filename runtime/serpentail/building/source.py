@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 MOST_BYTES = 1_000_000
-MOST_DOTS = 100  # in a line, besides those of numbers: the parser's work grows as their square
+MOST_DOTS = 100  # in a line, without those of numbers: the parser's work grows with their square
 DECIMAL = re.compile(r"(?<![\w.])\d[\d_]*\.\d[\d_]*(?:[eE][+-]?\d+)?(?![\w.])")
 
 
 def tables_of(path: Path) -> dict[str, Any]:
-    """Return the tables of a scene file; ValueError says why it has none, and what to do."""
+    """Return the tables of a scene file; ValueError gives the reason and a remedy."""
     try:
         return tables_in(_text(path))
     except OSError as error:
@@ -39,7 +39,7 @@ def _text(path: Path) -> str:
 
 
 def tables_in(text: str) -> dict[str, Any]:
-    """Return the tables of a TOML text; ValueError or RecursionError where it is none."""
+    """Return the tables of a TOML text; ValueError or RecursionError if it is not TOML."""
     for number, line in enumerate(text.splitlines(), 1):
         if line.count(".") > MOST_DOTS and DECIMAL.sub("", line).count(".") > MOST_DOTS:
             raise ValueError(f"more than {MOST_DOTS} dots in line {number}; no key is so deep")

@@ -1,4 +1,4 @@
-"""Files that options ask for: refused before the work where they cannot be, written after it."""
+"""Files that options ask for: checked before the work, written after it."""
 
 import argparse
 import os
@@ -14,7 +14,7 @@ SEPARATORS = ("/", os.sep)
 
 
 def refuse_targets(arguments: argparse.Namespace) -> None:
-    """SerpentailError where a file could not be written after the work is done."""
+    """SerpentailError if a file could not be written when the work is done."""
     if getattr(arguments, "view", None) is not None:
         from ..viewer.view import template
 
@@ -31,7 +31,7 @@ def refuse_targets(arguments: argparse.Namespace) -> None:
 
 
 def target(option: str, path: str) -> Path:
-    """Return where the file of an option goes; ValueError where its name is of no known kind."""
+    """Return the path of an option's file; ValueError if its suffix is unknown."""
     if option == "film":
         from ..pictures.film import film_path
 
@@ -46,7 +46,7 @@ def target(option: str, path: str) -> Path:
 
 
 def write(arguments: argparse.Namespace, option: str, make: Callable[[str], object]) -> bool:
-    """Write the file that an option asks for; tell whether it could be, and on stderr why not."""
+    """Write the file that an option asks for; return False and print the reason if that fails."""
     path = getattr(arguments, option)
     if path is None:
         return True

@@ -1,6 +1,4 @@
-"""The verbs about models: what one is, whether it obeys its laws, how other tools take it, what the
-cache holds.
-"""
+"""The verbs about models: info, verify, export, cache."""
 
 import argparse
 from pathlib import Path
@@ -14,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def info(arguments: argparse.Namespace) -> Outcome:
-    """Return what a model is."""
+    """Return a description of a model."""
     from ..model.info import described
     from ..model.info import info as report
 
@@ -26,7 +24,7 @@ def model_of(place: str) -> "Model":
     """Return the model of a generated folder, else of a scene file or an example."""
     from ..building.build import build
     from ..building.examples import example_paths
-    from ..model.model import load
+    from ..model.load import load
 
     scene = Path(place).suffix == ".toml" or (place in example_paths() and not Path(place).exists())
     return build(place) if scene else load(place)
@@ -43,7 +41,7 @@ def verify(arguments: argparse.Namespace) -> Outcome:
 
 
 def export(arguments: argparse.Namespace) -> Outcome:
-    """Write a model to a file of another tool's kind, and return where it is."""
+    """Write a model to a file for another tool, and return its path."""
     from ..exporting.export import checked_path
     from ..exporting.export import export as written
 
@@ -54,7 +52,7 @@ def export(arguments: argparse.Namespace) -> Outcome:
 
 
 def cache(arguments: argparse.Namespace) -> Outcome:
-    """Return what the cache of compiled models holds, emptied before where that is asked for."""
+    """Return what the cache of compiled models holds; empty it first if asked to."""
     from ..model.bound import contents, empty
     from ..model.cache import cache_folder
 

@@ -85,7 +85,7 @@ def _motion(scene: "Scenario", page: str | None) -> tuple["Trajectory", dict[str
 
 
 def view(arguments: argparse.Namespace) -> Outcome:
-    """Write the page of saved motions, and return where it is."""
+    """Write the page of saved motions, and return its path."""
     from ..viewer.saved import read
     from ..viewer.view import view as page_of
 

@@ -6,7 +6,9 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-Files = Mapping[str, Callable[[str], object]]  # option that names each -> what writes it
+Files = Mapping[
+    str, Callable[[str], object]
+]  # option with the file's name -> function that writes it
 
 
 class Outcome(NamedTuple):

@@ -10,7 +10,7 @@ LATER = ("executor", "retry_failed", "limit")  # of running alone
 
 
 def sweep(arguments: argparse.Namespace) -> Outcome:
-    """Return how far a scene's sweep is, after running what is missing."""
+    """Run the missing points of a scene's sweep, and return how far it is."""
     from ..sweeps.scene import arguments_of
     from ..sweeps.sweep import posed
     from ..sweeps.sweep import sweep as swept

@@ -46,7 +46,7 @@ class Variable:
 
 @dataclass(frozen=True, eq=False)
 class Contents:
-    """Labels of all dimensions, those that lead (time, or run and time); variables; facts."""
+    """Labels of all dimensions, leading dimensions (time, or run and time), variables, facts."""
 
     leading: tuple[str, ...]
     labels: dict[str, Sequence[Any]]
@@ -56,8 +56,9 @@ class Contents:
 
 
 def contents(motion: Trajectory | Rollouts) -> Contents:
-    """Return what a trajectory or rollouts hold, (time, ..) or (run, time, ..), SI; nan after the
-    end of a run.
+    """Return the content of a trajectory or of rollouts, SI.
+
+    Arrays are (time, ...) or (run, time, ...), with nan after the end of a run.
     """
     if isinstance(motion, Rollouts):
         return _of_runs(motion)
@@ -143,7 +144,7 @@ def _groups(contact: Contact | None) -> list[str]:
 
 
 def _contacts(runs: Rollouts) -> tuple[Contact | None, dict[str, Array]]:
-    """The first contact of runs, and the arrays (k, s, ...) of all; nan where there is none."""
+    """Return the first contact of runs, and the arrays (k, s, ...) of all; nan without contact."""
     first: Contact | None = None
     arrays: dict[str, Array] = {}
     for k in range(len(runs)) if runs.source.model.contacts else ():
@@ -162,7 +163,7 @@ def _contacts(runs: Rollouts) -> tuple[Contact | None, dict[str, Array]]:
 
 
 def _contact(runs: Rollouts, k: int) -> Contact | None:
-    """The contact of run k at the times that it reached; None: it never began, touches nothing."""
+    """Return the contact of run k at the times that it reached; None without contact or samples."""
     error = runs.errors[k]
     motion: Trajectory | None = runs[k] if error is None else error.trajectory
     if motion is None or motion.contact is None:

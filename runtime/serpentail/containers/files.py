@@ -9,10 +9,10 @@ WRITERS = {".npz": "save", ".csv": "to_csv", ".nc": "to_netcdf"}
 
 
 def checked(path: str) -> Path:
-    """Return the path of a file, with .npz where it has no suffix.
+    """Return the path of a file, with .npz if it has no suffix.
 
-    ValueError where its suffix is of no known kind, OSError where it is a folder, ExtraMissing
-    where nothing can write it.
+    ValueError if the suffix is unknown, OSError if it is a folder, ExtraMissing if the library for
+    it is not installed.
     """
     target = Path(path)
     if target.is_dir():
@@ -27,9 +27,9 @@ def checked(path: str) -> Path:
 
 
 def save(motion: Trajectory, path: str) -> Path:
-    """Write a motion to a file of the kind that its name tells; return the path.
+    """Write a motion to a file of the kind that its suffix names; return the path.
 
-    Raises as ``checked``, and NotWritten where it cannot be written.
+    Raises as ``checked``, and NotWritten if it cannot be written.
     """
     target = checked(path)
     written: Path = getattr(motion, WRITERS[target.suffix])(target)

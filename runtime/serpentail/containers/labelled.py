@@ -31,10 +31,10 @@ def dataset(held: Contents) -> "xarray.Dataset":
 
 
 def write(held: Contents, path: str | os.PathLike[str]) -> Path:
-    """Write a NetCDF file, whole or not at all, and return its path; ExtraMissing without xarray,
-    NotWritten where it cannot be.
+    """Write a NetCDF file, whole or not at all, and return its path.
 
-    SciPy, which is always there, writes it: NetCDF 3, with offsets of 64 bits.
+    ExtraMissing without xarray, NotWritten if it cannot be written. SciPy, which is always
+    installed, writes NetCDF 3 with 64-bit offsets.
     """
     target, data = Path(path), dataset(held)
     with replacing(target) as part:

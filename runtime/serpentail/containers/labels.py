@@ -16,7 +16,7 @@ TORSO_V = {
 }
 AXES = ("x", "y", "z")
 LEGS = ("gamma_right", "delta_right", "gamma_left", "delta_left")
-# of a segment, by its kind; of a motion without its model by what they bend
+# coordinates of a segment by its kind; of a motion without model by bend
 TAILS = {"articulated": ("alpha", "beta"), "continuum": ("a", "b")}
 POLAR = ("phi", "theta")
 WITHOUT_MODEL = ("pitch", "yaw")

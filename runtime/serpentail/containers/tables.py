@@ -22,7 +22,7 @@ Column = tuple[str, np.ndarray]  # its unit, and its numbers (rows,)
 def columns(held: Contents) -> dict[str, Column]:
     """Return the columns, by names such as z, tau_alpha_1, forces_tail_1_x.
 
-    What is one a run, and no sample, is in no table.
+    Values with one number for each run, and none for samples, are left out.
     """
     found: dict[str, Column] = {}
     for name, variable in held.variables.items():
@@ -62,9 +62,10 @@ def frame(held: Contents) -> "pandas.DataFrame":
 
 
 def write(held: Contents, path: str | os.PathLike[str]) -> Path:
-    """Write a CSV file, whole or not at all, and return its path; NotWritten where it cannot be.
+    """Write a CSV file, whole or not at all, and return its path.
 
-    Its header has names and units, as "time [s]"; numbers have all their digits.
+    NotWritten if it cannot be written. Its header has names and units, such as "time [s]"; numbers
+    have all their digits.
     """
     target, found = Path(path), columns(held)
     heads = {"run": "run", "time": "time [s]"}

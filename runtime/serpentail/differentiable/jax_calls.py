@@ -1,4 +1,4 @@
-"""Calls of a model's C from XLA: compiles what XLA calls, and enters functions of models there."""
+"""Calls of a model's C from XLA: compiles the code that XLA calls, and registers functions."""
 
 import ctypes
 import hashlib
@@ -21,11 +21,11 @@ from ..model.workers import MIN_STATES_PER_THREAD
 SOURCE = Path(__file__).with_name("native") / "jax_calls.cc"
 TARGET = "serpentail_call"
 LIBRARIES = ("-Wl,--no-as-needed,-lstdc++", "-pthread")
-kept: dict[str, Any] = {}  # by the names of entries: what these point to
+kept: dict[str, Any] = {}  # objects that entries point to, by the entries' names
 
 
 class Entry(ctypes.Structure):
-    """A function of a model, as the C++ has it."""
+    """A function of a model, as the C++ code knows it."""
 
     _fields_ = (
         *((name, ctypes.c_void_p) for name in ("single", "together", "parameters")),
@@ -36,7 +36,7 @@ class Entry(ctypes.Structure):
 
 @cache
 def library() -> ctypes.CDLL:
-    """Return what XLA calls, compiled once for a compiler and a version of JAX."""
+    """Return the code that XLA calls, compiled once for a compiler and a version of JAX."""
     version = f'-DJAX_VERSION="{jax.__version__}"'
     flags = ("-std=c++17", "-I", jax.ffi.include_dir(), version, *LIBRARIES)
     try:

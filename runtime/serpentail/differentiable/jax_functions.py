@@ -1,4 +1,4 @@
-"""A model's functions as JAX has them: they bear jit, vmap, jvp, grad and scan."""
+"""A model's functions for JAX; they work inside jit, vmap, jvp, grad and scan."""
 
 from collections.abc import Callable
 from typing import Any
@@ -14,14 +14,14 @@ from ..model.state_space import RATE
 from .jax_calls import TARGET, entered, library
 from .rules import RULES, Rule
 
-Array = Any  # a jax.Array, or what JAX makes one of
+Array = Any  # a jax.Array, or anything that JAX converts to one
 
 
 class JaxFunctions:
-    """Functions of q (..., nq), v (..., nv) and more on JAX's arrays, with exact derivatives.
+    """Functions of q (..., nq), v (..., nv) and more on JAX arrays, with exact derivatives.
 
-    They are of the model's parameters.  States that it refuses have nan: JAX's functions raise
-    nothing.
+    They use the model's parameters. A state that the model refuses gives nan: JAX's functions raise
+    no errors.
     """
 
     def __init__(self, model: Model):
@@ -47,13 +47,13 @@ class JaxFunctions:
         return jnp.concatenate([rates, self._function("forward_dynamics")(q, v, u)], axis=-1)
 
     def _function(self, name: str) -> Callable[..., Array]:
-        """Return a function with its derivatives, made once."""
+        """Return a function with its derivatives; it is made once."""
         if name not in self._made:
             self._made[name] = self._with_derivatives(name, RULES[name])
         return self._made[name]
 
     def _with_derivatives(self, name: str, rule: Rule) -> Callable[..., Array]:
-        """Return a function whose derivative is its Jacobians' product with tangents."""
+        """Return a function whose derivative is the product of its Jacobians with tangents."""
         self.model.kernel(name)  # ModelError where the scene left it out
 
         @jax.custom_jvp
@@ -75,7 +75,7 @@ class JaxFunctions:
         return function
 
     def _call(self, name: str, arrays: Any) -> list[Array]:
-        """Return the outputs of a function of the C."""
+        """Return the outputs of a C function."""
         lead, dtype = arrays[0].shape[:-1], self.model.parameter_vector.dtype
         shapes = [(*lead, *shape) for shape in self.model.kernel(name).out_shapes]
         call = jax.ffi.ffi_call(
@@ -110,7 +110,7 @@ class JaxFunctions:
 
 
 def _turned(q: Array, dq: Array) -> Array:
-    """Return the tangent (..., nv) of q that a change dq (..., nq) is."""
+    """Return the tangent (..., nv) of q that corresponds to a change dq (..., nq)."""
     w, x = q[..., 3:4], q[..., 4:7]
     dw, dx = dq[..., 3:4], dq[..., 4:7]
     square = jnp.sum(q[..., QUATERNION] ** 2, axis=-1, keepdims=True)
@@ -119,7 +119,7 @@ def _turned(q: Array, dq: Array) -> Array:
 
 
 def _q_dot(q: Array, v: Array) -> Array:
-    """Return dq/dt (..., nq), as ``serpentail.model.state_space`` has it."""
+    """Return dq/dt (..., nq), as ``serpentail.model.state_space`` does."""
     w, x, omega = q[..., 3:4], q[..., 4:7], v[..., OMEGA]
     scalar = -jnp.sum(x * omega, axis=-1, keepdims=True)
     turning = jnp.concatenate([scalar, w * omega + jnp.cross(x, omega)], axis=-1) / 2

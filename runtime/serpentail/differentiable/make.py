@@ -1,4 +1,4 @@
-"""``jax_functions`` and ``torch_functions``: a model's functions for tools that differentiate."""
+"""``jax_functions`` and ``torch_functions``: functions of a model with exact derivatives."""
 
 from typing import TYPE_CHECKING
 
@@ -13,13 +13,37 @@ if TYPE_CHECKING:
 
 
 def jax_functions(model: Model) -> "JaxFunctions":
-    """Return ``forward_dynamics``, ``inverse_dynamics`` and ``x_dot`` of a model for JAX.
+    """Return functions of a model for JAX, with exact derivatives.
 
-    They take arrays of any leading shape, bear jit, vmap, jvp, grad and scan, and run on the CPU in
-    lanes and threads.  Derivatives are exact, of ``forward_dynamics_derivatives``, or of
-    ``inverse_dynamics_derivatives`` and ``mass_matrix``, which the scene must ask for then.
-    Raises ExtraMissing without the extra "jax", CompileFailed without a C++ compiler, and when a
-    function is called ModelError (the scene left it out), StateError (shapes, types, 32 bits).
+    They are ``forward_dynamics``, ``inverse_dynamics`` and ``x_dot``, run on the CPU, and work
+    inside jit, vmap, jvp, grad and scan.
+
+    Parameters
+    ----------
+    model : Model
+        The model. Derivatives need "forward_dynamics_derivatives"; those of inverse dynamics
+        need "inverse_dynamics_derivatives" and "mass_matrix".
+
+    Returns
+    -------
+    JaxFunctions
+        The functions; they take arrays with any leading axes. States that the model refuses give
+        nan, because JAX's functions raise no errors.
+
+    Raises
+    ------
+    ExtraMissing
+        JAX is not installed; it comes with the extra "jax".
+    CompileFailed
+        No C++ compiler works.
+    ModelError, StateError
+        When a function is called: the scene left it out; a shape or type is wrong, or JAX
+        computes with 32 bits.
+
+    Examples
+    --------
+    >>> functions = st.jax_functions(model)  # doctest: +SKIP
+    >>> jax.grad(lambda tau: functions.forward_dynamics(q, v, tau)[3])(tau)  # doctest: +SKIP
     """
     _refuse_others(model)
     needed("jax", "jax")
@@ -29,10 +53,28 @@ def jax_functions(model: Model) -> "JaxFunctions":
 
 
 def torch_functions(model: Model) -> "TorchFunctions":
-    """Return the same for PyTorch: custom operators on the CPU, which autograd differentiates.
+    """Return functions of a model for PyTorch, with exact derivatives.
 
-    Raises ExtraMissing without the extra "torch"; errors else as of ``jax_functions``, and
-    StateError of values that are not finite.
+    They are ``forward_dynamics``, ``inverse_dynamics`` and ``x_dot``: custom operators on CPU
+    tensors, which autograd differentiates.
+
+    Parameters
+    ----------
+    model : Model
+        As of ``jax_functions``.
+
+    Returns
+    -------
+    TorchFunctions
+        The functions; they take tensors with any leading axes.
+
+    Raises
+    ------
+    ExtraMissing
+        PyTorch is not installed; it comes with the extra "torch".
+    ModelError, StateError
+        When a function is called: the scene left it out; a shape or type is wrong, or a value is
+        not finite.
     """
     _refuse_others(model)
     needed("torch", "torch")
@@ -42,6 +84,6 @@ def torch_functions(model: Model) -> "TorchFunctions":
 
 
 def _refuse_others(model: object) -> None:
-    """ModelError about what is no model."""
+    """ModelError unless it is a model."""
     if not isinstance(model, Model):
         raise ModelError(f"model: value {shown(model)}: needs a model, as st.load returns it")

@@ -1,4 +1,4 @@
-"""A model's functions as PyTorch's operators, which autograd differentiates."""
+"""A model's functions as PyTorch operators, which autograd differentiates."""
 
 from typing import Any
 from weakref import WeakValueDictionary
@@ -80,7 +80,7 @@ def _numbers(arrays: tuple[Tensor, ...], key: str, name: str) -> tuple[Tensor, .
     return tuple(torch.from_numpy(each).reshape(*lead, *each.shape[1:]) for each in outputs)
 
 
-# operators by their schemas: `custom_op` would check at each call what is so here
+# operators by their schemas: `custom_op` would check these at each call
 FUNCTION, JACOBIANS = "serpentail::function", "serpentail::jacobians"
 ARGUMENTS = "Tensor a, Tensor b, Tensor c, str key, str name"
 torch.library.define(FUNCTION, f"({ARGUMENTS}) -> Tensor")
@@ -121,7 +121,7 @@ def _fake_jacobians(
 
 
 def _kept(ctx: Any, inputs: tuple[Any, ...], output: Tensor) -> None:
-    """Keep what the derivative needs."""
+    """Save what the derivative needs."""
     ctx.save_for_backward(*inputs[:3])
     ctx.key, ctx.name = inputs[3:]
 
@@ -160,7 +160,7 @@ def _vmap(info: Any, in_dims: tuple, a: Tensor, b: Tensor, c: Tensor, *names: st
 
 
 def _q_dot(q: Tensor, v: Tensor) -> Tensor:
-    """Return dq/dt (..., nq), as ``serpentail.model.state_space`` has it."""
+    """Return dq/dt (..., nq), as ``serpentail.model.state_space`` does."""
     quaternion, omega = q[..., 3:7], v[..., OMEGA]
     w, x = q[..., 3:4], q[..., 4:7]
     scalar = -(x * omega).sum(-1, keepdim=True)

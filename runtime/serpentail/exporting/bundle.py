@@ -9,7 +9,7 @@ from ..model.model import Model
 from ..model.parameters import resolve
 from ..model.snapshot import contents
 
-BEGINNING = (1980, 1, 1, 0, 0, 0)  # of a zip's time: no date of ours
+BEGINNING = (1980, 1, 1, 0, 0, 0)  # earliest time of a zip: no real date is stored
 RIGHTS = 0o100644 << 16  # a plain file that all may read
 UNIX = 3  # whose rights they are
 
@@ -17,8 +17,8 @@ UNIX = 3  # whose rights they are
 def bundle(model: Model) -> bytes:
     """Return the file: a folder that ``st.load`` takes, named by the model and its content's hash.
 
-    Equal models have equal bytes.  ExportError where the parameters are not the scene's, which
-    alone are in the folder.
+    Equal models have equal bytes. ExportError if the parameters are not the scene's, because the
+    folder holds only those.
     """
     defaults = resolve(model.manifest, None)
     for name, value in model.parameters.items():
@@ -39,7 +39,7 @@ def name_of(model: Model) -> str:
 def zipped(files: dict[str, bytes]) -> bytes:
     """Return a zip of files by name.
 
-    They are stored as they are: each zlib would compress them to bytes of its own.
+    It is not compressed, because versions of zlib compress differently.
     """
     made = io.BytesIO()
     with zipfile.ZipFile(made, "w", zipfile.ZIP_STORED) as archive:

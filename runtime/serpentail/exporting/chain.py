@@ -45,7 +45,7 @@ class Link(NamedTuple):
         return (0.0, -self.length, 0.0)
 
     def joint(self, axis: str, number: int | None = None) -> str:
-        """Return the name of its joint about an axis, or of that of another link in its segment."""
+        """Return the name of its joint about an axis, or of that of another link of its segment."""
         return f"{axis}_{self.segment}_{number or self.number}"
 
 
@@ -66,7 +66,7 @@ class Capsule(NamedTuple):
 
 
 def chain_of(model: Model, kind: str) -> Chain:
-    """Return the chain of a model; ExportError where it has none."""
+    """Return the chain of links of a model; ExportError if it is not such a chain."""
     _refuse_other(model, kind)
     p = model.parameters
     numbers = [(i + 1, j + 1) for i, count in enumerate(model.joints_each) for j in range(count)]
@@ -92,11 +92,11 @@ def chain_of(model: Model, kind: str) -> Chain:
 
 
 def _refuse_other(model: Model, kind: str) -> None:
-    """ExportError where a model is no free chain of rigid links that torques alone move."""
+    """ExportError unless a model is a free chain of rigid links moved by torques only."""
     needs, remedy = "", 'export an "fmu"'
     if model.kind != "articulated":
         needs, remedy = (
-            "an articulated tail, and a continuum is no chain of rigid links",
+            "an articulated tail, because a continuum tail is not a chain of rigid links",
             'generate a scene with kind = "articulated" and some links, or export an "fmu"',
         )
     elif "torso_mass" not in model.parameters:
@@ -108,7 +108,7 @@ def _refuse_other(model: Model, kind: str) -> None:
 
 
 def _links(model: Model, count: int) -> tuple[list, list, list, list]:
-    """Return masses, lengths, places of the COM along them and moments of inertia of all links."""
+    """Return the links' masses, lengths, distances from joint to COM, moments of inertia."""
     p = model.parameters
     if "link_masses" not in p:
         length = p["tail_length"] / count
@@ -150,7 +150,7 @@ def text(numbers: float | Iterable[float]) -> str:
 
 
 def origin(model: Model) -> str:
-    """Return the line about where a file comes from, and what it lacks."""
+    """Return the line about a file's origin, and about what it leaves out."""
     return (
         f" {model.name}, made by serpentail {__version__}. SI units; B is the torso's origin. "
         "Legs and feet have no mass and are left out, and so are contacts. "

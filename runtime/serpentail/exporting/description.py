@@ -1,4 +1,4 @@
-"""modelDescription.xml of an FMU: variables, units, and what depends on what."""
+"""modelDescription.xml of an FMU: variables, units and dependencies."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -8,7 +8,7 @@ from .. import __version__
 from ..model.model import Model
 from ..viewer.shape import length
 
-# FMI's unit of each of ours: its name, and exponents of SI's base units
+# our unit -> FMI's: its name, and exponents of SI's base units
 UNITS: dict[str, tuple[str, dict[str, int] | None]] = {
     "1": ("1", {}),
     "m": ("m", {"m": 1}),
@@ -36,7 +36,7 @@ SHARED = {  # of both kinds of interface
 
 
 class Variable(NamedTuple):
-    """A variable: its name, what it is, its unit, and its start, None of what is computed."""
+    """A variable: name, description, unit and start value; computed ones have no start value."""
 
     name: str
     meaning: str
@@ -103,7 +103,7 @@ def _add_variables(root: Xml.Element, model: Model) -> None:
 
 
 def _add(variables: Xml.Element, each: Variable, role: dict[str, str]) -> Xml.Element:
-    """Add a variable, whose reference is its place; return what tells its type."""
+    """Add a variable, whose reference is its index; return the element of its type."""
     head = {"name": each.name, "valueReference": str(len(variables)), "description": each.meaning}
     scalar = Xml.SubElement(variables, "ScalarVariable", head | role)
     real = Xml.SubElement(scalar, "Real", unit=UNITS[each.unit][0])
@@ -137,12 +137,12 @@ def _states(model: Model) -> Iterator[Variable]:
 
 
 def height(model: Model) -> float:
-    """Return the height (m) at which a unit starts: that of a tail straight down, with contacts."""
+    """Return the height (m) of B at the start; with contacts a tail straight down is clear."""
     return length(model) if model.contacts else 0.0
 
 
 def legs(model: Model) -> int:
-    """Return how many numbers tell the legs: four angles, then their rates; 0 without feet."""
+    """Return the number of inputs for the legs: four angles and their rates; 0 without feet."""
     return 8 if "feet" in model.contacts else 0
 
 

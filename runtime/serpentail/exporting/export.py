@@ -1,4 +1,4 @@
-"""``export``: writes a model to a file of another tool's kind."""
+"""``export``: writes a model to a file for another tool."""
 
 import os
 from importlib import import_module
@@ -16,14 +16,37 @@ SEPARATORS = ("/", os.sep)
 
 
 def export(model: Model, kind: str, path: str | os.PathLike[str] | None = None) -> Path:
-    """Write a model, with the parameters that it has, to a file; return its path.
+    """Write a model, with its present parameters, to a file for another tool.
 
-    kind: "urdf" and "mjcf", of articulated tails: joints that mimic each other, or are tied by
-    equalities; "bundle": a .zip of the generated folder, for ``st.load`` elsewhere; "fmu": FMI
-    2.0.  path: by default the model's name in the working folder, a bundle's with its hash;
-    the file is written whole or not at all, and replaces what was there.
-    Raises ExportError with argument, value and remedy, NotWritten where the system refuses the
-    file, ModelError where the scene left out a function that the kind needs.
+    Parameters
+    ----------
+    model : Model
+        The model.
+    kind : {"urdf", "mjcf", "bundle", "fmu"}
+        "urdf" and "mjcf": articulated tails only; the joints of a segment are coupled by mimic
+        joints (URDF) or equality constraints (MJCF). "bundle": a .zip of the generated folder,
+        for ``load`` on another machine. "fmu": FMI 2.0.
+    path : str or path, optional
+        The file, ending in .urdf, .xml, .zip or .fmu. Default: the model's name in the working
+        folder; a bundle's name includes its hash.
+
+    Returns
+    -------
+    Path
+        The path of the file, which is written whole or not at all.
+
+    Raises
+    ------
+    ExportError
+        An argument is wrong, or the format cannot hold the model.
+    NotWritten
+        The file cannot be written.
+    ModelError
+        The scene left out a function that the format needs.
+
+    Examples
+    --------
+    >>> st.export(model, "mjcf", "rat.xml")  # doctest: +SKIP
     """
     one_of("kind", kind, SUFFIXES, ExportError)
     if not isinstance(model, Model):
@@ -37,8 +60,9 @@ def export(model: Model, kind: str, path: str | os.PathLike[str] | None = None) 
 
 
 def checked_path(kind: str, path: Any) -> Path:
-    """Return the path of a file of a kind; ExportError where its name is none's, or cannot be
-    written.
+    """Return the path of a file of a kind.
+
+    ExportError if its name is wrong, or if it cannot be written.
     """
     try:
         target = Path(path)

@@ -14,14 +14,16 @@ from .description import description, height, legs
 
 FLYING = ("forward_dynamics", "forward_dynamics_derivatives", "rollout")
 TOUCHING = ("contact_dynamics", "contact_points", "rollout")
-NATIVE = Path(__file__).with_name("native")  # names with hyphens, as no model has
+NATIVE = Path(__file__).with_name("native")  # names with hyphens, which no model can have
 PLATFORMS = {("Linux", "x86_64"): "linux64"}  # the standard's names of those that this runs on
 HIDDEN = ("-fvisibility=hidden",)  # several units in one process share no function
 
 
 def fmu(model: Model) -> bytes:
-    """Return the file; ExportError where the model is none that an FMU can be of, ModelError where
-    its scene left out a function, CompilerNotFound and CompileFailed as ``st.load``.
+    """Return the file.
+
+    ExportError if no FMU can be made of the model, ModelError if its scene left out a function,
+    CompilerNotFound and CompileFailed as ``st.load``.
     """
     _refuse_others(model)
     sources = _sources(model)
@@ -32,21 +34,21 @@ def fmu(model: Model) -> bytes:
     files = {f"sources/{name}": content for name, content in sources.items()}
     files["modelDescription.xml"] = description(model, guid, names)
     place = PLATFORMS.get((platform.system(), platform.machine()))
-    if place is not None:  # elsewhere the sources are what there is
+    if place is not None:  # on other platforms there are only the sources
         files[f"binaries/{place}/{model.name}.so"] = _library(sources, names)
     return zipped(files)
 
 
 def _refuse_others(model: Model) -> None:
-    """Refuse what no FMU can be of."""
+    """Refuse models that an FMU cannot hold."""
     scene = model.manifest["scene"]
     if model.fixed:
-        raise _refused(model, "base", "fixed", 'FMUs are of a torso that moves: give "free" to')
+        raise _refused(model, "base", "fixed", 'an FMU needs a torso that moves: give "free" to')
     if scene["coordinates"] == "polar":
         words = 'polar angles have no rates where a segment is straight: give "bend" to'
         raise _refused(model, "coordinates", "polar", words)
     if model.manifest["real"] != "double":
-        raise _refused(model, "real", model.manifest["real"], 'FMI has doubles: give "double" to')
+        raise _refused(model, "real", model.manifest["real"], 'FMI uses double: give "double" to')
     needs = _needs(model)
     absent = [name for name in needs if name not in model.generated]
     if absent or "c" not in scene["targets"]:
@@ -66,7 +68,7 @@ def _refused(model: Model, field: str, value: object, words: str) -> ExportError
 
 
 def _sources(model: Model) -> dict[str, bytes]:
-    """Return the C by the names of files: the model's, ours, and what ours must know of it."""
+    """Return the C by file name: the model's, the unit's, and what the unit needs to know."""
     files, native = model.checked.files, sorted(NATIVE.glob("*.[ch]"))
     sources = {PurePosixPath(n).name: text for n, text in files.items() if n.endswith(".h")}
     for name in (f"{model.name}.c", f"{model.name}_simulation.c"):

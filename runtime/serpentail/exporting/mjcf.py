@@ -1,5 +1,7 @@
-"""MJCF of an articulated model: joint equalities tie the joints of a segment to those of its first
-link, and motors on these have the model's torques.
+"""MJCF of an articulated model.
+
+Joint equalities couple the joints of a segment to those of its first link, and motors on these
+apply the model's torques.
 """
 
 from xml.etree import ElementTree as Xml
@@ -21,7 +23,7 @@ from .chain import (
 )
 
 LEAST = 1e-15  # kg, kg m^2: MuJoCo takes none of a moving body that is not above it (mjMINVAL)
-MARGIN = 1e-12  # of the sum of two moments, by which what is rounded may miss the third
+MARGIN = 1e-12  # tolerance of the sum of two moments, because of rounding
 MOST_LINKS = 480  # MuJoCo reads no deeper than 500 elements
 # MuJoCo's equalities are soft.  As stiff as its own time step of 2 ms allows, joints of a segment
 # differ by 1e-4 rad in fast motions; by default, 0.1 rad.
@@ -29,9 +31,7 @@ STIFF = {"solref": "0.004 1", "solimp": "0.9999 0.9999 0.001"}
 
 
 def mjcf(model: Model) -> bytes:
-    """Return the file; ExportError where the tail is no chain of rigid links, or one that MuJoCo
-    does not take.
-    """
+    """Return the file; ExportError if the tail is not a chain of links that MuJoCo can read."""
     chain, p = chain_of(model, "mjcf"), model.parameters
     if len(chain.links) > MOST_LINKS:
         raise ExportError(
@@ -47,7 +47,7 @@ def mjcf(model: Model) -> bytes:
     root.append(Xml.Comment(origin(model)))
     Xml.SubElement(root, "compiler", angle="radian", inertiafromgeom="false", autolimits="true")
     Xml.SubElement(root, "option", gravity=text((0.0, 0.0, -p.get("gravity", 0.0))))
-    # what floor a user adds is touched, and the animal does not touch itself
+    # it touches a floor that a user adds, but not itself
     default = Xml.SubElement(root, "default")
     Xml.SubElement(default, "geom", contype="0", conaffinity="1")
     Xml.SubElement(default, "equality", STIFF)
@@ -117,7 +117,7 @@ def _quaternion(turn: Vector) -> Vector:
 
 
 def _add_ties(root: Xml.Element, chain: Chain) -> None:
-    """Tie the joints of each segment, and give those of its first link their motors."""
+    """Couple the joints of each segment, and add motors to those of its first link."""
     equality = Xml.SubElement(root, "equality")
     actuator = Xml.SubElement(root, "actuator")
     for link in chain.links:

@@ -14,7 +14,7 @@ FIXED = (0.0, 0.0, 0.0)
 
 
 def urdf(model: Model) -> bytes:
-    """Return the file; ExportError where the tail is no chain of rigid links."""
+    """Return the file; ExportError if the tail is not a chain of rigid links."""
     chain, capsule = chain_of(model, "urdf"), torso_capsule(model)
     robot = Xml.Element("robot", name=model.name)
     robot.append(Xml.Comment(origin(model)))

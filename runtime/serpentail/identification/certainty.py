@@ -1,4 +1,4 @@
-"""How certain estimates are: noise, covariance, intervals, and what the data cannot determine."""
+"""Certainty of estimates: noise, covariance, intervals, and what the data cannot determine."""
 
 from dataclasses import dataclass
 
@@ -12,15 +12,17 @@ from .trial import Trial
 from .unknowns import Unknowns
 
 SHARE = 0.05  # of the largest part of a combination: smaller parts are not named
-TOUCHED = 1e-6  # part of an unknown in what no data tell, from which on it has no interval
-WIDE = 1.0  # relative standard deviation from which on a combination counts as undetermined
-FLAT = 1e3  # by how much a wider prior on torques tells what is known from the prior alone
+TOUCHED = 1e-6  # an unknown with this part in an undetermined direction has no interval
+WIDE = 1.0  # relative standard deviation at which a combination counts as undetermined
+FLAT = 1e3  # factor of a wider prior on torques, to find what only the prior determines
 
 
 @dataclass(frozen=True)
 class Combination:
-    """Unknowns that change together: the relative change of each by name, the standard deviation of
-    that, relative, too (inf where nothing tells it), and whether a prior alone determines it.
+    """Parameters that change together without much effect on the data.
+
+    parts: relative change of each parameter; std: relative standard deviation of the combination,
+    inf if no data determine it; by_prior: only a prior determines it.
     """
 
     parts: dict[str, float]
@@ -87,7 +89,7 @@ def own_root(unknowns: Unknowns, R: np.ndarray, C: np.ndarray) -> np.ndarray:
 def relative_covariance(unknowns: Unknowns, fit: Fit) -> np.ndarray:
     """Return the covariance of the unknowns over their sizes with the assumed noise, (P, P).
 
-    What no data tell has none: see ``certainty``.
+    Directions that no data determine are left out: see ``certainty``.
     """
     free = np.flatnonzero(~fit.pinned)
     C = np.zeros((len(fit.pinned),) * 2)
@@ -130,7 +132,7 @@ def certainty(unknowns: Unknowns, fit: Fit, noise: tuple[float, float]) -> Certa
 def _parts(
     unknowns: Unknowns, fit: Fit, free: np.ndarray, direction: np.ndarray
 ) -> dict[str, float]:
-    """Return the parts of a direction by name, over what was estimated, the largest 1."""
+    """Return the parts of a direction by name, relative to the estimates; the largest is 1."""
     values, sizes = np.abs(fit.point.values[free]), unknowns.sizes[free]
     moving = np.array([not unknowns.each[k].is_offset for k in free]) & (values > 0)
     shares = direction * np.where(moving, sizes / np.where(moving, values, 1), 1)
@@ -166,6 +168,6 @@ def from_prior_alone(
 
 
 def quantile(confidence: float, freedom: float, known_noise: bool) -> float:
-    """Return how many standard deviations an interval reaches to each side."""
+    """Return the half width of an interval in standard deviations."""
     upper = (1 + confidence) / 2
     return float(ndtri(upper) if known_noise else stdtrit(freedom, upper))

@@ -1,4 +1,4 @@
-"""How far to go along a step: cost and defects must fall together, positive numbers stay so."""
+"""Length of a step: cost and defects must fall together, and positive numbers stay positive."""
 
 import numpy as np
 
@@ -83,7 +83,7 @@ def search(
 
 
 def _scales(move: np.ndarray) -> np.ndarray:
-    """Return by what defects are multiplied so that numbers of different units compare."""
+    """Return the factors that make defects of different units comparable."""
     return 1 / np.maximum(np.abs(move).max(axis=0), 1e-12)
 
 
@@ -93,7 +93,7 @@ def _at(
     point: Point,
     direction: tuple[float, np.ndarray, list[np.ndarray], list[np.ndarray]],
 ) -> Point | None:
-    """Return the point at some length along a step, integrated; None where that fails."""
+    """Return the integrated point at some length along a step; None if that fails."""
     length, step, steps, moves = direction
     model, found = unknowns.model, []
     for iterate, own, move in zip(point.iterates, steps, moves, strict=True):

@@ -1,4 +1,4 @@
-"""Design of experiments: how certain a motion would make parameters, before it is recorded."""
+"""``fisher_information``: how certain parameters would be, before a motion is recorded."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -25,9 +25,20 @@ LONGEST = 0.005  # s: of the intervals
 
 @dataclass(frozen=True, eq=False)
 class Information:
-    """What markers on a motion would tell of parameters: their names; covariance (P, P), SI, the
-    Cramer-Rao bound of every unbiased estimate; singular_values (P,) of relative changes;
-    undetermined combinations.
+    """What markers on a motion would tell about parameters.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Names of the P parameters.
+    values : ndarray, shape (P,)
+        Their values, SI.
+    covariance : ndarray, shape (P, P)
+        Cramer-Rao bound of the covariance of every unbiased estimate, SI.
+    singular_values : ndarray, shape (P,)
+        Singular values of the information on relative changes.
+    undetermined : tuple of Combination
+        Combinations of parameters that are known to a factor at best.
     """
 
     names: tuple[str, ...]
@@ -38,14 +49,16 @@ class Information:
 
     @property
     def std(self) -> dict[str, float]:
-        """Standard deviation of each parameter by name."""
+        """Standard deviation of each parameter by name, SI."""
         each = np.sqrt(np.diag(self.covariance)).tolist()
         return dict(zip(self.names, each, strict=True))
 
     @property
     def d_optimality(self) -> float:
-        """Logarithm of the determinant of the information about relative changes: the more, the
-        smaller the volume in which the parameters are; -inf where one is undetermined.
+        """Logarithm of the determinant of the information on relative changes.
+
+        The larger it is, the smaller is the region in which the parameters lie; -inf if a
+        combination is not determined.
         """
         if any(np.isinf(each.std) for each in self.undetermined):
             return -np.inf
@@ -62,12 +75,35 @@ def fisher_information(
     noise: float,
     rate: float,
 ) -> Information:
-    """Return what markers on a motion in flight would tell of parameters.
+    """Compute what markers on a motion in flight would tell about parameters.
 
-    motion: planned or simulated, its torques are taken as known; only its first state and its
-    torques matter.  markers, estimate: as of ``identify``.  noise: standard deviation (m) of a
-    marker's coordinates.  rate: of the cameras, Hz.  The first state is unknown, too.
-    Raises IdentificationError.
+    Parameters
+    ----------
+    model : Model
+        The model, as of ``identify``.
+    motion : Trajectory
+        A planned or simulated motion. Only its first state and its torques matter; the torques
+        count as known, the first state as unknown.
+    markers : mapping of str to Marker
+        Place of each marker.
+    estimate : sequence of str, or mapping of str to (float or None)
+        Parameters to estimate, as of ``identify``.
+    noise : float
+        Standard deviation of a marker's coordinates (m).
+    rate : float
+        Frame rate of the cameras (Hz).
+
+    Returns
+    -------
+    Information
+        The Cramer-Rao bound, and what is not determined.
+
+    Raises
+    ------
+    IdentificationError
+        An argument is wrong.
+    ModelError
+        As of ``identify``.
     """
     check_model(model, estimate)
     noise = number("noise", noise, IdentificationError, above=0)
@@ -115,7 +151,7 @@ def fisher_information(
 
 
 def _flown(model: Model, trial: Trial, iterate: Iterate) -> Iterate:
-    """Return the flight from an iterate's first state: each pass makes one more interval exact."""
+    """Return the flight from an iterate's first state; each pass makes one more interval exact."""
     while True:
         done = solved(model, trial, iterate)
         if done is None:

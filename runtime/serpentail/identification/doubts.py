@@ -11,17 +11,17 @@ from .placement import Placements
 from .start import fitted
 from .tracks import MarkerTracks
 
-FRAMES = 3  # at which swaps of a whole trial are looked for
-LOOSE = 0.01  # of the tail's length: a misfit from which on swaps are looked for
+FRAMES = 3  # frames at which swaps during a whole trial are checked
+LOOSE = 0.01  # of the tail's length: swaps are checked for larger misfits
 HALF = 0.5  # of the misfit that must be left once a swap is undone
 CLEAR = 8.0  # times the usual residual that a swapped marker is off
-WORSE = 4.0  # times the others' residual from which on a marker is told of
-SMALL = 1e-3  # of the markers' extent: less is not told of
+WORSE = 4.0  # a marker is reported if its residual is so many times the others'
+SMALL = 1e-3  # of the markers' extent: smaller residuals are not reported
 FEWEST = 3  # markers that are seen at once
 
 
 def refuse_too_few(placed: Placements, tracks: MarkerTracks, nq: int) -> None:
-    """IdentificationError where no frame shows enough markers that are not on a line."""
+    """IdentificationError if no frame shows enough markers that are not on a line."""
     seen = tracks.seen.sum(axis=1)
     best = int(seen.argmax())
     if seen[best] >= FEWEST:
@@ -64,9 +64,9 @@ def tell_of_swaps(model: Model, placed: Placements, tracks: MarkerTracks, q: np.
 
 
 def tell_of_residuals(tracks: MarkerTracks, modelled: np.ndarray) -> None:
-    """Warn of markers that are where others should be, in some frames, and of those that fit badly.
+    """Warn of markers that look swapped in some frames, and of markers that fit badly.
 
-    modelled (F, M, 3): where the fit has the markers.
+    modelled (F, M, 3): positions of the markers by the fit.
     """
     off = np.linalg.norm(tracks.positions - modelled, axis=2)
     usual, told = float(np.nanmedian(off)), set[int]()
@@ -97,5 +97,5 @@ def tell_of_residuals(tracks: MarkerTracks, modelled: np.ndarray) -> None:
 
 
 def _tell(words: str) -> None:
-    """Warn who called ``identify``."""
+    """Issue a warning at the line that calls ``identify``."""
     warnings.warn(words, DoubtfulMarkers, stacklevel=5)

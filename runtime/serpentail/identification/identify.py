@@ -1,4 +1,4 @@
-"""``identify``: motion, torques and parameters from marker tracks."""
+"""``identify``: finds motion, torques and parameters from marker tracks."""
 
 import time
 from collections.abc import Mapping, Sequence
@@ -31,7 +31,7 @@ Data = MarkerTracks | str | PathLike[str]
 
 
 class Settings(TypedDict, total=False):
-    """Settings of ``identify`` beyond the model, the data, the markers and what is estimated."""
+    """Settings of ``identify`` besides the model, the data, the markers and the unknowns."""
 
     torques: Any
     noise: float | Mapping[str, float] | None
@@ -48,26 +48,66 @@ def identify(
     estimate: Sequence[str] | Mapping[str, float | None] = (),
     **settings: Unpack[Settings],
 ) -> Identification:
-    """Return motion, torques and parameters that fit marker tracks in flight best, with intervals.
+    """Find the motion, torques and parameters that fit marker tracks in flight best.
 
-    model: with the parameters to begin with; its scene names "forward_dynamics_derivatives" and,
-    where parameters are estimated, "forward_dynamics_parameter_derivatives".
-    data: tracks, or the path of a TRC, CSV or C3D file; several are trials of one animal.
-    markers: where each marker is; markers of the data without a place are left out.
-    estimate: names: of parameters, "tail_mass", "torso_inertia" (each of its numbers),
-    "torso_inertia[0]", "tail_damping[same]" (one number for all); "marker:NAME", its offset.  Or
-    name -> standard deviation of a normal prior about the model's value, None for no prior.
-    torques: what acts: None (nothing), 2m numbers, (times, values), a function of the time, a
-    Trajectory; or a TorquePrior, and they are estimated, too.  A list has one of each trial.
-    noise: standard deviation (m) of a marker's coordinates, or of those of each by name; None: it
-    is estimated, one for all.
-    confidence: of the intervals, 0.95.  unit, axes, zeros: of files, as of ``read_markers``.
+    Parameters
+    ----------
+    model : Model
+        The model, with the parameters to begin with. Its scene needs "forward_dynamics",
+        "forward_dynamics_derivatives", "energy", "momentum" and, if parameters are estimated,
+        "forward_dynamics_parameter_derivatives".
+    data : MarkerTracks, str, path, or a sequence of these
+        Tracks, or TRC, CSV or C3D files; several are trials of one animal.
+    markers : mapping of str to Marker
+        Place of each marker. Markers of the data without a place are ignored.
+    estimate : sequence of str, or mapping of str to (float or None), optional
+        Parameters to estimate: "tail_mass"; "torso_inertia" for each of its numbers;
+        "torso_inertia[0]"; "tail_damping[same]" for one number for all coordinates;
+        "marker:NAME" for the offset of a marker. A mapping gives the standard deviation of a
+        normal prior about the model's value, or None for no prior.
+    torques : optional
+        Known torques (N m): 2m numbers, (times, values), a function of time, or a Trajectory. With
+        a ``TorquePrior`` the torques are estimated too. A list has one entry for each trial.
+        Default: no torques.
+    noise : float or mapping of str to float, optional
+        Standard deviation of a marker's coordinates (m), of all markers or by name. Default: one
+        value for all is estimated.
+    confidence : float, default 0.95
+        Probability of the intervals.
+    unit, axes, zeros : optional
+        As of ``read_markers``, for files.
 
-    Between frames the motion obeys the equations of motion.  With known torques and no priors this
-    is maximum likelihood, and the intervals are those of the Fisher information; with a TorquePrior
-    or priors on parameters it is the most likely motion a posteriori, with Laplace's covariance.
-    Raises IdentificationError with field, value and remedy, ModelError where the model lacks a
-    function.  Warns DoubtfulMarkers of markers that look swapped or fit badly.
+    Returns
+    -------
+    Identification
+        Parameters with intervals, motions, torques and residuals.
+
+    Raises
+    ------
+    IdentificationError
+        An argument or the data are wrong; the message gives field, value and remedy.
+    ModelError
+        The model lacks a function, has a fixed base, uses polar coordinates or computes with
+        float.
+    ExtraMissing
+        A C3D file is read without the extra "c3d".
+
+    Warns
+    -----
+    DoubtfulMarkers
+        Markers look swapped, or fit badly.
+
+    Notes
+    -----
+    Between frames the motion obeys the equations of motion. With known torques and no priors
+    this is maximum likelihood, and the intervals follow from the Fisher information. With a
+    TorquePrior, or with priors on parameters, it is the maximum a posteriori motion, with
+    Laplace's approximation of the covariance.
+
+    Examples
+    --------
+    >>> found = st.identify(model, "flight.trc", markers, ["tail_mass"])  # doctest: +SKIP
+    >>> print(found.table)  # doctest: +SKIP
     """
     began = time.perf_counter()
     known = set(Settings.__annotations__)
@@ -106,13 +146,13 @@ def identify(
 
 
 def check_model(model: Any, estimate: Any) -> None:
-    """Raise where a model cannot be identified: its kind, or functions that it lacks."""
+    """Raise an error if a model cannot be identified, because of its kind or missing functions."""
     if not isinstance(model, Model):
         raise refusal("model", model, "a Model, as serpentail.load returns", IdentificationError)
     model.refuse_fixed("identify")
     if model.manifest["scene"].get("coordinates") == "polar":
         raise ModelError(
-            f'identify: {model.name} has coordinates = "polar": generate it with those of bends'
+            f'identify: {model.name} has coordinates = "polar": generate it with "bend"'
         )
     if model.manifest["real"] != "double":
         raise ModelError(f'identify: {model.name} has real = "float": generate it with "double"')
@@ -137,7 +177,7 @@ def tracks_of(data: Any, placed: Placements, settings: Mapping[str, Any]) -> lis
 
 
 def torques_of(torques: Any, count: int, nt: int) -> tuple[Known | TorquePrior, ...]:
-    """Return what is known of the torques of each trial."""
+    """Return the known torques, or their prior, for each trial."""
     several = isinstance(torques, list) and any(not np.isscalar(each) for each in torques)
     if several and len(torques) != count:
         raise IdentificationError(f"torques: {len(torques)} entries: needs one of {count} trials")
@@ -156,7 +196,9 @@ def noises_of(noise: Any, tracks: list[MarkerTracks]) -> tuple[list[np.ndarray],
     values = noise if isinstance(noise, Mapping) else dict.fromkeys(names, noise)
     lacking = [name for name in names if name not in values]
     if lacking:
-        raise IdentificationError(f"noise: none of {lacking[0]!r}: give one of each marker (m)")
+        raise IdentificationError(
+            f"noise: no value for {lacking[0]!r}: give one for each marker (m)"
+        )
     each = [
         number(f"noise.{name}", values[name], IdentificationError, above=0, most=1.0)
         for name in names
@@ -165,7 +207,7 @@ def noises_of(noise: Any, tracks: list[MarkerTracks]) -> tuple[list[np.ndarray],
 
 
 def begin(model: Model, placed: Placements, tracks: MarkerTracks) -> np.ndarray:
-    """Return the states (F, nx) that a trial's markers show, once they are enough."""
+    """Return the states (F, nx) that a trial's markers show; the error says if they are too few."""
     refuse_too_few(placed, tracks, model.nq)
     states = motion_shown(model, placed, tracks)
     tell_of_swaps(model, placed, tracks, states[:, : model.nq])

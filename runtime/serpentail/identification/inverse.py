@@ -1,4 +1,4 @@
-"""Inverse dynamics of marker tracks: from positions to joint torques, power and what is left over.
+"""``joint_torques``: inverse dynamics of marker tracks.
 
 This is the usual way of biomechanics: configurations are fitted to each frame, smoothed,
 differentiated twice, and put into the equations of motion.
@@ -31,13 +31,25 @@ ROUGH = 3  # the derivative whose square is penalised
 
 @dataclass(frozen=True, eq=False)
 class JointTorques:
-    """Inverse dynamics at the frames of marker tracks.
+    """Inverse dynamics at the F frames of marker tracks.
 
-    times (F,) s; tau (F, 2m) N m, conjugate to the tail coordinates; power (F, 2m) W, tau times
-    the coordinate's rate; residual_force (F, 3) N, world, and residual_moment (F, 3) N m about B,
-    body axes: what would have to act on the torso besides gravity for the motion to be true, zero
-    in flight but for errors; trajectory: the smoothed motion; modelled (F, M, 3) m: where it has
-    the markers.
+    Attributes
+    ----------
+    times : ndarray, shape (F,)
+        Times (s).
+    tau : ndarray, shape (F, 2m)
+        Torques (N m), conjugate to the tail coordinates.
+    power : ndarray, shape (F, 2m)
+        Torque times the rate of its coordinate (W).
+    residual_force : ndarray, shape (F, 3)
+        Force (N, world) that would have to act on the torso besides gravity; zero in flight
+        except for errors.
+    residual_moment : ndarray, shape (F, 3)
+        The same for the moment about B (N m, body).
+    trajectory : Trajectory
+        The smoothed motion.
+    modelled : ndarray, shape (F, M, 3)
+        Positions of the markers by the model (m, world).
     """
 
     times: np.ndarray
@@ -52,13 +64,42 @@ class JointTorques:
 def joint_torques(
     model: Model, tracks: MarkerTracks, markers: Mapping[str, Marker], *, cutoff: float
 ) -> JointTorques:
-    """Return the joint torques and powers of a motion that markers show, by inverse dynamics.
+    """Compute joint torques and powers of a motion from marker tracks, by inverse dynamics.
 
-    tracks, markers: as of ``identify``.  cutoff: Hz; the coordinates are smoothed by quintic
-    splines, which pass half the amplitude of an oscillation of that frequency, 1 / (1 + (f /
-    cutoff)^6) at f, without delay, at any times and over gaps.  Torques contain second derivatives:
-    noise in them grows with the cutoff, and what is quicker is lost.
-    Raises IdentificationError; warns DoubtfulMarkers of markers that fit badly.
+    Parameters
+    ----------
+    model : Model
+        The model, with a free base.
+    tracks : MarkerTracks
+        The tracks.
+    markers : mapping of str to Marker
+        Place of each marker, as of ``identify``.
+    cutoff : float
+        Cutoff frequency of the smoothing (Hz). Quintic splines pass the part
+        1 / (1 + (f / cutoff)^6) of an oscillation of frequency f, without delay, for frames at
+        any times and over gaps.
+
+    Returns
+    -------
+    JointTorques
+        Torques, powers, residuals and the smoothed motion.
+
+    Raises
+    ------
+    IdentificationError
+        An argument is wrong, or too few markers are seen.
+    ModelError
+        The base is fixed.
+
+    Warns
+    -----
+    DoubtfulMarkers
+        Markers fit badly.
+
+    Notes
+    -----
+    Torques contain second derivatives: their noise grows with the cutoff, and faster motion is
+    lost.
     """
     cutoff = number("cutoff", cutoff, IdentificationError, above=0)
     model.refuse_fixed("joint_torques")
@@ -89,8 +130,8 @@ def smoothed(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return values (F, C) smoothed, and their first two derivatives.
 
-    The spline minimises the sum of squares, each times the span it stands for, and (2 pi
-    cutoff)^-6 times the integral of the squared third derivative.
+    The spline minimises the sum of squared deviations, each weighted by the time between frames,
+    plus (2 pi cutoff)^-6 times the integral of the squared third derivative.
     """
     knots = np.concatenate([[times[0]] * DEGREE, times, [times[-1]] * DEGREE])
     count = len(knots) - DEGREE - 1
@@ -114,7 +155,7 @@ def smoothed(
 def rates(q: np.ndarray, first: np.ndarray, second: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return v and v_dot (F, nv) of configurations (F, nq) and their derivatives.
 
-    omega = 2 vec(conj(Q) Q_dot) / |Q|^2, of a quaternion Q whose norm need not be 1.
+    omega = 2 vec(conj(Q) Q_dot) / (Q . Q) for a quaternion Q of any norm.
     """
     Q, Q1, Q2 = (each[:, QUATERNION] for each in (q, first, second))
     square = (Q**2).sum(axis=1, keepdims=True)

@@ -18,14 +18,9 @@ from .certainty import (
     spread_of_noise,
 )
 from .doubts import tell_of_residuals
+from .estimates import Estimate, EstimatedTorques, IdentifiedTrial
 from .placement import Placements
-from .result import (
-    Estimate,
-    EstimatedTorques,
-    Identification,
-    IdentifiedTrial,
-    trajectory_of,
-)
+from .result import Identification, trajectory_of
 from .search import Task
 from .solve import Fit, triangle
 from .torques import Known, TorquePrior
@@ -96,7 +91,7 @@ def _interval(value: float, reach: float, pinned: bool) -> tuple[float, float]:
 
 
 def refuse_unseen(model: Model, task: Task, found: Fit) -> None:
-    """IdentificationError where the markers leave a turn or a tail coordinate open."""
+    """IdentificationError if the markers do not determine a rotation or a tail coordinate."""
     count = len(task.unknowns.each)
     names = ["x", "y", "z", *(f"turn about {axis}" for axis in "xyz")]
     names += [f"tail coordinate {k}" for k in range(model.layout.nt)]
@@ -111,8 +106,8 @@ def refuse_unseen(model: Model, task: Task, found: Fit) -> None:
         open_ones = [name for name, off in zip(names, blind, strict=False) if off]
         if open_ones:
             raise IdentificationError(
-                f"data: too few markers in {trial.tracks.source}: they leave open, by more than 1 "
-                f"rad, {', '.join(open_ones)}: add markers there, or fill their gaps"
+                f"data: too few markers in {trial.tracks.source}: they do not determine "
+                f"{', '.join(open_ones)} to 1 rad: add markers there, or fill their gaps"
             )
 
 
@@ -128,7 +123,7 @@ def _wider(task: Task, found: Fit) -> tuple[np.ndarray, ...]:
 
 
 def _torque_std(wanted: Unknowns, trial: Trial, R: np.ndarray, C: np.ndarray) -> np.ndarray | None:
-    """Return standard deviations of the torques at the knots, flat; None where they are known."""
+    """Return standard deviations of the torques at the knots, flat; None if these are known."""
     if not trial.unknown_torques:
         return None
     std = np.sqrt((own_root(wanted, R, C) ** 2).sum(axis=1))
@@ -142,7 +137,7 @@ def _trial(
     std: np.ndarray | None,
     reach: float,
 ) -> IdentifiedTrial:
-    """Return what came out of a trial."""
+    """Return the results of a trial."""
     trial, iterate, known = parts
     states = iterate.states[trial.frames]
     torques = None

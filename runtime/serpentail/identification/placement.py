@@ -1,4 +1,4 @@
-"""Where markers are glued on: to the torso, or to a point along the tail."""
+"""``Marker``: where a marker is on the torso or along the tail."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,11 +16,23 @@ NOWHERE = (0.0, 0.0, 0.0)
 
 @dataclass(frozen=True)
 class Marker:
-    """Where a marker is: ``Marker(torso=(x, y, z))`` m from B, in B; or ``Marker(tail=0.5)``.
+    """Place of a marker: ``Marker(torso=(x, y, z))`` or ``Marker(tail=0.5)``.
 
-    tail: how far along the tail, 0 at the mount, 1 at the tip, by length.  offset (3,): m, from
-    that point of the centre line to the marker, in the axes of the link, or of the arc's slice,
-    whose y points towards the mount.
+    Parameters
+    ----------
+    torso : sequence of float, shape (3,), optional
+        Position from B (m), in the body frame.
+    tail : float, optional
+        Place along the tail by length, from 0 at the mount to 1 at the tip.
+    offset : sequence of float, shape (3,), default zeros
+        Further offset to the marker (m); on the tail from its centre line, in the axes of the
+        link or of the arc's cross-section, whose y axis points towards the mount.
+
+    Examples
+    --------
+    >>> import serpentail as st
+    >>> st.Marker(tail=1.0).offset
+    (0.0, 0.0, 0.0)
     """
 
     torso: Sequence[float] | None = None
@@ -30,8 +42,9 @@ class Marker:
 
 @dataclass(frozen=True, eq=False)
 class Placements:
-    """M markers on a tail's pieces: names; piece (M,), -1 on the torso; fraction of the piece (M,);
-    offset (M, 3) m, from there.
+    """M markers on the pieces of a tail.
+
+    names; piece (M,), -1 for the torso; fraction of the piece (M,); offset from there (M, 3), m.
     """
 
     names: tuple[str, ...]
@@ -55,7 +68,7 @@ def piece_lengths(model: Model) -> np.ndarray:
 
 
 def placements(model: Model, markers: Any) -> Placements:
-    """Return where markers are; IdentificationError with each that is unsound."""
+    """Return the places of the markers; IdentificationError if one is wrong."""
     if not isinstance(markers, Mapping) or not markers:
         needs = 'a Marker for each name, such as {"head": Marker(torso=(0, 0.03, 0.02))}'
         raise refusal("markers", markers, needs, IdentificationError)

@@ -19,7 +19,7 @@ class Point:
 
 
 def integrated(unknowns: Unknowns, each: tuple[Trial, ...], point: Point) -> Point | None:
-    """Return a point with its intervals integrated; None where that fails."""
+    """Return a point with its intervals integrated; None if that fails."""
     try:
         model = unknowns.model_at(point.values)
     except ModelError:

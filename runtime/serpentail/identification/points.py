@@ -12,7 +12,7 @@ from ..model.model import Model
 from .placement import TORSO, Placements, piece_lengths
 
 STEP = 1e-30  # of complex steps
-SERIES = 0.5  # bend below which arcs take a series
+SERIES = 0.5  # bend below which arcs are computed by a series
 TERMS = 12
 CROSS = np.array(
     [
@@ -69,7 +69,7 @@ def frames(
     axes[:] = np.eye(3)
     joint = np.broadcast_to(numbers[..., :3], (*batch, 3))
     R = _mounted(numbers[..., 3:6])
-    # outward, piece by piece, as far as there are markers
+    # outward, piece by piece, up to the last marker
     for k in range(max(placed.piece.max(), -1) + 1):
         i = shape.segment[k]
         first, second = tail[..., 2 * i, None, None], tail[..., 2 * i + 1, None, None]
@@ -86,10 +86,10 @@ def frames(
 def _along(
     arcs: bool, first: np.ndarray, second: np.ndarray, x: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return where a point at x of a piece of length 1 is, (..., 3, 1), and its axes (..., 3, 3).
+    """Return the point at x of a piece of length 1, (..., 3, 1), and its axes (..., 3, 3).
 
-    A link turns at its joint by R = Rx(alpha) Rz(beta) and is straight along -y (Eq. 13).  An arc
-    turns by Exp(x [a, 0, b]) as it goes.
+    A link turns at its joint by R = Rx(alpha) Rz(beta) and is straight along -y (Eq. 13). Along an
+    arc the axes turn by Exp(x [a, 0, b]).
     """
     if not arcs:
         R = _exponential(first, 0) @ _exponential(second, 2)
@@ -162,7 +162,7 @@ def body_points(
     steps[range(nt + 1, count + 1), nt + wanted] = STEP
     moved = tail[..., None, :] + 1j * steps[:, :nt]
     origins, axes = frames(shape, numbers + 1j * steps[:, nt:], moved, placed)
-    # the first of all directions is none
+    # the first of all directions is zero
     points = origins + np.einsum("...mij,mj->...mi", axes, placed.offset)
     by = np.moveaxis(points.imag[..., 1:, :, :] / STEP, -3, -1)
     by_geometry = np.zeros((*by.shape[:-1], len(numbers)))

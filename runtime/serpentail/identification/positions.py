@@ -1,4 +1,4 @@
-"""``marker_positions``: where markers on a body are, for experiments that are yet to be made."""
+"""``marker_positions``: positions of markers on a model, to simulate experiments."""
 
 from collections.abc import Mapping
 
@@ -13,9 +13,28 @@ from .trial import world_points
 
 
 def marker_positions(model: Model, q: ArrayLike, markers: Mapping[str, Marker]) -> np.ndarray:
-    """Return where markers are in the world, (F, M, 3) m, at configurations q (F, nq).
+    """Return the positions of markers at given configurations.
 
-    markers: as of ``identify``.  Raises IdentificationError.
+    Parameters
+    ----------
+    model : Model
+        The model, with a free base.
+    q : array_like, shape (F, nq)
+        Configurations.
+    markers : mapping of str to Marker
+        Place of each marker.
+
+    Returns
+    -------
+    ndarray, shape (F, M, 3)
+        Positions (m, world).
+
+    Raises
+    ------
+    IdentificationError
+        An argument is wrong.
+    ModelError
+        The base is fixed.
     """
     model.refuse_fixed("marker_positions")
     rows = finite_array("q", q, IdentificationError)

@@ -1,4 +1,4 @@
-"""Reads marker tracks from files: TRC, CSV and C3D."""
+"""``read_markers``: reads marker tracks from TRC, CSV and C3D files."""
 
 import csv
 import io
@@ -26,12 +26,38 @@ def read_markers(
     axes: str = "xyz",
     zeros: str = "refuse",
 ) -> MarkerTracks:
-    """Return the marker tracks of a TRC, CSV or C3D file; C3D needs the extra "c3d".
+    """Read marker tracks from a TRC, CSV or C3D file.
 
-    unit: of a file that states none, as CSV; one that a file states must be this one.  axes, zeros:
-    as of ``marker_tracks``.
-    A CSV file has a line of names, ``time``, then ``NAME_x``, ``NAME_y``, ``NAME_z`` of each
-    marker; empty cells and nan are gaps.  Raises IdentificationError with the line of the file.
+    Parameters
+    ----------
+    path : str or path
+        The file. C3D needs the extra "c3d".
+    unit : str, optional
+        Unit of a file that states none, such as a CSV file. If the file states a unit, it must
+        be the same.
+    axes, zeros : str
+        As of ``marker_tracks``.
+
+    Returns
+    -------
+    MarkerTracks
+        The tracks.
+
+    Raises
+    ------
+    IdentificationError
+        The file cannot be read; the message names the line.
+    ExtraMissing
+        A C3D file is read without the extra "c3d".
+
+    Notes
+    -----
+    The first line of a CSV file names the columns: ``time``, then ``NAME_x``, ``NAME_y`` and
+    ``NAME_z`` of each marker. Empty cells and nan are gaps.
+
+    Examples
+    --------
+    >>> tracks = st.read_markers("flight.csv", unit="mm", axes="zxy")  # doctest: +SKIP
     """
     try:
         source = Path(path)
@@ -63,7 +89,7 @@ def _lines(source: Path) -> list[str]:
     try:
         return source.read_text(encoding="utf-8-sig").splitlines()
     except UnicodeDecodeError as error:
-        raise IdentificationError(f"{source}: is no text file ({error.reason})") from error
+        raise IdentificationError(f"{source}: is not a text file ({error.reason})") from error
 
 
 def _trc(source: Path) -> Read:
@@ -71,13 +97,13 @@ def _trc(source: Path) -> Read:
     lines = _lines(source)
     if len(lines) < 6 or not lines[0].startswith("PathFileType"):
         raise IdentificationError(
-            f"{source}: is no whole TRC file: its first line needs PathFileType"
+            f"{source}: is not a complete TRC file: its first line needs PathFileType"
         )
     header = dict(zip(lines[1].split("\t"), lines[2].split("\t"), strict=False))
     header = {key.strip(): value.strip() for key, value in header.items()}
     lacking = [key for key in ("NumFrames", "NumMarkers", "Units") if key not in header]
     if lacking:
-        raise IdentificationError(f"{source}: line 3 has no {lacking[0]}: is the header whole?")
+        raise IdentificationError(f"{source}: line 3 has no {lacking[0]}: is the header complete?")
     names = [name.strip() for name in lines[3].split("\t")[2:] if name.strip()]
     count, frames = (_whole(source, header, key) for key in ("NumMarkers", "NumFrames"))
     if len(names) != count:
@@ -107,7 +133,7 @@ def _whole(source: Path, header: dict[str, str], key: str) -> int:
 
 
 def _check_rate(source: Path, times: np.ndarray, stated: str | None) -> None:
-    """IdentificationError where the times have another rate than a file states."""
+    """IdentificationError if the times do not have the rate that the file states."""
     try:
         rate = float(stated or "nan")
     except ValueError:
@@ -122,7 +148,7 @@ def _check_rate(source: Path, times: np.ndarray, stated: str | None) -> None:
 
 
 def _cells(source: Path, line: int, cells: list[str], count: int) -> list[float]:
-    """Return the numbers of a line, nan in empty cells; IdentificationError where some lack."""
+    """Return the numbers of a line, nan in empty cells; IdentificationError if some are missing."""
     cells = [cell.strip() for cell in cells]
     while len(cells) > count and not cells[-1]:
         cells.pop()
@@ -152,7 +178,7 @@ def _csv(source: Path) -> Read:
 
 
 def _c3d(source: Path) -> Read:
-    """Read a C3D file through ezc3d, where markers that were not seen are nan."""
+    """Read a C3D file with ezc3d, which gives nan for markers that were not seen."""
     ezc3d = needed("ezc3d", "c3d")
     try:
         content = ezc3d.c3d(str(source))
@@ -164,9 +190,9 @@ def _c3d(source: Path) -> Read:
         first = int(content["header"]["points"]["first_frame"])
     except OSError:
         raise
-    except Exception as error:  # ezc3d tells of a damaged file by errors of many kinds
+    except Exception as error:  # ezc3d raises errors of many kinds for damaged files
         raise IdentificationError(
-            f"{source}: is no whole C3D file ({type(error).__name__}: {error!s:.100})"
+            f"{source}: is not a complete C3D file ({type(error).__name__}: {error!s:.100})"
         ) from error
     times = (first + np.arange(len(positions))) / rate
     return times, positions, names[: positions.shape[1]], str(units[0]) if units else None

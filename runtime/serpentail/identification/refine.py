@@ -1,4 +1,4 @@
-"""Cuts the mesh of a trial where its integration is not exact beside the noise."""
+"""Refines the mesh of a trial where integration errors are not small beside the noise."""
 
 import numpy as np
 
@@ -7,15 +7,15 @@ from . import stages as radau
 from .stages import difference
 from .trial import Iterate, Trial
 
-SHARE = 0.05  # of the noise that all intervals together may err
+SHARE = 0.05  # allowed error of all intervals together, relative to the noise
 ORDER = 6  # of the local error
 MOST = 8  # parts into which one interval is cut at once
 
 
 def parts_needed(model: Model, trial: Trial, iterate: Iterate) -> np.ndarray | None:
-    """Return into how many parts each interval must be cut, (K,); None where none must be.
+    """Return the number of parts for each interval, (K,); None if no interval must be cut.
 
-    The error of an interval is what two half steps differ by from the whole one.
+    The error of an interval is the difference between one step and two half steps.
     """
     half = trial.spans / 2
     torques = iterate.over(model, trial)

@@ -1,4 +1,4 @@
-"""What an identification comes to: parameters with intervals, motions, torques, residuals."""
+"""``Identification``: parameters with intervals, motions, torques and residuals."""
 
 from dataclasses import dataclass
 from os import PathLike
@@ -13,77 +13,45 @@ from ..motion.origin import origin
 from ..motion.table import as_text
 from ..motion.trajectory import Trajectory
 from .certainty import Combination
+from .estimates import Estimate, IdentifiedTrial
 from .placement import Placements
-from .tracks import MarkerTracks
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """One estimated number with its standard deviation and interval; begin: what the search began
-    with; at_bound: it went to 0, below which it cannot be.
-    """
-
-    name: str
-    value: float
-    std: float
-    low: float
-    high: float
-    unit: str
-    begin: float
-    at_bound: bool = False
-
-    def __str__(self) -> str:
-        told = f"{self.name} = {self.value:.6g} {self.unit}".rstrip()
-        if np.isinf(self.high - self.low):
-            return f"{told}, not determined"
-        return f"{told}, from {self.low:.6g} to {self.high:.6g}"
-
-
-@dataclass(frozen=True, eq=False)
-class EstimatedTorques:
-    """Torques at the knots of a trial: times (U,) s; values and their standard deviations (U, 2m)
-    N m; intervals low, high (U, 2m).
-    """
-
-    times: np.ndarray
-    values: np.ndarray
-    std: np.ndarray
-    low: np.ndarray
-    high: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
-class IdentifiedTrial:
-    """One trial: what was seen, the motion at its frames, where the model has the markers (F, M, 3)
-    m, the torques where these were estimated.
-    """
-
-    tracks: MarkerTracks
-    trajectory: Trajectory
-    modelled: np.ndarray
-    torques: EstimatedTorques | None
-
-    @property
-    def residuals(self) -> np.ndarray:
-        """Seen less modelled positions (F, M, 3), m; nan in gaps."""
-        return self.tracks.positions - self.modelled
-
-    @property
-    def power(self) -> np.ndarray:
-        """Power of each torque (F, 2m), W: tau times the rate of its tail coordinate."""
-        return self.trajectory.tau * self.trajectory.v[:, 6:]
 
 
 @dataclass(frozen=True, eq=False)
 class Identification:
     """Parameters, motions and torques that fit marker tracks best, and how certain they are.
 
-    parameters: an Estimate of each number; covariance (P, P) of them, SI, inf where the data
-    determine nothing; singular_values (P,) of the information about relative changes: each is 1
-    over a relative standard deviation; undetermined: combinations that are known to no better than
-    a factor.  noise: standard deviation of a marker's coordinate, m, stated or estimated.
-    model: with these parameters; placed: the markers, with these offsets; trials; confidence of the
-    intervals; iterations; success: whether the search converged; seconds that it took.
+    ``identification["tail_mass"]`` is the Estimate of that name.
+
+    Attributes
+    ----------
+    model : Model
+        The model with the estimated parameters.
+    placed : Placements
+        The markers, with their estimated offsets.
+    parameters : tuple of Estimate
+        Each estimated number: ``name``, ``value``, ``std``, the interval ``low`` to ``high``,
+        ``unit``, ``begin``, ``at_bound``.
+    covariance : ndarray, shape (P, P)
+        Covariance of the parameters, SI; inf if the data determine nothing.
+    singular_values : ndarray, shape (P,)
+        Singular values of the information on relative changes; each is 1 over a relative
+        standard deviation.
+    undetermined : tuple of Combination
+        Combinations of parameters that are known to a factor at best.
+    noise : float
+        Standard deviation of a marker's coordinate (m), as given or estimated.
+    confidence : float
+        Probability of the intervals.
+    trials : tuple of IdentifiedTrial
+        Each trial: ``tracks``, ``trajectory``, ``modelled``, ``residuals`` (m), ``torques`` and
+        ``power`` (W).
+    iterations : int
+        Iterations of the search.
+    success : bool
+        Whether the search converged.
+    seconds : float
+        Time that it took (s).
     """
 
     model: Model
@@ -114,7 +82,7 @@ class Identification:
 
     @property
     def report(self) -> dict[str, Any]:
-        """What came out, ready for JSON; intervals of what the data do not tell are null."""
+        """JSON-ready summary; intervals that the data do not determine are null."""
         told: dict[str, Any] = {
             "success": self.success,
             "iterations": self.iterations,
@@ -138,7 +106,7 @@ class Identification:
 
     @property
     def table(self) -> str:
-        """The parameters as lines: value, unit, standard deviation, interval."""
+        """The parameters as lines of text: value, unit, standard deviation, interval."""
         rows = {
             each.name: f"{each.value:.5g} {each.unit}, std {each.std:.2g}, "
             f"{self.confidence:.0%}: {each.low:.5g} to {each.high:.5g}"
@@ -153,9 +121,28 @@ class Identification:
         return "\n  ".join([head, *lines]) + ">"
 
     def plot(self, path: str | PathLike[str] | None = None, trial: int = 0) -> Any:
-        """Draw residuals, torques and power of a trial over time; return figure and axes.
+        """Draw residuals, torques and power of a trial over time; needs the extra "plot".
 
-        path: also write it to this .pdf, .png or .svg file.  ExtraMissing without the extra "plot".
+        Parameters
+        ----------
+        path : str or path, optional
+            A .pdf, .png or .svg file to write the figure to.
+        trial : int, default 0
+            Number of the trial.
+
+        Returns
+        -------
+        figure : matplotlib.figure.Figure
+            The figure.
+        axes : ndarray of matplotlib.axes.Axes
+            Its axes.
+
+        Raises
+        ------
+        IdentificationError
+            There is no such trial.
+        ExtraMissing
+            Matplotlib is not installed.
         """
         from ..pictures.residuals import residual_figure
 
@@ -169,7 +156,23 @@ class Identification:
         )
 
     def view(self, path: str | PathLike[str] = "identified.html") -> Path:
-        """Write the page of the motions with the seen markers over the model; return its path."""
+        """Write a page of the motions, with the seen markers over the model.
+
+        Parameters
+        ----------
+        path : str or path, default "identified.html"
+            The .html file.
+
+        Returns
+        -------
+        Path
+            The path of the file.
+
+        Raises
+        ------
+        ViewError, ModelError
+            As of ``serpentail.view``.
+        """
         from ..viewer.view import view
 
         names = None

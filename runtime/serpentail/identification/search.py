@@ -1,4 +1,4 @@
-"""Fits on meshes that are fine enough, with a noise that is estimated where it is unknown."""
+"""Fits on refined meshes, and estimates the noise if it is unknown."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -18,7 +18,7 @@ from .trial import Iterate, Trial
 from .unknowns import Unknowns
 
 ROUNDS = 4  # of refinement
-NOISE_ROUNDS, SETTLED = 15, 0.003  # of estimating the noise beside priors
+NOISE_ROUNDS, SETTLED = 15, 0.003  # rounds that estimate the noise if there are priors
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +39,7 @@ def first_iterate(model: Model, trial: Trial, states: np.ndarray) -> Iterate:
 
 
 def refined(task: Task, start: Point, stage: Stage) -> tuple[Task, Fit]:
-    """Return the best fit on meshes that are fine enough, with the noise where that is unknown."""
+    """Return the best fit on meshes that are fine enough, with the noise if that is unknown."""
     task, found = with_noise(task, start, stage)
     for _ in range(ROUNDS):
         model = task.unknowns.model_at(found.point.values)
@@ -78,7 +78,7 @@ def cut(
 
 
 def with_noise(task: Task, start: Point, stage: Stage) -> tuple[Task, Fit]:
-    """Return the best fit; an unknown noise is estimated in turn with it, where priors weigh."""
+    """Return the best fit; with priors, fit and estimate of an unknown noise alternate."""
     found = fit(task.unknowns, task.trials, start, stage)
     believed = any(each.spread is not None for each in task.unknowns.each)
     weighs = believed or any(trial.unknown_torques for trial in task.trials)

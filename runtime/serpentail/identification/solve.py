@@ -1,8 +1,8 @@
 """Finds the motion, the torques and the unknowns that fit best: Gauss-Newton with a line search.
 
-Every iteration linearises all trials, eliminates their states and torques by an orthogonal
-decomposition each, and solves for what they share. What is left of the decompositions tells the
-information about the shared unknowns.
+Every iteration linearises all trials, eliminates the states and torques of each by an orthogonal
+decomposition, and solves for the unknowns that they share. The remaining rows of the decompositions
+give the information about the shared unknowns.
 """
 
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ from .unknowns import Unknowns
 ITERATIONS = 60
 CLOSE = 1e-4  # last step, in standard deviations of the estimates
 ROUNDING = 1e-9  # last step over the size of the data
-NULL = 1e-9  # singular values below, over the largest, are of what no data can tell
+NULL = 1e-9  # directions with smaller singular values (relative) are undetermined
 DEPENDENT = 1e-5  # of a column's length that is left: below, columns depend on each other
 
 
@@ -40,7 +40,7 @@ class Fit:
 
 
 def fit(unknowns: Unknowns, each: tuple[Trial, ...], start: Point, stage: Stage | None) -> Fit:
-    """Return the best fit near a start; IdentificationError where no step can be made."""
+    """Return the best fit near a start; IdentificationError if no step is possible."""
     pinned = np.zeros(len(unknowns.each), bool)
     point = integrated(unknowns, each, start)
     if point is None:
@@ -72,7 +72,7 @@ def fit(unknowns: Unknowns, each: tuple[Trial, ...], start: Point, stage: Stage 
 def _decomposed(
     unknowns: Unknowns, each: tuple[Trial, ...], point: Point
 ) -> tuple[tuple[Linear, ...], tuple[np.ndarray, ...]]:
-    """Return each trial's linear problem, and its triangle with the right-hand side beside it."""
+    """Return each trial's linear problem, and its triangular factor with the right-hand side."""
     model, placed = unknowns.model_at(point.values), unknowns.placed_at(point.values)
     linear = tuple(
         trials.linearised(unknowns, model, placed, trial, iterate)
@@ -105,9 +105,9 @@ def triangle(rows: np.ndarray, right: np.ndarray) -> np.ndarray:
 
 
 def shared_rows(unknowns: Unknowns, triangles: tuple[np.ndarray, ...]) -> np.ndarray:
-    """Return what all trials tell about the shared unknowns, rows (R, P + 1), right-hand side last.
+    """Return the rows (R, P + 1) of all trials about the shared unknowns, right-hand side last.
 
-    The unknowns are over their sizes.
+    The unknowns are divided by their sizes.
     """
     count = len(unknowns.each)
     rows = np.vstack([R[-1 - count : -1, -1 - count :] for R in triangles])
@@ -120,7 +120,7 @@ def _step(
 ) -> tuple[np.ndarray, list[np.ndarray]]:
     """Return the step of the shared unknowns, and of each trial's own.
 
-    Directions that the data cannot tell are left as they are.
+    Directions that the data do not determine are not changed.
     """
     count, step = len(unknowns.each), np.zeros(len(unknowns.each))
     free = np.flatnonzero(~pinned)
@@ -151,7 +151,7 @@ def _change(
     step: np.ndarray,
     steps: list[np.ndarray],
 ) -> float:
-    """Return how far the step moves the model's markers, over what counts as converged."""
+    """Return how far the step moves the model's markers, relative to the limit of convergence."""
     total, rows, square, floor = 0.0, 0, 0.0, 0.0
     for trial, of_trial, own in zip(each, linear, steps, strict=True):
         change = of_trial.rows @ np.concatenate([own, step]) + of_trial.residual - of_trial.right

@@ -1,8 +1,8 @@
 """Integrates all intervals of a mesh side by side, with exact derivatives.
 
 Each interval is a step of the three-stage Radau IIA method (order 5), the collocation that plans
-use: its equations are solved by Newton's method, and differentiated by the implicit function
-theorem, so the derivatives are those of the numbers that come out.
+use. Newton's method solves its equations, and the implicit function theorem differentiates them, so
+the derivatives are exact for the numerical results.
 """
 
 from dataclasses import dataclass
@@ -28,9 +28,10 @@ TOLERANCE = 1e-11  # of the last Newton step, over the sizes of the states
 
 @dataclass(frozen=True, eq=False)
 class Steps:
-    """What K intervals come to: stages (K, 3, nx); derivatives of their ends in tangent numbers by
-    the states they begin with (K, 2nv, 2nv), by the torques at both ends (K, 2, 2nv, 2m), by the
-    parameters (K, 2nv, P).
+    """Results of K intervals: stages (K, 3, nx), and derivatives of their ends in tangent numbers.
+
+    The derivatives are with respect to the states at the beginning (K, 2nv, 2nv), the torques at
+    both ends (K, 2, 2nv, 2m) and the parameters (K, 2nv, P).
     """
 
     stages: np.ndarray
@@ -49,7 +50,7 @@ def solved(
 ) -> np.ndarray | None:
     """Return the stages (K, 3, nx) of intervals of spans (K,) s that begin at states (K, nx).
 
-    torques (K, 3, 2m): at the stages.  guess (K, 3, nx).  None where Newton's method fails.
+    torques (K, 3, 2m): at the stages.  guess (K, 3, nx).  None if Newton's method fails.
     """
     count, nx = begin.shape
     X, scale = guess.copy(), 1 + np.abs(begin).max(axis=0)
@@ -119,7 +120,7 @@ def differentiated(
 def _split(
     last: np.ndarray, model: Model, sizes: tuple[int, np.ndarray, bool], stages: np.ndarray
 ) -> Steps:
-    """Return derivatives of the ends by what they are of."""
+    """Return derivatives of the ends, split by their arguments."""
     count, by_unknowns, unknown_torques = sizes
     states, nt = 2 * model.nv, model.layout.nt
     by_torque = np.zeros((count, 2, states, nt))

@@ -13,10 +13,10 @@ from .trial import world_points
 
 ITERATIONS = 25
 CLOSE = 1e-5  # m and rad: the last step of a fit
-RIDGE = 1e-3  # of turns, over the length of the tail: holds what a frame's markers do not show
-ENOUGH = 0.5  # of the markers that a frame needs to be looked at by itself
+RIDGE = 1e-3  # weight of rotations, over the tail's length: holds undetermined directions
+ENOUGH = 0.5  # part of the markers that a frame needs to be fitted by itself
 WINDOW = 7  # frames of a local parabola
-FAR = 4.0  # times the usual misfit: such a frame is not what others begin with
+FAR = 4.0  # times the usual misfit: other frames do not begin from such a frame
 
 
 def motion_shown(model: Model, placed: Placements, tracks: MarkerTracks) -> np.ndarray:
@@ -51,9 +51,10 @@ def configurations(model: Model, placed: Placements, tracks: MarkerTracks) -> np
 def fitted(
     model: Model, placed: Placements, positions: np.ndarray, begin: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return configurations (F, nq) near others that fit positions (F, M, 3), and misfits (F,) m.
+    """Return configurations (F, nq) that fit positions (F, M, 3), and misfits (F,) m.
 
-    Levenberg-Marquardt steps of all frames side by side; turns are held a little where they are.
+    They begin at given ones. Levenberg-Marquardt steps of all frames side by side; a small weight
+    holds rotations where they are.
     """
     nv, reach = model.nv, float(model.parameters["tail_length"])
     weight = np.isfinite(positions).all(axis=2)
@@ -96,9 +97,9 @@ def turned(model: Model, q: np.ndarray, step: np.ndarray) -> np.ndarray:
 
 
 def _begin(model: Model, placed: Placements, tracks: MarkerTracks) -> np.ndarray:
-    """Return configurations with a straight tail whose torsos lie as the torso's markers do.
+    """Return configurations with a straight tail, and torsos placed by the torso's markers.
 
-    Where the torso has too few, all markers count; a frame without any is as the one before.
+    If these are too few, all markers count; a frame without any is like the one before.
     """
     frames = len(tracks.times)
     q = np.zeros((frames, model.nq))
@@ -142,7 +143,7 @@ def quaternion_of(R: np.ndarray) -> np.ndarray:
 
 
 def _between(times: np.ndarray, q: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Return configurations with those of frames that showed too little put between the others."""
+    """Return configurations in which frames with too few markers are interpolated."""
     q = q.copy()
     kept = q[rows]
     kept[:, QUATERNION] = sign_continuous(kept[:, QUATERNION])
@@ -168,7 +169,7 @@ def velocities(model: Model, times: np.ndarray, q: np.ndarray) -> np.ndarray:
 
 
 def on_mesh(model: Model, frames: np.ndarray, times: np.ndarray, mesh: np.ndarray) -> np.ndarray:
-    """Return states (K+1, nx) at a mesh between those of frames at times."""
+    """Return states (K+1, nx) at a mesh, interpolated from those of frames at times."""
     states = frames.copy()
     states[:, QUATERNION] = sign_continuous(states[:, QUATERNION])
     found = np.stack([np.interp(mesh, times, column) for column in states.T], axis=1)

@@ -15,11 +15,23 @@ PER_TIME = 8  # knots in each correlation time
 
 @dataclass(frozen=True)
 class TorquePrior:
-    """What is believed of unknown joint torques: each is a stationary Ornstein-Uhlenbeck process.
+    """Prior on unknown joint torques: each is a stationary Ornstein-Uhlenbeck process of mean zero.
 
-    std: standard deviation (N m) at any time; time: of correlation (s), so that torques t apart
-    correlate as exp(-t / time).  The mean is zero.  Torques are linear between knots
-    an eighth of that time apart, or a frame where frames are sparser, with these correlations.
+    Torques at times t apart have the correlation exp(-t / time). They are linear between knots
+    ``time / 8`` apart, or one frame apart if frames are sparser.
+
+    Parameters
+    ----------
+    std : float
+        Standard deviation at any time (N m).
+    time : float
+        Correlation time (s).
+
+    Examples
+    --------
+    >>> import serpentail as st
+    >>> st.TorquePrior(std=5e-3, time=0.02)
+    TorquePrior(std=0.005, time=0.02)
     """
 
     std: float
@@ -27,9 +39,9 @@ class TorquePrior:
 
 
 def checked_prior(prior: Any) -> TorquePrior:
-    """Return a prior; IdentificationError where it is none."""
+    """Return a checked prior; IdentificationError otherwise."""
     if not isinstance(prior, TorquePrior):
-        needs = "a TorquePrior(std, time), which says how large the torques may be, and how quick"
+        needs = "a TorquePrior: its standard deviation (N m) and correlation time (s)"
         raise refusal("torques", prior, needs, IdentificationError)
     return TorquePrior(
         number("torques.std", prior.std, IdentificationError, above=0),
@@ -41,9 +53,10 @@ Known = Callable[[np.ndarray], np.ndarray]  # times (...) -> torques (..., 2m)
 
 
 def known_torques(torques: Any, nt: int) -> Known:
-    """Return known torques as a function of time; IdentificationError where they are unsound.
+    """Return known torques as a function of time; IdentificationError if they are wrong.
 
-    torques: None, for none; numbers (2m,), constant; a Trajectory; a function of the time (s).
+    torques: None for none; numbers (2m,), constant; (times, values); a Trajectory; a function of
+    time.
     """
     if torques is None:
         return lambda times: np.zeros((*times.shape, nt))

@@ -1,4 +1,4 @@
-"""Marker tracks: where each marker was seen at each time, in the world, nan where it was not."""
+"""``MarkerTracks``: positions of markers over time, nan if a marker was not seen."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,9 +19,18 @@ FEWEST = 4  # frames
 
 @dataclass(frozen=True, eq=False)
 class MarkerTracks:
-    """Seen markers: times (F,) s, increasing; positions (F, M, 3) m, world, nan in gaps; M names.
+    """Positions of M markers at F times; ``marker_tracks`` and ``read_markers`` make them.
 
-    Made by ``marker_tracks`` or ``read_markers``, which check them.
+    Attributes
+    ----------
+    times : ndarray, shape (F,)
+        Increasing times (s).
+    positions : ndarray, shape (F, M, 3)
+        Positions (m, world); nan if a marker was not seen.
+    names : tuple of str
+        Names of the markers.
+    source : str
+        Where they are from, for messages.
     """
 
     times: np.ndarray
@@ -35,7 +44,23 @@ class MarkerTracks:
         return np.isfinite(self.positions).all(axis=2)
 
     def of(self, names: Sequence[str]) -> "MarkerTracks":
-        """Return the tracks of these markers in this order; IdentificationError where one lacks."""
+        """Return the tracks of some markers.
+
+        Parameters
+        ----------
+        names : sequence of str
+            Names in the wanted order.
+
+        Returns
+        -------
+        MarkerTracks
+            Their tracks.
+
+        Raises
+        ------
+        IdentificationError
+            There is no marker of such a name.
+        """
         for name in names:
             one_of(f"markers of {self.source}", name, self.names, IdentificationError)
         columns = [self.names.index(name) for name in names]
@@ -51,15 +76,43 @@ def marker_tracks(
     axes: str = "xyz",
     zeros: str = "refuse",
 ) -> MarkerTracks:
-    """Return checked marker tracks of arrays.
+    """Make marker tracks from arrays.
 
-    times (F,): s, increasing, at any rate, even or uneven.  positions (F, M, 3): nan where a marker
-    was not seen.  names: of the M markers.
-    unit: of the positions, such as "mm"; there is no default, since a wrong guess would go unseen.
-    axes: which axes of the data point right, forward and up, which are x, y and z of the world;
-    "zxy" for OpenSim's y up and x forward; a minus turns one, "-xz y" without spaces.
-    zeros: "refuse" markers at exactly (0, 0, 0), which some programs write in gaps, or take them as
-    "gap".  Raises IdentificationError.
+    Parameters
+    ----------
+    times : array_like, shape (F,)
+        Increasing times (s), four or more, evenly spaced or not.
+    positions : array_like, shape (F, M, 3)
+        Positions; nan if a marker was not seen.
+    names : sequence of str
+        Names of the M markers.
+    unit : str
+        Unit of the positions, such as "mm". It has no default, because a wrong guess would not
+        be noticed.
+    axes : str, default "xyz"
+        Axes of the data that point right, forward and up, which are the world's x, y and z. For
+        OpenSim's y up and x forward it is "zxy". A minus reverses an axis, as in "-yxz".
+    zeros : {"refuse", "gap"}, default "refuse"
+        Markers at exactly (0, 0, 0), which some programs write in gaps: refuse them, or read
+        them as gaps.
+
+    Returns
+    -------
+    MarkerTracks
+        The tracks, in m and in world axes.
+
+    Raises
+    ------
+    IdentificationError
+        An argument is wrong.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import serpentail as st
+    >>> tracks = st.marker_tracks(np.arange(4) / 100, np.ones((4, 1, 3)), ["tip"], unit="mm")
+    >>> tracks.positions[0, 0].tolist()
+    [0.001, 0.001, 0.001]
     """
     return checked_tracks(times, positions, names, (unit, axes, zeros), "arrays")
 
@@ -67,7 +120,7 @@ def marker_tracks(
 def checked_tracks(
     times: Any, positions: Any, names: Any, how: tuple[Any, Any, Any], source: str
 ) -> MarkerTracks:
-    """Return tracks of arrays, once each is sound; how: unit, axes, zeros; source: for errors."""
+    """Return tracks of arrays after checking them; how: unit, axes, zeros; source: for errors."""
     unit, axes, zeros = how
     factor = float(UNITS[checked_unit(unit, source)])
     t = checked_times(times, source)
@@ -93,7 +146,7 @@ def checked_tracks(
 
 
 def checked_unit(unit: Any, source: str) -> str:
-    """Return a unit of length as MEASURES spells it; the error asks for one."""
+    """Return a unit of length as MEASURES spells it; IdentificationError if it is missing."""
     if unit is None:
         raise IdentificationError(
             f'{source}: unit: none is stated: give unit="mm", or whichever of '
@@ -124,10 +177,10 @@ def checked_times(times: Any, source: str) -> np.ndarray:
 
 
 def checked_names(names: Any, source: str) -> tuple[str, ...]:
-    """Return names of markers; IdentificationError unless they are texts that differ."""
+    """Return the names of markers; IdentificationError unless they are different texts."""
     listed = tuple(names) if isinstance(names, list | tuple) else ()
     if not listed or not all(isinstance(name, str) and name.strip() for name in listed):
-        raise refusal(f"{source}: names", names, "a name of each marker", IdentificationError)
+        raise refusal(f"{source}: names", names, "a name for each marker", IdentificationError)
     twice = [name for name in listed if listed.count(name) > 1]
     if twice:
         raise IdentificationError(f"{source}: two markers are called {twice[0]!r}: rename one")
@@ -135,7 +188,7 @@ def checked_names(names: Any, source: str) -> tuple[str, ...]:
 
 
 def without_zeros(where: np.ndarray, names: Sequence[str], zeros: str, source: str) -> np.ndarray:
-    """Return positions with nan in place of exact zeros, or refuse these."""
+    """Return positions with nan in place of exact zeros, or refuse them."""
     empty = (where == 0).all(axis=2)
     if not empty.any():
         return where
@@ -149,7 +202,7 @@ def without_zeros(where: np.ndarray, names: Sequence[str], zeros: str, source: s
 
 
 def checked_axes(axes: Any) -> tuple[list[int], np.ndarray]:
-    """Return columns and signs of the data's axes that point right, forward and up."""
+    """Return columns and signs of the axes of the data that point right, forward and up."""
     words = axes if isinstance(axes, str) else ""
     columns: list[int] = []
     signs: list[float] = []

@@ -2,8 +2,8 @@
 
 The unknowns of a trial are the states at all mesh points and the torques at the knots. Linearised,
 each state follows from the first one, the torques, the shared unknowns and the defects, which are
-what the integrated intervals and the next states differ by: so the states are eliminated, and the
-columns left are those of the first state, of the torques and of the shared unknowns.
+the differences between the ends of integrated intervals and the next states. So the states are
+eliminated, and the columns for the first state, the torques and the shared unknowns are left.
 """
 
 from dataclasses import dataclass, replace
@@ -121,7 +121,7 @@ def meshed(
 
 
 def solved(model: Model, trial: Trial, iterate: Iterate) -> Iterate | None:
-    """Return the iterate with its intervals integrated; None where that fails."""
+    """Return the iterate with its intervals integrated; None if that fails."""
     found = radau.solved(
         model, trial.spans, iterate.states[:-1], iterate.over(model, trial), iterate.stages
     )
@@ -129,7 +129,7 @@ def solved(model: Model, trial: Trial, iterate: Iterate) -> Iterate | None:
 
 
 def defects(model: Model, iterate: Iterate) -> np.ndarray:
-    """Return what the ends of the intervals and the next states differ by, (K, 2nv)."""
+    """Return the differences between the ends of the intervals and the next states, (K, 2nv)."""
     return radau.difference(model, iterate.ends, iterate.states[1:])
 
 
@@ -141,12 +141,12 @@ def residuals(model: Model, placed: Placements, trial: Trial, states: np.ndarray
 
 
 def seen_points(model: Model, placed: Placements, trial: Trial, states: np.ndarray) -> np.ndarray:
-    """Return where the model has the markers at the frames, (F, M, 3) m."""
+    """Return the positions of the markers by the model at the frames, (F, M, 3) m."""
     return world_points(model, placed, states[trial.frames, : model.nq])
 
 
 def world_points(model: Model, placed: Placements, q: np.ndarray) -> np.ndarray:
-    """Return where the model has the markers at configurations (F, nq), (F, M, 3) m."""
+    """Return the positions of the markers by the model at configurations (F, nq), (F, M, 3) m."""
     body = body_positions(geometry_of(model), q[:, TAIL_Q], placed)
     return q[:, None, :3] + np.einsum("fij,fmj->fmi", rotation_matrix(q[:, QUATERNION]), body)
 
@@ -184,7 +184,7 @@ class Linear:
     defects: np.ndarray
 
     def states(self, trial: Trial, step: np.ndarray, shared: np.ndarray) -> np.ndarray:
-        """Return the steps (K+1, 2nv) of all states that a solution of the linear problem has."""
+        """Return the steps (K+1, 2nv) of all states for a solution of the linear problem."""
         own = self.steps.by_state.shape[1]
         torques = step[own:].reshape(len(trial.knots), self.steps.by_torque.shape[-1])
         driven = self.defects + self.steps.by_parameters @ shared

@@ -41,7 +41,7 @@ class Unknown:
 
 @dataclass(frozen=True, eq=False)
 class Unknowns:
-    """All estimated numbers of a model and its markers; start (P,): what they begin with."""
+    """All estimated numbers of a model and its markers; start (P,): their first values."""
 
     model: Model
     placed: Placements
@@ -54,7 +54,7 @@ class Unknowns:
         return np.array([each.size for each in self.each])
 
     def model_at(self, values: np.ndarray) -> Model:
-        """Return the model with these parameters; ModelError where they are unphysical."""
+        """Return the model with these parameters; ModelError if they are unphysical."""
         changes = independent(self.model.manifest, self.model.parameters)
         own = {each.of for each in self.each if not each.is_offset}
         new = {name: np.array(changes[name], float) for name in own}
@@ -63,7 +63,7 @@ class Unknowns:
                 new[each.of] = _with(new[each.of], each.entries, value)
         if not new:
             return self.model
-        with warnings.catch_warnings():  # an iterate may be unusual; the result is looked at
+        with warnings.catch_warnings():  # an iterate may be unusual; only the result is checked
             warnings.simplefilter("ignore", UnusualSize)
             warnings.simplefilter("ignore", UnlikeBodies)
             return self.model.with_parameters(**new)
@@ -136,9 +136,9 @@ def _struct_direction(model: Model, unknown: Unknown) -> np.ndarray:
 
 
 def unknowns(model: Model, placed: Placements, estimate: Any) -> Unknowns:
-    """Return what is to be estimated; IdentificationError with each name that is none.
+    """Return what is to be estimated; IdentificationError with each wrong name.
 
-    estimate: names, or name -> spread of a prior about the value to begin with.
+    estimate: names, or name -> spread of a prior about the first value.
     """
     if isinstance(estimate, Mapping):
         wanted = dict(estimate)

@@ -1,4 +1,4 @@
-"""Writes marker tracks to TRC and CSV files, as ``read_markers`` reads them."""
+"""``write_markers``: writes marker tracks to TRC and CSV files."""
 
 from os import PathLike
 from pathlib import Path
@@ -11,9 +11,26 @@ from .tracks import MarkerTracks
 
 
 def write_markers(tracks: MarkerTracks, path: str | PathLike[str]) -> Path:
-    """Write tracks to a .trc file in mm, or to a .csv file in m; return its path.
+    """Write marker tracks to a file that ``read_markers`` reads; gaps are empty cells.
 
-    Gaps are empty cells.  The file is written whole or not at all.
+    Parameters
+    ----------
+    tracks : MarkerTracks
+        The tracks.
+    path : str or path
+        A .trc file, written in mm, or a .csv file, written in m.
+
+    Returns
+    -------
+    Path
+        The path of the file, which is written whole or not at all.
+
+    Raises
+    ------
+    IdentificationError
+        The suffix is another one.
+    NotWritten
+        The file cannot be written.
     """
     target = Path(path)
     if target.suffix not in (".trc", ".csv"):

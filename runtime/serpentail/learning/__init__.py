@@ -1,1 +1,1 @@
-"""Environments in which a learner moves the tail, as Gymnasium has them."""
+"""Gymnasium environments in which a learner moves the tail."""

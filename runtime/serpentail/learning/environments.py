@@ -1,4 +1,4 @@
-"""Gymnasium's environments, one and many at once, on episodes of a task."""
+"""Gymnasium environments, a single one and many at once."""
 
 from typing import Any
 
@@ -17,7 +17,7 @@ MOST_SEED = 2**63 - 1
 
 
 class Environment(gymnasium.Env):
-    """One episode at a time."""
+    """One episode at a time; see ``serpentail.environment``."""
 
     metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012  as Gymnasium has it
 
@@ -28,23 +28,23 @@ class Environment(gymnasium.Env):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[np.ndarray, dict[str, Any]]:
-        """Begin an episode, drawn from a seed, or from where the last draw left off."""
+        """Begin an episode; without a seed, its start continues the random sequence."""
         _refuse_options(options)
         super().reset(seed=seed)
         self.worlds.restart(np.zeros(1, int), self.np_random.random((1, DRAWS)))
         return self.worlds.seen()[0], {}
 
     def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
-        """Apply an action for a control step."""
+        """Apply an action (2m,) for the time that an action is held."""
         rewards, terminated, truncated = self.worlds.act(np.asarray(action)[None])
         ends = bool(terminated[0]), bool(truncated[0])
         return self.worlds.seen()[0], float(rewards[0]), *ends, {}
 
 
 class Environments(VectorEnv):
-    """Many episodes at once; one that has ended begins anew at the next step, whatever its action.
+    """Many episodes at once; one that has ended begins anew at the next step, without its action.
 
-    Environment i draws its starts as ``Environment`` does from seed + i.
+    Environment i draws its starts as ``Environment`` does with the seed ``seed + i``.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012  as Gymnasium has it
@@ -63,7 +63,7 @@ class Environments(VectorEnv):
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[np.ndarray, dict[str, Any]]:
-        """Begin all episodes, drawn from seed + i, from seeds of each, or as draws go on."""
+        """Begin all episodes: number i with ``seed + i``, or with its own of a list of seeds."""
         _refuse_options(options)
         seeds = self._seeds(seed)
         if seeds is not None or not self.generators:
@@ -75,7 +75,7 @@ class Environments(VectorEnv):
     def step(
         self, actions: Any
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
-        """Apply actions (count, 2m) for a control step."""
+        """Apply actions (count, 2m) for the time that an action is held."""
         if not self.generators:
             raise SimulationError("step: no episode has begun: call reset() first")
         rewards, terminated, truncated = self.worlds.act(actions)
@@ -88,13 +88,13 @@ class Environments(VectorEnv):
         return self.worlds.seen(), rewards, terminated, truncated, {}
 
     def _restart(self, which: np.ndarray) -> None:
-        """Begin episodes anew, each from its own generator."""
+        """Begin new episodes, each from its own generator."""
         draws = np.array([self.generators[k].random(DRAWS) for k in which.tolist()])
         self.worlds.restart(which, draws)
         self.over[which] = False
 
     def _seeds(self, seed: int | list[int | None] | None) -> list[int | None] | None:
-        """Return a seed of each; None: none was given."""
+        """Return a seed for each; None if none was given."""
         if seed is None:
             return None
         if isinstance(seed, int | np.integer) and 0 <= seed <= MOST_SEED:
@@ -106,7 +106,7 @@ class Environments(VectorEnv):
 
 
 def spaces_of(worlds: Worlds) -> tuple[spaces.Box, spaces.Box]:
-    """Return the spaces of what is seen of one episode, and of an action."""
+    """Return the spaces of one observation and of one action."""
     nt = worlds.model.layout.nt
     return (
         spaces.Box(worlds.low, worlds.high, dtype=np.float32),
@@ -115,6 +115,6 @@ def spaces_of(worlds: Worlds) -> tuple[spaces.Box, spaces.Box]:
 
 
 def _refuse_options(options: dict[str, Any] | None) -> None:
-    """SimulationError where a reset is given options, of which there are none."""
+    """SimulationError if a reset is given options; it has none."""
     if options:
-        raise refusal("options", options, "none: settings are the environment's", SimulationError)
+        raise refusal("options", options, "none: pass settings to st.environment", SimulationError)

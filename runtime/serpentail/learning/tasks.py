@@ -1,4 +1,4 @@
-"""The tasks of environments: where an episode starts, and what a model needs for it."""
+"""The tasks of environments: the starts of episodes, and what a model needs for them."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -32,7 +32,7 @@ class Task:
         """Return all settings; SimulationError or ModelError names what is wrong."""
         missing = [group for group in self.contacts if group not in model.contacts]
         if missing or (model.contacts and not self.contacts):
-            needs = ", ".join(map(repr, self.contacts)) or "none, it is a flight"
+            needs = ", ".join(map(repr, self.contacts)) or "none, because it is a flight"
             has = ", ".join(map(repr, model.contacts)) or "none"
             raise ModelError(
                 f"{self.name}: {model.name} has contacts {has}: needs {needs}: change `contacts` "

@@ -1,4 +1,4 @@
-"""Many episodes of one task side by side: their states, what is seen of them, and rewards."""
+"""Many episodes of one task side by side: states, observations and rewards."""
 
 from typing import Any
 
@@ -11,7 +11,7 @@ from ..model.model import Model
 from .tasks import DRAWS, Task, standing_legs
 
 EFFORT = 0.01  # of a reward, that full torques cost
-# bounds of what is seen, which is cut there: m, m/s, rad/s
+# bounds of observations, which are clipped: m, m/s, rad/s
 FAR, FAST, SPIN, WHIRL = 100.0, 100.0, 1000.0, 1e5
 
 Array = np.ndarray
@@ -48,16 +48,16 @@ class Worlds:
         return self.settings["step"] * self.settings["substeps"]
 
     def restart(self, which: Array, draws: Array) -> None:
-        """Begin episodes anew; draws (len(which), DRAWS) are from [0, 1)."""
+        """Begin new episodes; draws (len(which), DRAWS) are from [0, 1)."""
         q, v = self.task.start(self.task, self.model, self.settings, draws)
         for part, start in zip(self.parts, (q, v, 0.0), strict=False):
             part[which] = start
         self.taken[which] = 0
 
     def act(self, actions: Any) -> tuple[Array, Array, Array]:
-        """Apply actions (k, 2m), parts of the largest torque, cut at -1 and 1.
+        """Apply actions (k, 2m), parts of the largest torque, limited to -1 and 1.
 
-        Return rewards (k,), and which episodes ended by what they did, or by their time.
+        Return rewards (k,), and which episodes were terminated, or truncated after their time.
         """
         nt, count = self.model.layout.nt, len(self.q)
         actions = real_array("action", actions, StateError)
@@ -80,7 +80,7 @@ class Worlds:
         return rewards, bent | (self.statuses != 0), self.taken >= self.horizon
 
     def seen(self) -> Array:
-        """Return what is seen of all (k, 9 + 4m), within its bounds."""
+        """Return the observations (k, 9 + 4m), within their bounds."""
         q, v = self.q, self.v
         columns = [*self._up(), *v[:, OMEGA].T, q[:, 2], v[:, 2], *q[:, TAIL_Q].T, *v[:, TAIL_V].T]
         left = 1 - self.taken / self.horizon
@@ -92,7 +92,7 @@ class Worlds:
         return 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)
 
     def _bounds(self) -> tuple[Array, Array]:
-        """Return the least and the most of what is seen, as floats."""
+        """Return the lower and upper bounds of observations, as floats."""
         nt = self.model.layout.nt
         bend = 2 * self.settings["angle"]
         high = np.array([1] * 3 + [SPIN] * 3 + [FAR, FAST] + [bend] * nt + [WHIRL] * nt + [1])

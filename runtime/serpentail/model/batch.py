@@ -23,9 +23,9 @@ RecordFunction = Callable[[int], int]  # takes the address of a record, returns 
 
 
 class LazyLibrary:
-    """A source of one model that is compiled when it is first needed, not with the model.
+    """A part of a model's C that is compiled when it is first worthwhile, not with the model.
 
-    missed: seconds that it would have saved so far where it was not used.
+    missed: seconds that it would have saved so far.
     """
 
     def __init__(self, checked: CheckedFolder, profile: str, part: str):
@@ -77,7 +77,7 @@ after_fork(_open_locks)
 class BatchLibrary:
     """The C of one model that evaluates batches, and that simulates batches of flights.
 
-    threads: at most so many evaluate a batch; None: as many as the process may use.
+    threads: largest number for a batch; None: as many as the process may use.
     """
 
     def __init__(self, checked: CheckedFolder, profile: str, threads: int | None = None):
@@ -90,17 +90,17 @@ class BatchLibrary:
         self.rollouts = self.sources["flights"]
 
     def address(self, name: str) -> int:
-        """Return the address of the C function for states that lie apart, for kernels in C.
+        """Return the address of the C function for strided states, for kernels in C.
 
-        It takes the record of a call and the numbers from state to state of each of its arrays;
-        KeyError where the model has no batches of that function.
+        It takes the record of a call, and for each of its arrays the stride between states.
+        KeyError if the model has no batches of that function.
         """
         source = self.sources[self.parts[name]]
         function: Any = source.function(f"{self.prefix}_side_by_side_{name}_apart")
         return ctypes.cast(function, ctypes.c_void_p).value or 0
 
     def entry(self, name: str, count: int) -> RecordFunction | None:
-        """Return the C function for a batch of so many states, None where it is not worth it."""
+        """Return the C function for a batch of this size; None if it is not worthwhile."""
         if name not in self.work:
             return None
         source = self.sources[self.parts[name]]

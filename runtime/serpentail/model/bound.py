@@ -1,4 +1,4 @@
-"""Keeps the cache of compiled models within its size, and tells what is in it."""
+"""Keeps the cache of compiled models within its size, and lists its content."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from .cache import BUILDS, COMPILERS, LIBRARIES, LOCKS, MODELS, PARTS, discard
 
 DEFAULT_SIZE = "1G"
 UNITS = {"": 1, "K": 2**10, "M": 2**20, "G": 2**30, "T": 2**40}
-IN_USE_S = 600.0  # s: what was used so lately stays, since its user may not have opened it yet
-LOST_S = 3600.0  # s after which a part is that of a build that was killed
+IN_USE_S = 600.0  # s: recently used entries stay, because a process may be about to open them
+LOST_S = 3600.0  # s: older parts are from builds that were killed
 KINDS = (LIBRARIES, MODELS, BUILDS, COMPILERS)
-# Names of entries and of parts: what else lies in a folder that a user chose is not the cache's.
+# Names of entries and parts: other files in the user's folder do not belong to the cache.
 OURS = {
     **dict.fromkeys((LIBRARIES, MODELS), re.compile(r"[0-9a-f]{64}")),
     **dict.fromkeys((BUILDS, COMPILERS), re.compile(r"[0-9a-f]{64}\.json")),
@@ -38,7 +38,7 @@ class Entry:
 
 
 def limit() -> int:
-    """Return the size in bytes that the cache may have; SerpentailError where it is no size."""
+    """Return the largest size of the cache in bytes; SerpentailError if the setting is wrong."""
     text = os.environ.get("SERPENTAIL_CACHE_SIZE") or DEFAULT_SIZE
     found = re.fullmatch(r"(\d{1,9})([KMGT]?)", text.strip(), re.IGNORECASE | re.ASCII)
     if found is None:
@@ -68,7 +68,7 @@ def _size(path: Path) -> int:
 
 
 def bound(cache: Path, most: int) -> None:
-    """Delete what killed builds left, then what was not used for longest, down to most bytes."""
+    """Delete leftovers of killed builds, then the oldest entries, down to ``most`` bytes."""
     now = time.time()
     for lost in entries(cache, PARTS, LOCKS):
         if now - lost.used > LOST_S:
@@ -83,7 +83,7 @@ def bound(cache: Path, most: int) -> None:
 
 
 def contents(cache: Path) -> dict[str, str | int]:
-    """Return where the cache is, how many entries of each kind it has, and bytes."""
+    """Return the folder of the cache, the number of entries of each kind, and their bytes."""
     found = list(entries(cache, *OURS))
     counts = {kind: sum(entry.kind == kind for entry in found) for kind in KINDS}
     size = sum(entry.size for entry in found)
@@ -91,12 +91,12 @@ def contents(cache: Path) -> dict[str, str | int]:
 
 
 def empty(cache: Path) -> None:
-    """Delete all that is in the cache; what a process has loaded, it keeps."""
+    """Delete all entries of the cache; processes keep what they have loaded."""
     for entry in entries(cache, *OURS):
         _delete(entry.path, cache)
 
 
 def _delete(path: Path, cache: Path) -> None:
-    """Delete an entry, unless another process does; one that cannot be deleted stays."""
+    """Delete an entry; ignore one that cannot be deleted, or that another process deletes."""
     with contextlib.suppress(OSError):
         discard(path, cache)

@@ -1,4 +1,4 @@
-"""The cache of compiled models: where it is, whose it is, and how an entry gets in whole."""
+"""The cache of compiled models: its folder, its owner, and how entries are added whole."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from .reading import regular_bytes
 
 CACHE_FORMAT = 2  # part of every name in the cache: raise it when the meaning of a name changes
 REMEDY_CACHE = "set SERPENTAIL_CACHE to a folder you can write"
-ROOT = 0  # user id of whom nothing can be kept from
+ROOT = 0  # user id of the administrator, who may read everything
 
 # Folders of the cache. An entry is made in PARTS, and one rename puts it in its place.
 LIBRARIES = "libraries"  # <key>/<digest of the library>.so: each has the proof of its content
 MODELS = "models"  # <manifest hash>/: generated folders as they were checked
-BUILDS = "builds"  # <key>.json: which of the models a scene became
-COMPILERS = "compilers"  # <key>.json: what a compiler said of itself
+BUILDS = "builds"  # <key>.json: the model that was made of a scene
+COMPILERS = "compilers"  # <key>.json: properties of a compiler
 LOCKS = "locks"
 PARTS = "parts"
 
@@ -44,13 +44,13 @@ def digest(data: object) -> str:
     return hashlib.sha256(json.dumps([CACHE_FORMAT, data]).encode()).hexdigest()
 
 
-# Whose it is.  A library in the cache is run, so nobody else may have put it there.
+# Owner. Libraries in the cache are executed, so nobody else may be able to put them there.
 
 
 def refuse_others(*paths: Path) -> None:
-    """Raise SerpentailError where others than the user and root own or may write what is there.
+    """Raise SerpentailError if others than the user and root own it or may write to it.
 
-    Windows tells neither owners nor rights in this way: a cache there is as safe as its folder.
+    Windows has no such owners and rights: there a cache is as safe as its folder.
     """
     if not hasattr(os, "geteuid"):
         return
@@ -60,7 +60,9 @@ def refuse_others(*paths: Path) -> None:
             if status.st_uid not in (os.geteuid(), ROOT):
                 raise _unsafe(path, f"belongs to user {status.st_uid}", "")
             if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
-                private = not status.st_mode & stat.S_ISVTX  # no folder for all, as /tmp is
+                private = (
+                    not status.st_mode & stat.S_ISVTX
+                )  # not a folder for all users, such as /tmp
                 mend = f"`chmod -R go-w {path}` if all in it is yours, or " if private else ""
                 raise _unsafe(path, "is writable by others", mend)
 
@@ -68,7 +70,7 @@ def refuse_others(*paths: Path) -> None:
 def _unsafe(path: Path, fault: str, remedy: str) -> SerpentailError:
     """Return the error that others could have put libraries into the cache."""
     return SerpentailError(
-        f"the cache of compiled models: {path} {fault}, who could have you run what they like: "
+        f"the cache of compiled models: {path} {fault}, who could make you run their code: "
         f"{remedy}set SERPENTAIL_CACHE to a folder of your own"
     )
 
@@ -82,7 +84,7 @@ def unwritable(cache: Path, error: OSError) -> SerpentailError:
 
 
 def own_folder(cache: Path, kind: str) -> Path:
-    """Return a folder of the cache, for the user alone, made where it is missing."""
+    """Return a folder of the cache that is private to the user; make it if it is missing."""
     for path in (cache, cache / kind):
         path.mkdir(0o700, parents=True, exist_ok=True)
     refuse_others(cache, cache / kind)
@@ -110,7 +112,7 @@ def library_name(path: Path) -> str:
 
 
 def mark_used(place: Path) -> None:
-    """Note the time, by which entries that nobody uses are told."""
+    """Store the time of use, by which unused entries are found."""
     with contextlib.suppress(OSError):
         os.utime(place)
 
@@ -127,7 +129,7 @@ def workshop(cache: Path) -> Iterator[Path]:
 
 
 def publish(part: Path, place: Path, whole: Callable[[Path], object]) -> None:
-    """Put an entry in its place by one rename; a whole one that is there stays, another goes."""
+    """Put an entry in its place by one rename; keep a whole one that is there, replace another."""
     own_folder(place.parents[1], place.parent.name)
     try:
         part.rename(place)

@@ -1,5 +1,6 @@
-"""Calls of compiled functions through a small extension in C, where this Python has the headers
-that it needs; where not, ctypes calls them.
+"""Calls of compiled functions through a small C extension.
+
+By ctypes if Python's headers are missing.
 """
 
 import ctypes
@@ -15,7 +16,7 @@ from ..errors import SerpentailError
 from .compiler import compile_library
 
 SOURCE = Path(__file__).with_name("native") / "calls.c"
-# what an extension needs of a linker that asks for every symbol
+# for linkers that ask for every symbol of an extension
 LINKING = ("-Wl,-undefined,dynamic_lookup",) if sys.platform == "darwin" else ()
 Call = Callable[..., Any]  # takes arguments, returns outputs, or None where it does not serve
 
@@ -29,7 +30,7 @@ class Memory(Protocol):
 
 
 def call_of(function: Any, own: Memory) -> Call:
-    """Return what calls a function of the generated C, as ctypes has it, on one state."""
+    """Return a fast call of a generated C function on one state."""
     library = extension()
     if library is None:
         return declined
@@ -38,12 +39,12 @@ def call_of(function: Any, own: Memory) -> Call:
 
 
 def declined(*_: Any) -> None:
-    """Serve in place of such a call where ctypes makes all."""
+    """Stand in for such a call if ctypes makes all calls."""
 
 
 @cache
 def extension() -> ctypes.PyDLL | None:
-    """Return the extension, compiled once for a compiler and a Python; None where it cannot be."""
+    """Return the extension, compiled once for a compiler and a Python; None if that fails."""
     import sysconfig
 
     headers = Path(sysconfig.get_path("include"))

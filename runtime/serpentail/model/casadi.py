@@ -17,14 +17,22 @@ if TYPE_CHECKING:
 
 
 class CasadiFunctions:
-    """Attributes are ``casadi.Function``s, each built once; others take parameters as an input."""
+    """A model's functions for CasADi; each attribute is a ``casadi.Function`` with its parameters.
+
+    ``model.casadi.energy`` takes ``q`` and ``v`` and is built once, when it is first used.
+
+    Parameters
+    ----------
+    model : Model
+        The model; its scene must have the target "casadi", except for ``external``.
+    """
 
     def __init__(self, model: "Model"):
         self._model = model
 
     @kept
     def _module(self) -> ModuleType:
-        """The generated module; ModelError where the scene did not ask for it."""
+        """The generated module; ModelError if the scene did not ask for it."""
         if not self._has_module:
             raise ModelError(
                 f'{self._model.name} was generated without CasADi functions: add "casadi" to '
@@ -52,10 +60,10 @@ class CasadiFunctions:
 
     @kept
     def x_dot(self) -> casadi.Function:
-        """Time derivative of the state x = (q, v) under torques u, of SX operations.
+        """Time derivative of the state x = (q, v), as SX operations.
 
-        Inputs x (nq + nv), u (2m), p: the parameters, such as ``parameter_vector``; see
-        ``Model.x_dot``.  ``external("x_dot")`` is the same of the compiled C.
+        Inputs: x (nq + nv), u (2m) torques (N m), p parameters such as ``parameter_vector``. See
+        ``Model.x_dot``. ``external("x_dot")`` is the same function of the compiled C.
         """
         return self._x_dot(self.symbolic("forward_dynamics"), casadi.SX)
 
@@ -93,23 +101,52 @@ class CasadiFunctions:
 
     @property
     def parameter_vector(self) -> casadi.DM:
-        """The model's parameters, as ``symbolic`` and ``external`` functions take them."""
+        """The model's parameters in the order that ``symbolic`` and ``external`` functions take."""
         return casadi.DM(flat(self._model.manifest, self._model.parameters))
 
     def symbolic(self, name: str) -> casadi.Function:
-        """Return a function of SX operations whose last input is the parameter vector."""
+        """Return a function of SX operations whose last input is the parameter vector.
+
+        Parameters
+        ----------
+        name : str
+            Name of a function of the scene.
+
+        Returns
+        -------
+        casadi.Function
+            Its inputs have the names of the method's arguments, then the parameters.
+
+        Raises
+        ------
+        ModelError
+            The scene left the function or the target "casadi" out, or the function has no SX form.
+        """
         return self._module.function(self._symbolic(name))
 
     def external(self, name: str, derivatives: int = 0, folded: bool = False) -> casadi.Function:
-        """Return the compiled C as a function whose last input is the parameter vector.
+        """Return the compiled C as a CasADi function whose last input is the parameter vector.
 
-        name: of a function of the scene, or "x_dot".
+        Parameters
+        ----------
+        name : str
+            Name of a function of the scene, or "x_dot".
+        derivatives : {0, 1, 2}, default 0
+            Check now that the scene has the functions that exact derivatives of this order need.
+            With 0, CasADi reports a missing one when it differentiates. Derivatives with respect to
+            parameters are of first order and need ``<name>_parameter_derivatives`` in the scene.
+        folded : bool, default False
+            Use the model's parameters in place of the last input.
 
-        Only models of doubles have it.
-        derivatives: 1 or 2 raises ModelError here where the scene lacks what exact derivatives
-        of that order are made of; else CasADi raises when it differentiates.  Those with respect
-        to parameters need ``<name>_parameter_derivatives`` in the scene, and are first ones.
-        folded: take the model's parameters instead of an input.
+        Returns
+        -------
+        casadi.Function
+            The function.
+
+        Raises
+        ------
+        ModelError
+            The model computes with float, was loaded with ``compiled=False``, or lacks a function.
         """
         prefix = self._model.manifest["prefix"]
         if self._model.manifest["real"] != "double":
@@ -133,7 +170,7 @@ class CasadiFunctions:
         return casadi.Function(name, inputs, outputs, names, function.name_out(), options)
 
     def _symbolic(self, name: str) -> str:
-        """Return the name of a function that exists in SX operations."""
+        """Return the name if the function has SX operations; ModelError otherwise."""
         if self._known(name) not in self._module.SIGNATURES:
             remedy = (
                 "differentiate the function by CasADi, or take the compiled one, "
@@ -143,7 +180,7 @@ class CasadiFunctions:
         return name
 
     def _check(self, name: str, derivatives: int) -> None:
-        """Raise ModelError where a scene lacks what derivatives of this order are made of."""
+        """Raise ModelError if the scene lacks a function that derivatives of this order need."""
         functions = self._model.manifest["functions"]
         orders = functions[name]["exact_derivatives"]
         if derivatives and not orders:
@@ -154,7 +191,7 @@ class CasadiFunctions:
             raise self._model.without(*lacking)
 
     def _known(self, name: str) -> str:
-        """Return the name of a function that the scene has."""
+        """Return the name if the scene has the function; ModelError otherwise."""
         if name not in self._model.manifest["functions"]:
             raise self._model.without(name)
         return name

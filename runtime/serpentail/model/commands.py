@@ -6,7 +6,7 @@ import subprocess
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 
-TICK_S = 0.2  # s between looks at how far a command is
+TICK_S = 0.2  # s between checks of a command's progress
 GRACE_S = 0.5  # s that a command has to remove its temporary files
 
 
@@ -15,10 +15,10 @@ def run_all(
     surroundings: Mapping[str, str],
     tick: Callable[[], object] = lambda: None,
 ) -> list[subprocess.CompletedProcess[str]]:
-    """Return the finished commands; OSError where one cannot be started.
+    """Return the finished commands; OSError if one cannot be started.
 
-    tick: called now and then while they run.
-    Where Ctrl-C or an error comes before their end, they are ended, and what they have started.
+    tick: called now and then while they run. After Ctrl-C or an error, the commands and their
+    children are ended.
     """
     with ExitStack() as running:
         started = [running.enter_context(_running(each, surroundings)) for each in commands]
@@ -29,7 +29,7 @@ def run_all(
 def _running(
     command: Sequence[str], surroundings: Mapping[str, str]
 ) -> Iterator[subprocess.Popen[str]]:
-    """Lend a command, in a process group of its own, of which nothing is left at the end."""
+    """Run a command in its own process group; at the end nothing of it is left."""
     with subprocess.Popen(
         command,
         env=surroundings,
@@ -38,7 +38,7 @@ def _running(
         stderr=subprocess.PIPE,
         encoding="utf-8",
         errors="replace",
-        process_group=0,  # Windows has none, and overlooks it
+        process_group=0,  # Windows has no sessions, and ignores it
     ) as process:
         try:
             yield process

@@ -53,10 +53,10 @@ def compile_library(
     cache: Path | None = None,
     flags: tuple[str, ...] = (),
 ) -> Path:
-    """Return the shared library of sources and headers, compiled unless the cache has it.
+    """Return the shared library of sources and headers; compile it unless it is in the cache.
 
     `profile` is "fast" or "reproducible"; `cache` defaults to $SERPENTAIL_CACHE, then the user's
-    cache; `flags` join the profile's. Raises CompilerNotFound, CompileFailed, ModelError
+    cache; `flags` are added to the profile's. Raises CompilerNotFound, CompileFailed, ModelError
     (unreadable sources), SerpentailError (profile, cache).
     """
     text = _text_of(sources, include)
@@ -70,9 +70,9 @@ def library_of(
     cache: Path,
     flags: tuple[str, ...] = (),
 ) -> Path:
-    """Return the library of texts that have this digest; where they lie is asked to compile them.
+    """Return the library of texts with this digest; their folder is read only to compile them.
 
-    flags: that join the profile's.  One process compiles while others wait for it.  Errors as of
+    flags: added to the profile's. One process compiles while others wait for it. Errors as of
     ``compile_library``.
     """
     check_profile(profile)
@@ -91,7 +91,7 @@ def library_of(
 
 
 def noted(text: str, profile: str, cache: Path, flags: tuple[str, ...] = ()) -> Path | None:
-    """Return the library that the compiler made which notes tell of; no process is started."""
+    """Return the library by stored notes about the compiler; no process is started."""
     toolchain = recall(profile, cache)
     if toolchain is None:
         return None
@@ -115,9 +115,9 @@ def describe_compiler(profile: str = "fast") -> dict[str, object]:
 
 
 def text_digest(sources: Sequence[tuple[str, str]], headers: Iterable[tuple[str, str]]) -> str:
-    """Return the digest of sources, in order, and of the headers that they can reach.
+    """Return the digest of sources, in order, and of the headers that they can include.
 
-    Of each its name, for headers as it is included, and the SHA-256 of its content.
+    For each it uses the name (of headers as included) and the SHA-256 of the content.
     """
     return digest([*sources, *sorted(headers)])
 
@@ -142,7 +142,7 @@ def _sha256(path: Path) -> str:
 
 
 def _headers(sources: Sequence[Path], include: Path) -> Iterator[tuple[str, Path]]:
-    """Yield name and path of the headers below `include` and beside the sources."""
+    """Yield name and path of the headers below `include` and next to the sources."""
     for path in include.rglob("*.h"):
         yield path.relative_to(include).as_posix(), path
     for folder in dict.fromkeys(path.parent for path in sources):
@@ -151,7 +151,7 @@ def _headers(sources: Sequence[Path], include: Path) -> Iterator[tuple[str, Path
 
 
 def _place(text: str, toolchain: Toolchain, cache: Path) -> Path:
-    """Return where the library is, named after the C text and all that machine code depends on."""
+    """Return the path of the library, named after all that its machine code depends on."""
     command = _public_command((os.path.realpath(toolchain.command[0]), *toolchain.command[1:]))
     flags = (*toolchain.flags, *SHARED_FLAGS)
     machine = (toolchain.version, flags, toolchain.target, kept_surroundings(), _c_library())
@@ -164,7 +164,7 @@ def _public_command(command: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def _c_library() -> str:
-    """Return the C library's version: what is linked to a newer one may not load with an older."""
+    """Return the C library's version, because a library linked to a newer one may not load."""
     with contextlib.suppress(AttributeError, ValueError, OSError):
         return os.confstr("CS_GNU_LIBC_VERSION") or ""
     return ""
@@ -222,7 +222,7 @@ def _failure(command: tuple[str, ...], finished: subprocess.CompletedProcess[str
 
 
 def _trimmed(text: str) -> str:
-    """Return `text` with its middle left out where it is too long to read."""
+    """Return `text`, without its middle if it is too long to read."""
     half = LONGEST_REPORT // 2
     if len(text) <= LONGEST_REPORT:
         return text

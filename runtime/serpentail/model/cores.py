@@ -1,4 +1,4 @@
-"""How many threads this process may use: as asked for, as the machine and its container allow."""
+"""Number of threads that this process may use: as set, or by the machine and its container."""
 
 import math
 import os
@@ -12,15 +12,14 @@ from ..checks import refusal
 from ..errors import SerpentailError
 
 VARIABLE = "SERPENTAIL_THREADS"  # of the environment
-MOST_THREADS = 1024  # of which a number beyond is a mistake
+MOST_THREADS = 1024  # larger numbers are mistakes
 
 
 def threads(asked: int | None = None) -> int:
-    """Return how many threads to use: as asked, as $SERPENTAIL_THREADS says, else one a core.
+    """Return the number of threads: as asked, as in $SERPENTAIL_THREADS, else one for each core.
 
-    A worker of a pool of processes (multiprocessing, concurrent.futures, joblib) uses one where
-    nothing is asked for, as its siblings use the other cores.  SerpentailError where
-    $SERPENTAIL_THREADS is no such number.
+    By default a worker of a process pool (multiprocessing, concurrent.futures, joblib) uses one,
+    because its siblings use the other cores. SerpentailError if $SERPENTAIL_THREADS is wrong.
     """
     if asked is not None:
         return asked
@@ -39,7 +38,7 @@ def checked_threads(field: str, value: object, error: type[Exception] = Serpenta
 
 
 def _is_worker() -> bool:
-    """Tell whether multiprocessing, or who builds on it, started this process."""
+    """Tell whether multiprocessing, or a library built on it, started this process."""
     multiprocessing = sys.modules.get("multiprocessing.process")
     return multiprocessing is not None and multiprocessing.parent_process() is not None
 
@@ -59,8 +58,8 @@ def _own_quota() -> float:
 def quota(root: Path) -> float:
     """Return the cores' worth of time that control groups grant this process; inf without a limit.
 
-    root: of the file system, in which proc/self and sys/fs/cgroup lie.  The least limit counts, of
-    the process's own group and of those around it.
+    root: of the file system, with proc/self and sys/fs/cgroup. The smallest limit counts, of the
+    process's own group and of the groups around it.
     """
     least = math.inf
     for line in _lines(root / "proc/self/cgroup"):
@@ -97,7 +96,7 @@ def _ratio(granted: str, period: str) -> float:
 
 
 def _lines(path: Path) -> list[str]:
-    """Lines of a file; none where it cannot be read."""
+    """Return the lines of a file; none if it cannot be read."""
     try:
         return path.read_text().splitlines()
     except (OSError, ValueError):

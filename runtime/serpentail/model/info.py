@@ -1,4 +1,4 @@
-"""What a model is, as data and as text: sizes, functions, their arguments, what they cost."""
+"""Descriptions of a model, as data and as text: sizes, functions, arguments, costs."""
 
 from typing import Any
 
@@ -7,7 +7,7 @@ from .parameters import json_ready
 
 
 def info(model: Model) -> dict[str, Any]:
-    """Return what a model is: sizes, functions, how each was emitted, what it costs."""
+    """Return a description of a model as data: sizes, functions, their form and cost."""
     functions = {}
     for name, entry in model.manifest["functions"].items():
         functions[name] = {
@@ -31,7 +31,7 @@ def info(model: Model) -> dict[str, Any]:
 
 
 def described(model: Model) -> str:
-    """Return what a model is as text: its sizes, its functions, their arguments with units."""
+    """Return a description of a model as text: sizes, functions, arguments with units."""
     real = model.manifest["real"]
     lines = [f"{model.name}: {model.tail_words()}, nq {model.nq}, nv {model.nv}, {real}"]
 

@@ -45,12 +45,12 @@ def argument_record(
     return ArgumentRecord(address_of(parameters), count, 0, address_of(work), addresses)
 
 
-# reals that a function works on: one of more takes so long that other threads should run meanwhile
+# numbers in a function's arrays; above, calls are so long that other threads should run meanwhile
 MOST_HELD = 8192
 
 
 def address_of(array: ndarray) -> int:
-    """Return where the numbers of an array lie; ``array.ctypes.data`` takes three times as long."""
+    """Return the address of an array's numbers; ``array.ctypes.data`` is three times as slow."""
     if array.flags.carray and array.size:
         return ctypes.addressof(ctypes.c_char.from_buffer(array))  # type: ignore[arg-type]
     return array.ctypes.data
@@ -60,7 +60,7 @@ CACHE_LINE = 64  # bytes, and the widest vector
 
 
 def aligned(count: int, dtype: DTypeLike) -> ndarray:
-    """Return a workspace that begins at a cache line, so that no vector in it lies across two."""
+    """Return a workspace that begins at a cache line, so that no vector in it crosses one."""
     size = (count + 1) * np.dtype(dtype).itemsize
     memory = np.zeros(size + CACHE_LINE, np.uint8)
     first = -address_of(memory) % CACHE_LINE
@@ -68,8 +68,9 @@ def aligned(count: int, dtype: DTypeLike) -> ndarray:
 
 
 def aligned_rows(shape: tuple[int, ...], dtype: DTypeLike) -> ndarray:
-    """Return an array to be filled that begins at a cache line: vectors are stored in half the
-    time where none lies across two.
+    """Return an uninitialised array that begins at a cache line.
+
+    Storing vectors takes half the time if none of them crosses a cache line.
     """
     size = math.prod(shape) * np.dtype(dtype).itemsize
     memory = np.empty(size + CACHE_LINE, np.uint8)
@@ -78,7 +79,7 @@ def aligned_rows(shape: tuple[int, ...], dtype: DTypeLike) -> ndarray:
 
 
 class Buffers:
-    """Arrays that are handed to C; as they stay, a call on one state costs little."""
+    """Arrays that are passed to C; they are kept, so that a call on one state is cheap."""
 
     def __init__(
         self, dtype: DTypeLike, inputs: Shapes, outputs: Shapes, work: int, parameters: ndarray
@@ -98,8 +99,8 @@ class Buffers:
 class RunKernel:
     """A compiled function on the samples of many runs, each with its own parameters.
 
-    parameters (runs, scalars); inputs and outputs (runs, samples, ...), of the model's reals, whose
-    addresses are looked up once.  For one thread.
+    parameters (runs, scalars); inputs and outputs (runs, samples, ...), of the model's number type.
+    Their addresses are looked up once. For one thread.
     """
 
     def __init__(self, kernel: "Kernel", parameters: ndarray, inputs: Arrays, outputs: Arrays):
@@ -111,7 +112,7 @@ class RunKernel:
         self.address = ctypes.addressof(self.record)
 
     def __call__(self, run: int, rows: int, begin: int = 0) -> None:
-        """Evaluate so many rows of a run; StateError counts all rows from the first run's on."""
+        """Evaluate ``rows`` rows of a run; a StateError counts rows from the first run's on."""
         record = self.record
         record.parameters, record.count = self.parameters[0] + run * self.parameters[1], rows
         for k, (first, apart, row) in enumerate(self.places):
@@ -152,7 +153,7 @@ class Kernel:
         return self._by_ctypes(arrays) if found is None else found
 
     def _prepared(self) -> Call:
-        """Return what calls the function where all is as it should be, and gives None elsewhere."""
+        """Return a fast call of the function; it returns None for arguments that it declines."""
         own = self._buffers()
         size = self.work + sum(array.size for array in (*own.inputs, *own.outputs))
         self.fast = fast = declined if size > MOST_HELD else call_of(self.function, own)
@@ -163,7 +164,7 @@ class Kernel:
         return Buffers(self.dtype, self.shapes, self.out_shapes, self.work, self.parameters)
 
     def _by_ctypes(self, arrays: Sequence[ArrayLike]) -> Any:
-        """Return outputs for whatever was given."""
+        """Return outputs for any arguments."""
         if len(arrays) != len(self.names):
             raise TypeError(f"{self.name} takes {', '.join(self.names)}")
         dtype = self.dtype
@@ -185,7 +186,7 @@ class Kernel:
         return buffers.only.copy() if buffers.only is not None else buffers.results()
 
     def _any(self, values: Sequence[ArrayLike]) -> Any:
-        """Return outputs for any arrays of numbers, of which some may have a batch axis."""
+        """Return outputs for any arrays of numbers, some of which may have a batch axis."""
         arguments = zip(self.names, self.shapes, values, strict=True)
         arrays = [self._checked(name, shape, value) for name, shape, value in arguments]
         # sizes of the batches among them
@@ -195,7 +196,8 @@ class Kernel:
             return self._one(arrays)
         if len(counts) > 1:
             raise StateError(
-                f"{self.name}: batch sizes differ ({', '.join(map(str, sorted(counts)))}): give one"
+                f"{self.name}: batch sizes differ ({', '.join(map(str, sorted(counts)))}): give "
+                "one size"
             )
         return self._batch(counts.pop(), arrays)
 
@@ -210,7 +212,7 @@ class Kernel:
         return array
 
     def _batch(self, count: int, arrays: Arrays) -> Any:
-        """Return outputs for so many states; single ones are repeated."""
+        """Return outputs for a batch; single states are repeated."""
         whole = [
             np.ascontiguousarray(np.broadcast_to(a, (count, *shape)))
             for a, shape in zip(arrays, self.shapes, strict=True)
@@ -247,15 +249,15 @@ class Kernel:
             first = after
 
     def fail(self, status: int, index: int, arrays: Arrays) -> NoReturn:
-        """Raise what a status means of one state among arrays."""
-        # an argument that is no number, or a quaternion that is none
+        """Raise the error that a status means for one state of the arrays."""
+        # an argument that is not finite, or a quaternion without direction
         state = f" of state {index}" if len(arrays[0]) > 1 else ""
         for name, array in zip(self.names, arrays, strict=True):
             refuse_not_finite(f"{self.name}: {name}", array[index], StateError, state)
         q = arrays[0][index].astype(float)
         if self.names[0] in QUATERNIONS:
             self._check_attitude(q, state)
-        # else what the C function found
+        # otherwise the error of the C function
         if status == OUT_OF_RANGE:
             raise StateError(f"{self.name}: {self._out_of_range(q, state)}")
         indefinite = f"the inertia matrix{state} is not positive definite"
@@ -275,7 +277,7 @@ class Kernel:
             )
 
     def _out_of_range(self, q: ndarray, state: str) -> str:
-        """Say which segment has a bend that the model does not cover, and what to do."""
+        """Return which segment is bent beyond the model's range, and the remedy."""
         tail = q[QUATERNIONS[self.names[0]].stop :]
         if self.names[0] == "x":  # the rates are there, too
             tail = tail[: len(tail) // 2]

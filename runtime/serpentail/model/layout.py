@@ -1,4 +1,4 @@
-"""Where the numbers of a state lie: the one place that knows how q, v and tau are laid out."""
+"""The layout of q, v and tau; no other place depends on it."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -25,7 +25,7 @@ FIRST_Q, SECOND_Q = slice(TORSO_NQ, None, PER_SEGMENT), slice(TORSO_NQ + 1, None
 class Layout:
     """The layout of a model of m segments: q (nq,), v (nv,), tau (nt,).
 
-    fixed: on a base that never moves, so that q and v are those of the tail alone.
+    fixed: the base never moves, so that q and v are those of the tail alone.
     """
 
     segments: int
@@ -33,9 +33,9 @@ class Layout:
 
     @classmethod
     def of_width(cls, nq: int) -> "Layout | None":
-        """Return the layout in which q has so many numbers, None where there is none.
+        """Return the layout in which q has ``nq`` numbers; None if there is none.
 
-        A free torso makes it an odd number.
+        With a free torso the number is odd.
         """
         fixed = nq % PER_SEGMENT == 0
         segments = (nq if fixed else nq - TORSO_NQ) // PER_SEGMENT

@@ -1,4 +1,4 @@
-"""Opens the compiled C of a model, as ctypes has it, and names its status codes."""
+"""Opens the compiled C of a model with ctypes, and names its status codes."""
 
 import ctypes
 
@@ -30,12 +30,12 @@ WHY = {  # a run cannot go on
         "large?"
     ),
     BAD_TIMES: "the samples are too close: in the model's numbers their times do not increase",
-    TORQUE_FAILED: "the compiled torque function did not return 0: what has it refused?",
+    TORQUE_FAILED: "the compiled torque function returned an error status, not 0: check it",
 }
 
 
 def open_library(checked: CheckedFolder, profile: str) -> ctypes.CDLL:
-    """Load a model's C, compiled or from the cache; ModelError where it is another's interface."""
+    """Load a model's C, compiled or from the cache; ModelError if its interface is another."""
     manifest, prefix = checked.manifest, checked.manifest["prefix"]
     lazy = {f"src/{prefix}_{part}.c" for part in LAZY_SOURCES}
     sources = [name for name in checked.files if name.startswith("src/") and name not in lazy]

@@ -1,4 +1,4 @@
-"""Lets one process at a time build an entry of the cache, while those who need it too wait."""
+"""Lets one process at a time build an entry of the cache, while others that need it wait."""
 
 import contextlib
 from collections.abc import Iterator
@@ -6,14 +6,14 @@ from pathlib import Path
 
 from .cache import LOCKS, mark_used, own_folder
 
-PATIENCE_S = 600.0  # s to wait for another process, which may have been stopped
+PATIENCE_S = 600.0  # s to wait for another process, because that may be suspended
 
 
 @contextlib.contextmanager
 def alone(cache: Path, name: str) -> Iterator[None]:
-    """Hold the lock of a name; on file systems without locks, and without patience, go on anyway.
+    """Hold the lock of a name; continue without it if locks do not work, or after a long wait.
 
-    Going on costs a second build and no more, as entries come into the cache whole.
+    Without the lock an entry may be built twice, but entries are still added whole.
     """
     from filelock import FileLock  # only builds need it
 

@@ -30,7 +30,7 @@ MOST_READS = 100  # of a folder that is exchanged again and again while it is re
 
 @dataclass(frozen=True, eq=False)
 class CheckedFolder:
-    """A generated folder as it was when it was checked, whatever becomes of the folder.
+    """A generated folder as it was when it was checked; later changes of the folder do not matter.
 
     files: the content of each file that the manifest names, by that name.
     """
@@ -41,7 +41,7 @@ class CheckedFolder:
 
     @property
     def manifest_hash(self) -> str:
-        """The digest of the manifest, and with it of all files."""
+        """Digest of the manifest, which covers all files."""
         return str(self.manifest["manifest_hash"])
 
     @kept
@@ -58,7 +58,7 @@ class Exchanged(ModelError):
 
 
 def read_folder(folder: Path) -> CheckedFolder:
-    """Return a folder's manifest and files; ModelError where one is missing, stale or changed."""
+    """Return a folder's manifest and files; ModelError if one is missing, stale or changed."""
     for _ in range(MOST_READS - 1):
         with suppress(Exchanged):
             return _read(folder)
@@ -71,7 +71,7 @@ def read_manifest(folder: Path) -> dict:
 
 
 def remedy(folder: Path) -> str:
-    """Say how to make a folder anew."""
+    """Return how to generate a folder again, for messages."""
     return (
         f"delete {folder} and generate it again (`make model`, or python "
         f"-m serpentail_codegen SCENE.toml)"
@@ -79,7 +79,7 @@ def remedy(folder: Path) -> str:
 
 
 def _read(folder: Path) -> CheckedFolder:
-    """Return what a folder that is held shows; Exchanged where the folder is another by then."""
+    """Return the content of a held folder; Exchanged if it was replaced meanwhile."""
     try:
         with held(folder) as opened:
             try:
@@ -87,7 +87,9 @@ def _read(folder: Path) -> CheckedFolder:
             except ModelError as error:
                 if opened.is_there():
                     raise
-                raise Exchanged(f"{folder} is exchanged all the time: load it later") from error
+                raise Exchanged(
+                    f"{folder} keeps changing while it is read: load it later"
+                ) from error
     except (FileNotFoundError, NotADirectoryError, ValueError) as error:
         raise _no_folder(folder) from error
     except OSError as error:
@@ -99,7 +101,7 @@ def _read(folder: Path) -> CheckedFolder:
 
 def _no_folder(folder: Path) -> ModelError:
     return ModelError(
-        f"{folder} is no generated folder (it has no manifest.json): make one, as by "
+        f"{folder} is not a generated folder (it has no manifest.json): make one by "
         "`serpentail generate SCENE.toml`, or `make model TAIL=articulated M=3 N=4`"
     )
 
@@ -147,7 +149,7 @@ def _file(folder: Path, opened: Held, name: str, digest: str) -> bytes:
 
 
 def _check(folder: Path, manifest: dict) -> None:
-    """Refuse a manifest of another version, one that lacks keys, and one that was changed."""
+    """Refuse a manifest of another version, without some keys, or changed."""
     if (manifest["format"], manifest["generator"]) != (FORMAT, __version__):
         made = f"format {manifest['format']}, generator {manifest['generator']}"
         raise ModelError(

@@ -1,26 +1,24 @@
-"""Models: what a generated folder, its parameters and its compiled C make together."""
+"""``Model``: a generated folder, its parameters and its compiled C."""
 
 import ctypes
 from collections.abc import Mapping
 from contextlib import suppress
-from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import ModelError, SerpentailError
+from ..errors import SerpentailError
 from ..extras import needed
 from .batch import BatchLibrary
 from .cache import cache_folder
-from .cores import checked_threads
-from .functions import Array, Functions
+from .functions import Functions
 from .kept import kept
 from .kernel import Kernel
 from .layout import Layout
-from .library import open_library
-from .manifest import CheckedFolder, read_folder
+from .manifest import CheckedFolder
+from .methods.steps import StepMethods
 from .parameters import (
     RunParameters,
     Value,
@@ -36,57 +34,6 @@ from .tail import links_of, words_of
 
 if TYPE_CHECKING:
     from .casadi import CasadiFunctions
-    from .stepping.step import Stepping
-
-
-def load(
-    folder: str | PathLike[str],
-    parameters: Mapping[str, object] | None = None,
-    profile: str | None = None,
-    compiled: bool = True,
-    threads: int | None = None,
-) -> "Model":
-    """Return the model of a generated folder, its C compiled (or taken from the cache) and loaded.
-
-    parameters: name -> number or 3 numbers, in SI or with units, such as "3.5 g"; override the
-    scene's, without recompiling.
-    profile: "fast" (this CPU, FMA) or "reproducible" (same bits everywhere); None: the scene's.
-    compiled: False needs no C compiler; then only ``model.casadi`` evaluates.
-    threads: most that its batches and many runs use; None: $SERPENTAIL_THREADS, else one a core
-    that this process may use, one in workers of process pools.
-    Raises ModelError (folder missing, stale or changed; parameter unknown or unphysical),
-    CompilerNotFound, CompileFailed.  Warns UnusualSize of what no animal or robot has, UnlikeBodies
-    where torso and tail are so unlike in size that H loses digits.
-    """
-    try:
-        folder = Path(folder)
-    except TypeError:
-        raise ModelError(
-            f"folder: value {folder!r:.60}: needs the path of a generated folder"
-        ) from None
-    return model_from(read_folder(folder), parameters, profile, compiled, threads)
-
-
-def model_from(
-    checked: CheckedFolder,
-    parameters: Mapping[str, object] | None,
-    profile: str | None = None,
-    compiled: bool = True,
-    threads: int | None = None,
-) -> "Model":
-    """Return the model of a folder that was checked, as ``load`` does."""
-    manifest = checked.manifest
-    values = resolve(manifest, parameters)
-    warn_of_sizes(manifest, values, 3)  # who calls st.load
-    profile = manifest["scene"]["profile"] if profile is None else profile
-    if not isinstance(compiled, bool | np.bool_):
-        raise ModelError(f"compiled: value {compiled!r:.60}: needs True or False")
-    if compiled and "c" not in manifest["scene"]["targets"]:
-        raise _without_c(manifest)
-    threads = None if threads is None else checked_threads("threads", threads, ModelError)
-    library = open_library(checked, profile) if compiled else None
-    batches = BatchLibrary(checked, profile, threads)
-    return Model(checked, values, library, profile, batches)
 
 
 def _unpickled(
@@ -96,30 +43,86 @@ def _unpickled(
     profile: str,
     options: tuple[bool, int | None],
 ) -> "Model":
-    """Return a pickled model, of the manifest that it was pickled with."""
+    """Return a pickled model: its files are those of the manifest that it was pickled with."""
+    from .load import model_from
+
     return model_from(restored(manifest_hash, folder), parameters, profile, *options)
 
 
-def _without_c(manifest: Mapping[str, Any]) -> ModelError:
-    """Return the error that a model has no C."""
-    return ModelError(
-        f"{manifest['prefix']} was generated without C: load it with compiled=False for "
-        'model.casadi, or add "c" to `targets` of the scene, then generate it again'
-    )
+class Model(Functions, StepMethods):
+    """Equations of motion of a body with a tail, compiled: H v_dot + C = [0; tau] + J^T f (Eq. 1).
 
+    ``load`` and ``build`` make models. All quantities are in SI units and radians. The world's
+    z axis points up. The body frame B has its origin at the torso's centre of mass and its axes
+    along the torso's principal axes.
 
-class Model(Functions):
-    """Equations of motion H(q) v_dot + C(q, v) = [0 (6); tau] + J^T f of one tail, SI units.
+    Attributes
+    ----------
+    name : str
+        Name of the model, which is the prefix of its C functions.
+    kind : {"articulated", "continuum", "mixed"}
+        Kind of the tail.
+    segments : int
+        Number m of segments.
+    kinds : tuple of str
+        Kind of each segment: "articulated" or "continuum".
+    links : int, tuple of int or None
+        Links of every segment; a tuple if the numbers differ, with 0 for an arc; None for a
+        continuum tail.
+    samples : int or None
+        Number of sample points of a continuum tail; None for an articulated one.
+    joints_each : ndarray, shape (m,)
+        How many joints share the coordinates of each segment; 1 for an arc.
+    fixed : bool
+        Whether the base is fixed, so that only the tail moves.
+    nq, nv : int
+        Lengths of ``q`` and ``v``: 7 + 2m and 6 + 2m; on a fixed base both are 2m.
+    contacts : dict
+        Number of points that can touch the ground, for each group: "feet", "tail", "torso".
+    parameters : mapping
+        Parameter values by name, SI; read-only.
+    parameter_vector : ndarray
+        The numbers of the C parameter struct in their order; read-only.
+    profile : {"fast", "reproducible"}
+        How the C was compiled; see ``load``.
+    layout : Layout
+        Where the parts of ``q``, ``v`` and ``tau`` are; ``model.layout.tail_q`` is the slice of
+        the tail coordinates in ``q``.
+    folder : Path
+        The generated folder.
+    manifest : dict
+        Content of its ``manifest.json``.
 
-    q (nq = 7 + 2m): position of B in the world, quaternion (w, x, y, z) of any norm but 0, tail
-    coordinates: joint angles (alpha_i, beta_i) of links, bend components (a_i, b_i) of arcs, or
-    polar angles (phi_i, theta_i) of a continuum whose scene has coordinates = "polar", which is for
-    comparison only. v (nv = 6 + 2m): velocity of B in the world, angular velocity in
-    the body frame, rates of the tail coordinates. Every method also takes arrays with a leading
-    batch axis; a single state is repeated over a batch.  All raise StateError on a wrong shape or a
-    value that is not finite, ModelError where the scene left the function out. With the profile
-    "fast" the last digits of a state may depend on the size of its batch. Threads may share a
-    model. Whatever becomes of its folder, it goes on as it was checked, and so does a pickled one.
+    Notes
+    -----
+    A configuration ``q`` (nq,) holds the position of B in the world (m), the quaternion
+    (w, x, y, z) from body to world axes, and the 2m tail coordinates (rad). The quaternion may
+    have any norm except 0. The coordinates of a segment are the joint angles (alpha, beta) that
+    all its links share; the bend components (a, b) of an arc; or the polar angles (phi, theta)
+    of an arc if the scene has ``coordinates = "polar"``, which serves comparisons only.
+
+    A velocity ``v`` (nv,) holds the velocity of B in the world (m/s), the angular velocity in
+    the body frame (rad/s), and the rates of the tail coordinates (rad/s). On a fixed base ``q``
+    and ``v`` hold the tail coordinates and their rates only.
+
+    Every numeric method also takes arrays with a leading batch axis, and repeats a single state
+    over the batch. With the profile "fast" the last digits of a result may depend on the size
+    of the batch. Every method raises ``StateError`` if a shape is wrong or a value is not
+    finite, and ``ModelError`` if the scene left the function out.
+
+    ``crba``, ``nle``, ``rnea`` and ``aba`` are other names of ``mass_matrix``, ``bias_force``,
+    ``inverse_dynamics`` and ``forward_dynamics``.
+
+    Several threads may share a model. A model keeps a private copy of the checked files, so it
+    and its pickles still work after the folder has changed or is gone.
+
+    Examples
+    --------
+    >>> import serpentail as st
+    >>> model = st.build(tail="articulated", segments=1, links=3)  # doctest: +SKIP
+    >>> q, v = [0, 0, 0, 1, 0, 0, 0, 0.1, 0.0], [0] * 8
+    >>> model.forward_dynamics(q, v, [0.0, 0.0]).shape  # doctest: +SKIP
+    (8,)
     """
 
     def __init__(
@@ -133,7 +136,7 @@ class Model(Functions):
         manifest = checked.manifest
         self.checked, self.folder, self.manifest = checked, checked.folder, manifest
         self.parameters, self.library, self.profile = parameters, library, profile
-        # what the tail is made of
+        # the tail
         self.name: str = manifest["prefix"]
         self.kind: str = manifest["scene"]["kind"]
         self.segments: int = manifest["dimensions"]["segments"]
@@ -151,7 +154,7 @@ class Model(Functions):
         self.layout = Layout(self.segments, self.fixed)
         self.nq, self.nv = self.layout.nq, self.layout.nv
         self.contacts = {entry["group"]: entry["count"] for entry in manifest["contacts"]}
-        # its functions, as compiled
+        # its compiled functions
         self.parameter_vector = np.array(flat(manifest, parameters), real_type(manifest))
         self.parameter_vector.setflags(write=False)  # with_parameters makes another model
         self.batch_library = batch_library or BatchLibrary(checked, profile)
@@ -165,17 +168,38 @@ class Model(Functions):
         return f"<serpentail.Model {self.name}: {self.tail_words()}, nv = {self.nv}>"
 
     def tail_words(self) -> str:
-        """Return what the tail is made of, in words."""
+        """Return in words what the tail is made of, such as "3 x 4 links"."""
         return words_of(self.links, self.segments)
 
     def with_parameters(self, **changes: ArrayLike) -> "Model":
-        """Return this model with other parameters; nothing is compiled.  Warns as ``load`` does."""
+        """Return this model with other parameters; nothing is compiled.
+
+        Parameters
+        ----------
+        **changes : float or sequence of float
+            New values by parameter name, in SI or as text with a unit.
+
+        Returns
+        -------
+        Model
+            A model of the same code; this one does not change.
+
+        Raises
+        ------
+        ModelError
+            A parameter is unknown or unphysical, or the parameters are baked into the code.
+
+        Warns
+        -----
+        UnusualSize, UnlikeBodies
+            As of ``load``.
+        """
         values = resolve(self.manifest, merged(self._independent(), changes))
         warn_of_sizes(self.manifest, values)
         return self._twin(values)
 
     def _twin(self, parameters: Mapping[str, Any]) -> "Model":
-        """Return a model of the same code."""
+        """Return a model of the same code with these parameters."""
         return Model(self.checked, parameters, self.library, self.profile, self.batch_library)
 
     def __copy__(self) -> "Model":
@@ -185,17 +209,35 @@ class Model(Functions):
         return self._twin(self.parameters)  # nothing in it changes
 
     def parameters_of_runs(self, changes: Mapping[str, object] | None, runs: int) -> RunParameters:
-        """Return the parameters of many runs; changes: name -> (runs,) or (runs, 3), SI."""
+        """Return the checked parameters of many runs, which ``step`` can take again and again.
+
+        Parameters
+        ----------
+        changes : mapping or None
+            Parameter name to values of shape (runs,) or (runs, 3), SI.
+        runs : int
+            Number of runs.
+
+        Returns
+        -------
+        RunParameters
+            All parameters of each run.
+
+        Raises
+        ------
+        ModelError
+            A parameter is unknown or unphysical; the message names the run.
+        """
         if changes is None or (isinstance(changes, Mapping) and not changes):
             vector = self.parameter_vector
             vectors = vector[None] if runs == 1 else np.broadcast_to(vector, (runs, len(vector)))
             return RunParameters({}, self.parameters, vectors)
         parameters = RunParameters.checked(self.manifest, self._independent(), changes, runs)
-        warn_of_sizes(self.manifest, parameters.values, 4)  # who calls st.simulate
+        warn_of_sizes(self.manifest, parameters.values, 4)  # 4: the caller of st.simulate
         return parameters
 
     def _independent(self) -> dict[str, Value]:
-        """Return the parameters that the others follow from; none where they are baked."""
+        """Return the parameters that determine all others; none if parameters are baked."""
         if self.manifest["scene"]["baked"]:
             return {}
         return independent(self.manifest, self.parameters)
@@ -212,75 +254,12 @@ class Model(Functions):
         )
 
     @kept
-    def generated(self) -> tuple[str, ...]:
-        """Names of all functions that were generated, the rollout of simulations included."""
-        return tuple(self.manifest["functions"] | self.manifest.get("work", {}))
-
-    def kernel(self, name: str) -> Kernel:
-        """Return a compiled function; ModelError where the scene did not ask for it."""
-        kernel = self.kernels.get(name)
-        if kernel is None and self.library is None:
-            raise ModelError(
-                f"{self.name} was loaded with compiled=False: only model.casadi evaluates; load it "
-                "again"
-            )
-        if kernel is None:
-            raise self.without(name)
-        return kernel
-
-    def refuse_fixed(self, what: str) -> None:
-        """Raise ModelError where the base is fixed: only a free torso has what is asked for."""
-        if self.fixed:
-            raise ModelError(
-                f"{what}: {self.name} has a fixed base, which neither flies nor lands: generate it "
-                'again with base = "free"'
-            )
-
-    def without(self, *names: str) -> ModelError:
-        """Return the error that functions are not there."""
-        if set(names) & set(self.manifest["scene"]["functions"]):  # what only C can do
-            return _without_c(self.manifest)
-        has = ", ".join(self.generated)
-        return ModelError(
-            f"{self.name} was generated without {', '.join(map(repr, names))} (it has {has}): add "
-            "it to `functions` of the scene, then generate it again"
-        )
-
-    def step(
-        self, q: ArrayLike, v: ArrayLike, tau: ArrayLike, h: float, **settings: Any
-    ) -> tuple[Array, ...]:
-        """(q, v) after a step of h (s) under torques tau (2m,) (N m) that stay; or of k runs.
-
-        q (nq,) or (k, nq), v, tau likewise: each run has torques of its own.  In flight by "rk4",
-        with contacts by "implicit_euler", whose state has bristles, too: (q, v, bristles).
-        steps: how many, of h each, 1 by default.  out: arrays that the results are written to,
-        which may be q and v themselves: then nothing is allocated.  parameters: name -> (k,) or
-        (k, 3), or what ``parameters_of_runs`` made of it before.  bristles (2K,), legs (8,), of
-        all or of each: as in ``contact_dynamics``; legs move on at their rates.  method: "rk4" or
-        "implicit_euler".  threads: at most so many; None: the model's, see ``load``.
-        statuses (k,) of ``numpy.intc``: is told how each run went, 0 well, and no run raises.
-
-        Eight flights or more are made in lanes, whose C is compiled at the first such call.
-        Raises StateError (shapes, values), SimulationError (h and other settings; a run that
-        cannot go on: it stays where it came to, the others are stepped), ModelError (the scene
-        left out rollout, or implicit on the ground).
-        """
-        from .stepping.step import step
-
-        return step(self, (q, v, tau), h, settings)
-
-    @kept
-    def stepping(self) -> "Stepping":
-        """What ``step`` keeps between calls."""
-        from .stepping.step import Stepping
-
-        return Stepping(self)
-
-    @kept
     def casadi(self) -> "CasadiFunctions":
-        """``casadi.Function``s by name, parameters folded in: ``model.casadi.energy(q, v)``.
+        """The model's functions as ``casadi.Function``, by name; needs the extra "plan".
 
-        ExtraMissing without the extra "plan".
+        ``model.casadi.energy`` has the model's parameters folded in. ``symbolic(name)`` and
+        ``external(name)`` take a parameter vector as their last input. ExtraMissing is raised if
+        CasADi is not installed.
         """
         needed("casadi", "plan")
         from .casadi import CasadiFunctions

@@ -13,7 +13,7 @@ from ..units import in_unit
 
 Value = float | tuple[float, ...]
 Values = Mapping[str, Any]  # name -> number or numbers, SI; of many runs (k,) or (k, size)
-# of a tail whose links or arcs have values of their own: what follows from these
+# parameters that follow from the values of single links or arcs
 UNITS = {"tail_mass": "kg", "tail_length": "m", "gravity": "m/s^2"}
 TOTALS = {
     "tail_mass": ("link_masses", "arc_masses"),
@@ -31,7 +31,7 @@ CHECKS = {  # of rows (K, size), for each one
 
 
 def resolve(manifest: dict, changes: Mapping[str, object] | None) -> MappingProxyType[str, Value]:
-    """Return name -> float or tuple (SI) of all parameters; ModelError lists all that is wrong."""
+    """Return name -> float or tuple (SI) of all parameters; ModelError lists all errors."""
     defaults = {p["name"]: p["default"] for p in manifest["parameters"]}
     defaults = {name: value for name, value in defaults.items() if value is not None}
     values = completed(manifest, merged(defaults, _checked_changes(manifest, changes, None)))
@@ -51,7 +51,7 @@ def json_ready(values: Mapping[str, Value]) -> dict[str, float | list[float]]:
 
 @dataclass(frozen=True, eq=False)
 class RunParameters:
-    """Parameters of k runs: what is changed, all values by name, and the C structs (k, scalars)."""
+    """Parameters of k runs: the changes, all values by name, and the C structs (k, scalars)."""
 
     changes: dict[str, np.ndarray]
     values: Values
@@ -113,9 +113,10 @@ def totals(values: Values) -> dict[str, Any]:
 
 
 def completed(manifest: dict, values: Values) -> dict[str, Any]:
-    """Return the values, of each run, with those that follow: link_inertia from link_radius, mass
-    and length of a tail from those of its links or arcs.  ModelError where the weight is no finite
-    number, or stops leave no room.
+    """Return the values of each run, with those that follow from them.
+
+    These are link_inertia from link_radius, and mass and length of a tail from those of its links
+    or arcs. ModelError if the weight is not finite, or stops exclude each other.
     """
     absent = {"gravity": 0.0} if manifest["scene"].get("weightless") else {}
     values = {**absent, **values, **totals(values)}
@@ -133,7 +134,7 @@ def completed(manifest: dict, values: Values) -> dict[str, Any]:
 
 
 def _refuse_stops_without_room(values: Values) -> None:
-    """ModelError where a lower stop is not below the upper one."""
+    """ModelError unless each lower stop is below the upper one."""
     if "tail_stop_lower" not in values:
         return
     lower, upper = (np.asarray(values[f"tail_stop_{end}"]) for end in ("lower", "upper"))
@@ -154,7 +155,7 @@ def _checked_changes(manifest: dict, changes: object, runs: int | None) -> dict[
         )
     fields = {p["name"]: p for p in manifest["parameters"]}
     problems, sound = [], {}
-    # each by itself, then what they are together
+    # each by itself, then all together
     for name, value in (changes or {}).items():
         checked = _checked(fields, str(name), value, runs)
         if isinstance(checked, str):
@@ -198,19 +199,19 @@ def flat(manifest: dict, values: Mapping[str, Value]) -> list[float]:
 
 
 def _checked(fields: dict, name: str, value: object, runs: int | None) -> np.ndarray | str:
-    """Return the value, of every run where there are many, or what is wrong with it."""
+    """Return the value, of each run if there are several, or the error about it."""
     if name not in fields:
         parts = [part for part in TOTALS.get(name, ()) if part in fields]
         remedy = did_you_mean(name, fields) or f"there are {', '.join(fields)}"
         remedy = f"it is the sum of {parts[0]}, change these" if parts else remedy
         return f"{name}: no such parameter; {remedy}"
-    # what the value must be, in words and as a shape
+    # the required value, in words and as a shape
     size, unit = fields[name]["size"], fields[name]["unit"]
     holds, words = CHECKS[fields[name]["check"]]
     pieces = fields[name].get("pieces")
     kind = "a finite number" if size == 1 else f"{size} finite numbers"
     kind += f", {size // pieces} of each piece of the tail" if pieces else ""
-    of_all = "per" in fields[name]  # one number may stand for those of all coordinates
+    of_all = "per" in fields[name]  # one number may be given for all coordinates
     kind += ", or one for all," if of_all else ""
     needs, shape = f"needs {kind} ({unit}), {words}", (size,) if size > 1 or pieces else ()
     if runs is not None:
@@ -225,7 +226,7 @@ def _checked(fields: dict, name: str, value: object, runs: int | None) -> np.nda
         numbers = np.repeat(numbers[..., None], size, axis=-1)
     if numbers is None or numbers.shape != shape:
         return f"{name}: value {shown(value)}: {needs}"
-    # the first run of which it does not hold
+    # the first run with a wrong value
     rows = numbers.reshape(-1, size)
     with np.errstate(over="ignore"):
         wrong = np.flatnonzero(~(np.isfinite(rows).all(axis=1) & holds(rows)))

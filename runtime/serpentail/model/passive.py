@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 
 PARTS = ("spring", "damping", "stops")
-# tail coordinates (rad) that no motion reaches: stops there are as good as none
+# tail coordinates (rad) that no motion reaches: stops there have no effect
 OUT_OF_REACH = 1e6
 ENDS = (("tail_stop_lower", -1), ("tail_stop_upper", 1))
 
 
 def passive_force(values: Mapping[str, Any], angles: Any, rates: Any) -> Any:
-    """Return what the passive parts ask of the torques (..., 2m), N m, at coordinates and rates."""
+    """Return the torques (..., 2m), N m, of springs, damping and stops at coordinates and rates."""
     force = np.zeros(np.shape(angles))
     if "tail_stiffness" in values:
         force = force + np.asarray(values["tail_stiffness"]) * (angles - _of(values, "tail_rest"))
@@ -39,8 +39,9 @@ def stored_energy(values: Mapping[str, Any], angles: Any) -> Any:
 
 
 def behind_stops(values: Mapping[str, Any], angles: Any) -> str:
-    """Return which of the tail coordinates (k, 2m) is first more than a stop's width beyond it;
-    empty where none is.
+    """Return the first tail coordinate of (k, 2m) that is more than a stop's width beyond it.
+
+    The text is empty if there is none.
     """
     for (name, _), (way, _) in zip(ENDS, _ways(values, angles), strict=False):
         wrong = np.argwhere(way > 1)
@@ -72,9 +73,7 @@ def _of(values: Mapping[str, Any], name: str) -> np.ndarray:
 
 
 def _ways(values: Mapping[str, Any], angles: Any) -> list[tuple[Any, int]]:
-    """How far coordinates are in the lower and in the upper stop, in its width, and which way a
-    stop's force on the torques goes.
-    """
+    """Return how far coordinates are in both stops, in widths, and the signs of their forces."""
     if "tail_stop_lower" not in values:
         return []
     width = _of(values, "tail_stop_width")

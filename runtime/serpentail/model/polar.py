@@ -13,10 +13,39 @@ Four = tuple[Array, Array, Array, Array]
 def polar_to_bend(
     phi: ArrayLike, theta: ArrayLike, phi_dot: ArrayLike = 0.0, theta_dot: ArrayLike = 0.0
 ) -> Four:
-    """Return (a, b, a_dot, b_dot) of a = -theta cos(phi), b = theta sin(phi).
+    """Convert polar angles of continuum segments to bend components.
 
-    rad and rad/s, in any equal shapes.  Raises StateError where a value is no finite number, or
-    the results are beyond numbers.
+    a = -theta cos(phi) and b = theta sin(phi); the rates are the time derivatives of these.
+
+    Parameters
+    ----------
+    phi, theta : array_like
+        Direction and size of the bend (rad), in equal shapes.
+    phi_dot, theta_dot : array_like, default 0
+        Their rates (rad/s).
+
+    Returns
+    -------
+    a, b : ndarray
+        Bend components (rad), as ``q`` has them.
+    a_dot, b_dot : ndarray
+        Their rates (rad/s), as ``v`` has them.
+
+    Raises
+    ------
+    StateError
+        A value is not finite, the shapes differ, or a result is too large for a number.
+
+    See Also
+    --------
+    bend_to_polar : The inverse.
+
+    Examples
+    --------
+    >>> import serpentail as st
+    >>> a, b, a_dot, b_dot = st.polar_to_bend(0.0, 0.5)
+    >>> float(a), float(b)
+    (-0.5, 0.0)
     """
     values = {"phi": phi, "theta": theta, "phi_dot": phi_dot, "theta_dot": theta_dot}
     phi, theta, phi_dot, theta_dot = _alike(values)
@@ -30,9 +59,30 @@ def polar_to_bend(
 def bend_to_polar(
     a: ArrayLike, b: ArrayLike, a_dot: ArrayLike = 0.0, b_dot: ArrayLike = 0.0
 ) -> Four:
-    """Return (phi, theta, phi_dot, theta_dot), theta > 0; rad and rad/s, in any equal shapes.
+    """Convert bend components of continuum segments to polar angles, with theta > 0.
 
-    Raises StateError as ``polar_to_bend``, and where a segment is straight: phi has no value.
+    Parameters
+    ----------
+    a, b : array_like
+        Bend components (rad), in equal shapes.
+    a_dot, b_dot : array_like, default 0
+        Their rates (rad/s).
+
+    Returns
+    -------
+    phi, theta : ndarray
+        Direction and size of the bend (rad).
+    phi_dot, theta_dot : ndarray
+        Their rates (rad/s).
+
+    Raises
+    ------
+    StateError
+        As of ``polar_to_bend``, or a segment is straight, so that phi is not defined.
+
+    See Also
+    --------
+    polar_to_bend : The inverse.
     """
     a, b, a_dot, b_dot = _alike({"a": a, "b": b, "a_dot": a_dot, "b_dot": b_dot})
     with np.errstate(over="ignore"):
@@ -59,11 +109,11 @@ def _alike(values: dict[str, ArrayLike]) -> list[Array]:
 
 
 def _finite_results(*results: Array) -> Four:
-    """Return results, unless one is beyond numbers."""
+    """Return results; StateError if one is too large for a number."""
     if not all(np.isfinite(x).all() for x in results):
         raise StateError(
-            "the converted state is beyond numbers: is an angle or a rate too large, or theta too "
-            "small?"
+            "the converted state is too large for numbers: is an angle or a rate too large, or "
+            "theta too small?"
         )
     first, second, third, fourth = results
     return first, second, third, fourth

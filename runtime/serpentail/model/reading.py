@@ -13,9 +13,10 @@ PLAIN = sum(getattr(os, name, 0) for name in ("O_NONBLOCK", "O_CLOEXEC", "O_BINA
 
 
 def regular_bytes(path: str | Path, folder: int | None = None) -> bytes:
-    """Return the content of a file, its name relative to the handle of a folder where one is given.
+    """Return the content of a file, whose name may be relative to the handle of a folder.
 
-    OSError where it cannot be read, or is a pipe, a device or a folder: nothing waits for a writer.
+    OSError if it cannot be read, or is a pipe, a device or a folder: the call never waits for a
+    writer.
     """
     handle = os.open(path, os.O_RDONLY | PLAIN, dir_fd=folder)
     try:
@@ -29,7 +30,7 @@ def regular_bytes(path: str | Path, folder: int | None = None) -> bytes:
 
 @dataclass(frozen=True)
 class Held:
-    """A folder as it was first seen; its handle, if any, stays with it wherever it is moved."""
+    """A folder as it was first seen; an open handle follows it if it is moved."""
 
     path: Path
     seen: os.stat_result
@@ -51,7 +52,7 @@ class Held:
 
 @contextmanager
 def held(folder: Path) -> Iterator[Held]:
-    """Lend a folder to read; OSError where it is none."""
+    """Hold a folder while it is read; OSError if there is no such folder."""
     if os.open not in os.supports_dir_fd:
         os.listdir(folder)  # NotADirectoryError for a file
         yield Held(folder, os.stat(folder), None)

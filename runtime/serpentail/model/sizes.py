@@ -1,4 +1,4 @@
-"""Warns of parameters that no animal has, or that digits are lost by: most are slips of units."""
+"""Warns of parameters that no animal has, or that cost digits; most often a unit is wrong."""
 
 import math
 import warnings
@@ -12,13 +12,13 @@ from .parameters import UNITS, Values
 
 UNLIKE = 1e4  # from here on H may be off by 1e-12 of its diagonal: docs/stability.md
 SMALLEST = {"torso_mass": (1e-4, "0.1 g"), "tail_length": (1e-3, "1 mm")}
-DENSEST = 1e6  # kg/m^3: 44 times osmium, as studies may change a mass and leave its inertia
+DENSEST = 1e6  # kg/m^3: 44 times osmium, because studies may change a mass but not its inertia
 
 
 def warn_of_sizes(manifest: dict, values: Values, calls: int = 2) -> None:
-    """Warn who called so many calls above of sizes of a model, or of many runs.
+    """Warn of the sizes of a model, or of many runs; ``calls``: frames above this function.
 
-    UnusualSize: no animal or robot has them.  UnlikeBodies: H loses digits.
+    UnusualSize: no animal or robot has them. UnlikeBodies: H loses digits.
     """
     units = UNITS | {p["name"]: p["unit"] for p in manifest["parameters"]}
     for name, value in values.items():
@@ -32,7 +32,7 @@ def warn_of_sizes(manifest: dict, values: Values, calls: int = 2) -> None:
 
 
 def _too_small(values: Values, units: dict[str, str]) -> Iterator[str]:
-    """Yield what to tell of parameters that are too small."""
+    """Yield a line about each parameter that is too small."""
     for name, (least, words) in [each for each in SMALLEST.items() if each[0] in values]:
         smallest = np.min(values[name])
         if smallest < least:
@@ -41,7 +41,7 @@ def _too_small(values: Values, units: dict[str, str]) -> Iterator[str]:
 
 
 def _too_dense(values: Values) -> Iterator[str]:
-    """Yield what to tell of a torso that is denser than any metal: of many runs, of the first."""
+    """Yield a line about a torso that is denser than any metal; of many runs, about the first."""
     masses = np.atleast_1d(values["torso_mass"])
     moments = np.atleast_1d(np.max(values["torso_inertia"], axis=-1))
     # of all bodies of this moment of inertia the ball, I = 2/5 m r^2, is the least dense
@@ -56,10 +56,11 @@ def _too_dense(values: Values) -> Iterator[str]:
 
 
 def disparity(values: Values) -> float:
-    """Return how unlike torso and tail are, of many runs the largest.
+    """Return by what factor torso and tail differ; of many runs, the largest.
 
-    That is the larger of m (|b2t| + L)^2 / min I_b, moments of inertia that cancel in H over what
-    is left, and of |b2t| / L, m and L being the tail's mass and length.
+    It is the larger of m (b + L)^2 / min I_b and b / L: m and L are the tail's mass and length, b
+    is the distance of its mount from B, I_b the torso's moments of inertia. The first compares
+    moments that cancel in H with what is left.
     """
     mass, length = np.asarray(values["tail_mass"]), np.asarray(values["tail_length"])
     with np.errstate(all="ignore"):
@@ -70,11 +71,12 @@ def disparity(values: Values) -> float:
 
 
 def warn_of_unlike(values: Values, calls: int = 2) -> None:
-    """Warn who called so many calls above where H loses digits by bodies of unlike size."""
+    """Warn if H loses digits because torso and tail differ in size; ``calls`` as above."""
     ratio = disparity(values)
     if ratio > UNLIKE:
         sizes = "tail_mass, tail_length, tail_mount, torso_inertia"
         words = (
-            f"torso and tail are unlike by {ratio:.1e} ({sizes}): H may be off by as many roundings"
+            f"torso and tail differ by a factor of {ratio:.1e} ({sizes}): H may be off by as many "
+            "roundings"
         )
         warnings.warn(f"{words}; are the units kg and m?", UnlikeBodies, stacklevel=calls + 1)

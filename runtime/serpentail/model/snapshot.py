@@ -33,12 +33,12 @@ def model_library(checked: CheckedFolder, sources: Sequence[str], profile: str) 
 
 
 def library_in_cache(checked: CheckedFolder, sources: Sequence[str], profile: str) -> Path | None:
-    """Return what ``model_library`` would return if nothing has to be compiled, else None."""
+    """Return the library of ``model_library`` if it is in the cache, else None."""
     return noted(_text(checked, sources), profile, cache_folder(None))
 
 
 def _text(checked: CheckedFolder, sources: Sequence[str]) -> str:
-    """Return the digest of sources, and of the headers that they can reach."""
+    """Return the digest of sources, and of the headers that they can include."""
     digests = checked.manifest["files"]
     paths = [PurePosixPath(name) for name in digests]
     headers = [path for path in paths if path.suffix == ".h"]
@@ -57,9 +57,9 @@ def _text(checked: CheckedFolder, sources: Sequence[str]) -> str:
 
 
 def snapshot(checked: CheckedFolder, cache: Path) -> Path:
-    """Return the folder in the cache that has a model's files and no others, made where needed.
+    """Return the folder in the cache with exactly a model's files; make it if needed.
 
-    SerpentailError where it cannot be written.
+    SerpentailError if it cannot be written.
     """
     place = cache / MODELS / checked.manifest_hash
     content = contents(checked)
@@ -79,9 +79,9 @@ def snapshot(checked: CheckedFolder, cache: Path) -> Path:
 
 
 def restored(manifest_hash: str, folder: Path) -> CheckedFolder:
-    """Return the model of a manifest's hash, from the cache or else from its folder.
+    """Return the model with a manifest's hash, from the cache or else from its folder.
 
-    ModelError where neither has it.
+    ModelError if neither has it.
     """
     with suppress(SerpentailError):
         place = cache_folder(None) / MODELS / manifest_hash
@@ -94,8 +94,8 @@ def restored(manifest_hash: str, folder: Path) -> CheckedFolder:
     if found.manifest_hash != manifest_hash:
         raise ModelError(
             f"{folder} was generated again since the model was pickled (its manifest was "
-            f"{manifest_hash:.12}, now {found.manifest_hash:.12}), and the cache has the pickled "
-            "one no longer: generate it again as it was, or load and pickle the model anew"
+            f"{manifest_hash:.12}, now {found.manifest_hash:.12}), and the cache no longer has "
+            "the pickled one: generate it again as it was, or load and pickle the model anew"
         )
     return found
 

@@ -45,7 +45,7 @@ def product_matrix(quaternion: Array) -> Array:
 
 
 def jacobians_of_tail(nt: int, of_v_dot: tuple[Array, Array, Array]) -> tuple[Array, Array]:
-    """Return the same of a tail on a fixed base: its rates move its coordinates."""
+    """Return the Jacobians of ``jacobians`` for a tail on a fixed base: q_dot is v."""
     by_q, by_v, by_tau = of_v_dot
     none, one = np.zeros_like(by_v), np.broadcast_to(np.eye(nt), by_v.shape)
     A = np.concatenate(
@@ -57,9 +57,9 @@ def jacobians_of_tail(nt: int, of_v_dot: tuple[Array, Array, Array]) -> tuple[Ar
 def jacobians(
     layout: Layout, q: Array, v: Array, of_v_dot: tuple[Array, Array, Array]
 ) -> tuple[Array, Array]:
-    """Return d(x_dot)/dx (..., nx, nx), d(x_dot)/du (..., nx, 2m).
+    """Return d(x_dot)/dx (..., nx, nx) and d(x_dot)/du (..., nx, 2m).
 
-    of_v_dot: those of v_dot by turns of the torso and shifts (..., nv, nv), by v, by tau.
+    of_v_dot: the Jacobians of v_dot with respect to q in its tangent space, v and tau.
     """
     if layout.fixed:
         return jacobians_of_tail(layout.nt, of_v_dot)

@@ -1,4 +1,4 @@
-"""The structures that the generated C takes, as ctypes has them."""
+"""The C structures of generated models, for ctypes."""
 
 import ctypes
 from functools import lru_cache

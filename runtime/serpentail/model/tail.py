@@ -1,4 +1,4 @@
-"""What a tail is made of: links of its segments, 0 where a segment is an arc."""
+"""The links of a tail's segments; 0 for a segment that is an arc."""
 
 Links = int | tuple[int, ...] | None  # of all segments, or of each; None of a continuum
 
@@ -13,7 +13,7 @@ def links_of(pieces: int | list[int], kinds: tuple[str, ...]) -> Links:
 
 
 def words_of(links: Links, segments: int) -> str:
-    """Return what a tail of so many segments is made of."""
+    """Return in words what a tail is made of."""
     if links is None:
         return f"{segments} continuum segments"
     if isinstance(links, int):

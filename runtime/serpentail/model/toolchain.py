@@ -67,11 +67,11 @@ def check_profile(profile: str) -> None:
     one_of("profile", profile, PROFILES, SerpentailError)
 
 
-# The compiler: which one, and what it resolves its flags to.
+# The compiler, and what its flags resolve to.
 
 
 def candidates() -> Iterator[tuple[str, ...]]:
-    """Yield the commands to try: $CC alone if set, else what is on PATH, then the ziglang wheel."""
+    """Yield the commands to try: $CC alone if set, else those on PATH, then the ziglang wheel."""
     chosen = os.environ.get("CC", "").strip()
     if chosen:
         yield _split(chosen)
@@ -82,7 +82,7 @@ def candidates() -> Iterator[tuple[str, ...]]:
 
 
 def _split(chosen: str) -> tuple[str, ...]:
-    """Return the words of $CC, the first one as a path where it can be found."""
+    """Return the words of $CC, the first one as a path if it can be found."""
     try:
         program, *arguments = shlex.split(chosen)
     except ValueError as error:
@@ -108,7 +108,7 @@ def examine(profile: str, folder: Path) -> Toolchain:
 
 
 def _not_found(refusals: list[str]) -> str:
-    """Return the message that names what was tried and how to mend it."""
+    """Return the message that names what was tried, and the remedy."""
     chosen = os.environ.get("CC", "").strip()
     if chosen:
         return f"CC={chosen!r} does not work as a C compiler: {refusals[0]}. {REMEDY_NOT_FOUND}"
@@ -121,7 +121,7 @@ def _not_found(refusals: list[str]) -> str:
 
 
 def _ask(command: tuple[str, ...], profile: str) -> Toolchain:
-    """Return what `command` says about itself, or raise CompilerNotFound with its reason."""
+    """Return what `command` reports about itself; CompilerNotFound if that fails."""
     answer = run_command((*command, "--version"))
     if answer.returncode or not answer.stdout.strip():
         reason = (answer.stderr.strip() or "no answer to --version")[:300]
@@ -142,7 +142,7 @@ def _cpu_flag(command: tuple[str, ...], profile: str) -> tuple[str, ...]:
 
 
 def _target(command: tuple[str, ...], flags: tuple[str, ...]) -> str:
-    """Return a digest of what flags resolve to: gcc's list of them, else the macros they define."""
+    """Return a digest of what the flags resolve to: gcc's list, else the predefined macros."""
     questions = (("-Q", "--help=target"), ("-dM", "-E", "-x", "c", os.devnull))
     answers = (run_command((*command, *flags, *question)) for question in questions)
     listings = (answer.stdout for answer in answers if answer.returncode == 0 and answer.stdout)
@@ -150,14 +150,14 @@ def _target(command: tuple[str, ...], flags: tuple[str, ...]) -> str:
 
 
 def run_command(command: Sequence[str]) -> subprocess.CompletedProcess[str]:
-    """Return the finished command, run in the C locale; 127 where it could not be started."""
+    """Return the finished command, run in the C locale; 127 if it could not be started."""
     return run_commands([command])[0]
 
 
 def run_commands(
     commands: Sequence[Sequence[str]], tick: Callable[[], object] = lambda: None
 ) -> list[subprocess.CompletedProcess[str]]:
-    """Return the finished commands, run at the same time; 127 where one could not be started.
+    """Return the finished commands, run at the same time; 127 if one could not be started.
 
     tick: called now and then meanwhile.
     """
@@ -171,7 +171,7 @@ def run_commands(
 
 
 def kept_surroundings() -> dict[str, str]:
-    """Return what a compiler is given of the environment that may change what it makes."""
+    """Return the environment variables that may change what a compiler makes."""
     return {
         name: value
         for name, value in sorted(os.environ.items())
@@ -179,11 +179,11 @@ def kept_surroundings() -> dict[str, str]:
     }
 
 
-# Notes: what a compiler said, kept so that a warm call starts no process.
+# Notes: properties of a compiler, kept so that later calls start no process.
 
 
 def recall(profile: str, folder: Path) -> Toolchain | None:
-    """Return the first working candidate by notes of such a processor, None to ask afresh."""
+    """Return the first working candidate by stored notes of such a processor; None to ask again."""
     for command in candidates():
         note = _read_note(_note_path(folder, command, profile))
         if note is None:
@@ -202,7 +202,7 @@ def _note_path(folder: Path, command: tuple[str, ...], profile: str) -> Path:
 
 
 def _file_identity(path: str) -> tuple[str, int, int]:
-    """Return what changes when the program at `path` is replaced."""
+    """Return values that change if the program at `path` is replaced."""
     with contextlib.suppress(OSError):
         status = os.stat(path)
         return os.path.realpath(path), status.st_mtime_ns, status.st_size
@@ -220,7 +220,7 @@ def _read_note(path: Path) -> dict[str, Any] | None:
 
 
 def _is_whole(note: object) -> bool:
-    """Tell whether a note has all that is looked up in it, of the right types."""
+    """Tell whether a note has all its entries, of the right types."""
     if not isinstance(note, dict) or not isinstance(note.get("works"), bool):
         return False
     texts = (note.get("version"), note.get("target"))
@@ -231,7 +231,7 @@ def _is_whole(note: object) -> bool:
 def _write_note(
     folder: Path, command: tuple[str, ...], profile: str, toolchain: Toolchain | None
 ) -> None:
-    """Keep what was learnt; a cache that cannot be written still serves, until a build needs it."""
+    """Store what was learnt; ignore a cache that cannot be written, until a build needs it."""
     blank = Toolchain(command, (), "", "")
     note = {"works": toolchain is not None, **asdict(toolchain or blank)}
     path = _note_path(folder, command, profile)

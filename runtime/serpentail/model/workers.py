@@ -14,11 +14,11 @@ from itertools import pairwise
 
 from .cores import threads as allowed
 
-POLL_S = 0.1  # s between looks at signals, such as Ctrl-C
+POLL_S = 0.1  # s between checks for signals, such as Ctrl-C
 MIN_STATES_PER_THREAD = 256  # states: the least that is worth a thread
-# states between looks at signals, at first, and at least, over those that are worth a thread
+# states between checks for signals, at first and at least, relative to those worth a thread
 FIRST_PIECE, LEAST_PIECE = 8, 1 / 4
-PIECE_S = 0.05  # s between looks: pieces grow or shrink to that
+PIECE_S = 0.05  # s between checks: pieces grow or shrink to this
 
 
 def after_fork(renew: Callable[[], object]) -> None:
@@ -42,11 +42,11 @@ def shared(
     run: Callable[[int, int], None],
     least: int = MIN_STATES_PER_THREAD,
 ) -> None:
-    """Call ``run(first, last)`` for pieces of a batch, in several threads where it is large.
+    """Call ``run(first, last)`` for pieces of a batch, in several threads if it is large.
 
-    threads: at most so many, None for as many as this process may use.  least: states that are
-    worth a thread.  Of states that fail the first one raises.  Ctrl-C ends all after the pieces in
-    work.
+    threads: their largest number, None for as many as this process may use. least: states that are
+    worth a thread. If states fail, the first one raises the error. Ctrl-C ends the work after the
+    pieces that are running.
     """
     if count < 2 * least:
         run(0, count)
@@ -98,7 +98,7 @@ def in_turn(
     with ThreadPoolExecutor(threads, thread_name_prefix="serpentail") as crew:
         try:
             waiting = {crew.submit(work, _taken(numbers), ended) for _ in range(threads)}
-            while waiting:  # looks at signals now and then
+            while waiting:  # checks for signals now and then
                 done, waiting = wait(waiting, POLL_S, FIRST_EXCEPTION)
                 for future in done:
                     future.result()

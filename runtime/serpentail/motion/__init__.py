@@ -1,1 +1,1 @@
-"""Recorded motions: trajectories, contacts, and what they amount to."""
+"""Recorded motions: trajectories, contacts, and numbers that summarise them."""

@@ -1,4 +1,4 @@
-"""What a REPL shows of a motion: on a few lines what moved, when, how it was made, how it ended."""
+"""The text of a motion in a REPL: what moved, when, how it was made, how it ended."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -28,7 +28,7 @@ def account(motion: "Trajectory") -> str:
 
 
 def tail_of(model: Model) -> str:
-    """Return what a model's tail is made of."""
+    """Return in words what a model's tail is made of."""
     if model.kind == "mixed":
         return model.tail_words()
     if isinstance(model.links, tuple):
@@ -47,7 +47,7 @@ def arrays_of(motion: Any) -> str:
 def how_made(info: dict[str, Any]) -> str:
     """Return how a motion was made, as far as its info says so."""
     if "method" not in info:
-        return "planned" if info.get("kind") == "plan" else "by no method that it tells"
+        return "planned" if info.get("kind") == "plan" else "by an unknown method"
     counts = [f"{info[name]} {name}" for name in ("steps", "rejected") if name in info]
     return f"by {info['method']}: {', '.join(counts)}"
 
@@ -75,6 +75,6 @@ def _ended(motion: "Trajectory") -> list[str]:
 
 
 def _listed(info: dict[str, Any], name: str) -> list[Any]:
-    """A list in an info, which is whatever its maker gave."""
+    """Return a list of an info; empty if the entry is something else."""
     found = info.get(name)
     return found if isinstance(found, list) else []

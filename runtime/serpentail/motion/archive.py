@@ -1,4 +1,4 @@
-"""Files of motions: arrays in one npz, read again only where every checksum is right."""
+"""Files of motions: arrays in one npz, which is read only if every checksum is right."""
 
 import json
 import os
@@ -24,8 +24,9 @@ def write(
     info: Mapping[str, Any],
     contact: Contact | None,
 ) -> Path:
-    """Write one npz file (suffix added if absent), whole or not at all, and return its path;
-    NotWritten where that cannot be done.
+    """Write one npz file (suffix added if absent), whole or not at all, and return its path.
+
+    NotWritten if it cannot be written.
     """
     target = _npz(path)
     touching: dict[str, Any] = {}
@@ -38,8 +39,9 @@ def write(
 
 
 def read(path: str | os.PathLike[str], arrays: Iterable[str]) -> tuple[Path, dict[str, Any]]:
-    """Return the path of a file, and its arrays, info and contact; FileNotFoundError if absent,
-    ValueError if it is none of ours.
+    """Return the path of a file, and its arrays, info and contact.
+
+    FileNotFoundError if it is absent, ValueError if it is not a trajectory.
     """
     source = _npz(path)
     if not source.is_file():
@@ -50,7 +52,7 @@ def read(path: str | os.PathLike[str], arrays: Iterable[str]) -> tuple[Path, dic
     try:
         return source, _parsed(fields)
     except ValueError as error:
-        raise ValueError(f"{str(source)!r} holds no sound trajectory: {error}") from error
+        raise ValueError(f"{str(source)!r} does not hold a valid trajectory: {error}") from error
 
 
 def _npz(path: str | os.PathLike[str]) -> Path:

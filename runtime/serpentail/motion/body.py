@@ -18,7 +18,7 @@ def semi_axes(model: Model) -> Array:
     """Return the semi-axes (3,) of the torso, m, along its own axes.
 
     The torso is the ellipsoid that touches the ground, else the homogeneous one of its inertia.
-    A fixed base has none: zeros.
+    A fixed base has no torso: zeros.
     """
     p = model.parameters
     if model.fixed:
@@ -30,7 +30,7 @@ def semi_axes(model: Model) -> Array:
 
 
 def centre_of_mass(model: Model, q: Array, v: Array) -> Array:
-    """Return (K, 3), m; of the torso, or the base, where the scene has no ``center_of_mass``."""
+    """Return the centre of mass (K, 3), m; that of the torso or base without ``center_of_mass``."""
     if "center_of_mass" not in model.kernels:
         return model.layout.pose(q)[:, POSITION]
     return np.asarray(model.center_of_mass(q, v)[0])
@@ -39,7 +39,7 @@ def centre_of_mass(model: Model, q: Array, v: Array) -> Array:
 def bends(model: Model, tail: Array) -> Array:
     """Return the bends (K, 2m) of the segments in pitch and yaw, rad, of tail coordinates (K, 2m).
 
-    An articulated segment bends by what all its links turn together.
+    The bend of an articulated segment is the sum of its links' angles.
     """
     if model.links is not None:
         return np.repeat(model.joints_each, 2) * tail
@@ -50,8 +50,9 @@ def bends(model: Model, tail: Array) -> Array:
 
 
 def leg_points(model: Model, q: Array, legs: Array | None) -> Array | None:
-    """Return the joints (K, 2, 6, 3) of the legs, m, world; None where the angles (K, 4) are
-    unknown, or the scene left out the function ``leg_points``.
+    """Return the joints (K, 2, 6, 3) of the legs, m, world.
+
+    None if the angles (K, 4) are unknown, or the scene left out the function ``leg_points``.
     """
     if legs is None or "leg_points" not in model.kernels:
         return None

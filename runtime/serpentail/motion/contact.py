@@ -1,4 +1,4 @@
-"""What touched the ground along a motion: points, forces and friction springs by groups."""
+"""``Contact``: points on the ground along a motion, their forces and friction springs."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -14,12 +14,23 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """K samples of P points: the feet's A, M and T (right, then left), the tail's, the torso's.
+    """Points of a motion that can touch the ground, and the ground's forces on them.
 
-    points (K, P, 3) m, world; forces (K, P, 3) N of the ground, world; bristles (K, P, 2) m,
-    stretch of the friction springs; groups: how many of the points are feet, tail and torso, in
-    that order; legs (K, 4) rad, gamma and delta of the right leg, then of the left, None without
-    feet.
+    There are K samples of P points: A, M and T of the right foot, then of the left; the tail's;
+    the torso's.
+
+    Attributes
+    ----------
+    points : ndarray, shape (K, P, 3)
+        Positions (m, world).
+    forces : ndarray, shape (K, P, 3)
+        Forces of the ground (N, world).
+    bristles : ndarray, shape (K, P, 2)
+        Stretch of the friction springs (m, world x and y).
+    groups : dict of str to int
+        Number of points of "feet", "tail" and "torso", in this order.
+    legs : ndarray, shape (K, 4), or None
+        gamma and delta of the right leg, then of the left (rad); None without feet.
     """
 
     points: Array
@@ -39,22 +50,38 @@ class Contact:
 
     @property
     def arrays(self) -> dict[str, Array]:
-        """What it has at every sample, by name."""
+        """The arrays that have one row for each sample, by name."""
         legs = {} if self.legs is None else {"legs": self.legs}
         return {name: getattr(self, name) for name in OF_POINTS} | legs
 
     @property
     def depth(self) -> Array:
-        """Depth (K, P) in m of the points below the ground; negative above it."""
+        """Depth of the points below the ground, (K, P), m; negative above it."""
         return -self.points[..., 2]
 
     @property
     def total(self) -> Array:
-        """Size (K,) in N of the ground's force on all points together."""
+        """Size of the ground's force on all points together, (K,), N."""
         return np.asarray(np.linalg.norm(self.forces.sum(axis=1), axis=1))
 
     def of(self, group: str) -> "Contact":
-        """Return the points of one group; KeyError where the motion has none."""
+        """Return the points of one group.
+
+        Parameters
+        ----------
+        group : str
+            "feet", "tail" or "torso".
+
+        Returns
+        -------
+        Contact
+            The points of that group.
+
+        Raises
+        ------
+        KeyError
+            The motion has no such group.
+        """
         if group not in self.groups:
             raise KeyError(f"no group {group!r}: this motion has {', '.join(self.groups)}")
         count = self.groups[group]
@@ -65,7 +92,7 @@ class Contact:
         return replace(self, **arrays, groups={group: count})
 
     def mapped(self, change: Callable[[Array], Array]) -> "Contact":
-        """Return this contact with a function applied to every array (K, columns)."""
+        """Return this contact with a function applied to every array, each as (K, columns)."""
         changed: dict[str, Any] = {}
         for name, array in self.arrays.items():
             rows = change(array.reshape(len(array), -1))

@@ -5,29 +5,29 @@ from typing import Any, TypeVar
 
 T = TypeVar("T")
 
-LATER = "later"  # what derives them, in a motion that has it
-# the name of a field -> that one, and what else comes with it, by name
+LATER = "later"  # attribute of a motion that holds the function deriving its fields
+# the name of a field -> this field and related ones, by name
 Later = Callable[[str], dict[str, Any]]
 
 
 def made(kind: type[T], fields: Mapping[str, Any], later: Later) -> T:
-    """Return a motion with these fields, all others of which are derived later."""
+    """Return a motion with these fields; all others are derived later."""
     motion = object.__new__(kind)
     vars(motion).update(fields, **{LATER: later})
     return motion
 
 
 def settled(motion: Any, names: Iterable[str]) -> dict[str, Any]:
-    """Return what a motion consists of when fields of these names have been derived."""
+    """Return the state of a motion after deriving the fields of these names."""
     state = vars(motion) | {name: getattr(motion, name) for name in names}
     state.pop(LATER, None)
     return state
 
 
 class Derived:
-    """A field that its motion derives once and keeps; where it was given, this is not asked.
+    """A field that its motion derives once and keeps, unless it was given.
 
-    In a race of threads the first one's values stay.
+    If threads race, the first one's values stay.
     """
 
     def __init__(self, name: str):

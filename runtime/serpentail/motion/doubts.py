@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 DEEP = 0.1  # of the torso's length, below the ground: as deep as a torso rests in it by contact
 SUNK = 0.1  # of the way from the torso's centre to its surface
-MOST_WEIGHTS = 20.0  # body weights of the ground's force beyond which it is a blow: our choice
+MOST_WEIGHTS = 20.0  # body weights: a larger force of the ground counts as an impact; our choice
 # rad, of a segment: beyond half a turn its end points back into it, and plans may go just so far
 MOST_BEND = 1.02 * np.pi
 KNEES = 3  # hip, D and knee come first in a leg, and are no contacts
@@ -31,9 +31,9 @@ Measure = Callable[[slice], Array]  # samples -> (K,)
 
 
 def warnings_of(model: Model | None, motion: "Trajectory") -> list[str]:
-    """Return what to mind about a motion: its books, then what cannot be true of an animal.
+    """Return the doubts about a motion: what does not balance, then what no animal can do.
 
-    Without a model the latter is what was found before the motion was saved or pickled.
+    Without a model the latter are those found before the motion was saved or pickled.
     """
     books: list[str] = motion.info.get("warnings", [])
     found = motion.info.get("doubts", []) if model is None else doubts(model, motion)
@@ -41,10 +41,9 @@ def warnings_of(model: Model | None, motion: "Trajectory") -> list[str]:
 
 
 def doubts(model: Model, motion: "Trajectory") -> list[str]:
-    """Return a sentence with value, time and remedy for all that cannot be true of an animal.
+    """Return a sentence with value, time and remedy for everything that no animal can do.
 
-    What needs points of tail or legs is looked at where the scene has the functions
-    ``tail_points`` and ``leg_points``.
+    Checks of tail or legs need the functions ``tail_points`` and ``leg_points`` of the scene.
     """
     with np.errstate(all="ignore"):  # of a run that blows up
         return [
@@ -56,7 +55,7 @@ def doubts(model: Model, motion: "Trajectory") -> list[str]:
 
 
 def _in_the_ground(model: Model, motion: "Trajectory") -> list[str]:
-    """Parts that the scene gave no contact although there is a ground, and that are deep in it."""
+    """Return parts that are deep in the ground, because the scene gives them no contact."""
     if motion.contact is None:
         return []
     allowed, told = DEEP * 2 * float(semi_axes(model).max()), []
@@ -73,7 +72,7 @@ def _in_the_ground(model: Model, motion: "Trajectory") -> list[str]:
 
 
 def _depths(model: Model, motion: "Trajectory") -> dict[str, Moment]:
-    """The largest depth (m) of each part that has no contact of its own, and when."""
+    """Return the largest depth (m) of each part without contact, and its time."""
     contact = motion.contact
     assert contact is not None
     q, axes, depths = motion.q, semi_axes(model), {}

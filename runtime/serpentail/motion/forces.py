@@ -1,4 +1,4 @@
-"""The ground's forces in a motion's samples: peaks of points, of feet, of groups and of all."""
+"""Peaks of the ground's forces at a motion's samples: of points, feet, groups and all together."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Motions one after another as one."""
+"""Joins motions that follow each other to one."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -13,10 +13,10 @@ BOOKS = ("work_J", "impulse_N_s")
 
 
 def joined(parts: Sequence[Trajectory]) -> Trajectory:
-    """Return motions of one model, each of which begins where the one before ends, as one.
+    """Return motions of one model, each beginning at the end of the one before, as one motion.
 
-    Samples at which two meet are those of the earlier.  Counts, works and impulses are added up;
-    the imbalance is the sum, its relative size the largest of one part.
+    A sample that two motions share is that of the earlier one. Counts, works and impulses are added
+    up. The imbalance is the sum; its relative size is the largest of all parts.
     """
     arrays: dict[str, Any] = {
         name: _end_to_end([getattr(part, name) for part in parts]) for name in ARRAYS
@@ -37,7 +37,7 @@ def _end_to_end(arrays: Sequence[np.ndarray]) -> np.ndarray:
 
 
 def _info(parts: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """What the parts tell, as of one run."""
+    """Return the info of the parts as that of one run."""
     info = dict(parts[-1])
     for name in COUNTS:
         if name in info:

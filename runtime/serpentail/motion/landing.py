@@ -23,7 +23,7 @@ Spans = list[tuple[float, float]]
 
 
 def knows_events(motion: Trajectory) -> bool:
-    """Tell whether the motion is on the ground and somebody looked for touches."""
+    """Tell whether the motion is on the ground and its events were detected."""
     return motion.contact is not None and "events" in motion.info
 
 
@@ -39,14 +39,14 @@ def flight(motion: Trajectory) -> tuple[float | None, float | None]:
 
 
 def events(motion: Trajectory) -> list[dict[str, Any]]:
-    """The events within the samples, of which a resampled motion may have only a part."""
+    """Return the events within the samples; a resampled motion may have only some of them."""
     slack = ROUNDING * max(abs(motion.t[0]), abs(motion.t[-1]))
     begin, end = motion.t[0] - slack, motion.t[-1] + slack
     return [event for event in motion.events if begin <= event["time"] <= end]
 
 
 def airborne(motion: Trajectory) -> list[tuple[float, float | None]]:
-    """Spans in which nothing touches the ground; -inf, None where they go beyond the motion."""
+    """Return spans in which nothing touches the ground; -inf or None if they exceed the motion."""
     touching = _touching_first(motion)
     begin: float | None = None if touching else -np.inf
     spans: list[tuple[float, float | None]] = []
@@ -66,7 +66,7 @@ def airborne(motion: Trajectory) -> list[tuple[float, float | None]]:
 
 
 def touches(motion: Trajectory) -> dict[str, Spans] | None:
-    """Spans (s) in which each group touches the ground; None where nobody looked for events."""
+    """Return spans (s) in which each group touches the ground; None if no events were detected."""
     if not knows_events(motion):
         return None
     begun = dict.fromkeys(_touching_first(motion), float(motion.t[0]))
@@ -133,10 +133,10 @@ def least_upright(motion: Trajectory) -> float | None:
 
 
 def turned(motion: Trajectory) -> float | None:
-    """Angle (rad) that the torso turned about horizontal axes from the landing on, to and fro.
+    """Return the rotation (rad) of the torso about horizontal axes after the landing, in total.
 
-    It is the integral of the angular velocity's horizontal part, and so the length of the way that
-    the world's z axis takes over the torso: taken from the samples' attitudes, which are less than
+    It is the integral of the horizontal angular velocity, that is the length of the path of the
+    world's z axis on the torso. It is computed from the samples' attitudes, which must be less than
     half a turn apart.
     """
     up = _up_after(motion)
@@ -159,7 +159,7 @@ def upright(motion: Trajectory) -> float:
 
 
 def standing(model: Model, motion: Trajectory) -> bool | None:
-    """Tell if it ends upright, at rest and on its feet; None where it has none."""
+    """Tell if it ends upright, at rest and on its feet; None without feet."""
     if motion.contact is None or "feet" not in motion.contact.groups:
         return None
     carried = motion.contact.of("feet").forces[-1, :, 2].sum()
@@ -168,9 +168,9 @@ def standing(model: Model, motion: Trajectory) -> bool | None:
 
 
 def landed(model: Model, motion: Trajectory) -> bool | None:
-    """Tell if it stands at the end and was never on its back from the landing on.
+    """Tell if it stands at the end and was never on its back after the landing.
 
-    None where it does not land, or has no feet.
+    None if it does not land, or has no feet.
     """
     stands, least = standing(model, motion), least_upright(motion)
     return None if stands is None or least is None else stands and least > 0

@@ -33,7 +33,7 @@ from .trajectory import Trajectory
 
 
 class Number(NamedTuple):
-    """A number of a run: ``of`` returns it ready for JSON, or None where there is none."""
+    """A number of a run: ``of`` returns it ready for JSON, or None if it does not exist."""
 
     name: str
     unit: str
@@ -54,12 +54,12 @@ def _of_torso(measure: Callable[[Trajectory], Any]) -> Callable[[Model, Trajecto
 
 
 def _told(name: str) -> Callable[[Model, Trajectory], Any]:
-    """What the run itself told in its info."""
+    """Return an entry of the run's info."""
     return lambda model, motion: motion.info.get(name)
 
 
 def _ground_impulse(motion: Trajectory) -> list[float] | None:
-    """The sum of the groups' impulses; None in flight, and where no run added them up."""
+    """Return the sum of the groups' impulses; None in flight, and if no run added them up."""
     impulses = motion.info.get("impulse_N_s")
     return np.sum(list(impulses.values()), axis=0).tolist() if impulses else None
 
@@ -76,7 +76,7 @@ def _real_time_factor(motion: Trajectory) -> float | None:
     return float(motion.t[-1] - motion.t[0]) / seconds if seconds else None
 
 
-SAMPLES = "in the samples, which may lie beside a blow's highest moment"
+SAMPLES = "at the samples, which may miss the peak of an impact"
 NUMBERS = (
     Number("model", "", "name of the model", lambda model, motion: model.name),
     Number(
@@ -85,60 +85,61 @@ NUMBERS = (
     ),
     # the leap
     Number(
-        "take_off_s", "s", "where the flight about the apex begins: nothing touches any more",
+        "take_off_s", "s", "start of the flight about the apex: nothing touches the ground",
         lambda model, motion: flight(motion)[0],
     ),
     Number(
-        "apex_m", "m", "highest B, the torso's centre of mass",
+        "apex_m", "m", "largest height of B, the torso's centre of mass",
         _of_torso(lambda motion: float(motion.q[:, 2].max())),
     ),
-    Number("com_rise_m", "m", "highest centre of mass, over its start", com_rise),
+    Number("com_rise_m", "m", "largest height of the centre of mass, above its start", com_rise),
     Number(
-        "recontact_s", "s", "the landing: where the flight about the apex ends",
+        "recontact_s", "s", "landing: end of the flight about the apex",
         lambda model, motion: flight(motion)[1],
     ),
     Number(
-        "landing_group", "", "the group of points that lands first",
+        "landing_group", "", "group of points that lands first",
         lambda model, motion: landing_group(motion),
     ),
     # the attitude, and whether it was a landing or a tumble
     Number(
-        "pitch_at_end_rad", "rad", "pitch, turns counted",
+        "pitch_at_end_rad", "rad", "pitch at the end, whole turns included",
         _of_torso(lambda motion: float(pitch_roll_yaw(motion.q, unwrap=True)[-1, 0])),
     ),
     Number(
-        "tilt_max_deg", "deg", "largest angle of the torso's z axis off the vertical",
+        "tilt_max_deg", "deg", "largest angle between the torso's z axis and the vertical",
         _of_torso(lambda motion: float(tilt_deg(motion.attitude).max())),
     ),
     Number(
-        "tilt_end_deg", "deg", "the same at the end",
+        "tilt_end_deg", "deg", "this angle at the end",
         _of_torso(lambda motion: float(tilt_deg(motion.attitude[-1]))),
     ),
     Number(
-        "upright_end", "", "z of the torso's z axis at the end: 1 level, -1 on its back",
+        "upright_end", "", "z component of the torso's z axis at the end: 1 level, -1 on its back",
         _of_torso(upright),
     ),
     Number(
-        "least_upright_landing", "", "least such z from the landing on: below 0 it was on its back",
+        "least_upright_landing", "",
+        "least such z component after the landing: below 0 it was on its back",
         lambda model, motion: least_upright(motion),
     ),
     Number(
         "turned_landing_rad", "rad",
-        "how far the torso turned about horizontal axes from the landing on, to and fro",
+        "total rotation of the torso about horizontal axes after the landing",
         lambda model, motion: turned(motion),
     ),
     Number(
         "standing_end", "",
-        f"at the end: upright above {MIN_UPRIGHT}, B below {MAX_SPEED} m/s, more than {MIN_SHARE} "
-        "of the weight on the feet, however it came there",
+        f"stands at the end: upright_end above {MIN_UPRIGHT}, B slower than {MAX_SPEED} m/s, more "
+        f"than {MIN_SHARE} of the weight on the feet",
         standing,
     ),
     Number(
-        "landed", "", "stands at the end, and was upright above 0 from the landing on", landed
+        "landed", "", "stands at the end, and least_upright_landing is above 0", landed
     ),
     # the ground
     Number(
-        "body_weight_N", "N", "weight of torso and tail, of the tail on a fixed base",
+        "body_weight_N", "N", "weight of torso and tail; on a fixed base, of the tail",
         lambda model, motion: weight(model) or None,
     ),
     Number(
@@ -146,34 +147,36 @@ NUMBERS = (
         lambda model, motion: peak_total(motion),
     ),
     Number(
-        "peak_ground_force_weights", "body weights", "the same",
+        "peak_ground_force_weights", "body weights", "the same in body weights",
         lambda model, motion: in_weights(model, peak_total(motion)),
     ),
     Number(
-        "peak_group_force_N", "N", "largest force on each group and on each foot, of the samples",
+        "peak_group_force_N", "N", "largest force on each group and on each foot, at the samples",
         lambda model, motion: peaks(motion),
     ),
-    Number("peak_group_force_weights", "body weights", "the same", _peaks_in_weights),
+    Number(
+        "peak_group_force_weights", "body weights", "the same in body weights", _peaks_in_weights
+    ),
     Number(
         "peak_foot_force_N", "N",
-        "largest force on one point, A, M or T of both feet together, of the samples",
+        "largest force on a point A, M or T, both feet together, at the samples",
         lambda model, motion: peak_force(motion, "feet"),
     ),
     Number(
-        "peak_tail_force_N", "N", "largest force on one point of the tail, of the samples",
+        "peak_tail_force_N", "N", "largest force on one point of the tail, at the samples",
         lambda model, motion: peak_force(motion, "tail"),
     ),
     Number(
         "ground_impulse_N_s", "N s",
-        "x, y and z of the ground's impulse on all points, added up by the integrator",
+        "impulse of the ground on all points (x, y, z), summed by the integrator",
         lambda model, motion: _ground_impulse(motion),
     ),
     Number(
-        "impulse_N_s", "N s", "the same on each group",
+        "impulse_N_s", "N s", "the same for each group",
         lambda model, motion: motion.info.get("impulse_N_s") or None,
     ),
     Number(
-        "touching_s", "s", "for how long each group touched the ground, in all",
+        "touching_s", "s", "total time for which each group touched the ground",
         lambda model, motion: touching_time(motion),
     ),
     Number(
@@ -186,34 +189,34 @@ NUMBERS = (
     ),
     # the books
     Number(
-        "peak_torque_N_m", "N m", "largest torque of a joint coordinate, of the samples",
+        "peak_torque_N_m", "N m", "largest torque of a tail coordinate, at the samples",
         lambda model, motion: float(np.abs(motion.tau).max(initial=0)),
     ),
     Number(
-        "energy_change_J", "J", "energy at the end less that at the start",
+        "energy_change_J", "J", "energy at the end minus energy at the start",
         lambda model, motion: float(motion.energy[-1] - motion.energy[0]),
     ),
     Number(
         "work_J", "J",
-        "what changed it: work of torques, of damping, of the ground, of the legs' drives",
+        "work of the torques, the damping, the ground and the legs' drives",
         _told("work_J"),
     ),
     Number(
         "imbalance", "",
-        "what work and impulses leave over: energy (J), momentum (N s), the larger over what was "
-        "moved",
+        "energy (J) and momentum (N s) that work and impulses do not explain, and the larger of "
+        "both relative to what was moved",
         _told("imbalance"),
     ),
-    Number("warnings", "", "what to mind about the run", warnings_of),
+    Number("warnings", "", "doubts about the run", warnings_of),
     # the effort
-    Number("method", "", "the integrator", _told("method")),
-    Number("reason", "", "why that one", _told("reason")),
+    Number("method", "", "integrator", _told("method")),
+    Number("reason", "", "why this integrator was chosen", _told("reason")),
     Number("steps", "", "steps that were taken", _told("steps")),
-    Number("rejected", "", "steps that were taken again, shorter", _told("rejected")),
+    Number("rejected", "", "steps that were repeated with a shorter length", _told("rejected")),
     Number("evaluations", "", "evaluations of the equations of motion", _told("evaluations")),
     Number("cpu_s", "s", "processor time", _told("cpu_seconds")),
     Number(
-        "real_time_factor", "", "duration over processor time",
+        "real_time_factor", "", "duration divided by processor time",
         lambda model, motion: _real_time_factor(motion),
     ),
 )  # fmt: skip

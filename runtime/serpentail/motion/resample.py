@@ -25,7 +25,7 @@ def inside(times: Array, span: Array) -> Array:
 
 @dataclass(frozen=True)
 class Interpolation:
-    """Where n times lie among samples: rows before and after; fraction and step between (n, 1)."""
+    """Places of n times among samples: rows before and after; fraction and step between (n, 1)."""
 
     before: NDArray[np.intp]
     after: NDArray[np.intp]

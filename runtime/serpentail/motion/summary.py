@@ -1,4 +1,4 @@
-"""What a motion came to: its numbers by name, for JSON, as aligned text or as a table."""
+"""``summary``: the numbers of a motion by name, for JSON, as text or as a table."""
 
 import math
 from typing import Any
@@ -31,16 +31,31 @@ class Summary(dict[str, Any]):
 
 
 def summary(model: Model, motion: Trajectory) -> Summary:
-    """Return what a motion came to, ready for JSON; None where there is no such number.
+    """Return the numbers of a motion, such as apex, landing, forces and work.
 
-    ``motion.numbers`` has the names, units and meanings, docs/simulation.md their table.
+    Parameters
+    ----------
+    model : Model
+        The model that moved.
+    motion : Trajectory
+        The motion.
+
+    Returns
+    -------
+    Summary
+        A dict of numbers by name, SI unless the name gives a unit; None if a number does not
+        exist. ``described()`` adds units and meanings, ``markdown()`` gives a table.
+
+    Notes
+    -----
+    docs/simulation.md lists all names, units and meanings.
     """
     with np.errstate(over="ignore", invalid="ignore"):  # of a run that blows up
         return Summary({each.name: _ready(each.of(model, motion)) for each in NUMBERS})
 
 
 def _ready(value: Any) -> Any:
-    """A value as JSON has it: None for what no number holds, of a run that blows up."""
+    """Return a value for JSON: None for a number that is not finite."""
     if isinstance(value, dict):
         return {name: _ready(each) for name, each in value.items()}
     return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -4,14 +4,17 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import Any
 
-DECIMALS = 12  # what is smaller is rounding
+DECIMALS = 12  # smaller numbers are rounding
 WIDEST = 32  # the column of values: long texts, such as reasons, make it no wider
 NO_UNITS: Mapping[str, str] = MappingProxyType({})
 Row = tuple[str, str, str]  # name, value, unit
 
 
 def as_text(report: Mapping[str, Any], units: Mapping[str, str] = NO_UNITS) -> str:
-    """Return a report as lines of name, value and unit; what has parts, a line a part."""
+    """Return a report as lines of name, value and unit.
+
+    An entry with parts has one line for each.
+    """
     table = [row for name, value in report.items() for row in _rows(name, value, units)]
     widths = [max((len(row[column]) for row in table), default=0) for column in (0, 1)]
     widths[1] = min(widths[1], WIDEST)
@@ -27,7 +30,7 @@ def as_markdown(heads: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
 
 
 def as_word(value: Any) -> str:
-    """Return a value as it is read: five digits, yes or no, "-" where there is none."""
+    """Return a value for readers: five digits, yes or no, "-" for None."""
     if value is None:
         return "-"
     if isinstance(value, bool):
@@ -40,7 +43,7 @@ def as_word(value: Any) -> str:
 
 
 def _rows(name: str, value: Any, units: Mapping[str, str]) -> list[Row]:
-    """The rows of an entry: one, or one a part of a mapping, or one a text of a list."""
+    """Return the rows of an entry: one, or one for each part of a mapping or text of a list."""
     unit = units.get(name, "")
     if isinstance(value, Mapping) and value:
         return [(f"{name}, {part}", as_word(each), unit) for part, each in value.items()]

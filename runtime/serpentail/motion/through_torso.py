@@ -8,8 +8,8 @@ from ..attitude import Array
 def sunk(points: Array) -> Array:
     """Return how far tails (K, P, 3) go into the torso, (K,): 0 not at all, 1 to its centre.
 
-    points: from the mount to the tip, joined by straight lines, in the torso's axes and from its
-    centre, over its semi-axes, so that the torso is the unit ball.  Until the tail has left the
+    points: from the mount to the tip, joined by straight lines, from the torso's centre in its axes
+    and divided by its semi-axes, so that the torso is the unit ball. Until the tail has left the
     ball once, it may be as near to the centre as its mount; from then on it must stay outside.
     """
     distance = np.linalg.norm(points, axis=2)

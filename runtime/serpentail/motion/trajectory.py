@@ -1,4 +1,4 @@
-"""Sampled motions: states, torques, energies and momenta at times, kept in files, sampled anew."""
+"""``Trajectory``: a sampled motion with torques, energies and momenta; it can be saved."""
 
 import dataclasses
 import json
@@ -7,11 +7,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from ..attitude import Array
-from ..checks import finite_array
 from ..model.layout import QUATERNION, Layout
 from ..model.model import Model
 from . import archive
@@ -21,19 +19,52 @@ from .derived import Derived, Later, made, settled
 from .doubts import doubts, warnings_of
 from .exports import Exports
 from .resample import Interpolation, hermite_q, inside, monotone, smooth
-
-UNIT_TOLERANCE = 1e-3  # how far a stored quaternion's norm may drift from 1
+from .showable import Showable
+from .soundness import check_time, check_unit, json_text, layout_of, real, shapes
 
 
 @dataclass(frozen=True, eq=False)
-class Trajectory(Exports):
-    """K samples of a motion with m tail segments, SI, in read-only arrays; ValueError if unsound.
+class Trajectory(Exports, Showable):
+    """A sampled motion: states, torques, energies and momenta at K times.
 
-    t (K,) s, increasing; q (K, 7+2m), v (K, 6+2m), on a fixed base both (K, 2m); tau (K, 2m) N m;
-    kinetic, potential (K,) J; in the world linear_momentum (K, 3) kg m/s and, about the COM,
-    angular_momentum (K, 3) kg m2/s, of the tail alone on a fixed base; info: JSON-ready dict;
-    contact: points, forces and bristles of a motion on the ground, None in flight; model: what
-    moved, which no file and no pickle keeps: None there.
+    ``simulate`` and ``plan`` make trajectories; the constructor checks arrays of other origin.
+    All arrays are read-only, in SI units.
+
+    Attributes
+    ----------
+    t : ndarray, shape (K,)
+        Increasing times (s).
+    q : ndarray, shape (K, nq)
+        Configurations with quaternions of norm 1; see ``Model``. On a fixed base (K, 2m).
+    v : ndarray, shape (K, nv)
+        Velocities. On a fixed base (K, 2m).
+    tau : ndarray, shape (K, 2m)
+        Torques (N m).
+    kinetic, potential : ndarray, shape (K,)
+        Energies (J).
+    linear_momentum : ndarray, shape (K, 3)
+        Momentum (kg m/s, world); on a fixed base that of the tail.
+    angular_momentum : ndarray, shape (K, 3)
+        Angular momentum about the centre of mass (kg m^2/s, world); on a fixed base that of the
+        tail.
+    info : dict
+        How the motion was made: method, reason, counts, events, warnings and more, JSON-ready.
+    contact : Contact or None
+        Points, forces and friction springs on the ground; None in flight.
+    model : Model or None
+        The model that moved. Files and pickles do not keep it; there it is None.
+
+    Raises
+    ------
+    ValueError
+        A shape is wrong, a value is not finite, times do not increase, or a quaternion does not
+        have norm 1.
+
+    Examples
+    --------
+    >>> motion = st.simulate(model, q0, v0, t_span=0.4)  # doctest: +SKIP
+    >>> motion.save("tumble.npz")  # doctest: +SKIP
+    >>> again = st.Trajectory.load("tumble.npz")  # doctest: +SKIP
     """
 
     t: Array
@@ -49,23 +80,24 @@ class Trajectory(Exports):
     model: Model | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
-        """Freeze private copies of the fields once each has been found sound."""
+        """Check the fields, and keep read-only copies."""
         for name in ARRAYS:
-            object.__setattr__(self, name, _real(name, getattr(self, name)))
-        for name, shape in _shapes(self.t, self.q, (self.v, self.tau)).items():
+            object.__setattr__(self, name, real(name, getattr(self, name)))
+        for name, shape in shapes(self.t, self.q, (self.v, self.tau)).items():
             actual = getattr(self, name).shape
             if actual != shape:
                 raise ValueError(
                     f"{name} has shape {actual}: give {shape}, to match the shapes of t and q"
                 )
-        _check_time(self.t)
-        _check_unit(self.attitude)
-        object.__setattr__(self, "info", json.loads(_json(self.info)))
+        check_time(self.t)
+        check_unit(self.attitude)
+        object.__setattr__(self, "info", json.loads(json_text(self.info)))
 
     @classmethod
     def of_run(cls, arrays: dict[str, Array], model: Model, later: Later) -> Self:
-        """Return a motion of sound arrays t, q, v, tau of its own, whose other fields are derived
-        by ``later(name)`` when they are first asked for.
+        """Return a motion of checked arrays t, q, v, tau, which it owns.
+
+        ``later(name)`` computes another field when that is first used.
         """
         for array in arrays.values():
             array.setflags(write=False)
@@ -75,28 +107,31 @@ class Trajectory(Exports):
 
     @property
     def energy(self) -> Array:
-        """Total energy T + V, (K,), J."""
+        """Total energy, (K,), J."""
         return self.kinetic + self.potential
 
     @property
     def events(self) -> list[dict[str, Any]]:
-        """Touch-downs and take-offs in order: time (s), group, kind, such as "take_off".
+        """Touch-downs and take-offs in the order of time.
 
-        ValueError where nobody looked for them: SciPy's methods on the ground.
+        Each is a dict of "time" (s), "group" ("feet", "tail" or "torso") and "kind" ("touch_down"
+        or "take_off"). ValueError is raised for a motion on the ground by one of SciPy's methods,
+        which detect no events.
         """
         if self.contact is not None and "events" not in self.info:
             method = self.info.get("method", "how it was made")
             raise ValueError(
-                f"events: {method} looks for none: simulate by a compiled method, such as ros34pw2"
+                f"events: {method} detects none: simulate by a compiled method, such as ros34pw2"
             )
         return self.info.get("events", [])
 
     @property
     def warnings(self) -> list[str]:
-        """What to mind about the motion, a sentence each: see docs/simulation.md.
+        """Doubts about the motion, one sentence each; see docs/simulation.md.
 
-        Books that do not balance, unfelt touches, what cannot be true of an animal.  The last needs
-        the model: where that is gone, it is what was found when the motion was saved or pickled.
+        They report energy or momentum that does not balance, touches that the integrator may have
+        missed, and motions that no animal can make. The last kind needs the model; without it they
+        are those that were found when the motion was saved or pickled.
         """
         return warnings_of(self.model, self)
 
@@ -107,94 +142,119 @@ class Trajectory(Exports):
 
     @property
     def layout(self) -> Layout:
-        """Where the numbers of q, v and tau lie."""
-        return _layout(self.q)
+        """Where the parts of q, v and tau are."""
+        return layout_of(self.q)
 
     @property
     def pose(self) -> Array:
-        """Place (m) and quaternion of the torso, (K, 7); a fixed base is at the origin."""
+        """Position of B (m, world) and quaternion of the torso, (K, 7).
+
+        A fixed base is at the origin.
+        """
         return self.layout.pose(self.q)
 
     @property
     def attitude(self) -> Array:
-        """Torso quaternions (w, x, y, z), torso to world, (K, 4)."""
+        """Quaternions (w, x, y, z) from torso to world, (K, 4)."""
         return self.pose[:, QUATERNION]
 
     @property
     def tail(self) -> Array:
-        """Tail coordinates q_t, (K, 2m), rad."""
+        """Tail coordinates, (K, 2m), rad."""
         return self.q[:, self.layout.tail_q]
 
     @property
     def tail_rate(self) -> Array:
-        """Their rates, (K, 2m), rad/s."""
+        """Rates of the tail coordinates, (K, 2m), rad/s."""
         return self.v[:, self.layout.tail_v]
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write one npz file (suffix added if absent), whole or not at all, and return its path;
-        NotWritten where that cannot be done.
+        """Write the motion to an .npz file, whole or not at all.
+
+        Parameters
+        ----------
+        path : str or path
+            The file; the suffix .npz is added if it is missing.
+
+        Returns
+        -------
+        Path
+            The path of the file.
+
+        Raises
+        ------
+        NotWritten
+            The file cannot be written.
         """
         arrays = {name: getattr(self, name) for name in ARRAYS}
         return archive.write(path, arrays, self._told(), self.contact)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
-        """Read a saved file; FileNotFoundError if absent, ValueError if it is no trajectory."""
+        """Read a motion that ``save`` wrote.
+
+        Parameters
+        ----------
+        path : str or path
+            The file; the suffix .npz is added if it is missing.
+
+        Returns
+        -------
+        Trajectory
+            The motion, without its model.
+
+        Raises
+        ------
+        FileNotFoundError
+            There is no such file.
+        ValueError
+            The file is not a trajectory, or is damaged.
+        """
         source, fields = archive.read(path, ARRAYS)
         try:
             return cls(**fields)
         except ValueError as error:
-            raise ValueError(f"{str(source)!r} holds no sound trajectory: {error}") from error
+            raise ValueError(
+                f"{str(source)!r} does not hold a valid trajectory: {error}"
+            ) from error
 
     def __getstate__(self) -> dict[str, Any]:
-        """Leave the model behind, whose compiled code belongs to one machine."""
+        """Leave out the model, whose compiled code belongs to one machine."""
         return settled(self, DERIVED) | {"model": None, "info": self._told()}
 
     def _told(self) -> dict[str, Any]:
-        """Info with what only the model can tell."""
+        """Return info with the doubts that only the model can find."""
         found = [] if self.model is None else doubts(self.model, self)
         return self.info | {"doubts": found} if found else self.info
 
-    def view(self, path: str | os.PathLike[str] = "run.html", model: Model | None = None) -> Path:
-        """Write the page of this motion, and return its path; see ``st.view``."""
-        from ..viewer.view import view
-
-        return view(self, path, model=model)
-
-    def _repr_html_(self) -> str:
-        """For notebooks: the text, and the page."""
-        from ..viewer.notebook import in_notebook
-
-        return in_notebook(self, lambda: [self])
-
-    def film(self, path: str | os.PathLike[str], **options: Any) -> Path:
-        """Write a moving film, a filmstrip or a page, by the suffix; see ``st.film``."""
-        from ..pictures.film import film
-
-        return film(self, path, **options)
-
-    def filmstrip(self, path: str | os.PathLike[str] | None = None, **options: Any) -> Any:
-        """Draw moments side by side; return figure and axes; see ``st.filmstrip``."""
-        from ..pictures.filmstrip import filmstrip
-
-        return filmstrip(self, path, **options)
-
-    def plot(self, *panels: str, **options: Any) -> Any:
-        """Draw panels over time, named or all; return figure and axes; see ``st.plot``."""
-        from ..pictures.plot import plot
-
-        return plot(self, *panels, **options)
-
     def resample(self, t: ArrayLike) -> Self:
-        """The motion at the increasing times t (n,), s; ValueError names the first one outside.
+        """Return the motion at other times, by interpolation.
 
-        p and q_t: cubic Hermite through positions and velocities. Attitude: the same on the
-        quaternion with q_dot = q (0, omega) / 2, normalised (samples less than half a turn apart).
-        v in flight: cubic spline, of fourth order in the samples' distance. v on the ground, and
-        energies and momenta: monotone cubic, of second order where they turn, so no overshoot at
-        impacts. tau and contact: linear, since they may jump.
+        Parameters
+        ----------
+        t : array_like, shape (n,)
+            Increasing times (s) within those of the motion.
+
+        Returns
+        -------
+        Trajectory
+            The motion at these times.
+
+        Raises
+        ------
+        ValueError
+            A time is outside; the message names the first one.
+
+        Notes
+        -----
+        Position and tail coordinates: cubic Hermite polynomials of positions and velocities.
+        Attitude: the same for the quaternion with its rate q (0, omega) / 2, then normalised; the
+        torso must turn less than half a turn between samples. Velocity in flight: a cubic spline,
+        of fourth order in the time between samples. Velocity on the ground, energies and momenta:
+        monotone cubics, which do not overshoot at impacts and are of second order at extrema.
+        Torques and contact: linear, because they may jump.
         """
-        times = inside(_real("t", t), self.t)
+        times = inside(real("t", t), self.t)
         rows = Interpolation.at(times, self.t)
         cubics: dict[str, Any] = {
             name: monotone(self.t, getattr(self, name), times) for name in MONOTONE
@@ -216,72 +276,3 @@ MONOTONE = ("kinetic", "potential", "linear_momentum", "angular_momentum")
 DERIVED = (*MONOTONE, "info", "contact")
 for _name in DERIVED:
     setattr(Trajectory, _name, Derived(_name))
-
-
-def _real(name: str, value: ArrayLike) -> Array:
-    """A finite, read-only float64 copy of value."""
-    array = finite_array(name, value, ValueError).copy()
-    array.setflags(write=False)
-    return array
-
-
-def _layout(q: Array) -> Layout:
-    """The layout of configurations (K, nq) that have one."""
-    layout = Layout.of_width(q.shape[1])
-    assert layout is not None
-    return layout
-
-
-def _shapes(t: Array, q: Array, like: tuple[Array, ...]) -> dict[str, tuple[int, ...]]:
-    """The shape each array must have, from the number of samples of t and the columns of q; on a
-    fixed base v and tau are like q.
-    """
-    samples = len(t) if t.ndim == 1 else 0
-    if not samples:
-        raise ValueError(f"t has shape {t.shape}: give one row of at least one time")
-    layout = Layout.of_width(q.shape[1]) if q.ndim == 2 else None
-    if layout is None or (layout.fixed and any(each.shape != q.shape for each in like)):
-        raise ValueError(
-            f"q has shape {q.shape}: give ({samples}, 7 + 2m), position, quaternion and 2m tail "
-            f"coordinates, or ({samples}, 2m) of a tail on a fixed base"
-        )
-    return {
-        "q": (samples, layout.nq),
-        "v": (samples, layout.nv),
-        "tau": (samples, layout.nt),
-        "kinetic": (samples,),
-        "potential": (samples,),
-        "linear_momentum": (samples, 3),
-        "angular_momentum": (samples, 3),
-    }
-
-
-def _check_time(t: Array) -> None:
-    """ValueError unless t increases."""
-    backward = np.flatnonzero(np.diff(t) <= 0)
-    if backward.size:
-        k = int(backward[0]) + 1
-        raise ValueError(
-            f"t has shape {t.shape} and t[{k}] = {t[k]} follows {t[k - 1]}: give strictly "
-            "increasing times"
-        )
-
-
-def _check_unit(attitude: Array) -> None:
-    """ValueError unless the quaternions have unit norm."""
-    norm = np.linalg.norm(attitude, axis=1)
-    k = int(np.argmax(np.abs(norm - 1)))
-    if abs(norm[k] - 1) > UNIT_TOLERANCE:
-        raise ValueError(f"q[{k}, 3:7] has norm {norm[k]:.6g}: give unit quaternions (w, x, y, z)")
-
-
-def _json(info: Any) -> str:
-    """The text of info, a dict of plain JSON values."""
-    try:
-        if isinstance(info, dict):
-            return json.dumps(info, allow_nan=False)
-    except (TypeError, ValueError) as error:
-        raise ValueError(
-            f"info is not JSON-ready ({error}): convert arrays by tolist(), use None for nan"
-        ) from error
-    raise ValueError(f"info is a {type(info).__name__}: give a dict of plain JSON values")

@@ -1,4 +1,4 @@
-"""How the animal looks at one moment in a view: torso, tail, legs and forces of the ground."""
+"""Draws the animal at one moment in a view: torso, tail, legs and forces of the ground."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -15,10 +15,10 @@ if TYPE_CHECKING:
 WIDTH = 1.4  # points, of the tail
 THIN, THICK = 0.4, 2.5  # of a tail of its own: least and largest width over that
 MOST_DOTS = 20  # more tail points than this are drawn without dots
-LARGE_DOTS = 8  # more than this have small ones, which leave the tail's colour in sight
+LARGE_DOTS = 8  # more joints than this get small marks, so that the tail's colour stays visible
 LEG, FORCE = "#009e73", "#cc79a7"  # Okabe and Ito
 SHADE, SHADOW = "#ecebe6", "#c9c7bf"  # the ground
-PALE = 0.3  # how much is seen of what is below it
+PALE = 0.3  # opacity of parts below it
 GRIDS = np.array([0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10])  # m, between lines on the ground
 LINES = 8  # of the ground's grid that are seen, about
 SLIVER = 0.05  # rad, of the torso's cap above the ground that is not drawn
@@ -27,9 +27,9 @@ EDGE_ON = 0.08  # sine of the elevation below which the ground is a line
 
 @dataclass(frozen=True, eq=False)
 class Pen:
-    """Draws one frame on axes in a view, world point `origin` at zero, above all lower levels.
+    """Draws one frame on axes in a view, with world point `origin` at zero, above lower levels.
 
-    Where there is ground, z = 0, what is below it is pale.
+    If there is ground, z = 0, parts below it are pale.
     """
 
     axes: "Axes"
@@ -43,7 +43,7 @@ class Pen:
         """World points (..., 3) on the axes, (..., 2)."""
         return self.view.of(world - self.origin)[..., :2]
 
-    # artists are made here, since Axes.plot and Axes.fill take thrice as long: they look for limits
+    # Axes.plot and Axes.fill take three times as long, because they update limits
 
     def plot(self, world: Array, mark: str, zorder: float, **look: Any) -> None:
         """World points (n, 3), joined by a line ("-", ":") or each a dot ("o")."""
@@ -60,7 +60,7 @@ class Pen:
         self.axes.add_artist(Polygon(outline, zorder=self.level + zorder, **look))
 
     def torso(self) -> None:
-        """The filled silhouette, and again what of it is above the ground."""
+        """Draw the filled silhouette, and again its part above the ground."""
         look = {"facecolor": TORSO, "edgecolor": INK, "linewidth": 0.7}
         outline = self.frame.outline(self.view) - self.view.of(self.origin)[:2]
         above = above_ground(self.frame) if self.grounded else None
@@ -72,9 +72,9 @@ class Pen:
             self.fill(hull(self.flat(above)), 0.41, **look)
 
     def line(self, corners: Array, **look: Any) -> None:
-        """A line, all of it under the torso, and again over it where the torso cannot hide it.
+        """Draw a line below the torso, and again above it where the torso cannot hide it.
 
-        That part has a white rim, so that it is seen to pass in front.
+        The latter part has a white rim, to show that it passes in front.
         """
         fine = np.linspace(0, len(corners) - 1, 16 * (len(corners) - 1) + 1)
         world = np.stack([np.interp(fine, np.arange(len(corners)), c) for c in corners.T], axis=1)
@@ -109,19 +109,22 @@ class Pen:
         )
 
     def parted(self, world: Array) -> tuple[Array, Array | None]:
-        """World points above the ground and below it, nan where they are not; None for none."""
+        """Return world points above the ground and below it, nan elsewhere.
+
+        None if there are none.
+        """
         below = world[:, 2:] < 0
         if not self.grounded or not below.any():
             return world, None
         return np.where(below, np.nan, world), np.where(below, world, np.nan)
 
     def visible(self, world: Array) -> Array:
-        """World points, nan where the torso may hide them."""
+        """Return world points, nan where the torso may hide them."""
         return np.where(self.frame.in_front(world, self.view)[:, None], world, np.nan)
 
 
 def above_ground(frame: Frame) -> Array | None:
-    """Points (n, 3) of the torso's surface above the ground; None where all of it is.
+    """Points (n, 3) of the torso's surface above the ground; None if all of it is.
 
     On the unit sphere they are a cap about n = diag(a) R^T e_z / d: z = p_z + d cos(polar).
     """
@@ -191,7 +194,7 @@ def draw_marks(pen: Pen) -> None:
 
 
 def draw_shadow(pen: Pen) -> None:
-    """What the animal's shadow covers at noon, in views that look down on the ground."""
+    """Draw the animal's shadow at noon, in views from above the ground."""
     if not pen.grounded or pen.view.matrix[2, 2] <= 0:
         return
     outline = pen.frame.outline(TOP) @ TOP.matrix[:2]

@@ -20,7 +20,7 @@ RATE = 25  # frames a second
 
 
 def encoder() -> str:
-    """Return the path of ffmpeg: that of imageio-ffmpeg, else one on PATH; ViewError for none."""
+    """Return the path of ffmpeg: that of imageio-ffmpeg, else one on PATH; ViewError if none."""
     if importlib.util.find_spec("imageio_ffmpeg") is not None:
         from imageio_ffmpeg import get_ffmpeg_exe
 
@@ -33,7 +33,7 @@ def encoder() -> str:
 
 
 def write_gif(path: Path, pictures: Iterator[Picture]) -> None:
-    """Write a GIF that goes round for ever, whole or not at all."""
+    """Write a GIF that repeats for ever, whole or not at all."""
     from PIL import Image
 
     whole, colours = BytesIO(), Image.new("P", (1, 1))
@@ -47,8 +47,9 @@ def write_gif(path: Path, pictures: Iterator[Picture]) -> None:
 
 
 def palette() -> list[int]:
-    """Return red, green and blue of the colours of a film, and of their edges on each other: the
-    same for all frames, so that only what moves is stored.
+    """Return the colours of a film and of the edges between them, as red, green and blue.
+
+    They are the same for all frames, so that only what moves is stored.
     """
     from matplotlib.colors import to_rgb
 
@@ -72,7 +73,7 @@ def write_mp4(path: Path, pictures: Iterator[Picture]) -> None:
 
 
 def _feed(command: list[str], first: Picture, pictures: Iterator[Picture]) -> None:
-    """Run ffmpeg on pictures; OSError with its last words where it fails."""
+    """Run ffmpeg on pictures; OSError with its last message if it fails."""
     pipe = subprocess.PIPE
     process = subprocess.Popen(command, stdin=pipe, stdout=subprocess.DEVNULL, stderr=pipe)
     assert process.stdin is not None and process.stderr is not None

@@ -1,4 +1,4 @@
-"""``film``: writes motions as a moving film, a filmstrip or a page, as the file's suffix says."""
+"""``film``: writes motions as a moving film, a filmstrip or a page, by the file's suffix."""
 
 import os
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ from .views import views_of
 
 MOVING = {".gif": write_gif, ".mp4": write_mp4}
 MOST = 10_000  # frames
-LASTS = 4.0  # s, a film whose speed is not told: slow motion, never faster than life
+LASTS = 4.0  # s, of a film without given speed: slow motion, never faster than real time
 
 
 def film(
@@ -32,14 +32,38 @@ def film(
     names: Sequence[str] | None = None,
     model: Model | None = None,
 ) -> Path:
-    """Write a motion, or several beside each other, to a file by its suffix; return its path.
+    """Write one motion, or several beside each other, as a film, a filmstrip or a page.
 
-    .mp4, .gif: a moving film of 25 frames a second; .png, .pdf, .svg: moments side by side, as
-    ``st.filmstrip``; .html: the page of ``st.view``.  speed: of a moving film, over that of life;
-    by default slow motion that lasts about 4 s, or life's speed where that lasts longer.  views,
-    names, model: as ``st.filmstrip``; the page has its own views.  The file is written whole or not
-    at all.  Raises ViewError with argument, value and remedy, ModelError where the model lacks
-    ``tail_points``, ExtraMissing without the extra "plot".
+    Parameters
+    ----------
+    motions : Trajectory or sequence of Trajectory
+        The motions.
+    path : str or path
+        The file. .mp4 and .gif are moving films with 25 frames per second; .png, .pdf and .svg
+        are filmstrips as of ``filmstrip``; .html is the page of ``view``.
+    speed : float, optional
+        Speed of a moving film relative to real time. Default: slow motion that lasts about 4 s,
+        or real time if that lasts longer.
+    views, names, model
+        As of ``filmstrip``; a page has its own views.
+
+    Returns
+    -------
+    Path
+        The path of the file, which is written whole or not at all.
+
+    Raises
+    ------
+    ViewError
+        An argument is wrong.
+    ModelError
+        The model lacks "tail_points".
+    ExtraMissing
+        A library is not installed; it comes with the extra "plot".
+
+    Examples
+    --------
+    >>> st.film(motion, "tumble.gif", speed=0.1)  # doctest: +SKIP
     """
     target = film_path(path)
     kind = target.suffix.lower()
@@ -51,7 +75,7 @@ def film(
     every = checked_motions(motions)
     begin, end = max(m.t[0] for m in every), min(m.t[-1] for m in every)
     if begin >= end:
-        raise ViewError("motions: no time that all of them have: a moving film needs some")
+        raise ViewError("motions: they have no time in common, which a moving film needs")
     slowness = _slowness(speed, end - begin)
     times = _times(begin, end, RATE * slowness)
     moved = [motion.resample(times) for motion in every]
@@ -61,8 +85,10 @@ def film(
 
 
 def film_path(path: str | os.PathLike[str]) -> Path:
-    """Return the path of a film; ViewError where its suffix is unknown, or an encoder or the page
-    that it needs is missing, ExtraMissing for a picture without the extra "plot".
+    """Return the path of a film.
+
+    ViewError if its suffix is unknown, or if the encoder or the page that it needs is missing;
+    ExtraMissing for a picture without the extra "plot".
     """
     target = Path(path)
     kind = target.suffix.lower()
@@ -79,14 +105,14 @@ def film_path(path: str | os.PathLike[str]) -> Path:
 
 
 def _slowness(speed: float | None, lasts: float) -> float:
-    """How many times slower than life a film of so many seconds is."""
+    """Return how many times slower than real time a film of a motion of ``lasts`` s is."""
     if speed is None:
         return float(max(1, round(LASTS / lasts)))
     return 1 / number("speed", speed, ViewError, above=0)
 
 
 def _times(begin: float, end: float, rate: float) -> Array:
-    """The times of the frames, so many a second of life; ViewError where that is too many."""
+    """Return the times of the frames; ViewError if there are too many."""
     count = (end - begin) * rate + 1e-9
     if count >= MOST:
         raise ViewError(

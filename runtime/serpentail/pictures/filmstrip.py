@@ -1,10 +1,8 @@
-"""Films on paper: moments of motions side by side, in one or several views."""
+"""``filmstrip``: moments of motions side by side, in one or several views."""
 
 import math
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,10 +14,11 @@ from ..model.model import Model
 from ..motion.body import centre_of_mass
 from ..motion.trajectory import Trajectory
 from ..viewer.view import checked_motions, checked_names, model_of
-from .animal import FORCE, LEG, Pen, draw_animal, draw_ground, draw_marks, draw_shadow
-from .frames import LONGEST, Frame, frames, largest_force, moments, way
-from .page import LEFT, Page, drawn_points, of_equal_widths, page_of, path_window, window_around
-from .style import HEAD, INK, QUIET, TAIL, Array, drawn
+from .animal import Pen, draw_animal, draw_ground, draw_marks, draw_shadow
+from .frames import Frame, frames, largest_force, moments, way
+from .page import LEFT, Page, page_of, path_window
+from .strip import Strip
+from .style import INK, QUIET, Array, drawn
 from .views import SIDE, View, views_of
 
 if TYPE_CHECKING:
@@ -27,69 +26,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 VIEWS = ("side", "oblique")
-HIGHEST = 4.0  # widths of a panel that a motion may rise for its panels to have the ground in them
-DOT: dict[str, Any] = {"color": HEAD, "linestyle": "", "marker": "o", "markersize": 4}
-KEY: dict[str, dict[str, Any]] = {
-    "head": DOT,
-    "head, far side": DOT | {"markerfacecolor": "white"},
-    "back": {"color": INK, "linewidth": 1.4},
-    "tail": {"color": TAIL, "linewidth": 1.4},
-    "path of the COM": {"color": QUIET, "linestyle": ":"},
-}
-OF_TORSO = ("head", "head, far side", "back", "path of the COM")  # which a fixed base has not
-
-
-@dataclass(frozen=True, eq=False)
-class Strip:
-    """What is drawn: the frames and the COM's path (K, 3) of each motion; in which views.
-
-    names: of motions that are told apart.  grounded: there is ground at z = 0.  largest: the
-    largest force, N.
-    """
-
-    films: list[list[Frame]]
-    coms: list[Array]
-    views: list[View]
-    names: list[str]
-    grounded: bool
-    largest: float
-
-    def origin(self, frame: Frame) -> Array:
-        """The world point at the middle of a frame's panels: over the ground its height is 0."""
-        return frame.com * (1, 1, 0) if self.anchored else frame.com
-
-    @cached_property
-    def every(self) -> list[Frame]:
-        """All frames."""
-        return [frame for film in self.films for frame in film]
-
-    @cached_property
-    def anchored(self) -> bool:
-        """Whether every panel has the ground in it: it is not too far below."""
-        reach = np.ptp(np.vstack([drawn_points(f, SIDE) - SIDE.of(f.com)[:2] for f in self.every]))
-        return self.grounded and max(f.com[2] for f in self.every) < HIGHEST * reach
-
-    def windows(self) -> list[Array]:
-        """What the panels of each view show, about their origins."""
-        found = []
-        for view in self.views:
-            shapes = [drawn_points(f, view) - view.of(self.origin(f))[:2] for f in self.every]
-            if self.anchored and view.matrix[1, 2] > 0:
-                shapes.append(np.array([[0.0, -0.02]]))
-            found.append(window_around(shapes))
-        return of_equal_widths(found)
-
-    def key(self) -> dict[str, dict[str, Any]]:
-        """What the marks mean."""
-        legs = {"leg": {"color": LEG, "linewidth": 1.4}} if len(self.every[0].legs) else {}
-        force = f"force, {1e3 * LONGEST:.0f} mm: {self.largest:.3g} N"
-        forces = {force: {"color": FORCE, "linewidth": 1.4}} if self.largest else {}
-        under = any(frame.lowest < -2e-3 for frame in self.every)
-        pale: dict[str, Any] = {"color": TAIL, "linewidth": 1.4, "alpha": 0.3}
-        below = {"below the ground": pale} if self.grounded and under else {}
-        torsos = any(frame.body.marked for frame in self.every)
-        own = {name: look for name, look in KEY.items() if torsos or name not in OF_TORSO}
-        return own | legs | forces | below
 
 
 def filmstrip(
@@ -101,15 +37,42 @@ def filmstrip(
     names: Sequence[str] | None = None,
     model: Model | None = None,
 ) -> tuple["Figure", np.ndarray]:
-    """Draw moments of a motion, or of several at the same times; return figure and its axes.
+    """Draw moments of a motion side by side; of several motions, at the same times.
 
-    The axes (rows, frames) have a row for each view of each motion.  frames: their times (s), or
-    how many, between which the animal moves alike.  views: names out of "side", "top", "oblique",
-    or (azimuth, elevation) in degrees.  names, model: as ``st.view``.  path: also write the figure
-    to this .pdf, .png or .svg file, whole or not at all.  Where a motion stays above the ground, or
-    touches it, the ground is drawn, and what is below it is pale.  Arrows are the ground's forces.
-    Raises ViewError with argument, value and remedy, ModelError where the model lacks
-    ``tail_points``, ExtraMissing without the extra "plot".
+    Where a motion touches the ground or stays above it, the ground is drawn, and parts below it
+    are pale. Arrows are the ground's forces.
+
+    Parameters
+    ----------
+    motions : Trajectory or sequence of Trajectory
+        The motions.
+    path : str or path, optional
+        A .pdf, .png or .svg file to write the figure to, whole or not at all.
+    frames : int or sequence of float, default 8
+        Times of the frames (s), or their number; the motion between two frames is then about
+        equal.
+    views : sequence of str or of (float, float), default ("side", "oblique")
+        Views: "side", "top", "oblique", or azimuth and elevation (deg).
+    names : sequence of str, optional
+        Names of the motions.
+    model : Model, optional
+        The model of motions that were read from files.
+
+    Returns
+    -------
+    figure : matplotlib.figure.Figure
+        The figure.
+    axes : ndarray of matplotlib.axes.Axes, shape (rows, frames)
+        One row for each view of each motion.
+
+    Raises
+    ------
+    ViewError
+        An argument is wrong.
+    ModelError
+        The model lacks "tail_points".
+    ExtraMissing
+        Matplotlib is not installed; it comes with the extra "plot".
     """
     needed("matplotlib", "plot")
     strip = strip_of(checked_motions(motions), frames, views_of(views), names, model)
@@ -123,7 +86,7 @@ def strip_of(
     names: Sequence[str] | None,
     model: Model | None,
 ) -> Strip:
-    """What to draw of motions."""
+    """Return what to draw of motions."""
     told = checked_names(names, motions) if len(motions) > 1 or names else [""]
     models = [model_of(k, motion, model) for k, motion in enumerate(motions)]
     rows = _rows(models, motions, wanted)
@@ -167,8 +130,9 @@ def _draw(strip: Strip) -> tuple["Figure", np.ndarray]:
 
 
 def _path_aspect(strip: Strip) -> float | None:
-    """Width over height of the path's panel; None where the COM stays within half a torso, or
-    where several motions would cover each other.
+    """Return width over height of the panel of the path.
+
+    None if the centre of mass moves less than half a torso, or if there are several motions.
     """
     still = np.ptp(strip.coms[0][:, 1:], axis=0).max() < max(strip.every[0].body.semi_axes)
     if len(strip.films) > 1 or still:
@@ -206,7 +170,7 @@ def _draw_row(
 
 
 def _label(k: int, film: list[Frame]) -> str:
-    """Number and time of frame k, with the decimals that tell the frames apart."""
+    """Return number and time of frame k, with enough decimals to distinguish the frames."""
     step = min(np.diff([frame.time for frame in film]), default=1.0)
     decimals = max(0, math.ceil(-math.log10(1e3 * step)))
     return rf"$\mathbf{{{k + 1}}}$  {1e3 * film[k].time:.{decimals}f} ms"

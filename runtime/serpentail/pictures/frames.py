@@ -1,4 +1,4 @@
-"""Where the parts of the animal are at moments of a motion: what every picture is drawn from."""
+"""Positions of the animal's parts at moments of a motion; all pictures are drawn from them."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -91,7 +91,7 @@ def tick(body: Body) -> Array:
 
 
 def body_of(model: Model) -> Body:
-    """The torso as the page of a run has it, and the tail's root."""
+    """Return the torso as in the page of a run, and the tail's root."""
     a, b, c = shape(model)["semi_axes"]
     x, y, z = (float(length) for length in model.parameters["tail_mount"])
     own = {"link_masses", "arc_masses"} & model.parameters.keys()
@@ -117,7 +117,7 @@ def frames(model: Model, motion: Trajectory, rows: Iterable[int], largest: float
 
 
 def _legs(model: Model, motion: Trajectory, rows: list[int]) -> Array:
-    """Joints (n, L, J, 3) of the legs; none where the motion or its model has none."""
+    """Return joints (n, L, J, 3) of the legs; none if the motion or its model has none."""
     angles = None if motion.contact is None else motion.contact.legs
     joints = leg_points(model, motion.q[rows], None if angles is None else angles[rows])
     return np.zeros((len(rows), 0, 2, 3)) if joints is None else joints
@@ -155,9 +155,9 @@ def way(model: Model, motion: Trajectory) -> Array:
 
 
 def moments(tracks: list[tuple[Array, Array]], count: int) -> Array:
-    """Times (s), at most so many, between which motions change alike; some for what rests.
+    """Return times (s), at most ``count``, between which motions change equally.
 
-    tracks: times and ways of each motion; the moments lie in the span that all have.
+    tracks: times and paths of each motion; the moments are in the span that all have.
     """
     begin, end = max(t[0] for t, _ in tracks), min(t[-1] for t, _ in tracks)
     grid = np.linspace(begin, end, 4001)

@@ -7,8 +7,8 @@ import numpy as np
 
 from .animal import Pen, draw_animal, draw_ground, draw_marks, draw_shadow
 from .encode import Picture
-from .filmstrip import Strip
 from .page import drawn_points, window_around
+from .strip import Strip
 from .style import INK, QUIET, STYLE, Array
 from .views import View
 
@@ -82,7 +82,7 @@ def _stage(strip: Strip) -> tuple["Figure", list[tuple["Axes", View, int]]]:
 
 
 def _window(strip: Strip, view: View) -> Array:
-    """What a panel shows: all of all motions, and a strip of the ground."""
+    """Return the part of the world that a panel shows: all motions, and a strip of the ground."""
     shown = [drawn_points(frame, view) for frame in strip.every]
     if strip.anchored:
         shown.append(view.of(np.array([[*strip.every[0].com[:2], -0.01]]))[:, :2])
@@ -92,7 +92,7 @@ def _window(strip: Strip, view: View) -> Array:
 def _draw_frame(
     figure: "Figure", panels: list[tuple["Axes", View, int]], strip: Strip, k: int
 ) -> None:
-    """Draw frame k over the empty panels, and take its artists away again."""
+    """Draw frame k over the empty panels, and remove its artists again."""
     renderer = figure.canvas.get_renderer()  # type: ignore[attr-defined]
     time = figure.text(0.01, 0.03, f"{strip.films[0][k].time:.3f} s", fontsize=9, color=INK)
     time.draw(renderer)

@@ -1,4 +1,4 @@
-"""The page of a filmstrip: where its panels are, and what part of the world each of them shows."""
+"""The page of a filmstrip: the places of its panels, and the part of the world in each."""
 
 import math
 from collections.abc import Sequence
@@ -51,7 +51,7 @@ class Page:
 
     @property
     def beside(self) -> bool:
-        """Whether the path is beside the film, where there is room, not below it."""
+        """Whether the path is beside the film, if there is room, not below it."""
         return self.path is not None and self.path < 1.6 and self.film[1] > 2
 
     @property
@@ -104,7 +104,7 @@ class Page:
 
 
 def page_of(frames: int, windows: Sequence[Array], marks: int, path: float | None) -> Page:
-    """The page of panels that show windows of equal widths, one a row, at one scale."""
+    """Return the page of panels for windows of equal widths, one for each row, at one scale."""
     sizes = np.array([window[1] - window[0] for window in windows])
     wide = sizes[0, 0]
     column = min(max(1.4 * math.sqrt(wide / sizes[:, 1].max()), 0.85), 1.9)

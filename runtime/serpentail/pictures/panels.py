@@ -16,13 +16,13 @@ from .style import INK, TAIL, Array
 # Okabe and Ito, dashed for grey prints
 TRIPLE = (("#0072b2", "-"), ("#d55e00", "--"), ("#009e73", "-."))
 WORLD = ("right $x$", "forward $y$", "up $z$")
-SINGULAR = 0.15  # |cos(pitch)| below which roll and yaw mean little: 9 degrees about the vertical
+SINGULAR = 0.15  # |cos(pitch)| below which roll and yaw are not drawn: 9 degrees about the vertical
 SEEN = 1e-3  # of a panel's least span
 
 
 @dataclass(frozen=True, eq=False)
 class Panel:
-    """One axis, and the curves on it; `still` names those that stay zero, which are not drawn."""
+    """One axis, and the curves on it; `still` names curves that stay zero, which are not drawn."""
 
     label: str
     curves: Array  # (K, n)
@@ -50,7 +50,7 @@ def height(motion: Trajectory, model: Model | None) -> Panel:
 
 
 def attitude(motion: Trajectory, model: Model | None) -> Panel:
-    """Euler angles, turns counted; roll and yaw have gaps where the torso points up or down."""
+    """Euler angles, with whole turns; roll and yaw have gaps where the torso points up or down."""
     angles = pitch_roll_yaw(motion.pose, unwrap=True)
     angles[np.abs(np.cos(angles[:, 0])) < SINGULAR, 1:] = np.nan
     names = (r"pitch $\phi_x$", r"roll $\phi_y$", r"yaw $\phi_z$")
@@ -64,8 +64,9 @@ def tilt(motion: Trajectory, model: Model | None) -> Panel:
 
 
 def tail(motion: Trajectory, model: Model | None) -> Panel:
-    """Bends of the segments: of an articulated one the sum of its links' angles; coordinates where
-    no model tells how many links there are.
+    """Bends of the segments, for articulated ones the sum of their links' angles.
+
+    Tail coordinates if no model is known.
     """
     names, styles, order = _of_segments(motion)
     if model is None:

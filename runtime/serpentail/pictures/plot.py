@@ -1,4 +1,4 @@
-"""``plot``: panels over time, such as height, attitude, tail and forces, on one time axis."""
+"""``plot``: panels over time, such as height, attitude, tail and forces."""
 
 import math
 import os
@@ -36,14 +36,41 @@ def plot(
     path: str | os.PathLike[str] | None = None,
     model: Model | None = None,
 ) -> tuple["Figure", Any]:
-    """Draw panels over time; return figure and axes, an array of them unless `ax` is one.
+    """Draw panels of a motion over time.
 
-    panels: names out of "height", "attitude", "tilt", "tail", "torque", "force", "rate", "energy",
-    "momentum", "angular_momentum"; by default all that do not stay zero.  ax: axes to draw on, as
-    many as panels; without them a figure of its own.  path: also write the figure to this .pdf,
-    .png or .svg file, whole or not at all.  model: of a motion from a file, so that the bends of
-    its segments are known.  Vertical lines are touch-downs (solid) and take-offs (dashed).
-    Raises ViewError with argument, value and remedy, ExtraMissing without the extra "plot".
+    Vertical lines are touch-downs (solid) and take-offs (dashed).
+
+    Parameters
+    ----------
+    motion : Trajectory
+        The motion.
+    *panels : str
+        Names: "height", "attitude", "tilt", "tail", "torque", "force", "rate", "energy",
+        "momentum", "angular_momentum". Default: all that do not stay zero.
+    ax : matplotlib.axes.Axes or sequence of these, optional
+        Axes to draw on, as many as panels. Default: a new figure.
+    path : str or path, optional
+        A .pdf, .png or .svg file to write the new figure to, whole or not at all.
+    model : Model, optional
+        The model of a motion that was read from a file; it is needed for the bends of segments.
+
+    Returns
+    -------
+    figure : matplotlib.figure.Figure
+        The figure.
+    axes : matplotlib.axes.Axes or ndarray of these
+        The given axes, else an array of the new ones.
+
+    Raises
+    ------
+    ViewError
+        An argument is wrong.
+    ExtraMissing
+        Matplotlib is not installed; it comes with the extra "plot".
+
+    Examples
+    --------
+    >>> figure, axes = st.plot(motion, "height", "tail")  # doctest: +SKIP
     """
     needed("matplotlib", "plot")
     names = [one_of(f"panels[{k}]", name, PANELS, ViewError) for k, name in enumerate(panels)]
@@ -60,12 +87,12 @@ def plot(
 def drawn_on(
     ax: Any, motion: Trajectory, chosen: list[Panel], path: str | os.PathLike[str] | None
 ) -> tuple["Figure", Any]:
-    """Draw on axes that are given, in the look that they have."""
+    """Draw on given axes, without changing their style."""
     every = np.atleast_1d(np.asarray(ax, dtype=object)).ravel()
     if len(every) != len(chosen):
         raise ViewError(f"ax: {len(every)} axes for {len(chosen)} panels: name one panel for each")
     if path is not None:
-        raise ViewError("path: goes with a figure of its own: leave ax out, or save ax.figure")
+        raise ViewError("path: is for a new figure only: leave ax out, or save ax.figure")
     _draw(every, motion, chosen)
     return every[0].figure, ax
 
@@ -126,9 +153,9 @@ def _limits(panel: Panel) -> tuple[float, float]:
 
 
 def _legend_rows(panel: Panel, width: float) -> tuple[int, int]:
-    """Rows and columns of a legend on axes of a width in inches; none where one curve needs none.
+    """Return rows and columns of a legend on axes of a width in inches; none for a single curve.
 
-    A panel's label tells what its only curve is.
+    The panel's label then names the curve.
     """
     labels = [*panel.names, *([f"{_listed(panel.still)}: 0"] if panel.still else [])]
     if len(labels) < 2:

@@ -1,4 +1,4 @@
-"""Draws what an identification leaves over: residuals of markers, torques and power over time."""
+"""Draws the results of an identification over time: residuals of markers, torques and power."""
 
 import os
 from typing import TYPE_CHECKING, Any

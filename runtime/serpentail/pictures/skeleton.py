@@ -1,4 +1,4 @@
-"""Where the joints of both legs are in a motion, to draw them."""
+"""``leg_joints``: the joints of both legs along a motion, to draw them."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -8,9 +8,27 @@ from ..motion.trajectory import Trajectory
 
 
 def leg_joints(model: Model, motion: Trajectory, angles: ArrayLike) -> np.ndarray:
-    """Return hip, D, knee, ankle A, M and T of both legs, (K, 2, 6, 3), m, world (Eqs. 5 to 9).
+    """Return the joints of both legs along a motion (Eqs. 5 to 9).
 
-    angles (K, 4): gamma and delta (rad) of the right leg, then of the left, as ``Legs.curve`` has
-    them.  ModelError where the model has no function ``leg_points``.
+    Parameters
+    ----------
+    model : Model
+        A model with feet.
+    motion : Trajectory
+        The motion, of K samples.
+    angles : array_like, shape (K, 4)
+        gamma and delta of the right leg, then of the left (rad), as in ``Contact.legs``.
+
+    Returns
+    -------
+    ndarray, shape (K, 2, 6, 3)
+        Hip, D, knee, A, M and T of the right leg, then of the left (m, world).
+
+    Raises
+    ------
+    StateError
+        The angles have a wrong shape.
+    ModelError
+        The model has no function "leg_points".
     """
     return model.leg_points(motion.q, angles)

@@ -1,4 +1,4 @@
-"""The look that all drawings share, and how they are written."""
+"""The style that all drawings share, and how they are written."""
 
 import io
 import os
@@ -38,7 +38,7 @@ STYLE: dict[str, Any] = {
 
 
 def writable(path: str | os.PathLike[str]) -> Path:
-    """The path, if its suffix names a known format; ViewError where it does not."""
+    """Return the path if its suffix is a known format; ViewError otherwise."""
     path = Path(path)
     if path.suffix.lower() not in METADATA:
         raise ViewError(
@@ -51,7 +51,7 @@ Drawn = tuple["Figure", Any]  # with its axes
 
 
 def drawn(draw: Callable[[], Drawn], path: str | os.PathLike[str] | None) -> Drawn:
-    """Draw in the shared look; where there is a path, write the figure, too."""
+    """Draw in the shared style; with a path, write the figure too."""
     from matplotlib import style
 
     target = None if path is None else writable(path)
@@ -63,7 +63,7 @@ def drawn(draw: Callable[[], Drawn], path: str | os.PathLike[str] | None) -> Dra
 
 
 def write(path: Path, figure: "Figure") -> None:
-    """Write a figure whole or not at all; the same bytes every time."""
+    """Write a figure whole or not at all; the same figure gives the same bytes."""
     kind = path.suffix.lower()
     drawn = io.BytesIO()  # Matplotlib would hide that a write failed, and leave its file open
     figure.savefig(drawn, format=kind[1:], metadata=METADATA[kind], dpi=DPI)

@@ -1,4 +1,4 @@
-"""From where a motion is seen: parallel views, told by azimuth and elevation."""
+"""Parallel views of a motion, by azimuth and elevation."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -26,8 +26,10 @@ class View:
 
 
 def looking(name: str, azimuth: float, elevation: float) -> View:
-    """The view of who stands `azimuth` degrees from the animal's right towards its head (of an
-    animal that heads along y), and looks down by `elevation` degrees.
+    """Return the view of an observer who looks down by `elevation` degrees.
+
+    The observer stands `azimuth` degrees from the animal's right towards its head, for an animal
+    that heads along y.
     """
     c, s = np.cos(np.radians([azimuth, elevation])), np.sin(np.radians([azimuth, elevation]))
     right = [-s[0], c[0], 0]
@@ -41,7 +43,10 @@ NAMED = {view.name: view for view in (SIDE, TOP, looking("oblique", 40, 20))}
 
 
 def views_of(wanted: Sequence[str | tuple[float, float]]) -> list[View]:
-    """The views of names or of (azimuth, elevation) in degrees; ViewError where there is none."""
+    """Return the views of names or of (azimuth, elevation) in degrees.
+
+    ViewError if one is wrong.
+    """
     if isinstance(wanted, str) or not isinstance(wanted, Sequence) or not wanted:
         needs = 'a tuple of names or of (azimuth, elevation), such as ("side", (60, 15))'
         raise refusal("views", wanted, needs, ViewError)

@@ -42,7 +42,7 @@ def flight(
 def end_of_flight(
     model: Model, start: State, controller: Controller, duration: float, step: float
 ) -> State:
-    """Return q (nq,), v (nv,) where RK4 with steps (s) ends a flight."""
+    """Return q (nq,), v (nv,) at the end of a flight by RK4 with steps (s)."""
     if not model.contacts:
         return end_state(model, *start, controller=controller, duration=duration, step=step)
     settings = {"method": "rk4", "step": step, "output_step": duration}

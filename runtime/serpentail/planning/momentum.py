@@ -14,12 +14,12 @@ from ..model.model import Model
 from .nlp.coordinates import IDENTITY_POSE
 from .problem import PlanningProblem
 
-SMALL = 1e-3  # of the angular momentum: what the end may be off before it is refused
+SMALL = 1e-3  # of the angular momentum: largest difference at the end that is not refused
 YAWS = np.linspace(0.0, 2 * np.pi, 73)
 
 
 def refuse_impossible(model: Model, problem: PlanningProblem) -> None:
-    """PlanningError where no end of a flight can have the rates that the goal asks for."""
+    """PlanningError if no end of a flight can have the rates that the goal asks for."""
     goal, h = problem.goal, model.momentum(problem.q0, problem.v0)[1]
     size = float(np.linalg.norm(h))
     if goal.torso_rate is None or size == 0:
@@ -35,8 +35,8 @@ def refuse_impossible(model: Model, problem: PlanningProblem) -> None:
     left = _least_left(model, problem, h)
     if left > SMALL * size:
         raise PlanningError(
-            f"goal: with this tail and torso_rate, rates of the tail within their bounds leave "
-            f"{left / size:.1%} of what they must carry: {told}: leave torso_rate, or entries of "
+            f"goal: with this tail and torso_rate, tail rates within their bounds cannot carry "
+            f"{left / size:.1%} of the angular momentum: {told}: leave torso_rate, or entries of "
             "tail or tail_rate, free"
         )
 

@@ -1,4 +1,4 @@
-"""Path constraints of a plan: checked rows, and clearance of the ground."""
+"""Path constraints of a plan, and its clearance above the ground."""
 
 from collections.abc import Callable
 from typing import Any
@@ -40,8 +40,9 @@ def checked_clearance(value: Any) -> float | None:
 
 
 def clear_of_ground(model: Model, start: tuple[Any, Any], clearance: float) -> PathConstraint:
-    """Return the constraint that keeps tail and torso so high (m); PlanningError where they have no
-    points that touch, or are too low at the start.
+    """Return the constraint that keeps the points of tail and torso at least so high (m).
+
+    PlanningError if these have no contact points, or a point is too low at the start.
     """
     if not set(model.contacts) - {"feet"}:
         remedy = "add 'tail' or 'torso' to its scene's contacts, or leave it out"

@@ -1,11 +1,6 @@
-"""``plan``: motions of the tail that bring the animal where it should be, found by collocation.
+"""``plan``: finds motions of the tail by direct collocation."""
 
-The search refines its mesh until the planned torques, applied to the model, do what was planned.
-"""
-
-import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from inspect import Parameter, signature
 from typing import Any, Never
 
@@ -15,17 +10,11 @@ from ..errors import PlanningError
 from ..model.model import Model
 from ..motion.trajectory import Trajectory
 from ..simulation.schedules import Legs
-from ..stages import Stage
-from .momentum import refuse_impossible
-from .nlp.fork_gate import forks_wait
-from .nlp.interrupt import stoppable
-from .nlp.node import equations_of_motion
-from .problem import SMOOTHING, Bounds, Goal, PathConstraint, PlanningProblem, checked_problem
+from .best import best_plan
+from .goal import Bounds, Goal
+from .problem import SMOOTHING, PathConstraint, checked_problem
 from .result.plan import Plan
-from .rounds import SOFTENING, Round, Search
 from .settings import PlanSettings, check_settings
-
-NEEDED = ("mass_matrix", "inverse_dynamics", "rollout")  # functions of the model
 
 
 def plan(  # noqa: PLR0913 - the public face names all that it takes
@@ -65,62 +54,132 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
     multi_start: int = 1,
     retries: int = 4,
     seed: int = 0,
-    # what is told
+    # output
     track: bool = True,
     watch: Callable[[Plan], object] | None = None,
     **unknown: Never,
 ) -> Plan:
-    """Plan a motion of the tail by direct collocation (Sect. 3), and tell what its torques do.
+    """Plan a motion of the tail by direct collocation, and check what its torques do (Sect. 3).
 
-    start: (q0 (nq,), v0 (nv,)).
-    goal: a Goal, or "upright", which it is by default: the torso upright and at rest.
-    duration: s, or (least, most) where it is free.
-    bounds: a Bounds; by default |tau| <= 0.02 N m.
+    Every plan is integrated again with its torques applied open loop. The mesh is refined until
+    the end of that true motion is right within tolerances.
 
-    The problem
-    objective: "effort" (integral of tau^2 + (smoothing q_t_dot)^2), "energy" (of sum
-    |tau q_t_dot|), "time", or a function of a point.
-    smoothing: N m s; without it plans whirl a light tail.
-    damping: N m s (Eq. 47), in addition to the planned torques.
-    path: rows (function of a point, least, most).  A point has the CasADi blocks tail, tail_rate,
-    torso_rate, torque, attitude, quaternion, time, duration, position, height, tip, tail_points,
-    center_of_mass, contact_points, body_points in SI, parameters by name, and the blocks of its
-    formulation.
-    clearance: m, of all points of tail and torso that may touch the ground, in the whole flight.
-    legs: of a model with feet, for path constraints on its contact_points; as they are at 0 s.
-    formulation: "airborne" (angular momentum conserved by construction), "translation-free",
-    "full".
-    attitude: "quaternion", "euler".
+    Parameters
+    ----------
+    model : Model
+        The model, with a free base; its scene needs "mass_matrix", "inverse_dynamics" and
+        "rollout". If it has contacts, its flight is planned without the ground.
+    start : (array_like, array_like)
+        State (q0 (nq,), v0 (nv,)) at the start.
+    goal : Goal or str, optional
+        What holds at the end. Default: "upright", the torso upright and at rest, at any yaw.
+    duration : float or (float, float)
+        Duration (s), or (least, most) if it is free.
+    bounds : Bounds, optional
+        Bounds along the motion. Default: torques up to 0.02 N m.
+    objective : {"effort", "energy", "time"} or callable, default "effort"
+        What is minimised: the integral of tau^2 + (smoothing q_t_dot)^2; the integral of the sum
+        of the absolute powers of all torques; the duration; or the integral of a function of a
+        point (see Notes).
+    smoothing : float, default 3e-4
+        Weight of the tail's rates in the effort (N m s). At 0, which is the paper's effort, plans
+        may whirl a light tail.
+    damping : float, default 0
+        Damping of the tail coordinates (N m s, Eq. 47), in addition to the planned torques.
+    path : sequence of (callable, float, float), optional
+        Path constraints: (function of a point, least, most).
+    clearance : float, optional
+        Least height (m) of all points of tail and torso that can touch the ground, during the
+        whole flight. Default: no constraint.
+    legs : Legs, optional
+        Legs of a model with feet, for path constraints on its ``contact_points``; they stay as
+        they are at 0 s.
+    formulation : {"airborne", "translation-free", "full"}, default "airborne"
+        Unknowns of the program: "airborne" conserves angular momentum by construction; "full" is
+        the paper's.
+    attitude : {"quaternion", "euler"}, default "quaternion"
+        Coordinates of the attitude.
 
-    The mesh
-    rule: "radau", "lobatto", "hermite-simpson", "trapezoidal"; degree: of the rule.
-    intervals: of the first mesh; most_intervals: of the last; rounds: of refinement.
-    controls: control intervals, in each of which torques are one polynomial, however fine the mesh;
-    None: in each interval of the mesh.  With "time" they are straight there.
-    tolerance: deg, of the true attitude at the end; None for no demand at all.
-    tail_tolerance: deg, rate_tolerance: rad/s of torso and tail, of the truth at the end; None for
-    no demand.  Between nodes, bounds hold to 1e-3 of them.
+    Returns
+    -------
+    Plan
+        The best plan found; see its ``success`` and ``report``.
 
-    The solver
-    solver, options: "ipopt", or another of ``casadi.nlpsol``; "fatrop", on stages, takes airborne
-    plans alone.
-    dynamics: "auto", "compiled", "symbolic".
-    time_limit: s, of the search.
+    Other Parameters
+    ----------------
+    rule : {"radau", "lobatto", "hermite-simpson", "trapezoidal"}, default "radau"
+        Collocation rule; "trapezoidal" is the paper's.
+    degree : int, optional
+        Degree of "radau" and "lobatto", from 1 to 5. Default: 3.
+    intervals : int, default 12
+        Number of intervals of the first mesh.
+    most_intervals : int, default 200
+        Largest number of intervals.
+    controls : int, optional
+        Number of equal control intervals; in each, the torques are one polynomial, however fine
+        the mesh is. Default: the intervals of the mesh. With the objective "time" torques are
+        linear in each interval.
+    rounds : int, default 6
+        Largest number of refinements.
+    tolerance : float or None, default 0.01
+        Largest error of the true attitude at the end (deg); None for no demand.
+    tail_tolerance : float or None, default 0.1
+        Largest error of the true tail coordinates at the end (deg); None for no demand.
+    rate_tolerance : float or None, default 0.1
+        Largest error of the true rates of torso and tail at the end (rad/s); None for no demand.
+    solver : str, default "ipopt"
+        "ipopt", another solver of ``casadi.nlpsol``, or "fatrop", which solves airborne problems
+        in stages.
+    options : dict, optional
+        Options of ``casadi.nlpsol``, such as ``{"ipopt.max_iter": 500}``.
+    dynamics : {"auto", "compiled", "symbolic"}, default "auto"
+        Source of the dynamics and its derivatives: compiled C or CasADi operations.
+    time_limit : float, optional
+        Time for the search (s).
+    guess : Plan or Trajectory, optional
+        First guess. Default: passive flight.
+    guess_damping : float, default 1e-3
+        Damping of that passive flight (N m s).
+    multi_start : int, default 1
+        Number of guesses that are solved; the best solution is kept.
+    retries : int, default 4
+        Number of further guesses if all of these fail.
+    seed : int, default 0
+        Seed of the random guesses.
+    track : bool, default True
+        Whether to simulate the plan tracked by ``Pfl`` too, for the report.
+    watch : callable, optional
+        Function that receives the Plan of each round when it is found. An exception that it
+        raises ends the search.
 
-    Where it begins
-    guess: a Plan or a Trajectory; by default passive flight, with guess_damping (N m s).
-    multi_start: guesses solved, the best is kept; retries: more guesses after failures; seed.
+    Raises
+    ------
+    PlanningError
+        The problem or a setting is wrong; the message names every field with value and remedy.
+    ModelError
+        The base is fixed, or the scene lacks a function.
+    ExtraMissing
+        CasADi is not installed; it comes with the extra "plan".
 
-    What is told
-    track: simulate with PFL, too.
-    watch: a function that is given the Plan of each round as it is found; what it raises ends all.
+    Notes
+    -----
+    A point, which objectives and path constraints receive, has the CasADi blocks ``tail``,
+    ``tail_rate``, ``torso_rate``, ``torque``, ``attitude``, ``quaternion``, ``time``,
+    ``duration``, ``position``, ``height``, ``tip``, ``tail_points``, ``center_of_mass``,
+    ``contact_points`` and ``body_points`` in SI units, the model's ``parameters`` by name, and
+    the blocks of its formulation.
 
-    Programs and solvers are remembered: planning again on a plan's mesh, from another start,
-    derives nothing.  Ctrl-C ends the search, as the time limit does, and the best so far is
-    returned; a second one raises KeyboardInterrupt.
-    Returns a Plan; look at its ``success`` and ``report``.  Raises PlanningError (fields, their
-    values, remedies), ModelError (the scene lacks functions), ExtraMissing without the extra
-    "plan".
+    Between nodes, bounds hold to one part in 1000.
+
+    Programs and solvers are kept: planning from another start on the mesh of a plan derives
+    nothing again. Ctrl-C or the time limit ends the search, and the best plan so far is
+    returned. A second Ctrl-C raises KeyboardInterrupt.
+
+    Examples
+    --------
+    >>> start = q0, v0  # doctest: +SKIP
+    >>> plan = st.plan(model, start=start, duration=0.3)  # doctest: +SKIP
+    >>> plan.success, plan.report["effort"]  # doctest: +SKIP
     """
     extras.needed("casadi", "plan")
     model.refuse_fixed("plan")
@@ -169,54 +228,8 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
     )
     problem = checked_problem(model, task, of_problem, refused)
     refused.tell()
-    assert problem is not None  # all has been told
-    return _found(model, problem, settings, watch)
-
-
-def _found(
-    model: Model,
-    problem: PlanningProblem,
-    settings: PlanSettings,
-    watch: Callable[[Plan], object] | None,
-) -> Plan:
-    """Search, round by round, and return the best plan."""
-    missing = [name for name in NEEDED if name not in model.generated]
-    if missing:
-        raise model.without(*missing)
-    refuse_impossible(model, problem)
-    begun, easier = time.perf_counter(), None
-    with forks_wait(), Stage("plan", model.name) as stage:
-        equations = equations_of_motion(model, settings.dynamics)
-        with stoppable(settings.time_limit, stage.tell):
-            if problem.objective in SOFTENING and settings.guess is None:
-                # from passive flight these are seldom solved
-                calm, untracked = (
-                    replace(problem, objective="effort"),
-                    replace(settings, track=False),
-                )
-                easier = Search(model, calm, untracked, equations)
-                found = _rounds(easier, stage)
-                guess = easier.plan(easier.best(found), len(found), 0.0)
-                settings = replace(settings, guess=guess)
-            search = Search(model, problem, settings, equations, easier)
-            rounds = _rounds(search, stage, watch, begun)
-        return search.plan(search.best(rounds), len(rounds), time.perf_counter() - begun)
-
-
-def _rounds(
-    search: Search,
-    stage: Stage,
-    watch: Callable[[Plan], object] | None = None,
-    begun: float = 0.0,
-) -> list[Round]:
-    """Return all rounds of a search, each told, and watched, as it is found."""
-    rounds: list[Round] = []
-    for each in search.rounds():
-        rounds.append(each)
-        stage.tell(what=f"{search.model.name}: {each} after round {len(rounds)}")
-        if watch is not None:
-            watch(search.plan(each, len(rounds), time.perf_counter() - begun))
-    return rounds
+    assert problem is not None  # otherwise tell() has raised
+    return best_plan(model, problem, settings, watch)
 
 
 NAMES = [

@@ -1,4 +1,4 @@
-"""What a user asks of a plan, checked field by field before anything is derived."""
+"""A planning problem, checked field by field before anything is derived."""
 
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, fields
@@ -14,6 +14,7 @@ from ..model.layout import QUATERNION, TAIL_Q, TAIL_V
 from ..model.model import Model
 from ..model.passive import behind_stops
 from ..simulation.schedules import Legs
+from .goal import GOALS, Bounds, Goal
 from .nlp.coordinates import KINDS
 from .nlp.node import FORMULATIONS
 from .paths import PathConstraint, checked_clearance, checked_path, clear_of_ground
@@ -23,41 +24,6 @@ OBJECTIVES = ("effort", "energy", "time")
 SMOOTHING = 3e-4
 HUGE = 1e100  # beyond it squares overflow
 START_SLACK = 1e-6  # rad, rad/s: how far a start may be beyond its bounds
-
-
-@dataclass(frozen=True)
-class Goal:
-    """What holds at the end (f_bc of Eq. 43); None leaves a part free.
-
-    So does a None among the tail's numbers.
-    attitude: "upright" (any yaw) or a quaternion (w, x, y, z), torso to world.
-    torso_rate (3,): rad/s in body axes.  tail (2m,): rad.  tail_rate (2m,): rad/s.
-    turns (2,): whole turns of pitch and roll at an upright end, for the attitude "euler" alone; by
-    default those nearest to the guess, as in Sect. 3.2.
-    """
-
-    attitude: Any = "upright"
-    torso_rate: Any = (0.0, 0.0, 0.0)
-    tail: Any = None
-    tail_rate: Any = None
-    turns: Any = None
-
-
-GOALS = {"upright": Goal()}  # by name
-
-
-@dataclass(frozen=True)
-class Bounds:
-    """Largest magnitudes along the motion (g_pc of Eq. 43); None: no bound.
-
-    Each is one number, or one a tail coordinate: angle (rad), rate (rad/s), torque (N m),
-    torque_rate (N m/s; torques are continuous then).
-    """
-
-    angle: Any = None
-    rate: Any = None
-    torque: Any = 0.02
-    torque_rate: Any = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +38,7 @@ class PlanningProblem:
     objective: str | Callable[[Any], Any]
     smoothing: float
     damping: float
-    path: tuple[PathConstraint, ...]  # with that of the clearance
+    path: tuple[PathConstraint, ...]  # including that of the clearance
     clearance: float | None
     legs: Legs | None
     formulation: str
@@ -83,11 +49,11 @@ class PlanningProblem:
 def checked_problem(
     model: Model, task: tuple[Any, Any, Any, Any], settings: dict[str, Any], refused: Refusals
 ) -> PlanningProblem | None:
-    """Return the problem of (start, goal, duration, bounds) and settings; None where it is none.
+    """Return the problem of (start, goal, duration, bounds) and settings; None if it is refused.
 
-    Notes each field that is wrong, its value and the remedy.
+    ``refused`` collects each field that is wrong, its value and the remedy.
     """
-    # start, goal and bounds, and whether these allow the others
+    # start, goal and bounds, and whether the bounds allow start and goal
     attempt, tail = refused.attempt, model.layout.nt
     start = attempt("start", _start, model, task[0])
     goal = attempt("goal", checked_goal, task[1], tail)
@@ -119,7 +85,7 @@ def checked_problem(
 
 
 def _vector(field: str, value: Any, size: int) -> np.ndarray:
-    """Return finite numbers (size,); PlanningError else, also of one number alone."""
+    """Return finite numbers (size,); PlanningError otherwise, also for a single number."""
     array = numbers_in(value)
     if array is None or array.shape == ():
         raise refusal(field, value, f"{size} numbers", PlanningError)
@@ -127,7 +93,7 @@ def _vector(field: str, value: Any, size: int) -> np.ndarray:
 
 
 def _unit_quaternion(field: str, quaternion: np.ndarray) -> np.ndarray:
-    """Return the quaternion, of norm 1; PlanningError where it is zero."""
+    """Return the quaternion with norm 1; PlanningError if it is zero."""
     largest = np.abs(quaternion).max()
     if largest == 0:
         raise PlanningError(f"{field}: the zero quaternion: upright is (1, 0, 0, 0)")
@@ -145,7 +111,7 @@ def _start(model: Model, start: Any) -> tuple[np.ndarray, np.ndarray]:
 
 
 def checked_goal(goal: Any, tail: int) -> Goal:
-    """Return a goal for 2m tail coordinates with arrays; None is upright and at rest."""
+    """Return a goal with arrays for 2m tail coordinates; None means upright and at rest."""
     if goal is None:
         goal = Goal()
     if isinstance(goal, str):
@@ -169,7 +135,7 @@ def checked_goal(goal: Any, tail: int) -> Goal:
 
 
 def _partly_free(field: str, value: Any, size: int) -> np.ndarray | None:
-    """Return numbers (size,), nan where they are free; None where all are."""
+    """Return numbers (size,), nan for free ones; None if all are free."""
     if value is None:
         return None
     if np.ma.is_masked(value):
@@ -197,7 +163,7 @@ def _bounds(bounds: Any, tail: int) -> Bounds:
 
 
 def _magnitudes(name: str, value: Any, tail: int) -> np.ndarray | None:
-    """Return one bound of every tail coordinate; None where there is none."""
+    """Return a bound of every tail coordinate; None for no bound."""
     if value is None:
         return None
     magnitudes = numbers(f"bounds.{name}", value, tail, PlanningError, most=HUGE)

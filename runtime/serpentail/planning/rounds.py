@@ -1,7 +1,7 @@
-"""The search for a plan: a first solution, then rounds on finer meshes until it is true.
+"""The search for a plan: a first solution, then rounds on finer meshes until the plan is true.
 
-A round is one solved program.  Its torques are applied to the model; intervals where the model
-does something else than planned are split for the next round.
+A round is one solved program. Its torques are applied to the model, and intervals in which the
+model deviates from the plan are split for the next round.
 """
 
 import time
@@ -35,8 +35,8 @@ from .settings import PlanSettings
 from .ways import Begin, way_of
 
 FIRST_PUSH = 0.05  # of the torques' unit: takes the first guess out of a plane of symmetry
-# what softens an objective, see ``cost``, in the first rounds, and the last in all others: from
-# afar the objectives themselves are seldom solved; of "energy" in mean powers of the guess
+# Softening of an objective, see ``cost``, in the first rounds; the last value holds in all others.
+# The exact ones are seldom solved from a distant guess. "energy": in mean powers of the guess.
 SOFTENING = {"energy": (3.0, 0.3, 0.03), "time": (1.0, 0.3)}
 USUAL_POWER = 0.01  # W, of a guess without torques
 DURATIONS = (1.0, 0.5, 0.75, 0.25)  # of guesses, in turn, from the least (0) to the most (1)
@@ -46,7 +46,7 @@ DURATIONS = (1.0, 0.5, 0.75, 0.25)  # of guesses, in turn, from the least (0) to
 class Round:
     """One solution on one mesh: q, v planned at the ends of intervals, and true at the last end.
 
-    errors: of the truth there, as ``end_errors`` has them; excess: over bounds, by intervals.
+    errors: true errors there, as of ``end_errors``; excess: over bounds, by intervals.
     softening: of the objective.
     """
 
@@ -64,7 +64,7 @@ class Round:
 
 
 class Search:
-    """What stays the same in all rounds, and what they have cost, with a search before."""
+    """What all rounds share, and what they and an earlier search have cost."""
 
     def __init__(
         self,
@@ -136,18 +136,18 @@ class Search:
         )
 
     def _off(self, found: Round) -> float:
-        """Return the errors of the truth over what is allowed, the largest."""
+        """Return the largest true error relative to its tolerance."""
         allowed = self.settings.allowed
         return max((found.errors[name] / most for name, most in allowed.items()), default=0.0)
 
     def _wrong(self, found: Round) -> float:
-        """The same, and how far bounds are exceeded over what is allowed."""
+        """Return the larger of ``_off`` and the excess over bounds relative to its tolerance."""
         if self.settings.tolerance is None:
             return 0.0
         return max(self._off(found), largest(found.excess)[0] / SLACK)
 
     def plan(self, best: Round, rounds: int, wall_s: float) -> Plan:
-        """Return the plan of a round, the best of so many."""
+        """Return the plan of a round; rounds: their number so far."""
         success = bool(best.solution.success and self._wrong(best) <= 1)
         trajectory = sampled(self.model, self.problem, best.curve)
         counts = {
@@ -175,7 +175,7 @@ class Search:
 
     @contextmanager
     def _timed(self, name: str) -> Iterator[None]:
-        """Add the time that a part takes to what was spent on it."""
+        """Add the time of a part of the work to what was spent on it."""
         begun = time.perf_counter()
         yield
         self.spent[name] += time.perf_counter() - begun
@@ -265,7 +265,9 @@ class Search:
         return Round(nlp, solution, motion, planned, true, errors, beyond, self.softening[0])
 
     def _finer(self, last: Round) -> Mesh:
-        """Return the next mesh: guards where torques go too far, finer where the truth is wrong, or
+        """Return the next mesh.
+
+        It has guards where torques exceed bounds. It is finer where the true motion is wrong, or
         else where other bounds are exceeded.
         """
         mesh, most, off = last.nlp.mesh, self.settings.most_intervals, self._off(last)
@@ -280,7 +282,7 @@ class Search:
 
 
 def _softening(problem: PlanningProblem, guess: object) -> tuple[float, ...]:
-    """Return what softens the objective in the first rounds; the last is that of all others."""
+    """Return the softening of the objective in the first rounds; the last one is kept."""
     steps = SOFTENING.get(str(problem.objective), (0.0,))
     if problem.objective == "energy":
         power = _mean_power(guess)

@@ -1,4 +1,4 @@
-"""How to search for a plan: the settings of rule, mesh, solver and guesses, and their checks."""
+"""How to search for a plan: settings of rule, mesh, solver and guesses, and their checks."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -27,7 +27,7 @@ DYNAMICS = ("auto", "compiled", "symbolic")
 
 @dataclass(frozen=True)
 class PlanSettings:
-    """How to find a plan: collocation rule, mesh, tolerance of the truth, solver, guesses."""
+    """How to search for a plan: collocation rule, mesh, tolerances, solver, guesses."""
 
     rule: str
     degree: int | None
@@ -51,7 +51,7 @@ class PlanSettings:
 
     @property
     def allowed(self) -> dict[str, float]:
-        """Largest errors of the truth at the end: attitude and tail, deg, rates, rad/s."""
+        """Largest true errors at the end: attitude and tail (deg), rates (rad/s)."""
         named = {
             "attitude": self.tolerance,
             "tail": self.tail_tolerance,
@@ -61,7 +61,7 @@ class PlanSettings:
 
 
 def check_settings(model: Model, settings: PlanSettings, refused: Refusals) -> None:
-    """Note each setting that is wrong, with the remedy."""
+    """Add each wrong setting, with its remedy, to ``refused``."""
     for name, bounds in WHOLE_NUMBERS.items():
         refused.attempt(name, _check_whole, name, getattr(settings, name), *bounds)
     if settings.controls is not None:
@@ -92,7 +92,7 @@ def _check_positive(name: str, value: Any) -> None:
 
 
 def _check_guess(model: Model, guess: Any) -> None:
-    """PlanningError unless a guess is None, or a motion of such a model."""
+    """PlanningError unless the guess is None, or a motion of such a model."""
     if guess is None:
         return
     motion = getattr(guess, "trajectory", guess)

@@ -1,5 +1,5 @@
-"""The two ways to solve a problem on a mesh: sparse programs by IPOPT, or another of CasADi's
-solvers, and stages by FATROP.
+"""The two ways to solve a problem on a mesh: a sparse program by IPOPT or another solver of
+CasADi, and stages by FATROP.
 """
 
 from collections.abc import Callable
@@ -50,7 +50,7 @@ class Way:
 
 
 def way_of(search: "Search") -> Way:
-    """Return the way of a search's solver; PlanningError where it does not take the problem."""
+    """Return the way of a search's solver; PlanningError if that cannot solve the problem."""
     if search.settings.solver != FATROP:
         return SPARSE
     reason = _beyond(search)
@@ -60,7 +60,7 @@ def way_of(search: "Search") -> Way:
 
 
 def _beyond(search: "Search") -> str | None:
-    """Return what stages lack for a problem, and the remedy; None where they take it."""
+    """Return what stages cannot do for a problem, and the remedy; None if they can solve it."""
     problem, settings = search.problem, search.settings
     needed = {
         "formulation": (problem.formulation, "airborne"),

@@ -9,8 +9,9 @@ from ..building.build import built
 from ..building.examples import tables_of_scene
 from ..checks import refusal, shown
 from ..errors import ModelError, SerpentailError
+from ..model.load import load, model_from
 from ..model.manifest import read_manifest
-from ..model.model import Model, load, model_from
+from ..model.model import Model
 from ..model.parameters import merged
 from ..units import in_unit
 
@@ -28,17 +29,20 @@ MADE_OF = (
     "base",
     "weightless",
 )
-# tables of verbs, and what each needs
+# tables of verbs, and the keys that each needs
 NEEDS = {
     "simulate": "start and duration",
     "plan": "start and duration",
     "identify": "tables [[identify.marker]]",
 }
-UNSAID = {"base": "free", "weightless": False}  # of manifests, which leave out these
+UNSAID = {"base": "free", "weightless": False}  # manifests leave these out
 
 
 def read_scene(path: str | Path, error: type[Exception]) -> tuple[dict[str, Any], Path]:
-    """Return the tables of a scene file or example, and its path; ``error`` where none is read."""
+    """Return the tables of a scene file or example, and its path.
+
+    ``error`` if it cannot be read.
+    """
     try:
         return tables_of_scene(path)
     except SerpentailError as reason:
@@ -46,7 +50,7 @@ def read_scene(path: str | Path, error: type[Exception]) -> tuple[dict[str, Any]
 
 
 def subtable(scene: Mapping, name: str, path: Path, error: type[Exception]) -> dict:
-    """Return a table of a scene; ``error`` where it has none."""
+    """Return a table of a scene; ``error`` if it is missing."""
     table = scene.get(name)
     if not isinstance(table, Mapping):
         others = [verb for verb in NEEDS if verb != name and verb in scene]
@@ -58,8 +62,8 @@ def subtable(scene: Mapping, name: str, path: Path, error: type[Exception]) -> d
 def model_of(scene: Mapping, path: Path, folder: str | Path | None, parameters: Mapping) -> Model:
     """Return the model of a scene, with the scene's parameters, then those given here.
 
-    folder: where it was generated; None: the model is built, or was.  ModelError where the folder
-    is of another scene.
+    folder: the generated folder; None: the model is built, or taken from the cache. ModelError if
+    the folder belongs to another scene.
     """
     if folder is None:
         return model_from(*built(scene, path.stem, parameters))
@@ -76,7 +80,7 @@ def model_of(scene: Mapping, path: Path, folder: str | Path | None, parameters: 
 
 
 def size_of(model: Model) -> dict[str, float]:
-    """Return what becomes of each "kg", "m" and "s" that its scene names; empty where they stay."""
+    """Return the factors of each "kg", "m" and "s" of a scaled scene; empty without scaling."""
     return dict(model.manifest.get("size", {}))
 
 
@@ -89,14 +93,14 @@ def _own_parameters(scene: Mapping) -> Mapping:
 
 
 def _same(value: Any, made: Any) -> bool:
-    """Tell whether a scene's value is that of a manifest; the order of a list means nothing."""
+    """Tell whether a scene's value equals that of a manifest; the order of a list is ignored."""
     if isinstance(value, list) and isinstance(made, list):
         return all(value.count(x) == made.count(x) for x in (*value, *made))
     return bool(value == made)
 
 
 def _in_radians(key: str, value: Any) -> Any:
-    """Return the value of a key, of an angle as a number where it has a unit."""
-    with suppress(ValueError):  # it is not what the model was made with, then
+    """Return the value of a key; an angle with a unit as a number in rad."""
+    with suppress(ValueError):  # then it differs from what the model was made with
         return in_unit(value, "rad") if key == "bend_range" else value
     return value

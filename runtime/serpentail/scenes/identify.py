@@ -14,23 +14,23 @@ from .file import model_of, read_scene, size_of, subtable
 from .identify_keys import IDENTIFY
 from .keys import read, sized
 
-# functions that an identification calls, beside those that scenes have by default
+# functions that an identification calls besides the default ones of scenes
 NEEDS = ("forward_dynamics_derivatives", "forward_dynamics_parameter_derivatives")
 USES = ("forward_dynamics", "energy", "momentum", "tail_points", "mass_matrix", "bias_force")
 UNSIZED: Mapping[str, float] = {}
-READ = ("unit", "axes", "zeros")  # keys that tell how files are read
+READ = ("unit", "axes", "zeros")  # keys for reading files
 
 
 def identified(path: str, data: Sequence[str], folder: str | None = None) -> Identification:
-    """Return what a scene file's table [identify] makes of files of marker tracks.
+    """Return the identification that a scene's table [identify] describes, for marker files.
 
     path: a scene file, or the name of an example; data: TRC, CSV or C3D files, trials of one
-    animal; folder: of its model, where that was generated; None: it is built, or was, with the
-    derivatives that are needed.  Raises IdentificationError with field, value and remedy.
+    animal; folder: the model's generated folder; None: the model is built with the derivatives that
+    are needed, or taken from the cache. Raises IdentificationError with field, value and remedy.
     """
     tables, place = read_scene(path, IdentificationError)
     table = subtable(tables, "identify", place, IdentificationError)
-    given = identify_arguments(table)  # what is wrong is told before a model is built
+    given = identify_arguments(table)  # errors are raised before a model is built
     files = {name: given.pop(name) for name in READ if name in given}
     unit = files.pop("unit", None)
     tracks = [read_markers(each, unit, **files) for each in data]

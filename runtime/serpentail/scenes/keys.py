@@ -15,14 +15,13 @@ from ..units import dimensions, in_unit
 
 @dataclass(frozen=True)
 class Key:
-    """What a key holds: numbers in a unit, a table of other keys, or something of another form.
+    """The values that a key may have: numbers in a unit, a table of keys, or another form.
 
-    unit: of the numbers, "1" where they are pure, "" where it is none; several: of the entries of
-    an array, the last one of all others.  depth: how deep arrays of them may be.  usual: whether
-    more than any animal has is told.
-    keys: of a table, those that it needs.  kinds: keys by the table's ``kind``.  each: of the
-    tables in an array.
-    words: what may be written instead.  form: JSON Schema of anything else.
+    unit: of the numbers; "1" for pure numbers, "" for no unit; several units: one for each entry of
+    an array, the last one for all further entries. depth: largest depth of nested arrays. usual:
+    whether to warn of values that no animal has. keys: of a table, with the required ones. kinds:
+    keys by the table's ``kind``. each: keys of the tables in an array. words: texts that are
+    allowed instead. form: JSON Schema of any other form.
     """
 
     unit: str | Sequence[str] = ""
@@ -47,9 +46,9 @@ def one_word(*words: str) -> Key:
 
 
 def read(table: Mapping, key: Key, where: str, refused: Refusals, part: str = "") -> dict:
-    """Return a table with all numbers in the units of their keys; notes keys that there are not.
+    """Return a table with all numbers in the units of their keys; refuse unknown keys.
 
-    part: what is refused belongs to it, by default to the key of this table that it is in.
+    part: the part to which errors belong; by default the key of this table.
     """
     found = {}
     for name, value in table.items():
@@ -61,7 +60,9 @@ def read(table: Mapping, key: Key, where: str, refused: Refusals, part: str = ""
     return found
 
 
-Part = tuple[Refusals, str]  # where refusals of a value are noted, and what they are part of
+Part = tuple[
+    Refusals, str
+]  # where errors about a value are collected, and the part that they belong to
 
 
 def _read(value: Any, key: Key, where: str, part: Part) -> Any:
@@ -79,7 +80,7 @@ def _read(value: Any, key: Key, where: str, part: Part) -> Any:
 
 
 def _read_table(table: Mapping, key: Key, where: str, part: Part) -> Mapping:
-    """Return a table with numbers in the units of its keys, as it is where it has no known kind."""
+    """Return a table with numbers in the units of its keys; unchanged if its kind is unknown."""
     kind = table.get("kind")
     if key.kinds:
         key = key.kinds.get(kind, Key()) if isinstance(kind, str) else Key()
@@ -100,9 +101,9 @@ def _read_numbers(value: Any, key: Key, where: str, part: Part) -> Any:
 
 
 def sized(value: Any, key: Key, size: Mapping[str, float]) -> Any:
-    """Return what was read of a key, all numbers in the size of a body.
+    """Return the value of a key with all numbers scaled to the size of a body.
 
-    size: by what each "kg", "m" and "s" is multiplied, as a manifest has it; empty: by 1.
+    size: factors of each "kg", "m" and "s", as in a manifest; empty: 1.
     """
     if not size:
         return value

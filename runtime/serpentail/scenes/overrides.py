@@ -23,7 +23,7 @@ def parsed(texts: Iterable[str]) -> dict:
             )
         try:
             values[name] = tables_in(f"value = {value}")["value"]
-        except (ValueError, RecursionError):  # what is no TOML
+        except (ValueError, RecursionError):  # not TOML
             values[name] = value
     return values
 

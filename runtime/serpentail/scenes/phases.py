@@ -22,7 +22,7 @@ INSTEAD = {  # keys of [simulate] that a scene with phases has elsewhere
 
 
 def refuse_beside_phases(table: Mapping, refused: Refusals) -> None:
-    """Note what a table [simulate] cannot have beside tables [[phase]]."""
+    """Refuse keys of a table [simulate] that cannot be combined with tables [[phase]]."""
     for name, remedy in INSTEAD.items():
         if name in table:
             refused.add(name, f"simulate.{name}: beside tables [[phase]]: {remedy}; remove it")
@@ -36,10 +36,9 @@ def refuse_beside_phases(table: Mapping, refused: Refusals) -> None:
 def phases_of(
     model: Model, tables: Any, usual: tuple[Controller, Path], refused: Refusals
 ) -> tuple[Phase, ...]:
-    """Return the phases of a scene's tables; usual: what acts in those without a law, and the
-    folder of files.
+    """Return the phases of a scene's tables, and add errors phase by phase.
 
-    Notes what is wrong, phase by phase.
+    usual: the controller of phases without one, and the folder of files.
     """
     if not isinstance(tables, list | tuple):
         refused.add("phase", needed("phase", tables, "tables, under lines [[phase]]"))

@@ -7,8 +7,8 @@ from typing import Any
 from .. import extras
 from ..checks import Refusals, needed, refusal, shown
 from ..errors import PlanningError
+from ..planning.goal import Bounds, Goal
 from ..planning.planner import plan
-from ..planning.problem import Bounds, Goal
 from ..planning.result.plan import Plan
 from .file import model_of, read_scene, size_of, subtable
 from .keys import read, sized
@@ -16,20 +16,20 @@ from .plan_keys import FREE, PLAN
 
 ELSEWHERE = "programs can give others, to serpentail.plan"
 UNSIZED: Mapping[str, float] = {}
-CODE_ONLY = ("guess", "path", "legs")  # what no file can hold
+CODE_ONLY = ("guess", "path", "legs")  # values that no file can hold
 
 
 def planned(path: str, folder: str | None = None) -> Plan:
-    """Return the plan that a scene file asks for.
+    """Return the plan that a scene file describes.
 
-    path: a scene file, or the name of an example; folder: of its model, where that was generated;
-    None: it is built, or was.  Raises PlanningError with field, value and
-    remedy, ModelError where the folder is of another scene, ExtraMissing without the extra "plan".
+    path: a scene file, or the name of an example; folder: the model's generated folder; None: the
+    model is built, or taken from the cache. Raises PlanningError with field, value and remedy,
+    ModelError if the folder belongs to another scene, ExtraMissing without the extra "plan".
     """
     extras.needed("casadi", "plan")  # before the model is built
     tables, place = read_scene(path, PlanningError)
     table = subtable(tables, "plan", place, PlanningError)
-    plan_arguments(table)  # what is wrong is told before a model is built
+    plan_arguments(table)  # errors are raised before a model is built
     model = model_of(tables, place, folder, {})
     return plan(model, **plan_arguments(table, size_of(model)))
 
@@ -72,7 +72,7 @@ def arguments_but_start(
     if refused.lines:
         return {}
 
-    # tables of their own are goal and bounds; the others are as they are, but for "free"
+    # goal and bounds are tables; other values are passed on, except "free"
     goal = table.get("goal", {})
     if isinstance(goal, Mapping):
         goal = Goal(**{key: _free(value) for key, value in goal.items()})
@@ -86,7 +86,7 @@ def _is_free(value: Any) -> bool:
 
 
 def _check_solver(solver: Any, options: Any) -> None:
-    """PlanningError where a solver could be made to load libraries, run code or write files."""
+    """PlanningError for a solver that could load libraries, run code or write files."""
     if not isinstance(solver, str) or not re.fullmatch("[a-z]+", solver):
         raise refusal("plan.solver", solver, f"a name of a-z; {ELSEWHERE}", PlanningError)
     for name, value in options.items() if isinstance(options, Mapping) else [("", options)]:

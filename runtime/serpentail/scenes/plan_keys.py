@@ -1,9 +1,10 @@
 """The keys of a scene's table [plan]."""
 
+from ..planning.goal import GOALS
 from ..planning.nlp.coordinates import KINDS
 from ..planning.nlp.node import FORMULATIONS
 from ..planning.nlp.rules import FAMILIES, MOST_DEGREE
-from ..planning.problem import GOALS, OBJECTIVES
+from ..planning.problem import OBJECTIVES
 from ..planning.settings import DYNAMICS, MOST_CONTROLS, WHOLE_NUMBERS
 from .keys import Key, one_word
 

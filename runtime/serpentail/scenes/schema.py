@@ -1,4 +1,4 @@
-"""The JSON Schema of scene files: the generator's, and what belongs in tables of the runtime."""
+"""The JSON Schema of scene files: the generator's, with the runtime's tables."""
 
 import json
 import subprocess
@@ -15,7 +15,7 @@ from .sweep_keys import SWEEP
 
 
 def scene_schema() -> dict[str, Any]:
-    """Return the schema of scene files; ModelError where the generator is not installed."""
+    """Return the schema of scene files; ModelError if the generator is not installed."""
     said = subprocess.run(
         [*command(), "--schema"], capture_output=True, text=True, check=True
     ).stdout
@@ -33,7 +33,7 @@ def scene_schema() -> dict[str, Any]:
 
 
 def key_schema(key: Key) -> dict[str, Any]:
-    """Return the schema of what a key holds."""
+    """Return the schema of a key's values."""
     forms: list[dict[str, Any]] = [{"enum": list(key.words)}] if key.words else []
     if key.form:
         forms.append(dict(key.form))

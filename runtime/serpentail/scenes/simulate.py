@@ -1,4 +1,4 @@
-"""The motion that a scene file's table [simulate] asks for: start, legs, controller, settings."""
+"""``scenario``: the motion of a scene's table [simulate], with start, legs and controller."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -8,34 +8,49 @@ from typing import Any, overload
 import numpy as np
 
 from ..brief import brief
-from ..checks import Refusals, did_you_mean, finite_array, none_of, number, refusal, shown
+from ..checks import Refusals, did_you_mean, none_of, number, shown
 from ..errors import SimulationError
-from ..model.layout import OMEGA, VELOCITY
 from ..model.model import Model
 from ..motion.summary import Summary, summary
 from ..motion.trajectory import Trajectory
 from ..sequence.phase import Phase
-from ..sequence.sequence import Sequence, SequenceRun
+from ..sequence.run import SequenceRun
+from ..sequence.sequence import Sequence
 from ..simulation.controllers import Controller
 from ..simulation.methods import SETTINGS
 from ..simulation.rollouts import Rollouts
-from ..simulation.schedules import Legs, Reference, shared_among_links
-from ..simulation.settle import check_settling, settle
+from ..simulation.schedules import Legs, Reference
+from ..simulation.settle import settle
 from ..simulation.simulate import simulate
 from .acting import controller_of, legs_of, reference_of
 from .file import model_of, read_scene, size_of, subtable
 from .keys import read, sized
 from .overrides import changed
 from .phases import phases_of, refuse_beside_phases
-from .simulate_keys import ANGLES, NUMBERS, SIMULATE
+from .simulate_keys import NUMBERS, SIMULATE
+from .start import start_of
 
 
 @dataclass(frozen=True, eq=False)
 class Scenario:
-    """A motion to simulate: a model, its start (q0, v0), and what else ``st.simulate`` takes.
+    """A motion to simulate: a model, its start, and further arguments of ``simulate``.
 
-    duration (s) from t = 0 on; controller, legs as in ``simulate``; settings: the rest of its
-    arguments.  phases: of a sequence, see ``Sequence``; the controller acts in those without one.
+    Attributes
+    ----------
+    model : Model
+        The model.
+    q0, v0 : ndarray, shapes (nq,) and (nv,)
+        State at the start.
+    duration : float
+        Duration from t = 0 (s); of phases, each has its own.
+    controller : controller or None
+        As of ``simulate``; in phases it acts where a phase has no other.
+    legs : Legs or None
+        Leg angles over time.
+    settings : dict
+        Further arguments of ``simulate``.
+    phases : tuple of Phase
+        Phases of a sequence; empty for a single run.
     """
 
     model: Model
@@ -55,10 +70,25 @@ class Scenario:
     def simulate(self, **changes: Any) -> Trajectory | Rollouts: ...
 
     def simulate(self, **changes: Any) -> Trajectory | Rollouts:
-        """Return the motion; changes replace arguments of ``st.simulate``.
+        """Make the motion.
 
-        They may give parameters of many runs, whose motions are Rollouts.  Of a sequence nothing
-        can be changed here.
+        Parameters
+        ----------
+        **changes
+            Arguments of ``serpentail.simulate`` that replace the scene's. With parameters of many
+            runs the result is Rollouts. A scene with phases allows no changes here.
+
+        Returns
+        -------
+        Trajectory or Rollouts
+            The motion.
+
+        Raises
+        ------
+        SimulationError
+            The scene has phases and changes are given, or as of ``serpentail.simulate``.
+        StateError, ModelError, PlanningError
+            As of ``serpentail.simulate`` and ``Sequence.simulate``.
         """
         if self.phases:
             if changes:
@@ -71,7 +101,18 @@ class Scenario:
         return simulate(self.model, self.q0, self.v0, **arguments | changes)
 
     def sequence(self) -> SequenceRun:
-        """Return the motion of the scene's phases, and how each went."""
+        """Make the motion of the scene's phases.
+
+        Returns
+        -------
+        SequenceRun
+            The motion and the outcome of each phase.
+
+        Raises
+        ------
+        SimulationError, PlanningError
+            As of ``Sequence.simulate``.
+        """
         settings, angles = dict(self.settings), {}
         bristles = settings.pop("bristles0", None)
         if self.legs is not None:
@@ -80,21 +121,53 @@ class Scenario:
         return sequence.simulate(self.q0, self.v0, bristles)
 
     def summary(self, motion: Trajectory) -> Summary:
-        """Return the numbers of a motion by name: leap, landing, forces, books, effort; SI."""
+        """Return the numbers of a motion by name; see ``serpentail.summary``.
+
+        Parameters
+        ----------
+        motion : Trajectory
+            The motion.
+
+        Returns
+        -------
+        Summary
+            The numbers, SI.
+        """
         return summary(self.model, motion)
 
 
 def scenario(
     path: str | Path, folder: str | Path | None = None, changes: Mapping | None = None
 ) -> Scenario:
-    """Return what a scene file's table [simulate], and its tables [[phase]], describe.
+    """Read the motion that a scene file describes in [simulate] and [[phase]].
 
-    path: a scene file, or the name of an example; see ``examples``.
-    folder: of its model, where that was generated; None: it is built, or was.
-    changes: new values by name, of parameters of the model, or of keys below [simulate], such as
-    "duration", "start.pitch" or "legs.moves.0.rate", or of phases, such as "phase.0.duration".
-    Raises SimulationError with field, value and remedy, ModelError where parameters are wrong or
-    the folder is of another scene.
+    Parameters
+    ----------
+    path : str or path
+        A scene file, or the name of an example (see ``examples``).
+    folder : str or path, optional
+        Generated folder of its model. Default: the model is built, or taken from the cache.
+    changes : mapping, optional
+        New values by name: of the model's parameters; of keys of [simulate], such as "duration",
+        "start.pitch" or "legs.moves.0.rate"; of phases, such as "phase.0.duration".
+
+    Returns
+    -------
+    Scenario
+        The motion to simulate.
+
+    Raises
+    ------
+    SimulationError
+        A key is wrong; the message names field, value and remedy of each.
+    ModelError
+        A parameter is wrong, or the folder belongs to another scene.
+
+    Examples
+    --------
+    >>> import serpentail as st
+    >>> kick = st.scenario("kick", changes={"duration": 0.5})  # doctest: +SKIP
+    >>> print(kick.summary(kick.simulate()))  # doctest: +SKIP
     """
     scene, path = read_scene(path, SimulationError)
     table = subtable(scene, "simulate", path, SimulationError)
@@ -114,7 +187,7 @@ def scenario(
 
 
 def _check_changes(parameters: Mapping) -> None:
-    """Refuse names of what can be no parameters, before any model is made."""
+    """Refuse names that cannot be parameters, before a model is made."""
     refused = Refusals(SimulationError)
     for name in parameters:
         near = did_you_mean(
@@ -127,10 +200,9 @@ def _check_changes(parameters: Mapping) -> None:
 
 
 def scenario_of(model: Model, table: Mapping, parent: Path, phases: Any = ()) -> Scenario:
-    """Return the scenario of a table [simulate], and of tables [[phase]]; files in them are
-    relative to ``parent``.
+    """Return the scenario of a table [simulate] and of tables [[phase]].
 
-    SimulationError has a line for each thing that is wrong.
+    Files in them are relative to ``parent``. SimulationError has a line for each error.
     """
     refused = Refusals(SimulationError)
     table = sized(read(table, SIMULATE, "simulate", refused), SIMULATE, size_of(model))
@@ -144,7 +216,7 @@ def scenario_of(model: Model, table: Mapping, parent: Path, phases: Any = ()) ->
     else:
         duration = refused.attempt("duration", _positive, "simulate.duration", table["duration"])
 
-    # what acts; a straight tail stands in for a reference that is refused, so that the rest is told
+    # actuation; a straight tail replaces a refused reference, so that further errors are found
     legs = refused.attempt("legs", legs_of, table["legs"]) if "legs" in table else None
     reference = None
     if "reference" in table:
@@ -157,13 +229,13 @@ def scenario_of(model: Model, table: Mapping, parent: Path, phases: Any = ()) ->
         "controller", controller_of, "simulate.controller", model, law, reference
     )
     start = table.get("start", {})
-    state = refused.attempt("start", _start, model, start, reference)
+    state = refused.attempt("start", start_of, model, start, reference)
     found_phases = phases_of(model, phases, (controller, parent), refused)
     refused.tell()
-    assert duration is not None and state is not None  # all has been told
+    assert duration is not None and state is not None  # otherwise tell() has raised
 
     if "settle" in start:
-        # what acts while a start settles
+        # actuation while a start settles
         acting = {name: value for name, value in settings.items() if name != "output_step"}
         acting |= {"controller": controller} | ({} if legs is None else {"legs": legs})
         q0, v0, settings["bristles0"] = settle(model, state[0], **acting | dict(start["settle"]))
@@ -172,7 +244,7 @@ def scenario_of(model: Model, table: Mapping, parent: Path, phases: Any = ()) ->
 
 
 def _check_settings(settings: Mapping[str, Any], refused: Refusals) -> None:
-    """Note a method that is none, and numbers that no method can have."""
+    """Add an unknown method, and numbers that no method can have, to ``refused``."""
     unknown = none_of("simulate.method", settings.get("method", "auto"), ("auto", *SETTINGS))
     if unknown:
         refused.add("method", unknown)
@@ -184,56 +256,3 @@ def _check_settings(settings: Mapping[str, Any], refused: Refusals) -> None:
 def _positive(field: str, value: Any) -> float:
     """Return a number above 0."""
     return number(field, value, SimulationError, above=0)
-
-
-def _start(model: Model, table: Mapping, reference: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Return q0 and v0, before it settles."""
-    tail = _tail(model, table, reference)
-    if model.fixed:
-        of_torso = [f"simulate.start.{name}" for name in table if name != "bends"]
-        if of_torso:
-            raise SimulationError(
-                f"{of_torso[0]}: this scene has a fixed base, whose start has `bends` alone: "
-                'remove it, or set base = "free"'
-            )
-        return tail, np.zeros(model.nv)
-    q = np.concatenate([_pose(table), tail])
-    v = np.zeros(model.nv)
-    v[VELOCITY] = _three("simulate.start.velocity", table.get("velocity", (0, 0, 0)))
-    v[OMEGA] = _three("simulate.start.rate", table.get("rate", (0, 0, 0)))
-    if "settle" in table:
-        check_settling(model, **table["settle"])
-        if v.any():
-            raise SimulationError(
-                "simulate.start.settle: a start that settles has no velocity and no rate: remove "
-                "them"
-            )
-    return q, v
-
-
-def _pose(table: Mapping) -> np.ndarray:
-    """Position and quaternion of R = Rz(yaw) Rx(pitch) Ry(roll)."""
-    from scipy.spatial.transform import Rotation
-
-    height, pitch, roll, yaw = (
-        number(f"simulate.start.{name}", table.get(name, 0.0), SimulationError)
-        for name in ("height", *ANGLES)
-    )
-    rotation = Rotation.from_euler("ZXY", [yaw, pitch, roll])
-    return np.array([0, 0, height, *np.roll(rotation.as_quat(), 1)])
-
-
-def _tail(model: Model, table: Mapping, reference: Any) -> np.ndarray:
-    """Tail coordinates: of the bends given, else of the reference at t = 0, else straight."""
-    if "bends" in table:
-        bends = finite_array("simulate.start.bends", table["bends"], SimulationError)
-        return shared_among_links(model, bends[None])[0]
-    curve = getattr(reference, "curve", None)
-    return np.zeros(model.layout.nt) if curve is None else curve.at(0.0)[0]
-
-
-def _three(name: str, value: Any) -> np.ndarray:
-    array = finite_array(name, value, SimulationError)
-    if array.shape != (3,):
-        raise refusal(name, value, "three numbers", SimulationError)
-    return array

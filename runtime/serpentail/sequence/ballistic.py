@@ -1,4 +1,4 @@
-"""When a flight would end: the centre of mass falls to its height in the landing's posture."""
+"""Predicts the end of a flight: the time at which the body would land in a posture."""
 
 import math
 
@@ -7,7 +7,7 @@ import numpy as np
 from ..errors import SimulationError
 from ..model.layout import QUATERNION, TAIL_Q
 from ..model.model import Model
-from ..planning.problem import Goal
+from ..planning.goal import Goal
 from ..planning.result.full_state import com_at_start
 
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
@@ -16,11 +16,11 @@ UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 def landing_time(
     model: Model, state: tuple[np.ndarray, np.ndarray], goal: Goal, angles: np.ndarray
 ) -> float:
-    """Return after how many seconds from a state (q, v) the lowest foot is at the ground, or the
-    lowest point of a model without feet, if the animal is in a checked goal's posture then.
+    """Return the time (s) from a state (q, v) to the landing in the posture of a checked goal.
 
-    angles (2,): gamma, delta (rad) of the legs.  What the goal leaves free is upright and straight.
-    SimulationError where the centre of mass never comes to that height.
+    Then the lowest foot, or the lowest point of a model without feet, is at the ground. angles
+    (2,): gamma, delta (rad) of the legs. Parts that the goal leaves free count as upright and
+    straight. SimulationError if the centre of mass never reaches that height.
     """
     (_, _, z), (_, _, rise) = com_at_start(model, state)
     drop, g = z - _height(model, goal, angles), model.parameters["gravity"]

@@ -1,4 +1,4 @@
-"""One phase of a sequence: what acts in it, and what ends it."""
+"""``Phase``: one phase of a sequence, its controller or plan, and the event that ends it."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -21,11 +21,25 @@ Event = tuple[str, str]  # kind, group
 
 @dataclass(frozen=True)
 class Tracking:
-    """How a planned flight is tracked, and when it ends.
+    """How a planned flight is tracked, and how early it ends.
 
-    kp (1/s^2), kd (1/s): gains of Pfl, whose torques keep to the plan's bound; early: s before the
-    landing that the plan ends, where it is given no duration.  mpc: settings of ``Mpc``, such as
-    {"rate": 100}, which controls the flight in place of Pfl.
+    Parameters
+    ----------
+    kp : float, default 4e4
+        Gain of ``Pfl`` (1/s^2); its torques stay within the plan's bound.
+    kd : float, default 400
+        Gain of ``Pfl`` (1/s).
+    early : float, default 0.003
+        Time before the predicted landing at which the plan ends (s), if the plan has no
+        ``duration``.
+    mpc : mapping, optional
+        Settings of ``Mpc``, such as ``{"rate": 100}``. With it, ``Mpc`` tracks the plan in place
+        of ``Pfl``.
+
+    Raises
+    ------
+    SimulationError
+        A number is negative or not finite.
     """
 
     kp: float = KP
@@ -34,7 +48,7 @@ class Tracking:
     mpc: Mapping[str, Any] | None = None
 
     def __post_init__(self) -> None:
-        """Refuse numbers that cannot be."""
+        """Check the numbers."""
         for name in ("kp", "kd", "early"):
             number(f"Tracking: {name}", getattr(self, name), SimulationError, least=0)
         if not isinstance(self.mpc, Mapping | None):
@@ -44,18 +58,42 @@ class Tracking:
 
 @dataclass(frozen=True, eq=False)
 class Phase:
-    """One phase of a ``Sequence``; its clock is at 0 where it begins.
+    """One phase of a ``Sequence``; its clock is 0 where it begins.
 
-    duration: s, at most.
-    until: what ends it before: "landing" (the first touch-down), "airborne" (nothing touches the
-    ground, and no point is below ``clearance`` (m)), or events such as [("take_off", "feet")], of
-    which the first one does; None: nothing does.
-    controller: of ``st.simulate``.
-    plan: arguments of ``st.plan`` for the state at which the phase begins, in place of a
-    controller; or several such, of which the first whose plan is true is taken.  Without a
-    ``duration`` a plan ends where the animal would land in the goal's posture.  tracking: of it.
-    moves: of the legs, as in ``Legs.moves``; in phases with a plan ``before_landing`` (s) may stand
-    in place of ``at``.
+    Parameters
+    ----------
+    name : str
+        Name of the phase.
+    duration : float
+        Longest duration (s).
+    until : {"landing", "airborne"} or sequence of (str, str), optional
+        What ends the phase earlier: "landing", the first touch-down; "airborne", as soon as
+        nothing touches the ground and no point is below ``clearance``; or the first of some
+        events, such as ``[("take_off", "feet")]``. Default: nothing.
+    clearance : float, default 0
+        Height (m) for "airborne".
+    controller : controller or callable, optional
+        As of ``simulate``.
+    plan : mapping or sequence of mapping, optional
+        Arguments of ``plan``, in place of a controller. The plan starts at the state in which
+        the phase begins. Of several, the first successful one is used. Without a ``duration``
+        the plan ends where the body would land in the goal's posture.
+    tracking : Tracking, optional
+        How the plan is tracked.
+    moves : iterable of mapping, optional
+        Moves of the legs, as in ``Legs.moves``. In a phase with a plan, ``before_landing`` (s)
+        may replace ``at``.
+
+    Raises
+    ------
+    SimulationError
+        An argument is wrong; the message names the phase.
+
+    Examples
+    --------
+    >>> import serpentail as st
+    >>> st.Phase("fall", 0.5, until="landing").words
+    'touch-down'
     """
 
     name: str
@@ -69,7 +107,7 @@ class Phase:
     __repr__ = brief
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be a phase of any model."""
+        """Check all that does not need the model."""
         if not isinstance(self.name, str) or not self.name.strip():
             raise refusal("Phase: name", self.name, "a word", SimulationError)
         where = f"phase {self.name!r}"
@@ -85,13 +123,13 @@ class Phase:
 
     @property
     def words(self) -> str:
-        """What ends it, for messages."""
+        """The event that ends it, in words for messages."""
         if isinstance(self.until, tuple):
             return " or ".join(f"{kind} of {group}" for kind, group in self.until)
         return "touch-down" if self.until == LANDING else "flight clear of the ground"
 
     def stop_at(self, model: Model) -> list[Event]:
-        """Return the events of a model that end it."""
+        """Return the events (kind, group) that end it, for a model."""
         if self.until == LANDING:
             return [("touch_down", group) for group in model.contacts]
         return list(self.until) if isinstance(self.until, tuple) else []
@@ -146,7 +184,7 @@ def _plans(where: str, plan: Any) -> tuple[Mapping[str, Any], ...]:
 
 
 def _check_acting(where: str, controller: Any, planned: bool) -> None:
-    """SimulationError where what is no controller, or a plan and a controller, would act."""
+    """SimulationError for a wrong controller, or for both a controller and a plan."""
     if planned and controller is not None:
         raise SimulationError(
             f"{where}: has a controller and a plan: the plan is tracked: leave one out"

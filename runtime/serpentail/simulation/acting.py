@@ -1,4 +1,4 @@
-"""What acts in each of some runs: a controller for all of them, or one a run."""
+"""What acts in each of some runs: one controller for all of them, or one for each."""
 
 import ctypes
 
@@ -14,9 +14,9 @@ from .start import Start
 
 
 class Acting:
-    """The actuation of each run; ``distinct`` has each once, ``alike`` tells whether all share one.
+    """The actuation of each run; ``distinct`` has each once, ``alike``: all runs share one.
 
-    drives: where the C records of what acts in each run lie.
+    drives: addresses of the C records of the runs' actuations.
     """
 
     def __init__(
@@ -44,7 +44,7 @@ class Acting:
         return self.records.model
 
     def _of(self, controller: Controller, legs: Piecewise | None, k: int | None) -> Actuation:
-        """Return the actuation of run k, or of all; SimulationError where there can be none."""
+        """Return the actuation of run k, or of all; SimulationError if it is impossible."""
         try:
             return Actuation(self.records, controller, legs)
         except SimulationError as error:
@@ -53,7 +53,7 @@ class Acting:
             raise SimulationError(f"controller of run {k}: {error}") from None
 
     def of(self, k: int) -> Actuation:
-        """Return what acts in run k."""
+        """Return the actuation of run k."""
         return self.distinct[0] if self.alike else self._each[k]
 
     @property

@@ -1,4 +1,4 @@
-"""What acts in a run, controllers and legs, as the generated C takes it."""
+"""Controllers and legs of a run, as records of the generated C."""
 
 import ctypes
 from typing import Any
@@ -8,14 +8,15 @@ import numpy as np
 from ..checks import numbers_in, refusal
 from ..errors import SimulationError
 from ..model.model import Model
-from .controllers import Controller, NativeTorque, Parts, TorqueFunction, parts_of, phases_of
+from .controllers import Controller, NativeTorque, parts_of, phases_of
 from .ctrl_c import CtrlC
+from .parts import Parts, TorqueFunction
 from .piecewise import Piecewise
 from .records import CFunction, Records
 
 
 class Actuation:
-    """Controllers and legs as a C record, times to stop at, and what a user's function raised."""
+    """Controllers and legs as a C record, times to stop at, and errors of a user's function."""
 
     def __init__(self, records: Records, controller: Controller, legs: Piecewise | None = None):
         self.records = records
@@ -30,7 +31,7 @@ class Actuation:
         self.legs = legs
         if self.of_python:  # the user's: SciPy's methods work with their own
             self.float_errors = np.geterr()
-        # times at which something is not smooth, where steps end
+        # times at which something is not smooth; steps end there
         stops = {*self._kinks(begins)}
         members = {}
         if legs is not None:
@@ -59,17 +60,17 @@ class Actuation:
 
     @property
     def keeps(self) -> bool:
-        """Whether one of them keeps something of a run, so that no two share it."""
+        """Whether one of them has a state of its own, so that runs cannot share it."""
         return any(parts.own is not None for parts in self.parts)
 
     def begin(self, run: ctypes.Structure) -> None:
-        """Let what keeps something of a run begin with another, by its record."""
+        """Reset controllers with a state for another run, given by its record."""
         for parts in self.parts:
             if parts.own is not None:
                 parts.own.begin(run, parts.clock)
 
     def told(self) -> dict[str, Any]:
-        """Return what they have to tell of a run."""
+        """Return what controllers add to a run's info."""
         told: dict[str, Any] = {}
         for parts in self.parts:
             if parts.own is not None:
@@ -77,13 +78,13 @@ class Actuation:
         return told
 
     def _available(self, parts: Parts) -> Parts:
-        """Return the parts as this model has them: PFL in Python where its C is missing."""
+        """Return the parts for this model: PFL in Python if its C is missing."""
         if parts.pfl is None or self.records.has("controller", "reference"):
             return parts
         return Parts(user=parts.pfl)
 
     def _kinks(self, begins: list[float]) -> list[float]:
-        """Times at which phases begin, and at which what acts in them is not smooth."""
+        """Return the times at which phases begin, or at which their torques are not smooth."""
         later = begins[1:]
         times = [*later]
         # the first phase acts before its begin, too
@@ -123,7 +124,7 @@ class Actuation:
         )
 
     def _callback(self, user: TorqueFunction) -> Any:
-        """Return a C function that calls the user's; what that raises is kept, and ends the run."""
+        """Return a C function that calls the user's; an exception is kept and ends the run."""
         real, pointer = self.records.real, ctypes.POINTER(self.records.real)
         prototype = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, real, pointer, pointer, pointer)
 
@@ -143,7 +144,7 @@ class Actuation:
         return function
 
     def _user_torque(self, user: TorqueFunction, t: float, q: Any, v: Any) -> np.ndarray:
-        """Torques of the user's function; nan, which ends the step, where there is no state."""
+        """Return torques of the user's function; nan, which ends the step, for an invalid state."""
         q = np.ctypeslib.as_array(q, (self.model.nq,)).copy()
         v = np.ctypeslib.as_array(v, (self.model.nv,)).copy()
         if not (np.isfinite(q).all() and np.isfinite(v).all()):

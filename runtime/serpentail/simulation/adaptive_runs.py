@@ -1,4 +1,4 @@
-"""Runs with adaptive steps, of which the generated C makes several at once: one in each lane."""
+"""Runs with adaptive steps; the generated C makes several at once, one in each lane."""
 
 import ctypes
 from collections.abc import Iterator
@@ -42,7 +42,7 @@ class AdaptiveRuns:
         return shared_out(runs, self.states, threads)
 
     def go(self, runs: range, ended: Event) -> Iterator[tuple[np.ndarray, dict[str, Any] | None]]:
-        """Make runs; yield numbers of them and what they came to, None of those to make alone."""
+        """Make runs; yield their numbers and outcomes, None for those that must be made alone."""
         records = CompiledRun(self.memory, self.acting, self.method).records_of(runs)
         statuses = np.full(len(runs), PAUSED, np.intc)
         lanes = np.full(self.states, -1, np.dtype(ctypes.c_long))

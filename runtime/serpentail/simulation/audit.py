@@ -1,4 +1,4 @@
-"""Whether a run's books balance: energy against work, momentum against impulses.
+"""Checks whether energy and momentum of a run balance with work and impulses.
 
 Work and impulses are added up inside the integrator, by the same weights as the state, so what does
 not balance is an error of the integration.
@@ -14,26 +14,25 @@ from ..brief import brief
 from ..model.model import Model
 from ..model.parameters import total_mass
 
-# An imbalance over what was moved is reported from so many times a method's relative tolerance on,
-# from so many roundings on, and where steps are fixed from this part on: docs/contact.md has what
-# runs come to.
-TOLERANCES = 100.0
-ROUNDINGS = 1e5
+# An imbalance relative to what was moved is reported if it exceeds the larger of the first two, or
+# the third with steps of a fixed length. docs/contact.md has measured imbalances.
+TOLERANCES = 100.0  # times a method's relative tolerance
+ROUNDINGS = 1e5  # rounding errors
 FIXED_STEPS = 0.05
-DIFFERENCE = 100.0  # roundings of kinetic energies that may be left of their difference
-TINY = np.finfo(float).tiny  # where nothing moves, and nothing weighs
-BALANCED = ("kinetic", "potential", "linear_momentum")  # what an audit needs of both ends
+DIFFERENCE = 100.0  # rounding errors of kinetic energies that their difference may contain
+TINY = np.finfo(float).tiny  # for bodies that neither move nor weigh anything
+BALANCED = ("kinetic", "potential", "linear_momentum")  # values at both ends that an audit needs
 Arrays = dict[str, np.ndarray]
 
 
 @dataclass(frozen=True, eq=False)
 class Audit:
-    """The books of runs; arrays have the leading axis of the runs, or none.
+    """Work, impulses, and what they do not explain; arrays have the runs' axis, or none.
 
-    work (J) of torques, damping, the ground on what touches it, and the drives of the legs;
-    impulses (..., 3) in N s, world, of the ground on each group of points; energy (J) and momentum
-    (..., 3) in N s: what changed without these and gravity; relative: the larger of both over what
-    was moved, in flights the energy about the centre of mass.
+    work (J): of torques, damping, the ground on the points, and the drives of the legs. impulses
+    (..., 3), N s, world: of the ground on each group of points. energy (J) and momentum (..., 3), N
+    s: changes that these and gravity do not explain. relative: the larger of both relative to what
+    was moved; in flights, the energy is that about the centre of mass.
     """
 
     work: Arrays
@@ -81,7 +80,7 @@ def audited(
     moved = momentum[..., 1, :] - momentum[..., 0, :] - pull - sum(impulses.values())
     moved = 0 * moved if model.fixed else moved  # its base gives a tail any momentum
 
-    # over what was moved, an animal at rest by its weight
+    # relative to what was moved; for an animal at rest, to its weight
     stored = ends["stored"]
     worked = sum(np.abs(each) for each in work.values())
     energies = kinetic.max(axis=-1) + weight * values["tail_length"] + stored.max(axis=-1) + worked
@@ -102,14 +101,15 @@ def _within(
     stored: np.ndarray,
     work: Arrays,
 ) -> np.ndarray:
-    """Return the imbalance of a flight's energy about its centre of mass, over that energy.
+    """Return the imbalance of a flight's energy about its centre of mass, relative to that energy.
 
-    The energy of the fall, which the momentum audits, would hide it.
+    The energy of the fall is larger and would hide it. The balance of momentum checks the fall.
     """
     fall = np.sum(momentum**2, axis=-1) / (2 * np.asarray(total_mass(values))[..., None])
     inner = np.fmax(kinetic - fall, 0.0)
     change = np.abs(np.diff(inner + stored)[..., 0] - sum(work.values()))
-    # roundings of the difference, and a torso that turns at 1 rad/s: less is next to nothing
+    # rounding errors of the difference do not count; less energy than that of a torso that turns at
+    # 1 rad/s counts as that
     change = np.fmax(change - DIFFERENCE * np.finfo(kinetic.dtype).eps * kinetic.max(axis=-1), 0.0)
     least = 0.5 * np.min(np.asarray(values["torso_inertia"])[..., :3], axis=-1)
     moved = inner.max(axis=-1) + stored.max(axis=-1) + sum(np.abs(each) for each in work.values())
@@ -129,7 +129,7 @@ def named(model: Model, ledger: np.ndarray) -> tuple[Arrays, Arrays]:
 
 
 def warnings_of(audit: Audit, info: Mapping[str, Any], eps: float) -> list[str]:
-    """Say what does not balance, and which touches were not felt; audit and info of one run."""
+    """Return warnings about imbalance and missed touches, from the audit and info of one run."""
     found = []
     allowed, remedy = FIXED_STEPS, "take a shorter step"
     if "rtol" in info:
@@ -143,7 +143,7 @@ def warnings_of(audit: Audit, info: Mapping[str, Any], eps: float) -> list[str]:
         )
     if info.get("unfelt"):
         found.append(
-            f"{info['unfelt']} touches were shorter than a step and may not have been felt: take a "
+            f"{info['unfelt']} touches were shorter than a step and may have been missed: take a "
             "shorter step, or an adaptive method"
         )
     return found

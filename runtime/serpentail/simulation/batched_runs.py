@@ -1,4 +1,4 @@
-"""Many runs with the same steps, of which the generated C makes several at once, in lanes."""
+"""Many runs with the same steps; the generated C makes several at once, in lanes."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -19,10 +19,10 @@ from .methods import IntegrationMethod, step_counts
 from .piecewise import Piecewise, constant
 from .start import Start
 
-MAX_SHARED_STEPS = 1_000_000  # steps of one run: beyond, what all runs share fills the memory
+MAX_SHARED_STEPS = 1_000_000  # steps of one run: with more, shared arrays would fill the memory
 AT_ONCE = 64  # groups of runs that a thread takes up at once
-# What compiling takes, and what a step saves in lanes, for tails from (1, 3) to (8, 16): about the
-# less favourable of what AVX2 and AVX-512 showed
+# Time to compile, and time that lanes save in a step, for tails from (1, 3) to (8, 16): about the
+# less favourable of measurements with AVX2 and with AVX-512
 COMPILE_S_PER_BYTE = 25e-6  # of C
 STEP_SAVES_S, OPERATION_SAVES_S = 4e-7, 2e-10  # each step; each operation of forward dynamics
 
@@ -45,7 +45,7 @@ class Steps:
         edges = _edges(start, actuation)
         spans, slack = _spans(edges)
         counts = step_counts(spans, slack, step)
-        # of each step: between which edges it lies, and which one it is there
+        # for each step: the edges that enclose it, and its number between them
         span = np.repeat(np.arange(len(spans)), counts)
         within = np.arange(len(span)) - np.repeat(np.cumsum(counts) - counts, counts)
         last = within + 1 == counts[span]
@@ -70,7 +70,7 @@ def _edges(start: Start, actuation: Actuation) -> np.ndarray:
 
 
 def _spans(edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Times between edges (s), and what of them is rounding, as for a single run in C."""
+    """Return times between edges (s), and their rounding, as for a single run in C."""
     spans = np.diff(edges)
     return spans, 100 * np.finfo(float).eps * (np.abs(edges[1:]) + spans)
 
@@ -88,12 +88,12 @@ def before(curve: Piecewise, t: np.ndarray) -> np.ndarray:
 
 
 def shared_steps(memory: Memory, acting: Acting, method: IntegrationMethod) -> int:
-    """Return how many steps all runs share, 0 where they cannot be made in batches."""
+    """Return the number of steps that all runs share; 0 if they cannot be made in batches."""
     start, first = memory.start, acting.distinct[0]
     if method.name != "rk4" or "flights" not in memory.records.model.manifest:
         return 0
     for each in acting.distinct:
-        # a single phase of damping and torques, which end steps where those of the others do
+        # a single phase of damping and torques, with kinks at the same times as in other runs
         parts = each.parts[0]
         others = (parts.pfl, parts.native, parts.user)
         if len(each.parts) > 1 or any(part is not None for part in others):
@@ -107,8 +107,10 @@ def shared_steps(memory: Memory, acting: Acting, method: IntegrationMethod) -> i
 
 
 def worth_batching(model: Model, runs: int, steps: int) -> bool:
-    """Tell whether runs fill the lanes, and whether these need not be compiled, or compiling them
-    pays by what they save in so many steps of each run, and would have saved before.
+    """Tell whether it is worthwhile to make runs in lanes.
+
+    The runs must fill the lanes. Their C must be compiled already, or its compilation must take
+    less time than these runs and earlier ones would have saved.
     """
     source = model.batch_library.rollouts
     if runs < model.manifest["flights"]["states"]:
@@ -122,7 +124,7 @@ def worth_batching(model: Model, runs: int, steps: int) -> bool:
 
 
 def shared_out(runs: range, states: int, threads: int, most: int = AT_ONCE) -> list[range]:
-    """Return which of some runs a thread makes at once: groups of states, at most so many."""
+    """Return the groups of runs that a thread makes at once, with at most ``most`` runs each."""
     groups = -(-len(runs) // states)
     size = states * max(1, min(most, groups // (2 * threads)))
     return [runs[first : first + size] for first in range(0, len(runs), size)]
@@ -130,7 +132,7 @@ def shared_out(runs: range, states: int, threads: int, most: int = AT_ONCE) -> l
 
 @dataclass(frozen=True, eq=False)
 class Laws:
-    """What acts in runs, or in all of them where there is one row.
+    """Torques of runs; a single row is shared by all runs.
 
     damping (k, 2m), N m s; torques (k, n, 3, 2m), N m, at begin, middle and end of each step, or
     None; sampled (k, samples, 2m), N m.
@@ -142,7 +144,7 @@ class Laws:
 
 
 class BatchedRuns:
-    """Runs of a memory, several of which the generated C makes at once."""
+    """Runs of a memory; the generated C makes several of them at once."""
 
     def __init__(self, memory: Memory, acting: Acting, method: IntegrationMethod):
         self.memory, self.acting, model = memory, acting, memory.records.model
@@ -156,7 +158,7 @@ class BatchedRuns:
         self.shared = self._laws(acting.distinct) if acting.alike else None
 
     def _laws(self, actuations: list[Actuation]) -> "Laws":
-        """Return what acts in runs, as the C takes it."""
+        """Return the torques of runs, as the C takes them."""
         parts = [each.parts[0] for each in actuations]
         nt, times = actuations[0].nt, self.memory.start.times
         still = constant(0.0, np.zeros(nt))
@@ -169,7 +171,7 @@ class BatchedRuns:
         return Laws(np.array(damping, self.dtype), torques, np.array(sampled, self.dtype))
 
     def parts(self, runs: range, threads: int) -> list[range]:
-        """Return which of some runs a thread makes at once, whole groups where it can be."""
+        """Return the groups of runs that a thread makes at once, whole groups if possible."""
         if self.acting.alike:
             return shared_out(runs, self.states, threads)
         # torques at each step of each run are to be held
@@ -177,7 +179,7 @@ class BatchedRuns:
         return shared_out(runs, self.states, threads, min(AT_ONCE, most))
 
     def go(self, runs: range, ended: Event) -> Iterator[tuple[np.ndarray, dict[str, Any] | None]]:
-        """Make runs; yield numbers of them and what they came to, None of those to make alone."""
+        """Make runs; yield their numbers and outcomes, None for those that must be made alone."""
         laws = self.shared or self._laws([self.acting.of(k) for k in runs])
         record, held = self._record(slice(runs.start, runs.stop), laws)
         steps, start = len(self.lengths), self.memory.start

@@ -1,4 +1,4 @@
-"""Runs of the generated C on arrays of ours, and what each run came to."""
+"""Runs of the generated C on arrays of NumPy, and the outcome of each."""
 
 import ctypes
 import time
@@ -23,14 +23,14 @@ from .records import Records
 from .start import Start
 
 MOST_STEPS = 2**31 - 1  # that the C interface counts
-PAUSE = 100  # steps before the first look at signals, such as Ctrl-C
-PAUSE_S = 0.05  # s between looks: pauses grow to that
+PAUSE = 100  # steps before the first check for signals, such as Ctrl-C
+PAUSE_S = 0.05  # s between checks: the time between pauses grows to this
 COUNTS = ("steps", "rejected", "evaluations", "factorisations")
 
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Samples of a motion up to where it came, its ledger, and what ended it before its end."""
+    """Samples of a motion up to its end, its ledger, and the error that ended it, if any."""
 
     t: np.ndarray
     q: np.ndarray
@@ -44,9 +44,7 @@ class Samples:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What a run came to: samples written, its end (s), its ledger, counts and events, what failed,
-    a stop.
-    """
+    """Outcome of a run: samples written, end (s), ledger, counts and events, failure, stop."""
 
     done: int
     end: float
@@ -80,7 +78,7 @@ class Memory:
             name: np.zeros((start.runs, start.intervals + 1, size), dtype)
             for name, size in sizes.items()
         }
-        # where the arrays of the first run lie, and how far apart those of two runs are
+        # addresses of the first run's arrays, and the distances between those of two runs
         arrays = {"parameters": parameters.vectors} | self.state
         arrays |= {f"{name}_out": array for name, array in self.out.items()}
         self.places = []
@@ -105,7 +103,7 @@ class Memory:
 
 
 def called(function: Callable[[int], int], record: Any) -> int:
-    """Call a function of C that goes on until it pauses; it pauses later where that was soon."""
+    """Call a C function that works until it pauses; lengthen the pauses if they come too often."""
     begun = time.perf_counter()
     answer = function(ctypes.addressof(record))
     if time.perf_counter() - begun < PAUSE_S:
@@ -120,7 +118,7 @@ class CompiledRun:
         records, start, ground = memory.records, memory.start, memory.ground
         self.memory, self.records, self.acting = memory, records, acting
         self.method, self.start, self.ground = method, start, ground
-        # what all runs share
+        # shared by all runs
         members = dict(start_members(method), pause=PAUSE, samples=start.intervals + 1)
         members["times"] = records.array(start.times)
         if ground.points:
@@ -153,7 +151,7 @@ class CompiledRun:
         return records
 
     def again(self, q0: np.ndarray, v0: np.ndarray) -> None:
-        """Take up the first run anew, from another start."""
+        """Prepare the first run again, from another start."""
         self.memory.restart(q0, v0)
         self.begin(0)
 
@@ -179,7 +177,7 @@ class CompiledRun:
         return function
 
     def go(self, ended: Event | None = None, look: Callable[[], None] | None = None) -> int:
-        """Advance until the run or something ends it, or ``ended`` is set; return the status.
+        """Advance until the run ends, something ends it, or ``ended`` is set; return the status.
 
         look: called at each pause.
         """
@@ -196,7 +194,7 @@ class CompiledRun:
         return status
 
     def outcome(self, status: int) -> Outcome:
-        """Return what the run came to, and what a status means."""
+        """Return the outcome of the run, with the meaning of a status."""
         record = self.record
         info = {name: getattr(record, name) for name in COUNTS} | self.actuation.told()
         if self.ground.points:
@@ -212,11 +210,11 @@ class CompiledRun:
         return Outcome(record.done, record.t, ledger, info, failure, stop)
 
     def samples(self, status: int) -> Samples:
-        """Return the samples written, and what a status means."""
+        """Return the samples written, with the meaning of a status."""
         return self.memory.samples(self.k, self.outcome(status))
 
     def _stop(self) -> dict[str, Any] | None:
-        """The state at which the run stopped, where it is no sample."""
+        """Return the state at which the run stopped, if that is not a sample."""
         if self.start.times[self.record.done - 1] >= self.record.t:
             return None
         state = self.state
@@ -230,7 +228,7 @@ class CompiledRun:
 
 
 def sampled(times: np.ndarray, arrays: dict[str, np.ndarray], outcome: Outcome) -> Samples:
-    """Return what a run wrote to q, v, tau, bristles, and where it stopped as a last sample."""
+    """Return what a run wrote to q, v, tau, bristles, with the state of its stop as last sample."""
     t, done, stop = times[: outcome.done].copy(), outcome.done, outcome.stop
     rows = {name: a[:done].astype(float).reshape(done, a[0].size) for name, a in arrays.items()}
     if stop is not None:

@@ -1,7 +1,7 @@
-"""Torque laws of the tail that a user can give, checked and split into what each adds up."""
+"""Torque laws for ``simulate``, and their checks."""
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Iterable
+from dataclasses import dataclass
 from itertools import repeat
 from typing import Any
 
@@ -11,85 +11,56 @@ from numpy.typing import ArrayLike
 from ..brief import brief
 from ..checks import finite_array, numbers, numbers_in, refusal
 from ..errors import SimulationError
+from .parts import Parts, TorqueFunction
 from .pfl import Pfl
 from .piecewise import Piecewise, checked_nodes, linear
 
-TorqueFunction = Callable[[float, np.ndarray, np.ndarray], ArrayLike]  # (t, q, v) -> tau
 CHOICES = (
     "None, Damping, TorqueTable, TorqueCurve, Pfl, Mpc, Phases, NativeTorque or a function "
     "(t, q, v)"
 )
 
 
-@dataclass(frozen=True, eq=False)
-class OwnState:
-    """What a function of C keeps of a run.
-
-    begin: called with the record of a run that begins, and the controller's clock (s).  told: what
-    the run's info has of it.  stops: times (s) at which steps must end.
-    """
-
-    begin: Callable[[Any, float], None]
-    told: Callable[[], dict[str, Any]]
-    stops: list[float]
-
-
-@dataclass(frozen=True, eq=False)
-class Parts:
-    """What one controller adds up; damping (2m,) in N m s, functions of C and of Python.
-
-    clock: s, the run's time at which that of the function of C is 0; own: what that keeps.
-    """
-
-    damping: np.ndarray | None = None
-    torques: Piecewise | None = None
-    pfl: Pfl | None = None
-    native: "NativeTorque | None" = None
-    user: TorqueFunction | None = None
-    clock: float = 0.0
-    own: OwnState | None = None
-
-    def since(self, begin: float) -> "Parts":
-        """Return the parts with a clock that is at 0 at the time ``begin`` (s) of the run."""
-        if begin == 0:
-            return self
-        user = self.user
-        return replace(
-            self,
-            torques=None if self.torques is None else self.torques.later(begin),
-            pfl=None if self.pfl is None else self.pfl.later(begin),
-            user=None if user is None else lambda t, q, v: user(t - begin, q, v),
-            clock=begin,
-        )
-
-    def kinks(self) -> list[float]:
-        """Times at which these torques jump or have a kink."""
-        times: list[float] = []
-        if self.torques is not None:
-            times += self.torques.kinks(2).tolist()
-        if self.pfl is not None:
-            times += self.pfl.curve.kinks(3).tolist()
-        if self.own is not None:
-            times += [self.clock + stop for stop in self.own.stops]
-        return times
-
-
 @dataclass(frozen=True)
 class Damping:
-    """tau = -damping q_t_dot (Eq. 47); damping in N m s, one number or one a tail coordinate."""
+    """Joint damping: tau = -damping * q_t_dot (Eq. 47).
+
+    Parameters
+    ----------
+    damping : float or sequence of float, default 1e-3
+        Damping (N m s), one number or one for each of the 2m tail coordinates, zero or more.
+
+    Examples
+    --------
+    >>> import serpentail as st
+    >>> st.Damping(1e-4)
+    Damping(damping=0.0001)
+    """
 
     damping: float | tuple[float, ...] = 1e-3
 
     def parts(self, nt: int) -> Parts:
-        """Return what it adds up for 2m tail coordinates."""
+        """Return its parts for 2m tail coordinates."""
         return Parts(_damping(self.damping, nt))
 
 
 @dataclass(frozen=True)
 class TorqueTable:
-    """Torques (K, 2m) in N m at increasing times (K,) in s, less damping q_t_dot.
+    """Torques at given times, linear between them, less joint damping.
 
-    They are linear in between, and held outside.
+    Parameters
+    ----------
+    times : array_like, shape (K,)
+        Increasing times (s). Before the first and after the last, the torques are held.
+    torques : array_like, shape (K, 2m)
+        Torques of the tail coordinates (N m).
+    damping : float or sequence of float, default 0
+        Damping (N m s), as of ``Damping``, in addition.
+
+    Examples
+    --------
+    >>> import serpentail as st
+    >>> law = st.TorqueTable([0.0, 0.1], [[0.0, 0.0], [0.01, 0.0]])
     """
 
     times: ArrayLike
@@ -98,20 +69,28 @@ class TorqueTable:
     __repr__ = brief
 
     def parts(self, nt: int) -> Parts:
-        """Return what it adds up for 2m tail coordinates."""
+        """Return its parts for 2m tail coordinates."""
         nodes = checked_nodes("TorqueTable", "torques", (self.times, self.torques), nt)
         return Parts(_damping(self.damping, nt), linear(*nodes))
 
 
 @dataclass(frozen=True, eq=False)
 class TorqueCurve:
-    """Torques in N m as polynomials piece by piece, of 2m channels; less damping q_t_dot."""
+    """Torques as piecewise polynomials of time, less joint damping.
+
+    Parameters
+    ----------
+    torques : Piecewise
+        Torques of the 2m tail coordinates (N m), one channel each.
+    damping : float or sequence of float, default 0
+        Damping (N m s), as of ``Damping``, in addition.
+    """
 
     torques: Piecewise
     damping: float | tuple[float, ...] = 0.0
 
     def parts(self, nt: int) -> Parts:
-        """Return what it adds up for 2m tail coordinates."""
+        """Return its parts for 2m tail coordinates."""
         if not isinstance(self.torques, Piecewise) or self.torques.channels != nt:
             needs = f"a Piecewise of {nt} channels"
             raise refusal("TorqueCurve: torques", self.torques, needs, SimulationError)
@@ -120,34 +99,55 @@ class TorqueCurve:
 
 @dataclass(frozen=True)
 class NativeTorque:
-    """A compiled function, which returns 0 for success.
+    """A compiled function as controller.
 
-    ``int f(void *context, real t, const real *q, const real *v, real *tau)``.  t: s, on the clock
-    of its phase.  function: a ctypes function, or an address; context: an address, or None.  The
-    caller keeps both alive.
+    The function has the C signature ``int f(void *context, real t, const real *q, const real *v,
+    real *tau)`` and returns 0 for success. ``t`` (s) is the clock of its phase.
+
+    Parameters
+    ----------
+    function : ctypes function or int
+        The function, or its address. The caller keeps it alive.
+    context : int, optional
+        Address that is passed to the function. The caller keeps it alive.
     """
 
     function: Any
     context: int | None = None
 
     def parts(self, nt: int) -> Parts:
-        """Return what it adds up, whatever the number of tail coordinates."""
+        """Return its parts; they do not depend on the number of tail coordinates."""
         return Parts(native=self)
 
 
 @dataclass(frozen=True, eq=False)
 class Phases:
-    """Controllers one after another: pairs of an increasing time (s) and what acts from then on.
+    """Controllers that act one after another, each on its own clock.
 
-    Each has a clock of its own, which is at 0 where its phase begins: a plan for the state at 0.4 s
-    is tracked by ``Phases([(0.0, None), (0.4, Pfl(model, plan))])``.
+    Parameters
+    ----------
+    phases : iterable of (float, controller)
+        Pairs of a time (s) and the controller that acts from then on, in the order of time. The
+        clock of a controller is 0 at the beginning of its phase. A controller is anything that
+        ``simulate`` takes, except Phases.
+
+    Raises
+    ------
+    SimulationError
+        The pairs are not in the order of time, or one of them is wrong.
+
+    Examples
+    --------
+    A plan for the state at 0.4 s is tracked from then on:
+
+    >>> law = st.Phases([(0.0, None), (0.4, st.Pfl(model, plan))])  # doctest: +SKIP
     """
 
     phases: Iterable[tuple[float, "Controller"]]
     __repr__ = brief
 
     def __post_init__(self) -> None:
-        """Refuse what is no list of pairs in the order of time."""
+        """Refuse anything but pairs in the order of time."""
         try:
             pairs = tuple((begin, controller) for begin, controller in self.phases)
         except (TypeError, ValueError):
@@ -171,26 +171,27 @@ Controller = Single | Phases | None
 
 
 def controllers_of(controller: object, runs: int | None) -> list[Any]:
-    """Return the controllers that are given: one for all runs, or one a run.
+    """Return the controllers that are given: one for all runs, or one for each.
 
-    runs: None for a single start.  Of many a list, or a TorqueTable or Damping whose numbers have a
-    leading axis of the runs; SimulationError where it has another number of them.
+    runs: number of runs, None for a single start. For many runs the controller may be a list, or a
+    TorqueTable or Damping whose numbers have a leading axis of the runs. SimulationError if their
+    number differs from that of the runs.
     """
     if runs is None and isinstance(controller, list | tuple):
-        remedy = "give one controller, or q0 or v0 a row a run"
+        remedy = "give one controller, or q0 or v0 one row for each run"
         raise SimulationError(f"controller: a list of {len(controller)}, one start: {remedy}")
     given = None if runs is None else _rows(controller)
     if given is None:
         return [controller]
     if len(given) != runs:
         raise SimulationError(
-            f"controller: {len(given)} controllers for {runs} runs: give one, or one a run"
+            f"controller: {len(given)} controllers for {runs} runs: give one, or one for each run"
         )
     return given
 
 
 def _rows(controller: object) -> list[Any] | None:
-    """Return a controller a run, None where there is one for all."""
+    """Return one controller for each run; None if one controller serves all."""
     if isinstance(controller, list | tuple):
         return [*controller]
     if isinstance(controller, TorqueTable):
@@ -214,13 +215,17 @@ def phases_of(controller: Controller) -> list[tuple[float, Controller]]:
 
 
 def parts_of(controller: Controller, nt: int) -> Parts:
-    """Return the parts of one controller for 2m tail coordinates; SimulationError if it is none."""
+    """Return the parts of a controller for 2m tail coordinates.
+
+    SimulationError if it is not a controller.
+    """
     if controller is None:
         return Parts()
     if isinstance(controller, Pfl):
         return Parts(pfl=controller)
-    if callable(getattr(controller, "parts", None)) and not isinstance(controller, type):
-        parts: Parts = controller.parts(nt)
+    own = getattr(controller, "parts", None)
+    if callable(own) and not isinstance(controller, type):
+        parts: Parts = own(nt)
         return parts
     if callable(controller):
         return Parts(user=controller)

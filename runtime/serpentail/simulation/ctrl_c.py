@@ -1,7 +1,7 @@
-"""Ctrl-C in runs in which a function of Python acts.
+"""Ctrl-C in runs with a Python function as controller.
 
-What it raises at the moment when C enters Python would be lost, and the run would go on: it waits
-until the function is entered.
+KeyboardInterrupt raised while C enters Python would be lost, and the run would continue. It is
+therefore held back until the function is entered.
 """
 
 import signal
@@ -12,15 +12,16 @@ from types import FrameType
 
 
 class CtrlC:
-    """Whether a signal came, and whether it may raise where Python is."""
+    """Whether a signal came, and whether it may be raised now in Python."""
 
     def __init__(self) -> None:
         self.noted = self.inside = False
 
     @contextmanager
     def waits(self, wanted: bool) -> Iterator[None]:
-        """Let signals wait for the next `enter`, or the end; where wanted, and in the main thread,
-        which alone gets them.
+        """Hold signals back until the next `enter`, or the end, if wanted and in the main thread.
+
+        Only the main thread receives signals.
         """
         main = wanted and threading.current_thread() is threading.main_thread()
         before = signal.getsignal(signal.SIGINT) if main else None

@@ -1,4 +1,4 @@
-"""How fast damping and springs move a tail: what makes a flight stiff."""
+"""Fastest rate of a tail's damping and springs, which can make a flight stiff."""
 
 import numpy as np
 
@@ -9,10 +9,10 @@ from .acting import Acting
 
 
 class FastestDecay:
-    """The fastest rate (1/s) of tails at starts q0 (runs, nq): the largest eigenvalue of
-    K (H^-1)_tt, K being joint damping; with springs the largest modulus of those of both.
+    """The fastest rate (1/s) of tails at starts q0 (runs, nq).
 
-    For one thread.
+    It is the largest eigenvalue of K (H^-1)_tt with the joint damping K; with springs, the largest
+    modulus of the eigenvalues of both together. For one thread.
     """
 
     def __init__(self, acting: Acting, runs: int, parameters: RunParameters):
@@ -20,7 +20,7 @@ class FastestDecay:
         parts = [parts for each in acting.distinct for parts in each.parts]
         laws = [each.damping for each in parts if each.damping is not None]
         acted = np.max(laws, axis=0) if laws else np.zeros(nt)
-        # a tail that is always tracked is rid of what it asks for itself
+        # tracking compensates the passive tail's own torques
         tracked = bool(parts) and all(each.pfl is not None for each in parts)
         values = {} if tracked else parameters.values
         self.damping = acted + own(values, "tail_damping", (runs, nt))
@@ -41,7 +41,7 @@ class FastestDecay:
         self.evaluate = RunKernel(kernel, parameters.vectors, (self.q, v, tau), (self.v_dot,))
 
     def __call__(self, q0: np.ndarray) -> float:
-        """Return it; 0 without damping and springs, or where no start has accelerations."""
+        """Return it; 0 without damping and springs, or if no start has accelerations."""
         if not self.moved:
             return 0.0
         self.q[...] = q0[:, None]
@@ -55,7 +55,7 @@ class FastestDecay:
         return float(np.linalg.eigvalsh(columns).max(initial=0.0))
 
     def _evaluated(self, k: int) -> bool:
-        """Evaluate the rows of run k; tell whether it could be done."""
+        """Evaluate the rows of run k; tell whether that succeeded."""
         try:
             self.evaluate(k, self.columns)
         except StateError:
@@ -64,7 +64,7 @@ class FastestDecay:
 
 
 def own(values: Values, name: str, shape: tuple[int, int]) -> np.ndarray:
-    """Return a parameter of the passive tail in each run (runs, 2m), zeros where it has none."""
+    """Return a parameter of the passive tail in each run (runs, 2m); zeros without one."""
     return np.broadcast_to(np.asarray(values.get(name, 0.0), float), shape)
 
 

@@ -1,4 +1,4 @@
-"""What a run on the ground needs: legs, friction springs, events to stop at; and what it met."""
+"""Settings of a run on the ground: legs, friction springs, events to stop at."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -37,7 +37,7 @@ class Ground:
     def checked(
         cls, model: Model, start: Start, parameters: RunParameters, settings: dict
     ) -> "Ground":
-        """Take legs, bristles0 and stop_at out of settings; SimulationError where one is wrong."""
+        """Take legs, bristles0 and stop_at out of settings; SimulationError if one is wrong."""
         choices = {name: settings.pop(name, None) for name in ("legs", "bristles0", "stop_at")}
         groups = model.contacts
         if not groups:
@@ -45,7 +45,7 @@ class Ground:
                 if value is not None:
                     remedy = "leave it out, or add `contacts` to the scene"
                     raise SimulationError(
-                        f"{name} {value!r}: {model.name} touches nothing: {remedy}"
+                        f"{name} {value!r}: {model.name} has no contacts: {remedy}"
                     )
             return cls()
         legs = _legs(groups, choices["legs"])
@@ -60,11 +60,11 @@ class Ground:
         return sum(self.groups.values())
 
     def legs_at(self, t: ArrayLike) -> tuple[np.ndarray, ...]:
-        """Return the argument ``legs`` (8,) or (K, 8) at t (s), where there are feet."""
+        """Return the argument ``legs`` (8,) or (K, 8) at t (s); nothing without feet."""
         return () if self.legs is None else (np.concatenate(self.legs.curve.at(t)[:2], axis=-1),)
 
     def refuse_deep(self, model: Model, start: Start, parameters: RunParameters) -> None:
-        """SimulationError where a point begins deeper than a static force could press it."""
+        """SimulationError if a point begins deeper than a static force could press it."""
         heights, p = self._heights(model, start, parameters), parameters.values
         weight = total_mass(p) * p["gravity"]
         limits = np.broadcast_to((MAX_STATIC_LOAD * weight / p["K_n"]) ** (2 / 3), start.runs)

@@ -7,11 +7,11 @@ from ..errors import SimulationError
 from ..model.model import Model
 
 MOST_STEPS = 1e9  # of one run: hours
-COPIES = 3  # of every sample: as the C writes it, as a trajectory has it, and what is measured
+COPIES = 3  # of every sample: written by the C, stored in a trajectory, and derived
 
 
 def refuse_endless(name: str, step: float, span: float, most_steps: float = MOST_STEPS) -> None:
-    """SimulationError where steps of at most this length (s) are too many for a span (s)."""
+    """SimulationError if steps of at most this length (s) are too many for a span (s)."""
     if span > most_steps * step:
         raise SimulationError(
             f"{name} {step:.3g}: needs {span / step:.2g} steps, more than {most_steps:g}: give "
@@ -20,7 +20,7 @@ def refuse_endless(name: str, step: float, span: float, most_steps: float = MOST
 
 
 def refuse_overfull(model: Model, runs: int, samples: int) -> None:
-    """SimulationError where the samples of runs need more memory than this machine has."""
+    """SimulationError if the samples of runs need more memory than this machine has."""
     width = model.nq + model.nv + model.layout.nt + 10 * sum(model.contacts.values())
     need, have = 8.0 * COPIES * width * samples * runs, memory()
     if need > have:
@@ -32,7 +32,7 @@ def refuse_overfull(model: Model, runs: int, samples: int) -> None:
 
 
 def memory() -> float:
-    """Return how much memory (bytes) this machine has; infinite where it does not tell."""
+    """Return the memory (bytes) of this machine; infinite if unknown."""
     try:
         return float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE")
     except (AttributeError, ValueError, OSError):

@@ -1,4 +1,4 @@
-"""Makes a trajectory of the samples of a run, or raises the error that ended the run."""
+"""Makes a trajectory from the samples of a run, or raises the error that ended the run."""
 
 import json
 from collections.abc import Iterable
@@ -23,7 +23,7 @@ MEASURES = {"energy": ("kinetic", "potential"), "momentum": ("linear_momentum", 
 
 
 def trajectory_or_error(model: Model, samples: Samples, ground: Ground) -> Trajectory:
-    """Return the trajectory of samples, or raise what ended the run; that keeps the trajectory."""
+    """Return the trajectory of samples; raise the error that ended the run, with its motion."""
     t, failure = samples.t, samples.failure
     if failure is not None and not len(t):
         raise failure
@@ -46,7 +46,7 @@ def trajectory_or_error(model: Model, samples: Samples, ground: Ground) -> Traje
 def measured(model: Model, samples: Samples, ground: Ground) -> Trajectory:
     """Return samples whose energies, momenta, forces and info are derived when asked for.
 
-    Where it is not certain that numbers hold them they are derived now; StateError where not.
+    Where it is not certain that numbers hold them they are derived now; StateError if not.
     """
     arrays = {"t": samples.t, "q": samples.q, "v": samples.v, "tau": samples.tau}
     motion = Trajectory.of_run(arrays, model, Measures(model, samples, ground))
@@ -57,10 +57,10 @@ def measured(model: Model, samples: Samples, ground: Ground) -> Trajectory:
 
 
 def certain(model: Model, method: str | None, numbers: Iterable[np.ndarray]) -> bool:
-    """Tell whether numbers are sure to hold what follows from a run in C of these numbers.
+    """Tell whether the energies, momenta and forces of a run are certainly finite.
 
-    Energies, momenta and forces are sums of products of at most five parameters, coordinates and
-    rates; a continuum may be bent too far between steps.
+    They are sums of products of at most five parameters, coordinates and rates; a continuum may be
+    bent too far between steps.
     """
     if method not in (*FIXED, *ADAPTIVE) or model.kind != "articulated":
         return False
@@ -69,7 +69,7 @@ def certain(model: Model, method: str | None, numbers: Iterable[np.ndarray]) -> 
 
 
 def certain_runs(model: Model, method: str, numbers: Iterable[np.ndarray]) -> np.ndarray:
-    """Tell of each of some runs what ``certain`` tells of one; their numbers, (runs, ...)."""
+    """Return ``certain`` for each of some runs, whose numbers are (runs, ...)."""
     sound = []
     for array in numbers:
         rows = array.reshape(len(array), -1)
@@ -78,9 +78,9 @@ def certain_runs(model: Model, method: str, numbers: Iterable[np.ndarray]) -> np
 
 
 class Measures:
-    """What follows from the samples of a run: given the name of a field, it and its companions.
+    """Derived fields of a run's samples: called with a name, it returns the field and related ones.
 
-    StateError where no number holds it.
+    StateError if a result is too large for a number.
     """
 
     def __init__(self, model: Model, samples: Samples, ground: Ground):
@@ -103,7 +103,7 @@ class Measures:
         return measures
 
     def _info(self) -> dict[str, Any]:
-        """Return what is told of the run, its books among it."""
+        """Return the info of the run, with its audit."""
         samples = self.samples
         info = samples.info | origin(self.model)
         if samples.failure is not None:

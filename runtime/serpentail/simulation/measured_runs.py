@@ -19,10 +19,10 @@ from .rollouts import Source
 
 
 class MeasuredRuns:
-    """What follows from the samples of runs: given the name of a field, it and its companions.
+    """Derived fields of runs' samples: called with a name, it returns the field and related ones.
 
-    arrays: energies and momenta of all runs; of those that are certain to have some, ``late``, they
-    are derived when they are asked for.
+    arrays: energies and momenta of all runs; ``late``: runs for which they are certainly finite, so
+    that they can be derived when they are used.
     """
 
     def __init__(
@@ -40,9 +40,7 @@ class MeasuredRuns:
         self.failed: list[int] = []
 
     def of_thread(self) -> Callable[[np.ndarray], None]:
-        """Return a function that measures runs where it is not certain that this can be done later;
-        for one thread.
-        """
+        """Return a function that measures runs for which this cannot wait; for one thread."""
         kernels = self._kernels()
 
         def measure(runs: np.ndarray) -> None:
@@ -86,7 +84,7 @@ class MeasuredRuns:
         return error
 
     def __call__(self, name: str) -> dict[str, Any]:
-        """Return fields of rollouts by name, arrays nan after the end of a run, read-only."""
+        """Return fields of rollouts by name, read-only arrays with nan after the end of a run."""
         if name in ("audit", "warnings"):
             books = self._audit()
             return {"audit": books, "warnings": self._warnings(books)}
@@ -116,7 +114,7 @@ class MeasuredRuns:
         ]
 
     def _audit(self) -> Audit:
-        """Return the books of all runs, from start to end; nan of those that failed."""
+        """Return the audits of all runs, from start to end; nan for those that failed."""
         self._measure(lambda k: [(1, 0), (1, int(self.outcomes.done[k]) - 1)])
         last, each = np.maximum(self.outcomes.done, 1) - 1, np.arange(len(self.outcomes))
         ends = {}
@@ -137,7 +135,7 @@ class MeasuredRuns:
         return audited(self.model, values, self.outcomes.ledger, span, ends)
 
     def _warnings(self, books: Audit) -> list[list[str]]:
-        """Return what does not balance of each run that did not fail."""
+        """Return the warnings of each run that did not fail."""
         eps, failed = float(np.finfo(self.memory.records.dtype).eps), set(self.failed)
         told = self.method.info, self.outcomes.told
         return [

@@ -1,4 +1,4 @@
-"""Integration methods: which there are, their settings, and which one "auto" takes."""
+"""Integration methods, their settings, and the choice of "auto"."""
 
 from collections.abc import Collection
 from dataclasses import dataclass
@@ -21,14 +21,14 @@ SETTINGS = {
 }
 # 1/s: a fastest decay beyond this limits the steps of an explicit method, not their accuracy
 STIFF_DECAY = 5e3
-MIN_ROUNDINGS = 100  # roundings that a relative tolerance must allow, as SciPy's methods ask
-# tolerances, unless others are asked for
+MIN_ROUNDINGS = 100  # rounding errors that a relative tolerance must allow, as in SciPy's methods
+# default tolerances
 SINGLE_RTOL = {"tsit5": 1e-4, "ros34pw2": 1e-3}
 DOUBLE_RTOL = {"tsit5": 1e-8, "ros34pw2": 1e-4}
 
 
 def step_counts(spans: np.ndarray, slack: np.ndarray, step: float) -> np.ndarray:
-    """Return how many steps of at most a length fill spans, of which the slack is rounding."""
+    """Return the numbers of steps, of at most a length, that fill spans; slack: their rounding."""
     return np.maximum(1, np.ceil((spans - slack) / step)).astype(int)
 
 
@@ -50,7 +50,7 @@ class IntegrationMethod:
 def checked_method(
     name: str, settings: dict[str, Any], available: Collection[str], single: bool
 ) -> IntegrationMethod:
-    """Return a method with settings checked and filled in; SimulationError names what is wrong."""
+    """Return a method with checked settings and defaults; SimulationError names what is wrong."""
     known = [each for each in SETTINGS if each in available or each in SCIPY]
     one_of("method", name, ("auto", *known), SimulationError)
     unknown = [key for key in settings if key not in SETTINGS[name]]
@@ -64,7 +64,8 @@ def checked_method(
         least = MIN_ROUNDINGS * np.finfo(np.float32 if single and name not in SCIPY else float).eps
         if checked["rtol"] < least:
             raise SimulationError(
-                f"rtol {checked['rtol']:.3g}: too near to rounding: give {least:.2g} or more"
+                f"rtol {checked['rtol']:.3g}: too close to rounding errors: give {least:.2g} or "
+                "more"
             )
     return IntegrationMethod(name, "", _defaults(name, single, checked))
 
@@ -84,8 +85,9 @@ def _defaults(name: str, single: bool, chosen: dict[str, float]) -> dict[str, fl
 def chosen(
     settings: dict[str, Any], available: Collection[str], decay: float | None
 ) -> tuple[str, str]:
-    """Return the method of "auto" and why; ``decay`` (1/s) is that of damping and springs, None on
-    the ground.
+    """Return the method of "auto" and the reason.
+
+    decay (1/s): fastest rate of damping and springs; None on the ground.
     """
     if "step" in settings:
         implicit = decay is None and "implicit_euler" in available
@@ -94,7 +96,7 @@ def chosen(
     if decay is None:
         if "ros34pw2" in available:
             return "ros34pw2", "contact with the ground: stiff"
-        lack = "the scene has no `implicit` for a method that suits it"
+        lack = "the scene lacks `implicit`, which suitable methods need"
         return "tsit5", f"contact with the ground, but {lack}"
     # in flight, damping and springs alone are stiff
     if decay > STIFF_DECAY and "ros34pw2" in available:

@@ -1,4 +1,4 @@
-"""What many runs came to, by their numbers: arrays, from which that of a single run is told."""
+"""Outcomes of many runs, as arrays from which that of a single run is made."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -10,22 +10,22 @@ from .compiled_run import COUNTS, Memory, Outcome
 
 
 def told_by(records: np.ndarray, memory: Memory, runs: np.ndarray) -> dict[str, Any]:
-    """Return what the C records of some runs tell, as ``keep_all`` takes it."""
+    """Return the content of the C records of some runs, as ``keep_all`` takes it."""
     told = {name: records[name] for name in (*COUNTS, "done")}
     return told | {"ends": records["t"], "ledger": memory.state["ledger"][runs]}
 
 
 class Outcomes:
-    """What runs came to: samples written ``done``, ``ends`` (s), ledgers and counts by run.
+    """Outcomes of runs: samples written (``done``), ``ends`` (s), ledgers and counts by run.
 
-    failures and stops are those of some runs, by their numbers; ``told`` what single runs have to
-    tell where that is not counts alone.  Several threads may keep theirs.
+    failures and stops: of some runs, by their numbers; ``told``: further info of single runs.
+    Several threads may store outcomes at once.
     """
 
     def __init__(self, memory: Memory):
         runs = memory.start.runs
         self.ended = np.zeros(runs, bool)
-        self.count = 0  # of those that ended, for who looks how far they are
+        self.count = 0  # number of runs that ended, for progress
         self.done = np.zeros(runs, int)
         self.ends = np.full(runs, memory.start.start)
         self.ledger = np.zeros_like(memory.state["ledger"])
@@ -38,7 +38,7 @@ class Outcomes:
         return len(self.done)
 
     def __getitem__(self, k: int) -> Outcome:
-        """Return what run k came to."""
+        """Return the outcome of run k."""
         counts = {name: int(each[k]) for name, each in self.counts.items()}
         return Outcome(
             int(self.done[k]),
@@ -50,7 +50,7 @@ class Outcomes:
         )
 
     def keep(self, k: int, outcome: Outcome) -> None:
-        """Keep what run k came to."""
+        """Store the outcome of run k."""
         self.done[k], self.ends[k], self.ledger[k] = outcome.done, outcome.end, outcome.ledger
         for name, each in self.counts.items():
             each[k] = outcome.info.get(name, 0)
@@ -63,8 +63,9 @@ class Outcomes:
         self.count += 1
 
     def keep_all(self, runs: np.ndarray | slice, numbers: Mapping[str, Any]) -> None:
-        """Keep what some runs came to that neither failed nor stopped: done, ends, ledger, counts,
-        each a number or one a run.
+        """Store the outcomes of runs that neither failed nor stopped.
+
+        done, ends, ledger and counts: a number each, or one for each run.
         """
         self.done[runs], self.ends[runs] = numbers["done"], numbers["ends"]
         self.ledger[runs] = numbers["ledger"]
@@ -74,7 +75,7 @@ class Outcomes:
         self.count += np.size(self.done[runs])
 
     def fail_rest(self, words: str) -> None:
-        """Give an error of their own to all runs that have not ended."""
+        """Give each run that has not ended its own error."""
         for k in np.flatnonzero(~self.ended).tolist():
             self.failures[k], self.told[k] = SimulationError(words), {}
         self.ended[:] = True

@@ -24,11 +24,11 @@ from .outcomes import Outcomes, told_by
 from .rollouts import Rollouts, Source
 from .runs_in_turn import RunsInTurn
 
-PILOTS = 64  # runs that tell how long others take before anything is compiled for these
+PILOTS = 64  # runs that are timed before code is compiled for the others
 
 
 class ParallelRuns:
-    """Runs on their way: threads take them up in turn, and write samples, measures and outcomes."""
+    """Runs in progress: threads take them in turn, and write samples, measures and outcomes."""
 
     def __init__(
         self, memory: Memory, acting: Acting, method: IntegrationMethod, threads: int | None
@@ -38,11 +38,11 @@ class ParallelRuns:
         self.batched: BatchedRuns | AdaptiveRuns | None = None
         of_python = method.name in SCIPY or acting.of_python
         self.threads = 1 if of_python else min(allowed(threads), runs)
-        # what they come to
+        # their outcomes
         self.outcomes = Outcomes(memory)
         self.source = Source(model, memory.parameters, memory.ground, self.outcomes, method.info)
         self.measures = MeasuredRuns(memory, method, self.source, self.threads)
-        self.stop: KeyboardInterrupt | None = None  # what ended all before their end
+        self.stop: KeyboardInterrupt | None = None  # what ended all runs early
 
     @property
     def part_done(self) -> float:
@@ -57,7 +57,7 @@ class ParallelRuns:
             self.batched = BatchedRuns(*told)
         elif adaptive_in_lanes(*told):
             if not self._pays(runs, 0):
-                # how long the others will take is known of some
+                # the first runs show how long the others will take
                 first = min(PILOTS, runs)
                 self._share(first, self._run_in_turn, stage)
             steps = int(self.outcomes.counts["steps"][:first].sum()) // max(first, 1)
@@ -78,11 +78,11 @@ class ParallelRuns:
         return of_python or bool(self.memory.ground.points)
 
     def _pays(self, runs: int, steps: int) -> bool:
-        """Tell whether runs of about so many steps are to be made abreast."""
+        """Tell whether it is worthwhile to make runs of about ``steps`` steps in lanes."""
         return worth_batching(self.source.model, runs, steps)
 
     def _share(self, count: int, work: Callable[..., None], stage: Stage) -> None:
-        """Have threads take up so many tasks in turn."""
+        """Let threads take tasks in turn."""
         if count:
             in_turn(count, min(self.threads, count), work, lambda: stage.tell(self.part_done))
 
@@ -117,7 +117,10 @@ class ParallelRuns:
             measure(np.delete(found.runs, wrong))
 
     def _run_batches(self, parts: Iterator[int], ended: Event) -> None:
-        """The same for runs abreast; a group among which one cannot go on is made again in turn."""
+        """Make runs in lanes.
+
+        A group in which one run fails is made again, one run after another.
+        """
         batched, measure = self.batched, self.measures.of_thread()
         assert batched is not None
         for part in parts:
@@ -129,7 +132,7 @@ class ParallelRuns:
                     measure(runs)
 
     def _by_scipy(self, run: CompiledRun) -> Outcome:
-        """Return what a run came to by one of SciPy's methods, its samples kept."""
+        """Return the outcome of a run by one of SciPy's methods; store its samples."""
         from .scipy_methods import integrate_by_scipy
 
         try:
@@ -142,9 +145,9 @@ class ParallelRuns:
         return Outcome(done, samples.t[-1], samples.ledger, samples.info, samples.failure)
 
     def rollouts(self, info: dict[str, Any]) -> Rollouts:
-        """Return what all runs came to, or raise Ctrl-C, which keeps it as ``motion``.
+        """Return the rollouts; after Ctrl-C raise it with these as ``motion``.
 
-        info: what else is to be told of them.
+        info: further entries of their info.
         """
         errors = self.measures.errors()
         # counts of all runs together
@@ -172,7 +175,7 @@ class ParallelRuns:
 
 
 def in_c(run: CompiledRun, ended: Event) -> Outcome | None:
-    """Return what a run came to, None where it was given up."""
+    """Return the outcome of a run; None if it was given up."""
     status = run.go(ended)
     return None if status == PAUSED and run.actuation.error is None else run.outcome(status)
 
@@ -180,7 +183,7 @@ def in_c(run: CompiledRun, ended: Event) -> Outcome | None:
 def run_parallel(
     memory: Memory, acting: Acting, method: IntegrationMethod, threads: int | None
 ) -> ParallelRuns:
-    """Make all runs, in so many threads unless Python acts in them; Ctrl-C ends all."""
+    """Make all runs, in several threads unless Python acts in them; Ctrl-C ends all."""
     runs = ParallelRuns(memory, acting, method, threads)
     try:
         with Stage("simulate", f"{memory.start.runs} runs of {runs.source.model.name}") as stage:

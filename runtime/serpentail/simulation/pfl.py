@@ -1,4 +1,4 @@
-"""Torques that make a tail follow a reference motion, by partial feedback linearisation."""
+"""``Pfl``: torques that make a tail follow a reference, by partial feedback linearisation."""
 
 from copy import copy
 from typing import Any, Self
@@ -17,16 +17,37 @@ KP, KD = 4e4, 400.0  # 1/s^2, 1/s: Table 1
 
 
 class Pfl:
-    """Partial feedback linearisation, Eqs. 44 to 46: a controller for ``st.simulate``.
+    """Partial feedback linearisation, Eqs. 44 to 46: a controller for ``simulate``.
 
-    Tail accelerations become q_t_ddot_r + Kd e_dot + Kp e, e = q_t_r - q_t.  reference: a
-    Reference, a Plan, a Trajectory, or (times (K,) s, tail coordinates (K, 2m) rad); of the last
-    three a cubic spline; after it the last value at rest.  kp (1/s^2), kd (1/s): gains, one number
-    each.  feedforward: use q_t_ddot_r, which the paper leaves out.  torque: N m, the most that the
-    tail's motors give, one number or one a coordinate, None for no limit.
+    The tail's accelerations become q_t_ddot_r + kd * e_dot + kp * e with the error
+    e = q_t_r - q_t. Called with (t, q, v), it returns the torques (2m,) (N m).
 
-    Called with (t, q, v) it returns tau (2m,) in N m.  Needs pfl of the model, or its
-    inverse_dynamics and mass_matrix.  Raises SimulationError where an argument is wrong.
+    Parameters
+    ----------
+    model : Model
+        The model; it needs the function "pfl", or "inverse_dynamics" and "mass_matrix".
+    reference : Reference, Plan, Trajectory or (array_like, array_like)
+        What the tail follows. The last is a pair of times (K,) (s) and tail coordinates (K, 2m)
+        (rad). All except a Reference are interpolated by a cubic spline. After its end the last
+        value is held, at rest.
+    kp : float, default 4e4
+        Gain of the error (1/s^2), Table 1.
+    kd : float, default 400
+        Gain of the error's rate (1/s), Table 1.
+    feedforward : bool, default True
+        Whether to use q_t_ddot_r, which the paper leaves out.
+    torque : float or sequence of float, optional
+        Largest torque of the motors (N m), one number or one for each tail coordinate. Default:
+        no limit.
+
+    Raises
+    ------
+    SimulationError
+        An argument is wrong.
+
+    Examples
+    --------
+    >>> motion = st.simulate(model, q0, v0, controller=st.Pfl(model, plan))  # doctest: +SKIP
     """
 
     def __init__(
@@ -46,20 +67,32 @@ class Pfl:
         self.torque = None if torque is None else _limit(torque, model.layout.nt)
 
     def later(self, delay: float) -> Self:
-        """Return the same law for a motion that begins later, by a delay (s)."""
+        """Return the same law for a reference that begins later by ``delay`` (s)."""
         law = copy(self)
         law.curve = self.curve.later(delay)
         return law
 
     def reference(self, t: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return tail coordinates, rates and accelerations (2m,) wanted at t (s)."""
+        """Evaluate the reference.
+
+        Parameters
+        ----------
+        t : float
+            Time (s).
+
+        Returns
+        -------
+        angles, rates, accelerations : ndarray, shape (2m,)
+            Tail coordinates (rad), rates (rad/s) and accelerations (rad/s^2); the last are zero
+            without feedforward.
+        """
         angles, rates, accelerations = self.curve.at(t)
         return angles, rates, accelerations if self.feedforward else 0 * accelerations
 
     def __call__(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Return tau (2m,), N m: X^-1 (S H^-1 C + a), X = S H^-1 [0; I], within its limit.
+        """Return tau (2m,), N m: X^-1 (S H^-1 C + a), X = S H^-1 [0; I], within the limit.
 
-        On a fixed base that is H a + C.
+        On a fixed base it is H a + C.
         """
         angles, rates, accelerations = self.reference(t)
         layout = self.model.layout
@@ -70,7 +103,7 @@ class Pfl:
         return tau if self.torque is None else np.clip(tau, -self.torque, self.torque)
 
     def _eliminated(self, q: np.ndarray, v: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-        """The same by H and C: the base's accelerations solve its rows of Eq. 1."""
+        """Compute the same torques from H and C: the base's rows of Eq. 1 give its acceleration."""
         tail = self.model.layout.tail_v
         v_dot = np.concatenate([np.zeros(tail.start), wanted])
         force = self.model.inverse_dynamics(q, v, v_dot)
@@ -90,7 +123,7 @@ def _limit(torque: Any, size: int) -> np.ndarray:
 
 
 def _curve(reference: object, size: int) -> Piecewise:
-    """Return what the user gave as a function of time."""
+    """Return the reference that the user gave as a function of time."""
     if isinstance(reference, Reference):
         if reference.curve.channels != size:
             raise SimulationError(
@@ -105,12 +138,12 @@ def _curve(reference: object, size: int) -> Piecewise:
 
 
 def _nodes(reference: Any) -> tuple[ArrayLike, ArrayLike, object]:
-    """Return times, angles and what a spline does at its ends."""
+    """Return times, angles and the end conditions of a spline through them."""
     motion = getattr(reference, "trajectory", reference)
     if hasattr(motion, "tail") and hasattr(motion, "t"):
         if motion is reference:
             return motion.t, motion.tail, tuple((1, motion.tail_rate[k]) for k in (0, -1))
-        # a plan: its accelerations, as a spline's own, fed forward, are least exact at the ends
+        # a plan: its own accelerations at the ends, because a spline's are least exact there
         slopes = reference.curve.slopes(motion.t[[0, -1]])["tail_rate"]
         return motion.t, motion.tail, tuple((2, row) for row in slopes)
     try:

@@ -1,4 +1,4 @@
-"""Functions of time as polynomials piece by piece, which the generated C can evaluate, too."""
+"""Piecewise polynomials of time, which the generated C can evaluate too."""
 
 from dataclasses import dataclass, replace
 from typing import Self
@@ -15,10 +15,16 @@ JUMP_TOLERANCE = 1e-9  # a jump that is smaller, over the largest value, is roun
 
 @dataclass(frozen=True, eq=False)
 class Piecewise:
-    """Polynomials of t - times[k] between times (pieces + 1,), s.
+    """Piecewise polynomials of time, with one or more channels.
 
-    coefficients (pieces, channels, degree + 1), constants first.  Before the first time and after
-    the last the values there are held.
+    Before the first time and after the last, the values there are held.
+
+    Parameters
+    ----------
+    times : ndarray, shape (pieces + 1,)
+        Increasing times (s) at which the pieces begin and end.
+    coefficients : ndarray, shape (pieces, channels, degree + 1)
+        Coefficients of the powers of ``t - times[k]``, constants first.
     """
 
     times: np.ndarray
@@ -27,17 +33,31 @@ class Piecewise:
 
     @property
     def channels(self) -> int:
-        """Number of functions."""
+        """Number of channels."""
         return self.coefficients.shape[1]
 
     @property
     def never_changes(self) -> bool:
-        """Whether it is one constant a channel."""
+        """Whether each channel is one constant."""
         return self.coefficients.shape[::2] == (1, 1)
 
     def later(self, delay: float) -> Self:
-        """Return the same functions, later by a delay (s); SimulationError where that rounds
-        different times to one.
+        """Return the same functions, delayed.
+
+        Parameters
+        ----------
+        delay : float
+            Delay (s).
+
+        Returns
+        -------
+        Piecewise
+            The delayed functions.
+
+        Raises
+        ------
+        SimulationError
+            Rounding would make two of the times equal.
         """
         times = self.times + delay
         if not (np.diff(times) > 0).all():
@@ -46,9 +66,19 @@ class Piecewise:
         return replace(self, times=times)
 
     def at(self, t: ArrayLike) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Values, rates, accelerations at t or t (K,), s: (channels,) or (K, channels) each.
+        """Evaluate values, rates and accelerations.
 
-        Where two pieces meet they are those of the later.
+        At a time where two pieces meet, those of the later piece are returned.
+
+        Parameters
+        ----------
+        t : array_like, shape () or (K,)
+            Times (s).
+
+        Returns
+        -------
+        values, rates, accelerations : ndarray, shape (channels,) or (K, channels)
+            Values, and their first and second time derivatives.
         """
         t = np.asarray(t, float)
         inside = np.clip(t, self.times[0], self.times[-1])
@@ -58,16 +88,16 @@ class Piecewise:
         value, rate, acceleration = (_horner(_derived(c, order), x) for order in range(3))
         return value, np.where(held, 0.0, rate), np.where(held, 0.0, acceleration)
 
-    @np.errstate(over="ignore", invalid="ignore")  # a run refuses what is beyond numbers
+    @np.errstate(over="ignore", invalid="ignore")  # a run refuses numbers that are not finite
     def kinks(self, orders: int) -> np.ndarray:
-        """Times at which a derivative below this order jumps, both ends among them."""
+        """Return the times at which a derivative of order below ``orders`` jumps, and both ends."""
         if self.never_changes:
             return self.times[:0]
         jumps = np.zeros(len(self.times), bool)
         for order in range(orders):
             c = _derived(self.coefficients, order)
             widths = np.diff(self.times)[:, None]
-            # each piece at both its ends, beside what is held outside
+            # each piece at both its ends, and the values held outside
             starts, ends, sizes = _horner(c, 0.0), _horner(c, widths), _horner(np.abs(c), widths)
             held = [starts[:1], ends[-1:]] if order == 0 else np.zeros((2, 1, self.channels))
             left, right = np.vstack([held[0], ends]), np.vstack([starts, held[1]])
@@ -76,7 +106,7 @@ class Piecewise:
 
 
 def _derived(coefficients: np.ndarray, order: int) -> np.ndarray:
-    """Coefficients of a derivative."""
+    """Return the coefficients of the derivative of this order."""
     for _ in range(order):
         powers = np.arange(1, coefficients.shape[-1])
         coefficients = coefficients[..., 1:] * powers if len(powers) else 0 * coefficients
@@ -84,7 +114,7 @@ def _derived(coefficients: np.ndarray, order: int) -> np.ndarray:
 
 
 def _horner(coefficients: np.ndarray, x: np.ndarray | float) -> np.ndarray:
-    """Values of polynomials at x."""
+    """Evaluate polynomials at x."""
     value = np.zeros(coefficients.shape[:-1])
     for k in reversed(range(coefficients.shape[-1])):
         value = value * x + coefficients[..., k]
@@ -106,7 +136,7 @@ def checked_nodes(
 
 
 def linear(times: np.ndarray, values: np.ndarray) -> Piecewise:
-    """Straight lines between nodes; one node is a constant."""
+    """Return straight lines between nodes; a single node gives a constant."""
     if len(times) == 1:
         return constant(times[0], values[0])
     with np.errstate(over="ignore"):
@@ -117,12 +147,12 @@ def linear(times: np.ndarray, values: np.ndarray) -> Piecewise:
 
 
 def constant(time: float, values: np.ndarray) -> Piecewise:
-    """Values (channels,) that never change."""
+    """Return values (channels,) that never change."""
     return Piecewise(np.array([time, time + 1.0]), np.asarray(values, float)[None, :, None])
 
 
 def spline(times: np.ndarray, values: np.ndarray, ends: object = "not-a-knot") -> Piecewise:
-    """Cubic spline through nodes; ``ends`` as SciPy's CubicSpline has it."""
+    """Return the cubic spline through nodes; ``ends`` as of SciPy's CubicSpline."""
     from scipy.interpolate import CubicSpline
 
     coefficients = CubicSpline(times, values, bc_type=ends).c  # highest powers first
@@ -130,7 +160,7 @@ def spline(times: np.ndarray, values: np.ndarray, ends: object = "not-a-knot") -
 
 
 def blends(times: np.ndarray, values: np.ndarray) -> Piecewise:
-    """From rest to rest: quintics 10 s^3 - 15 s^4 + 6 s^5 between nodes."""
+    """Return quintics 10 s^3 - 15 s^4 + 6 s^5 between nodes, each from rest to rest."""
     if len(times) == 1:
         return constant(times[0], values[0])
     rise, width = np.diff(values, axis=0), np.diff(times)[:, None]

@@ -1,4 +1,4 @@
-"""The structures that the generated C takes, as ctypes has them, with all that they point to."""
+"""The C structures of simulations, for ctypes, with all that they point to."""
 
 import ctypes
 from typing import Any, cast
@@ -11,7 +11,7 @@ from ..model.kernel import address_of
 from ..model.model import Model
 from ..model.structures import REALS, structure
 
-CFunction: Any = type(ctypes.CFUNCTYPE(None)()).__mro__[1]  # of all functions that ctypes makes
+CFunction: Any = type(ctypes.CFUNCTYPE(None)()).__mro__[1]  # base class of all ctypes functions
 
 
 _types: WeakKeyDictionary[Model, dict[str, type[ctypes.Structure]]] = WeakKeyDictionary()

@@ -1,4 +1,4 @@
-"""What many runs came to: their samples, measures and errors as one set of arrays."""
+"""``Rollouts``: the samples, measures and errors of many runs, as arrays."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -21,13 +21,13 @@ from .ground import Ground
 from .measured import trajectory_or_error
 from .outcomes import Outcomes
 
-LATER = (*MONOTONE, "audit", "warnings")  # what is derived when somebody asks
+LATER = (*MONOTONE, "audit", "warnings")  # fields that are derived when they are first used
 SHOWN = 3  # runs that a notebook shows over each other
 
 
 @dataclass(frozen=True, eq=False)
 class Source:
-    """What a single run of rollouts is made of anew; outcomes by the numbers of the runs."""
+    """What one run's trajectory is made from; outcomes by the numbers of the runs."""
 
     model: Model
     parameters: RunParameters
@@ -41,24 +41,55 @@ class Source:
         return self.model.with_parameters(**changes) if changes else self.model
 
     def trajectory(self, k: int, samples: Samples) -> Trajectory:
-        """Return the trajectory of run k, or raise what ended it."""
+        """Return the trajectory of run k; raise its error if it failed."""
         samples = replace(samples, info=samples.info | self.info)
         return trajectory_or_error(self.model_of(k), samples, self.ground)
 
 
 @dataclass(frozen=True, eq=False)
 class Rollouts(Exports):
-    """k motions, sampled at the same s times, in read-only arrays; NaN after a motion's end.
+    """k motions of one model, sampled at the same s times; ``rollouts[k]`` is a Trajectory.
 
-    t (s,) s; q (k, s, 7+2m), v (k, s, 6+2m); tau (k, s, 2m) N m; kinetic, potential (k, s) J;
-    linear_momentum, angular_momentum (k, s, 3); bristles (k, s, points, 2) m: as Trajectory has
-    them.  ends (k,) s: when each run ended: at the last time, at an event of ``stop_at``, or where
-    it failed.  errors: None or the SimulationError of each run, which keeps the trajectory up to
-    there.  audit: work, impulses and what they do not account for, (k,); warnings: of each run,
-    what does not balance; ``rollouts[k].warnings`` tell also what no animal does.  info: what all
-    have in common, JSON-ready; steps, rejected, evaluations and factorisations are those of all.
-    ``rollouts[k]`` is the Trajectory of run k, with its own parameters, counts and contact, or
-    raises its error.
+    The arrays are read-only, and NaN after the end of a run. ``len(rollouts)`` is k.
+    ``rollouts[k]`` has the run's own parameters, counts and contact; for a failed run it raises
+    the run's error.
+
+    Attributes
+    ----------
+    t : ndarray, shape (s,)
+        Times (s).
+    q : ndarray, shape (k, s, nq)
+        Configurations, as in ``Trajectory``.
+    v : ndarray, shape (k, s, nv)
+        Velocities, as in ``Trajectory``.
+    tau : ndarray, shape (k, s, 2m)
+        Torques (N m).
+    kinetic, potential : ndarray, shape (k, s)
+        Energies (J).
+    linear_momentum : ndarray, shape (k, s, 3)
+        Momentum (kg m/s, world).
+    angular_momentum : ndarray, shape (k, s, 3)
+        Angular momentum about the centre of mass (kg m^2/s, world).
+    bristles : ndarray, shape (k, s, points, 2)
+        Stretch of the friction springs (m).
+    ends : ndarray, shape (k,)
+        Time at which each run ended (s): the last time, an event of ``stop_at``, or the time of
+        failure.
+    errors : list of SimulationError or None
+        Error of each run; its ``trajectory`` is the motion up to the failure.
+    audit : Audit
+        Work, impulses, and what these do not account for; arrays of shape (k, ...).
+    warnings : list of list of str
+        For each run, what does not balance. ``rollouts[k].warnings`` also reports motions that
+        no animal can make.
+    info : dict
+        What all runs have in common, JSON-ready; steps, rejected, evaluations and
+        factorisations are sums over all runs.
+
+    Examples
+    --------
+    >>> rollouts = st.simulate(model, starts, v0, t_span=0.3)  # doctest: +SKIP
+    >>> rollouts.q[:, -1], rollouts[0].warnings  # doctest: +SKIP
     """
 
     t: np.ndarray
@@ -84,7 +115,7 @@ class Rollouts(Exports):
         return settled(self, LATER)
 
     def __repr__(self) -> str:
-        """On at most six lines what they are, and which failed."""
+        """At most six lines: number of runs, samples, method, and which failed."""
         model, failed = self.source.model, [k for k, e in enumerate(self.errors) if e is not None]
         lines = [
             f"Rollouts of {model.name}, {tail_of(model)}: {len(self)} runs of "
@@ -100,9 +131,26 @@ class Rollouts(Exports):
         return framed(lines + ([f"{warned} have warnings"] if warned else []))
 
     def view(self, k: int | Sequence[int], path: str | PathLike[str] = "run.html") -> Path:
-        """Write the page of run k, or of several; return its path.  Failed runs show their begin.
+        """Write a page that shows one run or several.
 
-        Raises as ``st.view``, or the error of a run that never began.
+        Parameters
+        ----------
+        k : int or sequence of int
+            Numbers of the runs, from 0. A failed run is shown up to its failure.
+        path : str or path, default "run.html"
+            The .html file.
+
+        Returns
+        -------
+        Path
+            The path of the file.
+
+        Raises
+        ------
+        ViewError
+            There is no such run, or as of ``view``.
+        SimulationError
+            The run failed before its first sample.
         """
         from ..viewer.view import view
 
@@ -113,7 +161,7 @@ class Rollouts(Exports):
         return view(motions, path, names=[f"run {number}" for number in numbers])
 
     def _repr_html_(self) -> str:
-        """For notebooks: the text, and the page of the first runs that began."""
+        """Text and page of the first runs, for notebooks."""
         from ..viewer.notebook import in_notebook
 
         begun = [k for k, e in enumerate(self.errors) if e is None or e.trajectory is not None]
@@ -122,7 +170,7 @@ class Rollouts(Exports):
         return in_notebook(self, lambda: [self._begun(k) for k in begun], names)
 
     def _begun(self, k: int) -> Trajectory:
-        """Return the trajectory of run k, as far as it went."""
+        """Return the trajectory of run k, up to its failure if it failed."""
         error = self.errors[k]
         if error is None:
             return self[k]

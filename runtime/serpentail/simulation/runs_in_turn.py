@@ -25,7 +25,7 @@ class Ended:
 
 
 class RunsInTurn:
-    """Takes up runs, so many at a time that Python may look around now and then; for one thread."""
+    """Makes runs, a few at a time, so that Python can react in between; for one thread."""
 
     def __init__(self, memory: Memory, acting: Acting, method: IntegrationMethod):
         self.run = CompiledRun(memory, acting, method)
@@ -33,7 +33,7 @@ class RunsInTurn:
         self.pause, self.at_once = PAUSE, 1
 
     def make(self, runs: list[int], ended: Event) -> Ended:
-        """Make runs; return those that came to an end, fewer where ``ended`` is set."""
+        """Make runs; return those that ended, fewer if ``ended`` is set."""
         numbers, records = np.array(runs), self.run.records_of(runs)
         statuses, done = np.zeros(len(runs), np.intc), 0
         while done < len(runs) and not ended.is_set():

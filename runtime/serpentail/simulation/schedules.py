@@ -1,4 +1,4 @@
-"""Angles of the legs, and wanted angles of the tail, as functions of time."""
+"""Schedules over time: angles of the legs, and reference angles of the tail."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -19,10 +19,35 @@ BLENDS = {"linear": linear, "quintic": blends, "spline": spline}
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """Tail angles (K, 2m) in rad at increasing times (K,) in s, held outside: what Pfl can track.
+    """Reference angles of the tail over time, which ``Pfl`` can track.
 
-    blend: "quintic", from rest to rest between nodes (equal nodes hold); "spline", a cubic one
-    through all nodes; "linear", whose rate jumps.  ``curve`` is the function of time.
+    Parameters
+    ----------
+    times : array_like, shape (K,)
+        Increasing times (s), two or more. The angles are held before the first and after the
+        last.
+    angles : array_like, shape (K, 2m)
+        Tail coordinates (rad).
+    blend : {"quintic", "spline", "linear"}, default "quintic"
+        "quintic": from rest to rest between nodes, so that equal nodes hold; "spline": a cubic
+        spline through all nodes; "linear": straight lines, whose rate jumps.
+
+    Attributes
+    ----------
+    curve : Piecewise
+        The angles as a function of time.
+
+    Raises
+    ------
+    SimulationError
+        Times, angles or blend are wrong.
+
+    Examples
+    --------
+    >>> import serpentail as st
+    >>> reference = st.Reference([0.0, 0.1], [[0.0, 0.0], [0.5, 0.0]])
+    >>> reference.curve.at(0.05)[0].tolist()
+    [0.25, 0.0]
     """
 
     times: ArrayLike
@@ -32,7 +57,7 @@ class Reference:
     __repr__ = brief
 
     def __post_init__(self) -> None:
-        """Refuse nodes that are no motion."""
+        """Check the nodes."""
         one_of("Reference: blend", self.blend, BLENDS, SimulationError)
         angles = finite_array("Reference: angles", self.angles, SimulationError)
         width = angles.shape[1] if angles.ndim == 2 else 0
@@ -45,10 +70,29 @@ class Reference:
     def of_bends(
         cls, model: Model, times: ArrayLike, bends: ArrayLike, blend: str = "quintic"
     ) -> Self:
-        """Return the reference of a tail whose segments bend by (K, m, 2) rad, pitch and yaw.
+        """Make the reference of a tail from the bends of its segments.
 
-        bends (K, m): pitch alone.  A segment's bend is what its links turn in all: each of n takes
-        1/n of it, a continuum all of it.
+        Parameters
+        ----------
+        model : Model
+            The model, which determines how a segment's bend is shared by its links: each of n links
+            takes 1/n of it; an arc takes all of it.
+        times : array_like, shape (K,)
+            Increasing times (s).
+        bends : array_like, shape (K, m, 2) or (K, m)
+            Pitch and yaw bend of each segment (rad), or pitch alone.
+        blend : str, default "quintic"
+            As of ``Reference``.
+
+        Returns
+        -------
+        Reference
+            The reference.
+
+        Raises
+        ------
+        SimulationError
+            An argument is wrong.
         """
         angles = shared_among_links(model, finite_array("bends", bends, SimulationError))
         return cls(times, angles, blend)
@@ -68,10 +112,36 @@ def shared_among_links(model: Model, bends: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Legs:
-    """Leg angles gamma, delta (rad) at increasing times (K,) in s: linear in between, held outside.
+    """Leg angles over time, linear between nodes and held outside.
 
-    gamma, delta: a number, which never changes; (K,), of both legs; or (K, 2), of the right and the
-    left leg.
+    Parameters
+    ----------
+    times : array_like, shape (K,)
+        Increasing times (s).
+    gamma, delta : float or array_like, shape (K,) or (K, 2)
+        Leg angles (rad), Eqs. 5 to 9: a constant, or at each time for both legs, or for the right
+        and the left leg.
+
+    Attributes
+    ----------
+    curve : Piecewise
+        gamma and delta of the right leg, then of the left, as a function of time.
+
+    Raises
+    ------
+    SimulationError
+        Times or angles are wrong.
+
+    See Also
+    --------
+    Legs.fixed, Legs.ramp, Legs.moves
+
+    Examples
+    --------
+    >>> import serpentail as st
+    >>> legs = st.Legs.moves(3.67, -0.26, [{"at": 0.1, "delta": -1.2, "rate": 20.0}])
+    >>> legs.curve.at(0.0)[0].tolist()
+    [3.67, -0.26, 3.67, -0.26]
     """
 
     times: ArrayLike
@@ -81,7 +151,7 @@ class Legs:
     __repr__ = brief
 
     def __post_init__(self) -> None:
-        """Refuse nodes that are no motion."""
+        """Check the nodes."""
         times = np.atleast_1d(finite_array("Legs: times", self.times, SimulationError))
         gamma, delta = (_both_legs(name, getattr(self, name), times) for name in ("gamma", "delta"))
         nodes = checked_nodes(
@@ -91,14 +161,44 @@ class Legs:
 
     @classmethod
     def fixed(cls, gamma: float, delta: float) -> Self:
-        """Legs that do not move."""
+        """Make legs that do not move.
+
+        Parameters
+        ----------
+        gamma, delta : float
+            Angles of both legs (rad).
+
+        Returns
+        -------
+        Legs
+            The schedule.
+        """
         return cls([0.0], gamma, delta)
 
     @classmethod
     def ramp(cls, gamma: float, delta: tuple[float, float], at: float, rate: float) -> Self:
-        """Legs whose delta goes from one angle to another: a kick (Eq. 48).
+        """Make legs whose delta goes from one angle to another at a constant rate: a kick (Eq. 48).
 
-        rate: rad/s, of any sign; at: s, when it begins.
+        Parameters
+        ----------
+        gamma : float
+            Angle of both legs (rad), constant.
+        delta : (float, float)
+            First and last angle (rad).
+        at : float
+            Time at which the ramp begins (s).
+        rate : float
+            Rate (rad/s), of any sign except 0.
+
+        Returns
+        -------
+        Legs
+            The schedule.
+
+        Raises
+        ------
+        SimulationError
+            An argument is wrong.
         """
         angles = finite_array("Legs.ramp: delta", delta, SimulationError)
         if angles.shape != (2,) or angles[0] == angles[1]:
@@ -111,10 +211,25 @@ class Legs:
 
     @classmethod
     def moves(cls, gamma: float, delta: float, moves: Iterable[Mapping[str, float]]) -> Self:
-        """Legs at gamma, delta (rad) that move from time to time, both alike, else are held.
+        """Make legs that move from time to time, both alike, and are held between the moves.
 
-        Each move is a mapping: at (s), its end's gamma, delta or both (rad), and duration (s) or
-        rate (rad/s, of the angle that goes farther).  Moves follow each other in time.
+        Parameters
+        ----------
+        gamma, delta : float
+            First angles (rad).
+        moves : iterable of mapping
+            Moves in the order of time. Each has ``at`` (s), the last ``gamma``, ``delta`` or both
+            (rad), and either ``duration`` (s) or ``rate`` (rad/s, of the angle that changes more).
+
+        Returns
+        -------
+        Legs
+            The schedule.
+
+        Raises
+        ------
+        SimulationError
+            A move is incomplete, or begins before the last one ends.
         """
         if isinstance(moves, str | Mapping) or not isinstance(moves, Iterable):
             raise refusal("legs.moves", moves, "an array of tables", SimulationError)
@@ -141,7 +256,7 @@ MOVE = ("at", "gamma", "delta", "duration", "rate")
 
 
 def _checked_move(field: str, move: object) -> Mapping[str, float]:
-    """Return a move with numbers and all keys that it needs; SimulationError where it has not."""
+    """Return a move whose keys and numbers are complete; SimulationError otherwise."""
     if not isinstance(move, Mapping):
         raise refusal(field, move, f"a table of {', '.join(MOVE)}", SimulationError)
     for name, value in move.items():
@@ -155,7 +270,7 @@ def _checked_move(field: str, move: object) -> Mapping[str, float]:
 
 
 def _move(field: str, move: Mapping[str, float], last: Node) -> list[Node]:
-    """Return the nodes that a move adds after the last one; SimulationError where it cannot."""
+    """Return the nodes that a move adds after the last one; SimulationError if it is impossible."""
     move = _checked_move(field, move)
     # where it goes, and how long that takes
     (end, angles), at = last, move["at"]

@@ -61,7 +61,7 @@ class SampleWriter:
         self.torques: list[np.ndarray] = []
 
     def write(self, t: float, y: np.ndarray) -> None:
-        """Write one sample, its quaternion, if there is one, normalised."""
+        """Write one sample; normalise its quaternion, if it has one."""
         y = y.copy()
         if not self.rate.run.model.fixed:
             y[QUATERNION] /= np.linalg.norm(y[QUATERNION])
@@ -69,12 +69,12 @@ class SampleWriter:
         self.states.append(y)
 
     def look(self) -> None:
-        """Let the run be looked at."""
+        """Report the progress of the run."""
         if self.watched is not None:
             self.watched.look(len(self.states), lambda first: rest(self.part(first), 0))
 
     def part(self, first: int) -> Samples:
-        """Return what was written from a sample on."""
+        """Return the samples written from a number on."""
         run, done = self.rate.run, len(self.states)
         sizes = np.cumsum([run.model.nq, run.model.nv, 2 * run.ground.points])
         q, v, bristles, ledger = np.split(np.array(self.states[first:]), sizes, axis=1)
@@ -91,9 +91,9 @@ class SampleWriter:
 def integrate_by_scipy(
     run: CompiledRun, method: IntegrationMethod, watched: Watched | None = None
 ) -> Samples:
-    """Return the samples of a run, made from stop to stop, and what ended it before its end."""
+    """Return the samples of a run, made from stop to stop, and the error that ended it, if any."""
     run.actuation.begin(run.record)
-    rate = StateRate(run, method.name == "dop853")  # which takes a step with NaN again, shorter
+    rate = StateRate(run, method.name == "dop853")  # a step with NaN is repeated, shorter
     samples, counts = SampleWriter(rate, run.start.times, watched), {"steps": 0, "evaluations": 0}
     ends = [*(t for t in run.actuation.stops if run.start.start < t < run.start.end), run.start.end]
     y, t = np.concatenate([*run.state.values()]).astype(float), run.start.start

@@ -1,4 +1,4 @@
-"""Lets a model come to rest on the ground, where other runs then start."""
+"""``settle``: lets a model come to rest on the ground, as a start for other runs."""
 
 from typing import Any
 
@@ -23,12 +23,44 @@ def settle(
     at: float = 0.0,
     **settings: Any,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return q (nq,), v (nv,) = 0 and the friction springs' stretch (points, 2) in m, at rest.
+    """Simulate a model on the ground until it is at rest; return that state.
 
-    q0 (nq,): where it starts, without velocity.  rounds: runs of ``duration`` s, after each of
-    which all velocities are set to zero; many short ones quench.  Controller and legs act as they
-    do before the time ``at`` (s), where schedules hold their first values.  settings: those of
-    ``simulate``, such as legs.  Raises what it raises.
+    Parameters
+    ----------
+    model : Model
+        A model with contacts.
+    q0 : array_like, shape (nq,)
+        Configuration at the start, without velocity.
+    rounds : int, default 1
+        Number of runs. All velocities are set to zero after each run, so many short runs damp
+        the motion faster.
+    duration : float, default 1.5
+        Duration of a run (s).
+    controller : controller or callable, optional
+        As of ``simulate``.
+    at : float, default 0
+        Time (s) at which the later motion begins. Controller and legs act as before this time,
+        where schedules hold their first values.
+    **settings
+        Other arguments of ``simulate``, such as ``legs``.
+
+    Returns
+    -------
+    q : ndarray, shape (nq,)
+        Configuration at rest.
+    v : ndarray, shape (nv,)
+        Zeros.
+    bristles : ndarray, shape (points, 2)
+        Stretch of the friction springs (m), for ``bristles0`` of ``simulate``.
+
+    Raises
+    ------
+    StateError
+        ``q0`` is not a single configuration.
+    SimulationError
+        A setting is wrong, the model has no contacts, or as of ``simulate``.
+    ModelError
+        The base is fixed, or the scene left a function out.
     """
     model.refuse_fixed("settle")
     if np.ndim(q0) != 1:
@@ -47,11 +79,11 @@ def settle(
 
 
 def check_settling(model: Model, rounds: object = 1, duration: object = 1.5) -> None:
-    """SimulationError where a model cannot come to rest in so many rounds."""
+    """SimulationError if a model cannot settle, or a number is wrong."""
     number("duration", duration, SimulationError, above=0)
     if isinstance(rounds, bool) or not isinstance(rounds, int) or rounds < 1:
         raise refusal("rounds", rounds, "a whole number from 1", SimulationError)
     if not model.contacts:
         raise SimulationError(
-            f"{model.name} touches nothing, so it cannot settle: add `contacts` to its scene"
+            f"{model.name} has no contacts, so it cannot settle: add `contacts` to its scene"
         )

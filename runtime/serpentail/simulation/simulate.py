@@ -1,6 +1,5 @@
-"""Simulates a motion, or many of one model at once: `simulate` checks, prepares and runs."""
+"""``simulate``: checks and prepares one run or many, and makes them."""
 
-import ctypes
 import time
 from dataclasses import replace
 from functools import partial
@@ -9,24 +8,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import ModelError, SimulationError
+from ..errors import SimulationError
 from ..model.cores import checked_threads
 from ..model.model import Model
-from ..model.parameters import RunParameters
 from ..motion.trajectory import Trajectory
 from ..stages import Stage
-from .acting import Acting
-from .compiled_run import CompiledRun, Memory, Samples
+from .choice import prepared, still_chosen
+from .compiled_run import CompiledRun, Samples
 from .controllers import Controller
-from .decay import FastestDecay
-from .ground import Ground
-from .limits import MOST_STEPS, refuse_endless
 from .measured import trajectory_or_error
-from .methods import SCIPY, IntegrationMethod, checked_method, chosen, step_counts
+from .methods import SCIPY
 from .parallel_runs import run_parallel
-from .records import Records
 from .rollouts import Rollouts
-from .start import EPS, Start
+from .start import Start
 from .waiting import asked_for, let_wait, taken
 from .watched import Watch, Watched, checked_watch
 
@@ -41,47 +35,107 @@ def simulate(
     method: str = "auto",
     **settings: Any,
 ) -> Trajectory | Rollouts:
-    """Simulate a motion: H v_dot + C = [0; tau], the quaternion kept on the unit sphere; on a fixed
-    base H v_dot + C = tau of the tail alone.
+    """Simulate one motion, or many of one model at once.
 
-    q0 (nq,), v0 (nv,): start; its quaternion is normalised; (k, nq), (k, nv), or one of both: k
-    starts, see below.
-    controller: None (no torque), Damping, TorqueTable, TorqueCurve, Pfl, Mpc, Phases of these,
-    NativeTorque, or a function (t (s), q, v) -> tau (2m,) in N m.
-    legs, bristles0, stop_at (models with contacts): Legs, where there are feet; stretch (points, 2)
-    of the friction springs in m, zero by default; events to stop at, pairs such as ("take_off",
-    "feet").
-    t_span: (start, end) in s, or the end alone.
-    method: "tsit5", "ros34pw2" (adaptive, in C), "rk4", "implicit_euler" (steps of a fixed length,
-    in C), "dop853", "lsoda" (SciPy's, as a check), or "auto", whose choice and reason ``info``
-    tells.
-    settings: output_step (s, default 1/200 of the span, rounded to divide it); adaptive methods:
-    rtol, atol (defaults 1e-8, 1e-4 for ros34pw2), first_step, least_step, most_step (s),
-    most_steps; fixed steps: step (s, default 1e-4, shortened to divide output_step); SciPy's: rtol,
-    atol (defaults 1e-10, 1e-12; 1e-6 both for a float model).
+    It integrates H v_dot + C = [0; tau] (Eq. 1), with the ground's forces if the model has
+    contacts, and keeps the quaternion at norm 1. On a fixed base only the tail moves.
 
-    watch: a function that is given the samples as they come, at most ten times a second, each once:
-    Trajectories that follow on one another, the last at the end.  What it raises ends the run.
+    Parameters
+    ----------
+    model : Model
+        The model; its scene needs the functions "rollout", "energy" and "momentum".
+    q0, v0 : array_like, shapes (nq,) and (nv,)
+        State at the start; the quaternion is normalised. With a leading axis, (k, nq) or
+        (k, nv), they are k starts; see Notes.
+    controller : controller or callable, optional
+        Torques of the tail: ``Damping``, ``TorqueTable``, ``TorqueCurve``, ``Pfl``, ``Mpc``,
+        ``NativeTorque``, ``Phases`` of these, or a function ``(t, q, v) -> tau`` with t (s) and
+        tau (2m,) (N m). Default: no torque.
+    t_span : float or (float, float), default (0, 1)
+        Start and end (s), or the end alone.
+    method : str, default "auto"
+        "tsit5" or "ros34pw2": adaptive, in C; "rk4" or "implicit_euler": steps of a fixed
+        length, in C; "dop853" or "lsoda": SciPy's, as a check; "auto" chooses, and ``info``
+        of the result gives its choice and reason.
 
-    Raises StateError (shapes, values), SimulationError (settings; the state left what numbers can
-    hold; its ``trajectory`` is the motion up to there), ModelError (the scene left out rollout,
-    energy or momentum).  Ctrl-C raises KeyboardInterrupt, whose ``motion`` is what there was: the
-    Trajectory, or Rollouts in which runs without an end have errors.
+    Returns
+    -------
+    Trajectory or Rollouts
+        The motion; for k starts their ``Rollouts``.
 
-    Many starts give Rollouts, which keep the SimulationErrors of single runs: the other runs go on.
-    One method is chosen for all.  controller may be a list, one of any kind a run; or a TorqueTable
-    with torques (k, K, 2m), or a Damping of (k, 2m), one a run.  parameters: name -> (k,) or (k,
-    3), SI, what the runs have of their own; bristles0 may be (k, points, 2).  threads: that take up
-    the runs; None: the model's, see ``load``.  A NativeTorque must bear calls from several threads
-    at once.
+    Other Parameters
+    ----------------
+    output_step : float, optional
+        Time between samples (s); it is rounded to divide the span. Default: span / 200.
+    rtol, atol : float, optional
+        Tolerances of adaptive methods. Defaults: 1e-8 for "tsit5" and 1e-4 for "ros34pw2"
+        (float models: 1e-4 and 1e-3), ``atol`` equal to ``rtol``; for SciPy's methods 1e-10 and
+        1e-12 (float models: 1e-6 and 1e-6).
+    first_step, least_step, most_step : float, optional
+        Bounds of the steps of "tsit5" and "ros34pw2" (s).
+    most_steps : int, default 1000000
+        Largest number of steps of these two.
+    step : float, default 1e-4
+        Step of "rk4" and "implicit_euler" (s); it is shortened to divide ``output_step``.
+    legs : Legs
+        Leg angles over time; required if the model has feet.
+    bristles0 : array_like, shape (points, 2), optional
+        Stretch of the friction springs at the start (m), of models with contacts. Default:
+        zero. For k starts also (k, points, 2).
+    stop_at : sequence of (str, str), optional
+        Events that end a run on the ground, such as ``[("take_off", "feet")]``; the kinds are
+        "touch_down" and "take_off".
+    watch : callable, optional
+        Function that receives the new samples during a run from one start, as ``Trajectory``
+        objects that follow each other: at most ten times a second, and once at the end. An
+        exception that it raises ends the run.
+    parameters : mapping, optional
+        For k starts: parameter name to values (k,) or (k, 3), SI.
+    threads : int, optional
+        For k starts: largest number of threads. Default: the model's, see ``load``.
 
-    Eight flights or more by "tsit5" or "rk4" whose torques are None, Damping, a TorqueTable or a
-    TorqueCurve (for "tsit5" also Phases of these, for "rk4" with kinks at the same times) fly as
-    lanes of vectors where the C of that is compiled, or its compilation pays: several times as
-    fast, other last digits.
+    Raises
+    ------
+    StateError
+        A shape is wrong, or a value is not finite.
+    SimulationError
+        A setting is wrong, or the state became too large for numbers. The error's
+        ``trajectory`` is the motion up to there.
+    ModelError
+        The scene left out "rollout", "energy" or "momentum", or a parameter is wrong.
+    KeyboardInterrupt
+        After Ctrl-C. Its attribute ``motion`` is the motion so far: a Trajectory, or Rollouts in
+        which unfinished runs have errors.
 
-    With a function of Python, or SciPy's methods, runs are made one after another in the calling
-    thread, and what the function raises, unless it is a SimulationError, ends all.
+    Notes
+    -----
+    k starts give ``Rollouts``. One method is chosen for all runs. The SimulationError of a run
+    is stored in ``Rollouts.errors``, and the other runs continue. ``controller`` may then also be
+    a list with one controller for each run, a ``TorqueTable`` with torques (k, K, 2m), or a
+    ``Damping`` with (k, 2m). A ``NativeTorque`` must allow calls from several threads at once.
+
+    Eight or more flights are computed in SIMD lanes, several times as fast, if the method is
+    "tsit5" or "rk4", if the torques are none, Damping, a TorqueTable or a TorqueCurve (with
+    "tsit5" also Phases of these; with "rk4" all must have their kinks at the same times), and if
+    the C for lanes is compiled or its compilation pays off. The last digits then differ.
+
+    With a Python function as controller, or with one of SciPy's methods, the runs are made one
+    after another in the calling thread. An exception of the function ends all runs, unless it is
+    a SimulationError.
+
+    See Also
+    --------
+    settle : Let a model come to rest on the ground.
+    scenario : Motion that a scene file describes.
+
+    Examples
+    --------
+    >>> import serpentail as st
+    >>> model = st.build("righting_m1_n3")  # doctest: +SKIP
+    >>> q0 = [0, 0, 0.5, 1, 0, 0, 0, 0.3, 0]
+    >>> v0 = [0, 0, 0, 8, 0, 0, 0, 0]
+    >>> law = st.Damping(1e-4)
+    >>> motion = st.simulate(model, q0, v0, controller=law, t_span=0.4)  # doctest: +SKIP
     """
     missing = [name for name in ("rollout", "energy", "momentum") if name not in model.generated]
     if missing:
@@ -107,13 +161,13 @@ def simulate(
 
 
 def _threads(model: Model, start: Start, asked: int | None) -> int | None:
-    """Return how many threads many runs may take up, as asked here, or else of the model."""
+    """Return the largest number of threads for many runs: as asked for here, else the model's."""
     if asked is None:
         return model.batch_library.threads
     if not start.many:
         raise SimulationError(
-            f"threads: value {asked!r:.60}: one start only, which takes one: leave it out, or give "
-            "q0 or v0 a row a run"
+            f"threads: value {asked!r:.60}: one start only, which uses one: leave it out, or give "
+            "q0 or v0 one row for each run"
         )
     return checked_threads("threads", asked, SimulationError)
 
@@ -124,7 +178,7 @@ def read_clocks() -> tuple[float, float]:
 
 
 def spent(clocks: tuple[float, float]) -> dict[str, float]:
-    """Return the times (s) that passed since clocks were read."""
+    """Return the times (s) that passed since the clocks were read."""
     seconds, cpu_seconds = time.perf_counter() - clocks[0], time.process_time() - clocks[1]
     return {"seconds": seconds, "cpu_seconds": cpu_seconds}
 
@@ -138,7 +192,7 @@ def end_state(
     duration: float,
     step: float,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return q (nq,), v (nv,) where "rk4" ends after a duration (s), with nothing measured."""
+    """Return q (nq,) and v (nv,) at the end of a run by "rk4", without energies and momenta."""
     start = Start.checked(model, (q0, v0), duration, duration)
     samples = integrate(CompiledRun(*prepared(model, start, controller, "rk4", {"step": step})))
     if samples.failure is not None:
@@ -146,76 +200,8 @@ def end_state(
     return samples.q[-1], samples.v[-1]
 
 
-def prepared(
-    model: Model, start: Start, controller: Controller, method: str, settings: dict[str, Any]
-) -> tuple[Memory, Acting, IntegrationMethod]:
-    """Return what runs need to go; SimulationError or ModelError where a setting is wrong."""
-    changes = settings.pop("parameters", None)
-    if changes is not None and not start.many:
-        raise ModelError(
-            "parameters: one start only: give q0 or v0 a row a run, or use model.with_parameters"
-        )
-    parameters = model.parameters_of_runs(changes, start.runs)
-    start.refuse_behind_stops(parameters.values)
-    ground = Ground.checked(model, start, parameters, settings)
-    acting = Acting(Records(model), controller, start, ground.legs.curve if ground.legs else None)
-    choice = choose(acting, start, parameters, method, settings)
-    if ground.stop_at and choice.name in SCIPY:
-        raise SimulationError(
-            f"stop_at: {choice.name} does not look for events: take tsit5 or ros34pw2"
-        )
-    return Memory(acting.records, start, ground, parameters), acting, choice
-
-
-def choose(
-    acting: Acting,
-    start: Start,
-    parameters: RunParameters,
-    name: str,
-    settings: dict[str, Any],
-) -> IntegrationMethod:
-    """Return the method that was asked for, or a choice and its reason."""
-    model, single = acting.model, acting.records.real is ctypes.c_float
-    available, reason = model.manifest["simulation"]["methods"], "asked for"
-    if isinstance(name, str) and name == "auto":
-        decay = None
-        if not model.contacts:
-            decay = FastestDecay(acting, start.runs, parameters)(start.q0)
-        name, reason = chosen(settings, available, decay)
-    method = checked_method(name, settings, available, single)
-    span, most_steps = start.end - start.start, method.settings.get("most_steps", MOST_STEPS)
-    for each in ("step", "most_step"):
-        length = method.settings.get(each, np.inf)
-        refuse_vanishing(start, each, length)
-        refuse_endless(each, length, span, most_steps)
-    if name == "rk4":  # steps divide the output's
-        interval = np.array([start.interval])
-        steps = step_counts(interval, 1e-12 * interval, method.settings["step"])
-        return replace(method, reason=reason, settings={"step": start.interval / int(steps[0])})
-    return replace(method, reason=reason)
-
-
-def still_chosen(run: CompiledRun, name: str) -> bool:
-    """Tell whether a run from a new start has the method that is asked for, and note why."""
-    if name != "auto" or run.ground.points:  # on the ground "auto" asks for no start
-        return True
-    method, available = run.method, run.model.manifest["simulation"]["methods"]
-    name, reason = chosen(method.settings, available, run.decay(run.memory.state["q"]))
-    run.method = replace(method, reason=reason)
-    return name == method.name
-
-
-def refuse_vanishing(start: Start, name: str, step: float) -> None:
-    """SimulationError where steps of at most this length (s) are too short to move the time."""
-    least = EPS * max(abs(start.start), abs(start.end))
-    if step < least:
-        raise SimulationError(
-            f"{name} {step:.3g}: too short to move the time: give {least:.2g} s or more"
-        )
-
-
 def integrate(run: CompiledRun, watch: Watch | None = None) -> Samples:
-    """Return the samples of a single run, of which a function is told meanwhile."""
+    """Return the samples of a single run; a function may watch them."""
     method = run.method
     watched = None if watch is None else Watched(watch, run.model, run.ground)
     with Stage("simulate", run.model.name) as stage:
@@ -231,7 +217,7 @@ def integrate(run: CompiledRun, watch: Watch | None = None) -> Samples:
 
 
 def _look(run: CompiledRun, stage: Stage, watched: Watched | None) -> None:
-    """Let a run in C be looked at."""
+    """Report the progress of a run in C, and its new samples."""
     done = run.record.done
     stage.tell(done / len(run.start.times))
     if watched is not None:

@@ -1,4 +1,4 @@
-"""Where and when runs start and end, and the times of their samples, checked."""
+"""Starts, spans and sample times of runs, checked."""
 
 import math
 from dataclasses import dataclass
@@ -15,14 +15,17 @@ from ..model.parameters import Values
 from ..model.passive import behind_stops
 from .limits import refuse_overfull
 
-MOST_SAMPLES = 10_000_000  # of all runs: more are a slip, and fill the memory
+MOST_SAMPLES = 10_000_000  # of all runs: more are a mistake, and would fill the memory
 SHORTEST = 1e-100  # s: between samples; methods multiply times
 EPS = float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """Checked starts q0 (k, nq), v0 (k, nv) and output times; ``many`` tells k runs from one."""
+    """Checked starts q0 (k, nq), v0 (k, nv) and output times.
+
+    ``many``: k runs, not a single one.
+    """
 
     q0: np.ndarray
     v0: np.ndarray
@@ -40,7 +43,7 @@ class Start:
         t_span: ArrayLike,
         output_step: object,
     ) -> "Start":
-        """Return starts; StateError or SimulationError where an argument is wrong."""
+        """Return starts; StateError or SimulationError if an argument is wrong."""
         q0, v0, many = checked_starts(model, state)
         # the grid of output times, the end among them
         start, end = checked_span(t_span)
@@ -64,7 +67,7 @@ class Start:
         return checked
 
     def refuse_behind_stops(self, values: Values) -> None:
-        """StateError where a tail begins behind its stops, from parameters of the runs."""
+        """StateError if a tail begins behind its stops; values: parameters of the runs."""
         behind = behind_stops(values, self.q0[:, self.tail])
         if behind:
             raise StateError(f"q0: {behind}")
@@ -88,7 +91,7 @@ class Start:
 
 
 def checked_span(t_span: ArrayLike) -> tuple[float, float]:
-    """Return start and end (s); SimulationError where they are none."""
+    """Return start and end (s); SimulationError if they are wrong."""
     if type(t_span) is float and 0 < t_span < math.inf:
         return 0.0, t_span
     span = finite_array("t_span", t_span, SimulationError)
@@ -134,7 +137,7 @@ def checked_states(name: str, value: ArrayLike, size: int) -> np.ndarray:
 
 
 def _paired(q0: np.ndarray, v0: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return copies (k, size), a single one repeated; StateError where numbers of runs differ."""
+    """Return copies (k, size), a single one repeated; StateError if numbers of runs differ."""
     counts = {len(array) for array in (q0, v0) if array.ndim == 2}
     if len(counts) > 1:
         raise StateError(

@@ -31,10 +31,10 @@ def asked_for(
     method: str,
     settings: dict[str, Any],
 ) -> Asked | None:
-    """Return by what a run's records are found again; None where they are not to be kept.
+    """Return the key by which a run's records are found again; None if they are not kept.
 
-    Kept are those of runs without torque or with damping, the same legs, and all else given as
-    plain numbers and names.
+    They are kept for runs without torque or with damping, the same legs, and plain numbers and
+    names otherwise.
     """
     acting: tuple[Any, ...] = ()
     if type(controller) is Damping:
@@ -56,10 +56,10 @@ def _plain(value: Any) -> bool:
 def taken(
     model: Model, asked: Asked | None, state: tuple[ArrayLike, ArrayLike]
 ) -> CompiledRun | None:
-    """Return a run that was asked for before, at its new start; None where none waits.
+    """Return a kept run for the same request, at its new start; None if there is none.
 
-    StateError where the start is wrong or behind the tail's stops, SimulationError where it is deep
-    in the ground.
+    StateError if the start is wrong or behind the tail's stops, SimulationError if it is deep in
+    the ground.
     """
     runs = None if asked is None else _waiting.get(model)
     if not runs or asked not in runs:

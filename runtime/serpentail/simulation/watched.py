@@ -1,4 +1,4 @@
-"""Tells a function of the user's what a run has come to, while it goes on."""
+"""Passes the samples of a run to a user's function while it is made."""
 
 import time
 from collections.abc import Callable
@@ -21,7 +21,7 @@ Watch = Callable[[Trajectory], object]
 
 
 def checked_watch(watch: Any, many: bool) -> Watch | None:
-    """Return what is to be called; SimulationError where that cannot be."""
+    """Return the function to call; SimulationError if it is wrong."""
     if watch is not None and not callable(watch):
         raise refusal("watch", watch, "a function of a Trajectory, or None", SimulationError)
     if watch is not None and many:
@@ -30,19 +30,19 @@ def checked_watch(watch: Any, many: bool) -> Watch | None:
 
 
 class Watched:
-    """A run that is watched: how many of its samples were told, and when."""
+    """A run that is watched: the number of samples passed on, and the time of the last call."""
 
     def __init__(self, watch: Watch, model: Model, ground: Ground):
         self.watch, self.model, self.ground = watch, model, ground
         self.seen, self.told = 0, -np.inf
 
     def look(self, done: int, part: Callable[[int], Samples]) -> None:
-        """Tell the samples from the first new one on, as ``part`` makes them, if it is time."""
+        """Pass on the new samples, which ``part`` makes, if it is time."""
         if done > self.seen and time.perf_counter() - self.told >= EVERY:
             self._tell(part(self.seen))
 
     def end(self, samples: Samples) -> None:
-        """Tell what is left of all samples, unless the user ended the run."""
+        """Pass on the remaining samples, unless the user ended the run."""
         if len(samples.t) > self.seen and isinstance(samples.failure, SimulationError | None):
             self._tell(rest(samples, self.seen))
 
@@ -58,7 +58,7 @@ class Watched:
 
 
 def rest(samples: Samples, first: int) -> Samples:
-    """Return samples from one on, as a part of a run: without its ledger, and what ended it."""
+    """Return samples from one on, as a part of a run, without its ledger and its failure."""
     arrays: dict[str, Any] = {
         name: getattr(samples, name)[first:] for name in ("t", "q", "v", "tau", "bristles")
     }

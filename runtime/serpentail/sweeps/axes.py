@@ -1,148 +1,179 @@
-"""What a sweep goes over: grids of values, and points at random or spread evenly."""
+"""The axes of a sweep together: which points they give."""
 
-import json
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any
 
 import numpy as np
 
-from ..checks import finite_array, one_of, refusal, shown
+from ..checks import needed, refusal, shown
 from ..errors import SweepError
-from ..units import MEASURES, in_unit
+from .axis import Grid, Spread, in_units
 
-LAWS = ("uniform", "log")
+MOST_POINTS = 10_000_000
+MOST_SEED = 2**63 - 1
+Point = dict[str, Any]  # name -> plain data
+
+
+def whole(field: str, value: Any, least: int, most: int) -> int:
+    """Return a whole number within bounds; SweepError otherwise."""
+    is_whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    if is_whole and least <= value <= most:
+        return int(value)
+    raise refusal(field, value, f"a whole number from {least} to {most}", SweepError)
 
 
 @dataclass(frozen=True)
-class Grid:
-    """Values that a sweep takes one after another."""
+class Axes:
+    """The axes of a sweep by their names; points, seed: of those that are spread."""
 
-    values: tuple[Any, ...]
+    grids: dict[tuple[str, ...], Grid]
+    spreads: dict[str, Spread]
+    points: int
+    seed: int
 
-    def measured(self, field: str, unit: str | Sequence[str] | None) -> "Grid":
-        """Return it with texts such as "2 g" as numbers in a unit, or in SI where it is None."""
-        return Grid(tuple(in_units(field, value, unit) for value in self.values))
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names that a point has, grids first."""
+        return (*(name for names in self.grids for name in names), *self.spreads)
 
+    def __len__(self) -> int:
+        return math.prod(len(each.values) for each in self.grids.values()) * self.points
 
-@dataclass(frozen=True)
-class Spread:
-    """Numbers between two bounds, of any shape; way: how points are spread in them; given: the
-    bounds as they were said.
-    """
+    def measured(self, units: Mapping[str, str | Sequence[str] | None]) -> "Axes":
+        """Return the axes with texts such as "2 g" as numbers, for the names that have a unit."""
+        grids = {names: _measured(names, axis, units) for names, axis in self.grids.items()}
+        spreads = {
+            name: axis.measured(f"over: {name}", units[name]) if name in units else axis
+            for name, axis in self.spreads.items()
+        }
+        return replace(self, grids=grids, spreads=spreads)
 
-    way: str
-    low: np.ndarray
-    high: np.ndarray
-    law: str
-    given: tuple[Any, Any]
+    def samples(self) -> dict[str, list]:
+        """Return the numbers of each random axis, one for each point."""
+        if not self.spreads:
+            return {}
+        sizes = [each.low.size for each in self.spreads.values()]
+        (way,) = {each.way for each in self.spreads.values()}
+        unit = _unit(way, self.points, sum(sizes), self.seed)
+        parts = np.split(unit, np.cumsum(sizes)[:-1], axis=1)
+        pairs = zip(self.spreads.items(), parts, strict=True)
+        return {name: each.at(part).tolist() for (name, each), part in pairs}
 
-    def measured(self, field: str, unit: str | Sequence[str] | None) -> "Spread":
-        """Return it with bounds such as "2 g" as numbers in a unit, or in SI where it is None."""
-        low, high = (in_units(field, bound, unit) for bound in self.given)
-        return replace(_spread(self.way, low, high, self.law), given=self.given)
-
-    def at(self, unit: np.ndarray) -> np.ndarray:
-        """Return the numbers (k, ...) at places (k, size) from 0 to 1 between the bounds."""
-        places = unit.reshape(-1, *self.low.shape)
-        if self.law == "log":
-            return np.exp(np.log(self.low) + places * (np.log(self.high) - np.log(self.low)))
-        return self.low + places * (self.high - self.low)
-
-
-def grid(values: Any) -> Grid:
-    """Return an axis of a sweep that takes each of these values: numbers, arrays, texts, tables.
-
-    Several grids give all their combinations.  A grid may belong to several names at once, as
-    ``over={("segments", "links"): st.grid([(1, 6), (2, 3)])}``: its values are then rows, one entry
-    a name.  Raises SweepError where there are none.
-    """
-    if isinstance(values, str | Mapping) or not hasattr(values, "__iter__"):
-        raise refusal("grid", values, "a list of values", SweepError)
-    found = tuple(plain("grid", value) for value in values)
-    if not found:
-        raise SweepError("grid: no values: needs one or more")
-    return Grid(found)
-
-
-def random(low: Any, high: Any, law: str = "uniform") -> Spread:
-    """Return an axis of independent random numbers between two bounds, numbers or arrays.
-
-    law: "uniform", or "log" for numbers above 0 whose logarithms are uniform.  How many points
-    there are, and their seed, is the sweep's to say: see ``sweep``.  All axes that are spread make
-    points together, and these are combined with all grids.  Raises SweepError.
-    """
-    return _spread("random", low, high, law)
+    def __iter__(self) -> Iterator[Point]:
+        """Yield the points: the last axis changes first, those that are spread together."""
+        samples = self.samples()
+        drawn: list[Point] = [
+            dict(zip(samples, each, strict=True)) for each in zip(*samples.values(), strict=True)
+        ] or [{}]
+        rows = [
+            [dict(zip(names, _entries(names, value), strict=True)) for value in each.values]
+            for names, each in self.grids.items()
+        ]
+        for chosen in product(*rows):
+            fixed: Point = {}
+            for part in chosen:
+                fixed |= part
+            for sample in drawn:
+                yield fixed | sample
 
 
-def latin(low: Any, high: Any, law: str = "uniform") -> Spread:
-    """Return an axis whose points are a Latin hypercube: each of k equal parts of it has one.
+def axes_of(over: Any, points: Any, seed: Any) -> Axes:
+    """Return the axes of a sweep; SweepError if one is wrong, or there are too many points."""
+    if not isinstance(over, Mapping) or not over:
+        needs = 'a table of axes by name, such as {"tail_mass": st.grid([0.002, 0.003])}'
+        raise refusal("over", over, needs, SweepError)
+    grids: dict[tuple[str, ...], Grid] = {}
+    spreads: dict[str, Spread] = {}
+    for names, axis in over.items():
+        key = _names(names)
+        if key in grids or key[0] in spreads:
+            raise SweepError(f"over: {key[0]!r} twice: needs one axis for each name")
+        if isinstance(axis, Grid):
+            for value in axis.values:
+                _entries(key, value)
+            grids[key] = axis
+        elif isinstance(axis, Spread) and len(key) == 1:
+            spreads[key[0]] = axis
+        else:
+            one = "st.grid(values), or st.random, st.latin or st.sobol (low, high)"
+            raise refusal(f"over[{names!r}]", axis, one if len(key) == 1 else "st.grid", SweepError)
+    return _checked(Axes(grids, spreads, *_numbers(spreads, points, seed)))
 
-    Arguments and errors as of ``random``; scipy.stats.qmc.LatinHypercube makes the points.
-    """
-    return _spread("latin", low, high, law)
+
+def _checked(axes: Axes) -> Axes:
+    """Return axes after checking their names, their kinds and the number of points."""
+    ways = {each.way for each in axes.spreads.values()}
+    if len(ways) > 1:
+        raise SweepError(
+            f"over: {' and '.join(sorted(ways))} together: needs one of them for all axes"
+        )
+    twice = {name for name in axes.names if axes.names.count(name) > 1}
+    if twice:
+        raise SweepError(f"over: {min(twice)!r} twice: needs one axis for each name")
+    if len(axes) > MOST_POINTS:
+        raise SweepError(
+            f"over: {len(axes)} points: needs at most {MOST_POINTS}: make several sweeps"
+        )
+    return axes
 
 
-def sobol(low: Any, high: Any, law: str = "uniform") -> Spread:
-    """Return an axis whose points are Sobol's, scrambled: even in all axes together.
-
-    Take a power of two of them.  Arguments and errors as of ``random``; scipy.stats.qmc.Sobol makes
-    the points.
-    """
-    return _spread("sobol", low, high, law)
-
-
-def _spread(way: str, low: Any, high: Any, law: str) -> Spread:
-    lows, highs = (
-        finite_array(f"{way}: {name}", in_units(f"{way}: {name}", x), SweepError)
-        for name, x in (("low", low), ("high", high))
+def _numbers(spreads: Mapping, points: Any, seed: Any) -> tuple[int, int]:
+    """Return the number of points of the random axes, 1 without any, and their seed."""
+    if not spreads and points is not None:
+        raise SweepError(
+            f"points: value {shown(points)}: no axis is random: leave it out, or give st.random, "
+            "st.latin or st.sobol"
+        )
+    if spreads and points is None:
+        raise SweepError("points: no value: needs the number of points of the random axes")
+    return (
+        whole("points", points, 1, MOST_POINTS) if spreads else 1,
+        whole("seed", seed, 0, MOST_SEED),
     )
-    one_of(f"{way}: law", law, LAWS, SweepError)
-    if lows.shape != highs.shape:
-        raise SweepError(
-            f"{way}: low is {lows.shape}, high is {highs.shape}: needs bounds of one shape"
-        )
-    if (lows > highs).any() or (law == "log" and (lows <= 0).any()):
-        least = "above 0 and " if law == "log" else ""
-        raise refusal(
-            f"{way}: low", low, f"numbers {least}not above high, {shown(high)}", SweepError
-        )
-    return Spread(way, lows, highs, law, (low, high))
 
 
-def plain(field: str, value: Any) -> Any:
-    """Return a value as JSON has it: numbers, texts, lists and tables."""
-    if isinstance(value, np.ndarray | np.generic):
-        value = value.tolist()
-    try:
-        return json.loads(json.dumps(value, allow_nan=False, default=_listed))
-    except (TypeError, ValueError) as reason:
-        raise SweepError(
-            f"{field}: value {shown(value)}: needs numbers, texts, lists or tables ({reason})"
-        ) from None
+def _names(names: Any) -> tuple[str, ...]:
+    """Return the names of an axis, given as a tuple or as a text with commas."""
+    key = tuple(part.strip() for part in names.split(",")) if isinstance(names, str) else names
+    if not isinstance(key, tuple) or not key or not all(isinstance(n, str) and n for n in key):
+        raise refusal("over", names, "a name, or several as a tuple", SweepError)
+    return key
 
 
-def in_units(field: str, value: Any, unit: str | Sequence[str] | None = None) -> Any:
-    """Return a value with each text such as "2 g", in lists too, as a number in a unit; None: in
-    SI, whatever it measures.
-    """
-    if unit is not None:
-        try:
-            return in_unit(value, unit)
-        except ValueError as reason:
-            raise SweepError(f"{field}: value {shown(value)}: {reason}") from None
-    if isinstance(value, list | tuple):
-        return [in_units(field, each) for each in value]
-    if not isinstance(value, str):
-        return value
-    for each in MEASURES:
-        with suppress(ValueError):
-            return in_unit(value, each)
-    raise refusal(field, value, "a unit that a scene may have, such as g, cm or deg", SweepError)
+def _measured(names: tuple[str, ...], axis: Grid, units: Mapping) -> Grid:
+    """Return a grid with numbers in the units of its names."""
+    if len(names) == 1:
+        return axis.measured(f"over: {names[0]}", units[names[0]]) if names[0] in units else axis
+    rows = [
+        [
+            in_units(f"over: {name}", value, units[name]) if name in units else value
+            for name, value in zip(names, row, strict=True)
+        ]
+        for row in axis.values
+    ]
+    return Grid(tuple(rows))
 
 
-def _listed(value: Any) -> Any:
-    if isinstance(value, np.ndarray | np.generic):
-        return value.tolist()
-    raise TypeError(f"{type(value).__name__} is none of these")
+def _entries(names: Sequence[str], value: Any) -> list:
+    """Return the values of one or several names at one place of a grid."""
+    if len(names) == 1:
+        return [value]
+    if not isinstance(value, list) or len(value) != len(names):
+        raise SweepError(needed(f"over: {', '.join(names)}", value, f"{len(names)} entries each"))
+    return value
+
+
+def _unit(way: str, points: int, size: int, seed: int) -> np.ndarray:
+    """Return points (points, size) from 0 to 1."""
+    if way == "random":
+        return np.random.default_rng(seed).random((points, size))
+    from scipy.stats import qmc
+
+    kind = {"latin": qmc.LatinHypercube, "sobol": qmc.Sobol}[way]
+    generator = kind(size, seed=np.random.default_rng(seed))
+    if way == "sobol":  # SciPy warns where points are no power of two: take some of one
+        return generator.random_base2(max(points - 1, 0).bit_length())[:points]
+    return generator.random(points)

@@ -1,5 +1,5 @@
-"""Models on their way: a hashed bundle of the generated folder, unpacked and compiled once a
-machine.
+"""Models that are sent to workers: a hashed bundle of the generated folder, unpacked and compiled
+once for each machine.
 """
 
 import io
@@ -13,8 +13,9 @@ from typing import Any
 from ..errors import SerpentailError
 from ..exporting.bundle import zipped
 from ..model.cache import MODELS, cache_folder, refuse_others, workshop
+from ..model.load import model_from
 from ..model.manifest import CheckedFolder, read_folder
-from ..model.model import Model, model_from
+from ..model.model import Model
 from ..model.snapshot import contents, snapshot
 from .job import Job
 
@@ -38,7 +39,7 @@ _models: OrderedDict[tuple[str, str], Model] = OrderedDict()
 
 
 def model_of(bundle: Bundle | None, job: Job) -> Model | None:
-    """Return the model of a bundle as a job has it, compiled where this machine has not yet."""
+    """Return the model of a bundle for a job, compiled if this machine has not yet done so."""
     if bundle is None:
         return None
     key = bundle.manifest_hash, job.identity()
@@ -51,7 +52,7 @@ def model_of(bundle: Bundle | None, job: Job) -> Model | None:
 
 
 def unpacked(bundle: Bundle) -> CheckedFolder:
-    """Return the folder of a bundle in this machine's cache, put there where it is missing."""
+    """Return the folder of a bundle in this machine's cache; unpack it if it is missing."""
     cache = cache_folder(None)
     place = cache / MODELS / bundle.manifest_hash
     with suppress(SerpentailError):

@@ -1,4 +1,4 @@
-"""A process that runs points: what hangs or crashes in it is ended with it, and nothing else is."""
+"""A process that runs points, so that a crash or a hang in a point ends this process only."""
 
 import importlib
 import os
@@ -20,7 +20,7 @@ from .runs import run_points
 def main(descriptor: int) -> None:
     """Run blocks that come through a socket, until it is closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the driver's to answer
-    os.dup2(2, 1)  # what functions print is no report of ours
+    os.dup2(2, 1)  # output of functions must not mix with reports
     link: Connection = Connection(descriptor)
     tasks: queue.SimpleQueue = queue.SimpleQueue()
     threading.Thread(target=_listen, args=(link, tasks), daemon=True).start()
@@ -43,7 +43,7 @@ def main(descriptor: int) -> None:
 
 
 def _listen(link: Connection, tasks: queue.SimpleQueue) -> None:
-    """Take what comes; end the process when nobody is there any more."""
+    """Receive tasks; end the process when the parent is gone."""
     try:
         while True:
             tasks.put(link.recv())

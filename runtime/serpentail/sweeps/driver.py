@@ -1,4 +1,4 @@
-"""Sends the points of a sweep as blocks of about a second, and writes what comes back."""
+"""Sends the points of a sweep in blocks of about one second, and writes their rows."""
 
 import time
 from collections import deque
@@ -10,10 +10,10 @@ from typing import Any, NamedTuple
 
 from ..errors import SweepError
 from ..stages import Stage
+from .axes import Point
 from .bundles import Bundle, model_of
 from .executors import Place, place_of
 from .job import Job
-from .points import Point
 from .runs import run_points
 from .store import Row, Store
 from .supervision import Block, Ran, run_block
@@ -23,7 +23,7 @@ GROWTH = 8  # times more points than in the block before
 MOST_IN_BLOCK = 20_000
 AHEAD = 2  # blocks a worker, so that none waits
 TRIES = 4  # of a block whose worker is gone
-LOOK_S = 0.2  # s between looks at blocks
+LOOK_S = 0.2  # s between checks of blocks
 HERE_S = 3.0  # s of work of flights that is not worth other processes
 
 
@@ -40,7 +40,7 @@ Work = tuple["Group", list[Task], int]  # points of a group, and how often they 
 
 @dataclass
 class Group:
-    """Points of one model that are still to be run; pace: seconds a point, where that is known."""
+    """Points of one model that are still to be run; pace: seconds for a point, if known."""
 
     bundle: Bundle | None
     job: Job
@@ -66,7 +66,7 @@ class Group:
 
 @dataclass
 class Spent:
-    """What a sweep took: seconds by the wall and of all workers, blocks, points, workers."""
+    """What a sweep took: elapsed seconds, seconds of all workers, blocks, points, workers."""
 
     wall_s: float = 0.0
     busy_s: float = 0.0
@@ -90,7 +90,7 @@ class Driver:
     spent: Spent = field(default_factory=Spent)
 
     def drive(self, executor: Any) -> Spent:
-        """Run all; NotWritten where rows cannot be kept, SweepError where no worker is left."""
+        """Run all points; NotWritten if rows cannot be written, SweepError if no worker is left."""
         begun = time.perf_counter()
         with Stage("sweep", self.name) as stage:
             self._tell(stage)
@@ -170,7 +170,7 @@ class Driver:
         return Block(jobs[id(group)], self.script, group.bundle, points, self.limit, together)
 
     def _result(self, future: Future, tries: int, place: Place) -> Ran | None:
-        """Return what came of a block; None where it is to be sent again."""
+        """Return the results of a block; None if it is to be sent again."""
         try:
             return future.result()
         except (Exception, CancelledError) as reason:  # whatever an executor loses work by
@@ -201,4 +201,6 @@ class Driver:
         stage.tell(self.done / self.total, f"{self.name}: {self.done} of {self.total}{failed}")
 
 
-GONE = "executor: its workers are gone: what was done is kept, and the same call goes on from there"
+GONE = (
+    "executor: its workers are gone: finished rows are kept, and the same call resumes from there"
+)

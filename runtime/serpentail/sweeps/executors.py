@@ -24,7 +24,7 @@ RETRIES = 3  # by Dask, of a task whose worker is gone
 
 @dataclass(frozen=True)
 class Place:
-    """Where blocks are run; workers: tells how many are at work now."""
+    """Where blocks are run; ``workers`` returns how many are at work now."""
 
     submit: Callable[..., Future]
     workers: Callable[[], int]
@@ -33,7 +33,7 @@ class Place:
 
 @contextmanager
 def place_of(executor: Any) -> Iterator[Place]:
-    """Lend what was asked for; SweepError where it is unknown, or not to be reached."""
+    """Provide the executor that was asked for; SweepError if it is unknown or not reachable."""
     if executor is None:
         executor = "processes"
     if isinstance(executor, str):
@@ -63,7 +63,7 @@ def place_of(executor: Any) -> Iterator[Place]:
 
 @contextmanager
 def _processes(count: int) -> Iterator[Place]:
-    """Threads, each of which looks after a process."""
+    """Threads, each of which controls one process."""
     pool: Executor = ThreadPoolExecutor(count, "serpentail-sweep")
     try:
         yield Place(pool.submit, lambda: count)
@@ -74,7 +74,7 @@ def _processes(count: int) -> Iterator[Place]:
 
 @contextmanager
 def _dask(address: str) -> Iterator[Place]:
-    """Dask's workers: of a cluster on this machine, or where a scheduler or its file says."""
+    """Dask's workers: of a cluster on this machine, or of a scheduler's address or file."""
     distributed = needed("distributed", "dask")
     if address:
         where: dict[str, Any] = {"address": address}

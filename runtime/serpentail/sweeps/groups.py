@@ -19,11 +19,11 @@ from ..scenes.keys import Key, read
 from ..scenes.overrides import changed
 from ..scenes.plan_keys import PLAN
 from ..scenes.simulate_keys import SIMULATE
+from .axes import Axes, Point
 from .bundles import Bundle
 from .driver import Group, Task
 from .job import DATA, STARTS, Job
 from .measures import Units, unit_at, units_of
-from .points import Axes, Point
 from .recordings import digest_of
 from .store import as_json
 
@@ -37,7 +37,7 @@ NEEDED = {  # of a run of a model: settings, and what they are
     "plan": (STARTS, "where a motion starts"),
     "identify": ((DATA, "markers"), "tracks, and where the markers are"),
 }
-NO_SHAPE = "a model is of one shape: give the sweep a scene, or a function without a model"
+NO_SHAPE = "the shape of a model is fixed: give the sweep a scene, or a function without a model"
 
 
 @dataclass(frozen=True)
@@ -52,11 +52,12 @@ class Entry:
 
 
 def entries_of(what: Any, axes: Axes, job: Job, of: Any) -> tuple[Axes, list[Entry]]:
-    """Return the axes, their numbers in SI, and all points with their keys, in order; SweepError
-    where two are the same.
+    """Return the axes, with numbers in SI, and all points with their keys, in order.
 
-    what: a model, a scene's path or example, or None for a function of points alone.  of: what
-    rows depend on besides.
+    SweepError if two points are the same.
+
+    what: a model, a scene's path or example, or None for a function of points alone. of: what else
+    rows depend on.
     """
     if isinstance(what, Model):
         find, units = _of_model(what, axes, job)
@@ -74,15 +75,13 @@ def entries_of(what: Any, axes: Axes, job: Job, of: Any) -> tuple[Axes, list[Ent
             told += digest_of(own, point)
         key = hashlib.sha256(f"{told}\n{besides}\n{text}".encode()).hexdigest()[:32]
         if key in found:
-            raise SweepError(
-                f"over: point {number} is there twice, {shown(point)}: needs each once"
-            )
+            raise SweepError(f"over: point {number} occurs twice, {shown(point)}: needs each once")
         found[key] = Entry(key, text, point, own, bundle)
     return axes, list(found.values())
 
 
 def groups_of(entries: list[Entry], done: Mapping[str, bool]) -> list[Group]:
-    """Return what is still to be run, by model."""
+    """Return the points that are still to be run, by model."""
     groups: dict[tuple[str, int], Group] = {}
     for each in entries:
         if each.key in done:
@@ -93,7 +92,7 @@ def groups_of(entries: list[Entry], done: Mapping[str, bool]) -> list[Group]:
     return list(groups.values())
 
 
-Find = Callable[[Point], tuple[Job, Bundle | None, str]]  # job, model, and what the key is of
+Find = Callable[[Point], tuple[Job, Bundle | None, str]]  # job, model, and what the key is made of
 
 
 def _without_model(job: Job) -> Find:
@@ -131,7 +130,7 @@ def _of_model(model: Model, axes: Axes, job: Job) -> tuple[Find, Units]:
 
 
 def _of_scene(scene: Any, axes: Axes, job: Job) -> tuple[Find, Units]:
-    """Points that change parameters, what the model is made of, or keys of the scene's table."""
+    """Return points that change parameters, keys of the model, or keys of the scene's table."""
     tables, path = read_scene(scene, SweepError)
     first = next(iter(axes))
     shape = [name for name in axes.names if name in MADE_OF]
@@ -151,7 +150,7 @@ def _of_scene(scene: Any, axes: Axes, job: Job) -> tuple[Find, Units]:
             raise SweepError(f"over: no {DATA}: needs files of marker tracks, here or in settings")
         keys += [DATA] if DATA in axes.names else []
 
-    # which of the others are parameters, and which of these there is other code for
+    # which other names are parameters, and which of these need other code
     others = [name for name in axes.names if name not in {*keys, *shape}]
     made = tables | {name: first[name] for name in shape}
     checked, left = built(made, path.stem, {name: first[name] for name in others})
@@ -186,7 +185,7 @@ def _of_scene(scene: Any, axes: Axes, job: Job) -> tuple[Find, Units]:
 
 
 def _refuse_keys(job: Job, values: Mapping[str, Any]) -> None:
-    """SweepError where a key of the table is unknown, before a model is built."""
+    """SweepError for an unknown key of the table, before a model is built."""
     assert isinstance(job.run, str) and job.table is not None
     refused = Refusals(SweepError)
     read(changed(job.table, values), TABLES[job.run][0], job.run, refused)
@@ -194,7 +193,7 @@ def _refuse_keys(job: Job, values: Mapping[str, Any]) -> None:
 
 
 def _refuse_unknown(names: list[str], run: str, known: Collection[str]) -> None:
-    """SweepError where there is a name that is neither a parameter nor a key of the table."""
+    """SweepError for a name that is neither a parameter nor a key of the table."""
     for name in names:
         near = did_you_mean(name.split(".")[0], [*known, *MADE_OF, *TABLES[run][0].keys])
         remedy = near or f"the parameters are {', '.join(sorted(known))}"

@@ -7,8 +7,8 @@ from ..model.model import Model
 from ..scenes.file import size_of
 from ..scenes.identify import identify_arguments
 from ..scenes.overrides import changed
+from .axes import Point
 from .job import DATA, Job
-from .points import Point
 from .recordings import recordings
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""What each point of a sweep is run as: plain data that travels to where it is run."""
+"""The job of a sweep: plain data that is sent to the processes that run points."""
 
 import hashlib
 import pickle
@@ -9,7 +9,7 @@ from typing import Any
 
 from ..checks import shown
 from ..errors import SweepError
-from .points import Point
+from .axes import Point
 from .store import as_json
 
 RUNS = ("simulate", "plan", "identify")
@@ -22,12 +22,10 @@ NOTHING: Mapping[str, Any] = {}
 class Job:
     """What is run: one of RUNS, or a function of a model and a point, or of a point alone.
 
-    settings: of st.simulate, st.plan or st.identify.  outputs: names of what a simulation is asked
-    for.
-    table, phases, parent: of a scene, which is where files that it names are; a model has no table,
-    and its files are where the sweep was called.
-    built: names that the model was built with.  keys: names of keys of the table.
-    parameters: of a model that was given, and its profile.
+    settings: of st.simulate, st.plan or st.identify. outputs: names of a simulation's outputs.
+    table, phases, parent: of a scene; a model has no table. parent is the folder of the files that
+    are named: the scene's, or the one where the sweep was called. built: names that the model was
+    built with. keys: names of keys of the table. parameters, profile: of a model that was given.
     """
 
     run: str | Callable[..., Any]
@@ -51,7 +49,7 @@ class Job:
         return {name: value for name, value in point.items() if name in self.keys}
 
     def pickled(self) -> bytes:
-        """Return it as bytes; SweepError where a part of it cannot travel."""
+        """Return it as bytes; SweepError if a part of it cannot be pickled."""
         try:
             return pickle.dumps(self)
         except Exception as reason:  # whatever a part of it raises
@@ -61,7 +59,7 @@ class Job:
             ) from None
 
     def identity(self) -> str:
-        """Return what rows depend on besides model and point."""
+        """Return what rows depend on besides the model and the point."""
         told = {
             "run": _named(self.run),
             "settings": _identified(self.settings),
@@ -75,7 +73,7 @@ class Job:
 
 
 def _named(run: Any) -> Any:
-    """Return what a run is called; of a partial function, with what it was given."""
+    """Return the name of a run; of a partial function, with its arguments."""
     if isinstance(run, str):
         return run
     if isinstance(run, partial):

@@ -7,8 +7,8 @@ from typing import Any
 
 from ..checks import shown
 from ..errors import SweepError
+from .axes import Point
 from .job import DATA, Job
-from .points import Point
 
 
 def recordings(job: Job, point: Point) -> list[Any]:

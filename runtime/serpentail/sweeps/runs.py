@@ -19,8 +19,8 @@ from ..scenes.simulate import Scenario, scenario_of
 from ..simulation.controllers import Damping, TorqueCurve, TorqueTable
 from ..simulation.rollouts import Rollouts
 from ..simulation.simulate import simulate
+from .axes import Point
 from .job import STARTS, Job
-from .points import Point
 
 ENDS = ("end_s", "q_end", "v_end", "kinetic_end_J", "potential_end_J")  # outputs by default
 OUTPUTS = (*ENDS, *(number.name for number in NUMBERS))
@@ -30,7 +30,7 @@ SHARED = (type(None), Damping, TorqueTable, TorqueCurve)  # controllers that any
 
 
 class Told(NamedTuple):
-    """What came of a point: its place in the block, outcome (JSON) or error, seconds."""
+    """Result of a point: its place in the block, outcome (JSON) or error, seconds."""
 
     place: int
     outcome: str | None
@@ -39,12 +39,12 @@ class Told(NamedTuple):
 
 
 def run_points(job: Job, model: Model | None, points: Sequence[Point]) -> Iterator[list[Told]]:
-    """Yield what came of points, in their order: one at a time, or of all at once."""
+    """Yield the results of points, in their order: one at a time, or all at once."""
     if len(points) >= FEW and model is not None and job.run == "simulate":
         begun = time.perf_counter()
         try:
             found = _side_by_side(job, model, points)
-        except SerpentailError:  # of one of them: which, each tells by itself
+        except SerpentailError:  # about one of them; running them one by one shows which
             found = None
         if found is not None:
             each = (time.perf_counter() - begun) / len(points)
@@ -60,9 +60,7 @@ def run_points(job: Job, model: Model | None, points: Sequence[Point]) -> Iterat
 
 
 def run_point(job: Job, model: Model | None, point: Point) -> tuple[dict[str, Any], Any]:
-    """Return the outcome of a point, and what has a page: its motion, plan or identification; None
-    without.
-    """
+    """Return the outcome of a point, and its motion, plan or other object with a page, or None."""
     if job.run == "simulate":
         assert model is not None
         motion = _simulated(job, model, point)
@@ -122,7 +120,7 @@ def _scenario(job: Job, model: Model, point: Point) -> Scenario:
 def _side_by_side(
     job: Job, model: Model, points: Sequence[Point]
 ) -> list[tuple[str | None, str | None]] | None:
-    """Return outcomes and errors of flights that differ in parameters and starts alone; None where
+    """Return outcomes and errors of flights that differ in parameters and starts alone; None if
     these differ in more.
     """
     parameters = [job.own_parameters(point) for point in points]
@@ -137,7 +135,7 @@ def _side_by_side(
             name: [p[name] for p in points] if name in job.keys else fixed.pop(name)
             for name in STARTS
         }
-        if not job.keys:  # a row a run tells that they are many
+        if not job.keys:  # one row for each run, because they are many
             both["q0"] = np.broadcast_to(both["q0"], (len(points), model.nq))
         fixed |= _samples(job, fixed, fixed.get("t_span", (0.0, 1.0)))
         found = simulate(model, both["q0"], both["v0"], parameters=runs, **fixed)
@@ -163,7 +161,7 @@ def _side_by_side(
 
 
 def _samples(job: Job, settings: dict[str, Any], t_span: Any) -> dict[str, Any]:
-    """Return the setting by which only ends are sampled, where nothing else is asked for."""
+    """Return the setting to sample only the ends, if the outputs need no more."""
     ends = np.asarray(t_span, float)
     if (
         "output_step" in settings
@@ -207,15 +205,15 @@ def outcome_of(motion: Trajectory, outputs: Sequence[str]) -> dict[str, Any]:
 
 
 def as_text(outcome: dict[str, Any]) -> str:
-    """Return an outcome as JSON; SweepError where it is not plain data."""
+    """Return an outcome as JSON; SweepError if it is not plain data."""
     try:
         return json.dumps(_ready(outcome), allow_nan=False)
     except (TypeError, ValueError) as reason:
-        raise SweepError(f"run: its outcome is no plain data ({reason})") from None
+        raise SweepError(f"run: its outcome is not plain data ({reason})") from None
 
 
 def _ready(value: Any) -> Any:
-    """Return a value as JSON has it: None for what no number holds."""
+    """Return a value for JSON: None for a number that is not finite."""
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
     if isinstance(value, dict):
@@ -226,5 +224,5 @@ def _ready(value: Any) -> Any:
 
 
 def error_text(reason: BaseException) -> str:
-    """Return what a row tells of a failure."""
+    """Return the text of a failure in a row."""
     return f"{type(reason).__name__}: {reason}"[:MOST_TEXT]

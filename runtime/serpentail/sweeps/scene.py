@@ -8,7 +8,7 @@ from ..checks import Refusals, none_of, refusal, shown
 from ..errors import SweepError
 from ..scenes.file import read_scene, subtable
 from ..scenes.sweep_keys import SWEEP
-from .axes import Grid, Spread, grid, latin, random, sobol
+from .axis import Grid, Spread, grid, latin, random, sobol
 from .job import RUNS
 
 WAYS = {"random": random, "latin": latin, "sobol": sobol}
@@ -16,10 +16,9 @@ AXIS = ("grid", *WAYS, "law")
 
 
 def arguments_of(path: str) -> dict[str, Any]:
-    """Return the arguments of ``sweep`` that the table [sweep] of a scene file has.
+    """Return the arguments of ``sweep`` from the table [sweep] of a scene file.
 
-    Its store is beside the file unless it says where; SweepError has a line for each key that is
-    wrong.
+    By default its store is next to the file. SweepError has a line for each wrong key.
     """
     tables, place = read_scene(path, SweepError)
     table = subtable(tables, "sweep", place, SweepError)

@@ -1,4 +1,4 @@
-"""The rows of a sweep in a file of SQLite: each once, by a key made of all that it depends on."""
+"""The rows of a sweep in an SQLite file; each has a key made of all that it depends on."""
 
 import json
 import sqlite3
@@ -23,7 +23,7 @@ IN_ONE_QUERY = 500
 
 
 class Row(NamedTuple):
-    """What a point came to: its outcome, or the error in place of it; seconds that it took."""
+    """Result of a point: its outcome, or the error in place of it; seconds that it took."""
 
     key: str
     point: str  # JSON
@@ -33,9 +33,9 @@ class Row(NamedTuple):
 
 
 class Store:
-    """Rows in a file, or in memory where the path is None.
+    """Rows in a file, or in memory if the path is None.
 
-    One process writes at a time, any number may read.  A row that is there stays.
+    One process writes at a time, any number may read. An existing row is never replaced.
     """
 
     def __init__(self, path: str | PathLike[str] | None):
@@ -47,7 +47,7 @@ class Store:
             except OSError as reason:
                 raise SweepError(f"store: {reason}: name another file") from None
         with self._told():
-            # blocks are finished in any thread, of which one at a time writes
+            # blocks finish in any thread, but one thread at a time writes
             self.base = sqlite3.connect(self.path or ":memory:", check_same_thread=False)
             (found,) = self.base.execute("pragma application_id").fetchone()
             (tables,) = self.base.execute("select count(*) from sqlite_master").fetchone()
@@ -65,7 +65,7 @@ class Store:
 
     @contextmanager
     def writing(self) -> Iterator[None]:
-        """Be the one process that writes; SweepError where another is."""
+        """Be the one process that writes; SweepError if another is."""
         if self.path is None:
             yield
             return
@@ -75,12 +75,12 @@ class Store:
                 yield
         except Timeout:
             raise SweepError(
-                f"store: another process writes {self.path}: wait for its end, look with --status, "
-                "or name another file"
+                f"store: another process is writing {self.path}: wait for its end, look with "
+                "--status, or name another file"
             ) from None
 
     def add(self, rows: Iterable[Row]) -> None:
-        """Write rows, all or none of them; NotWritten where the disk refuses."""
+        """Write rows, all or none of them; NotWritten if the disk refuses."""
         with self._told(), self.base:
             self.base.executemany(INSERT, rows)
 
@@ -102,26 +102,26 @@ class Store:
         return found
 
     def forget(self, keys: Iterable[str]) -> None:
-        """Delete rows, which are then made anew."""
+        """Delete rows, so that they are made again."""
         with self._told(), self.base:
             self.base.executemany("delete from rows where key = ?", [(key,) for key in keys])
 
     def close(self) -> None:
-        """Close the file; what waits beside it is put into it."""
+        """Close the file, after writing SQLite's log into it."""
         self.base.close()
 
     @contextmanager
     def _told(self) -> Iterator[None]:
-        """Tell what the system refuses in one line."""
+        """Turn errors of SQLite into one line."""
         try:
             yield
         except sqlite3.DatabaseError as reason:
             name = getattr(reason, "sqlite_errorname", "")
             if name == "SQLITE_NOTADB":
-                raise SweepError(f"store: {self.path} is no store: name another file") from None
+                raise SweepError(f"store: {self.path} is not a store: name another file") from None
             raise NotWritten(
                 f"store: {self.path} is not written ({reason}): make room, or mend the disk; its "
-                "rows are whole, and the same call goes on from them"
+                "rows are intact, and the same call resumes from them"
             ) from reason
 
 

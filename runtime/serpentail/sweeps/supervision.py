@@ -1,4 +1,4 @@
-"""Runs blocks of points in processes of their own, and outlives what happens to these."""
+"""Runs blocks of points in processes of their own, and survives crashes of these."""
 
 import atexit
 import os
@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 
 from ..errors import SweepError
 from ..model.cores import VARIABLE
+from .axes import Point
 from .bundles import Bundle
-from .points import Point
 from .runs import Told
 
 TRIES = 2  # of a point whose process ends: something else may have ended it
@@ -26,9 +26,9 @@ TRIES = 2  # of a point whose process ends: something else may have ended it
 class Block:
     """Points of one model that are sent as one task.
 
-    job: pickled; script: the driver's main program, None where the job needs none of its names;
+    job: pickled; script: the driver's main program, None if the job needs none of its names;
     limit: seconds that a point may take, None: no limit; together: whether points may be run side
-    by side, and told of all at once.
+    by side, with all results at once.
     """
 
     job: bytes
@@ -61,7 +61,7 @@ class Child:
         self.link: Connection[Any, Any] = here
 
     def end(self) -> int:
-        """End the process, whatever it does; return its status."""
+        """End the process in any case; return its status."""
         self.process.kill()
         self.link.close()
         return self.process.wait()
@@ -74,9 +74,9 @@ _ending = threading.Event()  # while all are ended, and no new one is to begin
 
 
 def run_block(block: Block) -> Ran:
-    """Run a block: each of its points is told of, whatever becomes of the process that runs it.
+    """Run a block; every point gets a result, whatever happens to the process that runs it.
 
-    A point that takes longer than the limit fails; so does one in which the process ends twice.
+    A point fails if it takes longer than the limit, or if the process ends twice while it runs.
     """
     told: dict[int, Told] = {}
     ended: dict[int, int] = {}
@@ -109,7 +109,7 @@ TOO_LONG, GONE = object(), object()
 
 
 class Found(NamedTuple):
-    """What a process told; trouble: None, TOO_LONG, GONE, or a refusal in words."""
+    """What a process sent; trouble: None, TOO_LONG, GONE, or a refusal in words."""
 
     told: list[Told]
     trouble: Any
@@ -204,7 +204,7 @@ def ending() -> Iterator[None]:
 
 
 def _forget() -> None:
-    """Leave to the parent of a forked process what is the parent's."""
+    """Leave the parent's resources to the parent in a forked process."""
     global _lock  # noqa: PLW0603 - another thread of the parent may hold it
     _lock = threading.Lock()
     _all.clear()

@@ -1,142 +1,24 @@
-"""`sweep` makes many runs, keeps each as a row of a store, and goes on where it was stopped."""
+"""``sweep``: makes many runs, keeps each as a row of a store, and resumes where it was stopped."""
 
-import json
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from functools import partial
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from ..brief import brief
 from ..checks import none_of, number, refusal, shown
 from ..errors import SweepError
 from ..model.model import Model
-from .axes import Grid, Spread, plain
+from .axes import axes_of
+from .axis import Grid, Spread, plain
 from .driver import Driver, Spent
-from .groups import Entry, entries_of, groups_of
+from .groups import entries_of, groups_of
 from .job import RUNS, STARTS, Job
-from .points import Axes, axes_of
-from .store import Row, Store
-
-if TYPE_CHECKING:
-    import pandas
-    import xarray
+from .result import Sweep
+from .store import Store
 
 WITHOUT = ("watch", "threads", "parameters")  # settings of a run that a sweep has itself
-
-
-@dataclass(frozen=True)
-class Status:
-    """How far a sweep is: points in all, of these with rows, and those whose run failed."""
-
-    points: int
-    done: int
-    failed: int
-
-    def __str__(self) -> str:
-        left = self.points - self.done
-        return (
-            f"{self.done} of {self.points} points done, {self.failed} of them failed, {left} left"
-        )
-
-
-@dataclass(frozen=True, eq=False)
-class Sweep:
-    """The rows of a sweep: ``sweep[k]`` is that of point k, a dict of its values and outputs.
-
-    spent: what this call took: wall_s and busy_s (of all workers) in s, blocks, points, workers.
-    """
-
-    axes: Axes = field(repr=False)
-    entries: Sequence[Entry] = field(repr=False)
-    store: Store = field(repr=False)
-    spent: Spent
-    __repr__ = brief
-
-    def __len__(self) -> int:
-        return len(self.entries)
-
-    def __getitem__(self, k: int) -> dict[str, Any]:
-        """Return the row of point k; KeyError where it has none yet."""
-        entry = self.entries[range(len(self))[k]]
-        found = self.store.rows([entry.key])
-        if not found:
-            raise KeyError(f"point {k} has no row yet")
-        return row_of(k, entry, found[entry.key])
-
-    def rows(self) -> list[dict[str, Any]]:
-        """Return all rows that there are, by their points' order.
-
-        Each has number, the point's values, the run's outputs, error (None where it went well) and
-        seconds (s).
-        """
-        found = self.store.rows(entry.key for entry in self.entries)
-        return [
-            row_of(k, entry, found[entry.key])
-            for k, entry in enumerate(self.entries)
-            if entry.key in found
-        ]
-
-    def status(self) -> Status:
-        """Return how far it is, as the store tells now."""
-        known = self.store.known(entry.key for entry in self.entries)
-        return Status(len(self), len(known), sum(not good for good in known.values()))
-
-    def motion(self, k: int) -> Any:
-        """Return the Trajectory, Plan or Identification of point k, run again; of a function, its
-        "motion".
-
-        Raises what the run raises, SweepError where a function has no motion.
-        """
-        from .bundles import model_of
-        from .runs import run_point
-
-        entry = self.entries[range(len(self))[k]]
-        _, motion = run_point(entry.job, model_of(entry.bundle, entry.job), entry.point)
-        if motion is None:
-            raise SweepError(
-                f"point {k}: its run returned no motion: let the function return it as "
-                '"motion", besides its outputs'
-            )
-        return motion
-
-    def view(self, k: int, path: str | PathLike[str] = "run.html") -> Path:
-        """Write the page of point k, whose motion is made again; return its path."""
-        page: Path = self.motion(k).view(path)
-        return page
-
-    def to_pandas(self) -> "pandas.DataFrame":
-        """Return the rows as a table, a row a point; ExtraMissing without pandas."""
-        from .tables import frame
-
-        return frame(self.rows())
-
-    def to_xarray(self) -> "xarray.Dataset":
-        """Return the rows as a dataset: a dimension for each grid, "sample" for what is spread.
-
-        Points without a row, and failed ones, are NaN.  ExtraMissing without xarray.
-        """
-        from .tables import dataset
-
-        return dataset(self.axes, len(self), self.rows())
-
-    def save(self, path: str | PathLike[str]) -> Path:
-        """Write the rows to a .parquet, .csv or .nc file, whole or not at all; return its path.
-
-        Raises SweepError (another ending), ExtraMissing, NotWritten.
-        """
-        from .tables import write
-
-        return write(self, path)
-
-
-def row_of(k: int, entry: Entry, row: Row) -> dict[str, Any]:
-    """Return a row as a dict."""
-    outcome = {} if row.outcome is None else json.loads(row.outcome)
-    told = {"error": row.error, "seconds": row.seconds}
-    return {"number": k} | entry.point | outcome | told
 
 
 def sweep(  # noqa: PLR0913 - the public face names all that it takes
@@ -154,29 +36,67 @@ def sweep(  # noqa: PLR0913 - the public face names all that it takes
     of: Any = None,
     retry_failed: bool = False,
 ) -> Sweep:
-    """Run a model at many points, keep a row of each, and go on where a call was stopped.
+    """Run a model at many points; keep a row of each, and resume where a call was stopped.
 
-    model: a model, or a scene file or an example's name, or None for a function of points alone.
-    over: axes by name, see ``grid``, ``random``, ``latin``, ``sobol``: of parameters; of a scene
-    also keys of its table, such as "start.pitch" or "duration", and what its model is made of, such
-    as "segments" and "links"; of a model also "q0", "v0" and settings.  points, seed: of the axes
-    that are spread.
-    run: "simulate", "plan", "identify", or a function of a module, f(model, point) or f(point) ->
-    dict of plain data, to which it may add its Trajectory or Plan as "motion", for pages.
-    settings: what else ``simulate``, ``plan`` or ``identify`` is to take, "q0" and "v0", or "data"
-    and "markers", of a model included.
-    outputs: of "simulate": "end_s", "q_end", "v_end", "kinetic_end_J", "potential_end_J", which are
-    the default, and names of ``st.summary``; plans and identifications have their report.
-    store: a file of SQLite on a local disk; None: in memory.  A row is known by the hash of model,
-    run and point: a second call runs what is missing, and ``retry_failed`` what failed.
-    limit: s that a point may take; it then fails, as one does that raises or whose process ends.
-    executor: None, "processes", "processes:4", "dask" (a cluster on this machine), "dask:ADDRESS",
-    "dask:FILE.json", or an executor of concurrent.futures.  Blocks of about a second are sent to
-    it.  With None, flights without a limit run in this process for the first 3 s.
-    of: plain data that a function's rows depend on besides, such as its version.
+    Parameters
+    ----------
+    model : Model, str, path or None
+        A model; a scene file or an example's name; None for a function of points alone.
+    over : mapping
+        Axes by name; see ``grid``, ``random``, ``latin``, ``sobol``. A name is a parameter; with
+        a scene also a key of its table, such as "start.pitch" or "duration", or of its model,
+        such as "segments" and "links"; with a model also "q0", "v0" or a setting.
+    run : {"simulate", "plan", "identify"} or callable, default "simulate"
+        What to run. A function f(model, point) or f(point) of a module returns a dict of plain
+        data. It may add its Trajectory or Plan as "motion", for pages.
+    store : str or path, optional
+        SQLite file on a local disk. Default: in memory. A row is identified by a hash of model,
+        run and point, so a second call runs only what is missing.
+    points : int, optional
+        Number of points of the axes made by ``random``, ``latin`` or ``sobol``.
+    seed : int, default 0
+        Seed of these points.
+    settings : mapping, optional
+        Further arguments of ``simulate``, ``plan`` or ``identify``. With a model they include
+        "q0" and "v0", or "data" (files of marker tracks) and "markers".
+    outputs : sequence of str, optional
+        Outputs of "simulate": "end_s", "q_end", "v_end", "kinetic_end_J", "potential_end_J"
+        (together the default), or names of ``summary``. The outputs of "plan" and "identify" are
+        their reports.
+    limit : float, optional
+        Time that a point may take (s). A point fails if it takes longer, if its run raises an
+        error, or if its process ends.
+    executor : str or concurrent.futures.Executor, optional
+        Where the points run: "processes", "processes:4", "dask" (a cluster on this machine),
+        "dask:ADDRESS", "dask:FILE.json", or an executor. They are sent in blocks of about one
+        second of work. Default: worker processes, but flights without a limit run in this
+        process for the first 3 s.
+    of : plain data, optional
+        What else the rows of a function depend on, such as its version.
+    retry_failed : bool, default False
+        Whether to run failed points again.
 
-    Raises SweepError (what cannot be, workers that are gone), NotWritten (a full disk), ModelError,
-    ExtraMissing.  All but failures of single points, which are rows.
+    Returns
+    -------
+    Sweep
+        The rows.
+
+    Raises
+    ------
+    SweepError
+        An argument is wrong, or the worker processes are gone.
+    NotWritten
+        The store cannot be written.
+    ModelError, ExtraMissing
+        A model cannot be made, or a library is not installed. Failures of single points do not
+        raise errors; they are rows.
+
+    Examples
+    --------
+    >>> import serpentail as st
+    >>> over = {"tail_mass": st.grid(["2 g", "3 g"]), "start.pitch": st.random(-1.0, 1.0)}
+    >>> sweep = st.sweep("kick", over, points=8, store="kick.db")  # doctest: +SKIP
+    >>> sweep.to_pandas()  # doctest: +SKIP
     """
     found = _posed(model, over, run, (points, seed, settings, outputs, of), store)
     limit = None if limit is None else number("limit", limit, SweepError, above=0)
@@ -203,14 +123,14 @@ def sweep(  # noqa: PLR0913 - the public face names all that it takes
 
 
 def posed(model: Any, over: Any, run: Any, store: Any, **rest: Any) -> Sweep:
-    """Return the rows that a store has of a sweep, and run nothing."""
+    """Return the rows that a store has of a sweep; run nothing."""
     names = ("points", "seed", "settings", "outputs", "of")
     given = {"seed": 0} | rest
     return _posed(model, over, run, tuple(given.get(name) for name in names), store)
 
 
 def _posed(model: Any, over: Any, run: Any, rest: tuple, store: Any) -> Sweep:
-    """Return a sweep whose points are checked, on its store."""
+    """Return a sweep with checked points and its store."""
     points, seed, settings, outputs, of = rest
     if isinstance(run, str):
         wrong = none_of("run", run, RUNS)
@@ -219,7 +139,7 @@ def _posed(model: Any, over: Any, run: Any, rest: tuple, store: Any) -> Sweep:
     axes = axes_of(over, points, seed)
     own = _settings(settings, run)
     job = Job(run, own, _outputs(outputs, run))
-    job.identity()  # refuses functions that nobody else could find
+    job.identity()  # refuses functions that other processes cannot import
     job.pickled()
     axes, entries = entries_of(model, axes, job, plain("of", of))
     return Sweep(axes, entries, Store(store), Spent())
@@ -231,12 +151,10 @@ def _settings(settings: Any, run: Any) -> dict[str, Any]:
         raise refusal("settings", settings, "a table of arguments by name", SweepError)
     own = dict(settings or {})
     if own and not isinstance(run, str):
-        raise SweepError(
-            "settings: a function takes none: give it what it needs by functools.partial"
-        )
+        raise SweepError("settings: a function has none: pass what it needs by functools.partial")
     for name in WITHOUT:
         if name in own:
-            raise SweepError(f"settings: {name}: the sweep's own to give: leave it out")
+            raise SweepError(f"settings: {name}: is set by the sweep: leave it out")
     for name in STARTS:
         if name in own:
             own[name] = plain(f"settings: {name}", own[name])
@@ -244,13 +162,13 @@ def _settings(settings: Any, run: Any) -> dict[str, Any]:
 
 
 def _outputs(outputs: Any, run: Any) -> tuple[str, ...]:
-    """Return the names of what a simulation is asked for."""
+    """Return the names of the outputs of a simulation; none for other runs."""
     from .runs import ENDS, OUTPUTS
 
     if run != "simulate":
         if outputs is not None:
             raise SweepError(
-                f"outputs: value {shown(outputs)}: only simulations choose: leave it out"
+                f"outputs: value {shown(outputs)}: only run='simulate' has a choice: leave it out"
             )
         return ()
     if outputs is None:
@@ -272,7 +190,7 @@ def _function(run: Any) -> str:
 
 
 def _script(data: bytes) -> str | None:
-    """Return the main program where a pickled job has functions of it, else None."""
+    """Return the path of the main program if a pickled job has functions of it, else None."""
     if b"__main__" not in data:
         return None
     script = getattr(sys.modules["__main__"], "__file__", None)

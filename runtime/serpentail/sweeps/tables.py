@@ -13,13 +13,13 @@ from ..checks import shown
 from ..errors import SweepError
 from ..extras import needed
 from ..files import refuse_unwritable, replacing
-from .points import Axes
+from .axes import Axes
 
 if TYPE_CHECKING:
     import pandas
     import xarray
 
-    from .sweep import Sweep
+    from .result import Sweep
 
 ENDINGS = (".parquet", ".csv", ".nc")
 SAMPLE = "sample"
@@ -27,7 +27,7 @@ Rows = list[dict[str, Any]]
 
 
 def checked(path: str | PathLike[str]) -> Path:
-    """Return the path of a file of rows; SweepError where it cannot be one."""
+    """Return the path of a file of rows; SweepError if its suffix is wrong."""
     target = Path(path)
     if target.suffix not in ENDINGS:
         raise SweepError(
@@ -62,7 +62,7 @@ def write(sweep: "Sweep", path: str | PathLike[str]) -> Path:
 
 
 def _write_csv(rows: Rows, path: Path) -> None:
-    """Write a line a row; numbers have all their digits, what there is not is empty."""
+    """Write one line for each row; numbers have all their digits, missing values are empty."""
     found = [flat(row) for row in rows]
     names = list(dict.fromkeys(name for row in found for name in row))
     with path.open("w", encoding="utf-8", newline="") as stream:
@@ -91,7 +91,7 @@ def frame(rows: Rows) -> "pandas.DataFrame":
 
 
 def dataset(axes: Axes, count: int, rows: Rows) -> "xarray.Dataset":
-    """Return the rows as a dataset, over the grids and what is spread."""
+    """Return the rows as a dataset over the grids and the samples."""
     xarray = needed("xarray", "xarray")
     dims = ["_".join(names) for names in axes.grids]
     sizes = [len(each.values) for each in axes.grids.values()]
@@ -115,7 +115,7 @@ def dataset(axes: Axes, count: int, rows: Rows) -> "xarray.Dataset":
 
 
 def _placed(count: int, rows: Rows) -> Rows:
-    """Return a row for every point, empty where there is none."""
+    """Return a row for every point, empty if it has none yet."""
     found: Rows = [{}] * count
     for row in rows:
         found[row["number"]] = flat(row)
@@ -145,7 +145,7 @@ def _entries(name: str, numbers: np.ndarray) -> dict[str, Any]:
 
 
 def _array(name: str, values: list[Any]) -> np.ndarray:
-    """Return a column as numbers, NaN where there are none, or else as texts."""
+    """Return a column as numbers with NaN for missing ones, or else as texts."""
     with suppress(TypeError, ValueError):
         if name != "error":
             return np.array([math.nan if x is None else float(x) for x in values])

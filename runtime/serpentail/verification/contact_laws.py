@@ -19,7 +19,7 @@ law = registry(LAWS)
 
 
 def legs(model: Model, time: float = 0.0) -> tuple[np.ndarray, ...]:
-    """Return the legs at a time, where the model has legs."""
+    """Return the legs at a time, if the model has legs."""
     if "feet" not in model.contacts:
         return ()
     angles, rates = LEGS[:4], LEGS[4:]
@@ -56,7 +56,7 @@ def tail_gets_the_accelerations_that_torques_are_for(model: Model, s: State) -> 
 
 @law("tracked_dynamics", "pfl", "forward_dynamics", units=VALUE_LIMIT, without=PIECEWISE)
 def tracking_moves_as_its_torques_do(model: Model, s: State) -> Errors:
-    """Torques and v_dot of one call are those of two calls, relative to cond(H)."""
+    """Torques and v_dot of one call equal those of two calls, relative to cond(H)."""
     tau, v_dot = model.kernel("tracked_dynamics")(s.q, s.v, s.accelerations)
     expected = model.forward_dynamics(s.q, s.v, tau)
     torques = model.pfl(s.q, s.v, s.accelerations)
@@ -79,7 +79,7 @@ def implicit_steps_solve_their_system(model: Model, s: State) -> Errors:
     factors = model.kernel("implicit_factor")(high, s.v, damping, GAINS, weight, *ground)
     k_q, k_v, *k_u = model.kernel("implicit_solve")(factors, s.dq, s.dv, *u)
 
-    # what k has to be: here q is in the tangent space, so that angles of the tail lie as rates do
+    # the expected k; q is in the tangent space, so tail angles have the places of their rates
     change, load = k_v.astype(float) - s.dv, np.zeros(model.nv)
     tail = model.layout.tail_v
     tracked = H[tail, tail] @ (GAINS @ [k_q[tail], k_v[tail]])
@@ -112,7 +112,7 @@ def velocities_are_the_rates_of_the_points(model: Model, s: State) -> Errors:
 
 @law("contact_points", units=VALUE_LIMIT, only="contact")
 def points_are_carried_by_the_torso(model: Model, s: State) -> Errors:
-    """Another place and velocity of B are added to those of every point."""
+    """A change of B's position and velocity is added to those of every point."""
     move = np.array([0.5, -0.25, 1.0])
     first = model.contact_points(s.q, s.v, *legs(model))
     q, v = s.q.copy(), s.v.copy()
@@ -149,8 +149,9 @@ def legs_have_their_lengths(model: Model, s: State) -> Errors:
     only="contact",
 )
 def the_ground_accelerates_by_its_generalised_force(model: Model, s: State) -> Errors:
-    """H v_dot + C = [0; tau] + J^T f, where a column of J is what one speed more adds to
-    velocities, cond(H) aside.
+    """H v_dot + C = [0; tau] + J^T f, relative to cond(H).
+
+    A column of J is the change of the points' velocities by one entry of v.
     """
     s = sunk(model, s)
     v_dot, _, forces = model.contact_dynamics(s.q, s.v, s.tau, bristles(model), *legs(model))
@@ -165,15 +166,16 @@ def the_ground_accelerates_by_its_generalised_force(model: Model, s: State) -> E
 
 @law("contact_rates", "contact_points", "contact_dynamics", units=VALUE_LIMIT, only="contact")
 def simulations_ask_what_users_do(model: Model, s: State) -> Errors:
-    """Heights are those of the points, accelerations and forces those of contact_dynamics, and the
-    ground's power is of forces on moving points.
+    """Heights equal those of the points, accelerations and forces those of contact_dynamics.
+
+    The ground's power is that of its forces on the moving points.
     """
     s = sunk(model, s)
     arguments = (s.q, s.v, s.tau, bristles(model), *legs(model))
     v_dot, rates, forces, heights, powers = model.kernel("contact_rates")(*arguments)
     positions, speeds = model.contact_points(s.q, s.v, *legs(model))
     expected = model.contact_dynamics(*arguments)
-    # the legs' drives hold what their own drift does against the forces
+    # the legs' drives balance the power of the forces on moving legs
     still = model.contact_points(s.q, s.v, *(x * (np.arange(8) < 4) for x in legs(model)))[1]
     work = [float((forces * each).sum(dtype=float)) for each in (speeds, still - speeds)]
     scale = np.abs(forces * np.abs(speeds).max(initial=1)).sum(dtype=float)

@@ -61,14 +61,15 @@ def inverse_dynamics_changes_by_its_jacobians(model: Model, s: State) -> Errors:
     without=PIECEWISE,
 )
 def forward_dynamics_changes_by_its_jacobians(model: Model, s: State) -> Errors:
-    """H times the change of v_dot is that of tau less the slope of H v_dot + C at fixed v_dot; H
-    dtau = [0; 1].
+    """H times the change of v_dot is that of tau less the slope of H v_dot + C at fixed v_dot.
+
+    H dtau = [0; 1].
     """
     v_dot, H = model.forward_dynamics(s.q, s.v, s.tau), model.mass_matrix(s.q).astype(float)
     dq, dv, dtau = (x.astype(float) for x in model.forward_dynamics_derivatives(s.q, s.v, s.tau))
     change, largest = slopes(model, s, lambda at: model.inverse_dynamics(at.q, at.v, v_dot))
     unit = np.eye(model.nv)[:, model.layout.tail_v]
-    # what H times the change sums up
+    # terms of H times the change
     terms = np.abs(H) @ (np.abs(dq) @ np.abs(s.dq) + np.abs(dv) @ np.abs(s.dv))
     return {
         "dq, dv": block_slope_error(model, -H @ (dq @ s.dq + dv @ s.dv), (change, largest + terms)),
@@ -132,8 +133,9 @@ def gradient_changes_by_the_hessian(model: Model, s: State) -> Errors:
 
 @law("energy", "energy_derivatives", "mass_matrix", units=SLOPE_LIMIT, without=PIECEWISE)
 def energies_change_by_their_gradients(model: Model, s: State) -> Errors:
-    """The gradients of both energies times a direction are their slopes; that of kinetic energy in
-    v is H v.
+    """The gradients of both energies times a direction are their slopes.
+
+    That of the kinetic energy with respect to v is H v.
     """
     kinetic_dq, kinetic_dv, potential_dq = model.energy_derivatives(s.q, s.v)
     change, largest = slopes(model, s, lambda at: np.hstack(model.energy(at.q, at.v)))
@@ -162,7 +164,7 @@ def momentum_changes_by_its_jacobians(model: Model, s: State) -> Errors:
     units=SLOPE_LIMIT,
 )
 def parameters_move_both_dynamics_alike(model: Model, s: State) -> Errors:
-    """H times a parameter's change of v_dot is minus that of H v_dot + C at the same v_dot."""
+    """H times a parameter's derivative of v_dot is minus that of H v_dot + C at the same v_dot."""
     v_dot, H = model.forward_dynamics(s.q, s.v, s.tau), model.mass_matrix(s.q).astype(float)
     forward = model.forward_dynamics_parameter_derivatives(s.q, s.v, s.tau).astype(float)
     inverse = model.inverse_dynamics_parameter_derivatives(s.q, s.v, v_dot).astype(float)

@@ -29,7 +29,7 @@ def rounding(model: Model) -> float:
 def differences(model: Model, name: str, state: State, references: Iterable[ArrayLike]) -> float:
     """Return the largest error of a function's outputs against references, in order.
 
-    Derivatives of what is solved for are relative to cond(H).
+    Errors of derivatives of v_dot are divided by cond(H).
     """
     errors = []
     results = outputs(model, name, state)
@@ -67,7 +67,7 @@ def same_bits(model: Model, names: Iterable[str], state: State, other: State) ->
 
 
 def differing_outputs(outputs: dict, others: dict) -> float:
-    """Return how many numbers of all outputs differ in some bit."""
+    """Return how many numbers of all outputs differ in at least one bit."""
     return sum(differing(outputs[key], others[key]) for key in outputs)
 
 
@@ -81,7 +81,7 @@ def turned_array(x: np.ndarray, X: np.ndarray) -> np.ndarray:
 
 
 def worst(errors: Iterable[float]) -> float:
-    """Return the largest error; one that is no number is the worst."""
+    """Return the largest error; nan counts as the worst."""
     return float(np.max(list(errors), initial=0.0))
 
 
@@ -117,9 +117,9 @@ def condition(H: np.ndarray) -> float:
 
 
 def sensitivity(model: Model, q: np.ndarray) -> float:
-    """Return the condition number that an error of v_dot is divided by.
+    """Return the condition number by which an error of v_dot is divided.
 
-    Where H is missing, that of the tail's part; 1 where v_dot is missing, too.
+    Without H it is that of the tail's part; without v_dot it is 1.
     """
     if "mass_matrix" in model.kernels:
         return condition(model.mass_matrix(q))

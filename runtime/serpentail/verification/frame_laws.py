@@ -1,6 +1,6 @@
-"""Laws of place and axes: results do not depend on where the world's origin and axes are.
+"""Laws of place and axes: results do not depend on the origin and axes of the world.
 
-Also where the tail's points are, and how loads on them act.
+Also laws of the tail's points, and of loads on them.
 """
 
 from dataclasses import replace
@@ -25,7 +25,7 @@ from .law import VALUE_LIMIT, Errors, Law, fastest, moved, registry, slope
 from .states import State, at_origin, outputs, state_functions
 
 WORLD = ("mass_matrix_world", "bias_force_world")
-# what position and velocity of B enter
+# results that depend on position and velocity of B
 PLACED = (
     "energy",
     "energy_derivatives",
@@ -69,7 +69,7 @@ def pose_in_the_world_turns_all_alike(model: Model, s: State) -> Errors:
 
 
 def turned_outputs(model: Model, results: dict, X: np.ndarray, shift: np.ndarray) -> dict:
-    """Return what outputs become in a world turned by X's first block and shifted."""
+    """Return the outputs transformed to a world rotated by X's first block and shifted."""
     Z, weight = X[VELOCITY, VELOCITY], total_mass(model.parameters) * model.parameters["gravity"]
     turn = {
         "potential": lambda V: V + weight * shift[2],

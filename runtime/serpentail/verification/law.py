@@ -21,7 +21,7 @@ SLOPE_LIMIT = 10 * VALUE_LIMIT  # a slope divides rounding by its step
 PIECEWISE = ("stops",)  # of the passive tail: their forces have no slopes by wide differences
 FEW_LINKS = 8  # in a segment: with more of them, rounding grows
 
-Errors = float | dict[str, float]  # one, or one a place
+Errors = float | dict[str, float]  # one error, or one for each place
 LawFunction = Callable[[Model, State], Errors]
 
 
@@ -34,7 +34,7 @@ class Law:
     error: LawFunction
     needs: tuple[str, ...] = ()  # functions of the model
     units: float = 0.0  # limit, in roundings (eps) of the model's real type
-    floor: float = 0.0  # limit of what has other reasons than rounding
+    floor: float = 0.0  # limit of errors with other causes than rounding
     only: str = ""  # real type or kind of tail of the models that it holds for; "free" torsos
     casadi: bool = False  # whether it evaluates CasADi functions
     without: tuple[str, ...] = ()  # parts of the passive tail that it holds without
@@ -42,7 +42,7 @@ class Law:
     def limit(self, model: Model) -> float:
         """Return the limit, which grows with the links of a segment.
 
-        An entry of H sums n^2 pairs of links, which cancel where the tail is folded.
+        An entry of H sums n^2 pairs of links, which cancel if the tail is folded.
         """
         units, pieces = self.units, int(max(model.joints_each)) if model.links else model.samples
         if units and pieces and pieces > FEW_LINKS:
@@ -53,8 +53,8 @@ class Law:
 def registry(laws: list[Law]) -> Callable[..., Callable[[LawFunction], LawFunction]]:
     """Return a decorator that adds a function (model, state) -> error, or errors by place, to laws.
 
-    The function's name and docstring are the law's; the decorator takes what the law needs, and its
-    limits.
+    The function's name and docstring are the law's; the decorator takes the functions that the law
+    needs, and its limits.
     """
 
     def law(*needs: str, **limits: Any) -> Callable[[LawFunction], LawFunction]:
@@ -73,7 +73,7 @@ def rid_of(model: Model, parts: tuple[str, ...]) -> Model:
     """Return a model without these parts of a passive tail."""
     changes = idle(model.parameters, parts)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UnusualSize)  # stops go out of reach
+        warnings.simplefilter("ignore", UnusualSize)  # move stops out of reach
         return model.with_parameters(**changes) if changes else model
 
 

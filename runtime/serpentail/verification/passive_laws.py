@@ -30,8 +30,9 @@ def the_tail_itself_asks_for_torques(model: Model, s: State) -> Errors:
 
 @law("energy", units=VALUE_LIMIT, only="passive")
 def springs_and_stops_store_potential_energy(model: Model, s: State) -> Errors:
-    """Potential energy is that of the height, and what the tail stores; kinetic energy is as it
-    was.
+    """Potential energy is that of height plus what the tail stores.
+
+    Kinetic energy does not change.
     """
     bare = rid_of(model, PARTS)
     kinetic, potential = model.energy(s.q, s.v)
@@ -58,7 +59,7 @@ def stored_energy_changes_by_its_forces(model: Model, s: State) -> Errors:
 
 @law("forward_dynamics", units=VALUE_LIMIT, only="passive")
 def torques_that_make_up_for_it_rid_a_tail_of_it(model: Model, s: State) -> Errors:
-    """Under torques greater by what the tail itself asks for, v_dot is that of a tail without."""
+    """With torques that compensate the passive tail, v_dot is that of a tail without it."""
     bare = rid_of(model, PARTS)
     own = passive_force(model.parameters, s.q[model.layout.tail_q], s.v[model.layout.tail_v])
     expected = bare.inverse_dynamics(s.q, s.v, bare.forward_dynamics(s.q, s.v, s.tau))

@@ -64,7 +64,7 @@ class Check:
 
     @property
     def ratio(self) -> float:
-        """Error over limit: inf where it is not a number, 0 where nothing is checked or allowed."""
+        """Error divided by limit: inf for nan, 0 if nothing is checked or allowed."""
         if self.omitted or not self.limit:
             return 0.0
         return float(np.nan_to_num(self.error / self.limit, nan=np.inf))
@@ -87,7 +87,7 @@ def check(entry: Law, model: Model, cases: list[State]) -> Check:
     model = model if reason else rid_of(model, entry.without)
     errors = [] if reason else [pair for case in cases for pair in errors_at(entry, model, case)]
     if not errors:
-        omitted = reason or "not generated: any function it speaks of"
+        omitted = reason or "not generated: the functions that it is about"
         return Check(entry.name, entry.text, 0.0, limit, omitted=omitted)
     where, error = max(errors, key=lambda pair: (np.isnan(pair[1]), pair[1]))
     return Check(entry.name, entry.text, float(error), limit, "" if error == 0 else where)
@@ -114,9 +114,9 @@ def unchecked(entry: Law, model: Model) -> str:
 
 
 def errors_at(entry: Law, model: Model, state: State) -> Iterator[tuple[str, float]]:
-    """Yield (place, error) of one state; nan where the model refuses to compute."""
+    """Yield (place, error) of one state; nan if the model refuses to compute."""
     try:
-        with np.errstate(all="ignore"):  # what is no number fails
+        with np.errstate(all="ignore"):  # nan fails
             errors = entry.error(model, state)
     except (SerpentailError, ValueError, ArithmeticError) as refusal:
         errors = {f"{refusal}".partition("\n")[0]: np.nan}
@@ -130,7 +130,7 @@ def counts(checks: list[Check]) -> dict[str, int]:
 
 
 def summary(model: Model, checks: list[Check]) -> dict[str, Any]:
-    """Return the checks as plain data for JSON; an error that is no finite number is null."""
+    """Return the checks as plain data for JSON; an error that is not finite is null."""
     rows = []
     for entry in checks:
         error = entry.error if np.isfinite(entry.error) and not entry.omitted else None
@@ -173,7 +173,7 @@ def _overview(model: Model, checks: list[Check]) -> list[str]:
 
 
 def _table(checks: list[Check], shown: Callable[[Check], bool]) -> list[str]:
-    """Lines: name, error, limit and place of the checks to show, what failed with its law."""
+    """Return lines with name, error, limit and place of checks; failed ones with their law."""
     rows = [c for c in checks if shown(c)]
     if not rows:
         return []

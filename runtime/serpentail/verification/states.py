@@ -96,10 +96,10 @@ def direction(rng: np.random.Generator, size: int) -> np.ndarray:
 
 
 def tail_angles(model: Model, rng: np.random.Generator, kind: str, k: int) -> np.ndarray:
-    """Return the tail of state k: straight, of random bends of up to 1 rad, or folded.
+    """Return the tail of state k: straight, with random bends of up to 1 rad, or folded.
 
-    Folded joints are, in turn, within 0.01 rad of +-pi and within two turns.  The bends of a
-    continuum keep within its range, also where a law moves on from the state.
+    Folded joints are, in turn, within 0.01 rad of +-pi and within two turns. The bends of a
+    continuum stay within its range, also where a law moves on from the state.
     """
     size = model.layout.nt
     reach = model.manifest["scene"].get("bend_range", np.inf)
@@ -163,7 +163,7 @@ def called_functions(model: Model) -> list[str]:
 
 
 def functions_of(model: Model, *known: str) -> list[str]:
-    """Return the functions that take such arguments alone."""
+    """Return the functions that take exactly these arguments."""
     functions = model.manifest["functions"]
     inputs = {name: {a["name"] for a in functions[name]["inputs"]} for name in model.kernels}
     return [name for name in model.kernels if inputs[name] <= {*known}]
@@ -175,7 +175,7 @@ def outputs(model: Model, name: str, state: State) -> dict[str, np.ndarray]:
 
 
 def named(model: Model, name: str, result: Any) -> dict[str, np.ndarray]:
-    """Return what a function returned by the names of its outputs."""
+    """Return the results of a function by the names of its outputs."""
     results = result if isinstance(result, tuple) else (result,)
     names = [a["name"] for a in model.manifest["functions"][name]["outputs"]]
     return dict(zip(names, results, strict=True))

@@ -18,7 +18,7 @@ from .states import State
 
 FLIGHT, STEPS = 0.2, 2000  # s
 SWING = 0.02  # s, of a tail on a fixed base, which gravity folds and whips
-CLEAR = 10.0  # m: more than a flight falls, or a tail reaches down
+CLEAR = 10.0  # m: more than a flight falls, or than a tail's length
 LAWS: list[Law] = []
 law = registry(LAWS)
 
@@ -116,7 +116,7 @@ def center_of_mass(model: Model, q: np.ndarray) -> np.ndarray:
 
 @law("mass_matrix", "center_of_mass", units=VALUE_LIMIT)
 def center_of_mass_is_that_of_the_mass_matrix(model: Model, s: State) -> Errors:
-    """The COM is where H puts it, and its Jacobian is the upper part of H over the mass."""
+    """The COM and its Jacobian follow from H; the Jacobian is the upper part of H over the mass."""
     position, _, J = model.center_of_mass(s.q, s.v)
     upper = model.mass_matrix(s.q)[VELOCITY]
     return {
@@ -141,8 +141,9 @@ def velocity_of_the_center_of_mass_is_J_v(model: Model, s: State) -> Errors:
 
 @law("energy", "forward_dynamics", units=VALUE_LIMIT, without=PIECEWISE)
 def energy_changes_by_the_power_of_the_torques(model: Model, s: State) -> Errors:
-    """Along forward dynamics dE/dt = tau . q_t_dot less what the tail's own damping loses, relative
-    to energy times the fastest turn.
+    """Along forward dynamics dE/dt = tau . q_t_dot less the power of the tail's own damping.
+
+    The error is relative to energy times the fastest rate.
     """
     v_dot = model.forward_dynamics(s.q, s.v, s.tau).astype(float)
     rate = 2 * fastest(model, s.v)  # energy has products of two sines

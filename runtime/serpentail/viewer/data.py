@@ -20,7 +20,7 @@ COMMON = 95  # percentile of the forces whose arrow is as long as half the torso
 def page_data(
     motions: list[Trajectory], names: list[str], models: list[Model], most: int
 ) -> dict[str, Any]:
-    """Return what the page reads, ready for JSON; most: samples of a run that it has."""
+    """Return the data of the page, ready for JSON; most: largest number of samples of a run."""
     shown, notes, warnings, runs = [], [], [], []
     for motion, name, model in zip(motions, names, models, strict=True):
         few, step = thinned(motion, most)

@@ -29,7 +29,7 @@ LABELS = {  # of the numbers that the page shows
 
 
 def figures(model: Model, motion: Trajectory) -> list[tuple[str, str]]:
-    """Return labels with units, and values, of what the motion has."""
+    """Return labels with units, and values, of the numbers that the motion has."""
     told, rows = summary(model, motion), []
     for name, label in LABELS.items():
         unit = f" ({UNITS[name]})" if UNITS[name] else ""

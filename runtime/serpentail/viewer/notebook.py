@@ -7,7 +7,7 @@ from html import escape
 from ..motion.trajectory import Trajectory
 from .view import page_text
 
-MOST_SHOWN = 600  # samples of a run: what a notebook keeps of it is small
+MOST_SHOWN = 600  # samples of a run: notebooks stay small
 HEIGHT = 620  # px, of the frame
 
 
@@ -27,11 +27,11 @@ def in_notebook(
     motions: Callable[[], Sequence[Trajectory]],
     names: Sequence[str] | None = None,
 ) -> str:
-    """Return the HTML of a thing, of its text and the page of its motions; it never raises.
+    """Return the HTML of an object: its text and the page of its motions; it never raises.
 
-    The page lies in a frame of its own, since notebooks run no scripts of what they are given.
-    Where there is no page, since no motion has a model, the model lacks ``tail_points`` or the page
-    was not built, a line says why.
+    The page is in a frame of its own, because notebooks do not run scripts of outputs. If there is
+    no page (no model is known, it lacks ``tail_points``, or the page was not built), a line gives
+    the reason.
     """
     text = f"<pre>{escape(repr(thing))}</pre>"
     try:

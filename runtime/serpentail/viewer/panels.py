@@ -1,4 +1,4 @@
-"""What the page plots over time: the panels, and which curves of which runs each has."""
+"""The panels that the page plots over time, and the curves of each run in them."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -11,7 +11,10 @@ ENERGIES = ("total", "kinetic", "potential")
 def panels(
     names: Sequence[str], motions: Sequence[Trajectory], weight: float
 ) -> list[dict[str, Any]]:
-    """Return the panels: title, curves, and of forces the weight (N) where the scale bends."""
+    """Return the panels: title and curves.
+
+    For forces also the weight (N) where the scale changes.
+    """
     titles = {
         "height": "height of the torso (m)",
         "tilt": "tilt of the back (deg)",
@@ -34,7 +37,7 @@ def panels(
 
 
 def _columns(array: str, motion: Trajectory) -> Sequence[str]:
-    """The names of an array's columns, none where a motion does not have it."""
+    """Return the names of an array's columns; none if a motion does not have it."""
     if array in ("height", "tilt") and motion.layout.fixed:
         return []
     if array in ("bends", "torque"):

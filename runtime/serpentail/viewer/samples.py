@@ -1,4 +1,4 @@
-"""The samples of a motion that the page has, and where the parts of the animal are at each."""
+"""The samples of a motion in the page, with the positions of the animal's parts."""
 
 import dataclasses
 from typing import Any
@@ -13,7 +13,7 @@ from ..motion.trajectory import ARRAYS, Trajectory
 
 
 def thinned_rows(count: int, most: int) -> tuple[NDArray[np.intp], int]:
-    """Return every n-th of so many rows, the last one too, at most so many; and n."""
+    """Return every n-th of ``count`` rows and the last, at most ``most`` of them; and n."""
     step = max(-(-(count - 1) // (most - 1)), 1)
     if step == 1:
         return np.arange(count), 1
@@ -21,7 +21,7 @@ def thinned_rows(count: int, most: int) -> tuple[NDArray[np.intp], int]:
 
 
 def thinned(motion: Trajectory, most: int) -> tuple[Trajectory, int]:
-    """Return every n-th sample of a motion, the last one too, at most so many; and n."""
+    """Return every n-th sample of a motion and the last, at most ``most`` of them; and n."""
     rows, step = thinned_rows(len(motion.t), most)
     if step == 1:
         return motion, 1
@@ -31,10 +31,10 @@ def thinned(motion: Trajectory, most: int) -> tuple[Trajectory, int]:
 
 
 def samples(model: Model, motion: Trajectory) -> dict[str, Array]:
-    """Return arrays (K, ...) by name, SI; angles to be read in degrees.
+    """Return arrays (K, ...) by name, SI; plotted angles are in degrees.
 
-    t as two floats that add up to it; pose: p and quaternion; tail, legs, touching: points in the
-    world; forces of the ground at ``touching``; then what is plotted.
+    t as two floats whose sum it is; pose: p and quaternion; tail, legs, touching: points in the
+    world; forces of the ground at ``touching``; then the plotted curves.
     """
     t = motion.t.astype(np.float32)
     arrays = {

@@ -4,8 +4,9 @@ import dataclasses
 from pathlib import Path
 
 from ..errors import ModelError, ViewError
+from ..model.load import model_from
 from ..model.manifest import read_folder
-from ..model.model import Model, model_from
+from ..model.model import Model
 from ..model.parameters import independent
 from ..model.snapshot import restored
 from ..motion.trajectory import Trajectory
@@ -14,7 +15,7 @@ GENERATED = Path("generated")
 
 
 def read(file: str, folder: str | None = None) -> Trajectory:
-    """Return the motion of a file with its model; ViewError where one of them cannot be had."""
+    """Return the motion of a file with its model; ViewError if one of them is missing."""
     try:
         motion = Trajectory.load(file)
     except (OSError, ValueError) as error:
@@ -25,8 +26,8 @@ def read(file: str, folder: str | None = None) -> Trajectory:
 def model_of(motion: Trajectory, folder: str | None = None) -> Model:
     """Return the model of a motion with its parameters.
 
-    folder: where it was generated; None: it is looked for in the cache, and below generated/.
-    ViewError where it is in neither.
+    folder: its generated folder; None: the cache and generated/ are searched. ViewError if it is in
+    neither.
     """
     name, made = str(motion.info.get("model", "?")), str(motion.info.get("manifest_hash", "?"))
     try:

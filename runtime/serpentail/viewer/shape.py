@@ -10,18 +10,18 @@ from ..model.model import Model
 from ..motion.body import semi_axes
 
 THINNEST = 0.15  # a semi-axis that is drawn, over the largest
-SLENDER = 0.015  # radius over length of a tail whose radius no parameter tells
+SLENDER = 0.015  # radius over length of a tail without a parameter for its radius
 THICKER = 1.15  # at the root, over the radius
 WATER = 1e3  # kg/m^3
 MOST_JOINTS = 60  # that are marked on a tail
 
 
 def shape(model: Model) -> dict[str, Any]:
-    """Return semi-axes of the torso and radii of the tail, m, one from each of its points to the
-    next, and whether its joints are marked.
+    """Return semi-axes of the torso (m), radii of the tail (m) between its points, and whether its
+    joints are marked.
 
-    The torso is that of ``motion.body``, no semi-axis too thin to be seen; a fixed base is drawn as
-    a ball that the tail begins in.
+    The torso is that of ``motion.body``, with semi-axes large enough to be seen; a fixed base is
+    drawn as a ball at the tail's mount.
     """
     axes = semi_axes(model)
     if model.fixed:
@@ -36,10 +36,10 @@ def shape(model: Model) -> dict[str, Any]:
 
 
 def tail_radii(model: Model) -> Array:
-    """Return the radius (m) of the tail from each of its points to the next.
+    """Return the radius (m) of the tail between its points.
 
-    Links with an inertia of their own are as thick as cylinders of it, arcs of their own as their
-    mass is of water.  Other tails are drawn thinner towards the tip.
+    Links with inertias of their own are as thick as cylinders of that inertia, arcs with masses of
+    their own as thick as that mass of water. Other tails become thinner towards the tip.
     """
     p, count = model.parameters, model.manifest["dimensions"]["total"]
     usual, found = usual_radius(model), np.zeros(count)

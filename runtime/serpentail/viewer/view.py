@@ -1,4 +1,4 @@
-"""``view``: writes one or several motions to a page that needs nothing but a browser."""
+"""``view``: writes motions to a page that needs only a browser."""
 
 import json
 import os
@@ -56,16 +56,38 @@ def view(
     model: Model | None = None,
     markers: Sequence[Any] | None = None,
 ) -> "Path | Page":
-    """Write a page that shows motions over each other; return its path.
+    """Write a page that shows motions over each other in a browser.
 
-    motions: a Trajectory, or several.  path: an .html file; it is complete in itself, fetches
-    nothing, and replaces what was there once it is whole.  With ``None`` nothing is written: the
-    result is the page itself, which a notebook shows (at most 600 samples of each motion).
-    names: of the motions, by default what each is.  model: of motions that were loaded from
-    files; others know theirs.  markers: of each motion, where markers were seen at its samples,
-    (K, M, 3) m, nan in gaps.
-    More than 2400 samples are thinned, which the page says, as it says that a run failed.  Raises
-    ViewError with argument, value and remedy, ModelError where the model lacks ``tail_points``.
+    Parameters
+    ----------
+    motions : Trajectory or sequence of Trajectory
+        The motions. More than 2400 samples are thinned, which the page says.
+    path : str, path or None, default "run.html"
+        The .html file. It contains all that it needs, and loads nothing from elsewhere. It
+        replaces an older file when it is complete. With None no file is written: the result is
+        the page itself, which a notebook shows (at most 600 samples of each motion).
+    names : sequence of str, optional
+        Names of the motions.
+    model : Model, optional
+        The model of motions that were read from files.
+    markers : sequence of array_like, shape (K, M, 3), optional
+        For each motion, positions of seen markers at its samples (m, world), nan in gaps.
+
+    Returns
+    -------
+    Path or page
+        The path of the file, or the page for a notebook.
+
+    Raises
+    ------
+    ViewError
+        An argument is wrong, or the file cannot be written.
+    ModelError
+        The model lacks "tail_points".
+
+    Examples
+    --------
+    >>> st.view([planned, true], "compare.html", names=["planned", "true"])  # doctest: +SKIP
     """
     if path is None:
         from .notebook import MOST_SHOWN, Page
@@ -88,7 +110,7 @@ def page_text(
     most: int = MOST,
     markers: Sequence[Any] | None = None,
 ) -> str:
-    """Return the page of motions as a text, with at most so many samples of each; see ``view``."""
+    """Return the page of motions as text, with at most ``most`` samples of each; see ``view``."""
     motions = checked_motions(motions)
     names = checked_names(names, motions)
     models = [model_of(k, motion, model) for k, motion in enumerate(motions)]
@@ -108,7 +130,7 @@ def page_text(
 
 
 def packed_markers(motion: Trajectory, seen: Any, most: int) -> tuple[str, int]:
-    """Return where markers were seen at the samples that a page has, as text, and how many."""
+    """Return the seen markers at the samples of the page, as text, and their number."""
     places = real_array("markers", seen, ViewError)
     if places.ndim != 3 or places.shape[::2] != (len(motion.t), 3):
         raise ViewError(f"markers: shape {places.shape}: needs ({len(motion.t)}, M, 3)")
@@ -116,7 +138,7 @@ def packed_markers(motion: Trajectory, seen: Any, most: int) -> tuple[str, int]:
 
 
 def checked_motions(motions: Any) -> list[Trajectory]:
-    """Return the motions as a list; ViewError where one is no Trajectory, or there is none."""
+    """Return the motions as a list; ViewError if it is empty or holds something else."""
     listed = list(motions) if isinstance(motions, list | tuple) else [motions]
     for k, motion in enumerate(listed):
         if not isinstance(motion, Trajectory):
@@ -127,7 +149,7 @@ def checked_motions(motions: Any) -> list[Trajectory]:
 
 
 def checked_path(path: Any) -> Path:
-    """Return the path of a page; ViewError where it names none."""
+    """Return the path of a page; ViewError if it is not the name of an .html file."""
     try:
         target = Path(path)
     except TypeError:
@@ -138,7 +160,7 @@ def checked_path(path: Any) -> Path:
 
 
 def checked_names(names: Any, motions: list[Trajectory]) -> list[str]:
-    """Return a name for each motion; ViewError unless there are as many, and they differ."""
+    """Return a name for each motion; ViewError unless they are as many, and different."""
     if names is None:
         kinds = ["planned" if m.info.get("kind") == "plan" else "run" for m in motions]
         return [
@@ -152,7 +174,7 @@ def checked_names(names: Any, motions: list[Trajectory]) -> list[str]:
 
 
 def model_of(k: int, motion: Trajectory, model: Any) -> Model:
-    """Return the model of motion k; ViewError where there is none that fits."""
+    """Return the model of motion k; ViewError if none fits."""
     found = motion.model if motion.model is not None else model
     if found is None:
         raise ViewError(
@@ -169,7 +191,7 @@ def model_of(k: int, motion: Trajectory, model: Any) -> Model:
 
 
 def template() -> str:
-    """Return the page without motions; ViewError where it was not built."""
+    """Return the page without motions; ViewError if it was not built."""
     try:
         return PAGE.read_text(encoding="utf-8")
     except OSError:

@@ -1,4 +1,4 @@
-"""``live``: a page that shows a run while it is integrated, and a plan while it is refined."""
+"""``live``: a page that shows a run while it is integrated, or a plan while it is refined."""
 
 from typing import Any, Self
 
@@ -28,11 +28,34 @@ ROUND = 16  # sides of a rod
 
 
 def live(model: Model, *, host: str = "127.0.0.1", port: int = 8080) -> "Live":
-    """Return a view of a model, to be given as ``watch`` to ``simulate`` and ``plan``.
+    """Serve a page that shows runs and plans while they are made.
 
-    It serves a page at its ``url``; host: "0.0.0.0" lets other machines see it; port: where that is
-    taken, the next free one.  Raises ExtraMissing without the extra "live", ModelError where the
-    model lacks ``tail_points``.
+    Parameters
+    ----------
+    model : Model
+        The model; it needs "tail_points".
+    host : str, default "127.0.0.1"
+        Address to serve at; "0.0.0.0" lets other machines see the page.
+    port : int, default 8080
+        Port; if it is taken, the next free one is used.
+
+    Returns
+    -------
+    Live
+        The view, to be passed as ``watch`` to ``simulate`` or ``plan``. Its ``url`` is the
+        address of the page, ``stop()`` ends it; it is also a context manager.
+
+    Raises
+    ------
+    ExtraMissing
+        viser is not installed; it comes with the extra "live".
+    ModelError
+        The model lacks "tail_points".
+
+    Examples
+    --------
+    >>> with st.live(model) as page:  # doctest: +SKIP
+    ...     st.simulate(model, q0, v0, watch=page)
     """
     model.kernel("tail_points")
     viser = needed("viser", "live")
@@ -40,7 +63,7 @@ def live(model: Model, *, host: str = "127.0.0.1", port: int = 8080) -> "Live":
 
 
 class Live:
-    """A view that shows the last pose of a run, or poses of a plan; it serves until ``stop``."""
+    """A page that shows the last pose of a run, or poses of a plan; it is served until ``stop``."""
 
     def __init__(self, model: Model, server: Any):
         self.model, self.server = model, server
@@ -58,15 +81,16 @@ class Live:
 
     @property
     def url(self) -> str:
-        """Where a browser finds it."""
+        """Address for a browser."""
         return f"http://{self.server.get_host()}:{self.server.get_port()}"
 
     def __repr__(self) -> str:
         return f"<serpentail live view of {self.model.name} at {self.url}>"
 
     def __call__(self, news: Trajectory | Plan) -> None:
-        """Show the last sample of a motion, or nine moments of a plan; ViewError if of another
-        model.
+        """Show the last sample of a motion, or nine moments of a plan.
+
+        ViewError if it is not of this model.
         """
         motion = news.trajectory if isinstance(news, Plan) else news
         if not isinstance(motion, Trajectory) or motion.q.shape[1] != self.model.nq:
@@ -90,14 +114,14 @@ class Live:
         self.server.flush()
 
     def _aim(self, at: Array) -> None:
-        """Look at a place (3,), m, from where the whole animal is seen."""
-        begin = self.server.initial_camera  # of those who come later
+        """Point the cameras at a place (3,), m, so that the whole body is seen."""
+        begin = self.server.initial_camera  # for later clients
         for camera in (begin, *(client.camera for client in self.server.get_clients().values())):
             camera.position = at + length(self.model) * EYE
             camera.look_at = at
 
     def _place(self, name: str, instances: Instances) -> None:
-        """Move the copies of a part, or make them where there were none, or others."""
+        """Move the copies of a part; make new ones if there are none, or another number."""
         node, mesh = self.nodes.get(name), self.meshes[name]
         if node is None or len(node.batched_positions) != len(instances.positions):
             self.nodes[name] = self.server.scene.add_batched_meshes_simple(
@@ -116,7 +140,7 @@ class Live:
         node.batched_scales = instances.scales
 
     def stop(self) -> None:
-        """End the page."""
+        """Stop serving the page."""
         self.server.stop()
 
     def __enter__(self) -> Self:

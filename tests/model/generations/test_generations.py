@@ -151,7 +151,7 @@ def test_pickle_without_a_cache_takes_the_same_folder_and_no_other(folder, cache
     with pytest.raises(st.ModelError, match="generated again since the model was pickled"):
         pickle.loads(pickled)
     shutil.rmtree(folder)
-    with pytest.raises(st.ModelError, match="is no generated folder"):
+    with pytest.raises(st.ModelError, match="is not a generated folder"):
         pickle.loads(pickled)
 
 

@@ -156,7 +156,7 @@ def test_other_archives_are_refused_without_unpickling(tmp_path, flight):
     with pytest.raises(ValueError, match=r"pickle\.npz' is damaged or not a trajectory"):
         Trajectory.load(tmp_path / "pickle.npz")
     np.savez(tmp_path / "short.npz", **fields(flight) | {"info": json.dumps({}), "v": flight.v[1:]})
-    with pytest.raises(ValueError, match=r"short\.npz' holds no sound trajectory: v has shape"):
+    with pytest.raises(ValueError, match=r"short\.npz' does not hold .*: v has shape"):
         Trajectory.load(tmp_path / "short.npz")
 
 

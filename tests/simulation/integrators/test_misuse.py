@@ -74,7 +74,10 @@ def test_interrupt_ends_a_long_run():
         (lambda: st.Phases([(0, st.Phases([(0, None)]))]), "put all pairs in one list"),
         (lambda: st.Phases(3), "needs pairs"),
         (lambda: st.Phases([(0, 3)]), "controller: value 3: needs"),
-        (lambda: Path("nowhere"), "controller: value PosixPath('nowhere'): needs"),  # it has parts, too
+        (
+            lambda: Path("nowhere"),
+            "controller: value PosixPath('nowhere'): needs",
+        ),  # it has parts, too
         (lambda: st.TorqueCurve(3), "needs a Piecewise of 4 channels"),
         (lambda: st.NativeTorque("f"), "needs a ctypes function or an address"),
         (
@@ -95,7 +98,7 @@ def test_misuse_is_named(controller, words):
 @pytest.mark.parametrize("name", ["legs", "bristles0", "stop_at"])
 def test_flight_has_no_ground(name):
     with pytest.raises(
-        st.SimulationError, match=f"^{name} .* touches nothing: leave it out, or add `contacts`"
+        st.SimulationError, match=f"^{name} .* has no contacts: leave it out, or add `contacts`"
     ):
         fly(**{name: [1]})
 

@@ -147,7 +147,7 @@ def test_the_same_object_serves_several_runs(monkeypatch):
 
 
 WRONG = {
-    "too few": ([None, None], "2 controllers for 3 runs: give one, or one a run"),
+    "too few": ([None, None], "2 controllers for 3 runs: give one, or one for each run"),
     "none": ([], "0 controllers for 3 runs"),
     "no controller": ([None, 5, None], "controller of run 1: controller: value 5"),
     "wrong table": (

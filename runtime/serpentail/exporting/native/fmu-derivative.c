@@ -56,7 +56,7 @@ FMI(fmi2Status, GetDirectionalDerivative)(fmi2Component c, const fmi2ValueRefere
 {
 #if POINTS
   (void)unknowns, (void)n, (void)knowns, (void)m, (void)along, (void)out;
-  return told(c, fmi2Error, "directional derivatives: a model with contacts has none");
+  return told(c, fmi2Error, "directional derivatives: not available for a model with contacts");
 #else
   Instance *unit = c;
   /* of states and their rates, by states and torques */
@@ -73,7 +73,7 @@ FMI(fmi2Status, GetDirectionalDerivative)(fmi2Component c, const fmi2ValueRefere
     }
   }
   if (rate_along(unit, all, torques, all + NX) != 0) {
-    return told(unit, fmi2Discard, "no derivatives: a state, torque or parameter is no number, or none of a body");
+    return told(unit, fmi2Discard, "no derivatives: a state, torque or parameter is not finite or not physical");
   }
   for (size_t k = 0; k < n; ++k) {
     if (unknowns[k] >= INPUTS) {

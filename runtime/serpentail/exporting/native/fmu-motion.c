@@ -33,7 +33,7 @@ fmi2Status known_rate(Instance *unit)
   const int status = MODEL(forward_dynamics)(&unit->now.parameters, q, v, unit->now.u, unit->rate + NQ, unit->work);
 #endif
   if (status != 0) {
-    return told(unit, fmi2Discard, "no accelerations: a state, input or parameter is no number, or none of a body");
+    return told(unit, fmi2Discard, "no accelerations: a state, input or parameter is not finite or not physical");
   }
   memcpy(unit->rate, v, 3 * sizeof(double));
   turned(q + 3, v + 3, unit->rate + 3);
@@ -111,7 +111,7 @@ FMI(fmi2Status, GetEventIndicators)(fmi2Component c, fmi2Real indicators[], size
   double places[3 * POINTS], velocities[3 * POINTS];
   const double *q = unit->now.x;
   if (MODEL(contact_points)(&unit->now.parameters, q, q + NQ, LEGS_OF(unit->now.u) places, velocities, unit->work) != 0) {
-    return told(unit, fmi2Discard, "no points: a state, input or parameter is no number");
+    return told(unit, fmi2Discard, "no points: a state, input or parameter is not finite");
   }
   for (int k = 0; k < POINTS; ++k) {
     indicators[k] = places[3 * k + 2];

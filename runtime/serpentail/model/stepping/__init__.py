@@ -1,1 +1,1 @@
-"""Steps of many runs in place: what a controller, a policy or another tool drives step by step."""
+"""Steps of many runs in place, for controllers, policies and tools that need one step at a time."""

@@ -1,4 +1,4 @@
-"""What one call of `model.step` moves: arrays of runs, whose torques stay while it lasts."""
+"""The arrays of one call of `model.step`."""
 
 from dataclasses import dataclass
 
@@ -7,11 +7,11 @@ import numpy as np
 
 @dataclass(frozen=True, eq=False)
 class Held:
-    """Runs of one call; arrays are of the model's reals.
+    """Runs of one call; arrays have the model's number type.
 
-    q (k, nq), v (k, nv) and, on the ground, bristles (k, 2K) are stepped in place; tau (k, 2m) in
-    N m.  legs (k, 4, 2): angles (rad) and rates (rad/s), where there are feet.  parameters (k,
-    scalars).  Rows of tau and legs may all be the same one.  steps: how many, of h (s) each.
+    q (k, nq), v (k, nv) and, on the ground, bristles (k, 2K) are advanced in place; tau (k, 2m) in
+    N m is constant. legs (k, 4, 2): angles (rad) and rates (rad/s), with feet only. parameters (k,
+    scalars). All rows of tau and legs may be the same. steps: their number; h: their length (s).
     """
 
     q: np.ndarray

@@ -15,7 +15,7 @@ SCRATCH = {"q_out": "q", "v_out": "v", "tau_out": "tau", "bristles_out": "bristl
 
 
 class SingleSteps:
-    """Makes steps of runs one by one; each thread has a workspace of its own."""
+    """Makes steps of runs one by one; each thread has its own workspace."""
 
     def __init__(self, manifest: dict, library: ctypes.CDLL, dtype: np.dtype):
         self.manifest, self.dtype = manifest, dtype
@@ -32,7 +32,7 @@ class SingleSteps:
     def make(self, held: Held, first: int, last: int) -> None:
         """Step runs [first, last), and write how each went to their statuses."""
         times = np.array([0, held.h * held.steps], self.dtype)
-        # torques and legs that hold over the whole call, and what acts: a record of each run
+        # torques and legs, constant during the call, and actuation: a record for each run
         acting = {"torques": self._tables(held.tau[first:last], 0, times)}
         controllers = self._records("controller", torques=_places(acting["torques"]))
         drive: dict[str, Any] = {"phases": 1, "begins": address_of(times)}
@@ -62,7 +62,7 @@ class SingleSteps:
         }
 
     def _workspace(self, held: Held) -> dict[str, np.ndarray]:
-        """Return this thread's memory: what C works on, and samples that nobody reads."""
+        """Return this thread's memory: the C's workspace, and samples that are not used."""
         if not hasattr(self.own, "arrays"):
             work = aligned(self.manifest["work"]["rollout"], self.dtype)
             arrays = {"work": work}
@@ -79,7 +79,7 @@ class SingleSteps:
         return self._records("piecewise", coefficients=places, times=address_of(times), **shared)
 
     def _records(self, name: str, **members: Any) -> np.ndarray:
-        """Return a record of each run, zero but for these members: one of all, or one of each."""
+        """Return a record for each run, zero except for these members, shared or one for each."""
         count = max(np.size(value) for value in members.values())
         records = np.zeros(count, np.dtype(self.types[name]))
         for member, value in members.items():
@@ -88,5 +88,5 @@ class SingleSteps:
 
 
 def _places(rows: np.ndarray) -> np.ndarray:
-    """Return where the rows of an array lie."""
+    """Return the addresses of the rows of an array."""
     return rows.ctypes.data + np.arange(len(rows)) * rows.strides[0]

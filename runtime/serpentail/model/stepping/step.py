@@ -22,14 +22,14 @@ if TYPE_CHECKING:
     from ..model import Model
 
 METHODS = ("rk4", "implicit_euler")
-MOST_STEPS = 10_000  # of one call: more are `simulate`'s, which looks at signals in between
+MOST_STEPS = 10_000  # in one call; for more, `simulate` checks for signals in between
 LEGS = 8  # angles (rad) and rates (rad/s) of both legs
 SINGLY_LEAST = 32  # steps that are worth a thread, made singly
-LANES_LEAST = 4 * MIN_STATES_PER_THREAD  # of a batch's states, of which a step has four
+LANES_LEAST = 4 * MIN_STATES_PER_THREAD  # states of a batch; a step evaluates four
 
 
 class Stepping:
-    """What steps runs of a model: its compiled C with workspaces, and parameters that all share."""
+    """What advances runs of a model: its compiled C with workspaces, and shared parameters."""
 
     def __init__(self, model: "Model"):
         assert model.library is not None
@@ -54,7 +54,7 @@ class Stepping:
         return alike[:runs]
 
     def maker(self, model: "Model", held: Held) -> tuple[SingleSteps | LaneSteps, int]:
-        """Return what makes steps of runs, and how many of these are worth a thread."""
+        """Return what makes steps of runs, and the number of runs that is worth a thread."""
         flights = model.manifest.get("flights")
         if held.method != "rk4" or flights is None or held.runs < flights["states"]:
             return self.singly, max(1, SINGLY_LEAST // held.steps)
@@ -78,7 +78,7 @@ class Settings:
 
     @classmethod
     def named(cls, given: Mapping[str, Any]) -> "Settings":
-        """Return settings by their names; SimulationError where there is none such."""
+        """Return settings by their names; SimulationError for an unknown name."""
         for name in given:
             if line := none_of("step: setting", name, list(cls.__dataclass_fields__)):
                 raise SimulationError(line)
@@ -91,7 +91,7 @@ def step(
     h: object,
     settings: Mapping[str, Any],
 ) -> tuple[np.ndarray, ...]:
-    """Return where runs come to: see ``Model.step``."""
+    """Return the states after the steps: see ``Model.step``."""
     asked = Settings.named(settings)
     method, stepping = _method(model, asked.method), model.stepping
     length = number("step: h", h, SimulationError, above=0)
@@ -99,7 +99,7 @@ def step(
     threads = model.batch_library.threads
     if asked.threads is not None:
         threads = checked_threads("step: threads", asked.threads, SimulationError)
-    # arrays of all runs, those that move copied to where they end
+    # arrays of all runs; those that change are copied to the results
     arrays, runs, many = _states(model, given, asked)
     if asked.statuses is None:
         _refuse_unsound(arrays, many)
@@ -130,7 +130,7 @@ def _method(model: "Model", asked: object) -> str:
     if asked is not None:
         name = one_of("step: method", asked, METHODS, SimulationError)
     if model.library is None:
-        model.kernel("rollout")  # raises what there is to do
+        model.kernel("rollout")  # raises the error with the remedy
     needs = ["rollout"] + ["implicit"] * (name == "implicit_euler")
     has = {"rollout": "rollout" in model.generated, "implicit": _implicit(model)}
     missing = [each for each in needs if not has[each]]
@@ -191,7 +191,7 @@ def _refuse_unsound(arrays: dict[str, np.ndarray], many: bool) -> None:
 
 
 def _rows(array: np.ndarray, runs: int) -> np.ndarray:
-    """Return a row of each run, all of them the same where there is one."""
+    """Return one row for each run; a single row is repeated."""
     return array if array.ndim == 2 else np.broadcast_to(array, (runs, array.size))
 
 
@@ -206,7 +206,7 @@ def _legs(legs: np.ndarray | None, runs: int) -> np.ndarray | None:
 def _outputs(
     dtype: np.dtype, arrays: dict[str, np.ndarray], out: object, runs: int | None
 ) -> dict[str, np.ndarray]:
-    """Return the arrays that are stepped in place, (k, size): new ones, or those of ``out``."""
+    """Return the arrays that are advanced in place, (k, size): new ones, or those of ``out``."""
     names = [name for name in ("q", "v", "bristles") if name in arrays]
     if out is None:
         return {name: np.array(_rows(arrays[name], runs or 1), order="C") for name in names}
@@ -231,7 +231,7 @@ def _serves(array: np.ndarray, dtype: np.dtype, shape: tuple[int, ...]) -> bool:
 
 
 def _statuses(given: object, runs: int) -> np.ndarray:
-    """Return where the C writes how runs went: a new array, or the caller's."""
+    """Return the array for the statuses of the runs: a new one, or the caller's."""
     if given is None:
         return np.zeros(runs, np.intc)
     if isinstance(given, np.ndarray) and _serves(given, np.dtype(np.intc), (runs,)):
@@ -241,7 +241,7 @@ def _statuses(given: object, runs: int) -> np.ndarray:
 
 
 def _fail(held: Held, many: bool) -> None:
-    """Raise why the first run that could not go on could not."""
+    """Raise the error of the first run that failed."""
     k = int(held.statuses.nonzero()[0][0])
     whose = f" of run {k}" if many else ""
     failed = np.count_nonzero(held.statuses)

@@ -1,1 +1,1 @@
-"""Programs of stages, each of which solves its collocation inside, for FATROP."""
+"""Nonlinear programs in stages for FATROP; each stage solves its collocation equations inside."""

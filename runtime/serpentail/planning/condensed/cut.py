@@ -12,10 +12,10 @@ from ..problem import PlanningProblem
 
 @dataclass(frozen=True, eq=False)
 class Cut:
-    """How a mesh is cut into stages, one a control interval.
+    """How a mesh is divided into stages, one for each control interval.
 
     ends (N + 1,) of the stages, fractions of the duration; first (N + 1,): their first intervals;
-    basis (I, K, C): torques at the nodes of each interval, of the Bernstein coefficients.
+    basis (I, K, C): torques at the nodes of each interval for each Bernstein coefficient.
     """
 
     ends: np.ndarray
@@ -29,7 +29,7 @@ class Cut:
 
 
 def cut(mesh: Mesh, rule: CollocationRule, coefficients: int) -> Cut:
-    """Return the stages of a mesh whose torques have so many coefficients in each."""
+    """Return the stages of a mesh; torques have the same number of coefficients in each stage."""
     controls = np.arange(mesh.intervals) if mesh.controls is None else mesh.controls
     first = np.append(np.flatnonzero(np.diff(controls, prepend=-1)), mesh.intervals)
     ends = mesh.ends[first]

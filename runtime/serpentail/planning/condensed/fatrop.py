@@ -31,7 +31,7 @@ CALLED = {  # of FATROP's C interface, by the names of Library in native/fatrop.
     "dual": "get_dual",
     "stats": "get_stats",
 }
-# of native/fatrop.c; what FATROP says itself where it says it
+# statuses of native/fatrop.c; FATROP's own message if it gives one
 SOLVED, SAID, STOPPED, MEMORY = 0, 1, 2, 6
 STATUSES = {
     2: "User_Requested_Stop",
@@ -49,8 +49,8 @@ SAYINGS = (
     "Error_In_Step_Computation",
     "Unknown",
 )
-# of the objective, tried in turn: FATROP adds bounds to the Hessians of stages, where those with
-# large multipliers may drown in rounding what torques cost
+# of the objective, tried in turn: FATROP adds bounds to the Hessians of stages, and if their
+# multipliers are large, the cost of torques may be lost in rounding
 SCALES = (0.1, 1.0)
 PREFIX = "fatrop."  # of its options
 OPTIONS = {
@@ -58,7 +58,7 @@ OPTIONS = {
     "max_iter": 300,
     # never: small steps in a row are no solution
     "acceptable_iter": 10_000,
-    # its trial steps may leave what can be collocated
+    # its trial steps may leave the region where collocation has a solution
     "watchdog_shortened_iter_trigger": 0,
 }
 # for guesses that are close to a solution
@@ -80,7 +80,7 @@ class Option(ctypes.Structure):
 
 
 class Outcome(ctypes.Structure):
-    """How a solve ended, and the wall clock (s) of evaluations and of all."""
+    """How a solve ended, and the elapsed times (s) of evaluations and in total."""
 
     _fields_ = (
         *((name, ctypes.c_int) for name in ("status", "iterations", "said")),
@@ -90,7 +90,7 @@ class Outcome(ctypes.Structure):
 
 @cache
 def library() -> ctypes.CDLL:
-    """FATROP's library; PlanningError where this CasADi brings none."""
+    """FATROP's library; PlanningError if this CasADi brings none."""
     import casadi as ca
 
     folder = Path(ca.__file__).parent
@@ -100,14 +100,14 @@ def library() -> ctypes.CDLL:
         except OSError:
             continue
     raise PlanningError(
-        f"solver: value 'fatrop': CasADi {ca.CasadiMeta.version()} brings no libfatrop: take "
+        f"solver: value 'fatrop': CasADi {ca.CasadiMeta.version()} comes without libfatrop: use "
         "solver='ipopt'"
     )
 
 
 @cache
 def kernel() -> ctypes.CDLL:
-    """The stages in C, compiled once; PlanningError where no compiler works."""
+    """The stages in C, compiled once; PlanningError if no compiler works."""
     import casadi as ca
 
     headers = Path(ca.__file__).parent / "include"
@@ -134,7 +134,7 @@ def kernel() -> ctypes.CDLL:
 
 @cache
 def called() -> Library:
-    """Addresses of what is called of FATROP."""
+    """Return the addresses of the functions of FATROP that are called."""
     found = library()
     return Library(
         **{
@@ -145,7 +145,7 @@ def called() -> Library:
 
 
 def options_of(asked: Mapping[str, Any], guess: str) -> Any:
-    """Return the settings, an array of Option; PlanningError where one is unknown, or no number."""
+    """Return the settings, an array of Option; PlanningError if one is unknown or not a number."""
     settings: dict[str, Any] = {}
     for name, value in asked.items():
         own = name.removeprefix(PREFIX)
@@ -166,7 +166,10 @@ def options_of(asked: Mapping[str, Any], guess: str) -> Any:
 
 @dataclass
 class _Stopping:
-    """Asks at every iteration whether to stop; what is raised then is kept for afterwards."""
+    """Checks at every iteration whether to stop.
+
+    Keeps an exception until the solver has returned.
+    """
 
     raised: BaseException | None = None
 
@@ -195,7 +198,7 @@ def solve_stages(
         success = outcome.status == SOLVED and bool(np.isfinite(found).all())
         if success or outcome.status == STOPPED:
             break
-    # what went astray may end where stages have no collocation
+    # a diverged solve may end where the collocation of stages has no solution
     ended = all(np.isfinite(part).all() for part in (found, *nodes.values()))
     return Solution(
         w=unpacked(stages, found, nodes | {"start": first}) if ended else w,

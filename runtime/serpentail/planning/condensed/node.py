@@ -16,9 +16,7 @@ FUNCTIONS = {  # of a model, by the names of Task in native/stage.h
 
 @dataclass(frozen=True, eq=False)
 class NodeCode:
-    """Functions by the names of Task, as ctypes has them, the doubles that they work on, and the
-    model's parameters.
-    """
+    """C functions by the names of Task, their workspace in doubles, and the model's parameters."""
 
     functions: dict[str, Any]
     work: int
@@ -26,7 +24,7 @@ class NodeCode:
 
 
 def node_code(model: Model) -> NodeCode:
-    """Return the functions of a model that lacks nothing."""
+    """Return the C functions of a model; ``lacking`` has checked that it has all of them."""
     functions = {
         name: getattr(model.library, f"{model.name}_{function}")
         for name, function in FUNCTIONS.items()
@@ -36,12 +34,12 @@ def node_code(model: Model) -> NodeCode:
 
 
 def lacking(model: Model) -> str | None:
-    """Return what a model lacks for stages, and the remedy; None where it lacks nothing."""
+    """Return what a model lacks for stages, and the remedy; None if it has all."""
     missing = [name for name in FUNCTIONS.values() if name not in model.generated]
     if missing:
         return f"the model lacks {', '.join(missing)}: add them to the scene's functions"
     if model.manifest["real"] != "double":
-        return f"the model's numbers are {model.manifest['real']}: it takes double"
+        return f"the model computes with {model.manifest['real']}: it needs double"
     if model.library is None:
         return "the model was loaded with compiled=False: load it again to use its C"
     return None

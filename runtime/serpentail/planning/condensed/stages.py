@@ -1,6 +1,6 @@
 """The nonlinear program of a problem on a mesh as stages, which solve their collocation inside.
 
-Its unknowns are those of the transcription, so that guesses, curves and plans are the same.
+Its unknowns are those of the transcription, so guesses, curves and plans are the same.
 """
 
 from dataclasses import dataclass
@@ -46,8 +46,9 @@ class Stages:
         return 0
 
     def rates(self, w: np.ndarray, _p: np.ndarray) -> np.ndarray:
-        """Rates (N, nx) of the states at the nodes, in units, times the duration: those of the
-        collocation polynomials.
+        """Return the rates (N, nx) of the states at the nodes, in units, times the duration.
+
+        They are the rates of the collocation polynomials.
         """
         nx, K = self.indices.states.shape[1], len(self.rule.nodes)
         points = np.arange(self.mesh.intervals)[:, None] * K + np.arange(K + 1)

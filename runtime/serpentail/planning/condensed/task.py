@@ -13,8 +13,8 @@ from .node import NodeCode
 from .stages import Stages
 
 EFFORT, ENERGY = 0, 1  # costs of a node
-# of the objective: FATROP adds bounds to a stage's Hessian, where those with large multipliers
-# would drown what the torques cost
+# of the objective: FATROP adds bounds to a stage's Hessian, and if their multipliers are large,
+# they would make the cost of torques negligible
 SCALE = 0.1
 GIVE = 1e8  # what squares of the goal's rows cost
 _pointer = ctypes.c_void_p
@@ -117,7 +117,7 @@ def _goal(stages: Stages) -> dict[str, np.ndarray]:
 
 
 def _bounds(stages: Stages) -> dict[str, np.ndarray]:
-    """Largest magnitudes of what is bounded."""
+    """Return the largest allowed magnitudes."""
     bounds, units = stages.problem.bounds, stages.variables.units
     limits = {
         "most_torque": (bounds.torque, "torque"),
@@ -130,7 +130,7 @@ def _bounds(stages: Stages) -> dict[str, np.ndarray]:
 def _cost(
     problem: PlanningProblem, torque_unit: np.ndarray, softening: float, scale: float
 ) -> dict[str, Any]:
-    """The objective, as ``nlp.node.cost`` has it, scaled."""
+    """Return the objective of ``nlp.node.cost``, scaled."""
     unit = float(torque_unit.mean())
     if problem.objective == "energy":
         size, price = unit * 10, 0.0

@@ -16,7 +16,7 @@ from ...model.workers import after_fork
 
 @cache
 def _blas() -> ctypes.CDLL | None:
-    """The BLAS that CasADi brings for its solvers; None where it brings another, or none."""
+    """Return the BLAS that CasADi's solvers use; None if it is an unknown one."""
     import casadi as ca
 
     for path in sorted(Path(ca.__file__).parent.glob("libcasadi-tp-openblas.*")):
@@ -28,9 +28,9 @@ def _blas() -> ctypes.CDLL | None:
 
 
 class _Solves:
-    """How many programs are being solved in all threads, and the threads of BLAS before the first.
+    """Number of programs being solved in all threads, and the BLAS threads before the first.
 
-    A forked child solves none: it begins anew.
+    A forked child solves none: it begins at zero.
     """
 
     def __init__(self) -> None:

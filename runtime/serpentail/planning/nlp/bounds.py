@@ -1,6 +1,6 @@
 """The limits of a nonlinear program: bounds of its unknowns and of its constraints.
 
-They hold what differs between two plans of one program: start, duration and magnitudes.
+They depend on start, duration and magnitudes, which differ between plans of one program.
 """
 
 from dataclasses import dataclass
@@ -9,7 +9,8 @@ import numpy as np
 
 from ...attitude import pitch_roll_yaw
 from ...model.layout import POSITION
-from ..problem import Goal, PlanningProblem
+from ..goal import Goal
+from ..problem import PlanningProblem
 from .coordinates import Attitude
 from .direct import goal_matrix
 from .indices import columns_of
@@ -58,7 +59,7 @@ def _bound_motion(nlp: Transcription, lbx: np.ndarray, ubx: np.ndarray) -> None:
 
 
 def _fix_end(nlp: Transcription, lbx: np.ndarray, ubx: np.ndarray) -> None:
-    """Fix what the goal says of the tail and of rates."""
+    """Fix tail and rates at the end to the goal."""
     goal, indices, variables = nlp.problem.goal, nlp.indices, nlp.variables
     for name in ("tail", "tail_rate", "torso_rate"):
         value = getattr(goal, name)

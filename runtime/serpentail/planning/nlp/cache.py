@@ -1,4 +1,4 @@
-"""A small memory of what takes long to make: nonlinear programs, their nodes and solvers.
+"""A small cache of programs, their nodes and their solvers, which take long to make.
 
 Planning again on the same mesh from another start then derives nothing.
 """
@@ -13,7 +13,7 @@ CAPACITY = 16  # programs, nodes and solvers; the one that was not used for long
 
 @dataclass(frozen=True)
 class _Entry:
-    """A key, and how to make what belongs to it; entries of one key are equal."""
+    """A key, and how to make its value; entries with the same key are equal."""
 
     key: tuple
     make: Callable[[], Any] = field(compare=False)

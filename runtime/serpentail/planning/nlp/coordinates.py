@@ -73,7 +73,7 @@ class Attitude:
 
 
 def attitude(kind: str) -> Attitude:
-    """Return the attitude coordinates of a name; PlanningError where it is unknown."""
+    """Return the attitude coordinates of a name; PlanningError if it is unknown."""
     if kind not in KINDS:
         raise PlanningError(f"attitude: value {kind!r}: needs {' or '.join(map(repr, KINDS))}")
     return Attitude(kind)

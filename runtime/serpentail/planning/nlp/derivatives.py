@@ -1,7 +1,7 @@
 """The program's objective, constraints and exact derivatives, assembled from those of its nodes.
 
-Everything outside the nodes is linear, so that each derivative is a sparse matrix times the
-entries of the nodes' derivatives.
+Everything outside the nodes is linear, so each derivative is a sparse matrix times the entries of
+the nodes' derivatives.
 """
 
 from dataclasses import dataclass
@@ -38,7 +38,7 @@ class Assembly:
         """
         import casadi as ca
 
-        # symbols, and what all nodes give
+        # symbols, and the results of all nodes
         w, p = ca.MX.sym("x", len(self.direct)), ca.MX.sym("p", PARAMETERS)
         lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", self.linear.shape[0])
         derivatives, count = self.node.derivatives, self.indices.shape[1]
@@ -93,7 +93,7 @@ class Assembly:
         """Pattern of the constraints' Jacobian, its map from the nodes' ones, its constant part."""
         count, size = self.indices.shape[1], self.node.size
 
-        # entries of the nodes' Jacobians: to which value of Y they belong, and to which unknown
+        # entries of the nodes' Jacobians: their rows (values of Y) and columns (unknowns)
         value = (np.arange(count)[:, None] * size + rows).ravel()
         unknown = self.indices[columns].T.ravel()
 
@@ -103,7 +103,7 @@ class Assembly:
         inside = np.arange(length.sum()) - np.repeat(np.cumsum(length) - length, length)
         k = start[entry] + inside
 
-        # places of all entries, column by column, those of the linear part with them
+        # places of all entries, column by column, with those of the linear part
         constant = self.linear.tocoo()
         row = np.concatenate([self.weights.indices[k], constant.row])
         column = np.concatenate([unknown[entry], constant.col])

@@ -1,7 +1,7 @@
 """Constraints of the unknowns alone: the attitude at the end, and torques between nodes.
 
-Between nodes torques are polynomials.  In the Bernstein basis their coefficients bound them, and
-those of their slopes bound these.
+Between nodes torques are polynomials. Their coefficients in the Bernstein basis bound them, and the
+coefficients of their slopes bound the slopes.
 """
 
 from dataclasses import dataclass
@@ -83,8 +83,9 @@ def _goal_rows(problem: "PlanningProblem", variables: "Variables", indices: Indi
 def _shared_rows(
     indices: Indices, controls: np.ndarray, mesh: Mesh, rule: CollocationRule
 ) -> DirectRows:
-    """Torques of intervals less what their polynomial in the interval before is there, which are
-    zero inside a control interval.
+    """Return torques minus the polynomial continued from the interval before.
+
+    These are zero inside a control interval.
     """
     earlier = np.flatnonzero(np.diff(controls) == 0)
     own = rule.nodes > 0  # the first may be the last of the interval before
@@ -97,7 +98,7 @@ def _shared_rows(
 
 
 def _straight_rows(indices: Indices, mesh: Mesh, rule: CollocationRule) -> DirectRows:
-    """Second differences of Bernstein coefficients, which are zero where torques are straight."""
+    """Return second differences of Bernstein coefficients, zero if torques are straight lines."""
     k = np.arange(mesh.intervals)
     if mesh.controls is not None:  # the first of each control interval; others share its polynomial
         k = np.flatnonzero(np.diff(mesh.controls, prepend=-1))
@@ -130,7 +131,7 @@ def _slope_rows(
 
 
 def _joint_rows(indices: Indices, mesh: Mesh, rule: CollocationRule) -> DirectRows:
-    """Torques at the ends of intervals less those where the next begin, which are zero."""
+    """Return torques at the ends of intervals minus those at the beginning of the next: zero."""
     bernstein, inner = rule.bernstein(), np.arange(mesh.intervals - 1)
     if rule.nodes[0] == 0:  # a node of both
         inner = inner[:0]

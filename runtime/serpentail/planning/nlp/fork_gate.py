@@ -1,7 +1,7 @@
 """Makes a fork wait until no search of another thread is inside CasADi or its solver.
 
-A lock that one of them holds at that moment would stay locked in the child for ever, as the thread
-that would open it is not there.  Searches let forks pass where they ask whether to stop.
+A lock that such a thread holds at that moment would stay locked in the child for ever, because the
+child does not have the thread. Searches let forks pass when they check whether to stop.
 """
 
 import os
@@ -42,7 +42,7 @@ class _Gate:
         self.changed.release()
 
     def in_child(self) -> None:
-        """Begin anew with the only thread that is left."""
+        """Reset the gate for the only thread that is left."""
         self.changed, self.waiting = threading.Condition(), 0
         self.inside &= {threading.get_ident()}
 

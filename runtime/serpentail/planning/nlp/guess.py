@@ -53,7 +53,7 @@ def pushes(random: np.random.Generator, size: float, model: Model) -> np.ndarray
 def of_trajectory(
     model: Model, motion: Trajectory, coordinates: Attitude, damping: float = 0.0
 ) -> Motion:
-    """Return the motion of a trajectory; what damping gives is taken off its torques."""
+    """Return the motion of a trajectory; its torques without the part that damping gives."""
     mass = total_mass(model.parameters)
     R, velocity, tail_rate = (
         rotation_matrix(motion.attitude),

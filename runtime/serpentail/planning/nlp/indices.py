@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Indices:
-    """Where the unknowns are in w: the duration first, then points and nodes along the motion.
+    """Positions of the unknowns in w: the duration first, then points and nodes along the motion.
 
     states (P, nx): of all points; others (N, na + nu): algebraic unknowns and torques of all nodes.
     """
@@ -23,7 +23,7 @@ class Indices:
     states: np.ndarray
     others: np.ndarray
     algebraic: int  # na
-    first: int  # the point that is the first node: 0, or 1 where the start is none
+    first: int  # the point that is the first node: 0, or 1 if the start is not a node
 
     @property
     def controls(self) -> np.ndarray:
@@ -36,7 +36,7 @@ class Indices:
         return 1 + self.states.size + self.others.size
 
     def nodes(self) -> np.ndarray:
-        """Indices (1 + nx + na + nu, N) of what each node's function takes."""
+        """Indices (1 + nx + na + nu, N) of the arguments of each node's function."""
         duration = np.zeros((len(self.others), 1), int)
         return np.column_stack([duration, self.states[self.first :], self.others]).T
 
@@ -55,7 +55,7 @@ def indices_of(variables: "Variables", mesh: Mesh, rule: CollocationRule) -> Ind
 
 
 def columns_of(indices: np.ndarray, blocks: tuple[tuple[str, int], ...], name: str) -> np.ndarray:
-    """Indices (K, size) of one block, of those (K, sizes) of all blocks (name, size) in a row."""
+    """Return indices (K, size) of one block from those (K, sizes) of all blocks (name, size)."""
     starts = accumulate((size for _, size in blocks), initial=0)
     start = dict(zip((block for block, _ in blocks), starts, strict=False))[name]
     return indices[:, start : start + dict(blocks)[name]]

@@ -15,13 +15,13 @@ from types import SimpleNamespace
 from ...model.workers import after_fork
 from .fork_gate import let_forks_pass
 
-# Ctrl-C as all threads see it: how often it was noted, by which thread, and who heard it before
+# Ctrl-C for all threads: its count, the thread that receives it, and the handler before
 _ctrl_c = SimpleNamespace(noted=0, listener=None, before=None)
 
 
 class _Search(threading.local):
-    """The search of one thread: when it is to end (s), what had been noted when it began, whom it
-    tells that it goes on, and what that raised.
+    """The search of one thread: its latest end (s), the count of interrupts at its beginning, the
+    function that receives its progress, and the exception that this raised.
     """
 
     deadline = math.inf
@@ -35,7 +35,7 @@ _search = _Search()
 
 def stop_reason() -> str | None:
     """Return why the search of this thread should end: "interrupt", "time limit", "progress" (the
-    function that is told of it raised something), or None.
+    progress function raised an exception), or None.
     """
     let_forks_pass()
     _tick()
@@ -50,11 +50,11 @@ def stop_reason() -> str | None:
 def stoppable(
     time_limit: float | None = None, tick: Callable[[], object] = lambda: None
 ) -> Iterator[None]:
-    """Let Ctrl-C stop the search, once, a second one acting as usual; and so a limit (s) from now.
+    """Let the first Ctrl-C stop the search, and a second one act as usual; limit: s from now.
 
-    The search of the main thread hears it, for all threads: without one, the time limit alone
-    counts.
-    tick: called as the search goes on, at every iteration of the solver; what it raises ends it.
+    Only a search in the main thread receives Ctrl-C, for all threads; without one, only the time
+    limit counts. tick: called at every iteration of the solver; an exception that it raises ends
+    the search.
     """
     _search.noted, _search.tick, _search.raised = _ctrl_c.noted, tick, None
     _search.deadline = math.inf if time_limit is None else time.monotonic() + time_limit
@@ -73,7 +73,7 @@ def stoppable(
 
 
 def _tick() -> None:
-    """Tell that the search goes on; CasADi hands no exception through, so it is kept."""
+    """Report progress; keep an exception, because CasADi would not pass it on."""
     try:
         _search.tick()
     except BaseException as error:
@@ -81,7 +81,7 @@ def _tick() -> None:
 
 
 def _raise() -> None:
-    """Raise what the function raised that was told."""
+    """Raise the exception that the progress function raised."""
     raised, _search.raised = _search.raised, None
     if raised is not None:
         raise raised

@@ -1,4 +1,4 @@
-"""How the duration is divided into intervals, and how these are split where a solution is wrong."""
+"""Intervals of the duration, and how they are split if a solution is wrong."""
 
 from dataclasses import dataclass, replace
 
@@ -45,14 +45,12 @@ class Mesh:
         return (*self.ends, *self.guarded, *controls)
 
     def with_guards(self, intervals: np.ndarray) -> "Mesh":
-        """Return the mesh with guards in more intervals (N,), and in those beside them."""
+        """Return the mesh with guards in further intervals (N,), and in their neighbours."""
         padded = np.pad(intervals, 1)
         return replace(self, guarded=self.guarded | padded[:-2] | padded[1:-1] | padded[2:])
 
     def halved(self, chosen: np.ndarray, most: int) -> "Mesh":
-        """Return the mesh with chosen intervals (N,) halved, the first of them if these are too
-        many for a mesh of at most so many intervals.
-        """
+        """Return the mesh with chosen intervals (N,) halved, as many of them as ``most`` allows."""
         room = most - self.intervals
         return self.split(1 + (chosen & (np.cumsum(chosen) <= room)))
 
@@ -83,12 +81,12 @@ def uniform(intervals: int, controls: int | None = None) -> Mesh:
 
 
 def refined(mesh: Mesh, errors: np.ndarray, factor: float, order: int, most: int) -> Mesh:
-    """Return a mesh of at most `most` intervals whose errors should sum to `factor` of those (N,).
+    """Return a mesh of at most `most` intervals whose errors sum to `factor` of these (N,).
 
-    Errors are spread evenly; one of an interval of width h falls like h^(order + 1).
+    Errors are spread evenly; the error of an interval of width h falls as h^(order + 1).
     """
     # how many pieces each interval needs for its part of the error
-    order = min(order, 4)  # what an optimiser's controls leave of it
+    order = min(order, 4)  # the order that is left with an optimiser's controls
     target = max(factor * errors.sum(), 1e-300) / mesh.intervals
     wanted = np.ceil((errors / target) ** (1 / (order + 1)))
     pieces = np.clip(np.nan_to_num(wanted, nan=2, posinf=MOST_PIECES), 1, MOST_PIECES).astype(int)

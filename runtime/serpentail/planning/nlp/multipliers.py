@@ -1,9 +1,8 @@
 """Multipliers of a solved program, carried to another mesh, so that the solver starts warm.
 
-Along the motion they are weights of the quadrature times functions of time, which are carried from
-mesh to mesh: the costate for the defects, others for what holds at every node and for bounds.  What
-the goal fixes adds to those of the last node what no weight has a part in: these are taken as they
-are.
+Along the motion they are quadrature weights times functions of time, which are interpolated: the
+costate for the defects, other functions for constraints at nodes and for bounds. At the last node
+the goal adds parts that do not depend on a weight; these are copied.
 """
 
 import numpy as np
@@ -14,9 +13,9 @@ Multipliers = tuple[np.ndarray, np.ndarray]  # of the unknowns' bounds, and of t
 
 
 def carried(multipliers: Multipliers, old: Transcription, new: Transcription) -> Multipliers | None:
-    """Return the multipliers of `new`; None for other rules than Radau's.
+    """Return the multipliers of `new`; None for rules other than Radau's.
 
-    Those of the attitude at the end stay; those of torque rates begin at zero.
+    Multipliers of the attitude at the end are kept; those of torque rates start at zero.
     """
     if old.rule.steps != len(old.rule.nodes):
         return None
@@ -24,7 +23,7 @@ def carried(multipliers: Multipliers, old: Transcription, new: Transcription) ->
 
 
 def _of_unknowns(lam: np.ndarray, old: Transcription, new: Transcription) -> np.ndarray:
-    """Those of bounds: of the duration, of the start, and of all nodes."""
+    """Return the multipliers of bounds: of the duration, of the start, and of all nodes."""
     carried, before, after = np.zeros(new.indices.size), old.indices, new.indices
     carried[0], carried[after.states[0]] = lam[0], lam[before.states[0]]
     carried[after.states[1:]] = _along(lam[before.states[1:]], old, new)
@@ -33,7 +32,7 @@ def _of_unknowns(lam: np.ndarray, old: Transcription, new: Transcription) -> np.
 
 
 def _of_rows(lam: np.ndarray, old: Transcription, new: Transcription) -> np.ndarray:
-    """Those of constraints: defects, what holds at nodes, and the rest."""
+    """Return the multipliers of constraints: defects, constraints at nodes, and the rest."""
     node, nodes, steps = old.node, len(old.indices.others), old.rule.steps
     sizes = np.array([nodes * node.rates, nodes * (node.residuals + node.path)])
     defects, held, rest = np.split(lam, np.cumsum(sizes))
@@ -51,7 +50,10 @@ def _of_rows(lam: np.ndarray, old: Transcription, new: Transcription) -> np.ndar
 
 
 def _along(rows: np.ndarray, old: Transcription, new: Transcription) -> np.ndarray:
-    """Multipliers (N, c) of the nodes, straight between them; those of the last node stay."""
+    """Return multipliers (N, c) of the nodes by linear interpolation.
+
+    The last node's are copied.
+    """
     before, after = _node_times(old), _node_times(new)
     values = rows / _weights(old)
     columns = [np.interp(after, before[:-1], column) for column in values[:-1].T]

@@ -1,6 +1,6 @@
-"""One node of the nonlinear program: the equations of motion at one instant, in the plan's units.
+"""One node of the nonlinear program: the equations of motion at one time, in the plan's units.
 
-Every node of every mesh evaluates the same CasADi function, of which the program is then built.
+Every node of every mesh evaluates the same CasADi function, from which the program is built.
 """
 
 from collections.abc import Iterable
@@ -31,7 +31,7 @@ FORMULATIONS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "translation-free": (("attitude", "tail", "torso_rate", "tail_rate"), ()),
     "full": (("position", "attitude", "tail", "velocity", "torso_rate", "tail_rate"), ()),
 }
-# units in which unknowns are of the order of 1
+# units that make unknowns of the order of 1
 UNITS = {
     "position": 0.1,
     "attitude": 1.0,
@@ -53,12 +53,12 @@ class Equations:
 
     forward: "ca.Function"
     inverse: "ca.Function"
-    parameters: tuple  # what they take after their usual inputs
+    parameters: tuple  # further inputs after the usual ones
     source: str
 
 
 def equations_of_motion(model: Model, source: str = "auto") -> Equations:
-    """Return the compiled functions where the scene has their second derivatives, else SX ones."""
+    """Return compiled functions if the scene has their second derivatives, else SX ones."""
     names = ("forward_dynamics", "inverse_dynamics")
     if source != "symbolic":
         try:
@@ -107,12 +107,13 @@ def variables_of(
 
 @dataclass(frozen=True, eq=False)
 class Node:
-    """A node's function y(zeta, p, results of calls), the calls, whose inputs are linear in zeta.
+    """A node's function y(zeta, p, results of calls), and the calls.
 
-    zeta: [duration, states, algebraic unknowns, torques] in units.  p: parameters, first the
-    angular momentum about the COM (kg m^2/s, world), which the airborne formulation conserves.
-    y: duration * rates of the states, algebraic residuals, path constraints, duration * objective,
-    all in units; rates and residuals are the numbers of them, paths those of each constraint.
+    Their inputs are linear in zeta. zeta: [duration, states, algebraic unknowns, torques] in units.
+    p: parameters, first the angular momentum about the COM (kg m^2/s, world), which the airborne
+    formulation conserves. y: duration * rates of the states, algebraic residuals, path constraints,
+    duration * objective, all in units. rates, residuals: their numbers; paths: number of entries of
+    each path constraint.
     """
 
     function: "ca.Function"
@@ -128,11 +129,11 @@ class Node:
 
     @property
     def path(self) -> int:
-        """Entries of all path constraints."""
+        """Number of entries of all path constraints."""
         return sum(self.paths)
 
     def each_path(self, numbers: Any) -> np.ndarray:
-        """Return one number of each path constraint (.., k) at all entries of it (.., path)."""
+        """Return one number for each path constraint (.., k) at all its entries (.., path)."""
         return np.repeat(np.asarray(numbers, float), self.paths, axis=-1)
 
     @property
@@ -155,7 +156,7 @@ def node_function(
     """
     import casadi as ca
 
-    # symbols of the unknowns, and of what the calls give
+    # symbols of the unknowns, and of the results of calls
     states, algebraic, controls = variables.sizes()
     zeta, p = ca.SX.sym("zeta", 1 + states + algebraic + controls), ca.SX.sym("p", PARAMETERS + 1)
     point = _point(model, zeta, p, variables, attitude, problem.legs)
@@ -243,9 +244,10 @@ def _rates(model: Model, point: Point, attitude: Attitude, v_dot: "ca.SX") -> di
 
 
 def _momentum(model: Model, point: Point, h: "ca.SX", momentum: "ca.SX") -> "ca.SX":
-    """H v of the motion relative to the COM less (0, R^T h), in units: zero where omega carries h.
+    """Return H v of the motion relative to the COM less (0, R^T h), in units.
 
-    Where the linear momentum is zero, the angular momentum about B is that about the COM.
+    It is zero if omega carries h. If the linear momentum is zero, the angular momentum about B is
+    that about the COM.
     """
     import casadi as ca
 

@@ -1,7 +1,7 @@
-"""The calls of compiled dynamics inside a node's function, with their exact derivatives.
+"""Calls of compiled dynamics inside a node's function, with their exact derivatives.
 
-CasADi cannot look into compiled C, so that the chain rule through a call is written out here.  A
-node's function is y(zeta, p, e), e being results of calls e = c(L zeta + l).  With E = c' L, its
+CasADi cannot see into compiled C, so the chain rule through a call is written out here. A node's
+function is y(zeta, p, e), where e = c(L zeta + l) are the results of calls. With E = c' L its
 Jacobian is y_zeta + y_e E, and the Hessian of mu^T y is
 [I; E]^T (mu^T y)'' [I; E] + L^T (nu^T c)'' L with nu = y_e^T mu.
 """
@@ -56,7 +56,7 @@ class NodeDerivatives:
         self.zeta, self.p, *self.results = node.function.sx_in()
         self.y = node.function.call([self.zeta, self.p, *self.results])[0]
 
-        # derivatives of the calls, of the objective, which is the last of y, and of all y
+        # derivatives of the calls, of the objective (the last entry of y), and of all of y
         self.jacobians_of_calls = [call.function.jacobian() for call in node.calls]
         self.hessians_of_calls = [call.function.reverse(1).jacobian() for call in node.calls]
         self.cost = ca.Function("cost", [self.zeta, self.p], [self.y[-1]])
@@ -75,7 +75,7 @@ class NodeDerivatives:
         ]
 
     def _by_zeta(self, blocks: "list[list[ca.SX]]") -> "ca.SX":
-        """E: derivatives of all results by zeta."""
+        """Return E: derivatives of all results with respect to zeta."""
         import casadi as ca
 
         rows = []
@@ -134,7 +134,7 @@ class NodeDerivatives:
 
 
 class MappedNode:
-    """A node's function at all of `count` nodes, of their unknowns Z (n, count) and of p."""
+    """A node's function at all `count` nodes, with unknowns Z (n, count) and parameters p."""
 
     def __init__(self, node: NodeDerivatives, fractions: np.ndarray):
         self.node, self.count, self.fractions = node, len(fractions), fractions
@@ -148,7 +148,7 @@ class MappedNode:
         ]
 
     def _first(self, Z: "ca.MX") -> "tuple[list[ca.MX], list[ca.MX]]":
-        """Results of all calls, and their Jacobians by the moving inputs."""
+        """Return results of all calls, and their Jacobians with respect to the moving inputs."""
         results, blocks = [], []
         for call, jacobian in zip(self.node.calls, self.node.jacobians_of_calls, strict=True):
             inputs = self._inputs(call, Z)

@@ -1,4 +1,4 @@
-"""A node as objectives and path constraints see it."""
+"""``Point``: a node, as objectives and path constraints receive it."""
 
 from collections.abc import Callable
 from types import SimpleNamespace
@@ -18,13 +18,15 @@ if TYPE_CHECKING:
 
 
 class Point(SimpleNamespace):
-    """CasADi blocks by name, in SI units: those of the formulation, torque (2m,), quaternion, time
-    and duration (s), parameters (numbers by name).
+    """CasADi blocks of a node by name, in SI units.
 
-    Made of them when first asked for, in world axes, m: center_of_mass (3,), position (3,) of B and
-    its height, tail_points (K, 3) as the model has them, the last of them, tip (3,), and of models
-    with contacts contact_points (K, 3), for which those with feet need the plan's legs, and
-    body_points (K, 3), those of tail and torso alone.
+    They are those of the formulation, torque (2m,), quaternion, time and duration (s), and
+    parameters (numbers by name).
+
+    Further blocks are made when they are used, in world axes (m): center_of_mass (3,); position
+    (3,) of B and its height; tail_points (K, 3) and the last of them, tip (3,); with contacts,
+    contact_points (K, 3), which need the plan's legs if the model has feet, and body_points (K, 3),
+    those of tail and torso alone.
     """
 
     def __getattr__(self, name: str) -> Any:
@@ -40,8 +42,9 @@ class Point(SimpleNamespace):
 
 
 def asked(field: str, function: Callable[[Any], Any], point: Point) -> Any:
-    """Return what a function of the user's makes of a point; PlanningError where it asks for what
-    the point lacks.
+    """Return the result of a user's function of a point.
+
+    PlanningError if the function uses a block that the point lacks.
     """
     try:
         return function(point)

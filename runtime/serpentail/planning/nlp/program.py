@@ -1,4 +1,4 @@
-"""What all nonlinear programs have in common, however they are solved."""
+"""What all nonlinear programs have in common, for any solver."""
 
 from typing import Protocol
 

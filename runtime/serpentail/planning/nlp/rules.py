@@ -1,4 +1,4 @@
-"""Collocation rules: where the equations hold in an interval, and how states are integrated."""
+"""Collocation rules: the nodes of an interval, and how states are integrated over it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ class CollocationRule:
     """One interval [0, 1] of a collocation Runge-Kutta method (Radau IIA, Lobatto IIIA).
 
     nodes (K,): where the equations hold; supports (S + 1,): where the states are unknowns, 0 first.
-    The defects are states (S, S + 1) X - h slopes (S, K) F = 0, F being the rates at the nodes; the
+    The defects are states (S, S + 1) X - h slopes (S, K) F = 0 with the rates F at the nodes; the
     integral of a function over the interval is h weights (K,) times its values at the nodes.
     """
 
@@ -72,10 +72,10 @@ class CollocationRule:
 
 
 def collocation_rule(name: str, degree: int | None = None) -> CollocationRule:
-    """Return a rule; PlanningError where the name is unknown or the degree none that it has.
+    """Return a rule; PlanningError if its name is unknown or it does not have this degree.
 
     "trapezoidal" (the paper's, Eqs. 41, 42), "hermite-simpson" (Lobatto of degree 2), "lobatto"
-    (degree + 1 nodes, both ends among them), "radau" (degree nodes, the right end among them).
+    (degree + 1 nodes, with both ends), "radau" (degree nodes, with the right end).
     """
     if not isinstance(name, str) or name not in FAMILIES:
         raise PlanningError(f"rule: value {shown(name)}: needs {' or '.join(map(repr, FAMILIES))}")

@@ -80,8 +80,8 @@ def solver(
 ) -> "ca.Function":
     """Return CasADi's solver of a program, for a guess that is "far", "close" or "warm".
 
-    Every thread has solvers of its own: two threads in one crash.
-    PlanningError where there is no solver of that name, or an option is unknown.
+    Every thread has its own solvers, because two threads in one solver crash. PlanningError if
+    there is no solver of that name, or an option is unknown.
     """
     import casadi as ca
 

@@ -1,8 +1,8 @@
 """The nonlinear program (NLP) of a problem on a mesh, with exact sparse derivatives.
 
 Objective and constraints are linear in the unknowns w and in the values Y of one function at all
-nodes: f = cost Y + direct w, g = linear w + weights Y.  All derivatives follow from those of that
-one function.
+nodes: f = cost Y + direct w, g = linear w + weights Y. All derivatives follow from those of this
+function.
 """
 
 from dataclasses import dataclass, replace
@@ -66,7 +66,7 @@ def transcription_of(
         problem.formulation, coordinates, model.layout.nt, torque_unit(problem)
     )
 
-    # what a node's function depends on, and what the whole program does
+    # dependencies of a node's function, and of the whole program
     goal, bounds = problem.goal.attitude, problem.bounds
     arrays = (goal, bounds.torque, bounds.torque_rate)
     key: tuple[Any, ...] = tuple(None if x is None else tuple(x) for x in arrays)
@@ -118,10 +118,10 @@ def collocate(
     direct: Any,
     time: bool = False,
 ) -> Assembly:
-    """Return defects of all intervals, residuals and path constraints of all nodes, rows `direct`.
+    """Return defects of all intervals, residuals and path constraints of all nodes, and `direct`.
 
-    The objective is Eq. 40, the defects are Eqs. 41, 42 of any rule.  direct: SciPy's sparse
-    matrix, constraints of w alone.  time: the duration is added to the objective.
+    The objective is Eq. 40, the defects are Eqs. 41, 42 for any rule. direct: a sparse matrix of
+    SciPy with constraints of w alone. time: the duration is added to the objective.
     """
     mesh, rule = scheme
     nodes = len(indices.others)
@@ -174,7 +174,7 @@ def _node_rows(node: Node, mesh: Mesh, rule: CollocationRule, nodes: int) -> Any
     entries = values.ravel(), (rows.ravel(), columns.ravel())
     defects = coo_matrix(entries, (N * S * nx, nodes * node.size))
 
-    # what holds at every node
+    # constraints of every node
     extra = node.residuals + node.path
     chosen = (np.arange(nodes)[:, None] * node.size + nx + np.arange(extra)).ravel()
     ones = np.ones(chosen.size), (np.arange(chosen.size), chosen)

@@ -26,13 +26,14 @@ USE = """/* The predictive controller of {prefix}, for one plan.
    static double memory[{upper}_MPC_MEMORY];
    static {prefix}_mpc_state state;
 
-   {prefix}_mpc_begin(&state, &{prefix}_mpc_plan, memory); where the flight begins, then, t s later,
-   {prefix}_mpc_control(&state, t, t, q, v, tau); as often as the motors take torques, which may be
-   oftener than there are ticks.  Joint damping is not among them: it is the body's own. */
+   At the start of the flight call {prefix}_mpc_begin(&state, &{prefix}_mpc_plan, memory).  Then, at
+   the time t (s) from there, call {prefix}_mpc_control(&state, t, t, q, v, tau) as often as the
+   motors take torques, which may be more often than the ticks.  tau does not contain joint damping,
+   which belongs to the body. */
 
 """
 DATA = """
-/* the model's functions, as the controller calls them */
+/* the model's functions, with the arguments that the controller passes */
 static int call_rates(const void *parameters, const double *x, const double *tau, const double *h,
                       double *y, double *work)
 {{
@@ -57,7 +58,7 @@ static int call_momentum(const void *parameters, const double *q, const double *
 def write_c(model: Model, task: MpcTask, memory: int, folder: str | os.PathLike[str]) -> list[Path]:
     """Write <model>_mpc.h and .c to a folder; return their paths; memory: in doubles.
 
-    PlanningError where there is no such folder, NotWritten where the system refuses a file.
+    PlanningError if there is no such folder, NotWritten if the system refuses a file.
     """
     try:
         target = Path(folder)
@@ -108,7 +109,7 @@ def _renamed(text: str, prefix: str) -> str:
 
 
 def _array(name: str, values: np.ndarray) -> str:
-    """Return an array; of an empty one a single 0, which nothing reads."""
+    """Return an array as C; an empty one as a single 0 that is never read."""
     flat = [repr(float(value)) for value in values.ravel()] or ["0.0"]
     rows = (", ".join(flat[k : k + A_LINE]) for k in range(0, len(flat), A_LINE))
     return f"static const double {name}[{len(flat)}] = {{\n    " + ",\n    ".join(rows) + "};\n"

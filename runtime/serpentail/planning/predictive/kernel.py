@@ -1,4 +1,4 @@
-"""The controller's C, compiled once, and its structures as ctypes has them."""
+"""The controller's C, compiled once, and its structures for ctypes."""
 
 import ctypes
 from functools import cache
@@ -53,7 +53,7 @@ class Simulation(ctypes.Structure):
 
 @cache
 def kernel() -> ctypes.CDLL:
-    """The controller in C, compiled once; PlanningError where no compiler works."""
+    """The controller in C, compiled once; PlanningError if no compiler works."""
     try:
         path = compile_library([NATIVE / name for name in SOURCES], NATIVE, flags=FLAGS)
     except CompilerNotFound as error:

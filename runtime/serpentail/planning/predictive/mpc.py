@@ -1,4 +1,4 @@
-"""``Mpc``: a controller that plans the rest of a flight anew at each tick."""
+"""``Mpc``: a controller that corrects the rest of a planned flight at each tick."""
 
 import ctypes
 from os import PathLike
@@ -12,7 +12,8 @@ from ...errors import SimulationError
 from ...model.kernel import aligned
 from ...model.layout import TAIL_V
 from ...model.model import Model
-from ...simulation.controllers import NativeTorque, OwnState, Parts
+from ...simulation.controllers import NativeTorque
+from ...simulation.parts import OwnState, Parts
 from ..result.plan import Plan
 from .emission import write_c
 from .kernel import Simulation, kernel
@@ -24,27 +25,54 @@ COUNTS = ("ticks", "failed", "set_changes")
 
 
 class Mpc:
-    """Model-predictive control of a planned flight: a controller for ``st.simulate``.
+    """Model-predictive control of a planned flight: a controller for ``simulate``.
 
-    At each tick the state is measured, and from it a correction of the plan's torques is computed
-    by one Gauss-Newton step: constant in each of some intervals, within the plan's bounds of
-    torque, it brings the end nearest to the plan's goal.  What the body does until the torques act
-    is foretold.  A tick that fails, as of a state that is not finite, changes nothing.
+    At each tick it measures the state and computes a correction of the plan's torques by one
+    Gauss-Newton step. The correction is constant in each of some intervals, stays within the
+    plan's torque bounds, and brings the end nearest to the plan's goal. The motion until the new
+    torques act is predicted. A tick that fails, for instance because the state is not finite,
+    changes nothing.
 
-    model: what the controller takes the body for; it needs airborne_rates,
-    airborne_rates_derivatives and momentum, in double.
-    plan: of ``st.plan``, its attitude a quaternion.
-    rate: Hz, of the ticks.  horizon: s, so far each tick looks ahead; by default to the plan's end,
-    and never beyond it.  A shorter one ends at the plan's state of that time.
-    settings: intervals of the correction (6); delay (0 s), from a tick until its torques act: what
-    computing takes; iterations (1), Gauss-Newton steps a tick; step (0.005 s), the longest of
-    Runge-Kutta's steps; rest (s), the time before the plan's end within which there are no ticks,
-    by default that between two.
+    Parameters
+    ----------
+    model : Model
+        The model that the controller uses; it needs "airborne_rates",
+        "airborne_rates_derivatives" and "momentum", computes with double, and has a free base.
+    plan : Plan
+        The plan, with ``attitude="quaternion"``.
+    rate : float, default 100
+        Rate of the ticks (Hz).
+    horizon : float, optional
+        How far each tick looks ahead (s), at most to the plan's end. A horizon that ends earlier
+        aims at the plan's state of that time. Default: to the plan's end.
+    intervals : int, default 6
+        Number of intervals of the correction.
+    delay : float, default 0
+        Time from a tick until its torques act (s), at most the time between ticks.
+    iterations : int, default 1
+        Number of Gauss-Newton steps at a tick.
+    step : float, default 0.005
+        Longest Runge-Kutta step of the prediction (s).
+    rest : float, optional
+        Time before the plan's end without ticks (s). Default: the time between two ticks.
 
-    Called with (t, q, v), t in s from the plan's begin, it returns tau (2m,) in N m, and takes q
-    and v as measured where a tick is due; in simulations each run has a memory of its own.  After
-    the plan's end there is no torque but that of the plan's damping.  Raises PlanningError where an
-    argument is wrong.
+    Raises
+    ------
+    PlanningError
+        The model, the plan or a setting is wrong.
+    ModelError
+        The base is fixed.
+
+    Notes
+    -----
+    Called with (t, q, v), t (s) from the plan's start, it returns the torques (2m,) (N m), and
+    takes q and v as measured if a tick is due. In simulations each run has its own memory. After
+    the plan's end only the plan's damping acts.
+
+    Examples
+    --------
+    >>> mpc = st.Mpc(model, plan, rate=200)  # doctest: +SKIP
+    >>> motion = st.simulate(other, q0, v0, controller=mpc, t_span=plan.duration)  # doctest: +SKIP
     """
 
     def __init__(
@@ -64,21 +92,21 @@ class Mpc:
         self._own = Memory(self.task)
 
     def __repr__(self) -> str:
-        """Of what, how often, how far ahead."""
+        """Model, rate, horizon and intervals."""
         rate, ahead = self.settings.rate, self.task.numbers["horizon"]
         return f"Mpc({self.model.name}, {rate:g} Hz, {ahead:.4g} s in {self.settings.intervals})"
 
     @property
     def info(self) -> dict[str, int]:
-        """Counts since the last begin: ticks, how many of them failed, and changes of active sets.
+        """Counts since ``begin``: ticks, failed ticks, and changes of active sets.
 
-        Of calls alone: those of a simulation are in its ``info["mpc"]``.
+        They count calls of this object only; a simulation's counts are in its ``info["mpc"]``.
         """
         return self._own.info()
 
     @property
     def memory_size(self) -> int:
-        """Doubles that the controller works on."""
+        """Number of doubles of its workspace."""
         return len(self._own.memory)
 
     def begin(self) -> None:
@@ -86,22 +114,46 @@ class Mpc:
         self._own.begin()
 
     def tick(self, t: float, q: Any, v: Any) -> bool:
-        """Compute a correction from q (7+2m,), v (6+2m,), measured at t (s); tell if that did not
-        fail.
+        """Compute a correction from a measured state.
+
+        Parameters
+        ----------
+        t : float
+            Time of the measurement (s).
+        q : array_like, shape (nq,)
+            Configuration.
+        v : array_like, shape (nv,)
+            Velocity.
+
+        Returns
+        -------
+        bool
+            False if the tick failed and changed nothing.
         """
         return self._own.tick(float(t), *self._state(q, v))
 
     def torque(self, t: float) -> np.ndarray:
-        """Return the torques (2m,) at t (s), N m, before damping."""
+        """Evaluate the corrected torques, without damping.
+
+        Parameters
+        ----------
+        t : float
+            Time (s).
+
+        Returns
+        -------
+        ndarray, shape (2m,)
+            Torques (N m).
+        """
         return self._own.torque(float(t))
 
     def __call__(self, t: float, q: Any, v: Any) -> np.ndarray:
-        """Return tau (2m,), N m; a tick where one is due."""
+        """Return tau (2m,), N m; compute a correction if a tick is due."""
         q, v = self._state(q, v)
         return self._own.control(float(t), q, v) - self.plan.problem.damping * v[TAIL_V]
 
     def parts(self, nt: int) -> Parts:
-        """Return what it adds up in a run, with a memory of that run's own."""
+        """Return its parts in a run, with that run's own memory."""
         if nt != self.model.layout.nt:
             needs = f"a model of {self.model.layout.nt} tail coordinates, as the controller's"
             raise refusal("Mpc: tail coordinates", nt, needs, SimulationError)
@@ -111,22 +163,37 @@ class Mpc:
         return Parts(np.full(nt, self.plan.problem.damping), native=native, own=own)
 
     def write_c(self, folder: str | PathLike[str] = ".") -> list[Path]:
-        """Write the controller and its plan as C99, <model>_mpc.h and .c; return their paths.
+        """Write the controller and its plan as C99.
 
-        They need the model's generated C, allocate nothing, and compute what this one does; the
-        header tells how they are called.  Raises PlanningError where there is no such folder.
+        The files need the model's generated C, allocate nothing, and compute what this object does;
+        the header describes how to call them.
+
+        Parameters
+        ----------
+        folder : str or path, default "."
+            An existing folder.
+
+        Returns
+        -------
+        list of Path
+            Paths of ``<model>_mpc.h`` and ``<model>_mpc.c``.
+
+        Raises
+        ------
+        PlanningError
+            There is no such folder.
         """
         return write_c(self.model, self.task, self.memory_size, folder)
 
     def stops(self) -> list[float]:
-        """Return the times (s) at which the torques jump, or are computed."""
+        """Return the times (s) at which the torques jump or are computed."""
         numbers, plan = self.task.numbers, self.task.arrays["times"]
         period, delay = numbers["period"], numbers["delay"]
         ticks = period * np.arange(np.floor(numbers["last"] / period + 1e-6) + 1)
         return sorted({*ticks.tolist(), *(ticks + delay).tolist(), *plan[1:].tolist()})
 
     def _state(self, q: Any, v: Any) -> tuple[np.ndarray, np.ndarray]:
-        """Return q, v as arrays; they may be anything but of another size."""
+        """Return q and v as arrays of the right size; their values may be anything."""
         arrays = []
         for name, value, size in (("q", q, self.model.nq), ("v", v, self.model.nv)):
             array = np.ascontiguousarray(value, float)
@@ -137,14 +204,14 @@ class Mpc:
 
 
 class Memory:
-    """What one controller at work keeps, and the C that works on it."""
+    """The memory of one controller at work, and the C code that uses it."""
 
     def __init__(self, task: MpcTask):
         self.task, self.code = task, kernel()
         self.place = ctypes.addressof(task.record)
         self.memory = aligned(self.code.mpc_memory_size(self.place), np.dtype(float))
         self.run = Simulation()
-        self.state = ctypes.addressof(self.run)  # of which its state is the first member
+        self.state = ctypes.addressof(self.run)  # its first member is the controller's state
         self.tau = np.zeros(task.record.tail)
         self.begin()
 
@@ -153,15 +220,15 @@ class Memory:
         self.code.mpc_begin(self.state, self.place, self.memory.ctypes.data)
 
     def begin_run(self, record: Any, clock: float) -> None:
-        """Begin a run of the generated C, whose controller's clock is at 0 at a time (s) of it."""
+        """Begin a run of the generated C whose time is ``clock`` (s) at the controller's time 0."""
         if type(record).t.size != ctypes.sizeof(ctypes.c_double):
-            raise SimulationError("Mpc: the simulated model's numbers are float: it needs double")
+            raise SimulationError("Mpc: the simulated model computes with float: needs double")
         self.begin()
         self.run.step_begin = ctypes.addressof(record) + type(record).t.offset
         self.run.clock = clock
 
     def tick(self, t: float, q: np.ndarray, v: np.ndarray) -> bool:
-        """Compute a correction; tell if that did not fail."""
+        """Compute a correction; return False if that failed."""
         return bool(self.code.mpc_tick(self.state, t, q.ctypes.data, v.ctypes.data) == 0)
 
     def torque(self, t: float) -> np.ndarray:
@@ -170,7 +237,7 @@ class Memory:
         return self.tau.copy()
 
     def control(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Return the torques at t; a tick where one is due."""
+        """Return the torques at t; compute a correction if a tick is due."""
         places = (q.ctypes.data, v.ctypes.data, self.tau.ctypes.data)
         self.code.mpc_control(self.state, t, t, *places)
         return self.tau.copy()

@@ -1,4 +1,4 @@
-"""What a user asks of a predictive controller, checked field by field."""
+"""Settings of ``Mpc``, checked one by one."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -35,7 +35,7 @@ class Settings:
 
 
 def checked_settings(plan: Plan, given: dict[str, Any]) -> Settings:
-    """Return the settings, of which some may be left out; PlanningError where one is wrong."""
+    """Return the settings, with defaults for those left out; PlanningError if one is wrong."""
     for name in given:
         unknown = none_of("Mpc: setting", name, NAMES)
         if unknown:
@@ -52,19 +52,19 @@ def checked_settings(plan: Plan, given: dict[str, Any]) -> Settings:
     horizon = np.inf if given["horizon"] is None else _number("horizon", given["horizon"], above=0)
     rest = 1 / rate if given["rest"] is None else _number("rest", given["rest"], least=0)
     if rest + delay >= plan.duration:
-        needs = f"with the delay less than the plan's {plan.duration:.4g} s: nothing is left else"
+        needs = f"to be less than the plan's {plan.duration:.4g} s, together with the delay"
         raise refusal("Mpc: rest", rest, needs, PlanningError)
     step = _number("step", given["step"], above=0)
     intervals = _count("intervals", given["intervals"])
     if max(min(horizon, plan.duration) / intervals, delay) / step > MOST_STEPS:
-        needs = f"no more than {MOST_STEPS} in an interval: make it longer"
+        needs = f"at most {MOST_STEPS} steps in an interval: make it longer"
         raise refusal("Mpc: step", step, needs, PlanningError)
     iterations = _count("iterations", given["iterations"])
     return Settings(rate, horizon, intervals, delay, iterations, step, rest)
 
 
 def refuse_unable(model: Model, plan: Plan) -> None:
-    """PlanningError where a model or a plan cannot be controlled."""
+    """PlanningError if the model or the plan cannot be controlled."""
     model.refuse_fixed("Mpc")
     missing = [name for name in NEEDED.values() if name not in model.generated]
     if missing:
@@ -72,7 +72,7 @@ def refuse_unable(model: Model, plan: Plan) -> None:
             f"Mpc: the model lacks {', '.join(missing)}: add them to the scene's functions"
         )
     if model.manifest["real"] != "double":
-        raise PlanningError(f"Mpc: the model's numbers are {model.manifest['real']}: needs double")
+        raise PlanningError(f"Mpc: the model computes with {model.manifest['real']}: needs double")
     if model.library is None:
         raise PlanningError("Mpc: the model was loaded with compiled=False: load it again with C")
     if not isinstance(plan, Plan):

@@ -15,7 +15,7 @@ from ..result.plan import Plan
 from .kernel import FUNCTIONS, Task
 from .settings import NEEDED, Settings
 
-# what is worth as much, at the end, as a correction as large as the largest torque all the time
+# errors at the end that weigh as much as a correction by the largest torque all the time
 TURN, TURN_RATE = 1e-3, 0.1  # rad, rad/s: of the torso
 ANGLE, RATE = 1e-2, 1.0  # rad, rad/s: of the tail
 BEYOND = 1e-2  # rad beyond an angle's bound
@@ -25,7 +25,7 @@ BLOCKS = ("torque", "attitude", "tail", "tail_rate")
 
 @dataclass(frozen=True, eq=False)
 class MpcTask:
-    """A task's numbers and arrays by the names of ``mpc_task``; record: as ctypes has it."""
+    """A task's numbers and arrays by the names of ``mpc_task``; record: the same for ctypes."""
 
     numbers: dict[str, float]
     arrays: dict[str, np.ndarray]
@@ -91,12 +91,12 @@ def polynomials_of(curve: Curve) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _steps(time: float, step: float) -> int:
-    """Return how many steps of about this length (s) make up a time (s)."""
+    """Return the number of steps of at most this length (s) in a time (s)."""
     return int(np.ceil(time / step - 1e-9))
 
 
 def _most_torque(plan: Plan) -> np.ndarray:
-    """Return the largest torques (2m,), of the plan where they have no bounds."""
+    """Return the bounds of torques (2m,); without bounds, the largest torques of the plan."""
     bound = plan.problem.bounds.torque
     if bound is not None:
         return np.asarray(bound, float)
@@ -110,7 +110,7 @@ def _most_angle(problem: PlanningProblem, size: int) -> np.ndarray:
 
 
 def _goal(problem: PlanningProblem, size: int) -> dict[str, np.ndarray]:
-    """Return the goal's numbers, 0 with a weight of 0 where it is free."""
+    """Return the goal's numbers; free ones are 0 with a weight of 0."""
     goal = problem.goal
     parts = (
         (goal.tail, size, ANGLE),

@@ -1,4 +1,4 @@
-"""The motion that the unknowns of a solved program mean, at any time."""
+"""The motion of a solved program, at any time."""
 
 from dataclasses import dataclass
 
@@ -13,8 +13,8 @@ from ..nlp.rules import CollocationRule
 class Curve:
     """Collocation polynomials of all intervals, by block, SI.
 
-    ends (N + 1,): s.  starts (N, size): states where intervals start; increments (N, K, size):
-    their rates at the nodes times the interval's duration; nodes (N, K, size): torques and
+    ends (N + 1,): s. starts (N, size): states at the beginning of intervals; increments (N, K,
+    size): their rates at the nodes times the interval's duration; nodes (N, K, size): torques and
     algebraic unknowns.
     """
 
@@ -67,7 +67,7 @@ def curve(nlp: Program, w: np.ndarray, p: np.ndarray) -> Curve:
     scale = variables.scale(variables.states)
     at_nodes = np.arange(mesh.intervals)[:, None] * rule.steps + np.arange(len(rule.nodes))
 
-    # states where intervals start, and what their rates at the nodes add
+    # states at the beginning of intervals, and the increments by their rates at the nodes
     states = w[indices.states[: -1 : rule.steps]] * scale
     rates = nlp.rates(w, p) * scale
     increments = rates[at_nodes] * mesh.widths[:, None, None]

@@ -9,7 +9,7 @@ from .curve import Curve
 from .truth import planned_torques
 
 SAMPLES = 33  # of an interval, its ends among them
-SLACK = 1e-3  # of a bound, by which a plan that is called true may exceed it
+SLACK = 1e-3  # of a bound: a successful plan may exceed it by this part
 
 Excess = dict[str, np.ndarray]
 
@@ -17,8 +17,8 @@ Excess = dict[str, np.ndarray]
 def excess(nlp: Program, curve: Curve, p: np.ndarray) -> Excess:
     """Return by what part (N,) of a bound each interval exceeds it, by name; 0 or less inside it.
 
-    Names: "torque", "torque_rate", "angle", "rate", "path", those that are bounded.  A path
-    constraint's part is that of its larger limit.  p: the program's parameters.
+    Names: "torque", "torque_rate", "angle", "rate", "path", if they are bounded. For a path
+    constraint it is a part of the larger limit. p: the program's parameters.
     """
     bounds, N = nlp.problem.bounds, nlp.mesh.intervals
     k, s = np.repeat(np.arange(N), SAMPLES), np.tile(np.linspace(0, 1, SAMPLES), N)
@@ -41,14 +41,14 @@ def excess(nlp: Program, curve: Curve, p: np.ndarray) -> Excess:
 
 
 def largest(found: Excess) -> tuple[float, str | None]:
-    """Return the largest excess, 0 where no bound is exceeded, and what it is of."""
+    """Return the largest excess, 0 if no bound is exceeded, and the name of its bound."""
     of = {name: float(np.nan_to_num(part, nan=np.inf).max()) for name, part in found.items()}
     worst = max(of, key=lambda name: of[name], default=None)
     return (0.0, None) if worst is None or of[worst] <= 0 else (of[worst], worst)
 
 
 def exceeded(part: np.ndarray) -> np.ndarray:
-    """Tell of each interval if it goes too far."""
+    """Tell for each interval if it exceeds a bound too far."""
     return ~(part <= SLACK)
 
 

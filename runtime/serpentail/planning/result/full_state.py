@@ -1,7 +1,7 @@
-"""The model's q and v of a planned motion, with what the formulation left out of the unknowns.
+"""q and v of a planned motion, with the parts that the formulation eliminated.
 
-Without the angular velocity, the conserved angular momentum tells it; without the position, the COM
-falls freely.
+The angular velocity follows from the conserved angular momentum, the position from the free fall of
+the COM.
 """
 
 import numpy as np
@@ -60,9 +60,9 @@ def _falling(
     body: tuple[np.ndarray, np.ndarray],
     rates: np.ndarray,
 ) -> State:
-    """Position and velocity (K, 3) of B: the COM's, less those of the COM from B.
+    """Return position and velocity (K, 3) of B: the COM's minus those of the COM relative to B.
 
-    body: rotations (K, 3, 3) and mass matrices.  rates: (omega, q_t_dot).
+    body: rotations (K, 3, 3) and mass matrices. rates: (omega, q_t_dot).
     """
     R, H = body
     mass = H[:, 0, 0][:, None]

@@ -1,4 +1,4 @@
-"""``Plan``: what the user gets, a motion with its torques and the report of its truth."""
+"""``Plan``: a planned motion with its torques, and a report on the true motion."""
 
 from dataclasses import dataclass
 from os import PathLike
@@ -32,15 +32,34 @@ TRUTH = ("open_loop_attitude_error_deg", "open_loop_goal_error_deg")
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """A planned motion and its truth.
+    """A planned motion, its torques, and a report on the motion that these cause.
 
-    success: the solver converged, the torques, applied open loop, end within the tolerances, and
-    bounds hold between nodes, too.
-    trajectory: the planned motion and its torques (before damping), at and between all ends of
-    intervals.
-    report: JSON-ready summary; errors in degrees, times in s, energy in J, power in W.
-    problem, mesh, rule, solution: what was asked and solved.
-    ``torque`` and ``curve`` give values at any time.
+    Attributes
+    ----------
+    success : bool
+        Whether the solver converged, the torques applied open loop end within the tolerances,
+        and bounds hold between nodes.
+    trajectory : Trajectory
+        The planned motion and torques, before damping. Its samples include all ends of
+        intervals.
+    report : dict
+        JSON-ready summary: errors at the end, effort (N^2 m^2 s), energy (J), peak power (W),
+        times (s), counts; docs/planning.md lists its keys.
+    problem : PlanningProblem
+        What was asked.
+    curve : Curve
+        The planned motion as polynomials; ``curve.at(times)`` evaluates them.
+    mesh : Mesh
+        Its intervals.
+    rule : CollocationRule
+        Its collocation rule.
+    solution : Solution
+        What the solver returned.
+
+    Examples
+    --------
+    >>> plan = st.plan(model, start=(q0, v0), duration=0.3)  # doctest: +SKIP
+    >>> true = st.simulate(model, q0, v0, controller=plan.controller, t_span=0.3)  # doctest: +SKIP
     """
 
     success: bool
@@ -53,7 +72,7 @@ class Plan:
     solution: Solution
 
     def __repr__(self) -> str:
-        """On at most six lines whether it succeeded, what it costs, and how true it is."""
+        """At most six lines: whether it succeeded, what it costs, and how true it is."""
         told, model = self.report, self.trajectory.model
         moved = tail_of(model) if model else "without its model"
         ended = "success" if self.success else f"no success ({told['status']})"
@@ -65,26 +84,40 @@ class Plan:
                 f"{self.duration:.6g} s, {self.mesh.intervals} intervals by {self.rule.name} of "
                 f"degree {self.rule.degree}, {len(self.trajectory.t)} samples; {UNITS}",
                 f"effort {effort} N^2 m^2 s, energy {energy} J, peak power {power} W",
-                f"attitude its torques lead to: {to_plan} deg to the plan, {to_goal} to the goal",
+                f"true attitude at the end: {to_plan} deg from the plan, {to_goal} from the goal",
                 f"{told['rounds']} rounds, {told['iterations']} iterations, {told['wall_s']:.3g} s",
             ]
         )
 
     @property
     def warnings(self) -> list[str]:
-        """What to mind about the planned motion: see ``Trajectory.warnings``."""
+        """Doubts about the planned motion; see ``Trajectory.warnings``."""
         return self.trajectory.warnings
 
     @property
     def duration(self) -> float:
-        """Duration in s."""
+        """Duration (s)."""
         return self.curve.duration
 
     def view(self, path: str | PathLike[str] = "plan.html", model: Model | None = None) -> Path:
-        """Write the page of the motion as planned, with its torques in truth, and passive.
+        """Write a page with the planned motion, the true one, and passive flight.
 
-        The last two are simulated.  model: of a plan that was pickled.  Returns the path; raises as
-        ``st.view``.
+        Parameters
+        ----------
+        path : str or path, default "plan.html"
+            The .html file.
+        model : Model, optional
+            The model of a plan that was pickled; the true and the passive motion are simulated.
+
+        Returns
+        -------
+        Path
+            The path of the file.
+
+        Raises
+        ------
+        ViewError, ModelError
+            As of ``view``.
         """
         from ...viewer.view import view
 
@@ -93,13 +126,13 @@ class Plan:
         return view(motions, path, names=SHOWN[: len(motions)], model=own)
 
     def _repr_html_(self) -> str:
-        """For notebooks: the text, and the page."""
+        """Text and page, for notebooks."""
         from ...viewer.notebook import in_notebook
 
         return in_notebook(self, lambda: self._motions(self.trajectory.model), SHOWN)
 
     def _motions(self, model: Model | None) -> list[Trajectory]:
-        """The motion as planned, and where there is a model, what its torques do, and passive."""
+        """Return the planned motion and, if the model is known, the true and the passive one."""
         if model is None:
             return [self.trajectory]
         damping = self.problem.damping
@@ -107,9 +140,9 @@ class Plan:
         return [self.trajectory, *(self._flown(model, law) for law in laws)]
 
     def _flown(self, model: Model, law: Controller) -> Trajectory:
-        """The motion under a law at the plan's samples, or what there is of it where it fails.
+        """Return the motion under a law at the plan's samples, or up to its failure.
 
-        A page interpolates nothing: samples of other times would look like errors.
+        A page interpolates nothing: samples at other times would look like errors.
         """
         start = self.problem.q0, self.problem.v0
         try:
@@ -121,21 +154,49 @@ class Plan:
             return cast(Trajectory, error.trajectory)
 
     def torque(self, times: ArrayLike) -> np.ndarray:
-        """Planned torques (n, 2m), N m, at times (n,) s from the start."""
+        """Evaluate the planned torques, without damping.
+
+        Parameters
+        ----------
+        times : array_like, shape (n,)
+            Times from the start (s).
+
+        Returns
+        -------
+        ndarray, shape (n, 2m)
+            Torques (N m).
+        """
         return self.curve.at(np.atleast_1d(np.asarray(times, float)))["torque"]
 
     def controller(self, t: float, _q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Open-loop torque law for ``st.simulate``: planned torques less the problem's damping."""
+        """Return the open-loop torques, a controller for ``simulate``.
+
+        They are the planned torques less the problem's damping.
+
+        Parameters
+        ----------
+        t : float
+            Time from the start (s).
+        _q : array_like, shape (nq,)
+            Not used.
+        v : ndarray, shape (nv,)
+            Velocity.
+
+        Returns
+        -------
+        ndarray, shape (2m,)
+            Torques (N m).
+        """
         return self.torque(min(max(t, 0.0), self.duration))[0] - self.problem.damping * v[TAIL_V]
 
 
 def _shown(value: float | None) -> str:
-    """A number of the report, which has None for what is not finite."""
+    """Return a number of the report as text; None stands for what is not finite."""
     return "no finite" if value is None else f"{value:.4g}"
 
 
 def sample_times(ends: np.ndarray) -> np.ndarray:
-    """Return times that divide every interval evenly, at least SAMPLES in all."""
+    """Return times that divide each interval evenly, at least SAMPLES in all."""
     parts = np.ceil(np.diff(ends) / ends[-1] * SAMPLES).astype(int)
     rows = [
         np.linspace(a, b, n, endpoint=False)

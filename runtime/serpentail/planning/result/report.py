@@ -1,4 +1,4 @@
-"""What a plan costs, and how true it is: the numbers of ``Plan.report``, ready for JSON."""
+"""The numbers of ``Plan.report``: what a plan costs, and how true it is."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -23,7 +23,7 @@ TRACKED_SAMPLES = 580  # of a tracked motion
 
 
 def report(search: "Search", best: "Round", planned: Trajectory) -> dict[str, Any]:
-    """Return the summary of a search's best round; None for what is not finite.
+    """Return the summary of a search's best round; None for a number that is not finite.
 
     planned: the round's trajectory.
     """
@@ -54,8 +54,10 @@ def report(search: "Search", best: "Round", planned: Trajectory) -> dict[str, An
 
 
 def truth(search: "Search", best: "Round", planned: Trajectory) -> dict[str, Any]:
-    """Return the plan's errors at its end: torques applied open loop, and the tail tracked by PFL
-    with torques within their bound.
+    """Return the plan's errors at its end.
+
+    They are found twice: with the torques applied open loop, and with the tail tracked by PFL and
+    torques within their bound.
     """
     problem, true_q = search.problem, best.true[0]
     to_plan, to_goal = attitude_errors(problem, best.planned[0][-1, QUATERNION], true_q[QUATERNION])

@@ -1,6 +1,6 @@
-"""What a plan's torques really do when they are applied to the model, in small steps.
+"""The true motion under a plan's torques, integrated in small steps.
 
-From end to end this is the plan's error; by intervals it tells where the mesh is too coarse.
+Its end shows the plan's error; its intervals show where the mesh is too coarse.
 """
 
 import numpy as np
@@ -23,16 +23,16 @@ SHORT_INTERVAL = 0.02  # s: rates of shorter ones are weighed as if they were as
 def applied(
     model: Model, torques: Piecewise, damping: float, q: np.ndarray, v: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return q, v after planned torques were applied from the state q, v; nan where they blow up.
+    """Return q, v after applying planned torques from the state q, v; nan if they diverge.
 
-    RK4 in C, its torques being the plan's own polynomials, steps ending where they join.
+    RK4 in C, with the plan's own polynomials as torques; steps end where the polynomials join.
     """
     duration = float(torques.times[-1])
     step = min(LONGEST_STEP, np.diff(torques.times).min() / 4)
     law = TorqueCurve(torques, damping)
     try:
         return end_of_flight(model, (q, v), law, duration, step)
-    except SimulationError:  # bent or whirled beyond what the model describes
+    except SimulationError:  # bent or rotating beyond the model's range
         return np.full_like(q, np.nan), np.full_like(v, np.nan)
 
 
@@ -55,7 +55,7 @@ def end_errors(
     planned: tuple[np.ndarray, np.ndarray],
     true: tuple[np.ndarray, np.ndarray],
 ) -> dict[str, float]:
-    """Return how far a true q, v at the end are from the planned ones; inf where they are lost.
+    """Return the distances of a true q, v at the end from the planned ones; inf if they diverged.
 
     "attitude": deg, to the plan or the goal, the larger one; "tail": deg; "rate": rad/s, of torso
     and tail.
@@ -73,7 +73,7 @@ def end_errors(
 def attitude_errors(
     problem: PlanningProblem, planned: np.ndarray, reached: np.ndarray
 ) -> tuple[float, float]:
-    """Angles (deg) of the attitude that was reached to the planned one, and to the goal; (4,)."""
+    """Return the angles (deg) from the reached attitude (4,) to the planned one and the goal."""
     to_plan, goal = float(angle_deg(planned, reached)), problem.goal.attitude
     if goal is None:
         return to_plan, to_plan
@@ -85,10 +85,10 @@ def attitude_errors(
 def work(
     model: Model, curve: Curve, damping: float, start: tuple[np.ndarray, np.ndarray]
 ) -> tuple[float, float]:
-    """Return the energy (J), the integral of sum |tau q_t_dot|, of the planned torques applied from
-    the start, and the largest such power (W); nan where the motion is lost.
+    """Return energy (J) and largest power (W) of the planned torques applied from the start.
 
-    By Gauss's rule of four nodes, between which torques do not jump.
+    The energy is the integral of the sum of all absolute powers tau q_t_dot, by Gauss's rule with
+    four nodes, between which torques do not jump. Both are nan if the motion diverges.
     """
     torques = planned_torques(curve)
     law, sample = TorqueCurve(torques, damping), min(SAMPLE, curve.duration / 4)

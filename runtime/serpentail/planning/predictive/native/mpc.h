@@ -1,13 +1,13 @@
-/* Model-predictive control of a flight: at each tick a Gauss-Newton step towards the torques that
-   bring the body from where it is to a plan's goal.
+/* Model-predictive control of a flight: each tick makes a Gauss-Newton step towards the torques
+   that bring the body from its measured state to a plan's goal.
 
-   Torques are the plan's and a correction, which is constant in each of N intervals between the
-   tick and the end of the horizon.  A tick follows the motion by classical Runge-Kutta steps with
-   exact derivatives, writes the sum of squares that the correction is to lower as a quadratic
-   program with bounds, solves that by an active set, and keeps the step if it lowers the sum.
+   The torques are the plan's plus a correction, which is constant in each of N intervals between
+   the tick and the end of the horizon.  A tick integrates the motion by classical Runge-Kutta steps
+   with exact derivatives.  It states the sum of squares to be minimised as a quadratic program with
+   bounds, solves that by an active-set method, and keeps the step if it lowers the sum.
 
-   Nothing is allocated: the caller gives as many doubles as mpc_memory_size tells.  SI units;
-   quaternions are w, x, y, z, torso to world. */
+   Nothing is allocated: the caller provides mpc_memory_size(task) doubles.  SI units; quaternions
+   are w, x, y, z, torso to world. */
 
 #ifndef MPC_H
 #define MPC_H
@@ -15,8 +15,8 @@
 #include <stddef.h>
 
 /* A model's functions of an airborne state x = (quaternion, tail, its rates): y = (rates of x,
-   omega), J = dy / d(x, tau) by rows; the angular momentum h, world axes, is conserved.  0: all is
-   finite. */
+   omega), J = dy / d(x, tau) by rows; h: the conserved angular momentum, world axes.  They return 0
+   if all results are finite. */
 typedef int (*mpc_rates)(const void *parameters, const double *x, const double *tau,
                          const double *h, double *y, double *work);
 typedef int (*mpc_slopes)(const void *parameters, const double *x, const double *tau,
@@ -27,19 +27,19 @@ typedef int (*mpc_momentum)(const void *parameters, const double *q, const doubl
 
 enum { MPC_ATTITUDE = 4, MPC_TURN = 3 }; /* sizes of a quaternion and of omega */
 
-/* What the controller is made for; the arrays may lie in constant memory. */
+/* The task of a controller; its arrays may be in constant memory. */
 typedef struct {
     int tail;             /* tail coordinates m */
-    int intervals, steps; /* N of the correction, and Runge-Kutta's in each */
-    int late_steps;       /* Runge-Kutta's from a tick until its torques act; 0: no delay */
-    int iterations;       /* Gauss-Newton steps of a tick */
-    int goal_rows;        /* of the attitude at the end */
+    int intervals, steps; /* N of the correction, and Runge-Kutta steps in each */
+    int late_steps;       /* Runge-Kutta steps from a tick until its torques act; 0: no delay */
+    int iterations;       /* Gauss-Newton steps in a tick */
+    int goal_rows;        /* rows of the attitude's goal at the end */
     int pieces, powers;   /* of the plan's polynomials */
-    int work;             /* doubles that the model's functions work on */
+    int work;             /* doubles of workspace for the model's functions */
     double period, delay; /* s: between ticks, and from a tick until its torques act */
-    double horizon;       /* s: of a tick, or what is left of the plan where that is less */
-    double end, last;     /* s: of the plan; the last tick */
-    double damping;       /* N m s, of the joints, beside the torques */
+    double horizon;       /* s: of a tick, at most to the end of the plan */
+    double end, last;     /* s: end of the plan; time of the last tick */
+    double damping;       /* N m s, of the joints, in addition to the torques */
 
     mpc_rates rates;
     mpc_slopes slopes;
@@ -50,29 +50,29 @@ typedef struct {
 
     const double *most_torque; /* (m) N m */
     const double *most_angle;  /* (m) rad */
-    /* what squares cost: each second those of the correction and of the tail's rates less the
-       plan's; at the ends of intervals those of angles beyond their bounds */
+    /* weights of squares: per second, of the correction, and of the tail's rates less the plan's;
+       at the ends of intervals, of angles beyond their bounds */
     const double *torque_weight, *rate_weight; /* (m) */
     double angle_weight;
-    /* at the end of the plan: of the turn (rad) that is left, and of (tail, rates, omega) less the
-       goal's, weights being 0 where it is free */
+    /* at the end of the plan: of the remaining rotation (rad) to the goal, and of (tail, rates,
+       omega) less the goal's; free entries have weight 0 */
     double attitude_weight;
     const double *goal;       /* (goal_rows, 4): rows that are 0 at the goal's quaternion */
     const double *end_state;  /* (2 m + 3) */
     const double *end_weight; /* (2 m + 3) */
-    /* at the end of a horizon that is shorter: of (tail, rates) less the plan's */
+    /* at the end of a shorter horizon: of (tail, rates) less the plan's */
     const double *track_weight; /* (2 m) */
 } mpc_task;
 
-/* Where a controller is. */
+/* The state of a controller. */
 typedef struct {
     const mpc_task *task;
     double *memory;      /* mpc_memory_size(task) doubles */
-    long tick;           /* the last, counted from the plan's begin; -1: none yet */
-    long ticks, failed;  /* how many there were, and how many of them failed */
-    long set_changes;    /* of the active set, in all ticks */
-    int newest;          /* which of two corrections is the newest */
-    double begin[2];     /* s, of the corrections; above all times where there is none */
+    long tick;           /* the last, counted from the plan's start; -1: none yet */
+    long ticks, failed;  /* number of ticks, and of those that failed */
+    long set_changes;    /* changes of the active set, in all ticks */
+    int newest;          /* which of the two corrections is newer */
+    double begin[2];     /* s, of the corrections; above all times if there is none */
     double width[2];     /* s, of their intervals */
     double cost;         /* the sum of squares after the last tick that did not fail */
 } mpc_state;
@@ -82,31 +82,31 @@ size_t mpc_memory_size(const mpc_task *task);
 /* Forget all ticks. */
 void mpc_begin(mpc_state *state, const mpc_task *task, double *memory);
 
-/* Compute a correction from q, v at t (s, from the plan's begin), whatever the ticks' clock says.
-   0: done; 1: the tick failed, and is counted: the last correction stays. */
+/* Compute a correction from q, v at t (s, from the plan's start), whether or not a tick is due.
+   Returns 0 for success; 1 if the tick failed: it is counted, and the last correction stays. */
 int mpc_tick(mpc_state *state, double t, const double *q, const double *v);
 
-/* Torques (m) at t, N m; clock: the begin of the time step that t lies in, or t. */
+/* Torques (m) at t, N m; clock: the start of the time step that contains t, or t. */
 void mpc_torque(const mpc_state *state, double clock, double t, double *tau);
 
-/* Both: where a tick is due at the clock, it is computed from q, v; then torques at t. */
+/* Both: compute a correction from q, v if a tick is due at the clock; then the torques at t. */
 void mpc_control(mpc_state *state, double clock, double t, const double *q, const double *v,
                  double *tau);
 
-/* A controller in a simulated run, whose trial states must not count as measured: ticks are at the
-   begins of its steps.  clock: the run's time at which the plan begins. */
+/* A controller in a simulated run.  Trial states of the integrator must not count as measured, so
+   ticks are at the starts of its steps.  clock: the run's time at which the plan starts. */
 typedef struct {
     mpc_state state;
-    const double *step_begin; /* s, of the run's time; NULL: every call is one */
+    const double *step_begin; /* s, run's time at the start of its step; NULL: each call */
     double clock;
 } mpc_simulation;
 
 /* mpc_control, as a NativeTorque; context: an mpc_simulation.  Returns 0. */
 int mpc_simulated(void *context, double t, const double *q, const double *v, double *tau);
 
-/* quadratic.c: d (n) that minimises d^T H d / 2 + g^T d within lower <= 0 <= upper; H by rows, both
-   triangles.  memory: n (n + 3) doubles, set: n ints.  Returns how often the active set changed, -1
-   where H is not positive definite or it changed too often. */
+/* quadratic.c: d (n) that minimises d^T H d / 2 + g^T d with lower <= d <= upper, lower <= 0 <=
+   upper; H by rows, both triangles.  memory: n (n + 3) doubles, set: n ints.  Returns the number of
+   changes of the active set; -1 if H is not positive definite, or after too many changes. */
 int mpc_quadratic(int n, const double *H, const double *g, const double *lower,
                   const double *upper, double *d, int *set, double *memory);
 

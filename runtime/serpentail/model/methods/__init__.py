@@ -1,0 +1,1 @@
+"""The methods of a model, in groups: each calls a compiled function."""

@@ -1,0 +1,64 @@
+"""Searches for a plan, round by round, and returns the best one."""
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+from ..model.model import Model
+from ..stages import Stage
+from .momentum import refuse_impossible
+from .nlp.fork_gate import forks_wait
+from .nlp.interrupt import stoppable
+from .nlp.node import equations_of_motion
+from .problem import PlanningProblem
+from .result.plan import Plan
+from .rounds import SOFTENING, Round, Search
+from .settings import PlanSettings
+
+NEEDED = ("mass_matrix", "inverse_dynamics", "rollout")  # functions of the model
+
+
+def best_plan(
+    model: Model,
+    problem: PlanningProblem,
+    settings: PlanSettings,
+    watch: Callable[[Plan], object] | None,
+) -> Plan:
+    """Search round by round, and return the best plan."""
+    missing = [name for name in NEEDED if name not in model.generated]
+    if missing:
+        raise model.without(*missing)
+    refuse_impossible(model, problem)
+    begun, easier = time.perf_counter(), None
+    with forks_wait(), Stage("plan", model.name) as stage:
+        equations = equations_of_motion(model, settings.dynamics)
+        with stoppable(settings.time_limit, stage.tell):
+            if problem.objective in SOFTENING and settings.guess is None:
+                # these objectives are seldom solved from passive flight
+                calm, untracked = (
+                    replace(problem, objective="effort"),
+                    replace(settings, track=False),
+                )
+                easier = Search(model, calm, untracked, equations)
+                found = rounds_of(easier, stage)
+                guess = easier.plan(easier.best(found), len(found), 0.0)
+                settings = replace(settings, guess=guess)
+            search = Search(model, problem, settings, equations, easier)
+            rounds = rounds_of(search, stage, watch, begun)
+        return search.plan(search.best(rounds), len(rounds), time.perf_counter() - begun)
+
+
+def rounds_of(
+    search: Search,
+    stage: Stage,
+    watch: Callable[[Plan], object] | None = None,
+    begun: float = 0.0,
+) -> list[Round]:
+    """Return all rounds of a search; each is reported and passed to ``watch`` when it is found."""
+    rounds: list[Round] = []
+    for each in search.rounds():
+        rounds.append(each)
+        stage.tell(what=f"{search.model.name}: {each} after round {len(rounds)}")
+        if watch is not None:
+            watch(search.plan(each, len(rounds), time.perf_counter() - begun))
+    return rounds

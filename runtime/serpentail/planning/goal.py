@@ -1,0 +1,70 @@
+"""``Goal`` and ``Bounds`` of a plan."""
+
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Goal:
+    """What holds at the end of a plan (f_bc of Eq. 43); None leaves a part free.
+
+    Parameters
+    ----------
+    attitude : {"upright"} or array_like, shape (4,), default "upright"
+        Attitude of the torso: upright at any yaw, or a quaternion (w, x, y, z) from torso to
+        world.
+    torso_rate : array_like, shape (3,), default zeros
+        Angular velocity of the torso (rad/s, body).
+    tail : array_like, shape (2m,), optional
+        Tail coordinates (rad); single numbers may be None. Default: free.
+    tail_rate : array_like, shape (2m,), optional
+        Their rates (rad/s); single numbers may be None. Default: free.
+    turns : (int, int), optional
+        Whole turns of pitch and roll at an upright end, only with ``attitude="euler"`` of the
+        plan. Default: those nearest to the guess, as in Sect. 3.2.
+
+    Examples
+    --------
+    >>> import serpentail as st
+    >>> st.Goal(tail=[0.0, None]).attitude
+    'upright'
+    """
+
+    attitude: Any = "upright"
+    torso_rate: Any = (0.0, 0.0, 0.0)
+    tail: Any = None
+    tail_rate: Any = None
+    turns: Any = None
+
+
+GOALS = {"upright": Goal()}  # by name
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Largest magnitudes along a plan (g_pc of Eq. 43); None sets no bound.
+
+    Each is one number, or one for each of the 2m tail coordinates.
+
+    Parameters
+    ----------
+    angle : float or array_like, optional
+        Tail coordinates (rad). Default: no bound.
+    rate : float or array_like, optional
+        Their rates (rad/s). Default: no bound.
+    torque : float or array_like, default 0.02
+        Torques (N m).
+    torque_rate : float or array_like, optional
+        Rates of the torques (N m/s). With it, the torques are continuous. Default: no bound.
+
+    Examples
+    --------
+    >>> import serpentail as st
+    >>> st.Bounds(torque=0.01).torque
+    0.01
+    """
+
+    angle: Any = None
+    rate: Any = None
+    torque: Any = 0.02
+    torque_rate: Any = None

@@ -1,0 +1,93 @@
+"""``SequenceRun``: the motion of a sequence, and the outcome of each phase."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import Any
+
+from ..brief import brief
+from ..errors import PlanningError, SimulationError
+from ..motion.joined import joined
+from ..motion.trajectory import Trajectory
+from ..planning.result.plan import Plan
+from .phase import Phase
+
+
+@dataclass(frozen=True, eq=False)
+class PhaseRun:
+    """Outcome of a phase.
+
+    Attributes
+    ----------
+    name : str
+        Name of the phase.
+    begin, end : float
+        Times on the clock of the whole motion (s).
+    ended_by : str
+        What ended it, such as "duration", "airborne" or "touch_down of feet".
+    plan : Plan or None
+        Its plan.
+    """
+
+    name: str
+    begin: float
+    end: float
+    ended_by: str
+    plan: Plan | None = None
+    __repr__ = brief
+
+    def info(self) -> dict[str, Any]:
+        """Return its entry in a trajectory's info."""
+        told = {"name": self.name, "begin": self.begin, "end": self.end, "ended_by": self.ended_by}
+        return told if self.plan is None else told | {"plan": self.plan.report}
+
+
+@dataclass(frozen=True, eq=False)
+class SequenceRun:
+    """The motion of a sequence, and the outcome of each phase.
+
+    Attributes
+    ----------
+    trajectory : Trajectory
+        The whole motion; its ``info["phases"]`` has the outcomes too.
+    phases : tuple of PhaseRun
+        Outcome of each phase that was made: ``name``, ``begin`` and ``end`` (s), ``ended_by``
+        and ``plan``.
+    complete : bool
+        Whether all phases were made.
+    """
+
+    trajectory: Trajectory
+    phases: tuple[PhaseRun, ...]
+    complete: bool
+    __repr__ = brief
+
+
+def whole(parts: list[Trajectory], runs: list[PhaseRun], phases: Iterable[Phase]) -> Trajectory:
+    """Return the motion of all phases as one, with their outcomes and warnings in its info."""
+    motion = joined(parts)
+    warnings = list(motion.info.get("warnings", []))
+    for run, phase in zip(runs, phases, strict=False):
+        if run.plan is not None and not run.plan.success:
+            warnings.append(f"the plan of phase {run.name!r} did not succeed: see its report")
+        if phase.until is not None and run.ended_by == "duration":
+            warnings.append(
+                f"phase {run.name!r} ended without {phase.words} within {phase.duration:.6g} s"
+            )
+    told = {"phases": [run.info() for run in runs], "warnings": warnings}
+    return replace(motion, info=motion.info | told)
+
+
+def told(
+    phase: Phase, error: SimulationError | PlanningError, parts: list[Trajectory]
+) -> SimulationError | PlanningError:
+    """Return an error that names its phase, with the motion up to there."""
+    found = type(error)(f"phase {phase.name!r}: {error}")
+    if isinstance(found, SimulationError):
+        found.trajectory = so_far(parts, getattr(error, "trajectory", None))
+    return found
+
+
+def so_far(parts: list[Trajectory], last: Trajectory | None) -> Trajectory | None:
+    """Return the motion of all finished phases and of a part of one more."""
+    made = parts if last is None else [*parts, last]
+    return joined(made) if made else None

@@ -1,0 +1,89 @@
+"""Prepares runs: checks their settings, and chooses the method of "auto"."""
+
+import ctypes
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ..errors import ModelError, SimulationError
+from ..model.model import Model
+from ..model.parameters import RunParameters
+from .acting import Acting
+from .compiled_run import CompiledRun, Memory
+from .controllers import Controller
+from .decay import FastestDecay
+from .ground import Ground
+from .limits import MOST_STEPS, refuse_endless
+from .methods import SCIPY, IntegrationMethod, checked_method, chosen, step_counts
+from .records import Records
+from .start import EPS, Start
+
+
+def prepared(
+    model: Model, start: Start, controller: Controller, method: str, settings: dict[str, Any]
+) -> tuple[Memory, Acting, IntegrationMethod]:
+    """Return what runs need; SimulationError or ModelError if a setting is wrong."""
+    changes = settings.pop("parameters", None)
+    if changes is not None and not start.many:
+        raise ModelError(
+            "parameters: one start only: give q0 or v0 one row for each run, or use "
+            "model.with_parameters"
+        )
+    parameters = model.parameters_of_runs(changes, start.runs)
+    start.refuse_behind_stops(parameters.values)
+    ground = Ground.checked(model, start, parameters, settings)
+    acting = Acting(Records(model), controller, start, ground.legs.curve if ground.legs else None)
+    choice = choose(acting, start, parameters, method, settings)
+    if ground.stop_at and choice.name in SCIPY:
+        raise SimulationError(
+            f"stop_at: {choice.name} does not detect events: use tsit5 or ros34pw2"
+        )
+    return Memory(acting.records, start, ground, parameters), acting, choice
+
+
+def choose(
+    acting: Acting,
+    start: Start,
+    parameters: RunParameters,
+    name: str,
+    settings: dict[str, Any],
+) -> IntegrationMethod:
+    """Return the method that was asked for, or the choice of "auto" with its reason."""
+    model, single = acting.model, acting.records.real is ctypes.c_float
+    available, reason = model.manifest["simulation"]["methods"], "asked for"
+    if isinstance(name, str) and name == "auto":
+        decay = None
+        if not model.contacts:
+            decay = FastestDecay(acting, start.runs, parameters)(start.q0)
+        name, reason = chosen(settings, available, decay)
+    method = checked_method(name, settings, available, single)
+    span, most_steps = start.end - start.start, method.settings.get("most_steps", MOST_STEPS)
+    for each in ("step", "most_step"):
+        length = method.settings.get(each, np.inf)
+        refuse_vanishing(start, each, length)
+        refuse_endless(each, length, span, most_steps)
+    if name == "rk4":  # steps divide the output's
+        interval = np.array([start.interval])
+        steps = step_counts(interval, 1e-12 * interval, method.settings["step"])
+        return replace(method, reason=reason, settings={"step": start.interval / int(steps[0])})
+    return replace(method, reason=reason)
+
+
+def still_chosen(run: CompiledRun, name: str) -> bool:
+    """Tell whether "auto" chooses a run's method again for a new start; store the reason."""
+    if name != "auto" or run.ground.points:  # on the ground "auto" asks for no start
+        return True
+    method, available = run.method, run.model.manifest["simulation"]["methods"]
+    name, reason = chosen(method.settings, available, run.decay(run.memory.state["q"]))
+    run.method = replace(method, reason=reason)
+    return name == method.name
+
+
+def refuse_vanishing(start: Start, name: str, step: float) -> None:
+    """SimulationError if steps of this length (s) are too short to advance the time."""
+    least = EPS * max(abs(start.start), abs(start.end))
+    if step < least:
+        raise SimulationError(
+            f"{name} {step:.3g}: too short to move the time: give {least:.2g} s or more"
+        )

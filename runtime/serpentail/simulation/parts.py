@@ -1,0 +1,70 @@
+"""Parts of a controller: damping, torque curves, tracking, functions of C and of Python."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .pfl import Pfl
+from .piecewise import Piecewise
+
+if TYPE_CHECKING:
+    from .controllers import NativeTorque
+
+TorqueFunction = Callable[[float, np.ndarray, np.ndarray], ArrayLike]  # (t, q, v) -> tau
+
+
+@dataclass(frozen=True, eq=False)
+class OwnState:
+    """State of a C function during a run.
+
+    begin: called with the record of a run that begins, and the controller's clock (s). told:
+    returns what the run's info has of it. stops: times (s) at which steps must end.
+    """
+
+    begin: Callable[[Any, float], None]
+    told: Callable[[], dict[str, Any]]
+    stops: list[float]
+
+
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """Sum of the torques of one controller.
+
+    damping (2m,) in N m s; native and user are functions of C and of Python. clock: time of the run
+    (s) at which the clock of the C function is 0; own: the state of that function.
+    """
+
+    damping: np.ndarray | None = None
+    torques: Piecewise | None = None
+    pfl: Pfl | None = None
+    native: "NativeTorque | None" = None
+    user: TorqueFunction | None = None
+    clock: float = 0.0
+    own: OwnState | None = None
+
+    def since(self, begin: float) -> "Parts":
+        """Return the parts with a clock that is 0 at the time ``begin`` (s) of the run."""
+        if begin == 0:
+            return self
+        user = self.user
+        return replace(
+            self,
+            torques=None if self.torques is None else self.torques.later(begin),
+            pfl=None if self.pfl is None else self.pfl.later(begin),
+            user=None if user is None else lambda t, q, v: user(t - begin, q, v),
+            clock=begin,
+        )
+
+    def kinks(self) -> list[float]:
+        """Return the times at which these torques have a jump or a kink."""
+        times: list[float] = []
+        if self.torques is not None:
+            times += self.torques.kinks(2).tolist()
+        if self.pfl is not None:
+            times += self.pfl.curve.kinks(3).tolist()
+        if self.own is not None:
+            times += [self.clock + stop for stop in self.own.stops]
+        return times
