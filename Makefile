@@ -40,7 +40,7 @@ GENERATE := $(PY) -m serpentail_codegen
 FOLDER   := "$$($(GENERATE) --print-folder $(WANTED))"
 PAGE     := $(wildcard hatch_build.py viewer/*.* viewer/src/*)
 
-.PHONY: help setup demo test test-portable test-all model verify bench stress mutants embedded size-report studies study-models study-righting study-contact study-landing study-morphology study-replanning wheels lint golden clean
+.PHONY: help setup demo test test-portable test-all model verify bench stress mutants embedded size-report studies study-models study-righting study-contact study-landing study-morphology study-replanning wheels docs lint golden clean
 .DELETE_ON_ERROR:
 
 help:
@@ -70,6 +70,7 @@ help:
 	@echo "  make study-replanning                      bodies unlike the planned one: open loop, PFL, predictive control"
 	@echo "  make studies                               all; STARTS=200 random starts in the second"
 	@echo "  make wheels                                builds wheel and sdist, installs the wheel for each Python that is here"
+	@echo "  make docs                                  the site, with the gallery: output/docs/index.html"
 	@echo "  make lint                                  style, import rules, types, lengths of files"
 	@echo "  make golden                                accept what the generator emits now as the golden models"
 	@echo "  make clean                                 remove what was generated, and output/"
@@ -178,9 +179,14 @@ studies: study-models study-righting study-contact study-landing study-morpholog
 wheels: $(READY)
 	$(PY) -m tests.packaging.wheels
 
+# Every warning is an error; the scripts of the gallery run.
+docs: $(READY)
+	$(PY) -m sphinx -W --keep-going -n -q -b html -d .build/doctrees docs output/docs
+	@echo "written: output/docs/index.html"
+
 golden: $(READY)
 	$(PY) -m pytest tests/house/test_golden.py tests/house/test_functions_document.py --update-golden
 
 clean:
-	rm -rf output .build
+	rm -rf output .build docs/api docs/gallery
 	test ! -d generated || find generated -mindepth 1 -maxdepth 1 ! -name README.md ! -name 'golden_*' -exec rm -rf {} +
