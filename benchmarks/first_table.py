@@ -1,5 +1,5 @@
-"""The table of the README, from a report: AVX-512 before AVX2 in each cell; of a peer how many
-times as long as ours it takes.
+"""The first table of docs/benchmarks.md, from a report: AVX-512 before AVX2 in each cell; of a peer
+how many times as long as ours it takes.
 """
 
 from collections.abc import Callable
@@ -68,7 +68,7 @@ ROWS: tuple[tuple[str, str, str | None, Callable[[dict], str]], ...] = (
 
 
 def block(report: dict) -> list[str]:
-    """Return the lines of the README's table; a row that nothing was measured for is left out."""
+    """Return the table's lines; a row that nothing was measured for is left out."""
     there = list(dict.fromkeys(row["processor"] for row in report.get("speed", [])))
     if not there:
         return []
