@@ -4,8 +4,8 @@ import json
 
 from benchmarks import closing, report
 from benchmarks.comparison import faster
-from benchmarks.peak import best_chains
 from benchmarks.first_table import block
+from benchmarks.peak import best_chains
 
 FD = {"function": "forward_dynamics", "model": "(1, 3)"}
 REPORT = {
