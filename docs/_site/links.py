@@ -21,8 +21,9 @@ LINK = re.compile(r"\]\((?![a-z]+:|#)([^)\s#]+)(#[^)\s]*)?\)")
 
 def links_of_page(app, name: str, source: list[str]) -> None:
     """Change the links of a page in docs/ that lead out of it."""
-    del app, name
-    source[0] = LINK.sub(lambda link: f"]({_from_docs(link[1])}{link[2] or ''})", source[0])
+    del app
+    up = "../" * name.count("/")
+    source[0] = LINK.sub(lambda link: f"]({_from_page(link[1], up)}{link[2] or ''})", source[0])
 
 
 def links_of_root(app, path: Path, parent: str, source: list[str]) -> None:
@@ -31,11 +32,12 @@ def links_of_root(app, path: Path, parent: str, source: list[str]) -> None:
     source[0] = LINK.sub(lambda link: f"]({_from_root(link[1])}{link[2] or ''})", source[0])
 
 
-def _from_docs(target: str) -> str:
-    """Return where a link of a page leads on the site."""
-    if not target.startswith("../"):
+def _from_page(target: str, up: str) -> str:
+    """Return where a link leads on the site; up: from the page's folder to docs/."""
+    if not target.startswith(f"../{up}"):
         return target
-    return _from_root(target.removeprefix("../"))
+    found = _from_root(target.removeprefix(f"../{up}"))
+    return found if found.startswith("https:") else f"{up}{found}"
 
 
 def _from_root(target: str) -> str:

@@ -10,12 +10,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-PAGES = {
-    path.stem: path
-    for path in [
-        *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "SECURITY.md", "CHANGELOG.md")),
-        *sorted(ROOT.glob("docs/*.md")),
-    ]
+ABOVE = ("README.md", "CONTRIBUTING.md", "SECURITY.md", "CHANGELOG.md")
+PAGES = {Path(name).stem: ROOT / name for name in ABOVE}
+PAGES |= {
+    path.relative_to(ROOT / "docs").as_posix().removesuffix(".md"): path
+    for path in sorted((ROOT / "docs").rglob("*.md"))
 }
 RUN = ("python", "sh", "toml", "c", "cpp", "cmake")  # languages whose blocks do something here
 SHOWN = ("text", "json", "html")  # output, formulas

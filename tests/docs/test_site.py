@@ -130,3 +130,24 @@ def test_a_browser_shows_the_pages_from_the_disk_alone(site, width):
             assert driver.execute_script(wide) <= 0, name
         asked = requests(driver)
         assert asked and all(url.startswith(("file:", "data:")) for url in asked)
+
+
+def test_links_lead_somewhere_from_any_page():
+    sys.path.insert(0, str(ROOT / "docs"))
+    try:
+        from _site.links import links_of_page, links_of_root
+    finally:
+        sys.path.pop(0)
+
+    def seen(change, *place, text):
+        source = [text]
+        change(None, *place, source)
+        return source[0]
+
+    assert seen(links_of_page, "a", text="[x](../CHANGELOG.md#y)") == "[x](changelog.md#y)"
+    assert seen(links_of_page, "a/b", text="[x](../../SECURITY.md)") == "[x](../security.md)"
+    assert seen(links_of_page, "a/b", text="[x](../a.md), [y](#y)") == "[x](../a.md), [y](#y)"
+    assert seen(links_of_page, "a", text="[x](../scenes/kick.toml)") == "[x](../scenes/kick.toml)"
+    assert seen(links_of_page, "a", text="[x](../viewer)").endswith("/tree/main/viewer)")
+    assert seen(links_of_root, ROOT, "a", text="[x](docs/a.md#b)") == "[x](a.md#b)"
+    assert seen(links_of_root, ROOT, "a", text="[x](CHANGELOG.md)") == "[x](changelog.md)"
