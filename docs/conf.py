@@ -44,6 +44,7 @@ autosummary_imported_members = False
 autodoc_typehints = "none"  # docstrings tell shapes and units, which types do not
 autodoc_member_order = "groupwise"
 autodoc_preserve_defaults = True
+maximum_signature_line_length = 90  # a longer one has a line for each argument
 numpydoc_show_class_members = False
 numpydoc_xref_param_type = False
 
