@@ -84,7 +84,7 @@ def of_casadi(ran):
 
 def of_python(ran):
     """The equation of motion holds."""
-    numbers = re.search(r"\[(.*?)\]", ran.printed, re.DOTALL)[1].split()
+    numbers = re.search(r"C = \[(.*?)\]", ran.printed, re.DOTALL)[1].split()
     assert np.abs(np.array(numbers, float)).max() < 1e-12
 
 
