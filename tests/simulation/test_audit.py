@@ -108,6 +108,32 @@ def check_drops(name, seeds):
             assert run.info["imbalance"]["relative"] < 100 * rtol
 
 
+def inner_energy(model, run):
+    """Energy of a flight about its centre of mass, J."""
+    mass = model.parameters["torso_mass"] + model.parameters["tail_mass"]
+    return run.kinetic - np.sum(run.linear_momentum**2, axis=1) / (2 * mass)
+
+
+def test_the_energy_of_a_fall_hides_no_loss():
+    model = animal()
+    q, v = np.zeros(model.nq), np.zeros(model.nv)
+    q[3], q[7:], v[1], v[3] = 1, (0.5, 0, 0.3, 0), 10, 20  # in one plane: a motion without chaos
+    how = {"t_span": 1.0, "method": "implicit_euler", "step": 2e-3, "output_step": 0.1}
+    many = st.simulate(model, np.tile(q, (2, 1)), v, **how)
+    for run in (st.simulate(model, q, v, **how), many[1]):
+        energy = inner_energy(model, run)
+        change = abs(energy[-1] - energy[0]) / energy.max()
+        assert change > 0.15 and abs(run.energy[-1] - run.energy[0]) < 1e-3 * run.kinetic[-1]
+        assert run.info["imbalance"]["relative"] == pytest.approx(change, rel=0.1)
+        assert "% of what was moved is not accounted for" in run.info["warnings"][0]
+    assert [len(each) for each in many.warnings] == [1, 1]
+    fine = st.simulate(model, q, v, t_span=1.0, method="tsit5", rtol=1e-8, atol=1e-8)
+    assert fine.info["warnings"] == [] and fine.info["imbalance"]["relative"] < 1e-6
+    # a fall that does not turn has nothing inside to lose: roundings are no loss
+    still = st.simulate(model, np.eye(1, model.nq, 3)[0], 0 * v, t_span=20.0)
+    assert still.info["warnings"] == [] and still.info["imbalance"]["relative"] < 1e-9
+
+
 def test_flights_balance_in_lanes_as_singly(monkeypatch):
     from serpentail.simulation import parallel_runs
 

@@ -24,7 +24,10 @@ def test_energy_balances_over_long_runs_and_better_with_tolerance(name, method, 
     errors = []
     for rtol in METHODS[method]:
         run = st.simulate(model, q, v, t_span=5.0, method=method, rtol=rtol)
-        assert run.info["warnings"] == []
+        share = run.info["imbalance"]["relative"]  # of the energy about the centre of mass
+        most = 500 if method == "ros34pw2" else 100  # which is of low order, and the run is long
+        assert share < most * rtol
+        assert bool(run.info["warnings"]) == (share > 100 * rtol)
         work = run.info["work_J"]
         moved = model.energy(q, v)[0] + abs(work["damping"])
         left = run.energy[-1] - run.energy[0] - work["damping"] - work["torques"]

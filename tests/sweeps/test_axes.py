@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import kstest
 
 import serpentail as st
-from serpentail.sweeps.axes import axes_of
+from serpentail.sweeps.points import axes_of
 
 LAWS = {"random": st.random, "latin": st.latin, "sobol": st.sobol}
 
@@ -29,8 +29,20 @@ def test_grids_give_all_combinations_in_order():
     assert points({"b, c": st.grid([(3, 4)])}) == [{"b": 3, "c": 4}]
 
 
-def test_units_become_si():
-    assert points({"m": st.grid(["2 g", 0.1])}) == [{"m": 0.002}, {"m": 0.1}]
+def test_units_become_those_of_the_names_that_have_one():
+    axes = axes_of({"m, word": st.grid([("2 g", "2nd"), (0.1, "3 s")])}, None, 0)
+    assert list(axes.measured({"m": "kg"})) == [
+        {"m": 0.002, "word": "2nd"},
+        {"m": 0.1, "word": "3 s"},
+    ]
+    spread = axes_of({"m": st.random("2 g", "3 g")}, 4, 0)
+    for unit, scale in (("kg", 1e-3), (None, 1e-3)):
+        assert all(2 * scale <= p["m"] <= 3 * scale for p in spread.measured({"m": unit}))
+    for wrong in ({"word": "s"}, {"word": None}):
+        with pytest.raises(st.SweepError, match="over: word: value '2nd'"):
+            axes.measured(wrong)
+    with pytest.raises(st.SweepError, match="over: m: value '2 g': a mass where a length"):
+        spread.measured({"m": "m"})
     found = points({"p": st.random("-30 deg", "30 deg")}, 50)
     assert all(abs(each["p"]) <= math.pi / 6 for each in found)
     assert max(each["p"] for each in found) > 0.4
@@ -67,7 +79,7 @@ def test_sobol_points_may_be_any_number():
         (lambda: st.grid(3), "grid: value 3: needs a list"),
         (lambda: st.grid([]), "grid: no values"),
         (lambda: st.grid([float("nan")]), "grid: value nan: needs numbers"),
-        (lambda: st.grid(["2 apples"]), "needs a unit|unknown unit"),
+        (lambda: st.random("2 apples", 3), "needs a unit"),
         (lambda: st.random(1, 0), "random: low: value 1: needs numbers not above high"),
         (lambda: st.random(0, 1, "log"), "above 0"),
         (lambda: st.latin(0, 1, "normal"), "latin: law: value 'normal'"),

@@ -138,6 +138,8 @@ def test_no_process_is_left(model):
         ({"executor": "processes:0"}, "executor: processes: value 0"),
         ({"over": {"segments": st.grid([1, 2])}}, "over: segments: a model is of one shape"),
         ({"over": {"tail_mass": st.grid([0.003, 0.003])}}, "point 1 is there twice"),
+        ({"over": {"tail_mass": st.grid(["3 s"])}}, "over: tail_mass: value '3 s': a time where"),
+        ({"run": "identify"}, "settings: no data and no markers: needs tracks"),
         ({"model": None}, "model: None"),
         ({"model": "no_such_scene"}, "no_such_scene"),
         ({"of": {1, 2}}, "of: value"),

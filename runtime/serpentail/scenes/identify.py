@@ -34,15 +34,18 @@ def identified(path: str, data: Sequence[str], folder: str | None = None) -> Ide
     files = {name: given.pop(name) for name in READ if name in given}
     unit = files.pop("unit", None)
     tracks = [read_markers(each, unit, **files) for each in data]
-    if folder is None:
-        own = tables.get("functions", ())
-        named = own if isinstance(own, list) else USES
-        tables = dict(tables) | {"functions": list(dict.fromkeys([*named, *USES, *NEEDS]))}
-    model = model_of(tables, place, folder, {})
+    model = model_of(with_functions(tables) if folder is None else tables, place, folder, {})
     given = identify_arguments(table, size_of(model))
     for name in READ:
         given.pop(name, None)
     return identify(model, tracks, given.pop("markers"), given.pop("estimate", ()), **given)
+
+
+def with_functions(tables: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a scene that also names the functions that an identification calls."""
+    own = tables.get("functions", ())
+    named = own if isinstance(own, list) else USES
+    return dict(tables) | {"functions": list(dict.fromkeys([*named, *USES, *NEEDS]))}
 
 
 def identify_arguments(table: Mapping, size: Mapping[str, float] = UNSIZED) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from .keys import Key
 NAME = {"type": "string"}
 SWEEP = Key(
     keys={
-        "run": Key(form={"enum": ["simulate", "plan"]}),
+        "run": Key(form={"enum": ["simulate", "plan", "identify"]}),
         "over": Key(form={"type": "object"}),
         "points": Key(form={"type": "integer", "minimum": 1}),
         "seed": Key(form={"type": "integer", "minimum": 0}),

@@ -10,10 +10,10 @@ from typing import Any, NamedTuple
 
 from ..errors import SweepError
 from ..stages import Stage
-from .axes import Point
 from .bundles import Bundle, model_of
 from .executors import Place, place_of
 from .job import Job
+from .points import Point
 from .runs import run_points
 from .store import Row, Store
 from .supervision import Block, Ran, run_block

@@ -4,28 +4,38 @@ import hashlib
 from collections import deque
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 from .. import __version__
 from ..building.build import built
 from ..checks import Refusals, did_you_mean, shown
-from ..errors import PlanningError, SimulationError, SweepError
+from ..errors import IdentificationError, PlanningError, SimulationError, SweepError
 from ..model.model import Model
 from ..model.parameters import independent
 from ..scenes.file import MADE_OF, read_scene, subtable
+from ..scenes.identify_keys import IDENTIFY
 from ..scenes.keys import Key, read
 from ..scenes.overrides import changed
 from ..scenes.plan_keys import PLAN
 from ..scenes.simulate_keys import SIMULATE
-from .axes import Axes, Point
 from .bundles import Bundle
 from .driver import Group, Task
-from .job import STARTS, Job
+from .job import DATA, STARTS, Job
+from .measures import Units, unit_at, units_of
+from .points import Axes, Point
+from .recordings import digest_of
 from .store import as_json
 
 TABLES: Mapping[str, tuple[Key, type[Exception]]] = {
     "simulate": (SIMULATE, SimulationError),
     "plan": (PLAN, PlanningError),
+    "identify": (IDENTIFY, IdentificationError),
+}
+NEEDED = {  # of a run of a model: settings, and what they are
+    "simulate": (STARTS, "where a motion starts"),
+    "plan": (STARTS, "where a motion starts"),
+    "identify": ((DATA, "markers"), "tracks, and where the markers are"),
 }
 NO_SHAPE = "a model is of one shape: give the sweep a scene, or a function without a model"
 
@@ -41,30 +51,34 @@ class Entry:
     bundle: Bundle | None
 
 
-def entries_of(what: Any, axes: Axes, job: Job, of: Any) -> list[Entry]:
-    """Return all points with their keys, in order; SweepError where two are the same.
+def entries_of(what: Any, axes: Axes, job: Job, of: Any) -> tuple[Axes, list[Entry]]:
+    """Return the axes, their numbers in SI, and all points with their keys, in order; SweepError
+    where two are the same.
 
     what: a model, a scene's path or example, or None for a function of points alone.  of: what
     rows depend on besides.
     """
-    if what is None:
-        find = _without_model(job)
-    elif isinstance(what, Model):
-        find = _of_model(what, axes, job)
+    if isinstance(what, Model):
+        find, units = _of_model(what, axes, job)
+    elif what is not None:
+        find, units = _of_scene(what, axes, job)
     else:
-        find = _of_scene(what, axes, job)
+        find, units = _without_model(job), {}
+    axes = axes.measured(units)
     found: dict[str, Entry] = {}
     besides = as_json(of)
     for number, point in enumerate(axes):
         own, bundle, told = find(point)
         text = as_json(point)
+        if own.run == "identify":
+            told += digest_of(own, point)
         key = hashlib.sha256(f"{told}\n{besides}\n{text}".encode()).hexdigest()[:32]
         if key in found:
             raise SweepError(
                 f"over: point {number} is there twice, {shown(point)}: needs each once"
             )
         found[key] = Entry(key, text, point, own, bundle)
-    return list(found.values())
+    return axes, list(found.values())
 
 
 def groups_of(entries: list[Entry], done: Mapping[str, bool]) -> list[Group]:
@@ -90,45 +104,59 @@ def _without_model(job: Job) -> Find:
     return lambda point: (job, None, told)
 
 
-def _of_model(model: Model, axes: Axes, job: Job) -> Find:
+def _of_model(model: Model, axes: Axes, job: Job) -> tuple[Find, Units]:
     """Points that change parameters, the start or settings of one model."""
     known = {entry["name"] for entry in model.manifest["parameters"]}
     others = frozenset(name for name in axes.names if name not in known)
     for name in others:
         if name in MADE_OF:
             raise SweepError(f"over: {name}: {NO_SHAPE}")
+    units = units_of(model.manifest, axes.names)
     if isinstance(job.run, str):
-        missing = [name for name in STARTS if name not in {*job.settings, *others}]
+        needed, what = NEEDED[job.run]
+        missing = [name for name in needed if name not in {*job.settings, *others}]
         if missing:
             raise SweepError(
-                f"settings: no {' and no '.join(missing)}: needs where a motion starts, here or in "
-                "over"
+                f"settings: no {' and no '.join(missing)}: needs {what}, here or in over"
             )
+        units |= dict.fromkeys(others - {DATA})
     baked = model.manifest["scene"]["baked"]
     parameters = {} if baked else independent(model.manifest, model.parameters)
-    own = replace(job, keys=others, parameters=parameters, profile=model.profile)
+    own = replace(
+        job, keys=others, parameters=parameters, profile=model.profile, parent=str(Path.cwd())
+    )
     bundle = Bundle.of(model.checked)
     told = f"{__version__}\n{bundle.manifest_hash}\n{own.identity()}"
-    return lambda point: (own, bundle, told)
+    return (lambda point: (own, bundle, told)), units
 
 
-def _of_scene(scene: Any, axes: Axes, job: Job) -> Find:
+def _of_scene(scene: Any, axes: Axes, job: Job) -> tuple[Find, Units]:
     """Points that change parameters, what the model is made of, or keys of the scene's table."""
     tables, path = read_scene(scene, SweepError)
     first = next(iter(axes))
     shape = [name for name in axes.names if name in MADE_OF]
     keys: list[str] = []
+    units: Units = {}
     if isinstance(job.run, str):
         key, error = TABLES[job.run]
         job = replace(job, table=subtable(tables, job.run, path, error))
         keys = [name for name in axes.names if name.split(".")[0] in key.keys]
         _refuse_keys(job, {name: first[name] for name in keys})
+        units = {name: unit_at(key, name) for name in keys}
+    if job.run == "identify":
+        from ..scenes.identify import with_functions
+
+        tables = with_functions(tables)
+        if DATA not in {*axes.names, *job.settings}:
+            raise SweepError(f"over: no {DATA}: needs files of marker tracks, here or in settings")
+        keys += [DATA] if DATA in axes.names else []
 
     # which of the others are parameters, and which of these there is other code for
     others = [name for name in axes.names if name not in {*keys, *shape}]
     made = tables | {name: first[name] for name in shape}
     checked, left = built(made, path.stem, {name: first[name] for name in others})
     known = {entry["name"] for entry in checked.manifest["parameters"]}
+    units |= units_of(checked.manifest, others)
     if isinstance(job.run, str):
         _refuse_unknown([name for name in others if name not in known], job.run, known)
     else:
@@ -154,7 +182,7 @@ def _of_scene(scene: Any, axes: Axes, job: Job) -> Find:
             models[name] = own, bundle, told
         return models[name]
 
-    return find
+    return find, units
 
 
 def _refuse_keys(job: Job, values: Mapping[str, Any]) -> None:

@@ -9,19 +9,23 @@ from typing import Any
 
 from ..checks import shown
 from ..errors import SweepError
-from .axes import Point
+from .points import Point
 from .store import as_json
 
+RUNS = ("simulate", "plan", "identify")
 STARTS = ("q0", "v0")
+DATA = "data"  # of an identification: its files of marker tracks
 NOTHING: Mapping[str, Any] = {}
 
 
 @dataclass(frozen=True)
 class Job:
-    """What is run: "simulate", "plan" or a function of a model and a point, or of a point alone.
+    """What is run: one of RUNS, or a function of a model and a point, or of a point alone.
 
-    settings: of st.simulate or st.plan.  outputs: names of what a simulation is asked for.
-    table, phases, parent: of a scene, which is where files that it names are; None of a model.
+    settings: of st.simulate, st.plan or st.identify.  outputs: names of what a simulation is asked
+    for.
+    table, phases, parent: of a scene, which is where files that it names are; a model has no table,
+    and its files are where the sweep was called.
     built: names that the model was built with.  keys: names of keys of the table.
     parameters: of a model that was given, and its profile.
     """
@@ -80,8 +84,8 @@ def _named(run: Any) -> Any:
     name = f"{where.__module__}.{where.__qualname__}"
     if not callable(run) or "<" in name:  # a lambda, or a function in a function
         raise SweepError(
-            f'run: value {shown(run)}: needs "simulate", "plan", or a function at the top of a '
-            "module, which other processes can import"
+            f"run: value {shown(run)}: needs {', '.join(map(repr, RUNS))}, or a function at the "
+            "top of a module, which other processes can import"
         )
     return name
 

@@ -19,8 +19,8 @@ from ..scenes.simulate import Scenario, scenario_of
 from ..simulation.controllers import Damping, TorqueCurve, TorqueTable
 from ..simulation.rollouts import Rollouts
 from ..simulation.simulate import simulate
-from .axes import Point
 from .job import STARTS, Job
+from .points import Point
 
 ENDS = ("end_s", "q_end", "v_end", "kinetic_end_J", "potential_end_J")  # outputs by default
 OUTPUTS = (*ENDS, *(number.name for number in NUMBERS))
@@ -60,7 +60,9 @@ def run_points(job: Job, model: Model | None, points: Sequence[Point]) -> Iterat
 
 
 def run_point(job: Job, model: Model | None, point: Point) -> tuple[dict[str, Any], Any]:
-    """Return the outcome of a point, and its motion, plan or whatever has a page; None without."""
+    """Return the outcome of a point, and what has a page: its motion, plan or identification; None
+    without.
+    """
     if job.run == "simulate":
         assert model is not None
         motion = _simulated(job, model, point)
@@ -69,6 +71,11 @@ def run_point(job: Job, model: Model | None, point: Point) -> tuple[dict[str, An
         assert model is not None
         found = _planned(job, model, point)
         return found.report | {"warnings": found.warnings}, found
+    if job.run == "identify":
+        from .identified import identified
+
+        assert model is not None
+        return identified(job, model, point)
     assert not isinstance(job.run, str)
     if model is None:
         outcome = job.run(point)

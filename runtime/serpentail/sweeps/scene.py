@@ -9,6 +9,7 @@ from ..errors import SweepError
 from ..scenes.file import read_scene, subtable
 from ..scenes.sweep_keys import SWEEP
 from .axes import Grid, Spread, grid, latin, random, sobol
+from .job import RUNS
 
 WAYS = {"random": random, "latin": latin, "sobol": sobol}
 AXIS = ("grid", *WAYS, "law")
@@ -28,7 +29,7 @@ def arguments_of(path: str) -> dict[str, Any]:
         if wrong:
             refused.add(name, wrong)
     run = table.get("run", "simulate")
-    wrong = none_of("sweep.run", run, ("simulate", "plan"))
+    wrong = none_of("sweep.run", run, RUNS)
     if wrong:
         refused.add("run", f"{wrong}; programs can run functions, by serpentail.sweep")
     over = table.get("over")

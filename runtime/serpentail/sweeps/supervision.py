@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 
 from ..errors import SweepError
 from ..model.cores import VARIABLE
-from .axes import Point
 from .bundles import Bundle
+from .points import Point
 from .runs import Told
 
 TRIES = 2  # of a point whose process ends: something else may have ended it

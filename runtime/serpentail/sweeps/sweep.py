@@ -13,17 +13,17 @@ from ..brief import brief
 from ..checks import none_of, number, refusal, shown
 from ..errors import SweepError
 from ..model.model import Model
-from .axes import Axes, Grid, Spread, axes_of, plain
+from .axes import Grid, Spread, plain
 from .driver import Driver, Spent
 from .groups import Entry, entries_of, groups_of
-from .job import STARTS, Job
+from .job import RUNS, STARTS, Job
+from .points import Axes, axes_of
 from .store import Row, Store
 
 if TYPE_CHECKING:
     import pandas
     import xarray
 
-RUNS = ("simulate", "plan")
 WITHOUT = ("watch", "threads", "parameters")  # settings of a run that a sweep has itself
 
 
@@ -85,7 +85,8 @@ class Sweep:
         return Status(len(self), len(known), sum(not good for good in known.values()))
 
     def motion(self, k: int) -> Any:
-        """Return the Trajectory or Plan of point k, run again; of a function, its "motion".
+        """Return the Trajectory, Plan or Identification of point k, run again; of a function, its
+        "motion".
 
         Raises what the run raises, SweepError where a function has no motion.
         """
@@ -160,11 +161,12 @@ def sweep(  # noqa: PLR0913 - the public face names all that it takes
     also keys of its table, such as "start.pitch" or "duration", and what its model is made of, such
     as "segments" and "links"; of a model also "q0", "v0" and settings.  points, seed: of the axes
     that are spread.
-    run: "simulate", "plan", or a function of a module, f(model, point) or f(point) -> dict of plain
-    data, to which it may add its Trajectory or Plan as "motion", for pages.
-    settings: what else ``simulate`` or ``plan`` is to take, "q0" and "v0" of a model included.
+    run: "simulate", "plan", "identify", or a function of a module, f(model, point) or f(point) ->
+    dict of plain data, to which it may add its Trajectory or Plan as "motion", for pages.
+    settings: what else ``simulate``, ``plan`` or ``identify`` is to take, "q0" and "v0", or "data"
+    and "markers", of a model included.
     outputs: of "simulate": "end_s", "q_end", "v_end", "kinetic_end_J", "potential_end_J", which are
-    the default, and names of ``st.summary``; a plan has its report.
+    the default, and names of ``st.summary``; plans and identifications have their report.
     store: a file of SQLite on a local disk; None: in memory.  A row is known by the hash of model,
     run and point: a second call runs what is missing, and ``retry_failed`` what failed.
     limit: s that a point may take; it then fails, as one does that raises or whose process ends.
@@ -219,7 +221,7 @@ def _posed(model: Any, over: Any, run: Any, rest: tuple, store: Any) -> Sweep:
     job = Job(run, own, _outputs(outputs, run))
     job.identity()  # refuses functions that nobody else could find
     job.pickled()
-    entries = entries_of(model, axes, job, plain("of", of))
+    axes, entries = entries_of(model, axes, job, plain("of", of))
     return Sweep(axes, entries, Store(store), Spent())
 
 

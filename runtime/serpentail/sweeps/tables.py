@@ -13,7 +13,7 @@ from ..checks import shown
 from ..errors import SweepError
 from ..extras import needed
 from ..files import refuse_unwritable, replacing
-from .axes import Axes
+from .points import Axes
 
 if TYPE_CHECKING:
     import pandas
