@@ -175,3 +175,16 @@ def test_theory_has_every_parameter_with_its_unit():
         re.MULTILINE,
     )
     assert {(p.name, p.unit) for p in PARAMETERS} <= set(rows)
+
+
+def test_the_glossary_has_every_word_of_the_house():
+    words = PAGES["CONTRIBUTING"].read_text(encoding="utf-8").split("\n## Words\n")[1]
+    rows = re.findall(r"^\| ([\w ]+?) \|", words.split("\n## ")[0], re.MULTILINE)
+    glossary = PAGES["glossary"].read_text(encoding="utf-8")
+    terms = {
+        term
+        for row in re.findall(r"^\| ([^|]+) \|", glossary, re.MULTILINE)
+        for term in row.split(", ")
+    }
+    assert len(rows) > 30
+    assert set(rows) - {"word"} - terms == set()
