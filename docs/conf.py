@@ -31,7 +31,6 @@ templates_path = ["_templates"]
 exclude_patterns = ["_*", "gallery/GALLERY_HEADER*", "gallery/README*"]
 nitpicky = True
 nitpick_ignore_regex = [("py:.*", r"(?!serpentail\.).*")]  # of Python and of other libraries
-suppress_warnings = ["toc.empty_glob"]  # of release notes
 default_role = "literal"  # `x` in a docstring is code
 highlight_language = "text"
 
