@@ -1,1 +1,1 @@
-"""`make bench`: run time, accuracy and size, beside peers."""
+"""`make bench`: run time, accuracy and size, compared with other engines (peers)."""

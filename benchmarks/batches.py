@@ -17,7 +17,7 @@ from serpentail.model.batch import MIN_BATCH
 from serpentail.model.kernel import aligned, argument_record
 
 STATES, ROUNDS = 512, 100  # a batch that stays in the cache
-MANY = 20  # times as many in a call from Python
+MANY = 20  # factor: that many more in a call from Python
 FD, DFD = "forward_dynamics", "forward_dynamics_derivatives"
 HESSIAN = "inverse_dynamics_hessian"
 BATCHES = {
@@ -25,16 +25,14 @@ BATCHES = {
     DFD: ((1, 3), (3, 4)),
     HESSIAN: ((1, 3), (3, 4)),
 }
-FLIGHTS = (64, 6000)  # of 200 steps: of the second number there are more than a million
+FLIGHTS = (64, 6000)  # of 200 steps each; the second number makes more than a million steps
 FLOWN = ((1, 3), (3, 4), (6, 6), (3, None))
 
 
 def batch_times(folder: Path) -> list[dict]:
-    """Nanoseconds a state: on one core in C, one by one and as a user's batch of 1000 states or
-    more is evaluated; for the caller in Python, on all cores.
-
-    All check that arguments and results are finite.  Where a function has no batches, a batch is
-    evaluated one by one.
+    """Nanoseconds a state: on one core in C, one by one, and in batches of 1000 states or more, as
+    a user gets them; and for the caller in Python, on all cores. All check that arguments and
+    results are finite. If a function has no batches, its batch is evaluated one by one.
     """
     return [batch_row(name, size) for name, sizes in BATCHES.items() for size in sizes]
 
@@ -53,11 +51,10 @@ def batch_row(name: str, size: tuple) -> dict:
 
 
 def rollout_rates(folder: Path) -> list[dict]:
-    """Damped flights of 200 steps of RK4, 11 samples, a second, for the caller: one call each, and
-    so many in one call on all cores, each with its own parameters.
-
-    Whether those fly abreast in lanes is left to st.simulate.  Last: microseconds of a flight of
-    one step among 64, which is what a run costs besides its steps.
+    """Damped flights per second (200 steps of RK4, 11 samples), for the caller: one call for each
+    flight, and many flights in one call on all cores, each with its own parameters. st.simulate
+    decides whether those are integrated side by side in lanes. Last column: microseconds of a
+    flight of one step among 64, which is the cost of a run besides its steps.
     """
     rows = []
     for size in FLOWN:
@@ -79,7 +76,7 @@ def alone_rate(model: st.Model) -> float:
 
 
 def flight_ns(model: st.Model, count: int, t_span: float, output_step: float) -> float:
-    """Return nanoseconds a flight of so many in one call."""
+    """Return nanoseconds a flight, for a number of flights in one call."""
     q, v = flown(model, count)
     own, settings = {"tail_mass": masses(count)}, settled(t_span, output_step)
     return best(lambda: st.simulate(model, q, v, parameters=own, **settings), 3) / count
@@ -97,7 +94,7 @@ def masses(count: int) -> np.ndarray:
 
 
 def flown(model: st.Model, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return q, v of as many starts."""
+    """Return q, v of a number of starts."""
     q, v, _ = random_states(model, count)
     q[:, 3] += 2
     return q, v
@@ -109,14 +106,14 @@ def random_states(model: st.Model, count: int) -> tuple[np.ndarray, ...]:
 
 
 def random_inputs(model: st.Model, name: str, count: int) -> tuple[np.ndarray, ...]:
-    """Return all inputs of a function, of so many states."""
+    """Return all inputs of a function, for a number of states."""
     rng, shapes = np.random.default_rng(1), model.kernels[name].shapes
     return tuple(0.5 * rng.normal(size=(count, *shape)) for shape in shapes)
 
 
 def c_times(model: st.Model, name: str = FD) -> tuple[float, float]:
-    """Return nanoseconds a state of both C functions of one function, rounds interleaved; of one
-    that has no batches the same twice.
+    """Return nanoseconds a state of both C functions of one function, in interleaved rounds;
+    without batches, the same time twice.
     """
     kernel, keep, calls = model.kernels[name], [], []
     states = [x.astype(kernel.dtype) for x in random_inputs(model, name, STATES)]

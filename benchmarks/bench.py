@@ -1,8 +1,8 @@
 """`make bench`: measures speed beside peers, generation, drift and precision, and reports.
 
-It needs an idle machine and takes about half an hour. What hangs on the processor is measured for
-AVX-512 and for AVX2 where the machine has both. One file of measures runs alone as
-`.venv/bin/python -m benchmarks.batches`, say.
+It needs an idle machine and takes about half an hour. Measures that depend on the processor are
+made for AVX-512 and for AVX2 if the machine has both. One file of measures runs alone, for example
+as `.venv/bin/python -m benchmarks.batches`.
 """
 
 from examples import front

@@ -1,4 +1,4 @@
-"""What a caller in Python waits, beside what the C of it takes: single calls and flights."""
+"""The waiting time of a caller in Python beside the time in C: single calls and flights."""
 
 if __name__ == "__main__":
     from benchmarks import alone
@@ -30,7 +30,7 @@ REPEATS = 40
 
 
 def call_times(folder: Path) -> list[dict]:
-    """Microseconds of one call: in C, for the caller in Python, and what of that is outside C."""
+    """Microseconds of one call: in C, for the caller in Python, and the part of that outside C."""
     rows = []
     for size in SIZES:
         model, states = built(*size, functions=[FD, DFD, HESSIAN]), timing.random_states(size[0])
@@ -47,7 +47,9 @@ def call_times(folder: Path) -> list[dict]:
 
 
 def call_us(call: Callable, arguments: tuple, count: int = 100, repeats: int = 300) -> float:
-    """Return the least microseconds of one call; repeats are short, so some are undisturbed."""
+    """Return the least microseconds of one call; repeats are short, so that some are
+    undisturbed.
+    """
 
     def calls() -> None:
         for _ in range(count):
@@ -57,11 +59,10 @@ def call_us(call: Callable, arguments: tuple, count: int = 100, repeats: int = 3
 
 
 def flight_times(folder: Path) -> list[dict]:
-    """Microseconds that the caller of st.simulate waits, and what of it is C: damped flights whose
-    q is off by at most 1e-6 (m, rad) at the end, and the impact of a (3, 4) tail, off by at most
-    1e-4.
-
-    201 samples, as by default; each by the fastest tolerance that is as accurate.
+    """Microseconds that the caller of st.simulate waits, and the part of that in C: damped flights
+    with an error of q of at most 1e-6 (m, rad) at the end, and the impact of a (3, 4) tail with an
+    error of at most 1e-4. 201 samples, the default; each by the fastest tolerance that is as
+    accurate.
     """
     rows = []
     for size, span in FLIGHTS:
@@ -96,7 +97,8 @@ def waited(scene: Callable[[], tuple[Callable, float]], method: str, error: floa
 def inside_ns(run: Callable[..., st.Trajectory], **how) -> float:
     """Return the least nanoseconds of a run that are spent in the C that makes it.
 
-    run: of a model that has made none yet, as what a model's runs keep is not timed.
+    run: of a model that has made no run yet, because the preparations that a model keeps are not
+    timed.
     """
     spent: list[float] = []
     with mock.patch.object(CompiledRun, "function", timed_function(spent)):
@@ -109,8 +111,8 @@ def inside_ns(run: Callable[..., st.Trajectory], **how) -> float:
 
 
 def timed_function(spent: list[float]) -> Callable:
-    """Return the method that gives runs their C functions, which add their time to the last of
-    those that are spent.
+    """Return a replacement of the method that gives runs their C functions; these add their time to
+    the last entry of ``spent``.
     """
     given = CompiledRun.function
 

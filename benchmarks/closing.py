@@ -1,4 +1,6 @@
-"""The closing table: of each figure and processor before, after, the best peer, the limit."""
+"""The closing table: for each figure and processor the values before and after, the best peer, and
+the limit.
+"""
 
 import json
 from collections.abc import Iterator
@@ -7,7 +9,7 @@ from typing import NamedTuple
 
 from benchmarks.batches import DFD, FD, HESSIAN
 
-BEFORE = Path(__file__).parent / "before.json"  # figures.json of a report, of the code before
+BEFORE = Path(__file__).parent / "before.json"  # figures.json of a report of the earlier code
 PINOCCHIO = ("plain_ns", "tuned_ns", "revolutes_ns", "own_ns")
 CASADI = ("casadi_ns", "hand_ns", "mujoco_ns")
 
@@ -15,8 +17,8 @@ CASADI = ("casadi_ns", "hand_ns", "mujoco_ns")
 class Figure(NamedTuple):
     """A column of a measure, for each of its rows.
 
-    peers: measures and columns of the same, in the same unit; limit: a function whose needed
-    operations, and a peak, bound it from below.
+    peers: measures and columns of the same quantity, in the same unit; limit: a function whose
+    necessary operations, divided by a peak, give a lower bound.
     """
 
     name: str
@@ -25,7 +27,7 @@ class Figure(NamedTuple):
     unit: str = "ns"
     peers: tuple[tuple[str, tuple[str, ...]], ...] = ()
     limit: tuple[str, str] | None = None
-    function: str | None = None  # rows of this one alone
+    function: str | None = None  # only rows of this function
     most: bool = False  # more is better
 
 
@@ -64,7 +66,7 @@ FIGURES = (
 
 
 def closing(report: dict) -> list[dict]:
-    """Return the rows of the closing table; before: what ``before.json`` has of the same."""
+    """Return the rows of the closing table; before: the same figures from ``before.json``."""
     before = recorded()["figures"] if comparable(report) else {}
     return [
         {key: row[key] for key in row if key != "figure"} | closed(figure, row, report, before)
@@ -73,7 +75,7 @@ def closing(report: dict) -> list[dict]:
 
 
 def recorded() -> dict:
-    """Return what ``before.json`` holds; nothing where it is not there."""
+    """Return the contents of ``before.json``; nothing if the file is missing."""
     return json.loads(BEFORE.read_text()) if BEFORE.exists() else {"machine": "", "figures": {}}
 
 
@@ -83,7 +85,7 @@ def comparable(report: dict) -> bool:
 
 
 def about(report: dict) -> str:
-    """Say what the closing table's columns are, and what before is."""
+    """Say what the columns of the closing table mean, and from where "before" is."""
     place = recorded()["machine"] or "none"
     told = "" if comparable(report) else f", of another processor ({place}), so not shown"
     return (
@@ -95,7 +97,7 @@ def about(report: dict) -> str:
 
 
 def figures(report: dict) -> dict:
-    """Return all figures by name, as ``before.json`` has them, and the machine's name."""
+    """Return all figures by name, in the form of ``before.json``, and the machine's name."""
     named = {name_of(figure, row): row["value"] for figure, row in present(report)}
     return {"machine": report["machine"]["processor"], "figures": named}
 
@@ -128,7 +130,7 @@ def closed(figure: Figure, row: dict, report: dict, before: dict) -> dict:
 
 
 def best_peer(figure: Figure, row: dict, report: dict) -> float | None:
-    """Return the least time of any peer on the same."""
+    """Return the least time of any peer for the same quantity."""
     times = [
         other[column]
         for measure, columns in figure.peers
@@ -141,7 +143,7 @@ def best_peer(figure: Figure, row: dict, report: dict) -> float | None:
 
 
 def floor(figure: Figure, row: dict, report: dict) -> float | None:
-    """Return the time of the operations that are needed at the core's peak."""
+    """Return the time of the necessary operations at the core's peak."""
     if figure.limit is None:
         return None
     function, peak = figure.limit
@@ -152,5 +154,5 @@ def floor(figure: Figure, row: dict, report: dict) -> float | None:
 
 
 def cell(rows: list[dict], key: dict, column: str) -> float | None:
-    """Return a column of the row with these values; None where there is no such row."""
+    """Return a column of the row with these values; None if there is no such row."""
     return next((row[column] for row in rows if key.items() <= row.items()), None)

@@ -1,4 +1,6 @@
-"""Times one function of a model beside peers, each by every compiler: the faster counts."""
+"""Times one function of a model beside peers, each compiled by every compiler; the faster one
+counts.
+"""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -17,7 +19,7 @@ def compared(
     calls: int = 128,
     again: Mapping[str, Fixture] = MappingProxyType({}),
 ) -> dict:
-    """Time all in one go, rounds interleaved; again: ours by clang."""
+    """Time all closures together, in interleaved rounds; the last is ours compiled by clang."""
     peers = {**peers, "clang": {by: each.closure for by, each in again.items()}}
     there = [(name, by, closure) for name, made in peers.items() for by, closure in made.items()]
     closures = [ours.closure, *(closure for *_, closure in there)]
@@ -26,9 +28,10 @@ def compared(
 
 
 def faster(own: tuple[float, float], found: list[tuple[str, str, float, float]]) -> dict:
-    """Return a row: own (minimum, median); of each peer the faster compiler's, and which it is.
+    """Return a row: our (minimum, median), and for each peer the faster compiler's result and its
+    name.
 
-    found: peer, compiler, minimum, median.  Ratios by minima (by medians in brackets).
+    found: peer, compiler, minimum, median. Ratios by minima (by medians in brackets).
     """
     row: dict = {"ns": own[0], "median_ns": own[1]}
     for name in dict.fromkeys(name for name, *_ in found):

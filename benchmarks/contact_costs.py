@@ -74,7 +74,7 @@ def made(parent: Path, size: tuple, contacts: tuple[str, ...]) -> Path:
 
 
 def inputs(manifest: dict) -> dict[str, np.ndarray]:
-    """States near standing, rates small, and right-hand sides, by argument."""
+    """States near standing with small rates, and right-hand sides, by argument."""
     rng, sizes = np.random.default_rng(1), manifest["dimensions"]
     points = sum(entry["count"] for entry in manifest["contacts"])
     shapes = {
@@ -152,11 +152,9 @@ def timed(folder: Path) -> dict[str, float]:
 
 
 def contact_costs(folder: Path) -> list[dict]:
-    """What a flight, a stance (feet) and a tail contact (feet, tail) of one model cost: C of its
-    file, calls.
-
-    Operations of one evaluation; processor time of single calls from C, half of the foot points in
-    the ground.
+    """Cost of a flight, a stance (feet) and a tail contact (feet, tail) of one model: size of its C
+    file, operations and calls. Operations of one evaluation; processor time of single calls from C,
+    with half of the foot points in the ground.
     """
     rows = []
     for size in SIZES:

@@ -1,4 +1,4 @@
-"""Where the time of a run on the ground goes: its calls of the model's C, and all else."""
+"""Where a run on the ground spends its time: in calls of the model's C, and elsewhere."""
 
 if __name__ == "__main__":
     from benchmarks import alone
@@ -21,10 +21,9 @@ RTOL = 1e-4
 
 def contact_shares(folder: Path) -> list[dict]:
     """0.5 s of impact of a (3, 4) tail by ros34pw2 at rtol 1e-4: calls of the model's C, their
-    times at the run's own states, and what is left of a call of st.simulate; processor time.
-
-    Rejected steps are told by their part of all that were tried; "looks" and the books of work and
-    impulses are among the rest, as are stages, errors and samples.
+    times at the run's own states, and the rest of a call of st.simulate; processor time. Rejected
+    steps are given as their share of all tried steps. The search for touches and the sums of work
+    and impulses belong to the rest, as do stages, errors and samples.
     """
     run, span = impact()
     exact = run(method="tsit5", rtol=1e-12, atol=1e-13, output_step=span)
@@ -58,7 +57,9 @@ def row(part: str, calls: object, seconds: float, whole: float) -> dict:
 
 
 def unit_times(motion: st.Trajectory) -> dict[str, float]:
-    """Return seconds of one call of each function at the samples of a motion, factors as found."""
+    """Return seconds of one call of each function at the samples of a motion, with the factors
+    found there.
+    """
     model, contact, count = motion.model, motion.contact, len(motion.t)
     given = {
         "q": motion.q,
@@ -87,7 +88,7 @@ def unit_times(motion: st.Trajectory) -> dict[str, float]:
 
 
 def timed(evaluate: RunKernel, count: int) -> float:
-    """Return seconds of so many rows."""
+    """Return seconds of a number of rows."""
     begun = time.process_time()
     evaluate(0, count)
     return time.process_time() - begun

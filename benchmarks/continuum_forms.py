@@ -19,7 +19,7 @@ THETAS = (*(10.0 ** (np.arange(-24, 2) / 3)), np.pi, 2 * np.pi)
 STATES = 6  # at each theta; the worst error counts
 ROUNDS, CALLS = 200, 256
 REFUSED = "refused"
-PAPER_SWITCH = 1e-6  # rad: below, the paper takes the segment for a rigid link
+PAPER_SWITCH = 1e-6  # rad: below, the paper treats the segment as a rigid link
 COLOURS = {"bend": "#0072b2", "polar": "#d55e00"}
 LABELS = {"bend": "bend components", "polar": "polar closed forms"}
 
@@ -32,10 +32,8 @@ def form(coordinates: str, segments: int) -> st.Model:
 
 def form_errors(folder: Path) -> list[dict]:
     """Largest errors of H and v_dot of one segment at bend theta over six random states, against 50
-    digits.
-
-    Rates of all coordinates are some 10 rad/s. Accelerations are compared in bend components.
-    "refused": some H was not positive definite, so that there is no v_dot.
+    digits. Rates of all coordinates are some 10 rad/s. Accelerations are compared in bend
+    components. "refused": some H was not positive definite, so that v_dot does not exist.
     """
     from tests.references.exact_polar import ExactPolar
 
@@ -57,8 +55,8 @@ def columns(rows: list[dict]) -> dict[str, list]:
 
 
 def state(theta: float, seed: int) -> tuple[np.ndarray, ...]:
-    """Return q, v, tau in polar angles, bent by theta; the torque on phi vanishes with theta, as it
-    does by nature.
+    """Return q, v, tau in polar angles, bent by theta; the torque on phi vanishes with theta, as in
+    reality.
     """
     rng = np.random.default_rng(seed)
     q, v, tau = rng.normal(size=9), 10 * rng.normal(size=8), 1e-3 * rng.normal(size=2)
@@ -83,7 +81,7 @@ def state_errors(models: dict, exact, q, v, tau) -> dict:
 
 
 def v_dot_error(model: st.Model, exact, arguments, to_bend) -> float | None:
-    """Return the error of forward dynamics in bend components; None where the model refuses."""
+    """Return the error of forward dynamics in bend components; None if the model refuses."""
     from tests.references.metrics import block_error
 
     q, v, tau = arguments
@@ -106,7 +104,7 @@ def form_times(folder: Path) -> list[dict]:
         q, v, tau = timing.random_states(m)
         q[:, 8::2] = (
             np.abs(q[:, 8::2]) + 0.5
-        )  # polar: theta; bend: b, to which its run time is indifferent
+        )  # polar: theta; bend: b, which does not affect its run time
         times = timing.time_rounds(
             [entry.closure for entry in pair.values()], (q, v, tau), ROUNDS, CALLS
         )
@@ -147,7 +145,7 @@ def draw(errors: list[dict], times: list[dict], path: Path) -> None:
 
 
 def draw_errors(axes, errors: list[dict], quantity: str) -> None:
-    """Draw one error of both forms; crosses where there is no result."""
+    """Draw one error of both forms; crosses mark missing results."""
     theta = np.array([float(row["theta"]) for row in errors])
     for name, colour in COLOURS.items():
         values = [row[f"{name}_{quantity}"] for row in errors]

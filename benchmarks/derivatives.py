@@ -112,7 +112,7 @@ def pinocchio_difference(
 
 
 def casadi_difference(model: st.Model, peer: InCasadi, states: timing.States) -> float:
-    """Largest difference in all that is not zero."""
+    """Largest difference of all entries that are not zero."""
     nt, errors = model.nv - 6, []
     for state in zip(*states, strict=True):
         dq, dv, dtau = model.forward_dynamics_derivatives(*state)
@@ -130,12 +130,11 @@ def difference(a: np.ndarray, b: np.ndarray) -> float:
 
 
 def hessian_times(folder: Path) -> list[dict]:
-    """Nanoseconds of the Hessian of lambda^T (H v_dot + C) from C, rounds interleaved.
-
-    Ours writes four square blocks, zeros and both triangles of symmetric ones included.  CasADi:
-    SX, Jacobian of the gradient; cse, -O2, by the faster of the compilers.  In like terms: the same
-    four blocks.  Its nonzeros: of the lower triangle and of the mixed block, less than ours gives.
-    Ratios by minima (by medians in brackets).  Ours by clang beside it, too.
+    """Nanoseconds of the Hessian of lambda^T (H v_dot + C) from C, rounds interleaved. Ours writes
+    four square blocks, including zeros and both triangles of symmetric ones. CasADi: SX, Jacobian
+    of the gradient; cse, -O2, by the faster of the compilers. In like terms: the same four blocks.
+    Its nonzeros: those of the lower triangle and of the mixed block, fewer than ours gives. Ratios
+    by minima (by medians in brackets). Ours compiled by clang is beside it.
     """
     rows = []
     for size in SIZES[:2]:
@@ -168,7 +167,7 @@ def block_difference(model: st.Model, peer: InCasadi, states: timing.States) -> 
 
 
 def multiplied(states: timing.States) -> timing.States:
-    """The states with an acceleration and multipliers in place of torques."""
+    """The states with an acceleration and multipliers instead of torques."""
     rng = np.random.default_rng(0)
     shape = states.v.shape
     return states._replace(tau=np.hstack([rng.uniform(-100, 100, shape), rng.normal(size=shape)]))
@@ -187,10 +186,8 @@ def hessian_difference(model: st.Model, peer: InCasadi, states: timing.States) -
 
 def derivative_code(folder: Path) -> list[dict]:
     """All ten derivative functions as loops: operations that a call executes, size of their C,
-    processor seconds.
-
-    Generating is one process from its start; compiling is all that the compiler takes, with the
-    runtime's flags.
+    processor seconds. Generation is measured as one process from its start; compilation is the
+    whole time of the compiler, with the runtime's flags.
     """
     rows = []
     for size in (*SIZES, (8, 16)):

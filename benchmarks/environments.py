@@ -1,4 +1,4 @@
-"""Steps a second of environments beside MuJoCo's, on the same tail with equalities of joints."""
+"""Steps per second of environments beside MuJoCo's, on the same tail with equalities of joints."""
 
 if __name__ == "__main__":
     from benchmarks import alone
@@ -15,21 +15,23 @@ import numpy as np
 import serpentail as st
 from benchmarks.fixtures import built, label
 
-COUNT, ROUNDS, STEPS = 4096, 20, 400  # environments; of each, alternately; MuJoCo's steps in one
+# environments; rounds of each, alternately; MuJoCo's steps in one round
+COUNT, ROUNDS, STEPS = 4096, 20, 400
 SIZES = ((1, 3), (3, 4))
 WANTED = ["forward_dynamics", "rollout"]
 
 
 def environment_rates(folder: Path) -> list[dict]:
-    """Steps of 1 ms a second, on one core: of 4096 environments of righting, observations, rewards
-    and new episodes counted in, five steps an action; of `model.step` alone; and of MuJoCo's
-    mj_step on the MJCF that `st.export` writes, by its own integrator and by Runge-Kutta.
+    """Steps of 1 ms a second, on one core: of 4096 environments of righting, including
+    observations, rewards and new episodes, with five steps for each action; of `model.step` alone;
+    and of MuJoCo's mj_step on the MJCF that `st.export` writes, by its own integrator and by
+    Runge-Kutta.
     """
     return [rates(size) for size in SIZES]
 
 
 def rates(size: tuple[int, int]) -> dict:
-    """Return the rates of one tail; the best of rounds that take turns."""
+    """Return the rates of one tail: the best of alternate rounds."""
     model = st.load(built(*size, functions=WANTED).folder, threads=1)
     clocks = {"gymnasium": environments(model), "model.step": steps(model)}
     for name in ("mujoco", "mujoco, RK4"):
@@ -45,7 +47,7 @@ def rates(size: tuple[int, int]) -> dict:
 
 
 def environments(model: st.Model) -> Callable[[], float]:
-    """Return a function that tells the seconds of a step of one environment among many."""
+    """Return a function that measures the seconds of a step of one environment among many."""
     worlds = st.environments(model, "righting", COUNT, step=1e-3, substeps=5)
     worlds.reset(seed=0)
     worlds.action_space.seed(0)

@@ -1,5 +1,6 @@
-"""The first table of docs/benchmarks.md, from a report: AVX-512 before AVX2 in each cell; of a peer
-how many times as long as ours it takes.
+"""The first table of docs/benchmarks.md, from a report.
+
+Each cell has AVX-512 before AVX2. A peer's figure is how many times as long as ours it takes.
 """
 
 from collections.abc import Callable
@@ -15,12 +16,12 @@ def short(value: float) -> str:
 
 
 def us(column: str, scale: float = 1e-3) -> Callable[[dict], str]:
-    """Return what shows nanoseconds in us."""
+    """Return a function that shows nanoseconds in us."""
     return lambda row: short(row[column] * scale)
 
 
 def times(column: str) -> Callable[[dict], str]:
-    """Return what shows how many times slower a peer is."""
+    """Return a function that shows how many times slower a peer is."""
     return lambda row: f"{short(row[f'{column}_ns'] / row['ns'])}x"
 
 
@@ -34,7 +35,7 @@ def waited(row: dict) -> str:
     return f"{short(row['caller_us'])} ({short(row['overhead_us'])})"
 
 
-# words, measure, function or scene, what a cell shows
+# words, measure, function or scene, contents of a cell
 ROWS: tuple[tuple[str, str, str | None, Callable[[dict], str]], ...] = (
     ("**forward dynamics, one call from C**, us", "speed", None, us("ns")),
     ("from Python (of it outside C), us", "call_times", FD, waited),
@@ -68,7 +69,7 @@ ROWS: tuple[tuple[str, str, str | None, Callable[[dict], str]], ...] = (
 
 
 def block(report: dict) -> list[str]:
-    """Return the table's lines; a row that nothing was measured for is left out."""
+    """Return the lines of the table; a row without a measurement is left out."""
     there = list(dict.fromkeys(row["processor"] for row in report.get("speed", [])))
     if not there:
         return []
@@ -83,7 +84,7 @@ def block(report: dict) -> list[str]:
 
 
 def cell(rows: list[dict], model: str, there: list[str], show: Callable[[dict], str]) -> str:
-    """Return what a model shows, on one processor after the other."""
+    """Return the result of a model on one processor after the other."""
     of = {row["processor"]: row for row in rows if row.get("model") == model}
     shown = []
     for processor in there:

@@ -130,7 +130,7 @@ def label(segments: int, links: int | None) -> str:
 
 @dataclass(frozen=True)
 class Fixture:
-    """A loaded model and what calls one of its C functions for the timer."""
+    """A loaded model, and an adapter that calls one of its C functions for the timer."""
 
     model: st.Model
     closure: Closure
@@ -148,11 +148,11 @@ def fixture(
     function: str = "forward_dynamics",
     compiler: Compiler | None = None,
 ) -> Fixture:
-    """Compile an adapter of one of a model's functions to the timer's call.
+    """Compile an adapter from one of a model's functions to the timer's call.
 
-    The third array of the timer holds all inputs after q and v, one after the other; more than one
-    output stays in the context, behind the workspace, which begins at a cache line.
-    compiler: one of the peers', by default what users of the model get.
+    The third array of the timer holds all inputs after q and v, one after the other. More than one
+    output stays in the context, behind the workspace, which begins at a cache line. compiler: one
+    of the peers'; by default the one that users of the model get.
     """
     work = -(-(model.manifest["work"][function] + 1) // 8) * 8
     inputs, outputs = (
@@ -192,7 +192,7 @@ def compiled(model: st.Model, adapter: Path, compiler: Compiler | None) -> Path:
 
 
 def by_clang(model: st.Model, scratch: Path, function: str) -> dict[str, Fixture]:
-    """Return a fixture of a function by clang, where that is here."""
+    """Return a fixture of a function compiled by clang, if that is installed."""
     found = (compiler for compiler in compilers() if compiler.name == "clang")
     return {each.name: fixture(model, scratch, function, each) for each in found}
 
@@ -203,5 +203,5 @@ def sizes(arguments: list[dict]) -> list[int]:
 
 
 def offsets(name: str, lengths: list[int]) -> list[str]:
-    """Return C expressions of arrays that lie one after the other."""
+    """Return C expressions of arrays that are one after the other."""
     return [f"{name} + {sum(lengths[:k])}" for k in range(len(lengths))]

@@ -31,7 +31,7 @@ SIZES = (
     *((4, 1), (4, 2), (4, 4), (6, 1), (6, 2), (6, 6), (8, 4)),
 )
 FORMS = ("straight", "loops", "lanes", "segments")
-# what -march says of each target, and how its rows call it
+# -march of each target, and its name in rows
 TARGETS = {"here": (), "16 registers": ("-march=x86-64-v3",)}
 MOST_TEXT = 1_000_000  # bytes of C: straight lines beyond would take minutes to compile
 ROUNDS, CALLS = 60, 64
@@ -80,14 +80,14 @@ def model_in(folder: Path, function: str, size: tuple[int, int], form: str) -> P
 
 
 def states(size: tuple[int, int], function: dict) -> States:
-    """Random states, and whatever else the function reads, one after the other."""
+    """Random states, and all other inputs of the function, one after the other."""
     q, v, _ = random_states(size[0])
     width = max(sum(sizes(function["inputs"][2:])), 1)
     return States(q, v, np.random.default_rng(0).uniform(-1, 1, (len(q), width)))
 
 
 def closure(model: st.Model, function: str, scratch: Path, flags) -> tuple[Closure, np.ndarray]:
-    """Compile an adapter of a function to the timer's call; return it and what it works in."""
+    """Compile an adapter of a function to the timer's call; return it and its workspace."""
     entry, work = model.manifest["functions"][function], model.manifest["work"][function]
     work = -(-(work + 1) // 8) * 8
     named = [a["name"] for a in entry["inputs"]]

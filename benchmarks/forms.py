@@ -1,8 +1,8 @@
-"""Times the forms of functions on both kinds of processor: what decides the form that is emitted.
+"""Times the forms of functions on both kinds of processor: the results decide the emitted form.
 
 Each function of each tail is generated in every form that it has, and compiled twice: for this
-processor, and as for x86-64-v3, which has 16 vector registers of 4 numbers each.  On an AVX-512
-machine the first has 32 registers of 8.  All run in interleaved rounds of one process.
+processor, and for x86-64-v3, which has 16 vector registers of 4 numbers each. On an AVX-512 machine
+the first has 32 registers of 8. All run in interleaved rounds of one process.
 """
 
 import argparse
@@ -11,7 +11,7 @@ from examples import front
 
 
 def grid(text: str) -> tuple[int, int]:
-    """Return (m, n) from "m,n"; ArgumentTypeError where it is something else."""
+    """Return (m, n) from "m,n"; ArgumentTypeError for any other text."""
     numbers = text.split(",")
     if len(numbers) != 2:
         raise argparse.ArgumentTypeError(f"{text!r}: needs segments and links, such as 3,4")
@@ -19,7 +19,7 @@ def grid(text: str) -> tuple[int, int]:
 
 
 def main(folder, functions, sizes) -> None:
-    """Measure, print the rows as they come, and write them all."""
+    """Measure, print each row when it is ready, and write them all."""
     from benchmarks.form_times import FUNCTIONS, SIZES, measured
 
     measured(folder, functions or FUNCTIONS, sizes or SIZES)

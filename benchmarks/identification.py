@@ -1,9 +1,11 @@
-"""Times identification against opty's approach: the midpoint rule, IPOPT without exact Hessians.
+"""Times identification against opty's approach: the midpoint rule, and IPOPT without exact
+Hessians.
 
-opty itself takes SymPy's equations, which no tail here has; so its nonlinear program is built in
-CasADi: states at nodes, the midpoint rule between them, IPOPT with its limited-memory Hessian.
-Both get the same exact tracks (without noise: the error left is the method's own), the same wrong
-parameters and the same first motion. The rule is tried with an exact Hessian, too.
+opty takes SymPy's equations, which no tail has here. Its nonlinear program is therefore built in
+CasADi: states at nodes, the midpoint rule between them, and IPOPT with its limited-memory Hessian.
+Both get the same exact tracks, the same wrong parameters and the same first motion. The tracks have
+no noise, so that only the error of the method remains. The rule is tried with an exact Hessian,
+too.
 """
 
 if __name__ == "__main__":
@@ -66,7 +68,7 @@ def midpoint(model: st.Model, data: tuple, torso: list, exact: bool) -> dict:
     (times, seen, first), parts = data, PARTS
     begun = time.process_time()
     mesh = np.interp(np.arange(parts * (len(times) - 1) + 1), parts * np.arange(len(times)), times)
-    theta = ca.MX.sym("theta", 4)  # over what they begin with
+    theta = ca.MX.sym("theta", 4)  # relative to their initial values
     p = _struct(model, theta * BEGIN)
     x_dot, points = model.casadi.x_dot, model.casadi.symbolic("tail_points")
     nx = model.nq + model.nv
@@ -102,7 +104,9 @@ def midpoint(model: st.Model, data: tuple, torso: list, exact: bool) -> dict:
 
 
 def _struct(model: st.Model, values):
-    """Return the parameter struct with other values; the links' inertia follows, Table 1."""
+    """Return the parameter struct with other values; the inertia of the links follows from them
+    (Table 1).
+    """
     import casadi as ca
 
     mass, length, stiffness, damping = ca.vertsplit(values)

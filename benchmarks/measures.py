@@ -41,7 +41,7 @@ ROOT = Path(__file__).resolve().parent.parent
 
 
 class Measure(NamedTuple):
-    """What gives a table's rows; each: once for each processor."""
+    """The function that gives the rows of a table; each: once for each processor."""
 
     rows: Callable[[Path], list[dict]]
     each: bool = False
@@ -80,7 +80,7 @@ MEASURES = {
     "page_speed": Measure(pages.page_speed),
     "identification_times": Measure(identification.identification_times),
 }
-# a process that keeps to a lesser processor: a folder, then names of measures
+# a process that uses a lesser processor; its arguments: a folder, then names of measures
 CHILD = """
 import json, sys
 from pathlib import Path
@@ -93,7 +93,7 @@ with st.progress():
 
 
 def bench(output: Path, names: Sequence[str] = tuple(MEASURES)) -> None:
-    """Measure everything that is named, write the report, print it."""
+    """Run the named measures, write the report, and print it."""
     there = processors.processors()
     report: dict = {"machine": machine(there), "seconds": []}
     with tempfile.TemporaryDirectory() as scratch:
@@ -113,7 +113,9 @@ def bench(output: Path, names: Sequence[str] = tuple(MEASURES)) -> None:
 
 
 def on(processor: processors.Processor, names: list[str], scratch: Path) -> dict:
-    """Return what is measured on a processor: here, or in a process that keeps to it."""
+    """Return the results of measures on a processor: in this process, or in one that uses a lesser
+    processor.
+    """
     if processor.level is None or not names:
         return measured(names, scratch)
     own = scratch / processor.name

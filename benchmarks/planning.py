@@ -1,8 +1,8 @@
 """Measures planning against its targets and against other ways to solve the same problem.
 
-All times are CPU seconds of this process.  The problem of one plan is that of Sect. 4.2 from a
-random tumbling start, 59 nodes (Hermite-Simpson, 29 intervals), the guess passive flight for all
-ways of solving it.
+All times are CPU seconds of this process. The problem of one plan is that of Sect. 4.2 from a
+random tumbling start, with 59 nodes (Hermite-Simpson, 29 intervals). All ways of solving it start
+from passive flight.
 """
 
 if __name__ == "__main__":
@@ -26,7 +26,7 @@ from serpentail_codegen.scene.parse import scene_for
 SLOWER, CAP = (
     500,
     300.0,
-)  # times slower than the best, or s of CPU: what does not end is cut at the lesser
+)  # times slower than the best, or s of CPU: endless solves are cut at the lesser of both
 EXAMPLE = 4  # the random start
 REPEATS = 5
 NODES = {
@@ -46,15 +46,14 @@ STARTS = {
 
 
 class Cut(Exception):
-    """What does not end has taken long enough."""
+    """Raised when a solve has taken long enough."""
 
 
 def planning(folder: Path) -> list[dict]:
     """Ways to solve one problem of 59 nodes; how often, and how fast, plans become true (<= 0.01
-    deg); planning again.
-
-    Paper's method: SciPy's SLSQP with finite differences of the trapezoidal program in Euler
-    angles; cut, unsolved, at 500 times the best way's time, 5 minutes at most.
+    deg); planning again. The paper's method is SciPy's SLSQP with finite differences of the
+    trapezoidal program in Euler angles; it is cut, unsolved, at 500 times the best way's time, at
+    most 5 minutes.
     """
     models = {size: righting.model(*size) for size in STARTS}
     rat, free = models[1, 3], st.Goal(torso_rate=None)
@@ -82,7 +81,7 @@ def plan(rat: st.Model, seed: int = EXAMPLE, **settings) -> st.Plan:
 
 
 def one_problem(rat: st.Model) -> list[dict]:
-    """Rows of one program solved in several ways, in turns."""
+    """Return the rows of one program solved in several ways, alternately."""
     ways = {
         "exact Hessian": NODES,
         "L-BFGS Hessian": NODES | LIMITED,
@@ -128,8 +127,8 @@ def opty(rat: st.Model, best: float) -> dict:
 
 
 def finite_differences(rat: st.Model, cap: float) -> tuple[float, str]:
-    """CPU seconds of SLSQP without derivatives on the paper's program, at most `cap`, and how it
-    ended.
+    """Return CPU seconds of SLSQP without derivatives on the paper's program, at most `cap`, and
+    its outcome.
     """
     transcription, limits, w, p = captured(rat)
     nlp, fixed = transcription.functions["nlp"], limits.lbg == limits.ubg
@@ -163,8 +162,8 @@ def finite_differences(rat: st.Model, cap: float) -> tuple[float, str]:
 
 
 def captured(rat: st.Model) -> tuple:
-    """The paper's program, its limits, passive flight as the guess and the parameters, as
-    ``plan`` has them.
+    """Return the paper's program, its limits, passive flight as the guess and the parameters, as
+    ``plan`` forms them.
     """
     seen, solve = [], ways.solve
 
@@ -184,8 +183,8 @@ def captured(rat: st.Model) -> tuple:
 
 
 def replanned(rat: st.Model) -> list[dict]:
-    """Plan again from states up to 1 % away, the plan before being the guess: the whole call, truth
-    included.
+    """Plan again from states up to 1 % away, with the previous plan as the guess: the whole call,
+    including the true flight.
     """
     q, v = righting.tumbling(rat, EXAMPLE)
     first, random, times = plan(rat, track=False), np.random.default_rng(0), []
@@ -205,8 +204,8 @@ def replanned(rat: st.Model) -> list[dict]:
 
 
 def true_plans(rat: st.Model, name: str, target: tuple, **settings) -> dict:
-    """Plans that are true within a time, of random tumbling starts, upright and, unless told
-    otherwise, at rest.
+    """Plans that become true within a time, from random tumbling starts, upright and, by default,
+    at rest.
     """
     starts, seconds, share = target
     times, errors = [], []

@@ -1,4 +1,4 @@
-"""What float costs and gives: time of forward dynamics against its error, beside double."""
+"""The cost and the error of float: time of forward dynamics against its error, beside double."""
 
 if __name__ == "__main__":
     from benchmarks import alone
@@ -20,10 +20,8 @@ EXACT = 10  # states that are compared with 40 digits
 
 def precision_times(folder: Path) -> list[dict]:
     """Nanoseconds a state of forward dynamics, and the largest error of v_dot over its largest
-    entry, 40 digits.
-
-    States are those that float holds, so the error is of the arithmetic, and in float of rounded
-    parameters.
+    entry, 40 digits. The states can be held exactly by float, so that the error comes from the
+    arithmetic and, in float, from rounded parameters.
     """
     rows = []
     for size in ((1, 3), (3, 4), (6, 6), (1, None), (3, None)):

@@ -16,10 +16,10 @@ TARGETS = "What is asked, what was found in this run, by minima; ratios: times s
 
 
 def written(folder: Path, report: dict, words: dict[str, str], pictures: list[Path]) -> str:
-    """Write report.json, report.md, report.html and figures.json, the last run compared; return the
-    Markdown.
+    """Write report.json, report.md, report.html and figures.json, compared with the last run;
+    return the Markdown.
 
-    words: of each measure what its docstring says.
+    words: the docstring of each measure.
     """
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / "report.json"
@@ -40,7 +40,7 @@ def written(folder: Path, report: dict, words: dict[str, str], pictures: list[Pa
 
 
 def changes(report: dict, last: dict | None) -> tuple[str, list[dict]]:
-    """Return what to say of the last run, and the times that differ from its by more than noise
+    """Return a sentence about the last run, and the times that differ from it by more than noise
     explains.
     """
     if last is None:
@@ -84,7 +84,7 @@ def change(name: str, row: dict, before: dict, key: str) -> dict | None:
 
 
 def which(row: dict) -> str:
-    """Return what a row is of: the texts that it begins with."""
+    """Return the name of a row: the texts that it begins with."""
     texts = itertools.takewhile(lambda value: isinstance(value, str), row.values())
     return ", ".join(texts) or str(next(iter(row.values())))
 
@@ -113,7 +113,7 @@ def heads(rows: list[dict]) -> list[str]:
 
 
 def body(rows: list[dict]) -> list[list[str]]:
-    """Return the cells; what a row has not is empty."""
+    """Return the cells; a missing value gives an empty cell."""
     return [[cell(row.get(key, "")) for key in keys(rows)] for row in rows]
 
 

@@ -1,4 +1,6 @@
-"""How forward dynamics grows with the tail, and what share of the core's peak it reaches."""
+"""How the time of forward dynamics grows with the tail, and which share of the core's peak it
+reaches.
+"""
 
 if __name__ == "__main__":
     from benchmarks import alone
@@ -26,11 +28,9 @@ ROUNDS, CALLS = 100, 64
 
 def scaling(folder: Path) -> list[dict]:
     """Nanoseconds of forward dynamics against the size of the tail, and its share of the peak of
-    multiply-adds.
-
-    Operations are additions, multiplications and divisions; lanes of rows are counted, so a sweep
-    in lanes does more of them, and faster.  The peak is measured in this run, of scalars (of
-    vectors in brackets).
+    multiply-adds. Operations are additions, multiplications and divisions, counted for each lane,
+    so that a sweep in lanes does more of them, and faster. The peak is measured in this run, of
+    scalars (of vectors in brackets).
     """
     scalar, vector = peak()
     rows = []

@@ -64,7 +64,7 @@ def flight() -> tuple[Callable, float]:
 
 
 def fly(model: st.Model, span: float) -> tuple[Callable, float]:
-    """So many s of damped flight."""
+    """Return a damped flight of a number of seconds."""
     start = thrown(model)
     damped = st.Damping(DAMPING)
     return lambda **how: st.simulate(model, *start, controller=damped, t_span=span, **how), span
@@ -79,7 +79,7 @@ def tracking() -> tuple[Callable, float]:
 
 
 def standing(model: st.Model) -> dict:
-    """Return what a run needs that begins standing at rest on feet and tail."""
+    """Return the arguments of a run that begins at rest on feet and tail."""
     q, legs = np.zeros(model.nq), st.Legs.fixed(GAMMA, STAND)
     q[2:5] = 0.1, np.cos(0.1), np.sin(0.1)
     acting = {"controller": st.Damping(DAMPING), "legs": legs}
@@ -133,8 +133,8 @@ def scene_rows(name: str) -> list[dict]:
 
 
 def timed(run: Callable, exact: st.Trajectory, span: float) -> dict:
-    """Least times of some runs, for the caller and of the processor within, and their error; no
-    numbers where the method fails.
+    """Return the least times of some runs, for the caller and for the processor within, and their
+    error; no numbers if the method fails.
     """
     waits, motions = [], []
     try:
@@ -152,17 +152,16 @@ def timed(run: Callable, exact: st.Trajectory, span: float) -> dict:
 
 @cache
 def simulation_times(folder: Path) -> list[dict]:
-    """What the caller waits against error (largest of q at the end) of all methods in four scenes
-    of a (3, 4) tail; beside it the processor's time in the run itself, once it is prepared.
-
+    """Waiting time of the caller against error (largest of q at the end) of all methods in four
+    scenes of a (3, 4) tail; beside it the processor's time in the run itself, once it is prepared.
     Flight and tracking 0.6 s, sliding and impact 0.5 s; lsoda and dop853 are SciPy's on the
-    compiled model.  nan: the method failed, as one whose steps are too long does.
+    compiled model. nan: the method failed, for example because its steps are too long.
     """
     return [row for name in SCENES for row in scene_rows(name)]
 
 
 def least(rows: list[dict], methods: tuple[str, ...], error: float) -> dict:
-    """The fastest run of some methods whose error is not above this."""
+    """Return the fastest run of some methods whose error does not exceed a bound."""
     return min(
         (row for row in rows if row["method"] in methods and row["error"] <= error),
         key=lambda row: row["ms"],
@@ -170,11 +169,9 @@ def least(rows: list[dict], methods: tuple[str, ...], error: float) -> dict:
 
 
 def simulation_summary(folder: Path) -> list[dict]:
-    """The fastest run of a generated method in each scene whose error is at most 1e-4, beside
-    SciPy's LSODA's.
-
-    At the same bound of the error, and at the error that ours has: where stability, not accuracy,
-    bounds our steps, that is far below.
+    """The fastest run of a generated method in each scene with an error of at most 1e-4, beside
+    SciPy's LSODA. LSODA is given the same bound of the error, and also our actual error, which is
+    far below the bound where stability, not accuracy, limits our steps.
     """
     found = []
     for name in SCENES:
@@ -190,7 +187,7 @@ def simulation_summary(folder: Path) -> list[dict]:
 
 
 def draw(rows: list[dict], path: Path) -> None:
-    """Draw run time against error of all methods, a panel for each scene."""
+    """Draw run time against error of all methods, one panel for each scene."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(9, 6.5), layout="constrained")
@@ -215,8 +212,8 @@ def draw(rows: list[dict], path: Path) -> None:
 
 
 def mujoco_times(folder: Path) -> list[dict]:
-    """0.5 s of sliding on feet and tail by MuJoCo, whose contacts and ties are soft constraints:
-    another physics.
+    """0.5 s of sliding on feet and tail by MuJoCo, whose contacts and ties are soft constraints: a
+    different physics.
     """
     model = touching().with_parameters(mu=0.3)
     start = standing(model)

@@ -1,4 +1,4 @@
-"""Times of making tails, of calls from C, and drifts of flights."""
+"""Times of making tails and of calls from C, and drifts of flights."""
 
 if __name__ == "__main__":
     from benchmarks import alone
@@ -39,7 +39,9 @@ print(json.dumps(found | {"emission": model.manifest["functions"]["forward_dynam
 
 
 def generation(folder: Path) -> list[dict]:
-    """Seconds from nothing to a loaded model: a new process generates, an empty cache compiles."""
+    """Seconds from nothing to a loaded model: a new process generates it, and it is compiled into
+    an empty cache.
+    """
     rows = []
     for size in ((1, 3), (3, 4), (8, 16), (6, None)):
         begun = time.perf_counter()
@@ -57,11 +59,10 @@ def generation(folder: Path) -> list[dict]:
 
 def speed(folder: Path) -> list[dict]:
     """Nanoseconds of one forward dynamics call from C, beside Pinocchio's coupled path, rounds
-    interleaved; each peer by the faster of the compilers.
-
-    Ratios by minima (by medians in brackets).  Pinocchio: as its documentation shows it; its CRBA
-    with all that was found to speed it up; the tied columns summed by own code on its types
-    (pinocchio_chain.cpp).  Ours is compiled as its users have it, and by clang beside that.
+    interleaved; each peer by the faster of the compilers. Ratios by minima (by medians in
+    brackets). Pinocchio: as its documentation shows it; its CRBA with all that was found to speed
+    it up; the tied columns summed by own code on its types (pinocchio_chain.cpp). Ours is compiled
+    as for its users, and by clang beside that.
     """
     plain, tuned = (
         build.by_each(partial(build.build_library, source, build.CACHE))
@@ -144,13 +145,13 @@ def thrown(model) -> tuple[np.ndarray, np.ndarray]:
 
 
 def internal_energy(flight, model) -> np.ndarray:
-    """Kinetic energy less that of the centre of mass: constant in free flight without torques."""
+    """Kinetic energy minus that of the centre of mass: constant in free flight without torques."""
     mass = model.parameters["torso_mass"] + model.parameters["tail_mass"]
     return flight.kinetic - (flight.linear_momentum**2).sum(axis=1) / (2 * mass)
 
 
 def work_precision(folder: Path) -> list[dict]:
-    """What the caller waits against error of 0.58 s of damped flight: RK4, Tsit5 and DOP853 at
+    """Waiting time of the caller against error of 0.58 s of damped flight: RK4, Tsit5 and DOP853 at
     several steps or tolerances.
     """
     model = built(1, 3)

@@ -4,10 +4,10 @@ from typing import NamedTuple
 
 
 class Target(NamedTuple):
-    """A bound of a column of a measure, or of how many times another it is.
+    """A bound of a column of a measure, or of the ratio of two columns.
 
-    of: in the rows of these models, all if none; on: these processors, all if none; where: what
-    another column is.
+    of: only in the rows of these models; on: only on these processors; where: the value that
+    another column must have.
     """
 
     what: str
@@ -88,8 +88,8 @@ TARGETS = (
 
 
 def judged(report: dict) -> list[dict]:
-    """Return for each target, processor and model what is asked and was found; of what was left
-    out, nothing.
+    """Return what is demanded and what was found for each target, processor and model; nothing
+    about measures that were left out.
     """
     return [
         judgement(target, row)

@@ -1,6 +1,6 @@
-/* Cortex-M4F and M7 of QEMU's mps2 boards: vectors, FPU, text by semihosting, instructions by SysTick.
+/* Cortex-M4F and Cortex-M7 of QEMU's mps2 boards: vectors, FPU, output by semihosting, instruction count by SysTick.
  *
- * Under `-icount shift=0` an instruction takes 1 ns; SysTick counts the boards' 25 MHz: 40 instructions a tick.
+ * With `-icount shift=0` an instruction takes 1 ns.  SysTick counts at 25 MHz, so one tick is 40 instructions.
  */
 #include "port.h"
 

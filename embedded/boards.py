@@ -33,7 +33,7 @@ PROFILES = {
 
 
 class ToolchainMissing(RuntimeError):
-    """A compiler or an emulator that is not installed; says how to install it."""
+    """A compiler or an emulator is not installed; the message says how to install it."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Board:
 
     name: str
     title: str
-    real: str  # what its FPU computes in
+    real: str  # type that its FPU computes
     compiler: str
     cpu: tuple[str, ...]
     port: str

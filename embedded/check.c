@@ -1,7 +1,8 @@
-/* Calls every function of a model on stored states; prints status, cost and the bits of what came out.
+/* Calls every function of a model on stored states, and prints status, the bits of the outputs, and the cost.
  *
- * cases.h, written for the model, has: `real`; `states[STATES][INPUTS]`; `cases[CASES]` of name, function and number
- * of outputs, the first of which does nothing, and the second only fills some stack; `prepare`; OUTPUTS and WORK, the most reals that any of them needs.
+ * cases.h, written for the model, defines: `real`; `states[STATES][INPUTS]`; `cases[CASES]` with name, function and number
+ * of outputs, where the first case does nothing and the second only uses a known amount of stack; `prepare`; OUTPUTS and
+ * WORK, the largest numbers of reals that a case needs.
  */
 #include <string.h>
 
@@ -37,7 +38,7 @@ static void write_bits(real value)
   write_number(" ", bits, 16);
 }
 
-/* Instructions of one call, the loop around it included. */
+/* Instructions of one call, including the loop around it. */
 static uint32_t cost(const struct a_case *test, const real *state)
 {
   port_start_counting();
@@ -47,7 +48,7 @@ static uint32_t cost(const struct a_case *test, const real *state)
   return port_counted() / REPEATS;
 }
 
-/* Paint the stack from here down; returns where that begins, a few words below the caller's. */
+/* Paint the stack from here down; return the top of the paint, a few words below the caller's frame. */
 static __attribute__((noinline)) volatile uint32_t *paint(void)
 {
   volatile uint32_t *const top = (volatile uint32_t *)__builtin_frame_address(0) - MARGIN;
@@ -57,7 +58,7 @@ static __attribute__((noinline)) volatile uint32_t *paint(void)
   return top;
 }
 
-/* Bytes of stack that one call changed below the paint's beginning; 0 on a host, whose stack is its own. */
+/* Bytes of painted stack that one call uses; 0 on a host, whose stack is not painted. */
 static __attribute__((noinline)) uint32_t depth(const struct a_case *test, const real *state)
 {
   if (port_stack_top - port_stack_low < 2 * DEEPEST) {

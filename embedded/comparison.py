@@ -11,27 +11,26 @@ from embedded.image import Image, build, manifest_of
 from embedded.results import Result, blocks, run
 from embedded.stack import deepest
 
-BOUND = (
-    1e4  # units of the last place of an output's largest entry: what the fast profile may differ by
-)
+# ulp of an output's largest entry: largest difference of the fast profile
+BOUND = 1e4
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """One function on a board: whether its bits are the host's, by how much it differs, what a call
-    costs.
+    """One function on a board: whether it gives the host's bits, its largest difference from the
+    host, and the cost of a call.
     """
 
     name: str
     same_bits: bool
-    # largest difference from the host, in units of the last place of the output's largest entry
+    # largest difference from the host, in units in the last place of the output's largest entry
     units: float
     instructions: int
     stack: int  # bytes, the sum of frames along the deepest chain of calls
-    painted: int  # bytes, as found on the board
+    painted: int  # bytes, measured on the board by a painted stack
 
     def holds(self, profile: str) -> bool:
-        """Tell if the profile's promise is kept."""
+        """Tell if the results agree as the profile promises."""
         return self.same_bits if profile == "reproducible" else self.units <= BOUND
 
 
@@ -71,8 +70,8 @@ def _compared(
 
 
 def _difference(some: np.ndarray, others: np.ndarray) -> float:
-    """Return the largest difference relative to the largest entry of each state; infinite where one
-    is no number.
+    """Return the largest difference relative to the largest entry of each state; infinite if a
+    value is not finite.
     """
     scale = np.abs(others).max(axis=1)
     difference = np.abs(some - others).max(axis=1)
@@ -100,13 +99,13 @@ def check(folder: Path, board: str, profile: str | None, output: Path) -> int:
         print(error, file=sys.stderr)
         return 2
     profile = profile or manifest_of(folder)["scene"]["profile"]
-    print(f"{folder} on {BOARDS[board].title} in QEMU, {profile} profile; against the host:")
+    print(f"{folder} on {BOARDS[board].title} in QEMU, {profile} profile, compared with the host:")
     print("\n".join(table(rows)))
     bad = [row.name for row in rows if not row.holds(profile)]
     promise = (
-        "the host's bits"
+        "same bits as the host"
         if profile == "reproducible"
-        else f"within {BOUND:g} units of the last place"
+        else f"within {BOUND:g} units in the last place"
     )
     print(f"{'FAILED: ' + ', '.join(bad) + ' not ' if bad else ''}{promise}")
     return 1 if bad else 0

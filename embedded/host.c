@@ -1,4 +1,4 @@
-/* The machine that builds: text by stdio; it counts nothing, and has no stack of ours. */
+/* The host: output by stdio; no instruction count, no painted stack. */
 #include <stdio.h>
 #include <stdlib.h>
 

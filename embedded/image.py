@@ -13,7 +13,7 @@ from embedded.states import stored_states
 
 LONGEST_REPORT = 3000  # characters of what a compiler says
 C_LINES = ("-std=gnu11", "-I", str(HERE))  # the harness alone: attributes, assembly
-# what the programs of all checks begin with
+# the start of cases.h, for all checks
 CASE = """struct a_case {{
   const char *name;
   int (*call)(const real *state, real *outputs, real *work);
@@ -29,7 +29,7 @@ BARE = """static int call_nothing(const real *state, real *outputs, real *work)
   return 0;
 }}
 
-/* A known depth of stack, for comparison. */
+/* Uses a known amount of stack, for comparison. */
 static int call_room(const real *state, real *outputs, real *work)
 {{
   volatile uint32_t room[32];
@@ -40,7 +40,7 @@ static int call_room(const real *state, real *outputs, real *work)
 }}
 """
 HEAD = (
-    """/* Stored states of {prefix}, and its functions by one signature. */
+    """/* Stored states of {prefix}, and its functions with one common signature. */
 #ifndef CASES_H
 #define CASES_H
 

@@ -13,7 +13,7 @@ from embedded.results import run
 TIMES = (0.0, 0.1, 0.2)  # s, of the ticks
 SHOWN = 4  # times of each tick's torques
 HEAD = (
-    """/* States at which ticks are computed: t, then q, v and those of the tick after. */
+    """/* States at which ticks are computed: t, then q, v, then q, v of the next tick. */
 #ifndef CASES_H
 #define CASES_H
 
@@ -39,7 +39,7 @@ static void prepare(void)
 """
     + BARE
     + """
-/* Torques from t to the plan's end. */
+/* Torques from t to the end of the plan. */
 static int torques(real t, real *outputs)
 {{
   for (int k = 0; k < SHOWN; ++k) {{

@@ -13,8 +13,8 @@ PATIENCE = 120  # s
 
 @dataclass(frozen=True)
 class Result:
-    """One function on all states: status and outputs as bits (states, length), instructions and
-    stack of each call.
+    """One function on all states: status, outputs as bits (states, length) and as numbers, and
+    instructions and stack (bytes) of each call.
     """
 
     statuses: tuple[int, ...]
@@ -25,7 +25,7 @@ class Result:
 
 
 def run(image: Image) -> dict[str, Result]:
-    """Run an image; raises RuntimeError where it ends with an error or does not end."""
+    """Run an image; raises RuntimeError if it ends with an error or takes too long."""
     words = [*image.board.emulator, str(image.path)]
     try:
         done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=PATIENCE)
@@ -39,8 +39,8 @@ def run(image: Image) -> dict[str, Result]:
 
 
 def parsed(text: str, real: str) -> dict[str, Result]:
-    """Return results by function; instructions above those of a call of nothing, stack above that
-    of a known room.
+    """Return results by function.  Instructions of an empty call, and the stack of a call with a
+    known frame, are subtracted.
     """
     rows: dict[str, list] = {}
     for line in text.splitlines():
@@ -64,7 +64,7 @@ def _result(lines: list, real: str, idle: int, room: int) -> Result:
 
 
 def blocks(image: Image, name: str) -> dict[str, slice]:
-    """Return where each output of a function is in a row of its values."""
+    """Return the slice of each output in a row of a function's values."""
     outputs = image.manifest["functions"][name]["outputs"]
     ends = np.cumsum([0, *sizes(outputs)])
     return {a["name"]: slice(*pair) for a, pair in zip(outputs, pairwise(ends), strict=True)}

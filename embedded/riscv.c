@@ -1,4 +1,4 @@
-/* RISC-V of QEMU's virt board: entry, FPU, text by semihosting, instructions by the core's own counter. */
+/* RISC-V of QEMU's virt board: entry, FPU, output by semihosting, instruction count by minstret. */
 #include "port.h"
 
 enum { SYS_WRITE0 = 0x04, SYS_EXIT_EXTENDED = 0x20, APPLICATION_EXIT = 0x20026 };
@@ -9,7 +9,7 @@ __attribute__((used)) static void prepare(void);
 
 static uint32_t counted_at_start;
 
-/* The three instructions must not be compressed, nor lie across two pages. */
+/* The three instructions must not be compressed, and must lie in one page. */
 __attribute__((naked, noinline, aligned(16))) static void call_host(uintptr_t operation, const void *argument)
 {
   (void)operation; /* a0 */

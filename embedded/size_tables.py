@@ -152,7 +152,7 @@ def _block_errors(
         error = (
             np.abs(some - exact).reshape(-1, nv, nv) / scale[:, :, None] / scale[:, None, :]
         ).max()
-        return [("H, by sqrt(H_ii H_jj)", error)]
+        return [("H, relative to sqrt(H_ii H_jj)", error)]
     if name == "v_dot":
         parts = {"p_ddot": slice(0, 3), "omega_dot": slice(3, 6), "q_t_ddot": slice(6, nv)}
         where = " in contact" if function == "contact_dynamics" else ""
@@ -174,9 +174,8 @@ def soft_double(parent: Path) -> str:
     folder = parent / "loops" / "double" / "articulated_m1_n3"
     found = run(build(folder, BOARDS["m4"], folder / "build" / "m4"))["forward_dynamics"]
     return (
-        f"In `double` a Cortex-M4F computes by software: {max(found.instructions):,} instructions "
-        "for forward dynamics "
-        "of (1, 3) in loops. Take `REAL=float` there."
+        "A Cortex-M4F computes `double` in software: the forward dynamics of (1, 3) in loops take "
+        f"{max(found.instructions):,} instructions. Use `REAL=float` there."
     )
 
 
@@ -218,6 +217,9 @@ def report(parent: Path) -> str:
     lines += [
         "### Error of `float`",
         "",
+        "Largest error of `float` on the Cortex-M4F against `double` on the host, relative to the "
+        "largest entry of each state.",
+        "",
         *markdown(("quantity", *by_tail), worst),
         "",
         soft_double(parent),
@@ -228,6 +230,9 @@ def report(parent: Path) -> str:
         [
             *lines,
             "### MISRA C:2012, for information",
+            "",
+            "Hits of cppcheck's MISRA addon in the C of (1, 3), `float`, in loops. They are "
+            "information, not a verdict.",
             "",
             *markdown(("rule", "hits"), summary(folder)),
             "",

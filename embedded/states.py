@@ -1,10 +1,10 @@
-"""The states that the check on a board calls every function with."""
+"""The states on which the check of a board calls every function."""
 
 import math
 
 import numpy as np
 
-# Largest |entry| of each entry of an input; the last one counts for all that follow.
+# Largest |value| of each entry of an input; the last one also applies to all entries after it.
 SCALES = {
     "v": (2, 2, 2, 20, 20, 20, 10),
     "v_dot": (20, 20, 20, 500, 500, 500, 500),
@@ -13,7 +13,7 @@ SCALES = {
     "f_ext": (0.1,),
     "bristles": (1e-3,),
 }
-# Least and most, where zero is not amid them.
+# Smallest and largest value of inputs that are not symmetric about zero.
 RANGES = {"damping": (0, 1e-3), "gains": (0, 400), "weight": (1e-4, 1e-3), "factors": (0.1, 1)}
 STANDING = np.radians([210, -40, 210, -40, 0, 0, 0, 0])  # gamma, delta of both legs and their rates
 
@@ -46,7 +46,7 @@ def _drawn(rng: np.random.Generator, name: str, shape: tuple[int, int]) -> np.nd
 
 
 def _configurations(rng: np.random.Generator, shape: tuple[int, int]) -> np.ndarray:
-    """Low above the ground, tilted by up to a radian or so, each tail coordinate up to 1.2 rad."""
+    """Close to the ground, tilted by up to about 1 rad, each tail coordinate up to 1.2 rad."""
     q = rng.uniform(-1.2, 1.2, shape)
     q[:, :3] = rng.uniform(0.01, 0.03, (shape[0], 3))
     quaternions = np.array([1, 0, 0, 0]) + rng.uniform(-0.5, 0.5, (shape[0], 4))

@@ -1,1 +1,1 @@
-"""Examples: a demonstration, and the studies."""
+"""Examples: a demonstration, a gallery, and the studies."""

@@ -1,1 +1,1 @@
-"""`make mutants`: breaks the sources one small change at a time, and asks the tests to notice."""
+"""`make mutants`: makes one small change at a time in the sources, and checks that tests notice."""

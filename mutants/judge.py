@@ -1,4 +1,4 @@
-"""Runs the tests that should notice a mutant, in a tree of its own."""
+"""Runs the tests that should notice a mutant, in a separate copy of the sources."""
 
 import contextlib
 import json
@@ -22,7 +22,7 @@ LONGEST = 1200.0  # s of tests after which a mutant has survived
 
 
 class NotLoaded(Exception):
-    """Tests failed, but not for the mutant: it was never loaded."""
+    """Tests failed for another reason than the mutant, which was never loaded."""
 
 
 class Tree:

@@ -19,7 +19,7 @@ class Mutation:
 
     @property
     def key(self) -> str:
-        """A name that stays when other lines of the file change."""
+        """A name that does not change when other lines of the file change."""
         told = "\n".join((self.path, self.text, self.change, str(self.nth)))
         return hashlib.sha256(told.encode()).hexdigest()[:16]
 

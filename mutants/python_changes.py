@@ -38,7 +38,7 @@ TEXT = (ast.JoinedStr,)
 
 @singledispatch
 def changes(node: ast.AST) -> Iterator[ast.AST]:
-    """Yield what may stand in place of a node; nothing for most kinds."""
+    """Yield possible replacements of a node; none for most kinds."""
     yield from ()
 
 

@@ -1,4 +1,4 @@
-"""What became of mutants: kept in output/mutants, told as a score and a list of survivors."""
+"""The verdicts on mutants: stored in output/mutants, shown as a score and a list of survivors."""
 
 import json
 import tomllib
@@ -17,7 +17,7 @@ ARGUED = Path(__file__).with_name("equivalent.toml")
 
 @dataclass(frozen=True)
 class Verdict:
-    """What became of a mutant."""
+    """The verdict on a mutant."""
 
     mutation: Mutation
     killed: bool
@@ -51,12 +51,12 @@ def kept(mutation: Mutation, state: str) -> Verdict | None:
 
 
 def arguments() -> list[dict]:
-    """Return mutants that are argued to change nothing that matters: file, line, change, why."""
+    """Return mutants that change nothing that matters: file, line, change, and the reason."""
     return tomllib.loads(ARGUED.read_text())["equivalent"]
 
 
 def argument(mutation: Mutation, argued: Iterable[dict]) -> str:
-    """Return why a mutant changes nothing that matters; "" where nobody has said so."""
+    """Return why a mutant changes nothing that matters; "" if no reason is given."""
     for entry in argued:
         if (entry["file"], entry["line"], entry["change"]) == (
             mutation.path,

@@ -20,7 +20,7 @@ from .results import Verdict, keep, kept, report, score
 from .sample import drawn, part_of
 
 WANTED = 95.0  # percent of the mutants that tests should notice
-# One file of each part that much else uses: broken for good, it must be noticed; as it is, not.
+# One much-used file of each part: tests must fail if it is broken, and pass if it is not.
 CONTROLS = {
     "codegen/serpentail_codegen/ir/tape.py": b"\nraise RuntimeError('control')\n",
     "codegen/serpentail_codegen/targets/c/templates/math/ldl.c.jinja": b"{{ control }}",
@@ -39,7 +39,7 @@ def arguments() -> argparse.Namespace:
 
 
 def controlled(place: Tree) -> None:
-    """Refuse to go on where a broken file is not noticed, or one as it is."""
+    """Stop if tests do not notice a broken file, or fail on an unchanged one."""
     for path, end in CONTROLS.items():
         source = (tree.BASE / path).read_bytes()
         as_it_is = Mutation(path, 1, 0, 0, "", "", f"control of {path}")
@@ -54,7 +54,7 @@ def controlled(place: Tree) -> None:
 
 
 def judged(place: Tree, mutation: Mutation, state: str) -> Verdict:
-    """Return what becomes of a mutant, and keep it."""
+    """Return the verdict on a mutant, and store it."""
     begun = time.monotonic()
     mutated = mutation.of((tree.BASE / mutation.path).read_bytes())
     try:
@@ -71,7 +71,7 @@ def judged(place: Tree, mutation: Mutation, state: str) -> Verdict:
 
 
 def all_judged(sample: list[Mutation], state: str, jobs: int) -> Iterator[Verdict]:
-    """Yield the verdict of every mutant as it comes."""
+    """Yield the verdict on each mutant as soon as it is known."""
     waiting = [mutation for mutation in sample if kept(mutation, state) is None]
     yield from (kept(mutation, state) for mutation in sample if mutation not in waiting)
     if not waiting:

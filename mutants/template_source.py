@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from .mutation import Mutation
 from .python_source import short
 
-# what no mutation touches: comments, texts, the preprocessor, loops and includes of the template
+# never mutated: comments, texts, preprocessor lines, loops and includes of the template
 SKIPPED = re.compile(
     rb"\{#.*?#\}|\{%.*?%\}|/\*.*?\*/|//[^\n]*|\"\"\".*?\"\"\"|\"(?:\\.|[^\"\\\n])*\"|^[ \t]*#[^\n]*"
     rb"|^(?:from|import) [^\n]*|^ +\* [^\n]*"  # the last: a comment with branches in it

@@ -19,7 +19,7 @@ PIECES = 20  # of a message that tell it from another
 
 @dataclass(frozen=True)
 class Target:
-    """A function of the public face, and arguments that it takes."""
+    """A public function, and valid arguments for it."""
 
     name: str
     function: Callable
@@ -28,8 +28,8 @@ class Target:
 
 @dataclass(frozen=True)
 class Fault:
-    """A call that did worse than an answer or a refusal: a bare error, a result that is no number,
-    a hang.
+    """A call that neither answered nor refused properly: another exception, a result that is not
+    finite, or a hang.
     """
 
     kind: str
@@ -39,7 +39,7 @@ class Fault:
 
 
 def targets(model: st.Model, parent: Path) -> list[Target]:
-    """Return all functions to call, with good arguments."""
+    """Return all functions to call, with valid arguments."""
     found = [
         Target(f"model.{name}", getattr(model, name), inputs(model, name))
         for name in sorted(methods(model))
@@ -97,7 +97,7 @@ def methods(model: st.Model) -> set[str]:
 
 
 def inputs(model: st.Model, name: str) -> dict:
-    """Return good inputs of a compiled function."""
+    """Return valid inputs of a compiled function."""
     entries = model.manifest["functions"][name]["inputs"]
     names = [n for n in inspect.signature(getattr(model, name)).parameters if n != "f_ext"]
     shapes = {entry["name"]: entry["shape"] for entry in entries}
@@ -146,7 +146,7 @@ def simulations(model: st.Model) -> list[Target]:
 
 
 def fuzz(found: list[Target], count: int, seed: int) -> list[Fault]:
-    """Return the faults of so many random calls, one for each kind of them."""
+    """Return the faults of ``count`` random calls, one of each kind."""
     rng, faults = np.random.default_rng(seed), {}
     before = signal.signal(signal.SIGALRM, _too_long)
     try:
@@ -175,7 +175,7 @@ def changed(target: Target, rng) -> dict:
 
 
 def tried(target: Target, arguments: dict) -> Fault | None:
-    """Call; return what is wrong with how it ended, or nothing."""
+    """Make a call; return its fault, or None."""
     shown = ", ".join(
         f"{name}={value!r:.60}" for name, value in arguments.items() if name != "model"
     )
@@ -207,7 +207,7 @@ def sound(result) -> bool:
 
 
 class _TooLong(Exception):
-    """A call took longer than it may."""
+    """A call took too long."""
 
 
 def _too_long(*_):

@@ -38,8 +38,8 @@ def start(model: st.Model, rng) -> tuple[np.ndarray, np.ndarray]:
 
 
 def dropped(model: st.Model, method: str, count: int, seed: int) -> tuple[list[float], Counter]:
-    """Return the relative gain of energy of each drop that ended, and how often each refusal
-    came.
+    """Return the relative gain of energy of each drop that finished, and the number of refusals of
+    each kind.
     """
     rng, gains, refusals = np.random.default_rng(seed), [], Counter()
     for _ in range(count):
@@ -59,8 +59,8 @@ def dropped(model: st.Model, method: str, count: int, seed: int) -> tuple[list[f
 
 
 def gain(motion: st.Trajectory) -> float:
-    """Return by how much the energy ever exceeds that of the start, relative to it; NaN where
-    something is no number.
+    """Return the largest excess of the energy over that at the start, relative to it; NaN if a
+    value is not finite.
 
     The ground, its friction and the joints only take energy, and fixed legs give none.
     """

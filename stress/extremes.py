@@ -1,4 +1,4 @@
-"""Errors where parameters are far from an animal's, and what is refused."""
+"""Errors and refusals for parameters that are far from those of an animal."""
 
 import numpy as np
 

@@ -1,13 +1,11 @@
-"""A figure of the stress report: what was found, and what it may be at most."""
+"""A figure of the stress report: a measured number and its limit."""
 
 from dataclasses import asdict, dataclass
 
 
 @dataclass(frozen=True)
 class Figure:
-    """One number that was found, and its limit; ``of`` says of what, ``note`` what else is worth
-    telling.
-    """
+    """A measured number and its limit.  ``of`` names the quantity; ``note`` adds a remark."""
 
     of: str
     found: float
@@ -16,7 +14,7 @@ class Figure:
 
     @property
     def passed(self) -> bool:
-        """Within the limit; what is no number is not."""
+        """Tell if the number is within its limit; NaN is not."""
         return bool(self.found <= self.limit)
 
     def row(self) -> dict:
@@ -29,7 +27,7 @@ class Figure:
 
 
 def table(figures: list[Figure]) -> str:
-    """Return figures as a table in Markdown."""
+    """Return figures as a Markdown table."""
     head = ["| of | found | limit | | note |", "|---|---|---|---|---|"]
     rows = [
         f"| {f.of} | {f.found:.3g} | {f.limit:.3g} | {'' if f.passed else '**FAILED**'} | {f.note} "

@@ -27,8 +27,8 @@ def starting(model: st.Model) -> tuple[np.ndarray, np.ndarray]:
 
 @cache
 def flown(size: tuple, damping: float, duration: float = DURATION) -> st.Trajectory:
-    """Return a flight without gravity, so that its height does not hide its energy; what it came
-    to, if refused.
+    """Return a flight without gravity, so that potential energy does not hide changes of kinetic
+    energy; if it is refused, return the part before.
     """
     model = subject(*size).model.with_parameters(gravity=0.0)
     settings = {

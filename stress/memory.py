@@ -1,4 +1,4 @@
-"""Runs emitted C under sanitizers and valgrind at states far from ordinary."""
+"""Runs emitted C under sanitizers and valgrind at extreme states."""
 
 import subprocess
 from collections.abc import Iterator
@@ -52,8 +52,8 @@ ENDS = STATUSES | {33, 34, 38}  # of runs: steps too small, too many, too long
 
 @dataclass(frozen=True)
 class Case:
-    """One call of the driver: function and form, or a method of rollouts; its record; whether it
-    must be refused.
+    """One call of the driver: a function and form, or a rollout method; its record of inputs; and
+    whether it must be refused.
     """
 
     name: str
@@ -64,7 +64,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Answer:
-    """What the driver said of a case."""
+    """The driver's answer to a case."""
 
     status: int
     finite: bool
@@ -131,9 +131,7 @@ def answers(program: Path, found: list[Case], *under: str) -> tuple[list[Answer]
 
 
 def insane(found: list[Case], told: list[Answer]) -> list[str]:
-    """Return what a sane model would not answer: a status unknown, a refusal not given, numbers
-    that are none.
-    """
+    """Return wrong answers: an unknown status, a missing refusal, outputs that are not finite."""
     wrong = [] if len(found) == len(told) else [f"{len(told)} answers to {len(found)} cases"]
     for case, answer in zip(found, told, strict=False):
         known = answer.status in (ENDS if case.name.startswith("rollout") else STATUSES)

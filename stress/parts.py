@@ -28,7 +28,7 @@ Parts = dict[str, Callable[[], list[Figure]]]
 
 
 def fuzzed(count: int) -> list[Figure]:
-    """Return how many random calls, and how many mutated scene files, ended worse than by an answer
+    """Return how many random calls, and how many mutated scene files, ended without an answer
     or a refusal.
     """
     found = []
@@ -53,7 +53,7 @@ def fuzzed(count: int) -> list[Figure]:
 
 
 def parts(swept: list[poses.Point], calls: int, duration: float) -> Parts:
-    """Return what finds the figures of each part."""
+    """Return the functions that measure the figures of each part."""
     return {
         "Bends from 0 to 2 pi": lambda: poses.of_sweep(swept),
         "Folds and coils": poses.folded,

@@ -1,4 +1,4 @@
-"""How far float models are from double ones, per quantity and along flights."""
+"""Differences between float and double models, per quantity and along flights."""
 
 import numpy as np
 

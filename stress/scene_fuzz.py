@@ -62,7 +62,7 @@ PIECES = (
 
 
 def mutated(text: bytes, dice: random.Random) -> bytes:
-    """Return bytes with one to three pieces replaced, removed or put in."""
+    """Return bytes with one to three pieces replaced, removed or inserted."""
     for _ in range(dice.randint(1, 3)):
         first = dice.randrange(len(text) + 1)
         last = min(len(text), first + dice.choice([0, 1, 3, 12, 60]))

@@ -1,4 +1,4 @@
-"""Many threads share one model: each result must be that of a single thread."""
+"""Many threads share one model: each result must equal that of a single thread."""
 
 from concurrent.futures import ThreadPoolExecutor
 

@@ -1,4 +1,4 @@
-"""The models under stress, each beside its exact reference."""
+"""The models of the stress test, each with its exact reference."""
 
 import warnings
 from dataclasses import dataclass
@@ -122,7 +122,7 @@ def state(
 
 
 def errors(of: Subject, q, v, tau) -> Errors:
-    """Return a model's errors at a state; a refusal is no error, but is told."""
+    """Return a model's errors at a state; a refusal is reported, but is not an error."""
     H = of.exact.mass_matrix(q)
     condition = equilibrated_condition(H)
     try:

@@ -1,4 +1,4 @@
-"""Values that a caller may give by mistake, like those that are right."""
+"""Wrong values that a caller may give by mistake, similar to valid ones."""
 
 import math
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Options of the test run, and where and how it compiles its models."""
+"""Options of the test run, and how it compiles its models."""
 
 import os
 import shlex
@@ -10,12 +10,12 @@ from tests.support.models import BUILD
 
 QUICK = shlex.quote(str(Path(__file__).parent / "support" / "cc_quick"))
 
-# One cache for all processes and runs, which is not the developer's own.
+# One cache for all processes and runs, separate from the developer's own.
 os.environ["SERPENTAIL_CACHE"] = str(BUILD / "cache")
 
 
 def pytest_addoption(parser):
-    """Add the switches that accept new golden models, and that compile models in less time."""
+    """Add the options that accept new golden models, and that compile models in less time."""
     parser.addoption(
         "--update-golden", action="store_true", help="rewrite generated/golden_* from the generator"
     )
@@ -32,6 +32,6 @@ def pytest_configure(config):
 
 @pytest.fixture
 def users_compiler(monkeypatch):
-    """Compile models as for a user, however quickly other tests do."""
+    """Compile models as for a user, even if other tests compile faster."""
     if os.environ.get("CC") == QUICK:
         monkeypatch.delenv("CC")

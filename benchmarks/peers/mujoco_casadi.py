@@ -24,11 +24,10 @@ IN_CASADI = ((1, 3), (3, 4))  # compilers take minutes for longer tails
 
 def other_peers(folder: Path) -> list[dict]:
     """Nanoseconds of forward dynamics beside MuJoCo's and CasADi's, rounds interleaved; ratios by
-    minima (by medians); each peer by the faster of the compilers.
-
-    MuJoCo: the full chain of 2 m n hinges, its inertia and bias by its own functions, which come
-    compiled, reduced and solved as Pinocchio's is (mujoco_chain.c).  CasADi: C of the generated SX
-    function, -O2, as its documentation has it.
+    minima (by medians); each peer by the faster of the compilers. MuJoCo: the full chain of 2 m n
+    hinges. Its own compiled functions give inertia and bias, which are reduced and solved as
+    Pinocchio's are (mujoco_chain.c). CasADi: C of the generated SX function, -O2, as in its
+    documentation.
     """
     libraries = build.by_each(mujoco_library)
     return [row(folder, size, libraries) for size in SIZES]
@@ -56,8 +55,8 @@ def row(folder: Path, size: tuple[int, int], libraries: dict[str, ctypes.CDLL]) 
 
 
 def acceleration(model) -> ca.Function:
-    """Return v_dot of (q, v, tau, parameters), and nothing second, as the timer's adapter wants two
-    outputs.
+    """Return v_dot of (q, v, tau, parameters), and an empty second output, because the timer's
+    adapter needs two.
     """
     graph = casadi_derivatives.Graph(model)
     tau = ca.SX.sym("tau", graph.nt)
@@ -69,9 +68,7 @@ def acceleration(model) -> ca.Function:
 
 
 def mujoco_library(compiler: Compiler) -> ctypes.CDLL:
-    """Compile mujoco_chain.c against the installed MuJoCo; PeerUnavailable where that is not
-    there.
-    """
+    """Compile mujoco_chain.c against the installed MuJoCo; PeerUnavailable if that is missing."""
     found = importlib.util.find_spec("mujoco")
     if found is None:
         raise build.PeerUnavailable("MuJoCo is not installed: pip install mujoco")
@@ -112,7 +109,7 @@ def chain_xml(folder: Path, model) -> Path:
 
 
 def words(numbers) -> str:
-    """Return numbers as MJCF has them."""
+    """Return numbers in the notation of MJCF."""
     return " ".join(map(repr, numbers))
 
 

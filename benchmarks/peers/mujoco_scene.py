@@ -1,7 +1,7 @@
 """Times MuJoCo on an articulated model that stands on the ground.
 
-Not the same physics: contacts are MuJoCo's soft constraints with an elliptic cone, and the joints
-that share an angle are tied by soft equalities.  For the run time of a like scene alone.
+The physics differs: contacts are MuJoCo's soft constraints with an elliptic cone, and joints that
+share an angle are tied by soft equalities. So only the run time of a similar scene can be compared.
 """
 
 import time

@@ -1,8 +1,8 @@
 """Solves the righting problem with opty, to compare planning times.
 
-Needs opty and cyipopt, which ``make setup`` does not install.  cyipopt builds against the IPOPT
-that CasADi brings, given an ipopt.pc that names its folder; it finds that library at run time once
-CasADi has solved a program.
+It needs opty and cyipopt, which ``make setup`` does not install. cyipopt can be built against the
+IPOPT that CasADi brings, with an ipopt.pc that names its folder. It finds that library at run time
+once CasADi has solved a program.
 """
 
 import sys
@@ -24,13 +24,13 @@ TIME = sympy.Symbol("t")
 
 
 def solved(scene: Scene, guess: st.Trajectory, bounds: st.Bounds, smoothing: float) -> dict:
-    """Plan by opty (midpoint rule, no Hessian) from where the guess starts: upright and at rest
-    where it ends.
+    """Plan by opty (midpoint rule, no Hessian) from the start of the guess to upright and at rest
+    at its end.
 
-    Returns setup_s and solve_s, CPU seconds of this process (the C compiler's are not counted), and
-    the status.
+    Returns setup_s and solve_s, CPU seconds of this process (without the C compiler), and the
+    status.
     """
-    sys.setrecursionlimit(100_000)  # SymPy's: expressions are deep
+    sys.setrecursionlimit(100_000)  # of SymPy: its expressions are deep
     from opty import Problem
 
     nodes, duration = guess.q.shape[0], guess.t[-1]
@@ -76,7 +76,7 @@ def solved(scene: Scene, guess: st.Trajectory, bounds: st.Bounds, smoothing: flo
 
 
 def equations(scene: Scene, q: list, v: list, tau: list) -> sympy.Matrix:
-    """q_dot and H v_dot + C - [0; tau], all of them zero, as SymPy's expressions of functions of
+    """q_dot and H v_dot + C - [0; tau], which must be zero, as SymPy expressions of functions of
     time.
     """
     inverse = assemble(CATALOGUE["inverse_dynamics"], tail_of(scene))

@@ -1,4 +1,4 @@
-"""Pinocchio's forward dynamics of the same tails, in several configurations, to be timed."""
+"""Pinocchio's forward dynamics of the same tails, in several configurations, for timing."""
 
 from __future__ import annotations
 
@@ -122,7 +122,7 @@ def chains(freed: ExitStack, made: Mapping[str, Path], size, ours) -> dict[str, 
 
 
 def _declared(path: Path) -> ctypes.CDLL:
-    """The library of a Pinocchio source; every pointer is passed as an address."""
+    """Return the library of a Pinocchio source; every pointer is passed as an address."""
     library = ctypes.CDLL(str(path))
     library.pinocchio_chain_new.restype = ctypes.c_void_p
     library.pinocchio_chain_new.argtypes = [ctypes.c_int, ctypes.c_int, ctypes.c_void_p]

@@ -25,13 +25,10 @@ ABSENT = "SoRoMoX is not installed, and left out: .venv/bin/pip install --editab
 
 def continuum_peer(folder: Path) -> list[dict]:
     """Nanoseconds of a continuum's forward dynamics beside SoRoMoX's, one state, double, rounds
-    interleaved.
-
-    SoRoMoX: floating, constant curvature, bending alone, five Gauss points a segment, jax.jit on
-    the CPU; one call from
-    Python, and one inside a compiled loop, where Python costs nothing. The models differ: its rod
-    has no torso and its
-    state derivative has the rates of q, too. Target: 100x.
+    interleaved. SoRoMoX: floating, constant curvature, bending alone, five Gauss points a segment,
+    jax.jit on the CPU; one call from Python, and one inside a compiled loop, where Python costs
+    nothing. The models differ: its rod has no torso, and its state derivative includes the rates of
+    q. Target: 100x.
     """
     if importlib.util.find_spec("soromox") is None:
         print(ABSENT, file=sys.stderr)
@@ -84,13 +81,13 @@ def robot(ours: Fixture):
 
 
 def compiled(rod, states: timing.States) -> tuple[Callable, Callable]:
-    """Return calls of the rod's compiled dynamics: of one state; of LOOP states, one after the
+    """Return calls of the rod's compiled dynamics: of one state, and of LOOP states one after the
     other.
     """
     import jax
 
     bends, length = states.q[:LOOP, 7:], float(rod.segment_length[0])
-    attitude = states.q[:LOOP, [4, 5, 6, 3]]  # SoRoMoX has the scalar last, before the position
+    attitude = states.q[:LOOP, [4, 5, 6, 3]]  # SoRoMoX: (x, y, z, w), then the position
     q = np.hstack([attitude, states.q[:LOOP, :3], bends / length])
     v = np.hstack([states.v[:LOOP, 3:6], states.v[:LOOP, :3], states.v[:LOOP, 6:] / length])
     many = jax.numpy.array(np.hstack([q, v]))

@@ -59,7 +59,9 @@ def time_rounds(
 
 
 def random_states(segments: int, count: int = 64, seed: int = 0) -> States:
-    """Tumbling torsos with moderately bent tails, the same ones for the same arguments."""
+    """Return tumbling torsos with moderately bent tails; the same arguments give the same
+    states.
+    """
     rng = np.random.default_rng([seed, segments])
     q = rng.uniform(-1, 1, (count, 7 + 2 * segments))
     q[:, 3:7] = rng.normal(size=(count, 4))

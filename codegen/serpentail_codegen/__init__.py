@@ -1,5 +1,3 @@
-"""Symbolic code generation: scenes go in, C and CasADi functions of their equations of motion come
-out.
-"""
+"""Generates C and CasADi functions of the equations of motion that a scene describes."""
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"

@@ -45,7 +45,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 def scene_of(arguments: argparse.Namespace) -> Scene:
-    """Return the scene that the arguments describe, of a name that the options are part of."""
+    """Return the scene that the arguments describe; the options are part of its name."""
     chosen: dict[str, Any] = {
         name: getattr(arguments, name)
         for name in ("real", "emission", "profile", "name")
@@ -63,7 +63,7 @@ def scene_of(arguments: argparse.Namespace) -> Scene:
 
 
 def _with_options(arguments: argparse.Namespace, chosen: dict[str, Any]) -> tuple[Scene, Scene]:
-    """Return a scene with options, and the same without."""
+    """Return a scene with the options applied, and the same scene without them."""
     if arguments.scene:
         own = load_scene(arguments.scene)
         return parse_scene(scene_to_dict(own) | chosen, own.name), own
@@ -75,12 +75,12 @@ def _with_options(arguments: argparse.Namespace, chosen: dict[str, Any]) -> tupl
 
 
 def _renamed(scene: Scene, name: str) -> Scene:
-    """Return a scene of another name; SceneError where it can have none such."""
+    """Return the scene under another name; SceneError if the name is not allowed."""
     return parse_scene(scene_to_dict(scene) | {"name": name}, name)
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Generate what is not made yet; return the exit status."""
+    """Generate the model if its folder is not up to date; return the exit status."""
     try:
         arguments = parser().parse_args(argv)
         if arguments.schema:
@@ -106,9 +106,9 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def made(scene: Scene, folder: Path, progress: Path | None = None) -> list[str]:
-    """Generate a scene unless its folder is what it would be; return the files that changed.
+    """Generate a scene unless its folder is up to date; return the files that changed.
 
-    progress: a file that is kept to say how far that is.
+    progress: a file into which the progress is written.
     """
     key = key_of(scene)
     if is_made(folder, key):
@@ -125,5 +125,5 @@ def made(scene: Scene, folder: Path, progress: Path | None = None) -> list[str]:
 
 
 if __name__ == "__main__":
-    gc.disable()  # expressions hold no cycles worth a search, which takes a tenth of a short run
+    gc.disable()  # a search for cycles takes a tenth of a short run; expressions have none worth it
     sys.exit(main())

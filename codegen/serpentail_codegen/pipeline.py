@@ -21,9 +21,10 @@ Tell = Callable[[float, str], object]  # which part is done, and the function th
 
 
 def generate(scene: Scene, output: Path, tell: Tell | None = None) -> list[str]:
-    """Derive, emit and write what a scene asks for to ``output/<scene>``; return what changed.
+    """Derive, emit and write what a scene asks for to ``output/<scene>``; return the files that
+    changed.
 
-    tell: called as each function is begun for each target.
+    tell: called when each function is begun for each target.
     """
     tail = tail_of(scene)
     functions = [function_of(name, tail) for name in needed(scene.functions, bool(scene.contacts))]
@@ -32,7 +33,7 @@ def generate(scene: Scene, output: Path, tell: Tell | None = None) -> list[str]:
         one_by_one = told(functions, tell, (k, len(scene.targets)))
         emissions.append(TARGETS[name].emit(scene, tail, one_by_one, __version__))
 
-    # the hash is of texts without it, and then put into them
+    # the hash is computed from the texts without it, then put into them
     content_hash = hash_of(emissions[0])
     files = {
         path: text.replace(SEAL, content_hash)
@@ -47,7 +48,7 @@ def generate(scene: Scene, output: Path, tell: Tell | None = None) -> list[str]:
 def told(
     functions: Collection[Function], tell: Tell | None, place: tuple[int, int]
 ) -> Iterator[Function]:
-    """Yield the functions of target ``place[0]`` of ``place[1]``, and tell of each."""
+    """Yield the functions of target number ``place[0]`` of ``place[1]``, and report each one."""
     k, targets = place
     for j, function in enumerate(functions):
         if tell is not None:
@@ -56,7 +57,7 @@ def told(
 
 
 def hash_of(emission: Emission) -> str:
-    """Return the hash by which a model is known: of what the first of its targets derived."""
+    """Return the content hash of a model, computed from what its first target derived."""
     texts = "".join(emission.files[path] for path in emission.derivation)
     return digest(texts.replace(SEAL, ""))[:16]
 
@@ -79,7 +80,7 @@ def tail_of(scene: Scene) -> Tail:
 
 
 def needed(names: Collection[str], contacts: bool = False) -> list[str]:
-    """Return the functions to derive: those asked for, and what rollouts and solves call."""
+    """Return the functions to derive: those asked for, and those that rollouts and solves call."""
     flight = ("forward_dynamics", "tracked_dynamics") if "pfl" in names else ("forward_dynamics",)
     called = ("contact_points", "contact_rates") if contacts else flight
     parts = {"rollout": called, "implicit": ("implicit_factor", "implicit_solve")}

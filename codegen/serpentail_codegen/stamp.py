@@ -1,6 +1,7 @@
-"""Tells by hashes whether a generated folder is what its scene would make now.
+"""Decides by hashes whether a generated folder is up to date with its scene.
 
-Times of files say nothing: a scene that is restored is older than the folder made of another.
+Modification times would mislead: a scene file that is restored is older than the folder that was
+made from another version of it.
 """
 
 import hashlib
@@ -12,11 +13,11 @@ from pathlib import Path
 from .scene.parse import scene_to_dict
 from .scene.scene import Scene
 
-TOOLS = ("sympy", "jinja2")  # another version of which may print another text
+TOOLS = ("sympy", "jinja2")  # packages: another version of one may print another text
 
 
 def key_of(scene: Scene) -> str:
-    """Return the hash of all that a scene's folder follows from: scene, generator, tools."""
+    """Return the hash of everything that a scene's folder depends on: scene, generator, tools."""
     home = Path(__file__).parent
     sources = sorted(path for path in home.rglob("*") if path.suffix in (".py", ".jinja"))
     tools = [sys.version, *(name for tool in TOOLS for name in _installed(tool))]
@@ -25,7 +26,7 @@ def key_of(scene: Scene) -> str:
 
 
 def _installed(tool: str) -> list[str]:
-    """Return a package's name and version; importlib.metadata would take 30 ms to tell them."""
+    """Return a package's name and version; importlib.metadata would take 30 ms for this."""
     found = find_spec(tool)
     if found is None or found.origin is None:
         return []
@@ -33,7 +34,7 @@ def _installed(tool: str) -> list[str]:
 
 
 def is_made(folder: Path, key: str) -> bool:
-    """Tell whether a folder was made by this key, and none of its files changed since."""
+    """Tell whether a folder was generated under this key, and none of its files changed since."""
     try:
         return _place(folder).read_text() == key + _contents(folder)
     except (OSError, ValueError, KeyError, TypeError):
@@ -41,14 +42,16 @@ def is_made(folder: Path, key: str) -> bool:
 
 
 def note(folder: Path, key: str) -> None:
-    """Note that a folder was made by this key."""
+    """Record that a folder was generated under this key."""
     place = _place(folder)
     place.parent.mkdir(exist_ok=True)
     place.write_text(key + _contents(folder))
 
 
 def _place(folder: Path) -> Path:
-    """Return where a folder's stamp is: beside the folder, which holds what it is made of alone."""
+    """Return the path of a folder's stamp. It is beside the folder, which holds only generated
+    files.
+    """
     return folder.parent / ".stamps" / folder.name
 
 

@@ -1,7 +1,7 @@
 """The paper's motions on the ground (Sects. 4 and 4.4): films, plots and a table.
 
-Motions are simulated side by side, as many as $SERPENTAIL_THREADS says or there are cores, and each
-is a row of a store in FOLDER/parts: a study that was stopped goes on.
+Motions are simulated in parallel, as many as $SERPENTAIL_THREADS says or there are cores. Each is a
+row of a store in FOLDER/parts, so that an interrupted study resumes.
 """
 
 from examples import front

@@ -1,4 +1,4 @@
-"""The motions of the contact study: each a part of it, from names to plain data and files."""
+"""The motions of the contact study: each is a part of it, from names to plain data and files."""
 
 import json
 from functools import partial
@@ -18,7 +18,7 @@ SCENES = {  # the moments (s) that films show
     "self_recovery_continuum": (0.0, 0.25, 0.4, 0.5, 0.6, 0.75, 1.0, 1.3, 2.5),
 }
 PASSIVE = {"controller": {"kind": "damping", "damping": 1e-3}}
-# What must not stand: the same motions with the tail through the ground, and with one that only
+# Motions that must not succeed: the same with the tail through the ground, or with one that only
 # damps.
 CONTRASTS = {
     f"{scene}, {words}": (scene, without, changes)
@@ -45,7 +45,7 @@ DRAWN = ("{}.npz", "{}_film.png", "{}_time.png")
 
 
 def scene_file(scene: str, folder: Path, without: str) -> Path:
-    """Write a scene with one group of contacts less; return its path."""
+    """Write a scene without one of its groups of contacts; return its path."""
     text = (ROOT / "scenes" / f"{scene}.toml").read_text(encoding="utf-8")
     path = folder / "scenes" / f"{scene}_without_{without}.toml"
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -64,19 +64,21 @@ def drawn(scene: str, folder: Path) -> dict:
 
 
 def contrast(scene: str, without: str | None, changes: dict, folder: Path) -> dict:
-    """Return the summary of a scene's motion with changes, or one group of contacts less."""
+    """Return the summary of a scene's motion with changes, or without one group of contacts."""
     found = st.scenario(scene_file(scene, folder, without) if without else scene, changes=changes)
     return found.summary(found.simulate())
 
 
 def drops(seeds: list[int]) -> list[dict]:
-    """Random attitudes, bends and spins, dropped from 0.15 m: what is left after a while."""
+    """Drop the animal from 0.15 m with random attitudes, bends and spins; return its final
+    motion.
+    """
     scene = st.scenario("self_recovery")
     return [drop(scene, seed) for seed in seeds]
 
 
 def drop(scene: st.Scenario, seed: int) -> dict:
-    """Return what is left of one drop."""
+    """Return the final motion after one drop."""
     model, random = scene.model, np.random.default_rng(seed)
     weight = (model.parameters["torso_mass"] + model.parameters["tail_mass"]) * model.parameters[
         "gravity"
@@ -100,7 +102,7 @@ def drop(scene: st.Scenario, seed: int) -> dict:
 
 
 def parts(folder: Path) -> dict[str, Part]:
-    """Return the parts of the study: motions, what must not stand, and drops."""
+    """Return the parts of the study: motions, those that must not succeed, and drops."""
     program = digest(ROOT / "runtime", ROOT / "codegen", Path(__file__))
     found = {}
     for scene in SCENES:
@@ -131,7 +133,7 @@ def table(rows: dict[str, dict]) -> str:
 
 
 def study(folder: Path) -> None:
-    """Do what of the study is not kept yet, compare, and write its summary."""
+    """Compute the missing parts of the study, compare them, and write its summary."""
     found = made("contact", folder / "parts", parts(folder))
     rows = {name: found[name] for name in (*SCENES, *CONTRASTS)}
     fallen = [row for title in found if title not in rows for row in found[title]]

@@ -2,7 +2,7 @@
 
 Known torques: the parameters of an elastic tail from noisy markers with gaps; the spread of the
 estimates is compared with the Cramer-Rao bound. Unknown torques: each trial draws its own from the
-stated prior; geometry, a marker's place and the torques are estimated. Prints both tables.
+stated prior; geometry, the position of a marker and the torques are estimated. Prints both tables.
 """
 
 import argparse
@@ -21,7 +21,9 @@ LEVEL = 0.95
 
 
 def scene(segments: int, links: int | None):
-    """Return the model, and where its markers are: four on the torso, four along the tail."""
+    """Return the model, and the positions of its markers: four on the torso, four along the
+    tail.
+    """
     import serpentail as st
 
     kind = {"tail": "articulated", "links": links} if links else {"tail": "continuum"}
@@ -56,7 +58,7 @@ def start(model):
 
 
 def flown(model, times, torques, fine):
-    """Return states at times under torques (K, 2m) at fine times, linear between, by SciPy."""
+    """Return states at times under torques (K, 2m) at fine times, linear in between, by SciPy."""
     import numpy as np
     from scipy.integrate import solve_ivp
 
@@ -100,7 +102,9 @@ def seen(model, markers, times, states, rng):
 
 
 def trials(count: int, case: str, size: tuple[int, int | None], folder: Path) -> dict:
-    """Return coverage, spread and time of so many trials, which go on from what is kept."""
+    """Return coverage, spread and time of a number of trials, resuming from those that are
+    stored.
+    """
     from serpentail.stages import Stage
 
     model, markers = scene(*size)

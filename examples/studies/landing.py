@@ -1,7 +1,7 @@
 """Kicks that the tail rights in the air, onto the feet: how many land, planned and passive.
 
-Kicks are made side by side, as many as $SERPENTAIL_THREADS says or there are cores, and each is
-a row of a store in FOLDER/parts: a study that was stopped goes on.
+Kicks are made in parallel, as many as $SERPENTAIL_THREADS says or there are cores. Each is a row of
+a store in FOLDER/parts, so that an interrupted study resumes.
 """
 
 from examples import front

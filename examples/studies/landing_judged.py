@@ -1,4 +1,4 @@
-"""What kicks and jumps of the study share: models, and when a landing counts."""
+"""Common parts of kicks and jumps of the study: models, and the criterion of a landing."""
 
 from math import radians
 
@@ -11,15 +11,20 @@ SETTINGS = {"rtol": 1e-5, "output_step": 2e-3}
 
 
 def model_of(options: dict) -> st.Model:
-    """Return a model of this tail with all that lands, and exact derivatives for its plans."""
+    """Return a model of this tail with all groups of contacts, and exact derivatives for its
+    plans.
+    """
     functions = st.scenario("kick_and_land").model.generated
-    inner = ("contact_rates", "implicit_factor", "implicit_solve")  # come with others
+    # these come with other functions
+    inner = ("contact_rates", "implicit_factor", "implicit_solve")
     wanted = [*(name for name in functions if name not in inner), "implicit"]
     return st.build(**options, contacts=["feet", "tail", "torso"], functions=wanted)
 
 
 def judged(model: st.Model, run: st.SequenceRun) -> dict:
-    """Return the numbers of a landing, and whether it counts: see docs/sequences.md."""
+    """Return the numbers of a landing, and whether it counts (docs/sequences.md has the
+    criterion).
+    """
     found, motion = st.summary(model, run.trajectory), run.trajectory
     names = ("standing_end", "landing_group", "least_upright_landing", "turned_landing_rad")
     told = {name: found[name] for name in names}

@@ -1,5 +1,8 @@
-"""Jumps of a tail of three segments from feet and tail, harder and weaker than the scene's: its
-flight planned, passive, held straight, or by the scene's reference, blind to what the jump gave.
+"""Jumps of a tail of three segments from feet and tail, with a stronger and a weaker push than the
+scene's.
+
+The flight is planned, passive, held straight, or controlled by the scene's reference, which does
+not depend on the result of the jump.
 """
 
 from math import cos, pi, radians, sin
@@ -23,7 +26,7 @@ STRAIGHT = ([0.0, 1.0], np.zeros((2, 6)))  # s, rad
 
 
 def jump(push: float, flight: str) -> dict:
-    """Return what becomes of a jump."""
+    """Return the outcome of a jump."""
     model = model_of(OPTIONS).with_parameters(mu=0.5)
     law = st.Pfl(model, reference(push), **GAINS)
     leap = st.Phase("jump", 1.0, until="airborne", clearance=0.01, controller=law, moves=[PUSH])
@@ -33,7 +36,7 @@ def jump(push: float, flight: str) -> dict:
 
 
 def reference(push: float) -> st.Reference:
-    """Return the scene's reference, its push bent by so much (rad)."""
+    """Return the scene's reference, with this bend (rad) of its push."""
     bends = [[-0.5, 1.1, -0.7], [-0.6, push, 1.9], [-0.6, push, 1.9], [-0.7, 0.4, 1.2]]
     angles = np.zeros((len(TIMES), 6))
     angles[:, ::2] = np.array(bends) / OPTIONS["links"]
@@ -41,7 +44,7 @@ def reference(push: float) -> st.Reference:
 
 
 def settled(model: st.Model) -> tuple:
-    """Return where the jump starts: at rest on feet and tail, the tail in its first shape."""
+    """Return the start of the jump: at rest on feet and tail, with the tail in its first shape."""
     q, half = np.zeros(model.nq), radians(25) / 2
     law = st.Pfl(model, reference(PUSHES[0]), **GAINS)
     q[2:5], q[7:] = (0.1, cos(half), sin(half)), law.curve.at(0.0)[0]
@@ -50,7 +53,7 @@ def settled(model: st.Model) -> tuple:
 
 
 def flown(model: st.Model, flight: str, law: st.Pfl) -> list[st.Phase]:
-    """Return the phases from clear of the ground to touch-down."""
+    """Return the phases from the state clear of the ground to touch-down."""
     if flight == "planned":
         stow = st.Phase("stow", STOWED, controller=st.Pfl(model, STRAIGHT, **SOFT))
         moves = [{"before_landing": 0.2} | LANDING]
@@ -66,7 +69,7 @@ def flown(model: st.Model, flight: str, law: st.Pfl) -> list[st.Phase]:
 
 
 def plan_to(pitch: float) -> dict:
-    """Return arguments of a plan to a pitch (deg), the tail straight and at rest."""
+    """Return the arguments of a plan to a pitch (deg), with the tail straight and at rest."""
     half = radians(pitch) / 2
     goal = st.Goal(
         attitude=[cos(half), sin(half), 0.0, 0.0],

@@ -1,4 +1,4 @@
-"""Kicks of animals at random, whose flights are planned, and the same with a passive tail."""
+"""Kicks of random animals with planned flights, and the same with a passive tail."""
 
 import json
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ SOURCES = ("codegen", "runtime", "examples/studies")
 
 @dataclass(frozen=True)
 class Tail:
-    """A tail of the study: what it is, how far a coordinate may go (rad), and its goal (deg)."""
+    """A tail of the study: its description, the bound of a coordinate (rad), and its goal (deg)."""
 
     options: dict
     angle: float
@@ -40,7 +40,7 @@ TAILS = {
 
 
 def kick(tail: Tail, number: int) -> dict:
-    """Return what becomes of one animal, whose flight is planned, and with a passive tail."""
+    """Return the outcome for one animal, with a planned flight and with a passive tail."""
     random, model = np.random.default_rng([SEED, number]), model_of(tail.options)
     factors = {name: random.uniform(1 - SPREAD, 1 + SPREAD) for name in VARIED}
     changes = {
@@ -59,7 +59,7 @@ def kick(tail: Tail, number: int) -> dict:
 
 
 def settled(model: st.Model) -> tuple:
-    """Return where the kick starts: at rest on feet, torso and tail."""
+    """Return the start of the kick: at rest on feet, torso and tail."""
     q, half = np.zeros(model.nq), radians(7) / 2
     q[2:5] = 0.03, cos(half), sin(half)
     acting = {"controller": st.Damping(1e-3), "legs": st.Legs.fixed(GAMMA, DELTA)}
@@ -73,7 +73,7 @@ def crouch() -> st.Phase:
 
 
 def planned(tail: Tail, pitch: float) -> st.Phase:
-    """Return a flight that is planned to end at this pitch (deg), or at one that is near."""
+    """Return a flight that is planned to end at this pitch (deg), or at one near it."""
     pitches = [pitch, *sorted(PITCHES, key=lambda other: abs(other - pitch))]
     bounds = st.Bounds(angle=tail.angle, torque=TORQUE)
     plans = [

@@ -1,7 +1,7 @@
 """The paper's comparison of tail models (Sect. 4.1): one motion by both tails, Fig. 8 and its cost.
 
-Tails are built side by side, as many as $SERPENTAIL_THREADS says or there are cores, then timed
-alone; each result is a row of a store in FOLDER/parts: a study that was stopped goes on.
+Tails are built in parallel, as many as $SERPENTAIL_THREADS says or there are cores, then timed
+alone. Each result is a row of a store in FOLDER/parts, so that an interrupted study resumes.
 """
 
 import sys
@@ -10,7 +10,7 @@ from examples import front
 
 
 def main(folder) -> int | None:
-    """Do the study; status 1 where the timer cannot be built."""
+    """Do the study; return status 1 if the timer cannot be built."""
     from benchmarks.peers.build import PeerUnavailable
     from examples.studies.models_study import study
 

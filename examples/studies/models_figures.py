@@ -80,7 +80,7 @@ def _motion(axes: "Axes", study: dict) -> None:
 
 
 def _dress_inset(axes: "Axes", ends: list[float]) -> None:
-    """A frame of its own, and the difference at the end as a double arrow."""
+    """Draw a frame around the inset, and the difference at the end as a double arrow."""
     axes.spines[:].set(visible=True, color=QUIET)
     axes.tick_params(labelsize=6, length=2)
     axes.set(xticks=[0.9, 0.95, 1.0], yticks=[-22, -21.5, -21])
@@ -132,7 +132,7 @@ def _difference(axes: "Axes", study: dict) -> None:
 
 
 def _cost(study: dict) -> tuple["Figure", "Axes"]:
-    """Run time over difference, both logarithmic.
+    """Draw run time over difference, both logarithmic.
 
     Marks are not joined: the difference changes its sign, and neither it nor the time is steady.
     """

@@ -10,7 +10,7 @@ import serpentail as st
 STEPS = 400
 FULL_TURN = np.arctan(np.pi / 2)  # rad, COM direction of an arc bent by pi
 SHOWN = 4  # links of the tail in Fig. 8a, the one that differs most
-THIN = (0.0, 0.0, 0.0)  # kg m^2, links that are lines, as the continuum is
+THIN = (0.0, 0.0, 0.0)  # kg m^2: links are lines, like the continuum
 MOST_BEND = 1.5 * np.pi  # rad, more than any tail needs for it
 
 
@@ -34,12 +34,12 @@ def chain_direction(bend: np.ndarray, links: int) -> np.ndarray:
     angles = np.multiply.outer(bend, np.arange(1, links + 1) / links)
     reach = (
         links + 0.5 - np.arange(1, links + 1)
-    )  # how often a link counts: in itself half, in each one after it
+    )  # weight of each link's bend: half for the link itself, one for each link after it
     return np.arctan2(np.sin(angles) @ reach, np.cos(angles) @ reach)
 
 
 def bend_towards(direction: Callable, targets: np.ndarray) -> np.ndarray:
-    """Return the bends (rad) whose COM directions are the targets (rad), by bisection."""
+    """Return the bends (rad) at which the COM has the target directions (rad), by bisection."""
     low, high = np.zeros_like(targets), np.full_like(targets, MOST_BEND)
     for _ in range(60):
         middle = (low + high) / 2
@@ -62,7 +62,7 @@ def torso_yaw(model: st.Model, angles: np.ndarray) -> np.ndarray:
     """Return the yaw (K,), deg, of a torso at zero momentum whose tail takes the yaw coordinates
     (K,), rad, in turn.
 
-    Zero momentum is H_bb v_b + H_bt q_t_dot = 0 (upper rows of Eq. 1): the path alone matters, not
+    Zero momentum is H_bb v_b + H_bt q_t_dot = 0 (upper rows of Eq. 1): only the path matters, not
     its timing.
     """
     q = np.zeros((len(angles) - 1, model.nq))

@@ -1,4 +1,4 @@
-"""What the study of tail models consists of: a part for each tail, and the times of all."""
+"""The parts of the study of tail models: one for each tail, and the run times of all."""
 
 import json
 from functools import partial
@@ -55,14 +55,14 @@ def run_times() -> list[float]:
 
 
 def measured(folder: Path) -> dict:
-    """Return yaw, differences and run times of all tails, in plain numbers: what summary.json
-    holds.
+    """Return yaw, differences and run times of all tails as plain numbers, the contents of
+    summary.json.
     """
     of = {"program": digest(Path(__file__), *(ROOT / source for source in SOURCES))}
     titles = {links: f"links {links}" if links else "continuum" for links in (None, *LINKS)}
     parts = {title: Part(partial(motion, links), of) for links, title in titles.items()}
     moved = made("tails", folder / "parts", dict(reversed(parts.items())))  # the longest first
-    # alone, as what else runs costs time
+    # timed alone, because other processes would disturb
     ns = made("timing", folder / "parts", {"times": Part(run_times, of)})["times"]
     yaw = moved["continuum"]["motion"][-1]
     rows = [row(n, moved[titles[n]], yaw) | {"ns": t} for n, t in zip(LINKS, ns[1:], strict=True)]
@@ -76,7 +76,7 @@ def measured(folder: Path) -> dict:
 
 
 def row(links: int, moved: dict, continuum_yaw: float) -> dict:
-    """Return what one articulated tail contributes to Fig. 8b."""
+    """Return the contribution of one articulated tail to Fig. 8b."""
     yaw, thin = moved["motion"][-1], moved["thin_yaw"]
     differences = {"difference": yaw - continuum_yaw, "thin_difference": thin - continuum_yaw}
     return {"links": links, "yaw": yaw} | differences | {"emission": moved["emission"]}
@@ -101,7 +101,7 @@ def table(study: dict) -> str:
 
 
 def study(folder: Path) -> None:
-    """Do what of the study is not kept yet, and write its summary and figures."""
+    """Compute the missing parts of the study, and write its summary and figures."""
     found = measured(folder)
     (folder / "summary.json").write_text(json.dumps(found, indent=1) + "\n")
     draw_figure_8(found, folder / "fig8.png")

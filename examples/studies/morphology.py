@@ -1,7 +1,7 @@
-"""What a tail is worth: plans of righting for tails of many shapes, from many tumbles.
+"""The value of a tail: plans of righting for tails of many shapes, from many tumbles.
 
-Each plan is a row of FOLDER/rows.db; the same command goes on where it was stopped.  --executor
-takes the workers of a cluster: see docs/sweeps.md.
+Each plan is a row of FOLDER/rows.db; the same command resumes an interrupted study. --executor uses
+the workers of a cluster: see docs/sweeps.md.
 """
 
 from examples import front

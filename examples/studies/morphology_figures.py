@@ -16,7 +16,7 @@ AXES = {
 }
 BINS = 8
 FEWEST = 4  # plans in a bin
-PANELS = {  # what each line of panels shows, and by what it is multiplied
+PANELS = {  # the quantity of each line of panels, and its factor
     "righted [%]": ("righted", 100.0),
     "energy [mJ]": ("energy_J", 1e3),
     "duration [ms]": ("duration_s", 1e3),
@@ -24,10 +24,11 @@ PANELS = {  # what each line of panels shows, and by what it is multiplied
 
 
 def draw(rows: list[dict], path: Path) -> tuple[Figure, np.ndarray]:
-    """Righted shares with their standard errors, energies and durations, against what a tail is.
+    """Draw righted shares with their standard errors, energies and durations, against the shape of
+    a tail.
 
-    Energies and durations are medians with quartiles, of the plans that right; all else varies in
-    each bin as it does in all.
+    Energies and durations are medians with quartiles of the plans that right the animal. All other
+    properties vary in each bin as in the whole sample.
     """
 
     def make() -> tuple[Figure, np.ndarray]:

@@ -1,4 +1,4 @@
-"""What a tail is worth for righting, against its segments, length, mass and taper."""
+"""The value of a tail for righting, against its segments, length, mass and taper."""
 
 import json
 from functools import cache
@@ -19,7 +19,7 @@ DENSITY = 1000.0  # kg/m^3
 SHORTEST = 0.15  # s
 INTERVALS = 8
 ITERATIONS, LIMIT = 120, 60.0  # of a plan's search, and s that a row may take
-UPRIGHT = 10.0  # deg off upright at the landing, when the torques are applied
+UPRIGHT = 10.0  # deg from upright at the landing, when the torques are applied
 TAPERED = {
     "length": LENGTH,
     "radii": [0.003, 0.001],
@@ -41,8 +41,8 @@ OVER = {
 def cone(length: float, mass: float, taper: float) -> dict[str, np.ndarray]:
     """Return the links of a cone that is cut into equal lengths, as parameters.
 
-    Its density is fixed, so that mass, length and taper tell its radii.  Gauss's rule of five nodes
-    is exact: a link's inertia is an integral of a polynomial of degree 4.
+    Its density is fixed, so that mass, length and taper determine its radii. Gauss's rule of five
+    nodes is exact, because the inertia of a link is an integral of a polynomial of degree 4.
     """
     area = mass / (DENSITY * length * (1 + taper + taper**2) / 3)  # of the base
     nodes, weights = np.polynomial.legendre.leggauss(5)
@@ -65,7 +65,7 @@ def cone(length: float, mass: float, taper: float) -> dict[str, np.ndarray]:
 
 @cache
 def tail(segments: int) -> st.Model:
-    """Return the model of a tail whose links have parameters of their own."""
+    """Return the model of a tail whose links have their own parameters."""
     shape = {"tail": "articulated", "segments": segments, "links": LINKS // segments}
     return st.build(**shape, taper=TAPERED, functions=righting.FUNCTIONS.split(","))
 
@@ -109,8 +109,8 @@ def right(point: dict) -> dict:
 
 
 def swept(folder: Path, points: int, executor: str | None) -> Sweep:
-    """Make the plans that are missing, and return all."""
-    for segments in SEGMENTS:  # built once, before many ask for it
+    """Make the missing plans, and return all."""
+    for segments in SEGMENTS:  # built once, before many processes need it
         tail(segments)
     given = {"store": folder / "rows.db", "limit": LIMIT, "executor": executor, "of": VERSION}
     over = {"segments": st.grid(SEGMENTS)} | OVER
@@ -118,7 +118,9 @@ def swept(folder: Path, points: int, executor: str | None) -> Sweep:
 
 
 def table(rows: list[dict]) -> str:
-    """Return a table of what each number of segments comes to; medians are of what is righted."""
+    """Return a table of the results for each number of segments; medians are of the plans that
+    right the animal.
+    """
     lines = ["| segments | plans | righted | energy, median | duration, median |"]
     lines.append("|---" * 5 + "|")
     for segments in SEGMENTS:
@@ -133,7 +135,7 @@ def table(rows: list[dict]) -> str:
 
 
 def study(folder: Path, points: int, executor: str | None) -> None:
-    """Do what of the study is not kept yet, and write its figure and summary."""
+    """Compute the missing plans of the study, and write its figure and summary."""
     folder.mkdir(parents=True, exist_ok=True)
     found = swept(folder, points, executor)
     rows = found.rows()

@@ -1,4 +1,4 @@
-"""Parts of long studies as the rows of a sweep: each is made anew only where what it depends on
+"""Parts of long studies as the rows of a sweep: a part is computed again only if its inputs
 changed.
 """
 
@@ -21,8 +21,8 @@ Result = dict | list
 class Part:
     """A part of a study.
 
-    make: returns its result, plain data; a function that can be pickled, without arguments.
-    of: what else it depends on, plain data.  files: what it writes besides.
+    make: returns its result, plain data; a function that can be pickled, without arguments. of:
+    other inputs on which the result depends, plain data. files: files that it writes.
     """
 
     make: Callable[[], Result]
@@ -32,26 +32,27 @@ class Part:
 
 @dataclass(frozen=True)
 class Maker:
-    """Makes the part that a point of a sweep names."""
+    """Computes the part that a point of a sweep names."""
 
     study: str
     makes: Mapping[str, Callable[[], Result]]
 
     @property
     def __name__(self) -> str:
-        """What is told while parts are made."""
+        """Return the name that progress reports show."""
         return self.study
 
     def __call__(self, point: dict) -> dict[str, str]:
-        """Return the part's result as JSON, which has NaN here."""
+        """Return the part's result as JSON, which may hold NaN here."""
         return {"result": json.dumps(self.makes[point["part"]]())}
 
 
 def made(study: str, folder: Path, parts: Mapping[str, Part]) -> dict[str, Result]:
-    """Return the results of parts by title; those that FOLDER/STUDY.db has not are made, in as many
-    processes as this one may use threads, and each is a row of it when it is finished.
+    """Return the results of parts by title.
 
-    SerpentailError where a part failed, and where another process makes parts in the folder.
+    Parts that FOLDER/STUDY.db does not have are computed, in as many processes as this one may use
+    threads. Each becomes a row when it is finished. SerpentailError if a part failed, or if another
+    process computes parts in the folder.
     """
     folder.mkdir(parents=True, exist_ok=True)
     over = {("part", "of"): st.grid([(title, part.of) for title, part in parts.items()])}
@@ -66,16 +67,14 @@ def made(study: str, folder: Path, parts: Mapping[str, Part]) -> dict[str, Resul
 
 
 def _forget_without_files(found: st.Sweep, parts: Mapping[str, Part]) -> None:
-    """Have those parts made again whose files are gone."""
+    """Forget the results of parts whose files are gone, so that they are computed again."""
     gone = {title for title, part in parts.items() if not all(f.exists() for f in part.files)}
     found.store.forget(each.key for each in found.entries if each.point["part"] in gone)
     found.store.close()
 
 
 def digest(*sources: Path) -> str:
-    """Return a hash of Python sources and templates, files or folders: what makes a part is what it
-    depends on, too.
-    """
+    """Return a hash of Python sources and templates, files or folders, for the inputs of a part."""
     inside = [
         p
         for source in sources

@@ -1,7 +1,7 @@
-"""Flights of bodies unlike the planned one, with noise, delay and pushes: the plan's torques as
-they are, PFL along the plan, and predictive control.
+"""Flights of bodies that differ from the planned one, with noise, delay and pushes.
 
-Each start is kept in FOLDER/parts: a study that was stopped goes on.
+Three laws are compared: the plan's torques, PFL along the plan, and predictive control. Each start
+is kept in FOLDER/parts, so that an interrupted study resumes.
 """
 
 from examples import front

@@ -1,4 +1,6 @@
-"""Tumbling starts whose plans are flown by three laws, under what the plans do not know of."""
+"""Tumbling starts whose plans are flown by three laws, under conditions that the plans do
+not know.
+"""
 
 import json
 from collections.abc import Callable
@@ -26,8 +28,8 @@ STEP = 1e-3  # s, of the flights' RK4
 
 @dataclass(frozen=True)
 class Trial:
-    """What a flight has that its plan has not: factors of parameters, noise of what is measured (in
-    units of NOISE), delay (s) of the controller, a push (rad/s).
+    """How a flight differs from its plan: factors of parameters, noise of measurements (in units of
+    NOISE), delay (s) of the controller, a push (rad/s).
     """
 
     factors: dict = field(default_factory=dict)
@@ -37,7 +39,7 @@ class Trial:
 
 
 def bodies(part: float) -> dict:
-    """Return trials of bodies that are wrong by a part."""
+    """Return trials of bodies with parameters that are wrong by a fraction."""
     found = {}
     for name in ("tail_mass", "torso_inertia", "tail_length"):
         for sign in (1, -1):
@@ -59,7 +61,7 @@ TRIALS = {
 
 
 def rat() -> st.Model:
-    """Return the model of (1, 3) that is planned for."""
+    """Return the model of (1, 3) for which the flights are planned."""
     functions = [*FUNCTIONS.split(","), *NODE]
     return st.build(tail="articulated", segments=1, links=3, functions=functions)
 
@@ -73,7 +75,9 @@ def body_of(model: st.Model, trial: Trial) -> st.Model:
 
 
 def measured(q: np.ndarray, v: np.ndarray, off: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return what is measured: off (6 + 2 * 2m) are turn, spin, angles, rates."""
+    """Return the measured state; off (6 + 2 * 2m) are errors of attitude, angular velocity, angles
+    and rates.
+    """
     q, v, nt = q.copy(), v.copy(), len(q) - 7
     turn, spin, angles, rates = np.split(off, [3, 6, 6 + nt])
     q[3:7] = product(q[3:7], [1.0, *turn / 2])
@@ -85,7 +89,7 @@ def measured(q: np.ndarray, v: np.ndarray, off: np.ndarray) -> tuple[np.ndarray,
 
 
 def laws(model: st.Model, plan: st.Plan, trial: Trial) -> dict[str, tuple]:
-    """Return laws by name: what is done at a tick, and the torques (t, q, v) at any time."""
+    """Return laws by name: the action at a tick, and the torques (t, q, v) at any time."""
     pfl = st.Pfl(model, plan, torque=TORQUE)
     mpc = st.Mpc(model, plan, rate=RATE, delay=trial.delay)
 
@@ -127,7 +131,7 @@ def flown(body: st.Model, plan: st.Plan, law: tuple, trial: Trial, seed: int) ->
 
 
 def _with_noise(torque: Callable, off: np.ndarray) -> Callable:
-    """Return torques of what is measured, off by the same until the next tick."""
+    """Return torques for measured states, with an error that is constant until the next tick."""
 
     def law(t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         return torque(t, *measured(q, v, off))
@@ -136,7 +140,7 @@ def _with_noise(torque: Callable, off: np.ndarray) -> Callable:
 
 
 def trials_of(seed: int) -> dict:
-    """Return the tilts (deg) of a start by trial and law; empty where there is no true plan."""
+    """Return the tilts (deg) of a start by trial and law; empty if there is no true plan."""
     model = rat()
     plan = st.plan(
         model,
@@ -157,7 +161,7 @@ def trials_of(seed: int) -> dict:
 
 
 def study(folder: Path, starts: int) -> None:
-    """Fly all, write summary.json and tilts.png, and print a table."""
+    """Make all flights, write summary.json and tilts.png, and print a table."""
     of = {"program": digest(Path(__file__), *(ROOT / source for source in SOURCES))}
     rat()
     parts = {

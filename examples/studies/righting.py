@@ -1,7 +1,7 @@
 """Airborne righting (Sects. 4.2, 4.3): the paper's Figs. 9 to 13 and Table 2, and ours.
 
-Plans are made side by side, as many as $SERPENTAIL_THREADS says or there are cores, and each is
-a row of a store in FOLDER/parts: a second run draws at once, one that was stopped goes on.
+Plans are made in parallel, as many as $SERPENTAIL_THREADS says or there are cores. Each is a row of
+a store in FOLDER/parts: a second run only draws, and an interrupted one resumes.
 """
 
 from examples import front

@@ -33,8 +33,8 @@ PANELS = (  # of Fig. 10
 def draw_figure_10(
     flights: dict[str, st.Trajectory], links: int, path: Path
 ) -> tuple[Figure, np.ndarray]:
-    """Position, attitude, tail bends and torques of the planned, the tracked and the passive
-    flight, and how far the tracked one is off the planned.
+    """Draw position, attitude, tail bends and torques of the planned, the tracked and the passive
+    flight, and the difference of the tracked flight from the plan.
     """
 
     def draw() -> tuple[Figure, np.ndarray]:
@@ -74,7 +74,7 @@ def _draw_differences(
 
 def _curves(flight: st.Trajectory, like: st.Trajectory, links: int) -> list[np.ndarray]:
     angles = _angles_near(flight, like)
-    # near the vertical, roll and yaw mean little
+    # near the vertical, roll and yaw are ill-defined
     angles[np.abs(np.cos(angles[:, 0])) < SINGULAR, 1:] = np.nan
     bends = links * np.degrees(flight.tail)
     curves = [flight.q[:, 1], flight.q[:, 2], *np.degrees(angles).T, tilt_deg(flight.attitude)]
@@ -82,11 +82,11 @@ def _curves(flight: st.Trajectory, like: st.Trajectory, links: int) -> list[np.n
 
 
 def _angles_near(flight: st.Trajectory, like: st.Trajectory) -> np.ndarray:
-    """Pitch, roll, yaw (K, 3): of the two triples of each attitude, and turns of them, those
-    nearest to another flight.
+    """Return pitch, roll, yaw (K, 3): of the two triples of each attitude, and their whole turns,
+    those nearest to another flight.
 
     (pi - phi_x, phi_y + pi, phi_z + pi) is the same attitude: near pitches of 90 degrees, either
-    may come out.
+    may result.
     """
     angles, wanted = (st.pitch_roll_yaw(motion.q, unwrap=True) for motion in (flight, like))
     wanted = np.column_stack([np.interp(flight.t, like.t, column) for column in wanted.T])
@@ -97,7 +97,7 @@ def _angles_near(flight: st.Trajectory, like: st.Trajectory) -> np.ndarray:
 
 
 def draw_figure_11(rows: dict[str, list[dict]], path: Path) -> tuple[Figure, np.ndarray]:
-    """Iterations, effort, time and true error against the nodes a second, and time against
+    """Draw iterations, effort, time and true error against the nodes a second, and time against
     error.
     """
     panels = {
@@ -159,8 +159,8 @@ def draw_figure_13(
 
 
 def draw_rates(rates: dict[str, list[dict]], path: Path) -> tuple[Figure, np.ndarray]:
-    """Share of random starts that have a true plan within a CPU time, and the true errors of all of
-    them.
+    """Draw the share of random starts that have a true plan within a CPU time, and the true errors
+    of all.
     """
     times = {k: [r["cpu_s"] if r["success"] else np.inf for r in rows] for k, rows in rates.items()}
     errors = {k: [r["open_loop_attitude_error_deg"] for r in rows] for k, rows in rates.items()}
@@ -184,7 +184,7 @@ def draw_rates(rates: dict[str, list[dict]], path: Path) -> tuple[Figure, np.nda
 
 
 def _draw_shares(panel: Axes, values: dict[str, list[float]]) -> None:
-    """Draw for each kind which share (%) of all is up to a value: from 0, to the panel's edge."""
+    """Draw for each kind the share (%) of values up to a value: from 0, to the panel's edge."""
     known = {kind: np.sort(np.array(all_)[np.isfinite(all_)]) for kind, all_ in values.items()}
     most = 1.2 * max((x.max() for x in known.values() if len(x)), default=1.0)
     for k, (kind, found) in enumerate(known.items()):

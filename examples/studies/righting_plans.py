@@ -1,4 +1,4 @@
-"""The plans of the righting study, each a part of it: by tail, from plain data to plain data."""
+"""The plans of the righting study, each a part of it, by tail: plain data in, plain data out."""
 
 import time
 from functools import cache
@@ -17,13 +17,13 @@ rat = cache(righting.model)
 
 
 def content(size: tuple) -> dict:
-    """Build a tail's model, and tell which it is."""
+    """Build a tail's model, and return its content hash."""
     return {"content_hash": rat(*size).manifest["content_hash"]}
 
 
 def section_4_2() -> dict:
-    """Plan from the kick's state within 0.58 s; flights that follow the plan, by its torques and by
-    feedback, and one whose tail only damps.
+    """Plan from the kick's state within 0.58 s; add flights that follow the plan, by its torques
+    and by feedback, and one whose tail only damps.
     """
     model = rat(*RAT)
     start, limits = righting.kicked(model), righting.bounds(model)
@@ -68,8 +68,9 @@ def paper(size: tuple) -> dict:
 
 
 def block(size: tuple, starts: list[int], any_rate: bool, settings: dict) -> list[dict]:
-    """Plan from random starts; the whole tail bends by 180 degrees as in Sect. 4.2, or by 360 as in
-    4.3.  Upright at rest, or at any rate.
+    """Plan from random starts, upright at rest or at any rate.
+
+    The whole tail bends by 180 degrees as in Sect. 4.2, or by 360 as in 4.3.
     """
     model, rows = rat(*size), []
     limits = righting.bounds(model, np.pi if size == RAT else 2 * np.pi)

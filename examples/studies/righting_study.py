@@ -1,4 +1,4 @@
-"""What the righting study consists of: its parts, and what becomes of their results."""
+"""The parts of the righting study, and the use of their results."""
 
 import json
 from functools import partial
@@ -36,7 +36,7 @@ def name(segments: int, links: int | None) -> str:
 
 
 def built(folder: Path) -> dict[tuple, str]:
-    """Build the tails, and return what tells the code of each from another's."""
+    """Build the tails, and return hashes that distinguish their code."""
     sizes = {name(*size): size for size in (RAT, *TAILS, *MORE)}
     of = {"program": digest(ROOT / "codegen"), "functions": righting.FUNCTIONS}
     parts = {title: Part(partial(plans.content, size), of) for title, size in sizes.items()}
@@ -45,8 +45,8 @@ def built(folder: Path) -> dict[tuple, str]:
 
 
 def examples() -> dict[str, tuple]:
-    """Fig. 11: what more nodes cost and bring, as the paper plans and as we do, on one random
-    start.
+    """Fig. 11: the cost and the benefit of more nodes, as the paper plans and as we do, on one
+    random start.
     """
     parts = {}
     for frequency in FREQUENCIES:
@@ -72,7 +72,7 @@ def segments() -> dict[str, tuple]:
 
 
 def blocks(count: int) -> dict[str, dict[str, tuple]]:
-    """Plans from random tumbling starts by kind, upright and at rest unless told otherwise."""
+    """Plans from random tumbling starts by kind, upright and, by default, at rest."""
     fewer, kinds = max(1, count // FEWER), {"(1, 3)": (RAT, count, False, {})}
     kinds["(1, 3), any rate"] = RAT, count, True, {}
     kinds["(1, 3), no smoothing"] = RAT, fewer, False, {"smoothing": 0.0}
@@ -106,7 +106,7 @@ def draw_flights(folder: Path, found: dict) -> None:
 
 
 def summary(found: dict, kinds: dict[str, dict]) -> dict:
-    """Return what summary.json holds."""
+    """Return the contents of summary.json."""
     rows = []
     for m, n in (*TAILS, *MORE):
         title = f"Sect. 4.3 {name(m, n)}"
@@ -160,7 +160,7 @@ def table(study: dict) -> str:
 
 
 def righted(folder: Path, starts: int) -> None:
-    """Do what of the study is not kept yet, and write its summary and figures."""
+    """Compute the missing parts of the study, and write its summary and figures."""
     hashes, kinds, program = built(folder), blocks(starts), digest(*(ROOT / s for s in SOURCES))
     wanted = {"Sect. 4.2": (RAT, {}, plans.section_4_2)} | examples() | segments()
     for parts in kinds.values():

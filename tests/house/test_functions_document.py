@@ -12,11 +12,23 @@ DOCUMENT = Path(__file__).parents[2] / "docs" / "functions.md"
 HEAD = """\
 # Functions
 
-Every function of a model, from the generator's table of signatures; `make golden` writes this page.
-A scene names those that it wants in `functions`; without that key it gets those that are emitted
-"always", and in scenes with contacts those "with contacts", too. Units are SI.
+This page lists every function that a model can have, with its arguments, shapes, units and frames.
+
+Name the functions that you need in the scene's key `functions`. Without that key a model gets the
+functions marked "emitted always" and, if the scene has contacts, also those marked "emitted with
+contacts". A function marked "emitted where named" must be named; `functions = "all"` names all that
+the tail can have.
+
+All units are SI. B is the torso's centre of mass; "world" and "body" are the axes of the world and
+of the torso. "q in its tangent space" means that a derivative has nv columns, not nq: a rotation of
+the torso about its own axes takes the place of the four numbers of the quaternion. Equation numbers
+are those of the paper ([theory.md](theory.md)).
+
+`make golden` writes this page from the generator's table of signatures.
 
 ## Sizes
+
+The shapes below use these names:
 """
 
 

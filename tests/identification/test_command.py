@@ -1,30 +1,44 @@
-"""The verb identify, on the recording that an example generates."""
+"""The verb identify, on the recording that an example of the gallery generates."""
 
 import json
+import runpy
+import tempfile
 
+import matplotlib.pyplot as plt
 import pytest
 
-from examples import front, markers
+from examples import front
 from serpentail import cli
 
 SCENE = str(front.ROOT / "scenes" / "identify_tail.toml")
+EXAMPLE = str(front.ROOT / "examples" / "gallery" / "plot_10_identify.py")
 
 
 @pytest.fixture(scope="module")
-def recording(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("recording")
-    markers.main(front.parser(None, markers.OUTPUT).parse_args([str(folder)]))
-    return folder / "tail_markers.trc"
+def example(tmp_path_factory):
+    """The names of the example, after it has run."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(tempfile, "tempdir", str(tmp_path_factory.mktemp("recording")))
+        patch.setattr(plt, "show", lambda: None)
+        patch.setenv("MPLBACKEND", "agg")
+        names = runpy.run_path(EXAMPLE)
+        plt.close("all")
+    return names
 
 
-def test_it_finds_what_the_recording_was_made_with(recording, tmp_path, capsys):
+@pytest.fixture
+def recording(example):
+    return example["file"]
+
+
+def test_it_finds_what_the_recording_was_made_with(example, recording, tmp_path, capsys):
     page, motion = tmp_path / "page.html", tmp_path / "motion.npz"
     words = ["identify", SCENE, str(recording), "--json", "-"]
     assert cli.main([*words, "--view", str(page), "--save", str(motion)]) == 0
     report = json.loads(capsys.readouterr().out)
     assert report["success"] and report["undetermined"] == []
     truth = {name.split("[")[0]: name for name in report["parameters"]}
-    for name, value in markers.TRUE.items():
+    for name, value in example["truth"].items():
         row = report["parameters"][truth[name]]
         assert row["low"] < value < row["high"] and row["high"] - row["low"] < 0.5 * value
     assert 4.5e-4 < report["noise_m"] < 5.5e-4

@@ -1,3 +1,3 @@
-"""Independent references, one per rigid-body library, that the generated models are compared
-with.
+"""Independent references, one for each method or library, with which the generated models are
+compared.
 """

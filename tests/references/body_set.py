@@ -1,9 +1,8 @@
-"""Any torso with any tail as a set of rigid bodies, in 60 digits: links and arcs of their own, any
-mount.
+"""Any torso with any tail as a set of rigid bodies, in 60 digits: own links and arcs, any mount.
 
-Nothing is derived: places and attitudes of all bodies are functions of time along a motion, and
-their velocities and accelerations are differences of these, exact to 20 digits and more.  Arcs are
-point masses at Gauss-Legendre nodes.  It shares no formula with the recursions under test.
+Nothing is derived. Positions and attitudes of all bodies are functions of time along a motion;
+their velocities and accelerations are differences of these, exact to 20 digits and more. Arcs are
+point masses at Gauss-Legendre nodes. It shares no formula with the recursions under test.
 """
 
 from dataclasses import dataclass
@@ -163,7 +162,7 @@ class Animal:
 
 
 def exact(values):
-    """Numbers as they are, in 60 digits."""
+    """Return numbers without change, in 60 digits."""
     return np.array([x if isinstance(x, MP.mpf) else MP.mpf(float(x)) for x in values])
 
 
@@ -202,9 +201,10 @@ def turned(quaternion, turn):
 
 
 def moved(q, v, t, v_dot=None):
-    """The configuration a time t later: velocities change by v_dot, turns by their series.
+    """Return the configuration a time t later: velocities change by v_dot, rotations by their
+    series.
 
-    Up to t^2: omega turns about itself, so w t + w_dot t^2 / 2 is the rotation to that order.
+    Up to t^2: omega is parallel to itself, so w t + w_dot t^2 / 2 is the rotation to that order.
     """
     v, half = exact(v), (exact(v_dot) * t / 2 if v_dot is not None else 0)
     go = (v + half) * t
@@ -218,9 +218,9 @@ def spin(R_dot, R):
 
 
 def bent(a, b, length):
-    """Place and attitude of the end of an arc of a bend, in its root's frame.
+    """Return position and attitude of the end of an arc of a bend, in its root's frame.
 
-    The frame turns evenly about (a, 0, b), and goes along its own -y.
+    The frame rotates uniformly about (a, 0, b), and moves along its own -y.
     """
     axis = np.array([a, MP.mpf(0), b])
     angle = MP.sqrt(axis.dot(axis))

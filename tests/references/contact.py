@@ -1,7 +1,7 @@
 """Contact in plain NumPy: points, velocities, Jacobians, forces and stiffness.
 
-Every formula also takes complex numbers: velocities and Jacobians are complex steps of the points'
-places.
+Every formula also takes complex numbers: velocities and Jacobians are complex-step derivatives of
+the points' positions.
 """
 
 import numpy as np
@@ -97,8 +97,8 @@ class Contacts:
         self.friction, self.nv = model.manifest["scene"]["friction"], model.nv
 
     def places(self, R, q_t, legs):
-        """All points in the torso frame; the torso's lowest is a point of it, so it has no
-        derivative.
+        """Return all points in the torso frame; the lowest point of the torso is fixed to it, so it
+        has no derivative.
         """
         P, out = self.parameters, []
         if "feet" in self.groups:
@@ -123,7 +123,7 @@ class Contacts:
         return self.positions(q, legs, v, 0 if legs is None else np.asarray(legs[4:])).imag / STEP
 
     def jacobians(self, q, legs):
-        """d(velocity)/dv, (K, 3, nv): the legs' rates have no share in it."""
+        """Return d(velocity)/dv, (K, 3, nv), without the legs' rates."""
         return np.moveaxis(
             [self.positions(q, legs, unit).imag / STEP for unit in np.eye(self.nv)], 0, 2
         )
@@ -138,7 +138,9 @@ class Contacts:
         return np.array([f for f, _ in found]), np.concatenate([rate for _, rate in found])
 
     def law(self, place, velocity, bristle, bounding=lambda normal: normal):
-        """Force and bristle rate of one point; ``bounding`` is the load that bounds friction."""
+        """Return force and bristle rate of one point; ``bounding`` is the load that bounds
+        friction.
+        """
         P, depth = self.parameters, -place[2]
         normal = self.normal(depth, -velocity[2])
         trial = -(P["K_f"] * bristle + P["D_f"] * P["K_f"] * velocity[:2])
@@ -157,7 +159,7 @@ class Contacts:
         return push if push.real > 0 else 0 * push
 
     def limited(self, trial, limit):
-        """The friction force that a trial force becomes."""
+        """Return the friction force for a trial force."""
         if limit.real == 0:
             return 0 * trial
         if self.friction == "smooth":
@@ -168,10 +170,11 @@ class Contacts:
         return np.where(np.abs(trial.real) <= limit.real, trial, np.sign(trial.real) * limit)
 
     def slopes(self, place, velocity, bristle, share):
-        """Derivatives of force (3) and bristle rate (2) by place, velocity (3 each) and bristle
-        (2), by complex steps.
+        """Return derivatives of force (3) and bristle rate (2) by position, velocity (3 each) and
+        bristle (2), by complex steps.
 
-        share: of how friction's bound moves with the load, which a W-method may leave out.
+        share: the part of the dependence of friction's bound on the load that is included; a
+        W-method may leave it out.
         """
 
         def found(k):

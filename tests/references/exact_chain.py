@@ -1,4 +1,4 @@
-"""From parameters and (m, n) to the articulated tail's dynamics, by the paper's recursion to 40
+"""Dynamics of the articulated tail from parameters and (m, n), by the paper's recursion to 40
 digits.
 """
 
@@ -127,7 +127,7 @@ class ExactChain:
         return bodies
 
     def _link(self, axes, joint, segment):
-        """The link that hangs along -y_j from its joint (Eqs. 13, 15, A13)."""
+        """Return the link that is attached along -y_j to its joint (Eqs. 13, 15, A13)."""
         to_com, to_next = (
             _scaled(-self.link_length / 2, axes[1]),
             _scaled(-self.link_length, axes[1]),
@@ -279,7 +279,7 @@ def _world_inertia(axes, principal):
 def _carried(linear, angular, arm):
     """J - p~ J_omega by columns: the Jacobian of the point at p from that of J (A7, A8)."""
     moved = [_plus(x, _cross(omega, arm)) for x, omega in zip(linear[3:], angular[3:], strict=True)]
-    return linear[:3] + moved  # the base's translation turns nothing
+    return linear[:3] + moved  # translation of the base rotates nothing
 
 
 def _point_acceleration(omega, omega_dot, arm):

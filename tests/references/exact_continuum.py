@@ -1,4 +1,4 @@
-"""From parameters and m to the continuum tail's dynamics, by point masses moved along power series,
+"""Dynamics of the continuum tail from parameters and m, by point masses moved along power series,
 to 40 digits.
 """
 
@@ -17,8 +17,8 @@ class ExactContinuum:
 
     A motion is an array of Taylor coefficients in the time t, up to t^2. It starts at q with the
     rates v and v_dot; the rate of the motion along one coordinate is a column of the Jacobian. The
-    quadrature by 24 nodes is wrong by 2e-38 at a bend of 2 pi per segment, by 3e-24 at 4 pi; longer
-    turns want more nodes.
+    quadrature by 24 nodes has an error of 2e-38 at a bend of 2 pi per segment, and of 3e-24 at 4
+    pi; larger bends need more nodes.
     """
 
     def __init__(self, parameters, segments, digits=40, nodes=24):

@@ -1,6 +1,4 @@
-"""From states in polar angles (phi, theta) to the same states in bend components, exactly, for
-`ExactContinuum`.
-"""
+"""Converts states in polar angles (phi, theta) exactly to bend components, for `ExactContinuum`."""
 
 import numpy as np
 

@@ -1,6 +1,4 @@
-"""From a mass matrix or a (force, torque, tail) vector, and its reference, to an error without
-units.
-"""
+"""Dimensionless errors of a mass matrix or a (force, torque, tail) vector against its reference."""
 
 import numpy as np
 
@@ -24,11 +22,11 @@ def block_error(x, x_ref):
 
 
 def force_error(force, force_ref, mass_ref):
-    """Largest |dC_i| / sqrt(H_ii) over the largest |C_i| / sqrt(H_ii).
+    """Return the largest |dC_i| / sqrt(H_ii) over the largest |C_i| / sqrt(H_ii).
 
-    C_i sums products of a Jacobian's column with accelerations, both weighted by masses: by Cauchy
-    and Schwarz no sum of its terms is above sqrt(H_ii) times the norm of the latter, however much
-    they cancel.
+    C_i sums products of a Jacobian's column with accelerations, both weighted by masses. By Cauchy
+    and Schwarz no term is above sqrt(H_ii) times the norm of the accelerations, however much the
+    terms cancel.
     """
     scale = np.sqrt(np.diag(mass_ref))
     return float(
@@ -43,6 +41,6 @@ def equilibrated_condition(mass):
 
 
 def _scaled_error(x, x_ref, floor):
-    """max|d| / max|ref|, the scale never below the floor."""
+    """Return max|d| / max|ref|, with a scale never below the floor."""
     scale = np.max(np.abs(x_ref), initial=0.0)
     return np.max(np.abs(x - x_ref), initial=0.0) / max(scale, floor)

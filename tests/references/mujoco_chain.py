@@ -1,4 +1,4 @@
-"""From parameters and (m, n) to the articulated tail's dynamics, by MuJoCo on a reduced chain of
+"""Dynamics of the articulated tail from parameters and (m, n), by MuJoCo on a reduced chain of
 hinges.
 """
 
@@ -92,7 +92,7 @@ class MujocoChain:
         return jacobian
 
     def _evaluate(self, q, v=None):
-        """Everything of MuJoCo's that depends on position and velocity."""
+        """Compute all of MuJoCo's quantities that depend on position and velocity."""
         angles = np.reshape(q[7:], (self.segments, 2))
         self.data.qpos[:3], self.data.qpos[3:7] = q[:3], q[3:7] / np.linalg.norm(q[3:7])
         self.data.qpos[7:] = np.repeat(angles, self.links, axis=0).ravel()

@@ -5,9 +5,10 @@ import time
 import numpy as np
 import pytest
 
+import serpentail as st
 from serpentail.simulation import compiled_run
 
-from .test_ground import kick
+from .test_ground import kick, rat
 
 
 def test_where_a_run_stops_its_friction_springs_are_told():
@@ -47,3 +48,18 @@ def test_times_that_a_run_took_are_told():
     info = kick(t_span=0.1).info
     assert 0 < info["seconds"] <= time.perf_counter() - begun[0]
     assert 0 <= info["cpu_seconds"] <= time.process_time() - begun[1]
+
+
+@pytest.mark.parametrize("begin", [1e-160, 1e-180, 1e-300, 5e-324])
+@pytest.mark.parametrize("method", ["tsit5", "ros34pw2", "rk4"])
+def test_a_step_may_be_so_short_that_its_square_is_zero(begin, method):
+    """A phase that begins after next to no time: the first step ends there."""
+    model = rat("feet")
+    q, v = np.zeros(model.nq), np.full(model.nv, 0.1)
+    q[2:4] = 0.3, 1.0
+    how = {"t_span": 2e-3, "legs": st.Legs.fixed(3.6, -0.3), "method": method}
+    phases = st.Phases([(0.0, st.Damping(1e-3)), (begin, None)])
+    found = st.simulate(model, q, v, controller=phases, **how)
+    assert found.events == [] and found.info["steps"] < 300
+    plain = st.simulate(model, q, v, **how)
+    np.testing.assert_allclose(found.q, plain.q, rtol=0, atol=1e-12)

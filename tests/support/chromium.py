@@ -1,4 +1,4 @@
-"""A real Chromium that opens pages, and tells what it was asked for."""
+"""A real Chromium that opens pages, and records the requested addresses."""
 
 import json
 import os
@@ -36,7 +36,7 @@ def need_chromium() -> None:
 
 @contextmanager
 def chromium(*more):
-    """A headless Chromium that draws by software, and remembers console and requests.
+    """Yield a headless Chromium that draws in software, and records console messages and requests.
 
     more: options.
     """
@@ -53,7 +53,7 @@ def chromium(*more):
 
 
 def opened(driver, page: Path, size=(1280, 800), scheme="light"):
-    """The browser with a page that is ready, in a window of a size, in light or dark."""
+    """Return the browser with a loaded page, in a window of a size, in light or dark."""
     for log in ("browser", "performance"):
         driver.get_log(log)
     width, height = size
@@ -69,7 +69,7 @@ def opened(driver, page: Path, size=(1280, 800), scheme="light"):
 
 
 def requests(driver) -> list[str]:
-    """Addresses that were asked for since the last look."""
+    """Return addresses that were requested since the last call."""
     entries = [json.loads(entry["message"])["message"] for entry in driver.get_log("performance")]
     sent = [e["params"] for e in entries if e["method"] == "Network.requestWillBeSent"]
     return [each["request"]["url"] for each in sent]

@@ -1,9 +1,9 @@
-"""A small optimal control problem for ``casadi.Function``s of the dynamics; needs casadi and numpy
-alone.
+"""A small optimal control problem for ``casadi.Function``s of the dynamics; needs only casadi and
+numpy.
 
-From a turning start the tail goes to given coordinates, its torques squared being least; implicit
-midpoint, the attitude a quaternion.  Run as a program, it compares a compiled model with its CasADi
-module.
+From a turning start the tail goes to given coordinates with the least sum of squared torques;
+implicit midpoint, the attitude a quaternion. Run as a program, it compares a compiled model with
+its CasADi module.
 """
 
 import sys
@@ -17,7 +17,7 @@ QUIET = {"ipopt.print_level": 0, "print_time": False, "ipopt.sb": "yes", "ipopt.
 
 
 def rate(q, v):
-    """Return the rate of q: the quaternion turns with the angular velocity in body axes."""
+    """Return the rate of q: the quaternion rotates with the angular velocity in body axes."""
     w, x, y, z = (q[3 + k] for k in range(4))
     a, b, c = (v[3 + k] for k in range(3))
     turn = casadi.vertcat(
@@ -60,8 +60,8 @@ def problem(f, parameters, nodes):
 
 
 def plan(f, parameters, nodes=8, **options):
-    """Solve by IPOPT with exact second derivatives; return the solution, its value, and how it was
-    found.
+    """Solve by IPOPT with exact second derivatives; return the solution, its value, and the
+    solver's statistics.
     """
     nlp, guess = problem(f, parameters, nodes)
     solver = casadi.nlpsol(

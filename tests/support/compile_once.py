@@ -1,4 +1,4 @@
-"""What tests compile by hand, each file once for all tests, processes and runs."""
+"""Compiles the files of tests, each once for all tests, processes and runs."""
 
 import json
 import shlex
@@ -12,7 +12,7 @@ from tests.support.models import BUILD, digest
 
 
 def compile_once(name: str, command: Sequence[str], sources: Sequence[Path], include: Path) -> Path:
-    """Return the file that ``command sources -o name`` makes; the compiler must say nothing."""
+    """Return the file that ``command sources -o name`` makes; the compiler must print nothing."""
     files = [*sources, *sorted(include.rglob("*.h"))]
     compiler = Path(shutil.which(command[0]) or command[0]).resolve()
     texts = [(path.name, digest(path.read_text())) for path in files]

@@ -1,5 +1,5 @@
-"""Derivatives by other means: states to try, a complex step through the loops of a function, and a
-fair measure.
+"""Derivatives by other means: states, a complex step through the loops of a function, and an error
+measure.
 """
 
 from functools import cache
@@ -20,11 +20,11 @@ from tests.references.parameters import random_states
 from tests.support.models import model_folder
 
 COMPLEX = Numbers(np, complex)
-STEP = 1e-30  # of the imaginary part: nothing is subtracted, so derivatives are as exact as values
-# of the largest derivative in the same rows: smaller blocks of columns are compared with that
+STEP = 1e-30  # of the imaginary part: without a subtraction, derivatives are as exact as values
+# part of the largest derivative in the same rows: smaller blocks are compared with that
 NEGLIGIBLE = 1e-6
 KINDS = ("random", "straight", "folded", "still", "scaled")
-# what is differentiated: of every derivative function the function, and of its outputs (output,
+# for every derivative function: the differentiated function, and for its outputs (output,
 # argument)
 FIRST = {
     "inverse_dynamics_derivatives": (
@@ -65,7 +65,9 @@ FIRST = {
 
 @cache
 def derivative_model(segments, links, emission, **options):
-    """A compiled model with all derivatives and what they are compared with."""
+    """Return a compiled model with all derivatives and the functions that they are compared
+    with.
+    """
     wanted = [
         *DERIVATIVES,
         "mass_matrix",
@@ -112,7 +114,7 @@ def tangent_of_q(q):
 
 @cache
 def nest_of(model, function):
-    """The loop nest of a model's function, what it calls written out."""
+    """Return the loop nest of a model's function, with called programs inlined."""
     scene = parse_scene(model.manifest["scene"], model.name)
     return inlined(assemble(CATALOGUE[function], tail_of(scene)))
 
@@ -161,8 +163,8 @@ def spans(size, nv):
 
 
 def jacobian_error(found, expected, nv, negligible=NEGLIGIBLE):
-    """Largest over blocks of max|d| / max|ref|; a block that is negligible in its rows is scaled by
-    them.
+    """Return the largest max|d| / max|ref| over blocks; a block that is negligible in its rows is
+    scaled by them.
     """
     found, expected = np.atleast_2d(found), np.atleast_2d(expected)
     assert found.shape == expected.shape
@@ -177,8 +179,8 @@ def jacobian_error(found, expected, nv, negligible=NEGLIGIBLE):
 
 
 def parameter_scales(model):
-    """The magnitude of each parameter, so that its derivatives are forces; a zero has that of its
-    vector.
+    """Return the magnitude of each parameter, so that its derivatives are forces; a zero has the
+    magnitude of its vector.
     """
     return np.concatenate(
         [np.full(len(part), np.abs(part).max()) for part in parameters_of(model).values()]

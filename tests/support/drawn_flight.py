@@ -1,4 +1,4 @@
-"""A flight to draw: its trajectory, and a stand-in for a model that tells the tail's points."""
+"""A flight to draw: its trajectory, and a stand-in for a model that gives the tail's points."""
 
 from dataclasses import dataclass, field
 
@@ -24,7 +24,9 @@ SPEEDS = {
 
 @dataclass
 class Drawn:
-    """What drawings ask of a model with links along -y; it is of no generated folder."""
+    """The attributes that drawings need of a model with links along -y; it has no generated
+    folder.
+    """
 
     segments: int
     links: int = 4

@@ -1,4 +1,4 @@
-"""Models of passive tails for tests, beside the same without their passive parts."""
+"""Models of passive tails for tests, and the same models without their passive parts."""
 
 from functools import cache
 
@@ -32,7 +32,7 @@ def _loaded(folder):
 
 
 def unequal(segments):
-    """Parameters of all passive parts, other ones for each coordinate."""
+    """Return parameters of all passive parts, different ones for each coordinate."""
     rng, size = np.random.default_rng(17), 2 * segments
     return {
         "tail_stiffness": rng.uniform(0.001, 0.01, size),

@@ -1,4 +1,4 @@
-"""States of the 40-digit continuum, and what its tests compare by."""
+"""States of the 40-digit continuum, and the comparisons of its tests."""
 
 from math import pi
 
@@ -38,7 +38,7 @@ def at_rest(tail_rates):
 
 
 def assert_same_float64(x, x_ref):
-    """Every entry is the same float64, but for zeros that come out as what is left of many
+    """Check that every entry is the same float64, except zeros, which are remainders of many
     digits.
     """
     x, x_ref = np.asarray(x), np.asarray(x_ref)

@@ -19,8 +19,8 @@ def failed(checks):
 
 
 def laws_broken(model, count=2):
-    """Names of the laws that a model breaks, CasADi's left out: they compare with the C, which is
-    at fault here.
+    """Return the names of the laws that a model breaks, without those of CasADi, which compare with
+    the faulty C.
     """
     cases = list(states.states(model, count))
     entries = [entry for entry in verify.LAWS if "casadi" not in entry.name]
@@ -28,7 +28,7 @@ def laws_broken(model, count=2):
 
 
 def broken(model, name, change):
-    """The model with one function whose result, and arguments, go through a change."""
+    """Return the model with one function whose result, and arguments, are changed."""
     faulty, kernel = copy.copy(model), model.kernel(name)
 
     def call(*arrays):
@@ -39,14 +39,14 @@ def broken(model, name, change):
 
 
 def times(factor):
-    """A change that multiplies every output."""
+    """Return a change that multiplies every output."""
     return lambda result, *_: (
         tuple(factor * x for x in result) if isinstance(result, tuple) else factor * result
     )
 
 
 def not_a_number(result, *_):
-    """The last entry of the last output is lost."""
+    """Replace the last entry of the last output by NaN."""
     outputs = [np.array(x) for x in (result if isinstance(result, tuple) else (result,))]
     outputs[-1][(..., *(-1,) * min(1, outputs[-1].ndim))] = np.nan
     return tuple(outputs) if isinstance(result, tuple) else outputs[0]

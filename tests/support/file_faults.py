@@ -1,4 +1,4 @@
-"""Calls of the file system, before each of which something can happen: a kill, or an error."""
+"""Lets something happen before each call of the file system: a kill, or an error."""
 
 import builtins
 import io
@@ -17,7 +17,7 @@ HOUR = 3600.0  # s
 
 
 class Torn:
-    """A file of which half is written when something happens."""
+    """A file of which one half is written before something happens."""
 
     def __init__(self, file, act: Callable[[], None]):
         self.file, self.act = file, act
@@ -32,7 +32,7 @@ class Torn:
         self.file.close()
 
     def write(self, content):
-        """Write one half, let something happen, and write the other."""
+        """Write one half, let something happen, and write the other half."""
         half = len(content) // 2
         self.file.write(content[:half])
         self.file.flush()
@@ -67,7 +67,7 @@ def before_calls(act: Callable[[], None], *others: tuple[object, str]) -> Iterat
 
 
 def at(moment: int, act: Callable[[], None]) -> Callable[[], None]:
-    """Return a function of which the call of that number acts; calls count from 0."""
+    """Return a function that acts at the call of that number; calls count from 0."""
     count = itertools.count()
 
     def call():
@@ -78,7 +78,7 @@ def at(moment: int, act: Callable[[], None]) -> Callable[[], None]:
 
 
 def fault(code: int) -> Callable[[], None]:
-    """Return a function that fails as the system does."""
+    """Return a function that raises the error of a failing system."""
 
     def fail():
         raise OSError(code, os.strerror(code))
@@ -87,7 +87,7 @@ def fault(code: int) -> Callable[[], None]:
 
 
 def killed_at(moment: int, work: Callable[[], object], *others: tuple[object, str]) -> bool:
-    """Do some work in a process that is killed at a call; tell whether it came to that."""
+    """Do some work in a process that is killed at a call; tell whether that call was reached."""
     child = os.fork()
     if child == 0:
         with before_calls(at(moment, lambda: os._exit(KILLED)), *others):
@@ -99,7 +99,7 @@ def killed_at(moment: int, work: Callable[[], object], *others: tuple[object, st
 
 
 def age(folder: Path) -> None:
-    """Make what lies in a folder more than an hour older."""
+    """Make the contents of a folder more than an hour older."""
     then = time.time() - 2 * HOUR
     for path in folder.iterdir():
         os.utime(path, (then, then), follow_symlinks=False)

@@ -1,4 +1,4 @@
-"""One folder that is generated again and again, as other models of the same name."""
+"""One folder that is generated again and again, as different models of the same name."""
 
 import json
 from pathlib import Path
@@ -31,5 +31,5 @@ def model_of(links: int, **options) -> tuple[dict[str, str], dict]:
 
 
 def agree(model) -> None:
-    """Demand that CasADi and C are of one model."""
+    """Check that CasADi and C are of one model."""
     np.testing.assert_allclose(model.casadi.mass_matrix(Q), model.mass_matrix(Q), rtol=1e-12)

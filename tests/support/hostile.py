@@ -1,4 +1,4 @@
-"""What a scene may not be called, and files that are no scenes: for both packages."""
+"""Names that a scene may not have, and files that are not scenes, for both packages."""
 
 import os
 from pathlib import Path
@@ -13,7 +13,7 @@ GOOD_NAMES = ("t", "math_", "float1", "t1", "a_b", "a" * 63, "kangaroo_rat_m1_n3
 
 
 def unreadable(folder: Path) -> dict[str, Path]:
-    """Make files that no scene can be read from, and return their paths by what they are."""
+    """Make files from which no scene can be read, and return their paths by description."""
     texts = {
         "empty name": b"kind = ",
         "latin": b"kind = '\xff'",

@@ -1,7 +1,7 @@
 """Generated models for tests, each generated once for all tests, processes and runs.
 
-They lie in ``.build/models/<digest of the generator>/<digest of the scene>``, so that a change of
-the generator makes all of them anew. No test writes into them: one that must takes a copy.
+They are in ``.build/models/<digest of the generator>/<digest of the scene>``, so that a change of
+the generator makes all of them again. No test writes to them: a test that must takes a copy.
 """
 
 import hashlib
@@ -21,7 +21,7 @@ from serpentail_codegen.scene.parse import scene_for
 from serpentail_codegen.scene.scene import Scene
 
 BUILD = Path(__file__).parents[2] / ".build"
-KEPT = 3600.0  # s: what another generator made stays that long, since its tests may still run
+KEPT = 3600.0  # s: models of another generator stay that long, because its tests may still run
 
 
 def model_folder(segments: int, links: int | None, **options) -> Path:
@@ -39,7 +39,7 @@ def folder_of(scene: Scene) -> Path:
     """Return the generated folder of a scene."""
     place = shelf() / digest(repr(scene))
     if not place.exists():
-        # One rename publishes the whole folder; who comes second throws his own away.
+        # One rename publishes the whole folder; the second process deletes its own.
         with TemporaryDirectory(dir=shelf(), prefix=".") as temporary:
             own = Path(temporary) / "made"
             generate(scene, own)
@@ -53,7 +53,7 @@ def folder_of(scene: Scene) -> Path:
 
 @cache
 def shelf() -> Path:
-    """Return the folder of all that this generator makes, and delete those of earlier ones."""
+    """Return the folder of all models of this generator, and delete those of earlier ones."""
     sources = Path(serpentail_codegen.__file__).parent
     texts = [
         (str(path.relative_to(sources)), digest(path.read_text()))

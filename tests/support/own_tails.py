@@ -1,4 +1,4 @@
-"""Tails whose segments and links differ: their scenes, and the same as sets of bodies."""
+"""Tails whose segments and links differ: their scenes, and the same tails as sets of bodies."""
 
 from pathlib import Path
 from typing import Any
@@ -42,7 +42,7 @@ LINK_BODIES = (
     [Link(1e-4, 0.01, 0.005, (2e-9, 1e-9, 2e-9))] * 2,
 )
 ARC_BODIES = (Arc(1.5e-3, 0.06, 3), Arc(1.1e-3, 0.09, 3))
-# links and arcs in turn, so that the numbers of each kind are no numbers of segments
+# links and arcs alternate, so that the numbers of each kind differ from those of segments
 BOTH = [
     {"kind": "continuum", **ARCS[0]},
     {"kind": "articulated", **LINKS[1]},
@@ -75,7 +75,7 @@ def folder_of_tables(tables: dict[str, Any], parameters: dict[str, Any], **keys:
 
 
 def states(nq: int, count: int = 2):
-    """Yield q, v, v_dot and torques, which bend the tail by much."""
+    """Yield q, v, v_dot and torques, with strong bends of the tail."""
     rng = np.random.default_rng(19)
     nv = nq - 1
     for _ in range(count):

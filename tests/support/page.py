@@ -1,4 +1,4 @@
-"""What the data of a page say, and a word for tests that need the page."""
+"""Reads the data of a page, and skips tests if the page is missing."""
 
 import base64
 import gzip
@@ -15,13 +15,13 @@ from serpentail.viewer import view
 
 
 def need_page() -> None:
-    """ToolchainMissing where the page was not built."""
+    """Raise ToolchainMissing if the page was not built."""
     if not view.PAGE.exists():
         raise ToolchainMissing("the page of runs was not built; install Node.js 18, `make setup`")
 
 
 def need(check) -> None:
-    """Skip a test that lacks something, saying what; in CI it fails."""
+    """Skip a test if something is missing, with the reason; in CI it fails."""
     try:
         check()
     except ToolchainMissing as error:

@@ -1,4 +1,4 @@
-"""Plans that are posed and checked, and not searched for."""
+"""Planning problems that are checked, but not solved."""
 
 from unittest.mock import patch
 

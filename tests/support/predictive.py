@@ -1,5 +1,6 @@
-"""The program of a predictive controller's tick in CasADi, which shares the model's functions of
-CasADi with the controller, and nothing else.
+"""The program of a predictive controller's tick in CasADi.
+
+It shares with the controller only the model's functions of CasADi.
 """
 
 import casadi as ca
@@ -22,7 +23,9 @@ def plan_of(seed: int = 0, **settings) -> st.Plan:
 
 
 def airborne(model: st.Model):
-    """(x, tau, h) -> (x_dot, omega): omega carries what the tail leaves of h."""
+    """Return the function (x, tau, h) -> (x_dot, omega); omega carries the part of h that the tail
+    does not.
+    """
     nt = model.layout.nt
     x, tau, h = ca.SX.sym("x", 4 + 2 * nt), ca.SX.sym("tau", nt), ca.SX.sym("h", 3)
     c, tail, rate = ca.vertsplit(x, [0, 4, 4 + nt, 4 + 2 * nt])
@@ -107,7 +110,7 @@ class Reference:
         return ca.vertcat(*rows)
 
     def bounds(self):
-        """Of the correction: torques keep theirs at all ends of steps."""
+        """Return bounds of the correction: torques keep their bounds at all ends of steps."""
         parts = np.arange(self.steps + 1) / self.steps
         rows = [
             np.concatenate(

@@ -1,4 +1,4 @@
-"""Programs that are run and unrolled, and the outputs of both."""
+"""Runs programs interpreted and unrolled, and returns the outputs of both."""
 
 from serpentail_codegen.ir.interpret import Run, unroll
 from serpentail_codegen.ir.tape import replay

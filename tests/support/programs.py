@@ -1,5 +1,5 @@
-"""Small loop nests for tests, all of exact arithmetic, and what checks them: dual numbers, and runs
-of few lanes.
+"""Small loop nests for tests, all of exact arithmetic, and two checks of them: dual numbers, and
+runs of few lanes.
 """
 
 import random
@@ -48,12 +48,12 @@ DUALS = Numbers(SimpleNamespace(sin=None, cos=None, sqrt=None), Dual)
 
 
 class Narrow(Run):
-    """A run that computes no lane beyond those that a step is told to; what was never computed is
-    not a number.
+    """A run that computes only the lanes that a step is told to; a lane that was never computed is
+    NaN.
     """
 
     def apply(self, call, at):
-        """Run a step, then take back the lanes that are not its own."""
+        """Run a step, then undo the lanes that are not its own."""
         wide = [ref for ref in call.writes if ref.lanes and call.columns is not None]
         before = [self.read(ref, at) for ref in wide]
         super().apply(call, at)
@@ -128,7 +128,7 @@ def built(count=3):
 
 
 def carry(downward=False):
-    """A state overwritten in every iteration, kept as it goes by; the sum of all."""
+    """A state that is overwritten in every iteration, whose values are kept; the sum of all."""
     b, mass, x, y, u, w = built()
     s = b.array("s", 1)
     b.copy(s[0], mass[0])
@@ -157,7 +157,7 @@ def accumulators():
 
 
 def temporaries():
-    """A temporary that starts anew in every iteration and is squared and doubled in place."""
+    """A temporary that starts again in every iteration and is squared and doubled in place."""
     b, mass, x, y, u, w = built()
     t = b.array("t", 1)
     b.fill(w[0], 0)
@@ -236,7 +236,7 @@ def outputs_read():
 
 
 def guarded():
-    """A guard, a step without active inputs, and what no output needs."""
+    """A guard, a step without active inputs, and statements that no output needs."""
     b, mass, x, y, u, w = built()
     t, dead = b.array("t", 1), b.array("dead", 1, 3)
     with b.loop("i", 3) as i:

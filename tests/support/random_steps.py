@@ -34,7 +34,7 @@ def grow(rng, operations=(*UNARY, *BINARY, *BINARY, *TERNARY), length=30):
         (a, x), (b, y) = operand(rng, tape, pool), operand(rng, tape, pool)
         if rng.random() < 0.15:
             b, y = a, x
-        if op == "sqrt":  # of what is positive whatever its operand
+        if op == "sqrt":  # of a node that is positive for every operand
             a, x = tape.add(tape.mul(a, a), tape.const(1)), x * x + 1
         if op == "div":
             b, y = tape.add(tape.mul(b, b), tape.const(2)), y * y + 2
@@ -50,7 +50,7 @@ def grow(rng, operations=(*UNARY, *BINARY, *BINARY, *TERNARY), length=30):
 
 
 def operand(rng, tape, pool):
-    """A constant, or something recorded before, the later the likelier."""
+    """Return a constant, or an earlier node; later ones are more likely."""
     if rng.random() < 0.15:
         value = rng.choice(CONSTANTS)
         return tape.const(value), sympy.Rational(value)
@@ -74,7 +74,7 @@ def random_step(seed, **options):
 
 
 def point(seed, exact=False):
-    """A value for every symbol, and a weight or direction for everything that needs one."""
+    """Return a value for every symbol, and a weight or direction for everything that needs one."""
     rng = random.Random(1000 + seed)
 
     def number():

@@ -1,4 +1,4 @@
-"""The scenes of the checkout, and the shortest scene file that is right."""
+"""The scenes of the checkout, and the shortest valid scene file."""
 
 from pathlib import Path
 

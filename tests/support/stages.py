@@ -33,7 +33,7 @@ class Stage(ctypes.Structure):
 
 
 class Head(ctypes.Structure):
-    """What ``Program`` of native/program.h begins with."""
+    """The first members of ``Program`` in native/program.h."""
 
     _fields_ = (("task", ctypes.c_void_p), ("stages", ctypes.POINTER(Stage)))
 
@@ -75,7 +75,7 @@ class OneStage:
         self.size = self.stage.variables
 
     def values(self, v):
-        """The results (r,) at v, None where there are none."""
+        """Return the results (r,) at v, or None if there are none."""
         v = np.ascontiguousarray(v)
         if self.code.stage_values(self.address, v.ctypes.data):
             return None

@@ -1,4 +1,4 @@
-"""Functions that sweeps run in tests, and a program that makes a sweep and can be killed."""
+"""Functions that sweeps run in tests, and a program that runs a sweep and can be killed."""
 
 import ctypes
 import os
@@ -47,7 +47,7 @@ def fly(model, point):
 
 
 def main(folder, executor, pause):
-    """Make the troubled sweep, and print how far it is."""
+    """Run the troubled sweep, and print its progress."""
     run = partial(troubled, pause, str(folder / "log"))
     over = {"number_of": st.grid(range(POINTS))}
     found = st.sweep(None, over, run, store=folder / "s.db", limit=1.0, executor=executor)

@@ -19,7 +19,7 @@ PARTS, TAKES = 8, 0.15  # s a part
 
 
 def square(number: int, folder: Path) -> dict:
-    """Take a while, and tell of it."""
+    """Take some time, and report it."""
     time.sleep(TAKES)
     with open(folder / "ended", "a") as file:
         file.write(f"{number} {os.getpid()}\n")
@@ -32,12 +32,12 @@ def parts(folder: Path) -> dict[str, Part]:
 
 
 def ones() -> list:
-    """Take no time."""
+    """Return at once."""
     return [1]
 
 
 def lost() -> dict:
-    """Return what is no number."""
+    """Return NaN."""
     return {"lost": float("nan")}
 
 
@@ -47,7 +47,7 @@ def wrong() -> list:
 
 
 def endless(folder: Path) -> None:
-    """Plan for ever, by a search that does not end."""
+    """Plan forever, by a search that does not end."""
     from tests.support.tumbling import AGAIN, rat, start
 
     (folder / "ready").touch()
@@ -57,12 +57,12 @@ def endless(folder: Path) -> None:
 
 
 def plans_without_end(folder: Path) -> dict[str, Part]:
-    """Return a part that is made, and one that never is."""
+    """Return a part that ends, and one that does not."""
     return {"first": Part(ones, {}), "second": Part(partial(endless, folder), {})}
 
 
 def titles(store: Path) -> list[str]:
-    """Return the parts that a store has."""
+    """Return the titles of the parts that a store has."""
     if not store.exists():
         return []
     base = sqlite3.connect(f"file:{store}?mode=ro", uri=True, timeout=10)
@@ -75,7 +75,7 @@ def titles(store: Path) -> list[str]:
 
 
 def main(folder: Path) -> None:
-    """Make what is missing, and print the results."""
+    """Make the missing parts, and print the results."""
     print(sorted(made("tiny", folder / "parts", parts(folder)).items()))
 
 

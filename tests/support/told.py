@@ -1,4 +1,4 @@
-"""What a command says on stderr, besides how far it is."""
+"""The messages of a command on stderr, without its progress."""
 
 import re
 
@@ -8,5 +8,5 @@ PROGRESS = re.compile(
 
 
 def besides_progress(words):
-    """Return what was said without the lines about long work."""
+    """Return the text without the lines about long work."""
     return PROGRESS.sub("", words)

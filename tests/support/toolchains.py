@@ -1,5 +1,5 @@
-"""Cross compilers, emulators and analysers for tests: without them a test is skipped, in CI it
-fails.
+"""Cross compilers, emulators and analysers for tests: a test without its tool is skipped, and fails
+in CI.
 """
 
 import os
@@ -14,7 +14,7 @@ from embedded.boards import BOARDS, ToolchainMissing
 
 
 def _required(need: Callable[[], None]) -> None:
-    """Skip a test whose tools are missing, saying how to get them; in CI it fails."""
+    """Skip a test if its tools are missing, with the way to get them; in CI it fails."""
     try:
         need()
     except ToolchainMissing as error:

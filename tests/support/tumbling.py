@@ -25,7 +25,7 @@ AGAIN = {
 
 @cache
 def rat(segments: int = 1, links: int | None = 3, exact: bool = True) -> st.Model:
-    """Return a model; without its exact second derivatives, plans take its SX functions."""
+    """Return a model; without its exact second derivatives, plans use its SX functions."""
     functions = (
         [*NODE, *FUNCTIONS]
         if exact
@@ -35,8 +35,8 @@ def rat(segments: int = 1, links: int | None = 3, exact: bool = True) -> st.Mode
 
 
 def start(model: st.Model, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
-    """Return q0, v0 of a rat that was thrown up, pitched by a quarter turn or less, and turns about
-    all axes.
+    """Return q0, v0 of a rat thrown up, pitched by a quarter turn or less, and turning about all
+    axes.
     """
     random = np.random.default_rng(seed)
     q, v = np.zeros(model.nq), np.zeros(model.nv)
@@ -50,7 +50,7 @@ def start(model: st.Model, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
 
 @cache
 def planned(**settings) -> st.Plan:
-    """Return a plan for the first start, made once a process."""
+    """Return a plan for the first start, made once in a process."""
     model = rat()
     bounds = st.Bounds(angle=np.pi / 3)
     return st.plan(
@@ -59,7 +59,7 @@ def planned(**settings) -> st.Plan:
 
 
 def rate(model, plan):
-    """y -> y_dot of (q, v) under the plan's torques, by NumPy."""
+    """Return y -> y_dot of (q, v) under the plan's torques, by NumPy."""
 
     def y_dot(t, y):
         q, v = y[: model.nq], y[model.nq :]

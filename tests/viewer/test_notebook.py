@@ -91,6 +91,21 @@ def test_a_plan_shows_what_it_does_in_truth(tmp_path):
     assert "which has no model" in Output(without._repr_html_()).words
 
 
+def test_several_motions_are_shown_without_a_file(flight, kick, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    both = st.view([flight, flight], None, names=["one", "other"])
+    output = Output(both._repr_html_())
+    assert list(tmp_path.iterdir()) == [] and output.words == "" and len(repr(both)) < 80
+    page = st.view([flight, flight], "both.html", names=["one", "other"])
+    assert output.frame["srcdoc"] == page.read_text(encoding="utf-8")
+    assert output.frame["sandbox"] == "allow-scripts"
+    short = tmp_path / "short.html"
+    short.write_text(Output(st.view(kick, None)._repr_html_()).frame["srcdoc"], encoding="utf-8")
+    assert [run["rows"] for run in data_of(short)["runs"]] == [401]  # every third of 1201
+    with pytest.raises(st.ViewError, match="names"):
+        st.view([flight, flight], None, names=["one"])
+
+
 def test_without_a_page_a_line_says_why(flight, monkeypatch, tmp_path):
     loaded = st.Trajectory.load(flight.save(tmp_path / "flight.npz"))
     silent = flown(model_of(1, 2, ("energy", "momentum", "rollout")))

@@ -29,7 +29,7 @@ Bound = Callable[[tuple[Loop, ...]], Index | None]
 
 
 def all_lanes(loops: tuple[Loop, ...]) -> None:
-    """Set no bound: every lane is needed, whatever the loops are."""
+    """Set no bound: every lane is needed in all loops."""
 
 
 def tangent_program(
@@ -44,7 +44,7 @@ def tangent_program(
     ``lanes`` is the number of directions, 0 for one direction in narrow scalars; ``bound`` tells
     how many of the lanes are needed inside given loops.  ``kept`` outputs are given, too.
     """
-    # every array that depends on the active ones has tangents, or its angles have
+    # every array that depends on the active ones has tangents, or its angles do
     moving = forward_slice(program.body, active)
     by_angles = {
         name: array for name, array in sines_and_cosines_arrays(program).items() if name in moving
@@ -69,7 +69,7 @@ def tangent_program(
 
 
 def _role(array: Array) -> str:
-    """Return the role of an array's tangents: those of parameters are inputs."""
+    """Return the role of an array's tangents; the tangents of parameters are inputs."""
     return "input" if array.role == "parameters" else array.role
 
 

@@ -29,7 +29,8 @@ from .angles import SinesAndCosinesArray, angle_inputs, kinds, sines_and_cosines
 from .step import adjoint
 
 Loops = tuple[Loop, ...]
-BothWays = tuple[list[Statement], list[Statement]]  # what runs forward, and what runs backward
+# the statements that run forward, and those that run backward
+BothWays = tuple[list[Statement], list[Statement]]
 
 
 def adjoint_program(program: Program, wanted: Collection[str], given: Collection[str]) -> Program:
@@ -86,7 +87,7 @@ def iterations(loops: Loops) -> tuple[Index, int]:
 
 
 def _apart(ref: Ref, loops: tuple[Loop | When, ...]) -> bool:
-    """Tell if a reference means another place in every iteration of the loops."""
+    """Tell if a reference means a different place in every iteration of the loops."""
     strides = {var: abs(factor) for var, factor in ref.offset.terms}
     span = ref.size * ref.stride  # of the places meant in all iterations of the inner loops
     rectangles = [loop for loop in loops if isinstance(loop, Loop)]

@@ -1,4 +1,6 @@
-"""All functions that can be emitted: every signature with its assembly, in the table's order."""
+"""All functions that can be emitted: each signature with its assembly, in the order of the
+table.
+"""
 
 from ..scene.signatures.table import SIGNATURES
 from . import contact, fixed_base, pfl
@@ -18,12 +20,12 @@ _FOUND = FUNCTIONS | signed(
     | implicit.ASSEMBLIES
     | airborne.ASSEMBLIES
 )
-# A signature without outputs stands for others: nothing is assembled for it.
+# A signature without outputs stands for other functions and has no assembly of its own.
 CATALOGUE = {name: _FOUND[name] for name, s in SIGNATURES.items() if s.outputs}
 
 
 def function_of(name: str, tail: Tail) -> Function:
-    """Return a function of a tail, with the arguments that it has there."""
+    """Return a function of a tail, with the arguments that it has for that tail."""
     return (fixed_base.FUNCTIONS if tail.shape.fixed else CATALOGUE)[name].of(tail)
 
 

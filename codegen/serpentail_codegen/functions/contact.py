@@ -1,4 +1,4 @@
-"""Functions of the points that touch the ground: their places, motion and forces."""
+"""Functions of the points that can touch the ground: their positions, motion and forces."""
 
 from dataclasses import dataclass
 
@@ -18,8 +18,8 @@ from .tails.mechanism import Segments
 
 @dataclass(frozen=True)
 class Points:
-    """Arms and velocities of all points; where each group begins; columns of the tail's joints, one
-    for a point; how fast the feet's points drift in the torso.
+    """Arms and velocities of all points, the first point of each group, columns of the tail's
+    joints (one for each point), and the drift rates of the feet's points in the torso.
     """
 
     arms: Array
@@ -59,9 +59,9 @@ def first_points(tail: Tail) -> dict[str, int]:
 def gather_points(
     draft: Draft, state: State, R: Ref, arrays: dict[str, Array], segments: Segments | None = None
 ) -> Points:
-    """All points that can touch the ground: feet, then tail, then the torso's lowest.
+    """Compute all points that can touch the ground: feet, then tail, then the lowest of the torso.
 
-    ``segments`` describes the tail's pieces, if something else has asked for them before.
+    ``segments`` describes the pieces of the tail, if another function has prepared them before.
     """
     tail, torso = draft.tail, state.torso(R)
     S = draft.array("S_point", 12, tail.total) if "tail" in tail.contacts else None
@@ -99,10 +99,10 @@ def place_feet(draft: Draft, torso: Torso, points: Points, angles: Array) -> Non
 
 
 def place_tail(draft: Draft, torso: Torso, samples: Segments, points: Points) -> None:
-    """The tail's points but the first: that one is the mount, a point of the torso and inside
-    it.
+    """Compute the tail's points but the first, which is the mount: a point of the torso,
+    inside it.
     """
-    # fixed samples of an arc, not its one lowest point (Eqs. 38, 39), which jumps from end to end
+    # fixed samples of an arc, because its lowest point (Eqs. 38, 39) jumps from end to end
     S = points.columns
     pose = torso_pose(draft, torso.R, name="point")
     twist = draft.store(contact.torso_twist, torso, turn=3, slide=3)
@@ -194,7 +194,9 @@ def contact_load(
 
 
 def balance_powers(draft: Draft, torso: Torso, points: Points, arrays: dict[str, Array]) -> None:
-    """Heights of all points; the power of the ground on them, and that of the legs' drives."""
+    """Heights of all points, the power of the ground on them, and the power of the drives of the
+    legs.
+    """
     powers = arrays["powers"]
     draft.fill(powers.part(0, 2), 0)
     with draft.loop("k", draft.tail.points) as k:

@@ -1,4 +1,6 @@
-"""A function being assembled: a builder that knows the tail, and checks what each step reads."""
+"""A function that is being assembled: a builder that knows the tail, and checks the inputs of each
+step.
+"""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -19,16 +21,19 @@ Reads = Scope | Mapping[str, Ref]
 
 @dataclass(kw_only=True)
 class Draft(Builder):
-    """A function being assembled: the builder, the tail's sizes, and the model's parameters.
+    """A function that is being assembled: the builder, the sizes of the tail, and the parameters of
+    the model.
 
-    ``dynamics`` of an articulated tail: "composite", H column by column; "lanes", its columns are
-    lanes; "segments", v_dot comes about without H where nothing else is asked for.
+    ``dynamics`` of an articulated tail: "composite" forms H column by column; "lanes" computes its
+    columns in lanes; "segments" computes v_dot without H if no other result needs H.
     """
 
     tail: Tail
     dynamics: str = "composite"
     parameters: Mapping[str, Ref] = field(default_factory=dict, init=False)
-    stretch: Stretch | None = field(default=None, init=False)  # whose segments a loop is over
+    stretch: Stretch | None = field(
+        default=None, init=False
+    )  # the stretch whose segments the open loop is over
 
     def declare_parameters(self, parameters: Iterable[Parameter]) -> None:
         """Declare the parameter struct: steps find its numbers by their names."""
@@ -36,14 +41,14 @@ class Draft(Builder):
         self.parameters = MappingProxyType(refs)
 
     def entry(self, name: str, k: Index, size: int) -> Ref:
-        """Return the numbers of piece k of a parameter that has some for each piece."""
+        """Return the numbers of piece k, for a parameter with numbers for each piece."""
         return self.parameters[name].array.part(size * k, size)
 
     def step(self, function: Callable[..., dict] | Step, *reads: Reads, **writes: Ref) -> None:
         """Apply a step, or the one derived from a function of mechanics.
 
-        Parameters are found by their names, all else is passed: from a scope the step takes what
-        it declares, from a plain dictionary it must read everything.
+        Parameters are found by their names, all other inputs are passed. From a scope the step
+        takes the vectors that it declares; from a plain dictionary it must read all.
         """
         step = function if isinstance(function, Step) else derive(function)
         if self.tail.shape.weightless and ("gravity", 1) in step.inputs:
@@ -51,7 +56,7 @@ class Draft(Builder):
         declared = set(dict(step.inputs) if function is step else declared_shapes(function))
         refs = self._refs(step.name, declared, reads)
 
-        # of what the step declares, its unwanted outputs may need some that is not there
+        # a declared input may be missing if only unwanted outputs need it
         wanted = narrowed(step, {name.rstrip("_") for name in writes})
         for name, _ in wanted.inputs:
             if name not in refs:
@@ -65,7 +70,9 @@ class Draft(Builder):
         self.apply(step, refs, **writes)
 
     def _refs(self, step: str, declared: set[str], reads: Iterable[Reads]) -> dict[str, Ref]:
-        """Return what a step reads by name; refuse unknown names, parameters' and double ones."""
+        """Return what a step reads by name; refuse names that are unknown, given twice or those of
+        parameters.
+        """
         refs: dict[str, Ref] = {}
         for source in reads:
             instead = isinstance(source, Instead)
@@ -101,7 +108,7 @@ class Draft(Builder):
         return Vectors({name: self.vector(name, size) for name, size in sizes.items()})
 
     def scratch(self, **sizes: int) -> Vectors:
-        """Return local vectors that each stretch of segments uses anew; they are declared once."""
+        """Return local vectors that each stretch of segments uses again; they are declared once."""
         found = {a.name: a[0] for a in self.arrays if a.name in sizes and a.role == "local"}
         return Vectors({n: found.get(n) or self.vector(n, size) for n, size in sizes.items()})
 

@@ -41,7 +41,7 @@ def fill_mass_matrix(
     along = R if world else None
     segments, composite = tail_inertia(draft, state, H_tail, columns, along)
 
-    # with columns in world axes all is there: nothing else has to be turned
+    # columns in world axes need no further rotation
     axes = {"R": R}
     if world:
         inertia = composite.only("h", "I")
@@ -86,7 +86,9 @@ def assemble_inverse_dynamics(draft: Draft, arrays: dict[str, Array], world: boo
 def inertial_forces(
     draft: Draft, segments: Segments, motion: Motion, v_dot: Array | None, force: Array
 ) -> None:
-    """Generalised forces of a motion of the torso and ``v_dot`` of the tail, in torso axes."""
+    """Compute the generalised forces of a motion of the torso and ``v_dot`` of the tail, in torso
+    axes.
+    """
     wrenches = forward_wrenches(draft, segments, motion, v_dot)
     total = gather_wrenches(draft, segments, wrenches, lambda i: segment_v(force, i))
     torso_wrench(draft, motion, total, force)
@@ -106,7 +108,7 @@ def assemble_forward_dynamics(draft: Draft, arrays: dict[str, Array]) -> Factore
 
 
 def assemble_acceleration(draft: Draft, arrays: dict[str, Array]) -> None:
-    """v_dot alone: H is not formed where the draft goes by segments."""
+    """v_dot alone: H is not formed if the draft goes by segments."""
     if draft.dynamics != "segments":
         assemble_forward_dynamics(draft, arrays)
         return
@@ -117,7 +119,7 @@ def assemble_acceleration(draft: Draft, arrays: dict[str, Array]) -> None:
 def accelerate_by_segments(
     draft: Draft, arrays: dict[str, Array], applied: Vectors, torques: Array
 ) -> None:
-    """v_dot from ``load_force, load_moment`` at B in torso axes and torques."""
+    """Compute v_dot from ``load_force, load_moment`` at B in torso axes and torques."""
     load = draft.array("load_at_torso", 6)
     for k, name in enumerate(("load_force", "load_moment")):
         draft.copy(load.part(3 * k, 3), applied[name])
@@ -133,8 +135,8 @@ def assemble_segment_dynamics(draft: Draft, arrays: dict[str, Array]) -> None:
 
 
 def applied_load(draft: Draft, arrays: dict[str, Array], R: Ref) -> tuple[Vectors, Array]:
-    """Return ``load_force, load_moment`` from outside, at B in torso axes, and the torques of
-    actuators and loads together, less those of the passive tail.
+    """Return ``load_force, load_moment`` of external loads at B in torso axes, and the torques of
+    actuators and loads minus those of the passive tail.
     """
     tau = net_torques(draft, State(arrays["q"], arrays["v"]), arrays["tau"])
     if "f_ext" not in arrays:
@@ -146,7 +148,7 @@ def applied_load(draft: Draft, arrays: dict[str, Array], R: Ref) -> tuple[Vector
 
 
 def copied_torques(draft: Draft, tau: Array) -> Array:
-    """Return a copy of torques, for others to be added."""
+    """Return a copy of torques, to which others can be added."""
     torques = draft.array("applied", draft.tail.nt)
     with draft.loop("k", draft.tail.nt) as k:
         draft.copy(torques.part(k, 1), tau.part(k, 1))
@@ -157,7 +159,7 @@ def copied_torques(draft: Draft, tau: Array) -> Array:
 
 
 def assemble_momentum(draft: Draft, arrays: dict[str, Array]) -> None:
-    """Momentum, and angular momentum about the COM; the sweep sees the motion relative to B."""
+    """Momentum, and angular momentum about the COM; the sweep uses the motion relative to B."""
     state = State(arrays["q"], arrays["v"])
     unmoved = draft.fixed("still", [0, 0, 0])
     R = attitude(draft, state)

@@ -1,4 +1,4 @@
-"""H with translation eliminated, factored: what every function solves with that needs v_dot."""
+"""H with translation eliminated, factored: all functions that need v_dot solve with it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from .sweeps.wrenches import core_bias
 
 
 def assemble_factored_dynamics(draft: Draft, arrays: dict[str, Array]) -> None:
-    """What H v_dot + C = loads is solved with: H without translation, factored, and C without
+    """The factors for H v_dot + C = loads: H without translation, factored, and C without
     gravity.
     """
     tail, A, bias = draft.tail, arrays["A"], arrays["bias"]
@@ -80,11 +80,11 @@ FACTORED_DYNAMICS = Function(
 
 @dataclass(frozen=True)
 class Loads:
-    """What accelerates the animal: ``load_force, load_moment`` minus ``force, moment`` at B in
-    torso axes, and torques.
+    """The loads that accelerate the animal: ``load_force, load_moment`` minus ``force, moment`` at
+    B in torso axes, and torques.
 
-    ``inertial(k)`` is taken from the torque ``tau(k)``; None stands for zero.  ``gravity`` is the
-    parameter's, or what stands for it.
+    ``inertial(k)`` is subtracted from the torque ``tau(k)``; None stands for zero. ``gravity`` is
+    the parameter, or a vector in its place.
     """
 
     at_torso: Scope
@@ -95,8 +95,8 @@ class Loads:
 
 @dataclass(frozen=True)
 class FactoredDynamics:
-    """H with translation eliminated, factored, the tail's momentum columns, and ``R``,
-    ``inverse_mass``, ``com``, ``h``: all that solving H x = loads needs.
+    """H with translation eliminated, factored, the momentum columns of the tail, and ``R``,
+    ``inverse_mass``, ``com``, ``h``: everything that is needed to solve H x = loads.
     """
 
     A: Array

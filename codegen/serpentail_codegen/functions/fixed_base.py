@@ -1,7 +1,7 @@
 """Functions of a tail on a base that never moves: q, v and all forces are those of the tail alone.
 
-The torso is at rest, B at the world's origin with the world's axes; of its mass, its motion and the
-momentum of the whole nothing is computed.
+The torso is at rest, with B at the world's origin and along the world's axes. Its mass, its motion
+and the momentum of the whole animal are not computed.
 """
 
 from dataclasses import replace
@@ -33,21 +33,21 @@ from .tails.mechanism import Segments, Wrenches
 
 MEANINGS = {
     "q": "tail coordinates (rad)",
-    "v": "their rates (rad/s)",
-    "v_dot": "their accelerations (rad/s^2)",
-    "force": "forces on the tail coordinates (N m)",
-    "linear": "momentum of the tail (kg m/s, world)",
+    "v": "rates of the tail coordinates (rad/s)",
+    "v_dot": "accelerations of the tail coordinates (rad/s^2)",
+    "force": "generalised forces on the tail coordinates (N m)",
+    "linear": "linear momentum of the tail (kg m/s, world)",
     "angular": "angular momentum of the tail about its own centre of mass (kg m^2/s, world)",
     "r_q": "right-hand side for q",
-    "k_q": "solution",
+    "k_q": "solution for q",
 }
 
 
-# ---- the whole from the tail ---------------------------------------------------------------------
+# ---- the whole animal from the tail --------------------------------------------------------------
 
 
 def whole_v(draft: Draft, tail: Array) -> Array:
-    """Return rates, or accelerations, of the whole: the torso's are zero."""
+    """Return rates, or accelerations, of the whole animal: those of the torso are zero."""
     whole = draft.array(f"{tail.name}_whole", TORSO_NV + draft.tail.nt)
     draft.fill(whole.part(0, TORSO_NV), 0)
     draft.copy(whole.part(TORSO_NV, draft.tail.nt), tail.part(0, draft.tail.nt))
@@ -55,7 +55,7 @@ def whole_v(draft: Draft, tail: Array) -> Array:
 
 
 def whole_state(draft: Draft, arrays: dict[str, Array]) -> State:
-    """Return the state of the whole, its torso at rest at the origin."""
+    """Return the state of the whole animal, with the torso at rest at the origin."""
     q = draft.array("q_whole", TORSO_NQ + draft.tail.nt)
     draft.fill(block(q, POSITION), 0)
     draft.fill(block(q, QUATERNION), 1, 0, 0, 0)
@@ -77,7 +77,7 @@ def fill_inertia(draft: Draft, state: State, H: Array, row: int) -> Segments:
 
 
 def fill_forces(draft: Draft, segments: Segments, v_dot: Array | None, force: Array) -> None:
-    """Fill H v_dot + C of the tail, or C, with what its passive parts ask for."""
+    """Fill H v_dot + C of the tail, or C, including the forces of its passive parts."""
     zero = draft.zero(3)
     motion = Motion(zero, zero, draft.store(resting.resting_acceleration, a=3)["a"])
     wrenches = forward_wrenches(draft, segments, motion, v_dot)
@@ -118,7 +118,7 @@ def accelerate(draft: Draft, arrays: dict[str, Array]) -> Array:
 
 
 def subtract(draft: Draft, tau: Array | None, force: Array, rest: Array) -> None:
-    """Store torques minus forces, in all lanes; tau None is zero."""
+    """Store torques minus forces, in all lanes; tau None stands for zero."""
     with draft.loop("k", draft.tail.nt) as k:
         torque = tau.part(k, 1) if tau else draft.zero(1)
         reads = {"tau": torque, "inertial": force.part(k, 1)}
@@ -129,9 +129,9 @@ def subtract(draft: Draft, tau: Array | None, force: Array, rest: Array) -> None
 
 
 def assemble_pfl(draft: Draft, arrays: dict[str, Array]) -> None:
-    """Torques H v_dot + C: on a base that holds still they give exactly the wanted v_dot.
+    """Torques H v_dot + C: on a fixed base they give exactly the wanted v_dot.
 
-    With ``v_dot`` among the arguments it is these accelerations.
+    If ``v_dot`` is among the arguments, it is these accelerations.
     """
     segments = mechanism(draft).prepare(draft, whole_state(draft, arrays), False)
     fill_forces(draft, segments, whole_v(draft, arrays["accelerations"]), arrays["tau"])
@@ -152,7 +152,7 @@ def resting_inertia(
 
 
 def resting_root(draft: Draft) -> Vectors:
-    """Return velocities to be carried along the tail, from a root at rest."""
+    """Return velocities of a root at rest, to be carried along the tail."""
     velocity = draft.vectors(w=3, u=3)
     for ref in velocity.named.values():
         draft.fill(ref, 0)

@@ -15,7 +15,7 @@ Assembly = Callable[[Draft, dict[str, Array]], object]
 
 @dataclass(frozen=True)
 class Function:
-    """A function of a model, or one that others call: name, arguments, and how to assemble it."""
+    """A function of a model, or one that other functions call: name, arguments, and assembly."""
 
     name: str
     doc: str
@@ -24,7 +24,7 @@ class Function:
     assemble: Assembly
 
     def of(self, tail: Tail) -> "Function":
-        """Return this function with the arguments that a tail has: those of a length."""
+        """Return this function with those of its arguments that are not empty for this tail."""
         inputs = tuple(a for a in self.inputs if a.length(tail))
         outputs = tuple(a for a in self.outputs if a.length(tail))
         return replace(self, inputs=inputs, outputs=outputs)
@@ -41,14 +41,14 @@ def signed(assemblies: Mapping[str, Assembly]) -> dict[str, Function]:
 
 @cache
 def assemble(function: Function, tail: Tail, dynamics: str = "composite") -> Program:
-    """Assemble one function for given sizes; other ``dynamics`` where vectors hold several numbers
-    and tails are long.
+    """Assemble one function for given sizes.
 
-    What they do not apply to is the same in all.
+    ``dynamics`` chooses another algorithm for long tails where vectors hold several numbers;
+    functions that it does not apply to stay the same.
     """
     dynamics = dynamics if tail.kind == "articulated" else "composite"
     if dynamics == "segments" and not tail.uniform:
-        dynamics = "lanes"  # what goes by segments takes as many, and equal, links in each
+        dynamics = "lanes"  # dynamics by segments needs equal segments of equal links
     draft = Draft(function.name, function.doc, tail=tail, dynamics=dynamics)
     # parameters first, then arguments: the program keeps the order of its arrays
     draft.declare_parameters(struct_parameters(tail))

@@ -29,8 +29,9 @@ def assemble_tail_points(draft: Draft, arrays: dict[str, Array]) -> None:
 
 
 def assemble_tail_point_jacobians(draft: Draft, arrays: dict[str, Array]) -> None:
-    """d(point)/dt = J v for every tail point (Eqs. A5 to A8); arms start at B, so distance from the
-    origin costs no accuracy.
+    """d(point)/dt = J v for every tail point (Eqs. A5 to A8).
+
+    Arms start at B, so that distance from the origin costs no accuracy.
     """
     J, tail, state = arrays["J"], draft.tail, State(arrays["q"])
     R = attitude(draft, state)
@@ -66,8 +67,8 @@ def assemble_tail_point_jacobians(draft: Draft, arrays: dict[str, Array]) -> Non
 
 
 def assemble_center_of_mass(draft: Draft, arrays: dict[str, Array]) -> None:
-    """Where the animal's centre of mass is, how fast it moves, and its Jacobian: momentum columns
-    over the mass.
+    """Position and velocity of the animal's centre of mass, and its Jacobian: momentum columns over
+    the mass.
     """
     tail, J, velocity = draft.tail, arrays["J"], arrays["velocity"][0]
     state = State(arrays["q"], arrays["v"])
@@ -79,7 +80,7 @@ def assemble_center_of_mass(draft: Draft, arrays: dict[str, Array]) -> None:
     forward_roots(draft, segments, torso_pose(draft), roots)
     composite = gather_inertia(draft, segments, roots, columns)
 
-    # the torso's motion, then what the tail's adds to it
+    # the motion of the torso, then the contribution of the tail
     rows = {f"J_{name}": J.part(axis * tail.nv, TORSO_NV) for axis, name in enumerate("xyz")}
     motion = {"position": arrays["position"][0], "velocity": velocity}
     mass = draft.vectors(inverse_mass=1)

@@ -1,6 +1,6 @@
-"""Where the numbers of q, v and tau lie: the generator's twin of serpentail.model.layout.
+"""The positions of numbers in q, v and tau; the runtime has the same in serpentail.model.layout.
 
-A velocity, its derivative and a generalised force have one layout, and so have the rows of H.
+A velocity, its derivative, a generalised force and a row of H have the same layout.
 """
 
 from dataclasses import dataclass
@@ -57,7 +57,7 @@ class Layout:
 
     @property
     def nt(self) -> int:
-        """Tail coordinates, and torques."""
+        """Number of tail coordinates and of torques, 2m for m segments."""
         return PER_SEGMENT * self.segments
 
     @property

@@ -1,6 +1,7 @@
-"""Springs, damping and stops of the tail's coordinates, where a scene has them.
+"""Springs, damping and stops of the tail's coordinates, if a scene has them.
 
-They act on the coordinates alone: their forces are added to H v_dot + C, or taken from the torques.
+They act only on the coordinates: their forces are added to H v_dot + C, or subtracted from the
+torques.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -26,14 +27,14 @@ SLOPES: dict[str, StepFunction] = {"spring": passive.spring_slope, "stops": pass
 
 
 def passive_parameters(draft: Draft, step: StepFunction, part: Callable[[Array], Ref]) -> Instead:
-    """Return the parameters that a step reads, of some coordinates alone."""
+    """Return the parameters that a step reads, for some coordinates only."""
     names = [name for name in draft.parameters if name in declared_shapes(step)]
     return Instead({name: part(draft.parameters[name].array) for name in names})
 
 
 @contextmanager
 def each_passive_force(draft: Draft, state: State) -> Iterator[tuple[Index, Ref]]:
-    """Open a loop over segments; yields the segment and what its passive parts ask for."""
+    """Open a loop over segments; yields the segment and the forces of its passive parts."""
     force = draft.vector("passive", 2)
     with draft.loop("i", draft.tail.segments) as i:
         draft.fill(force, 0)
@@ -50,14 +51,14 @@ def _add_forces(draft: Draft, state: State, i: Index, force: Ref) -> None:
 
 
 def add_passive_forces(draft: Draft, state: State, force: Callable[[Index], Ref]) -> None:
-    """Add what the passive parts ask for to the force on each segment."""
+    """Add the forces of the passive parts to the force on each segment."""
     if draft.tail.passive:
         with draft.loop("i", draft.tail.segments) as i:
             _add_forces(draft, state, i, force(i))
 
 
 def add_passive_power(draft: Draft, state: State, multiplier: Array, power: Ref) -> None:
-    """Add the power of what the passive parts ask for, when the tail moves with a multiplier."""
+    """Add the power of the passive parts, when the tail moves with a multiplier."""
     if draft.tail.passive:
         with each_passive_force(draft, state) as (i, passive_force):
             reads = {"passive": passive_force, "virtual_rates": segment_v(multiplier, i)}
@@ -65,7 +66,7 @@ def add_passive_power(draft: Draft, state: State, multiplier: Array, power: Ref)
 
 
 def net_torques(draft: Draft, state: State, tau: Array) -> Array:
-    """Return the torques less what the passive parts ask for: what is left for the dynamics."""
+    """Return the torques minus those of the passive parts: what is left for the dynamics."""
     if not draft.tail.passive:
         return tau
     net = draft.array("net_torques", draft.tail.nt)
@@ -78,8 +79,8 @@ def net_torques(draft: Draft, state: State, tau: Array) -> Array:
 def add_passive_slopes(
     draft: Draft, state: State, own: Mapping[str, Ref], slopes: Callable[[Index], Ref]
 ) -> None:
-    """Add how the passive parts of each segment follow its own ``angles`` and ``rates``, whose
-    directions are ``own``.
+    """Add the derivatives of each segment's passive parts by its own ``angles`` and ``rates``,
+    whose directions are ``own``.
     """
     for name in draft.tail.passive:
         function = FORCES[name]

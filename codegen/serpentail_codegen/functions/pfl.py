@@ -13,11 +13,12 @@ from .tails.mechanism import Segments
 
 
 def assemble_pfl(draft: Draft, arrays: dict[str, Array]) -> None:
-    """Torques of Eq. 46 without X: six rows of Eq. 1 give the torso's accelerations, the others
-    then the torques.
+    """Torques of Eq. 46 without X: six rows of Eq. 1 give the accelerations of the torso, the other
+    rows the torques.
 
-    In flight gravity moves torso and tail alike, and torques depend on neither place nor attitude.
-    With ``v_dot`` among the arguments it is all accelerations, which need no forward dynamics then.
+    In flight gravity accelerates torso and tail equally, and the torques depend neither on position
+    nor on attitude. If ``v_dot`` is among the arguments, it receives all accelerations, so that no
+    forward dynamics is needed.
     """
     tail, tau, state = draft.tail, arrays["tau"], State(arrays["q"], arrays["v"])
     v_dot = arrays.get("v_dot") or draft.array("v_dot", tail.nv)
@@ -28,7 +29,7 @@ def assemble_pfl(draft: Draft, arrays: dict[str, Array]) -> None:
     forward_roots(draft, segments, torso_pose(draft), roots)
     composite = gather_inertia(draft, segments, roots, columns)
 
-    # torques of a torso that does not accelerate, then how it does, and what that adds
+    # torques for a torso at rest, then the torso's acceleration, and the torques that it adds
     with draft.loop("k", tail.nt) as k:
         draft.copy(tail_v(v_dot, k), arrays["accelerations"].part(k, 1))
     wrench = tail_alone(draft, segments, v_dot, tau)
@@ -44,8 +45,8 @@ def assemble_pfl(draft: Draft, arrays: dict[str, Array]) -> None:
 
 
 def tail_alone(draft: Draft, segments: Segments, v_dot: Array, tau: Array) -> Vectors:
-    """``force, moment`` at B, and torques, of the tail that ``v_dot`` moves while the torso does
-    not accelerate.
+    """Compute ``force, moment`` at B and torques for ``v_dot`` of the tail while the torso does not
+    accelerate.
     """
     motion = Motion(segments.state.omega, draft.zero(3), draft.zero(3))
     wrenches = forward_wrenches(draft, segments, motion, v_dot)
@@ -54,8 +55,8 @@ def tail_alone(draft: Draft, segments: Segments, v_dot: Array, tau: Array) -> Ve
 
 
 def free_torso(draft: Draft, composite: Vectors, wrench: Vectors) -> Vectors:
-    """``w_dot`` and ``a`` of the torso that balance ``force, moment``: translation eliminated, then
-    LDL^T.
+    """Compute ``w_dot`` and ``a`` of the torso that balance ``force, moment``: translation
+    eliminated, then LDL^T.
     """
     A, w_dot = draft.array("A", padded(3), 3), draft.vectors(w_dot=3)
     unloaded = dict.fromkeys(["load_force", "load_moment"], draft.zero(3))

@@ -1,4 +1,4 @@
-"""The functions that derivatives are taken of: all of one state that no contact acts on."""
+"""The functions that derivatives are taken of: functions of one state without contact."""
 
 from . import dynamics, kinematics
 from .function import signed

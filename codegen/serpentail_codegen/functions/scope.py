@@ -1,6 +1,7 @@
 """Vectors that belong together, under the names by which steps read them.
 
-A sweep hands scopes on instead of single vectors; a step takes from a scope what it declares.
+A sweep passes scopes instead of single vectors; a step takes from a scope the vectors that it
+declares.
 """
 
 from collections.abc import Iterable, Mapping
@@ -41,7 +42,7 @@ class Vectors(Scope):
 
 
 class Instead(Vectors):
-    """Vectors that stand for the parameters of their names, which nothing else may do."""
+    """Vectors that replace the parameters of the same names; only this scope may do so."""
 
 
 class Fields(Scope):
@@ -54,7 +55,7 @@ class Fields(Scope):
 
 @dataclass(frozen=True)
 class Pose(Fields):
-    """Where a frame is: its attitude and its origin."""
+    """The attitude and the origin of a frame."""
 
     R: Ref
     P: Ref
@@ -62,7 +63,7 @@ class Pose(Fields):
 
 @dataclass(frozen=True)
 class Motion(Fields):
-    """How a frame moves: angular velocity, its rate, and the acceleration of its origin."""
+    """Angular velocity of a frame, its rate, and the acceleration of the frame's origin."""
 
     w: Ref
     w_dot: Ref
@@ -71,7 +72,7 @@ class Motion(Fields):
 
 @dataclass(frozen=True)
 class Torso(Fields):
-    """The torso in the world: attitude, place, velocity and angular velocity (body axes)."""
+    """The torso in the world: attitude, position, velocity and angular velocity (body axes)."""
 
     R: Ref
     p: Ref
@@ -81,7 +82,7 @@ class Torso(Fields):
 
 @dataclass(frozen=True)
 class State:
-    """The arguments q and v of a function; without v nothing moves, or nothing asks for it."""
+    """The arguments q and v of a function; v is missing if the function does not use it."""
 
     q: Array
     v: Array | None = None
@@ -113,7 +114,7 @@ class State:
         return self.v
 
     def torso(self, R: Ref) -> Torso:
-        """Return what describes the torso, its attitude being R."""
+        """Return the vectors of the torso; R is its attitude."""
         return Torso(R, self.position, self.velocity, self.omega)
 
     def angles(self, i: Index | int) -> Ref:

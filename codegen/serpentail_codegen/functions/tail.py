@@ -1,4 +1,4 @@
-"""The sizes of a tail, by which arrays are declared and the shapes of arguments are known."""
+"""The sizes of a tail, which determine the sizes of arrays and the shapes of arguments."""
 
 from dataclasses import dataclass, replace
 from math import pi
@@ -15,9 +15,10 @@ SPRING = 18  # numbers of a point's linearised contact
 
 @dataclass(frozen=True)
 class Tail(Layout):
-    """Sizes of a tail of m segments: n links each, or a continuum with n samples each, bent by
-    bend_range at most, or "mixed" of both, whose arcs have n samples; ``shape`` tells in what
-    segments and links differ.
+    """Sizes of a tail of m segments.
+
+    They have n links each; or n samples each in a continuum, bent by bend_range at most; or both in
+    a "mixed" tail, whose arcs have n samples. ``shape`` says how segments and links differ.
     """
 
     links: int
@@ -31,26 +32,28 @@ class Tail(Layout):
 
     @property
     def stretches(self) -> tuple[Stretch, ...]:
-        """Segments of one kind and as many links that follow each other."""
+        """Consecutive segments of one kind with equally many links."""
         return stretches_of(self.segments, self.links, self.kind, self.shape)
 
     def runs(self, kind: str) -> tuple[Run, ...]:
-        """Segments of one kind, links or arcs, that follow each other; all of them in most."""
+        """Consecutive segments of one kind, links or arcs; in most tails all of them."""
         return runs_of(self.stretches, kind)
 
     @property
     def uniform(self) -> bool:
-        """Tell if all links are equal, as many in each segment, on axes of a free torso."""
+        """Tell if all links are equal, equally many in each segment, and mounted along the axes of
+        a free torso.
+        """
         return replace(self.shape, weightless=False) == EQUAL
 
     @property
     def nq(self) -> int:
-        """Numbers of a configuration: of the tail alone on a fixed base."""
+        """Length of q, 7 + nt; with a fixed base nt, the tail coordinates alone."""
         return self.nt if self.shape.fixed else super().nq
 
     @property
     def nv(self) -> int:
-        """Numbers of a velocity."""
+        """Length of v, 6 + nt; with a fixed base nt, the rates of the tail coordinates alone."""
         return self.nt if self.shape.fixed else super().nv
 
     @property
@@ -70,72 +73,72 @@ class Tail(Layout):
 
     @property
     def tail_points(self) -> int:
-        """N + 1 tail points."""
+        """Number of tail points, N + 1: N joints and the tip, or the root and N samples of arcs."""
         return self.total + 1
 
     @property
     def loads(self) -> int:
-        """Scalars of loads: a force and a moment at B, a force at each tail point."""
+        """Length of f_ext: a force and a moment at B, then a force at each tail point."""
         return LOAD + 3 * self.tail_points
 
     @property
     def parameter_numbers(self) -> int:
-        """Numbers in the parameter struct."""
+        """Number of values in the parameter struct of the C code."""
         return sum(p.size for p in struct_parameters(self))
 
     @property
     def elastic(self) -> bool:
-        """Whether forces follow the tail coordinates themselves."""
+        """Tell if forces depend on the tail coordinates themselves."""
         return "spring" in self.passive or "stops" in self.passive
 
     @property
     def groups(self) -> dict[str, int]:
-        """How many points each group has that can touch the ground: A, M and T of both feet, tail,
-        torso.
+        """Return the number of points in each group that can touch the ground: A, M and T of both
+        feet, tail, torso.
         """
         count = {"feet": 6, "tail": self.total, "torso": 1}
         return {name: count[name] for name in self.contacts}
 
     @property
     def points(self) -> int:
-        """Points that can touch the ground."""
+        """Number of points that can touch the ground."""
         return sum(self.groups.values())
 
     @property
     def bristles(self) -> int:
-        """Stretches of the points' friction springs, along x and y."""
+        """Number of bristle deflections: x and y of each point that can touch the ground."""
         return 2 * self.points
 
     @property
     def leg_numbers(self) -> int:
-        """Angles and rates of both legs."""
+        """Number of leg angles and their rates, 8 for both legs; 0 in scenes without feet."""
         return 8 if "feet" in self.contacts else 0
 
     @property
     def airborne_state(self) -> int:
-        """Numbers of an airborne state: a quaternion, tail coordinates, their rates."""
+        """Length of an airborne state: a quaternion, the tail coordinates, their rates."""
         return 4 + 2 * self.nt
 
     @property
     def airborne_arguments(self) -> int:
-        """An airborne state's numbers, then torques."""
+        """Length of (x, tau): an airborne state and the torques."""
         return self.airborne_state + self.nt
 
     @property
     def airborne_results(self) -> int:
-        """Rates of an airborne state, then omega."""
+        """Length of y: the rates of an airborne state, then omega (3)."""
         return self.airborne_state + 3
 
     @property
     def weights(self) -> int:
-        """Numbers that weight an implicit method's Jacobian: with contacts one more for friction's
-        bound.
+        """Numbers that weight the Jacobian of an implicit method: with contacts one more, for the
+        bound of friction.
         """
         return 2 if self.points else 1
 
     @property
     def factor_blocks(self) -> dict[str, tuple[int, int]]:
-        """Size and count of what factoring hands to solving, S first."""
+        """Size and count of the blocks that factoring hands to solving, S first."""
         blocks = {"S": (padded(self.nv), self.nv)}
         if self.contacts:
             blocks |= {"S_turned": (padded(self.nv), self.nv)}

@@ -1,6 +1,7 @@
-"""What it takes to give the operations of a tape a meaning.
+"""The interface that gives the operations of a tape a meaning.
 
-Numbers are one algebra, a tape is another: the same code then evaluates a formula, or records it.
+Numbers are one algebra, a tape is another: the same code evaluates a formula with the one, and
+records it with the other.
 """
 
 from fractions import Fraction
@@ -10,7 +11,7 @@ Number = int | float | Fraction
 
 
 class Algebra(Protocol):
-    """The operations of a tape; what they work on is up to the algebra."""
+    """The operations of a tape; the algebra chooses the values on which they work."""
 
     def const(self, value: Number, /) -> Any:
         """An exact constant."""
@@ -52,4 +53,4 @@ class Algebra(Protocol):
         """a where c > 0, else b."""
 
     def decide(self, c: Any, /) -> bool | None:
-        """Whether c > 0; None where the algebra cannot tell."""
+        """Tell whether c > 0; None if the algebra cannot tell."""

@@ -1,4 +1,4 @@
-"""How much work a program is: what decides the form in which it is emitted."""
+"""Counts the work of a program; the count decides the form in which it is emitted."""
 
 from .dataflow import inlined
 from .interpret import Run
@@ -22,7 +22,7 @@ class Counter:
     add = sub = mul = div = _binary
     neg = sin = cos = sqrt = _unary
     select = staticmethod(max)
-    decide = staticmethod(lambda c: True)  # the dearer case
+    decide = staticmethod(lambda c: True)  # the more expensive case
     const = staticmethod(lambda value: 0)
     lane = staticmethod(lambda a, lane: 0)
     unit = staticmethod(lambda lane, lanes: lanes)
@@ -56,7 +56,9 @@ def executed(program: Program) -> int:
 
 
 def applied(program: Program) -> int:
-    """Return how many nodes of steps one run evaluates: what unrolling has to write out or fold."""
+    """Return how many nodes of steps one run evaluates, all of which unrolling must print or
+    fold.
+    """
     return _applied(inlined(program).body, {})
 
 

@@ -1,4 +1,4 @@
-"""What depends on what in a program, and programs rewritten: pruned, inlined, on other arrays."""
+"""Dependences in a program, and programs rewritten: pruned, inlined, on other arrays."""
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import fields, replace
@@ -43,7 +43,7 @@ def overlap(ref: Ref, other: Ref) -> bool:
 
 @singledispatch
 def reads(statement: Statement) -> tuple[Ref, ...]:
-    """Return what a statement reads; sums and what is overwritten in place are read too."""
+    """Return what a statement reads, including targets that it adds to or overwrites in place."""
     raise TypeError(f"no rule says what {type(statement).__name__} reads")
 
 

@@ -1,7 +1,7 @@
-"""What a program means: run it statement by statement.
+"""The meaning of a program: a run executes it statement by statement.
 
-Over numbers, a run is the reference that every emitted text is compared with.  Over a tape, it
-unrolls the loops into one straight line.
+Over numbers, a run is the reference for every emitted text. Over a tape, it unrolls the loops into
+one straight line.
 """
 
 import math
@@ -131,12 +131,12 @@ class Run:
     # What references mean
 
     def slots(self, ref: Ref, at: dict[str, int]) -> range:
-        """Return the positions of the scalars that a reference means."""
+        """Return the positions of the scalars of a reference."""
         first = ref.offset.at(at)
         return range(first, first + ref.size * ref.stride, ref.stride)
 
     def places(self, ref: Ref, at: dict[str, int]) -> list[tuple[int, int]]:
-        """Return the scalars and lanes that a reference to lanes means."""
+        """Return the scalars and lanes of a reference to lanes."""
         if ref.lane is None:
             raise ValueError(f"a reference to scalars of {ref.array.name} means no lanes")
         first, lane = ref.offset.at(at), ref.lane.at(at)
@@ -186,14 +186,14 @@ class Run:
             self.body(when.body, at)
 
     def choose(self, when: When, at: dict[str, int], condition: Any) -> None:
-        """Run a conditional body, and select new or old values; the algebra cannot tell which."""
+        """Run a conditional body, and select new or old values; the algebra cannot decide."""
         before = {name: list(scalars) for name, scalars in self.values.items()}
         guards = len(self.guards)
         self.body(when.body, at)
         if len(self.guards) > guards:
             raise ValueError("a guard under a condition cannot be unrolled")
 
-        # what had no value before is not read where the condition fails
+        # a scalar without an earlier value is not read if the condition fails
         for name, old_scalars in before.items():
             scalars = self.values[name]
             for k, old in enumerate(old_scalars):
@@ -231,7 +231,7 @@ class Run:
         self.store(copy.target, at, self.read(copy.source, at), copy.adds)
 
     def guard(self, guard: Guard, at: dict[str, int]) -> None:
-        """Note what must be positive."""
+        """Record what must be positive."""
         self.guards += [(guard.status, value) for value in self.read(guard.scalar, at)]
 
     # Linear equations

@@ -1,7 +1,7 @@
-"""What one emitted function does, before it is text: loops that apply steps to flat arrays.
+"""The content of one emitted function before it is text: loops that apply steps to flat arrays.
 
-A ``Program`` is a list of arrays and a tree of statements; everything here is frozen data.  What
-the statements mean is defined by ``interpret.Run``.
+A ``Program`` is a list of arrays and a tree of statements; everything here is frozen data.
+``interpret.Run`` defines the meaning of the statements.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -15,7 +15,7 @@ VECTOR = 8  # lanes of the widest vector
 
 
 def padded(lanes: int) -> int:
-    """Return how many numbers store so many lanes: those of whole vectors."""
+    """Return how many numbers store a given number of lanes: those of whole vectors."""
     return -(-lanes // VECTOR) * VECTOR
 
 

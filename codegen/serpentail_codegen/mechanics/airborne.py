@@ -19,14 +19,16 @@ def momentum_in_torso(let, R: M33, angular: V3) -> dict:
 
 
 def momentum_left(let, coupling: V3, rate: V1) -> dict:
-    """What a rate of the tail leaves of the angular momentum for the torso: minus N_k q_dot_k."""
+    """The part of the angular momentum that a rate of the tail leaves for the torso: minus N_k
+    q_dot_k.
+    """
     return {"momentum": -rate[0] * coupling}
 
 
 def pair_without_torso(
     let, inverse_mass: V1, column: V6, other: V6, coupling: V3, gain: V3
 ) -> dict:
-    """What eliminating the torso takes from H_kl: f_k . f_l / M + N_k . B_l."""
+    """What elimination of the torso subtracts from H_kl: f_k . f_l / M + N_k . B_l."""
     moved = inverse_mass[0] * column[0:3, :].dot(other[0:3, :])
     return {"entry": [-(moved + coupling.dot(gain))]}
 
@@ -45,14 +47,14 @@ def torso_load(let, com: V3, force: V3, moment: V3) -> dict:
 
 
 def turned_back_by(let, gain: V3, rate: V1) -> dict:
-    """How a rate, or a second derivative, of a tail coordinate turns the torso: minus B_k times
-    it.
+    """Rotation of the torso by a rate, or a second derivative, of a tail coordinate: minus B_k
+    times it.
     """
     return {"turn": -rate[0] * gain}
 
 
 def moved_back_by(let, inverse_mass: V1, column: V6, rate: V1) -> dict:
-    """How it moves B: minus f_k times it over M."""
+    """Motion of B by it: minus f_k times it over M."""
     return {"shift": -(inverse_mass[0] * rate[0]) * column[0:3, :]}
 
 
@@ -62,7 +64,7 @@ def pushed(let, inverse_mass: V1, net: V3) -> dict:
 
 
 def drift_of_turn(let, com: V3, turn: V3) -> dict:
-    """How B moves that the COM rests while the torso turns: minus turn x c."""
+    """Motion of B that keeps the COM at rest while the torso rotates: minus turn x c."""
     return {"shift": com.cross(turn)}
 
 
@@ -160,7 +162,7 @@ def momentum_slope(
 
 
 def chained_row(let, omega_0: V1, omega_1: V1, omega_2: V1, by_omega: V3) -> dict:
-    """What a change of omega adds to a row of slopes."""
+    """Contribution of a change of omega to a row of slopes."""
     return {"row": [by_omega[0] * omega_0[0] + by_omega[1] * omega_1[0] + by_omega[2] * omega_2[0]]}
 
 
@@ -178,27 +180,29 @@ def by_quaternion(let, row: V3, turn_0: V3, turn_1: V3, turn_2: V3, turn_3: V3) 
 
 
 def torso_weights(let, inverse_mass: V1, com: V3, move: V3, turn: V3) -> dict:
-    """Weights of net force and turn_load in place of those of B's acceleration and omega_dot."""
+    """Weights of net force and turn_load that replace those of the acceleration of B and of
+    omega_dot.
+    """
     return {"move": inverse_mass[0] * move, "turn": turn - com.cross(move)}
 
 
 def tail_weight(let, weight: V1, move: V3, turn: V3, column: V6, gain: V3) -> dict:
-    """Weight of a tail coordinate's second derivative, the torso following it."""
+    """Weight of the second derivative of a tail coordinate, with the torso following it."""
     return {"weight": [weight[0] - column[0:3, :].dot(move) - gain.dot(turn)]}
 
 
 def recoil(let, inverse_mass: V1, momentum: V3) -> dict:
-    """How B moves against what is minus a momentum."""
+    """Motion of B that balances a momentum; the argument is minus that momentum."""
     return {"shift": inverse_mass[0] * momentum}
 
 
 def crossed(let, weight: V3, change: V3) -> dict:
-    """Three changes by their weights."""
+    """Sum of three changes times their weights."""
     return {"sum": [weight.dot(change)]}
 
 
 def crossed_by_rate(let, weight: V1, change: V1) -> dict:
-    """A change by its weight."""
+    """A change times its weight."""
     return {"sum": [weight[0] * change[0]]}
 
 
@@ -208,5 +212,5 @@ def curvature_by_omega(let, row_0: V3, row_1: V3, row_2: V3, omega: V3) -> dict:
 
 
 def both_by_omega(let, share: V3, other: V3, turn: V3, other_turn: V3) -> dict:
-    """Second derivative of two directions by way of omega."""
+    """Second derivative along two directions through omega."""
     return {"entry": [share.dot(other_turn) + turn.dot(other)]}

@@ -1,5 +1,7 @@
-"""Virtual power of a piece of the tail, and its momentum's under a motion as one rigid body: what
-second derivatives of airborne motion are made of.
+"""Virtual power of a piece of the tail, and the power of its momentum under a motion as one rigid
+body.
+
+Second derivatives of airborne motion are made from these.
 """
 
 from sympy import Matrix

@@ -26,14 +26,14 @@ def lowest_point(let, R: M33, torso_semi_axes: V3) -> dict:
 
 
 def torso_twist(let, R: M33, p_dot: V3, omega: V3) -> dict:
-    """Angular velocity and velocity at B of the torso, world axes: where the tail's twists
-    start.
+    """Angular velocity and velocity at B of the torso, world axes: the twists of the tail start
+    from it.
     """
     return {"turn": R * omega, "slide": p_dot}
 
 
 def carried_twist(let, S: V12, rates: V2) -> dict:
-    """What one joint or bend adds to the twist about B of all beyond."""
+    """Contribution of one joint or bend to the twist about B of everything beyond."""
     total = rates[0] * S[0:6, :] + rates[1] * S[6:12, :]
     return {"turn": total[0:3, :], "slide": total[3:6, :]}
 
@@ -69,8 +69,8 @@ def bristle_properties(let, K_f: V1, D_f: V1) -> dict:
 
 
 def guarded(let, value, positive):
-    """Return a value where something is positive, else 1: what a root or quotient may be taken
-    of.
+    """Return a value if a condition number is positive, else 1, so that roots and quotients are
+    defined.
     """
     return let("safe", Piecewise((value, positive > 0), (1, True)))
 
@@ -83,7 +83,7 @@ def normal_force(let, K_n, D_n, depth, rate):
 
 
 def cone(let, trial, limit) -> Matrix:
-    """The trial force, shortened to the limit whatever its direction: Coulomb's law."""
+    """The trial force, shortened to the limit in any direction: Coulomb's law."""
     length = let("t_t", trial.dot(trial))
     excess = let("excess", length - limit**2)
     shorter = let("shorter", limit / let("length", sqrt(guarded(let, length, excess))))

@@ -116,12 +116,12 @@ def linearised_contact(
     bristle: V2,
     friction: str = "cone",
 ) -> dict:
-    """``spring`` of a point in the ground (Eqs. 35 to 37)."""
+    """Compute ``spring`` of a point in the ground (Eqs. 35 to 37)."""
     w, depth, rate = weight[0], let("z", -(p[2] + arm[2])), -velocity[2]
     f_n = normal_force(let, K_n, D_n, depth, rate)
     k_n, d_n = normal_slopes(let, K_n, D_n, depth, rate, f_n)
 
-    # how friction follows the trial force, and its bound
+    # how friction depends on the trial force, and on its bound
     trial = let("trial", -(K_f[0] * bristle + drag[0] * velocity[0:2, :]))
     limit = let("limit", mu[0] * f_n)
     P, g = SLOPE[friction](let, trial, limit), BOUND[friction](let, trial, limit)
@@ -134,7 +134,7 @@ def linearised_contact(
     N = let("N", w * M * following)
     B = w * P * let("K_N", K_f[0] * N + drag[0] * eye(2))
 
-    # all that factoring and solving need
+    # everything that factoring and solving need
     spring = [w * k_n, w * (d_n + w * k_n)]
     for matrix in (B, let("w_K_f", w * K_f[0]) * P * M, M, N):
         spring += plane_entries(matrix)
@@ -155,7 +155,7 @@ def depth_of_point(let, p: V3, arm: V3) -> dict:
 
 
 def stiffened(let, spring, velocity) -> Matrix:
-    """Force that a velocity calls for: B across the ground, a along its normal."""
+    """Force for a velocity: B across the ground, a along its normal."""
     across = plane(spring[2:5]) * velocity[0:2, :]
     return Matrix([across[0], across[1], spring[1] * velocity[2]])
 
@@ -180,7 +180,7 @@ def coupled_columns(let, J_k: V3, force: V3) -> dict:
 
 
 def sliding(let, spring: V18) -> dict:
-    """|h|^2: positive where friction follows the load."""
+    """|h|^2: positive if friction follows the load."""
     return {"slip": [spring[14] ** 2 + spring[15] ** 2]}
 
 
@@ -199,7 +199,7 @@ def sheared_column(let, spring: V18, J_k: V3) -> dict:
 
 
 def sheared_entries(let, push_k: V1, push_l: V1, lift_k: V1, lift_l: V1) -> dict:
-    """push_k lift_l, and what is opposite it."""
+    """push_k lift_l, and the entry opposite to it."""
     return {"entry": [push_k[0] * lift_l[0]], "turned": [lift_k[0] * push_l[0]]}
 
 
@@ -209,12 +209,12 @@ def torso_turn(let, R: M33, rotation: V3) -> dict:
 
 
 def point_shift(let, shift: V3, turn: V3, arm: V3) -> dict:
-    """What moves a point of the torso: J (shift, rotation)."""
+    """Motion of a point of the torso: J (shift, rotation)."""
     return {"motion": shift + turn.cross(arm)}
 
 
 def tail_shift(let, J_k: V3, coupling: V1) -> dict:
-    """What one tail coordinate adds to it."""
+    """Contribution of one tail coordinate to it."""
     return {"motion": J_k * coupling[0]}
 
 
@@ -232,7 +232,7 @@ def contact_response(let, spring: V18, motion_q: V3, motion_v: V3, lag: V2) -> d
 
 
 def tail_response(let, J_k: V3, force: V3) -> dict:
-    """A force's share in one tail coordinate."""
+    """Contribution of a force to one tail coordinate."""
     return {"rhs": [J_k.dot(force)]}
 
 

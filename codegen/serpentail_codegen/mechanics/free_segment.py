@@ -20,8 +20,8 @@ def swept_by(arm) -> Matrix:
 
 
 def tip_motion(let, R: M33, P: V3, S: V12) -> dict:
-    """What the tip's motion is made of: R^T, R^T (e_k x P), and in its axes the columns S at the
-    tip (A5 to A8).
+    """The quantities that determine the tip's motion: R^T, R^T (e_k x P), and in its axes the
+    columns S at the tip (A5 to A8).
     """
     turn, parts = R.T, []
     for axis, velocity in ((S[0:3, :], S[3:6, :]), (S[6:9, :], S[9:12, :])):
@@ -34,7 +34,7 @@ def tip_motion(let, R: M33, P: V3, S: V12) -> dict:
 
 
 def tip_matrix(tip_map) -> Matrix:
-    """T, 6 x 8: motion of the tip in its own axes = T x, but for what velocities add."""
+    """T, 6 x 8: motion of the tip in its own axes = T x, without the terms of velocities."""
     turn, swept = (tip_map[k : k + 9, :].reshape(3, 3) for k in (0, 9))
     pitch, turn_pitch, yaw, turn_yaw = (tip_map[18 + 3 * k : 21 + 3 * k, :] for k in range(4))
     return Matrix.vstack(
@@ -64,8 +64,8 @@ def own_inertia(
 
 
 def load_at_tip(let, A: V6, b: V1, coasting: V6) -> dict:
-    """Wrench that moves all beyond a tip whose motion is ``coasting``, what velocities alone give
-    it: A a + b.
+    """Wrench that moves everything beyond a tip with the motion ``coasting``, which velocities
+    alone give: A a + b.
     """
     total = b[0]
     for k in range(6):
@@ -76,8 +76,8 @@ def load_at_tip(let, A: V6, b: V1, coasting: V6) -> dict:
 def pass_on(
     let, T: V6, tip_map: V30, A_0: V6, A_1: V6, A_2: V6, A_3: V6, A_4: V6, A_5: V6, load: V6
 ) -> dict:
-    """What all beyond the tip adds to a segment: K by T^T A T, b by T^T load; ``A_0`` to ``A_5``
-    are the rows of A.
+    """Contribution of everything beyond the tip to a segment: T^T A T to K, T^T load to b; ``A_0``
+    to ``A_5`` are the rows of A.
     """
     entries, A = tip_matrix(tip_map), (A_0, A_1, A_2, A_3, A_4, A_5)
     moved = [let("moved", sum((A[c][r] * T[c] for c in range(6)), 0)) for r in range(6)]
@@ -120,8 +120,8 @@ def free_coordinates(
 
 
 def outward(let, tip_map: V30, shares: V15, coasting: V6, base: V6) -> dict:
-    """Second derivatives of a segment's coordinates, and the motion of its tip, from that of its
-    base.
+    """Second derivatives of a segment's coordinates, and the motion of its tip, from the motion of
+    its base.
     """
     pitch = let("pitch", -(shares[0:6, :].dot(base) + shares[6]))
     yaw = let("yaw", -(shares[7:13, :].dot(base) + shares[13] * pitch + shares[14]))
@@ -168,5 +168,5 @@ def freed_wrench(let, tail_mount: V3, a_mount: V3, A_0: V6, A_1: V6, A_2: V6, b_
 
 
 def net_load(let, at_torso: V6, force: V3, moment: V3) -> dict:
-    """Applied less inertial loads at B, for (omega_dot, a)."""
+    """Applied minus inertial loads at B, for (omega_dot, a)."""
     return {"rhs": Matrix([at_torso[3:6, :] - moment, at_torso[0:3, :] - force])}

@@ -66,8 +66,8 @@ def lanes_at_torso(let, tail_mount: V3, F_lanes: V6) -> dict:
 
 
 def torso_bias(let, torso_mass: V1, torso_inertia: V3, w: V3, a: V3, F: V6) -> dict:
-    """Inertial force and moment of torso and tail at B, the tail's being ``F``; nothing turns
-    faster.
+    """Inertial force and moment of torso and tail at B, where ``F`` is that of the tail; no
+    rotation accelerates.
     """
     euler = w.cross(let("I_w", torso_inertia.multiply_elementwise(w)))
     return {"force": F[0:3, :] + torso_mass[0] * a, "moment": F[3:6, :] + euler}
@@ -80,7 +80,7 @@ def lanes_without_translation(let, com: V3, F_lanes: V6) -> dict:
 
 
 def row_without_translation(let, inverse_mass: V1, column: V6, F_lanes: V6) -> dict:
-    """What eliminating translation takes from a row of H: f_k . f_l / M for all l."""
+    """Terms that elimination of translation subtracts from a row of H: f_k . f_l / M for all l."""
     scaled = let("scaled", column[0:3, :] * inverse_mass[0])
     return {"H_row": [-scaled.dot(F_lanes[0:3, :])]}
 

@@ -1,4 +1,6 @@
-"""What forces on the tail's points do to torso and joints, and the points' Jacobians."""
+"""The effect of forces on the tail's points on torso and joints, and the Jacobians of the
+points.
+"""
 
 from sympy import Matrix
 

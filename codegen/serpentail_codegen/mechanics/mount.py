@@ -1,7 +1,7 @@
-"""The axes in which a tail begins where they are not those of the torso: from one to the other.
+"""Rotations between the axes in which a tail begins and those of the torso, if they differ.
 
-``mount`` turns from the tail's root axes to those of the torso.  Its angles are the pitch, roll and
-yaw of reports: R = R_z(yaw) R_x(pitch) R_y(roll).
+``mount`` rotates from the tail's root axes to those of the torso. Its angles are the pitch, roll
+and yaw of reports: R = R_z(yaw) R_x(pitch) R_y(roll).
 """
 
 from sympy import Matrix, cos, sin

@@ -1,8 +1,8 @@
-"""Springs, damping and stops of a tail's coordinates: forces that ask for torques, and energies.
+"""Springs, damping and stops of a tail's coordinates: the torques that they require, and energies.
 
-A stop's stiffness grows from zero to its own on the way w into it, as S(s) = 3 s^2 - 2 s^3 of
-s = way / w, so that its force k w (s^3 - s^4 / 2) has two continuous derivatives; beyond, it is
-that of a spring.
+Within a width w of a stop its stiffness grows from zero to its full value, as S(s) = 3 s^2 - 2 s^3
+with s = depth / w. The force k w (s^3 - s^4 / 2) therefore has two continuous derivatives. Beyond,
+it is that of a spring.
 """
 
 from sympy import Matrix, Piecewise
@@ -28,7 +28,7 @@ def stop_force(
     tail_stop_width: V2,
     angles: V2,
 ) -> dict:
-    """Force of the stops: below zero beneath the lower one, above zero beyond the upper one."""
+    """Force of the stops: negative below the lower one, positive above the upper one."""
     forces = []
     for k in range(2):
         w = tail_stop_width[k]
@@ -39,7 +39,7 @@ def stop_force(
 
 
 def ways_into(let, lower, upper, width, angle) -> list[tuple]:
-    """How far a coordinate is in the lower stop and in the upper one, in widths: up to one, and
+    """Depth of a coordinate in the lower stop and in the upper one, in widths: up to one, and
     beyond.
     """
     ways = []
@@ -65,7 +65,7 @@ def stop_energy(
     tail_stop_width: V2,
     angles: V2,
 ) -> dict:
-    """The integral of the stops' forces over the way into them."""
+    """The integral of the stops' forces over the depth."""
     total = 0
     for k in range(2):
         w, parts = tail_stop_width[k], 0
@@ -81,7 +81,7 @@ def net_torque(let, tau: V2, passive: V2) -> dict:
 
 
 def virtual_power(let, passive: V2, virtual_rates: V2) -> dict:
-    """Power that the passive parts ask for at virtual rates."""
+    """Power of the passive parts at virtual rates."""
     return {"power": [passive.dot(virtual_rates)]}
 
 
@@ -101,7 +101,7 @@ def stop_slope(
     tail_stop_width: V1,
     angle: V1,
 ) -> dict:
-    """Stiffness of the stops where a coordinate is."""
+    """Stiffness of the stops at a coordinate."""
     w = tail_stop_width[0]
     both = ways_into(let, tail_stop_lower[0], tail_stop_upper[0], w, angle[0])
     shares = [s * s * (3 - 2 * s) for s, _ in both]
@@ -109,18 +109,18 @@ def stop_slope(
 
 
 def damped_coordinate(let, tail_damping: V1, weight: V1, gain_v: V1) -> dict:
-    """w times the tail's own damping, which a tracked tail is rid of."""
+    """w times the tail's own damping, which tracking cancels."""
     return {"damped": [untracked(gain_v, weight[0] * tail_damping[0])]}
 
 
 def sprung_coordinate(let, weight: V1, gain_v: V1, slope: V1) -> dict:
-    """w times the stiffness, and w times that, which acts as damping does."""
+    """w times the stiffness, and w^2 times the stiffness, which acts like damping."""
     sprung = let("sprung", untracked(gain_v, weight[0] * slope[0]))
     return {"sprung": [sprung], "damped": [weight[0] * sprung]}
 
 
 def untracked(gain_v, value):
-    """A value, or 0 where tracking makes up for all forces of the tail."""
+    """A value, or 0 if tracking cancels all forces of the tail."""
     return Piecewise((0, gain_v[0] > 0), (value, True))
 
 

@@ -7,23 +7,23 @@ from .shapes import V1, V3, V6
 
 
 def resting_acceleration(let, gravity: V1) -> dict:
-    """What gravity is to bodies on a base at rest: an acceleration of the base, upward."""
+    """Gravity on a base at rest, as an acceleration of the base, upward."""
     return {"a": gravity[0] * Z}
 
 
 def net_torque(let, tau: V1, inertial: V1) -> dict:
-    """A torque less the force that velocities and gravity ask for."""
+    """A torque minus the force that velocities and gravity require."""
     return {"rest": Matrix([tau[0] - inertial[0]])}
 
 
 def resting_potential(let, gravity: V1, tail_mount: V3, mass: V1, h: V3) -> dict:
-    """g times the tail's first moment along z, ``h`` being about its mount."""
+    """g times the tail's first moment along z; ``h`` is about the mount."""
     return {"potential": [gravity[0] * (h[2] + mass[0] * tail_mount[2])]}
 
 
 def resting_momentum(let, mass: V1, h: V3, F_next: V6) -> dict:
-    """The tail's momentum, and its moment about the tail's centre of mass, from those at the mount,
-    about which ``h`` is, too.
+    """The tail's momentum, and its moment about the tail's centre of mass, from those at the mount;
+    ``h`` is about the mount, too.
     """
     force, moment = F_next[0:3, :], F_next[3:6, :]
     return {"linear": force, "angular": moment - h.cross(force) / mass[0]}

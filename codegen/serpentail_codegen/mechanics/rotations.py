@@ -76,7 +76,7 @@ def unit_quaternion(let, quaternion: V4) -> dict:
 
 
 def turned_quaternion(let, quaternion: V4, turn: V3) -> dict:
-    """Rate of a unit quaternion for a rate of turn in body axes: q (0, turn) / 2."""
+    """Rate of a unit quaternion for a rate of rotation in body axes: q (0, turn) / 2."""
     w, x, y, z = quaternion
     half = [let("half", entry / 2) for entry in turn]
     rates = [
@@ -89,8 +89,8 @@ def turned_quaternion(let, quaternion: V4, turn: V3) -> dict:
 
 
 def turn_gradient(let, quaternion: V4, gradient: V4) -> dict:
-    """Gradient with respect to a turn in body axes, from that with respect to a unit quaternion's
-    four numbers.
+    """Gradient with respect to a rotation in body axes, from that with respect to a unit
+    quaternion's four numbers.
     """
     w, x, y, z = quaternion
     gw, gx, gy, gz = gradient

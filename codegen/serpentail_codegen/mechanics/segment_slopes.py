@@ -69,9 +69,10 @@ def change_from_tip(let, tip_map: V30, wrench: V6) -> dict:
 
 
 def freed_change(let, change: V8, shares: V15) -> dict:
-    """Eliminate the coordinates: the wrench that is left, and what accelerates each of them.
+    """Eliminate the coordinates: the wrench that is left, and the load that accelerates each of
+    them.
 
-    ``shares`` as of ``free_segment.free_coordinates``.
+    ``shares`` are those of ``free_segment.free_coordinates``.
     """
     pitch_share, yaw_share = shares[0:6, :], shares[7:14, :]
     yaw = change[7]
@@ -93,7 +94,7 @@ def responding(let, tip_map: V30, shares: V15, over: V2, free: V2, base: V6) -> 
 
 
 def accelerating_load(let, force: V3, moment: V3) -> dict:
-    """What accelerates the torso, for (omega_dot, a): less inertial force and moment."""
+    """The load that accelerates the torso, for (omega_dot, a): minus inertial force and moment."""
     return {"rhs": Matrix([-moment, -force])}
 
 
@@ -104,5 +105,5 @@ def mount_response(let, response: V6, tail_mount: V3) -> dict:
 
 
 def with_own(let, change: V8, own: V8) -> dict:
-    """Add what the segment's own change asks for."""
+    """Add the segment's own change."""
     return {"change": change + own}

@@ -12,33 +12,33 @@ from .shapes import M33, V1, V3
 
 
 def turned_back(let, vector: V3, turn: V3) -> dict:
-    """How a vector that stays in the world changes in torso axes."""
+    """Change, in torso axes, of a vector that is constant in the world."""
     return {"change": vector.cross(turn)}
 
 
 def turning_force(let, R: M33, force: V3, turn: V3, change: V3) -> dict:
-    """How a force in world axes changes that is ``force`` in torso axes, where its change is
+    """Change of a force in world axes that is ``force`` in torso axes, where its change is
     given.
     """
     return {"change": R * let("both", change + turn.cross(force))}
 
 
 def power_by_turn(let, a: V3, u: V3, b_a: V3, b_u: V3) -> dict:
-    """Gradient of P by a turn: f x a + g x u, for M (u x a + a x u) is zero."""
+    """Gradient of P by a rotation: f x a + g x u, because M (u x a + a x u) is zero."""
     return {"turn": b_a.cross(a) + b_u.cross(u)}
 
 
 def term_by_turn(let, gradient: V3, vector: V3) -> dict:
-    """Gradient by a turn of what is gradient . vector, the vector staying in the world.
+    """Gradient by a rotation of the term gradient . vector, with the vector constant in the world.
 
-    Of a row of H lambda in the tail, that is f_k . u, f_k being the change of the first moment with
-    the tail coordinate.
+    For a row of H lambda in the tail this is f_k . u, where f_k is the change of the first moment
+    with the tail coordinate.
     """
     return {"turn": gradient.cross(vector)}
 
 
 def turn_curvature(let, torso_mass: V1, tail_mass: V1, a: V3, u: V3, b_a: V3, b_u: V3) -> dict:
-    """Second derivatives of P by turns (by the exponential map), row by row."""
+    """Second derivatives of P by rotations (by the exponential map), row by row."""
     mass = let("mass", torso_mass[0] + tail_mass[0])
     pairs = ((a, let("f", b_a - mass * u)), (u, let("g", b_u - mass * a)))
     total = -let("trace", a.dot(pairs[0][1]) + u.dot(pairs[1][1])) * eye(3)
@@ -49,8 +49,8 @@ def turn_curvature(let, torso_mass: V1, tail_mass: V1, a: V3, u: V3, b_a: V3, b_
 
 
 def turned_momentum(let, torso_mass: V1, tail_mass: V1, R: M33, h: V3, u: V3, b_a: V3) -> dict:
-    """How the first six rows of H lambda change with a turn, row by row: R (turn x f), and
-    h x (u x turn).
+    """Change of the first six rows of H lambda with a rotation, row by row: R (turn x f), and h x
+    (u x turn).
     """
     f = let("f", b_a - let("mass", torso_mass[0] + tail_mass[0]) * u)
     force = [R * axis.cross(f) for axis in (X, Y, Z)]

@@ -10,6 +10,7 @@ from ..ir.step import Step, compacted
 from ..ir.tape import Tape, replay
 
 THEN = "_then_"  # between the names of steps that were joined
+AFTER = " Then: "  # between their descriptions
 MOST_WRITTEN_OUT = 400  # nodes of all iterations of a loop
 MOST_NODES = 1500  # of one step: beyond, its text and its spilled values cost more than it saves
 
@@ -125,7 +126,7 @@ def joined(first: Apply, second: Apply) -> Apply:
     step = compacted(
         Step(
             "",
-            f"{first.step.doc} Then: {second.step.doc}",
+            f"{first.step.doc}{AFTER}{second.step.doc}",
             tuple((name, ref.size) for name, ref in recording.reads.items()),
             tuple((name, ref.size) for name, (ref, _, _) in outputs.items()),
             tuple(recording.tape.nodes),

@@ -1,4 +1,6 @@
-"""Steps in two: what all directions of differentiation share, and what each of them adds."""
+"""Splits steps in two: the part that all directions of differentiation share, and the part of each
+direction.
+"""
 
 from dataclasses import dataclass, replace
 from functools import cache
@@ -11,9 +13,9 @@ SLOPES = "slopes"  # the vector that the first part hands to the second
 
 @dataclass(frozen=True)
 class Parted:
-    """A step in two: what all directions share, and what each of them adds.
+    """A step in two parts: the one that all directions share, and the one of each direction.
 
-    slopes: how many numbers the first hands to the second.
+    slopes: how many numbers the first part hands to the second.
     """
 
     shared: Step
@@ -23,7 +25,7 @@ class Parted:
 
 @cache
 def parted(step: Step, wide: frozenset[str], overwritten: frozenset[str]) -> Parted:
-    """Part a step by its wide vectors.
+    """Split a step by its wide vectors.
 
     Of the narrow inputs the second part reads those that are not ``overwritten`` by the first.
     """
@@ -38,7 +40,7 @@ def parted(step: Step, wide: frozenset[str], overwritten: frozenset[str]) -> Par
         results=(*narrow, *handed),
     )
 
-    # what is handed on is an input of the second part
+    # the handed vector is an input of the second part
     nodes = [
         ("input", len(vector) + handed[n]) if n in handed else node
         for n, node in enumerate(step.nodes)

@@ -1,6 +1,4 @@
-"""Tangents that are zero in all directions, whatever the state is: programs that compute without
-them.
-"""
+"""Removes tangents that are zero in all directions for every state."""
 
 from collections.abc import Iterator
 from dataclasses import replace

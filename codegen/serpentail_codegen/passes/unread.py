@@ -1,4 +1,4 @@
-"""Fills that nothing reads: a program without them."""
+"""Removes fills that nothing reads."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""Structural zeros: which lanes of what a program's statements read are zero, whatever its inputs.
+"""Structural zeros: which lanes of the values that statements read are zero for all inputs.
 
 A value is the set of its lanes that may differ from zero, as the bits of an integer; a narrow
 scalar counts for every lane.

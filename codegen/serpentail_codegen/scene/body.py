@@ -1,6 +1,7 @@
-"""The table `body`: how large an animal is, and a torso of a simple shape.
+"""The table `body` of a scene: the size of the animal, and a torso of a simple shape.
 
-All that a scene says is of the animal at scale 1; `body` scales it, by the units of its numbers.
+All other values of the scene describe the animal at scale 1; `body` scales them according to their
+units.
 """
 
 from collections.abc import Collection, Mapping
@@ -18,7 +19,7 @@ from .units import dimensions, in_unit
 # (1979) 305-314; times of a stride at equivalent speeds, Heglund & Taylor, J. Exp. Biol. 138 (1988)
 # 301-318; all else keeps its shape.
 LENGTH, LEG, TIME = 1 / 3, 0.35, 0.15
-LEG_BONES = "L_"  # how the names of their lengths begin
+LEG_BONES = "L_"  # first letters of the names of their lengths
 TORSOS = {"ellipsoid": "semi_axes", "box": "sides"}  # shape -> its three lengths
 OF_TORSO = ("torso_mass", "torso_inertia", "torso_semi_axes")  # what a torso's shape tells
 KEYS = ("scale", "mass", "torso")
@@ -27,8 +28,8 @@ LARGEST = 1e3  # scale; 1 over it is the least
 
 @dataclass(frozen=True)
 class Size:
-    """By what numbers are multiplied for each kilogram, metre and second of their unit, and lengths
-    of leg bones.
+    """Factors for each kilogram, metre and second in a unit, and the factor of lengths of leg
+    bones.
     """
 
     mass: float = 1.0
@@ -37,7 +38,7 @@ class Size:
     leg: float = 1.0
 
     def of(self, name: str, unit: str, value: Any) -> Any:
-        """Return the numbers of a parameter, scaled; the earth's pull stays what it is."""
+        """Return the scaled numbers of a parameter; gravity is not scaled."""
         if name == "gravity" or self == SAME:
             return value
         length = self.leg if name.startswith(LEG_BONES) else self.length
@@ -51,7 +52,7 @@ SAME = Size()
 
 @dataclass(frozen=True)
 class Body:
-    """A checked table `body`: scale or mass (kg), the torso's parameters, and what is wrong."""
+    """A checked table `body`: scale or mass (kg), the parameters of the torso, and its problems."""
 
     scale: float | None = None
     mass: float | None = None
@@ -59,16 +60,17 @@ class Body:
     problems: tuple[Problem, ...] = ()
 
     def completed(self, named: Any, contacts: Collection[str]) -> Any:
-        """Return a table of parameters with those that the torso's shape tells."""
+        """Return a table of parameters, completed by those that the torso's shape determines."""
         if not self.torso or not isinstance(named, Mapping):
             return named
         touches = "torso" in contacts
         return {**named, **{n: x for n, x in self.torso.items() if touches or n != OF_TORSO[2]}}
 
     def size(self, total_mass: float) -> Size:
-        """Return the size of an animal of this total mass (kg) at scale 1.
+        """Return the size of an animal whose total mass is this (kg) at scale 1.
 
-        A scale keeps the shape, and the Froude number: times go with the root of lengths.
+        A scale keeps the shape and the Froude number, so that times scale with the square root of
+        lengths.
         """
         if self.mass is not None:
             ratio = self.mass / total_mass
@@ -79,7 +81,7 @@ class Body:
 
 
 def body_of(table: Any, parameters: Any) -> Body:
-    """Return a scene's table `body`, checked; parameters: its table of these."""
+    """Return the checked table `body` of a scene; parameters: the scene's table of these."""
     if table is None:
         return Body()
     named = parameters if isinstance(parameters, Mapping) else {}
@@ -96,14 +98,14 @@ def body_of(table: Any, parameters: Any) -> Body:
 
 
 def _unknown(key: object) -> str:
-    """Say what a table `body` may have."""
+    """Return a problem for each key that a table `body` cannot have."""
     return suggest(str(key), KEYS) or f"unknown; needs {', '.join(KEYS)}"
 
 
 def _number(
     field: str, value: Any, unit: str, bounds: tuple[float, float], problems: list[Problem]
 ) -> float | None:
-    """Return a number between bounds; None where there is none, or it is wrong."""
+    """Return a number between bounds; None if it is missing or wrong."""
     if value is None:
         return None
     try:
@@ -121,7 +123,7 @@ def _number(
 def _torso(
     table: Any, named: Mapping[str, Any], problems: list[Problem]
 ) -> Mapping[str, Value] | None:
-    """Return mass, inertia and contact ellipsoid of a torso of one density."""
+    """Return mass, inertia and contact ellipsoid of a torso of uniform density."""
     shape = table.get("shape") if isinstance(table, Mapping) else None
     if shape not in TORSOS:
         names = " or ".join(map(repr, TORSOS))
@@ -173,7 +175,7 @@ def _shaped(shape: str, lengths: tuple[float, ...], density: float) -> dict[str,
 
 
 def scaled(body: Body, described: Parameters) -> dict[str, Any]:
-    """Return parameters in the size of a body, what they were, and that size, as a Scene has it."""
+    """Return the scaled parameters, the original ones, and the size, as Scene stores them."""
     tail = next(described[n] for n in ("tail_mass", "link_masses", "arc_masses") if n in described)
     masses = tail if isinstance(tail, tuple) else (tail,)
     size = body.size(float(described.get("torso_mass", 0.0)) + sum(masses))  # type: ignore[arg-type]

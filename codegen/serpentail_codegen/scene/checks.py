@@ -1,4 +1,4 @@
-"""The rules that a scene's table must keep; what breaks one becomes a problem with a remedy."""
+"""The rules for a scene's table. A broken rule becomes a problem with a remedy."""
 
 import sys
 from collections.abc import Collection, Mapping
@@ -22,12 +22,12 @@ from .signatures.table import AIRBORNE, ALL, DERIVATIVES, FIXED, NEEDS
 
 
 def plain(value: Value) -> float | list[float]:
-    """Return a value as TOML and JSON have it."""
+    """Return a value in the types of TOML and JSON."""
     return list(value) if isinstance(value, tuple) else value
 
 
 def fits(parameter: Parameter, value: Any) -> bool:
-    """Tell if a value is as many finite numbers as the parameter has, and keeps its rule."""
+    """Tell if a value has as many finite numbers as the parameter, and satisfies its rule."""
     if (parameter.size > 1) != isinstance(value, list | tuple):
         return False
     numbers = value if parameter.size > 1 else [value]
@@ -64,7 +64,7 @@ def key_problems(values: Mapping[str, Any]) -> list[Problem]:
 
 
 def size_problems(values: Mapping[str, Any]) -> list[Problem]:
-    """Return a problem for each size of which a model would not be generated in sensible time."""
+    """Return a problem for each size that could not be generated in reasonable time."""
     most, of = (MOST_SEGMENTS, MOST_LINKS), ""
     if values["emission"] == "straight":
         most, of = MOST_STRAIGHT, ' of emission "straight"'
@@ -82,7 +82,7 @@ def size_problems(values: Mapping[str, Any]) -> list[Problem]:
 
 
 def kind_problems(table: Mapping[str, Any], kind: str) -> list[Problem]:
-    """Return a problem for all that the tail's kind does not have."""
+    """Return a problem for each key and parameter that this kind of tail does not have."""
     problems, parameters, rules = [], parameters_in(table), ONLY[kind]
 
     # keys and parameters of the other kinds
@@ -92,7 +92,7 @@ def kind_problems(table: Mapping[str, Any], kind: str) -> list[Problem]:
     wrong = [key for key in names if key in parameters]
     problems += [Problem(f"parameters.{key}", parameters[key], remedy) for key in wrong]
 
-    # coordinates, and what polar ones do not have
+    # coordinates, and functions that polar ones do not have
     derivatives = _derivatives_in(table.get("functions"))
     if table.get("coordinates", rules.coordinates[0]) not in rules.coordinates:
         choices = " or ".join(f'"{name}"' for name in rules.coordinates)
@@ -109,7 +109,9 @@ def kind_problems(table: Mapping[str, Any], kind: str) -> list[Problem]:
 
 
 def lacking(needs: str, contacts: Collection[str]) -> str:
-    """Return the group of points to add where a need is not met, feet where any would do."""
+    """Return the group of contact points to add if a need is not met; feet if any group
+    would do.
+    """
     if not needs or needs in contacts or (needs == "contacts" and contacts):
         return ""
     return "feet" if needs == "contacts" else needs
@@ -118,7 +120,7 @@ def lacking(needs: str, contacts: Collection[str]) -> str:
 def contact_problems(
     table: Mapping[str, Any], values: Mapping[str, Any], contacts: Collection[str]
 ) -> list[Problem]:
-    """Return a problem for all that needs contacts which the scene does not have."""
+    """Return a problem for each entry that needs contacts which the scene does not have."""
     problems, parameters = [], parameters_in(table)
 
     # parameters of groups that do not touch the ground
@@ -134,7 +136,7 @@ def contact_problems(
         remedy = "a tail of links and arcs touches nothing so far: remove the group"
         problems.append(Problem("contacts", list(contacts), remedy))
 
-    # what no flight has: friction, and functions of the ground; some need one group of points
+    # a flight has no friction and no functions of the ground; some need one group of points
     remedy = 'needs points that touch the ground: add contacts = ["feet"]'
     if "friction" in table and not contacts:
         problems.append(Problem("friction", table["friction"], remedy))
@@ -147,7 +149,7 @@ def contact_problems(
 
 
 def fixed_problems(values: Mapping[str, Any], contacts: Collection[str]) -> list[Problem]:
-    """Return a problem for all that a tail on a fixed base does not have."""
+    """Return a problem for each entry that a tail on a fixed base does not have."""
     if values["base"] != "fixed":
         return []
     remedy = 'a fixed base has none; remove it, or set base = "free"'
@@ -158,13 +160,15 @@ def fixed_problems(values: Mapping[str, Any], contacts: Collection[str]) -> list
 
 
 def parameters_in(table: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return the table of parameters; an empty one where it is none, which another check tells."""
+    """Return the table of parameters; an empty one if it is no table, which another check
+    reports.
+    """
     parameters = table.get("parameters", {})
     return parameters if isinstance(parameters, Mapping) else {}
 
 
 def airborne_problems(wanted: Any, plain_tail: bool) -> list[Problem]:
-    """Return a problem for each function of a plan's node that a tail does not have."""
+    """Return a problem for each function of plan nodes that this tail does not have."""
     names = wanted if isinstance(wanted, list | tuple) and not plain_tail else ()
     remedy = "is for equal links without springs, damping, stops and mount_angles: remove it"
     return [Problem("functions", name, remedy) for name in names if name in AIRBORNE]
@@ -189,19 +193,19 @@ def single_problems(parameters: Mapping[str, Value]) -> list[Problem]:
 
 
 def segments_in(values: Mapping[str, Any]) -> int:
-    """m, or 1 where it is wrong, and at most what can be generated."""
+    """Return m, or 1 if it is wrong, and at most what can be generated."""
     m = values["segments"]
     return min(m, MOST_SEGMENTS) if COUNT.holds(m) else 1
 
 
 def tail_pieces(values: Mapping[str, Any], key: str = "links") -> int:
-    """N = m n, or 1 where m or n is wrong; n is the links or the samples of a segment."""
+    """Return N = m n, or 1 if m or n is wrong; n counts the links or the samples of a segment."""
     m, n = values["segments"], values[key]
     return m * n if COUNT.holds(m) and COUNT.holds(n) else 1
 
 
 def function_problems(wanted: Any) -> list[Problem]:
-    """Return a problem for each entry that is unknown or listed before, or for what is no array."""
+    """Return a problem for each unknown or repeated function, or for a value that is no array."""
     if not isinstance(wanted, list | tuple) or not wanted:
         remedy = (
             'needs an array of names, such as ["mass_matrix"]; leave it out for the usual ones, or '
@@ -220,7 +224,7 @@ def function_problems(wanted: Any) -> list[Problem]:
 
 
 def unknown_keys(table: Mapping[str, Any], prefix: str, names: Collection[str]) -> list[Problem]:
-    """Return a problem for each key that is not among the names, with its place or spelling."""
+    """Return a problem for each unknown key, with its correct place or spelling."""
     elsewhere, place = (KEYS, "above") if prefix else (NAMES, "below")
     problems = []
     for key in [key for key in table if key not in names]:

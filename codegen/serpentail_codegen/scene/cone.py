@@ -1,7 +1,7 @@
-"""What links weigh that are cut out of one tapered body: a truncated cone of one density.
+"""Mass properties of links that are cut out of one tapered body: a truncated cone of one density.
 
-A link is a slice of the cone across its axis: a truncated cone itself, whose mass, centre of mass
-and moments of inertia are exact.
+A link is a slice of the cone across its axis. It is a truncated cone itself, and its mass, centre
+of mass and moments of inertia are exact.
 """
 
 from collections.abc import Sequence
@@ -29,7 +29,9 @@ def _fields(links: Links) -> tuple[tuple[float, ...], ...]:
 
 
 def cut(lengths: Sequence[float], radii: Sequence[float], density: float) -> Links:
-    """Return the links of these lengths, from the root on, of a cone with radii at both ends."""
+    """Return links of these lengths, from the root on, cut out of a cone with radii at both
+    ends.
+    """
     total = sum(lengths)
     places = [place / total for place in accumulate(lengths, initial=0.0)]
     at = [radii[0] + (radii[1] - radii[0]) * place for place in places]
@@ -59,8 +61,8 @@ def _slice(
     square = a * a + a * b + b * b
     center = length * (a * a + 2 * a * b + 3 * b * b) / (4 * square)
 
-    # along the axis: the integral of r^4 / 2; across: half of it and that of r^2 s^2, s being
-    # measured from the COM
+    # along the axis: the integral of r^4 / 2; across: half of that plus the integral of r^2 s^2,
+    # where s is measured from the COM
     both, product = a * a + b * b, a * b
     fourth = (both - product) * (a + b) * (a + b) + product * product
     along = density * pi / 10 * length * fourth
@@ -76,9 +78,7 @@ def single(
     inertias: Sequence[float],
     radius: float,
 ) -> Links:
-    """Return links by themselves; without ``inertias`` each is an ellipsoid of semi-axes
-    (r, L / 2, r).
-    """
+    """Return single links; without ``inertias`` each is an ellipsoid of semi-axes (r, L / 2, r)."""
     moments = tuple(inertias) or tuple(
         moment
         for m, length in zip(masses, lengths, strict=True)

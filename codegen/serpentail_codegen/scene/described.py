@@ -1,4 +1,4 @@
-"""In what the segments of a scene's tail differ: by tables, or by parameters of single pieces."""
+"""How the segments of a scene's tail differ: by tables, or by parameters of single pieces."""
 
 import json
 from collections.abc import Collection, Mapping
@@ -16,7 +16,7 @@ OWN = {p.name: p.tail for p in PARAMETERS if p.tail in ("link", "arc")}
 
 @dataclass(frozen=True)
 class TailDescribed:
-    """Values of the scene that follow, its shape, and what is wrong."""
+    """Values of the scene that follow from the description, its shape, and problems."""
 
     values: Mapping[str, Any]
     shape: Shape = EQUAL
@@ -24,12 +24,12 @@ class TailDescribed:
 
 
 def tail_described(kind: str, values: Mapping[str, Any]) -> TailDescribed:
-    """Return what `segments`, `links`, `taper` and parameters of single pieces say of a tail."""
+    """Return what `segments`, `links`, `taper` and parameters of single pieces say about a tail."""
     segments, taper = values["segments"], values["taper"]
     rest = Shape(fixed=values["base"] == "fixed", weightless=values["weightless"] is True)
     pieces = {"articulated": values["links"], "continuum": values["samples"]}
     if kind == "mixed":
-        del pieces["articulated"]  # each table tells its own
+        del pieces["articulated"]  # each table has its own
         rest = replace(rest, kinds=("articulated", "continuum"))
     each = pieces.get(kind)
     counted = COUNT.holds(segments) and COUNT.holds(each)
@@ -37,9 +37,9 @@ def tail_described(kind: str, values: Mapping[str, Any]) -> TailDescribed:
         remedy = "needs an array of tables, one for each segment, each with a kind"
         return TailDescribed({"shape": rest}, rest, (Problem("segments", segments, remedy),))
     if not SEGMENTS.holds(segments) or not (counted or are_tables(segments)):
-        return TailDescribed({"shape": rest}, rest)  # the rules of these keys tell
+        return TailDescribed({"shape": rest}, rest)  # the rules of these keys report that
     if not are_tables(segments) and segments * each > MOST_LINKS:
-        return TailDescribed({"shape": rest}, rest)  # a rule of sizes tells
+        return TailDescribed({"shape": rest}, rest)  # a rule of sizes reports that
 
     named = values["parameters"] if isinstance(values["parameters"], Mapping) else {}
     found = described(kind, segments, pieces, taper, named)
@@ -57,7 +57,7 @@ def tail_described(kind: str, values: Mapping[str, Any]) -> TailDescribed:
 
 
 def _given_twice(named: Mapping[str, Any], found: Described) -> list[Problem]:
-    """Return a problem for each parameter that tables tell, too."""
+    """Return a problem for each parameter that tables give, too."""
     remedy = "follows from `segments` or `taper`; remove one of the two"
     return [
         Problem(f"parameters.{name}", named[name], remedy)
@@ -67,7 +67,7 @@ def _given_twice(named: Mapping[str, Any], found: Described) -> list[Problem]:
 
 
 def _shape(kind: str, named: Collection[str], found: Described, rest: Shape) -> Shape:
-    """Return the shape of a tail with these parameters, and segments as they were found."""
+    """Return the shape of a tail with these parameters and these segments."""
     links = sum(n for n, own in zip(found.counts, found.kinds, strict=True) if own != "continuum")
     arcs, mixed = found.kinds.count("continuum"), kind == "mixed"
     tails = {OWN[name] for name in named if name in OWN}

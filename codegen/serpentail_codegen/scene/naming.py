@@ -1,4 +1,4 @@
-"""Names models by what distinguishes them, so that no option overwrites another's folder."""
+"""Names models so that models with different options have different folders."""
 
 import hashlib
 
@@ -6,9 +6,9 @@ from .scene import Scene
 
 
 def suffix(scene: Scene, own: Scene, functions: str | None = None) -> str:
-    """Return what the name of a scene with options has after that of the scene's own.
+    """Return what options add to the name of a scene.
 
-    functions: as given by the user; "all" is said so, other choices get a short hash.
+    functions: as the user gave them; "all" is added as a word, other choices as a short hash.
     """
     keys = ("real", "emission", "profile")
     words = [getattr(scene, key) for key in keys if getattr(scene, key) != getattr(own, key)]

@@ -11,7 +11,7 @@ Value = float | tuple[float, ...]
 
 @dataclass(frozen=True)
 class Rule:
-    """What a value must fulfil: in words that complete "needs ...", as a test, as JSON Schema."""
+    """A condition on a value: as words that complete "needs ...", as a test, and as JSON Schema."""
 
     text: str
     holds: Callable[[Any], bool]
@@ -32,12 +32,13 @@ BODY_INERTIA = Rule(
 
 @dataclass(frozen=True)
 class Parameter:
-    """One physical parameter: `size` numbers in `unit`; no default: computed from the others.
+    """One physical parameter: `size` numbers in `unit`; without a default it is computed from the
+    others.
 
     ``needs`` is a group of contact points, or "contacts" for any of them; empty: every scene has
-    the parameter.  ``tail`` tells of what tails it is: "equal", of equal pieces; "link" or "arc",
-    of pieces with values of their own, ``size`` numbers for each; "tilted"; "free", of a torso that
-    moves; "weight", of all but the weightless; empty: of all.
+    the parameter.  ``tail`` says which tails have it: "equal", tails of equal pieces; "link" or
+    "arc", tails whose pieces have their own values, ``size`` numbers each; "tilted", tails on
+    turned axes; "free", tails of a torso that moves; "weight", all but weightless ones; empty: all.
     """
 
     name: str
@@ -77,7 +78,7 @@ PARAMETERS = (
         (0.0, -0.0405, 0.0045),
         "m",
         ANY,
-        "root of the tail from the torso COM, in B",
+        "position of the tail's root relative to the torso COM, in B",
     ),
     Parameter(
         "mount_angles",
@@ -85,7 +86,7 @@ PARAMETERS = (
         None,
         "rad",
         ANY,
-        "pitch, roll and yaw of the tail's root axes in B; the tail begins along their -y",
+        "pitch, roll and yaw of the axes at the tail's root, in B; the tail begins along their -y",
         tail="tilted",
     ),
     Parameter("tail_mass", 1, 0.00351, "kg", POSITIVE, "mass of the whole tail", tail="equal"),
@@ -116,7 +117,7 @@ PARAMETERS = (
         None,
         "m",
         ANY,
-        "COM of each link from its joint, along the link",
+        "distance of each link's COM from its joint, along the link",
         tail="link",
     ),
     Parameter(
@@ -130,31 +131,45 @@ PARAMETERS = (
     ),
     Parameter("arc_masses", 1, None, "kg", POSITIVE, "mass of each segment", tail="arc"),
     Parameter("arc_lengths", 1, None, "m", POSITIVE, "length of each segment", tail="arc"),
-    Parameter("K_n", 1, 1000.0, "N/m^1.5", POSITIVE, "stiffness of the ground", "contacts"),
+    Parameter(
+        "K_n", 1, 1000.0, "N/m^1.5", POSITIVE, "stiffness K_n of the ground, Eq. 36", "contacts"
+    ),
     Parameter(
         "D_n",
         1,
         0.75,
         "s",
         NOT_NEGATIVE,
-        "damping of the ground, over its stiffness",
+        "damping of the ground divided by its stiffness, Eq. 36",
         "contacts",
     ),
-    Parameter("K_f", 1, 600.0, "N/m", POSITIVE, "stiffness of the friction spring", "contacts"),
+    Parameter(
+        "K_f", 1, 600.0, "N/m", POSITIVE, "stiffness of a friction bristle, Eq. 37", "contacts"
+    ),
     Parameter(
         "D_f",
         1,
         0.01,
         "s",
         POSITIVE,
-        "damping of the friction spring, over its stiffness",
+        "damping of a friction bristle divided by its stiffness, Eq. 37",
         "contacts",
     ),
     Parameter("mu", 1, 1.0, "1", NOT_NEGATIVE, "coefficient of friction", "contacts"),
-    Parameter("L_h2d", 1, 0.008, "m", NOT_NEGATIVE, "leg linkage from H to D", "feet"),
-    Parameter("L_d2k", 1, 0.024, "m", NOT_NEGATIVE, "leg linkage from D to the knee K", "feet"),
     Parameter(
-        "L_k2a", 1, 0.032, "m", NOT_NEGATIVE, ("leg linkage from the knee K to the ankle A"), "feet"
+        "L_h2d", 1, 0.008, "m", NOT_NEGATIVE, "length of the leg link from the hip H to D", "feet"
+    ),
+    Parameter(
+        "L_d2k", 1, 0.024, "m", NOT_NEGATIVE, "length of the leg link from D to the knee K", "feet"
+    ),
+    Parameter(
+        "L_k2a",
+        1,
+        0.032,
+        "m",
+        NOT_NEGATIVE,
+        "length of the leg link from the knee K to the ankle A",
+        "feet",
     ),
     Parameter(
         "L_a2m",
@@ -162,7 +177,7 @@ PARAMETERS = (
         0.035,
         "m",
         NOT_NEGATIVE,
-        "leg linkage from the ankle A to the metatarsal M",
+        "length of the leg link from the ankle A to the metatarsal M",
         "feet",
     ),
     Parameter(
@@ -171,17 +186,25 @@ PARAMETERS = (
         0.016,
         "m",
         NOT_NEGATIVE,
-        "leg linkage from the metatarsal M to the toe T",
+        "length of the leg link from the metatarsal M to the toe T",
         "feet",
     ),
-    Parameter("delta_m", 1, pi / 6, "rad", ANY, "angle of the sole against the thigh", "feet"),
+    Parameter(
+        "delta_m",
+        1,
+        pi / 6,
+        "rad",
+        ANY,
+        "constant angle delta_m between sole and thigh, Eq. 8",
+        "feet",
+    ),
     Parameter(
         "hip",
         3,
         (0.0225, -0.018, 0.01125),
         "m",
         ANY,
-        "p_b2h of the right leg, in B; the left one mirrors x",
+        "position p_b2h of the right hip, in B; the left hip has the opposite x",
         "feet",
     ),
     Parameter(
@@ -190,7 +213,7 @@ PARAMETERS = (
         (0.0315, 0.0495, 0.027),
         "m",
         POSITIVE,
-        "semi-axes of the torso, an ellipsoid about B",
+        "semi-axes of the torso, an ellipsoid centred at B",
         "torso",
     ),
 )
@@ -198,7 +221,7 @@ PARAMETERS = (
 
 @dataclass(frozen=True, eq=False)
 class Parameters(Mapping[str, Value]):
-    """Parameters with values, in the order of PARAMETERS; no link_radius where a scene names
+    """Parameters with values, in the order of PARAMETERS; without link_radius if a scene names
     link_inertia.
     """
 

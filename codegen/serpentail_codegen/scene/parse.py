@@ -1,4 +1,4 @@
-"""Reads scene files and tables; what comes back is a checked, frozen Scene."""
+"""Reads scene files and tables, checks them and returns a frozen Scene."""
 
 import json
 import re
@@ -97,7 +97,7 @@ def parse_scene(table: Mapping[str, Any], name: str) -> Scene:
     problems += function_problems(values["functions"]) + contact_problems(table, values, contacts)
     problems += fixed_problems(values, contacts)
 
-    # parameters: which there are follows from the kind and the contacts
+    # the kind and the contacts determine which parameters there are
     links = min(sum(tail.shape.counts) or tail_pieces(values), MOST_LINKS)
     body = body_of(values["body"], values["parameters"])
     named = body.completed(values["parameters"], contacts)
@@ -123,13 +123,13 @@ def parse_scene(table: Mapping[str, Any], name: str) -> Scene:
 
 
 def _kind(table: Mapping[str, Any]) -> str:
-    """Return the kind of tail; where it is wrong the table is checked as an articulated one."""
+    """Return the kind of tail; a table with a wrong kind is checked as an articulated tail."""
     kind = table.get("kind")
     return kind if isinstance(kind, str) and kind in ONLY else "articulated"
 
 
 def _with_defaults(table: Mapping[str, Any], name: str, rules: Only) -> dict[str, Any]:
-    """Return a table with the default of every key that it leaves out, None where it is needed."""
+    """Return a table with defaults for missing keys, None for a missing key that is required."""
     values = {key: default for key, (default, _) in KEYS.items()}
     values |= {"name": name, "coordinates": rules.coordinates[0]}
     values |= dict.fromkeys(rules.required) | {"shape": EQUAL, "tables": ""}
@@ -140,12 +140,12 @@ def _with_defaults(table: Mapping[str, Any], name: str, rules: Only) -> dict[str
 def _chosen_functions(
     table: Mapping[str, Any], values: Mapping[str, Any], contacts: Collection[str]
 ) -> Any:
-    """Return the functions that a scene means by naming them, by "all", or by leaving them out."""
+    """Return the functions of a scene: those that it names, "all", or the default ones."""
     chosen = table.get("functions")
     if "functions" in table and chosen != "all":
         return chosen
 
-    # all that the scene can have, or the usual ones; a passive tail may be stiff
+    # all that the scene can have, or the default ones; a passive tail may be stiff
     names = DEFAULT + DEFAULT_ON_GROUND if contacts else DEFAULT
     if not contacts and parts_of(parameters_in(table)):
         names += ("implicit",)
@@ -159,11 +159,13 @@ def _chosen_functions(
 
 
 def scene_to_dict(scene: Scene) -> dict[str, Any]:
-    """Return the table that parse_scene turns into this scene again: JSON-ready, floats exact."""
+    """Return the table from which parse_scene makes this scene again: ready for JSON, floats
+    exact.
+    """
     # keys that this kind of tail, or a flight, does not have
     foreign = {*foreign_to(scene.kind)[0]}
     foreign |= set() if scene.contacts else {"contacts", "friction"}
-    foreign |= {"shape", "tables", "body", "unscaled", "size"}  # follow from what is written
+    foreign |= {"shape", "tables", "body", "unscaled", "size"}  # these follow from other keys
     foreign |= {name for name in ("base", "weightless") if getattr(scene, name) == KEYS[name][0]}
     names = [field.name for field in fields(Scene) if field.name not in foreign]
     table = {name: getattr(scene, name) for name in names}
@@ -173,7 +175,7 @@ def scene_to_dict(scene: Scene) -> dict[str, Any]:
         table.pop("links", None)
     table |= {key: list(table[key]) for key in ("functions", "contacts", "targets") if key in table}
 
-    # an inertia that follows from link_radius is computed again, and so is what tables tell
+    # an inertia that follows from link_radius is computed again, as are values from tables
     computed = {"link_inertia"} if "link_radius" in scene.parameters else set()
     if written and tell_values(written):
         computed |= {p.name for p in PARAMETERS if p.tail in ("link", "arc")}

@@ -1,6 +1,6 @@
-"""The passive tail: springs, damping and stops of its coordinates, which a scene names or has not.
+"""The passive tail: springs, damping and stops of its coordinates, if a scene names them.
 
-Their parameters have one number for each tail coordinate; a single one stands for all.
+Their parameters have one number for each tail coordinate; a single number stands for all.
 """
 
 from collections.abc import Collection, Mapping
@@ -10,9 +10,9 @@ from typing import Any
 from .parameters import ANY, NOT_NEGATIVE, POSITIVE, Parameter
 from .problems import Problem
 
-PARTS = ("spring", "damping", "stops")  # each is there where a scene names one of its parameters
-PER_COORDINATE = 0  # a size that the scene's segments decide
-# no default: a part that is there needs it
+PARTS = ("spring", "damping", "stops")  # a scene has a part if it names one of its parameters
+PER_COORDINATE = 0  # the number of segments determines the size
+# no default: required if a scene has the part
 PASSIVE = (
     Parameter(
         "tail_stiffness",
@@ -20,7 +20,7 @@ PASSIVE = (
         None,
         "N m/rad",
         NOT_NEGATIVE,
-        "stiffness of the tail coordinates' springs",
+        "stiffness of the springs of the tail coordinates",
         "spring",
     ),
     Parameter(
@@ -29,7 +29,7 @@ PASSIVE = (
         0.0,
         "rad",
         ANY,
-        "tail coordinates at which their springs rest",
+        "tail coordinates at which the springs are relaxed",
         "spring",
     ),
     Parameter(
@@ -38,7 +38,7 @@ PASSIVE = (
         None,
         "N m s",
         NOT_NEGATIVE,
-        "damping of the tail coordinates by the tail itself",
+        "passive damping of the tail coordinates",
         "damping",
     ),
     Parameter(
@@ -65,7 +65,7 @@ PASSIVE = (
         None,
         "N m/rad",
         POSITIVE,
-        "stiffness of the stops from tail_stop_width on",
+        "stiffness of the stops beyond tail_stop_width",
         "stops",
     ),
     Parameter(
@@ -74,7 +74,7 @@ PASSIVE = (
         0.1,
         "rad",
         POSITIVE,
-        "way into a stop on which its stiffness grows from zero to its own",
+        "angle beyond a stop over which its stiffness grows from zero to tail_stop_stiffness",
         "stops",
     ),
 )
@@ -82,13 +82,13 @@ PASSIVE_NAMES = tuple(p.name for p in PASSIVE)
 
 
 def parts_of(named: Collection[str]) -> tuple[str, ...]:
-    """Return the parts of a tail of which some parameter is named."""
+    """Return the passive parts of which the scene names at least one parameter."""
     present = {p.needs for p in PASSIVE if p.name in named}
     return tuple(part for part in PARTS if part in present)
 
 
 def passive_parameters(passive: Collection[str], segments: int) -> tuple[Parameter, ...]:
-    """Return the parameters of a tail's passive parts, each a number for each coordinate."""
+    """Return the parameters of a tail's passive parts, with one number for each coordinate."""
     size = 2 * segments
     return tuple(
         replace(p, size=size, default=(p.default,) * size if isinstance(p.default, float) else None)
@@ -98,13 +98,13 @@ def passive_parameters(passive: Collection[str], segments: int) -> tuple[Paramet
 
 
 def for_all(parameter: Parameter, value: Any) -> Any:
-    """Return the numbers of all coordinates where one number stands for all."""
+    """Return one number for each coordinate, also if a single number stands for all."""
     alone = isinstance(value, int | float) and not isinstance(value, bool)
     return [value] * parameter.size if alone else value
 
 
 def lacking_passive(named: Mapping[str, Any], passive: Collection[str]) -> list[Problem]:
-    """Return a problem for each parameter that a part needs, and the scene does not name."""
+    """Return a problem for each parameter that a part needs and the scene does not name."""
     problems = []
     for p in PASSIVE:
         if p.needs in passive and p.default is None and p.name not in named:
@@ -115,7 +115,7 @@ def lacking_passive(named: Mapping[str, Any], passive: Collection[str]) -> list[
 
 
 def stop_problems(given: Mapping[str, Any]) -> list[Problem]:
-    """Return a problem for each coordinate whose stops leave it no room."""
+    """Return a problem for each coordinate whose stops leave no room between them."""
     pairs = zip(given["tail_stop_lower"], given["tail_stop_upper"], strict=True)
     return [
         Problem(

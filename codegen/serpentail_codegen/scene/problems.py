@@ -1,10 +1,10 @@
-"""What is wrong with a scene, told so that its author can mend all of it at once."""
+"""The problems of a scene, collected so that its author can correct all of them at once."""
 
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from difflib import get_close_matches
 
-# Names used elsewhere for the same things: suggested, never accepted.
+# Names that other software uses for the same things: suggested, never accepted.
 ALIASES = {
     "crba": "mass_matrix",
     "nle": "bias_force",
@@ -18,7 +18,7 @@ ALIASES = {
 
 @dataclass(frozen=True)
 class Problem:
-    """One thing that is wrong: where, the value there (None: nothing), and what to do."""
+    """One problem: its place, the value there (None: nothing), and what to do."""
 
     field: str
     value: object
@@ -40,14 +40,14 @@ class SceneError(ValueError):
 
 
 def suggest(word: object, names: Collection[str]) -> str:
-    """Return "did you mean ...?", or all names that there are."""
+    """Return "did you mean ...?", or the list of all names."""
     text = word[:64].lower() if isinstance(word, str) else ""
     near = [ALIASES[text]] if ALIASES.get(text) in names else get_close_matches(text, names, 1)
     return f"did you mean '{near[0]}'?" if near else f"known: {', '.join(names)}"
 
 
 def show(value: object) -> str:
-    """Return "value ..." as a reader of the file would write it."""
+    """Return "value ..." in the notation of the file."""
     if value is None:
         return "no value"
     try:

@@ -1,4 +1,4 @@
-"""From the parameters that a scene names to a value for each that its model has."""
+"""Gives each parameter of a model its value, from those that the scene names."""
 
 import math
 from collections.abc import Collection, Mapping
@@ -27,11 +27,11 @@ HAS_NOT = {  # why a tail or a base has no such parameters
     "free": "a fixed base does not move",
     "weight": "this scene is weightless",
 }
-MEANINGS = {  # in a tail of both kinds
+MEANINGS = {  # in a mixed tail
     "arc_masses": "mass of each arc",
     "arc_lengths": "length of each arc",
 }
-OPTIONAL = ("link_centers", "link_inertias")  # of what single links may leave out
+OPTIONAL = ("link_centers", "link_inertias")  # defaults of values that single links may leave out
 
 
 def parameters_of(
@@ -41,10 +41,9 @@ def parameters_of(
     passive: Collection[str] = (),
     segments: int = 1,
 ) -> tuple[Parameter, ...]:
-    """Return the parameters that a kind of tail has, with those of its contacts and of the passive
-    parts of so many segments.
+    """Return the parameters of a kind of tail, with those of its contacts and of its passive parts.
 
-    Those of single links or arcs have as many numbers as all of these together.
+    Parameters of single links or arcs have numbers for all links or arcs together.
     """
     foreign = foreign_to(kind)[1]
     present = {"", *contacts, *(["contacts"] if contacts else [])}
@@ -116,9 +115,7 @@ def _ellipsoid_inertia(parameters: Mapping[str, Any], tail_links: int) -> tuple[
 
 
 def of_pieces(parameter: Parameter, value: Any) -> Any:
-    """Return a value of single links or arcs as one array: a moment of each may be one of its
-    own.
-    """
+    """Return a value of single links or arcs as one array; each may have its own three moments."""
     if parameter.tail not in ("link", "arc") or not isinstance(value, list | tuple):
         return value
     numbers = list(flattened(value))
@@ -126,7 +123,9 @@ def of_pieces(parameter: Parameter, value: Any) -> Any:
 
 
 def own_problems(given: Mapping[str, Any], shape: Shape) -> list[Problem]:
-    """Return a problem for what single links or arcs lack, and what this tail or base has not."""
+    """Return a problem for each missing value of single links or arcs, and for each parameter that
+    this tail or base does not have.
+    """
     problems = []
     for p in PARAMETERS:
         lacks = p.default is None and p.tail and p.name not in OPTIONAL
@@ -140,8 +139,8 @@ def own_problems(given: Mapping[str, Any], shape: Shape) -> list[Problem]:
 
 
 def completed(given: Mapping[str, Any], links: int) -> dict[str, Any]:
-    """Return the values of single links with those that nothing tells: COM in the middle, and the
-    inertia of an ellipsoid.
+    """Return the values of single links, with defaults: COM in the middle, inertia of an
+    ellipsoid.
     """
     masses, lengths = (tuple(flattened(given[name])) for name in ("link_masses", "link_lengths"))
     default = single(masses, lengths, tuple(length / 2 for length in lengths), (), RADIUS)

@@ -16,13 +16,13 @@ GROUPS = ("feet", "tail", "torso")  # of contact points, in their order
 FRICTION = ("cone", "box", "smooth", "paper")
 BASES = ("free", "fixed")  # of the tail: a torso that moves, or one that never does
 TARGETS = ("c", "casadi")  # languages to emit, in their order
-# a model of such a name would hide the system's header
+# a model with such a name would hide the system's header
 C_HEADERS = (
     "assert|complex|ctype|errno|features|fenv|float|inttypes|iso646|limits|locale|math|setjmp|"
     "signal|stdarg|stdbool|stddef|stdint|stdio|stdlib|string|tgmath|time|wchar|wctype"
 )
-# What is generated within a minute or so; the work grows as the cube of the segments, and
-# straight lines grow with every piece.
+# Larger models would take more than about a minute: the work grows with the cube of the
+# number of segments, and the text of straight lines with every piece.
 MOST_SEGMENTS = 100
 MOST_LINKS = 10_000  # or samples, of all segments
 MOST_STRAIGHT = (20, 100)  # segments, and pieces in all, of straight lines
@@ -41,7 +41,7 @@ def _names(names: Sequence[str], **more: Any) -> dict[str, Any]:
 
 
 def is_whole(x: object) -> bool:
-    """Tell if x is an integer; true and false are none."""
+    """Tell if x is an integer, but not true or false."""
     return isinstance(x, int) and not isinstance(x, bool)
 
 
@@ -112,7 +112,7 @@ class Scene:
     name: str  # prefix of every C symbol and generated file
     kind: str
     segments: int  # m
-    links: int  # n, in each segment; 1 for a continuum, and for tails of both kinds
+    links: int  # n, in each segment; 1 for a continuum and for mixed tails
     functions: tuple[str, ...]  # in the order of their table
     parameters: Parameters
     coordinates: str = (
@@ -123,7 +123,7 @@ class Scene:
     baked: bool = False  # parameters folded into the code, behind the same ABI
     real: str = "double"
     emission: str = "auto"
-    profile: str = "fast"  # or the same bits on every machine
+    profile: str = "fast"  # or "reproducible": the same bits on every machine
     contacts: tuple[
         str, ...
     ] = ()  # groups of points that can touch the ground, in the order of GROUPS
@@ -131,20 +131,20 @@ class Scene:
     targets: tuple[str, ...] = TARGETS  # in that order
     base: str = "free"  # or "fixed": the torso never moves
     weightless: bool = False
-    shape: Shape = EQUAL  # in what segments and links differ
-    body: str = ""  # `body` as it is written, as JSON
-    unscaled: Parameters | None = None  # as the scene describes it, where `body` scales it
-    size: tuple[float, float, float] = (1.0, 1.0, 1.0)  # what becomes of each kg, m and s
-    tables: str = ""  # `segments` and `taper` as they are written, as JSON; empty: a count
+    shape: Shape = EQUAL  # how segments and links differ
+    body: str = ""  # the key `body` of the file, as JSON
+    unscaled: Parameters | None = None  # before scaling, if `body` scales the parameters
+    size: tuple[float, float, float] = (1.0, 1.0, 1.0)  # factors of kg, m and s
+    tables: str = ""  # the keys `segments` and `taper` of the file, as JSON; empty: a count
 
     @property
     def passive(self) -> tuple[str, ...]:
-        """Parts of the passive tail that it has."""
+        """Parts of the passive tail that the scene has."""
         return parts_of(self.parameters)
 
 
-# The keys of a scene file: default (None: required) and rule; ANY where a function of its own
-# checks.
+# The keys of a scene file: default (None: required) and rule. ANY: a function of its own checks the
+# key.
 KEYS: dict[str, tuple[Any, Rule]] = {
     "name": (None, NAME),
     "description": ("", TEXT),
@@ -166,13 +166,13 @@ KEYS: dict[str, tuple[Any, Rule]] = {
     "plan": (
         {},
         _table("plan"),
-    ),  # a motion to plan, and one to simulate: for the runtime, which checks them
+    ),  # motions to plan and to simulate, which the runtime checks
     "simulate": ({}, _table("simulate")),
     "identify": ({}, _table("identify")),
-    "phase": ((), TABLES),  # of a motion of several, likewise
+    "phase": ((), TABLES),  # of a sequence, likewise
     "sweep": ({}, _table("sweep")),  # of many runs, likewise
     "taper": (None, ANY),
-    "body": (None, ANY),  # how large it is
+    "body": (None, ANY),  # the size of the animal
     "base": (Scene.base, _one_of(BASES)),
     "weightless": (Scene.weightless, FLAG),
 }
@@ -181,7 +181,9 @@ NAMES = (*(parameter.name for parameter in PARAMETERS), *PASSIVE_NAMES)
 
 @dataclass(frozen=True)
 class Only:
-    """What only one kind of tail has: keys, parameters, and its coordinates, the default first."""
+    """What only one kind of tail has: keys, parameters, and its coordinates, with the default
+    first.
+    """
 
     keys: tuple[str, ...]
     required: tuple[str, ...]
@@ -215,7 +217,7 @@ ONLY = {
 
 
 def foreign_to(kind: str) -> tuple[list[str], list[str]]:
-    """Return keys, and parameters, that tails of other kinds have and this one has not."""
+    """Return the keys and the parameters that only other kinds of tails have."""
     own = ONLY[kind]
     keys = [key for only in ONLY.values() for key in only.keys if key not in own.keys]
     names = [

@@ -1,7 +1,7 @@
-"""The JSON Schema of scene files, from the tables that scenes are checked against.
+"""The JSON Schema of scene files, made from the tables that scenes are checked against.
 
-The tables [plan], [simulate], [identify] and [[phase]] are any tables here: the runtime knows what
-belongs in them.
+Here the tables [plan], [simulate], [identify] and [[phase]] may hold anything: the runtime knows
+their keys.
 """
 
 from collections.abc import Mapping
@@ -44,13 +44,15 @@ def scene_schema() -> dict[str, Any]:
 
 
 def _table(keys: Mapping[str, Any], required: list[str]) -> dict[str, Any]:
-    """Return the schema of a table that has no other keys."""
+    """Return the schema of a table without other keys."""
     table = {"type": "object", "properties": dict(keys), "additionalProperties": False}
     return table | {"required": required}
 
 
 def _of_kind(kind: str) -> list[dict[str, Any]]:
-    """Return what a tail of a kind has not, and what it needs where its segments are counted."""
+    """Return which keys a kind of tail does not have, and which it needs if its segments are
+    counted.
+    """
     foreign, has_not = foreign_to(kind)
     keys: dict[str, Any] = dict.fromkeys(foreign, False)
     keys["coordinates"] = {"enum": list(ONLY[kind].coordinates)}
@@ -64,7 +66,9 @@ def _of_kind(kind: str) -> list[dict[str, Any]]:
 
 
 def _key(key: Key) -> dict[str, Any]:
-    """Return the schema of a key of a segment's table: one number, some, or some of each link."""
+    """Return the schema of a key of a segment's table: one number, several, or several for each
+    link.
+    """
     one = _numbers(key.rule.schema, key.unit)
     if key.size == 1 and not key.of_links:
         return one
@@ -72,7 +76,7 @@ def _key(key: Key) -> dict[str, Any]:
 
 
 def _array(one: dict[str, Any], unit: str, size: int | None) -> dict[str, Any]:
-    """Return the schema of so many numbers in a unit, or of any number, three in one perhaps."""
+    """Return the schema of a number of values in a unit, or of any number of them."""
     bounds = {"minItems": size, "maxItems": size} if size else {"minItems": 1}
     entry = one if size else {"anyOf": [one, {"type": "array", "items": one}]}
     forms: list[dict[str, Any]] = [{"type": "array", "items": entry} | bounds]
@@ -95,7 +99,9 @@ def _parameter(parameter: Parameter) -> dict[str, Any]:
 
 
 def _of_each_coordinate(parameter: Parameter) -> dict[str, Any]:
-    """Return the schema of a parameter of the passive tail: one number, or one a coordinate."""
+    """Return the schema of a parameter of the passive tail: one number, or one for each
+    coordinate.
+    """
     one = _numbers(parameter.check.schema, parameter.unit)
     forms = [one, {"type": "array", "items": one, "minItems": 2}]
     if plain(parameter.unit) in MEASURES:
@@ -110,7 +116,7 @@ def _numbers(bounds: Mapping[str, Any], unit: str) -> dict[str, Any]:
 
 
 def _text(unit: str, size: int | None = 1) -> dict[str, Any]:
-    """Return the schema of a text of so many numbers with a unit, or of any number."""
+    """Return the schema of a text of a number of values with a unit, or of any number of them."""
     return {
         "type": "string",
         "pattern": pattern(unit, "*" if size is None else f"{{{size - 1}}}"),

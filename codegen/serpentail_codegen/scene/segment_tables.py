@@ -10,13 +10,13 @@ from .problems import Problem, suggest
 from .scene import COUNT
 from .units import in_unit
 
-Numbers = Mapping[str, tuple[float, ...]]  # of a table, by its keys, SI
+Numbers = Mapping[str, tuple[float, ...]]  # the numbers of a table by key, in SI units
 PIECES = {"articulated": "links", "continuum": "samples"}
 
 
 @dataclass(frozen=True)
 class Key:
-    """What a key of a table holds: so many numbers in a unit, or so many of each link."""
+    """What a key of a table holds: a number of values in a unit, or as many for each link."""
 
     unit: str
     rule: Rule
@@ -38,12 +38,12 @@ INERTIAS = {
 }
 CENTERS = {"link_centers": Key("m", ANY, of_links=True)}
 VALUES = LENGTHS | MASSES | INERTIAS | CENTERS
-OF_LINKS = {name for name in VALUES if name.startswith("link_")}  # that no arc has
+OF_LINKS = {name for name in VALUES if name.startswith("link_")}  # only links have them
 TAPER = {name: VALUES[name] for name in ("length", "radii", "density", "mass")}
 
 
 def table_of(place: str, table: Any, kind: str, problems: list[Problem]) -> dict[str, Any]:
-    """Return the values of one segment as they are written, without its kind and its links."""
+    """Return the values of one segment as written, without its kind and its number of links."""
     if not isinstance(table, Mapping):
         problems.append(Problem(place, table, "needs a table, such as {links = 4}"))
         return {}
@@ -59,7 +59,7 @@ def table_of(place: str, table: Any, kind: str, problems: list[Problem]) -> dict
 
 
 def kind_of(place: str, table: Any, kind: str, problems: list[Problem]) -> str:
-    """Return the kind of one segment: its scene's, or its own in a mixed tail."""
+    """Return the kind of one segment: that of the scene, or its own in a mixed tail."""
     given = table.get("kind") if isinstance(table, Mapping) else None
     if kind == "mixed":
         if given in ("articulated", "continuum"):
@@ -76,8 +76,8 @@ def kind_of(place: str, table: Any, kind: str, problems: list[Problem]) -> str:
 def count_of(
     place: str, table: Any, kind: str, pieces: Mapping[str, Any], problems: list[Problem]
 ) -> int:
-    """Return the number of links of a segment, or samples, by default those of the scene; a mixed
-    tail has no links in common.
+    """Return the number of links or samples of a segment; the scene's is the default, but not for
+    links of a mixed tail.
     """
     own = isinstance(table, Mapping) and "links" in table and kind == "articulated"
     count: Any = table["links"] if own else pieces.get(kind)
@@ -91,7 +91,7 @@ def count_of(
 def numbers_of(
     place: str, table: Any, keys: Mapping[str, Key], links: int, problems: list[Problem]
 ) -> Numbers:
-    """Return the numbers of a table, SI; what cannot be becomes a problem."""
+    """Return the numbers of a table in SI units; a wrong value becomes a problem."""
     if not isinstance(table, Mapping):
         remedy = "needs a table, such as {length = 0.2, radii = [0.004, 0.001], density = 1000}"
         problems.append(Problem(place, table, remedy))

@@ -1,4 +1,6 @@
-"""The tables of `segments` and `taper`: what each segment is made of, checked, link by link."""
+"""Reads and checks the tables `segments` and `taper`: the properties of each segment, link
+by link.
+"""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
@@ -24,13 +26,13 @@ OWN = {
     *("link_masses", "link_lengths", "link_centers", "link_inertias"),
     *("arc_masses", "arc_lengths"),
 }
-RADIUS = 0.0029  # m, of links whose inertia no key tells: that of Table 1's tail
+RADIUS = 0.0029  # m, of links whose inertia no key gives: the radius of the tail in Table 1
 
 
 @dataclass(frozen=True)
 class Described:
-    """What tables say: links, or samples, of each segment, and its kind; values of all links or
-    arcs by the names of parameters, and what is wrong.
+    """What tables describe: the kind of each segment and its number of links or samples, values of
+    all links or arcs by the names of parameters, and problems.
     """
 
     counts: tuple[int, ...]
@@ -40,12 +42,12 @@ class Described:
 
 
 def are_tables(segments: Any) -> bool:
-    """Tell if segments are described one by one, not counted."""
+    """Tell if segments are described one by one instead of counted."""
     return isinstance(segments, list | tuple)
 
 
 def tell_values(written: Mapping[str, Any]) -> bool:
-    """Tell if the tables `segments` and `taper` say more than how many links there are."""
+    """Tell if the tables `segments` and `taper` give more than the numbers of links."""
     segments: Any = written.get("segments")
     counted = not are_tables(segments)
     return "taper" in written or not (counted or all(set(t) <= {"kind", "links"} for t in segments))
@@ -54,10 +56,11 @@ def tell_values(written: Mapping[str, Any]) -> bool:
 def described(
     kind: str, segments: Any, pieces: Mapping[str, Any], taper: Any, named: Collection[str] = ()
 ) -> Described:
-    """Return what the keys `segments`, `links`, `samples` and `taper` of a scene say.
+    """Return what the keys `segments`, `links`, `samples` and `taper` of a scene describe.
 
-    segments: how many, or a table for each.  pieces: links and samples of each segment, by kinds,
-    where its table tells none.  named: parameters that the scene gives beside.
+    segments: a count, or a table for each segment.
+    pieces: numbers of links and of samples of a segment whose table gives none, by kind.
+    named: parameters that the scene gives besides.
     """
     problems: list[Problem] = []
     tables = list(segments) if are_tables(segments) else [{} for _ in range(segments)]
@@ -78,7 +81,7 @@ def described(
     if problems:
         return Described(counts, kinds, problems=tuple(problems))
 
-    # equal pieces, unless anything says what they are; those of both kinds have no equals
+    # pieces are equal unless a key describes them; those of a mixed tail never are
     if taper is None and not any(read) and (kind != "mixed" or OWN & set(named)):
         return Described(counts, kinds)
     sizes = [n if own == "articulated" else 1 for n, own in zip(counts, kinds, strict=True)]
@@ -131,11 +134,11 @@ def _parameters(made: Links, kinds: list[str]) -> dict[str, tuple[float, ...]]:
     return found
 
 
-# ---- what belongs together -----------------------------------------------------------------------
+# ---- combinations of keys ------------------------------------------------------------------------
 
 
 def _lacking(place: str, given: Mapping[str, Any]) -> list[Problem]:
-    """Return what a segment lacks, and what it says twice."""
+    """Return problems for the keys that a segment lacks, and for those that say the same twice."""
     problems = []
     for group, needed in ((LENGTHS, "length"), (MASSES, "mass"), (INERTIAS, "")):
         names = [name for name in group if name in given]
@@ -156,7 +159,9 @@ def _lacking(place: str, given: Mapping[str, Any]) -> list[Problem]:
 
 
 def _beside_taper(places: list[str], values: list[Numbers], taper: Numbers) -> list[Problem]:
-    """Return what a taper lacks, and what segments may not say beside it."""
+    """Return problems for the keys that a taper lacks, and for those that segments may not have
+    beside it.
+    """
     problems = []
     for place, given in zip(places, values, strict=True):
         for name in [name for name in given if name not in LENGTHS]:
@@ -204,7 +209,7 @@ def _links(given: Numbers, pieces: int) -> Links:
 
 
 def _cone(lengths: tuple[float, ...], given: Numbers) -> Links:
-    """Return the links of a cone of a density, or of a mass."""
+    """Return the links of a cone of given density or mass."""
     density = given.get("density") or (given["mass"][0] / volume(given["radii"], sum(lengths)),)
     return cut(lengths, given["radii"], density[0])
 
@@ -214,7 +219,9 @@ def _tapered(
     pieces: list[int],
     taper: Numbers,
 ) -> Links:
-    """Return the links of a whole tail that is one cone, its length shared equally by default."""
+    """Return the links of a whole tail that is one cone; by default links share its length
+    equally.
+    """
     total = sum(pieces)
     if "length" in taper:
         return _cone((taper["length"][0] / total,) * total, taper)

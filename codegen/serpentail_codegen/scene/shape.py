@@ -1,4 +1,4 @@
-"""In what a model differs from most: a free torso with gravity, a tail of equal links."""
+"""How a model differs from the usual one: a free torso with gravity and a tail of equal links."""
 
 from dataclasses import dataclass
 from itertools import groupby
@@ -6,14 +6,14 @@ from itertools import groupby
 
 @dataclass(frozen=True)
 class Shape:
-    """In what segments and links differ, and what does not move or pull.
+    """How segments and links differ, and whether torso and gravity are there.
 
-    counts: links, or samples, of each segment where they are not as many in all.
-    kinds: of each segment, where there are links in some and arcs in others; counts are told then.
+    counts: links, or samples, of each segment if they are not equally many.
+    kinds: of each segment, in a mixed tail; it has counts, too.
     links, arcs: how many have a mass, a length and an inertia of their own; 0: all are equal.
     tilted: the tail begins in axes of its own, not in those of the torso.
     fixed: the torso never moves.
-    weightless: nothing has weight.
+    weightless: there is no gravity.
     """
 
     counts: tuple[int, ...] = ()
@@ -30,7 +30,9 @@ class Shape:
         return bool(self.links or self.arcs)
 
     def numbers_of(self, tail: str) -> int:
-        """How often a parameter of these tails is there, by ``Parameter.tail``; 0: it is not."""
+        """Return how many times these tails have a parameter, by ``Parameter.tail``; 0: not
+        at all.
+        """
         present = {"equal": not self.own, "link": self.links, "arc": self.arcs}
         present |= {"": 1, "tilted": self.tilted}
         present |= {"free": not self.fixed, "weight": not self.weightless}
@@ -42,10 +44,10 @@ EQUAL = Shape()
 
 @dataclass(frozen=True)
 class Stretch:
-    """Segments ``first`` to ``stop`` - 1, which have as many pieces and points each.
+    """Segments ``first`` to ``stop`` - 1, which all have equally many pieces and points.
 
-    first_piece, first_point: how many all segments before have; others: pieces of the other kind
-    before.
+    first_piece, first_point: how many pieces and points all segments before have; others: pieces of
+    the other kind before.
     """
 
     kind: str
@@ -58,16 +60,18 @@ class Stretch:
     others: int = 0
 
     def pieces_before(self, segment: int) -> int:
-        """Pieces of all segments before one of this stretch, or before its end."""
+        """Return the number of pieces before a segment of this stretch, or before its end."""
         return self.first_piece + self.pieces * (segment - self.first)
 
     def points_before(self, segment: int) -> int:
-        """Points of all segments before one of this stretch, or before its end."""
+        """Return the number of points before a segment of this stretch, or before its end."""
         return self.first_point + self.points * (segment - self.first)
 
 
 def stretches_of(segments: int, links: int, kind: str, shape: Shape) -> tuple[Stretch, ...]:
-    """Return the stretches of a tail: one, where all segments have as many links or samples."""
+    """Return the stretches of a tail: only one if all segments have equally many links or
+    samples.
+    """
     kinds, counts = shape.kinds or (kind,) * segments, shape.counts or (links,) * segments
     stretches: list[Stretch] = []
     for (own, points), members in groupby(zip(kinds, counts, strict=True)):
@@ -88,7 +92,7 @@ def stretches_of(segments: int, links: int, kind: str, shape: Shape) -> tuple[St
 class Run:
     """Segments ``first`` to ``stop`` - 1 of one kind, and their pieces.
 
-    other_pieces, other_points, other_segments: of the other kind, before.
+    other_pieces, other_points, other_segments: numbers of the other kind before them.
     """
 
     first: int
@@ -101,7 +105,7 @@ class Run:
 
 
 def runs_of(stretches: tuple[Stretch, ...], kind: str) -> tuple[Run, ...]:
-    """Return the runs of segments of a kind, each as long as it can be."""
+    """Return the runs of segments of a kind, each as long as possible."""
     runs, points, before = [], 0, 0
     for own, members in groupby(stretches, lambda stretch: stretch.kind):
         found = list(members)

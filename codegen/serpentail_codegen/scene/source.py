@@ -1,4 +1,4 @@
-"""Reads scene files as data: regular files of a bounded size, with keys of a bounded depth.
+"""Reads scene files as data: regular files of bounded size, with keys of bounded depth.
 
 The runtime reads them by the same rules, in ``serpentail/building/source.py``.
 """
@@ -14,14 +14,14 @@ DECIMAL = re.compile(r"(?<![\w.])\d[\d_]*\.\d[\d_]*(?:[eE][+-]?\d+)?(?![\w.])")
 
 
 def tables_of(path: Path) -> dict[str, Any]:
-    """Return the tables of a scene file; ValueError says why it has none, and what to do."""
+    """Return the tables of a scene file; ValueError gives the reason and the remedy."""
     try:
         return tables_in(_text(path))
     except OSError as error:
         reason = f"cannot be read: {error.strerror}; give the path of a scene file (.toml)"
     except UnicodeDecodeError as error:
         reason = f"not UTF-8 from byte {error.start} on; save it as UTF-8 text"
-    except (ValueError, RecursionError) as error:  # of the TOML parser, or for a NUL in the path
+    except (ValueError, RecursionError) as error:  # of the parser, or for a NUL in the path
         reason = f"cannot be read as TOML: {error}"
     raise ValueError(reason)
 
@@ -39,7 +39,7 @@ def _text(path: Path) -> str:
 
 
 def tables_in(text: str) -> dict[str, Any]:
-    """Return the tables of a TOML text; ValueError or RecursionError where it is none."""
+    """Return the tables of a TOML text; ValueError or RecursionError if it is invalid."""
     for number, line in enumerate(text.splitlines(), 1):
         if line.count(".") > MOST_DOTS and DECIMAL.sub("", line).count(".") > MOST_DOTS:
             raise ValueError(f"more than {MOST_DOTS} dots in line {number}; no key is so deep")

@@ -1,8 +1,8 @@
-"""Puts a folder in the place of another by one rename, so that everybody sees the old or the new.
+"""Exchanges two folders by one rename, so that every reader sees either the old or the new one.
 
-A process that is killed leaves one of them whole, and beside it a part that a later call sweeps.
-Where the system or the file system cannot exchange two folders (NFS, say) there are two renames,
-and the place is empty for the moment between them.
+If the process is killed, one of them is left whole, and a temporary folder beside it, which a later
+call deletes. If the system or the file system (NFS, for example) cannot exchange two folders, there
+are two renames, and the place is empty for a moment between them.
 """
 
 import ctypes
@@ -19,18 +19,18 @@ from functools import cache
 from pathlib import Path
 
 PART = re.compile(r"\.serpentail-[0-9a-f]{24}\.part")
-LOST_S = 600.0  # s after which a part is that of a process that was killed
+LOST_S = 600.0  # s; an older temporary folder is from a process that was killed
 OCCUPIED = (errno.ENOTEMPTY, errno.EEXIST)
-# what a system says that cannot exchange folders there, or synchronise them
+# errors of a system that cannot exchange folders there, or synchronise them
 UNKNOWN = (errno.ENOSYS, errno.EINVAL, errno.ENOTSUP, errno.EOPNOTSUPP)
-# what it says that cannot link files there, or any more
+# errors of one that cannot link files there, or no more of them
 UNLINKED = (*UNKNOWN, errno.EPERM, errno.EACCES, errno.EXDEV, errno.EMLINK, errno.ENOENT)
 HERE, EXCHANGE = -100, 2  # AT_FDCWD; RENAME_EXCHANGE of Linux and RENAME_SWAP of macOS
 
 
 @contextmanager
 def pinned(folder: Path) -> Iterator[Callable[[], bool]]:
-    """Lend a function that tells whether a folder is still the one that it was at first."""
+    """Yield a function that tells whether a folder is still the one that it was at the start."""
     try:
         handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     except FileNotFoundError:
@@ -43,7 +43,7 @@ def pinned(folder: Path) -> Iterator[Callable[[], bool]]:
 
 
 def _leads_to(path: Path, handle: int) -> bool:
-    """Tell whether a path still leads to the folder of a handle."""
+    """Tell whether a path still leads to the folder of an open handle."""
     try:
         return os.path.samestat(path.stat(), os.fstat(handle))
     except FileNotFoundError:
@@ -55,9 +55,9 @@ def replace_folder(
 ) -> bool:
     """Put a folder with these files in place of one whose own files had the names `old`.
 
-    What else was there, its user's files, comes along.  False where the folder is not the same any
-    more, since another process was quicker: nothing is done then.  OSError where something cannot
-    be written; then the old folder stays.
+    Other files in it, those of its user, are kept. Returns False, and does nothing, if the folder
+    is not the same any more because another process was quicker. OSError if something cannot be
+    written; then the old folder stays.
     """
     folder.parent.mkdir(parents=True, exist_ok=True)
     beside = _name_beside(folder)
@@ -79,7 +79,7 @@ def replace_folder(
 
 
 def sweep(parent: Path) -> None:
-    """Delete the parts that killed processes left."""
+    """Delete the temporary folders of killed processes."""
     with suppress(OSError):
         for path in parent.iterdir():
             if PART.fullmatch(path.name) and time.time() - path.lstat().st_mtime > LOST_S:
@@ -99,7 +99,7 @@ def holds(path: Path, content: bytes) -> bool:
 
 
 def _fill(beside: Path, folder: Path, contents: Mapping[str, bytes]) -> None:
-    """Write the files, but keep those that are as they were: `make` goes by their times."""
+    """Write the files, but keep unchanged ones: `make` goes by their times."""
     for name, content in contents.items():
         path = beside / name
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -111,7 +111,7 @@ def _fill(beside: Path, folder: Path, contents: Mapping[str, bytes]) -> None:
 
 
 def _bring_along(beside: Path, folder: Path, ours: Collection[str]) -> None:
-    """Give the new folder all that is not ours, too."""
+    """Give the new folder all files that are not ours, too."""
     for name, is_folder in _leaves(folder):
         source, path = folder / name, beside / name
         if name in ours:
@@ -138,7 +138,7 @@ def _leaves(folder: Path, inside: str = "") -> Iterator[tuple[str, bool]]:
 
 
 def _linked(source: Path, path: Path) -> bool:
-    """Give a file a second name; False where the file system has no such thing."""
+    """Give a file a second name; False if the file system cannot."""
     try:
         os.link(source, path, follow_symlinks=False)
     except OSError as error:
@@ -149,7 +149,7 @@ def _linked(source: Path, path: Path) -> bool:
 
 
 def _synchronise(folder: Path) -> None:
-    """Have the names in a folder written to the disk."""
+    """Write the names in a folder to the disk."""
     handle = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(handle)
@@ -161,7 +161,7 @@ def _synchronise(folder: Path) -> None:
 
 
 def _swap(beside: Path, folder: Path) -> None:
-    """Give the two their places; `beside` is the old folder then, or gone."""
+    """Exchange the places of the two; `beside` is the old folder then, or gone."""
     while True:
         try:
             beside.rename(folder)  # there is no folder, or an empty one
@@ -173,13 +173,13 @@ def _swap(beside: Path, folder: Path) -> None:
             if not _exchanged(beside, folder):
                 _in_steps(beside, folder)
             return
-        except OSError as error:  # another process had it in hand
+        except OSError as error:  # another process was using it
             if error.errno not in (errno.ENOENT, *OCCUPIED):
                 raise
 
 
 def _exchanged(beside: Path, folder: Path) -> bool:
-    """Exchange two folders by one rename; False where that is unknown here."""
+    """Exchange two folders by one rename; False if the system cannot."""
     call = _system_call()
     if call is None or call(os.fsencode(beside), os.fsencode(folder)) == 0:
         return call is not None
@@ -203,7 +203,7 @@ def _system_call() -> Callable[[bytes, bytes], int] | None:
 
 
 def _in_steps(beside: Path, folder: Path) -> None:
-    """Exchange two folders by renames, with nothing at the place for a moment."""
+    """Exchange two folders by two renames, with nothing at the place for a moment."""
     aside = _name_beside(folder)
     folder.rename(aside)
     try:

@@ -1,4 +1,6 @@
-"""Prints the scalar expressions of steps: one definition a line, in the dialect of a language."""
+"""Prints the scalar expressions of steps: one definition on each line, in the dialect of a
+language.
+"""
 
 from collections import Counter, defaultdict
 from dataclasses import dataclass, field
@@ -18,7 +20,7 @@ def index_text(index: Index) -> str:
 
 
 def literal(value, real: str) -> str:
-    """Print a number by its shortest exact decimal; 0 where a single-precision real has none."""
+    """Print a number by its shortest exact decimal; 0 if single precision cannot hold it."""
     single = real == "float"
     tiny = single and abs(value) < LEAST_SINGLE
     return repr(0.0 if tiny else float(value)) + ("f" if single else "")
@@ -34,10 +36,10 @@ class Dialect:
     real: str = "double"
     select: str = "{c} > {zero} ? {a} : {b}"
     wide_select: str = ""  # of wide operands
-    sincos: str = ""  # defines sine and cosine of one argument at once; empty: by two functions
+    sincos: str = ""  # defines sine and cosine of one argument together; empty: two functions
     wide_sincos: str = ""  # the same of a wide argument
     wide: str = ""  # defines a wide scalar: one number in each lane
-    load: str = ""  # the lanes at an address that are in turn
+    load: str = ""  # the current lanes at an address
 
     def literal(self, value) -> str:
         """Print a number of the language's real type."""
@@ -51,9 +53,9 @@ Part = str | int  # one of these, or the lanes of a part of wide scalars
 class Scalars:
     """Prints the nodes that the results need, part by part.
 
-    ``wide`` are the lanes of the wide inputs, by number.  Narrow nodes come first, then those of
-    so many lanes, then narrow ones that need a lane.  A product or sign that is used once goes
-    into its use.
+    ``wide`` are the lanes of the wide inputs, by number. Narrow nodes come first, then wide ones,
+    then narrow ones that need a lane. A product or sign that is used once is printed inside its
+    use.
     """
 
     def __init__(self, nodes, results, names, dialect: Dialect, wide: dict[int, int] | None = None):
@@ -62,7 +64,9 @@ class Scalars:
         self.uses = Counter(a for n in self.live for a in operands(nodes[n]))
         self.uses.update(results)
         self.text: dict[object, str] = {}
-        self.stored: dict[int, int] = {}  # where the workspace has what a lane is needed of
+        self.stored: dict[
+            int, int
+        ] = {}  # position in the workspace of scalars of which a lane is needed
         self.count = 0
         self.part, self.lanes = self._parts(wide or {})
         self.abroad = {
@@ -87,7 +91,7 @@ class Scalars:
         return part, lanes
 
     def lines(self, part: Part = EARLY) -> list[str]:
-        """Return the definitions of a part in order; ``text`` then tells how to write its nodes."""
+        """Return the definitions of a part in order; afterwards ``text`` prints its nodes."""
         out = []
         for node in scheduled(
             self.nodes, [n for n in self.live if self.part[n] == part], self.results

@@ -1,7 +1,7 @@
 """The manifest: what the loader of a generated folder needs to know, as plain data.
 
-The scene and its functions give what holds for every target; each target reports the rest, such as
-the workspace of C functions.
+The scene and its functions give the entries that hold for every target. Each target adds the
+others, such as the workspace of C functions.
 """
 
 from collections.abc import Sequence
@@ -30,7 +30,7 @@ CHECKS = {
 def manifest(
     scene: Scene, tail: Tail, functions: Sequence[Function], emissions: Sequence[Emission]
 ) -> dict[str, Any]:
-    """Return the manifest of a generated folder, but for its versions, hashes and files."""
+    """Return the manifest of a generated folder, without its versions, hashes and files."""
     sizes = ("segments", "links", "total", "nq", "nv", "nt")
     described = {
         "prefix": scene.name,
@@ -46,7 +46,7 @@ def manifest(
         ],
         "functions": {f.name: function_entry(f, tail, emissions) for f in functions},
     }
-    if scene.unscaled:  # what becomes of each kg, m and s that the scene names
+    if scene.unscaled:  # factors of each kg, m and s in the scene
         described["size"] = dict(zip(("kg", "m", "s"), scene.size, strict=True))
     for emission in emissions:
         described |= emission.entries
@@ -54,15 +54,15 @@ def manifest(
 
 
 def own_counts(tail: Tail) -> dict[str, Any]:
-    """Return the links of each segment, where they are not as many in all; and kinds of both."""
+    """Return the links of each segment if they differ, and the kinds in a mixed tail."""
     counts = {"links": list(tail.shape.counts)} if tail.shape.counts else {}
     return counts | ({"kinds": list(tail.shape.kinds)} if tail.shape.kinds else {})
 
 
 def parameter_entry(scene: Scene, parameter: Parameter) -> dict[str, Any]:
-    """Return what a caller must know of a parameter; the default is null where it is computed.
+    """Return what a caller must know about a parameter; the default is null if it is computed.
 
-    pieces: of how many links or arcs it has numbers of their own, one array for all.
+    pieces: how many links or arcs have their own numbers, in one array for all.
     """
     value = scene.parameters.get(parameter.name)
     own = parameter.tail in ("link", "arc")
@@ -84,7 +84,7 @@ def parameter_entry(scene: Scene, parameter: Parameter) -> dict[str, Any]:
 
 
 def function_entry(function: Function, tail: Tail, emissions: Sequence[Emission]) -> dict[str, Any]:
-    """Return what a caller must know of a function."""
+    """Return what a caller must know about a function."""
     exact = EXACT_DERIVATIVES.get(function.name, ())
     entry = {
         "doc": function.doc,
@@ -99,6 +99,6 @@ def function_entry(function: Function, tail: Tail, emissions: Sequence[Emission]
 
 
 def argument_entry(argument: Argument, tail: Tail) -> dict[str, Any]:
-    """Return what a caller must know of an argument."""
+    """Return what a caller must know about an argument."""
     shape = list(argument.shape(tail))
     return {"name": argument.name, "shape": shape, "meaning": argument.meaning}

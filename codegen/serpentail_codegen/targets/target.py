@@ -1,9 +1,10 @@
-"""What every target follows: the language that programs are printed in, as a package.
+"""The protocol of every target: a package for one language in which programs are printed.
 
-A target's package holds a printer, which turns the statements of a program into lines of text, its
-templates, which lay the lines out as files, and a ``Target``, which names both for the pipeline.
-The printer has one method for each kind of statement, chosen by the statement's type: a statement
-that it does not know, or cannot print, ends the generation with an error and is never left out.
+A target's package holds a printer, templates and a ``Target``. The printer turns the statements of
+a program into lines of text. The templates arrange the lines as files. The ``Target`` names both
+for the pipeline. The printer has one method for each kind of statement, chosen by the statement's
+type. A statement that it does not know, or cannot print, ends the generation with an error and is
+never left out.
 """
 
 from collections.abc import Callable, Iterable
@@ -14,7 +15,7 @@ from ..functions.function import Function
 from ..functions.tail import Tail
 from ..scene.scene import Scene
 
-SEAL = "\0content hash\0"  # stands in a target's texts for the hash that the pipeline puts there
+SEAL = "\0content hash\0"  # placeholder in a target's texts: the pipeline replaces it by the hash
 
 
 class UnprintableStatement(ValueError):
@@ -24,8 +25,8 @@ class UnprintableStatement(ValueError):
 class Printer(Protocol):
     """Prints programs in one language.
 
-    ``statement``, a ``functools.singledispatchmethod`` made of ``unknown_statement``, has a method
-    for every kind of statement in ir/program.py.
+    ``statement``, a ``functools.singledispatchmethod`` made from ``unknown_statement``, has a
+    method for every kind of statement in ir/program.py.
     """
 
     @property
@@ -54,17 +55,19 @@ def body_lines(printer: Printer, body: Iterable[object]) -> list[str]:
 
 @dataclass(frozen=True)
 class Emission:
-    """What a target makes of a scene: files, and what a loader must know of them."""
+    """The result of a target for a scene: files, and what a loader must know about them."""
 
     files: dict[str, str]  # text by path
-    derivation: tuple[str, ...]  # paths of the files whose texts make the content hash
+    derivation: tuple[str, ...]  # paths of the files whose texts determine the content hash
     entries: dict[str, Any]  # of the manifest
     functions: dict[str, dict[str, Any]]  # of each function in the manifest, besides its arguments
 
 
 @dataclass(frozen=True)
 class Target:
-    """A language: its name in a scene, its printer, and what makes the files of a scene."""
+    """A language: its name in a scene, its printer, and the function that makes the files of a
+    scene.
+    """
 
     name: str
     printer: type[Printer]

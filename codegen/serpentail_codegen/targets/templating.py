@@ -1,4 +1,4 @@
-"""Renders templates by Jinja2; a target keeps its own in the folder `templates` of its package."""
+"""Renders templates by Jinja2; a target has its own in the folder `templates` of its package."""
 
 from functools import cache
 

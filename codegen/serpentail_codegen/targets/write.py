@@ -17,21 +17,21 @@ def digest(text: str) -> str:
 
 
 def signed(manifest: dict) -> dict:
-    """Return a manifest with the SHA-256 of its other entries, which shows a change by hand."""
+    """Return a manifest with the SHA-256 of its other entries, which reveals a change by hand."""
     entries = {key: value for key, value in manifest.items() if key != "manifest_hash"}
     return entries | {"manifest_hash": digest(json.dumps(entries, sort_keys=True))}
 
 
 def write_folder(folder: Path, files: dict[str, str], manifest: dict) -> list[str]:
-    """Write all files and the manifest; drop earlier ones; return the changed names.
+    """Write all files and the manifest, delete earlier ones, and return the changed names.
 
-    Nothing is written where nothing changed.  Files that no manifest names stay.  SceneError where
-    the folder cannot be written; then it is as it was.
+    Nothing is written if nothing changed. Files that no manifest names stay. SceneError if the
+    folder cannot be written; then it stays unchanged.
     """
     listed = {"files": {name: digest(text) for name, text in sorted(files.items())}}
     described = json.dumps(signed(manifest | listed), indent=1, ensure_ascii=False) + "\n"
     contents = {name: text.encode() for name, text in {**files, MANIFEST: described}.items()}
-    place = Path(os.path.realpath(folder))  # what a link leads to is exchanged, not the link
+    place = Path(os.path.realpath(folder))  # the target of a link is exchanged, not the link
     try:
         sweep(place.parent)
         return _written(place, contents)
@@ -41,8 +41,8 @@ def write_folder(folder: Path, files: dict[str, str], manifest: dict) -> list[st
 
 
 def _written(folder: Path, contents: dict[str, bytes]) -> list[str]:
-    """Return the names of files that differed, all of them written by now."""
-    while True:  # until no other process is quicker
+    """Write all files; return the names of those that differed."""
+    while True:  # again if another process was quicker
         with pinned(folder) as same:
             changed = [name for name in contents if not holds(folder / name, contents[name])]
             if not changed or replace_folder(folder, contents, _named(folder), same):

@@ -1,4 +1,4 @@
-/* One forward dynamics call.  Build: cc -std=c99 -O2 -Iinclude example/main.c src/golden_loops.c -lm */
+/* One call of the forward dynamics, Eq. 1.  Build: cc -std=c99 -O2 -Iinclude example/main.c src/golden_loops.c -lm */
 #include <stdio.h>
 
 #include "golden_loops.h"
@@ -7,7 +7,7 @@ int main(void)
 {
   golden_loops_parameters parameters;
   golden_loops_default_parameters(&parameters);
-  const golden_loops_real q[GOLDEN_LOOPS_NQ] = { [3] = 1.0, [7] = 0.5 }; /* upright, first joint angle 0.5 rad */
+  const golden_loops_real q[GOLDEN_LOOPS_NQ] = { [3] = 1.0, [7] = 0.5 }; /* torso upright, first tail coordinate 0.5 rad */
   const golden_loops_real v[GOLDEN_LOOPS_NV] = { 0.0 };
   const golden_loops_real tau[GOLDEN_LOOPS_NT] = { 0.0 };
   golden_loops_real v_dot[GOLDEN_LOOPS_NV];

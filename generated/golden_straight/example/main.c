@@ -1,4 +1,4 @@
-/* One forward dynamics call.  Build: cc -std=c99 -O2 -Iinclude example/main.c src/golden_straight.c -lm */
+/* One call of the forward dynamics, Eq. 1.  Build: cc -std=c99 -O2 -Iinclude example/main.c src/golden_straight.c -lm */
 #include <stdio.h>
 
 #include "golden_straight.h"
@@ -7,7 +7,7 @@ int main(void)
 {
   golden_straight_parameters parameters;
   golden_straight_default_parameters(&parameters);
-  const golden_straight_real q[GOLDEN_STRAIGHT_NQ] = { [3] = 1.0, [7] = 0.5 }; /* upright, first joint angle 0.5 rad */
+  const golden_straight_real q[GOLDEN_STRAIGHT_NQ] = { [3] = 1.0, [7] = 0.5 }; /* torso upright, first tail coordinate 0.5 rad */
   const golden_straight_real v[GOLDEN_STRAIGHT_NV] = { 0.0 };
   const golden_straight_real tau[GOLDEN_STRAIGHT_NT] = { 0.0 };
   golden_straight_real v_dot[GOLDEN_STRAIGHT_NV];

@@ -219,7 +219,7 @@ def parts_of(controller: Controller, nt: int) -> Parts:
         return Parts()
     if isinstance(controller, Pfl):
         return Parts(pfl=controller)
-    if hasattr(controller, "parts") and not isinstance(controller, type):
+    if callable(getattr(controller, "parts", None)) and not isinstance(controller, type):
         parts: Parts = controller.parts(nt)
         return parts
     if callable(controller):

@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from html import escape
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, overload
 
 from ..checks import real_array
 from ..errors import ViewError
@@ -17,10 +17,14 @@ from .data import page_data
 from .packing import packed
 from .samples import thinned_rows
 
+if TYPE_CHECKING:
+    from .notebook import Page
+
 MOST = 2400  # samples of a run in a page
 PAGE = Path(__file__).with_name("page.html")  # made of the sources in viewer/ when this is built
 
 
+@overload
 def view(
     motions: Trajectory | Sequence[Trajectory],
     path: str | os.PathLike[str] = "run.html",
@@ -29,15 +33,44 @@ def view(
     model: Model | None = None,
     markers: Sequence[Any] | None = None,
 ) -> Path:
+    """Write a page that shows motions over each other; return its path."""
+
+
+@overload
+def view(
+    motions: Trajectory | Sequence[Trajectory],
+    path: None,
+    *,
+    names: Sequence[str] | None = None,
+    model: Model | None = None,
+    markers: Sequence[Any] | None = None,
+) -> "Page":
+    """Return a page that shows motions over each other, for a notebook."""
+
+
+def view(
+    motions: Trajectory | Sequence[Trajectory],
+    path: str | os.PathLike[str] | None = "run.html",
+    *,
+    names: Sequence[str] | None = None,
+    model: Model | None = None,
+    markers: Sequence[Any] | None = None,
+) -> "Path | Page":
     """Write a page that shows motions over each other; return its path.
 
     motions: a Trajectory, or several.  path: an .html file; it is complete in itself, fetches
-    nothing, and replaces what was there once it is whole.  names: of the motions, by default what
-    each is.  model: of motions that were loaded from files; others know theirs.
-    markers: of each motion, where markers were seen at its samples, (K, M, 3) m, nan in gaps.
+    nothing, and replaces what was there once it is whole.  With ``None`` nothing is written: the
+    result is the page itself, which a notebook shows (at most 600 samples of each motion).
+    names: of the motions, by default what each is.  model: of motions that were loaded from
+    files; others know theirs.  markers: of each motion, where markers were seen at its samples,
+    (K, M, 3) m, nan in gaps.
     More than 2400 samples are thinned, which the page says, as it says that a run failed.  Raises
     ViewError with argument, value and remedy, ModelError where the model lacks ``tail_points``.
     """
+    if path is None:
+        from .notebook import MOST_SHOWN, Page
+
+        return Page(page_text(motions, names, model, MOST_SHOWN, markers))
     target = checked_path(path)
     text = page_text(motions, names, model, markers=markers)
     try:

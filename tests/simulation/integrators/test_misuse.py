@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -73,6 +74,7 @@ def test_interrupt_ends_a_long_run():
         (lambda: st.Phases([(0, st.Phases([(0, None)]))]), "put all pairs in one list"),
         (lambda: st.Phases(3), "needs pairs"),
         (lambda: st.Phases([(0, 3)]), "controller: value 3: needs"),
+        (lambda: Path("nowhere"), "controller: value PosixPath('nowhere'): needs"),  # it has parts, too
         (lambda: st.TorqueCurve(3), "needs a Piecewise of 4 channels"),
         (lambda: st.NativeTorque("f"), "needs a ctypes function or an address"),
         (

@@ -1,4 +1,6 @@
-"""Rates of an airborne state: omega from the angular momentum, q_t_ddot from the tail's rows."""
+"""Rates of an airborne state: omega from the angular momentum, q_t_ddot from the equations of the
+tail.
+"""
 
 from dataclasses import dataclass
 
@@ -16,22 +18,25 @@ TURN = 3  # numbers of omega, of a moment
 
 
 def at_coordinates(tail: Tail) -> int:
-    """Where the tail's coordinates begin in x."""
+    """Position of the tail's coordinates in x."""
     return QUATERNION.stop
 
 
 def at_rates(tail: Tail) -> int:
-    """Where its rates begin in x."""
+    """Position of the tail's rates in x."""
     return QUATERNION.stop + tail.nt
 
 
 @dataclass(frozen=True)
 class Balance:
-    """An airborne state, and what its accelerations are solved with.
+    """An airborne state, and the quantities with which its accelerations are solved.
 
-    ``inertia``: about the COM, factored; ``M``: of the tail, the torso following, factored;
-    ``columns``, ``coupling``, ``gain``: of each tail coordinate its momentum at B, that about the
-    COM, and how its rate turns the torso; ``center``: ``inverse_mass, com``; ``bias``: C.
+    ``inertia``: about the COM, factored.
+    ``M``: of the tail while the torso follows, factored.
+    ``columns``, ``coupling``, ``gain``: for each tail coordinate its momentum at B, its momentum
+    about the COM, and how its rate turns the torso.
+    ``center``: ``inverse_mass, com``.
+    ``bias``: C.
     """
 
     draft: Draft
@@ -57,8 +62,10 @@ class Balance:
         return {"column": column_of(self.columns, k), "gain": self.gain[k]}
 
     def follow(self, rates: Array, turn: Ref, shift: Ref, net: Ref | None = None) -> None:
-        """Fill how the torso follows the tail's rates, or second derivatives: ``turn`` to start
-        with is what it does by itself; ``shift`` is that of B, which a net force moves, too.
+        """Add to ``turn`` how the torso follows the tail's rates, or its second derivatives.
+
+        ``turn`` initially holds the motion of the torso by itself; ``shift`` is the motion of B,
+        which a net force moves, too.
         """
         with self.draft.loop("k", self.draft.tail.nt) as k:
             reads = {"gain": self.gain[k], "rate": tail_v(rates, k)}
@@ -69,7 +76,7 @@ class Balance:
             self.draft.step(airborne.pushed, mass, {"net": net}, shift_=shift)
 
     def shift(self, turn: Ref, shift: Ref, rates: Array | None = None) -> None:
-        """Fill how B moves that the COM rests, while the torso turns and the tail has rates."""
+        """Compute how B moves if the COM rests while the torso turns and the tail has rates."""
         com, mass = self.center.only("com"), self.center.only("inverse_mass")
         self.draft.step(airborne.drift_of_turn, com, {"turn": turn}, shift=shift)
         if rates is None:
@@ -88,14 +95,16 @@ class Motion:
 
 
 def balance(draft: Draft, arrays: dict[str, Array]) -> Balance:
-    """Store the state with omega, all that its accelerations are solved with, and their bias."""
+    """Store the state with omega, the quantities that its accelerations are solved with, and their
+    bias.
+    """
     tail, x = draft.tail, arrays["x"]
     q, v = draft.array("q", tail.nq), draft.array("v", tail.nv)
     draft.copy(tail.all_q(q), x.part(at_coordinates(tail), tail.nt))
     draft.copy(tail.all_v(v), x.part(at_rates(tail), tail.nt))
     quaternion = block(x, QUATERNION)
 
-    # the torso's angular momentum, all of it
+    # the total angular momentum, in torso axes
     R = draft.store(rotations.quaternion_rotation, {"quaternion": quaternion}, R=9)
     momentum = draft.vector("momentum", 3)
     draft.step(airborne.momentum_in_torso, R, {"angular": arrays["angular"][0]}, momentum=momentum)

@@ -1,7 +1,7 @@
-"""Second derivatives of mu^T y, y being an airborne state's rates.
+"""Second derivatives of mu^T y, where y are the rates of an airborne state.
 
-mu^T y is differentiated as it stands where the equations that determine omega and the accelerations
-hold: their multipliers follow from mu, so that no second derivative of these unknowns is needed.
+mu^T y is differentiated on the surface where the equations for omega and for the accelerations
+hold. Their multipliers follow from mu, so that no second derivative of these unknowns is needed.
 """
 
 from dataclasses import dataclass
@@ -40,8 +40,8 @@ BY_Q = ("q", "v", "v_dot", "a", "drift", "slide")
 
 @dataclass(frozen=True)
 class Weights:
-    """What weights the equations: ``accelerating`` (nv, in torso axes) those of accelerations,
-    ``turning`` that of omega.
+    """The weights of the equations: ``accelerating`` (nv, in torso axes) of those of accelerations,
+    ``turning`` of that of omega.
     """
 
     accelerating: Array
@@ -50,8 +50,8 @@ class Weights:
 
 @dataclass(frozen=True)
 class Curvatures:
-    """Minus second derivatives of the weighted equations: rows of gradients, lanes are coordinates
-    (``by_q``), or omega and rates (``by_v``).
+    """Minus the second derivatives of the weighted equations: rows are gradients, lanes are
+    coordinates (``by_q``), or omega and rates (``by_v``).
     """
 
     by_q: dict[str, Array]
@@ -70,7 +70,9 @@ def assemble_hessian(draft: Draft, arrays: dict[str, Array]) -> None:
 
 
 def store_weights(b: Balance, slopes: Slopes, mu: Array) -> Weights:
-    """Store the multipliers: of accelerations M^-1 mu, the torso following; then of omega."""
+    """Store the multipliers: those of accelerations, M^-1 mu with the torso following, then those
+    of omega.
+    """
     draft, tail = b.draft, b.draft.tail
     first, second = at_rates(tail), tail.airborne_state
     accelerating, turning = draft.array("accelerating", tail.nv), draft.array("turning", TURN)
@@ -82,7 +84,7 @@ def store_weights(b: Balance, slopes: Slopes, mu: Array) -> Weights:
     turn, move = block(accelerating, OMEGA), block(accelerating, VELOCITY)
     b.follow(accelerating, turn, move)
 
-    # of omega: all that it changes, at fixed momentum
+    # of omega: everything that it changes, at fixed momentum
     gradient = {"quaternion": b.quaternion, "gradient": block(mu, QUATERNION)}
     draft.step(rotations.turn_gradient, gradient, turn=turning[0])
     draft.copy(turning[0], mu.part(second, TURN), adds=True)
@@ -119,8 +121,8 @@ def curvatures(b: Balance, motion: Motion, slopes: Slopes, weights: Weights) -> 
 
 
 def store_crossed(b: Balance, slopes: Slopes, found: Curvatures) -> tuple[Array, Array]:
-    """Return what pairs of a coordinate (lane) and any direction give by way of accelerations and
-    drift: along slopes' directions, and along torques.
+    """Return the mixed terms of pairs of a coordinate (lane) and any direction through
+    accelerations and drift: along the directions of slopes, and along torques.
     """
     draft, tail, by_q = b.draft, b.draft.tail, found.by_q
     nt, directions = tail.nt, slopes.directions
@@ -226,16 +228,16 @@ def store_hessian(
 
 
 def store_by_omega(b: Balance, found: Curvatures, arrays: dict[str, Array]) -> None:
-    """Store what any two directions of x give by way of omega, in the lower triangle."""
+    """Store the terms of pairs of directions of x through omega, in the lower triangle."""
     draft, tail, H, J = b.draft, b.draft.tail, arrays["hessian"], arrays["J"]
     size, count = tail.airborne_arguments, tail.airborne_state
     q, v = at_coordinates(tail), at_rates(tail)
 
     def turn(k: Index) -> Ref:
-        """How omega moves along a direction."""
+        """Return how omega changes along a direction."""
         return J.part(k + size * count, TURN, size)
 
-    # the gradient by omega along each direction; the half of what is omega twice
+    # the gradient by omega along each direction, and half of the second derivative by omega
     share = draft.array("turn_share", TURN, count)
     rows = {f"row_{k}": found.by_v.lane(OMEGA.start + k, 0, TURN) for k in range(TURN)}
     with draft.loop("k", count) as k:

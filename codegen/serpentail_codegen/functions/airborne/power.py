@@ -1,4 +1,4 @@
-"""The function whose gradient is differentiated: virtual power, and momentum times a rigid motion.
+"""The scalar function that is differentiated: virtual power, and momentum times a rigid motion.
 
 Its weights are Lagrange's multipliers of the two sets of equations that determine accelerations and
 omega: H v_dot + C = loads, and A_r v = R^T h.
@@ -20,7 +20,9 @@ SLIDE = Argument("slide", (3,), "its velocity at B")
 
 
 def assemble_power(draft: Draft, arrays: dict[str, Array]) -> None:
-    """lambda^T (H v_dot + C), and the momentum's power under a rigid motion, in one way out."""
+    """lambda^T (H v_dot + C), and the power of the momentum under a rigid motion, in one sweep
+    outward.
+    """
     v_dot, multiplier, power = arrays["v_dot"], arrays["multiplier"], arrays["power"][0]
     state = State(arrays["q"], arrays["v"])
     segments = mechanism(draft).prepare(draft, state, False)

@@ -1,7 +1,7 @@
-"""First derivatives of an airborne state's rates.
+"""First derivatives of the rates of an airborne state.
 
 Lanes are directions: the angular momentum in torso axes, then coordinates and rates of segment
-after segment.  The quaternion is seen in that momentum alone.
+after segment. The quaternion acts only through that momentum.
 """
 
 from dataclasses import dataclass
@@ -27,11 +27,13 @@ from .balance import (
 
 @dataclass(frozen=True)
 class Slopes:
-    """How an airborne state's unknowns move, row by row, along all directions.
+    """Derivatives of an airborne state's unknowns, row by row, along all directions.
 
-    ``omega`` (3 rows), ``tail``: q_t_ddot (nt rows), ``loads``: net and turn_load (3 rows each).
-    ``by_omega`` (nv x 3): C along omega alone.  ``by_torque``: q_t_ddot along torques (nt rows).
-    ``turns`` (4 x 3): the momentum along the quaternion's numbers.  ``a``: acceleration of B.
+    ``omega`` (3 rows); ``tail``: q_t_ddot (nt rows); ``loads``: net and turn_load (3 rows each).
+    ``by_omega`` (nv x 3): C along omega alone.
+    ``by_torque``: q_t_ddot along torques (nt rows).
+    ``turns`` (4 x 3): the momentum along the numbers of the quaternion.
+    ``a``: acceleration of B.
     """
 
     directions: Directions
@@ -44,7 +46,7 @@ class Slopes:
     a: Array
 
     def turn(self) -> dict[str, Ref]:
-        """Return how the momentum moves with the quaternion's numbers."""
+        """Return how the momentum in torso axes changes with the numbers of the quaternion."""
         return {f"turn_{k}": self.turns[k] for k in range(4)}
 
 
@@ -61,7 +63,7 @@ def store_slopes(b: Balance, motion: Motion) -> Slopes:
     draft, tail, directions = b.draft, b.draft.tail, Directions(b.draft.tail, ("omega",))
     lanes = directions.count
 
-    # accelerations of the torso, of which the tail's rows have no need
+    # accelerations of the torso, which the rows of the tail do not need
     a = draft.array("a", 3)
     draft.solve(b.inertia, block(motion.v_dot, OMEGA))
     b.follow(motion.v_dot, block(motion.v_dot, OMEGA), a[0], motion.net)
@@ -101,7 +103,9 @@ def store_slopes(b: Balance, motion: Motion) -> Slopes:
 
 
 def store_omega(b: Balance, directions: Directions, rows: Array, omega: Array) -> None:
-    """Store how omega moves: by the momentum, and as the tail takes momentum from the torso."""
+    """Store the derivatives of omega: by the momentum, and by the momentum that the tail takes from
+    the torso.
+    """
     draft, tail = b.draft, b.draft.tail
     draft.unit(omega.part(0, TURN), 0)
     forces = {f"row_{axis}": rows.lane(k, 0, TURN) for k, axis in enumerate("xyz")}
@@ -122,7 +126,7 @@ def store_omega(b: Balance, directions: Directions, rows: Array, omega: Array) -
 
 
 def chain(draft: Draft, rows: Array, omega: Array) -> Array:
-    """Make of slopes at fixed omega those at fixed momentum; return the slopes along omega."""
+    """Turn slopes at fixed omega into slopes at fixed momentum; return the slopes along omega."""
     by_omega = draft.array("by_omega", TURN, draft.tail.nv)
     turning = {f"omega_{k}": omega.part(k, 1) for k in range(TURN)}
     with draft.loop("row", draft.tail.nv) as r:

@@ -27,14 +27,16 @@ def assemble_forward_dynamics_parameter_derivatives(draft: Draft, arrays: dict[s
     gravity = None
     if "gravity" in draft.parameters:
         gravity = draft.wide("d_gravity_z", 1, count)[0]
-        draft.unit(gravity, 0)  # it is the first parameter: p_b_ddot falls by as much
+        draft.unit(
+            gravity, 0
+        )  # gravity is the first parameter: p_b_ddot decreases by the same amount
     factored.solve(draft, minus(draft, rows, gravity=gravity), x)
     spread_parameters(draft, x, arrays["dparameters"])
 
 
 def parameter_tangents(draft: Draft, function: Function, arguments: dict[str, Array]) -> Array:
-    """Return the tangents of a force with respect to every parameter, a lane for each number of the
-    struct.
+    """Return the tangents of a force with respect to every parameter: one lane for each number of
+    the struct.
     """
     count, lane, tangents = draft.tail.parameter_numbers, 0, {}
     names = [p.name for p in struct_parameters(draft.tail)]

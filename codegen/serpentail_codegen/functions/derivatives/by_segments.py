@@ -1,10 +1,11 @@
 """Derivatives of v_dot of a long tail, segment by segment: the work grows with m^2.
 
-Each segment's links are differentiated by omega of its base and by its own coordinates and rates
-alone, 7 directions whatever m is; what accelerations do is known from its inertia.  From segment to
-segment pass the motion, out along the tail, and the loads that it asks for, back with the
-coordinates eliminated; the accelerations that balance these loads follow on a last way out.  A lane
-is a direction: the torso's turning, coordinates and rates of all segments, then all torques.
+Each segment's links are differentiated along 7 directions only, whatever m is: omega of the
+segment's base, and its own coordinates and rates. The effect of accelerations is known from its
+inertia. One sweep carries the motion out along the tail. A second sweep carries loads back to the
+torso and eliminates the coordinates. A last one outward gives the accelerations that balance these
+loads. A lane is a direction: the rotation of the torso, coordinates and rates of all segments, then
+all torques.
 """
 
 from dataclasses import dataclass
@@ -34,7 +35,9 @@ FORCES = 6 + PER_SEGMENT  # wrench at the base, torques
 
 @dataclass(frozen=True)
 class Slopes:
-    """Of every segment: the tip's motion, and wrench and torques, by its own directions."""
+    """Derivatives of every segment along its own directions: motion of the tip, wrench and
+    torques.
+    """
 
     tip: Array
     force: Array
@@ -50,7 +53,9 @@ class Slopes:
         return self.force.part(FORCES * i + 6, PER_SEGMENT)
 
     def by_omega(self, i: Index) -> dict[str, Ref]:
-        """Slopes by omega of the base: of w_dot and a of the tip, and of wrench and torques."""
+        """Slopes by omega of the base: of w_dot and a of the tip, and of the wrench and the
+        torques.
+        """
         rows = {f"tip_{r}": self.tip.lane(9 * i + 3 + r, 0, 3) for r in range(6)}
         return rows | {f"force_{r}": self.force.lane(FORCES * i + r, 0, 3) for r in range(FORCES)}
 
@@ -100,7 +105,7 @@ def moved(function, *active: str) -> Step:
 
 @dataclass(frozen=True)
 class Links:
-    """Differentiates the links of every segment: their wrenches, and all directions of its own."""
+    """Differentiates the links of every segment: their wrenches along all of its own directions."""
 
     draft: Draft
     segments: Segments
@@ -230,7 +235,9 @@ class Changes:
             draft.step(segment_slopes.responding, passes.tip_of(i), reads, **writes)
 
     def _outward(self, start: Motion) -> Array:
-        """Carry the motion to the tip at fixed second derivatives; return what it asks for."""
+        """Carry the motion to the tip at fixed second derivatives; return the loads that it
+        requires.
+        """
         draft, directions = self.draft, self.directions
         motion = draft.wide("d_motion", 9, self.lanes)
         loads = draft.wide("d_loads", FORCES * draft.tail.segments, self.lanes)
@@ -241,7 +248,7 @@ class Changes:
         with draft.loop("i", draft.tail.segments) as i:
             slopes = Vectors(self.slopes.by_omega(i) | self.freed.own(i))
             load, reads = loads.part(FORCES * i, FORCES), {"motion": motion[0]}
-            # those of the segment itself are still zero, and then copied
+            # the lanes of the segment itself are still zero; they are copied afterwards
             with draft.first_lanes(directions.of_q(i + 1)):
                 draft.step(segment_slopes.change_at_base, reads, slopes, change=load)
                 draft.step(segment_slopes.change_at_tip, reads, slopes, motion=motion[0])
@@ -255,7 +262,7 @@ class Changes:
         return loads
 
     def _inward(self, loads: Array, free: Array) -> Ref:
-        """Carry loads to the mount, coordinates eliminated; return what hangs on it."""
+        """Carry loads to the mount, with coordinates eliminated; return what acts at the mount."""
         draft, directions, passes = self.draft, self.directions, self.freed.passes
         wrench = draft.wide("d_wrench_base", 6, self.lanes)[0]
         change = draft.wide("d_change", FORCES, self.lanes)[0]

@@ -22,7 +22,7 @@ FIRST_MOMENT = Argument("moment", (3,), "first moment about B, torso axes (kg m)
 
 
 def assemble_core(draft: Draft, arrays: dict[str, Array]) -> None:
-    """H v_dot + C in torso axes throughout: no attitude, no gravity."""
+    """H v_dot + C with all vectors in torso axes: it depends on no attitude and no gravity."""
     state = State(arrays["q"], arrays["v"])
     core_forces(draft, state, state.omega, arrays)
     add_passive_forces(draft, state, lambda i: segment_v(arrays["force"], i))

@@ -1,8 +1,7 @@
-"""Which lane of a wide vector stands for which direction of differentiation, and where its results
-belong.
+"""Assigns lanes of wide vectors to directions of differentiation, and the results to columns.
 
 Derivatives with respect to q are in the tangent space: position of B, a rotation of the torso in
-body axes, tail coordinates; the columns of such a matrix are those of a velocity v.
+body axes, tail coordinates. The columns of such a matrix are those of a velocity v.
 """
 
 from dataclasses import dataclass
@@ -23,14 +22,14 @@ from ..layout import (
 )
 from ..tail import Tail
 
-# directions of the torso: where they are in the tangent of q or v, and whether it is q
+# directions of the torso: their position in the tangent of q or v, and whether it is q
 TORSO = {"turn": (OMEGA, True), "p_dot": (VELOCITY, False), "omega": (OMEGA, False)}
 
 
 @dataclass(frozen=True)
 class Directions:
-    """Which lane stands for which direction: some of the torso, then coordinates and rates of
-    segment after segment.
+    """Which lane is which direction: some of the torso, then coordinates and rates of segment after
+    segment.
     """
 
     tail: Tail
@@ -54,8 +53,8 @@ class Directions:
         return self.base + self.each * self.tail.segments
 
     def outward(self, loops: tuple[Loop, ...]) -> Index | None:
-        """Where a sweep goes from the torso to the tip, segment i depends on the segments up to i
-        alone.
+        """Return how many lanes a sweep outward needs: segment i depends only on the segments up to
+        i.
         """
         return None if any(loop.downward for loop in loops) else self.up_to(loops)
 
@@ -79,10 +78,10 @@ class Directions:
         return "_".join([*self.torso, *(name for name, here in tail.items() if here)])
 
     def tangents(self, draft: Draft, q: Array | None = None) -> dict[str, Array]:
-        """Declare ``d_q`` and ``d_v``, where anything moves in them, and store the directions in
+        """Declare ``d_q`` and ``d_v`` if some direction moves them, and store the directions in
         them as rows.
 
-        q, which has a unit quaternion, is given where the attitude is differentiated.
+        q, with a unit quaternion, is given if the attitude is differentiated.
         """
         sizes = {"d_q": self.tail.nq} if self.coordinates else {}
         sizes |= {"d_v": self.tail.nv} if self.rates else {}
@@ -103,7 +102,7 @@ class Directions:
         return tangents
 
     def turn(self, draft: Draft) -> Ref:
-        """Declare the directions of turns as rows of a vector, and store them."""
+        """Declare the directions that rotate the torso as rows of a vector, and store them."""
         turn = draft.wide("turn", 3, self.count)[0]
         draft.unit(turn, 3 * self.torso.index("turn"))
         return turn

@@ -17,12 +17,14 @@ from .hessian_blocks import HessianBlocks
 from .torso_axes import TorsoAxes, torso_axes
 
 BY_Q = ("q", "v", "v_dot", "a", "u")
-BY_V = ("v", "u")  # what remains is the transpose of what is by q, or zero
+BY_V = ("v", "u")  # the other blocks are transposes of those by q, or zero
 
 
 def assemble_inverse_dynamics_hessian(draft: Draft, arrays: dict[str, Array]) -> None:
     """Tangents of the gradient of lambda^T (H v_dot + C) in torso axes, by tail coordinates and by
-    v; all that turns of the torso do follows from these.
+    v.
+
+    All terms with rotations of the torso follow from these.
     """
     of_q = Directions(draft.tail, (), rates=False)
     of_v = Directions(draft.tail, ("omega",), coordinates=False)
@@ -42,7 +44,7 @@ def assemble_inverse_dynamics_hessian(draft: Draft, arrays: dict[str, Array]) ->
     draft.step(rotations.world_vector, force, vector=block(rows, VELOCITY))
     blocks.of_inertia(rows)
 
-    # tangents of the gradient by a turn
+    # tangents of the gradient by a rotation of the torso
     turn_q, turn_v = (draft.wide(f"turn_{d.label}", 3, d.count) for d in (of_q, of_v))
     changes = {f"b_{name}": by_q[name][0] for name in ("a", "u")}
     draft.step(turns.power_by_turn, axes.vectors(), changes, turn=turn_q[0])
@@ -60,8 +62,8 @@ def tangents_of_gradient(
     wanted: tuple[str, ...],
     gradients: Mapping[str, Array] = MappingProxyType({}),
 ) -> dict[str, Array]:
-    """Return wide rows of tangents of the wanted gradients of ``power``, and store some of the
-    gradients; its weight is the argument ``b_power``.
+    """Return the tangents of the wanted gradients of ``power`` as wide rows, and store some of the
+    gradients; the weight of the power is the argument ``b_power``.
     """
     tail, lanes = draft.tail, directions.count
     inner = adjoint_program(assemble(function, tail), wanted, ("power",))
@@ -83,7 +85,9 @@ def turned_twice(
     gradient: dict[str, Array],
     blocks: HessianBlocks,
 ) -> None:
-    """Store second derivatives by turns, and how H lambda changes with a turn."""
+    """Store second derivatives by rotations of the torso, and how H lambda changes with a
+    rotation.
+    """
     of_q = blocks.of_q
     inner = tangent_program(
         assemble(MOMENT, draft.tail), ("q",), of_q.count, of_q.outward, ("moment",)
@@ -103,7 +107,7 @@ def turned_twice(
 
 
 def own_tail_mass(draft: Draft) -> dict[str, Ref]:
-    """Return the mass of a tail whose links or arcs have masses of their own; else nothing."""
+    """Return the mass of a tail whose links or arcs have their own masses; else nothing."""
     if not draft.tail.shape.own:
         return {}
     mass = draft.vector("tail_mass", 1)

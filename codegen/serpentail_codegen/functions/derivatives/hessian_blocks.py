@@ -1,4 +1,4 @@
-"""Where tangents of gradients belong in the blocks of a Hessian."""
+"""Copies tangents of gradients to the blocks of a Hessian."""
 
 from dataclasses import dataclass
 
@@ -22,12 +22,12 @@ class HessianBlocks:
     arrays: dict[str, Array]
 
     def clear(self) -> None:
-        """Store zeros, for what depends neither on place nor on velocity of B."""
+        """Store zeros in the blocks that do not depend on position or velocity of B."""
         for name in BLOCKS:
             self.draft.fill(self.arrays[name].whole(), 0)
 
     def of_motion(self, by_q: Array, v_by_q: Array, by_v: Array) -> None:
-        """Copy tangents of the gradients by q and v, by q; and by v, by v."""
+        """Copy tangents of the gradients by q and v along q, and of the gradient by v along v."""
         draft, tail, nv = self.draft, self.draft.tail, self.draft.tail.nv
         with draft.loop("k", self.of_v.count) as k:
             to = self.arrays["qv"].part(nv * TORSO_NV + k + OMEGA.start, tail.nt, nv)
@@ -62,7 +62,9 @@ class HessianBlocks:
             self.draft.copy(to, rows.lane(r, 0, tail.nt))
 
     def of_turn(self, by_q: Array, by_v: Array) -> None:
-        """Copy tangents of the gradient by a turn, but those by a turn."""
+        """Copy tangents of the gradient by a rotation of the torso, except those along a
+        rotation.
+        """
         nv = self.draft.tail.nv
         with self.draft.loop("k", 3) as k:
             row = k + OMEGA.start
@@ -71,14 +73,16 @@ class HessianBlocks:
             self.draft.copy(to, by_v.lane(k, 0, by_v.lanes))
 
     def of_turned_inertia(self, by_turn: Array) -> None:
-        """Copy how the tail's rows of H lambda change with a turn."""
+        """Copy how the tail's rows of H lambda change with a rotation of the torso."""
         tail = self.draft.tail
         with self.draft.loop("k", 3) as k:
             to = self.arrays["aq"].part(k + (tail.nv * TORSO_NV + OMEGA.start), tail.nt, tail.nv)
             self.draft.copy(to, by_turn.lane(k, 0, tail.nt))
 
     def columns_of_turns(self, block: str, first: int, count: int) -> dict[str, Ref]:
-        """Return the columns of turns in some rows of a block, by the names of a step's outputs."""
+        """Return the columns of rotations in some rows of a block, by the names of a step's
+        outputs.
+        """
         nv, array = self.draft.tail.nv, self.arrays[block]
         places = [nv * (first + r) + OMEGA.start for r in range(count)]
         return {f"row_{r}": array.part(place, 3) for r, place in enumerate(places)}

@@ -1,6 +1,6 @@
 """Exact first derivatives: Jacobians, and products with them.
 
-Nothing depends on the position of B or on its velocity.
+No result depends on the position or the velocity of B.
 """
 
 from collections.abc import Callable
@@ -26,7 +26,7 @@ from .torso_axes import TorsoAxes, acceleration_at, torso_axes, turned_back
 
 
 def with_unit_quaternion(draft: Draft, q: Array) -> Array:
-    """Return q with a unit quaternion, which rotations are taken at: of any other, squares may
+    """Return q with a unit quaternion, at which rotations are taken; squares of another one may
     overflow.
     """
     unit = draft.array("q_unit", draft.tail.nq)
@@ -51,7 +51,7 @@ def assemble_inverse_dynamics_derivatives(draft: Draft, arrays: dict[str, Array]
     tangents = directions.tangents(draft) | {"d_a": turned_back(draft, a, turn)}
     draft.call(inner, **arguments, **tangents, d_force=rows)
 
-    # the force in world axes turns with the torso
+    # the force in world axes rotates with the torso
     change = block(rows, VELOCITY)
     reads = {"R": R, "force": block(force, VELOCITY), "turn": turn, "change": change}
     draft.step(turns.turning_force, reads, change=change)
@@ -68,13 +68,13 @@ def forward_dynamics_first(
 
 
 def loads_at_torso(draft: Draft, **loads: Ref) -> Vectors:
-    """Loads at the torso of a system H x = loads; what is not named is zero."""
+    """Return loads at the torso of a system H x = loads; those that are not given are zero."""
     names = ("force", "moment", "load_force", "load_moment")
     return Vectors(dict.fromkeys(names, draft.zero(3)) | loads)
 
 
 def weightless(draft: Draft, tau: Callable[[Index], Ref] | None, **loads: Ref) -> Loads:
-    """Loads of a system H x = loads without gravity; what is not named is zero."""
+    """Return loads of a system H x = loads without gravity; those that are not given are zero."""
     return Loads(loads_at_torso(draft, **loads), tau=tau, gravity=draft.zero(1))
 
 
@@ -84,7 +84,7 @@ def minus(
     tau: Callable[[Index], Ref] | None = None,
     gravity: Ref | None = None,
 ) -> Loads:
-    """Loads of H x = tau - rows, rows being a change of H v_dot + C in torso axes."""
+    """Return loads of H x = tau - rows, where rows are a change of H v_dot + C in torso axes."""
     change = {"force": block(rows, VELOCITY), "moment": block(rows, OMEGA)}
     at_torso, none = loads_at_torso(draft, **change), draft.zero(1)
     return Loads(at_torso, lambda k: tail_v(rows, k), tau, gravity or none)
@@ -115,7 +115,7 @@ def assemble_forward_dynamics_derivatives(draft: Draft, arrays: dict[str, Array]
 
 
 def torque_columns(draft: Draft, factored: FactoredDynamics, dtau: Array) -> None:
-    """Columns of H^-1 that belong to tau."""
+    """Store the columns of H^-1 that belong to tau."""
     nt, nv = draft.tail.nt, draft.tail.nv
     unit, x = draft.wide("unit_torque", nt, nt), draft.wide("x_torque", nv, nt)
     draft.unit(unit.part(0, nt), 0)
@@ -145,7 +145,7 @@ def assemble_forward_dynamics_jvp(draft: Draft, arrays: dict[str, Array]) -> Non
 
 
 def assemble_inverse_dynamics_vjp(draft: Draft, arrays: dict[str, Array]) -> None:
-    """Gradient of lambda^T (H v_dot + C), by one way out along the tail and one back."""
+    """Gradient of lambda^T (H v_dot + C), by one sweep outward along the tail and one back."""
     axes = torso_axes(draft, arrays["q"], arrays["v_dot"], arrays["multiplier"])
     arguments = {name: arrays[name] for name in ("q", "v", "v_dot", "multiplier")}
     wanted = {"b_v": arrays["dv"], "b_v_dot": arrays["dv_dot"]}
@@ -204,8 +204,8 @@ def assemble_forward_dynamics_vjp(draft: Draft, arrays: dict[str, Array]) -> Non
 
 
 def in_tangent_space(draft: Draft, q: Array, gradient: Array, dq: Array) -> None:
-    """Make of a gradient with respect to the numbers of q one with respect to a velocity's
-    directions.
+    """Turn a gradient with respect to the numbers of q into one with respect to the directions of a
+    velocity.
     """
     draft.copy(block(dq, POSITION), block(gradient, POSITION))
     reads = {"quaternion": block(q, QUATERNION), "gradient": block(gradient, QUATERNION)}

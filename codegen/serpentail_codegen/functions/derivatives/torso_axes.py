@@ -1,5 +1,6 @@
-"""Accelerations and virtual velocities in torso axes, where nothing depends on the attitude, and
-what a turn of the torso then does.
+"""Accelerations and virtual velocities in torso axes, where nothing depends on the attitude.
+
+It also has the effect of a rotation of the torso on them.
 """
 
 from dataclasses import dataclass
@@ -49,7 +50,9 @@ def acceleration_at(draft: Draft, R: Ref, v_dot: Array) -> Array:
 
 
 def turned_back(draft: Draft, vector: Array, turn: Ref) -> Array:
-    """Return how a vector that stays in the world changes in torso axes, turned in all lanes."""
+    """Return the change, in torso axes, of a vector that is constant in the world while the torso
+    rotates, in all lanes.
+    """
     change = draft.wide(f"d_{vector.name}", 3, turn.lanes)
     draft.step(turns.turned_back, {"vector": vector[0], "turn": turn}, change=change[0])
     return change

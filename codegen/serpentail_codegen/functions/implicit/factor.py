@@ -1,10 +1,10 @@
 """Factoring 1 - w J for implicit integrators.
 
-J is the Jacobian of the rates of (q in its tangent space, v, bristles), of contact, joint damping,
-the passive tail and tracking gains alone.  With k_q = r_q + w k_v and the bristles eliminated,
-S (k_v - r_v) = forces is left, S = H + stiffness, symmetric and positive definite but for points
-that slide: there friction follows the load, and S takes two triangles. Eliminating translation is
-what the first three pivots of S do.
+J is the Jacobian of the rates of (q in its tangent space, v, bristles). It contains only contact,
+joint damping, the passive tail and tracking gains. With k_q = r_q + w k_v and the bristles
+eliminated, S (k_v - r_v) = forces is left, where S = H + stiffness. S is symmetric and positive
+definite, except for points that slide: their friction follows the load, and S takes two triangles.
+The first three pivots of S eliminate translation.
 """
 
 from collections.abc import Callable
@@ -25,7 +25,7 @@ from ..sweeps.pieces import each_segment, points_of
 from ..tails.mechanism import Segments
 from .layout import Factors, each_contact, first_tail_point
 
-# fills H, its rows so far apart; returns the state, segments, and the attitude of a free torso
+# fills H with a given distance of rows; returns state, segments, and attitude of a free torso
 Inertia = Callable[[Draft, dict[str, Array], Array, int], tuple[State, Segments, Ref | None]]
 
 
@@ -71,7 +71,7 @@ def assemble_factor(
 
 
 def add_passive_stiffness(draft: Draft, f: Factors, state: State, k: Index) -> None:
-    """Springs, damping and stops of coordinate k, which tracking leaves nothing of."""
+    """Add springs, damping and stops of coordinate k, except those that tracking cancels."""
     weights = {"weight": f("weight"), "gain_v": f("gain_v")}
 
     def own(array: Array) -> Ref:
@@ -91,7 +91,7 @@ def add_passive_stiffness(draft: Draft, f: Factors, state: State, k: Index) -> N
 
 
 def add_gains(draft: Draft, f: Factors, weights: dict[str, Ref]) -> None:
-    """Tracking gains act through H_tt, which solving needs, too."""
+    """Add tracking gains, which act through H_tt; solving needs H_tt, too."""
     gains = {name: f(name) for name in ("gain_q", "gain_v")}
     draft.step(stiffness.gain_weights, weights, **gains)
     draft.fill(f.array.part(f.first("H_tail"), draft.tail.nt**2), 0)
@@ -112,7 +112,9 @@ def add_gains(draft: Draft, f: Factors, weights: dict[str, Ref]) -> None:
 
 @dataclass(frozen=True)
 class Ground:
-    """What linearising a point reads: the torso, weights and bristles; and the law."""
+    """What the linearisation of a point reads: the torso, weights and bristles, and the contact
+    law.
+    """
 
     torso: Torso
     weights: Vectors
@@ -129,7 +131,7 @@ def add_contacts(
     segments: Segments,
     arrays: dict[str, Array],
 ) -> None:
-    """The points in the ground, linearised; the others cost a comparison."""
+    """Add the points in the ground, linearised; a point outside costs one comparison."""
     draft.copy(f("R"), R)
     weight = {"weight": arrays["weight"].part(0, 1), "bound_share": arrays["weight"].part(1, 1)}
     draft.step(stiffness.relaxation, Vectors(weight), relax=f("relax"))
@@ -149,7 +151,7 @@ def add_contacts(
 
 
 def keep_point(draft: Draft, f: Factors, ground: Ground, number: Index) -> None:
-    """Arm and depth of a point, and no stiffness so far."""
+    """Store arm and depth of a point, and zero stiffness."""
     arm = ground.points.arms[number]
     draft.copy(f("arm", number), arm)
     draft.step(stiffness.depth_of_point, ground.torso, {"arm": arm}, depth=f("depth", number))
@@ -166,7 +168,7 @@ def stiffen(draft: Draft, f: Factors, ground: Ground, number: Index) -> None:
 
 
 def add_tail_contacts(draft: Draft, f: Factors, ground: Ground) -> None:
-    """Tail points: as those of the torso, and their columns of the tail's coordinates."""
+    """Add tail points like those of the torso, with their columns of the tail's coordinates."""
     tail, points = draft.tail, ground.points
     S, force = draft.array("S_segment", 12, tail.segments), draft.vector("force_column", 3)
     for stretch, i in each_segment(draft):
@@ -204,7 +206,7 @@ def stiffen_tail(
 
 @dataclass(frozen=True)
 class Shear:
-    """Columns of a point whose friction follows the load: along its friction, and up."""
+    """Columns of a point whose friction follows the load: along its friction, and upward."""
 
     push: Array
     lift: Array
@@ -215,8 +217,8 @@ class Shear:
 
 
 def add_sliding(draft: Draft, f: Factors, R: Ref) -> None:
-    """The transpose of S, and what makes them differ: the points that slide, whose friction follows
-    the load.
+    """Compute the transpose of S, and the terms by which the two differ: points that slide, whose
+    friction follows the load.
     """
     nv, row = draft.tail.nv, padded(draft.tail.nv)
     draft.copy(f.array.part(f.first("S_turned"), nv * row), f.array.part(f.first("S"), nv * row))
@@ -240,7 +242,7 @@ def add_sliding(draft: Draft, f: Factors, R: Ref) -> None:
 
 
 def shear_tail(draft: Draft, f: Factors, number: Index, segment: Index, shear: Shear) -> None:
-    """The tail's part of both columns of a tail point."""
+    """Compute the tail's part of both columns of a tail point."""
     point = number + -first_tail_point(draft.tail)
     with draft.loop("k", coordinate(segment + 1)) as k:
         reads = {"J_k": f.column(point, k), "spring": f("spring", number)}

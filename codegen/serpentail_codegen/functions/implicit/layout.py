@@ -1,4 +1,4 @@
-"""What factoring hands to solving: one array, its parts by their names."""
+"""The layout of the array that factoring hands to solving: its parts by name."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ class Factors:
     tail: Tail
 
     def first(self, name: str) -> int:
-        """Where a part begins."""
+        """Return the position of a part."""
         parts = self.tail.factor_blocks
         before = list(parts)[: list(parts).index(name)]
         return sum(size * count for size, count in map(parts.__getitem__, before))
@@ -29,23 +29,23 @@ class Factors:
         return self.array.part(self.first(name) + size * k, size)
 
     def entry(self, name: str, row: Index | int, column: Index | int, size: int = 1) -> Ref:
-        """Numbers of a matrix."""
+        """Return the position of a matrix entry."""
         return self.array.part(
             self.first(name) + self.tail.factor_blocks[name][0] * row + column, size
         )
 
     def tail_entry(self, k: Index, other: Index) -> Ref:
-        """The number of S for two tail coordinates."""
+        """Return the entry of S for two tail coordinates."""
         first = self.tail.torso_nv
         return self.entry("S", first + k, first + other)
 
     def row(self, point: Index | int, axis: int, segment: Index | int) -> Ref:
-        """How a tail point moves along an axis with the two coordinates of a segment."""
+        """Return how a tail point moves along an axis with the two coordinates of a segment."""
         first = self.first("J") + 3 * self.tail.nt * point + axis
         return self.array.part(first + 3 * PER_SEGMENT * segment, PER_SEGMENT, 3)
 
     def column(self, point: Index | int, k: Index | int) -> Ref:
-        """How a tail point moves with tail coordinate k."""
+        """Return how a tail point moves with tail coordinate k."""
         return self.array.part(self.first("J") + 3 * self.tail.nt * point + 3 * k, 3)
 
 
@@ -55,7 +55,9 @@ def first_tail_point(tail: Tail) -> int:
 
 
 def each_contact(draft: Draft, respond: Callable[[Index, Index | None], None]) -> None:
-    """Call ``respond(number, segment)`` for all points, tail points with their segment."""
+    """Call ``respond(number, segment)`` for all points; tail points are given with their
+    segment.
+    """
     first, tail = 0, draft.tail
     for group, count in tail.groups.items():
         if group == "tail":

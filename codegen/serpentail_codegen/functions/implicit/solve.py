@@ -1,7 +1,7 @@
-"""Solving with 1 - w J, which factoring has made triangles of.
+"""Solving with 1 - w J, once it is factored.
 
-``f`` are the factors; r_q, r_v and r_u are right-hand sides for q in its tangent space, for v and
-for the bristles, k_q, k_v and k_u the solution.
+``f`` are the factors. r_q, r_v and r_u are right-hand sides for q in its tangent space, for v and
+for the bristles; k_q, k_v and k_u are the solution.
 """
 
 from dataclasses import dataclass
@@ -72,7 +72,9 @@ def tail_response(draft: Draft, f: Factors, arrays: dict[str, Array]) -> None:
 
 @dataclass(frozen=True)
 class Shift:
-    """A velocity of the animal, to be seen at points: ``v``, and its rotation in world axes."""
+    """A velocity of the animal that is evaluated at points: ``v``, and its rotation in world
+    axes.
+    """
 
     v: Array
     rotation: Ref

@@ -1,4 +1,4 @@
-"""What sweeps over segments as articulated bodies hand on, and where a segment's part of it is."""
+"""What sweeps over segments as articulated bodies hand on, and which part belongs to a segment."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,7 @@ from ..scope import Vectors
 
 
 def lane(vector: Ref, i: Index) -> Ref:
-    """Return what is segment i's: of a wide vector a lane, else an entry of its array."""
+    """Return the part of segment i: a lane of a wide vector, or an entry of an array."""
     if not vector.lanes:
         return vector.array[i]
     return vector.array.down(vector.offset, i, vector.size)
@@ -15,24 +15,24 @@ def lane(vector: Ref, i: Index) -> Ref:
 
 @dataclass(frozen=True)
 class Passes:
-    """What the passes over the segments hand on: how each tip moves (lanes), what velocities alone
-    accelerate it by, what its coordinates' second derivatives follow from.
+    """What the passes over the segments hand on: how each tip moves (lanes), its acceleration by
+    velocities alone, and the elimination that gives second derivatives of the coordinates.
     """
 
     tip: Array
     coasting: Array
     elimination: Array
-    over: Array | None = None  # one over the pivots, for those who ask
+    over: Array | None = None  # reciprocals of the pivots, if a caller needs them
 
     def tip_of(self, i: Index) -> dict[str, Ref]:
-        """What the motion of one tip is made of."""
+        """Return the quantities that determine the motion of one tip."""
         return {"tip_map": self.tip.down(0, i, self.tip.size)}
 
 
 @dataclass(frozen=True)
 class Freed:
-    """What solves for accelerations of any load: the passes, the segments' own inertia, the
-    torso's with free coordinates, factored, and the attitude.
+    """What is needed to solve for the accelerations of any load: the passes, the segments' own
+    inertia, the factored inertia of the torso with free coordinates, and the attitude.
     """
 
     passes: Passes
@@ -41,7 +41,9 @@ class Freed:
     R: Ref
 
     def elimination(self, i: Index) -> dict[str, Ref]:
-        """What the second derivatives of a segment's coordinates follow from."""
+        """Return the quantities that determine the second derivatives of a segment's
+        coordinates.
+        """
         if self.passes.over is None:
             raise ValueError("forward dynamics kept no pivots: ask for them by again=True")
         return {"shares": self.passes.elimination[i], "over": self.passes.over[i]}
@@ -54,7 +56,9 @@ class Freed:
 
 @dataclass(frozen=True)
 class Body:
-    """All that hangs on the base of a segment: its wrench is A a + b for the base's motion a."""
+    """Everything beyond the base of a segment as one body: its wrench is A a + b for the motion a
+    of the base.
+    """
 
     A: Array
     b: Array

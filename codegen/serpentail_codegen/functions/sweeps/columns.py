@@ -1,7 +1,7 @@
 """The sweep of a long articulated tail that gives H without translation and C at once.
 
-All momentum columns and the bias wrench are columns of one wide wrench that is swept from the tip
-to the base, so that the links need no pose and no column has to meet another one.  It pays where
+All momentum columns and the bias wrench are columns of one wide wrench, which is swept from the tip
+to the base. So the links need no pose, and no two columns have to be multiplied. It pays off if
 vectors hold several numbers: a column is a lane.
 """
 
@@ -21,8 +21,8 @@ from .wrenches import forward_wrenches
 def factored_dynamics_by_columns(
     draft: Draft, arrays: dict[str, Array], entry: Callable[..., Ref]
 ) -> None:
-    """Fill ``A`` (by ``entry(row, column)``, lower triangle), ``columns``, ``bias`` and what
-    elimination needs.
+    """Fill ``A`` (by ``entry(row, column)``, lower triangle), ``columns``, ``bias`` and the
+    quantities that elimination needs.
     """
     nt, columns, bias = draft.tail.nt, arrays["columns"], arrays["bias"]
     state = State(arrays["q"], arrays["v"])
@@ -64,8 +64,8 @@ def factored_dynamics_by_columns(
 def _gather(
     draft: Draft, segments: Segments, wrenches: Wrenches, F_columns: Ref, rows: Array
 ) -> tuple[Vectors, Array]:
-    """Sweep from the tip to the mount; return ``mass, h, I``, and what each segment's joints
-    contribute to its block by themselves.
+    """Sweep from the tip to the mount; return ``mass, h, I``, and the contribution of each
+    segment's joints to its own block.
     """
     tail, lanes = draft.tail, rows.lanes
     at, own_joints = draft.wide("at", lanes, lanes), draft.array("own", 2, tail.segments)
@@ -124,7 +124,7 @@ def _own_blocks(
     columns: Array,
     entry: Callable[..., Ref],
 ) -> None:
-    """Put the rows into ``A``: blocks of two segments as they are, those of one segment
+    """Store the rows in ``A``: blocks of two segments unchanged, blocks of one segment
     completed.
     """
     with draft.loop("i", draft.tail.segments) as i:

@@ -1,7 +1,7 @@
 """Long segments by doubling: chains of equal links are joined, so that work grows with log n.
 
-A lane of a vector is a segment and one of its coordinates: lane i is segment i, its tangents those
-by pitch; lane m + i is segment i again, its tangents those by yaw.  What velocities ask for follows
+A lane of a vector is a segment and one of its coordinates. Lane i is segment i with tangents by
+pitch; lane m + i is segment i again with tangents by yaw. The terms that velocities cause follow
 from these derivatives.
 """
 
@@ -18,7 +18,7 @@ BY = ("pitch", "yaw")
 
 
 def is_doubled(tail: Tail) -> bool:
-    """Tell if doubling is faster: a join takes as long as a few links, and longer for more
+    """Tell if doubling is faster: joining takes as long as a few links, and longer for more
     segments.
     """
     joins = tail.links.bit_length() - 1 + tail.links.bit_count() - 1
@@ -38,7 +38,7 @@ def joined_links(draft: Draft, state: State, link: Ref) -> Vectors:
             draft.copy(angles.array.down(0, lane, 2), state.angles(i))
             draft.copy(turning.array.lane(c, lane), one)
 
-    # a link, and how to put one chain behind another
+    # one link, and the step that joins two chains
     single, chain = _declared(draft, "link", lanes), _declared(draft, "chain", lanes)
     step = tangent(derive(link_chain.one_link), frozenset({"angles"}))
     draft.step(step, {"angles": angles, "d_angles": turning, "link": link}, **single.named)
@@ -75,7 +75,7 @@ def links_of(draft: Draft, count: int) -> dict[str, Ref]:
 
 
 def _beyond(name: str) -> str:
-    """Return what a vector of the chain beyond is called."""
+    """Return the name of a vector in the outer chain."""
     return f"{name}_beyond"
 
 

@@ -1,4 +1,6 @@
-"""Sweeps of inertia: composite bodies from the tip to the torso, and all that H is made of."""
+"""Sweeps of inertia: composite bodies from the tip to the torso, and everything that H
+consists of.
+"""
 
 from collections.abc import Callable
 
@@ -10,7 +12,7 @@ from ..scope import Pose, State, Vectors
 from ..tails.mechanism import Segments
 from .pieces import across, each_segment, mechanism, pieces_of, torso_pose
 
-Block = Callable[..., Ref]  # entries of H, by the numbers of two tail coordinates and how many
+Block = Callable[..., Ref]  # entries of H: from two tail coordinates and a count
 
 
 def gather_inertia(
@@ -28,7 +30,7 @@ def gather_inertia(
     for ref in composite.named.values():
         draft.fill(ref, 0)
     for stretch, i in each_segment(draft, downward=True):
-        # the segment's own block of H and its columns start anew, what is beyond goes on
+        # the segment's own block of H and its columns start from zero; the sums of all beyond go on
         own = _own_block(H_tail, i) if H_tail else {}
         for ref in (*momenta.named.values(), *own.values()):
             draft.fill(ref, 0)
@@ -44,7 +46,7 @@ def gather_inertia(
 
 
 def _own_block(H_tail: Block, i: Index) -> dict[str, Ref]:
-    """The lower triangle of H of one segment's two coordinates, to be added to."""
+    """Return the lower triangle of H of one segment's two coordinates, to be added to."""
     pitch, yaw = coordinate(i), coordinate(i, 1)
     return {
         "H_pp_": H_tail(pitch, pitch),
@@ -66,8 +68,8 @@ def forward_roots(
     roots: dict[str, Array],
     S: Array | None = None,
 ) -> None:
-    """Pose of every segment's root, and spatial columns of all segments but the last, from a pose
-    on.
+    """Compute the pose of every segment's root, and spatial columns of all segments but the last,
+    starting from a pose.
     """
     last = draft.tail.segments - 1
 
@@ -89,11 +91,11 @@ def forward_roots(
 def tail_inertia(
     draft: Draft, state: State, H_tail: Block, columns: Array, R: Ref | None = None
 ) -> tuple[Segments, Vectors]:
-    """All that H is made of (Eqs. 2, 16, 18): ``mass, h, I`` at B, momentum columns, H of the tail
-    (lower triangle).
+    """Compute everything that H consists of (Eqs. 2, 16, 18): ``mass, h, I`` at B, momentum
+    columns, H of the tail (lower triangle).
 
-    The columns are in torso axes, or in world axes with the attitude R of the torso.  Returns the
-    segments, and ``mass, h, I``.
+    The columns are in torso axes, or in world axes if the attitude R of the torso is given. Returns
+    the segments, and ``mass, h, I``.
     """
     segments = mechanism(draft).prepare(draft, state, True)
     pose = torso_pose(draft, R)

@@ -1,4 +1,4 @@
-"""Sweeps of loads: forces on the tail's points, as a load on the torso and torques."""
+"""Sweeps of loads: forces on the tail's points as a load on the torso and as torques."""
 
 from ...ir.program import Array, Index, Ref
 from ...mechanics import loads
@@ -9,7 +9,7 @@ from .pieces import each_point, mechanism, torso_pose
 
 
 def sample_joints(draft: Draft, state: State) -> tuple[Array, Array]:
-    """Spatial columns between tail points, and all tail points, in torso axes from B."""
+    """Compute spatial columns between tail points, and all tail points, in torso axes from B."""
     tail, samples = draft.tail, mechanism(draft).prepare_samples(draft, state, None)
     S, points = draft.array("S_joint", 12, tail.total), draft.array("tail_point", 3, tail.total + 1)
     pose = torso_pose(draft, name="joint")

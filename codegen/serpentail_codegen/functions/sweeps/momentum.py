@@ -50,7 +50,7 @@ def _begin_momentum(
 
 
 def gather_moment(draft: Draft, segments: Segments) -> Vectors:
-    """Mass and first moment of the tail at its mount, then with a torso that moves at B, in
+    """Sum mass and first moment of the tail at its mount, then with a moving torso at B, in
     ``mass`` and ``h``.
     """
     moment = draft.vectors(mass=1, h=3)

@@ -1,8 +1,8 @@
-"""What all sweeps over the tail begin with: its loops, and where it is mounted.
+"""The loops of all sweeps over the tail, and the mount where they begin.
 
-Forward sweeps go from the torso to the tip, backward sweeps from the tip to the torso; ``i`` counts
-segments, ``g`` pieces or tail points.  What a sweep carries from piece to piece is updated in
-place.
+Forward sweeps go from the torso to the tip, backward sweeps from the tip to the torso. ``i`` counts
+segments, ``g`` pieces or tail points. Quantities that a sweep carries from piece to piece are
+updated in place.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -20,8 +20,10 @@ IDENTITY = (1, 0, 0, 0, 1, 0, 0, 0, 1)
 
 
 def mechanism(draft: Draft) -> Mechanism:
-    """Return the steps of the draft's tail; of a mixed one those of the segments that a loop is
-    over, and outside of such loops what describes all of them.
+    """Return the steps of the draft's tail.
+
+    In a mixed tail these are the steps of the segments that the open loop is over; outside of such
+    loops, those that describe all segments.
     """
     return mechanism_of(draft.tail, draft.stretch.kind if draft.stretch else "")
 
@@ -37,7 +39,7 @@ def each_segment(
 ) -> Iterator[tuple[Stretch, Index]]:
     """Open a loop over the segments of each stretch, up to segment ``stop``; yields both.
 
-    What a for statement does with them is recorded once for each stretch.
+    The body of a ``for`` statement over it is recorded once for each stretch.
     """
     end = draft.tail.segments if stop is None else stop
     stretches = [stretch for stretch in draft.tail.stretches if stretch.first < end]
@@ -60,7 +62,7 @@ def pieces_of(
 def points_of(
     draft: Draft, stretch: Stretch, i: Index, downward: bool = False
 ) -> AbstractContextManager[Index]:
-    """Open a loop over the tail points of segment i; yields the number of those before each."""
+    """Open a loop over the tail points of segment i; yields the number of points before each."""
     return _numbered(
         draft, stretch.points, stretch.first_point - stretch.points * stretch.first, i, downward
     )
@@ -68,7 +70,7 @@ def points_of(
 
 @contextmanager
 def _numbered(draft: Draft, count: int, first: int, i: Index, downward: bool) -> Iterator[Index]:
-    """Open a loop over so many of each segment; yields their number along the tail."""
+    """Open a loop over a number of items of each segment; yields their number along the tail."""
     with draft.loop("j", count, downward) as j:
         yield count * i + j + first
 
@@ -83,8 +85,8 @@ def each_piece(draft: Draft, downward: bool = False) -> Iterator[tuple[Index, In
 
 
 def each_point(draft: Draft, downward: bool = False) -> Iterator[tuple[Index, Index]]:
-    """Open the loops over segments and their tail points; yields the segment, and how many points
-    of the tail are before this one, but the first.
+    """Open the loops over segments and their tail points; yields the segment, and the number of
+    points before this one, without the first point of the tail.
     """
     for stretch, i in each_segment(draft, downward):
         with points_of(draft, stretch, i, downward) as g:
@@ -94,8 +96,8 @@ def each_point(draft: Draft, downward: bool = False) -> Iterator[tuple[Index, In
 def torso_pose(
     draft: Draft, R: Ref | None = None, origin: Ref | None = None, name: str = "link"
 ) -> Pose:
-    """Pose of the tail mount, to be carried along the tail: from B in torso axes, or with the
-    attitude R in world axes from an origin.
+    """Return the pose of the tail mount, to be carried along the tail: from B in torso axes, or
+    from an origin in world axes if the attitude R is given.
     """
     pose = Pose(draft.vector(f"R_{name}", 9), draft.vector(f"P_{name}", 3))
     axes = mount_axes(draft)
@@ -114,7 +116,9 @@ def torso_pose(
 
 
 def mount_axes(draft: Draft) -> dict[str, Ref]:
-    """Return the rotation from the tail's root axes to the torso's; nothing where they are one."""
+    """Return the rotation from the tail's root axes to those of the torso; nothing if they are the
+    same.
+    """
     if not draft.tail.shape.tilted:
         return {}
     known = [array[0] for array in draft.arrays if array.name == "mount"]
@@ -127,7 +131,7 @@ def across(
     vectors: Mapping[str, Ref] | None = None,
     **more: Ref,
 ) -> None:
-    """Take vectors across the mount, in place, where the tail begins in axes of its own."""
+    """Rotate vectors across the mount, in place, if the tail begins in axes of its own."""
     axes, vectors = mount_axes(draft), {**(vectors or {}), **more}
     if axes:
         draft.step(function, axes, vectors, **vectors)

@@ -1,8 +1,8 @@
-"""Forward dynamics of a long articulated tail, by segments: v_dot comes about without H.
+"""Forward dynamics of a long articulated tail by segments: it gives v_dot without H.
 
-The links of all segments are swept at once, segment i in lane i, or joined by doubling.  Then one
-sweep takes the segments from the tip to the mount, each as an articulated body whose coordinates
-are free, and one takes accelerations from the torso to the tip.
+The links of all segments are swept at once, segment i in lane i, or joined by doubling. Then one
+sweep goes over the segments from the tip to the mount and treats each as an articulated body with
+free coordinates. A last sweep carries accelerations from the torso to the tip.
 """
 
 from collections.abc import Iterator
@@ -30,18 +30,18 @@ def forward_dynamics(
 ) -> Freed:
     """Fill ``v_dot`` from a load (force, moment) at B in torso axes and torques.
 
-    again: keep what other loads take.
+    again: keep the quantities that further loads need.
     """
     m = draft.tail.segments
     tip = _wide(draft, "tip_map", 30).array
     over = draft.array("over_pivots", 2, m) if again else None
     passes = Passes(tip, draft.array("coasting", 6, m), draft.array("shares", 15, m), over)
 
-    # what the segments' own links ask for
+    # loads of the segments' own links
     own = _doubled if is_doubled(draft.tail) else _link_by_link
     inertia, bias = own(draft, state, passes)
 
-    # inward: all that hangs on the mount, then the torso; outward: accelerations
+    # inward: everything beyond the mount, then the torso; outward: accelerations
     body = _inward_pass(draft, passes, inertia, bias, torques)
     freed, a_mount = _at_torso(draft, state, body, load, v_dot)
     base = draft.array("base", 6)
@@ -55,7 +55,7 @@ def forward_dynamics(
 
 
 def _wide(draft: Draft, name: str, size: int, *values: Number) -> Ref:
-    """Declare a vector with one lane for each segment; ``values`` are those it begins with."""
+    """Declare a vector with one lane for each segment, which begins with ``values``."""
     vector = draft.wide(f"{name}_lanes", size, draft.tail.segments)[0]
     if values:
         draft.fill(vector, *values)
@@ -120,7 +120,7 @@ def _prepare(draft: Draft, state: State) -> Vectors:
 
 
 def _own_inertia(draft: Draft, links: Vectors, passes: Passes) -> Vectors:
-    """How each tip moves, and the composite inertia of each segment's own links."""
+    """Compute how each tip moves, and the composite inertia of each segment's own links."""
     # from the base to the tip
     pose = {"R": _wide(draft, "R", 9, *IDENTITY), "P": _wide(draft, "P", 3, 0)}
     S = _wide(draft, "S", 12, 0)
@@ -141,8 +141,8 @@ def _own_inertia(draft: Draft, links: Vectors, passes: Passes) -> Vectors:
 
 
 def _bias(draft: Draft, state: State, links: Vectors, w: Ref) -> Vectors:
-    """Loads that velocities alone ask for in each segment, ``F_next`` and ``torque``, and what they
-    alone accelerate its tip by, ``w_dot`` and ``a``.
+    """Compute the loads that velocities alone cause in each segment, ``F_next`` and ``torque``, and
+    the accelerations of its tip by velocities alone, ``w_dot`` and ``a``.
     """
     # from the base to the tip
     motion = {"w": w, "w_dot": _wide(draft, "w_dot", 3, 0), "a": _wide(draft, "a", 3, 0)}
@@ -166,14 +166,18 @@ def _bias(draft: Draft, state: State, links: Vectors, w: Ref) -> Vectors:
 def _inward_pass(
     draft: Draft, passes: Passes, inertia: Vectors, bias: Vectors, torques: Array
 ) -> Body:
-    """From the tip to the mount, coordinates eliminated; return what hangs on the mount."""
+    """Sweep from the tip to the mount, eliminate the coordinates, and return what is beyond the
+    mount.
+    """
     K, T = draft.wide("K", UNKNOWNS, UNKNOWNS), draft.wide("T", 6, UNKNOWNS)
     b, load = draft.wide("b", 1, UNKNOWNS), draft.wide("load", 1, UNKNOWNS)
     pivots = draft.vector("pivots", 2)
     body = Body(draft.wide("A", 6, UNKNOWNS), draft.wide("b_base", 1, UNKNOWNS))
 
     def begin(i: Index) -> None:
-        """The segment alone: its inertia, loads, and what velocities accelerate its tip by."""
+        """Start with the segment alone: its inertia, loads, and the acceleration of its tip by
+        velocities.
+        """
         own = {name: lane(inertia[name], i) for name in OWN_INERTIA} | {"mass": inertia["mass"]}
         rows = {f"K_{r}": K.lane(r, 0, UNKNOWNS) for r in range(UNKNOWNS)}
         draft.step(free_segment.own_inertia, own, **rows)
@@ -183,7 +187,7 @@ def _inward_pass(
             draft.copy(passes.coasting.part(6 * i + first, 3), lane(bias[name], i))
 
     def end(i: Index) -> None:
-        """Its coordinates are free: eliminate them."""
+        """Eliminate the segment's coordinates, which are free."""
         reads = {
             "K": K[0],
             "b": b[0],
@@ -199,7 +203,7 @@ def _inward_pass(
         draft.guard(pivots, "NOT_POSITIVE_DEFINITE", *writes.values())
 
     def to_parent(i: Index) -> None:
-        """Add what hangs on the segment's tip."""
+        """Add everything beyond the segment's tip."""
         tip = passes.tip_of(i)
         rows = {f"T_{r}": T.lane(r, 0, UNKNOWNS) for r in range(6)}
         draft.step(free_segment.tip_rows, tip, **rows)
@@ -221,8 +225,8 @@ def _inward_pass(
 def _at_torso(
     draft: Draft, state: State, body: Body, load: Array, v_dot: Array
 ) -> tuple[tuple[Array, Ref], Ref]:
-    """Accelerations of the torso; returns its inertia and attitude, and how the mount
-    accelerates.
+    """Compute the accelerations of the torso; return its inertia and attitude, and the acceleration
+    of the mount.
     """
     H, rhs = draft.array("H", UNKNOWNS, 6), draft.array("rhs", 6)
     zero, omega = draft.zero(3), state.omega
@@ -231,7 +235,7 @@ def _at_torso(
     draft.step(free_segment.freed_inertia, body.rows(6), **rows)
     draft.factor(H, 6)
 
-    # what velocities alone ask for at B
+    # loads at B by velocities alone
     motion = {"w": omega, "w_dot": zero, "a": zero}
     draft.step(torso.mount_acceleration, motion, a_mount=a_mount)
     beyond = {"b_mount": body.b.lane(0, 0, 6), "a_mount": a_mount}

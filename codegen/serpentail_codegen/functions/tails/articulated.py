@@ -10,11 +10,13 @@ from ..draft import Draft
 from ..scope import Instead, Motion, State, Vectors
 from .mechanism import Mechanism, Place, Segments, simplified
 
-SIZES = {"link_inertias": 3}  # numbers of each link, of parameters that have more than one
+SIZES = {"link_inertias": 3}  # parameters with more than one number for each link
 
 
 def own_links(draft: Draft) -> Array:
-    """Store the properties of every link from its own mass, length, COM and inertia, by pieces."""
+    """Store the properties of every link from its own mass, length, COM and inertia, one after
+    another.
+    """
     array = draft.array("link", 6, draft.tail.pieces)
     fill_links(draft, array, lambda run: run.other_pieces)
     return array
@@ -31,7 +33,7 @@ def fill_links(draft: Draft, array: Array, others: Callable[[Run], int]) -> None
 
 
 def link_properties(draft: Draft) -> Vectors:
-    """Store the properties of a link, all being equal."""
+    """Store the properties of one link; all links are equal."""
     share = draft.fixed("share", [Fraction(1, draft.tail.total)])
     return draft.store(link.link_properties, {"share": share}, link=6)
 
@@ -54,12 +56,12 @@ def prepare_links(draft: Draft, state: State, doubled: bool = False) -> Segments
 
 
 def prepare_link_samples(draft: Draft, state: State, segments: Segments | None) -> Segments:
-    """Tail points are the joints: what describes the links describes them."""
+    """The tail points are the joints, so the data of the links serve for them, too."""
     return segments or prepare_links(draft, state)
 
 
 def no_torques(draft: Draft) -> Array | None:
-    """A link does not bend."""
+    """Return nothing: a link does not bend."""
     return None
 
 

@@ -23,7 +23,7 @@ def shape_step(bend_range: float) -> Step:
 
 
 def bend_range(draft: Draft) -> dict[str, Ref]:
-    """Return the range that bends are declared to stay in."""
+    """Return the range within which bends are declared to stay."""
     return {"bend_range": draft.fixed("bend_range", [draft.tail.bend_range])}
 
 
@@ -40,7 +40,9 @@ def own_sections(draft: Draft, name: str, part: Fraction) -> Array:
 
 
 def section_properties(draft: Draft) -> tuple[dict[str, Array], Mapping[str, Ref]]:
-    """Store the properties of every segment, or of one, all being equal: as arrays, or shared."""
+    """Store the properties of every segment as arrays, or those of one segment as shared vectors if
+    all are equal.
+    """
     if draft.tail.shape.own:
         return {"section": own_sections(draft, "section", Fraction(1))}, {}
     share = draft.fixed("share", [Fraction(1, draft.tail.segments)])
@@ -67,7 +69,9 @@ def prepare_arcs(draft: Draft, state: State, doubled: bool = False) -> Segments:
 
 
 def sample_section(draft: Draft) -> tuple[dict[str, Ref], Callable[[Index], dict[str, Ref]]]:
-    """Store the properties of one n-th of a segment; return the fraction, and them by segment."""
+    """Store the properties of one n-th of a segment; return the fraction, and the properties by
+    segment.
+    """
     part = Fraction(1, draft.tail.links)
     fraction = {"fraction": draft.fixed("fraction", [part])}
     if draft.tail.shape.own:
@@ -80,7 +84,7 @@ def sample_section(draft: Draft) -> tuple[dict[str, Ref], Callable[[Index], dict
 
 
 def sample_arrays(draft: Draft) -> dict[str, Array]:
-    """Declare what describes one n-th of every segment."""
+    """Declare arrays for one n-th of every segment."""
     return {
         name: draft.array(f"{name}_sample", ARC[name], draft.tail.segments)
         for name in ("E", "r", "bend")
@@ -101,7 +105,7 @@ def prepare_arc_samples(draft: Draft, state: State, segments: Segments | None) -
             draft.step(arc.part_of_bend, angles, fraction, part=part)
             draft.step(shape, {"angles": part}, tip=tip)
 
-            # the range is one of whole segments
+            # the range is that of whole segments
             draft.step(arc_shape.bend_margin, angles, limit, margin=margin)
             draft.guard(margin, "OUT_OF_RANGE", tip)
             bent = {"angles": part, "tip": tip}

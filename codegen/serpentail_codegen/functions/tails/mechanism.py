@@ -1,4 +1,4 @@
-"""What a kind of tail must say of itself, so that the same sweeps serve all of them.
+"""What a kind of tail must define so that the same sweeps serve all kinds.
 
 A segment of the articulated tail has n pieces, its links; a segment of the continuum tail is one
 piece.
@@ -20,8 +20,8 @@ Place = tuple[Index, Index]  # a segment, and a piece
 
 @dataclass(frozen=True)
 class Segments:
-    """What describes the pieces of all segments: arrays with an entry a segment, vectors that all
-    of them share, and arrays with an entry a piece.
+    """The data of the pieces of all segments: arrays with an entry for each segment, vectors that
+    all segments share, and arrays with an entry for each piece.
     """
 
     state: State
@@ -30,7 +30,7 @@ class Segments:
     each: Mapping[str, Array] = field(default_factory=dict)
 
     def at(self, i: Index, g: Index | None = None) -> Vectors:
-        """Return what describes piece g of segment i, and the segment's coordinates."""
+        """Return the data of piece g of segment i, and the coordinates of the segment."""
         entries = {name: array[i] for name, array in self.arrays.items()}
         own = {} if g is None else {name: array[g] for name, array in self.each.items()}
         shared = dict(self.shared) | {"angles": self.state.angles(i)}
@@ -46,7 +46,7 @@ class Segments:
 
 @dataclass(frozen=True)
 class Wrenches:
-    """Wrenches (or momenta) of all pieces, and the generalised forces of bends themselves."""
+    """Wrenches (or momenta) of all pieces, and the generalised forces of the bends."""
 
     F: Array
     torque_own: Array | None = None
@@ -61,15 +61,17 @@ class Wrenches:
 
 @dataclass(frozen=True)
 class Mechanism:
-    """How one piece moves, what it weighs, and how it passes things on.
+    """How one piece moves, its mass properties, and how it passes quantities on.
 
-    ``prepare(draft, state, doubled)`` stores what describes the pieces, ``prepare_samples`` what
-    lies between two tail points, given what describes the pieces if that is there.
-    ``declare_torques`` declares what ``move`` stores a bend's own generalised forces in.
+    ``prepare(draft, state, doubled)`` stores the data of the pieces.
+    ``prepare_samples`` stores the data of what lies between two tail points; it is given the data
+    of the pieces if they exist.
+    ``declare_torques`` declares the array in which ``move`` stores the generalised forces of bends.
     ``move(draft, segments, place, motion, v_dot, wrench)`` carries the motion over a piece and
-    stores its inertial wrench; ``momentum(draft, segments, place, velocity, writes)`` carries
-    angular and linear velocity ``w, u`` and gives momentum or kinetic energy; the place is a
-    segment and a piece of it.  The others are steps.
+    stores its inertial wrench.
+    ``momentum(draft, segments, place, velocity, writes)`` carries angular and linear velocity ``w,
+    u`` over a piece and gives momentum or kinetic energy.
+    A place is a segment and one of its pieces. The other fields are steps.
     """
 
     prepare: Callable[[Draft, State, bool], Segments]

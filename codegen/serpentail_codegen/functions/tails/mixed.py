@@ -1,7 +1,8 @@
-"""A tail of both kinds: what describes its links and its arcs, side by side.
+"""A tail of both kinds, with the data of its links and of its arcs side by side.
 
-Each stretch of segments has the steps of its own kind; frames, motions, wrenches and composites go
-from one to the next as between two links, since both kinds hand them on at their tips.
+Each stretch of segments uses the steps of its own kind. Frames, motions, wrenches and composites
+pass from one stretch to the next as between two links, because both kinds hand them on at their
+tips.
 """
 
 from dataclasses import replace
@@ -15,7 +16,7 @@ from .mechanism import Mechanism, Segments
 
 
 def both(links: Segments, arcs: Segments) -> Segments:
-    """Return what describes the links, and what describes the arcs, the latter where both would."""
+    """Return the data of the links and those of the arcs; the latter win if both have a name."""
     return Segments(
         links.state,
         links.arrays | arcs.arrays,
@@ -30,8 +31,8 @@ def prepare_both(draft: Draft, state: State, doubled: bool = False) -> Segments:
 
 
 def prepare_both_samples(draft: Draft, state: State, segments: Segments | None) -> Segments:
-    """Links by the numbers of their points, and one n-th of each arc, whose frames take the place
-    of whole arcs'.
+    """Prepare links by the numbers of their points, and one n-th of each arc, whose frames replace
+    those of whole arcs.
     """
     links = segments or prepare_links(draft, state)
     array = draft.array("link_point", 6, draft.tail.total)
@@ -41,12 +42,12 @@ def prepare_both_samples(draft: Draft, state: State, segments: Segments | None) 
 
 
 def of_no_segment(*_: Any, **__: Any) -> Any:
-    """Refuse to be a step: there are those of the stretches alone."""
+    """Refuse to be a step: only the stretches have steps."""
     raise ValueError("a mixed tail has steps within loops over its segments alone")
 
 
 def with_both(kind: Mechanism) -> Mechanism:
-    """Return the steps of segments of a kind, with what describes all segments."""
+    """Return the steps of segments of a kind, with the data of all segments."""
     return replace(
         kind,
         prepare=prepare_both,

@@ -1,4 +1,4 @@
-"""Which tail a scene has."""
+"""Chooses the mechanism of a tail."""
 
 from ..tail import Tail
 from .articulated import ARTICULATED
@@ -9,7 +9,7 @@ from .polar import POLAR
 
 
 def mechanism_of(tail: Tail, kind: str = "") -> Mechanism:
-    """Return the steps of a tail; of a mixed one those of segments of a kind, or of all."""
+    """Return the steps of a tail; in a mixed tail those of segments of a kind, or of all."""
     if tail.polar:
         return POLAR
     if tail.kind == "mixed":

@@ -21,7 +21,7 @@ POLAR_OWN = {"trig": 4, "E_v": 15, "Q_v": 10, "loading": 27}
 
 
 def guard_polar(draft: Draft, angles: Ref, limit: dict[str, Ref], *protects: Ref) -> None:
-    """Refuse a segment that is straight or bent beyond the range."""
+    """Refuse a segment that is straight, or bent beyond the range."""
     margins = draft.store(polar_arc.polar_margins, {"angles": angles}, limit, bent=1, margin=1)
     for margin in margins.named.values():
         draft.guard(margin, "OUT_OF_RANGE", *protects)

@@ -1,4 +1,4 @@
-"""Functions of a plan's nodes: airborne motion without drift and omega among the unknowns."""
+"""Functions of a plan's nodes: airborne motion, with drift and omega eliminated."""
 
 from .arguments import ANGULAR, TAU, Argument
 from .signature import NAMED, PLANNING, Signature
@@ -8,11 +8,11 @@ X = Argument(
     ("airborne_state",),
     "airborne state: quaternion w x y z of any norm, tail coordinates (rad), their rates (rad/s)",
 )
-WEIGHTS = Argument("weights", ("airborne_results",), "of the rows of y")
+WEIGHTS = Argument("weights", ("airborne_results",), "weights, one for each row of y")
 Y = Argument(
     "y",
     ("airborne_results",),
-    "rates of x, then omega (rad/s, body), which the angular momentum determines",
+    "rates of x, then omega (rad/s, body), which follows from the angular momentum",
 )
 J = Argument("J", ("airborne_results", "airborne_arguments"), "d(y)/d(x, tau)")
 HESSIAN = Argument(
@@ -24,7 +24,7 @@ STATE = (X, TAU, ANGULAR)
 SIGNATURES = (
     Signature(
         "airborne_rates",
-        "rates of an airborne state, translation and omega eliminated",
+        "rates of an airborne state, from which translation and omega are eliminated",
         STATE,
         (Y,),
         PLANNING,
@@ -32,7 +32,7 @@ SIGNATURES = (
     ),
     Signature(
         "airborne_rates_derivatives",
-        "the same with its Jacobian",
+        "airborne_rates and its Jacobian",
         STATE,
         (Y, J),
         PLANNING,
@@ -40,7 +40,7 @@ SIGNATURES = (
     ),
     Signature(
         "airborne_rates_hessian",
-        "the same with its Jacobian and the Hessian of weights^T y",
+        "airborne_rates, its Jacobian, and the Hessian of weights^T y",
         (*STATE, WEIGHTS),
         (Y, J, HESSIAN),
         PLANNING,

@@ -1,7 +1,7 @@
-"""The arguments of functions: their names, shapes, and what their numbers mean.
+"""The arguments of functions: their names, shapes and meanings.
 
-A shape is made of numbers and of names of sizes, such as ("nv", "nv"): what these are, a tail says
-(`functions.tail.Tail` has a property of each name).
+A shape consists of numbers and names of sizes, such as ("nv", "nv"). `functions.tail.Tail` has a
+property for each name.
 """
 
 from dataclasses import dataclass
@@ -52,10 +52,10 @@ Q = Argument(
     "configuration: position of B (m, world), quaternion w x y z, tail coordinates (rad)",
 )
 V = nv_numbers(
-    "v", "velocity: of B (m/s, world), omega (rad/s, body), rates of the tail coordinates (rad/s)"
+    "v", "velocity of B (m/s, world), omega (rad/s, body), rates of the tail coordinates (rad/s)"
 )
-V_DOT = nv_numbers("v_dot", "time derivative of v")
-TAU = Argument("tau", ("nt",), "torques (N m), conjugate to the tail coordinates")
+V_DOT = nv_numbers("v_dot", "acceleration: time derivative of v (m/s^2, rad/s^2)")
+TAU = Argument("tau", ("nt",), "torques conjugate to the tail coordinates (N m)")
 F_EXT = Argument(
     "f_ext",
     ("loads",),
@@ -64,62 +64,78 @@ F_EXT = Argument(
 )
 FORCE = nv_numbers(
     "force",
-    "generalised force: on p_dot (N, world), on omega (N m, body), on the rates of the tail "
-    "coordinates (N m)",
+    "generalised force: at B (N, world), moment (N m, body), torques of the tail coordinates (N m)",
 )
 ACCELERATIONS = Argument(
-    "accelerations", ("nt",), "wanted accelerations of the tail coordinates (rad/s^2)"
+    "accelerations", ("nt",), "desired accelerations of the tail coordinates (rad/s^2)"
 )
-MULTIPLIER = nv_numbers("multiplier", "weights lambda of the rows")
+MULTIPLIER = nv_numbers("multiplier", "weights lambda, one for each row of the force or of v_dot")
 
 # What plain functions return
-H = nv_by_nv("H", "inertia matrix, symmetric positive definite (kg, kg m, kg m^2)")
-POINTS = Argument("points", ("tail_points", 3), "joint positions, then the tip (m, world)")
-JACOBIANS = Argument("J", ("tail_points", 3, "nv"), "d(point)/dt = J v")
+H = nv_by_nv("H", "inertia matrix, symmetric and positive definite (kg, kg m, kg m^2)")
+POINTS = Argument(
+    "points", ("tail_points", 3), "positions of the joints, then of the tip (m, world)"
+)
+JACOBIANS = Argument(
+    "J",
+    ("tail_points", 3, "nv"),
+    "Jacobians of the tail points: velocity of a point (m/s, world) = J v",
+)
 KINETIC = Argument("kinetic", (1,), "kinetic energy (J)")
 POTENTIAL = Argument(
     "potential", (1,), "potential energy, zero at the height of the world's origin (J)"
 )
-LINEAR = Argument("linear", (3,), "momentum (kg m/s, world)")
+LINEAR = Argument("linear", (3,), "linear momentum (kg m/s, world)")
 ANGULAR = Argument("angular", (3,), "angular momentum about the centre of mass (kg m^2/s, world)")
 
 # Derivatives
 DPARAMETERS = Argument(
     "dparameters",
     ("nv", "parameter_numbers"),
-    "derivative with respect to the parameter struct's numbers",
+    "derivative with respect to the values of the parameter struct, in their order",
 )
 
 # Contact
 LEGS = Argument(
     "legs",
     ("leg_numbers",),
-    "gamma_1, delta_1 of the right leg, gamma_2, delta_2 of the left (rad), then their rates "
-    "(rad/s)",
+    "leg angles gamma_1, delta_1 (right), gamma_2, delta_2 (left) (rad), then their rates (rad/s)",
 )
 ANGLES = Argument(
-    "angles", (4,), "gamma_1, delta_1 of the right leg, gamma_2, delta_2 of the left (rad)"
+    "angles", (4,), "leg angles gamma_1, delta_1 (right), gamma_2, delta_2 (left) (rad)"
 )
 JOINTS = Argument(
-    "joints", (2, 6, 3), "hip, D, knee, A, M and T of the right leg, then of the left (m, world)"
+    "joints",
+    (2, 6, 3),
+    "positions of hip, D, knee, A, M and T of the right leg, then of the left (m, world)",
 )
-POSITIONS = Argument("positions", ("points", 3), "points that can touch the ground (m, world)")
+POSITIONS = Argument(
+    "positions", ("points", 3), "positions of the points that can touch the ground (m, world)"
+)
 VELOCITIES = Argument("velocities", ("points", 3), "their velocities (m/s, world)")
-BRISTLES = bristle_numbers("bristles", "stretch of the friction springs (m, world x and y)")
-BRISTLE_RATES = bristle_numbers("bristle_rates", "their rates (m/s)")
+BRISTLES = bristle_numbers("bristles", "deflections of the friction bristles (m, world x and y)")
+BRISTLE_RATES = bristle_numbers("bristle_rates", "rates of the bristle deflections (m/s)")
 FORCES = Argument("forces", ("points", 3), "forces of the ground on the points (N, world)")
 HEIGHTS = Argument(
-    "heights", ("points", 2), "of the points above the ground (m), and how fast they rise (m/s)"
+    "heights", ("points", 2), "heights of the points above the ground (m), and their rates (m/s)"
 )
-POWERS = Argument("powers", (2,), "of the ground on the points, and of the legs' drives (W)")
+POWERS = Argument(
+    "powers", (2,), "powers of the ground on the points, and of the leg actuators (W)"
+)
 
 # Linear systems of implicit methods
-DAMPING = Argument("damping", ("nt",), "of the tail's joints (N m s): tau = -damping q_t_dot")
-GAINS = Argument("gains", (2,), "K_p (1/s^2), K_d (1/s) of tracking, through H_tt; zeros without")
+DAMPING = Argument(
+    "damping", ("nt",), "damping of the tail coordinates (N m s): tau = -damping q_t_dot"
+)
+GAINS = Argument(
+    "gains",
+    (2,),
+    "tracking gains K_p (1/s^2), K_d (1/s), applied through H_tt; zeros if nothing is tracked",
+)
 WEIGHT = Argument(
     "weight",
     ("weights",),
-    "w, weight of J: a method's coefficient times its step (s); with contacts then 1, or 0: "
-    "friction's bound stays",
+    "weight w of J: the method's coefficient times the step (s); with contacts a second number: 1, "
+    "or 0 to keep the bound of friction fixed",
 )
-FACTORS = Argument("factors", ("factors",), "what implicit_solve needs")
+FACTORS = Argument("factors", ("factors",), "factors and intermediate results for implicit_solve")

@@ -17,7 +17,7 @@ from .signature import ALWAYS, DERIVATIVE, NAMED, Signature
 SIGNATURES = (
     Signature(
         "inverse_dynamics_derivatives",
-        "Jacobians of H v_dot + C; that with respect to v_dot is H",
+        "Jacobians of H v_dot + C with respect to q and v; the Jacobian with respect to v_dot is H",
         (Q, V, V_DOT),
         (
             nv_by_nv("dq", "d(force)/d(q), q in its tangent space"),
@@ -28,7 +28,7 @@ SIGNATURES = (
     ),
     Signature(
         "forward_dynamics_derivatives",
-        "Jacobians of v_dot from Eq. 1",
+        "Jacobians of v_dot, Eq. 1, with respect to q, v and tau",
         (Q, V, TAU),
         (
             nv_by_nv("dq", "d(v_dot)/d(q), q in its tangent space"),
@@ -48,7 +48,7 @@ SIGNATURES = (
     ),
     Signature(
         "forward_dynamics_parameter_derivatives",
-        "Jacobian of v_dot from Eq. 1 with respect to the parameters",
+        "Jacobian of v_dot, Eq. 1, with respect to the parameters",
         (Q, V, TAU),
         (DPARAMETERS,),
         DERIVATIVE,
@@ -56,37 +56,37 @@ SIGNATURES = (
     ),
     Signature(
         "inverse_dynamics_vjp",
-        "gradient of lambda^T (H v_dot + C)",
+        "gradients of lambda^T (H v_dot + C) with respect to q, v and v_dot",
         (Q, V, V_DOT, MULTIPLIER),
         (
-            nv_numbers("dq", "with respect to q, in its tangent space"),
-            nv_numbers("dv", "with respect to v"),
-            nv_numbers("dv_dot", "with respect to v_dot: H lambda"),
+            nv_numbers("dq", "gradient with respect to q, in its tangent space"),
+            nv_numbers("dv", "gradient with respect to v"),
+            nv_numbers("dv_dot", "gradient with respect to v_dot, H lambda"),
         ),
         DERIVATIVE,
         NAMED,
     ),
     Signature(
         "forward_dynamics_jvp",
-        "directional derivative of v_dot from Eq. 1",
+        "directional derivative of v_dot, Eq. 1",
         (
             Q,
             V,
             TAU,
-            nv_numbers("dq", "direction of q, in its tangent space"),
-            nv_numbers("dv", "direction of v"),
-            Argument("dtau", ("nt",), "direction of tau"),
+            nv_numbers("dq", "direction in q, in its tangent space"),
+            nv_numbers("dv", "direction in v"),
+            Argument("dtau", ("nt",), "direction in tau"),
         ),
-        (nv_numbers("dv_dot", "derivative of v_dot"),),
+        (nv_numbers("dv_dot", "derivative of v_dot along the direction"),),
         DERIVATIVE,
         NAMED,
     ),
     Signature(
         "forward_dynamics_vjp",
-        "lambda^T times the Jacobians of v_dot from Eq. 1",
+        "lambda^T times the Jacobians of v_dot, Eq. 1",
         (Q, V, TAU, MULTIPLIER),
         (
-            nv_numbers("dq", "lambda^T d(v_dot)/d(q), in the tangent space"),
+            nv_numbers("dq", "lambda^T d(v_dot)/d(q), q in its tangent space"),
             nv_numbers("dv", "lambda^T d(v_dot)/d(v)"),
             Argument("dtau", ("nt",), "lambda^T d(v_dot)/d(tau)"),
         ),
@@ -95,16 +95,14 @@ SIGNATURES = (
     ),
     Signature(
         "inverse_dynamics_hessian",
-        "second derivatives of lambda^T (H v_dot + C); with respect to v_dot twice, or v_dot and "
-        "v, they are zero",
+        "second derivatives of lambda^T (H v_dot + C); those with respect to v_dot twice, and to "
+        "v_dot and v, are zero",
         (Q, V, V_DOT, MULTIPLIER),
         (
-            nv_by_nv(
-                "qq", "with respect to q twice, in its tangent space (by the exponential map)"
-            ),
-            nv_by_nv("qv", "row: q, column: v"),
+            nv_by_nv("qq", "with respect to q twice, in its tangent space (exponential map)"),
+            nv_by_nv("qv", "with respect to q (row) and v (column)"),
             nv_by_nv("vv", "with respect to v twice"),
-            nv_by_nv("aq", "row: v_dot, column: q; d(H lambda)/d(q)"),
+            nv_by_nv("aq", "with respect to v_dot (row) and q (column): d(H lambda)/d(q)"),
         ),
         DERIVATIVE,
         NAMED,
@@ -115,11 +113,13 @@ SIGNATURES = (
         (Q, V),
         (
             nv_numbers(
-                "kinetic_dq", "of the kinetic energy with respect to q, in its tangent space"
+                "kinetic_dq",
+                "gradient of the kinetic energy with respect to q, in its tangent space",
             ),
-            nv_numbers("kinetic_dv", "of the kinetic energy with respect to v: H v"),
+            nv_numbers("kinetic_dv", "gradient of the kinetic energy with respect to v, H v"),
             nv_numbers(
-                "potential_dq", "of the potential energy with respect to q, in its tangent space"
+                "potential_dq",
+                "gradient of the potential energy with respect to q, in its tangent space",
             ),
         ),
         DERIVATIVE,
@@ -130,12 +130,16 @@ SIGNATURES = (
         "Jacobians of linear and angular momentum",
         (Q, V),
         (
-            three_by_nv("linear_dq", "of the momentum with respect to q, in its tangent space"),
-            three_by_nv("linear_dv", "of the momentum with respect to v"),
             three_by_nv(
-                "angular_dq", "of the angular momentum with respect to q, in its tangent space"
+                "linear_dq",
+                "Jacobian of the linear momentum with respect to q, in its tangent space",
             ),
-            three_by_nv("angular_dv", "of the angular momentum with respect to v"),
+            three_by_nv("linear_dv", "Jacobian of the linear momentum with respect to v"),
+            three_by_nv(
+                "angular_dq",
+                "Jacobian of the angular momentum with respect to q, in its tangent space",
+            ),
+            three_by_nv("angular_dv", "Jacobian of the angular momentum with respect to v"),
         ),
         DERIVATIVE,
         NAMED,

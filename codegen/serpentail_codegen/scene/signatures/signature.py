@@ -1,13 +1,13 @@
-"""What is known of a function before it is derived: a row of the table of functions."""
+"""A row of the table of functions: what is known about a function before it is derived."""
 
 from dataclasses import dataclass
 
 from .arguments import Argument
 
-# Groups: what a function belongs to.
+# Groups of functions.
 VALUE = "value"
 DERIVATIVE = "derivative"
-CONTACT = "contact"  # scenes with contacts alone have them
+CONTACT = "contact"  # only in scenes with contacts
 CONTROL = "control"
 IMPLICIT = "implicit"
 SIMULATION = "simulation"
@@ -15,20 +15,19 @@ PLANNING = "planning"
 
 # When a function is emitted.
 ALWAYS = "always"  # unless the scene chooses its functions
-GROUND = "with contacts"  # the same, in scenes with contacts; in others where a scene names it
+GROUND = "with contacts"  # the same in scenes with contacts; in others only if a scene names it
 NAMED = "where named"
-CALLED = "with its callers"  # no scene names it
+CALLED = "with its callers"  # with the functions that call it; scenes cannot name it
 
 
 @dataclass(frozen=True)
 class Signature:
-    """A function: name, what it computes of what, its group, and when it is emitted.
+    """A function: name, meaning, arguments, group, and when it is emitted.
 
-    One without outputs stands for others that it is made of: a scene names it, nobody calls it.
-    ``exact`` are the functions that its Jacobians are made of, then those that gradients are, then
-    what second derivatives need beside them: so CasADi differentiates calls of the compiled code.
-    ``needs`` is a group of contact points, or "contacts" for any of them; empty: every scene may
-    have it.
+    A signature without outputs stands for several functions: a scene names it, nobody calls it.
+    ``exact`` lists functions by which CasADi differentiates calls of the compiled code: first those
+    for Jacobians, then those for gradients, then what second derivatives need besides. ``needs`` is
+    a group of contact points, or "contacts" for any of them; empty: every scene may have it.
     """
 
     name: str
@@ -42,5 +41,5 @@ class Signature:
 
     @property
     def symbolic(self) -> bool:
-        """Tell if the CasADi module builds it of operations."""
+        """Tell if the CasADi module builds it from operations."""
         return self.group in (VALUE, CONTACT, CONTROL)

@@ -1,4 +1,4 @@
-"""Functions that simulations are made of: contact, tracking, implicit methods, and whole runs."""
+"""Functions for simulations: contact, tracking, implicit methods, and whole runs."""
 
 from .arguments import (
     ACCELERATIONS,
@@ -28,8 +28,8 @@ from .signature import ALWAYS, CALLED, CONTACT, CONTROL, GROUND, IMPLICIT, SIMUL
 SIGNATURES = (
     Signature(
         "contact_points",
-        "points that can touch the ground: A, M, T of the right foot, of the left; tail; the "
-        "torso's lowest",
+        "points that can touch the ground, and their velocities: A, M, T of the right foot, then "
+        "of the left; the tail's points; the lowest point of the torso",
         (Q, V, LEGS),
         (POSITIONS, VELOCITIES),
         CONTACT,
@@ -38,7 +38,7 @@ SIGNATURES = (
     ),
     Signature(
         "leg_points",
-        "joints of both legs, from the hips to the toes, Eqs. 5 to 9",
+        "positions of the joints of both legs, from the hips to the toes, Eqs. 5 to 9",
         (Q, ANGLES),
         (JOINTS,),
         CONTACT,
@@ -47,7 +47,7 @@ SIGNATURES = (
     ),
     Signature(
         "contact_dynamics",
-        "v_dot from Eq. 1 with the forces of the ground, Eqs. 35 to 37",
+        "acceleration v_dot, Eq. 1, with the contact forces of the ground, Eqs. 35 to 37",
         (Q, V, TAU, BRISTLES, LEGS),
         (V_DOT, BRISTLE_RATES, FORCES),
         CONTACT,
@@ -56,7 +56,7 @@ SIGNATURES = (
     ),
     Signature(
         "contact_rates",
-        "what simulations on the ground ask of a state: contact_dynamics, heights and powers",
+        "contact_dynamics, and the heights and powers that a simulation on the ground needs",
         (Q, V, TAU, BRISTLES, LEGS),
         (V_DOT, BRISTLE_RATES, FORCES, HEIGHTS, POWERS),
         SIMULATION,
@@ -65,7 +65,8 @@ SIGNATURES = (
     ),
     Signature(
         "pfl",
-        "torques in flight that give the tail wanted accelerations, Eq. 46",
+        "partial feedback linearisation: torques that give the tail desired accelerations in "
+        "flight, Eq. 46",
         (Q, V, ACCELERATIONS),
         (TAU,),
         CONTROL,
@@ -73,7 +74,7 @@ SIGNATURES = (
     ),
     Signature(
         "tracked_dynamics",
-        "torques in flight that give the tail wanted accelerations, Eq. 46, and v_dot under them",
+        "the torques of pfl, Eq. 46, and v_dot under them",
         (Q, V, ACCELERATIONS),
         (TAU, V_DOT),
         CONTROL,
@@ -81,7 +82,7 @@ SIGNATURES = (
     ),
     Signature(
         "implicit_factor",
-        "factors of 1 - w J, J of contact, joint damping and gains alone",
+        "factors of 1 - w J, where J contains only contact, damping, passive tail and gains",
         (Q, V, DAMPING, GAINS, WEIGHT, BRISTLES, LEGS),
         (FACTORS,),
         IMPLICIT,
@@ -89,28 +90,30 @@ SIGNATURES = (
     ),
     Signature(
         "implicit_solve",
-        "(1 - w J) k = r",
+        "solution k of (1 - w J) k = r",
         (
             FACTORS,
             nv_numbers("r_q", "right-hand side for q, in its tangent space"),
-            nv_numbers("r_v", "for v"),
-            bristle_numbers("r_u", "for the bristles"),
+            nv_numbers("r_v", "right-hand side for v"),
+            bristle_numbers("r_u", "right-hand side for the bristle deflections"),
         ),
         (
-            nv_numbers("k_q", "solution, in the tangent space"),
-            nv_numbers("k_v", "for v"),
-            bristle_numbers("k_u", "for the bristles"),
+            nv_numbers("k_q", "solution for q, in its tangent space"),
+            nv_numbers("k_v", "solution for v"),
+            bristle_numbers("k_u", "solution for the bristle deflections"),
         ),
         IMPLICIT,
         CALLED,
     ),
     Signature(
         "implicit",
-        "linear systems of implicit methods",
+        "implicit_factor and implicit_solve, which solve the linear systems of implicit methods",
         (),
         (),
         IMPLICIT,
         GROUND,
     ),
-    Signature("rollout", "whole simulations", (), (), SIMULATION, ALWAYS),
+    Signature(
+        "rollout", "whole simulations in C, which st.simulate runs", (), (), SIMULATION, ALWAYS
+    ),
 )

@@ -1,7 +1,7 @@
 """The table of all functions, and the lists of names that scenes are checked against.
 
 The rules for scenes, the catalogue of assemblies, the manifest, the runtime's lists and the
-documentation of functions are made of this table. Its order is that of emitted code.
+documentation of functions follow from this table. Its order is that of the emitted code.
 """
 
 from . import airborne, derivatives, simulation, values
@@ -43,7 +43,7 @@ FIXED = (
 )
 AIRBORNE = in_group(PLANNING)
 NEEDS = {name: signature.needs for name, signature in SIGNATURES.items() if signature.needs}
-# functions that first, then second derivatives of a compiled function are made of
+# functions from which first, then second derivatives of a compiled function are computed
 EXACT_DERIVATIVES = {
     name: (signature.exact[0], signature.exact[1] + signature.exact[2])
     for name, signature in SIGNATURES.items()

@@ -1,4 +1,4 @@
-"""Functions of one state: the terms of the equations of motion, energy, momentum and places."""
+"""Functions of one state: terms of the equations of motion, energy, momentum and positions."""
 
 from .arguments import (
     ANGULAR,
@@ -20,11 +20,18 @@ from .arguments import (
 from .signature import ALWAYS, NAMED, VALUE, Signature
 
 SIGNATURES = (
-    Signature("mass_matrix", "H(q) of Eq. 2", (Q,), (H,), VALUE, ALWAYS),
-    Signature("bias_force", "C(q, v) of Eq. 3, gravity included", (Q, V), (FORCE,), VALUE, ALWAYS),
+    Signature("mass_matrix", "inertia matrix H(q), Eq. 2", (Q,), (H,), VALUE, ALWAYS),
+    Signature(
+        "bias_force",
+        "bias force C(q, v), Eq. 3: centrifugal and Coriolis terms, gravity, the passive tail",
+        (Q, V),
+        (FORCE,),
+        VALUE,
+        ALWAYS,
+    ),
     Signature(
         "inverse_dynamics",
-        "H v_dot + C",
+        "generalised force H v_dot + C that an acceleration v_dot needs",
         (Q, V, V_DOT),
         (FORCE,),
         VALUE,
@@ -37,7 +44,7 @@ SIGNATURES = (
     ),
     Signature(
         "forward_dynamics",
-        "v_dot from Eq. 1",
+        "acceleration v_dot under joint torques, Eq. 1",
         (Q, V, TAU),
         (V_DOT,),
         VALUE,
@@ -50,33 +57,54 @@ SIGNATURES = (
     ),
     Signature(
         "forward_dynamics_external",
-        "v_dot from Eq. 1, loads applied",
+        "acceleration v_dot under joint torques and external loads, Eq. 1",
         (Q, V, TAU, F_EXT),
         (V_DOT,),
         VALUE,
         ALWAYS,
     ),
     Signature(
-        "energy", "kinetic and potential energy", (Q, V), (KINETIC, POTENTIAL), VALUE, ALWAYS
+        "energy",
+        "kinetic and potential energy of torso and tail",
+        (Q, V),
+        (KINETIC, POTENTIAL),
+        VALUE,
+        ALWAYS,
     ),
-    Signature("momentum", "linear and angular momentum", (Q, V), (LINEAR, ANGULAR), VALUE, ALWAYS),
-    Signature("tail_points", "Eqs. 13 to 15", (Q,), (POINTS,), VALUE, ALWAYS),
-    Signature("tail_point_jacobians", "Eqs. A5 to A8", (Q,), (JACOBIANS,), VALUE, ALWAYS),
+    Signature(
+        "momentum",
+        "linear and angular momentum of torso and tail",
+        (Q, V),
+        (LINEAR, ANGULAR),
+        VALUE,
+        ALWAYS,
+    ),
+    Signature(
+        "tail_points", "positions of the tail points, Eqs. 13 to 15", (Q,), (POINTS,), VALUE, ALWAYS
+    ),
+    Signature(
+        "tail_point_jacobians",
+        "Jacobians of the tail points, Eqs. A5 to A8",
+        (Q,),
+        (JACOBIANS,),
+        VALUE,
+        ALWAYS,
+    ),
     Signature(
         "center_of_mass",
-        "centre of mass of the whole animal",
+        "centre of mass of torso and tail, its velocity and its Jacobian",
         (Q, V),
         (
-            Argument("position", (3,), "its position (m, world)"),
-            Argument("velocity", (3,), "its velocity (m/s, world): J v"),
-            three_by_nv("J", "its Jacobian, world"),
+            Argument("position", (3,), "position of the centre of mass (m, world)"),
+            Argument("velocity", (3,), "velocity of the centre of mass, J v (m/s, world)"),
+            three_by_nv("J", "Jacobian of the centre of mass, world"),
         ),
         VALUE,
         ALWAYS,
     ),
     Signature(
         "mass_matrix_world",
-        "H for (p_dot, omega in world axes, q_t_dot)",
+        "inertia matrix H for the velocity (p_dot, omega in world axes, q_t_dot)",
         (Q,),
         (H,),
         VALUE,
@@ -84,7 +112,7 @@ SIGNATURES = (
     ),
     Signature(
         "bias_force_world",
-        "C for (p_dot, omega in world axes, q_t_dot)",
+        "bias force C for the velocity (p_dot, omega in world axes, q_t_dot)",
         (Q, V),
         (FORCE,),
         VALUE,

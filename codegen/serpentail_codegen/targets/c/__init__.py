@@ -1,1 +1,1 @@
-"""The C target: sources and headers that need C99 alone, and the package around them."""
+"""The C target: sources and headers that need only C99, and the package around them."""

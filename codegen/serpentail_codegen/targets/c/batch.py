@@ -22,8 +22,8 @@ from .views import ArgumentView, callee_view, quaternion_in, step_views
 STATES = {"double": 8, "float": 16}  # side by side: lanes of the widest vector
 # nodes: beyond, loops are hardly slower, and compile in a quarter of the time
 STRAIGHT_UP_TO = 11000
-MOST_APPLIED = 28000  # nodes: of more, no line is that short without its zeros
-# by the source that they lie in: each is compiled when it is first needed
+MOST_APPLIED = 28000  # nodes: longer lines stay too long even without their zeros
+# by source file: each file is compiled when it is first needed
 PARTS = {
     "batch": ("mass_matrix", "bias_force", "inverse_dynamics", "forward_dynamics"),
     "batch_derivatives": (
@@ -41,7 +41,7 @@ BATCHED = {name: part for part, names in PARTS.items() for name in names}
 
 @dataclass(frozen=True)
 class Batch:
-    """One function over lanes of states: its program, and the C of that."""
+    """One function over lanes of states: its program, and its C."""
 
     function: Function
     states: int
@@ -76,9 +76,9 @@ def _batch(scene: Scene, tail: Tail, function: Function) -> Batch:
 
 
 def _of_directions(scene: Scene, single: Program, fixed: dict[str, list]) -> Program:
-    """Return a program whose directions come in turn, or all of it as one line where that is short.
+    """Return a program whose directions are in loops, or one straight line if that is short.
 
-    Of no scene it is a long line: a compiler would work on it for minutes.
+    It is never a long straight line: a compiler would work on it for minutes.
     """
     turns = directions_in_turn(unrolled_ldl(single, UNROLLED_ROWS))
     if scene.emission in ("auto", "straight") and applied(turns) <= MOST_APPLIED:
@@ -89,7 +89,7 @@ def _of_directions(scene: Scene, single: Program, fixed: dict[str, list]) -> Pro
 
 
 def straight(scene: Scene, program: Program) -> bool:
-    """Tell if a batch has no loops: it has no sweeps in lanes that would be faster than these."""
+    """Tell if a batch has no loops: it has no sweeps in lanes that would be faster."""
     if scene.emission == "auto":
         return applied(program) <= STRAIGHT_UP_TO and not branches(program)
     return scene.emission == "straight"
@@ -114,7 +114,7 @@ class BatchView:
 def batch_files(
     scene: Scene, tail: Tail, batches: Sequence[Batch], context: dict[str, Any]
 ) -> dict[str, str]:
-    """Render the files of batches that there are."""
+    """Render the files of the batches that the scene has."""
     files = {}
     for part in PARTS:
         here = [batch for batch in batches if BATCHED[batch.function.name] == part]

@@ -22,41 +22,41 @@ RECORD = fields(
     ("parameters", "const real *", "[count][PARAMETERS]"),
     ("q", "const real *", "[count][NQ] start"),
     ("v", "const real *", "[count][NV] start"),
-    ("q_out", "real *", "[count][samples][NQ], the start first"),
-    ("v_out", "real *", "[count][samples][NV]"),
-    ("ledger", "real *", "[count][2] work (J) of torques and of damping, at the end"),
-    ("count", "size_t", "flights, of which STATES are made at a time"),
-    ("samples", "long", "of each"),
-    ("damping", "const real *", "[NT] N m s, of the first flight"),
-    ("damping_apart", "size_t", "reals from there to the next flight's; 0: all have the same"),
-    ("lengths", "const real *", "[steps] (s)"),
+    ("q_out", "real *", "[count][samples][NQ] configurations, the start first"),
+    ("v_out", "real *", "[count][samples][NV] velocities"),
+    ("ledger", "real *", "[count][2] work (J) of torques and of damping over the flight"),
+    ("count", "size_t", "number of flights; STATES are computed at a time"),
+    ("samples", "long", "number of samples of each flight"),
+    ("damping", "const real *", "[NT] damping of the first flight (N m s)"),
+    ("damping_apart", "size_t", "reals from one flight's damping to the next; 0: the same for all"),
+    ("lengths", "const real *", "[steps] lengths of the steps (s)"),
     (
         "torques",
         "const real *",
-        "[steps][3][NT] (N m) at begin, middle, end of each step, of the first flight; NULL: none",
+        "[steps][3][NT] torques (N m) at start, middle, end of each step, first flight; or NULL",
     ),
-    ("torques_apart", "size_t", "reals from there to the next flight's; 0: all have the same"),
-    ("due", "const int *", "[steps] whether a sample follows"),
-    ("steps", "long", ""),
-    ("pause", "long", "steps of one call"),
-    ("work", "real *", "holds the flights between calls"),
-    ("first", "size_t", "of the flights that are being made; those before it have ended"),
-    ("step", "long", "steps that they have done"),
-    ("done", "long", "samples that they have written"),
+    ("torques_apart", "size_t", "reals from one flight's torques to the next; 0: the same for all"),
+    ("due", "const int *", "[steps] whether a sample follows the step"),
+    ("steps", "long", "number of steps of each flight"),
+    ("pause", "long", "largest number of steps in one call"),
+    ("work", "real *", "workspace; it contains the flights between calls"),
+    ("first", "size_t", "first of the flights that are computed now; those before it have ended"),
+    ("step", "long", "number of steps that they have done"),
+    ("done", "long", "number of samples that they have written"),
 )
 
 
 ROLLOUTS = fields(
-    ("runs", "void *", "[count] records of runs, as the simulation has them"),
-    ("count", "long", "runs"),
-    ("statuses", "int *", "[count] of those that have ended: OK, or anything else: make it alone"),
-    ("lanes", "long *", "[STATES] run in each lane; -1: none"),
-    ("next", "long", "run that is taken up next"),
-    ("pause", "long", "steps of one call"),
-    ("work", "real *", "holds the flights between calls"),
+    ("runs", "void *", "[count] run records of the simulation header"),
+    ("count", "long", "number of runs"),
+    ("statuses", "int *", "[count] of ended runs: OK; anything else: compute the run by itself"),
+    ("lanes", "long *", "[STATES] index of the run in each lane; -1: none"),
+    ("next", "long", "index of the next run to start"),
+    ("pause", "long", "largest number of steps in one call"),
+    ("work", "real *", "workspace; it contains the flights between calls"),
 )
 SLOTS = 10  # states in the workspace: start, seven rates, end, error of an adaptive step
-LEDGER = 2  # numbers that a flight adds up behind its state
+LEDGER = 2  # numbers that a flight sums up, stored behind its state
 
 
 @dataclass(frozen=True)
@@ -72,17 +72,17 @@ class BatchRollout:
 
     @property
     def given(self) -> int:
-        """Where torques lie in the workspace: behind the parameters."""
+        """Return the position of torques in the workspace: behind the parameters."""
         return self.states * self.parameters
 
     @property
     def state(self) -> int:
-        """Where the states lie: behind given torques, damping and torques in all."""
+        """Return the position of the states: behind given torques, damping and total torques."""
         return self.given + 3 * self.states * self.nt
 
     @property
     def inner(self) -> int:
-        """Where the workspace of forward dynamics begins."""
+        """Return the position of the workspace of forward dynamics."""
         return padded(self.state + SLOTS * self.states * self.size)
 
     @property
@@ -94,7 +94,7 @@ class BatchRollout:
 def batch_rollout(
     scene: Scene, tail: Tail, printed: Sequence[PrintedFunction]
 ) -> BatchRollout | None:
-    """Return the batch rollout of a scene that has a rollout, a free torso, and touches nothing."""
+    """Return the batch rollout of a scene with rollout and a free torso, but without contacts."""
     if "rollout" not in scene.functions or scene.contacts or tail.shape.fixed:
         return None
     (dynamics,) = (f.function for f in printed if f.function.name == "forward_dynamics")
@@ -122,8 +122,8 @@ def batch_rollout_file(
 
 
 def rollout_context(scene: Scene, rollout: BatchRollout) -> dict[str, Any]:
-    """Return what the template lays out other than the model's does."""
-    # states and torques have names of their own; parameters lie at the begin of the workspace
+    """Return the values that differ from those of the model's template."""
+    # states and torques have their own names; parameters are at the start of the workspace
     arguments, place, places = [], 0, {}
     for array in rollout.program.of_role("input"):
         if array.name in ("q", "v", "tau"):

@@ -18,9 +18,9 @@ from .straight import straight_line
 STRAIGHT_UP_TO = 7000  # nodes: beyond, the text leaves the instruction cache and compile time grows
 # nodes: where there is a sweep in lanes, too; v_dot's text of so many has 32 KB with AVX2
 STRAIGHT_BESIDE_LANES = 4100
-# zeros and copies above all: loops are as fast, and quick to compile
+# mostly zeros and copies: loops are as fast, and quick to compile
 ALWAYS_IN_LOOPS = ("tail_point_jacobians",)
-# columns of H times links, the work of a sweep in lanes: from here on segments are no slower
+# columns of H times links, the work of a sweep in lanes: from here on segments are as fast
 SEGMENTS_FROM = 128
 # what the manifest says of the choice
 RULE = {
@@ -59,17 +59,17 @@ def printed_function(scene: Scene, tail: Tail, function: Function) -> PrintedFun
 def fastest(function: Function, tail: Tail) -> tuple[str, Program]:
     """Return the form that runs fastest on a processor with vectors, and the program in that form.
 
-    Straight lines are fastest until their text crowds the instruction cache, if all of them are
-    always run; sweeps in lanes overtake them before that, and sweeps by segments overtake both.
+    Straight lines are fastest until their text fills the instruction cache, if all of them are
+    always run. Sweeps in lanes overtake them before that, and sweeps by segments overtake both.
     """
-    # sweeps by segments, where the tail or a segment is long
+    # sweeps by segments, if the tail or a segment is long
     several = tail.segments > 1 and tail.nt * tail.total >= SEGMENTS_FROM
     long = tail.uniform and (several or is_doubled(tail))
     form, swept = in_form("segments" if long else "lanes", function, tail)
     if form == "segments" or function.name in ALWAYS_IN_LOOPS:
         return form, swept
 
-    # straight lines, where they are short and all of them are always run
+    # straight lines, if they are short and all of them are always run
     program = assemble(function, tail)
     longest = STRAIGHT_BESIDE_LANES if form == "lanes" else STRAIGHT_UP_TO
     if applied(program) <= longest and not branches(program):
@@ -78,9 +78,9 @@ def fastest(function: Function, tail: Tail) -> tuple[str, Program]:
 
 
 def in_form(form: str, function: Function, tail: Tail) -> tuple[str, Program]:
-    """Return the form that a function gets where this one is asked for, and its program.
+    """Return the form and the program of a function when the scene asks for this form.
 
-    What nothing goes by segments in gets lanes, what has no use for lanes gets loops.
+    A function without a form by segments gets lanes; a function without a form in lanes gets loops.
     """
     program = assemble(function, tail)
     if form in ("straight", "loops"):

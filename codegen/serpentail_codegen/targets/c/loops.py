@@ -27,7 +27,7 @@ from .routine import CFunction, Routine, dialect, pointer, scalar, singles
 
 INLINE_SCALARS = 3  # are written one by one, more by a helper
 STACK_SCALARS = 12  # larger local arrays go to the caller's workspace
-CALLEES_WORK = "<work>"  # stands for where the workspace of what is called begins
+CALLEES_WORK = "<work>"  # placeholder for the start of a called function's workspace
 
 
 class LoopPrinter:
@@ -45,7 +45,7 @@ class LoopPrinter:
         """Return the printed function."""
         body = body_lines(self, self.program.body)
         declarations, work = self._declarations()
-        inner = padded(work)  # what is called begins at a whole vector, too
+        inner = padded(work)  # the workspace of called functions begins at a whole vector, too
         lines = (
             *declarations,
             *(line.replace(CALLEES_WORK, str(inner)) for line in body),
@@ -236,7 +236,7 @@ class LoopPrinter:
         routine, lanes = self._routine(call)
         arguments = [pointer(self._ref(ref)) for ref in call.reads]
 
-        # an output whose scalars lie apart is made beside its place, then goes there
+        # an output whose scalars are not contiguous is computed elsewhere, then copied
         before, after = [], []
         for (name, size), target, adds in outputs:
             if target.stride == 1:
@@ -279,7 +279,7 @@ class LoopPrinter:
 
 
 def unless_definite(call: str) -> list[str]:
-    """Print a call that gives up where a matrix is not positive definite."""
+    """Print a call that gives up if a matrix is not positive definite."""
     return [f"if ({call} != STATUS_OK) {{", "  return STATUS_NOT_POSITIVE_DEFINITE;", "}"]
 
 

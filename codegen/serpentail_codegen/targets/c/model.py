@@ -1,4 +1,4 @@
-"""The model's own C files: what their templates lay out, and the files."""
+"""The model's own C files, and the values for their templates."""
 
 import hashlib
 import json
@@ -34,7 +34,9 @@ PIECES = {"articulated": "links", "continuum": "samples", "mixed": "parts"}
 
 
 def abi_hash(scene: Scene, views: list[FunctionView], simulation: SimulationFeatures | None) -> str:
-    """Digest of what a caller relies on: symbols, sizes, workspace, the parameter struct."""
+    """Return a digest of everything that a caller relies on: symbols, sizes, workspace, the
+    parameter struct.
+    """
     fields = [[p.name, p.size] for p in struct_parameters(scene)]
     interface: list[Any] = [scene.name, scene.real, fields]
     interface += [
@@ -55,7 +57,7 @@ def features_of(scene: Scene, tail: Tail, views: list[FunctionView]) -> Simulati
 def c_context(
     scene: Scene, tail: Tail, printed: list[PrintedFunction], version: str
 ) -> dict[str, Any]:
-    """Return everything that the C templates lay out."""
+    """Return all values that the C templates use."""
     views = [FunctionView(function, tail, scene.name) for function in printed]
     works = {f.name: f.work for f in views}
     simulation = features_of(scene, tail, views)
@@ -69,7 +71,9 @@ def c_context(
 
 
 def model_context(scene: Scene, tail: Tail) -> dict[str, Any]:
-    """Return what the templates say of the model as a whole: names, sizes, types, parameters."""
+    """Return the values of templates about the model as a whole: names, sizes, types,
+    parameters.
+    """
     pieces, single = PIECES[scene.kind], scene.real == "float"
     own = tail.shape.counts
     counts = f"of {', '.join(map(str, own))}" if own else f"x {tail.links}"
@@ -98,7 +102,7 @@ def model_context(scene: Scene, tail: Tail) -> dict[str, Any]:
 
 
 def words_of(tail: Tail) -> str:
-    """Return what the parts of a mixed tail are, in words."""
+    """Return the parts of a mixed tail in words."""
     kinds = {"articulated": "links", "continuum": "samples of an arc"}
     return f": {', '.join(kinds[kind] for kind in tail.shape.kinds)}" if tail.shape.kinds else ""
 
@@ -106,7 +110,7 @@ def words_of(tail: Tail) -> str:
 def function_context(
     scene: Scene, printed: list[PrintedFunction], views: list[FunctionView]
 ) -> dict[str, Any]:
-    """Return what the templates say of the functions, and what these call."""
+    """Return the values of templates about the functions, and about those that they call."""
     outputs = [a for f in views for a in f.outputs]
     return {
         "functions": views,
@@ -125,7 +129,7 @@ def function_context(
 
 
 def joined(*parts: dict[str, Any]) -> dict[str, Any]:
-    """Return the parts of a context as one; no name means two things."""
+    """Return the parts of a context as one; a name in two parts is an error."""
     whole: dict[str, Any] = {}
     for part in parts:
         if whole.keys() & part.keys():

@@ -11,6 +11,6 @@ TEMPLATES = {
 
 
 def package_files(context: dict) -> dict[str, str]:
-    """Render what a user of the C alone needs beside it."""
+    """Render the files that a user of the C alone needs besides it."""
     context = context | {"size": {"float": 4, "double": 8}[context["real"]]}
     return {name: render("c", template, context) for name, template in TEMPLATES.items()}

@@ -1,8 +1,9 @@
-"""The records of a simulation: C structs that its caller fills in, and that keep it between calls.
+"""The records of a simulation: C structs that the caller fills in, and that hold its state between
+calls.
 
-One table says for each record which members it has, with their C types and meanings.  The header's
-structs and the manifest's list of members, by which the runtime builds the same structs, are both
-made of it.
+One table lists the members of each record, with their C types and meanings. The header's structs
+and the manifest's list of members follow from it; the runtime builds the same structs from the
+manifest.
 """
 
 import re
@@ -24,7 +25,7 @@ class Field:
 
     @property
     def kind(self) -> str:
-        """What a caller in another language stores there."""
+        """Return what a caller in another language stores in it."""
         return "pointer" if "*" in self.type or self.type == "torque" else self.type
 
 
@@ -51,11 +52,14 @@ def records(has: SimulationFeatures) -> dict[str, list[Field]]:
 
 DESCRIPTIONS = {
     "piecewise": (
-        "Functions of time, polynomials piece by piece: torques, reference motions, leg angles."
+        "Functions of time as piecewise polynomials: torques, reference motions, leg angles."
     ),
-    "controller": "Torques of the tail: the sum of the parts that are there.",
-    "drive": "What acts in a run: controllers, one after another, and where they are not smooth.",
-    "run": "A run, zero but for what its caller sets: all up to `work`.",
+    "controller": "Torques of the tail: the sum of the parts that are set.",
+    "drive": "Controllers of a run, one after another, and times at which they are not smooth.",
+    "run": (
+        "A run.  The caller sets all members up to `work`, with contacts up to `event_kinds`, and "
+        "the others to zero."
+    ),
 }
 
 
@@ -66,113 +70,123 @@ def layouts(has: SimulationFeatures) -> dict[str, list[list[str]]]:
 
 PIECEWISE = fields(
     ("pieces", "int", "number of polynomials"),
-    ("channels", "int", "functions of time in the table"),
-    ("degree", "int", "of the polynomials"),
-    ("times", "const real *", "[pieces + 1] increasing (s)"),
+    ("channels", "int", "number of functions of time in the table"),
+    ("degree", "int", "degree of the polynomials"),
+    ("times", "const real *", "[pieces + 1] limits of the pieces, increasing (s)"),
     (
         "coefficients",
         "const real *",
-        "[pieces][channels][degree + 1] of powers of t - times[piece], constants first",
+        "[pieces][channels][degree + 1], for powers of t - times[piece], constants first",
     ),
 )
 CONTROLLER = fields(
-    ("damping", "const real *", "[NT] N m s: tau = -damping q_t_dot (Eq. 47); NULL: none"),
-    ("torques", "const piecewise *", "of NT channels (N m), added; NULL: none"),
-    ("function", "torque", "added; NULL: none"),
-    ("context", "void *", "its first argument"),
-    ("clock", "real", "s, the run's time at which the clock of `function` is at 0"),
+    (
+        "damping",
+        "const real *",
+        "[NT] damping (N m s): tau = -damping q_t_dot (Eq. 47); NULL: none",
+    ),
+    ("torques", "const piecewise *", "NT channels of torques (N m), added; NULL: none"),
+    ("function", "torque", "your torques (N m), added; NULL: none"),
+    ("context", "void *", "first argument of `function`"),
+    ("clock", "real", "time of the run at which the clock of `function` is 0 (s)"),
 )
 PFL = fields(
     (
         "reference",
         "const piecewise *",
-        "of NT channels (rad) that Eq. 46 tracks, added; NULL: none",
+        "NT channels (rad) that Eq. 46 tracks; its torques are added; NULL: none",
     ),
-    ("kp", "real", "1/s^2"),
-    ("kd", "real", "1/s"),
-    ("feedforward", "int", "whether the reference's acceleration is asked for"),
-    ("limit", "const real *", "[NT] N m, the most that tracking gives; NULL: no limit"),
+    ("kp", "real", "gain K_p of tracking (1/s^2)"),
+    ("kd", "real", "gain K_d of tracking (1/s)"),
+    ("feedforward", "int", "1: add the acceleration of the reference; 0: feedback only"),
+    ("limit", "const real *", "[NT] largest torque of tracking (N m); NULL: no limit"),
 )
 DRIVE = fields(
     ("phases", "int", "number of controllers"),
-    ("begins", "const real *", "[phases] increasing (s); the first acts before its time, too"),
-    ("controllers", "const controller *", "[phases]"),
-    ("stops", "int", "number of times where what acts jumps or has a kink"),
-    ("stop_times", "const real *", "[stops] increasing (s): steps end there"),
+    (
+        "begins",
+        "const real *",
+        "[phases] start of each controller, increasing (s); the first also acts before",
+    ),
+    ("controllers", "const controller *", "[phases] one controller after another"),
+    ("stops", "int", "number of times at which a torque or leg motion is not smooth"),
+    ("stop_times", "const real *", "[stops] these times, increasing (s); steps end there"),
 )
-LEGS = fields(
-    ("legs", "const piecewise *", "of 4 channels: gamma_1, delta_1, gamma_2, delta_2 (rad)")
-)
+LEGS = fields(("legs", "const piecewise *", "4 channels: gamma_1, delta_1, gamma_2, delta_2 (rad)"))
 START = fields(
-    ("parameters", "const parameters *", "of the model"),
-    ("drive", "const drive *", "what acts"),
-    ("t", "real", "start, then where it is (s)"),
-    ("q", "real *", "[NQ] likewise"),
-    ("v", "real *", "[NV] likewise"),
+    ("parameters", "const parameters *", "parameters of the model"),
+    ("drive", "const drive *", "controllers and leg motion"),
+    ("t", "real", "time (s): the start, then the current time"),
+    ("q", "real *", "[NQ] configuration: the start, then the current one"),
+    ("v", "real *", "[NV] velocity: the start, then the current one"),
 )
 LEDGER = fields(
     (
         "ledger",
         "real *",
-        "work (J) of torques, damping, ground, legs, and impulses (N s) of groups: so far; or NULL",
+        "work so far (J) of torques, damping, ground, legs; impulses (N s) on groups; or NULL",
     )
 )
 BRISTLES = fields(
-    ("bristles", "real *", "[2 CONTACTS] likewise (m)"),
-    ("bristles_out", "real *", "[samples][2 CONTACTS]"),
+    (
+        "bristles",
+        "real *",
+        "[2 CONTACTS] bristle deflections (m): the start, then the current ones",
+    ),
+    ("bristles_out", "real *", "[samples][2 CONTACTS] bristle deflections (m)"),
 )
 SETTINGS = fields(
-    ("method", "int", "one of the methods"),
-    ("rtol", "real", "error of a step over a state's size"),
-    ("atol", "real", "added to it (m, rad, m/s, rad/s; mm of bristles)"),
-    ("step", "real", "fixed step; else the first, 0: chosen (s)"),
-    ("least_step", "real", "(s)"),
-    ("most_step", "real", "(s)"),
-    ("most_steps", "long", "accepted and rejected"),
-    ("pause", "long", "steps of one call"),
+    ("method", "int", "one of the methods above"),
+    ("rtol", "real", "relative tolerance of one step"),
+    ("atol", "real", "absolute tolerance, added (m, rad, m/s, rad/s; mm for bristles)"),
+    ("step", "real", "fixed step, or first step of an adaptive method (s); 0: it is chosen"),
+    ("least_step", "real", "smallest step (s)"),
+    ("most_step", "real", "largest step (s)"),
+    ("most_steps", "long", "largest number of steps, accepted and rejected"),
+    ("pause", "long", "largest number of steps in one call"),
 )
 SAMPLES = fields(
-    ("samples", "long", "wanted"),
-    ("times", "const real *", "[samples] increasing (s), from t on; the run ends at the last"),
-    ("q_out", "real *", "[samples][NQ]"),
-    ("v_out", "real *", "[samples][NV]"),
-    ("tau_out", "real *", "[samples][NT]"),
-    ("work", "real *", "[WORK_ROLLOUT]; holds the run between calls"),
+    ("samples", "long", "number of samples"),
+    ("times", "const real *", "[samples] times, increasing from t (s); the run ends at the last"),
+    ("q_out", "real *", "[samples][NQ] configurations"),
+    ("v_out", "real *", "[samples][NV] velocities"),
+    ("tau_out", "real *", "[samples][NT] torques (N m)"),
+    ("work", "real *", "[WORK_ROLLOUT] workspace; it contains the run between calls"),
 )
 EVENT_FIELDS = fields(
     (
         "stop_at",
         "int",
-        "sum of 1 << event: the run ends at the first of these; event = 2 group + (0: it begins to "
-        "press, 1: it ceases to)",
+        "sum of 1 << event for events that end the run; event = 2 group + (0: it begins to press, "
+        "1: it ceases to)",
     ),
-    ("most_events", "long", "that fit"),
-    ("event_times", "real *", "[most_events] (s)"),
+    ("most_events", "long", "length of the next two arrays"),
+    ("event_times", "real *", "[most_events] times of events (s)"),
     (
         "event_kinds",
         "int *",
-        "[most_events] of events; 2 GROUPS + group: all its points are out of the ground again",
+        "[most_events] events; 2 GROUPS + group: all points of the group are above ground again",
     ),
-    ("events", "long", "that happened"),
-    ("unfelt", "long", "touches shorter than a step, which no stage may have felt"),
+    ("events", "long", "number of events so far"),
+    ("unfelt", "long", "contacts shorter than a step, which its stages may have missed"),
 )
 KEPT = fields(
-    ("begun", "int", "0 at first"),
-    ("done", "long", "samples written"),
-    ("steps", "long", "accepted"),
-    ("rejected", "long", ""),
-    ("evaluations", "long", "of forward dynamics"),
-    ("factorisations", "long", ""),
-    ("stop", "int", "next of the drive's stops"),
-    ("until", "real", "where the steps' smooth part ends (s)"),
-    ("next_step", "real", "(s)"),
-    ("error_before", "real", "of the last step over what is allowed"),
-    ("known", "int", "whether the rate at t is in the workspace"),
+    ("begun", "int", "whether the run has started"),
+    ("done", "long", "number of samples written"),
+    ("steps", "long", "number of accepted steps"),
+    ("rejected", "long", "number of rejected steps"),
+    ("evaluations", "long", "number of evaluations of the forward dynamics"),
+    ("factorisations", "long", "number of factorisations of 1 - w J"),
+    ("stop", "int", "index of the next stop of the drive"),
+    ("until", "real", "end of the current smooth part (s)"),
+    ("next_step", "real", "length of the next step (s)"),
+    ("error_before", "real", "error of the last step relative to the tolerance"),
+    ("known", "int", "whether the workspace contains the rate at t"),
 )
 
 
 def contact_samples(has: SimulationFeatures) -> list[Field]:
-    """Return the members that a run with contact has."""
+    """Return the members that a run with contacts has."""
     return BRISTLES[1:] + EVENT_FIELDS if has.contacts else []
 
 

@@ -1,4 +1,4 @@
-"""Steps as C functions, and what all C function bodies are made of: addresses, loops over lanes."""
+"""Steps as C functions, and the parts of all C function bodies: addresses, loops over lanes."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -18,11 +18,11 @@ class Routine:
     wide: frozenset[str] = frozenset()  # inputs and outputs whose scalars have lanes
     pitch: int = 1  # numbers from one wide scalar to the next
     adds: frozenset[str] = frozenset()  # outputs that are added, not stored
-    apart: tuple[tuple[str, int], ...] = ()  # strides of inputs whose scalars lie apart
+    apart: tuple[tuple[str, int], ...] = ()  # strides of inputs whose scalars are not contiguous
 
     @property
     def name(self) -> str:
-        """Name that tells routines of one step apart."""
+        """Return a name that distinguishes the routines of one step."""
         names = {n for n, _ in (*self.step.inputs, *self.step.outputs)}
         usual = {n for n in names if n.startswith("d_")} or names
         odd = sorted(self.wide ^ usual) if self.wide else []
@@ -34,16 +34,15 @@ class Routine:
 
 @dataclass(frozen=True)
 class CFunction:
-    """One C function body but for its end: what it calls, what it costs.
-
-    It calls routines, helpers and other programs.
+    """The body of one C function, except its end: the routines, helpers and programs that it calls,
+    and its cost.
     """
 
     lines: tuple[str, ...]
     work: int  # scalars of workspace
     routines: tuple[Routine, ...]
     helpers: frozenset[str]
-    cost: Program | int  # operations, or the program whose run tells them
+    cost: Program | int  # operations, or the program whose run counts them
     callees: "tuple[tuple[Program, CFunction], ...]" = ()  # programs that it calls, with their C
 
     @cached_property
@@ -69,7 +68,7 @@ def dialect(real: str, prefix: str = "") -> Dialect:
 
 
 def begin(ref: Ref) -> Index:
-    """Return where a reference begins, in numbers."""
+    """Return the start of a reference, in numbers."""
     return ref.offset * ref.array.row + (ref.lane or 0)
 
 
@@ -96,12 +95,12 @@ def singles(ref: Ref) -> list[Ref]:
 
 
 def argument_name(array: Array) -> str:
-    """Print what a C function calls an array."""
+    """Print the name of an array in a C function."""
     return f"parameters->{array.name}" if array.role == "parameters" else array.name
 
 
 def each_lane(columns: str, lines: Iterable[str]) -> list[str]:
-    """Print a loop over lanes, as many in turn as a vector holds."""
+    """Print a loop over lanes, as many at a time as a vector holds."""
     return [f"for (int c = 0; c < {columns}; c += LANES) {{", *("  " + line for line in lines), "}"]
 
 
@@ -156,7 +155,7 @@ def input_names(routine: Routine) -> tuple[list[str], dict[int, int]]:
 
 
 def store(routine: Routine, name: str, k: int, scalars: Scalars, node: int) -> str:
-    """Print how scalar number k of a wide output is stored, in a loop over lanes."""
+    """Print the statement that stores scalar number k of a wide output, in a loop over lanes."""
     text = scalars.text[node] if scalars.lanes[node] else f"WIDE({scalars.text[node]})"
     address = f"&{name}_out[{k * routine.pitch}] + c"
     return f"STORE({address}, {f'LOAD({address}) + {text}' if name in routine.adds else text});"

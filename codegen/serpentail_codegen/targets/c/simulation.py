@@ -1,4 +1,4 @@
-"""What the templates of a simulation lay out: its workspace, its methods and its records."""
+"""The values for the templates of a simulation: its workspace, its methods and its records."""
 
 from itertools import accumulate
 from typing import Any
@@ -23,7 +23,7 @@ MACROS = (
 
 
 def own_damping(scene: Scene) -> str:
-    """Print where a run has the damping of the tail itself; empty where it has none."""
+    """Print the position of the tail's own damping in a run; empty if it has none."""
     if "damping" not in scene.passive:
         return ""
     return f"{scene.name}_tail_damping" if scene.baked else "run->parameters->tail_damping"
@@ -32,7 +32,7 @@ def own_damping(scene: Scene) -> str:
 def simulation_context(
     scene: Scene, tail: Tail, has: SimulationFeatures, works: dict[str, int]
 ) -> dict[str, Any]:
-    """Return what a simulation's templates lay out; ``works``: workspace of each function."""
+    """Return the values for a simulation's templates; ``works``: workspace of each function."""
     single = scene.real == "float"
     ledger, table = sum(size for _, size in has.ledger), max(4 * tail.nt, 2 * tail.nv)
     size = tail.nq + tail.nv + 2 * has.contacts + ledger

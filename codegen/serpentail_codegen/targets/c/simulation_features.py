@@ -1,4 +1,4 @@
-"""What a scene's simulation can do, and so which parts its C and its records have."""
+"""The abilities of a scene's simulation, which decide the parts of its C and of its records."""
 
 from collections.abc import Collection
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ METHODS = {"rk4": False, "tsit5": False, "ros34pw2": True, "implicit_euler": Tru
 
 @dataclass(frozen=True)
 class SimulationFeatures:
-    """What a scene's simulation can do."""
+    """The abilities of a scene's simulation."""
 
     pfl: bool  # partial feedback linearisation
     factors: int  # reals of implicit_factor's, 0 without
@@ -21,27 +21,31 @@ class SimulationFeatures:
 
     @property
     def ledger(self) -> tuple[tuple[str, int], ...]:
-        """What a run adds up, and in how many numbers: works (J), impulses of groups (N s)."""
+        """Return the sums that a run keeps, and how many numbers each has: works (J), impulses of
+        groups (N s).
+        """
         works = ["torques", "damping"] + ["ground"] * bool(self.contacts) + ["legs"] * self.legs
         return tuple((name, 1) for name in works) + tuple((name, 3) for name, _ in self.groups)
 
     @property
     def implicit(self) -> bool:
-        """Whether it can take implicit steps."""
+        """Tell if it can take implicit steps."""
         return self.factors > 0
 
     @property
     def tracked(self) -> bool:
-        """Whether feedback linearisation gives v_dot, too: where the ground adds nothing to it."""
+        """Tell if feedback linearisation gives v_dot, too: only without forces of the ground."""
         return self.pfl and not self.contacts
 
     @property
     def methods(self) -> list[str]:
-        """The methods it has."""
+        """Return the methods that it has."""
         return [name for name, implicit in METHODS.items() if self.implicit or not implicit]
 
 
 def simulation_features(tail: Tail, names: Collection[str], factors: int) -> SimulationFeatures:
-    """Return what a simulation of these functions can do, given the length of implicit factors."""
+    """Return the abilities of a simulation of these functions, given the length of implicit
+    factors.
+    """
     groups, legs = tuple(tail.groups.items()), "feet" in tail.contacts
     return SimulationFeatures("pfl" in names, factors, tail.points, groups, legs)

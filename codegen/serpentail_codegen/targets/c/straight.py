@@ -1,4 +1,4 @@
-"""Prints a program as one straight line of C, but for loops over lanes."""
+"""Prints a program as one straight line of C, with loops only over lanes."""
 
 from collections.abc import Iterable
 
@@ -10,7 +10,7 @@ from .routine import CFunction, dialect, each_lane, scalar
 
 
 def straight_line(program: Program, real: str, prefix: str, fixed=None) -> CFunction:
-    """Print a program without loops but those over lanes."""
+    """Print a program without loops except those over lanes."""
     tape, outputs, guards = unroll(program, fixed)
     results = [node for a in program.of_role("output") for node in outputs[a.name]]
     needed = [*results, *(node for _, node in guards)]
@@ -42,7 +42,9 @@ def scalar_names(arrays: Iterable[Array]) -> list[str]:
 
 
 def wide_lines(scalars: Scalars) -> tuple[list[str], int]:
-    """Print wide scalars, those of equal lanes in one loop; return the workspace they take, too."""
+    """Print wide scalars, those of equal lanes in one loop; return the workspace that they take,
+    too.
+    """
     lines: list[str] = []
     work = 0
     needed = sorted({scalars.nodes[n][1] for n in scalars.live if scalars.nodes[n][0] == "lane"})

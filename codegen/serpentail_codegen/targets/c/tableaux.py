@@ -1,4 +1,4 @@
-"""Integration methods: their coefficients, as their authors give them and as C needs them."""
+"""Integration methods: their coefficients as published, and as the C needs them."""
 
 from dataclasses import dataclass
 from fractions import Fraction
@@ -10,7 +10,7 @@ Row = tuple[float, ...]
 class Explicit:
     """A Runge-Kutta method.
 
-    Stage s is at t + nodes[s] h, made of rows[s]; weights are those of the result and of its error.
+    Stage s is at t + nodes[s] h, formed with rows[s]; weights give the result and its error.
     """
 
     nodes: Row
@@ -130,7 +130,9 @@ ROS34PW2 = Classical(
 
 
 def transformed(method: Classical) -> Rosenbrock:
-    """Return a method in u = Gamma k (Hairer and Wanner, Eq. IV.7.25), made without rounding."""
+    """Return a method in u = Gamma k (Hairer and Wanner, Eq. IV.7.25), computed without
+    rounding.
+    """
     size, gamma = len(method.weights), Fraction(method.gamma)
     lower = [[*map(Fraction, row), gamma] for row in method.below]
     inverse = _inverse(lower)

@@ -39,7 +39,7 @@ def emit(scene: Scene, tail: Tail, functions: Iterable[Function], version: str) 
 
 
 def c_entries(context: dict[str, Any]) -> dict[str, Any]:
-    """Return what a caller must know of the model's C: its interface, workspace, simulation."""
+    """Return what a caller must know about the model's C: its interface, workspace, simulation."""
     work = {f["name"]: f["work"] for f in context["works"]}
     entries = {"abi_hash": context["abi_hash"], "work": work}
     if "has" in context:

@@ -1,18 +1,20 @@
-"""Views: arguments, functions, steps and parameters as the C templates see them."""
+"""Views: arguments, functions, steps and parameters in the form that the C templates need."""
 
 import re
 from collections.abc import Iterable, Sequence
+from itertools import groupby
 from typing import Any, Protocol
 
 from ...functions.tail import Tail, struct_parameters
 from ...ir.program import Program
 from ...ir.tape import operation_count
+from ...passes.fused import AFTER
 from ...scene.scene import Scene
 from ...scene.signatures.arguments import FACTORS, Argument
 from .form import PrintedFunction, values
 from .routine import CFunction, Routine, routine_arguments, routine_lines
 
-# operations: smaller steps are written out where they are called, others as the compiler sees fit
+# operations: smaller steps are always inlined; for others the compiler decides
 INLINED_OPERATIONS = 100
 # results: vectors of fewer would be loaded before all that they hold is stored
 STORED_ONE_BY_ONE = 16
@@ -21,7 +23,7 @@ QUATERNIONS = {"q": 3, "x": 0}  # where they begin, by the first argument's name
 
 
 class HasBody(Protocol):
-    """What has a C function body: a printed function, a batch, a batch rollout."""
+    """Anything with a C function body: a printed function, a batch, a batch rollout."""
 
     @property
     def body(self) -> CFunction:
@@ -29,7 +31,7 @@ class HasBody(Protocol):
 
 
 class ArgumentView:
-    """An argument as the templates see it."""
+    """An argument in the form that the templates need."""
 
     def __init__(self, argument: Argument, tail: Tail):
         self.name, self.meaning = argument.name, argument.meaning
@@ -38,7 +40,9 @@ class ArgumentView:
 
 
 class FunctionView:
-    """A function as the templates see it: its prototype, what is checked before and after."""
+    """A function in the form that the templates need: its prototype, and the checks before and
+    after.
+    """
 
     def __init__(self, printed: PrintedFunction, tail: Tail, prefix: str):
         function = printed.function
@@ -50,7 +54,7 @@ class FunctionView:
         self.names = ", ".join(a.name for a in views)
         self.unchecked = f"{prefix}_unchecked_{self.name}(parameters, {self.names}, work)"
 
-        # factors are many, and what solves with them reads them: its results tell
+        # factors are many and not checked: the results of solving with them are
         self.quaternion = "" if tail.shape.fixed else quaternion_in(self.inputs[0].name)
         read = [a for a in self.inputs if a.name != FACTORS.name]
         self.arguments = zero_where_finite(f"{prefix}_zero_times", read)
@@ -76,7 +80,9 @@ def quaternion_in(name: str, states: str = "") -> str:
 
 
 class UncheckedView:
-    """A function that checks nothing, as the templates see it: its prototype and its lines."""
+    """A function without checks in the form that the templates need: its prototype and its
+    lines.
+    """
 
     def __init__(self, view: FunctionView, body: CFunction, prefix: str):
         self.doc, self.lines = view.doc, body.lines
@@ -85,7 +91,7 @@ class UncheckedView:
 
 
 def zero_where_finite(helper: str, arguments: Sequence[ArgumentView]) -> str:
-    """Print a sum that is zero where all numbers of some arguments are finite."""
+    """Print a sum that is zero if all numbers of some arguments are finite."""
     return " + ".join(f"{helper}({a.length}, {a.name})" for a in arguments)
 
 
@@ -128,7 +134,7 @@ def step_views(printed: Sequence[HasBody], real: str, prefix: str) -> list[dict[
             "kind": "STEP"
             if operation_count(routine.step.nodes, routine.step.results) < INLINED_OPERATIONS
             else "static void",
-            "doc": routine.step.doc,
+            "doc": comment(routine.step.doc),
             "lines": routine_lines(routine, real, prefix),
             "arguments": routine_arguments(routine),
         }
@@ -136,8 +142,17 @@ def step_views(printed: Sequence[HasBody], real: str, prefix: str) -> list[dict[
     ]
 
 
+def comment(doc: str) -> str:
+    """Return a step's description as a comment, each repeated part of it once, with a count."""
+    parts = []
+    for part, alike in groupby(doc.replace("``", "`").split(AFTER)):
+        count = len(list(alike))
+        parts.append(f"{part} ({count} times)" if count > 1 else part)
+    return AFTER.join(parts)
+
+
 def callees_of(printed: Sequence[HasBody]) -> list[tuple[Program, CFunction]]:
-    """Return the programs that functions call, once, those first that others call."""
+    """Return the programs that functions call, once each; a callee comes before its callers."""
     callees: dict[str, tuple[Program, CFunction]] = {}
     for program, body in (callee for p in printed for callee in p.body.callees):
         for inner in (*body.callees, (program, body)):

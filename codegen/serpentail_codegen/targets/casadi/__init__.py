@@ -1,1 +1,1 @@
-"""The CasADi target: a Python module that builds a ``casadi.Function`` of each function."""
+"""The CasADi target: a Python module that builds a ``casadi.Function`` for each function."""

@@ -1,4 +1,4 @@
-"""Prints programs as Python: plain loops over lists, whose scalars CasADi's symbols may be."""
+"""Prints programs as Python: plain loops over lists, whose scalars may be CasADi symbols."""
 
 import re
 from functools import singledispatchmethod
@@ -33,7 +33,7 @@ PYTHON = Dialect(
 
 
 def slice_text(ref: Ref) -> str:
-    """Print the slice of a list that a reference means."""
+    """Print the slice of a list for a reference."""
     if ref.array.lanes:
         raise UnprintableStatement(f"{ref.array.name} has lanes: the module's lists hold numbers")
     name = f'parameters["{ref.array.name}"]' if ref.array.role == "parameters" else ref.array.name
@@ -73,7 +73,7 @@ class PythonPrinter:
         body = body_lines(self, self.program.body)
         used = set(re.findall(r"\w+", " ".join(body)))
 
-        # outputs and what the body uses are lists; constants come with their numbers
+        # outputs and arrays that the body uses are lists; constants have their numbers
         arrays = [
             a
             for a in self.program.arrays

@@ -14,7 +14,7 @@ from .printer import PythonPrinter, step_view
 
 
 def emit(scene: Scene, tail: Tail, functions: Iterable[Function], version: str) -> Emission:
-    """Return the module of a scene; functions that have no symbolic form are left to the C."""
+    """Return the module of a scene; functions without a symbolic form exist only in C."""
     views: list[dict[str, Any]] = []
     steps: dict[str, Step] = {}
     for function in functions:
@@ -37,7 +37,7 @@ def emit(scene: Scene, tail: Tail, functions: Iterable[Function], version: str) 
 
 
 def function_view(function: Function, tail: Tail, lines: list[str]) -> dict[str, Any]:
-    """Return a function as the template sees it."""
+    """Return a function in the form that the template needs."""
     arguments = (*function.inputs, *function.outputs)
     return {
         "name": function.name,

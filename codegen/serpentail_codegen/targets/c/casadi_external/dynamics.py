@@ -1,23 +1,23 @@
-"""What derivatives of the dynamics are made of in C, and where they are zero."""
+"""The C functions for derivatives of the dynamics, and the zeros of these derivatives."""
 
 from collections.abc import Collection
 from dataclasses import dataclass
 
 from ....scene.signatures.table import SIGNATURES
 
-# where the numbers begin that anything depends on: neither the position of B nor its velocity
+# first number with an effect: neither the position of B nor its velocity
 # matters
 MOVING = {"q": 3, "v": 3}
 
 
 def moves(name: str, k: int) -> bool:
-    """Tell if something depends on number k of an input."""
+    """Tell if some output depends on number k of an input."""
     return k >= MOVING.get(name, 0)
 
 
 @dataclass(frozen=True)
 class DynamicsDerivatives:
-    """Inverse or forward dynamics, and the C functions that its derivatives are made of."""
+    """Inverse or forward dynamics, and the C functions that compute its derivatives."""
 
     name: str
     last: str
@@ -32,7 +32,7 @@ class DynamicsDerivatives:
         return ("q", "v", self.last)
 
     def has(self, works: Collection[str], kind: str) -> bool:
-        """Tell if the functions are there that a derivative is made of."""
+        """Tell if the scene has the functions that a derivative needs."""
         parts = {
             "jac_": self.jacobian,
             "adj1_": self.adjoint,

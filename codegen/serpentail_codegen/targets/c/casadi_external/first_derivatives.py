@@ -19,7 +19,7 @@ def first_derivatives(e: External, f: DynamicsDerivatives) -> dict[str, str]:
 
 
 def by_parameters(e: External, f: DynamicsDerivatives) -> dict[str, str]:
-    """Compute the Jacobian with respect to the parameters, where the model can."""
+    """Compute the Jacobian with respect to the parameters, if the model can."""
     if not f.by_parameters(e.works):
         return {}
     e.call(f"{f.name}_parameter_derivatives", "q", "v", f.last, "dparameters")

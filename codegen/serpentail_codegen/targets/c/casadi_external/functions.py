@@ -1,4 +1,4 @@
-"""All functions of a scene for CasADi, and what the templates lay out of them."""
+"""All functions of a scene for CasADi, and the values for their templates."""
 
 from typing import Any
 
@@ -10,22 +10,30 @@ from .plain import plain
 from .ports import External
 from .second_derivatives import hessian
 
+MEANINGS = {  # prefixes of CasADi's names -> what such a function returns
+    "": "{}",
+    "jac_": "Jacobian of {}",
+    "adj1_": "Gradient of the weighted outputs of {}",
+    "jac_adj1_": "Jacobian of the gradient of the weighted outputs of {}",
+}
+
 
 def externals(scene: Scene, tail: Tail, works: dict[str, int]) -> list[External]:
-    """Return every function that CasADi can call, derivatives after what they are of."""
+    """Return every function that CasADi can call, each derivative after its function."""
     sizes = {"q": tail.nq, "v": tail.nv, "v_dot": tail.nv, "force": tail.nv, "tau": tail.nt}
     sizes["parameters"] = sum(p.size for p in struct_parameters(scene))
 
     made: list[External] = []
 
     def begin(name: str, kind: str = "") -> External:
-        symbol, doc = f"{kind}{scene.name}_casadi_{name}", f"{kind}{name}"
+        symbol = f"{kind}{scene.name}_casadi_{name}"
+        doc = MEANINGS[kind].format(name)
         made.append(External(symbol, doc, tail, scene.name, callable_for(scene, name, works)))
         return made[-1]
 
     for name in works:
         plain(begin(name), name, sizes)
-    # derivatives by CasADi's q are made for a torso that turns
+    # derivatives by CasADi's q exist only for a free torso
     for f in () if tail.shape.fixed else DYNAMICS:
         for kind, make in (("jac_", jacobian), ("adj1_", adjoint), ("jac_adj1_", hessian)):
             if f.has(works, kind):
@@ -34,7 +42,7 @@ def externals(scene: Scene, tail: Tail, works: dict[str, int]) -> list[External]
 
 
 def callable_for(scene: Scene, name: str, works: dict[str, int]) -> dict[str, int]:
-    """Return what a function may be made of: no derivatives by parameters that are folded in."""
+    """Return the functions that may be used: no derivatives by parameters that are folded in."""
     suffix = "_parameter_derivatives"
     return {
         other: work
@@ -44,7 +52,7 @@ def callable_for(scene: Scene, name: str, works: dict[str, int]) -> dict[str, in
 
 
 def casadi_context(scene: Scene, tail: Tail, works: dict[str, int]) -> dict[str, Any]:
-    """Return what the templates of ``casadi.external`` lay out."""
+    """Return the values for the templates of ``casadi.external``."""
     made = externals(scene, tail, works) if scene.real == "double" else []
     ports = [port for e in made for port in (*e.inputs, *e.outputs)]
     patterns = sorted({port.pattern for port in ports})

@@ -1,4 +1,6 @@
-"""Inputs and outputs of functions for CasADi: their sparsity, and where the numbers lie in C."""
+"""Inputs and outputs of functions for CasADi: their sparsity, and the positions of their numbers in
+C.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -11,19 +13,20 @@ Nonzero = Callable[[int, int], bool]
 
 
 def dense(row: int, column: int) -> bool:
-    """Tell that a matrix is dense."""
+    """Return True: every entry of a matrix may be nonzero."""
     return True
 
 
 def zero(row: int, column: int) -> bool:
-    """Tell that a matrix is zero."""
+    """Return False: every entry of a matrix is zero."""
     return False
 
 
 def pattern(rows: int, columns: int, nonzero: Nonzero = dense) -> tuple[int, ...]:
-    """Return a sparsity pattern as CasADi reads it.
+    """Return a sparsity pattern in CasADi's form.
 
-    The size, then 1 if it is dense, else where the columns start, and the rows of nonzeros.
+    It has the size, then 1 if the matrix is dense, else the starts of the columns and the rows of
+    nonzeros.
     """
     by_column = [[r for r in range(rows) if nonzero(r, c)] for c in range(columns)]
     if sum(map(len, by_column)) == rows * columns:
@@ -34,13 +37,15 @@ def pattern(rows: int, columns: int, nonzero: Nonzero = dense) -> tuple[int, ...
 
 @dataclass(frozen=True)
 class Port:
-    """An input or output of a CasADi function, and where its numbers lie in a dense array."""
+    """An input or output of a CasADi function, and the positions of its numbers in a dense
+    array.
+    """
 
     name: str
     pattern: tuple[int, ...]
     source: str = ""
-    row: int = 1  # how far apart neighbours in a column lie
-    column: int = 1  # and neighbours in a row
+    row: int = 1  # distance of neighbours in a column
+    column: int = 1  # and of neighbours in a row
     differentiable: bool = True
 
 
@@ -78,12 +83,12 @@ class External:
         )
 
     def unknown(self, name: str) -> None:
-        """Make an array of one number that is none."""
+        """Make an array of one number that is NaN."""
         self.arrays[name] = 1
         self.lines.append(f"*{name} = (real)NAN;")
 
     def places(self) -> dict[str, int]:
-        """Return where each array begins: whole cache lines apart."""
+        """Return the start of each array, at whole cache lines."""
         places, first = {}, 0
         taken = {port.source: port.pattern[0] for port in self.inputs if port.source}
         for name, length in (taken | self.arrays).items():
@@ -93,5 +98,5 @@ class External:
 
     @property
     def size(self) -> int:
-        """Reals of workspace, with what it takes to begin at a cache line."""
+        """Return the reals of workspace, including the padding to a cache line."""
         return self.places()["work"] + self.inner_work + VECTOR - 1

@@ -38,7 +38,7 @@ def second_derivatives(
     e.use("quaternion_rows", "q", nv, "qv", by_qv=nq * nv)
     e.use("quaternion_columns", "q", rows, "aq" if last == "v_dot" else "tq", by_last=rows * nq)
 
-    # blocks are symmetric: what is there once serves twice
+    # blocks are symmetric: each array serves two blocks
     sources = {
         ("q", "q"): ("by_qq", nq, 1),
         ("q", "v"): ("by_qv", nv, 1),
@@ -54,7 +54,9 @@ def second_derivatives(
 
 
 def hessian(e: External, f: DynamicsDerivatives, sizes: dict[str, int]) -> None:
-    """Make ``jac_adj1_f``; second derivatives by parameters, which no C gives, are NaN."""
+    """Make ``jac_adj1_f``; second derivatives by parameters are NaN, because the C does not compute
+    them.
+    """
     sources = second_derivatives(e, f)
     known = f.by_parameters(e.works)
     e.inputs = ports_in(f, sizes, known, 3)
