@@ -40,7 +40,7 @@ GENERATE := $(PY) -m serpentail_codegen
 FOLDER   := "$$($(GENERATE) --print-folder $(WANTED))"
 PAGE     := $(wildcard hatch_build.py viewer/*.* viewer/src/*)
 
-.PHONY: help setup demo test test-portable test-all model verify bench stress mutants embedded size-report studies study-models study-righting study-contact study-landing study-morphology study-replanning wheels lint golden clean
+.PHONY: help setup demo test test-portable test-slow test-all model verify bench stress mutants embedded size-report studies study-models study-righting study-contact study-landing study-morphology study-replanning wheels docs lint golden clean
 .DELETE_ON_ERROR:
 
 help:
@@ -49,6 +49,7 @@ help:
 	@echo "  make setup                                 .venv with everything, by uv where it is on PATH"
 	@echo "  make demo                                  the paper's rat: generate, compile, simulate, draw"
 	@echo "  make test                                  the quick tests;  make test-all: every test, models optimised"
+	@echo "  make test-slow                             what make test leaves out, as CI runs it"
 	@echo "  make test   ROOM=simulation                the tests of one room, a folder of tests/"
 	@echo "  make test-portable                         motions and plans, as on a processor with AVX2, without AVX-512"
 	@echo "  make model  TAIL=articulated M=3 N=4       -> generated/articulated_m3_n4"
@@ -70,6 +71,7 @@ help:
 	@echo "  make study-replanning                      bodies unlike the planned one: open loop, PFL, predictive control"
 	@echo "  make studies                               all; STARTS=200 random starts in the second"
 	@echo "  make wheels                                builds wheel and sdist, installs the wheel for each Python that is here"
+	@echo "  make docs                                  the site, with the gallery: output/docs/index.html"
 	@echo "  make lint                                  style, import rules, types, lengths of files"
 	@echo "  make golden                                accept what the generator emits now as the golden models"
 	@echo "  make clean                                 remove what was generated, and output/"
@@ -109,8 +111,8 @@ demo: $(DRAWS)
 	@$(MAKE) --no-print-directory $(PAGED)
 
 # What pytest and Python compile is kept, away from the sources; seconds of every process.
-test test-portable test-all: export PYTHONDONTWRITEBYTECODE :=
-test test-portable test-all: export PYTHONPYCACHEPREFIX := $(CURDIR)/.build/bytecode
+test test-portable test-slow test-all: export PYTHONDONTWRITEBYTECODE :=
+test test-portable test-slow test-all: export PYTHONPYCACHEPREFIX := $(CURDIR)/.build/bytecode
 
 test: $(READY)
 	$(PY) -m pytest --quick -m "not slow" $(WORKERS) $(if $(ROOM),tests/$(ROOM))
@@ -119,6 +121,10 @@ test: $(READY)
 test-portable: $(READY)
 	$(PY) tests/support/as_on.py x86-64-v3 \
 	  $(PY) -m pytest -m "not slow" $(WORKERS) tests/simulation tests/planning tests/scenes
+
+# What `test` leaves out.
+test-slow: test-portable
+	$(PY) -m pytest -m slow $(WORKERS)
 
 # Every test, with models compiled as a user's are.
 test-all: test-portable
@@ -178,9 +184,14 @@ studies: study-models study-righting study-contact study-landing study-morpholog
 wheels: $(READY)
 	$(PY) -m tests.packaging.wheels
 
+# Every warning is an error; the scripts of the gallery run.
+docs: $(READY)
+	$(PY) -m sphinx -W --keep-going -n -q -b html -d .build/doctrees docs output/docs
+	@echo "written: output/docs/index.html"
+
 golden: $(READY)
 	$(PY) -m pytest tests/house/test_golden.py tests/house/test_functions_document.py --update-golden
 
 clean:
-	rm -rf output .build
+	rm -rf output .build docs/api docs/gallery
 	test ! -d generated || find generated -mindepth 1 -maxdepth 1 ! -name README.md ! -name 'golden_*' -exec rm -rf {} +

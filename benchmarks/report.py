@@ -6,7 +6,7 @@ import itertools
 import json
 from pathlib import Path
 
-from benchmarks import readme
+from benchmarks import first_table
 from benchmarks.closing import about, closing, figures
 from benchmarks.fixtures import COLUMNS
 from benchmarks.targets import judged
@@ -30,7 +30,8 @@ def written(folder: Path, report: dict, words: dict[str, str], pictures: list[Pa
     sections.append(("since the last run", *changes(report, last)))
     head = "; ".join(str(value) for value in report["machine"].values())
     lines = ["# Benchmark", "", head, "", *(line for s in sections for line in markdown(*s))]
-    text = "\n".join([*lines, "## README", "", "Its table:", "", *readme.block(report), ""])
+    lines += ["## docs/benchmarks.md", "", "Its first table:", "", *first_table.block(report), ""]
+    text = "\n".join(lines)
     (folder / "report.md").write_text(text)
     (folder / "report.html").write_text(page(head, sections, pictures))
     (folder / "figures.json").write_text(json.dumps(figures(report), indent=1) + "\n")

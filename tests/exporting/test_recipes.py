@@ -1,40 +1,23 @@
-"""The blocks of docs/recipes.md that are marked so run, and come to what the model does."""
+"""The blocks of docs/recipes.md run, and come to what the model does."""
 
-import ast
-import os
-import re
 import subprocess
+from contextlib import chdir
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-TEXT = (Path(__file__).parents[2] / "docs" / "recipes.md").read_text(encoding="utf-8")
-BLOCKS = re.findall(r"^```(\w+)([^\n]*)\n(.*?)^```$", TEXT, re.MULTILINE | re.DOTALL)
-RUNS = [(kind, words.split()[1:], text) for kind, words, text in BLOCKS if "runs" in words]
+from tests.docs.blocks import PAGES
+from tests.docs.running import run_page
 
 
 @pytest.fixture(scope="module")
 def ran(tmp_path_factory):
     """The names that the Python blocks made, in the folder where all blocks ran."""
-    names, folder = {}, tmp_path_factory.mktemp("recipes")
-    before = os.getcwd()
-    os.chdir(folder)
-    try:
-        for kind, words, text in RUNS:
-            if words:
-                Path(words[0]).write_text(text, encoding="utf-8")
-            elif kind == "python":
-                exec(compile(text, "docs/recipes.md", "exec"), names)
-            else:
-                environment = os.environ | {"FOLDER": names["folder"]}
-                subprocess.run(
-                    ["sh", "-ec", text], check=True, env=environment, capture_output=True
-                )
-        names["compiled_jacobians"] = names["casadi"].external("f_jac", "./f.so")
-        yield names
-    finally:
-        os.chdir(before)
+    page = run_page(PAGES["recipes"], tmp_path_factory.mktemp("recipes"))
+    with chdir(page.folder):
+        page.names["compiled_jacobians"] = page.names["casadi"].external("f_jac", "./f.so")
+        yield page.names
 
 
 def state(model):
@@ -42,15 +25,6 @@ def state(model):
     q[3:7] /= np.linalg.norm(q[3:7])
     v = np.array([0.1, 0.2, 0.3, 4.0, -5.0, 6.0, 7.0, -8.0])
     return np.concatenate([q, v]), np.array([1e-3, -2e-3])
-
-
-def test_every_kind_of_block_is_there():
-    kinds = [(kind, *words) for kind, words, _ in RUNS]
-    assert kinds.count(("python",)) == 5 and kinds.count(("sh",)) == 3
-    assert ("cmake", "CMakeLists.txt") in kinds and ("cpp", "node.cpp") in kinds
-    for kind, _, text in BLOCKS:  # those that cannot be run are Python at least
-        if kind == "python":
-            ast.parse(text)
 
 
 def test_generated_casadi_code_calls_the_model(ran):

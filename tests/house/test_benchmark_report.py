@@ -4,8 +4,8 @@ import json
 
 from benchmarks import closing, report
 from benchmarks.comparison import faster
+from benchmarks.first_table import block
 from benchmarks.peak import best_chains
-from benchmarks.readme import block
 
 FD = {"function": "forward_dynamics", "model": "(1, 3)"}
 REPORT = {
@@ -60,7 +60,7 @@ def test_figures_of_another_machine_are_not_compared(monkeypatch, tmp_path):
     assert {row["before"] for row in closing.closing(REPORT)} == {""}
 
 
-def test_the_table_of_the_readme_has_both_processors_in_a_cell():
+def test_the_table_of_the_benchmarks_page_has_both_processors_in_a_cell():
     head, _, *rows = block(REPORT)
     assert (
         head == "| articulated tail (m, n): AVX-512 / AVX2 | (1, 3) | (3, 4) | (6, 6) | (8, 16) |"

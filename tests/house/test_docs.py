@@ -1,134 +1,38 @@
-"""The documents: their examples run, what they name exists, and their links lead somewhere."""
+"""The documents: what they name exists, and their links lead somewhere.  tests/docs runs them."""
 
 import importlib
 import re
 import shlex
-import subprocess
-import sys
-import tomllib
 from pathlib import Path
 
-import numpy as np
 import pytest
-from scipy.integrate import simpson
 
 import serpentail as st
 from serpentail.cli import ROOMS, arguments_of
 from serpentail_codegen.scene.parameters import PARAMETERS
-from serpentail_codegen.scene.parse import parse_scene
 from serpentail_codegen.scene.signatures.table import ALL
-from tests.support.told import besides_progress
+from tests.docs.blocks import PAGES, blocks
+from tests.support.models import model_folder
 
 ROOT = Path(__file__).parents[2]
-DOCUMENTS = [
-    ROOT / "README.md",
-    ROOT / "CONTRIBUTING.md",
-    ROOT / "CHANGELOG.md",
-    *sorted(ROOT.glob("docs/*.md")),
-    *sorted(ROOT.glob("docs/release_notes/*.md")),
-]
-README = DOCUMENTS[0].read_text(encoding="utf-8")
+DOCUMENTS = list(PAGES.values())
 CODEGEN, RUNTIME = ROOT / "codegen" / "serpentail_codegen", ROOT / "runtime" / "serpentail"
 MADE = ("generated/", "output/", "include/", "src/", "example/")  # folders that commands make
 # files that commands make
-YOURS = ("fall.c", "articulated_m3_n4.h", "rat.toml", "drop.toml", "study.toml")
+YOURS = ("fall.c", "articulated_m3_n4.h", "rat.toml", "drop.toml", "study.toml", "lizard.toml")
+YOURS += ("flight.png", "./fall")
 YOURS += ("f.c", "rat.c", "rat_host.c", "rat.h")
 
 every_document = pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
 
 
-def block(language: str, start: str = "") -> str:
-    """The README's fenced block of a language that starts with a text; there is one."""
-    blocks = re.findall(rf"^```{language}\n(.*?)^```$", README, re.MULTILINE | re.DOTALL)
-    (found,) = [text for text in blocks if text.startswith(start)]
-    return found
-
-
 def code(document: Path) -> list[str]:
     """Fenced lines, without comments, and code spans of a document."""
     text = document.read_text(encoding="utf-8")
-    fenced = re.findall(r"^```\w*\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
-    lines = [line.split("#")[0] for lines in fenced for line in lines.splitlines()]
+    lines = [line.split("#")[0] for each in blocks(document) for line in each.text.splitlines()]
     return lines + re.findall(
         r"`([^`\n]+)`", re.sub(r"^```.*?^```$", "", text, flags=re.MULTILINE | re.DOTALL)
     )
-
-
-def run(command: list[str], folder: Path) -> str:
-    """What a command prints, once it has ended well and without a complaint."""
-    finished = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-    told = besides_progress(finished.stderr)
-    assert (finished.returncode, told) == (0, ""), told
-    return finished.stdout
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory) -> Path:
-    """A folder in which `make model TAIL=articulated M=3 N=4` was run."""
-    path = tmp_path_factory.mktemp("readme")
-    size = ["--tail", "articulated", "--segments", "3", "--links", "4"]
-    run([sys.executable, "-m", "serpentail_codegen", *size], path)
-    return path
-
-
-# Examples
-
-
-def test_python_example_runs(folder):
-    printed = run([sys.executable, "-c", block("python")], folder)
-    residual, flight = re.fullmatch(
-        r"H v_dot \+ C = \[(.*?)\]\n(.*)\n", printed, re.DOTALL
-    ).groups()
-    assert np.abs(np.array(residual.split(), float)).max() < 1e-12
-    height, damped = map(float, re.search(r"height (\S+) m, (\S+) J", flight).groups())
-    assert height == pytest.approx(
-        0.3 + 2 * 0.5 - 9.8 / 2 * 0.5**2, abs=0.1
-    )  # of B, not of the centre of mass
-    assert 0 < damped < 0.1
-
-
-def test_c_example_compiles_without_warnings_and_runs(folder):
-    (folder / "fall.c").write_text(block("c"), encoding="utf-8")
-    command = shlex.split(block("sh", "cc ").replace("\\\n", " "))
-    run([*command, "-pedantic", "-Wall", "-Wextra", "-Werror"], folder)
-    printed = run([str(folder / "fall")], folder)
-
-    model = st.load(folder / "generated" / "articulated_m3_n4")
-    q = np.array([0, 0, 0, 1, 0, 0, 0, 0.5, 0, 0, 0, 0, 0])
-    v_dot = model.forward_dynamics(q, np.zeros(model.nv), np.array([1e-3, 0, 0, 0, 0, 0]))
-    expected = f"status 0, p_ddot_z = {v_dot[2]:g} m/s^2, alpha_1_ddot = {v_dot[6]:g} rad/s^2\n"
-    assert printed == expected
-
-
-def test_examples_are_short():
-    assert len(block("python").splitlines()) <= 12
-    assert len(block("c").splitlines()) <= 15
-
-
-def test_scene_example_is_a_scene_that_can_be_simulated():
-    scene = parse_scene(tomllib.loads(block("toml")), "example")
-    assert set(scene.functions) == {"forward_dynamics", "rollout", "energy", "momentum"}
-
-
-@pytest.mark.slow
-def test_demo_runs_anywhere_and_writes_its_files(tmp_path):
-    printed = run([sys.executable, str(ROOT / "examples" / "demo.py"), "demo"], tmp_path)
-    for scene in ("kangaroo_rat_m1_n3", "kangaroo_rat_m3_n4"):
-        flight = st.Trajectory.load(tmp_path / "demo" / f"{scene}.npz")
-        assert flight.t[-1] == pytest.approx(0.58)
-        damped = simpson(-np.sum(flight.tau * flight.v[:, 6:], axis=1), x=flight.t)
-        assert flight.energy[0] - flight.energy[-1] == pytest.approx(damped, rel=1e-3)
-        for picture in ("film", "time"):
-            assert (tmp_path / "demo" / f"{scene}_{picture}.png").read_bytes()[:4] == b"\x89PNG"
-    for picture in ("kick_film.png", "righting_film.png"):
-        assert (tmp_path / "demo" / picture).read_bytes()[:4] == b"\x89PNG"
-    assert (tmp_path / "demo" / "righting.gif").read_bytes()[:6] == b"GIF89a"
-    assert "0.00 deg with the planned tail" in printed
-    drifts = re.findall(r"constant to (\S+),", printed)
-    differences = re.findall(r"differ by (\S+) at most", printed)
-    assert len(drifts) == 4
-    assert max(map(float, drifts)) < 1e-9
-    assert max(map(float, differences)) < 1e-8
 
 
 # Names
@@ -182,8 +86,8 @@ def test_functions_exist(document):
 
 
 @every_document
-def test_methods_exist(document, folder):
-    model = st.load(folder / "generated" / "articulated_m3_n4")
+def test_methods_exist(document):
+    model = st.load(model_folder(1, 3), compiled=False)
     for span in code(document):
         for name in re.findall(r"(?<![\w/])model\.(?!py\b)(\w+)", span):
             assert hasattr(type(model), name) or name in vars(model), span
@@ -234,11 +138,12 @@ def test_pictures_are_small_and_used():
 
 
 def test_benchmark_block_can_be_filled():
+    text = PAGES["benchmarks"].read_text(encoding="utf-8")
     assert (
-        len(re.findall(r"^<!-- bench -->$.*?^<!-- /bench -->$", README, re.MULTILINE | re.DOTALL))
+        len(re.findall(r"^<!-- bench -->$.*?^<!-- /bench -->$", text, re.MULTILINE | re.DOTALL))
         == 1
     )
-    assert README.count("bench -->") == 2
+    assert text.count("bench -->") == 2
 
 
 def test_quoted_errors_are_the_ones_raised():
@@ -247,7 +152,8 @@ def test_quoted_errors_are_the_ones_raised():
         for home in (CODEGEN, RUNTIME)
         for path in home.rglob("*.py")
     )
-    rows = re.findall(r"^\| `(.*?)` \|", README.split("## Errors you may meet")[1], re.MULTILINE)
+    text = PAGES["errors"].read_text(encoding="utf-8")
+    rows = re.findall(r"^\| `(.*?)` \|", text, re.MULTILINE)
     assert rows
     for message in rows:
         for part in re.split(r"\.\.\.|'[^']*'|\([^)]*\)", message):
@@ -269,3 +175,16 @@ def test_theory_has_every_parameter_with_its_unit():
         re.MULTILINE,
     )
     assert {(p.name, p.unit) for p in PARAMETERS} <= set(rows)
+
+
+def test_the_glossary_has_every_word_of_the_house():
+    words = PAGES["CONTRIBUTING"].read_text(encoding="utf-8").split("\n## Words\n")[1]
+    rows = re.findall(r"^\| ([\w ]+?) \|", words.split("\n## ")[0], re.MULTILINE)
+    glossary = PAGES["glossary"].read_text(encoding="utf-8")
+    terms = {
+        term
+        for row in re.findall(r"^\| ([^|]+) \|", glossary, re.MULTILINE)
+        for term in row.split(", ")
+    }
+    assert len(rows) > 30
+    assert set(rows) - {"word"} - terms == set()

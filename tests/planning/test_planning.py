@@ -1,9 +1,6 @@
 """Plans: formulations agree, laws hold, and what reports say is true is so by other means."""
 
-import re
-import shutil
 from dataclasses import replace
-from pathlib import Path
 
 import casadi
 import numpy as np
@@ -19,8 +16,6 @@ from serpentail.planning.nlp.node import equations_of_motion
 from serpentail.planning.nlp.transcription import transcription_of
 from serpentail.planning.result.full_state import full_state
 from serpentail.planning.result.truth import local_errors, open_loop
-from serpentail_codegen.scene.parse import load_scene
-from tests.support.models import folder_of
 from tests.support.tumbling import AGAIN, DURATION, integrated, planned, rat, start
 
 FORMS = [
@@ -220,14 +215,3 @@ def test_torques_that_no_model_survives_are_an_infinite_error():
     assert np.isnan(np.concatenate(open_loop(model, wild, 0.0, start))).all()
     errors = local_errors(model, wild, 0.0, *(np.tile(x, (len(wild.ends), 1)) for x in start))
     assert np.isfinite(errors).all()
-
-
-def test_example_of_the_document_runs(tmp_path, monkeypatch, capsys):
-    root = Path(__file__).parents[2]
-    folder = folder_of(load_scene(root / "scenes" / "righting_m1_n3.toml"))
-    shutil.copytree(folder, tmp_path / "generated" / folder.name)
-    monkeypatch.chdir(tmp_path)
-    text = (root / "docs" / "planning.md").read_text()
-    exec(re.search(r"```python\n(.*?)```", text, re.DOTALL)[1], {})
-    good, error, _ = capsys.readouterr().out.split()
-    assert good == "True" and float(error) <= 0.01

@@ -4,7 +4,6 @@ IPOPT takes them.
 
 import re
 import subprocess
-import sys
 import tomllib
 import venv
 from pathlib import Path
@@ -19,7 +18,6 @@ from serpentail_codegen.scene.signatures.table import EXACT_DERIVATIVES
 from ...references.parameters import random_states
 from ...support import collocation
 from ...support.models import model_folder
-from .external_models import PARTS
 
 # What a scene has.
 
@@ -146,17 +144,8 @@ def installed(python):
 # Documents.
 
 
-def test_example_of_the_document_runs(tmp_path):
+def test_the_document_has_every_exact_derivative():
     text = (Path(__file__).parents[3] / "docs" / "casadi.md").read_text()
-    (example,) = re.findall(r"^```python\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
-    (tmp_path / "generated").mkdir()
-    (tmp_path / "generated" / "planned").symlink_to(
-        model_folder(1, 3, functions=PARTS, name="planned")
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", example], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
-    assert (done.returncode, done.stdout.split()[-1:]) == (0, ["Solve_Succeeded"]), done.stderr
     for name, (first, second) in EXACT_DERIVATIVES.items():
         row = next(line for line in text.splitlines() if line.startswith(f"| `{name}` |"))
         assert re.findall(r"`(\w+)`", row) == [name, *first, *second]

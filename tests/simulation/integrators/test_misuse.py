@@ -74,10 +74,7 @@ def test_interrupt_ends_a_long_run():
         (lambda: st.Phases([(0, st.Phases([(0, None)]))]), "put all pairs in one list"),
         (lambda: st.Phases(3), "needs pairs"),
         (lambda: st.Phases([(0, 3)]), "controller: value 3: needs"),
-        (
-            lambda: Path("nowhere"),
-            "controller: value PosixPath('nowhere'): needs",
-        ),  # it has parts, too
+        (lambda: Path("nowhere"), "controller: value PosixPath('nowhere'): needs"),  # has parts
         (lambda: st.TorqueCurve(3), "needs a Piecewise of 4 channels"),
         (lambda: st.NativeTorque("f"), "needs a ctypes function or an address"),
         (

@@ -1,4 +1,4 @@
-"""The table of the README, from a report.
+"""The first table of docs/benchmarks.md, from a report.
 
 Each cell has AVX-512 before AVX2. A peer's figure is how many times as long as ours it takes.
 """
@@ -69,7 +69,7 @@ ROWS: tuple[tuple[str, str, str | None, Callable[[dict], str]], ...] = (
 
 
 def block(report: dict) -> list[str]:
-    """Return the lines of the README's table; a row without a measurement is left out."""
+    """Return the lines of the table; a row without a measurement is left out."""
     there = list(dict.fromkeys(row["processor"] for row in report.get("speed", [])))
     if not there:
         return []

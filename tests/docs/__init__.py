@@ -1,0 +1,1 @@
+"""The documents as a reader meets them: their blocks, run in order, and the site made of them."""

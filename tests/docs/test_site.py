@@ -1,0 +1,153 @@
+"""The site: whole, without a warning, and complete in itself."""
+
+import inspect
+import re
+import shutil
+import subprocess
+import sys
+from html.parser import HTMLParser
+from urllib.parse import unquote
+
+import pytest
+from sphinx.util.inventory import InventoryFile
+
+import serpentail as st
+from tests.docs.blocks import ROOT
+from tests.support.chromium import chromium, need_chromium, requests
+from tests.support.page import need
+
+CLASSES = (
+    st.Model,
+    st.Trajectory,
+    st.Plan,
+    st.Rollouts,
+    st.Mpc,
+    st.Sweep,
+    st.Identification,
+)
+FETCHED = {"script": "src", "img": "src", "iframe": "src", "source": "src", "video": "src"}
+BESIDE = ("CHANGELOG.md", "CONTRIBUTING.md", "LICENSE", "README.md", "SECURITY.md")
+BESIDE += ("examples", "hatch_build.py", "scenes", "tests", "viewer")  # what pages link to
+
+
+def test_every_public_name_is_in_the_reference():
+    text = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
+    listed = re.findall(r"^   ([A-Za-z_]+)$", text, re.MULTILINE)
+    assert sorted(listed) == sorted(st.__all__)
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """The site, built as `make docs` does, but without running the scripts of the gallery."""
+    tree = tmp_path_factory.mktemp("site")
+    made = shutil.ignore_patterns("api", "gallery", "__pycache__")
+    shutil.copytree(ROOT / "docs", tree / "docs", ignore=made)
+    for name in BESIDE:
+        (tree / name).symlink_to(ROOT / name)
+    options = ["-W", "--keep-going", "-n", "-q", "-D", "plot_gallery=False"]
+    command = [sys.executable, "-m", "sphinx", *options, "docs", "html"]
+    done = subprocess.run(command, cwd=tree, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    return tree / "html"
+
+
+class Page(HTMLParser):
+    """What a page fetches, where it leads, and the anchors that it has."""
+
+    def __init__(self, path):
+        super().__init__()
+        self.fetched, self.links, self.anchors = [], [], set()
+        self.feed(path.read_text(encoding="utf-8"))
+
+    def handle_starttag(self, tag, attrs):
+        """Note what a tag refers to."""
+        given = dict(attrs)
+        self.anchors.add(given.get("id"))
+        if tag in FETCHED:
+            self.fetched.append(given.get(FETCHED[tag]) or "")
+        elif tag == "link" and not {"next", "prev", "search", "index"} & set(given["rel"].split()):
+            self.fetched.append(given["href"])
+        elif tag == "a":
+            self.links.append(given.get("href") or "")
+
+
+def of_class(member) -> bool:
+    """Tell whether a member is a method or a property; fields are explained by their class."""
+    return inspect.isfunction(member) or inspect.ismethod(member) or isinstance(member, property)
+
+
+@pytest.fixture(scope="module")
+def pages(site):
+    """Every page of the site."""
+    return {path: Page(path) for path in site.rglob("*.html")}
+
+
+@pytest.mark.slow
+def test_every_name_and_method_has_its_place(site):
+    with (site / "objects.inv").open("rb") as file:
+        known = InventoryFile.load(file, "", lambda base, name: name)
+    names = {name for kind in known for name in known[kind] if kind.startswith("py:")}
+    wanted = {f"serpentail.{name}" for name in st.__all__}
+    for each in CLASSES:
+        members = inspect.getmembers(each, of_class)
+        wanted |= {f"serpentail.{each.__name__}.{name}" for name, _ in members if name[0] != "_"}
+    assert wanted - names == set()
+
+
+@pytest.mark.slow
+def test_nothing_is_fetched_from_elsewhere(site, pages):
+    for path, page in pages.items():
+        outside = [x for x in page.fetched if "//" in x.split("?")[0] or x.startswith("/")]
+        assert outside == [], path
+    for sheet in site.rglob("*.css"):
+        text = sheet.read_text(encoding="utf-8")
+        assert re.findall(r"@import[^;]*//|url\([\"']?(?:https?:)?//", text) == [], sheet
+
+
+@pytest.mark.slow
+def test_local_links_and_pictures_lead_somewhere(pages):
+    for path, page in pages.items():
+        for target in [*page.links, *page.fetched]:
+            if re.match(r"[a-z]+:", target) or not target:
+                continue
+            place, _, anchor = target.partition("#")
+            other = (path.parent / unquote(place.split("?")[0])).resolve() if place else path
+            assert other.exists(), (path.name, target)
+            if anchor and other in pages:
+                assert unquote(anchor) in pages[other].anchors, (path.name, target)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("width", [1280, 390])
+def test_a_browser_shows_the_pages_from_the_disk_alone(site, width):
+    need(need_chromium)
+    with chromium() as driver:
+        metrics = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 500}
+        driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+        for name in ("index", "planning", "benchmarks", "api/serpentail.plan", "gallery/index"):
+            driver.get((site / f"{name}.html").as_uri())
+            wide = "return document.documentElement.scrollWidth - window.innerWidth"
+            assert driver.execute_script(wide) <= 0, name
+        asked = requests(driver)
+        assert asked and all(url.startswith(("file:", "data:")) for url in asked)
+
+
+def test_links_lead_somewhere_from_any_page():
+    sys.path.insert(0, str(ROOT / "docs"))
+    try:
+        from _site.links import links_of_page, links_of_root
+    finally:
+        sys.path.pop(0)
+
+    def seen(change, *place, text):
+        source = [text]
+        change(None, *place, source)
+        return source[0]
+
+    assert seen(links_of_page, "a", text="[x](../CHANGELOG.md#y)") == "[x](changelog.md#y)"
+    assert seen(links_of_page, "a/b", text="[x](../../SECURITY.md)") == "[x](../security.md)"
+    assert seen(links_of_page, "a/b", text="[x](../a.md), [y](#y)") == "[x](../a.md), [y](#y)"
+    assert seen(links_of_page, "a", text="[x](../scenes/kick.toml)") == "[x](../scenes/kick.toml)"
+    assert seen(links_of_page, "a", text="[x](../viewer)").endswith("/tree/main/viewer)")
+    assert seen(links_of_root, ROOT, "a", text="[x](docs/a.md#b)") == "[x](a.md#b)"
+    assert seen(links_of_root, ROOT, "a", text="[x](CHANGELOG.md)") == "[x](changelog.md)"
