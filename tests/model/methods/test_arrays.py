@@ -73,10 +73,12 @@ def test_single_states_are_repeated_over_a_batch(model, name):
 
 def test_batches_of_different_size_are_refused(model):
     with pytest.raises(
-        st.StateError, match=r"^forward_dynamics: batch sizes differ \(1, 3, 5\): give one$"
+        st.StateError, match=r"^forward_dynamics: batch sizes differ \(1, 3, 5\): give one size$"
     ):
         model.forward_dynamics(states(3)["q"], states(5)["v"], states(1)["tau"])
-    with pytest.raises(st.StateError, match=r"^energy: batch sizes differ \(0, 1\): give one$"):
+    with pytest.raises(
+        st.StateError, match=r"^energy: batch sizes differ \(0, 1\): give one size$"
+    ):
         model.energy(states(1)["q"], states(0)["v"])
 
 

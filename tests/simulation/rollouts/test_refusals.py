@@ -82,7 +82,7 @@ def test_wrong_parameters_are_named(own, words):
 
 @pytest.mark.filterwarnings("ignore::serpentail.errors.UnusualSize")
 def test_bodies_of_unlike_size_in_one_run_are_warned_of_where_it_is_called():
-    with pytest.warns(st.UnlikeBodies, match=r"unlike by 3\.9e\+06") as caught:
+    with pytest.warns(st.UnlikeBodies, match=r"differ by a factor of 3\.9e\+06") as caught:
         st.simulate(
             tail(), Q, V, parameters={"tail_length": [0.2, 200.0, 0.2, 0.2]}, t_span=1e-3, step=1e-3
         )
