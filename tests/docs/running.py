@@ -17,18 +17,12 @@ from jsonschema import Draft7Validator
 from serpentail.scenes.schema import scene_schema
 from serpentail_codegen.scene.parse import parse_scene
 from tests.docs.blocks import ROOT, Block, blocks
+from tests.support.makes import away_from_make, stand_in
 
 STRICT = ("-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror")
 LINKED = ("runtime", "codegen", "scenes", "tests", "embedded", "benchmarks", "docs", "stress")
 LINKED += ("Makefile", "pyproject.toml", "hatch_build.py", "viewer", "mutants")
-STAMPS = (".draws", ".paged", ".ready")  # of what is installed, each after those before it
-# Programs of .venv: this interpreter, and no installation, which would reach the real environment.
-PROGRAM = """#!/bin/sh
-case "$*" in *"pip install"*) echo "no pip in here" >&2; exit 9;; esac
-exec {} "$@"
-"""
 OF_RUNTIME = ("simulate", "plan", "identify", "sweep", "phase")  # tables that the runtime reads
-OF_MAKE = ("MAKEFLAGS", "MFLAGS", "MAKELEVEL", "MAKEOVERRIDES")  # of a make that runs these tests
 
 
 @dataclass(frozen=True)
@@ -45,7 +39,7 @@ def run_page(page: Path, folder: Path) -> Ran:
     like_a_checkout(folder)
     names: dict = {"__name__": "page"}
     printed = io.StringIO()
-    own = {key: value for key, value in os.environ.items() if key not in OF_MAKE}
+    own = away_from_make()
     own["PATH"] = f"{folder}/.venv/bin:{Path(sys.executable).parent}:{os.environ['PATH']}"
     todo = [block for block in blocks(page) if not block.reason]
     with ExitStack() as stack:
@@ -65,16 +59,7 @@ def like_a_checkout(folder: Path) -> None:
     for name in LINKED:
         (folder / name).symlink_to(ROOT / name)
     shutil.copytree(ROOT / "examples", folder / "examples")  # scripts write beside themselves
-    programs = folder / ".venv" / "bin"
-    programs.mkdir(parents=True)
-    for name, command in (
-        ("python", sys.executable),
-        ("serpentail", f"{sys.executable} -m serpentail.cli"),
-    ):
-        (programs / name).write_text(PROGRAM.format(command))
-        (programs / name).chmod(0o755)
-    for stamp in STAMPS:
-        (folder / ".venv" / stamp).touch()
+    stand_in(folder)
 
 
 def _do(block: Block, names: dict) -> None:

@@ -6,24 +6,17 @@ import re
 import shlex
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
+from tests.support.makes import away_from_make, stand_in
 from tests.support.told import besides_progress
 
 ROOT = Path(__file__).resolve().parents[2]
-VARIABLES = {"TAIL", "M", "N", "SCENE", "REAL", "EMISSION", "BAKED", "FUNCTIONS", "CC"}
 ORDER = ("TAIL=articulated", "M=1", "N=1", "FUNCTIONS=mass_matrix")
 NAME = "articulated_m1_n1_fc4a05d"  # of these functions
 UP_TO_DATE = rf"generated/{NAME}: up to date, \d+\.\d\d s\n"
-STAMPS = (".draws", ".paged", ".ready")  # of what is installed, each after those before it
-# Programs of .venv: this interpreter, and no installation, which would reach the real environment.
-PROGRAM = (
-    '#!/bin/sh\ncase "$*" in *"pip install"*) echo "no pip in here" >&2; exit 9;; esac\nexec {} '
-    '"$@"\n'
-)
 
 
 @pytest.fixture
@@ -33,16 +26,7 @@ def tree(tmp_path):
         shutil.copy2(ROOT / name, tmp_path)
     for name in ("codegen", "scenes"):
         shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
-    programs = tmp_path / ".venv" / "bin"
-    programs.mkdir(parents=True)
-    for name, command in (
-        ("python", sys.executable),
-        ("serpentail", f"{sys.executable} -m serpentail.cli"),
-    ):
-        (programs / name).write_text(PROGRAM.format(command))
-        (programs / name).chmod(0o755)
-    for stamp in STAMPS:
-        (tmp_path / ".venv" / stamp).touch()
+    stand_in(tmp_path)
     return tmp_path
 
 
@@ -51,11 +35,7 @@ def make(tree):
     """Return a function that runs make there, away from a make that runs these tests."""
 
     def run(*arguments, **more):
-        own = {
-            k: v
-            for k, v in os.environ.items()
-            if k not in VARIABLES and not re.match("MAKE|MFLAGS", k)
-        }
+        own = {name: value for name, value in away_from_make().items() if name != "CC"}
         own |= {"PYTHONPATH": str(tree / "codegen"), "LC_ALL": "C", "UV": "", **more}
         return subprocess.run(
             ["make", *arguments], cwd=tree, env=own, capture_output=True, text=True, check=False

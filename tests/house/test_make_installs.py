@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.makes import away_from_make
+
 ROOT = Path(__file__).resolve().parents[2]
 DRAWS, PAGE, REST = "plan,plot", "", "dev,peers"  # extras of what is installed, in their order
 
@@ -23,10 +25,9 @@ def tree(tmp_path):
 
 def planned(tree, target, **more):
     """What make would do for a target, away from a make that runs these tests and its choices."""
-    own = {k: v for k, v in os.environ.items() if not re.match("MAKE|MFLAGS|UV$|EXTRAS$", k)}
     command = ["make", "-n", target]
     done = subprocess.run(
-        command, cwd=tree, env=own | more, capture_output=True, text=True, check=True
+        command, cwd=tree, env=away_from_make() | more, capture_output=True, text=True, check=True
     )
     return done.stdout
 
