@@ -123,7 +123,7 @@ def exact_of(model: st.Model):
 
 
 def changed(of: Subject, **parameters) -> Subject:
-    """Return a subject with other parameters, however unlike."""
+    """Return a subject with other parameters, without warnings about unlike sizes."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", st.UnlikeBodies)
         warnings.simplefilter("ignore", st.UnusualSize)
