@@ -11,21 +11,11 @@ import pytest
 import serpentail as st
 from serpentail.model.sizes import UNLIKE as UNLIKE_FROM
 from serpentail.model.sizes import disparity
-from stress import call_fuzz, drops, poses, scene_fuzz, stress_plots
+from stress import call_fuzz, drops, scene_fuzz, stress_plots
 from stress.call_fuzz import Fault, Target
 from stress.figures import Figure, table
 from stress.poses import Point
-from stress.subjects import (
-    Errors,
-    Subject,
-    changed,
-    errors,
-    exact_of,
-    judged,
-    roundings,
-    state,
-    subject,
-)
+from stress.subjects import Errors, Subject, changed, exact_of, state
 from tests.references.metrics import mass_matrix_error
 from tests.support.models import model_folder
 
@@ -80,25 +70,6 @@ def test_plots_are_drawn(tmp_path):
         "condition.png",
         "margins.png",
     ]
-
-
-def test_coiled_tails_keep_the_limits_of_their_compiler():
-    """Without optimisation the error of H is twice that of fused operations."""
-    of, rng = subject(3, None), np.random.default_rng(2)
-    coiled = {name: bends for name, bends in poses.folds(of).items() if "coiled" in name}
-    assert len(coiled) == 2
-    for name, bends in coiled.items():
-        figures = judged(of, name, [errors(of, *state(of, rng, bends))])
-        assert all(figure.passed for figure in figures), figures
-
-
-def test_compilers_that_fuse_are_told_from_others(monkeypatch):
-    quick = Path(__file__).parents[1] / "support" / "cc_quick"
-    monkeypatch.setenv("CC", str(quick))
-    assert roundings.__wrapped__() == 2
-    monkeypatch.setenv("CC", "cc")
-    if " fma " in Path("/proc/cpuinfo").read_text():
-        assert roundings.__wrapped__() == 1
 
 
 @pytest.mark.parametrize("result", [np.array([1.0, np.nan]), (1.0, (np.inf,))])
