@@ -42,7 +42,10 @@ CASES = {
     "arcs": (None, {"mount_angles": TILT} | ELASTIC),
     "mixed": (MIXED, {"mount_angles": TILT} | ELASTIC),
     "both": (None, {"mount_angles": TILT} | ELASTIC),
-    "tilted": (CHAIN, {"link_inertia": INERTIA, "mount_angles": TILT} | EVEN),
+    "tilted": (
+        CHAIN | {"weightless": True},
+        {"link_inertia": INERTIA, "mount_angles": TILT} | EVEN,
+    ),
     "elastic": (CHAIN, {"link_inertia": INERTIA} | EVEN | ELASTIC),
     "many arcs": (ARCS, {"tail_damping": 2e-4} | EVEN),
 }
