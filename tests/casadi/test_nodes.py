@@ -125,7 +125,7 @@ def test_ipopt_takes_the_derivatives():
 
 
 def test_results_do_not_depend_on_the_number_of_threads(monkeypatch):
-    rat, count, name = model(), 203, "forward_dynamics"
+    rat, count, name = model(), 303, "forward_dynamics"
     given, found = arguments(rat, name, count), []
     for most in (1, 3):
         monkeypatch.setattr(rat.batch_library, "threads", most)

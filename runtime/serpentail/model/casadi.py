@@ -8,6 +8,7 @@ import casadi
 
 from ..checks import one_of, whole_number
 from ..errors import ModelError
+from .cores import threads
 from .kept import kept
 from .layout import OMEGA, QUATERNION, TAIL_V, VELOCITY
 from .nodes.function import MOST_NODES, RESULTS, nodes_function
@@ -31,6 +32,7 @@ class CasadiFunctions:
 
     def __init__(self, model: "Model"):
         self._model = model
+        self._nodes: dict[tuple[str, int, int, int], casadi.Function] = {}  # they stay loaded
 
     @kept
     def _module(self) -> ModuleType:
@@ -202,8 +204,10 @@ class CasadiFunctions:
         count = whole_number("count", count, ModelError, least=1, most=MOST_NODES)
         order = whole_number("derivatives", derivatives, ModelError, least=0, most=2)
         self.external(name, order)
-        function = nodes_function(self._model, name, count, order)
-        return self._wrapped(f"{name}_nodes", function, folded)
+        key = (name, count, order, threads(self._model.batch_library.threads))
+        if key not in self._nodes:
+            self._nodes[key] = nodes_function(self._model, name, count, order)
+        return self._wrapped(f"{name}_nodes", self._nodes[key], folded)
 
     def _wrapped(self, name: str, function: casadi.Function, folded: bool) -> casadi.Function:
         """Return the function with a name of its own, with the model's parameters if folded."""

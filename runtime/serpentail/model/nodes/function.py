@@ -27,7 +27,7 @@ RESULTS = ("forward_dynamics", "inverse_dynamics")
 MOST_NODES = 100_000
 # about how long a node takes: ns, times this power of nv
 COSTS = {"values": (6, 1), "jacobian": (10, 2), "gradient": (10, 2), "hessian": (5, 3)}
-WORTH_A_THREAD = 1e5  # ns
+WORTH_A_THREAD = 2e5  # ns: to start one takes up to a third of it
 _held: list[Any] = []  # what the copies point to: they stay loaded
 
 
