@@ -66,7 +66,7 @@ def casadi_times(model: st.Model) -> dict[str, float]:
 
     kind, tail = attitude("quaternion"), model.nv - 6
     start = np.zeros(model.nq), np.zeros(model.nv)
-    task = st.Goal(), (0.5, 0.5), st.Bounds(), "effort", SMOOTHING, 0.0, (), None
+    task = st.Goal(), (0.5, 0.5), st.Bounds(), "effort", SMOOTHING, 0.0, (), None, None
     problem = PlanningProblem(*start, *task, "airborne", "quaternion")
     variables = variables_of("airborne", kind, tail, np.full(tail, 1e-3))
     node = node_function(model, problem, kind, variables, equations_of_motion(model, "compiled"))
