@@ -1,10 +1,14 @@
 """Plans that choose parameters of the model: the best of many ordinary plans, and true."""
 
+import json
+from types import SimpleNamespace
+
 import casadi as ca
 import numpy as np
 import pytest
 
 import serpentail as st
+from serpentail import cli
 from serpentail.attitude import angle_deg
 from serpentail.planning.design import checked_design
 from serpentail.planning.nlp.body import Body
@@ -12,6 +16,7 @@ from serpentail.planning.nlp.equations import equations_of_motion
 from serpentail.planning.nlp.mesh import uniform
 from serpentail.planning.nlp.rules import collocation_rule
 from serpentail.planning.nlp.transcription import transcription_of
+from serpentail.scenes.plan import arguments_for
 from tests.support.models import model_folder
 from tests.support.own_tails import folder_of_tables
 from tests.support.tumbling import AGAIN, DURATION, integrated, planned, rat, start
@@ -284,3 +289,42 @@ def test_parameters_that_do_nothing_are_refused():
         q, v = np.r_[0, 0, 1, 1, np.zeros(model.nq - 4)], np.zeros(model.nv)
         v[3] = 5
         st.plan(model, start=(q, v), duration=DURATION, design={name: (value, 2 * value)})
+
+
+SCENE = """
+[plan]
+duration = 0.4
+intervals = 8
+design.tail_length = ["16 cm", 0.24]
+free_start.tail = [[-0.2, "-5 deg"], [0.2, 0.1]]
+"""
+
+
+def test_command_line_takes_both(tmp_path, capsys):
+    model = rat()
+    q, v = start(model)
+    (tmp_path / "own.toml").write_text(
+        f"{SCENE}start.q = {q.tolist()}\nstart.v = {v.tolist()}\nbounds.angle = 1.0\n"
+    )
+    saved, folder = tmp_path / "own.npz", str(model.folder)
+    given = [str(tmp_path / "own.toml"), "--folder", folder, "--json", "-", "--save", str(saved)]
+    assert cli.main(["plan", *given]) == 0
+    report, motion = json.loads(capsys.readouterr().out), st.Trajectory.load(saved)
+    length = report["design"]["tail_length"]
+    assert report["success"] and 0.16 <= length <= 0.24
+    assert motion.info["parameters"]["tail_length"] == length
+    assert report["start"]["tail"] == pytest.approx(motion.q[0, 7:], abs=1e-6)
+    assert set(report["design_slopes"]) == {"tail_length"}
+
+
+def test_a_scaled_scene_scales_its_ranges():
+    """By the parameter's unit: an inertia is a mass times a square of a length."""
+    manifest = rat().manifest | {"size": {"kg": 8.0, "m": 2.0, "s": 1.0}}
+    body = SimpleNamespace(manifest=manifest)
+    table = {"start": {"q": [0], "v": [0]}, "duration": 1}
+    inertias = [[1e-5, 1e-5, 1e-5], ["20 g mm^2", 1e-5, 1e-5]]
+    table["design"] = {"tail_length": ["10 cm", 0.2], "torso_inertia": inertias, "tale": 3}
+    found = arguments_for(body, table)["design"]
+    np.testing.assert_allclose(found["tail_length"], [0.2, 0.4])
+    np.testing.assert_allclose(found["torso_inertia"], [[32e-5] * 3, [64e-8, 32e-5, 32e-5]])
+    assert found["tale"] == 3
