@@ -25,7 +25,7 @@ WARNINGS = (
     "-Wshadow",
     "-Werror",
 )
-# As the runtime's profiles; fast lets the compiler fuse a * b + c.
+# Flags as in the runtime's profiles; `fast` lets the compiler fuse a * b + c.
 PROFILES = {
     "fast": ("-O2", "-ffp-contract=fast", "-fno-math-errno", "-fno-trapping-math"),
     "reproducible": ("-O2", "-ffp-contract=off"),

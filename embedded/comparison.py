@@ -17,8 +17,8 @@ BOUND = 1e4
 
 @dataclass(frozen=True)
 class Comparison:
-    """One function on a board: whether it gives the host's bits, its largest difference from the
-    host, and the cost of a call.
+    """One function on a board: whether its results equal the host's bit for bit, its largest
+    difference from the host, and the cost of a call.
     """
 
     name: str

@@ -12,8 +12,9 @@ from embedded.boards import HERE, PROFILES, WARNINGS, Board
 from embedded.states import stored_states
 
 LONGEST_REPORT = 3000  # characters of what a compiler says
-C_LINES = ("-std=gnu11", "-I", str(HERE))  # the harness alone: attributes, assembly
-# the start of cases.h, for all checks
+# for the harness only, which uses attributes and assembly
+C_LINES = ("-std=gnu11", "-I", str(HERE))
+# the start of cases.h in all checks
 CASE = """struct a_case {{
   const char *name;
   int (*call)(const real *state, real *outputs, real *work);

@@ -1,4 +1,4 @@
-"""Runs cppcheck over a model: its faults, and how often each MISRA C:2012 rule is hit."""
+"""Runs cppcheck on a model: its faults, and how often it breaks each MISRA C:2012 rule."""
 
 import re
 import shutil
@@ -21,7 +21,7 @@ def need() -> None:
 
 
 def summary(folder: Path) -> list[tuple[str, int]]:
-    """Return (rule, hits) of a model's source, the most frequent first: information, no verdict."""
+    """Return (rule, hits) of a model's source, the most frequent first; hits are no faults."""
     need()
     source = folder / "src" / f"{folder.name}.c"
     words = [*CPPCHECK, "--addon=misra", "-I", str(folder / "include"), str(source)]
@@ -31,7 +31,7 @@ def summary(folder: Path) -> list[tuple[str, int]]:
 
 
 def faults(folder: Path) -> str:
-    """Return what cppcheck's own checks find in a model's source: nothing, where it is clean."""
+    """Return what cppcheck's own checks find in a model's source; an empty result is a pass."""
     need()
     source = folder / "src" / f"{folder.name}.c"
     words = [

@@ -10,8 +10,8 @@ from embedded.boards import BOARDS, HERE, PROFILES, WARNINGS, Board
 from embedded.image import BARE, C_LINES, CASE, Image, command, compiled, manifest_of
 from embedded.results import run
 
-TIMES = (0.0, 0.1, 0.2)  # s, of the ticks
-SHOWN = 4  # times of each tick's torques
+TIMES = (0.0, 0.1, 0.2)  # s, times of the ticks
+SHOWN = 4  # number of times at which the torques of a tick are read
 HEAD = (
     """/* States at which ticks are computed: t, then q, v, then q, v of the next tick. */
 #ifndef CASES_H
@@ -96,7 +96,9 @@ class Ticks:
 
 
 def states_of(mpc: st.Mpc) -> np.ndarray:
-    """Return rows (t, q, v, q, v): a plan's motion at ticks and those after, turned otherwise."""
+    """Return rows (t, q, v, q, v): states of a plan at a tick and one period later, each with
+    0.1 rad/s more about the torso's x axis.
+    """
     period, motion = 1 / mpc.settings.rate, mpc.plan.trajectory
     rows = []
     for t in TIMES:

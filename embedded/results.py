@@ -8,7 +8,7 @@ import numpy as np
 
 from embedded.image import Image, sizes
 
-PATIENCE = 120  # s
+PATIENCE = 120  # s, longest run of an image
 
 
 @dataclass(frozen=True)

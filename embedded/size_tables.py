@@ -23,7 +23,8 @@ TAILS = ((1, 3), (3, 4), (6, 4), (1, None), (3, None))  # segments, links; None:
 FUNCTIONS = ("mass_matrix", "forward_dynamics", "pfl", "contact_dynamics")
 DERIVATIVES = "forward_dynamics_derivatives"
 STRAIGHT_DERIVATIVES = ((1, 3), (1, None))
-IMPLICIT = ("implicit_factor", "implicit_solve")  # hand on what has no meaning of its own
+# the first one gives factors without a meaning of their own to the second one
+IMPLICIT = ("implicit_factor", "implicit_solve")
 CONTACTS = ["feet", "tail"]
 REAL = {"m4": "float", "m7": "double"}
 HEAD = (
@@ -75,7 +76,7 @@ def made(parent: Path, tail: tuple, form: str, real: str) -> Path:
     ]
     wanted += (
         ["implicit"] if form == "loops" else []
-    )  # written out, every point is computed, in the ground or not
+    )  # without loops, every point is computed, in the ground or not
     options = {"functions": wanted, "contacts": CONTACTS, "emission": form, "real": real}
     scene = scene_for("articulated" if tail[1] else "continuum", *tail, **options)
     generate(scene, parent / form / real)

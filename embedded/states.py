@@ -46,7 +46,7 @@ def _drawn(rng: np.random.Generator, name: str, shape: tuple[int, int]) -> np.nd
 
 
 def _configurations(rng: np.random.Generator, shape: tuple[int, int]) -> np.ndarray:
-    """Close to the ground, tilted by up to about 1 rad, each tail coordinate up to 1.2 rad."""
+    """Return q close to the ground, tilted by up to about 1 rad, tail coordinates up to 1.2 rad."""
     q = rng.uniform(-1.2, 1.2, shape)
     q[:, :3] = rng.uniform(0.01, 0.03, (shape[0], 3))
     quaternions = np.array([1, 0, 0, 0]) + rng.uniform(-0.5, 0.5, (shape[0], 4))

@@ -92,7 +92,7 @@ def tracked(rat: st.Model, plan: st.Plan) -> st.Trajectory:
 
 
 def row(plan: st.Plan) -> dict:
-    """What the studies tell of a plan."""
+    """Return the numbers of a plan that the studies report."""
     names = (
         "converged",
         "success",

@@ -15,14 +15,14 @@ from .recorded import Recorder
 from .sample import part_of
 
 GOLDEN = "tests/house/test_golden.py"
-STARTING = 40.0  # s that a process of tests may take above its tests
-SLOWER = 6.0  # times that a mutant's tests may take
+STARTING = 40.0  # s that a process may take in addition to its tests
+SLOWER = 6.0  # factor by which a mutant's tests may be slower
 FIRST = 15.0  # s of tests that the first process of a mutant runs; each other four times as many
 LONGEST = 1200.0  # s of tests after which a mutant has survived
 
 
 class NotLoaded(Exception):
-    """Tests failed for another reason than the mutant, which was never loaded."""
+    """Tests failed although the mutant was never loaded: it is not the reason."""
 
 
 class Tree:
@@ -50,7 +50,7 @@ class Tree:
             shutil.copy2(tree.BASE / mutation.path, self.root / mutation.path)
 
     def golden(self, mutation: Mutation) -> bool:
-        """Tell if the golden models would show a mutant in the generator."""
+        """Tell if a mutant in the generator changes the golden models."""
         self._plant(mutation, mutation.of((tree.BASE / mutation.path).read_bytes()))
         try:
             return bool(self._failed(mutation, [GOLDEN]))
@@ -70,13 +70,13 @@ class Tree:
         for kept in ("cache", "objects", *models):
             made = tree.BASE / ".build" / kept
             if made.exists():
-                with contextlib.suppress(shutil.Error):  # what is being made there vanishes
+                with contextlib.suppress(shutil.Error):  # files in use may vanish
                     hidden = shutil.ignore_patterns(".*", "*.part")
                     shutil.copytree(made, self.root / ".build" / kept, ignore=hidden)
         (self.root / ".build").mkdir(exist_ok=True)
         file = self.root / mutation.path
         file.write_bytes(marked(mutation, self._witness, mutated))
-        moment = 1_000_000_000 + int(mutation.key[:7], 16)  # no bytecode is of this second
+        moment = 1_000_000_000 + int(mutation.key[:7], 16)  # no bytecode has this time
         os.utime(file, (moment, moment))
 
     def _noticed(
@@ -104,13 +104,13 @@ class Tree:
         return None
 
     def _believed(self, by: str, tests: list[str]) -> bool:
-        """Tell if what noticed a mutant is known to notice nothing without it."""
+        """Tell if the test that noticed a mutant is known to pass without it."""
         return by in self.recorder.trusted or by not in tests
 
     def _failed(
         self, mutation: Mutation, tests: list[str], patience: float = 1.0
     ) -> tuple[str, str] | None:
-        """Run tests; return which failed first and what it said."""
+        """Run tests; return the first one that failed, and its message."""
         orders, verdict = self.root / ".build" / "orders", self.root / ".build" / "verdict"
         verdict.unlink(missing_ok=True)
         told = {"witness": str(self._witness), "verdict": str(verdict), "mark": mutation.key}
@@ -133,19 +133,19 @@ class Tree:
 
 
 def late(found: tuple[str, str]) -> bool:
-    """Tell if tests, or one of them, only took too long."""
+    """Tell if a failure only means that tests took too long."""
     return found[0] == "timeout" or "from pytest-timeout" in found[1]
 
 
 def marked(mutation: Mutation, witness: Path, source: bytes) -> bytes:
-    """Return a file that says it was loaded, its lines where they were."""
+    """Return a source that reports that it was loaded; its lines keep their numbers."""
     if not mutation.path.endswith(".py"):
         return source + b"{# %s #}" % mutation.key.encode()
     return with_first(source, f"open({str(witness)!r}, 'w').close()")
 
 
 def packed(recorder: Recorder, mutation: Mutation, most: float) -> Iterator[list[str]]:
-    """Yield the tests that run a mutated line, so many for each process as it should run."""
+    """Yield the tests that run a mutated line, in groups for one process each."""
     pack: list[str] = []
     limit, spent = FIRST, 0.0
     for tests in rows(recorder, mutation):
@@ -176,7 +176,7 @@ def rows(recorder: Recorder, mutation: Mutation) -> Iterator[list[str]]:
 
 
 def nearby(path: str, file: str) -> bool:
-    """Tell if a file of tests is of the room, or of the concept, of a source."""
+    """Tell if a file of tests belongs to the room or to the concept of a source."""
     source, test = (words(Path(p)) for p in (path, file))
     return bool(source & test)
 

@@ -1,4 +1,4 @@
-"""A mutation: one small change of one source file, and what is known of it afterwards."""
+"""A mutation: one small change of one source file."""
 
 import hashlib
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ class Mutation:
     after: str
     text: str
     change: str  # "a < b -> a <= b"
-    nth: int = 0  # of equal changes on equal lines of a file
+    nth: int = 0  # number among equal changes on equal lines of a file
 
     @property
     def key(self) -> str:

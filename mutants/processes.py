@@ -1,4 +1,4 @@
-"""Processes of tests, which end with all that they started."""
+"""Runs processes of tests; when one ends, so do all processes that it started."""
 
 import contextlib
 import os
@@ -8,7 +8,7 @@ from pathlib import Path
 
 
 def run(words: list[str], cwd: Path, env: dict, limit: float) -> tuple[int | None, str]:
-    """Return a process's status, None if it took too long, and its output; end what it started."""
+    """Run a process; return its status, or None if it took too long, and its output."""
     process = subprocess.Popen(
         words,
         cwd=cwd,

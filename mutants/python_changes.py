@@ -1,5 +1,5 @@
-"""What a mutation may make of a node of Python's syntax: comparisons, arithmetic, constants, calls,
-returns, deleted statements.
+"""The changes that a mutation may make to a node of Python's syntax: comparisons, arithmetic,
+constants, calls, returns, deleted statements.
 """
 
 import ast
@@ -32,7 +32,8 @@ ARITHMETIC = {
     ast.LShift: ast.RShift,
     ast.RShift: ast.LShift,
 }
-SAFE = {"encoding", "strict", "help", "metavar", "prog", "description"}  # words; checks of zip
+# arguments that are texts for people, and the check of zip
+SAFE = {"encoding", "strict", "help", "metavar", "prog", "description"}
 TEXT = (ast.JoinedStr,)
 
 

@@ -1,4 +1,4 @@
-"""The mutations of a Python file: of all that runs, not of what only tells: docstrings, types, the
+"""The mutations of a Python file. Only code that runs is mutated, not docstrings, types or the
 words of messages.
 """
 
@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from .mutation import Mutation
 from .python_changes import changes, negated
 
-WIDEST = 70  # columns of a change that is told
+WIDEST = 70  # columns of a change in a report
 
 
 def mutations(path: str, source: bytes) -> Iterator[Mutation]:
@@ -26,7 +26,7 @@ def mutations(path: str, source: bytes) -> Iterator[Mutation]:
 
 
 def conditions(node: ast.AST) -> Iterator[tuple[ast.AST, ast.AST]]:
-    """Yield a condition and its opposite, where no comparison in it would give the same."""
+    """Yield a condition and its opposite, unless a changed comparison in it gives the same."""
     if isinstance(node, ast.If) and not isinstance(node.test, ast.Compare | ast.UnaryOp):
         yield node.test, negated(node.test)
 
@@ -41,7 +41,7 @@ def running(node: ast.AST) -> Iterator[ast.AST]:
 
 
 def telling(parent: ast.AST, field: str, child: ast.AST) -> bool:
-    """Tell if a part of a node only tells: types, names, decorators, words."""
+    """Tell if a part of a node is only information: types, names, decorators, words."""
     if field in {"annotation", "returns", "decorator_list", "bases", "type_params", "format_spec"}:
         return True
     if isinstance(child, ast.JoinedStr | ast.Import | ast.ImportFrom):
@@ -56,7 +56,7 @@ def telling(parent: ast.AST, field: str, child: ast.AST) -> bool:
 
 
 def is_error(call: ast.Call) -> bool:
-    """Tell if a call makes an exception: what it is given are words."""
+    """Tell if a call makes an exception, whose arguments are words."""
     name = ast.unparse(call.func).split(".")[-1]
     return name.endswith("Error") or name in {"refusal", "refused", "error", "warn"}
 
@@ -70,7 +70,7 @@ def line_starts(source: bytes) -> list[int]:
 
 
 def short(text: str) -> str:
-    """Return a text on one line, its middle left out where it is long."""
+    """Return a text on one line; if it is long, without its middle."""
     line = " ".join(text.split())
     half = WIDEST // 2
     return line if len(line) <= WIDEST else f"{line[:half]} ... {line[-half:]}"

@@ -28,13 +28,13 @@ current = [""]  # the context of the lines that run now
 
 
 def entered(context: str) -> None:
-    """Let the lines from now on be of a test or of a scene."""
+    """Assign all lines that run from now on to a test or to a scene."""
     current[0] = context
     tracer.switch_context(context)
 
 
 def noted(scene):
-    """Note the scene whose folder a test asks for."""
+    """Record the scene whose folder a test asks for."""
     scenes.add(models.digest(repr(scene)))
     return folder_of(scene)
 

@@ -14,7 +14,7 @@ from . import tree
 from .mutation import Mutation
 from .processes import run
 
-# They compare texts, or tell of documents, mutants and make: a change of a text is no fault.
+# They compare texts, or check documents, mutants and make: a change of a text is no fault.
 NO_JUDGES = {
     "tests/house/test_architecture.py",
     "tests/house/test_benchmark_targets.py",
@@ -50,7 +50,7 @@ class Recorder:
         self.place.mkdir(parents=True, exist_ok=True)
         self.locks, self.known = defaultdict(Lock), {}
         self.trusted: set[str] = set()  # tests that failed for a mutant and passed without it
-        self.distrusted: set[str] = set()  # that fail without it as well, now and then
+        self.distrusted: set[str] = set()  # tests that sometimes fail without it, too
 
     def files(self) -> list[str]:
         """Return all files of tests that may judge."""
@@ -59,7 +59,7 @@ class Recorder:
         return [name for name in names if name not in NO_JUDGES]
 
     def cost(self, file: str) -> float:
-        """Return how long a file takes; infinity where it was not recorded yet."""
+        """Return how long a file takes (s); infinity if it is not recorded yet."""
         if file not in self.known and not self._kept(file).exists():
             return float("inf")
         return sum(test["seconds"] for test in self.of(file).tests.values())
@@ -98,7 +98,7 @@ class Recorder:
 
     @cache  # noqa: B019 - there is one recorder
     def scene(self, scene: str) -> dict[str, list[int]] | None:
-        """Return the lines that run while a scene is generated; None where that was not seen."""
+        """Return the lines that run while a scene is generated; None if that is not recorded."""
         kept = self._scene(scene)
         return json.loads(kept.read_text()) if kept.exists() else None
 
@@ -111,7 +111,7 @@ class Recorder:
         good = set(record.passed)
         direct = [name for name, lines in here.items() if name in good and touches(lines, span)]
         if not span & ran_when_called(mutation.path):
-            # a line of no function: whoever runs any line of the file
+            # the line is in no function: every test that runs any line of the file
             direct = [name for name in here if name in good] or (record.passed if here else [])
         if any(self._generates(scene, mutation.path, span) for scene in record.scenes):
             return [direct, [name for name in record.passed if name not in direct]]

@@ -22,11 +22,11 @@ class Verdict:
     mutation: Mutation
     killed: bool
     by: str  # the test that failed first, or "timeout"
-    words: str  # what it said; of a survivor, what else is known
+    words: str  # its message; for a survivor, a remark
     tests: int  # that ran
     seconds: float
     source: str  # digest of the file
-    state: str  # fingerprint of all that decides
+    state: str  # digest of everything on which the verdict depends
 
 
 def keep(verdict: Verdict) -> None:
@@ -56,7 +56,7 @@ def arguments() -> list[dict]:
 
 
 def argument(mutation: Mutation, argued: Iterable[dict]) -> str:
-    """Return why a mutant changes nothing that matters; "" if no reason is given."""
+    """Return the reason why a mutant changes nothing that matters; "" if none is given."""
     for entry in argued:
         if (entry["file"], entry["line"], entry["change"]) == (
             mutation.path,
@@ -96,7 +96,7 @@ def report(verdicts: list[Verdict]) -> str:
 
 
 def score(verdicts: list[Verdict]) -> float:
-    """Return the part of the mutants that were noticed, of those that could be, in percent."""
+    """Return how many percent of the mutants that can be noticed were noticed."""
     argued = arguments()
     counted = [v for v in verdicts if v.killed or not argument(v.mutation, argued)]
     return 100 * sum(v.killed for v in counted) / max(1, len(counted))

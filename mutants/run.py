@@ -1,5 +1,5 @@
 """`make mutants`: runs a sample of mutants, each against the tests that run its line; prints a
-score and the survivors. It may be interrupted, and goes on where it was.
+score and the survivors. After an interruption the same command goes on.
 """
 
 import argparse
@@ -92,12 +92,12 @@ def all_judged(sample: list[Mutation], state: str, jobs: int) -> Iterator[Verdic
     try:
         for done in as_completed([pool.submit(one, mutation) for mutation in waiting]):
             yield done.result()
-    finally:  # on Ctrl-C those that run now are ended, and the others left
+    finally:  # on Ctrl-C, end the running ones and start no others
         pool.shutdown(cancel_futures=True)
 
 
 def main(options: argparse.Namespace) -> int:
-    """Run the sample; 1 where fewer than wanted were noticed."""
+    """Run the sample; return 1 if too few mutants were noticed."""
     os.nice(5)
     tree.snapshot()
     state = tree.state(tests=True)

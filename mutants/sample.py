@@ -1,5 +1,5 @@
-"""Which mutations are run: a sample of all, drawn by a seed, in equal parts of the generator's
-Python, of its templates and of the runtime.
+"""Draws a sample of all mutations by a seed, in equal parts from the generator's Python, from its
+templates and from the runtime.
 """
 
 import hashlib

@@ -41,7 +41,7 @@ NUMBER = re.compile(rb"(?<![\w.])\d+(?:\.\d+)?(?:e-?\d+)?(?![\w.])")
 NOT = re.compile(rb"!(?=[\w(])")
 CONDITION = re.compile(rb"(?<=\bif \()(.+)(?=\) \{$)", re.MULTILINE)
 BRANCH = re.compile(rb"(?<=\{% if )(.+?)(?= %\})")
-# an assignment to what was declared before, or a call: not a declaration, not a return
+# an assignment to a declared variable, or a call; no declaration and no return
 STATEMENT = re.compile(
     rb"^[ \t]*((?:\*?[\w.\[\]>{}-][^=;\n(]*(?: [-+*/|&]?= )[^;\n]+|[\w{} ]+\([^;\n]*\));)$",
     re.MULTILINE,
@@ -63,7 +63,7 @@ def mutations(path: str, source: bytes) -> Iterator[Mutation]:
 
 
 def changes(source: bytes) -> Iterator[tuple[int, int, bytes]]:
-    """Yield what may stand in place of which bytes."""
+    """Yield spans of bytes and their replacements."""
     filters = [match.span() for match in PIPE.finditer(source)]
     for match in OPERATOR.finditer(source):
         if not (match[0] == b" | " and any(a < match.start() < b for a, b in filters)):
@@ -82,7 +82,7 @@ def changes(source: bytes) -> Iterator[tuple[int, int, bytes]]:
 
 
 def mutation(path: str, source: bytes, start: int, end: int, after: bytes) -> Mutation:
-    """Return a mutation with the line and the change as told."""
+    """Return a mutation with its line and its change in words."""
     line = source.count(b"\n", 0, start) + 1
     text = source.split(b"\n")[line - 1].decode().strip()
     change = f"{short(source[start:end].decode())} -> {short(after.decode()) or '(nothing)'}"

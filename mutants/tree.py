@@ -1,4 +1,4 @@
-"""Copies of the sources in which mutants run: the checkout itself is never changed."""
+"""Makes copies of the sources in which mutants run; the checkout itself is never changed."""
 
 import hashlib
 import os
@@ -10,7 +10,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 PLACE = ROOT / ".build" / "mutants"
 BASE = PLACE / "base"  # the checkout as it was when the run began
-BUILT = (Path("runtime/serpentail/viewer/page.html"),)  # which git does not know, and tests need
+BUILT = (Path("runtime/serpentail/viewer/page.html"),)  # git ignores it, and tests need it
 LONGEST_TEST = 120  # s that one test may take
 JUDGED_BY = ("codegen", "runtime", "tests", "stress", "scenes", "pyproject.toml")
 
@@ -23,7 +23,7 @@ def sources() -> list[Path]:
 
 
 def snapshot() -> None:
-    """Make the base as the checkout is now; what was built there stays."""
+    """Update the base to the present checkout; files that were built in it stay."""
     BASE.mkdir(parents=True, exist_ok=True)
     for entry in BASE.iterdir():
         if entry.name != ".build":
@@ -37,7 +37,7 @@ def snapshot() -> None:
 
 
 def planted(name: str) -> Path:
-    """Copy the base to a tree of this name, without what is built; return its root."""
+    """Copy the base, without built files, to a tree of this name; return its root."""
     tree = PLACE / name
     shutil.rmtree(tree, ignore_errors=True)
     return shutil.copytree(BASE, tree, ignore=shutil.ignore_patterns(".build"))

@@ -14,7 +14,7 @@ get_source = PackageLoader.get_source
 
 
 def watched(loader, environment, template):
-    """Load a template; leave the witness when it is the mutant."""
+    """Load a template; if it is the mutant, note that it was loaded."""
     found = get_source(loader, environment, template)
     if ORDERS["mark"] in found[0]:
         WITNESS.touch()
@@ -42,7 +42,7 @@ def pytest_runtest_logreport(report):
 
 
 def pytest_collectreport(report):
-    """A file of tests that cannot be imported has noticed the mutant too."""
+    """Count a file of tests that cannot be imported as one that noticed the mutant."""
     if report.failed and not VERDICT.exists():
         words = {"by": report.nodeid, "words": str(report.longrepr)[-300:]}
         VERDICT.write_text(json.dumps(words))

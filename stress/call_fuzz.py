@@ -13,8 +13,8 @@ import serpentail as st
 
 from .wrong_values import values
 
-SECONDS = 20  # that a call may take
-PIECES = 20  # of a message that tell it from another
+SECONDS = 20  # s that a call may take
+PIECES = 20  # characters of a message by which faults are told apart
 
 
 @dataclass(frozen=True)
@@ -151,7 +151,7 @@ def fuzz(found: list[Target], count: int, seed: int) -> list[Fault]:
     before = signal.signal(signal.SIGALRM, _too_long)
     try:
         with warnings.catch_warnings():
-            # any other is a fault where warnings are errors
+            # any other warning is a fault if warnings are errors
             warnings.simplefilter("ignore", st.UnlikeBodies)
             warnings.simplefilter("ignore", st.UnusualSize)
             for _ in range(count):

@@ -18,7 +18,7 @@ METHODS = {
     "dop853": 8,
 }  # drops each
 DURATION = 0.5  # s
-GAIN = 1e-6  # of the energy at the start: what integration may add
+GAIN = 1e-6  # gain of energy by integration that is allowed, relative to the energy at the start
 RANGE = "bent beyond the scene's bend_range"
 
 
@@ -72,7 +72,7 @@ def gain(motion: st.Trajectory) -> float:
 
 
 def measured() -> list[Figure]:
-    """Return the largest gain, and the share of drops refused, by tail and method."""
+    """Return the largest gain, and the number of refused drops, by tail and method."""
     found = []
     for size in ((1, 3), (1, None)):
         model = falling(*size)

@@ -36,7 +36,7 @@ def cases(size: tuple[int, int | None]) -> dict[str, dict]:
 
 
 def measured() -> list[Figure]:
-    """Return errors by case, over bent and straight tails."""
+    """Return the errors of each case, for a bent and a straight tail."""
     rng, found = np.random.default_rng(6), []
     for size in ((1, 1), (1, 3), (3, 4), (1, None), (3, None)):
         of = subject(*size)

@@ -29,7 +29,7 @@ WATCHED = (
     "--leak-check=full",
     "--errors-for-leak-kinds=definite",
 )
-BARE, BATCH, ROWS = 0, 1, 2  # a function, its batch, its batch side by side
+BARE, BATCH, ROWS = 0, 1, 2  # forms of a function: one state, a batch, a batch in lanes
 NUMBERS = (
     np.nan,
     np.inf,
@@ -47,7 +47,7 @@ NUMBERS = (
     0.0,
 )
 STATUSES = {0, 1, 2, 3}
-ENDS = STATUSES | {33, 34, 38}  # of runs: steps too small, too many, too long
+ENDS = STATUSES | {33, 34, 38}  # and statuses of runs: steps too small, too many, too long
 
 
 @dataclass(frozen=True)
@@ -147,7 +147,7 @@ def every(model: st.Model, seed: int) -> list[Case]:
     many, found = model.manifest["batch"]["work"], []
     several = (
         model.manifest["batch"]["states"] + 3
-    )  # more than are taken side by side at once, no multiple of that
+    )  # more states than lanes, and no multiple of the lanes
     for number, (name, lengths, inputs) in enumerate(shapes(model)):
         names = [a["name"] for a in model.manifest["functions"][name]["inputs"]]
         for given, parameters, refused in states(model, names, lengths[:inputs], rng):
@@ -200,7 +200,7 @@ def states(
         for number in NUMBERS:
             given = good(model, names, lengths, rng, rng.uniform(-1, 1, nt))
             given[where][rng.integers(lengths[where])] = number
-            # of factors not all are read
+            # not all factors are read
             yield given, vector, not np.isfinite(number) and names[where] != "factors"
     if names[0] == "q":
         for number in NUMBERS:
@@ -209,7 +209,7 @@ def states(
                 vector,
                 not np.isfinite(number),
             )
-        yield [np.zeros(length) for length in lengths], vector, True  # no quaternion
+        yield [np.zeros(length) for length in lengths], vector, True  # its quaternion is zero
 
 
 def good(

@@ -28,8 +28,8 @@ Parts = dict[str, Callable[[], list[Figure]]]
 
 
 def fuzzed(count: int) -> list[Figure]:
-    """Return how many random calls, and how many mutated scene files, ended without an answer
-    or a refusal.
+    """Return how many random calls, and how many mutated scene files, ended with neither an
+    answer nor a refusal.
     """
     found = []
     with tempfile.TemporaryDirectory() as name, warnings.catch_warnings():

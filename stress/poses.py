@@ -67,8 +67,8 @@ def of_sweep(points: list[Point]) -> list[Figure]:
 
 
 def folds(of: Subject) -> dict[str, np.ndarray]:
-    """Return tail coordinates by name: joints folded back at pi, segments coiled by 2 pi, half
-    turns in turn.
+    """Return tail coordinates by name: joints folded back by pi, and segments coiled by 2 pi, all
+    in one direction or in alternating directions.
     """
     size, links = of.model.nv - 6, of.model.links or 1
     turns = np.resize([1.0, -1.0], size)
@@ -110,8 +110,8 @@ def fast() -> list[Figure]:
 
 
 def attitudes() -> list[Figure]:
-    """Return by how much a quaternion's norm changes H, C and v_dot: it may have any norm whose
-    square is a number.
+    """Return the errors of H, C and v_dot for quaternions of many norms: every norm is allowed
+    whose square is a finite number above 0.
     """
     rng, found = np.random.default_rng(4), []
     for size in ((1, 3), (3, None)):

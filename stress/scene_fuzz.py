@@ -78,8 +78,8 @@ def faults(
     """Return what so many mutated files raised besides refusals, read by the generator and by each
     verb of the runtime.
 
-    model: one that motions of files with a table [simulate] are made ready for, whatever model they
-    name.
+    model: the model for which motions of files with a table [simulate] are prepared, whatever model
+    they describe.
     """
     found, sources = [], [path.read_bytes() for path in files]
     path = folder / "mutated.toml"
@@ -108,8 +108,8 @@ def generated(path: Path) -> None:
 
 
 def refused(verb: str, path: Path) -> None:
-    """Plan or simulate a scene whose folder holds no model: the file is read, the folder
-    refused.
+    """Plan or simulate a scene with a folder that has no model: the file must be read and the
+    folder refused.
     """
     empty = path.parent / "empty"
     empty.mkdir(exist_ok=True)
@@ -120,7 +120,7 @@ def refused(verb: str, path: Path) -> None:
 
 
 def made_ready(model: st.Model, path: Path) -> None:
-    """Make a scene's motion ready, from where it starts: to settle takes as long as it takes."""
+    """Prepare a scene's motion from its start, without settling, which may take long."""
     with contextlib.suppress(st.SerpentailError):
         tables, _ = read_scene(path, st.SimulationError)
         table = subtable(tables, "simulate", path, st.SimulationError)

@@ -12,7 +12,7 @@ THREADS, JOBS = 8, 64
 
 
 def job(model: st.Model, seed: int) -> np.ndarray:
-    """Return the numbers of calls, a batch, other parameters and a drop of one seed."""
+    """Return the results of one seed: calls, a batch, a call with other parameters, and a drop."""
     rng = np.random.default_rng(seed)
     q, v = drops.start(model, rng)
     tau, other = np.zeros(model.nv - 6), model.with_parameters(gravity=rng.uniform(0, 20))
@@ -25,8 +25,8 @@ def job(model: st.Model, seed: int) -> np.ndarray:
 
 
 def measured() -> list[Figure]:
-    """Return how many results differ in some bit, and that a refusal in one thread harms no
-    other.
+    """Return how many results differ in some bit while other threads get refusals, and how many
+    states with NaN are not refused.
     """
     model = drops.falling(1, 3)
     alone = [job(model, seed) for seed in range(JOBS)]
@@ -37,5 +37,5 @@ def measured() -> list[Figure]:
     harmed = sum(not isinstance(refusal.exception(), st.StateError) for refusal in refusals)
     return [
         Figure(f"{JOBS} jobs in {THREADS} threads: results that differ in a bit", differing, 0),
-        Figure(f"{JOBS} states that are no numbers: not refused", harmed, 0),
+        Figure(f"{JOBS} states with NaN: not refused", harmed, 0),
     ]

@@ -1,4 +1,4 @@
-"""`make stress`: drives models to their limits; writes figures, each with its limit, and plots."""
+"""`make stress`: tests models at their limits; reports each figure with its limit, and plots."""
 
 from examples import front
 

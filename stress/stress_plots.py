@@ -10,7 +10,7 @@ from stress.figures import Figure
 from stress.poses import Point
 from stress.subjects import PER_CONDITION
 
-LEAST = 1e-5  # share of a limit that is told from less
+LEAST = 1e-5  # smaller shares of a limit are drawn as this one
 
 
 def draw(found: dict[str, list[Figure]], swept: list[Point], folder: Path) -> None:
@@ -22,7 +22,7 @@ def draw(found: dict[str, list[Figure]], swept: list[Point], folder: Path) -> No
 
 
 def bends(swept: list[Point]) -> Page:
-    """Errors of H, C and v_dot, one place for each bend, one axes for each tail."""
+    """Draw errors of H, C and v_dot over the bend, in one diagram for each tail."""
     page = Page(figsize=(8, 6), layout="constrained")
     tails = list(dict.fromkeys(p.tail for p in swept))
     places = sorted({p.bend for p in swept})
@@ -45,7 +45,7 @@ def bends(swept: list[Point]) -> Page:
 
 
 def conditions(found: dict[str, list[Figure]]) -> Page:
-    """Errors of v_dot against the condition number of H, and their bound."""
+    """Draw errors of v_dot over the condition number of H, with their bound."""
     page = Page(figsize=(8, 4), layout="constrained")
     axes = page.subplots()
     for part, figures in found.items():
@@ -67,7 +67,7 @@ def conditions(found: dict[str, list[Figure]]) -> Page:
 
 
 def margins(found: dict[str, list[Figure]]) -> Page:
-    """How much of its limit each figure takes, by part."""
+    """Draw each figure as a share of its limit, by part."""
     page = Page(figsize=(8, 4), layout="constrained")
     axes = page.subplots()
     names = [name for name in found if any(f.limit > 0 for f in found[name])]

@@ -1,12 +1,16 @@
 """The models of the stress test, each with its exact reference."""
 
+import ctypes
+import tempfile
 import warnings
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 
 import serpentail as st
+from serpentail.model.toolchain import examine, run_command
 from stress.figures import Figure
 from tests.references.exact_chain import ExactChain
 from tests.references.exact_continuum import ExactContinuum
@@ -33,6 +37,7 @@ FUNCTIONS = [
 DIGITS, NODES = 30, 20
 EPS = float(np.finfo(float).eps)
 PER_CONDITION = 5e-15  # of v_dot, over the condition number of H with a unit diagonal
+SUM = "double sum(double a, double b, double c) { return a * b + c; }\n"
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,14 +58,31 @@ class Subject:
         """Rounding of H, in the units of its diagonal: what one body adds, and a little for each of
         a long chain.
         """
-        return EPS * (64 + self.links)
+        return EPS * (64 + self.links) * roundings()
 
     @property
     def solved_limit(self) -> float:
         """Error of v_dot over cond(H): 5e-15, and more where hundreds of links add up their
         rounding.
         """
-        return PER_CONDITION * (1 + self.links / 256)
+        return PER_CONDITION * (1 + self.links / 256) * roundings()
+
+
+@cache
+def roundings() -> int:
+    """Return how many roundings a * b + c has in compiled models: 1 if it is fused, else 2.
+
+    It is fused by optimising compilers for processors that can; `-O0` never fuses it.
+    """
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        compiler = examine("fast", folder)
+        (folder / "sum.c").write_text(SUM)
+        files = str(folder / "sum.c"), "-o", str(folder / "sum.so")
+        run_command((*compiler.command, *compiler.flags, "-shared", "-fPIC", *files))
+        function = ctypes.CDLL(folder / "sum.so").sum
+    function.restype, function.argtypes = ctypes.c_double, [ctypes.c_double] * 3
+    return 1 if function(1 + 2**-30, 1 - 2**-30, -1) else 2  # the product alone rounds to 1
 
 
 @dataclass(frozen=True)
@@ -101,7 +123,7 @@ def exact_of(model: st.Model):
 
 
 def changed(of: Subject, **parameters) -> Subject:
-    """Return a subject with other parameters, however unlike."""
+    """Return a subject with other parameters, without warnings about unlike sizes."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", st.UnlikeBodies)
         warnings.simplefilter("ignore", st.UnusualSize)

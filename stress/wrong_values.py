@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 
 
-@np.errstate(all="ignore")  # casts of what has no value of that type
+@np.errstate(all="ignore")  # casts of values that the type does not have
 def values(like, rng) -> list:
-    """Return things to give in place of an argument: wrong types, shapes, layouts and numbers, and
+    """Return values to give instead of an argument: wrong types, shapes, layouts and numbers, and
     right ones.
     """
     try:

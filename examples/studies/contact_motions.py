@@ -140,8 +140,8 @@ def study(folder: Path) -> None:
     print(table(rows))
     slowest = max(row["speed_m_s"] for row in fallen)
     loads = [row["load_over_weight"] for row in fallen]
-    carried = f"{min(loads):.3f} to {max(loads):.3f} weights carried"
-    print(f"{DROPS} random drops, after {DROPPED} s: at most {slowest:.2g} m/s, rolling; {carried}")
+    carried = f"the ground carries {min(loads):.3f} to {max(loads):.3f} times the weight"
+    print(f"{DROPS} random drops: after {DROPPED} s at most {slowest:.2g} m/s; {carried}")
     (folder / "contact.json").write_text(
         json.dumps({"scenes": rows, "drops": fallen}, indent=1), encoding="utf-8"
     )

@@ -174,7 +174,7 @@ def study(folder: Path, starts: int) -> None:
     }
     (folder / "summary.json").write_text(json.dumps(told, indent=1) + "\n")
     _draw(told, folder / "tilts.png")
-    print(f"{len(found)} true plans of {starts}; tilt at the end, deg: median, most")
+    print(f"{len(found)} true plans from {starts} starts; tilt at the end, deg: median, largest")
     print("| | " + " | ".join(LAWS) + " |\n|---" + "|---" * len(LAWS) + "|")
     for title, row in told.items():
         cells = (f"{np.median(row[name]):.2g}, {max(row[name]):.2g}" for name in LAWS)

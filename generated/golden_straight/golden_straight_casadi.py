@@ -447,7 +447,7 @@ def column_without_translation(com, column):
 
 
 def pair_without_translation(inverse_mass, column, other):
-    """What eliminating translation takes from H_kl: f_k . f_l / M."""
+    """Term that elimination of translation subtracts from H_kl: f_k . f_l / M."""
     t0 = column[0] * other[0] + column[1] * other[1]
     t1 = t0 + column[2] * other[2]
     return ([-(inverse_mass[0] * t1)],)

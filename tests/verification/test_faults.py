@@ -7,9 +7,10 @@ import pytest
 
 import serpentail as st
 from serpentail.verification import report as verify
-from serpentail.verification import states
+from serpentail.verification import states, value_laws
 from serpentail.verification.law import fastest
 from serpentail_codegen.functions.catalogue import CATALOGUE
+from tests.support.elastic import FUNCTIONS, elastic_model
 from tests.support.faults import (
     SLIGHT_FAULT,
     TAKING_MORE,
@@ -231,6 +232,28 @@ def test_faults_of_flight_break_the_laws_of_flight(model, monkeypatch, law, chan
 
     monkeypatch.setattr("serpentail.verification.value_laws.flight", flight)
     assert law in laws_broken(model)
+
+
+def test_faults_of_a_tail_with_stops_break_its_law_of_flight(monkeypatch):
+    """Energy of springs and stops that is off by 1e-4, momentum, and a slightly heavier fall."""
+    sound = elastic_model(2, 3, functions=FUNCTIONS)
+    name = "passive tails change energy by their damping alone"
+    (law,) = (law for law in verify.LAWS if law.name == name)
+    cases = list(states.states(sound))[::4]
+
+    def stored(result, *_):
+        kinetic, potential = result
+        return kinetic, potential * (1 + 1e-4)
+
+    for name, change in ((None, None), ("energy", stored), ("momentum", times(1 + 1e-4))):
+        model = broken(sound, name, change) if name else sound
+        assert verify.check(law, model, cases).passed == (name is None)
+
+    def flight(model, s, **settings):
+        return value_laws.flight(model.with_parameters(gravity=9.8 * (1 + 1e-4)), s, **settings)
+
+    monkeypatch.setattr("serpentail.verification.passive_laws.flight", flight)
+    assert not verify.check(law, sound, cases).passed
 
 
 def test_casadi_functions_that_are_slightly_wrong_fail(model):

@@ -58,8 +58,8 @@ def gather_segment(
     h: V3,
     I: V6,
 ) -> dict:
-    """Composite inertia at the root from what hangs at the tip, the momentum columns of a and b,
-    their block of H.
+    """Composite inertia at the root, from the composite inertia at the tip; momentum columns of a
+    and b, and their block of H.
     """
     # the blocks that Eq. 18 has for this segment and for all beyond, which its bend moves, too
     # what is beyond, from the tip to the root

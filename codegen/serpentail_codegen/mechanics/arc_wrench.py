@@ -20,7 +20,7 @@ def bending_rates(let, angles, rates) -> tuple:
 
 
 def relative_wrench(let, angles, rates, shape, w) -> tuple[Matrix, Matrix]:
-    """What bending adds at fixed rates: integrals of r_ddot over m L, of r x (2 w x r_dot + r_ddot)
+    """Terms of bending at fixed rates: integrals of r_ddot over m L, of r x (2 w x r_dot + r_ddot)
     over m L^2.
 
     r = -sigma y + gamma u; with N the integral of r r_dot^T, that of r x (w x r_dot) is tr(N) w -
@@ -190,9 +190,7 @@ def segment_power(
 
 
 def gather_segment_wrench(let, E: M33, r: V3, bend: V12, F: V6, torque_own: V2, F_next: V6) -> dict:
-    """Add what the next segment passes on, in this segment's root frame; generalised forces of a
-    and b.
-    """
+    """Add the next segment's wrench in this segment's root frame; generalised forces of a and b."""
     force, moment = let("force", E * F_next[0:3, :]), let("moment", E * F_next[3:6, :])
     torque = [bend[k : k + 3, :].dot(moment) + bend[k + 3 : k + 6, :].dot(force) for k in (0, 6)]
     total = Matrix([F[0:3, :] + force, F[3:6, :] + moment + r.cross(force)])

@@ -49,7 +49,7 @@ def position(let, p: V3, arm: V3) -> dict:
 
 
 def height(let, p: V3, arm: V3, velocity: V3) -> dict:
-    """How high a point is above the ground, and how fast it rises."""
+    """Height of a point above the ground, and the rate at which it rises."""
     return {"height": [p[2] + arm[2], velocity[2]]}
 
 
@@ -64,7 +64,7 @@ def leg_power(let, R: M33, drift: V3, force: V3) -> dict:
 
 
 def bristle_properties(let, K_f: V1, D_f: V1) -> dict:
-    """Damping D_f K_f of a bristle, and 1 over it."""
+    """Damping D_f K_f of a bristle, and its inverse."""
     return {"drag": D_f * K_f[0], "mobility": [let("mobility", 1 / (D_f[0] * K_f[0]))]}
 
 

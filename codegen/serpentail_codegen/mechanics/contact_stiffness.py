@@ -29,7 +29,7 @@ def plane_entries(matrix) -> list:
 
 
 def normal_slopes(let, K_n, D_n, depth, rate, f_n) -> tuple:
-    """d|f_n|/dz and d|f_n|/dz_dot of Eq. 36, 0 where nothing presses."""
+    """d|f_n|/dz and d|f_n|/dz_dot of Eq. 36; 0 if no force presses."""
     root = let("root", sqrt(guarded(let, depth, depth)))
     stiffness = let("k", K_n[0] * (root * 3 / 2 + D_n[0] * rate / (2 * root)))
     damping = let("d", K_n[0] * D_n[0] * root)
@@ -92,9 +92,7 @@ BOUND = {"cone": cone_bound, "box": box_bound, "smooth": smooth_bound, "paper": 
 
 
 def following_load(let, bound, pressing, mu, share) -> Matrix:
-    """g = mu df/d(bound), 0 where nothing presses; ``share`` 0 leaves it out, so that S is
-    symmetric.
-    """
+    """g = mu df/d(bound), 0 if no force presses; ``share`` 0 leaves it out: S is symmetric."""
     return let(
         "g", (bound * mu * share).applyfunc(lambda e: Piecewise((e, pressing > 0), (0, True)))
     )
@@ -150,7 +148,7 @@ def inverted(let, A) -> Matrix:
 
 
 def depth_of_point(let, p: V3, arm: V3) -> dict:
-    """How deep a point is in the ground."""
+    """Depth of a point in the ground."""
     return {"depth": [-(p[2] + arm[2])]}
 
 
@@ -185,8 +183,8 @@ def sliding(let, spring: V18) -> dict:
 
 
 def sheared_torso(let, R: M33, arm: V3, spring: V18) -> dict:
-    """J^T h and a J_z of one point for (p_dot, omega): S has their product, too, so it is not
-    symmetric.
+    """J^T h and a J_z of one point for (p_dot, omega). Their product is part of S, which is
+    therefore not symmetric.
     """
     R, h, lift = R.T, Matrix([spring[14], spring[15], 0]), Matrix([0, 0, spring[1]])
     push = Matrix([h, R * let("moment", arm.cross(h))])
@@ -194,7 +192,7 @@ def sheared_torso(let, R: M33, arm: V3, spring: V18) -> dict:
 
 
 def sheared_column(let, spring: V18, J_k: V3) -> dict:
-    """The same for one tail coordinate."""
+    """h . J_k and a J_z,k of one tail coordinate k."""
     return {"push": [spring[14] * J_k[0] + spring[15] * J_k[1]], "lift": [spring[1] * J_k[2]]}
 
 
@@ -214,13 +212,13 @@ def point_shift(let, shift: V3, turn: V3, arm: V3) -> dict:
 
 
 def tail_shift(let, J_k: V3, coupling: V1) -> dict:
-    """Contribution of one tail coordinate to it."""
+    """Contribution of one tail coordinate to the motion of a point."""
     return {"motion": J_k * coupling[0]}
 
 
 def contact_response(let, spring: V18, motion_q: V3, motion_v: V3, lag: V2) -> dict:
-    """Force on a point, w df, for right-hand sides of its place, velocity and bristle; ``pressed``:
-    its place's.
+    """Force on a point, w df, for right-hand sides of its place, velocity and bristle; ``pressed``
+    is the part of its place.
     """
     across = plane(spring[2:5]) * motion_v[0:2, :] + plane(spring[5:8]) * lag
     pressed = let("pressed", -spring[0] * motion_q[2])
@@ -257,7 +255,7 @@ def relaxation(let, D_f: V1, weight: V1) -> dict:
 
 
 def relaxed(let, relax: V1, lag: V2) -> dict:
-    """A bristle in the air."""
+    """Bristle in the air for a right-hand side: the relaxation times it."""
     return {"k_u": lag * relax[0]}
 
 
@@ -274,7 +272,7 @@ def damped(let, weight: V1, damping: V1) -> dict:
 
 
 def damped_response(let, damped: V1, rate: V1) -> dict:
-    """Its force for a right-hand side."""
+    """Force of the damping of one tail coordinate for a right-hand side."""
     return {"rhs": [-damped[0] * rate[0]]}
 
 

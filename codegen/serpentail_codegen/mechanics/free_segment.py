@@ -64,8 +64,8 @@ def own_inertia(
 
 
 def load_at_tip(let, A: V6, b: V1, coasting: V6) -> dict:
-    """Wrench that moves everything beyond a tip with the motion ``coasting``, which velocities
-    alone give: A a + b.
+    """Wrench A a + b that moves everything beyond a tip with the motion ``coasting``, which follows
+    from velocities alone.
     """
     total = b[0]
     for k in range(6):

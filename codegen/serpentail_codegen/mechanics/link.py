@@ -130,8 +130,8 @@ def turned_inertia(let, axes, turn, twice, I) -> Matrix:
 
 
 def with_link(let, mass, link, h, I) -> tuple[Matrix, Matrix]:
-    """First moment and inertia about this joint of one link and what hangs at its end, ``mass, h,
-    I`` at that end.
+    """First moment and inertia about this joint of one link and of the bodies at its end, whose
+    ``mass, h, I`` are about that end.
     """
     # the link's COM (Eq. 13) enters by its first moment b along -y
     _, length, b, Ix, Iy, Iz = link

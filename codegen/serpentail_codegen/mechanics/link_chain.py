@@ -62,7 +62,7 @@ def joined(
     yaw_beyond: V6,
     H_beyond: V3,
 ) -> dict:
-    """A chain and another one ``beyond``, whose base is the tip of the first, as one chain.
+    """Join two chains: the base of the chain ``beyond`` is the tip of the first one.
 
     The one beyond bends, and the first one carries it as a rigid body (Eqs. A5 to A8, 16).
     """
@@ -112,7 +112,9 @@ def joined(
 
 
 def chain_tip(let, E: M33, P: V3, S: V12) -> dict:
-    """What the tip's motion is made of, in its axes, as ``free_segment.tip_motion`` has it."""
+    """The quantities that determine the tip's motion, in its axes, as in
+    ``free_segment.tip_motion``.
+    """
     turn = E.T
     swept = Matrix.hstack(*(turn * axis.cross(P) for axis in (X, Y, Z)))
     columns = [turn * S[k : k + 3, :] for k in (3, 0, 9, 6)]
@@ -141,8 +143,8 @@ def chain_bias(
     H_pitch: V3,
     H_yaw: V3,
 ) -> dict:
-    """What velocities alone ask for: wrench at the base and torques on the coordinates; and what
-    they alone accelerate the tip by, in its axes.
+    """Terms of velocities alone: wrench at the base, torques on the coordinates, and acceleration
+    of the tip, in its axes.
 
     ``x_pitch`` and ``x_yaw`` are derivatives of x by alpha and beta.  The base turns with ``w``; it
     neither moves nor accelerates.  Lagrange: d(dT/dq_dot)/dt - dT/dq.
@@ -191,5 +193,5 @@ def chain_bias(
 
 
 def mass_of_links(let, link: V6, count: V1) -> dict:
-    """Mass of so many links."""
+    """Mass of a number of links."""
     return {"mass": [link[0] * count[0]]}

@@ -50,8 +50,8 @@ def gather_lanes(
     at_yaw: V1,
     F_lanes: V6,
 ) -> dict:
-    """Add a link's wrench and columns, read what its joint feels, and pass all on to the parent's
-    frame.
+    """Add a link's wrench and columns, read the torques of its joint, and pass all on to the
+    parent's frame.
     """
     turn_x, turn_z = joint_turns(joint)
     total = let("total", along_link(let, link[1], F_lanes) + at_bias[0] * F + at_yaw[0] * yaw)

@@ -39,8 +39,8 @@ def stop_force(
 
 
 def ways_into(let, lower, upper, width, angle) -> list[tuple]:
-    """Depth of a coordinate in the lower stop and in the upper one, in widths: up to one, and
-    beyond.
+    """Depth of a coordinate in the lower and in the upper stop, in widths: the part up to one
+    width, and the rest.
     """
     ways = []
     for way in (lower - angle, angle - upper):

@@ -22,8 +22,8 @@ def segment_trigonometry(let, angles: V2) -> dict:
 
 
 def polar_margins(let, angles: V2, bend_range: V1) -> dict:
-    """Positive where a segment is bent at all, and where it is bent by less than the declared
-    range, up to rounding.
+    """Positive if a segment is bent, and if it is bent by less than the declared range, up to
+    rounding.
     """
     square = let("square", angles[1] ** 2)
     limit = let("limit", bend_range[0] * bend_range[0] * Rational(10**12 + 1, 10**12))

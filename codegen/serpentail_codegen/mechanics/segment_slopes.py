@@ -30,7 +30,7 @@ def change_at_base(
     force_6: V3,
     force_7: V3,
 ) -> dict:
-    """Change of wrench and torques with the motion of the base: with accelerations by the segment's
+    """Change of wrench and torques with the motion of the base; accelerations act by the segment's
     own inertia.
     """
     w, w_dot, a = (motion[k : k + 3, :] for k in (0, 3, 6))
@@ -52,7 +52,7 @@ def change_at_tip(
     tip_4: V3,
     tip_5: V3,
 ) -> dict:
-    """Change of the tip's motion with that of the base: ``tip_0`` to ``tip_5`` are those of
+    """Change of the tip's motion with that of the base: ``tip_0`` to ``tip_5`` are the rows of
     (w_dot, a) by w, the rest is T.
     """
     w, w_dot, a = (motion[k : k + 3, :] for k in (0, 3, 6))
@@ -99,7 +99,7 @@ def accelerating_load(let, force: V3, moment: V3) -> dict:
 
 
 def mount_response(let, response: V6, tail_mount: V3) -> dict:
-    """Acceleration of the mount and its angular one, from (omega_dot, a) of the torso."""
+    """Acceleration and angular acceleration of the mount, from (omega_dot, a) of the torso."""
     w_dot, a = response[0:3, :], response[3:6, :]
     return {"base": Matrix([a + w_dot.cross(tail_mount), w_dot])}
 

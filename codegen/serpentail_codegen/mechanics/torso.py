@@ -117,7 +117,9 @@ def com_at_base(let, R: M33, p: V3, p_dot: V3, omega: V3, mass: V1, h: V3) -> di
 
 
 def com_of_coordinate(let, R: M33, inverse_mass: V1, column: V6, rate: V1) -> dict:
-    """Velocity of the COM per rate of one tail coordinate, R f_k / M; and what its rate adds."""
+    """Velocity of the COM per rate of one tail coordinate, R f_k / M, and the contribution of its
+    rate.
+    """
     J = let("J", R * column[0:3, :] * inverse_mass[0])
     return {"J_column": J, "velocity": J * rate[0]}
 

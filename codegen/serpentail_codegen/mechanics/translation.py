@@ -27,7 +27,7 @@ def column_without_translation(let, com: V3, column: V6) -> dict:
 
 
 def pair_without_translation(let, inverse_mass: V1, column: V6, other: V6) -> dict:
-    """What eliminating translation takes from H_kl: f_k . f_l / M."""
+    """Term that elimination of translation subtracts from H_kl: f_k . f_l / M."""
     return {"A_entry": [-inverse_mass[0] * column[0:3, :].dot(other[0:3, :])]}
 
 
@@ -60,19 +60,17 @@ def base_acceleration(
 
 
 def free_acceleration(let, inverse_mass: V1, com: V3, net: V3, w_dot: V3) -> dict:
-    """Acceleration of B, gravity taken off, of what a net force moves: net / M - omega_dot x c,
-    torso axes.
-    """
+    """Acceleration of B without gravity under a net force: net / M - omega_dot x c, torso axes."""
     return {"a": inverse_mass[0] * net - w_dot.cross(com)}
 
 
 def coupling_torque(let, column: V6, a: V3, w_dot: V3) -> dict:
-    """What accelerations of the torso add to the torque of one tail coordinate."""
+    """Contribution of accelerations of the torso to the torque of one tail coordinate."""
     return {"torque": [column[0:3, :].dot(a) + column[3:6, :].dot(w_dot)]}
 
 
 def turned_acceleration(let, R: M33, a: V3) -> dict:
-    """How p_b_ddot = R_b a - g z moves with a turn of the torso in body axes: columns R_b (e_k x
+    """Derivative of p_b_ddot = R_b a - g z by a turn of the torso in body axes: columns R_b (e_k x
     a), row by row.
     """
     columns = [R * axis.cross(a) for axis in (X, Y, Z)]
@@ -80,5 +78,5 @@ def turned_acceleration(let, R: M33, a: V3) -> dict:
 
 
 def turning_acceleration(let, R: M33, a: V3, turn: V3, p_ddot: V3) -> dict:
-    """Add what a turn of the torso in body axes does to p_b_ddot = R_b a - g z."""
+    """Add the change of p_b_ddot = R_b a - g z with a turn of the torso in body axes."""
     return {"p_ddot": p_ddot + R * let("swept", turn.cross(a))}

@@ -17,9 +17,7 @@ def turned_back(let, vector: V3, turn: V3) -> dict:
 
 
 def turning_force(let, R: M33, force: V3, turn: V3, change: V3) -> dict:
-    """Change of a force in world axes that is ``force`` in torso axes, where its change is
-    given.
-    """
+    """Change of a force in world axes with a turn, from the force and its change in torso axes."""
     return {"change": R * let("both", change + turn.cross(force))}
 
 

@@ -794,7 +794,7 @@ STEP golden_loops_column_without_translation(const real *com, const real *column
   A_row_out[2] = t5;
 }
 
-/* What eliminating translation takes from H_kl: f_k . f_l / M. */
+/* Term that elimination of translation subtracts from H_kl: f_k . f_l / M. */
 STEP golden_loops_pair_without_translation_add_A_entry(const real *inverse_mass, const real *column, const real *other, real *A_entry_out)
 {
   const real t0 = column[0] * other[0] + column[1] * other[1];

@@ -1307,7 +1307,7 @@ STEP golden_loops_column_without_translation_rows_of_8(const real *com, const re
   }
 }
 
-/* What eliminating translation takes from H_kl: f_k . f_l / M. */
+/* Term that elimination of translation subtracts from H_kl: f_k . f_l / M. */
 STEP golden_loops_pair_without_translation_rows_of_8_add_A_entry(const real *inverse_mass, const real *column, const real *other, real *A_entry_out, int count)
 {
   for (int c = 0; c < count; c += LANES) {

@@ -1,15 +1,18 @@
 """Laws of the passive tail: its springs, damping and stops, against the same tail without them."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from ..model.model import Model
+from ..model.parameters import total_mass
 from ..model.passive import PARTS, passive_force, stored_energy
 from .contact_laws import HEIGHT, bristles, legs, raised
-from .errors import relative, sensitivity
+from .errors import relative, rounding, sensitivity
 from .law import PIECEWISE, VALUE_LIMIT, Errors, Law, registry, rid_of
 from .states import State
+from .value_laws import flight
 
 LAWS: list[Law] = []
 law = registry(LAWS)
@@ -66,6 +69,30 @@ def torques_that_make_up_for_it_rid_a_tail_of_it(model: Model, s: State) -> Erro
     found = bare.inverse_dynamics(s.q, s.v, model.forward_dynamics(s.q, s.v, s.tau + own))
     scale = np.abs(own).max() + np.abs(expected).max() + np.abs(found).max()
     return relative(found, expected, scale)
+
+
+@law("rollout", "energy", "momentum", units=2000, floor=1e-6, only="passive")
+def passive_tails_change_energy_by_their_damping_alone(model: Model, s: State) -> Errors:
+    """In flight, momentum changes by - M g t and energy by the work of the tail's damping; springs
+    and stops store energy and give it back. The tail starts between its stops.
+    """
+    values, q = model.parameters, s.q.copy()
+    tail = np.clip(q[model.layout.tail_q], -1, 1)
+    if "tail_stop_lower" in values:
+        tail = np.clip(tail, values["tail_stop_lower"], values["tail_stop_upper"])
+    q[model.layout.tail_q] = tail
+    motion = flight(model, replace(s, q=q), rtol=max(1e-8, 200 * rounding(model)))
+    energy = motion.energy[-1] - sum(motion.info["work_J"].values())
+    size = np.max(motion.kinetic + np.abs(motion.potential))
+    error = {"energy": relative(energy, motion.energy[0], size)}
+    if model.fixed:
+        return error
+    weight = total_mass(values) * values["gravity"]
+    linear = motion.linear_momentum[0] - np.outer(motion.t, [0, 0, weight])
+    return error | {
+        "linear": relative(motion.linear_momentum, linear),
+        "angular": relative(motion.angular_momentum, motion.angular_momentum[0]),
+    }
 
 
 @law(

@@ -127,7 +127,9 @@ def center_of_mass_is_that_of_the_mass_matrix(model: Model, s: State) -> Errors:
 
 @law("momentum", "center_of_mass", units=VALUE_LIMIT)
 def momentum_is_mass_times_velocity_of_the_center_of_mass(model: Model, s: State) -> Errors:
-    """Momentum is the mass of the animal (of the tail, on a fixed base) times the COM's velocity."""
+    """Momentum is the mass times the velocity of the COM: of the animal, or of a tail on a fixed
+    base.
+    """
     velocity = model.center_of_mass(s.q, s.v)[1]
     return relative(total_mass(model.parameters) * velocity, model.momentum(s.q, s.v)[0])
 
@@ -157,17 +159,19 @@ def energy_changes_by_the_power_of_the_torques(model: Model, s: State) -> Errors
     return relative(power.sum(), rates @ (s.tau - damped), rate * largest.sum())
 
 
-def flight(model: Model, s: State) -> Trajectory:
+def flight(model: Model, s: State, **settings: Any) -> Trajectory:
     """Fly without torques, links turning at up to 10 rad/s: undamped tails whip, long ones more.
 
-    Where the model has contacts it flies above the ground, and its legs are held.
+    A model with contacts flies above the ground with its legs held. settings: method and
+    tolerance; without them 2000 steps of RK4.
     """
     q, v = s.q.copy(), 10 / fastest(model, s.v) * s.v
     if model.contacts:
         q[2] += CLEAR
     held: dict[str, Any] = {"legs": Legs.fixed(0.0, 0.0)} if "feet" in model.contacts else {}
     span = SWING if model.fixed else FLIGHT
-    motion = simulate(model, q, v, t_span=span, method="rk4", step=span / STEPS, **held)
+    settings = settings or {"method": "rk4", "step": span / STEPS}
+    motion = simulate(model, q, v, t_span=span, **held, **settings)
     assert isinstance(motion, Trajectory)  # one start, one motion
     return motion
 
