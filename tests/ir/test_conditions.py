@@ -104,12 +104,20 @@ def test_what_a_condition_of_lanes_decides_about_has_lanes():
     assert list(u) == [1, 0, 1]
 
 
-def test_c_refuses_constants_in_some_lanes_alone():
-    b = Builder("filled", "A constant under a condition.")
+@pytest.mark.parametrize(
+    ("kind", "record"),
+    [
+        ("Fill", lambda b, u: b.fill(u[0], 1)),
+        ("Guard", lambda b, u: b.guard(u[0], "OUT_OF_RANGE", u[0])),
+    ],
+)
+def test_c_refuses_what_cannot_be_done_in_some_lanes_alone(kind, record):
+    b = Builder("partly", "A statement under a condition.")
     x, u = b.array("x", 1, role="input"), b.array("u", 1, role="output")
+    b.copy(u[0], x[0])
     with b.when(x[0]):
-        b.fill(u[0], 1)
-    with pytest.raises(UnprintableStatement, match="cannot print Fill: constants cannot be"):
+        record(b, u)
+    with pytest.raises(UnprintableStatement, match=f"cannot print {kind}: it cannot be done"):
         in_loops(batched(b.finish(), 8), "double", "rat")
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ...ir.program import Apply, Ref, When
+from ...ir.program import Apply, Copy, Ref, When, statements
 from ..target import body_lines, refused
 from .routine import pointer, scalar, singles
 
@@ -14,6 +14,9 @@ if TYPE_CHECKING:
 
 def when_in_lanes(printer: LoopPrinter, when: When, condition: Ref) -> list[str]:
     """Print a body that runs if the condition holds in a lane, and stores in such lanes alone."""
+    for statement, _ in statements(when.body):
+        if not isinstance(statement, Apply | Copy):
+            raise refused(printer, statement, "it cannot be done in some lanes alone")
     outer, row = printer.where, condition.array.row
     name = f"where_{len(outer) + 1}"
     copy = f"{printer.helper('copy_rows')}({row}, {pointer(condition)}, {name});"

@@ -22,7 +22,7 @@ from ...ir.program import (
     padded,
 )
 from ..expressions import called, index_text
-from ..target import UnprintableStatement, body_lines, refused, unknown_statement
+from ..target import UnprintableStatement, body_lines, unknown_statement
 from .conditions import copied_where, stored_where, when_in_lanes
 from .routine import CFunction, Routine, dialect, pointer, scalar, singles
 
@@ -99,8 +99,6 @@ class LoopPrinter:
     @statement.register
     def _fill(self, fill: Fill) -> list[str]:
         target = self._ref(fill.target)
-        if self.where:
-            raise refused(self, fill, "constants cannot be stored in some lanes alone")
         if target.lanes:
             return self._fill_wide(target, fill.values)
         alike = target.stride == 1 and len(set(fill.values)) == 1
