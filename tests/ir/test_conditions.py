@@ -3,6 +3,7 @@
 import random
 from fractions import Fraction
 
+import numpy as np
 import pytest
 
 from serpentail_codegen.functions.function import assemble
@@ -10,7 +11,10 @@ from serpentail_codegen.functions.plain import FUNCTIONS
 from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.ir.builder import Builder
 from serpentail_codegen.ir.cost import branches
-from serpentail_codegen.ir.interpret import Run, unroll
+from serpentail_codegen.ir.interpret import Numbers, Run, unroll
+from serpentail_codegen.passes.batch import batched
+from serpentail_codegen.targets.c.loops import in_loops
+from serpentail_codegen.targets.target import UnprintableStatement
 from tests.support.algebras import RATIONAL
 from tests.support.program_runs import unrolled_values
 from tests.support.programs import step_of
@@ -69,6 +73,52 @@ def test_conditions_run_what_they_ask_for_and_unroll_to_choices(seed):
         "u": values["u"],
         "w": values["w"],
     }
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_each_lane_runs_what_its_own_conditions_ask_for(seed):
+    rng, lanes = random.Random(seed), 5
+    each = [
+        {name: [float(rng.randint(-3, 3)) for _ in range(4)] for name in "xy"} for _ in range(lanes)
+    ]
+    many = {name: list(np.array([one[name] for one in each]).T) for name in "xy"}
+    values = Run(batched(conditional(), lanes), Numbers(np), many).values
+    for k, one in enumerate(each):
+        u = [np.broadcast_to(scalar, lanes)[k] for scalar in values["u"]]
+        assert (u, np.broadcast_to(values["w"][0], lanes)[k]) == plainly(**one)
+
+
+def test_what_a_condition_of_lanes_decides_about_has_lanes():
+    """The sum w is 1 at first in all lanes, then each adds what it is asked for."""
+    assert {a.name: a.lanes for a in batched(conditional(), 5).arrays}["w"] == 5
+    b = Builder("counts", "A number of its own under a condition.")
+    x, u = b.array("x", 1, role="input"), b.array("u", 1, role="output")
+    t, one = b.array("t", 1), b.constant("one", [1])
+    b.fill(t[0], 0)
+    with b.when(x[0]):
+        b.copy(t[0], one[0])
+    b.copy(u[0], t[0])
+    p = batched(b.finish(), 3)
+    assert {a.name: a.lanes for a in p.arrays}["t"] == 3
+    (u,) = Run(p, Numbers(np), {"x": [np.array([1.0, -1.0, 2.0])]}).values["u"]
+    assert list(u) == [1, 0, 1]
+
+
+@pytest.mark.parametrize(
+    ("kind", "record"),
+    [
+        ("Fill", lambda b, u: b.fill(u[0], 1)),
+        ("Guard", lambda b, u: b.guard(u[0], "OUT_OF_RANGE", u[0])),
+    ],
+)
+def test_c_refuses_what_cannot_be_done_in_some_lanes_alone(kind, record):
+    b = Builder("partly", "A statement under a condition.")
+    x, u = b.array("x", 1, role="input"), b.array("u", 1, role="output")
+    b.copy(u[0], x[0])
+    with b.when(x[0]):
+        record(b, u)
+    with pytest.raises(UnprintableStatement, match=f"cannot print {kind}: it cannot be done"):
+        in_loops(batched(b.finish(), 8), "double", "rat")
 
 
 def test_a_condition_survives_being_called():

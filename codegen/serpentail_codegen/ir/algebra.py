@@ -54,3 +54,11 @@ class Algebra(Protocol):
 
     def decide(self, c: Any, /) -> bool | None:
         """Tell whether c > 0; None if the algebra cannot tell."""
+
+
+def positive_in_lanes(c: Any) -> bool | None:
+    """Tell if a number is positive, or all lanes of an array are; None if lanes differ in it."""
+    positive = c > 0
+    if not getattr(positive, "ndim", 0):
+        return bool(positive)
+    return bool(positive[0]) if (positive == positive[0]).all() else None

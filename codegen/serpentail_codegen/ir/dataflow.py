@@ -158,6 +158,19 @@ def forward_slice(body: Body, start: Collection[str]) -> set[str]:
     return _fixpoint(body, start, more)
 
 
+def decided_slice(body: Body, start: Collection[str]) -> set[str]:
+    """Return what ``forward_slice`` does, and the arrays that conditions on these decide about."""
+    reached, before = forward_slice(body, start), -1
+    while before < len(reached):
+        before = len(reached)
+        for statement, around in statements(body):
+            conditions = [outer.scalar for outer in around if isinstance(outer, When)]
+            if names(conditions) & reached:
+                reached |= names(writes(statement))
+        reached = forward_slice(body, reached)
+    return reached
+
+
 def backward_slice(body: Body, end: Collection[str]) -> set[str]:
     """Return the arrays that the arrays ``end`` may depend on, by name."""
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 from fractions import Fraction
 from typing import Any
 
-from .algebra import Algebra, Number
+from .algebra import Algebra, Number, positive_in_lanes
 from .dataflow import inlined
 from .ldl import ldl_factor, ldl_solve, pair_factor, pair_solve
 from .program import (
@@ -84,7 +84,7 @@ class Numbers:
     mul = staticmethod(lambda a, b: a * b)
     div = staticmethod(lambda a, b: a / b)
     neg = staticmethod(lambda a: -a)
-    decide = staticmethod(lambda c: c > 0)
+    decide = staticmethod(positive_in_lanes)
 
 
 class Run:
@@ -197,7 +197,7 @@ class Run:
         for name, old_scalars in before.items():
             scalars = self.values[name]
             for k, old in enumerate(old_scalars):
-                if old is not None and old != scalars[k]:
+                if old is not None and old is not scalars[k]:
                     scalars[k] = self.algebra.select(condition, scalars[k], old)
 
     # Statements that store

@@ -1,12 +1,13 @@
 """Programs for batches: several states in one call, one in each lane of the vectors.
 
 Every array that depends on an argument becomes wide, with a lane for each state.  What depends on
-parameters alone stays narrow, and is computed once for all states.
+parameters alone stays narrow, and is computed once for all states.  What a wide condition asks for
+is stored in the lanes where it holds.
 """
 
 from dataclasses import replace
 
-from ..ir.dataflow import forward_slice, inlined, on_arrays
+from ..ir.dataflow import decided_slice, inlined, on_arrays
 from ..ir.interpret import unroll
 from ..ir.program import Apply, Array, Guard, Program
 from ..ir.step import Step, compacted
@@ -16,7 +17,7 @@ def batched(program: Program, states: int) -> Program:
     """Return a program over so many states, the lanes of its inputs and outputs."""
     program = inlined(program)
     arguments = {a.name for a in program.arrays if a.role in ("input", "output")}
-    wide = forward_slice(program.body, arguments)
+    wide = decided_slice(program.body, arguments)
     array = {a.name: replace(a, lanes=states) if a.name in wide else a for a in program.arrays}
     body = on_arrays(program.body, array)
     return replace(program, name=f"{program.name}_rows", arrays=tuple(array.values()), body=body)

@@ -17,7 +17,14 @@ from .workers import after_fork
 
 MIN_BATCH = 1000  # states: from here on a batch pays for compiling
 # sources of a model that are compiled when they are needed
-LAZY_SOURCES = ("batch", "batch_derivatives", "batch_airborne", "batch_contact", "flights")
+LAZY_SOURCES = (
+    "batch",
+    "batch_derivatives",
+    "batch_airborne",
+    "batch_contact",
+    "flights",
+    "ground",
+)
 NO_BATCH: dict = {"states": 1, "work": {}, "parts": {}}  # of models without C
 RecordFunction = Callable[[int], int]  # takes the address of a record, returns a status
 
@@ -75,7 +82,7 @@ after_fork(_open_locks)
 
 
 class BatchLibrary:
-    """The C of one model that evaluates batches, and that simulates batches of flights.
+    """The C of one model that evaluates batches, and that simulates or steps batches of runs.
 
     threads: largest number for a batch; None: as many as the process may use.
     """
@@ -87,7 +94,7 @@ class BatchLibrary:
         self.work: dict[str, int] = batch["work"]
         self.parts: dict[str, str] = batch["parts"]
         self.sources = {part: LazyLibrary(checked, profile, part) for part in LAZY_SOURCES}
-        self.rollouts = self.sources["flights"]
+        self.rollouts, self.ground = self.sources["flights"], self.sources["ground"]
 
     def address(self, name: str) -> int:
         """Return the address of the C function for strided states, for kernels in C.

@@ -8,9 +8,12 @@ import mpmath
 import numpy as np
 import pytest
 
+from serpentail import load
 from serpentail.model.compiler import compile_library
-from serpentail_codegen.targets.c.batch import STATES
+from serpentail.model.kernel import Kernel
+from serpentail_codegen.targets.c.batch import PARTS, STATES
 
+from ...support.models import model_folder
 from .tails import FREE, alone, evaluated, given, model, states
 
 FORMS = [
@@ -108,3 +111,15 @@ void row(const real *x, real *sine, real *cosine) {{
                 assert abs(mpmath.mpf(float(y)) - value) <= 1.5 * float(
                     np.spacing(number(abs(value)))
                 ), x
+
+
+@pytest.mark.parametrize("name", ["mass_matrix", "forward_dynamics"])
+def test_batches_of_a_fixed_base_look_for_no_quaternion(name, monkeypatch):
+    monkeypatch.setattr(Kernel, "_each", lambda *_: pytest.fail("one by one"))
+    folder = model_folder(1, 2, name="held", base="fixed", functions=list(PARTS["batch"]))
+    found = load(folder)
+    rng = np.random.default_rng(2)
+    q, v, tau = rng.normal(size=(3, 11, 2))
+    given = (q,) if name == "mass_matrix" else (q, v, tau)
+    expected = [found.kernel(name)(*(a[k] for a in given)) for k in range(11)]
+    np.testing.assert_allclose(found.kernel(name)(*given), expected, rtol=1e-9)

@@ -35,6 +35,7 @@ STRICT = (
     "-Werror",
 )
 C99 = ("-std=c99", *STRICT)
+CONTACT = ("_batch_contact", "_ground")  # sources of models that touch the ground
 PLAIN = ("-std=c99", "-fno-stack-protector", "-fno-pic")
 TAILS = {"m1_n1": (1, 1), "m2_n2": (2, 2), "arcs2": (2, None)}
 FORMS = [
@@ -87,18 +88,18 @@ class Model(SimpleNamespace):
         self.manifest = json.loads((self.folder / "manifest.json").read_text())
         self.scene = parse_scene(self.manifest["scene"], name)
         self.include, self.header = self.folder / "include", self.folder / "include" / f"{name}.h"
-        self.source, self.host, self.batch, self.simulation, self.flights = (
+        self.source, self.host, self.batch, self.simulation, self.flights, *self.contact = (
             self.folder / "src" / f"{name}{part}.c"
-            for part in ("", "_host", "_batch", "_simulation", "_flights")
+            for part in ("", "_host", "_batch", "_simulation", "_flights", *CONTACT)
         )
         self.example = self.folder / "example" / "main.c"
 
     @property
     def sources(self):
-        """The model, its host entries and, where it has them, its batches, its simulation and its
-        flights.
+        """The model, its host entries and, where it has them, its batches, its simulation, its
+        flights and its batches of contact.
         """
-        parts = (self.source, self.host, self.batch, self.simulation, self.flights)
+        parts = (self.source, self.host, self.batch, self.simulation, self.flights, *self.contact)
         return [path for path in parts if path.is_file()]
 
     @property

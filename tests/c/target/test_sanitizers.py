@@ -144,6 +144,36 @@ GROUND = """q[2] = 0;
     run.event_kinds = event_kinds;
     run.most_events = 3;
 """
+STEPS = """  {
+    enum { COUNT = 11, SIZE = sizeof(@_parameters) / sizeof(real) };
+    @_parameters parameters;
+    @_default_parameters(&parameters);
+    real *own = heap(COUNT * SIZE, 0), *q = heap(COUNT * @@_NQ, 1), *v = heap(COUNT * @@_NV, 1);
+    real *bristles = heap(COUNT * 2 * @@_CONTACTS, 0), *torques = heap(@@_NT, 0);
+    real *legs = heap(COUNT * 8, 1), *work = heap(@WORK, 1);
+    for (int k = 0; k < COUNT; ++k) {
+      memcpy(own + k * SIZE, &parameters, sizeof parameters);
+      q[k * @@_NQ + 2] = (real)0.01 * (real)k; /* some touch the ground, some do not */
+    }
+    @_ground steps = { 0 };
+    steps.parameters = own;
+    steps.q = q;
+    steps.v = v;
+    steps.bristles = bristles;
+    steps.torques = torques;
+    steps.legs = legs;
+    steps.legs_apart = 8;
+    steps.count = COUNT;
+    steps.h = (real)0.00001;
+    steps.steps = 2;
+    steps.work = work;
+    bad += @_side_by_side_ground(&steps) != 0 || steps.first != COUNT;
+    real *all[] = { own, q, v, bristles, torques, legs, work };
+    for (size_t k = 0; k < sizeof all / sizeof *all; ++k) {
+      free(all[k]);
+    }
+  }
+"""
 
 
 def driver(model):
@@ -171,6 +201,9 @@ def driver(model):
     text += '  printf("%d bad\\n", bad);\n  return bad;\n}\n'
     text = text.replace("//ground", GROUND if model.scene.contacts else "")
     if model.scene.contacts:
+        text = '#include "@_ground.c"\n#include <string.h>\n' + text
+        text = text.replace('  printf("%d bad', STEPS + '  printf("%d bad')
+        text = text.replace("@WORK", str(model.manifest["ground"]["work"]))
         text = text.replace("method <= @@_TSIT5", "method <= @@_IMPLICIT_EULER")
     return text.replace("@@", model.name.upper()).replace("@", model.name)
 

@@ -107,7 +107,8 @@ class BatchView:
         )
         self.inputs = [ArgumentView(a, tail) for a in function.inputs]
         self.outputs = [ArgumentView(a, tail) for a in function.outputs]
-        self.quaternion = quaternion_in(function.inputs[0].name, " * STATES")
+        free = not tail.shape.fixed
+        self.quaternion = quaternion_in(function.inputs[0].name, " * STATES") if free else ""
         self.names = ", ".join(a.name for a in self.inputs + self.outputs)
         self.arguments_work = batch.arguments_work
 

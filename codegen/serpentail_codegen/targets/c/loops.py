@@ -23,6 +23,7 @@ from ...ir.program import (
 )
 from ..expressions import called, index_text
 from ..target import UnprintableStatement, body_lines, unknown_statement
+from .conditions import copied_where, stored_where, when_in_lanes
 from .routine import CFunction, Routine, dialect, pointer, scalar, singles
 
 INLINE_SCALARS = 3  # are written one by one, more by a helper
@@ -40,6 +41,7 @@ class LoopPrinter:
         self.routines: dict[str, Routine] = {}
         self.helpers: set[str] = set()
         self.used: dict[str, Array] = {}
+        self.where: tuple[str, ...] = ()  # rows that are positive in the lanes that store
 
     def function(self) -> CFunction:
         """Return the printed function."""
@@ -89,6 +91,8 @@ class LoopPrinter:
 
     @statement.register
     def _when(self, when: When) -> list[str]:
+        if when.scalar.lanes:
+            return when_in_lanes(self, when, self._ref(when.scalar))
         head = f"if ({scalar(self._ref(when.scalar), 0)} > {self.dialect.literal(0)}) {{"
         return [head, *("  " + line for line in body_lines(self, when.body)), "}"]
 
@@ -100,7 +104,7 @@ class LoopPrinter:
         alike = target.stride == 1 and len(set(fill.values)) == 1
         if target.size > INLINE_SCALARS and alike:
             value = self.dialect.literal(fill.values[0])
-            return [f"{self._helper('fill')}({target.size}, {value}, {pointer(target)});"]
+            return [f"{self.helper('fill')}({target.size}, {value}, {pointer(target)});"]
         return [
             f"{scalar(target, k)} = {self.dialect.literal(v)};" for k, v in enumerate(fill.values)
         ]
@@ -108,10 +112,9 @@ class LoopPrinter:
     def _fill_wide(self, target: Ref, values) -> list[str]:
         if target.stride == 1 and not any(values):
             return [
-                f"{self._helper('clear_rows')}({target.size * target.array.row}, "
-                f"{pointer(target)});"
+                f"{self.helper('clear_rows')}({target.size * target.array.row}, {pointer(target)});"
             ]
-        fill, pitch = self._helper("fill_rows"), target.array.row
+        fill, pitch = self.helper("fill_rows"), target.array.row
         texts = [self.dialect.literal(v) for v in values]
         return [
             f"{fill}({pitch}, {text}, {pointer(one)});"
@@ -121,7 +124,7 @@ class LoopPrinter:
     @statement.register
     def _unit(self, unit: Unit) -> list[str]:
         target, pitch = self._ref(unit.target), unit.target.array.row
-        zeros = f"{self._helper('clear_rows')}({target.size * pitch}, {pointer(target)});"
+        zeros = f"{self.helper('clear_rows')}({target.size * pitch}, {pointer(target)});"
         ones = [target.offset * pitch + k * pitch + unit.first + k for k in range(target.size)]
         return [
             zeros,
@@ -134,15 +137,17 @@ class LoopPrinter:
         if target.lanes:
             return self._copy_wide(target, source, copy.adds)
         if target.size > INLINE_SCALARS and target.stride == source.stride == 1:
-            helper = self._helper("add" if copy.adds else "copy")
+            helper = self.helper("add" if copy.adds else "copy")
             return [f"{helper}({target.size}, {pointer(source)}, {pointer(target)});"]
         sign = "+=" if copy.adds else "="
         return [f"{scalar(target, k)} {sign} {scalar(source, k)};" for k in range(target.size)]
 
     def _copy_wide(self, target: Ref, source: Ref, adds: bool) -> list[str]:
         pitch = target.array.row
+        if self.where:
+            return copied_where(self, target, source, adds)
         if source.lanes:
-            copy = self._helper("add_rows" if adds else "copy_rows")
+            copy = self.helper("add_rows" if adds else "copy_rows")
             if target.stride == source.stride == 1:
                 return [f"{copy}({target.size * pitch}, {pointer(source)}, {pointer(target)});"]
             pairs = zip(singles(source), singles(target), strict=True)
@@ -153,13 +158,14 @@ class LoopPrinter:
             raise UnprintableStatement(
                 f"numbers cannot be added to the lanes of {target.array.name}"
             )
-        fill = self._helper("fill_rows")
+        fill = self.helper("fill_rows")
         return [
             f"{fill}({pitch}, {scalar(source, k)}, {pointer(one)});"
             for k, one in enumerate(singles(target))
         ]
 
-    def _helper(self, name: str) -> str:
+    def helper(self, name: str) -> str:
+        """Return the C name of a helper, which is then emitted."""
         self.helpers.add(name)
         return f"{self.prefix}_{name}"
 
@@ -168,44 +174,42 @@ class LoopPrinter:
         scalars, zero = self._ref(guard.scalar), self.dialect.literal(0)
         if scalars.lanes:
             length = scalars.size * scalars.array.row
-            holds = f"{self._helper('all_positive')}({length}, {pointer(scalars)})"
+            holds = f"{self.helper('all_positive')}({length}, {pointer(scalars)})"
         else:
             tests = [f"{scalar(scalars, k)} > {zero}" for k in range(scalars.size)]
             holds = f"({' && '.join(tests)})"
         return [f"if (!{holds}) {{", f"  return STATUS_{guard.status};", "}"]
 
-    @statement.register
-    def _factor(self, factor: Factor) -> list[str]:
+    @statement.register(Factor)
+    @statement.register(FactorPair)
+    def _factor(self, factor: Factor | FactorPair) -> list[str]:
+        helper = "pair_factor" if isinstance(factor, FactorPair) else "ldl_factor"
         matrix = self._ref(factor.matrix[0])
-        helper, arguments = "ldl_factor", f"{factor.size}, {pointer(matrix)}"
-        if matrix.lanes:
-            helper = "ldl_factor_side_by_side"
-            arguments = f"{factor.size}, {matrix.array.row}, {pointer(matrix)}"
         self.helpers.add("all_positive" if matrix.lanes else "lanes")
-        return unless_definite(f"{self._helper(helper)}({arguments})")
+        if matrix.lanes:
+            arguments = f"{factor.size}, {matrix.array.row}, {pointer(matrix)}"
+            return unless_definite(f"{self.helper(f'{helper}_side_by_side')}({arguments})")
+        return unless_definite(f"{self.helper(helper)}({factor.size}, {pointer(matrix)})")
 
     @statement.register
     def _solve(self, solve: Solve) -> list[str]:
         matrix, x = self._ref(solve.matrix[0]), self._ref(solve.x)
         if not x.lanes:
-            return [f"{self._helper('ldl_solve')}({x.size}, {pointer(matrix)}, {pointer(x)});"]
+            return [f"{self.helper('ldl_solve')}({x.size}, {pointer(matrix)}, {pointer(x)});"]
         self.helpers.add("lanes")
         if matrix.lanes:
-            helper = self._helper("ldl_solve_side_by_side")
+            helper = self.helper("ldl_solve_side_by_side")
             return [f"{helper}({x.size}, {x.array.row}, {pointer(matrix)}, {pointer(x)});"]
-        helper = self._helper("ldl_solve_rows")
+        helper = self.helper("ldl_solve_rows")
         return [f"{helper}({x.size}, {x.lanes}, {x.array.row}, {pointer(matrix)}, {pointer(x)});"]
-
-    @statement.register
-    def _factor_pair(self, factor: FactorPair) -> list[str]:
-        self.helpers |= {"lanes"}
-        matrix = pointer(self._ref(factor.matrix[0]))
-        return unless_definite(f"{self._helper('pair_factor')}({factor.size}, {matrix})")
 
     @statement.register
     def _solve_pair(self, solve: SolvePair) -> list[str]:
         matrix, x = pointer(self._ref(solve.matrix[0])), pointer(self._ref(solve.x))
-        return [f"{self._helper('pair_solve')}({solve.x.size}, {matrix}, {x});"]
+        if solve.x.lanes:
+            helper = self.helper("pair_solve_side_by_side")
+            return [f"{helper}({solve.x.size}, {solve.x.array.row}, {matrix}, {x});"]
+        return [f"{self.helper('pair_solve')}({solve.x.size}, {matrix}, {x});"]
 
     @statement.register
     def _call(self, call: Call) -> list[str]:
@@ -245,6 +249,7 @@ class LoopPrinter:
                 before.append(f"real {name}_new[{size * target.array.row}];")
                 after += self._scattered(name, target, adds)
                 arguments.append(f"{name}_new")
+        arguments += [self.where[-1]] if routine.chosen else []
         if lanes:
             arguments.append(index_text(call.columns) if call.columns else str(lanes))
         line = f"{self.prefix}_{routine.name}({', '.join(arguments)});"
@@ -269,7 +274,8 @@ class LoopPrinter:
         written = zip(outputs.items(), call.adds, strict=True)
         adds = {name for (name, ref), added in written if added and ref.stride == 1}
         apart = tuple((name, ref.stride) for name, ref in inputs.items() if ref.stride > 1)
-        routine = Routine(call.step, frozenset(wide), pitch, frozenset(adds), apart)
+        chosen = stored_where(self, call)
+        routine = Routine(call.step, frozenset(wide), pitch, frozenset(adds), apart, chosen)
         if self.routines.setdefault(routine.name, routine) != routine:
             raise ValueError(f"two steps are called {routine.name}")
         lanes = {name: padded(ref.lanes) for name, ref in wide.items()}

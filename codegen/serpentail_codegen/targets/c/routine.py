@@ -19,6 +19,7 @@ class Routine:
     pitch: int = 1  # numbers from one wide scalar to the next
     adds: frozenset[str] = frozenset()  # outputs that are added, not stored
     apart: tuple[tuple[str, int], ...] = ()  # strides of inputs whose scalars are not contiguous
+    chosen: frozenset[str] = frozenset()  # outputs that only lanes with ``where`` > 0 store
 
     @property
     def name(self) -> str:
@@ -29,7 +30,8 @@ class Routine:
         lanes = [f"rows_of_{self.pitch}", *odd] if self.wide else []
         adds = ["add", *sorted(self.adds)] if self.adds else []
         apart = [f"{name}_apart_{stride}" for name, stride in self.apart]
-        return "_".join([self.step.name, *lanes, *adds, *apart])
+        chosen = ["where", *sorted(self.chosen)] if self.chosen else []
+        return "_".join([self.step.name, *lanes, *adds, *apart, *chosen])
 
 
 @dataclass(frozen=True)
@@ -108,7 +110,8 @@ def routine_arguments(routine: Routine) -> str:
     """Print the arguments of a step."""
     inputs = [f"const real *{name}" for name, _ in routine.step.inputs]
     outputs = [f"real *{name}_out" for name, _ in routine.step.outputs]
-    return ", ".join([*inputs, *outputs, *(["int count"] if routine.wide else [])])
+    where = ["const real *where"] if routine.chosen else []
+    return ", ".join([*inputs, *outputs, *where, *(["int count"] if routine.wide else [])])
 
 
 def routine_lines(routine: Routine, real: str, prefix: str) -> list[str]:
@@ -125,7 +128,7 @@ def routine_lines(routine: Routine, real: str, prefix: str) -> list[str]:
         for k in range(size):
             node = next(results)
             if name in routine.wide:
-                stores.append(store(routine, name, k, scalars, node))
+                stores.append(store(routine, name, k, scalars, node, prefix))
             else:
                 narrow.append((name, k, scalars.text[node]))
 
@@ -154,8 +157,13 @@ def input_names(routine: Routine) -> tuple[list[str], dict[int, int]]:
     return names, lanes
 
 
-def store(routine: Routine, name: str, k: int, scalars: Scalars, node: int) -> str:
+def store(
+    routine: Routine, name: str, k: int, scalars: Scalars, node: int, prefix: str = ""
+) -> str:
     """Print the statement that stores scalar number k of a wide output, in a loop over lanes."""
     text = scalars.text[node] if scalars.lanes[node] else f"WIDE({scalars.text[node]})"
     address = f"&{name}_out[{k * routine.pitch}] + c"
-    return f"STORE({address}, {f'LOAD({address}) + {text}' if name in routine.adds else text});"
+    value = f"LOAD({address}) + {text}" if name in routine.adds else text
+    if name in routine.chosen:
+        value = f"{prefix}_select_row(LOAD(where + c), {value}, LOAD({address}))"
+    return f"STORE({address}, {value});"

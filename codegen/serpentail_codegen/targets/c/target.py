@@ -8,6 +8,7 @@ from ...functions.tail import Tail
 from ...scene.scene import Scene
 from ..target import Emission, Target
 from .batch import batch_entry, batch_files, batches
+from .batch_ground import ground_entry, ground_file, ground_steps
 from .batch_rollout import batch_rollout, batch_rollout_entry, batch_rollout_file
 from .form import RULE, printed_function
 from .loops import LoopPrinter
@@ -27,9 +28,11 @@ def emit(scene: Scene, tail: Tail, functions: Iterable[Function], version: str) 
     rollout = batch_rollout(scene, tail, printed)
     files = model | batch_files(scene, tail, batched, context) | package_files(context)
     files |= batch_rollout_file(scene, rollout, context)
+    ground = ground_steps(scene, tail, printed)
+    files |= ground_file(scene, tail, ground, context)
 
     entries = c_entries(context) | {"batch": batch_entry(scene, batched)}
-    entries |= batch_rollout_entry(rollout)
+    entries |= batch_rollout_entry(rollout) | ground_entry(ground)
     if scene.emission == "auto":
         entries["forms"] = RULE
     described = {

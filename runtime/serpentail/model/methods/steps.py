@@ -67,8 +67,8 @@ class StepMethods(Evaluated):
 
         Notes
         -----
-        Eight or more runs in flight are computed in SIMD lanes. The C of these is compiled in the
-        first such call.
+        Eight or more runs are computed in SIMD lanes, in flight by "rk4", with contacts by
+        "implicit_euler". The C of these is compiled in the first such call.
         """
         from ..stepping.step import step
 

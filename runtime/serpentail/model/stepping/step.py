@@ -15,13 +15,14 @@ from ..library import WHY
 from ..parameters import RunParameters
 from ..workers import MIN_STATES_PER_THREAD, shared
 from .held import Held
-from .lanes import LaneSteps
+from .lanes import GroundLaneSteps, LaneSteps
 from .singly import SingleSteps
 
 if TYPE_CHECKING:
     from ..model import Model
 
-METHODS = ("rk4", "implicit_euler")
+LANES = {"rk4": LaneSteps, "implicit_euler": GroundLaneSteps}
+METHODS = tuple(LANES)
 MOST_STEPS = 10_000  # in one call; for more, `simulate` checks for signals in between
 LEGS = 8  # angles (rad) and rates (rad/s) of both legs
 SINGLY_LEAST = 32  # steps that are worth a thread, made singly
@@ -35,7 +36,7 @@ class Stepping:
         assert model.library is not None
         self.dtype = model.parameter_vector.dtype
         self.singly = SingleSteps(model.manifest, model.library, self.dtype)
-        self.lanes: LaneSteps | None = None
+        self.lanes: dict[str, LaneSteps] = {}  # by method, made when it is first used
         self.alike = np.zeros((0, len(model.parameter_vector)), self.dtype)
 
     def parameters(self, model: "Model", given: object, runs: int) -> np.ndarray:
@@ -55,12 +56,14 @@ class Stepping:
 
     def maker(self, model: "Model", held: Held) -> tuple[SingleSteps | LaneSteps, int]:
         """Return what makes steps of runs, and the number of runs that is worth a thread."""
-        flights = model.manifest.get("flights")
-        if held.method != "rk4" or flights is None or held.runs < flights["states"]:
+        kind, batches = LANES[held.method], model.batch_library
+        entry = model.manifest.get(kind.entry)
+        if entry is None or held.runs < entry["states"]:
             return self.singly, max(1, SINGLY_LEAST // held.steps)
-        if self.lanes is None:
-            self.lanes = LaneSteps(model.manifest, model.batch_library.rollouts, self.singly)
-        return self.lanes, max(flights["states"], LANES_LEAST // (4 * held.steps))
+        if held.method not in self.lanes:
+            source = batches.rollouts if held.method == "rk4" else batches.ground
+            self.lanes[held.method] = kind(model.manifest, source, self.singly)
+        return self.lanes[held.method], max(entry["states"], LANES_LEAST // (4 * held.steps))
 
 
 @dataclass(frozen=True)
