@@ -167,7 +167,7 @@ class CasadiFunctions:
             function = casadi.external(f"{prefix}_casadi_{name}", self._model.library._name)
         if not folded:
             return function
-        return self._wrapped(name, function, folded)
+        return self._folded(name, function)
 
     def nodes(
         self, name: str, count: int, derivatives: int = 2, folded: bool = False
@@ -207,14 +207,14 @@ class CasadiFunctions:
         key = (name, count, order, threads(self._model.batch_library.threads))
         if key not in self._nodes:
             self._nodes[key] = nodes_function(self._model, name, count, order)
-        return self._wrapped(f"{name}_nodes", self._nodes[key], folded)
+        function = self._nodes[key]
+        return self._folded(f"{name}_nodes", function) if folded else function
 
-    def _wrapped(self, name: str, function: casadi.Function, folded: bool) -> casadi.Function:
-        """Return the function with a name of its own, with the model's parameters if folded."""
-        names = function.name_in()[: -1 if folded else None]
+    def _folded(self, name: str, function: casadi.Function) -> casadi.Function:
+        """Return the function with the model's parameters in place of its last input."""
+        names = function.name_in()[:-1]
         inputs = [casadi.MX.sym(key, function.sparsity_in(key)) for key in names]
-        parameters = [casadi.MX(self.parameter_vector)] if folded else []
-        outputs = list(function.call([*inputs, *parameters]))
+        outputs = list(function.call([*inputs, casadi.MX(self.parameter_vector)]))
         options = {"always_inline": True}  # graphs then see the blocks
         return casadi.Function(name, inputs, outputs, names, function.name_out(), options)
 
