@@ -148,6 +148,7 @@ def test_the_plan_is_true_for_the_found_model(chosen):
     assert chosen.success and RANGE[0] < length < RANGE[1]
     assert chosen.report["design"] == chosen.design
     assert chosen.model.parameters["tail_length"] == length
+    assert f"design: tail_length {length:.4f}" in repr(chosen)
     q, v = integrated(rat().with_parameters(**chosen.design), chosen)
     end = chosen.trajectory
     assert angle_deg(q[3:7] / np.linalg.norm(q[3:7]), end.attitude[-1]) < 0.011
