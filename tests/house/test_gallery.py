@@ -32,6 +32,7 @@ SAID = {
     "plot_12_sweep": "121 of 121 points done, 0 of them failed",
     "plot_13_casadi_mpc": r"68\.8 deg at the start, 0\.\d+ deg at the end",
     "plot_17_jax": r"tilt 45\.8, then \d\.\d deg",
+    "plot_18_tail_length": r"found True: 157 mm\s+found True: 1[56]\d mm",
 }
 
 # Runs a script as the site does: the value of the last expression is what the page shows.

@@ -1,14 +1,10 @@
 """Plans that choose parameters of the model: the best of many ordinary plans, and true."""
 
-import json
-from types import SimpleNamespace
-
 import casadi as ca
 import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail import cli
 from serpentail.attitude import angle_deg
 from serpentail.planning.design import checked_design
 from serpentail.planning.nlp.body import Body
@@ -16,8 +12,6 @@ from serpentail.planning.nlp.equations import equations_of_motion
 from serpentail.planning.nlp.mesh import uniform
 from serpentail.planning.nlp.rules import collocation_rule
 from serpentail.planning.nlp.transcription import transcription_of
-from serpentail.scenes.plan import arguments_for
-from tests.support.models import model_folder
 from tests.support.own_tails import folder_of_tables
 from tests.support.tumbling import AGAIN, DURATION, integrated, planned, rat, start
 
@@ -154,6 +148,7 @@ def test_the_plan_is_true_for_the_found_model(chosen):
     assert chosen.success and RANGE[0] < length < RANGE[1]
     assert chosen.report["design"] == chosen.design
     assert chosen.model.parameters["tail_length"] == length
+    assert f"design: tail_length {length:.4f}" in repr(chosen)
     q, v = integrated(rat().with_parameters(**chosen.design), chosen)
     end = chosen.trajectory
     assert angle_deg(q[3:7] / np.linalg.norm(q[3:7]), end.attitude[-1]) < 0.011
@@ -233,98 +228,3 @@ def test_other_objectives_choose_too(objective):
             **settings | {"tolerance": None},
         )
         assert again.report["objective"] > plan.report["objective"] * (1 - 1e-3)
-
-
-@pytest.mark.parametrize(
-    ("design", "words"),
-    [
-        (3, "design: value 3: needs a mapping of parameters, such as {'tail_length'"),
-        ({"tail_lenght": RANGE}, "design.tail_lenght: no such parameter; did you mean 'tail_len"),
-        ({"tail_length": 0.1}, "design.tail_length: value 0.1: needs (least, most)"),
-        ({"tail_length": (0.2, 0.1)}, "design.tail_length: value (0.2, 0.1): needs least below mo"),
-        ({"tail_length": (0.2, 0.2)}, "needs least below most"),
-        ({"tail_mass": (-0.1, 0.1)}, "design.tail_mass: value -0.1: needs a finite number (kg), a"),
-        ({"tail_mass": (0.1, float("nan"))}, "design.tail_mass: value nan"),
-        ({"tail_mass": ("1 m", "2 m")}, "design.tail_mass: value '1 m'"),
-        (
-            {"torso_inertia": ((1e-5, 1e-5, 1e-5), (1e-5, 1e-5, 3e-5))},
-            "design.torso_inertia: value (1e-05, 1e-05, 3e-05): needs",
-        ),
-        (
-            {"link_radius": (1e-3, 2e-3), "link_inertia": (1e-8, 1e-7)},
-            "design.link_inertia: value 1e-08: needs 3 finite numbers",
-        ),
-        (
-            {"link_radius": (1e-3, 2e-3), "link_inertia": ([1e-8] * 3, [1e-7] * 3)},
-            "design: parameters: link_radius and link_inertia: give one of them, not both",
-        ),
-    ],
-)
-def test_wrong_designs_are_refused(design, words):
-    with pytest.raises(st.PlanningError) as caught:
-        st.plan(rat(), start=start(rat()), duration=DURATION, design=design)
-    assert words in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    ("settings", "words"),
-    [
-        ({"solver": "fatrop"}, "solver: value 'fatrop': design is given: it takes known"),
-        ({"dynamics": "compiled"}, "dynamics: value 'compiled': compiled C takes the parameters"),
-    ],
-)
-def test_what_takes_known_parameters_says_so(settings, words):
-    with pytest.raises(st.PlanningError, match=words):
-        st.plan(
-            rat(), start=start(rat()), duration=DURATION, design={"tail_length": RANGE}, **settings
-        )
-
-
-def test_parameters_that_do_nothing_are_refused():
-    """Those of contacts: a plan flies."""
-    model = st.load(model_folder(1, 2, contacts=["torso"]))
-    name = next(name for name in model.parameters if name.startswith("K_"))
-    value = model.parameters[name]
-    with pytest.raises(st.PlanningError, match=f"design: value '{name}': nothing in this plan"):
-        q, v = np.r_[0, 0, 1, 1, np.zeros(model.nq - 4)], np.zeros(model.nv)
-        v[3] = 5
-        st.plan(model, start=(q, v), duration=DURATION, design={name: (value, 2 * value)})
-
-
-SCENE = """
-[plan]
-duration = 0.4
-intervals = 8
-design.tail_length = ["16 cm", 0.24]
-free_start.tail = [[-0.2, "-5 deg"], [0.2, 0.1]]
-"""
-
-
-def test_command_line_takes_both(tmp_path, capsys):
-    model = rat()
-    q, v = start(model)
-    (tmp_path / "own.toml").write_text(
-        f"{SCENE}start.q = {q.tolist()}\nstart.v = {v.tolist()}\nbounds.angle = 1.0\n"
-    )
-    saved, folder = tmp_path / "own.npz", str(model.folder)
-    given = [str(tmp_path / "own.toml"), "--folder", folder, "--json", "-", "--save", str(saved)]
-    assert cli.main(["plan", *given]) == 0
-    report, motion = json.loads(capsys.readouterr().out), st.Trajectory.load(saved)
-    length = report["design"]["tail_length"]
-    assert report["success"] and 0.16 <= length <= 0.24
-    assert motion.info["parameters"]["tail_length"] == length
-    assert report["start"]["tail"] == pytest.approx(motion.q[0, 7:], abs=1e-6)
-    assert set(report["design_slopes"]) == {"tail_length"}
-
-
-def test_a_scaled_scene_scales_its_ranges():
-    """By the parameter's unit: an inertia is a mass times a square of a length."""
-    manifest = rat().manifest | {"size": {"kg": 8.0, "m": 2.0, "s": 1.0}}
-    body = SimpleNamespace(manifest=manifest)
-    table = {"start": {"q": [0], "v": [0]}, "duration": 1}
-    inertias = [[1e-5, 1e-5, 1e-5], ["20 g mm^2", 1e-5, 1e-5]]
-    table["design"] = {"tail_length": ["10 cm", 0.2], "torso_inertia": inertias, "tale": 3}
-    found = arguments_for(body, table)["design"]
-    np.testing.assert_allclose(found["tail_length"], [0.2, 0.4])
-    np.testing.assert_allclose(found["torso_inertia"], [[32e-5] * 3, [64e-8, 32e-5, 32e-5]])
-    assert found["tale"] == 3

@@ -80,6 +80,7 @@ class Plan:
         told, model = self.report, self.trajectory.model
         moved = tail_of(model) if model else "without its model"
         ended = "success" if self.success else f"no success ({told['status']})"
+        chosen = ", ".join(f"{name} {_digits(x)}" for name, x in self.design.items())
         names = "effort", "energy_J", "peak_power_W", *TRUTH
         effort, energy, power, to_plan, to_goal = (_shown(told[name]) for name in names)
         return framed(
@@ -90,6 +91,7 @@ class Plan:
                 f"effort {effort} N^2 m^2 s, energy {energy} J, peak power {power} W",
                 f"true attitude at the end: {to_plan} deg from the plan, {to_goal} from the goal",
                 f"{told['rounds']} rounds, {told['iterations']} iterations, {told['wall_s']:.3g} s",
+                *([f"design: {chosen}"] if chosen else []),
             ]
         )
 
@@ -202,6 +204,11 @@ class Plan:
             Torques (N m).
         """
         return self.torque(min(max(t, 0.0), self.duration))[0] - self.problem.damping * v[TAIL_V]
+
+
+def _digits(value: Any) -> str:
+    """Return a number or numbers with four digits."""
+    return np.array2string(np.asarray(value), precision=4, separator=", ", threshold=4)
 
 
 def _shown(value: float | None) -> str:
