@@ -15,12 +15,8 @@ from benchmarks.batches import best, c_times
 from benchmarks.fixtures import built, label
 from benchmarks.operations import needed
 from serpentail.planning.nlp.coordinates import attitude
-from serpentail.planning.nlp.node import (
-    PARAMETERS,
-    equations_of_motion,
-    node_function,
-    variables_of,
-)
+from serpentail.planning.nlp.equations import equations_of_motion
+from serpentail.planning.nlp.node import PARAMETERS, node_function, variables_of
 from serpentail.planning.nlp.node_calls import MappedNode
 from serpentail.planning.problem import SMOOTHING, PlanningProblem
 from serpentail_codegen.functions.catalogue import CATALOGUE
@@ -66,7 +62,7 @@ def casadi_times(model: st.Model) -> dict[str, float]:
 
     kind, tail = attitude("quaternion"), model.nv - 6
     start = np.zeros(model.nq), np.zeros(model.nv)
-    task = st.Goal(), (0.5, 0.5), st.Bounds(), "effort", SMOOTHING, 0.0, (), None
+    task = st.Goal(), (0.5, 0.5), st.Bounds(), "effort", SMOOTHING, 0.0, (), None, None
     problem = PlanningProblem(*start, *task, "airborne", "quaternion")
     variables = variables_of("airborne", kind, tail, np.full(tail, 1e-3))
     node = node_function(model, problem, kind, variables, equations_of_motion(model, "compiled"))

@@ -13,7 +13,7 @@ from serpentail.attitude import tilt_deg
 from serpentail.planning.condensed import fatrop
 from serpentail.planning.condensed.stages import stages_of
 from serpentail.planning.nlp.bounds import limits
-from serpentail.planning.nlp.node import equations_of_motion
+from serpentail.planning.nlp.equations import equations_of_motion
 from serpentail.planning.nlp.solver import solve, solver
 from serpentail.planning.nlp.transcription import transcription_of
 from serpentail.planning.result.truth import planned_torques

@@ -29,6 +29,9 @@ class Stage(ctypes.Structure):
         ("pivots", ctypes.c_void_p),
         *((name, _numbers) for name in ("slopes", "Jr", "from_v", "from_z", "scratch")),
         *((name, ctypes.c_int) for name in ("known", "failed", "sloped", "factored")),
+        *((name, ctypes.c_long) for name in ("node_calls", "newton_steps")),
+        *((name, _numbers) for name in ("given", "mu", "H")),
+        ("curved", ctypes.c_int),
     )
 
 
@@ -70,7 +73,8 @@ class OneStage:
         for name in ("stage_values", "stage_slopes"):
             getattr(self.code, name).argtypes = (ctypes.c_void_p, ctypes.c_void_p)
         self.code.stage_hessian.argtypes = (ctypes.c_void_p,) * 4
-        self.stage = ctypes.cast(program, ctypes.POINTER(Head)).contents.stages[0]
+        self.all = ctypes.cast(program, ctypes.POINTER(Head)).contents.stages
+        self.stage = self.all[0]
         self.address = ctypes.addressof(self.stage)
         self.size = self.stage.variables
 

@@ -6,9 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 import casadi
 
+from ..checks import one_of, whole_number
 from ..errors import ModelError
+from .cores import threads
 from .kept import kept
 from .layout import OMEGA, QUATERNION, TAIL_V, VELOCITY
+from .nodes.function import MOST_NODES, RESULTS, nodes_function
 from .parameters import flat
 from .state_space import RATE
 
@@ -29,6 +32,7 @@ class CasadiFunctions:
 
     def __init__(self, model: "Model"):
         self._model = model
+        self._nodes: dict[tuple[str, int, int, int], casadi.Function] = {}  # they stay loaded
 
     @kept
     def _module(self) -> ModuleType:
@@ -97,7 +101,7 @@ class CasadiFunctions:
         symbolic = [*self._module.SIGNATURES] if self._has_module else []
         if "forward_dynamics" in symbolic:
             symbolic.append("x_dot")
-        return [*symbolic, "symbolic", "external", "parameter_vector"]
+        return [*symbolic, "symbolic", "external", "nodes", "parameter_vector"]
 
     @property
     def parameter_vector(self) -> casadi.DM:
@@ -163,9 +167,54 @@ class CasadiFunctions:
             function = casadi.external(f"{prefix}_casadi_{name}", self._model.library._name)
         if not folded:
             return function
-        names = function.name_in()[:-1]
-        inputs = [casadi.MX.sym(key, function.size1_in(key)) for key in names]
-        outputs = list(function.call([*inputs, casadi.MX(self.parameter_vector)]))
+        return self._wrapped(name, function, folded)
+
+    def nodes(
+        self, name: str, count: int, derivatives: int = 2, folded: bool = False
+    ) -> casadi.Function:
+        """Return the compiled dynamics at many nodes at once, such as those of a mesh.
+
+        The columns of its inputs and outputs are the nodes. It evaluates them in vector lanes and
+        in threads, as ``threads=`` of ``st.load`` allows. Derivatives have one block for each node.
+
+        Parameters
+        ----------
+        name : {"forward_dynamics", "inverse_dynamics"}
+            Which dynamics.
+        count : int
+            Number of nodes.
+        derivatives : {0, 1, 2}, default 2
+            Order of the exact derivatives that it has; of a higher order, CasADi has none.
+        folded : bool, default False
+            Use the model's parameters in place of the last input.
+
+        Returns
+        -------
+        casadi.Function
+            Its inputs are q (nq, count), v (nv, count), tau (2m, count) or v_dot (nv, count), and
+            parameters (P, 1), by which it is not differentiable; its output is v_dot or force (nv,
+            count).
+
+        Raises
+        ------
+        ModelError
+            As of ``external``; a model with a fixed base; a name or a number that cannot be used.
+        """
+        one_of("name", name, RESULTS, ModelError)
+        count = whole_number("count", count, ModelError, least=1, most=MOST_NODES)
+        order = whole_number("derivatives", derivatives, ModelError, least=0, most=2)
+        self.external(name, order)
+        key = (name, count, order, threads(self._model.batch_library.threads))
+        if key not in self._nodes:
+            self._nodes[key] = nodes_function(self._model, name, count, order)
+        return self._wrapped(f"{name}_nodes", self._nodes[key], folded)
+
+    def _wrapped(self, name: str, function: casadi.Function, folded: bool) -> casadi.Function:
+        """Return the function with a name of its own, with the model's parameters if folded."""
+        names = function.name_in()[: -1 if folded else None]
+        inputs = [casadi.MX.sym(key, function.sparsity_in(key)) for key in names]
+        parameters = [casadi.MX(self.parameter_vector)] if folded else []
+        outputs = list(function.call([*inputs, *parameters]))
         options = {"always_inline": True}  # graphs then see the blocks
         return casadi.Function(name, inputs, outputs, names, function.name_out(), options)
 

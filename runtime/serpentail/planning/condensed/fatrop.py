@@ -15,11 +15,12 @@ from ...errors import CompilerNotFound, PlanningError
 from ...model.compiler import compile_library
 from ..nlp.interrupt import stop_reason
 from ..nlp.solver import Solution
+from .helpers import crew_of, helped
 from .stages import Stages, packed, unpacked
 from .task import Task, task_of
 
 NATIVE = Path(__file__).parents[1] / "native"
-FLAGS = ("-O3", "-ftree-vectorize")  # loops along rows of matrices
+FLAGS = ("-O3", "-ftree-vectorize", "-pthread")  # loops along rows of matrices; threads
 CALLED = {  # of FATROP's C interface, by the names of Library in native/fatrop.c
     "create": "create",
     "solve": "solve",
@@ -121,7 +122,9 @@ def kernel() -> ctypes.CDLL:
     made.program_new.restype = pointer
     made.program_new.argtypes = (ctypes.POINTER(Task),)
     made.program_free.argtypes = made.program_variables.argtypes = (pointer,)
-    made.program_rows.argtypes = (pointer,)
+    made.program_rows.argtypes = made.program_help.argtypes = (pointer,)
+    made.program_dismiss.argtypes = (pointer,)
+    made.program_helpers.argtypes = (pointer, ctypes.c_int)
     made.program_guess.argtypes = (pointer, pointer)
     made.program_nodes.argtypes = (pointer, pointer, pointer)
     made.fatrop_run.argtypes = (
@@ -191,9 +194,10 @@ def solve_stages(
     first = np.concatenate([start[name] / units[name] for name, _ in stages.variables.states])
     variables, states = packed(stages, w)
     begun, iterations = time.process_time(), 0
+    crew = crew_of(stages)
     for scale in SCALES:
         task = task_of(stages, first, p, scale)
-        outcome, found, multipliers, nodes = _run(task, variables, states, settings)
+        outcome, found, multipliers, nodes = _run(task, variables, states, settings, crew)
         iterations += outcome.iterations
         success = outcome.status == SOLVED and bool(np.isfinite(found).all())
         if success or outcome.status == STOPPED:
@@ -212,9 +216,12 @@ def solve_stages(
 
 
 def _run(
-    task: Any, variables: np.ndarray, states: np.ndarray, settings: Any
+    task: Any, variables: np.ndarray, states: np.ndarray, settings: Any, crew: int = 1
 ) -> tuple[Outcome, np.ndarray, np.ndarray, dict[str, np.ndarray]]:
-    """Run FATROP; what it ends with, its variables, multipliers, and states and turn at nodes."""
+    """Run FATROP; what it ends with, its variables, multipliers, and states and turn at nodes.
+
+    crew: number of threads that evaluate stages.
+    """
     code, stopping, outcome = kernel(), _Stopping(), Outcome()
     found, nodes = variables.copy(), np.ascontiguousarray(states)
     y = np.zeros((*states.shape[:2], states.shape[2] + 3))
@@ -224,16 +231,17 @@ def _run(
     try:
         multipliers = np.zeros(code.program_rows(program))
         code.program_guess(program, nodes.ctypes.data)
-        code.fatrop_run(
-            program,
-            ctypes.byref(called()),
-            settings,
-            len(settings),
-            Stop(stopping),
-            found.ctypes.data,
-            multipliers.ctypes.data,
-            ctypes.byref(outcome),
-        )
+        with helped(code, program, crew - 1):
+            code.fatrop_run(
+                program,
+                ctypes.byref(called()),
+                settings,
+                len(settings),
+                Stop(stopping),
+                found.ctypes.data,
+                multipliers.ctypes.data,
+                ctypes.byref(outcome),
+            )
         if outcome.status in (SOLVED, SAID, *STATUSES):
             code.program_nodes(program, nodes.ctypes.data, y.ctypes.data)
     finally:

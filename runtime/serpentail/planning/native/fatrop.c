@@ -52,7 +52,7 @@ typedef struct {
     int (*stop)(void); /* asked at each iteration */
     int ended;         /* the status that ended it early, or 0 */
     int restoring;     /* iterations of the restoration that it is in */
-    const double *guess; /* u and s of all stages in a row */
+    const double *guess; /* u and s of all stages in a row, at program->offsets */
     double *values;      /* of one stage's constraints, and their slopes */
     double *slopes;
 } Run;
@@ -60,16 +60,6 @@ typedef struct {
 static int stages_of(const Run *run)
 {
     return run->program->task->stages;
-}
-
-static int variables_before(const Run *run, int k)
-{
-    int sum = 0;
-    for (int j = 0; j < k; j++) {
-        const Sizes sizes = sizes_of(run->program, j);
-        sum += sizes.controls + sizes.states;
-    }
-    return sum;
 }
 
 /* ---- sizes and starting values */
@@ -121,14 +111,14 @@ static int get_bounds(double *least, double *most, int k, void *run)
 static int get_controls(double *u, int k, void *data)
 {
     const Run *run = data;
-    memcpy(u, run->guess + variables_before(run, k), (size_t)get_nu(k, data) * sizeof *u);
+    memcpy(u, run->guess + run->program->offsets[k], (size_t)get_nu(k, data) * sizeof *u);
     return 0;
 }
 
 static int get_states(double *s, int k, void *data)
 {
     const Run *run = data;
-    memcpy(s, run->guess + variables_before(run, k) + get_nu(k, data),
+    memcpy(s, run->guess + run->program->offsets[k] + get_nu(k, data),
            (size_t)get_nx(k, data) * sizeof *s);
     return 0;
 }
@@ -181,6 +171,7 @@ static int eval_violations(const double *w, const double *a, const double *b, do
     const int N = stages_of(run);
     (void)a;
     (void)b;
+    program_values(run->program, w);
     for (int k = 0; k <= N; k++) {
         inequalities_of(run->program, k, controls_of(w, dims, k), states_at(w, dims, k),
                         rows + dims->g_ineq_offs[k]);
@@ -201,6 +192,7 @@ static int eval_objective(double scale, const double *w, const double *a, const 
     double sum = 0.0;
     (void)a;
     (void)b;
+    program_values(run->program, w);
     for (int k = 0; k < task->stages; k++) {
         const Stage *stage = valued(run->program, k, controls_of(w, dims, k),
                                     states_at(w, dims, k));
@@ -238,6 +230,7 @@ static int eval_gradient(double scale, const double *w, const double *a, const d
     const int N = task->stages;
     (void)a;
     (void)b;
+    program_slopes(run->program, w);
     for (int k = 0; k < N; k++) {
         double *own = gradient + dims->ux_offs[k];
         const Stage *stage = sloped_or_last(run, k, w, dims);
@@ -292,6 +285,7 @@ static int eval_jacobians(const double *w, const double *a, const double *b,
     const int N = stages_of(run);
     (void)a;
     (void)b;
+    program_slopes(run->program, w);
     for (int k = 0; k <= N; k++) {
         const double *s = states_at(w, dims, k);
         if (k < N) {
@@ -308,21 +302,20 @@ static int eval_jacobians(const double *w, const double *a, const double *b,
 
 /* The Hessian of stage k, or the identity where there is none or the run is to end: with it FATROP
    finds a last step at once. */
-static void write_curvature(Run *run, int k, double scale, const double *w, const double *lambda,
-                            struct blasfeo_dmat *matrix, const struct FatropOcpCDims *dims)
+static void write_curvature(Run *run, int k, struct blasfeo_dmat *matrix,
+                            const struct FatropOcpCDims *dims)
 {
-    const int columns = dims->nu[k] + dims->nx[k], n = run->program->stages[k].variables;
-    const double *H = curved(run->program, k, controls_of(w, dims, k), states_at(w, dims, k),
-                             scale, lambda + dims->dyn_eq_offs[k], lambda + dims->g_ineq_offs[k]);
-    if (H == NULL) {
+    const Stage *stage = run->program->stages + k;
+    const int columns = dims->nu[k] + dims->nx[k], n = stage->variables;
+    if (!stage->curved) {
         end_soon(run, NO_DERIVATIVES);
     }
     for (int r = 0; r < columns; r++) {
         for (int c = 0; c < columns; c++) {
             BLASFEO_DMATEL(matrix, r, c)
                 = run->ended ? r == c
-                             : H[(size_t)column_of(run->program, k, r) * n
-                                 + column_of(run->program, k, c)];
+                             : stage->H[(size_t)column_of(run->program, k, r) * n
+                                        + column_of(run->program, k, c)];
         }
     }
 }
@@ -367,8 +360,9 @@ static int eval_hessian(double scale, const double *w, const double *lambda, con
     if (run->stop != NULL && run->stop()) {
         end_soon(run, STOPPED);
     }
+    program_curve(run->program, w, scale, lambda, dims->dyn_eq_offs, dims->g_ineq_offs);
     for (int k = 0; k < N; k++) {
-        write_curvature(run, k, scale, w, lambda, matrices + k, dims);
+        write_curvature(run, k, matrices + k, dims);
     }
     write_end(run, scale, w, lambda, matrices + N, dims);
     return DONE;
@@ -417,13 +411,14 @@ static void set_options(const Run *run, const Option *options, int count)
 static int starts(Run *run)
 {
     const int N = stages_of(run);
+    program_slopes(run->program, run->guess);
     for (int k = 0; k < N; k++) {
-        const double *u = run->guess + variables_before(run, k);
+        const double *u = run->guess + run->program->offsets[k];
         if (sloped(run->program, k, u, u + get_nu(k, run)) == NULL) {
             return 0;
         }
     }
-    const double *u = run->guess + variables_before(run, N);
+    const double *u = run->guess + run->program->offsets[N];
     return goal_of(run->program, u, u + get_nu(N, run), run->values, run->slopes) == 0;
 }
 
@@ -461,8 +456,9 @@ static void eval_solution(Run *run, const double *w, Outcome *outcome)
     const Task *task = run->program->task;
     const int last = get_nu(0, run), size = get_nx(0, run);
     outcome->objective = task->price * (size > 0 ? w[last] : task->longest);
+    program_values(run->program, w);
     for (int k = 0; k < task->stages; k++) {
-        const double *u = w + variables_before(run, k);
+        const double *u = w + run->program->offsets[k];
         const Stage *stage = valued(run->program, k, u, u + get_nu(k, run));
         outcome->objective += stage == NULL ? NAN : stage->r[stage->results - 1];
     }

@@ -30,13 +30,9 @@ static size_t own_doubles(Program *program, double *memory)
 {
     const Task *task = program->task;
     const size_t n = most_variables(task), y = (size_t)(states_of(task) + TURN);
-    const size_t zeta = (size_t)(states_of(task) + task->tail), square = n > zeta ? n : zeta;
-    size_t results = y, sum = 0;
-    for (int k = 0; k < task->stages; k++) {
-        const size_t own = (size_t)program->stages[k].results;
-        results = own > results ? own : results;
-    }
-    const size_t counts[] = {square * square, results, n, y, y * zeta, node_scratch(task),
+    const size_t zeta = (size_t)(states_of(task) + task->tail);
+    size_t sum = 0;
+    const size_t counts[] = {zeta * zeta, y, n, y, y * zeta, node_scratch(task),
                              (size_t)task->tail, (size_t)(task->goal_rows) + y};
     double **arrays[] = {&program->H, &program->mu, &program->v, &program->y, &program->J,
                          &program->scratch, &program->still, &program->shift};
@@ -47,7 +43,7 @@ static size_t own_doubles(Program *program, double *memory)
     return sum;
 }
 
-/* One block of memory: the program, its stages, their doubles, their pivots. */
+/* Blocks of memory: the program, its stages, all doubles, and all pivots with the offsets. */
 Program *program_new(const Task *task)
 {
     Program sketch = {.task = task, .stages = calloc((size_t)task->stages, sizeof(Stage))};
@@ -63,25 +59,32 @@ Program *program_new(const Task *task)
     }
     program = calloc(1, sizeof *program);
     double *memory = calloc(doubles, sizeof *memory);
-    int *places = calloc(pivots, sizeof *places);
-    if (program == NULL || memory == NULL || places == NULL) {
+    int *places = calloc(pivots + (size_t)task->stages + 1, sizeof *places);
+    if (program == NULL || memory == NULL || places == NULL || crew_begin(&program->crew) != 0) {
         free(program);
         free(memory);
         free(places);
         free(sketch.stages);
         return NULL;
     }
-    *program = sketch;
+    program->task = task;
+    program->stages = sketch.stages;
     lay_out(program, memory + own_doubles(program, memory));
     for (int k = 0; k < task->stages; k++) {
         program->stages[k].pivots = places;
         places += stage_pivots(program->stages + k);
+    }
+    program->offsets = places;
+    for (int k = 0; k < task->stages; k++) {
+        const Sizes sizes = sizes_of(program, k);
+        places[k + 1] = places[k] + sizes.controls + sizes.states;
     }
     return program;
 }
 
 void program_free(Program *program)
 {
+    crew_end(&program->crew);
     free(program->stages[0].pivots);
     free(program->H); /* where the doubles begin */
     free(program->stages);
@@ -129,41 +132,27 @@ int column_of(const Program *program, int k, int c)
     return k == 0 && c >= torques_of(task) ? c + states_of(task) : c;
 }
 
-/* v of stage k, of its u and s. */
-static const double *variables_of(Program *program, int k, const double *u, const double *s)
+void variables_of(const Program *program, int k, const double *u, const double *s, double *v)
 {
     const Task *task = program->task;
     const int controls = torques_of(task), states = states_of(task);
-    double *v = program->v;
     memcpy(v, u, (size_t)controls * sizeof *v);
     memcpy(v + controls, k > 0 ? s : task->start, (size_t)states * sizeof *v);
     v[controls + states] = duration_is_free(task) ? s[k > 0 ? states : 0] : task->longest;
-    return v;
 }
 
 Stage *valued(Program *program, int k, const double *u, const double *s)
 {
     Stage *stage = program->stages + k;
-    return stage_values(stage, variables_of(program, k, u, s)) == 0 ? stage : NULL;
+    variables_of(program, k, u, s, program->v);
+    return stage_values(stage, program->v) == 0 ? stage : NULL;
 }
 
 Stage *sloped(Program *program, int k, const double *u, const double *s)
 {
     Stage *stage = program->stages + k;
-    return stage_slopes(stage, variables_of(program, k, u, s)) == 0 ? stage : NULL;
-}
-
-const double *curved(Program *program, int k, const double *u, const double *s, double scale,
-                     const double *next, const double *inner)
-{
-    const int states = states_of(program->task), rows = inner_rows(program->stages + k);
-    const int before = sizes_of(program, k).inequalities - rows;
-    double *mu = program->mu;
-    memcpy(mu, next, (size_t)states * sizeof *mu);
-    memcpy(mu + states, inner + before, (size_t)rows * sizeof *mu);
-    mu[states + rows] = scale;
-    const double *v = variables_of(program, k, u, s);
-    return stage_hessian(program->stages + k, v, mu, program->H) == 0 ? program->H : NULL;
+    variables_of(program, k, u, s, program->v);
+    return stage_slopes(stage, program->v) == 0 ? stage : NULL;
 }
 
 /* ---- a motion on the program's stages */

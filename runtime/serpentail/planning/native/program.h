@@ -14,17 +14,20 @@
 #ifndef SERPENTAIL_PROGRAM_H
 #define SERPENTAIL_PROGRAM_H
 
+#include "crew.h"
 #include "stage.h"
 
 typedef struct {
     const Task *task;
     Stage *stages;
-    double *H;    /* of one stage, or of a node at the end */
-    double *mu;   /* of one stage's results, or of a node's y */
+    double *H;    /* of a node at the end */
+    double *mu;   /* of a node's y */
     double *v;    /* of one stage */
     double *y, *J, *scratch; /* of the node at the end, whose torques are zero */
     double *still;           /* no torques */
     double *shift;           /* of the goal's rows */
+    int *offsets;            /* (N + 1) of the stages' variables among all */
+    Crew crew;               /* what evaluates all stages at once */
 } Program;
 
 static const double MOST_GIVEN = 1e-3;
@@ -52,10 +55,21 @@ int column_of(const Program *program, int k, int c);
 /* Of stage k < N, given its u and s: the stage evaluated, or NULL where it cannot be. */
 Stage *valued(Program *program, int k, const double *u, const double *s);
 Stage *sloped(Program *program, int k, const double *u, const double *s);
-/* The Hessian (all variables of the stage) of scale cost + next^T end + inner^T inequalities, or
-   NULL; inner as the inequalities of the stage are. */
-const double *curved(Program *program, int k, const double *u, const double *s, double scale,
-                     const double *next, const double *inner);
+/* Their v. */
+void variables_of(const Program *program, int k, const double *u, const double *s, double *v);
+
+/* together.c: all stages, at u and s of all in a row; what they give is kept, so that the functions
+   above give it at once.  The Hessian (all variables of the stage) of stage k is that of scale cost
+   + lambda[next[k] ..]^T end + lambda[inner[k] ..]^T inequalities, as those of the stage are. */
+void program_values(Program *program, const double *w);
+void program_slopes(Program *program, const double *w);
+void program_curve(Program *program, const double *w, double scale, const double *lambda,
+                   const int *next, const int *inner);
+/* Threads of the host that share this: each calls program_help, which returns when they are
+   dismissed.  0 of them, too, where a fork has left them behind. */
+void program_helpers(Program *program, int helpers);
+void program_help(Program *program);
+void program_dismiss(Program *program);
 
 /* Limits of inequalities, and these: values, and slopes (inequalities, variables). */
 void limits_of(const Program *program, int k, double *least, double *most);

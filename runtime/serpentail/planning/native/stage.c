@@ -40,10 +40,10 @@ size_t stage_lay_out(Stage *stage, const Task *task, int index, double *memory)
     const size_t n = (size_t)stage->variables, pieces = (size_t)stage->pieces, z = pieces * d;
     const size_t counts[] = {n, z, pieces * K * y, (size_t)stage->results, pieces * K * y * zeta,
                              z * d, z * n, (size_t)stage->results * n, n, z,
-                             scratch_doubles(stage)};
+                             scratch_doubles(stage), n, (size_t)stage->results, n * n};
     double **arrays[] = {&stage->v, &stage->z, &stage->y, &stage->r, &stage->J, &stage->factors,
                          &stage->slopes, &stage->Jr, &stage->from_v, &stage->from_z,
-                         &stage->scratch};
+                         &stage->scratch, &stage->given, &stage->mu, &stage->H};
     size_t sum = 0;
     for (size_t k = 0; k < sizeof counts / sizeof *counts; k++) {
         *arrays[k] = next(&memory, counts[k]);

@@ -85,6 +85,9 @@ typedef struct {
     int known, failed;            /* whether v is known, and has no z */
     int sloped, factored;         /* whether slopes and factors are there, as of any v */
     long node_calls, newton_steps;
+    double *given;                /* v where the program evaluates it, see together.c */
+    double *mu, *H;               /* weights of r, and its Hessian with them */
+    int curved;                   /* whether H could be had */
 } Stage;
 
 /* dense.c: matrices row by row */

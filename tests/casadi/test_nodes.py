@@ -1,0 +1,177 @@
+"""Dynamics at many nodes as one CasADi function: those of CasADi's own SX operations."""
+
+from functools import cache
+
+import casadi
+import numpy as np
+import pytest
+
+import serpentail as st
+from serpentail.model.nodes.function import _record
+from tests.casadi.derivatives.external_models import LAST, PARTS, every_function
+from tests.support.models import model_folder
+
+COUNTS = (1, 8, 11)  # one, a full group of lanes, and a part of a second one
+TAILS = [(1, 3), pytest.param((1, None), marks=pytest.mark.slow)]
+every_tail = pytest.mark.parametrize("tail", TAILS)
+
+
+@cache
+def model(segments: int = 1, links: int | None = 3, parts: tuple = tuple(PARTS)) -> st.Model:
+    return st.load(model_folder(segments, links, functions=list(parts)))
+
+
+def arguments(rat: st.Model, name: str, count: int) -> list[np.ndarray]:
+    """Inputs at nodes, quaternions of several norms, and weights of the results."""
+    random = np.random.default_rng(count)
+    q, v = 0.5 * random.normal(size=(rat.nq, count)), random.normal(size=(rat.nv, count))
+    q[3:7] += np.array([[1.0], [0.2], [0.0], [0.0]]) * random.uniform(0.5, 2, count)
+    last = 1e-2 * random.normal(size=(rat.layout.nt if LAST[name] == "tau" else rat.nv, count))
+    return [q, v, last, random.normal(size=(rat.nv, count))]
+
+
+def symbolic(rat: st.Model, name: str) -> list[casadi.Function]:
+    """CasADi's own derivatives of SX operations at one node: value, Jacobian, Hessian."""
+    f = rat.casadi.symbolic(name)
+    inputs = [casadi.SX.sym(key, f.size1_in(key)) for key in f.name_in()[:3]]
+    x, mu = casadi.veccat(*inputs), casadi.SX.sym("mu", rat.nv)
+    y = f(*inputs, casadi.SX(rat.casadi.parameter_vector))
+    results = [y, casadi.jacobian(y, x), casadi.hessian(casadi.dot(mu, y), x)[0]]
+    return [casadi.Function("f", [*inputs, mu], [result]) for result in results]
+
+
+def at_nodes(f: casadi.Function, count: int) -> list[casadi.Function]:
+    """The same of a function of many nodes: its unknowns are those of node after node."""
+    inputs = [casadi.MX.sym(f.name_in(k), *f.size_in(k)) for k in range(3)]
+    x, mu = casadi.veccat(*inputs), casadi.MX.sym("mu", *f.size_out(0))
+    y = f(*inputs)
+    sizes = [f.size1_in(k) for k in range(3)]
+    starts = np.cumsum([0, *(size * count for size in sizes)])
+    by_node = [
+        int(starts[k] + size * node + row)
+        for node in range(count)
+        for k, size in enumerate(sizes)
+        for row in range(size)
+    ]
+    J = casadi.jacobian(casadi.vec(y), x)[:, by_node]
+    H = casadi.hessian(casadi.dot(mu, y), x)[0][by_node, by_node]
+    return [casadi.Function("f", [*inputs, mu], [result]) for result in (y, J, H)]
+
+
+@every_tail
+@every_function
+@pytest.mark.parametrize("count", COUNTS)
+def test_values_and_derivatives_are_those_of_the_symbolic_function(tail, name, count):
+    rat = model(*tail)
+    given = arguments(rat, name, count)
+    compiled = at_nodes(rat.casadi.nodes(name, count, folded=True), count)
+    for order, (f, g) in enumerate(zip(compiled, symbolic(rat, name), strict=True)):
+        found = f(*given)
+        blocks = [g(*(part[:, node] for part in given)) for node in range(count)]
+        wanted = casadi.diagcat(*blocks) if order else casadi.horzcat(*blocks)
+        largest = np.abs(wanted.full()).max()
+        np.testing.assert_allclose(found.full(), wanted.full(), atol=1e-10 * largest)
+        assert found.nnz() <= wanted.nnz()
+
+
+@every_function
+def test_blocks_are_those_of_the_compiled_function(name):
+    """Exact sparsity: the Jacobian's and the Hessian's are those of ``external``, node by node."""
+    rat = model()
+    single = at_nodes(rat.casadi.external(name, derivatives=2, folded=True), 1)
+    several = at_nodes(rat.casadi.nodes(name, 3, folded=True), 3)
+    for one, three in zip(single[1:], several[1:], strict=True):
+        pattern = one.sparsity_out(0)
+        assert three.sparsity_out(0) == casadi.diagcat(pattern, pattern, pattern)
+
+
+@every_function
+def test_parameters_are_one_vector_for_all_nodes(name):
+    rat, count = model(), 3
+    q, v, last, _ = arguments(rat, name, count)
+    f, single = rat.casadi.nodes(name, count), rat.casadi.symbolic(name)
+    assert f.name_in() == single.name_in()
+    assert f.name_out() == single.name_out()
+    other = 1.1 * rat.casadi.parameter_vector
+    wanted = single.map(count)(q, v, last, casadi.repmat(other, 1, count))
+    np.testing.assert_allclose(f(q, v, last, other), wanted, rtol=1e-10, atol=1e-12)
+
+
+def test_ipopt_takes_the_derivatives():
+    """The optimum, in as many iterations, of the mapped SX function."""
+    rat, count = model(), 5
+    wanted = np.linspace(-40, 60, count)
+    found = []
+    for f in (
+        rat.casadi.nodes("forward_dynamics", count, folded=True),
+        rat.casadi.forward_dynamics.map(count),
+    ):
+        bend, tau = (casadi.MX.sym(key, 2, count) for key in ("bend", "tau"))
+        pose = casadi.repmat(casadi.DM([0, 0, 0, 1, 0, 0, 0]), 1, count)
+        v = casadi.repmat(casadi.DM([0, 0, 0, 1, 2, 3, 4, 5]), 1, count)
+        v_dot = f(casadi.vertcat(pose, bend), v, 1e-3 * tau)
+        nlp = {
+            "x": casadi.veccat(bend, tau),
+            "f": casadi.sumsqr(tau) + casadi.sumsqr(bend),
+            "g": v_dot[3, :].T,
+        }
+        quiet = {"ipopt.print_level": 0, "print_time": False, "ipopt.tol": 1e-10}
+        solver = casadi.nlpsol("solver", "ipopt", nlp, quiet)
+        end = solver(x0=0.1, lbg=wanted, ubg=wanted)
+        assert solver.stats()["success"]
+        found.append((end["x"].full(), solver.stats()["iter_count"]))
+    np.testing.assert_allclose(found[0][0], found[1][0], atol=1e-7)
+    assert found[0][1] == found[1][1]
+
+
+def test_results_do_not_depend_on_the_number_of_threads(monkeypatch):
+    rat, count, name = model(), 303, "forward_dynamics"
+    given, found = arguments(rat, name, count), []
+    for most in (1, 3):
+        monkeypatch.setattr(rat.batch_library, "threads", most)
+        assert _record(rat, name, count, 2).kinds[3].threads == most
+        hessian = at_nodes(rat.casadi.nodes(name, count, folded=True), count)[2]
+        found.append(hessian(*given).nonzeros())
+    assert found[0] == found[1]
+
+
+def test_derivatives_of_a_higher_order_than_asked_are_not_there():
+    for order in (0, 1):
+        f = model().casadi.nodes("forward_dynamics", 2, derivatives=order, folded=True)
+        inputs = [casadi.MX.sym("x", *f.size_in(k)) for k in range(3)]
+        y = casadi.sum2(casadi.sum1(f(*inputs)))
+        with pytest.raises(RuntimeError):
+            casadi.Function("f", inputs, [casadi.hessian(y, inputs[0])[0]])
+        if order:  # all but the position of B moves an acceleration
+            slope = casadi.Function("f", inputs, [casadi.jacobian(y, inputs[0])])
+            assert slope.nnz_out() == 2 * (model().nq - 3)
+
+
+def test_a_node_that_gives_no_number_is_an_error_of_the_evaluation():
+    rat = model()
+    f = rat.casadi.nodes("forward_dynamics", 9, folded=True)
+    q, v, tau, _ = arguments(rat, "forward_dynamics", 9)
+    q[3:7, 8] = 0.0
+    with pytest.raises(RuntimeError, match="failed"):
+        f(q, v, tau)
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (("mass_matrix", 3), "name: value 'mass_matrix'"),
+        (("forward_dynamics", 0), "count: value 0"),
+        (("forward_dynamics", 2.5), "count: value 2.5"),
+        (("forward_dynamics", 3, 3), "derivatives: value 3"),
+    ],
+)
+def test_what_cannot_be_is_refused(given, words):
+    with pytest.raises(st.ModelError, match=words):
+        model().casadi.nodes(*given)
+
+
+def test_functions_that_the_scene_lacks_are_named():
+    rat = model(parts=("forward_dynamics", "forward_dynamics_derivatives"))
+    with pytest.raises(st.ModelError, match="forward_dynamics_vjp"):
+        rat.casadi.nodes("forward_dynamics", 3)
+    assert rat.casadi.nodes("forward_dynamics", 3, derivatives=1).n_in() == 4
