@@ -11,7 +11,7 @@ from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.scene.shape import Shape
 from tests.functions.test_columns import arguments, outputs
-from tests.mechanics.test_contact import CASES, touching
+from tests.mechanics.test_contact import CASES, near_ground, touching
 
 FUNCTIONS = ("energy", "momentum", "rollout", "implicit", "tail_points", "center_of_mass")
 G = 9.8
@@ -77,6 +77,18 @@ def test_touch_downs_are_where_points_of_the_tail_reach_the_ground():
     k = int(np.argmax(lowest < 0))
     share = lowest[k - 1] / (lowest[k - 1] - lowest[k])
     assert first["time"] == pytest.approx(flight.t[k - 1] + share * 2e-5, abs=1e-6)
+
+
+def test_batches_are_those_of_single_states():
+    """So many states that they are evaluated side by side."""
+    segments, _, options = CASES["mixed"]
+    model = touching(segments, None, **options)
+    states = near_ground(model, 3, 1000)
+    together = model.contact_dynamics(*states)
+    alone = [model.contact_dynamics(*(rows[k] for rows in states)) for k in range(50)]
+    assert together[2].any()
+    for found, expected in zip(together, map(np.array, zip(*alone, strict=True)), strict=True):
+        assert np.abs(found[:50] - expected).max() <= 1e-11 * np.abs(expected).max()
 
 
 def test_methods_agree():
