@@ -11,19 +11,27 @@ import pytest
 
 import serpentail as st
 from serpentail.verification.report import laws
+from serpentail_codegen.scene.parse import parse_scene
 from tests.c.target.emitted import C99, compiled
 from tests.references.contact import Contacts, attitude
 from tests.references.parameters import random_states
-from tests.support.models import model_folder
+from tests.support.models import folder_of, model_folder
 
 ALL = ("feet", "tail", "torso")
 FRICTION = ("cone", "box", "smooth", "paper")
+# segments of a mixed tail
+MIXED = (
+    {"kind": "articulated", "links": 2, "length": 0.08, "mass": 0.0015},
+    {"kind": "continuum", "length": 0.06, "mass": 0.001},
+    {"kind": "articulated", "links": 3, "link_lengths": [0.03, 0.02, 0.02], "mass": 0.0008},
+)
 CASES = {
     "straight": (1, 3, {"emission": "straight"}),
     "loops": (2, 2, {"emission": "loops"}),
     "continuum": (2, None, {"samples": 3}),
     "continuum_loops": (1, None, {"emission": "loops"}),
     "baked": (1, 2, {"baked": True}),
+    "mixed": (3, None, {"kind": "mixed", "samples": 3}),
 }
 NAMES = ["mass_matrix", "bias_force", "forward_dynamics", "contact_points", "contact_dynamics"]
 
@@ -32,6 +40,8 @@ NAMES = ["mass_matrix", "bias_force", "forward_dynamics", "contact_points", "con
 def touching(segments=1, links=3, contacts=ALL, functions=tuple(NAMES), **options):
     """A model that can touch the ground."""
     options = {"contacts": list(contacts), "functions": list(functions), "name": "rat"} | options
+    if options.get("kind") == "mixed":
+        return st.load(folder_of(parse_scene(options | {"segments": MIXED[:segments]}, "rat")))
     return st.load(model_folder(segments, links, **options))
 
 

@@ -4,6 +4,8 @@ Every formula also takes complex numbers: velocities and Jacobians are complex-s
 the points' positions.
 """
 
+from itertools import pairwise
+
 import numpy as np
 
 STEP = 1e-30
@@ -58,41 +60,62 @@ def feet(parameters, legs):
     return [point for leg in joints(parameters, legs[:4]) for point in leg[3:]]
 
 
-def articulated(parameters, q_t, links):
-    """Joints but the first, then the tip, in the torso frame."""
-    R, P, out = np.eye(3), np.array(parameters["tail_mount"]), []
-    length = parameters["tail_length"] / (links * len(q_t) // 2)
-    for alpha, beta in np.reshape(q_t, (-1, 2)):
-        for _ in range(links):
-            R = R @ turn(np.array([alpha, 0, 0])) @ turn(np.array([0, 0, beta]))
-            P = P - length * R[:, 1]
-            out.append(P)
-    return out
+def chain(R, P, angles, lengths):
+    """Return the frame beyond a segment of links, its joints but the first, and its tip."""
+    out = []
+    alpha, beta = angles
+    for length in lengths:
+        R = R @ turn(np.array([alpha, 0, 0])) @ turn(np.array([0, 0, beta]))
+        P = P - length * R[:, 1]
+        out.append(P)
+    return R, out
 
 
-def continuum(parameters, q_t, samples):
-    """Equally spaced points of every arc, in the torso frame: Gauss-Legendre quadrature of the
-    tangent.
+def arc(R, P, angles, length, samples):
+    """Return the frame beyond an arc and its equally spaced points: Gauss-Legendre quadrature of
+    the tangent.
     """
-    R, P, out = np.eye(3), np.array(parameters["tail_mount"]), []
-    length = parameters["tail_length"] / (len(q_t) // 2)
+    bend, out = np.array([angles[0], 0, angles[1]]), []
     nodes, weights = np.polynomial.legendre.leggauss(12)
-    for a, b in np.reshape(q_t, (-1, 2)):
-        bend = np.array([a, 0, b])
-        for k in range(samples):
-            xs, ws = (k + (nodes + 1) / 2) / samples, weights / (2 * samples)
-            P = P - length * R @ sum(w * turn(x * bend)[:, 1] for x, w in zip(xs, ws, strict=True))
-            out.append(P)
-        R = R @ turn(bend)
-    return out
+    for k in range(samples):
+        xs, ws = (k + (nodes + 1) / 2) / samples, weights / (2 * samples)
+        P = P - length * R @ sum(w * turn(x * bend)[:, 1] for x, w in zip(xs, ws, strict=True))
+        out.append(P)
+    return R @ turn(bend), out
+
+
+class Points:
+    """The tail's points but the mount, in the torso frame, of links and arcs."""
+
+    def __init__(self, model):
+        given, m = model.parameters, model.segments
+        self.mount, self.samples = np.array(given["tail_mount"]), model.samples
+        links, total = np.broadcast_to(model.links or 0, m), given["tail_length"]
+        chains = given.get("link_lengths", [total / max(1, sum(links))] * sum(links))
+        arcs = iter(given.get("arc_lengths", [total / m] * m))
+        ends = np.cumsum([0, *links])
+        self.lengths = [chains[a:b] if a < b else next(arcs) for a, b in pairwise(ends)]
+        self.kinds = model.kinds
+
+    def at(self, q_t):
+        """Return the points from root to tip."""
+        R, out = np.eye(3), [self.mount]
+        for kind, length, angles in zip(
+            self.kinds, self.lengths, np.reshape(q_t, (-1, 2)), strict=True
+        ):
+            if kind == "articulated":
+                R, more = chain(R, out[-1], angles, length)
+            else:
+                R, more = arc(R, out[-1], angles, length, self.samples)
+            out += more
+        return out[1:]
 
 
 class Contacts:
     """The points of a model; ``groups`` as in its manifest."""
 
     def __init__(self, model):
-        self.parameters, self.kind = model.parameters, model.kind
-        self.pieces = model.links or model.samples
+        self.parameters, self.points = model.parameters, Points(model)
         self.groups = [entry["group"] for entry in model.manifest["contacts"]]
         self.friction, self.nv = model.manifest["scene"]["friction"], model.nv
 
@@ -104,7 +127,7 @@ class Contacts:
         if "feet" in self.groups:
             out += feet(P, legs)
         if "tail" in self.groups:
-            out += (articulated if self.kind == "articulated" else continuum)(P, q_t, self.pieces)
+            out += self.points.at(q_t)
         if "torso" in self.groups:
             axes, down = np.array(P["torso_semi_axes"]), -R.real[2]
             out.append(axes**2 * down / np.sqrt((axes * down) @ (axes * down)))

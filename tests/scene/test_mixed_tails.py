@@ -72,7 +72,6 @@ def test_pieces_may_be_parameters():
         ({"segments": [LINKS, ARC], "links": 3}, "links", "has none; remove it"),
         ({"segments": [LINKS, ARC], "samples": 0}, "samples", "1 or above"),
         ({"segments": [LINKS, ARC], "coordinates": "polar"}, "coordinates", 'needs "mixed"'),
-        ({"segments": [LINKS, ARC], "contacts": ["tail"]}, "contacts", "remove the group"),
         (
             {"segments": [LINKS, ARC], "parameters": {"tail_mass": 1}},
             "parameters.tail_mass",

@@ -132,10 +132,6 @@ def contact_problems(
         remedy = 'polar coordinates have no contacts: use "bend"'
         problems.append(Problem("contacts", list(contacts), remedy))
 
-    if "tail" in contacts and values["kind"] == "mixed":
-        remedy = "a tail of links and arcs touches nothing so far: remove the group"
-        problems.append(Problem("contacts", list(contacts), remedy))
-
     # a flight has no friction and no functions of the ground; some need one group of points
     remedy = 'needs points that touch the ground: add contacts = ["feet"]'
     if "friction" in table and not contacts:

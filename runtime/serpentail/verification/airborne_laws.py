@@ -9,7 +9,7 @@ from ..model.layout import OMEGA, QUATERNION, TAIL_V
 from ..model.model import Model
 from .derivative_laws import along
 from .errors import relative, sensitivity
-from .law import SLOPE_LIMIT, VALUE_LIMIT, Errors, Law, fastest, registry, slope
+from .law import PIECEWISE, SLOPE_LIMIT, VALUE_LIMIT, Errors, Law, fastest, registry, slope
 from .states import State
 
 # accelerations are quotients in q_t: differences follow them in smaller steps than sines
@@ -54,7 +54,13 @@ def slopes(
     return change, rate * largest
 
 
-@law("airborne_rates", "airborne_rates_derivatives", "mass_matrix", units=SLOPE_LIMIT)
+@law(
+    "airborne_rates",
+    "airborne_rates_derivatives",
+    "mass_matrix",
+    units=SLOPE_LIMIT,
+    without=PIECEWISE,
+)
 def airborne_rates_change_by_their_jacobian(model: Model, s: State) -> Errors:
     """The Jacobian of an airborne state's rates times a direction is their slope along it."""
     y, J = model.airborne_rates_derivatives(s.x, s.tau, s.angular)
@@ -68,7 +74,13 @@ def airborne_rates_change_by_their_jacobian(model: Model, s: State) -> Errors:
     return errors
 
 
-@law("airborne_rates_derivatives", "airborne_rates_hessian", "mass_matrix", units=SLOPE_LIMIT)
+@law(
+    "airborne_rates_derivatives",
+    "airborne_rates_hessian",
+    "mass_matrix",
+    units=SLOPE_LIMIT,
+    without=PIECEWISE,
+)
 def airborne_gradient_changes_by_the_hessian(model: Model, s: State) -> Errors:
     """The Hessian of weights^T y times a direction is the slope of weights^T J along it."""
     y, J, H = model.airborne_rates_hessian(s.x, s.tau, s.angular, s.weights)

@@ -1,5 +1,6 @@
 """The values for the templates of a simulation: its workspace, its methods and its records."""
 
+from dataclasses import dataclass
 from itertools import accumulate
 from typing import Any
 
@@ -13,6 +14,11 @@ LOOKS = 24  # parts of parts of a step in which contacts are looked for: up to 2
 # heights (m): how exactly the sides of the ground are told apart; depths from which a point counts
 # as having entered it; from which on a step must not overlook that
 RESOLUTION = {"double": (1e-7, 1e-6, 2e-6), "float": (2e-6, 1e-5, 2e-5)}
+TURNED_AT = {  # where along a tail its turn grows, and by what
+    "articulated": "at each joint by the segment's rates",
+    "continuum": "at each sample by its part of the bend",
+    "mixed": "at each joint by the segment's rates, at each sample by its part of the bend",
+}
 SLOTS = 11  # states in the workspace: see simulation/workspace.c.jinja
 # of simulation/workspace.c.jinja, undefined again where the file ends
 MACROS = (
@@ -46,7 +52,7 @@ def simulation_context(
         # of an index that counts the tail's numbers of q, of v
         "before_q": "" if tail.shape.fixed else "7 + ",
         "before_v": "" if tail.shape.fixed else "6 + ",
-        "articulated": tail.kind == "articulated",
+        "turned_at": TURNED_AT[tail.kind],
         "own_lengths": own_lengths(scene),
         "part": 1.0
         if tail.kind == "articulated"
@@ -73,8 +79,21 @@ def simulation_context(
     }
 
 
-def own_lengths(scene: Scene) -> tuple[float, ...]:
-    """Return the lengths of links or arcs that have their own; else nothing."""
-    names = [name for name in ("link_lengths", "arc_lengths") if name in scene.parameters]
-    value = scene.parameters[names[0]] if names else ()
-    return value if isinstance(value, tuple) else (value,)
+@dataclass(frozen=True)
+class Lengths:
+    """Lengths of links or arcs that have their own: the C array, their parameter, its values."""
+
+    name: str
+    parameter: str
+    values: tuple[float, ...]
+
+
+def own_lengths(scene: Scene) -> list[Lengths]:
+    """Return the lengths of links and arcs that have their own; a mixed tail has both."""
+    found = []
+    for parameter in ("link_lengths", "arc_lengths"):
+        if parameter in scene.parameters:
+            value = scene.parameters[parameter]
+            name = parameter if scene.kind == "mixed" else "lengths"
+            found.append(Lengths(name, parameter, value if isinstance(value, tuple) else (value,)))
+    return found
