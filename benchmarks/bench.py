@@ -1,8 +1,8 @@
 """`make bench`: measures speed beside peers, generation, drift and precision, and reports.
 
-It needs an idle machine and takes about half an hour. Measures that depend on the processor are
-made for AVX-512 and for AVX2 if the machine has both. One file of measures runs alone, for example
-as `.venv/bin/python -m benchmarks.batches`.
+It needs an idle machine and takes about 45 minutes; an interrupted run resumes. Measures that
+depend on the processor are made for AVX-512 and for AVX2 if the machine has both. One file of
+measures runs alone, for example as `.venv/bin/python -m benchmarks.batches`.
 """
 
 from examples import front
@@ -17,4 +17,4 @@ def main(folder) -> None:
 
 if __name__ == "__main__":
     given = front.parser(__doc__, "output/bench").parse_args()
-    front.run(main, given.folder)
+    front.run(main, given.folder, after=front.GOES_ON)

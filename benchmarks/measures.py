@@ -1,7 +1,9 @@
 """What `make bench` measures, in this order, and the report of one run of it."""
 
+import hashlib
 import json
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -36,9 +38,12 @@ from benchmarks.peers import compilers
 from benchmarks.peers import mujoco_casadi as more_peers
 from benchmarks.peers import soromox as continuum_peer
 from benchmarks.report import written
+from examples.studies.parts import digest
+from serpentail.files import replacing
 from serpentail.stages import Stage
 
 ROOT = Path(__file__).resolve().parent.parent
+SOURCES = ("codegen", "runtime", "benchmarks", "examples/righting.py")
 
 
 class Measure(NamedTuple):
@@ -83,60 +88,77 @@ MEASURES = {
     "page_speed": Measure(pages.page_speed),
     "identification_times": Measure(identification.identification_times),
 }
-# a process that uses a lesser processor; its arguments: a folder, then names of measures
+# a process that uses a lesser processor; its arguments: two folders, then names of measures
 CHILD = """
-import json, sys
+import sys
 from pathlib import Path
 import serpentail as st
-from benchmarks.measures import measured
+from benchmarks.measures import measure
 with st.progress():
-    found = measured(sys.argv[2:], Path(sys.argv[1]))
-(Path(sys.argv[1]) / "found.json").write_text(json.dumps(found, default=float))
+    measure(sys.argv[3:], *map(Path, sys.argv[1:3]))
 """
 
 
 def bench(output: Path, names: Sequence[str] = tuple(MEASURES)) -> None:
-    """Run the named measures, write the report, and print it."""
+    """Run the named measures, write the report, and print it.
+
+    What is measured is kept in OUTPUT/measured until the report is written, so that an interrupted
+    run resumes if neither the sources nor the machine have changed.
+    """
     there = processors.processors()
+    kept = output / "measured" / state()
     report: dict = {"machine": machine(there), "seconds": []}
-    with tempfile.TemporaryDirectory() as scratch:
-        for processor in there:
-            wanted = [name for name in names if MEASURES[name].each or processor is there[0]]
-            found = on(processor, wanted, Path(scratch))
-            for name, (rows, seconds) in found.items():
-                tag = {"processor": processor.name} if MEASURES[name].each else {}
-                report.setdefault(name, []).extend(tag | row for row in rows)
-                report["seconds"].append({"measure": name} | tag | {"took_s": seconds})
+    for processor in there:
+        wanted = [name for name in names if MEASURES[name].each or processor is there[0]]
+        for name, found in on(processor, wanted, kept / processor.name).items():
+            tag = {"processor": processor.name} if MEASURES[name].each else {}
+            report.setdefault(name, []).extend(tag | row for row in found["rows"])
+            report["seconds"].append({"measure": name} | tag | {"took_s": found["seconds"]})
     report = {name: report[name] for name in ("machine", *MEASURES, "seconds") if name in report}
-    output.mkdir(parents=True, exist_ok=True)
     pictures = drawn(report, output)
     words = {name: MEASURES[name].rows.__doc__ for name in MEASURES if name in report}
     print(written(output, report, words, pictures))
     print(f"written: {output}: report.md, report.html, report.json, figures.json", file=sys.stderr)
+    shutil.rmtree(kept.parent)
 
 
-def on(processor: processors.Processor, names: list[str], scratch: Path) -> dict:
-    """Return the results of measures on a processor: in this process, or in one that uses a lesser
-    processor.
+def state() -> str:
+    """Return a hash of what a measure depends on: sources and processor."""
+    sources = digest(*(ROOT / name for name in SOURCES))
+    told = f"{sources} {processors.processor_line('model name')} {os.cpu_count()}"
+    return hashlib.sha256(told.encode()).hexdigest()[:16]
+
+
+def on(processor: processors.Processor, names: list[str], kept: Path) -> dict[str, dict]:
+    """Return what measures found on a processor, which a process of its own uses if it is a lesser
+    one.
     """
-    if processor.level is None or not names:
-        return measured(names, scratch)
-    own = scratch / processor.name
-    own.mkdir()
-    command = [sys.executable, "-c", CHILD, str(own), *names]
-    subprocess.run(command, cwd=ROOT, env=processor.environment, check=True)
-    return json.loads((own / "found.json").read_text())
+    kept.mkdir(parents=True, exist_ok=True)
+    missing = [name for name in names if not of(kept, name).exists()]
+    with tempfile.TemporaryDirectory() as scratch:
+        if missing and processor.level is None:
+            measure(missing, Path(scratch), kept)
+        elif missing:
+            command = [sys.executable, "-c", CHILD, scratch, str(kept), *missing]
+            subprocess.run(command, cwd=ROOT, env=processor.environment, check=True)
+    return {name: json.loads(of(kept, name).read_text()) for name in names}
 
 
-def measured(names: Sequence[str], scratch: Path) -> dict[str, tuple[list[dict], float]]:
-    """Return the rows of measures, and the seconds that each took."""
-    found = {}
+def measure(names: Sequence[str], scratch: Path, kept: Path) -> None:
+    """Run measures, and keep the rows of each and the seconds that it took."""
     with Stage("bench", processors.march()) as stage:
         for done, name in enumerate(names):
             stage.tell(done / len(names), name.replace("_", " "))
             begun = time.perf_counter()
-            found[name] = MEASURES[name].rows(scratch), time.perf_counter() - begun
-    return found
+            rows = MEASURES[name].rows(scratch)
+            found = {"rows": rows, "seconds": time.perf_counter() - begun}
+            with replacing(of(kept, name)) as part:
+                part.write_text(json.dumps(found, default=float))
+
+
+def of(kept: Path, name: str) -> Path:
+    """Return the file that keeps what a measure found."""
+    return kept / f"{name}.json"
 
 
 def drawn(report: dict, output: Path) -> list[Path]:

@@ -15,12 +15,8 @@ from benchmarks.batches import best, c_times
 from benchmarks.fixtures import built, label
 from benchmarks.operations import needed
 from serpentail.planning.nlp.coordinates import attitude
-from serpentail.planning.nlp.node import (
-    PARAMETERS,
-    equations_of_motion,
-    node_function,
-    variables_of,
-)
+from serpentail.planning.nlp.equations import equations_of_motion
+from serpentail.planning.nlp.node import PARAMETERS, node_function, variables_of
 from serpentail.planning.nlp.node_calls import MappedNode
 from serpentail.planning.problem import SMOOTHING, PlanningProblem
 from serpentail_codegen.functions.catalogue import CATALOGUE

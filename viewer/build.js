@@ -1,4 +1,4 @@
-// Makes the page that serpentail fills with motions, with scripts, styles and licences in it.
+// Builds the page that serpentail fills with motions; scripts, styles and licences are inside it.
 import { readFileSync, writeFileSync } from "node:fs";
 import { fileURLToPath } from "node:url";
 import { build } from "esbuild";

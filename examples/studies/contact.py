@@ -4,6 +4,11 @@ Motions are simulated in parallel, as many as $SERPENTAIL_THREADS says or there 
 row of a store in FOLDER/parts, so that an interrupted study resumes.
 """
 
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))  # for a run by the path of this file
+
 from examples import front
 
 

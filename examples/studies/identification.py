@@ -7,8 +7,11 @@ stated prior; geometry, the position of a marker and the torques are estimated. 
 
 import argparse
 import json
+import sys
 import time
 from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))  # for a run by the path of this file
 
 from examples import front
 

@@ -5,6 +5,9 @@ alone. Each result is a row of a store in FOLDER/parts, so that an interrupted s
 """
 
 import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))  # for a run by the path of this file
 
 from examples import front
 

@@ -4,6 +4,11 @@ Each plan is a row of FOLDER/rows.db; the same command resumes an interrupted st
 the workers of a cluster: see docs/sweeps.md.
 """
 
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))  # for a run by the path of this file
+
 from examples import front
 
 

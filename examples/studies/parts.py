@@ -74,13 +74,13 @@ def _forget_without_files(found: st.Sweep, parts: Mapping[str, Part]) -> None:
 
 
 def digest(*sources: Path) -> str:
-    """Return a hash of Python sources and templates, files or folders, for the inputs of a part."""
+    """Return a hash of sources, files or folders, for the inputs of a part."""
     inside = [
         p
         for source in sources
         for p in (sorted(source.rglob("*")) if source.is_dir() else [source])
     ]
-    files = [p for p in inside if p.suffix in (".py", ".jinja")]
+    files = [p for p in inside if p.suffix in (".py", ".jinja", ".c", ".h")]
     return hashlib.sha256(b"\0".join(p.read_bytes() for p in files)).hexdigest()[:16]
 
 

@@ -4,6 +4,11 @@ Three laws are compared: the plan's torques, PFL along the plan, and predictive 
 is kept in FOLDER/parts, so that an interrupted study resumes.
 """
 
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))  # for a run by the path of this file
+
 from examples import front
 
 

@@ -4,6 +4,11 @@ Plans are made in parallel, as many as $SERPENTAIL_THREADS says or there are cor
 a store in FOLDER/parts: a second run only draws, and an interrupted one resumes.
 """
 
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))  # for a run by the path of this file
+
 from examples import front
 
 

@@ -3,12 +3,12 @@
 from pathlib import Path
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
 import serpentail as st
+from examples.studies.righting_kinds import TRUE, is_true
 from serpentail.attitude import angle_deg, tilt_deg
 from serpentail.pictures.panels import SINGULAR
 from serpentail.pictures.style import drawn
@@ -19,7 +19,7 @@ LOOKS = {  # a band, and the curve that may lie on it
     "tracked": {"color": BLUE, "linewidth": 1.0},
     "passive": {"color": "#d55e00", "linestyle": "--"},
 }
-WAYS = {"paper": ("#d55e00", "o--"), "ours": ("#0072b2", "s-")}
+WAYS = {"ours": ("#0072b2", "s-"), "paper": ("#d55e00", "o--")}
 PANELS = (  # of Fig. 10
     *("$p_{b,y}$ [m]", "$p_{b,z}$ [m]"),
     *(r"pitch $\phi_x$ [deg]", r"roll $\phi_y$ [deg]"),
@@ -158,41 +158,45 @@ def draw_figure_13(
     return drawn(draw, path)
 
 
-def draw_rates(rates: dict[str, list[dict]], path: Path) -> tuple[Figure, np.ndarray]:
-    """Draw the share of random starts that have a true plan within a CPU time, and the true errors
-    of all.
+def draw_rates(rates: dict[str, dict[str, list[dict]]], path: Path) -> tuple[Figure, np.ndarray]:
+    """Draw, for each kind of random start and both ways of planning, the share of true plans, and
+    CPU time and true error of all plans: medians, and the range of nine tenths of them.
     """
-    times = {k: [r["cpu_s"] if r["success"] else np.inf for r in rows] for k, rows in rates.items()}
-    errors = {k: [r["open_loop_attitude_error_deg"] for r in rows] for k, rows in rates.items()}
+    spans = {"cpu_s": "CPU time [s]", "open_loop_attitude_error_deg": "true error [deg]"}
 
     def draw() -> tuple[Figure, np.ndarray]:
-        figure = Figure(figsize=(7.2, 3.5), layout="constrained")
-        left, right = axes = figure.subplots(1, 2)
-        for panel, values in ((left, times), (right, errors)):
-            panel.set(xscale="log", ylim=(0, 101))
-            _draw_shares(panel, values)
+        figure = Figure(figsize=(7.2, 1.2 + 0.24 * len(rates)), layout="constrained")
+        axes = figure.subplots(1, 3, sharey=True)
+        for shift, (way, (colour, mark)) in zip((0.15, -0.15), WAYS.items(), strict=True):
+            at = shift - np.arange(len(rates))
+            rows = [ways[way] for ways in rates.values()]
+            shares = [100 * np.mean([is_true(row) for row in of]) for of in rows]
+            look = {"color": colour, "label": way}
+            axes[0].plot(shares, at, mark[0], markersize=3.5, **look)
+            for panel, key in zip(axes[1:], spans, strict=True):
+                low, middle, high = np.transpose([_middle([r[key] for r in of]) for of in rows])
+                panel.hlines(at, low, high, color=colour, linewidth=1)
+                panel.plot(middle, at, mark[0], markersize=3.5, **look)
+        axes[0].set(xlabel="true plans [%]", xlim=(-4, 104))
+        names = [f"{kind}: {len(ways['ours'])}" for kind, ways in rates.items()]
+        axes[0].set_yticks(-np.arange(len(rates)), names)
+        for panel, name in zip(axes[1:], spans.values(), strict=True):
+            panel.set(xlabel=name, xscale="log")
+        _write_times(axes[1].xaxis)
+        axes[2].axvline(TRUE, color="0.5", linestyle=":")
+        for panel in axes:
             panel.grid(color="#e6e6e6", linewidth=0.6)
-        left.set(xlabel="CPU time [s]", ylabel="starts with a true plan [%]")
-        _write_times(left.xaxis)
-        right.set(xlabel="true error at the end [deg]", ylabel="starts [%]")
-        right.axvline(0.01, color="0.5", linestyle=":")
-        keys = left.get_legend_handles_labels()
-        figure.legend(*keys, loc="outside upper center", ncols=4, fontsize=7)
+        keys = axes[0].get_legend_handles_labels()
+        figure.legend(*keys, loc="outside upper center", ncols=2)
         return figure, axes
 
     return drawn(draw, path)
 
 
-def _draw_shares(panel: Axes, values: dict[str, list[float]]) -> None:
-    """Draw for each kind the share (%) of values up to a value: from 0, to the panel's edge."""
-    known = {kind: np.sort(np.array(all_)[np.isfinite(all_)]) for kind, all_ in values.items()}
-    most = 1.2 * max((x.max() for x in known.values() if len(x)), default=1.0)
-    for k, (kind, found) in enumerate(known.items()):
-        share = 100 * np.arange(len(found) + 1) / len(values[kind])
-        x = np.concatenate([found[:1], found, [most]])
-        y = np.concatenate([share, share[-1:]]) if len(found) else [0]
-        panel.step(x, y, color=f"C{k}", label=f"{kind}: {len(values[kind])}", where="post")
-    panel.set_xlim(None, most)
+def _middle(values: list[float]) -> np.ndarray:
+    """Return the percentiles 5, 50 and 95 of the finite ones of values."""
+    finite = np.array(values)[np.isfinite(values)]
+    return np.percentile(finite, (5, 50, 95)) if len(finite) else np.full(3, np.nan)
 
 
 def _write_times(axis: Axis) -> None:

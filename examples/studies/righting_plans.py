@@ -1,6 +1,5 @@
 """The plans of the righting study, each a part of it, by tail: plain data in, plain data out."""
 
-import time
 from functools import cache
 
 import numpy as np
@@ -65,20 +64,3 @@ def paper(size: tuple) -> dict:
     given = {"start": start, "bounds": limits, "duration": righting.FLIGHT}
     plan = st.plan(model, **righting.PAPER, intervals=58, time_limit=LIMIT, **given)
     return righting.row(plan)
-
-
-def block(size: tuple, starts: list[int], any_rate: bool, settings: dict) -> list[dict]:
-    """Plan from random starts, upright at rest or at any rate.
-
-    The whole tail bends by 180 degrees as in Sect. 4.2, or by 360 as in 4.3.
-    """
-    model, rows = rat(*size), []
-    limits = righting.bounds(model, np.pi if size == RAT else 2 * np.pi)
-    given = {"duration": (0.3, righting.FLIGHT), "bounds": limits, "time_limit": LIMIT}
-    if any_rate:
-        given["goal"] = st.Goal(torso_rate=None)
-    for k in starts:
-        begun = time.process_time()
-        plan = st.plan(model, start=righting.tumbling(model, k), track=False, **given, **settings)
-        rows.append(righting.row(plan) | {"start": k, "cpu_s": time.process_time() - begun})
-    return rows

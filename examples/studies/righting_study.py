@@ -4,10 +4,9 @@ import json
 from functools import partial
 from pathlib import Path
 
-import numpy as np
-
 from examples import righting
 from examples.front import ROOT
+from examples.studies import righting_kinds as kinds
 from examples.studies import righting_plans as plans
 from examples.studies.parts import Part, as_flight, digest, made
 from examples.studies.righting_figures import (
@@ -20,11 +19,13 @@ from examples.studies.righting_plans import RAT, rat
 
 FREQUENCIES = (20, 40, 60, 80, 100, 150, 200)  # Hz, nodes a second
 TAILS = ((1, 6), (2, 3), (3, 2))
-MORE = ((4, 2), (5, 2), (6, 2), (1, None), (2, None), (3, None))
-SEVERAL = ((2, 3), (3, 2), (1, None), (3, None))  # tails righted from random starts, besides (1, 3)
-FEWER = 16  # times fewer starts for these
-BLOCK = 10  # random starts that are kept together
-SOURCES = ("examples/righting.py", "examples/studies/righting_plans.py", "runtime")
+MORE = ((4, 2), (5, 2), (6, 2), (1, None), (2, None), (3, None), (4, None))
+SOURCES = (
+    "examples/righting.py",
+    "examples/studies/righting_plans.py",
+    "examples/studies/righting_kinds.py",
+    "runtime",
+)
 
 
 def name(segments: int, links: int | None) -> str:
@@ -71,25 +72,6 @@ def segments() -> dict[str, tuple]:
     return parts
 
 
-def blocks(count: int) -> dict[str, dict[str, tuple]]:
-    """Plans from random tumbling starts by kind, upright and, by default, at rest."""
-    fewer, kinds = max(1, count // FEWER), {"(1, 3)": (RAT, count, False, {})}
-    kinds["(1, 3), any rate"] = RAT, count, True, {}
-    kinds["(1, 3), no smoothing"] = RAT, fewer, False, {"smoothing": 0.0}
-    kinds |= {name(*size): (size, fewer, False, {}) for size in SEVERAL}
-    return {kind: _blocks(kind, *given) for kind, given in kinds.items()}
-
-
-def _blocks(kind: str, size: tuple, count: int, any_rate: bool, settings: dict) -> dict[str, tuple]:
-    parts = {}
-    for first in range(1, count + 1, BLOCK):
-        starts = list(range(first, min(first + BLOCK, count + 1)))
-        make = partial(plans.block, size, starts, any_rate, settings)
-        told = settings | {"any_rate": any_rate}
-        parts[f"{kind} starts {first} to {starts[-1]}"] = size, told, make
-    return parts
-
-
 # ---- results -------------------------------------------------------------------------------------
 
 
@@ -105,7 +87,7 @@ def draw_flights(folder: Path, found: dict) -> None:
     draw_figure_13(flights, {size: rat(*size) for size in TAILS}, folder / "fig13.png")
 
 
-def summary(found: dict, kinds: dict[str, dict]) -> dict:
+def summary(found: dict, starts: int) -> dict:
     """Return the contents of summary.json."""
     rows = []
     for m, n in (*TAILS, *MORE):
@@ -117,28 +99,9 @@ def summary(found: dict, kinds: dict[str, dict]) -> dict:
         way: [{"frequency": f} | found[f"Fig. 11 {way} {f} Hz"] for f in FREQUENCIES]
         for way in ("paper", "ours")
     }
-    rates = {
-        kind: [row for title in parts for row in found[title]] for kind, parts in kinds.items()
-    }
+    rates = kinds.rows_of(starts, found)
     told = {"righting": found["Sect. 4.2"]["row"], "frequencies": frequencies}
     return told | {"segments": {"rows": rows}, "rates": rates}
-
-
-def rate_lines(rates: dict[str, list[dict]]) -> list[str]:
-    """Return the rates as text: successes, medians and tails of CPU time, error and objective."""
-    lines = [
-        "random starts          true      of  cpu: median    95 %   most [s]  err [deg]  objective"
-    ]
-    for kind, rows in rates.items():
-        good = [r for r in rows if r["success"]]
-        cpu = np.percentile([r["cpu_s"] for r in rows], [50, 95, 100])
-        medians = [
-            np.median([r[key] for r in good])
-            for key in ("open_loop_attitude_error_deg", "objective")
-        ]
-        numbers = "{:>12.2f}{:>8.2f}{:>11.2f}{:>11.4f}{:>11.2e}".format(*cpu, *medians)
-        lines.append(f"{kind:<22}{len(good):>5}{len(rows):>8}{numbers}")
-    return lines
 
 
 def table(study: dict) -> str:
@@ -155,23 +118,25 @@ def table(study: dict) -> str:
         lines += [line.format(f"{tail} {kind}", r[kind]) for kind in ("paper", "ours") if kind in r]
     for kind, rows in study["frequencies"].items():
         lines += [line.format(f"{r['frequency']} Hz, {kind}", r) for r in rows]
-    lines += ["", *rate_lines(study["rates"])]
+    lines += ["", *kinds.table(study["rates"])]
     return "\n".join(lines)
 
 
 def righted(folder: Path, starts: int) -> None:
     """Compute the missing parts of the study, and write its summary and figures."""
-    hashes, kinds, program = built(folder), blocks(starts), digest(*(ROOT / s for s in SOURCES))
+    hashes, program = built(folder), digest(*(ROOT / s for s in SOURCES))
+
+    def of(size: tuple) -> dict:
+        return {"model": hashes[size], "program": program}
+
     wanted = {"Sect. 4.2": (RAT, {}, plans.section_4_2)} | examples() | segments()
-    for parts in kinds.values():
-        wanted |= parts
     parts = {
-        title: Part(make, {"model": hashes[size], "program": program, "settings": settings})
+        title: Part(make, of(size) | {"settings": settings})
         for title, (size, settings, make) in wanted.items()
     }
-    found = made("righting", folder / "parts", parts)
+    found = made("righting", folder / "parts", parts | kinds.parts(starts, of))
     draw_flights(folder, found)
-    study = summary(found, kinds)
+    study = summary(found, starts)
     draw_figure_11(study["frequencies"], folder / "fig11.png")
     draw_rates(study["rates"], folder / "rates.png")
     (folder / "summary.json").write_text(json.dumps(study, indent=1) + "\n")

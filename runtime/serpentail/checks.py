@@ -124,7 +124,7 @@ def number(
         return value
     numbers, bounds = numbers_in(value), (above, least, most)
     if numbers is None or numbers.shape != () or not _within(numbers, bounds):
-        raise refusal(field, value, f"a {_words('number', bounds)}", error)
+        raise refusal(field, value, f"a {_words('number', bounds)}{_no_text(value)}", error)
     return float(numbers)
 
 
@@ -135,7 +135,8 @@ def whole_number(field: str, value: object, error: Error, *, least: int, most: i
     except TypeError:
         number = most + 1
     if not least <= number <= most:
-        raise refusal(field, value, f"a whole number from {least} to {most}", error)
+        needs = f"a whole number from {least} to {most}{_no_text(value)}"
+        raise refusal(field, value, needs, error)
     return number
 
 
@@ -151,7 +152,8 @@ def numbers(
     """Return finite numbers (size,) within bounds; a single one is repeated."""
     numbers, bounds = numbers_in(value), (-np.inf, least, most)
     if numbers is None or numbers.shape not in ((), (size,)) or not _within(numbers, bounds):
-        raise refusal(field, value, f"one or {size} {_words('numbers', bounds)}", error)
+        needs = f"one or {size} {_words('numbers', bounds)}{_no_text(value)}"
+        raise refusal(field, value, needs, error)
     return np.broadcast_to(numbers, (size,)).copy()
 
 
@@ -180,6 +182,17 @@ def _words(noun: str, bounds: Bounds) -> str:
     if above > -np.inf:
         return f"{noun} above {above:g}{to}"
     return f"{noun} from {least:g}{to}" if least > -np.inf else f"finite {noun}{to}"
+
+
+def _no_text(value: object) -> str:
+    """Return the end of a line about a text where numbers belong; "" for other values."""
+    if not isinstance(value, str):
+        return ""
+    try:
+        float(value)
+    except ValueError:
+        return ", not a text"
+    return ", not a text: remove the quotes"
 
 
 def one_of(field: str, value: object, names: Collection[str], error: Error) -> str:

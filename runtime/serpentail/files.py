@@ -16,6 +16,7 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     NotWritten if the system refuses.
     """
     target = Path(path)
+    _refuse_unusable_name(target)
     part = target.with_name(f".{target.name}.{secrets.token_hex(4)}.part")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -34,6 +35,7 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
 def refuse_unwritable(path: str | os.PathLike[str]) -> None:
     """OSError if a file cannot be written: it is a folder, or its folder cannot be used."""
     target = Path(path)
+    _refuse_unusable_name(target)
     if target.is_dir():
         raise IsADirectoryError(f"{path} is a folder")
     refuse_unusable(target.absolute().parent)
@@ -48,3 +50,10 @@ def refuse_unusable(folder: str | os.PathLike[str]) -> None:
         raise NotADirectoryError(f"{place} is not a folder")
     if not os.access(place, os.W_OK | os.X_OK):
         raise PermissionError(f"{place} cannot be written to")
+
+
+def _refuse_unusable_name(path: Path) -> None:
+    """NotWritten if no system can have a file of this name."""
+    if not path.name or "\0" in str(path):
+        fault = "a path cannot contain the character NUL" if path.name else "it is a folder"
+        raise NotWritten(f"{str(path)!r} is not written ({fault}): name another file")

@@ -8,6 +8,7 @@ from serpentail_codegen.functions.tail import Tail, struct_parameters
 from serpentail_codegen.ir.program import Apply, statements
 from serpentail_codegen.mechanics import contact, rotations, torso
 from serpentail_codegen.mechanics.lower import derive
+from serpentail_codegen.mechanics.shapes import M33, V3
 
 
 def draft_with(**sizes):
@@ -48,6 +49,18 @@ def test_a_read_that_is_missing_is_refused():
     draft, given = draft_with(R=9, p_ddot=3)
     with pytest.raises(ValueError, match=r"world_acceleration.* in drafted: nothing gives a"):
         draft.step(rotations.world_acceleration, {"R": given["R"]}, p_ddot=given["p_ddot"])
+
+
+def test_a_step_with_the_name_of_an_emitted_function_is_refused():
+    draft, given = draft_with(R=9, a=3, p_ddot=3)
+
+    def forward_dynamics(let, R: M33, a: V3) -> dict:
+        """A step whose name the CasADi module would define twice."""
+        return {"p_ddot": R * a}
+
+    p_ddot = given.pop("p_ddot")
+    with pytest.raises(ValueError, match=r"forward_dynamics in drafted: .* function: rename it"):
+        draft.step(forward_dynamics, given, p_ddot=p_ddot)
 
 
 def test_what_only_an_unwanted_output_needs_may_be_missing():

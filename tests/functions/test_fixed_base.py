@@ -74,6 +74,36 @@ def test_dynamics_are_the_tails_part_of_a_torso_at_rest(pair):
         np.testing.assert_allclose(model.tail_points(q), points, rtol=0, atol=1e-15)
 
 
+def tail_center(bodies, q):
+    """The COM (3,) of all bodies but the torso, in 60 digits."""
+    tail = bodies.bodies(q)[0][1:]
+    return sum(mass * place for mass, place, *_ in tail) / sum(mass for mass, *_ in tail)
+
+
+def test_the_center_of_mass_is_that_of_the_tail(pair):
+    model, bodies = pair
+    for q, v, *_ in cases(model):
+
+        def slope(rates, q=q):
+            ends = [
+                [MP.mpf(x) + h * MP.mpf(y) for x, y in zip(q, rates, strict=True)]
+                for h in (SHIFT, -SHIFT)
+            ]
+            ahead, behind = (tail_center(bodies, np.array([*REST, *each])) for each in ends)
+            return ((ahead - behind) / (2 * SHIFT)).astype(float)
+
+        expected = (
+            tail_center(bodies, np.array([*REST, *map(MP.mpf, q)])).astype(float),
+            slope(v),
+            np.stack([slope(unit) for unit in np.eye(model.nq)], axis=1),
+        )
+        by_casadi = [each.full().squeeze() for each in model.casadi.center_of_mass(q, v)]
+        for found in (model.center_of_mass(q, v), by_casadi):
+            for value, there in zip(found, expected, strict=True):
+                size = np.abs(there).max()
+                np.testing.assert_allclose(value, there, rtol=0, atol=1e-13 * size)
+
+
 def test_derivatives(pair):
     model, bodies = pair
     q, v, v_dot, tau = next(cases(model))

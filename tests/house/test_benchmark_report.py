@@ -2,10 +2,13 @@
 
 import json
 
+import pytest
+
 from benchmarks import closing, report
 from benchmarks.comparison import faster
 from benchmarks.first_table import block
 from benchmarks.peak import best_chains
+from benchmarks.processors import Processor
 
 FD = {"function": "forward_dynamics", "model": "(1, 3)"}
 REPORT = {
@@ -88,3 +91,36 @@ def test_a_report_has_its_tables_and_what_changed(tmp_path):
 def test_rows_that_lack_a_column_leave_its_cell_empty():
     rows = [{"model": "(1, 3)", "ns": 1.0}, {"model": "(6, 6)", "other": 2.0}]
     assert report.table(rows)[2:] == ["| (1, 3) | 1 |  |", "| (6, 6) |  | 2 |"]
+
+
+def test_an_interrupted_run_resumes_with_what_is_missing(tmp_path, monkeypatch, capsys):
+    from benchmarks import measures  # with every peer: seconds for each worker, were it above
+
+    ran, broken = [], [True]
+
+    def speed(_scratch):
+        """Nanoseconds."""
+        ran.append("speed")
+        return [{"model": "(1, 3)", "ns": 1.5}]
+
+    def drift(_scratch):
+        """Change."""
+        ran.append("drift")
+        if broken.pop():
+            raise KeyboardInterrupt
+        return [{"model": "(1, 3)", "change": 1e-10}]
+
+    found = {"speed": measures.Measure(speed, True), "drift": measures.Measure(drift)}
+    monkeypatch.setattr(measures, "MEASURES", found)
+    monkeypatch.setattr(measures.processors, "processors", lambda: [Processor("AVX2")])
+    with pytest.raises(KeyboardInterrupt):
+        measures.bench(tmp_path, tuple(found))
+    broken.append(False)
+    measures.bench(tmp_path, tuple(found))
+    assert ran == ["speed", "drift", "drift"]
+    report = json.loads((tmp_path / "report.json").read_text())
+    assert report["speed"] == [{"processor": "AVX2", "model": "(1, 3)", "ns": 1.5}]
+    assert report["drift"] == [{"model": "(1, 3)", "change": 1e-10}]
+    broken.append(False)
+    measures.bench(tmp_path, tuple(found))  # what a whole run found is measured again
+    assert ran[3:] == ["speed", "drift"] and "1e-10" in capsys.readouterr().out

@@ -9,7 +9,22 @@ from serpentail import checks
 @pytest.mark.parametrize(
     ("check", "words"),
     [
-        (lambda e: checks.number("x", "1", e), "x: value '1': needs a finite number"),
+        (
+            lambda e: checks.number("x", "600", e, above=0),
+            "x: value '600': needs a number above 0, not a text: remove the quotes",
+        ),
+        (
+            lambda e: checks.number("x", "short", e),
+            "x: value 'short': needs a finite number, not a text",
+        ),
+        (
+            lambda e: checks.numbers("x", "1", 3, e),
+            "x: value '1': needs one or 3 finite numbers, not a text: remove the quotes",
+        ),
+        (
+            lambda e: checks.whole_number("x", "2", e, least=1, most=9),
+            "x: value '2': needs a whole number from 1 to 9, not a text: remove the quotes",
+        ),
         (lambda e: checks.number("x", True, e), "x: value True: needs a finite number"),
         (lambda e: checks.number("x", [1.0], e), "x: value [1.0]: needs a finite number"),
         (lambda e: checks.number("x", np.nan, e), "x: value nan: needs a finite number"),

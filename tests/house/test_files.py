@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 import serpentail as st
+from serpentail.files import refuse_unwritable
 from tests.support.drawn_flight import flight
 
 ROOT = Path(__file__).parents[2]
@@ -144,6 +145,25 @@ def test_a_folder_that_cannot_be_is_told(name, tmp_path):
         WRITERS[name](flight(samples=20), tmp_path / name)
     assert sorted(p.name for p in tmp_path.iterdir()) == sorted(["file", name])
     assert (tmp_path / "file").read_text() == "mine" and not any((tmp_path / name).iterdir())
+
+
+@every_writer
+@pytest.mark.parametrize("place", ["a\0b{}", "a\0b/c{}"])
+def test_a_name_with_nul_is_told(name, place, tmp_path):
+    path = tmp_path / place.format(Path(name).suffix)
+    with pytest.raises(st.NotWritten, match=r"^'[^\n]*\(a path cannot contain the .*NUL\)"):
+        WRITERS[name](flight(samples=20), path)
+    with pytest.raises(st.NotWritten, match="NUL"):
+        refuse_unwritable(path)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("path", ["", ".", "/"])
+def test_a_path_without_a_name_is_told(path):
+    with pytest.raises(st.NotWritten, match="it is a folder"):
+        flight(samples=20).save(path)
+    with pytest.raises(FileNotFoundError, match="no trajectory file"):
+        st.Trajectory.load(path)
 
 
 @every_writer

@@ -69,6 +69,20 @@ def test_help_and_nonsense_are_answered_at_once_without_work(script, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize("script", [s for s in SCRIPTS if s.startswith("examples.")])
+def test_examples_run_by_their_paths_too(script, tmp_path):
+    path = ROOT.joinpath(*script.split(".")).with_suffix(".py")
+    done = subprocess.run(
+        [sys.executable, path, "--help"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+    )
+    assert (done.returncode, done.stderr) == (0, "") and f"usage: {path.name}" in done.stdout
+
+
 def spent() -> float:
     """Processor time of all processes that were started here and have ended, of the user's (s)."""
     return resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime

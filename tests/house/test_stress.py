@@ -84,7 +84,19 @@ def test_the_fuzz_sees_bare_errors():
     assert isinstance(found[0], Fault)
 
 
-@pytest.mark.filterwarnings("ignore::serpentail.errors.UnusualSize")
+def test_an_unusual_number_in_a_scene_is_no_fault(standing, tmp_path, monkeypatch):
+    """Warnings are errors here, as in the stress test."""
+    path = tmp_path / "bent.toml"
+    text = (SCENES[0].parent / "kick.toml").read_text(encoding="utf-8")
+    assert "\nheight = " in text
+    path.write_text(text.replace("\nheight = ", "\nbends = 11.6\nheight = "), encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    with pytest.warns(st.UnusualSize, match="bends"):
+        scene_fuzz.made_ready(standing, path)
+    monkeypatch.setattr(scene_fuzz, "mutated", lambda text, dice: text)
+    assert scene_fuzz.faults([path], 1, random.Random(1), tmp_path, standing) == []
+
+
 @pytest.mark.parametrize("count", [300, slow_count])
 def test_mutated_scene_files_are_read_or_refused(count, tmp_path, monkeypatch):
     functions = ["forward_dynamics", "rollout", "energy", "momentum", "pfl"]

@@ -1,33 +1,59 @@
 """Figures of studies show every kind of start, however few have a plan."""
 
 import numpy as np
-import pytest
 
 from examples.studies.righting_figures import draw_figure_11, draw_rates
+from examples.studies.righting_kinds import KINDS, WAYS, is_true, rows_of, table, titles
 
 
-def start(cpu_s, success=True, error=1e-3):
-    return {"cpu_s": cpu_s, "success": success, "open_loop_attitude_error_deg": error}
+def start(cpu_s, converged=True, error=1e-3):
+    return {"cpu_s": cpu_s, "converged": converged, "open_loop_attitude_error_deg": error}
 
 
-KINDS = {
-    "several": [start(0.2), start(0.1), start(0.4, success=False, error=3.0), start(0.3)],
-    "one": [start(2.0)],
-    "none": [start(5.0, success=False, error=np.nan)],
+FAILED = start(5.0, converged=False, error=np.nan)
+RATES = {
+    "several": {
+        "ours": [start(0.2), start(0.1), start(0.4, error=3.0), start(0.3)],
+        "paper": [start(1.0, error=2.0)] * 4,
+    },
+    "none": {"ours": [FAILED], "paper": [FAILED]},
 }
 
 
-def test_shares_rise_from_nothing_and_end_at_the_edge(tmp_path):
-    _, (times, errors) = draw_rates(KINDS, tmp_path / "rates.png")
-    several, one, none = times.get_lines()
-    np.testing.assert_array_equal(several.get_ydata(), [0, 25, 50, 75, 75])
-    np.testing.assert_array_equal(several.get_xdata()[:4], [0.1, 0.1, 0.2, 0.3])
-    np.testing.assert_array_equal(one.get_ydata(), [0, 100, 100])
-    assert max(none.get_ydata()) == 0
-    edge = times.get_xlim()[1]
-    assert edge > 2.0 and several.get_xdata()[-1] == one.get_xdata()[-1] == pytest.approx(edge)
-    assert errors.get_lines()[0].get_ydata()[-1] == 100
+def test_a_plan_is_true_if_it_converged_and_ends_where_it_should():
+    assert is_true(start(1.0)) and not is_true(start(1.0, error=0.011))
+    assert not is_true(start(1.0, converged=False)) and not is_true(FAILED)
+
+
+def test_rates_are_drawn_for_each_kind_and_way(tmp_path):
+    _, (shares, times, errors) = draw_rates(RATES, tmp_path / "rates.png")
+    ours, papers = shares.get_lines()
+    np.testing.assert_array_equal(ours.get_xdata(), [75, 0])
+    np.testing.assert_array_equal(papers.get_xdata(), [0, 0])
+    assert [label.get_text() for label in shares.get_yticklabels()] == ["several: 4", "none: 1"]
+    np.testing.assert_allclose(times.get_lines()[0].get_xdata(), [0.25, 5.0])
+    np.testing.assert_allclose(errors.get_lines()[1].get_xdata(), [2.0, np.nan])
     assert (tmp_path / "rates.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_a_table_has_a_line_for_each_kind():
+    several, none = table(RATES)[2:]
+    assert several.startswith("| several | 4 | 3 | 0.25 | ") and "| 0 | 1 | 2 |" in several
+    assert none.startswith("| none | 1 | 0 | 5 |")
+    assert {line.count("|") for line in table(RATES)} == {11}
+
+
+def test_each_kind_has_its_starts_in_both_ways():
+    found = titles(200)
+    assert set(found) == {(name, way) for name in KINDS for way in WAYS}
+    rows = {
+        title: [{"start": k} for k in make.args[2]]
+        for makes in found.values()
+        for title, make in makes.items()
+    }
+    for name, ways in rows_of(200, rows).items():
+        for way in ways.values():
+            assert [row["start"] for row in way] == list(range(1, 200 // KINDS[name].fewer + 1))
 
 
 def test_efforts_are_told_in_their_unit_and_times_without_powers_of_ten(tmp_path):

@@ -146,7 +146,9 @@ def test_digests_follow_the_sources(tmp_path):
     (tmp_path / "notes.md").write_text("words")
     assert digest(tmp_path) == before
     (tmp_path / "a.py").write_text("x = 2\n")
-    assert digest(tmp_path) != before
+    assert (changed := digest(tmp_path)) != before
+    (tmp_path / "native.c").write_text("int x;\n")
+    assert digest(tmp_path) != changed
 
 
 def test_flights_come_back_bit_for_bit():

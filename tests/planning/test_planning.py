@@ -11,8 +11,8 @@ from serpentail.attitude import angle_deg, from_angles, rotation_matrix
 from serpentail.planning import ways
 from serpentail.planning.nlp.blas_threads import _blas, one_thread
 from serpentail.planning.nlp.coordinates import Attitude
+from serpentail.planning.nlp.equations import equations_of_motion
 from serpentail.planning.nlp.multipliers import carried
-from serpentail.planning.nlp.node import equations_of_motion
 from serpentail.planning.nlp.transcription import transcription_of
 from serpentail.planning.result.full_state import full_state
 from serpentail.planning.result.truth import local_errors, open_loop

@@ -16,8 +16,8 @@ from serpentail.checks import Refusals
 from serpentail.planning.condensed import fatrop
 from serpentail.planning.condensed.stages import stages_of
 from serpentail.planning.nlp.bounds import limits
+from serpentail.planning.nlp.equations import equations_of_motion
 from serpentail.planning.nlp.mesh import uniform
-from serpentail.planning.nlp.node import equations_of_motion
 from serpentail.planning.nlp.rules import collocation_rule
 from serpentail.planning.nlp.solver import solve, solver
 from serpentail.planning.nlp.transcription import transcription_of

@@ -194,7 +194,7 @@ def test_command_line_prints_one_object(tmp_path, capsys):
 def test_settings_are_named_for_editors_and_help():
     parameters = inspect.signature(st.plan).parameters
     named = [p for p in parameters.values() if p.kind == p.KEYWORD_ONLY]
-    assert len(named) == 32 and all(p.annotation is not p.empty for p in named)
+    assert len(named) == 34 and all(p.annotation is not p.empty for p in named)
     assert {key for key in PLAN.keys if key not in parameters} == set()
 
 

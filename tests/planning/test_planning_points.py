@@ -7,6 +7,7 @@ import pytest
 import serpentail as st
 from serpentail.planning.nlp.coordinates import attitude
 from serpentail.planning.nlp.node import PARAMETERS, _point, variables_of
+from serpentail.planning.nlp.start import shared_of
 from serpentail.planning.result.full_state import com_at_start, full_state
 from tests.support.tumbling import DURATION, planned, rat, start
 
@@ -20,7 +21,8 @@ def test_blocks_are_the_models(formulation):
     model, plan = rat(), planned(formulation=formulation, tolerance=None, intervals=8)
     variables = variables_of(formulation, attitude("quaternion"), 2, np.ones(2))
     zeta, p = ca.SX.sym("zeta", 1 + sum(variables.sizes())), ca.SX.sym("p", PARAMETERS + 1)
-    point = _point(model, zeta, p, variables, attitude("quaternion"))
+    shared = shared_of(model, zeta, p, variables)
+    point = _point(shared, zeta, p, variables, attitude("quaternion"))
     function = ca.Function("point", [zeta, p], [getattr(point, name) for name in NAMES])
 
     times, problem = np.linspace(0, DURATION, 7), plan.problem

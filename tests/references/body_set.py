@@ -95,15 +95,19 @@ class Animal:
         ]
 
     def mass_matrix(self, q):
-        """H for (p_dot world, omega body, q_t_dot)."""
-        q, size = exact(q), 6 + 2 * len(self.segments)
+        """H for (p_dot world, omega body, q_t_dot) in float64."""
+        return self.inertia(exact(q)).astype(float)
+
+    def inertia(self, q):
+        """H."""
+        size = 6 + 2 * len(self.segments)
         H = np.full((size, size), MP.mpf(0))
         for (mass, _, R, moments), (linear, angular) in zip(
             self.bodies(q)[0], self._jacobians(q), strict=True
         ):
             J, W = np.array(linear).T, np.array(angular).T
             H = H + mass * J.T.dot(J) + W.T.dot(R * moments).dot(R.T.dot(W))
-        return H.astype(float)
+        return H
 
     def inverse_dynamics(self, q, v, v_dot):
         """H v_dot + C: forces and moments of all bodies through their Jacobians."""
@@ -141,8 +145,12 @@ class Animal:
         return float(kinetic), float(potential)
 
     def momentum(self, q, v):
-        """Momentum, and angular momentum about the COM, world axes."""
-        q, v = exact(q), exact(v)
+        """Momentum, and angular momentum about the COM, world axes, in float64."""
+        linear, angular = self.momenta(exact(q), exact(v))
+        return linear.astype(float), angular.astype(float)
+
+    def momenta(self, q, v):
+        """Momentum, and angular momentum about the COM."""
         bodies, rates = self.bodies(q)[0], self._rates(q, v)
         total = sum(mass for mass, *_ in bodies)
         com = sum(mass * place for mass, place, *_ in bodies) / total
@@ -151,7 +159,7 @@ class Animal:
             mass * crossed(place - com, u) + (R * moments).dot(R.T).dot(w)
             for (mass, place, R, moments), (u, w) in zip(bodies, rates, strict=True)
         )
-        return linear.astype(float), angular.astype(float)
+        return linear, angular
 
     def tail_points(self, q):
         """The tail's points in the world."""

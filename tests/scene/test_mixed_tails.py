@@ -74,11 +74,6 @@ def test_pieces_may_be_parameters():
         ({"segments": [LINKS, ARC], "coordinates": "polar"}, "coordinates", 'needs "mixed"'),
         ({"segments": [LINKS, ARC], "contacts": ["tail"]}, "contacts", "remove the group"),
         (
-            {"segments": [LINKS, ARC], "functions": ["airborne_rates"]},
-            "functions",
-            "is for equal links",
-        ),
-        (
             {"segments": [LINKS, ARC], "parameters": {"tail_mass": 1}},
             "parameters.tail_mass",
             "a value of its own",

@@ -111,6 +111,8 @@ GOOD = [
     ("plan.bounds.torque", "20 mN m"),
     ("plan.options", {"ipopt.max_iter": 100}),
     ("plan.intervals", 20),
+    ("plan.design", {"tail_length": ["8 cm", 0.25]}),
+    ("plan.free_start", {"tail": ["-20 deg", 0.5], "torso_rate": [[0, 0, 0], [1, 1, 2]]}),
 ]
 BAD = [
     ("segmnts", 3),
@@ -145,6 +147,8 @@ BAD = [
     ("plan.start", {"q": [0]}),
     ("plan.goal", "upwright"),
     ("plan.goal.tale", 1),
+    ("plan.free_start.tale", [0, 1]),
+    ("plan.free_start.tail", ["0 m", 1]),
     ("plan.bounds.angle", "3 s"),
     ("plan.intervals", 0),
     ("plan.rule", "radaw"),

@@ -101,6 +101,8 @@ WRONG = [
     ({"controller": st.Phases([(0.0, None)])}, "give each of its controllers a phase"),
     ({"plan": 3}, "plan: value 3: needs a mapping"),
     ({"plan": {"start": 3}}, "plan.start: value 3: needs none"),
+    ({"plan": {"free_start": {}}}, "plan.free_start: value {}: needs none"),
+    ({"plan": {"design": {}}}, "plan.design: value {}: needs none: all phases have the sequence's"),
     ({"plan": {}, "controller": DAMPING}, "has a controller and a plan"),
     ({"moves": [{"delta": 1.0, "rate": 1.0}]}, "needs at"),
     ({"moves": [{"before_landing": 0.1, "delta": 1.0}]}, "key"),

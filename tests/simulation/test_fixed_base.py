@@ -71,6 +71,15 @@ def test_runs_are_those_of_another_integrator_and_derivation(chain, method):
     assert not run.info["warnings"]
 
 
+@pytest.mark.parametrize(
+    ("damping", "reason"), [(0, "fixed base"), (1e-5, "fixed base, damping and springs act at")]
+)
+def test_the_choice_of_a_method_tells_of_the_base(chain, damping, reason):
+    run = st.simulate(chain, *START, controller=st.Damping(damping), t_span=0.01)
+    assert run.info["method"] == "tsit5" and run.info["reason"].startswith(reason)
+    assert "flight" not in f"{run!r} {run.info}"
+
+
 def test_implicit_euler_comes_to_the_same(chain):
     ends = [
         st.simulate(

@@ -79,10 +79,10 @@ def test_the_kick_s_numbers_and_events(tmp_path, kick, kick_scene):
     assert numbers["samples"] == "1201" and numbers["landed, and stands at the end"] == "no"
     forces = np.linalg.norm(kick.contact.forces.sum(axis=1), axis=1)
     weight = 9.8 * (0.10572 + 0.00351)
-    assert float(numbers["largest force of the ground (N)"]) == pytest.approx(
+    assert float(numbers["largest force of the ground at the samples (N)"]) == pytest.approx(
         forces.max(), rel=1e-4
     )
-    times = float(numbers["largest force of the ground (body weights)"])
+    times = float(numbers["largest force of the ground at the samples (body weights)"])
     assert times == pytest.approx(forces.max() / weight, rel=1e-4)
     assert float(numbers["tilt at the end (deg)"]) == pytest.approx(0.795, abs=0.01)
     assert data["notes"] == [] and data["warnings"] == kick.warnings and len(kick.warnings) == 5

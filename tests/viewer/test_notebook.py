@@ -53,6 +53,15 @@ def test_a_motion_is_shown_with_its_text(kick, tmp_path):
     assert any("one of 3 samples is shown" in note for note in data["notes"])
 
 
+def test_a_motion_of_601_samples_is_shown_whole(tmp_path):
+    """0.6 s at 1 kHz; of one sample more, every second one is shown."""
+    model = model_of(1, 2)
+    (run,) = shown(flown(model, samples=601), tmp_path)[0]["runs"]
+    assert run["rows"] == 601
+    (run,) = shown(flown(model, samples=602), tmp_path)[0]["runs"]
+    assert run["rows"] == 302
+
+
 def test_the_frame_is_the_page_itself(flight, tmp_path):
     page = flight.view(tmp_path / "run.html").read_text(encoding="utf-8")
     assert Output(flight._repr_html_()).frame["srcdoc"] == page

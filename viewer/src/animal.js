@@ -1,4 +1,4 @@
-// One run's animal on the stage: torso, tail, legs, forces, centre of mass and its path.
+// Draws the animal of one run: torso, tail, legs, forces, centre of mass and its path.
 import {
   BufferAttribute,
   BufferGeometry,
@@ -20,7 +20,7 @@ const from = new Vector3();
 const to = new Vector3();
 const force = new Vector3();
 
-// Where runs are in one place the first is seen, not spots of each.
+// Offsets the depth of each run. Where runs overlap, the first one is drawn, not spots of each.
 const ghost = (k) => ({
   transparent: true,
   opacity: 0.5,
@@ -53,7 +53,7 @@ export class Animal {
     this.paint();
   }
 
-  // Where markers were seen, through all that is before them.
+  // Markers are drawn in front of everything, so that nothing hides them.
   addMarkers() {
     this.materials.marker = new MeshBasicMaterial({ depthTest: false, transparent: true });
     this.markers = new Balls(this.materials.marker, this.run.markers ?? 0);
@@ -61,7 +61,7 @@ export class Animal {
     this.group.add(this.markers.mesh);
   }
 
-  // The centre of mass is seen through the torso.
+  // The centre of mass is drawn in front of the torso, so that the torso does not hide it.
   addCentre() {
     this.centre = new Mesh(BALL, new MeshBasicMaterial({ depthTest: false, transparent: true }));
     this.centre.scale.setScalar(0.065 * Math.max(...this.run.body.semi_axes));
@@ -75,7 +75,7 @@ export class Animal {
     this.group.add(this.centre, this.path);
   }
 
-  // Straight below the torso: it tells how high that is.
+  // The shadow lies on the ground straight below the torso and shows how high the torso is.
   addShadow() {
     const look = { color: "#000", transparent: true, opacity: 0.22, depthWrite: false };
     this.shadow = new Mesh(new CircleGeometry(1, 40), new MeshBasicMaterial(look));
@@ -111,7 +111,7 @@ export class Animal {
     this.showMarkers(row);
   }
 
-  // Those in gaps are not there.
+  // Markers that were not seen at this sample are hidden.
   showMarkers(row) {
     const radius = 0.05 * Math.max(...this.run.body.semi_axes);
     for (let m = 0; m < (this.run.markers ?? 0); m++) {
@@ -148,7 +148,7 @@ export class Animal {
     this.knees.placed();
   }
 
-  // An arrow of a common force is as long as the torso's half; none is longer than three.
+  // An arrow of a typical force is as long as half the torso; no arrow exceeds three times that.
   showForces(row) {
     const longest = Math.max(...this.run.body.semi_axes);
     for (let c = 0; c < this.run.contacts; c++) {

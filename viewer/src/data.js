@@ -1,12 +1,13 @@
-// The motions of a page, as they were packed by serpentail: columns of floats by name.
+// Unpacks the motions of a page, which serpentail packed as columns of floats with names.
 
-// Columns are four planes of bytes, of differences between the bits of one row and the next.
+// A column is stored as four planes of bytes. They hold the differences between the bits of
+// successive rows.
 export async function decoded(text, rows) {
   const packed = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
   const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
   const planes = new Uint8Array(await new Response(stream).arrayBuffer());
   const count = planes.length / 4;
-  if (count % rows) throw new Error("its data are damaged");
+  if (count % rows) throw new Error("its data is damaged");
   const bits = new Uint32Array(count);
   for (let i = 0; i < count; i++) {
     let step = 0;
@@ -16,7 +17,7 @@ export async function decoded(text, rows) {
   return new Float32Array(bits.buffer);
 }
 
-// One motion: what it is (meta) and its samples.
+// One motion: its description (meta) and its samples.
 export class Run {
   constructor(meta, columns) {
     Object.assign(this, meta);
@@ -37,7 +38,7 @@ export class Run {
     return this.columns[name][column * this.rows + row];
   }
 
-  // Put point i of a row into a vector.
+  // Copy point i of a row into a vector.
   point(name, row, i, vector) {
     return vector.set(
       this.value(name, row, 3 * i),
@@ -46,7 +47,7 @@ export class Run {
     );
   }
 
-  // The last sample that is not after t, the first before all of them.
+  // Return the last sample at or before t; before the first sample, return the first one.
   row(t) {
     let low = 0;
     let high = this.rows - 1;

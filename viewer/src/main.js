@@ -1,4 +1,4 @@
-// The page of runs: reads its data, puts stage, plots and numbers together, and obeys the keyboard.
+// The page of runs: reads its data, assembles stage, plots and numbers, and handles the keyboard.
 import { Run } from "./data.js";
 import { addNotes, addNumbers, addSwitches, addWarnings } from "./panel.js";
 import { Player } from "./player.js";
@@ -8,7 +8,7 @@ import { Stage } from "./stage.js";
 const find = (id) => document.getElementById(id);
 const page = (window.serpentail = { ready: false, seek: null, error: null });
 
-// Without WebGL all but the animal is there.
+// Without WebGL the page shows everything except the animal.
 function stageOf(canvas, runs, meta) {
   try {
     return new Stage(canvas, runs, meta);
@@ -62,7 +62,7 @@ function obey(event, player, switches, look) {
   action();
 }
 
-// The digits switch runs.
+// The digit keys show and hide runs.
 function switched(switches, key) {
   const box = /^[1-9]$/.test(key) && switches[Number(key) - 1];
   return box ? () => box.click() : undefined;

@@ -1,4 +1,4 @@
-// What stands beside the stage in words: notes, switches of the runs, numbers.
+// The panel beside the stage: notes, a switch for each run, and a table of numbers.
 import { onChange, series } from "./theme.js";
 
 const made = (name, text = "", more = {}) =>
@@ -9,14 +9,14 @@ export function addNotes(holder, notes) {
   holder.hidden = !notes.length;
 }
 
-// Folded, since plots and numbers come after them.
+// Warnings are folded, so that plots and numbers below them stay in view.
 export function addWarnings(holder, warnings) {
   const count = `${warnings.length} warning${warnings.length === 1 ? "" : "s"}`;
   holder.querySelector("summary").textContent = count;
   addNotes(holder, warnings);
 }
 
-// One switch a run; returns them.
+// Adds a switch for each run; returns the switches.
 export function addSwitches(holder, runs, change) {
   const switches = runs.map((run, k) => {
     const box = made("input", "", { type: "checkbox", checked: true });
@@ -37,7 +37,7 @@ export function addSwitches(holder, runs, change) {
   return switches;
 }
 
-// A row a number, a column a run.
+// Fills a table: one row for each number, one column for each run.
 export function addNumbers(table, runs) {
   const labels = [...new Set(runs.flatMap((run) => run.numbers.map(([label]) => label)))];
   if (runs.length > 1) {

@@ -1,8 +1,8 @@
-// The present time: played, sought, stepped, by mouse and by keyboard.
+// Controls the time that is shown: play, seek and step, by mouse and by keyboard.
 
 const SPEEDS = [0.01, 0.02, 0.05, 0.1, 0.25, 0.5, 1, 2, 5];
-const WATCHED = 8; // s, that a run takes at the speed it begins with
-const PRESSED = "button, input[type=checkbox], summary"; // by the space bar
+const WATCHED = 8; // s that a run takes at the initial speed
+const PRESSED = "button, input[type=checkbox], summary"; // controls that the space bar presses
 const MOST_MARKS = 200;
 
 export class Player {
@@ -73,7 +73,7 @@ export class Player {
     requestAnimationFrame((later) => this.frame(later));
   }
 
-  // Samples of the run that is sampled most.
+  // Steps by samples of the run that has the most samples.
   step(count) {
     const run = this.runs.reduce((most, each) => (each.rows > most.rows ? each : most));
     const row = Math.min(Math.max(run.row(this.time) + count, 0), run.rows - 1);
@@ -91,8 +91,8 @@ export class Player {
     this.speed.selectedIndex = Math.min(Math.max(this.speed.selectedIndex + by, 0), last);
   }
 
-  // What a key does; undefined where it is not one of the player's, or the focused control has
-  // its own use for it.
+  // Return the action of a key; undefined if the player does not use the key, or if the focused
+  // control uses it itself.
   action(event) {
     const { key, shiftKey, target } = event;
     const count = shiftKey ? 10 : 1;

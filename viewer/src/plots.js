@@ -1,11 +1,11 @@
-// Curves over time with a cursor at the present; a click or a drag on one seeks.
+// Plots curves over time, with a cursor at the time that is shown; a click or a drag seeks.
 import uPlot from "uplot";
 import { colour, onChange, series } from "./theme.js";
 
 const HEIGHT = 150;
 const DASHES = [[], [6, 4], [2, 3], [9, 3, 2, 3]];
 
-// Four digits; rounding that is nothing beside the plot's largest value is 0.
+// Four digits; a value below 1e-6 of the plot's largest one is shown as 0, since it is rounding.
 const digits = (value, largest) =>
   Number((Math.abs(value) < 1e-6 * largest ? 0 : value).toPrecision(4)).toString();
 
@@ -44,7 +44,7 @@ class Plot {
     this.plot.over.addEventListener("pointermove", (event) => event.buttons && at(event));
   }
 
-  // One run: a colour a curve. Several: a colour a run, a dash a curve.
+  // One run: each curve has a colour. Several runs: each run has a colour, each curve a dash.
   stroke(curve, i) {
     return series(this.alone ? i : curve.run);
   }
@@ -73,7 +73,7 @@ class Plot {
     };
   }
 
-  // Runs may be sampled at times of their own.
+  // Runs may be sampled at different times.
   data() {
     const tables = this.curves.map(({ run, array, column }) => {
       const { times, rows } = this.runs[run];

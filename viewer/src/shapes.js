@@ -1,4 +1,4 @@
-// Many rods, balls and arrow heads at once: one draw call each, placed anew for every moment.
+// Draws many rods, balls or arrow heads in one draw call; each frame places them again.
 import {
   ConeGeometry,
   CylinderGeometry,
@@ -42,7 +42,7 @@ export class Rods extends Many {
     super(ROD, material, count);
   }
 
-  // From one point to another.
+  // Place a rod from one point to another.
   place(k, from, to, radius) {
     const length = along.subVectors(to, from).length();
     if (!(length > 0)) return this.hide(k);
@@ -57,7 +57,7 @@ export class Heads extends Many {
     super(HEAD, material, count);
   }
 
-  // With its base at a point, in a direction of length 1.
+  // Place an arrow head: its base at a point, its axis along a direction of length 1.
   place(k, base, direction, radius, length) {
     turn.setFromUnitVectors(UP, direction);
     middle.copy(base).addScaledVector(direction, length / 2);

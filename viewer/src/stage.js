@@ -1,4 +1,4 @@
-// The stage: light, ground, cameras, and the animals on it.
+// The stage: lights, ground, cameras and animals.
 import {
   AmbientLight,
   BufferGeometry,
@@ -32,8 +32,8 @@ const FIELD = 35; // degrees
 const DISTANCE = 2.5; // of the camera, in lengths of the animal
 const SQUARES = 60; // of the ground, along and across
 
-// The edges of all squares, each for itself: a line that begins behind the camera may not be
-// drawn at all.
+// Each edge of a square is a line of its own, because a browser may not draw a long line that
+// begins behind the camera.
 function edges(square) {
   const points = [];
   const half = SQUARES / 2;
@@ -86,7 +86,7 @@ export class Stage {
     this.render();
   }
 
-  // A floor that lets what lies below it be seen, with squares of 1, 2 or 5 times a power of ten.
+  // The floor is transparent. Its squares have sides of 1, 2 or 5 times a power of ten, in m.
   layGround() {
     const power = 10 ** Math.floor(Math.log10(this.length / 2));
     const square = (this.square =
@@ -108,7 +108,7 @@ export class Stage {
     this.ground.add(floor, grid);
   }
 
-  // By whole squares, so that it has no end and still seems at rest.
+  // Moves the ground by whole squares: it seems endless and at rest.
   moveGround({ x, y }) {
     if (this.grounded)
       this.ground.position.set(
@@ -117,7 +117,7 @@ export class Stage {
       );
   }
 
-  // The run that a following camera follows: the first one that is shown.
+  // The camera follows the first run that is shown.
   get followed() {
     return this.animals.find((animal) => animal.group.visible) ?? this.animals[0];
   }

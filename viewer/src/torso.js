@@ -1,4 +1,4 @@
-// The torso with what tells its sides apart: a pale belly, a head with snout, ears and eyes.
+// The torso: a pale belly and a head with snout, ears and eyes show which way it faces.
 import {
   BufferAttribute,
   Color,
@@ -10,7 +10,7 @@ import {
 } from "three";
 import { BALL } from "./shapes.js";
 
-const BELLY = [-0.22, -0.08]; // heights, in semi-axes, between which the coat turns pale
+const BELLY = [-0.22, -0.08]; // semi-axes; between these heights the coat turns pale
 
 export class Torso {
   constructor([a, b, c], look) {

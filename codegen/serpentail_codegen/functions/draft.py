@@ -13,6 +13,7 @@ from ..ir.tape import Number
 from ..mechanics.lower import declared_shapes, derive
 from ..scene.parameters import Parameter
 from ..scene.shape import Stretch
+from ..scene.signatures.table import SIGNATURES
 from .scope import Instead, Scope, Vectors
 from .tail import Tail
 
@@ -51,6 +52,10 @@ class Draft(Builder):
         takes the vectors that it declares; from a plain dictionary it must read all.
         """
         step = function if isinstance(function, Step) else derive(function)
+        if step.name in SIGNATURES:  # the CasADi module defines both, and would keep only one
+            raise ValueError(
+                f"{step.name} in {self.name}: a step has the name of an emitted function: rename it"
+            )
         if self.tail.shape.weightless and ("gravity", 1) in step.inputs:
             function = step = specialised(step, f"{step.name}_weightless", gravity=(0,))
         declared = set(dict(step.inputs) if function is step else declared_shapes(function))

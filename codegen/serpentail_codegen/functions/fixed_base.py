@@ -25,7 +25,13 @@ from .layout import (
 )
 from .passive import add_elastic_energy, add_passive_forces
 from .scope import Motion, State, Vectors
-from .sweeps.inertia import tail_inertia
+from .sweeps.inertia import (
+    column_of,
+    forward_roots,
+    gather_inertia,
+    segment_roots,
+    tail_inertia,
+)
 from .sweeps.momentum import gather_moment
 from .sweeps.pieces import each_piece, each_point, mechanism, torso_pose
 from .sweeps.wrenches import forward_wrenches, gather_wrenches
@@ -38,6 +44,9 @@ MEANINGS = {
     "force": "generalised forces on the tail coordinates (N m)",
     "linear": "linear momentum of the tail (kg m/s, world)",
     "angular": "angular momentum of the tail about its own centre of mass (kg m^2/s, world)",
+    "position": "position of the tail's centre of mass (m, world)",
+    "velocity": "velocity of the tail's centre of mass, J v (m/s, world)",
+    "J": "Jacobian of the tail's centre of mass, world",
     "r_q": "right-hand side for q",
     "k_q": "solution for q",
 }
@@ -184,6 +193,25 @@ def assemble_momentum(draft: Draft, arrays: dict[str, Array]) -> None:
     draft.step(resting.resting_momentum, moment, total, **writes)
 
 
+def assemble_center_of_mass(draft: Draft, arrays: dict[str, Array]) -> None:
+    """Position and velocity of the tail's centre of mass, and its Jacobian: momentum columns over
+    the mass.
+    """
+    tail, J, velocity = draft.tail, arrays["J"], arrays["velocity"][0]
+    segments = mechanism(draft).prepare(draft, whole_state(draft, arrays), True)
+    columns, roots = draft.array("columns", 12, tail.segments), segment_roots(draft)
+    forward_roots(draft, segments, torso_pose(draft), roots)
+    composite = gather_inertia(draft, segments, roots, columns)
+
+    mass = draft.vectors(inverse_mass=1)
+    draft.step(resting.resting_com, composite, **mass, position=arrays["position"][0])
+    draft.fill(velocity, 0)
+    with draft.loop("k", tail.nt) as k:
+        reads = {"column": column_of(columns, k), "rate": arrays["v"].part(k, 1)}
+        writes = {"J_column": J.part(k, 3, stride=tail.nt), "velocity_": velocity}
+        draft.step(resting.resting_com_of_coordinate, mass, reads, **writes)
+
+
 def assemble_tail_points(draft: Draft, arrays: dict[str, Array]) -> None:
     """The joints and the tip (Eqs. 14, 15), or equally spaced samples of every segment."""
     points = arrays["points"]
@@ -278,6 +306,7 @@ FUNCTIONS = {
             "forward_dynamics": assemble_forward_dynamics,
             "energy": assemble_energy,
             "momentum": assemble_momentum,
+            "center_of_mass": assemble_center_of_mass,
             "tail_points": assemble_tail_points,
             "pfl": assemble_pfl,
             "tracked_dynamics": assemble_pfl,

@@ -27,3 +27,15 @@ def resting_momentum(let, mass: V1, h: V3, F_next: V6) -> dict:
     """
     force, moment = F_next[0:3, :], F_next[3:6, :]
     return {"linear": force, "angular": moment - h.cross(force) / mass[0]}
+
+
+def resting_com(let, tail_mount: V3, mass: V1, h: V3) -> dict:
+    """Position of the tail's COM, p_b2t + h / m; ``h`` is about the mount. And 1 / m."""
+    inverse = let("inverse", 1 / mass[0])
+    return {"position": tail_mount + h * inverse, "inverse_mass": [inverse]}
+
+
+def resting_com_of_coordinate(let, inverse_mass: V1, column: V6, rate: V1) -> dict:
+    """Velocity of the tail's COM per rate of one coordinate, f_k / m, and the part of this rate."""
+    J = let("J", column[0:3, :] * inverse_mass[0])
+    return {"J_column": J, "velocity": J * rate[0]}

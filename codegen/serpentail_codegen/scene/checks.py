@@ -167,13 +167,6 @@ def parameters_in(table: Mapping[str, Any]) -> Mapping[str, Any]:
     return parameters if isinstance(parameters, Mapping) else {}
 
 
-def airborne_problems(wanted: Any, plain_tail: bool) -> list[Problem]:
-    """Return a problem for each function of plan nodes that this tail does not have."""
-    names = wanted if isinstance(wanted, list | tuple) and not plain_tail else ()
-    remedy = "is for equal links without springs, damping, stops and mount_angles: remove it"
-    return [Problem("functions", name, remedy) for name in names if name in AIRBORNE]
-
-
 def _derivatives_in(wanted: Any) -> list[str]:
     """Return the derivatives among wanted functions."""
     names = ALL if wanted == "all" else wanted if isinstance(wanted, list | tuple) else ()

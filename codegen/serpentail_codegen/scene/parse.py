@@ -10,7 +10,6 @@ from typing import Any
 
 from .body import OF_TORSO, body_of, scaled
 from .checks import (
-    airborne_problems,
     contact_problems,
     fixed_problems,
     function_problems,
@@ -43,7 +42,6 @@ from .scene import (
 from .segments import are_tables, tell_values
 from .shape import EQUAL
 from .signatures.table import (
-    AIRBORNE,
     ALL,
     DEFAULT,
     DEFAULT_ON_GROUND,
@@ -89,10 +87,6 @@ def parse_scene(table: Mapping[str, Any], name: str) -> Scene:
     problems = unknown_keys(table, "", KEYS)
     tail = tail_described(kind, values)
     values |= tail.values
-    plain_tail = tail.shape == EQUAL and not parts_of(parameters_in(table))
-    if table.get("functions") == "all" and not plain_tail:
-        values["functions"] = tuple(f for f in values["functions"] if f not in AIRBORNE)
-    problems += airborne_problems(values["functions"], plain_tail)
     problems += [*tail.problems, *key_problems(values), *kind_problems(table, kind)]
     problems += function_problems(values["functions"]) + contact_problems(table, values, contacts)
     problems += fixed_problems(values, contacts)

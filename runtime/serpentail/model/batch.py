@@ -17,7 +17,7 @@ from .workers import after_fork
 
 MIN_BATCH = 1000  # states: from here on a batch pays for compiling
 # sources of a model that are compiled when they are needed
-LAZY_SOURCES = ("batch", "batch_derivatives", "batch_airborne", "flights")
+LAZY_SOURCES = ("batch", "batch_derivatives", "batch_airborne", "batch_contact", "flights")
 NO_BATCH: dict = {"states": 1, "work": {}, "parts": {}}  # of models without C
 RecordFunction = Callable[[int], int]  # takes the address of a record, returns a status
 

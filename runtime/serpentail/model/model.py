@@ -194,9 +194,13 @@ class Model(Functions, StepMethods):
         UnusualSize, UnlikeBodies
             As of ``load``.
         """
-        values = resolve(self.manifest, merged(self._independent(), changes))
-        warn_of_sizes(self.manifest, values)
-        return self._twin(values)
+        varied = self._varied(changes)
+        warn_of_sizes(self.manifest, varied.parameters)
+        return varied
+
+    def _varied(self, changes: Mapping[str, Any]) -> "Model":
+        """Return this model with other parameters, whose sizes are not doubted."""
+        return self._twin(resolve(self.manifest, merged(self._independent(), changes)))
 
     def _twin(self, parameters: Mapping[str, Any]) -> "Model":
         """Return a model of the same code with these parameters."""

@@ -157,7 +157,7 @@ def _checked_changes(manifest: dict, changes: object, runs: int | None) -> dict[
     problems, sound = [], {}
     # each by itself, then all together
     for name, value in (changes or {}).items():
-        checked = _checked(fields, str(name), value, runs)
+        checked = checked_value(fields, str(name), value, runs)
         if isinstance(checked, str):
             problems.append(checked)
         else:
@@ -176,15 +176,21 @@ def _checked_changes(manifest: dict, changes: object, runs: int | None) -> dict[
 
 def ellipsoid(values: Values, links: int) -> tuple[Any, Any, Any]:
     """Moments of inertia (kg m^2) of one link along y, an ellipsoid of semi-axes (r, L / 2, r)."""
-    m, length, r = values["tail_mass"] / links, values["tail_length"] / links, values["link_radius"]
     with np.errstate(over="ignore", invalid="ignore"):
-        across, along = m / 5 * (length * length / 4 + r * r), m / 5 * (2 * r * r)
+        across, along, _ = moments = ellipsoid_moments(values, links)
         sound = np.isfinite(across + along).all()
     if not sound:
         raise ModelError(
             "parameters: tail_mass, tail_length and link_radius give no finite link_inertia: use "
             "kg and m"
         )
+    return moments
+
+
+def ellipsoid_moments(values: Values, links: int) -> tuple[Any, Any, Any]:
+    """Moments of inertia of ``ellipsoid``, of numbers or symbols."""
+    m, length, r = values["tail_mass"] / links, values["tail_length"] / links, values["link_radius"]
+    across, along = m / 5 * (length * length / 4 + r * r), m / 5 * (2 * r * r)
     return across, along, across
 
 
@@ -198,8 +204,10 @@ def flat(manifest: dict, values: Mapping[str, Value]) -> list[float]:
     return scalars
 
 
-def _checked(fields: dict, name: str, value: object, runs: int | None) -> np.ndarray | str:
-    """Return the value, of each run if there are several, or the error about it."""
+def checked_value(
+    fields: dict, name: str, value: object, runs: int | None = None
+) -> np.ndarray | str:
+    """Return a parameter's value, of each run if there are several, or the error about it."""
     if name not in fields:
         parts = [part for part in TOTALS.get(name, ()) if part in fields]
         remedy = did_you_mean(name, fields) or f"there are {', '.join(fields)}"

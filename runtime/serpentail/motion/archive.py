@@ -56,9 +56,10 @@ def read(path: str | os.PathLike[str], arrays: Iterable[str]) -> tuple[Path, dic
 
 
 def _npz(path: str | os.PathLike[str]) -> Path:
-    """The path with the suffix .npz."""
+    """The path with the suffix .npz; "." and "/", which name no file, stay as they are."""
     path = Path(path)
-    return path if path.suffix == SUFFIX else path.with_name(path.name + SUFFIX)
+    complete = path.suffix == SUFFIX or not path.name
+    return path if complete else path.with_name(path.name + SUFFIX)
 
 
 def _stored(source: Path, arrays: Iterable[str]) -> dict[str, Any]:

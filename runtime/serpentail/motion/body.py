@@ -30,8 +30,10 @@ def semi_axes(model: Model) -> Array:
 
 
 def centre_of_mass(model: Model, q: Array, v: Array) -> Array:
-    """Return the centre of mass (K, 3), m; that of the torso or base without ``center_of_mass``."""
-    if "center_of_mass" not in model.kernels:
+    """Return the centre of mass (K, 3), m; that of the torso if the scene left out
+    ``center_of_mass``; on a fixed base the place of the base.
+    """
+    if model.fixed or "center_of_mass" not in model.kernels:
         return model.layout.pose(q)[:, POSITION]
     return np.asarray(model.center_of_mass(q, v)[0])
 

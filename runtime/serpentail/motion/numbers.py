@@ -76,7 +76,7 @@ def _real_time_factor(motion: Trajectory) -> float | None:
     return float(motion.t[-1] - motion.t[0]) / seconds if seconds else None
 
 
-SAMPLES = "at the samples, which may miss the peak of an impact"
+SAMPLES = "at the samples, which may miss the peak of an impact or of legs that start to move"
 NUMBERS = (
     Number("model", "", "name of the model", lambda model, motion: model.name),
     Number(

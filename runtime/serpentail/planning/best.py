@@ -7,13 +7,14 @@ from dataclasses import replace
 from ..model.model import Model
 from ..stages import Stage
 from .momentum import refuse_impossible
+from .nlp.equations import equations_of_motion
 from .nlp.fork_gate import forks_wait
 from .nlp.interrupt import stoppable
-from .nlp.node import equations_of_motion
 from .problem import PlanningProblem
 from .result.plan import Plan
-from .rounds import SOFTENING, Round, Search
+from .rounds import Round, Search
 from .settings import PlanSettings
+from .softening import SOFTENING
 
 NEEDED = ("mass_matrix", "inverse_dynamics", "rollout")  # functions of the model
 
@@ -31,7 +32,7 @@ def best_plan(
     refuse_impossible(model, problem)
     begun, easier = time.perf_counter(), None
     with forks_wait(), Stage("plan", model.name) as stage:
-        equations = equations_of_motion(model, settings.dynamics)
+        equations = equations_of_motion(model, settings.dynamics, problem.design)
         with stoppable(settings.time_limit, stage.tell):
             if problem.objective in SOFTENING and settings.guess is None:
                 # these objectives are seldom solved from passive flight

@@ -19,7 +19,12 @@ YAWS = np.linspace(0.0, 2 * np.pi, 73)
 
 
 def refuse_impossible(model: Model, problem: PlanningProblem) -> None:
-    """PlanningError if no end of a flight can have the rates that the goal asks for."""
+    """PlanningError if no end of a flight can have the rates that the goal asks for.
+
+    Nothing is refused if parts of the start are free, because they change the momentum.
+    """
+    if problem.free_start:
+        return
     goal, h = problem.goal, model.momentum(problem.q0, problem.v0)[1]
     size = float(np.linalg.norm(h))
     if goal.torso_rate is None or size == 0:
@@ -30,7 +35,7 @@ def refuse_impossible(model: Model, problem: PlanningProblem) -> None:
         raise PlanningError(
             f"goal: torso and tail at rest, but {told}: leave torso_rate or tail_rate free"
         )
-    if goal.tail is None or not np.isfinite(goal.tail).all():
+    if problem.design.size or goal.tail is None or not np.isfinite(goal.tail).all():
         return
     left = _least_left(model, problem, h)
     if left > SMALL * size:

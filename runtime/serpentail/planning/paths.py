@@ -39,16 +39,20 @@ def checked_clearance(value: Any) -> float | None:
     return None if value is None else number("clearance", value, PlanningError, least=0)
 
 
-def clear_of_ground(model: Model, start: tuple[Any, Any], clearance: float) -> PathConstraint:
+def clear_of_ground(
+    model: Model, start: tuple[Any, Any] | None, clearance: float
+) -> PathConstraint:
     """Return the constraint that keeps the points of tail and torso at least so high (m).
 
-    PlanningError if these have no contact points, or a point is too low at the start.
+    PlanningError if these have no contact points, or a point is too low at a start that is known.
     """
     if not set(model.contacts) - {"feet"}:
         remedy = "add 'tail' or 'torso' to its scene's contacts, or leave it out"
         raise PlanningError(
             f"clearance: {model.name} has no points of tail or torso that touch: {remedy}"
         )
+    if start is None:
+        return body_heights, clearance, np.inf
     points, _ = model.contact_points(*start, *any_legs(model))
     lowest = points[model.contacts.get("feet", 0) :, 2].min()
     if lowest < clearance:

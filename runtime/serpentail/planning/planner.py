@@ -1,6 +1,6 @@
 """``plan``: finds motions of the tail by direct collocation."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from inspect import Parameter, signature
 from typing import Any, Never
 
@@ -33,6 +33,8 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
     legs: Legs | None = None,
     formulation: str = "airborne",
     attitude: str = "quaternion",
+    design: Mapping[str, Any] | None = None,
+    free_start: Mapping[str, Any] | None = None,
     # the mesh
     rule: str = "radau",
     degree: int | None = None,
@@ -99,6 +101,14 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
         the paper's.
     attitude : {"quaternion", "euler"}, default "quaternion"
         Coordinates of the attitude.
+    design : mapping, optional
+        Parameters of the model that the planner chooses: name to (least, most), each one number
+        or all numbers of the parameter (SI, or text with a unit).
+    free_start : mapping, optional
+        Parts of the start that the planner chooses: "tail", "tail_rate", "torso_rate",
+        "position", "velocity", or "attitude" (pitch, roll, yaw, only with
+        ``attitude="euler"``), to (least, most), each one number or all of the part (SI).
+        ``start`` is then the first guess of these parts.
 
     Returns
     -------
@@ -219,6 +229,8 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
         "legs": legs,
         "formulation": formulation,
         "attitude": attitude,
+        "design": design,
+        "free_start": free_start,
     }
     task = (
         start,

@@ -1,7 +1,7 @@
 """A planning problem, checked field by field before anything is derived."""
 
-from collections.abc import Callable, Collection
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field, fields
 from functools import partial
 from typing import Any
 
@@ -14,6 +14,8 @@ from ..model.layout import QUATERNION, TAIL_Q, TAIL_V
 from ..model.model import Model
 from ..model.passive import behind_stops
 from ..simulation.schedules import Legs
+from .design import Design, checked_design
+from .free_start import Range, checked_free_start, moved_inside, within_bounds
 from .goal import GOALS, Bounds, Goal
 from .nlp.coordinates import KINDS
 from .nlp.node import FORMULATIONS
@@ -43,7 +45,14 @@ class PlanningProblem:
     legs: Legs | None
     formulation: str
     attitude: str
+    design: Design = field(default_factory=Design)
+    free_start: Mapping[str, Range] = field(default_factory=dict)  # q0, v0 are then the guess's
     __repr__ = brief
+
+    @property
+    def is_free(self) -> bool:
+        """Tell if parameters or parts of the start are unknowns."""
+        return bool(self.design.size or self.free_start)
 
 
 def checked_problem(
@@ -54,8 +63,13 @@ def checked_problem(
     ``refused`` collects each field that is wrong, its value and the remedy.
     """
     # start, goal and bounds, and whether the bounds allow start and goal
-    attempt, tail = refused.attempt, model.layout.nt
+    attempt, tail, settings = refused.attempt, model.layout.nt, dict(settings)
+    free = settings.pop("free_start", None)
+    design = attempt("design", checked_design, model, settings.pop("design", None))
+    free = attempt("free_start", checked_free_start, model, free, settings["attitude"])
     start = attempt("start", _start, model, task[0])
+    if start is not None and free is not None:
+        start = moved_inside(start, free)
     goal = attempt("goal", checked_goal, task[1], tail)
     duration, bounds = (
         attempt("duration", _duration, task[2]),
@@ -77,10 +91,13 @@ def checked_problem(
         name: attempt(name, SETTINGS[name], value) for name, value in settings.items()
     }
     if checked["clearance"] is not None and start is not None:
-        row = attempt("clearance", clear_of_ground, model, start, checked["clearance"])
+        known = None if design is None or design.size or free else start
+        row = attempt("clearance", clear_of_ground, model, known, checked["clearance"])
         checked["path"] = (*(checked["path"] or ()), row)
     if refused.lines or start is None or goal is None or duration is None or bounds is None:
         return None
+    assert design is not None and free is not None  # else they are refused
+    checked |= {"design": design, "free_start": within_bounds(free, bounds)}
     return PlanningProblem(*start, goal, duration, bounds, **checked)
 
 

@@ -11,15 +11,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..model.layout import OMEGA, POSITION, TAIL_Q, TAIL_V, VELOCITY
 from ..model.model import Model
-from ..motion.trajectory import Trajectory
+from .flight import State
+from .found import chosen, flown, guessed
 from .nlp.coordinates import attitude
+from .nlp.equations import Equations
 from .nlp.guess import Motion, of_trajectory, passive, pushes, unknowns
 from .nlp.interrupt import stop_reason
 from .nlp.mesh import Mesh, refined, uniform
 from .nlp.multipliers import Multipliers
-from .nlp.node import Equations
 from .nlp.program import Program
 from .nlp.rules import collocation_rule
 from .nlp.solver import Solution
@@ -32,13 +32,10 @@ from .result.plan import Plan, sampled
 from .result.report import report
 from .result.truth import end_errors, local_errors, open_loop
 from .settings import PlanSettings
+from .softening import softening_of
 from .ways import Begin, way_of
 
 FIRST_PUSH = 0.05  # of the torques' unit: takes the first guess out of a plane of symmetry
-# Softening of an objective, see ``cost``, in the first rounds; the last value holds in all others.
-# The exact ones are seldom solved from a distant guess. "energy": in mean powers of the guess.
-SOFTENING = {"energy": (3.0, 0.3, 0.03), "time": (1.0, 0.3)}
-USUAL_POWER = 0.01  # W, of a guess without torques
 DURATIONS = (1.0, 0.5, 0.75, 0.25)  # of guesses, in turn, from the least (0) to the most (1)
 
 
@@ -46,10 +43,13 @@ DURATIONS = (1.0, 0.5, 0.75, 0.25)  # of guesses, in turn, from the least (0) to
 class Round:
     """One solution on one mesh: q, v planned at the ends of intervals, and true at the last end.
 
+    model, problem: with the parameters and the start of the solution.
     errors: true errors there, as of ``end_errors``; excess: over bounds, by intervals.
     softening: of the objective.
     """
 
+    model: Model
+    problem: PlanningProblem
     nlp: Program
     solution: Solution
     curve: Curve
@@ -58,6 +58,11 @@ class Round:
     errors: dict[str, float]
     excess: Excess
     softening: float
+
+    @property
+    def start(self) -> State:
+        """The start."""
+        return self.problem.q0, self.problem.v0
 
     def __str__(self) -> str:
         return f"{self.nlp.mesh.intervals} intervals, {self.errors['attitude']:.2g} deg off"
@@ -76,11 +81,11 @@ class Search:
     ):
         self.model, self.problem, self.settings = model, problem, settings
         self.equations, self.rule = equations, collocation_rule(settings.rule, settings.degree)
-        self.start = (problem.q0, problem.v0)
-        momentum, com = model.momentum(*self.start)[1], com_at_start(model, self.start)
+        start = (problem.q0, problem.v0)
+        momentum, com = model.momentum(*start)[1], com_at_start(model, start)
         self.conserved = np.concatenate([momentum, *com])
         self.way = way_of(self)
-        self.softening = _softening(problem, settings.guess)
+        self.softening = softening_of(problem, settings.guess)
         self.attitude = attitude(problem.attitude)
         self.spent = dict.fromkeys(("derive_s", "solve_cpu_s", "truth_s"), 0.0)
         self.iterations = self.attempts = 0
@@ -121,7 +126,7 @@ class Search:
                 break
             self.softening = self.softening[1:] or self.softening
             nlp = self._transcribed(mesh)
-            motion = Motion(last.curve.duration, last.curve.at)
+            motion = Motion(last.curve.duration, last.curve.at, last.start, last.model.parameters)
             multipliers = self.way.carried(last.solution.multipliers, last.nlp, nlp)
             last = self._round(nlp, self._solved_near(nlp, motion, multipliers))
             yield last
@@ -149,7 +154,7 @@ class Search:
     def plan(self, best: Round, rounds: int, wall_s: float) -> Plan:
         """Return the plan of a round; rounds: their number so far."""
         success = bool(best.solution.success and self._wrong(best) <= 1)
-        trajectory = sampled(self.model, self.problem, best.curve)
+        trajectory = sampled(best.model, best.problem, best.curve)
         counts = {
             "rounds": rounds,
             "iterations": self.iterations,
@@ -161,11 +166,12 @@ class Search:
             success=success,
             trajectory=trajectory,
             report=summary | self.spent | {"wall_s": wall_s},
-            problem=self.problem,
+            problem=best.problem,
             curve=best.curve,
             mesh=best.nlp.mesh,
             rule=self.rule,
             solution=best.solution,
+            design=chosen(best.problem, best.model),
         )
 
     def _stopped(self) -> bool:
@@ -196,13 +202,15 @@ class Search:
         # a plan in other variables is a motion, too
         variables = (guess.problem.formulation, guess.problem.attitude)
         if variables != (self.problem.formulation, self.problem.attitude):
-            motion = of_trajectory(self.model, guess.trajectory, self.attitude)
+            model = self.model._varied(guess.design)
+            motion = of_trajectory(model, guess.trajectory, self.attitude)
             return self._solved(nlp, motion, "close")
 
         # a plan of the same size has multipliers for this one
         multipliers = guess.solution.multipliers
         same_size = [part.size for part in multipliers] == [nlp.indices.size, nlp.rows]
-        motion = Motion(guess.duration, guess.curve.at)
+        parameters = {**self.model.parameters, **guess.design}
+        motion = Motion(guess.duration, guess.curve.at, guess.start, parameters)
         return self._solved_near(nlp, motion, multipliers if same_size else None)
 
     def _solved_near(
@@ -218,8 +226,10 @@ class Search:
         settings, (least, most) = self.settings, self.problem.duration
         duration = least + (most - least) * DURATIONS[k % len(DURATIONS)]
         size = float(torque_unit(self.problem).mean()) * (FIRST_PUSH if k == 0 else 1.0)
-        push = pushes(np.random.default_rng([settings.seed, k]), size, self.model)
-        return passive(self.model, self.problem, settings.guess_damping, duration, push)
+        random = np.random.default_rng([settings.seed, k])
+        push = pushes(random, size, self.model)
+        own = guessed(self.model, self.problem, random if k else None)
+        return passive(*own, settings.guess_damping, duration, push)
 
     def _solved(
         self,
@@ -241,28 +251,19 @@ class Search:
             self._stopped()
         return solution
 
-    def start_blocks(self) -> dict[str, np.ndarray]:
-        """Return the start's blocks, SI."""
-        q, v = self.start
-        return {
-            "position": q[POSITION],
-            "attitude": self.attitude.coordinates(q[None])[0],
-            "tail": q[TAIL_Q],
-            "velocity": v[VELOCITY],
-            "torso_rate": v[OMEGA],
-            "tail_rate": v[TAIL_V],
-        }
-
     def _round(self, nlp: Program, solution: Solution) -> Round:
         """Return a round: the solution's curve, and its truth."""
         motion = curve(nlp, solution.w, self.parameters)
+        model, problem = flown(self.model, self.problem, nlp, solution.w)
+        start = problem.q0, problem.v0
         with self._timed("truth_s"):
             blocks = motion.at(motion.ends)
-            planned = full_state(self.model, self.start, self.attitude, motion.ends, blocks)
-            true = open_loop(self.model, motion, self.problem.damping, self.start)
-            errors = end_errors(self.problem, (planned[0][-1], planned[1][-1]), true)
-            beyond = excess(nlp, motion, self.parameters)
-        return Round(nlp, solution, motion, planned, true, errors, beyond, self.softening[0])
+            planned = full_state(model, start, self.attitude, motion.ends, blocks)
+            true = open_loop(model, motion, problem.damping, start)
+            errors = end_errors(problem, (planned[0][-1], planned[1][-1]), true)
+            beyond = excess(nlp, motion, self.parameters, solution.w)
+        truth = (planned, true, errors, beyond, self.softening[0])
+        return Round(model, problem, nlp, solution, motion, *truth)
 
     def _finer(self, last: Round) -> Mesh:
         """Return the next mesh.
@@ -277,24 +278,5 @@ class Search:
         if off <= 1:
             return mesh.halved(np.any([no_interval, *far.values()], axis=0), most)
         with self._timed("truth_s"):
-            errors = local_errors(self.model, last.curve, self.problem.damping, *last.planned)
+            errors = local_errors(last.model, last.curve, self.problem.damping, *last.planned)
         return refined(mesh, errors, min(0.3 / off, 0.3), self.rule.order, most)
-
-
-def _softening(problem: PlanningProblem, guess: object) -> tuple[float, ...]:
-    """Return the softening of the objective in the first rounds; the last one is kept."""
-    steps = SOFTENING.get(str(problem.objective), (0.0,))
-    if problem.objective == "energy":
-        power = _mean_power(guess)
-        steps = tuple(power * step for step in steps)
-    known = isinstance(guess, Plan) and guess.problem.objective == problem.objective
-    return steps[-1:] if known else steps
-
-
-def _mean_power(guess: object) -> float:
-    """Return the mean of sum |tau q_t_dot| (W) in a guess."""
-    motion = getattr(guess, "trajectory", guess)
-    if not isinstance(motion, Trajectory):
-        return USUAL_POWER
-    power = np.abs(motion.tau * motion.v[:, TAIL_V]).sum(axis=1)
-    return float(np.trapezoid(power, motion.t) / np.ptp(motion.t)) or USUAL_POWER

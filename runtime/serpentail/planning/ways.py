@@ -12,6 +12,7 @@ from ..errors import PlanningError
 from .condensed.fatrop import options_of, solve_stages
 from .condensed.node import lacking
 from .condensed.stages import Stages, stages_of
+from .found import start_blocks
 from .nlp.bounds import limits
 from .nlp.mesh import Mesh
 from .nlp.multipliers import Multipliers, carried
@@ -74,6 +75,9 @@ def _beyond(search: "Search") -> str | None:
         return "objective is a function: it takes 'effort', 'energy' and 'time'"
     if problem.path:
         return "path or clearance is given: it takes bounds alone, so leave it out"
+    if problem.is_free:
+        name = "design" if problem.design.size else "free_start"
+        return f"{name} is given: it takes known parameters and a known start, so leave it out"
     if problem.bounds.torque_rate is not None:
         return "bounds.torque_rate is given: leave it out"
     return lacking(search.model)
@@ -88,7 +92,7 @@ def _sparse_engine(search: "Search", nlp: Transcription, guess: str) -> Any:
 
 
 def _sparse_solved(search: "Search", nlp: Transcription, engine: Any, begin: Begin) -> Solution:
-    bounds = limits(nlp, search.start_blocks(), begin.angles)
+    bounds = limits(nlp, start_blocks(search.problem), begin.angles)
     return solve(engine, bounds, begin.w, search.parameters, begin.multipliers)
 
 
@@ -101,7 +105,7 @@ def _staged_engine(search: "Search", _stages: Stages, guess: str) -> Any:
 
 
 def _staged_solved(search: "Search", stages: Stages, engine: Any, begin: Begin) -> Solution:
-    return solve_stages(stages, search.start_blocks(), begin.w, search.parameters, engine)
+    return solve_stages(stages, start_blocks(search.problem), begin.w, search.parameters, engine)
 
 
 def _not_carried(_multipliers: Multipliers, _old: Program, _new: Program) -> None:

@@ -1,6 +1,6 @@
 """The keys of a scene's tables [[phase]]."""
 
-from ..sequence.phase import AIRBORNE, BEFORE, LANDING
+from ..sequence.phase import AIRBORNE, BEFORE, GIVEN, LANDING
 from ..simulation.ground import KINDS
 from .keys import Key
 from .plan_keys import PLAN
@@ -8,7 +8,7 @@ from .simulate_keys import LAWS_OF_ONE, METRES, MOVES, REFERENCE, SECONDS
 
 EVENT = {"type": "array", "prefixItems": [{"enum": list(KINDS)}, {"type": "string"}]}
 UNTIL = {"anyOf": [{"enum": [AIRBORNE, LANDING]}, {"type": "array", "items": EVENT}]}
-WITHOUT_START = {name: key for name, key in PLAN.keys.items() if name != "start"}
+WITHOUT_START = {name: key for name, key in PLAN.keys.items() if name not in GIVEN}
 PHASE = Key(
     keys={
         "name": Key(form={"type": "string"}),

@@ -7,11 +7,13 @@ from typing import Any
 from .. import extras
 from ..checks import Refusals, needed, refusal, shown
 from ..errors import PlanningError
+from ..model.model import Model
 from ..planning.goal import Bounds, Goal
 from ..planning.planner import plan
 from ..planning.result.plan import Plan
+from ..units import in_unit
 from .file import model_of, read_scene, size_of, subtable
-from .keys import read, sized
+from .keys import Key, read, sized
 from .plan_keys import FREE, PLAN
 
 ELSEWHERE = "programs can give others, to serpentail.plan"
@@ -31,7 +33,28 @@ def planned(path: str, folder: str | None = None) -> Plan:
     table = subtable(tables, "plan", place, PlanningError)
     plan_arguments(table)  # errors are raised before a model is built
     model = model_of(tables, place, folder, {})
-    return plan(model, **plan_arguments(table, size_of(model)))
+    return plan(model, **arguments_for(model, table))
+
+
+def arguments_for(model: Model, table: Mapping) -> dict[str, Any]:
+    """Return the arguments of ``plan`` that a table [plan] has, in the size of the model's body."""
+    size = size_of(model)
+    arguments = plan_arguments(table, size)
+    design = arguments.get("design")
+    if size and isinstance(design, Mapping):
+        units = {p["name"]: p["unit"] for p in model.manifest["parameters"]}
+        arguments["design"] = {
+            name: _in_size(pair, units.get(name, "1"), size) for name, pair in design.items()
+        }
+    return arguments
+
+
+def _in_size(pair: Any, unit: str, size: Mapping[str, float]) -> Any:
+    """Return least and most of a parameter in the size of a body; wrong ones as they are."""
+    try:
+        return sized(in_unit(pair, unit), Key(unit), size)
+    except ValueError:
+        return pair  # ``plan`` refuses it
 
 
 def plan_arguments(table: Mapping, size: Mapping[str, float] = UNSIZED) -> dict[str, Any]:

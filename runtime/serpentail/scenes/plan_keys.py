@@ -42,6 +42,17 @@ BOUNDS = {
     "torque": _bound("N m"),
     "torque_rate": _bound("N m/s"),
 }
+FREE_START = {
+    "position": Key("m", depth=2),
+    "attitude": Key("rad", depth=2),
+    "tail": Key("rad", depth=2),
+    "velocity": Key("m/s", depth=2),
+    "torso_rate": Key("rad/s", depth=2),
+    "tail_rate": Key("rad/s", depth=2),
+}
+# of parameters, whose units the model knows
+PAIR = {"type": "array", "minItems": 2, "maxItems": 2}
+RANGES = {"type": "object", "additionalProperties": PAIR}
 PLAN = Key(
     keys={
         "start": Key(
@@ -57,6 +68,8 @@ PLAN = Key(
         "clearance": Key("m"),
         "formulation": one_word(*FORMULATIONS),
         "attitude": one_word(*KINDS),
+        "design": Key(form=RANGES),
+        "free_start": Key(keys=FREE_START),
         # of the search
         **{name: _whole(*bounds) for name, bounds in WHOLE_NUMBERS.items()},
         "controls": _whole(1, MOST_CONTROLS),

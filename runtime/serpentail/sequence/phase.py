@@ -17,6 +17,11 @@ AIRBORNE, LANDING = "airborne", "landing"
 BEFORE = "before_landing"  # of a move: s, in place of `at`
 EARLY = 0.003  # s before it would land that a plan ends
 Event = tuple[str, str]  # kind, group
+GIVEN = {  # arguments of ``plan`` that a phase has no choice of, and what is needed instead
+    "start": "none: it is the state in which the phase begins",
+    "free_start": "none: the phase begins in the state in which the one before ends",
+    "design": "none: all phases have the sequence's model: choose its parameters by st.plan before",
+}
 
 
 @dataclass(frozen=True)
@@ -177,9 +182,9 @@ def _plans(where: str, plan: Any) -> tuple[Mapping[str, Any], ...]:
         needs = "a mapping of st.plan's arguments, or a list of such"
         raise refusal(f"{where}: plan", plan, needs, SimulationError)
     for each in plans:
-        if "start" in each:
-            needs = "none: it is the state in which the phase begins"
-            raise refusal(f"{where}: plan.start", each["start"], needs, SimulationError)
+        for name, needs in GIVEN.items():
+            if name in each:
+                raise refusal(f"{where}: plan.{name}", each[name], needs, SimulationError)
     return tuple(plans)
 
 

@@ -56,7 +56,7 @@ def choose(
         decay = None
         if not model.contacts:
             decay = FastestDecay(acting, start.runs, parameters)(start.q0)
-        name, reason = chosen(settings, available, decay)
+        name, reason = chosen(settings, available, decay, model.fixed)
     method = checked_method(name, settings, available, single)
     span, most_steps = start.end - start.start, method.settings.get("most_steps", MOST_STEPS)
     for each in ("step", "most_step"):
@@ -75,7 +75,8 @@ def still_chosen(run: CompiledRun, name: str) -> bool:
     if name != "auto" or run.ground.points:  # on the ground "auto" asks for no start
         return True
     method, available = run.method, run.model.manifest["simulation"]["methods"]
-    name, reason = chosen(method.settings, available, run.decay(run.memory.state["q"]))
+    decay = run.decay(run.memory.state["q"])
+    name, reason = chosen(method.settings, available, decay, run.model.fixed)
     run.method = replace(method, reason=reason)
     return name == method.name
 

@@ -83,11 +83,11 @@ def _defaults(name: str, single: bool, chosen: dict[str, float]) -> dict[str, fl
 
 
 def chosen(
-    settings: dict[str, Any], available: Collection[str], decay: float | None
+    settings: dict[str, Any], available: Collection[str], decay: float | None, fixed: bool
 ) -> tuple[str, str]:
     """Return the method of "auto" and the reason.
 
-    decay (1/s): fastest rate of damping and springs; None on the ground.
+    decay (1/s): fastest rate of damping and springs; None on the ground. fixed: the base is fixed.
     """
     if "step" in settings:
         implicit = decay is None and "implicit_euler" in available
@@ -98,9 +98,10 @@ def chosen(
             return "ros34pw2", "contact with the ground: stiff"
         lack = "the scene lacks `implicit`, which suitable methods need"
         return "tsit5", f"contact with the ground, but {lack}"
-    # in flight, damping and springs alone are stiff
+    # without contacts, damping and springs alone are stiff
     if decay > STIFF_DECAY and "ros34pw2" in available:
         return "ros34pw2", f"damping and springs act at {decay:.2g} 1/s: stiff"
+    place = "fixed base" if fixed else "flight"
     if decay:
-        return "tsit5", f"flight, damping and springs act at {decay:.2g} 1/s"
-    return "tsit5", "flight"
+        return "tsit5", f"{place}, damping and springs act at {decay:.2g} 1/s"
+    return "tsit5", place

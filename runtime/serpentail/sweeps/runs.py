@@ -13,7 +13,6 @@ from ..errors import SerpentailError, SweepError
 from ..model.model import Model
 from ..motion.numbers import NUMBERS
 from ..motion.trajectory import Trajectory
-from ..scenes.file import size_of
 from ..scenes.overrides import changed
 from ..scenes.simulate import Scenario, scenario_of
 from ..simulation.controllers import Damping, TorqueCurve, TorqueTable
@@ -101,12 +100,12 @@ def _simulated(job: Job, model: Model, point: Point) -> Trajectory:
 
 def _planned(job: Job, model: Model, point: Point) -> Any:
     from ..planning.planner import plan
-    from ..scenes.plan import plan_arguments
+    from ..scenes.plan import arguments_for
 
     own = model.with_parameters(**job.own_parameters(point))
     if job.table is not None:
         table = changed(job.table, job.own_keys(point))
-        return plan(own, **plan_arguments(table, size_of(own)) | job.settings)
+        return plan(own, **arguments_for(own, table) | job.settings)
     arguments = job.settings | job.own_keys(point)
     start = tuple(arguments.pop(name) for name in STARTS)
     return plan(own, start=start, **arguments)

@@ -114,7 +114,7 @@ def center_of_mass(model: Model, q: np.ndarray) -> np.ndarray:
     return q[..., POSITION] + (R @ h[..., None])[..., 0] / H[..., :1, 0]
 
 
-@law("mass_matrix", "center_of_mass", units=VALUE_LIMIT)
+@law("mass_matrix", "center_of_mass", units=VALUE_LIMIT, only="free")
 def center_of_mass_is_that_of_the_mass_matrix(model: Model, s: State) -> Errors:
     """The COM and its Jacobian follow from H; the Jacobian is the upper part of H over the mass."""
     position, _, J = model.center_of_mass(s.q, s.v)
@@ -127,7 +127,7 @@ def center_of_mass_is_that_of_the_mass_matrix(model: Model, s: State) -> Errors:
 
 @law("momentum", "center_of_mass", units=VALUE_LIMIT)
 def momentum_is_mass_times_velocity_of_the_center_of_mass(model: Model, s: State) -> Errors:
-    """Momentum is the mass of the whole animal times the velocity of its centre of mass."""
+    """Momentum is the mass of the animal (of the tail, on a fixed base) times the COM's velocity."""
     velocity = model.center_of_mass(s.q, s.v)[1]
     return relative(total_mass(model.parameters) * velocity, model.momentum(s.q, s.v)[0])
 

@@ -7,7 +7,7 @@ from html import escape
 from ..motion.trajectory import Trajectory
 from .view import page_text
 
-MOST_SHOWN = 600  # samples of a run: notebooks stay small
+MOST_SHOWN = 601  # samples of a run, such as 0.6 s at 1 kHz: notebooks stay small
 HEIGHT = 620  # px, of the frame
 
 

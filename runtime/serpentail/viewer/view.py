@@ -65,7 +65,7 @@ def view(
     path : str, path or None, default "run.html"
         The .html file. It contains all that it needs, and loads nothing from elsewhere. It
         replaces an older file when it is complete. With None no file is written: the result is
-        the page itself, which a notebook shows (at most 600 samples of each motion).
+        the page itself, which a notebook shows (at most 601 samples of each motion).
     names : sequence of str, optional
         Names of the motions.
     model : Model, optional

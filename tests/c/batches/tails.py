@@ -7,9 +7,12 @@ from functools import cache
 import numpy as np
 
 import serpentail as st
-from serpentail_codegen.targets.c.batch import BATCHED
+from serpentail_codegen.targets.c.batch import BATCHED, PARTS
 
 from ...support.models import model_folder
+
+GROUND = PARTS["batch_contact"]
+FREE = [name for name in BATCHED if name not in GROUND]  # of models without contacts
 
 ARGUMENTS = {
     "mass_matrix": ("q",),
@@ -31,7 +34,7 @@ ARGUMENTS = {
 @cache
 def model(kind="articulated", segments=2, links=2, profile="fast", **options):
     """A model with all functions that have batches."""
-    folder = model_folder(segments, links, name=f"{kind}_batch", functions=list(BATCHED), **options)
+    folder = model_folder(segments, links, name=f"{kind}_batch", functions=FREE, **options)
     return st.load(folder, profile=profile)
 
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from serpentail.model.compiler import compile_library
-from serpentail_codegen.targets.c.batch import BATCHED, STATES
+from serpentail_codegen.targets.c.batch import STATES
 
-from .tails import alone, evaluated, given, model, states
+from .tails import FREE, alone, evaluated, given, model, states
 
 FORMS = [
     pytest.param(
@@ -31,7 +31,7 @@ every_form = pytest.mark.parametrize(("tail", "emission", "real"), FORMS)
 
 
 @every_form
-@pytest.mark.parametrize("name", BATCHED)
+@pytest.mark.parametrize("name", FREE)
 def test_any_number_of_states_gives_what_each_gives_alone(tail, emission, real, name):
     found = model(*tail, emission=emission, real=real)
     arguments = states(found, 37)
@@ -45,7 +45,7 @@ def test_any_number_of_states_gives_what_each_gives_alone(tail, emission, real, 
 
 @pytest.mark.parametrize("tail", [("articulated", 2, 2), ("continuum", 2, None)])
 @pytest.mark.parametrize("emission", ["loops", pytest.param("straight", marks=pytest.mark.slow)])
-@pytest.mark.parametrize("name", BATCHED)
+@pytest.mark.parametrize("name", FREE)
 def test_the_reproducible_profile_gives_the_same_bits(tail, emission, name):
     found = model(*tail, profile="reproducible", emission=emission)
     arguments = states(found, 11)

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from ...ir.program import Array, Index, Ref, padded
 from ...mechanics import airborne, rotations, translation
 from ..draft import Draft
-from ..layout import OMEGA, VELOCITY, block, tail_v
+from ..layout import OMEGA, VELOCITY, block, segment_v, tail_v
+from ..passive import add_passive_forces
 from ..scope import State, Vectors
 from ..sweeps.inertia import column_of, tail_inertia
 from ..sweeps.wrenches import core_bias
@@ -36,7 +37,7 @@ class Balance:
     ``columns``, ``coupling``, ``gain``: for each tail coordinate its momentum at B, its momentum
     about the COM, and how its rate turns the torso.
     ``center``: ``inverse_mass, com``.
-    ``bias``: C.
+    ``bias``: C and the forces of passive parts.
     """
 
     draft: Draft
@@ -150,6 +151,7 @@ def balance(draft: Draft, arrays: dict[str, Array]) -> Balance:
 
     bias = draft.array("bias", tail.nv)
     core_bias(draft, segments, bias)
+    add_passive_forces(draft, segments.state, lambda i: segment_v(bias, i))
     tail_momenta = columns, coupling, gain
     return Balance(draft, q, v, quaternion, momentum, inertia, M, *tail_momenta, center, bias)
 

@@ -5,14 +5,15 @@ omega: H v_dot + C = loads, and A_r v = R^T h.
 """
 
 from ...ir.program import Array
-from ...mechanics import airborne_power, torso
+from ...mechanics import airborne_power, mount, torso
 from ...scene.signatures.arguments import MULTIPLIER, V_DOT, Argument, Q, V
 from ..derivatives.differentiated import POWER, U_VIRTUAL, A
 from ..draft import Draft
 from ..function import Function
 from ..layout import OMEGA, block, segment_v
+from ..passive import add_passive_power
 from ..scope import State, Vectors
-from ..sweeps.pieces import each_piece, mechanism
+from ..sweeps.pieces import across, each_piece, mechanism
 
 DRIFT = Argument("drift", (3,), "velocity of B relative to the COM, torso axes")
 RIGID = Argument("rigid", (3,), "turn of a virtual motion as one rigid body")
@@ -48,11 +49,19 @@ def assemble_power(draft: Draft, arrays: dict[str, Array]) -> None:
     for name in ("w", "w_dot", "w_virtual", "w_rigid"):
         draft.copy(carried[name], start[name])
 
+    # into the tail's root axes
+    across(draft, mount.motion_at_root, carried.only("w", "w_dot", "a").named)
+    across(draft, mount.velocity_at_root, carried.only("u").named)
+    for w, u in (("w_virtual", "u_virtual"), ("w_rigid", "u_rigid")):
+        turned = {"w_virtual": carried[w], "u_virtual": carried[u]}
+        across(draft, mount.virtual_velocity_at_root, turned)
+
     # from the mount to the tip
-    for i, _ in each_piece(draft):
+    for i, g in each_piece(draft):
         rates = segments.motion(i, v_dot), {"virtual_rates": segment_v(multiplier, i)}
         step = mechanism(draft).power_and_momentum
-        draft.step(step, segments.at(i), *rates, carried, power_=power, **carried)
+        draft.step(step, segments.at(i, g), *rates, carried, power_=power, **carried)
+    add_passive_power(draft, state, multiplier, power)
 
 
 POWER_AND_MOMENTUM = Function(

@@ -36,7 +36,7 @@ DERIVATIVES = in_group(DERIVATIVE)
 # of a tail on a fixed base
 FIXED = (
     *("mass_matrix", "bias_force", "inverse_dynamics", "forward_dynamics"),
-    *("energy", "momentum", "tail_points"),
+    *("energy", "momentum", "tail_points", "center_of_mass"),
     *("inverse_dynamics_derivatives", "forward_dynamics_derivatives"),
     *("inverse_dynamics_parameter_derivatives", "forward_dynamics_parameter_derivatives"),
     *("pfl", "implicit", "rollout"),

@@ -35,6 +35,7 @@ PARTS = {
         "inverse_dynamics_hessian",
     ),
     "batch_airborne": AIRBORNE,
+    "batch_contact": ("contact_points", "leg_points", "contact_dynamics"),
 }
 BATCHED = {name: part for part, names in PARTS.items() for name in names}
 

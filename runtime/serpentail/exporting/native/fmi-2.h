@@ -1,4 +1,4 @@
-/* The interface FMI 2.0 as far as a unit of real variables declares it. */
+/* The part of the interface FMI 2.0 that a unit with only real variables needs. */
 #ifndef SERPENTAIL_FMI2_H
 #define SERPENTAIL_FMI2_H
 
@@ -36,7 +36,7 @@ typedef struct {
   fmi2Real nextEventTime;
 } fmi2EventInfo;
 
-/* Functions have their plain names in a shared library; linked statically, a prefix as the standard has it. */
+/* Functions have their plain names in a shared library; with static linking they have a prefix, as FMI requires. */
 #ifndef FMI2_FUNCTION_PREFIX
 #define FMI2_FUNCTION_PREFIX
 #endif

@@ -1,4 +1,4 @@
-/* Directional derivatives of flights, exact: of the kinematics by hand, of accelerations by the model's Jacobians. */
+/* Exact directional derivatives of flights: kinematics by formulas here, accelerations by the model's Jacobians. */
 
 #include "fmu-unit.h"
 
@@ -26,7 +26,7 @@ static void add_product(const double *A, const double *x, size_t columns, double
   }
 }
 
-/* The change of the rate along a change of states and torques; not 0 where there is none. */
+/* Compute the change of the rates along a change of states and torques; return 0 for success. */
 static int rate_along(Instance *unit, const double *along, const double *torques, double *out)
 {
   const double *q = unit->now.x, *v = q + NQ;
@@ -59,7 +59,7 @@ FMI(fmi2Status, GetDirectionalDerivative)(fmi2Component c, const fmi2ValueRefere
   return told(c, fmi2Error, "directional derivatives: not available for a model with contacts");
 #else
   Instance *unit = c;
-  /* of states and their rates, by states and torques */
+  /* derivatives of states and their rates, with respect to states and torques */
   double all[2 * NX], torques[NT];
   memset(all, 0, sizeof all);
   memset(torques, 0, sizeof torques);

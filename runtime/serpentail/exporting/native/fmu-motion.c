@@ -1,15 +1,15 @@
-/* How a unit moves: by the environment's integrator, or by the model's own. */
+/* The motion of a unit, by the environment's integrator or by the model's own. */
 
 #include "fmu-unit.h"
 
-/* The argument of functions that know of legs. */
+/* The additional argument of functions of a model with legs. */
 #if LEGS
 #define LEGS_OF(u) (u) + NT,
 #else
 #define LEGS_OF(u)
 #endif
 
-static const long MOST_STEPS = 1000000; /* of one step of co-simulation */
+static const long MOST_STEPS = 1000000; /* in one step of co-simulation */
 
 void turned(const double *a, const double *omega, double *out)
 {
@@ -141,21 +141,21 @@ FMI(fmi2Status, DoStep)(fmi2Component c, fmi2Real t, fmi2Real step, fmi2Boolean 
   if (!(step > 0 && t + step > t)) {
     return told(unit, fmi2Error, "communicationStepSize: needs a time above 0 that moves the clock");
   }
-  /* the torques, held */
+  /* torques are constant during the step */
   const double times[2] = {t, t + step};
   const MODEL(piecewise) held = {1, NT, 0, times, now->u};
   const MODEL(controller) controller = {.torques = &held};
   MODEL(drive) drive = {.phases = 1, .begins = times, .controllers = &controller};
 #if LEGS
   double moves[LEGS];
-  for (int k = 0; k < 4; ++k) { /* an angle and its rate each */
+  for (int k = 0; k < 4; ++k) { /* an angle and its rate for each */
     moves[2 * k] = now->u[NT + k];
     moves[2 * k + 1] = now->u[NT + 4 + k];
   }
   const MODEL(piecewise) legs = {1, 4, 1, times, moves};
   drive.legs = &legs;
 #endif
-  /* samples at both ends */
+  /* samples at both ends of the step */
   double state[NX], q[2 * NQ], v[2 * NV], tau[2 * NT];
   memcpy(state, now->x, sizeof state);
   MODEL(run) run = {
@@ -199,7 +199,7 @@ FMI(fmi2Status, GetRealStatus)(fmi2Component c, const fmi2StatusKind kind, fmi2R
   return kind == fmi2LastSuccessfulTime ? fmi2OK : fmi2Discard;
 }
 
-/* Steps end before DoStep returns, so nothing is pending. */
+/* A step ends before DoStep returns, so no step is ever pending. */
 #define NO_STATUS(Name, type)                                                              \
   FMI(fmi2Status, Name)(fmi2Component c, const fmi2StatusKind kind, type *value)           \
   {                                                                                        \

@@ -1,4 +1,4 @@
-/* The life of a unit, its variables and its states. */
+/* Creation and end of a unit, its variables and its states. */
 
 #include <stdlib.h>
 
@@ -21,7 +21,7 @@ static void start(State *now)
   now->tolerance = TOLERANCE;
 }
 
-/* Where a variable that may be set is; NULL of others. */
+/* Return the address of a variable that may be set; NULL for the others. */
 static double *place(State *now, fmi2ValueReference reference)
 {
   if (reference < DERIVATIVES) {
@@ -33,7 +33,7 @@ static double *place(State *now, fmi2ValueReference reference)
   return reference < PARAMETERS ? now->u + (reference - INPUTS) : (double *)&now->parameters + (reference - PARAMETERS);
 }
 
-/* Life of an instance. */
+/* Creation and end of an instance. */
 
 FMI(const char *, GetTypesPlatform)(void) { return "default"; }
 FMI(const char *, GetVersion)(void) { return "2.0"; }
@@ -139,7 +139,7 @@ FMI(fmi2Status, SetReal)(fmi2Component c, const fmi2ValueReference references[],
   return fmi2OK;
 }
 
-/* There are variables of no other type. */
+/* All variables are real; the other types have none. */
 #define NONE(Type)                                                                                                   \
   FMI(fmi2Status, Get##Type)(fmi2Component c, const fmi2ValueReference references[], size_t n, fmi2##Type values[])  \
   {                                                                                                                  \
@@ -158,7 +158,7 @@ NONE(String)
 
 /* States of the unit. */
 
-/* Copy a state to where one is kept, which is allocated at first. */
+/* Copy a state into a kept one, which is allocated on first use. */
 static fmi2Status kept(const Instance *unit, const void *from, fmi2FMUstate *state)
 {
   if (*state == NULL) {

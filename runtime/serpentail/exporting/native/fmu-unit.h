@@ -1,4 +1,4 @@
-/* A model as a functional mock-up unit: what its files share.
+/* A model as a functional mock-up unit: declarations that its files share.
 
    States x = (q, v, bristles) are also outputs.  Inputs are the torques, held over a step of
    co-simulation, and with feet the legs: four angles, which go on at their four rates.  Value
@@ -15,7 +15,7 @@
 enum { NX = NQ + NV + 2 * POINTS, NU = NT + LEGS };
 enum { DERIVATIVES = NX, INPUTS = 2 * NX, PARAMETERS = INPUTS + NU, END = PARAMETERS + NP };
 
-/* What an FMU state keeps: numbers, so that its bytes can be stored. */
+/* An FMU state: only numbers, so that its bytes can be stored. */
 typedef struct {
   double t, x[NX], u[NU];
   MODEL(parameters) parameters; /* as NP numbers */
@@ -25,17 +25,17 @@ typedef struct {
 typedef struct {
   State now;
   double rate[NX];
-  int known; /* whether rate is that of the state */
+  int known; /* 1 if rate belongs to the present state */
   fmi2CallbackFunctions callbacks;
   char *name;
   double work[WORK + 1];
 } Instance;
 
-/* Tell the environment what is wrong, and return the status. */
+/* Report a message to the environment, and return the status. */
 fmi2Status MODEL(fmu_told)(const Instance *unit, fmi2Status status, const char *message);
 #define told MODEL(fmu_told)
 
-/* Find the rate of the states; fmi2Discard where they have none. */
+/* Compute the rates of the states; fmi2Discard if they cannot be computed. */
 fmi2Status MODEL(fmu_known)(Instance *unit);
 #define known_rate MODEL(fmu_known)
 

@@ -63,6 +63,8 @@ class MeasureMethods(Evaluated):
     def center_of_mass(self, q: ArrayLike, v: ArrayLike) -> tuple[Array, Array, Array]:
         """Compute position and velocity of the whole body's centre of mass, and its Jacobian.
 
+        On a fixed base they are those of the tail.
+
         Parameters
         ----------
         q : array_like, shape (nq,)

@@ -1,9 +1,9 @@
 /* Calls of compiled functions on one state, from Python and without its interpreter.
 
-   A call takes the plain case alone: NumPy arrays of the right type and shape.  For all else, and
-   where the function refuses the state, it returns None, and its caller does the same in Python,
-   which converts arguments and words the errors.  Only CPython's stable ABI is used, so that a
-   build serves every version from 3.11 on, and every NumPy. */
+   A call accepts only NumPy arrays of the right type and shape.  For any other argument, and if the
+   function refuses the state, it returns None.  Its caller then does the same work in Python, which
+   converts arguments and raises errors with a message.  The code uses only CPython's stable ABI, so
+   that one build serves every version from 3.11 on, and every NumPy. */
 
 #define Py_LIMITED_API 0x030B0000
 #include <Python.h>
@@ -13,28 +13,28 @@ enum { MOST_ARRAYS = 10 };
 
 typedef int (*Function)(void *record);
 
-/* A function, its argument record, the arrays that the record points to, and what owns all. */
+/* A function, its argument record, the arrays that the record points to, and their owner. */
 typedef struct {
     Function function;
     void *record;
     Py_ssize_t inputs, outputs;
-    Py_buffer arrays[MOST_ARRAYS]; /* inputs, then outputs; held, so that they stay where they are */
-    PyObject *copies[MOST_ARRAYS]; /* what copies an output; NULL of a scalar */
-    PyObject *whole;               /* the index () */
-    PyObject *owner;               /* of all that the record points to, and of the record */
-    int busy;                      /* whether a call is copying outputs */
+    Py_buffer arrays[MOST_ARRAYS]; /* inputs, then outputs; held, so that they do not move */
+    PyObject *copies[MOST_ARRAYS]; /* the method that copies an output; NULL for a scalar */
+    PyObject *whole;               /* the index (), of a scalar */
+    PyObject *owner;               /* keeps the record, and what it points to, alive */
+    int busy;                      /* 1 while a call copies outputs */
 } Call;
 
 static const char NAME[] = "serpentail.call";
 
-/* Whether an argument is an array like one of ours. */
+/* Tell whether an argument is an array of the same type and shape as one of ours. */
 static int alike(const Py_buffer *given, const Py_buffer *own)
 {
     return given->ndim == own->ndim && strcmp(given->format, own->format) == 0
         && memcmp(given->shape, own->shape, (size_t)own->ndim * sizeof *own->shape) == 0;
 }
 
-/* Copy an argument into the array that the function reads; 0 where it is not the plain case. */
+/* Copy an argument into the array that the function reads; 0 if it needs Python's conversion. */
 static int taken(PyObject *argument, const Py_buffer *own)
 {
     Py_buffer given;
@@ -51,7 +51,7 @@ static int taken(PyObject *argument, const Py_buffer *own)
     return plain;
 }
 
-/* A fresh copy of output k. */
+/* Return a new copy of output k. */
 static PyObject *copied(const Call *call, Py_ssize_t k)
 {
     if (call->copies[k] != NULL) {
@@ -60,7 +60,7 @@ static PyObject *copied(const Call *call, Py_ssize_t k)
     return PyObject_GetItem(call->arrays[call->inputs + k].obj, call->whole);
 }
 
-/* Fresh copies of all outputs: one alone, or a tuple. */
+/* Return new copies of all outputs: a single one, or a tuple. */
 static PyObject *results(const Call *call)
 {
     Py_ssize_t k;
@@ -79,9 +79,10 @@ static PyObject *results(const Call *call)
     return all;
 }
 
-/* Evaluate on one state.  Python's lock is held from the first argument to the last result, but
-   where NumPy lets go of it to copy much, or where Python collects garbage and runs what a user
-   wrote: a call that comes meanwhile finds this one busy, and is made in Python. */
+/* Evaluate the function on one state.  Python's lock is held from the first argument to the last
+   result, with two exceptions: NumPy releases it to copy large arrays, and Python's garbage
+   collection may run code of the user.  Another call at such a time finds this one busy and is made
+   in Python. */
 static PyObject *evaluate(PyObject *self, PyObject *const *arguments, Py_ssize_t count)
 {
     Call *call = PyCapsule_GetPointer(self, NAME);
@@ -112,7 +113,7 @@ static void release(PyObject *capsule)
     Call *call = PyCapsule_GetPointer(capsule, NAME);
     Py_ssize_t k;
     for (k = 0; k < MOST_ARRAYS; k++) {
-        PyBuffer_Release(&call->arrays[k]); /* nothing where none is held */
+        PyBuffer_Release(&call->arrays[k]); /* does nothing if none is held */
         Py_XDECREF(call->copies[k]);
     }
     Py_XDECREF(call->whole);
@@ -120,7 +121,7 @@ static void release(PyObject *capsule)
     PyMem_Free(call);
 }
 
-/* Hold the arrays, and what copies the outputs; -1 and an error where that cannot be done. */
+/* Hold the arrays and the methods that copy the outputs; return -1 and set an error on failure. */
 static int held(Call *call, PyObject *arrays)
 {
     Py_ssize_t k;
@@ -143,9 +144,8 @@ static int held(Call *call, PyObject *arrays)
 
 static PyMethodDef METHOD = {"evaluate", (PyCFunction)(void (*)(void))evaluate, METH_FASTCALL, NULL};
 
-/* Return what evaluates a function, given its arrays, of which so many are inputs.
-
-   The record points to them.  The owner of both is kept; the function must outlive the call. */
+/* Return a callable that evaluates a function.  arrays: inputs first, then outputs; the argument
+   record points to them.  The callable keeps the owner of both; the function must outlive it. */
 PyObject *serpentail_call(
     void *function, void *record, PyObject *arrays, Py_ssize_t inputs, PyObject *owner)
 {

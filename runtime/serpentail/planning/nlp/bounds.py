@@ -37,10 +37,24 @@ def limits(nlp: Transcription, start: dict[str, np.ndarray], angles: np.ndarray)
     lbx, ubx = np.full(indices.size, -np.inf), np.full(indices.size, np.inf)
     lbx[0], ubx[0] = problem.duration
     _bound_motion(nlp, lbx, ubx)
-    first = np.concatenate([start[name] / variables.units[name] for name, _ in variables.states])
-    lbx[indices.states[0]] = ubx[indices.states[0]] = first
+    lbx[indices.states[0]], ubx[indices.states[0]] = _ranges(nlp, variables.states, start)
+    lbx[indices.at_start], ubx[indices.at_start] = _ranges(nlp, variables.at_start, start)
+    design = variables.design
+    chosen = indices.common[: design.size]
+    lbx[chosen], ubx[chosen] = design.least / design.units, design.most / design.units
     _fix_end(nlp, lbx, ubx)
     return Limits(lbx, ubx, *_constraint_bounds(nlp, angles))
+
+
+def _ranges(
+    nlp: Transcription, blocks: tuple[tuple[str, int], ...], start: dict[str, np.ndarray]
+) -> np.ndarray:
+    """Return least and most (2, n), in units, of blocks at the start: ranges if they are free."""
+    units, free = nlp.variables.units, nlp.problem.free_start
+    parts = [np.zeros((2, 0))]
+    for name, _ in blocks:
+        parts.append(np.array(free.get(name, (start[name], start[name]))) / units[name])
+    return np.concatenate(parts, axis=1)
 
 
 def _bound_motion(nlp: Transcription, lbx: np.ndarray, ubx: np.ndarray) -> None:
@@ -82,10 +96,22 @@ def _constraint_bounds(nlp: Transcription, angles: np.ndarray) -> tuple[np.ndarr
     goal = _goal_values(problem.goal, nlp.attitude, angles)
     least, most = nlp.direct.least.copy(), nlp.direct.most.copy()
     least[: len(goal)] = most[: len(goal)] = goal
+    at_start = _at_start(nlp)
     return (
-        np.concatenate([defects, at_nodes[0], least]),
-        np.concatenate([defects, at_nodes[1], most]),
+        np.concatenate([defects, at_nodes[0], least, at_start[0]]),
+        np.concatenate([defects, at_nodes[1], most, at_start[1]]),
     )
+
+
+def _at_start(nlp: Transcription) -> np.ndarray:
+    """Bounds (2, rows) of the rows at the start; path constraints there hold at a first node."""
+    rows = nlp.node.start
+    if rows is None:
+        return np.zeros((2, 0))
+    paths = np.array([row[1:] for row in nlp.problem.path]).reshape(-1, 2).T[:, rows.paths]
+    if nlp.indices.first == 0:
+        paths = np.repeat([[-np.inf], [np.inf]], len(rows.paths), axis=1)
+    return np.concatenate([np.zeros((2, rows.zeros)), paths], axis=1)
 
 
 def _path(problem: PlanningProblem, node: Node) -> np.ndarray:

@@ -11,6 +11,7 @@ import numpy as np
 
 from .node import PARAMETERS, Node
 from .node_calls import MappedNode
+from .start import StartRows
 
 if TYPE_CHECKING:
     import casadi as ca
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Assembly:
-    """f = cost Y + direct w, g = linear w + weights Y.
+    """f = cost Y + direct w, g = linear w + weights Y, then the node's rows at the start.
 
     Y (nodes * size): values of the node's function at w[indices] and fractions of every node.
     """
@@ -31,6 +32,16 @@ class Assembly:
     cost: np.ndarray
     direct: np.ndarray
 
+    @property
+    def start(self) -> StartRows | None:
+        """Rows at the start."""
+        return self.node.start
+
+    @property
+    def rows(self) -> int:
+        """Number of constraints."""
+        return self.linear.shape[0] + (0 if self.start is None else self.start.rows)
+
     def functions(self) -> "dict[str, ca.Function]":
         """Return nlp, grad_f, jac_g, hess_lag, with CasADi's names and inputs, and values.
 
@@ -40,17 +51,23 @@ class Assembly:
 
         # symbols, and the results of all nodes
         w, p = ca.MX.sym("x", len(self.direct)), ca.MX.sym("p", PARAMETERS)
-        lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", self.linear.shape[0])
+        lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", self.rows)
         derivatives, count = self.node.derivatives, self.indices.shape[1]
         mapped = MappedNode(derivatives, self.fractions)
         Z = ca.reshape(w[self.indices.T.ravel().tolist()], self.indices.shape)
-        mu = lam_f * ca.DM(self.cost) + ca.mtimes(_dm(self.weights.T.tocsc()), lam_g)
+        lam, lam_start = ca.vertsplit(lam_g, [0, self.linear.shape[0], self.rows])
+        mu = lam_f * ca.DM(self.cost) + ca.mtimes(_dm(self.weights.T.tocsc()), lam)
         Y, J = ca.vec(mapped.values(Z, p)), mapped.jacobians(Z, p)
         S = mapped.hessians(Z, p, ca.reshape(mu, self.node.size, count))
 
         # objective and constraints
         f = self._objective(mapped, Z, p, w)
         g = ca.mtimes(_dm(self.linear), w) + ca.mtimes(_dm(self.weights), Y)
+        if self.start is not None:
+            x = w[: self.start.unknowns.size]
+            g = ca.vertcat(g, self.start.function(x))
+            J = ca.vertcat(J, _entries(self.start.jacobian(x)))
+            S = ca.vertcat(S, _entries(self.start.hessian(x, lam_start)))
 
         # their derivatives
         pattern, matrix, constant = self._jacobian(*_triplet(derivatives.jacobian.sparsity_out(0)))
@@ -103,16 +120,25 @@ class Assembly:
         inside = np.arange(length.sum()) - np.repeat(np.cumsum(length) - length, length)
         k = start[entry] + inside
 
+        # and those of the rows at the start once
+        weight, (row, column) = self.weights.data[k], (self.weights.indices[k], unknown[entry])
+        if self.start is not None:
+            own_rows, own_columns = _triplet(self.start.jacobian.sparsity_out(0))
+            row = np.append(row, self.linear.shape[0] + own_rows)
+            column = np.append(column, own_columns)
+            entry = np.append(entry, unknown.size + np.arange(own_rows.size))
+            weight = np.append(weight, np.ones(own_rows.size))
+
         # places of all entries, column by column, with those of the linear part
-        constant = self.linear.tocoo()
-        row = np.concatenate([self.weights.indices[k], constant.row])
-        column = np.concatenate([unknown[entry], constant.col])
-        places = column.astype(np.int64) * self.linear.shape[0] + row
+        constant, moved = self.linear.tocoo(), len(row)
+        row, column = np.append(row, constant.row), np.append(column, constant.col)
+        places = column.astype(np.int64) * self.rows + row
         key, position = np.unique(places, return_inverse=True)
-        moving, fixed = position[: len(k)], position[len(k) :]
-        matrix = _sparse(self.weights.data[k], moving, entry, (len(key), unknown.size))
+        moving, fixed = position[:moved], position[moved:]
+        entries = unknown.size + moved - len(k)
+        matrix = _sparse(weight, moving, entry, (len(key), entries))
         return (
-            _sparsity(key, self.linear.shape),
+            _sparsity(key, (self.rows, len(self.direct))),
             matrix,
             np.bincount(fixed, constant.data, len(key)),
         )
@@ -120,12 +146,22 @@ class Assembly:
     def _hessian(self, rows: np.ndarray, columns: np.ndarray) -> "tuple[ca.Sparsity, ca.DM]":
         """Pattern of the Lagrangian's Hessian, upper triangle, and its map from the nodes' ones."""
         row, column = self.indices[rows].T.ravel(), self.indices[columns].T.ravel()
+        if self.start is not None:
+            own_rows, own_columns = _triplet(self.start.hessian.sparsity_out(0))
+            row, column = np.append(row, own_rows), np.append(column, own_columns)
         upper = np.flatnonzero(row <= column)
         n = len(self.direct)
         places = column[upper].astype(np.int64) * n + row[upper]
         key, position = np.unique(places, return_inverse=True)
         gather = _sparse(np.ones(len(upper)), position, upper, (len(key), row.size))
         return _sparsity(key, (n, n)), gather
+
+
+def _entries(matrix: "ca.MX") -> "ca.MX":
+    """Entries of a sparse matrix in a column."""
+    import casadi as ca
+
+    return ca.vec(matrix.nz[:])
 
 
 def _triplet(sparsity: "ca.Sparsity") -> tuple[np.ndarray, np.ndarray]:

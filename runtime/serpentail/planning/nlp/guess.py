@@ -1,7 +1,8 @@
 """Where the solver starts: a motion, such as passive flight or an earlier plan, put on a mesh."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -11,10 +12,13 @@ from ...model.model import Model
 from ...model.parameters import total_mass
 from ...motion.trajectory import Trajectory
 from ...simulation.controllers import TorqueTable
-from ..flight import flight
+from ..flight import State, flight
+from ..free_start import part_of
 from ..problem import PlanningProblem
 from .coordinates import Attitude, attitude
 from .program import Program
+from .start import StartRows
+from .transcription import Transcription
 
 PUSH_SAMPLES = 33  # of a random push
 PUSH_WAVES = 3  # sines that it sums
@@ -22,10 +26,15 @@ PUSH_WAVES = 3  # sines that it sums
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """A motion of a duration (s): at times (K,), s, blocks (K, size) in SI by name."""
+    """A motion of a duration (s): at times (K,), s, blocks (K, size) in SI by name.
+
+    start: its state; parameters: of the model that moves.
+    """
 
     duration: float
     at: Callable[[np.ndarray], dict[str, np.ndarray]]
+    start: State
+    parameters: Mapping[str, Any]
 
 
 def passive(
@@ -75,7 +84,7 @@ def of_trajectory(
     def at(times: np.ndarray) -> dict[str, np.ndarray]:
         return {name: _linear(t, values, times) for name, values in samples.items()}
 
-    return Motion(t[-1], at)
+    return Motion(t[-1], at, (motion.q[0], motion.v[0]), model.parameters)
 
 
 def _linear(t: np.ndarray, values: np.ndarray, times: np.ndarray) -> np.ndarray:
@@ -86,12 +95,27 @@ def unknowns(motion: Motion, nlp: Program, duration: float) -> np.ndarray:
     """Return w: the motion, stretched to a duration (s), at the points of a mesh."""
     variables, indices = nlp.variables, nlp.indices
     blocks = motion.at(nlp.fractions * motion.duration)
-    scaled = {name: blocks[name] / unit for name, unit in variables.units.items()}
-    states = [scaled[name] for name, _ in variables.states]
-    others = [scaled[name][indices.first :] for name, _ in (*variables.algebraic, ("torque", 0))]
+    states = [blocks[name] / variables.units[name] for name, _ in variables.states]
+    others = [
+        blocks[name][indices.first :] / variables.units[name]
+        for name, _ in (*variables.algebraic, ("torque", 0))
+    ]
 
     w = np.zeros(indices.size)
     w[0] = duration
     w[indices.states] = np.column_stack(states)
     w[indices.others] = np.column_stack(others)
+    if isinstance(nlp, Transcription) and nlp.node.start is not None:
+        _fill_shared(w, nlp, nlp.node.start, motion)
     return w
+
+
+def _fill_shared(w: np.ndarray, nlp: Transcription, rows: StartRows, motion: Motion) -> None:
+    """Set the unknowns that all nodes share, and those of the start alone."""
+    variables, indices, design = nlp.variables, nlp.indices, nlp.variables.design
+    parts = [part_of(motion.start, name) for name, _ in variables.at_start]
+    scale = variables.scale(variables.at_start)
+    w[indices.at_start] = np.concatenate([np.zeros(0), *parts]) / scale
+    w[indices.common[: design.size]] = design.of(motion.parameters) / design.units
+    conserved = np.array(rows.conserved(w[rows.unknowns])).ravel()
+    w[indices.common[design.size :]] = conserved[: indices.common.size - design.size]

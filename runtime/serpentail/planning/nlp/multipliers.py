@@ -25,7 +25,8 @@ def carried(multipliers: Multipliers, old: Transcription, new: Transcription) ->
 def _of_unknowns(lam: np.ndarray, old: Transcription, new: Transcription) -> np.ndarray:
     """Return the multipliers of bounds: of the duration, of the start, and of all nodes."""
     carried, before, after = np.zeros(new.indices.size), old.indices, new.indices
-    carried[0], carried[after.states[0]] = lam[0], lam[before.states[0]]
+    own = np.arange(after.states[0, -1] + 1)  # the duration, what nodes share, and the start
+    carried[own] = lam[own]
     carried[after.states[1:]] = _along(lam[before.states[1:]], old, new)
     carried[after.others] = _along(lam[before.others], old, new)
     return carried
@@ -45,7 +46,9 @@ def _of_rows(lam: np.ndarray, old: Transcription, new: Transcription) -> np.ndar
 
     held = _along(held.reshape(nodes, -1), old, new)
     left = new.rows - defects.size - held.size
-    rest = rest if len(rest) == left else np.zeros(left)
+    start = 0 if new.node.start is None else new.node.start.rows
+    if len(rest) != left:
+        rest = np.append(np.zeros(left - start), rest[len(rest) - start :])
     return np.concatenate([defects.ravel(), held.ravel(), rest])
 
 

@@ -4,19 +4,21 @@ Every node of every mesh evaluates the same CasADi function, from which the prog
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...errors import ModelError
 from ...model.kept import kept
 from ...model.layout import OMEGA, TAIL_V, VELOCITY
 from ...model.model import Model
 from ...model.parameters import total_mass
+from ..design import Design, refuse_unused
 from .coordinates import Attitude, rotated
+from .equations import Equations
 from .node_calls import NodeCall, NodeDerivatives, linear_call
 from .point import Point, asked, at_identity, point_of
+from .start import Shared, StartRows, shared_of, start_rows
 
 if TYPE_CHECKING:
     import casadi as ca
@@ -48,39 +50,25 @@ PARAMETERS = 10
 
 
 @dataclass(frozen=True, eq=False)
-class Equations:
-    """Equations of motion as CasADi functions, and their source: "compiled" or "symbolic"."""
-
-    forward: "ca.Function"
-    inverse: "ca.Function"
-    parameters: tuple  # further inputs after the usual ones
-    source: str
-
-
-def equations_of_motion(model: Model, source: str = "auto") -> Equations:
-    """Return compiled functions if the scene has their second derivatives, else SX ones."""
-    names = ("forward_dynamics", "inverse_dynamics")
-    if source != "symbolic":
-        try:
-            forward, inverse = (model.casadi.external(name, derivatives=2) for name in names)
-            return Equations(forward, inverse, (model.casadi.parameter_vector,), "compiled")
-        except ModelError:
-            if source == "compiled":
-                raise
-    forward, inverse = (getattr(model.casadi, name) for name in names)
-    return Equations(forward, inverse, (), "symbolic")
-
-
-@dataclass(frozen=True, eq=False)
 class Variables:
     """The unknowns of a node: blocks (name, size) of states and algebraic unknowns; all units.
 
-    The units also have those of the torques, the node's controls.
+    The units also have those of the torques, the node's controls. common: blocks that all nodes
+    share; at_start: blocks of the start that are no states; both are empty if start and parameters
+    are known.
     """
 
     states: tuple[tuple[str, int], ...]
     algebraic: tuple[tuple[str, int], ...]
     units: dict[str, np.ndarray]
+    common: tuple[tuple[str, int], ...] = ()
+    at_start: tuple[tuple[str, int], ...] = ()
+    design: Design = field(default_factory=Design)
+
+    @property
+    def shared(self) -> tuple[tuple[tuple[str, int], ...], ...]:
+        """Blocks common to all nodes, and those of the start alone."""
+        return self.common, self.at_start
 
     def sizes(self) -> tuple[int, int, int]:
         """Numbers of states, algebraic unknowns and controls."""
@@ -109,11 +97,12 @@ def variables_of(
 class Node:
     """A node's function y(zeta, p, results of calls), and the calls.
 
-    Their inputs are linear in zeta. zeta: [duration, states, algebraic unknowns, torques] in units.
-    p: parameters, first the angular momentum about the COM (kg m^2/s, world), which the airborne
-    formulation conserves. y: duration * rates of the states, algebraic residuals, path constraints,
-    duration * objective, all in units. rates, residuals: their numbers; paths: number of entries of
-    each path constraint.
+    Their inputs are linear in zeta. zeta: [duration, common unknowns, states, algebraic unknowns,
+    torques] in units. p: parameters, first the angular momentum about the COM (kg m^2/s, world),
+    which the airborne formulation conserves. y: duration * rates of the states, algebraic
+    residuals, path constraints, duration * objective, all in units. rates, residuals: their
+    numbers; paths: number of entries of each path constraint. start: rows of the program at its
+    start, if that is unknown.
     """
 
     function: "ca.Function"
@@ -121,6 +110,7 @@ class Node:
     rates: int
     residuals: int
     paths: tuple[int, ...]
+    start: StartRows | None = None
 
     @kept
     def derivatives(self) -> NodeDerivatives:
@@ -158,15 +148,18 @@ def node_function(
 
     # symbols of the unknowns, and of the results of calls
     states, algebraic, controls = variables.sizes()
-    zeta, p = ca.SX.sym("zeta", 1 + states + algebraic + controls), ca.SX.sym("p", PARAMETERS + 1)
-    point = _point(model, zeta, p, variables, attitude, problem.legs)
-    calls = _calls(model, problem, point, zeta, equations)[: 2 if algebraic else 1]
+    common = sum(size for _, size in variables.common)
+    size = 1 + common + states + algebraic + controls
+    zeta, p = ca.SX.sym("zeta", size), ca.SX.sym("p", PARAMETERS + 1)
+    shared = shared_of(model, zeta, p, variables)
+    point = _point(shared, zeta, p, variables, attitude, problem.legs)
+    calls = _calls(shared, problem, point, zeta, equations)[: 2 if algebraic else 1]
     results = [ca.SX.sym("result", call.function.size1_out(0)) for call in calls]
 
     # the parts of y
-    duration, rates = zeta[0], _rates(model, point, attitude, results[0])
+    duration, rates = zeta[0], _rates(shared, point, attitude, results[0])
     state_rates = ca.vertcat(*(rates[name] for name, _ in variables.states))
-    residuals = _momentum(model, point, p[:3], results[1]) if algebraic else ca.SX.zeros(0)
+    residuals = _momentum(shared, point, results[1]) if algebraic else ca.SX.zeros(0)
     constraints = [
         ca.vec(ca.SX(asked(f"path[{k}]", function, point)))
         for k, (function, _, _) in enumerate(problem.path)
@@ -180,11 +173,27 @@ def node_function(
     )
     function = ca.Function("node", [zeta, p, *results], [y])
     paths = tuple(rows.size1() for rows in constraints)
-    return Node(function, tuple(calls), states, residuals.size1(), paths)
+    _refuse_unused(variables, function, calls)
+    start = start_rows(model, problem, attitude, variables)
+    return Node(function, tuple(calls), states, residuals.size1(), paths, start)
+
+
+def _refuse_unused(
+    variables: Variables, function: "ca.Function", calls: Iterable[NodeCall]
+) -> None:
+    """PlanningError if neither the dynamics nor a function of points uses a design's parameter."""
+    design = variables.design
+    if not design.size:
+        return
+    patterns = [call.function.jac_sparsity(0, call.function.n_in() - 1) for call in calls]
+    own = function.jac_sparsity(0, 0)
+    columns = {column for pattern in patterns for column in pattern.get_triplet()[1]}
+    columns |= {column - 1 for column in own.get_triplet()[1]}
+    refuse_unused(design, np.isin(np.arange(design.size), list(columns)))
 
 
 def _calls(
-    model: Model,
+    shared: Shared,
     problem: "PlanningProblem",
     point: Point,
     zeta: "ca.SX",
@@ -196,21 +205,21 @@ def _calls(
     """
     import casadi as ca
 
-    more = equations.parameters
+    more = (*equations.parameters, *shared.design)
     q = at_identity(point)
     v = ca.vertcat(ca.DM.zeros(3), point.torso_rate, point.tail_rate)
     applied = point.torque - problem.damping * point.tail_rate
     calls = [linear_call(equations.forward, zeta, [q, v, applied, *more])]
     if hasattr(point, "drift"):
-        gravity = ca.DM([0, 0, model.parameters["gravity"]])
-        motion = ca.vertcat(point.drift - gravity, point.torso_rate, point.tail_rate)
-        rest = ca.DM.zeros(model.nv)
+        drift = point.drift - shared.body.gravity()
+        motion = ca.vertcat(drift, point.torso_rate, point.tail_rate)
+        rest = ca.DM.zeros(shared.body.model.nv)
         calls.append(linear_call(equations.inverse, zeta, [q, rest, motion, *more]))
     return calls
 
 
 def _point(
-    model: Model,
+    shared: Shared,
     zeta: "ca.SX",
     p: "ca.SX",
     variables: Variables,
@@ -219,20 +228,18 @@ def _point(
 ) -> Point:
     """Return the blocks of a node in SI units, which objectives and path constraints see."""
     blocks: dict[str, Any] = {"duration": zeta[0], "time": p[PARAMETERS] * zeta[0]}
-    start = 1
+    start = 1 + sum(size for _, size in variables.common)
     controls = ("torque", variables.units["torque"].size)
     for name, size in (*variables.states, *variables.algebraic, controls):
         blocks[name] = variables.units[name] * zeta[start : start + size]
         start += size
     blocks["quaternion"] = attitude.quaternion(blocks["attitude"])
-    return point_of(model, blocks, p[3:9], legs)
+    return point_of(shared.body, blocks, shared.com, legs)
 
 
-def _rates(model: Model, point: Point, attitude: Attitude, v_dot: "ca.SX") -> dict[str, Any]:
+def _rates(shared: Shared, point: Point, attitude: Attitude, v_dot: "ca.SX") -> dict[str, Any]:
     """Return the rates of state blocks; p_ddot = R (p_ddot(identity) + g z) - g z."""
-    import casadi as ca
-
-    gravity = ca.DM([0, 0, model.parameters["gravity"]])
+    gravity = shared.body.gravity()
     return {
         "position": getattr(point, "velocity", None),
         "attitude": attitude.rate(point.attitude, point.torso_rate),
@@ -243,7 +250,7 @@ def _rates(model: Model, point: Point, attitude: Attitude, v_dot: "ca.SX") -> di
     }
 
 
-def _momentum(model: Model, point: Point, h: "ca.SX", momentum: "ca.SX") -> "ca.SX":
+def _momentum(shared: Shared, point: Point, momentum: "ca.SX") -> "ca.SX":
     """Return H v of the motion relative to the COM less (0, R^T h), in units.
 
     It is zero if omega carries h. If the linear momentum is zero, the angular momentum about B is
@@ -251,9 +258,10 @@ def _momentum(model: Model, point: Point, h: "ca.SX", momentum: "ca.SX") -> "ca.
     """
     import casadi as ca
 
-    mass = total_mass(model.parameters)
-    inertia = float(np.mean(model.parameters["torso_inertia"]))
-    angular = momentum[OMEGA] - rotated(point.quaternion, h, -1)
+    parameters = shared.body.model.parameters
+    mass = total_mass(parameters)
+    inertia = float(np.mean(parameters["torso_inertia"]))
+    angular = momentum[OMEGA] - rotated(point.quaternion, shared.momentum, -1)
     return ca.vertcat(
         momentum[VELOCITY] / (mass * UNITS["drift"]), angular / (inertia * UNITS["torso_rate"])
     )

@@ -9,6 +9,7 @@ import numpy as np
 from ...checks import did_you_mean
 from ...errors import PlanningError
 from ...model.model import Model
+from .body import Body
 from .coordinates import COM_ENTRIES, IDENTITY_POSE, rotated
 
 if TYPE_CHECKING:
@@ -55,24 +56,24 @@ def asked(field: str, function: Callable[[Any], Any], point: Point) -> Any:
 
 
 def point_of(
-    model: Model, blocks: dict[str, Any], start: "ca.SX", legs: "Legs | None" = None
+    body: Body, blocks: dict[str, Any], start: "ca.SX", legs: "Legs | None" = None
 ) -> Point:
     """Return the point of a node's blocks; start (6,): position and velocity of the COM then."""
     import casadi as ca
 
-    gravity = ca.DM([0, 0, -model.parameters["gravity"]])
+    model = body.model
 
     def center_of_mass(point: Point) -> "ca.SX":
         if "velocity" in blocks:
-            return point.position + _offset(model, point)
+            return point.position + _offset(body, point)
         t = point.time
-        return start[:3] + start[3:] * t + gravity * t**2 / 2
+        return start[:3] + start[3:] * t - body.gravity() * t**2 / 2
 
     def position(point: Point) -> "ca.SX":
-        return point.center_of_mass - _offset(model, point)
+        return point.center_of_mass - _offset(body, point)
 
     def tail_points(point: Point) -> "ca.SX":
-        own = model.casadi.tail_points(at_identity(point))
+        own = body.call("tail_points", at_identity(point))
         rows = [point.position + rotated(point.quaternion, own[k, :].T) for k in range(own.size1())]
         return ca.horzcat(*rows).T
 
@@ -82,10 +83,10 @@ def point_of(
                 "contact_points: give the plan `legs`, such as st.Legs.fixed(gamma, delta)"
             )
         still = () if legs is None else (np.append(legs.curve.at(0.0)[0], np.zeros(4)),)
-        return _touching(model, point, still)
+        return _touching(body, point, still)
 
     def body_points(point: Point) -> "ca.SX":
-        return _touching(model, point, any_legs(model))[model.contacts.get("feet", 0) :, :]
+        return _touching(body, point, any_legs(model))[model.contacts.get("feet", 0) :, :]
 
     makers = {
         "center_of_mass": center_of_mass,
@@ -96,7 +97,7 @@ def point_of(
         makers |= {"tail_points": tail_points, "tip": lambda point: point.tail_points[-1, :].T}
     if model.contacts:
         makers |= {"contact_points": contact_points, "body_points": body_points}
-    return Point(makers=makers, parameters=dict(model.parameters), **blocks)
+    return Point(makers=makers, parameters=dict(body.parameters), **blocks)
 
 
 def any_legs(model: Model) -> tuple[np.ndarray, ...]:
@@ -116,18 +117,18 @@ def at_identity(point: Point) -> "ca.SX":
     return ca.vertcat(ca.DM(IDENTITY_POSE), point.tail)
 
 
-def _touching(model: Model, point: Point, legs: tuple[np.ndarray, ...]) -> "ca.SX":
+def _touching(body: Body, point: Point, legs: tuple[np.ndarray, ...]) -> "ca.SX":
     """Points (K, 3) that may touch the ground, world."""
     import casadi as ca
 
     unit = point.quaternion / ca.norm_2(point.quaternion)
     q = ca.vertcat(point.position, unit, point.tail)
-    return model.casadi.contact_points(q, np.zeros(model.nv), *legs)[0]
+    return body.call("contact_points", q, np.zeros(body.model.nv), *legs)[0]
 
 
-def _offset(model: Model, point: Point) -> "ca.SX":
+def _offset(body: Body, point: Point) -> "ca.SX":
     """The COM from B, world."""
     import casadi as ca
 
-    H = model.casadi.mass_matrix(at_identity(point))
+    H = body.call("mass_matrix", at_identity(point))
     return rotated(point.quaternion, ca.vertcat(*(H[i, j] for i, j in COM_ENTRIES)) / H[0, 0])

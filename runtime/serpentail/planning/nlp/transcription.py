@@ -18,10 +18,12 @@ from .cache import memoised
 from .coordinates import Attitude, attitude
 from .derivatives import Assembly
 from .direct import DirectRows, direct_rows
+from .equations import Equations
 from .indices import Indices, indices_of
 from .mesh import Mesh
-from .node import UNIT_OF_BOUND, Equations, Node, Variables, node_function, variables_of
+from .node import UNIT_OF_BOUND, Node, Variables, node_function, variables_of
 from .rules import CollocationRule
+from .start import with_start
 
 if TYPE_CHECKING:
     import casadi as ca
@@ -65,6 +67,7 @@ def transcription_of(
     variables = variables_of(
         problem.formulation, coordinates, model.layout.nt, torque_unit(problem)
     )
+    variables = with_start(variables, model, problem)
 
     # dependencies of a node's function, and of the whole program
     goal, bounds = problem.goal.attitude, problem.bounds
@@ -73,6 +76,7 @@ def transcription_of(
     key += (problem.objective, problem.smoothing, problem.damping, problem.path)
     key += (None if problem.legs is None else tuple(problem.legs.curve.at(0.0)[0]),)
     key += (problem.formulation, problem.attitude, model, equations.source)
+    key += (problem.is_free, problem.design.key)
 
     make_node = partial(node_function, model, problem, coordinates, variables, equations)
     node = memoised(("node", *key), make_node)

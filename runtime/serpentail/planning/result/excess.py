@@ -14,11 +14,11 @@ SLACK = 1e-3  # of a bound: a successful plan may exceed it by this part
 Excess = dict[str, np.ndarray]
 
 
-def excess(nlp: Program, curve: Curve, p: np.ndarray) -> Excess:
+def excess(nlp: Program, curve: Curve, p: np.ndarray, w: np.ndarray) -> Excess:
     """Return by what part (N,) of a bound each interval exceeds it, by name; 0 or less inside it.
 
     Names: "torque", "torque_rate", "angle", "rate", "path", if they are bounded. For a path
-    constraint it is a part of the larger limit. p: the program's parameters.
+    constraint it is a part of the larger limit. p: the program's parameters; w: its unknowns.
     """
     bounds, N = nlp.problem.bounds, nlp.mesh.intervals
     k, s = np.repeat(np.arange(N), SAMPLES), np.tile(np.linspace(0, 1, SAMPLES), N)
@@ -36,7 +36,7 @@ def excess(nlp: Program, curve: Curve, p: np.ndarray) -> Excess:
         found["torque_rate"] = _beyond(_slopes(nlp, curve, k, s) / bounds.torque_rate, N)
     if isinstance(nlp, Transcription) and nlp.problem.path:
         times = curve.ends[k] + s * np.diff(curve.ends)[k]
-        found["path"] = _path(nlp, curve.duration, times, blocks, p)
+        found["path"] = _path(nlp, w, times, blocks, p)
     return found
 
 
@@ -71,7 +71,7 @@ def _slopes(nlp: Program, curve: Curve, k: np.ndarray, s: np.ndarray) -> np.ndar
 
 def _path(
     nlp: Transcription,
-    duration: float,
+    w: np.ndarray,
     times: np.ndarray,
     blocks: dict[str, np.ndarray],
     p: np.ndarray,
@@ -80,8 +80,9 @@ def _path(
     variables, node, count = nlp.variables, nlp.node, len(times)
     names = [name for name, _ in (*variables.states, *variables.algebraic, ("torque", 0))]
     parts = [blocks[name] / variables.units[name] for name in names]
-    zeta = np.column_stack([np.full(count, duration), *parts])
-    own = np.column_stack([np.tile(p, (count, 1)), times / duration])
+    shared = np.append(w[0], w[nlp.indices.common])
+    zeta = np.column_stack([np.tile(shared, (count, 1)), *parts])
+    own = np.column_stack([np.tile(p, (count, 1)), times / w[0]])
     values = _path_values(node, zeta, own)
     least, most = node.each_path(np.array([row[1:] for row in nlp.problem.path]).T)
     sizes = np.where(np.isfinite([least, most]), np.abs([least, most]), 0).max(axis=0)

@@ -1,6 +1,7 @@
 """``Plan``: a planned motion with its torques, and a report on the true motion."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
 from typing import Any, cast
@@ -55,6 +56,8 @@ class Plan:
         Its collocation rule.
     solution : Solution
         What the solver returned.
+    design : dict
+        Parameters that the planner chose: name to a number or numbers, SI.
 
     Examples
     --------
@@ -70,6 +73,7 @@ class Plan:
     mesh: Mesh
     rule: CollocationRule
     solution: Solution
+    design: Mapping[str, Any] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         """At most six lines: whether it succeeded, what it costs, and how true it is."""
@@ -93,6 +97,16 @@ class Plan:
     def warnings(self) -> list[str]:
         """Doubts about the planned motion; see ``Trajectory.warnings``."""
         return self.trajectory.warnings
+
+    @property
+    def model(self) -> Model | None:
+        """The model that flies the plan, with the parameters of its design; None if unpickled."""
+        return self.trajectory.model
+
+    @property
+    def start(self) -> tuple[np.ndarray, np.ndarray]:
+        """State (q0, v0) at the start; its free parts are those that the planner chose."""
+        return self.problem.q0, self.problem.v0
 
     @property
     def duration(self) -> float:

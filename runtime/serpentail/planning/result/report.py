@@ -11,6 +11,7 @@ from ...model.model import Model
 from ...motion.trajectory import Trajectory
 from ...simulation.pfl import Pfl
 from ..flight import flight
+from ..found import chosen, start_found
 from ..problem import PlanningProblem
 from .curve import Curve
 from .excess import largest
@@ -27,8 +28,8 @@ def report(search: "Search", best: "Round", planned: Trajectory) -> dict[str, An
 
     planned: the round's trajectory.
     """
-    problem, solution, nlp = search.problem, best.solution, best.nlp
-    energy, power = work(search.model, best.curve, problem.damping, search.start)
+    problem, solution, nlp = best.problem, best.solution, best.nlp
+    energy, power = work(best.model, best.curve, problem.damping, best.start)
     excess, of = largest(best.excess)
     values = {
         "converged": solution.success,
@@ -48,6 +49,10 @@ def report(search: "Search", best: "Round", planned: Trajectory) -> dict[str, An
         "bound_excess": excess,
         "bound_excess_of": of,
     }
+    if problem.design.size:
+        values |= {"design": chosen(problem, best.model), "design_slopes": slopes(best)}
+    if problem.free_start:
+        values["start"] = start_found(problem)
     values |= truth(search, best, planned)
     lost = [name for name, x in values.items() if isinstance(x, float) and not np.isfinite(x)]
     return values | dict.fromkeys(lost)
@@ -59,7 +64,7 @@ def truth(search: "Search", best: "Round", planned: Trajectory) -> dict[str, Any
     They are found twice: with the torques applied open loop, and with the tail tracked by PFL and
     torques within their bound.
     """
-    problem, true_q = search.problem, best.true[0]
+    problem, true_q = best.problem, best.true[0]
     to_plan, to_goal = attitude_errors(problem, best.planned[0][-1, QUATERNION], true_q[QUATERNION])
     errors: dict[str, Any] = {
         "open_loop_attitude_error_deg": to_plan,
@@ -74,7 +79,7 @@ def truth(search: "Search", best: "Round", planned: Trajectory) -> dict[str, Any
     if not search.settings.track:
         return errors
     try:
-        motion = tracked(search.model, problem, planned)
+        motion = tracked(best.model, problem, planned)
     except SimulationError:  # a plan that did not converge may ask for anything
         return errors
     deviation = motion.resample(np.clip(planned.t, 0, motion.t[-1])).tail - planned.tail
@@ -89,13 +94,23 @@ def truth(search: "Search", best: "Round", planned: Trajectory) -> dict[str, Any
 
 def objective(best: "Round") -> float:
     """The objective's value in SI units."""
-    problem, value = best.nlp.problem, best.solution.value
-    unit = best.nlp.variables.units["torque"].mean()
-    if problem.objective == "effort":
-        return value * unit**2
-    if problem.objective == "energy":
-        return value * (10 * unit)
-    return best.curve.duration if problem.objective == "time" else value
+    if best.problem.objective == "time":
+        return best.curve.duration
+    return best.solution.value * objective_unit(best)
+
+
+def slopes(best: "Round") -> dict[str, Any]:
+    """Derivatives of the least objective by the design, SI, from multipliers; 0 inside a range."""
+    design = best.problem.design
+    lam = best.solution.multipliers[0][best.nlp.indices.common[: design.size]]
+    found = design.split(-lam / design.units * objective_unit(best))
+    return {name: np.asarray(slope).tolist() for name, slope in found.items()}
+
+
+def objective_unit(best: "Round") -> float:
+    """SI units of the program's objective."""
+    unit = float(best.nlp.variables.units["torque"].mean())
+    return {"effort": unit**2, "energy": 10 * unit}.get(str(best.problem.objective), 1.0)
 
 
 def effort(curve: Curve) -> float:

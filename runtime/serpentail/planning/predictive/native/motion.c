@@ -1,4 +1,5 @@
-/* The body's motion under the plan's torques and a correction, and its derivatives by that. */
+/* The body's motion under the plan's torques and a correction, and its derivatives with respect to
+   the correction. */
 
 #include <math.h>
 #include <string.h>
@@ -8,7 +9,8 @@
 static const double NODES[4] = {0.0, 0.5, 0.5, 1.0};
 static const double WEIGHTS[4] = {1.0 / 6, 1.0 / 3, 1.0 / 3, 1.0 / 6};
 
-/* Rates at x, and their Jacobian by (x, correction) where slopes are wanted; 0: all finite. */
+/* Compute the rates at x and, if slopes are wanted, their Jacobian with respect to (x, correction);
+   return 0 if all numbers are finite. */
 int mpc_node(mpc_motion *motion, double t, const double *x, const double *correction, int slopes)
 {
     const mpc_task *task = motion->task;
@@ -32,7 +34,7 @@ int mpc_node(mpc_motion *motion, double t, const double *x, const double *correc
     return failed;
 }
 
-/* K = J_x S_at, and J_tau in the columns of block. */
+/* K = J_x S_at; J_tau is added in the columns of interval block. */
 static void turn_slopes(mpc_motion *motion, int block, int columns)
 {
     const mpc_task *task = motion->task;
@@ -56,7 +58,7 @@ static void turn_slopes(mpc_motion *motion, int block, int columns)
     }
 }
 
-/* to = from + factor * slope, of so many columns of rows that lie apart. */
+/* to = from + factor * slope, for matrices whose rows begin apart numbers after each other. */
 static void shift(int rows, int columns, size_t apart, const double *from, double factor,
                   const double *slope, double *to)
 {

@@ -14,14 +14,14 @@
 
 #include <stddef.h>
 
-/* A model's functions of an airborne state x = (quaternion, tail, its rates): y = (rates of x,
-   omega), J = dy / d(x, tau) by rows; h: the conserved angular momentum, world axes.  They return 0
-   if all results are finite. */
+/* A model's functions of an airborne state x = (quaternion, tail coordinates, their rates).
+   y = (rates of x, omega); J = dy / d(x, tau), row by row; h: the conserved angular momentum in
+   world axes.  They return 0 if all results are finite. */
 typedef int (*mpc_rates)(const void *parameters, const double *x, const double *tau,
                          const double *h, double *y, double *work);
 typedef int (*mpc_slopes)(const void *parameters, const double *x, const double *tau,
                           const double *h, double *y, double *J, double *work);
-/* Linear and angular momentum (3 each) of q, v. */
+/* Linear and angular momentum (3 numbers each) at q, v. */
 typedef int (*mpc_momentum)(const void *parameters, const double *q, const double *v,
                             double *linear, double *angular, double *work);
 
@@ -30,14 +30,14 @@ enum { MPC_ATTITUDE = 4, MPC_TURN = 3 }; /* sizes of a quaternion and of omega *
 /* The task of a controller; its arrays may be in constant memory. */
 typedef struct {
     int tail;             /* tail coordinates m */
-    int intervals, steps; /* N of the correction, and Runge-Kutta steps in each */
+    int intervals, steps; /* number N of intervals; Runge-Kutta steps in each */
     int late_steps;       /* Runge-Kutta steps from a tick until its torques act; 0: no delay */
     int iterations;       /* Gauss-Newton steps in a tick */
     int goal_rows;        /* rows of the attitude's goal at the end */
     int pieces, powers;   /* of the plan's polynomials */
-    int work;             /* doubles of workspace for the model's functions */
+    int work;             /* size of the workspace of the model's functions, in doubles */
     double period, delay; /* s: between ticks, and from a tick until its torques act */
-    double horizon;       /* s: of a tick, at most to the end of the plan */
+    double horizon;       /* s: of a tick; it ends with the plan at the latest */
     double end, last;     /* s: end of the plan; time of the last tick */
     double damping;       /* N m s, of the joints, in addition to the torques */
 
@@ -46,21 +46,21 @@ typedef struct {
     mpc_momentum momentum;
     const void *parameters; /* of the model */
     const double *times;    /* (pieces + 1) s */
-    const double *plan;     /* (pieces, 3 m + 4, powers): torques, quaternion, tail, its rates */
+    const double *plan;     /* (pieces, 3 m + 4, powers): torques, quaternion, tail, rates */
 
     const double *most_torque; /* (m) N m */
     const double *most_angle;  /* (m) rad */
-    /* weights of squares: per second, of the correction, and of the tail's rates less the plan's;
-       at the ends of intervals, of angles beyond their bounds */
+    /* weights of squares.  Per second: the correction, and the tail's rates minus the plan's.  At
+       the end of each interval: the excess of angles over their bounds */
     const double *torque_weight, *rate_weight; /* (m) */
     double angle_weight;
-    /* at the end of the plan: of the remaining rotation (rad) to the goal, and of (tail, rates,
-       omega) less the goal's; free entries have weight 0 */
+    /* at the end of the plan: the remaining rotation (rad) to the goal, and (tail, rates, omega)
+       minus the goal's; free entries have weight 0 */
     double attitude_weight;
     const double *goal;       /* (goal_rows, 4): rows that are 0 at the goal's quaternion */
     const double *end_state;  /* (2 m + 3) */
     const double *end_weight; /* (2 m + 3) */
-    /* at the end of a shorter horizon: of (tail, rates) less the plan's */
+    /* at the end of a shorter horizon: (tail, rates) minus the plan's */
     const double *track_weight; /* (2 m) */
 } mpc_task;
 
@@ -68,12 +68,12 @@ typedef struct {
 typedef struct {
     const mpc_task *task;
     double *memory;      /* mpc_memory_size(task) doubles */
-    long tick;           /* the last, counted from the plan's start; -1: none yet */
+    long tick;           /* number of the last tick, from the plan's start; -1: none yet */
     long ticks, failed;  /* number of ticks, and of those that failed */
     long set_changes;    /* changes of the active set, in all ticks */
     int newest;          /* which of the two corrections is newer */
-    double begin[2];     /* s, of the corrections; above all times if there is none */
-    double width[2];     /* s, of their intervals */
+    double begin[2];     /* s, start of each correction; above all times if there is none */
+    double width[2];     /* s, length of their intervals */
     double cost;         /* the sum of squares after the last tick that did not fail */
 } mpc_state;
 
@@ -89,22 +89,22 @@ int mpc_tick(mpc_state *state, double t, const double *q, const double *v);
 /* Torques (m) at t, N m; clock: the start of the time step that contains t, or t. */
 void mpc_torque(const mpc_state *state, double clock, double t, double *tau);
 
-/* Both: compute a correction from q, v if a tick is due at the clock; then the torques at t. */
+/* Compute a correction from q, v if a tick is due at the clock, then the torques at t. */
 void mpc_control(mpc_state *state, double clock, double t, const double *q, const double *v,
                  double *tau);
 
-/* A controller in a simulated run.  Trial states of the integrator must not count as measured, so
-   ticks are at the starts of its steps.  clock: the run's time at which the plan starts. */
+/* A controller in a simulated run.  Ticks are at the starts of the integrator's steps, so that a
+   trial state never counts as measured.  clock: the run's time at which the plan starts. */
 typedef struct {
     mpc_state state;
-    const double *step_begin; /* s, run's time at the start of its step; NULL: each call */
+    const double *step_begin; /* s, the run's time at its step's start; NULL: each call's t */
     double clock;
 } mpc_simulation;
 
 /* mpc_control, as a NativeTorque; context: an mpc_simulation.  Returns 0. */
 int mpc_simulated(void *context, double t, const double *q, const double *v, double *tau);
 
-/* quadratic.c: d (n) that minimises d^T H d / 2 + g^T d with lower <= d <= upper, lower <= 0 <=
+/* quadratic.c: find d (n) that minimises d^T H d / 2 + g^T d with lower <= d <= upper, lower <= 0 <=
    upper; H by rows, both triangles.  memory: n (n + 3) doubles, set: n ints.  Returns the number of
    changes of the active set; -1 if H is not positive definite, or after too many changes. */
 int mpc_quadratic(int n, const double *H, const double *g, const double *lower,

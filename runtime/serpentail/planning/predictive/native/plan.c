@@ -1,8 +1,8 @@
-/* The plan's torques and states, polynomials piece by piece. */
+/* The plan's torques and states, which are polynomials on each piece. */
 
 #include "inside.h"
 
-/* The last piece that begins at the clock or before. */
+/* Return the last piece that begins at or before the clock. */
 static int piece_of(const mpc_task *task, double clock)
 {
     int first = 0, end = task->pieces;

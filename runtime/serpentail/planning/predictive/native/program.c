@@ -1,11 +1,11 @@
-/* The sum of squares that a correction is to lower, and its Gauss-Newton derivatives. */
+/* The sum of squares that a correction minimises, and its Gauss-Newton derivatives. */
 
 #include <math.h>
 #include <string.h>
 
 #include "inside.h"
 
-/* Add weight r^2 / 2, of which row (columns) is the slope. */
+/* Add weight r^2 / 2; row (columns) is dr / d(correction). */
 static void add_square(const mpc_motion *motion, mpc_program *program, double weight, double r,
                        const double *row, int columns)
 {
@@ -28,7 +28,7 @@ static const double *slope_of(const mpc_motion *motion, int state)
     return motion->S + (size_t)state * (size_t)motion->variables;
 }
 
-/* The correction itself. */
+/* Add the squares of the correction. */
 static void add_torques(mpc_motion *motion, mpc_program *program)
 {
     const mpc_task *task = motion->task;
@@ -42,7 +42,7 @@ static void add_torques(mpc_motion *motion, mpc_program *program)
     }
 }
 
-/* The tail's rates less the plan's, over a step of length h to t. */
+/* Add the squares of the tail's rates minus the plan's, over a step of length h that ends at t. */
 static void add_rates(mpc_motion *motion, mpc_program *program, double t, double h, int columns)
 {
     const mpc_task *task = motion->task;
@@ -54,7 +54,7 @@ static void add_rates(mpc_motion *motion, mpc_program *program, double t, double
     }
 }
 
-/* Angles that are beyond their bounds. */
+/* Add the squares of the excess of angles over their bounds. */
 static void add_angles(mpc_motion *motion, mpc_program *program, int columns)
 {
     const mpc_task *task = motion->task;
@@ -68,7 +68,8 @@ static void add_angles(mpc_motion *motion, mpc_program *program, int columns)
     }
 }
 
-/* The turn from an attitude: twice the rows of goal times the quaternion. */
+/* Add the square of the rotation from a goal's attitude: twice the rows of goal times the
+   quaternion. */
 static void add_attitude(mpc_motion *motion, mpc_program *program, int rows, const double *goal)
 {
     const int n = motion->variables;
@@ -88,7 +89,7 @@ static void add_attitude(mpc_motion *motion, mpc_program *program, int rows, con
     }
 }
 
-/* omega less the goal's: of a node at the end. */
+/* Add the squares of omega minus the goal's, at the end of the plan; return 0 for success. */
 static int add_turn(mpc_motion *motion, mpc_program *program, double t, const double *correction)
 {
     const mpc_task *task = motion->task;
@@ -117,7 +118,7 @@ static int add_turn(mpc_motion *motion, mpc_program *program, double t, const do
     return 0;
 }
 
-/* What is left at the end of the plan. */
+/* Add the squares of the errors at the end of the plan; return 0 for success. */
 static int add_goal(mpc_motion *motion, mpc_program *program, double t, const double *correction)
 {
     const mpc_task *task = motion->task;
@@ -130,7 +131,7 @@ static int add_goal(mpc_motion *motion, mpc_program *program, double t, const do
     return add_turn(motion, program, t, correction);
 }
 
-/* What is left to the plan at t, before its end. */
+/* Add the squares of the deviations from the plan at t, before its end. */
 static void add_tracking(mpc_motion *motion, mpc_program *program, double t)
 {
     const mpc_task *task = motion->task;

@@ -1,13 +1,14 @@
-/* Strictly convex quadratic programs with a bound on each side of each variable. */
+/* Solves strictly convex quadratic programs with a lower and an upper bound of each variable. */
 
 #include <math.h>
 
 #include "mpc.h"
 
 enum { FREE, LOWER, UPPER };
-static const double TIGHT = 1e-12; /* of the largest slope: what a multiplier may be off */
+static const double TIGHT = 1e-12; /* allowed error of a multiplier, relative to slopes */
 
-/* L D L^T of the free variables' rows of H, in place of F (count, count); 0 where D > 0. */
+/* Factorise the rows and columns of H of the free variables as L D L^T, stored in F (count, count);
+   return 0 if D > 0. */
 static int factorise(int n, const double *H, const int *set, double *F, int *count)
 {
     int rows = 0;
@@ -38,7 +39,7 @@ static int factorise(int n, const double *H, const int *set, double *F, int *cou
             pivot -= own[j] * scaled;
             own[j] = scaled;
         }
-        if (!(pivot > 0.0)) { /* nan, too */
+        if (!(pivot > 0.0)) { /* or nan */
             return 1;
         }
         own[i] = pivot;
@@ -46,7 +47,7 @@ static int factorise(int n, const double *H, const int *set, double *F, int *cou
     return 0;
 }
 
-/* b (count) becomes (L D L^T)^-1 b. */
+/* Replace b (count) by (L D L^T)^-1 b. */
 static void solve(int n, int count, const double *F, double *b)
 {
     for (int i = 0; i < count; i++) {
@@ -62,7 +63,7 @@ static void solve(int n, int count, const double *F, double *b)
     }
 }
 
-/* slope = H d + g; returns its largest magnitude, of the terms that it is the sum of. */
+/* slope = H d + g; return the largest sum of the magnitudes of an entry's terms. */
 static double write_slope(int n, const double *H, const double *g, const double *d, double *slope)
 {
     double largest = 0.0;
@@ -79,8 +80,8 @@ static double write_slope(int n, const double *H, const double *g, const double 
     return largest;
 }
 
-/* Go from d by p to the minimum of the free variables, or as far as bounds allow; returns whether
-   one of them stopped it, which joins the set. */
+/* Move d by p to the minimum of the free variables, or as far as bounds allow.  The bound that
+   stops the move joins the set; return whether there is one. */
 static int advance(int n, const double *p, const double *lower, const double *upper, double *d,
                    int *set)
 {
@@ -109,7 +110,7 @@ static int advance(int n, const double *p, const double *lower, const double *up
     return stopped >= 0;
 }
 
-/* Free the variable whose bound holds it back most; returns whether there is one. */
+/* Free the variable that its bound holds back most; return whether there is one. */
 static int release(int n, const double *slope, double least, int *set)
 {
     int worst = -1;

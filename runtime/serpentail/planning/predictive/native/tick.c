@@ -1,15 +1,15 @@
-/* Ticks: from a measured state to a correction of the plan's torques, and the torques in between. */
+/* Ticks compute a correction of the plan's torques from a measured state; torques between ticks. */
 
 #include <math.h>
 #include <string.h>
 
 #include "inside.h"
 
-static const double NEVER = 1e300, SAME = 1e-6; /* of a period: times that are one */
-static const double ROUNDING = 1e-9;            /* of a sum of squares */
+static const double NEVER = 1e300, SAME = 1e-6; /* of a period: closer times count as equal */
+static const double ROUNDING = 1e-9;            /* relative, of a sum of squares */
 enum { HALVINGS = 4 };
 
-/* What a tick works on. */
+/* The arrays of a tick. */
 typedef struct {
     mpc_motion motion;
     mpc_program program;
@@ -26,7 +26,8 @@ static double *next(double **memory, size_t count)
     return own;
 }
 
-/* Lay a tick's arrays out behind the two corrections (memory NULL: only count). */
+/* Place a tick's arrays behind the two corrections and return the size; with memory NULL only
+   return the size. */
 static size_t lay_out(const mpc_task *task, double *memory, workspace *w)
 {
     const size_t m = (size_t)task->tail, n = m * (size_t)task->intervals;
@@ -77,7 +78,7 @@ static double *correction_of(const mpc_state *state, int which)
     return state->memory + (size_t)which * (size_t)(task->intervals * task->tail);
 }
 
-/* Which correction acts at a time, -1 for none yet. */
+/* Return which correction acts at a time; -1: none yet. */
 static int acting(const mpc_state *state, double clock)
 {
     const double late = clock + SAME * state->task->period;
@@ -87,7 +88,7 @@ static int acting(const mpc_state *state, double clock)
     return state->begin[1 - state->newest] <= late ? 1 - state->newest : -1;
 }
 
-/* Add to tau the correction that acts at t, of those known at the clock. */
+/* Add to tau the correction that acts at t; only those known at the clock count. */
 static void add_correction(const mpc_state *state, double clock, double t, double *tau)
 {
     const mpc_task *task = state->task;
@@ -118,7 +119,8 @@ void mpc_torque(const mpc_state *state, double clock, double t, double *tau)
     }
 }
 
-/* x of q, v, its quaternion of norm 1, and the angular momentum; 0 where all is finite. */
+/* Compute x0, with a quaternion of norm 1, and the angular momentum from q, v; return 0 if all
+   numbers are finite. */
 static int measured(workspace *w, const double *q, const double *v)
 {
     const mpc_task *task = w->motion.task;
@@ -144,7 +146,7 @@ static int measured(workspace *w, const double *q, const double *v)
     return failed || !isfinite(sum);
 }
 
-/* x0 where the motion is after the delay, under the torques that act meanwhile. */
+/* Move x0 to the end of the delay, under the torques that act until then; return 0 for success. */
 static int foretell(const mpc_state *state, workspace *w, double t)
 {
     const mpc_task *task = state->task;
@@ -162,8 +164,8 @@ static int foretell(const mpc_state *state, workspace *w, double t)
     return 0;
 }
 
-/* Bounds of each number of the correction: those of the torque less the plan's, at all ends of
-   Runge-Kutta's steps in its interval. */
+/* Compute bounds of each number of the correction: those of the torque minus the plan's torque, at
+   both ends of all Runge-Kutta steps in its interval. */
 static void write_bounds(workspace *w)
 {
     const mpc_motion *motion = &w->motion;
@@ -186,7 +188,7 @@ static void write_bounds(workspace *w)
                 upper[a] = up < upper[a] ? up : upper[a];
             }
         }
-        for (int a = 0; a < m; a++) { /* a plan that is beyond its bounds itself */
+        for (int a = 0; a < m; a++) { /* the plan itself exceeds the bounds */
             if (lower[a] > upper[a]) {
                 lower[a] = upper[a] = 0.5 * (lower[a] + upper[a]);
             }
@@ -199,7 +201,7 @@ static double between(double value, double lower, double upper)
     return value < lower ? lower : value > upper ? upper : value;
 }
 
-/* The last correction where the new one's intervals are in the middle, within bounds. */
+/* Guess the new correction: the last one at the middle of each new interval, within bounds. */
 static void write_guess(const mpc_state *state, workspace *w, double *correction)
 {
     const mpc_task *task = state->task;
@@ -213,7 +215,7 @@ static void write_guess(const mpc_state *state, workspace *w, double *correction
     }
 }
 
-/* Lower the sum of squares by one Gauss-Newton step from the correction; 0: done. */
+/* Lower the sum of squares by one Gauss-Newton step from the correction; return 0 for success. */
 static int improve(mpc_state *state, workspace *w, double *correction)
 {
     const int n = w->motion.variables;
@@ -252,7 +254,7 @@ static int improve(mpc_state *state, workspace *w, double *correction)
     return 1;
 }
 
-/* Compute the correction from q, v at t, to w->fresh; 0: done. */
+/* Compute the correction from q, v at t and store it in w->fresh; return 0 for success. */
 static int computed(mpc_state *state, workspace *w, double t, const double *q, const double *v)
 {
     const mpc_task *task = state->task;
@@ -271,7 +273,7 @@ static int computed(mpc_state *state, workspace *w, double t, const double *q, c
     if (improve(state, w, w->fresh) != 0) {
         return 1;
     }
-    for (int k = 1; k < task->iterations; k++) { /* that cannot be improved: it is the best */
+    for (int k = 1; k < task->iterations; k++) { /* if no step improves it, it is the best */
         if (improve(state, w, w->fresh) != 0) {
             break;
         }
@@ -288,7 +290,7 @@ int mpc_tick(mpc_state *state, double t, const double *q, const double *v)
         state->failed++;
         return 1;
     }
-    /* in place of the correction that does not act */
+    /* it replaces the correction that does not act now */
     const int place = acting(state, t) == state->newest ? 1 - state->newest : state->newest;
     memcpy(correction_of(state, place), w.fresh, (size_t)w.motion.variables * sizeof(double));
     state->begin[place] = w.motion.begin;
