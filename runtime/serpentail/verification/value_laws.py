@@ -127,7 +127,7 @@ def center_of_mass_is_that_of_the_mass_matrix(model: Model, s: State) -> Errors:
 
 @law("momentum", "center_of_mass", units=VALUE_LIMIT)
 def momentum_is_mass_times_velocity_of_the_center_of_mass(model: Model, s: State) -> Errors:
-    """Momentum is the mass of the animal (of the tail, on a fixed base) times the COM's velocity."""
+    """Momentum is the mass of the animal (the tail, on a fixed base) times the COM's velocity."""
     velocity = model.center_of_mass(s.q, s.v)[1]
     return relative(total_mass(model.parameters) * velocity, model.momentum(s.q, s.v)[0])
 
