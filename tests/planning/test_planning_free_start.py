@@ -138,6 +138,16 @@ def test_both_at_once_and_again(chosen):
 
 
 @pytest.mark.slow
+def test_least_energy_needs_slower_torques():
+    """Without a bound of torque rates the best motion has pulses that no mesh resolves."""
+    bounds = st.Bounds(angle=np.pi / 3, torque_rate=1.0)
+    settings = {"objective": "energy", "guess": None, "tolerance": 0.01, "bounds": bounds}
+    known, free = freed(**settings), freed(**settings, free_start=FREE)
+    assert known.success and free.success
+    assert free.report["energy_J"] < known.report["energy_J"]
+
+
+@pytest.mark.slow
 def test_least_time_and_several_guesses():
     settings = {"duration": (0.1, DURATION), "bounds": st.Bounds(angle=np.pi / 3, torque=0.005)}
     settings |= {"objective": "time", "guess": None, "tolerance": 0.01, "multi_start": 3}
