@@ -27,7 +27,7 @@ typedef struct {
     double *shift;           /* of the goal's rows */
 } Program;
 
-static const double MOST_GIVEN = 1e-3;
+static const double MOST_GIVEN = 0.1;
 
 typedef struct {
     int controls, states, equalities, inequalities;
