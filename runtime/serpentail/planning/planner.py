@@ -38,8 +38,8 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
     # the mesh
     rule: str = "radau",
     degree: int | None = None,
-    intervals: int = 12,
-    most_intervals: int = 200,
+    intervals: int | None = None,
+    most_intervals: int | None = None,
     controls: int | None = None,
     rounds: int = 6,
     tolerance: float | None = 0.01,
@@ -121,14 +121,15 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
         Collocation rule; "trapezoidal" is the paper's.
     degree : int, optional
         Degree of "radau" and "lobatto", from 1 to 5. Default: 3.
-    intervals : int, default 12
-        Number of intervals of the first mesh.
-    most_intervals : int, default 200
-        Largest number of intervals.
+    intervals : int, optional
+        Number of intervals of the first mesh. Default: 12. With the solver "fatrop" each control
+        interval has 1 if the tail has up to two segments, 4 up to four segments, else 12.
+    most_intervals : int, optional
+        Largest number of intervals. Default: 200, or 400 with the solver "fatrop".
     controls : int, optional
         Number of equal control intervals; in each, the torques are one polynomial, however fine
-        the mesh is. Default: the intervals of the mesh. With the objective "time" torques are
-        linear in each interval.
+        the mesh is. Default: the intervals of the mesh, or 12 with the solver "fatrop". With the
+        objective "time" torques are linear in each interval.
     rounds : int, default 6
         Largest number of refinements.
     tolerance : float or None, default 0.01

@@ -18,7 +18,7 @@ from .nlp.coordinates import attitude
 from .nlp.equations import Equations
 from .nlp.guess import Motion, of_trajectory, passive, pushes, unknowns
 from .nlp.interrupt import stop_reason
-from .nlp.mesh import Mesh, refined, uniform
+from .nlp.mesh import Mesh, refined
 from .nlp.multipliers import Multipliers
 from .nlp.program import Program
 from .nlp.rules import collocation_rule
@@ -103,9 +103,7 @@ class Search:
         """Return the best solution on the first mesh, from all guesses, and more if these fail."""
         settings, guess = self.settings, self.settings.guess
         same_rule = isinstance(guess, Plan) and guess.rule is self.rule
-        nlp = self._transcribed(
-            guess.mesh if same_rule else uniform(settings.intervals, settings.controls)
-        )
+        nlp = self._transcribed(guess.mesh if same_rule else self.way.mesh(self))
         solutions = [self._solved_given(nlp)]
         for k in range(1, settings.multi_start + settings.retries):
             enough = k >= settings.multi_start and any(entry.success for entry in solutions)
@@ -271,7 +269,8 @@ class Search:
         It has guards where torques exceed bounds. It is finer where the true motion is wrong, or
         else where other bounds are exceeded.
         """
-        mesh, most, off = last.nlp.mesh, self.settings.most_intervals, self._off(last)
+        mesh, off = last.nlp.mesh, self._off(last)
+        most = self.settings.most_intervals or self.way.most
         far = {name: exceeded(part) for name, part in last.excess.items()}
         no_interval = np.zeros(mesh.intervals, bool)
         mesh = mesh.with_guards(far.pop("torque", no_interval))

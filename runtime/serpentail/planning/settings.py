@@ -13,15 +13,14 @@ from ..motion.trajectory import Trajectory
 from .nlp.rules import collocation_rule
 from .problem import HUGE
 
-MOST_CONTROLS = 10_000
 WHOLE_NUMBERS = {  # least and most of each; beyond the most a search would not end
-    "intervals": (1, 10_000),
     "rounds": (0, 1000),
-    "most_intervals": (1, 10_000),
     "multi_start": (1, 10_000),
     "retries": (0, 10_000),
     "seed": (0, 2**63 - 1),
 }
+# None: the planner chooses
+CHOSEN = dict.fromkeys(("intervals", "most_intervals", "controls"), (1, 10_000))
 DYNAMICS = ("auto", "compiled", "symbolic")
 
 
@@ -31,8 +30,8 @@ class PlanSettings:
 
     rule: str
     degree: int | None
-    intervals: int
-    most_intervals: int
+    intervals: int | None
+    most_intervals: int | None
     controls: int | None
     rounds: int
     tolerance: float | None  # deg; None: no demand at all
@@ -64,8 +63,9 @@ def check_settings(model: Model, settings: PlanSettings, refused: Refusals) -> N
     """Add each wrong setting, with its remedy, to ``refused``."""
     for name, bounds in WHOLE_NUMBERS.items():
         refused.attempt(name, _check_whole, name, getattr(settings, name), *bounds)
-    if settings.controls is not None:
-        refused.attempt("controls", _check_whole, "controls", settings.controls, 1, MOST_CONTROLS)
+    for name, bounds in CHOSEN.items():
+        if getattr(settings, name) is not None:
+            refused.attempt(name, _check_whole, name, getattr(settings, name), *bounds)
     for name in ("tolerance", "tail_tolerance", "rate_tolerance", "time_limit"):
         if getattr(settings, name) is not None:
             refused.attempt(name, _check_positive, name, getattr(settings, name))

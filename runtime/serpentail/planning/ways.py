@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import PlanningError
-from .condensed.fatrop import options_of, solve_stages
+from .condensed.fatrop import engine_of, solve_stages
 from .condensed.node import lacking
 from .condensed.stages import Stages, stages_of
 from .found import start_blocks
 from .nlp.bounds import limits
-from .nlp.mesh import Mesh
+from .nlp.mesh import Mesh, uniform
 from .nlp.multipliers import Multipliers, carried
 from .nlp.program import Program
 from .nlp.solver import Solution, solve, solver
@@ -24,6 +24,11 @@ if TYPE_CHECKING:
     from .rounds import Search
 
 FATROP = "fatrop"
+INTERVALS, MOST = 12, 200  # of a sparse program: of its first mesh, and the most
+CONTROL_INTERVALS, MOST_STAGED = 12, 400  # of stages: control intervals, and the most intervals
+# (most segments, intervals in each control interval at first): with fewer, optima of long tails
+# exploit the errors of the mesh
+PIECES = ((2, 1), (4, 4), (np.inf, 12))
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,10 +45,14 @@ class Begin:
 
 @dataclass(frozen=True, eq=False)
 class Way:
-    """How to make the program of a mesh, to make its solver, to solve it, and to carry multipliers
-    to another mesh.
+    """How to make the first mesh, the program of a mesh, its solver, to solve it, and to carry
+    multipliers to another mesh.
+
+    most: intervals of a mesh.
     """
 
+    most: int
+    mesh: "Callable[[Search], Mesh]"
     program: "Callable[[Search, Mesh], Any]"
     engine: "Callable[[Search, Any, str], Any]"
     solved: "Callable[[Search, Any, Any, Begin], Solution]"
@@ -83,6 +92,19 @@ def _beyond(search: "Search") -> str | None:
     return lacking(search.model)
 
 
+def _sparse_mesh(search: "Search") -> Mesh:
+    settings = search.settings
+    return uniform(settings.intervals or INTERVALS, settings.controls)
+
+
+def _staged_mesh(search: "Search") -> Mesh:
+    """States have a mesh of their own: several intervals in each control interval."""
+    settings = search.settings
+    pieces = next(count for most, count in PIECES if search.model.segments <= most)
+    intervals = settings.intervals or (settings.controls or CONTROL_INTERVALS) * pieces
+    return uniform(intervals, settings.controls or min(CONTROL_INTERVALS, intervals))
+
+
 def _sparse_program(search: "Search", mesh: Mesh) -> Transcription:
     return transcription_of(search.model, search.problem, mesh, search.rule, search.equations)
 
@@ -101,7 +123,7 @@ def _staged_program(search: "Search", mesh: Mesh) -> Stages:
 
 
 def _staged_engine(search: "Search", _stages: Stages, guess: str) -> Any:
-    return options_of(search.settings.options, guess)
+    return engine_of(search.settings.options, guess)
 
 
 def _staged_solved(search: "Search", stages: Stages, engine: Any, begin: Begin) -> Solution:
@@ -112,5 +134,7 @@ def _not_carried(_multipliers: Multipliers, _old: Program, _new: Program) -> Non
     """FATROP's interface takes no multipliers."""
 
 
-SPARSE = Way(_sparse_program, _sparse_engine, _sparse_solved, carried)
-STAGED = Way(_staged_program, _staged_engine, _staged_solved, _not_carried)
+SPARSE = Way(MOST, _sparse_mesh, _sparse_program, _sparse_engine, _sparse_solved, carried)
+STAGED = Way(
+    MOST_STAGED, _staged_mesh, _staged_program, _staged_engine, _staged_solved, _not_carried
+)

@@ -5,7 +5,7 @@ from ..planning.nlp.coordinates import KINDS
 from ..planning.nlp.node import FORMULATIONS
 from ..planning.nlp.rules import FAMILIES, MOST_DEGREE
 from ..planning.problem import OBJECTIVES
-from ..planning.settings import DYNAMICS, MOST_CONTROLS, WHOLE_NUMBERS
+from ..planning.settings import CHOSEN, DYNAMICS, WHOLE_NUMBERS
 from .keys import Key, one_word
 
 FREE = "free"  # TOML has no None
@@ -71,8 +71,7 @@ PLAN = Key(
         "design": Key(form=RANGES),
         "free_start": Key(keys=FREE_START),
         # of the search
-        **{name: _whole(*bounds) for name, bounds in WHOLE_NUMBERS.items()},
-        "controls": _whole(1, MOST_CONTROLS),
+        **{name: _whole(*bounds) for name, bounds in (WHOLE_NUMBERS | CHOSEN).items()},
         "rule": one_word(*FAMILIES),
         "degree": _whole(1, MOST_DEGREE),
         "tolerance": Key("deg", words=(FREE,)),

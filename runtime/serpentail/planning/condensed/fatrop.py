@@ -41,6 +41,7 @@ STATUSES = {
     5: "Restoration_Failed",
     7: "No_Room_Between_Bounds",
 }
+NOT_STARTED = (3, 7)  # statuses
 SAYINGS = (
     "Solve_Succeeded",
     "Maximum_Iterations_Exceeded",
@@ -62,6 +63,11 @@ OPTIONS = {
     # its trial steps may leave the region where collocation has a solution
     "watchdog_shortened_iter_trigger": 0,
 }
+# A matrix counts as indefinite if a pivot is a smaller part of its diagonal entry. FATROP's own
+# value, 1e-6, would add regularisation wherever a bound or the goal has a large weight, and steps
+# would become short. FATROP has this setting, although it does not list it.
+PIVOT, LEAST_PIVOT = "linsol_pivot_tol", 1e-14
+PIVOT_SETTER = "_ZN6fatrop15AugSystemSolverINS_7OcpTypeEE13set_pivot_tolERKd"
 # for guesses that are close to a solution
 CLOSE_OPTIONS = {"mu_init": 1e-5, "bound_push": 1e-6, "bound_frac": 1e-6}
 GUESS_OPTIONS: dict[str, dict[str, float]] = {"far": {}, "close": CLOSE_OPTIONS}
@@ -162,9 +168,18 @@ def options_of(asked: Mapping[str, Any], guess: str) -> Any:
         settings[own] = value
     settings = OPTIONS | GUESS_OPTIONS[guess] | settings
     kinds = {name: library().fatrop_ocp_c_option_type(name.encode()) for name in settings}
+    if _has_pivot():
+        kinds[PIVOT], settings[PIVOT] = 0, LEAST_PIVOT
     return (Option * len(settings))(
         *(Option(name.encode(), kinds[name], float(value)) for name, value in settings.items())
     )
+
+
+@cache
+def _has_pivot() -> bool:
+    """Tell if FATROP has the setting PIVOT; an unknown setting would end the process."""
+    found = library()
+    return hasattr(found, PIVOT_SETTER) and PIVOT.encode() in Path(found._name).read_bytes()
 
 
 @dataclass
@@ -184,26 +199,39 @@ class _Stopping:
             return 1
 
 
+@dataclass(frozen=True, eq=False)
+class Engine:
+    """How to solve from a "far" or a "close" guess; settings: an array of Option."""
+
+    guess: str
+    settings: Any
+
+
+def engine_of(asked: Mapping[str, Any], guess: str) -> Engine:
+    """Return FATROP's engine; PlanningError if an option is unknown or not a number."""
+    return Engine(guess, options_of(asked, guess))
+
+
 def solve_stages(
-    stages: Stages, start: dict[str, np.ndarray], w: np.ndarray, p: np.ndarray, settings: Any
+    stages: Stages, start: dict[str, np.ndarray], w: np.ndarray, p: np.ndarray, engine: Engine
 ) -> Solution:
-    """Solve from unknowns w; start: blocks in SI; p: the program's parameters (``nlp.node``);
-    settings: from ``options_of``.
-    """
+    """Solve from unknowns w; start: blocks in SI; p: the program's parameters (``nlp.node``)."""
     units = stages.variables.units
     first = np.concatenate([start[name] / units[name] for name, _ in stages.variables.states])
     variables, states = packed(stages, w)
     begun, iterations = time.process_time(), 0
     crew = crew_of(stages)
     for scale in SCALES:
-        task = task_of(stages, first, p, scale)
-        outcome, found, multipliers, nodes = _run(task, variables, states, settings, crew)
+        task = task_of(stages, first, p, scale, engine.guess)
+        outcome, found, multipliers, nodes = _run(task, variables, states, engine.settings, crew)
         iterations += outcome.iterations
         success = outcome.status == SOLVED and bool(np.isfinite(found).all())
         if success or outcome.status == STOPPED:
             break
-    # a diverged solve may end where the collocation of stages has no solution
-    ended = all(np.isfinite(part).all() for part in (found, *nodes.values()))
+    # a diverged solve may end where the collocation of stages has no solution, or never start
+    ended = outcome.status not in NOT_STARTED and all(
+        np.isfinite(part).all() for part in (found, *nodes.values())
+    )
     return Solution(
         w=unpacked(stages, found, nodes | {"start": first}) if ended else w,
         multipliers=(np.zeros(0), multipliers / scale),

@@ -13,10 +13,9 @@ from .node import NodeCode
 from .stages import Stages
 
 EFFORT, ENERGY = 0, 1  # costs of a node
-# of the objective: FATROP adds bounds to a stage's Hessian, and if their multipliers are large,
-# they would make the cost of torques negligible
-SCALE = 0.1
-GIVE = 1e8  # what squares of the goal's rows cost
+# What squares of the goal's rows cost, by guess: a soft goal is found from afar with fewer steps, a
+# stiff one is met more exactly.
+GIVES = {"far": 1e5, "close": 1e8}
 _pointer = ctypes.c_void_p
 
 
@@ -53,9 +52,11 @@ class OwnedTask:
     node: NodeCode
 
 
-def task_of(stages: Stages, start: np.ndarray, p: np.ndarray, scale: float) -> OwnedTask:
+def task_of(
+    stages: Stages, start: np.ndarray, p: np.ndarray, scale: float, guess: str = "close"
+) -> OwnedTask:
     """Return the task of stages from a start (nx,), in units; p: parameters, as of ``nlp.node``;
-    scale: of the objective.
+    scale: of the objective; guess: "far" or "close".
     """
     problem, node, torque_unit = stages.problem, stages.node, stages.variables.units["torque"]
     arrays = _arrays(stages) | _goal(stages) | _bounds(stages)
@@ -72,7 +73,7 @@ def task_of(stages: Stages, start: np.ndarray, p: np.ndarray, scale: float) -> O
         smoothing=problem.smoothing,
         shortest=problem.duration[0],
         longest=problem.duration[1],
-        give=GIVE * scale,
+        give=GIVES[guess] * scale,
         goal_rows=len(arrays["goal"]),
         **_cost(problem, torque_unit, p[PARAMETERS - 1], scale),
         **{name: ctypes.cast(function, _pointer) for name, function in node.functions.items()},

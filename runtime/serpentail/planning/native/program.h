@@ -30,7 +30,7 @@ typedef struct {
     Crew crew;               /* what evaluates all stages at once */
 } Program;
 
-static const double MOST_GIVEN = 1e-3;
+static const double MOST_GIVEN = 0.1;
 
 typedef struct {
     int controls, states, equalities, inequalities;
