@@ -12,7 +12,7 @@ from queue import Queue
 from examples import front
 from serpentail.stages import Stage
 
-from . import tree
+from . import processes, tree
 from .judge import NotLoaded, Tree
 from .mutation import Mutation
 from .recorded import Recorder
@@ -92,6 +92,9 @@ def all_judged(sample: list[Mutation], state: str, jobs: int) -> Iterator[Verdic
     try:
         for done in as_completed([pool.submit(one, mutation) for mutation in waiting]):
             yield done.result()
+    except BaseException:
+        processes.stop()
+        raise
     finally:  # on Ctrl-C, end the running ones and start no others
         pool.shutdown(cancel_futures=True)
 

@@ -2,12 +2,15 @@
 
 import ast
 import importlib.util
+import os
+import threading
+import time
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
-from mutants import judge, python_source, sample, template_source
+from mutants import judge, processes, python_source, sample, template_source
 from mutants.mutation import Mutation
 from mutants.recorded import NO_JUDGES, own_lines
 from mutants.results import Verdict, argument, arguments, report, score
@@ -170,3 +173,31 @@ def test_every_argument_is_of_a_line_that_is_there():
 
 def test_judges_that_are_left_out_exist():
     assert all((ROOT / name).is_file() for name in NO_JUDGES)
+
+
+def test_an_interrupted_run_ends_its_processes_at_once_and_believes_none(monkeypatch, tmp_path):
+    monkeypatch.setattr(processes, "stopped", threading.Event())
+    ends, begun = [], tmp_path / "begun"
+
+    def tests():
+        with pytest.raises(processes.Stopped):
+            processes.run(["sh", "-c", f"touch {begun}; sleep 600"], tmp_path, {**os.environ}, 600)
+        ends.append(time.monotonic())
+
+    thread = threading.Thread(target=tests)
+    thread.start()
+    while not begun.exists():
+        time.sleep(0.01)
+    processes.stop()
+    thread.join(60)
+    assert ends and not processes.running
+    with pytest.raises(processes.Stopped):
+        processes.run(["true"], tmp_path, {**os.environ}, 600)
+
+
+def test_what_takes_too_long_is_ended():
+    assert processes.run(["sleep", "600"], Path.cwd(), {**os.environ}, 0.1) == (None, "")
+    assert processes.run(["sh", "-c", "echo told; exit 3"], Path.cwd(), {**os.environ}, 60.0) == (
+        3,
+        "told\n",
+    )
