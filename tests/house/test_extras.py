@@ -22,7 +22,7 @@ EXTRAS = PROJECT["optional-dependencies"]
 BROUGHT_ALONG = {"trimesh": "viser"}  # by a library of the extra
 GATE = re.compile(r'\bneeded\("(\w+)", "(\w+)"\)')
 HOMES = {  # where alone a library of an extra may be imported, behind the room's gates
-    "casadi": ("model/casadi.py", "planning/"),
+    "casadi": ("model/casadi.py", "model/nodes/", "planning/"),
     "matplotlib": ("pictures/",),
     "PIL": ("pictures/",),
     "imageio_ffmpeg": ("pictures/encode.py",),

@@ -48,7 +48,7 @@ def test_a_motion_is_shown_with_its_text(kick, tmp_path):
     data, words = shown(kick, tmp_path)
     assert words == repr(kick)
     (run,) = data["runs"]
-    assert run["rows"] == 401  # every third of 1201
+    assert run["rows"] == 601  # every second of 1201
     assert run["arrays"]["pose"][-1] == pytest.approx(kick.q[-1, :7], rel=1e-6)
     assert any("one of 3 samples is shown" in note for note in data["notes"])
 
@@ -110,7 +110,7 @@ def test_several_motions_are_shown_without_a_file(flight, kick, tmp_path, monkey
     assert output.frame["sandbox"] == "allow-scripts"
     short = tmp_path / "short.html"
     short.write_text(Output(st.view(kick, None)._repr_html_()).frame["srcdoc"], encoding="utf-8")
-    assert [run["rows"] for run in data_of(short)["runs"]] == [401]  # every third of 1201
+    assert [run["rows"] for run in data_of(short)["runs"]] == [601]  # every second of 1201
     with pytest.raises(st.ViewError, match="names"):
         st.view([flight, flight], None, names=["one"])
 
