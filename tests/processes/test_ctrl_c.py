@@ -20,6 +20,7 @@ from tests.support.told import besides_progress
 from tests.support.tumbling import rat
 
 PROMPT = 1.0  # s
+TRIES = 3  # of which one must be prompt: other work may hold up a process
 PATIENCE = 60.0  # s to begin, and to end at the latest
 HEAR = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
 BEGIN = (
@@ -91,13 +92,16 @@ def ended(process, after: float) -> tuple[str, str, float]:
 def test_what_takes_long_ends_and_keeps_what_there_is(what, threads):
     call, told = LONG[what]
     program = f"{BEGIN}told = {told}\nsay('ready')\ntry:\n    while True:\n        {call}\n{REPORT}"
-    process = child(program, rat().folder, threads)
-    assert process.stdout.readline().startswith("ready")
-    said, errors, asked = ended(process, after=1.0)
-    words, kept = said.splitlines()
-    assert (process.returncode, errors) == (0, "")
-    assert float(words.split()[1]) - asked < PROMPT
-    assert kept == ("motion" if told == "None" else "motion True True")
+    took = []
+    while not took or (took[-1] > PROMPT and len(took) < TRIES):
+        process = child(program, rat().folder, threads)
+        assert process.stdout.readline().startswith("ready")
+        said, errors, asked = ended(process, after=1.0)
+        words, kept = said.splitlines()
+        assert (process.returncode, errors) == (0, "")
+        assert kept == ("motion" if told == "None" else "motion True True")
+        took.append(float(words.split()[1]) - asked)
+    assert took[-1] <= PROMPT, took
 
 
 # The command line.

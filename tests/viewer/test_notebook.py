@@ -50,7 +50,7 @@ def test_a_motion_is_shown_with_its_text(kick, tmp_path):
     (run,) = data["runs"]
     assert run["rows"] == 601  # every second of 1201
     assert run["arrays"]["pose"][-1] == pytest.approx(kick.q[-1, :7], rel=1e-6)
-    assert any("one of 3 samples is shown" in note for note in data["notes"])
+    assert any("one of 2 samples is shown" in note for note in data["notes"])
 
 
 def test_a_motion_of_601_samples_is_shown_whole(tmp_path):
