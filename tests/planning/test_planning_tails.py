@@ -88,7 +88,7 @@ def test_optima_of_stages_are_those_of_ipopt(name):
     assert wanted.success
     w = wanted.w * (1 + 1e-6 * np.random.default_rng(0).normal(size=wanted.w.size))
     stages = stages_of(model, near.problem, near.mesh, near.rule)
-    found = fatrop.solve_stages(stages, begin, w, kept, fatrop.options_of({}, "close"))
+    found = fatrop.solve_stages(stages, begin, w, kept, fatrop.engine_of({}, "close"))
     assert found.success, found.status
     assert found.value == pytest.approx(wanted.value, rel=1e-8)
     np.testing.assert_allclose(found.w, wanted.w, atol=1e-4)
