@@ -8,7 +8,7 @@ from ...functions.function import Function, assemble
 from ...functions.tail import Tail
 from ...ir.cost import applied, branches, executed
 from ...ir.program import Program
-from ...passes.batch import batched, unrolled_step
+from ...passes.batch import batched, unrolled_step, with_own_parameters
 from ...passes.directions import directions_in_turn, has_directions
 from ...passes.unrolled_ldl import unrolled_ldl
 from ...scene.scene import Scene
@@ -94,6 +94,24 @@ def straight(scene: Scene, program: Program) -> bool:
     if scene.emission == "auto":
         return applied(program) <= STRAIGHT_UP_TO and not branches(program)
     return scene.emission == "straight"
+
+
+@dataclass(frozen=True)
+class LaneFunction:
+    """A function over lanes of states and of their own parameters: its program, and its C."""
+
+    program: Program
+    body: CFunction
+
+
+def lane_function(scene: Scene, single: Program, name: str) -> LaneFunction:
+    """Return a program of one state over lanes; name: of the program with its own parameters."""
+    fixed = baked_values(scene)
+    single = unrolled_step(single, fixed) if straight(scene, single) else single
+    if not scene.baked:
+        single = with_own_parameters(single, name)
+    lanes = batched(single, STATES[scene.real])
+    return LaneFunction(lanes, in_loops(lanes, scene.real, scene.name, fixed))
 
 
 class BatchView:

@@ -10,14 +10,11 @@ from ...functions.function import assemble
 from ...functions.tail import Tail, struct_parameters
 from ...ir.dataflow import on_arrays
 from ...ir.program import Program, padded
-from ...passes.batch import batched, unrolled_step, with_own_parameters
 from ...scene.scene import Scene
 from ..templating import render
-from .batch import STATES, straight
-from .form import PrintedFunction, baked_values
-from .loops import in_loops
+from .batch import STATES, LaneFunction, lane_function
+from .form import PrintedFunction
 from .records import fields, member_views
-from .routine import CFunction
 from .views import callee_view, step_views
 
 RECORD = fields(
@@ -59,19 +56,11 @@ ROWS = {
 
 
 @dataclass(frozen=True)
-class GroundPart:
-    """One function of a step over lanes of states and of their parameters: its program and C."""
-
-    program: Program
-    body: CFunction
-
-
-@dataclass(frozen=True)
 class GroundSteps:
     """Implicit steps over lanes of states: their functions by role, and places in the workspace."""
 
     states: int
-    parts: Mapping[str, GroundPart]
+    parts: Mapping[str, LaneFunction]
     parameters: int
     rows: tuple[tuple[str, int], ...]  # name and number of rows of each block of the workspace
 
@@ -116,15 +105,10 @@ def ground_steps(
     return GroundSteps(STATES[scene.real], parts, count, rows)
 
 
-def _part(scene: Scene, tail: Tail, name: str) -> GroundPart:
+def _part(scene: Scene, tail: Tail, name: str) -> LaneFunction:
     """Return a function over lanes."""
-    fixed = baked_values(scene)
     single = _with_zeros(assemble(function_of(name, tail), tail))
-    single = unrolled_step(single, fixed) if straight(scene, single) else single
-    if not scene.baked:
-        single = with_own_parameters(single, f"{name}_of_runs")
-    lanes = batched(single, STATES[scene.real])
-    return GroundPart(lanes, in_loops(lanes, scene.real, scene.name, fixed))
+    return lane_function(scene, single, f"{name}_of_runs")
 
 
 def _with_zeros(program: Program) -> Program:

@@ -7,12 +7,10 @@ from typing import Any
 from ...functions.function import assemble
 from ...functions.tail import Tail
 from ...ir.program import Program, padded
-from ...passes.batch import batched, unrolled_step, with_own_parameters
 from ...scene.scene import Scene
 from ..templating import render
-from .batch import STATES, straight
-from .form import PrintedFunction, baked_values
-from .loops import in_loops
+from .batch import STATES, lane_function
+from .form import PrintedFunction
 from .records import fields, member_views
 from .routine import CFunction
 from .simulation import own_damping
@@ -98,17 +96,13 @@ def batch_rollout(
     if "rollout" not in scene.functions or scene.contacts or tail.shape.fixed:
         return None
     (dynamics,) = (f.function for f in printed if f.function.name == "forward_dynamics")
-    fixed, states = baked_values(scene), STATES[scene.real]
 
     # one state, with parameters of its own; then a lane for each state
     single = assemble(dynamics, tail)
     count = 0 if scene.baked else sum(a.length for a in single.of_role("parameters"))
-    single = unrolled_step(single, fixed) if straight(scene, single) else single
-    if not scene.baked:
-        single = with_own_parameters(single, "forward_dynamics_of_flights")
-    lanes = batched(single, states)
-    body = in_loops(lanes, scene.real, scene.name, fixed)
-    return BatchRollout(states, lanes, body, count, tail.nq + tail.nv + LEDGER, tail.nt)
+    lanes = lane_function(scene, single, "forward_dynamics_of_flights")
+    size = tail.nq + tail.nv + LEDGER
+    return BatchRollout(STATES[scene.real], lanes.program, lanes.body, count, size, tail.nt)
 
 
 def batch_rollout_file(
