@@ -33,6 +33,8 @@ def run(words: list[str], cwd: Path, env: dict, limit: float) -> tuple[int | Non
     )
     with begun as process:
         running.add(process)
+        if stopped.is_set():  # since it was asked above
+            kill(process)
         try:
             output, _ = process.communicate(timeout=limit)
             found = process.returncode, output
