@@ -94,7 +94,7 @@ class BatchLibrary:
         self.work: dict[str, int] = batch["work"]
         self.parts: dict[str, str] = batch["parts"]
         self.sources = {part: LazyLibrary(checked, profile, part) for part in LAZY_SOURCES}
-        self.rollouts, self.ground = self.sources["flights"], self.sources["ground"]
+        self.rollouts = self.sources["flights"]
 
     def address(self, name: str) -> int:
         """Return the address of the C function for strided states, for kernels in C.

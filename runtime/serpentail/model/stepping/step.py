@@ -61,7 +61,7 @@ class Stepping:
         if entry is None or held.runs < entry["states"]:
             return self.singly, max(1, SINGLY_LEAST // held.steps)
         if held.method not in self.lanes:
-            source = batches.rollouts if held.method == "rk4" else batches.ground
+            source = batches.sources[kind.entry]
             self.lanes[held.method] = kind(model.manifest, source, self.singly)
         return self.lanes[held.method], max(entry["states"], LANES_LEAST // (4 * held.steps))
 
