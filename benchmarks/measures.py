@@ -33,6 +33,7 @@ from benchmarks import (
     processors,
     scaling,
     simulations,
+    solvers,
     speeds,
 )
 from benchmarks.peers import compilers
@@ -88,6 +89,7 @@ MEASURES = {
     "continuum_forms": Measure(continuum_forms.form_errors),
     "continuum_form_times": Measure(continuum_forms.form_times),
     "planning": Measure(planning.planning),
+    "solver_times": Measure(solvers.solver_times),
     "page_speed": Measure(pages.page_speed),
     "identification_times": Measure(identification.identification_times),
 }

@@ -23,6 +23,8 @@ FUNCTIONS = (
     "forward_dynamics_derivatives,inverse_dynamics_derivatives,inverse_dynamics_vjp,forward_dynamics_vjp,"
     "inverse_dynamics_hessian,pfl,center_of_mass"
 )
+# those, and what the stages of FATROP need
+STAGED = f"{FUNCTIONS},airborne_rates,airborne_rates_derivatives,airborne_rates_hessian"
 PAPER = {
     "formulation": "full",
     "attitude": "euler",
@@ -33,10 +35,10 @@ PAPER = {
 PAPER |= {"smoothing": 0.0}
 
 
-def model(segments: int, links: int | None) -> st.Model:
+def model(segments: int, links: int | None, functions: str = FUNCTIONS) -> st.Model:
     """Return a tail with exact derivatives; a continuum where links is None."""
     tail = {"tail": "articulated", "links": links} if links else {"tail": "continuum"}
-    return st.build(segments=segments, functions=FUNCTIONS.split(","), **tail)
+    return st.build(segments=segments, functions=functions.split(","), **tail)
 
 
 def share(rat: st.Model) -> np.ndarray:

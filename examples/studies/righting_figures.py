@@ -20,6 +20,7 @@ LOOKS = {  # a band, and the curve that may lie on it
     "passive": {"color": "#d55e00", "linestyle": "--"},
 }
 WAYS = {"ours": ("#0072b2", "s-"), "paper": ("#d55e00", "o--")}
+RATES = {"IPOPT": (BLUE, "s"), "FATROP": ("#009e73", "D"), "paper": ("#d55e00", "o")}
 PANELS = (  # of Fig. 10
     *("$p_{b,y}$ [m]", "$p_{b,z}$ [m]"),
     *(r"pitch $\phi_x$ [deg]", r"roll $\phi_y$ [deg]"),
@@ -159,26 +160,26 @@ def draw_figure_13(
 
 
 def draw_rates(rates: dict[str, dict[str, list[dict]]], path: Path) -> tuple[Figure, np.ndarray]:
-    """Draw, for each kind of random start and both ways of planning, the share of true plans, and
+    """Draw, for each kind of random start and each way of planning, the share of true plans, and
     CPU time and true error of all plans: medians, and the range of nine tenths of them.
     """
     spans = {"cpu_s": "CPU time [s]", "open_loop_attitude_error_deg": "true error [deg]"}
 
     def draw() -> tuple[Figure, np.ndarray]:
-        figure = Figure(figsize=(7.2, 1.2 + 0.24 * len(rates)), layout="constrained")
+        figure = Figure(figsize=(7.2, 1.2 + 0.3 * len(rates)), layout="constrained")
         axes = figure.subplots(1, 3, sharey=True)
-        for shift, (way, (colour, mark)) in zip((0.15, -0.15), WAYS.items(), strict=True):
+        for shift, (way, (colour, mark)) in zip((0.22, 0, -0.22), RATES.items(), strict=True):
             at = shift - np.arange(len(rates))
             rows = [ways[way] for ways in rates.values()]
             shares = [100 * np.mean([is_true(row) for row in of]) for of in rows]
             look = {"color": colour, "label": way}
-            axes[0].plot(shares, at, mark[0], markersize=3.5, **look)
+            axes[0].plot(shares, at, mark, markersize=3.5, linestyle="none", **look)
             for panel, key in zip(axes[1:], spans, strict=True):
                 low, middle, high = np.transpose([_middle([r[key] for r in of]) for of in rows])
                 panel.hlines(at, low, high, color=colour, linewidth=1)
-                panel.plot(middle, at, mark[0], markersize=3.5, **look)
+                panel.plot(middle, at, mark, markersize=3.5, linestyle="none", **look)
         axes[0].set(xlabel="true plans [%]", xlim=(-4, 104))
-        names = [f"{kind}: {len(ways['ours'])}" for kind, ways in rates.items()]
+        names = [f"{kind}: {len(ways['IPOPT'])}" for kind, ways in rates.items()]
         axes[0].set_yticks(-np.arange(len(rates)), names)
         for panel, name in zip(axes[1:], spans.values(), strict=True):
             panel.set(xlabel=name, xscale="log")
@@ -187,7 +188,7 @@ def draw_rates(rates: dict[str, dict[str, list[dict]]], path: Path) -> tuple[Fig
         for panel in axes:
             panel.grid(color="#e6e6e6", linewidth=0.6)
         keys = axes[0].get_legend_handles_labels()
-        figure.legend(*keys, loc="outside upper center", ncols=2)
+        figure.legend(*keys, loc="outside upper center", ncols=len(RATES))
         return figure, axes
 
     return drawn(draw, path)

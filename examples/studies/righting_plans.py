@@ -12,7 +12,11 @@ EXAMPLE = 4  # the random start of Fig. 11: both ways of planning converge on it
 RAT = (1, 3)
 LIMIT = 300.0  # s a plan
 
-rat = cache(righting.model)
+
+@cache
+def rat(segments: int, links: int | None) -> st.Model:
+    """Return a tail that both solvers can plan for."""
+    return righting.model(segments, links, righting.STAGED)
 
 
 def content(size: tuple) -> dict:
