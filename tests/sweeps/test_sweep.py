@@ -1,6 +1,6 @@
 """Rows of sweeps are what the runs themselves return, however and wherever they are made."""
 
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from multiprocessing import get_context
 
 import numpy as np
@@ -57,6 +57,30 @@ def test_all_executors_make_the_same_rows(model, kind):
             found = flights(model, 2, executor=executor)
     for row, other in zip(found.rows(), wanted, strict=True):
         np.testing.assert_allclose(row["q_end"], other["q_end"], rtol=0, atol=1e-9)
+
+
+class Forgetful(ThreadPoolExecutor):
+    """Loses the first `lost` blocks that it gets."""
+
+    def __init__(self, lost):
+        super().__init__(1)
+        self.lost = lost
+
+    def submit(self, *work):
+        if not self.lost:
+            return super().submit(*work)
+        self.lost -= 1
+        gone = Future()
+        gone.set_exception(BrokenExecutor("the worker has died"))
+        return gone
+
+
+def test_a_block_that_a_worker_lost_runs_again(model):
+    with Forgetful(1) as executor:
+        found = flights(model, 2, executor=executor, limit=60)
+    assert len(found) == 4 and all(row["error"] is None for row in found.rows())
+    with Forgetful(99) as executor, pytest.raises(st.SweepError, match="the worker has died"):
+        flights(model, 2, executor=executor, limit=60)
 
 
 def test_a_second_call_runs_what_is_missing_only(model, tmp_path):
