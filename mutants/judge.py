@@ -160,14 +160,15 @@ def packed(recorder: Recorder, mutation: Mutation, most: float) -> Iterator[list
 
 
 def rows(recorder: Recorder, mutation: Mutation) -> Iterator[list[str]]:
-    """Yield the tests of each file that run a mutated line: files of the same room first, and those
-    that take less; last the files that must be recorded to know.
+    """Yield the tests of each file that run a mutated line: first files whose path shares most
+    words with the mutant's, then those that take less; last the files that must be recorded to
+    know.
     """
     waiting = recorder.files()
 
-    def rank(file: str) -> tuple[bool, bool, float]:
+    def rank(file: str) -> tuple[bool, int, float]:
         cost = recorder.cost(file)
-        return cost == float("inf"), not nearby(mutation.path, file), cost
+        return cost == float("inf"), -nearness(mutation.path, file), cost
 
     while waiting:
         file = min(waiting, key=rank)
@@ -175,16 +176,16 @@ def rows(recorder: Recorder, mutation: Mutation) -> Iterator[list[str]]:
         yield from filter(None, recorder.chosen(mutation, file))
 
 
-def nearby(path: str, file: str) -> bool:
-    """Tell if a file of tests belongs to the room or to the concept of a source."""
-    source, test = (words(Path(p)) for p in (path, file))
-    return bool(source & test)
+def nearness(path: str, file: str) -> int:
+    """Return how many words the paths of a source and of a file of tests share."""
+    return len(words(Path(path)) & words(Path(file)))
 
 
 def words(path: Path) -> set[str]:
     """Return the words of a path in the singular: of its folders and of its file."""
     parts = (*path.parts[1:-1], path.name.split(".")[0].removeprefix("test_"))
-    return {part.removesuffix("s").removesuffix("e") for part in parts}
+    found = {word for part in parts for word in part.split("_")}
+    return {word.removesuffix("s").removesuffix("e") for word in found}
 
 
 def seconds(recorder: Recorder, tests: list[str]) -> float:

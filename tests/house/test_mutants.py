@@ -142,6 +142,15 @@ def test_what_is_late_on_a_busy_machine_gets_more_time(monkeypatch, end):
         assert told[-1] == b"mutant" and not place.recorder.distrusted
 
 
+def test_files_of_tests_that_are_named_alike_come_first():
+    source = "codegen/serpentail_codegen/targets/c/templates/batch/lane_samples.c.jinja"
+    lanes, batches, others = (
+        judge.nearness(source, f"tests/{name}.py")
+        for name in ("simulation/test_adaptive_lanes", "c/batches/test_kernels", "fuzz/test_plans")
+    )
+    assert (lanes, batches, others) == (1, 2, 0)
+
+
 def test_lines_of_a_compound_statement_are_its_head():
     tree = ast.parse("if (a and\n    b):\n    c()\nd()\n")
     assert [list(own_lines(node)) for node in tree.body] == [[1, 2], [4]]
