@@ -37,14 +37,14 @@ def in_digits(program, given, digits=40):
     return Run(program, numbers, exact).values["v_dot"]
 
 
-@pytest.mark.parametrize("links", [96, 128, 171])
+@pytest.mark.parametrize("size", [(1, 96), (1, 128), (1, 171), (2, 96)], ids=str)
 @pytest.mark.parametrize("bend", [0.0, 0.05, 1.3], ids=["straight", "bent", "coiled"])
-def test_chains_of_links_mean_what_links_mean_to_40_digits(links, bend):
-    tail = Tail(1, links)
+def test_chains_of_links_mean_what_links_mean_to_40_digits(size, bend):
+    tail = Tail(*size)
     plain, doubled = (assemble(FUNCTIONS[FUNCTION], tail, form) for form in ("lanes", "segments"))
     assert is_doubled(tail) and plain != doubled
     given = arguments(plain)
-    given["q"][7:] = [bend, -bend / 3]
+    given["q"][7:] = [bend, -bend / 3, bend / 2, bend][: 2 * tail.segments]
     expected, found = (in_digits(program, given) for program in (plain, doubled))
     largest = max(abs(x) for x in expected)
     assert max(abs(x - y) for x, y in zip(found, expected, strict=True)) <= 1e-30 * largest

@@ -150,7 +150,7 @@ def test_what_is_missing_is_named_before_anything_is_served(monkeypatch):
         st.live(rat())
 
 
-def test_a_browser_sees_it(view):
+def test_a_browser_sees_it_and_the_terminal_does_not_tell_of_it(view, capfd):
     need(chromium.need_chromium)
     with chromium.chromium() as driver:
         driver.get(view.url)
@@ -160,6 +160,7 @@ def test_a_browser_sees_it(view):
             lambda browser: "t = 0.1000 s" in browser.execute_script(words)
         )
         assert seen and rat().name in driver.execute_script(words)
+    assert "Connection" not in "".join(capfd.readouterr())
 
 
 def test_a_model_that_can_touch_the_ground_stands_on_it(view):
