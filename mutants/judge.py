@@ -162,7 +162,7 @@ def packed(recorder: Recorder, mutation: Mutation, most: float) -> Iterator[list
 def rows(recorder: Recorder, mutation: Mutation) -> Iterator[list[str]]:
     """Yield the tests of each file that run a mutated line: first files whose path shares most
     words with the mutant's, then those that take less; last the files that must be recorded to
-    know.
+    know.  Where none runs the line, those of the nearest files.
     """
     waiting = recorder.files()
 
@@ -170,10 +170,22 @@ def rows(recorder: Recorder, mutation: Mutation) -> Iterator[list[str]]:
         cost = recorder.cost(file)
         return cost == float("inf"), -nearness(mutation.path, file), cost
 
+    found = False
     while waiting:
         file = min(waiting, key=rank)
         waiting.remove(file)
-        yield from filter(None, recorder.chosen(mutation, file))
+        for tests in filter(None, recorder.chosen(mutation, file)):
+            found = True
+            yield tests
+    if not found:  # what runs in a process of its own is not recorded
+        yield from filter(None, (recorder.of(file).passed for file in nearest(recorder, mutation)))
+
+
+def nearest(recorder: Recorder, mutation: Mutation) -> list[str]:
+    """Return the files of tests that are nearest to a mutant, if any is near."""
+    near = {file: nearness(mutation.path, file) for file in recorder.files()}
+    most = max(near.values())
+    return [file for file, count in near.items() if count == most > 0]
 
 
 def nearness(path: str, file: str) -> int:

@@ -151,6 +151,19 @@ def test_files_of_tests_that_are_named_alike_come_first():
     assert (lanes, batches, others) == (1, 2, 0)
 
 
+@pytest.mark.parametrize("runs", [True, False])
+def test_lines_that_no_test_runs_itself_are_judged_by_the_nearest_files(runs):
+    passed = {"tests/sweeps/test_kills.py": ["kills"], "tests/fuzz/test_plans.py": ["plans"]}
+    recorder = SimpleNamespace(
+        files=lambda: list(passed),
+        cost=lambda file: 1.0,
+        chosen=lambda mutation, file: [["plans"]] if runs and "plans" in file else [[]],
+        of=lambda file: SimpleNamespace(passed=passed[file]),
+    )
+    child = Mutation("runtime/serpentail/sweeps/child.py", 1, 0, 1, "", "", "")
+    assert list(judge.rows(recorder, child)) == [["plans" if runs else "kills"]]
+
+
 def test_lines_of_a_compound_statement_are_its_head():
     tree = ast.parse("if (a and\n    b):\n    c()\nd()\n")
     assert [list(own_lines(node)) for node in tree.body] == [[1, 2], [4]]
