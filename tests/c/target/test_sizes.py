@@ -38,6 +38,7 @@ def test_automatic_form_is_straight_until_the_code_grows_large():
         return model.manifest["functions"]["forward_dynamics"]["emission"]
 
     assert (emission((1, 1)), emission((8, 16))) == ("straight", "segments")
+    assert (emission((2, 15)), emission((2, 16))) == ("lanes", "segments")
     assert emission((1, 1), emission="loops") == "loops"
 
 
