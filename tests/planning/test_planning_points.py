@@ -12,7 +12,7 @@ from serpentail.planning.result.full_state import com_at_start, full_state
 from tests.support.tumbling import DURATION, planned, rat, start
 
 FORMULATIONS = ["airborne", "translation-free", "full"]
-NAMES = ("time", "center_of_mass", "position", "height", "tail_points", "tip")
+NAMES = ("duration", "time", "center_of_mass", "position", "height", "tail_points", "tip")
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
@@ -39,7 +39,7 @@ def test_blocks_are_the_models(formulation):
             [np.zeros(3), *com_at_start(model, state), [0.0, time / DURATION]]
         )
         found = dict(zip(NAMES, map(np.array, function(unknowns, parameters)), strict=True))
-        assert found["time"].item() == pytest.approx(time)
+        assert (found["duration"].item(), found["time"].item()) == pytest.approx((DURATION, time))
         np.testing.assert_allclose(found["position"].ravel(), q[k, :3], atol=1e-9)
         np.testing.assert_allclose(found["height"].ravel(), q[k, 2], atol=1e-9)
         np.testing.assert_allclose(found["tail_points"], points[k], atol=1e-9)

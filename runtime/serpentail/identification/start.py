@@ -106,7 +106,6 @@ def _begin(model: Model, placed: Placements, tracks: MarkerTracks) -> np.ndarray
     body = body_positions(geometry_of(model), q[:1, TAIL_Q], placed)[0]
     torso = on_torso(placed)
     use = torso if torso.sum() >= 3 else np.ones_like(torso)
-    q[:, QUATERNION] = (1, 0, 0, 0)
     last = np.array([0.0, 0, 0, 1, 0, 0, 0])
     for frame in range(frames):
         here = tracks.seen[frame] & use
