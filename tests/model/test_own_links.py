@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import serpentail as st
+from serpentail.verification.report import laws
 from tests.support.own_tails import folder, folder_of_tables
 
 FUNCTIONS = ["mass_matrix", "forward_dynamics", "energy", "momentum", "rollout"]
@@ -68,3 +69,12 @@ def test_a_scene_is_built_with_links_of_its_own():
     tables = [{"links": 2, "length": 0.1, "mass": 1e-3}, {"links": 1, "length": 0.1, "mass": 2e-3}]
     other = st.build(tail="articulated", segments=tables, functions=["energy"], torso_mass=0.2)
     assert other.links == (2, 1) and other.parameters["torso_mass"] == 0.2
+
+
+def test_second_derivatives_hold_for_links_of_their_own():
+    """Their turns need the tail's mass, which is the sum over the links."""
+    names = ["inverse_dynamics", "inverse_dynamics_vjp", "inverse_dynamics_hessian"]
+    sound = laws(st.load(folder("links", functions=names)))
+    checked = {check.name for check in sound if not check.omitted}
+    assert "gradient changes by the hessian" in checked
+    assert all(check.passed for check in sound)

@@ -7,6 +7,7 @@ from scipy.integrate import solve_ivp
 import serpentail as st
 from serpentail.attitude import quaternion_rate, tilt_deg
 from serpentail.planning.result.truth import planned_torques
+from tests.support.models import model_folder
 from tests.support.predictive import TORQUE, Reference, correction_of, plan_of
 from tests.support.tumbling import DURATION, rat, start
 
@@ -245,6 +246,10 @@ def test_models_and_plans_that_do_not_fit_are_refused(plan):
     other = rat(3, 2)
     with pytest.raises(st.SimulationError, match="tail coordinates"):
         st.simulate(other, np.r_[np.zeros(3), 1, np.zeros(9)], np.zeros(12), controller=mpc)
+    names = ["rollout", "energy", "momentum"]
+    short = st.load(model_folder(1, 3, functions=names, real="float"))
+    with pytest.raises(st.SimulationError, match=r"Mpc: .* float: needs double"):
+        st.simulate(short, *start(rat(), 1), controller=mpc, t_span=0.01)
 
 
 def test_a_phase_of_a_sequence_is_controlled_predictively():

@@ -207,3 +207,20 @@ def test_a_foot_that_dips_within_a_step_is_seen():
     assert (down["kind"], off["kind"]) == ("touch_down", "take_off")
     assert down["time"] == pytest.approx(under[0], abs=1e-4)
     assert down["time"] < off["time"] < under[-1]  # a point that rises ceases to press before
+
+
+@pytest.mark.parametrize("how", [{"method": "implicit_euler", "step": 5e-3}, {"rtol": 1e-4}])
+def test_a_run_stops_at_the_first_of_events_that_almost_coincide(how):
+    model, pitch = animal(), np.linspace(-0.4, 0.4, 81)
+    q, v = np.zeros((81, model.nq)), np.zeros((81, model.nv))
+    q[:, 2], q[:, 3], q[:, 4], v[:, 2] = 0.1, np.cos(pitch / 2), np.sin(pitch / 2), -1.5
+    whole = flown(model, q, v, **how)
+    stopped = flown(model, q, v, stop_at=[("touch_down", g) for g in model.contacts], **how)
+    first_of = set()
+    for run, end in zip(whole, stopped.ends, strict=True):
+        downs = [(e["time"], e["group"]) for e in run.events if e["kind"] == "touch_down"]
+        (time, group), (after, other), *_ = sorted(downs)
+        assert end == pytest.approx(time, abs=1e-9)
+        if after - time < 1e-3:
+            first_of.add((group, other))
+    assert first_of >= {("torso", "tail"), ("tail", "torso"), ("torso", "feet")}
