@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 import serpentail as st
+from benchmarks.fixtures import label
 from benchmarks.planning import EXAMPLE, figure, plan
 from examples import righting
 from examples.studies.righting_kinds import is_true
@@ -61,11 +62,6 @@ def made(call: Callable[[], st.Plan]) -> Made:
     return Made(found, time.process_time() - begun)
 
 
-def size_of(rat: st.Model) -> str:
-    """Return (m, n) of a tail as text."""
-    return f"({rat.segments}, {rat.links})"
-
-
 def iteration(rat: st.Model, intervals: int, least: float) -> dict:
     """Time an iteration from passive flight, torques and states on one mesh."""
     given = {"intervals": intervals, "controls": intervals, "tolerance": None, "retries": 0}
@@ -77,7 +73,7 @@ def iteration(rat: st.Model, intervals: int, least: float) -> dict:
             each[name] = min(each[name], told["solve_cpu_s"] / told["iterations"])
     ratio = each["IPOPT"] / each["FATROP"]
     about = ", ".join(f"{name} {1e3 * s:.2f} ms" for name, s in each.items())
-    name = f"{size_of(rat)}, {intervals} intervals, an iteration"
+    name = f"{label(rat.segments, rat.links)}, {intervals} intervals, an iteration"
     return figure(name, f"{ratio:.1f}x", f">= {least:g}x", about)
 
 
@@ -87,7 +83,7 @@ def random_starts(rat: st.Model) -> list[dict]:
     for seed in range(1, RANDOM + 1):
         for name, way in SOLVERS.items():
             found[name].append(made(lambda seed=seed, way=way: plan(rat, seed, track=False, **way)))
-    rows, head = [], f"{size_of(rat)}, {RANDOM} starts, at rest, "
+    rows, head = [], f"{label(rat.segments, rat.links)}, {RANDOM} starts, at rest, "
     for name, plans in found.items():
         times = np.array([one.cpu_s if one.true else np.inf for one in plans])
         true = f"{100 * np.isfinite(times).mean():.1f} % true at all"
@@ -105,12 +101,12 @@ def kicked(rat: st.Model, most: float) -> dict:
         told[name] = made(
             lambda way=way: plan(rat, start=start, time_limit=LIMIT, track=False, **way)
         )
-    error = {k: one.plan.report["open_loop_attitude_error_deg"] for k, one in told.items()}
+    error = {k: righting.row(one.plan)["open_loop_attitude_error_deg"] for k, one in told.items()}
     about = (
         f"{error['FATROP']:.4f} deg; IPOPT {told['IPOPT'].cpu_s:.2f} s, {error['IPOPT']:.4f} deg"
     )
     value = f"{told['FATROP'].cpu_s:.2f} s{'' if told['FATROP'].true else ', not true'}"
-    return figure(f"{size_of(rat)} from the kick", value, f"<= {most:g} s", about)
+    return figure(f"{label(rat.segments, rat.links)} from the kick", value, f"<= {most:g} s", about)
 
 
 def objective(rat: st.Model, name: str) -> dict:
@@ -130,7 +126,10 @@ def objective(rat: st.Model, name: str) -> dict:
     )
     share = f"{100 * np.mean([one.true for one in found['FATROP']]):.0f} %"
     return figure(
-        f"{size_of(rat)}, {name}, {OBJECTIVES} starts, true", share, f">= {SHARE} %", about
+        f"{label(rat.segments, rat.links)}, {name}, {OBJECTIVES} starts, true",
+        share,
+        f">= {SHARE} %",
+        about,
     )
 
 
@@ -148,6 +147,6 @@ def ticks(rat: st.Model) -> list[dict]:
             mpc.tick(0.0, q, near)
             least = min(least, time.process_time() - begun)
         about = f"{mpc.settings.intervals} intervals, {first.duration:.2f} s ahead"
-        name = f"{size_of(rat)}, predictive control, {what}"
+        name = f"{label(rat.segments, rat.links)}, predictive control, {what}"
         rows.append(figure(name, f"{1e3 * least:.2f} ms", f"<= {most:g} ms", about))
     return rows
