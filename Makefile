@@ -138,12 +138,12 @@ lint: $(READY)
 	$(PY) -m tests.house.file_lengths
 
 # The generator compares hashes, and makes what differs; what it made is compiled and told once.
-model: $(READY)
+model: $(DRAWS)
 	@said=$$($(GENERATE) $(WANTED)) && echo "$$said" && folder=$${said%%:*} && \
 	stamp=generated/.stamps/$${folder##*/} && { cmp -s $$stamp $$stamp.told || \
 	{ $(VENV)/bin/serpentail info "$$folder" && cp $$stamp $$stamp.told; }; }
 
-verify: model
+verify: $(READY) model
 	$(PY) -m tests.verification $(FOLDER)
 
 bench: $(READY)
@@ -155,7 +155,7 @@ stress: $(READY)
 mutants: $(READY)
 	$(PY) -m mutants.run --mutants $(MUTANTS) --seed $(SEED) --jobs $(JOBS)
 
-embedded: model
+embedded: $(READY) model
 	$(PY) -m embedded.check $(FOLDER) --board $(CPU)
 
 size-report: $(READY)

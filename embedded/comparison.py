@@ -7,12 +7,18 @@ from pathlib import Path
 import numpy as np
 
 from embedded.boards import BOARDS, ToolchainMissing
+from embedded.flash import flash
 from embedded.image import Image, build, manifest_of
 from embedded.results import Result, blocks, run
 from embedded.stack import deepest
 
 # ulp of an output's largest entry: largest difference of the fast profile
 BOUND = 1e4
+LEGEND = (
+    "ulp: largest difference from the host, in last places of an output's largest entry",
+    "flash: bytes of the function and all that it calls; stack: bytes, the sum of the frames;",
+    "painted: bytes of the stack that the calls overwrote on the board",
+)
 
 
 @dataclass(frozen=True)
@@ -26,6 +32,7 @@ class Comparison:
     # largest difference from the host, in units in the last place of the output's largest entry
     units: float
     instructions: int
+    flash: int  # bytes, of the function with all that it calls
     stack: int  # bytes, the sum of frames along the deepest chain of calls
     painted: int  # bytes, measured on the board by a painted stack
 
@@ -64,6 +71,7 @@ def _compared(
         np.array_equal(found.bits, host.bits),
         max(units) / epsilon,
         max(found.instructions),
+        flash(image, name),
         depths[f"call_{name}"],
         max(found.depths) + depths["call_room"],
     )
@@ -81,14 +89,14 @@ def _difference(some: np.ndarray, others: np.ndarray) -> float:
 
 def table(rows: list[Comparison]) -> list[str]:
     """Return the comparison as lines of text."""
-    head = f"{'function':<28}{'bits':>10}{'units':>10}{'instructions':>14}"
-    head += f"{'stack, bytes':>14}{'painted':>9}"
+    head = f"{'function':<28}{'bits':>8}{'ulp':>8}{'instructions':>14}"
+    head += f"{'flash':>8}{'stack':>8}{'painted':>9}"
     lines = [
-        f"{r.name:<28}{'same' if r.same_bits else 'differ':>10}{r.units:>10.3g}{r.instructions:>14}"
-        f"{r.stack:>14}{r.painted:>9}"
+        f"{r.name:<28}{'same' if r.same_bits else 'other':>8}{r.units:>8.3g}{r.instructions:>14}"
+        f"{r.flash:>8}{r.stack:>8}{r.painted:>9}"
         for r in rows
     ]
-    return [head, *lines]
+    return [head, *lines, *LEGEND]
 
 
 def check(folder: Path, board: str, profile: str | None, output: Path) -> int:

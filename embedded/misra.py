@@ -8,6 +8,19 @@ from pathlib import Path
 
 from embedded.boards import ToolchainMissing
 
+ASKS = {  # in our own words
+    "2.2": "no operation without effect",
+    "2.4": "no tag that is not used",
+    "2.5": "no macro that is not used",
+    "8.7": "no external name for what one file uses",
+    "10.3": "no assignment to a narrower type, or to one of another kind",
+    "10.4": "operands of one kind of type",
+    "12.1": "parentheses that show the precedence of operators",
+    "12.3": "no comma operator",
+    "15.5": "one return, at the end of a function",
+    "18.4": "no +, -, += or -= of pointers",
+    "20.5": "no #undef",
+}
 CPPCHECK = ("cppcheck", "--std=c99", "--quiet")
 
 
@@ -20,14 +33,16 @@ def need() -> None:
         )
 
 
-def summary(folder: Path) -> list[tuple[str, int]]:
-    """Return (rule, hits) of a model's source, the most frequent first; hits are no faults."""
+def summary(folder: Path) -> list[tuple[str, str, int]]:
+    """Return (rule, what it asks for, hits) of a model's source, the most frequent first; hits are
+    no faults.
+    """
     need()
     source = folder / "src" / f"{folder.name}.c"
     words = [*CPPCHECK, "--addon=misra", "-I", str(folder / "include"), str(source)]
     done = subprocess.run(words, capture_output=True, text=True, check=True)
     hits = Counter(re.findall(r"\[misra-c2012-([\d.]+)\]", done.stderr))
-    return sorted(hits.items(), key=lambda item: (-item[1], item[0]))
+    return [(rule, ASKS.get(rule, ""), count) for rule, count in hits.most_common()]
 
 
 def faults(folder: Path) -> str:

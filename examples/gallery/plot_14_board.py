@@ -29,7 +29,7 @@ for path in sorted(rat.folder.rglob("*.[ch]")):
 
 # %%
 # An operation is an addition, a multiplication or a division. On a Cortex-M with an FPU
-# for ``float``, gcc 12 makes 1 to 2.5 instructions of an operation.
+# for ``float``, gcc 12 makes 1 to 4 instructions of an operation.
 
 plt.style.use("seaborn-v0_8-colorblind")
 figure, ax = plt.subplots(figsize=(7, 3.4), layout="constrained")

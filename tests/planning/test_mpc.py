@@ -221,12 +221,13 @@ def test_wrong_settings_are_refused(plan, settings, words):
         st.Mpc(rat(), plan, **settings)
 
 
-def test_the_c_goes_to_a_folder_that_is_there(plan, tmp_path):
+def test_the_c_goes_to_a_folder_which_is_made(plan, tmp_path):
     mpc = st.Mpc(rat(), plan)
-    for folder in (tmp_path / "none", 3):
-        with pytest.raises(st.PlanningError, match=r"write_c: folder: value .* needs a folder"):
-            mpc.write_c(folder)
-    first = [path.read_bytes() for path in mpc.write_c(tmp_path)]
+    with pytest.raises(st.PlanningError, match=r"write_c: folder: value 3: needs the path of a"):
+        mpc.write_c(3)
+    with pytest.raises(OSError, match="is not a folder"):
+        mpc.write_c(mpc.write_c(tmp_path)[0])
+    first = [path.read_bytes() for path in mpc.write_c(tmp_path / "made" / "here")]
     assert [path.read_bytes() for path in st.Mpc(rat(), plan).write_c(tmp_path)] == first
     assert repr(mpc) == f"Mpc({rat().name}, 100 Hz, 0.4 s in 6)"
 

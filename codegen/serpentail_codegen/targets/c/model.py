@@ -30,6 +30,24 @@ COORDINATES = {
     "mixed": "of each segment alpha, beta of its joints, or a, b of its bend",
     "polar": "phi_1, theta_1, ... of the segments' bend",
 }
+# what they mean, with their signs, as lines of the header
+JOINT_ANGLES = (
+    "alpha_i, beta_i are the angles of each joint of segment i: a joint turns its link about x by",
+    "alpha_i, then about the new z by beta_i, against the link before it (the first: the torso).",
+)
+BENDS = (
+    "(a_i, 0, b_i) is the rotation vector from the root to the tip of segment i, a circular arc.",
+    "It is the limit of n alpha_i, n beta_i for a segment of n links.",
+)
+ANGLES = {
+    "joint": JOINT_ANGLES,
+    "bend": BENDS,
+    "mixed": (*JOINT_ANGLES, *BENDS),
+    "polar": (
+        "theta_i is the angle between the tangents at the ends of segment i, a circular arc;",
+        "phi_i its direction: a bend by -theta_i cos(phi_i) about x, theta_i sin(phi_i) about z.",
+    ),
+}
 PIECES = {"articulated": "links", "continuum": "samples", "mixed": "parts"}
 
 
@@ -87,6 +105,7 @@ def model_context(scene: Scene, tail: Tail) -> dict[str, Any]:
         "baked": scene.baked,
         "tail": tail,
         "coordinates": COORDINATES[scene.coordinates],
+        "angles": ANGLES[scene.coordinates],
         "polar": tail.polar,
         "groups": ", ".join(f"{count} of the {name}" for name, count in tail.groups.items()),
         "parameters": parameter_views(scene),

@@ -29,7 +29,11 @@ USE = """/* The predictive controller of {prefix}, for one plan.
    At the start of the flight call {prefix}_mpc_begin(&state, &{prefix}_mpc_plan, memory).  Then, at
    the time t (s) from there, call {prefix}_mpc_control(&state, t, t, q, v, tau) as often as the
    motors take torques, which may be more often than the ticks.  tau does not contain joint damping,
-   which belongs to the body. */
+   which belongs to the body.
+
+   Link this file's source with src/{prefix}.c of the model.  The parameters of the body are the
+   table {prefix}_mpc_plan.parameters: for another body, copy {prefix}_mpc_plan, and let the copy
+   point to a {prefix}_parameters of yours. */
 
 """
 DATA = """
@@ -58,14 +62,12 @@ static int call_momentum(const void *parameters, const double *q, const double *
 def write_c(model: Model, task: MpcTask, memory: int, folder: str | os.PathLike[str]) -> list[Path]:
     """Write <model>_mpc.h and .c to a folder; return their paths; memory: in doubles.
 
-    PlanningError if there is no such folder, NotWritten if the system refuses a file.
+    A missing folder is made.  PlanningError if it is not a path, NotWritten if the system refuses.
     """
     try:
         target = Path(folder)
-        if not target.is_dir():
-            raise TypeError
     except TypeError:
-        needs = "a folder that is there"
+        needs = "the path of a folder"
         raise PlanningError(f"write_c: folder: value {shown(folder)}: needs {needs}") from None
     texts = {
         f"{model.name}_mpc.h": header(model.name, memory),
@@ -81,11 +83,11 @@ def write_c(model: Model, task: MpcTask, memory: int, folder: str | os.PathLike[
 def header(prefix: str, memory: int) -> str:
     """Return the header of a model's controller."""
     own = _renamed((NATIVE / "mpc.h").read_text(encoding="utf-8"), prefix)
-    begin, end = own.rstrip().rsplit("#endif", 1)
+    begin, end = own.rsplit("#ifdef __cplusplus", 1)
     plan = (
         f"/* doubles that the plan below needs */\n"
         f"enum {{ {prefix.upper()}_MPC_MEMORY = {memory} }};\n\n"
-        f"extern const {prefix}_mpc_task {prefix}_mpc_plan;\n\n#endif{end}\n"
+        f"extern const {prefix}_mpc_task {prefix}_mpc_plan;\n\n#ifdef __cplusplus{end}"
     )
     return USE.format(prefix=prefix, upper=prefix.upper()) + begin + plan
 

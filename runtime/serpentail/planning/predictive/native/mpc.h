@@ -14,6 +14,10 @@
 
 #include <stddef.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* A model's functions of an airborne state x = (quaternion, tail coordinates, their rates).
    y = (rates of x, omega); J = dy / d(x, tau), row by row; h: the conserved angular momentum in
    world axes.  They return 0 if all results are finite. */
@@ -29,7 +33,7 @@ enum { MPC_ATTITUDE = 4, MPC_TURN = 3 }; /* sizes of a quaternion and of omega *
 
 /* The task of a controller; its arrays may be in constant memory. */
 typedef struct {
-    int tail;             /* tail coordinates m */
+    int tail;             /* number of tail coordinates, called m below */
     int intervals, steps; /* number N of intervals; Runge-Kutta steps in each */
     int late_steps;       /* Runge-Kutta steps from a tick until its torques act; 0: no delay */
     int iterations;       /* Gauss-Newton steps in a tick */
@@ -89,7 +93,8 @@ int mpc_tick(mpc_state *state, double t, const double *q, const double *v);
 /* Torques (m) at t, N m; clock: the start of the time step that contains t, or t. */
 void mpc_torque(const mpc_state *state, double clock, double t, double *tau);
 
-/* Compute a correction from q, v if a tick is due at the clock, then the torques at t. */
+/* Compute a correction from q, v if a tick is due at the clock, then the torques at t.  A tick that
+   fails, as for a q that is not finite, is counted in state->failed, and the last correction stays. */
 void mpc_control(mpc_state *state, double clock, double t, const double *q, const double *v,
                  double *tau);
 
@@ -101,13 +106,18 @@ typedef struct {
     double clock;
 } mpc_simulation;
 
-/* mpc_control, as a NativeTorque; context: an mpc_simulation.  Returns 0. */
+/* mpc_control, with the arguments of a controller in a simulated run; context: mpc_simulation.
+   Returns 0. */
 int mpc_simulated(void *context, double t, const double *q, const double *v, double *tau);
 
-/* quadratic.c: find d (n) that minimises d^T H d / 2 + g^T d with lower <= d <= upper, lower <= 0 <=
+/* Find d (n) that minimises d^T H d / 2 + g^T d with lower <= d <= upper, lower <= 0 <=
    upper; H by rows, both triangles.  memory: n (n + 3) doubles, set: n ints.  Returns the number of
    changes of the active set; -1 if H is not positive definite, or after too many changes. */
 int mpc_quadratic(int n, const double *H, const double *g, const double *lower,
                   const double *upper, double *d, int *set, double *memory);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif
