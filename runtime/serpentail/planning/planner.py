@@ -76,7 +76,7 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
     goal : Goal or str, optional
         What holds at the end. Default: "upright", the torso upright and at rest, at any yaw.
     duration : float or (float, float)
-        Duration (s), or (least, most) if it is free.
+        Duration (s), or (least, most) if it is free; also text with a unit, such as "580 ms".
     bounds : Bounds, optional
         Bounds along the motion. Default: torques up to 0.02 N m.
     objective : {"effort", "energy", "time"} or callable, default "effort"
@@ -146,7 +146,8 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
     dynamics : {"auto", "compiled", "symbolic"}, default "auto"
         Source of the dynamics and its derivatives: compiled C or CasADi operations.
     time_limit : float, optional
-        Time for the search (s).
+        Time for the search (s). If it leaves no time to track the plan, the report has no errors
+        of tracking.
     guess : Plan or Trajectory, optional
         First guess. Default: passive flight.
     guess_damping : float, default 1e-3
@@ -196,7 +197,9 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
     model.refuse_fixed("plan")
     refused = Refusals(PlanningError)
     for name in unknown:
-        refused.add(name, none_of("setting", name, NAMES))
+        same = OTHER_WORDS.get(name)
+        meant = f"setting: value {name!r}: did you mean {same!r}?"
+        refused.add(name, meant if same else none_of("setting", name, NAMES))
     if watch is not None and not callable(watch):
         refused.add("watch", needed("watch", watch, "a function of a Plan, or None"))
     settings = PlanSettings(
@@ -245,6 +248,12 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
     return best_plan(model, problem, settings, watch)
 
 
+OTHER_WORDS = {  # of other planners, for our settings
+    **dict.fromkeys(("num_nodes", "nodes", "n_nodes", "num_intervals", "N"), "intervals"),
+    **dict.fromkeys(("constraints", "path_constraints"), "path"),
+    **dict.fromkeys(("initial_guess", "initial"), "guess"),
+    "x0": "start",
+}
 NAMES = [
     name
     for name, parameter in signature(plan).parameters.items()
