@@ -17,7 +17,10 @@ from .rounds import Round, Search
 from .settings import PlanSettings
 from .softening import SOFTENING
 
-NEEDED = ("mass_matrix", "inverse_dynamics", "rollout")  # functions of the model
+NEEDED = (  # functions of the model
+    *("mass_matrix", "inverse_dynamics", "forward_dynamics"),
+    *("rollout", "energy", "momentum"),
+)
 
 
 def best_plan(

@@ -62,10 +62,9 @@ def checked_bounds(model: Model, bounds: Any) -> Bounds:
     usual = STRONGEST * total_mass(p) * 9.81 * p["tail_length"]
     if torque is not None and torque.max() > usual:
         most = f"{torque.max():.6g}"
-        told = (
-            f"bounds.torque: value {most} N m: {STRONGEST:g} times this body's weight at the end "
-        )
-        told += f'of its tail is {usual:.2g} N m: did you mean "{most} mN m"? None sets no bound'
+        told = f"bounds.torque: value {most} N m: {STRONGEST:g} times this body's weight at the "
+        told += f"end of its tail is {usual:.2g} N m: did you mean "
+        told += f'"{most} mN m"? None sets no bound'
         warnings.warn(told, UnusualSize, stacklevel=FRAMES)
     return Bounds(**found)
 

@@ -69,8 +69,9 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
     Parameters
     ----------
     model : Model
-        The model, with a free base; its scene needs "mass_matrix", "inverse_dynamics" and
-        "rollout". If it has contacts, its flight is planned without the ground.
+        The model, with a free base; its scene needs "mass_matrix", "inverse_dynamics",
+        "forward_dynamics", "rollout", "energy" and "momentum". If it has contacts, its flight is
+        planned without the ground.
     start : (array_like, array_like)
         State (q0 (nq,), v0 (nv,)) at the start.
     goal : Goal or str, optional
@@ -140,7 +141,7 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
         Largest error of the true rates of torso and tail at the end (rad/s); None for no demand.
     solver : str, default "ipopt"
         "ipopt", another solver of ``casadi.nlpsol``, or "fatrop", which solves airborne problems
-        in stages.
+        in stages: with known starts and parameters, and neither paths nor own objectives.
     options : dict, optional
         Options of ``casadi.nlpsol``, such as ``{"ipopt.max_iter": 500}``.
     dynamics : {"auto", "compiled", "symbolic"}, default "auto"
@@ -179,7 +180,8 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
     ``tail_rate``, ``torso_rate``, ``torque``, ``attitude``, ``quaternion``, ``time``,
     ``duration``, ``position``, ``height``, ``tip``, ``tail_points``, ``center_of_mass``,
     ``contact_points`` and ``body_points`` in SI units, the model's ``parameters`` by name, and
-    the blocks of its formulation.
+    the blocks of its formulation. ``torso_rate`` is in body axes; quaternions are (w, x, y, z),
+    from torso to world.
 
     Between nodes, bounds hold to one part in 1000.
 
