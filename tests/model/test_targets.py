@@ -72,7 +72,9 @@ def test_a_model_without_casadi_functions_evaluates_by_its_c(plain, both):
     np.testing.assert_array_equal(model.mass_matrix(Q), both.mass_matrix(Q))
     compiled = model.casadi.external("mass_matrix", folded=True)
     np.testing.assert_array_equal(compiled(Q), both.mass_matrix(Q))
-    assert dir(model.casadi) == ["external", "nodes", "parameter_vector", "symbolic"]
+    assert dir(model.casadi) == [
+        *("external", "nodes", "parameter_names", "parameter_vector", "symbolic")
+    ]
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ import serpentail as st
 from serpentail.attitude import from_angles
 from serpentail.planning import rounds, ways
 from serpentail.planning.nlp import interrupt, solver, transcription
+from serpentail.planning.result import report as result_report
 from tests.support.models import model_folder
 from tests.support.tumbling import AGAIN, FUNCTIONS, planned, rat, start
 
@@ -123,6 +124,29 @@ def test_time_limit_ends_refinement_with_the_best_round(monkeypatch):
     cut = st.plan(model, start=start(model), **settings)
     assert not cut.success and cut.report["converged"]
     assert (cut.report["stopped"], cut.report["rounds"]) == ("time limit", 1)
+
+
+def test_wall_time_counts_the_tracking(monkeypatch):
+    def slow(*arguments):
+        time.sleep(0.2)
+        return tracked(*arguments)
+
+    tracked = result_report.tracked
+    monkeypatch.setattr(result_report, "tracked", slow)
+    given = AGAIN | {"start": start(rat()), "intervals": 6, "track": True}
+    begun = time.perf_counter()
+    report = st.plan(rat(), **given).report
+    assert 0.2 + report["truth_s"] <= report["wall_s"] <= time.perf_counter() - begun
+    assert report["tracked_attitude_error_deg"] is not None
+
+
+def test_tracking_for_which_the_limit_leaves_no_time_is_left_out(monkeypatch):
+    monkeypatch.setattr(result_report, "TRACKING_COST", 1e6)
+    given = AGAIN | {"start": start(rat()), "intervals": 6, "track": True}
+    for limit, stopped in ((60.0, "time limit"), (None, None)):
+        report = st.plan(rat(), **given, time_limit=limit).report
+        assert report["stopped"] == stopped and report["success"]
+        assert (report["tracked_attitude_error_deg"] is None) == (limit is not None)
 
 
 def test_time_limits_are_of_one_thread():

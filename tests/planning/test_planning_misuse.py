@@ -12,6 +12,8 @@ import pytest
 
 import serpentail as st
 from serpentail import cli
+from serpentail.checks import Refusals
+from serpentail.planning.problem import checked_problem
 from serpentail.scenes.plan import plan_arguments, planned
 from serpentail.scenes.plan_keys import PLAN
 from tests.support.models import model_folder
@@ -20,6 +22,10 @@ from tests.support.tumbling import DURATION, FUNCTIONS, rat, start
 
 SCENE = Path(__file__).parents[2] / "scenes" / "righting_m1_n3.toml"
 NAN = [float("nan")] * 8
+USUAL = {
+    **{"objective": "effort", "smoothing": 0.0, "damping": 0.0, "path": (), "clearance": None},
+    **{"legs": None, "formulation": "airborne", "attitude": "quaternion"},
+}
 
 
 def refused(**changes) -> str:
@@ -74,15 +80,85 @@ def refused(**changes) -> str:
         ),
         ({"objective": lambda p: p.torqe**2}, "did you mean 'torque'?"),
         ({"path": [(lambda p: p.hight, 0, 1)]}, "path[0]: a point has no 'hight', it has"),
+        (
+            {"objective": lambda p: p.torque},
+            "objective: a result of shape (2, 1): needs one number",
+        ),
+        ({"objective": lambda _: "least"}, "objective: value 'least': needs a result of numbers"),
+        ({"path": [(lambda _: None, 0, 1)]}, "path[0]: value None: needs a result of numbers"),
+        ({"path": [(lambda p: p.tail, 0.5, 1)]}, "path[0]: the start has"),
+        (
+            {"path": [(lambda p: p.position[2], 0, 0.2)]},
+            "path[0]: the start has 0.3, beyond (0, 0.2)",
+        ),
+        ({"path": [(lambda p: p.time, 0.1, 1)]}, "path[0]: the start has 0, beyond (0.1, 1)"),
+        ({"num_nodes": 59}, "setting: value 'num_nodes': did you mean 'intervals'?"),
         ({"interval": 20}, "setting: value 'interval': did you mean 'intervals'?"),
         ({"guess": 3}, "guess: value 3: needs a Plan or a Trajectory"),
         ({"solver": "no_such"}, "solver: value 'no_such'"),
+        (
+            {"solver": "ipotp"},
+            "solver: value 'ipotp': did you mean 'ipopt'? There are 'ipopt', 'fatrop'",
+        ),
+        ({"options": {"max_iter": 5}}, 'did you mean "ipopt.max_iter"?'),
+        ({"options": {"max_iter": 5}, "solver": "fatrop"}, "did you mean 'fatrop.max_iter'?"),
+        ({"duration": 580}, 'a body falls 1.6e+06 m in this time: did you mean "580 ms"?'),
+        ({"duration": "20 mm"}, "duration: value '20 mm': a length where a time is needed"),
+        ({"bounds": st.Bounds(torque="20 mm")}, "bounds.torque: value '20 mm': a length where"),
         ({"options": {"ipopt.no_such": 1}}, "options: value {'ipopt.no_such': 1}"),
         ({"options": 3}, "options: value 3: needs a dict"),
     ],
 )
 def test_what_is_wrong_is_named(changes, words):
     assert words in refused(**changes)
+
+
+def test_path_constraints_that_a_start_may_meet_are_not_refused():
+    """Torques and a free duration are not known there, nor are free starts."""
+    q, v = start(rat())
+    path = [(lambda p: p.torque, -1e-4, 0.02), (lambda p: p.duration, 0.3, 0.4)]
+    path += [(lambda p: p.tail[0], q[7] - 1e-7, 3.0), (lambda p: p.tail_rate[0], -np.inf, 1e3)]
+    given = {"duration": (0.1, 0.5), "rounds": 0, "retries": 0, "intervals": 3, "track": False}
+    few = {"options": {"ipopt.max_iter": 2}, "tolerance": None}
+    assert not st.plan(rat(), start=(q, v), path=path, **given, **few).success
+    path = [(lambda p: p.tail[0], q[7] + 0.01, 3.0)]
+    with pytest.raises(st.PlanningError, match=r"path\[0\]: the start has"):
+        st.plan(rat(), start=(q, v), path=path, **given, **few)
+    free = {"tail": (q[7:] - 0.1, q[7:] + 0.1)}
+    assert not st.plan(rat(), start=(q, v), path=path, free_start=free, **given, **few).success
+
+
+def test_bounds_and_durations_may_have_units():
+    checked = [
+        checked_problem(rat(), (start(rat()), None, duration, bounds), USUAL, Refusals(ValueError))
+        for duration, bounds in (
+            (0.4, st.Bounds(angle=np.pi / 3, torque=(0.02, 0.01), rate=np.radians(500))),
+            ("400 ms", st.Bounds("60 deg", "500 deg/s", ["20 mN m", "10 N mm"])),
+        )
+    ]
+    assert checked[0].duration == checked[1].duration == (0.4, 0.4)
+    for name in ("angle", "rate", "torque"):
+        own, texts = (getattr(problem.bounds, name) for problem in checked)
+        np.testing.assert_allclose(texts, own, rtol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("duration", "bounds", "words"),
+    [
+        (6.0, st.Bounds(), r'duration: value 6 s: a body falls .*: did you mean "6 ms"\?'),
+        (0.4, st.Bounds(torque=20), r'torque: value 20 N m: .*: did you mean "20 mN m"\?'),
+        (0.4, st.Bounds(angle=60), r'angle: value 60 rad: .*: did you mean "60 deg"\?'),
+    ],
+)
+def test_slips_of_units_give_a_warning(duration, bounds, words):
+    with pytest.warns(st.UnusualSize, match=words):
+        checked_problem(rat(), (start(rat()), None, duration, bounds), USUAL, Refusals(ValueError))
+
+
+def test_a_long_flight_without_gravity_is_no_slip():
+    weightless = rat().with_parameters(gravity=0.0)
+    task = (start(rat()), None, 580.0, st.Bounds(angle=1e3, torque=None))
+    assert checked_problem(weightless, task, USUAL, Refusals(ValueError)).duration == (580, 580)
 
 
 def test_scenes_without_a_function_are_refused():

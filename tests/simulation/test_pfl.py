@@ -6,6 +6,7 @@ import pytest
 import serpentail as st
 from serpentail.simulation.pfl import KD, KP
 from tests.references.parameters import random_states
+from tests.support.models import model_folder
 from tests.support.tumbling import planned, rat, start
 
 
@@ -74,6 +75,15 @@ def test_misuse(reference, gains, words):
     with pytest.raises(st.SimulationError) as caught:
         st.Pfl(rat(), reference, **gains)
     assert words in str(caught.value)
+
+
+def test_functions_that_the_model_lacks_are_named_at_once():
+    reference = ([0.0, 1.0], np.zeros((2, 2)))
+    has = ["forward_dynamics", "energy", "momentum", "rollout", "mass_matrix"]
+    with pytest.raises(st.ModelError, match="without 'inverse_dynamics'"):
+        st.Pfl(st.load(model_folder(1, 1, functions=has)), reference)
+    st.Pfl(st.load(model_folder(1, 1, functions=[*has, "inverse_dynamics"])), reference)
+    st.Pfl(st.load(model_folder(1, 1, functions=[*has, "pfl"])), reference)
 
 
 def test_tracking_a_plan_takes_the_planned_torques():

@@ -12,11 +12,15 @@ from .cores import threads
 from .kept import kept
 from .layout import OMEGA, QUATERNION, TAIL_V, VELOCITY
 from .nodes.function import MOST_NODES, RESULTS, nodes_function
-from .parameters import flat
+from .parameters import flat, flat_names
 from .state_space import RATE
 
 if TYPE_CHECKING:
     from .model import Model
+
+# Graphs then see the calls inside. A function that is called as a whole would be differentiated by
+# all its inputs, and second derivatives by parameters, which the compiled C lacks, are NaN.
+INLINED = {"always_inline": True}
 
 
 class CasadiFunctions:
@@ -73,13 +77,13 @@ class CasadiFunctions:
 
     def _x_dot(self, forward_dynamics: casadi.Function, kind: Any) -> casadi.Function:
         """Return x_dot of a function of q, v, tau and parameters; SX or MX."""
-        layout = self._model.layout
+        layout, options = self._model.layout, INLINED if kind is casadi.MX else {}
         sizes = {"x": layout.nq + layout.nv, "u": layout.nt, "p": self.parameter_vector.numel()}
         x, u, p = inputs = [kind.sym(name, size) for name, size in sizes.items()]
         q, v = casadi.vertsplit(x, [0, layout.nq, sizes["x"]])
         if layout.fixed:
             rates = casadi.vertcat(v, forward_dynamics(q, v, u, p))
-            return casadi.Function("x_dot", inputs, [rates], [*sizes], ["x_dot"])
+            return casadi.Function("x_dot", inputs, [rates], [*sizes], ["x_dot"], options)
         quaternion, omega = q[QUATERNION], v[OMEGA]
         scalar, vector = quaternion[0], quaternion[1:]
         turning = casadi.vertcat(
@@ -88,7 +92,7 @@ class CasadiFunctions:
         restoring = RATE * (1 - casadi.sumsqr(quaternion)) * quaternion
         v_dot = forward_dynamics(q, v, u, p)
         x_dot = casadi.vertcat(v[VELOCITY], turning / 2 + restoring, v[TAIL_V], v_dot)
-        return casadi.Function("x_dot", inputs, [x_dot], [*sizes], ["x_dot"])
+        return casadi.Function("x_dot", inputs, [x_dot], [*sizes], ["x_dot"], options)
 
     def __repr__(self) -> str:
         names = ", ".join(self._model.manifest["functions"])
@@ -101,12 +105,17 @@ class CasadiFunctions:
         symbolic = [*self._module.SIGNATURES] if self._has_module else []
         if "forward_dynamics" in symbolic:
             symbolic.append("x_dot")
-        return [*symbolic, "symbolic", "external", "nodes", "parameter_vector"]
+        return [*symbolic, "symbolic", "external", "nodes", "parameter_names", "parameter_vector"]
 
     @property
     def parameter_vector(self) -> casadi.DM:
         """The model's parameters in the order that ``symbolic`` and ``external`` functions take."""
         return casadi.DM(flat(self._model.manifest, self._model.parameters))
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """The name of each number of ``parameter_vector``, such as "link_masses[0]"."""
+        return flat_names(self._model.manifest)
 
     def symbolic(self, name: str) -> casadi.Function:
         """Return a function of SX operations whose last input is the parameter vector.
@@ -140,7 +149,8 @@ class CasadiFunctions:
             With 0, CasADi reports a missing one when it differentiates. Derivatives with respect to
             parameters are of first order and need ``<name>_parameter_derivatives`` in the scene.
         folded : bool, default False
-            Use the model's parameters in place of the last input.
+            Use the model's parameters in place of the last input. Do so before ``map`` and in
+            functions of your own: there, missing second derivatives by parameters make others NaN.
 
         Returns
         -------
@@ -152,6 +162,7 @@ class CasadiFunctions:
         ModelError
             The model computes with float, was loaded with ``compiled=False``, or lacks a function.
         """
+        order = whole_number("derivatives", derivatives, ModelError, least=0, most=2)
         prefix = self._model.manifest["prefix"]
         if self._model.manifest["real"] != "double":
             raise ModelError(
@@ -161,9 +172,9 @@ class CasadiFunctions:
         if self._model.library is None:
             raise ModelError(f"{prefix} was loaded with compiled=False: load it again to use its C")
         if name == "x_dot":
-            function = self._x_dot(self.external("forward_dynamics", derivatives), casadi.MX)
+            function = self._x_dot(self.external("forward_dynamics", order), casadi.MX)
         else:
-            self._check(self._known(name), derivatives)
+            self._check(self._known(name), order)
             function = casadi.external(f"{prefix}_casadi_{name}", self._model.library._name)
         if not folded:
             return function
@@ -215,8 +226,7 @@ class CasadiFunctions:
         names = function.name_in()[:-1]
         inputs = [casadi.MX.sym(key, function.sparsity_in(key)) for key in names]
         outputs = list(function.call([*inputs, casadi.MX(self.parameter_vector)]))
-        options = {"always_inline": True}  # graphs then see the blocks
-        return casadi.Function(name, inputs, outputs, names, function.name_out(), options)
+        return casadi.Function(name, inputs, outputs, names, function.name_out(), INLINED)
 
     def _symbolic(self, name: str) -> str:
         """Return the name if the function has SX operations; ModelError otherwise."""

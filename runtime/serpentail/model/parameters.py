@@ -204,6 +204,16 @@ def flat(manifest: dict, values: Mapping[str, Value]) -> list[float]:
     return scalars
 
 
+def flat_names(manifest: dict) -> tuple[str, ...]:
+    """Return the names of these scalars: that of the parameter, with an index if it has several."""
+    names: list[str] = []
+    for p in manifest["parameters"]:
+        if p["in_struct"]:
+            several = p["size"] > 1
+            names += [f"{p['name']}[{k}]" for k in range(p["size"])] if several else [p["name"]]
+    return tuple(names)
+
+
 def checked_value(
     fields: dict, name: str, value: object, runs: int | None = None
 ) -> np.ndarray | str:

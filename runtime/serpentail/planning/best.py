@@ -10,13 +10,17 @@ from .momentum import refuse_impossible
 from .nlp.equations import equations_of_motion
 from .nlp.fork_gate import forks_wait
 from .nlp.interrupt import stoppable
+from .paths_at_start import refuse_violated
 from .problem import PlanningProblem
 from .result.plan import Plan
 from .rounds import Round, Search
 from .settings import PlanSettings
 from .softening import SOFTENING
 
-NEEDED = ("mass_matrix", "inverse_dynamics", "rollout")  # functions of the model
+NEEDED = (  # functions of the model
+    *("mass_matrix", "inverse_dynamics", "forward_dynamics"),
+    *("rollout", "energy", "momentum"),
+)
 
 
 def best_plan(
@@ -30,6 +34,7 @@ def best_plan(
     if missing:
         raise model.without(*missing)
     refuse_impossible(model, problem)
+    refuse_violated(model, problem)
     begun, easier = time.perf_counter(), None
     with forks_wait(), Stage("plan", model.name) as stage:
         equations = equations_of_motion(model, settings.dynamics, problem.design)
@@ -42,11 +47,11 @@ def best_plan(
                 )
                 easier = Search(model, calm, untracked, equations)
                 found = rounds_of(easier, stage)
-                guess = easier.plan(easier.best(found), len(found), 0.0)
+                guess = easier.plan(easier.best(found), len(found), begun)
                 settings = replace(settings, guess=guess)
             search = Search(model, problem, settings, equations, easier)
             rounds = rounds_of(search, stage, watch, begun)
-        return search.plan(search.best(rounds), len(rounds), time.perf_counter() - begun)
+        return search.plan(search.best(rounds), len(rounds), begun)
 
 
 def rounds_of(
@@ -61,5 +66,5 @@ def rounds_of(
         rounds.append(each)
         stage.tell(what=f"{search.model.name}: {each} after round {len(rounds)}")
         if watch is not None:
-            watch(search.plan(each, len(rounds), time.perf_counter() - begun))
+            watch(search.plan(each, len(rounds), begun))
     return rounds

@@ -44,12 +44,14 @@ GOALS = {"upright": Goal()}  # by name
 class Bounds:
     """Largest magnitudes along a plan (g_pc of Eq. 43); None sets no bound.
 
-    Each is one number, or one for each of the 2m tail coordinates.
+    Each is one number, or one for each of the 2m tail coordinates, in SI units or as text with a
+    unit, such as "20 mN m".
 
     Parameters
     ----------
     angle : float or array_like, optional
-        Tail coordinates (rad). Default: no bound.
+        Tail coordinates (rad): the angle of each joint. A segment of n links bends by n times it.
+        Default: no bound.
     rate : float or array_like, optional
         Their rates (rad/s). Default: no bound.
     torque : float or array_like, default 0.02

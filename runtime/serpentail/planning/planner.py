@@ -69,14 +69,15 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
     Parameters
     ----------
     model : Model
-        The model, with a free base; its scene needs "mass_matrix", "inverse_dynamics" and
-        "rollout". If it has contacts, its flight is planned without the ground.
+        The model, with a free base; its scene needs "mass_matrix", "inverse_dynamics",
+        "forward_dynamics", "rollout", "energy" and "momentum". If it has contacts, its flight is
+        planned without the ground.
     start : (array_like, array_like)
         State (q0 (nq,), v0 (nv,)) at the start.
     goal : Goal or str, optional
         What holds at the end. Default: "upright", the torso upright and at rest, at any yaw.
     duration : float or (float, float)
-        Duration (s), or (least, most) if it is free.
+        Duration (s), or (least, most) if it is free; also text with a unit, such as "580 ms".
     bounds : Bounds, optional
         Bounds along the motion. Default: torques up to 0.02 N m.
     objective : {"effort", "energy", "time"} or callable, default "effort"
@@ -140,13 +141,14 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
         Largest error of the true rates of torso and tail at the end (rad/s); None for no demand.
     solver : str, default "ipopt"
         "ipopt", another solver of ``casadi.nlpsol``, or "fatrop", which solves airborne problems
-        in stages.
+        in stages: with known starts and parameters, and neither paths nor own objectives.
     options : dict, optional
         Options of ``casadi.nlpsol``, such as ``{"ipopt.max_iter": 500}``.
     dynamics : {"auto", "compiled", "symbolic"}, default "auto"
         Source of the dynamics and its derivatives: compiled C or CasADi operations.
     time_limit : float, optional
-        Time for the search (s).
+        Time for the search (s). If it leaves no time to track the plan, the report has no errors
+        of tracking.
     guess : Plan or Trajectory, optional
         First guess. Default: passive flight.
     guess_damping : float, default 1e-3
@@ -178,7 +180,8 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
     ``tail_rate``, ``torso_rate``, ``torque``, ``attitude``, ``quaternion``, ``time``,
     ``duration``, ``position``, ``height``, ``tip``, ``tail_points``, ``center_of_mass``,
     ``contact_points`` and ``body_points`` in SI units, the model's ``parameters`` by name, and
-    the blocks of its formulation.
+    the blocks of its formulation. ``torso_rate`` is in body axes; quaternions are (w, x, y, z),
+    from torso to world.
 
     Between nodes, bounds hold to one part in 1000.
 
@@ -196,7 +199,9 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
     model.refuse_fixed("plan")
     refused = Refusals(PlanningError)
     for name in unknown:
-        refused.add(name, none_of("setting", name, NAMES))
+        same = OTHER_WORDS.get(name)
+        meant = f"setting: value {name!r}: did you mean {same!r}?"
+        refused.add(name, meant if same else none_of("setting", name, NAMES))
     if watch is not None and not callable(watch):
         refused.add("watch", needed("watch", watch, "a function of a Plan, or None"))
     settings = PlanSettings(
@@ -245,6 +250,12 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
     return best_plan(model, problem, settings, watch)
 
 
+OTHER_WORDS = {  # of other planners, for our settings
+    **dict.fromkeys(("num_nodes", "nodes", "n_nodes", "num_intervals", "N"), "intervals"),
+    **dict.fromkeys(("constraints", "path_constraints"), "path"),
+    **dict.fromkeys(("initial_guess", "initial"), "guess"),
+    "x0": "start",
+}
 NAMES = [
     name
     for name, parameter in signature(plan).parameters.items()

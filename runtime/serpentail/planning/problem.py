@@ -1,7 +1,7 @@
 """A planning problem, checked field by field before anything is derived."""
 
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
@@ -17,6 +17,7 @@ from ..simulation.schedules import Legs
 from .design import Design, checked_design
 from .free_start import Range, checked_free_start, moved_inside, within_bounds
 from .goal import GOALS, Bounds, Goal
+from .magnitudes import HUGE, checked_bounds, checked_duration
 from .nlp.coordinates import KINDS
 from .nlp.node import FORMULATIONS
 from .paths import PathConstraint, checked_clearance, checked_path, clear_of_ground
@@ -24,7 +25,6 @@ from .paths import PathConstraint, checked_clearance, checked_path, clear_of_gro
 OBJECTIVES = ("effort", "energy", "time")
 # N m s: the effort counts a tail's rates as torques, or a plan whirls a light tail at no cost
 SMOOTHING = 3e-4
-HUGE = 1e100  # beyond it squares overflow
 START_SLACK = 1e-6  # rad, rad/s: how far a start may be beyond its bounds
 
 
@@ -72,8 +72,8 @@ def checked_problem(
         start = moved_inside(start, free)
     goal = attempt("goal", checked_goal, task[1], tail)
     duration, bounds = (
-        attempt("duration", _duration, task[2]),
-        attempt("bounds", _bounds, task[3], tail),
+        attempt("duration", checked_duration, model, task[2]),
+        attempt("bounds", checked_bounds, model, task[3]),
     )
     if start is not None and bounds is not None:
         attempt("bounds.angle", _start_inside, start[0][TAIL_Q], bounds.angle, "angle", "rad")
@@ -171,24 +171,6 @@ def _partly_free(field: str, value: Any, size: int) -> np.ndarray | None:
     return array
 
 
-def _bounds(bounds: Any, tail: int) -> Bounds:
-    if not isinstance(bounds, Bounds):
-        raise PlanningError(f"bounds: value {shown(bounds)}: needs a serpentail.Bounds")
-    return Bounds(
-        *(_magnitudes(entry.name, getattr(bounds, entry.name), tail) for entry in fields(Bounds))
-    )
-
-
-def _magnitudes(name: str, value: Any, tail: int) -> np.ndarray | None:
-    """Return a bound of every tail coordinate; None for no bound."""
-    if value is None:
-        return None
-    magnitudes = numbers(f"bounds.{name}", value, tail, PlanningError, most=HUGE)
-    if not (magnitudes > 0).all():
-        raise PlanningError(f"bounds.{name}: value {shown(value)}: needs magnitudes above 0")
-    return magnitudes
-
-
 def _start_inside(values: np.ndarray, bound: np.ndarray | None, name: str, unit: str) -> None:
     if bound is None:
         return
@@ -216,18 +198,6 @@ def _goal_inside(name: str, values: np.ndarray | None, bound: np.ndarray | None)
             f"goal.{name}: entry {k} is {values[k]:.6g}, beyond its bound {bound[k]:.6g}: change "
             "one"
         )
-
-
-def _duration(duration: Any) -> tuple[float, float]:
-    pair = duration if isinstance(duration, tuple | list) else (duration, duration)
-    if len(pair) != 2:
-        raise PlanningError(
-            f"duration: value {shown(duration)}: needs one number, or (least, most), in s"
-        )
-    least, most = (number("duration", value, PlanningError, above=0) for value in pair)
-    if most < least:
-        raise PlanningError(f"duration: value {shown(duration)}: needs least <= most, in s")
-    return least, most
 
 
 def _objective(objective: Any) -> str | Callable[[Any], Any]:

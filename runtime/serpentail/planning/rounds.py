@@ -17,7 +17,7 @@ from .found import chosen, flown, guessed
 from .nlp.coordinates import attitude
 from .nlp.equations import Equations
 from .nlp.guess import Motion, of_trajectory, passive, pushes, unknowns
-from .nlp.interrupt import stop_reason
+from .nlp.interrupt import stop_reason, time_left
 from .nlp.mesh import Mesh, refined
 from .nlp.multipliers import Multipliers
 from .nlp.program import Program
@@ -37,6 +37,7 @@ from .ways import Begin, way_of
 
 FIRST_PUSH = 0.05  # of the torques' unit: takes the first guess out of a plane of symmetry
 DURATIONS = (1.0, 0.5, 0.75, 0.25)  # of guesses, in turn, from the least (0) to the most (1)
+OVERRUN = 0.1  # of a time limit: how far work after the search may exceed it
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,21 +150,22 @@ class Search:
             return 0.0
         return max(self._off(found), largest(found.excess)[0] / SLACK)
 
-    def plan(self, best: Round, rounds: int, wall_s: float) -> Plan:
-        """Return the plan of a round; rounds: their number so far."""
+    def plan(self, best: Round, rounds: int, begun: float) -> Plan:
+        """Return the plan of a round; rounds: their number so far; begun: the clock's time then."""
         success = bool(best.solution.success and self._wrong(best) <= 1)
         trajectory = sampled(best.model, best.problem, best.curve)
-        counts = {
+        summary = {"success": success} | report(self, best, trajectory)
+        summary |= {
             "rounds": rounds,
             "iterations": self.iterations,
             "guesses": self.attempts,
             "stopped": self.stopped,
         }
-        summary = {"success": success} | report(self, best, trajectory) | counts
+        wall = {"wall_s": time.perf_counter() - begun}
         return Plan(
             success=success,
             trajectory=trajectory,
-            report=summary | self.spent | {"wall_s": wall_s},
+            report=summary | self.spent | wall,
             problem=best.problem,
             curve=best.curve,
             mesh=best.nlp.mesh,
@@ -171,6 +173,14 @@ class Search:
             solution=best.solution,
             design=chosen(best.problem, best.model),
         )
+
+    def leaves_no_time(self, needed: float) -> bool:
+        """Tell, and note, whether work that needs so long (s) would end far beyond the limit."""
+        limit = self.settings.time_limit
+        if limit is None or needed <= time_left() + OVERRUN * limit:
+            return False
+        self.stopped = self.stopped or "time limit"
+        return True
 
     def _stopped(self) -> bool:
         """Tell, and note why, whether the search should end that is not done."""

@@ -10,8 +10,8 @@ from ..checks import Refusals, needed, number, one_of, shown, whole_number
 from ..errors import PlanningError
 from ..model.model import Model
 from ..motion.trajectory import Trajectory
+from .magnitudes import HUGE
 from .nlp.rules import collocation_rule
-from .problem import HUGE
 
 WHOLE_NUMBERS = {  # least and most of each; beyond the most a search would not end
     "rounds": (0, 1000),

@@ -14,6 +14,7 @@ from .piecewise import Piecewise, checked_nodes, spline
 from .schedules import Reference
 
 KP, KD = 4e4, 400.0  # 1/s^2, 1/s: Table 1
+NEEDED = ("inverse_dynamics", "mass_matrix")  # functions of a model without "pfl"
 
 
 class Pfl:
@@ -38,12 +39,14 @@ class Pfl:
         Whether to use q_t_ddot_r, which the paper leaves out.
     torque : float or sequence of float, optional
         Largest torque of the motors (N m), one number or one for each tail coordinate. Default:
-        no limit.
+        no limit, also if the reference is a plan with bounds: give ``plan.problem.bounds.torque``.
 
     Raises
     ------
     SimulationError
         An argument is wrong.
+    ModelError
+        The scene left these functions out.
 
     Examples
     --------
@@ -60,6 +63,10 @@ class Pfl:
         torque: Any = None,
     ):
         self.model = model
+        needed = NEEDED[:1] if model.fixed else NEEDED
+        missing = [name for name in needed if name not in model.generated]
+        if missing and "pfl" not in model.generated:
+            raise model.without(*missing)
         self.kp = number("Pfl: kp", kp, SimulationError, least=0)
         self.kd = number("Pfl: kd", kd, SimulationError, least=0)
         self.curve = _curve(reference, model.layout.nt)

@@ -18,6 +18,7 @@ from serpentail_codegen.scene.signatures.table import EXACT_DERIVATIVES
 from ...references.parameters import random_states
 from ...support import collocation
 from ...support.models import model_folder
+from .external_models import BY_PARAMETERS, PARTS
 
 # What a scene has.
 
@@ -78,6 +79,58 @@ def test_folded_function_takes_the_parameters_of_the_model(loaded):
     symbols = [casadi.MX.sym(key, f.size1_in(key), 3) for key in f.name_in()]
     of_q = casadi.jacobian(f.map(3)(*symbols), symbols[0])
     assert of_q.nnz() == 3 * f.jacobian().nnz_out("jac_v_dot_q")
+
+
+def test_each_parameter_has_its_name(loaded):
+    names, values = loaded.casadi.parameter_names, loaded.casadi.parameter_vector.full().ravel()
+    assert len(names) == len(values)
+    for name, value in zip(names, values, strict=True):
+        key, _, k = name.rstrip("]").partition("[")
+        whole = loaded.parameters[key]
+        assert value == (whole[int(k)] if k else whole)
+    heavier = loaded.parameters["torso_mass"] * 1.01
+    changed = loaded.with_parameters(torso_mass=heavier).casadi.parameter_vector.full().ravel()
+    assert names[np.flatnonzero(changed != values)[0]] == "torso_mass"
+
+
+@pytest.mark.parametrize("order", [3, -1, 1.5, True, "2"])
+def test_order_of_derivatives_is_checked(loaded, order):
+    for name in ("forward_dynamics", "x_dot"):
+        with pytest.raises(st.ModelError, match=r"derivatives: value .*: needs a whole number"):
+            loaded.casadi.external(name, derivatives=order)
+
+
+def test_what_only_simulations_call_is_no_casadi_function():
+    model = st.load(model_folder(1, 1, functions=["forward_dynamics", "energy", "rollout"]))
+    for made in (model.casadi.symbolic, model.casadi.external, model.kernel):
+        with pytest.raises(st.ModelError, match=r"'rollout' of .* no form for CasADi"):
+            made("rollout")
+
+
+@pytest.mark.parametrize("folded", [True, False])
+def test_second_derivatives_of_x_dot_are_those_of_the_symbolic_function(folded):
+    """Also where the scene has derivatives by parameters, whose second ones are NaN."""
+    model = st.load(model_folder(1, 3, functions=[*PARTS, *BY_PARAMETERS]))
+    p, (nx, nu) = model.casadi.parameter_vector, (model.nq + model.nv, 2)
+    compiled = model.casadi.external("x_dot", derivatives=2, folded=folded)
+    q, v, _, tau = (x[0] for x in random_states(1, 3, 1, "random"))
+    found = []
+    for kind, f in ((casadi.MX, compiled), (casadi.SX, model.casadi.x_dot)):
+        x, u = kind.sym("x", nx), kind.sym("u", nu)
+        y = f(*(x, u, p)[: f.n_in()])
+        weighted = casadi.dot(casadi.cos(casadi.DM(range(nx))), y)
+        of = casadi.hessian(weighted, casadi.vertcat(x, u))[0]
+        found.append(casadi.Function("of", [x, u], [of])(casadi.vertcat(q, v), tau).full())
+    np.testing.assert_allclose(*found, rtol=1e-9, atol=1e-12 * np.abs(found[1]).max())
+    if not folded:
+        inputs = casadi.MX.sym("x", nx), casadi.MX.sym("u", nu), casadi.MX.sym("p", p.numel())
+        slope = casadi.Function("slope", inputs, [casadi.jacobian(compiled(*inputs), inputs[2])])
+        symbols = model.casadi.x_dot.sx_in()
+        own = casadi.jacobian(model.casadi.x_dot(*symbols), symbols[2])
+        expected = casadi.Function("slope", symbols, [own])
+        at = casadi.vertcat(q, v), tau, p
+        found, expected = slope(*at).full(), expected(*at).full()
+        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12 * np.abs(expected).max())
 
 
 def test_second_derivatives_that_a_scene_lacks_are_refused(loaded):

@@ -76,8 +76,15 @@ class Evaluated:
 
     def without(self, *names: str) -> ModelError:
         """Return the ModelError about functions that the model was generated without."""
-        if set(names) & set(self.manifest["scene"]["functions"]):  # functions that only the C has
+        inner = sorted(set(names) & set(self.manifest["scene"]["functions"]))
+        if inner and "c" not in self.manifest["scene"]["targets"]:
             return without_c(self.manifest)
+        if inner:
+            return ModelError(
+                f"{', '.join(map(repr, inner))} of {self.name} is C that runs simulations, with no "
+                "form for CasADi or single calls: use st.simulate, or CasADi's own integrators "
+                "with forward_dynamics"
+            )
         has = ", ".join(self.generated)
         return ModelError(
             f"{self.name} was generated without {', '.join(map(repr, names))} (it has {has}): add "

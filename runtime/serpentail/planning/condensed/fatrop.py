@@ -160,9 +160,10 @@ def options_of(asked: Mapping[str, Any], guess: str) -> Any:
         own = name.removeprefix(PREFIX)
         kind = library().fatrop_ocp_c_option_type(own.encode())
         if own == name or kind not in (0, 1, 2):
-            raise PlanningError(
-                f"options: {shown(name)}: FATROP has no such setting; 'fatrop.max_iter' is one"
-            )
+            meant = "'fatrop.max_iter' is one"
+            if kind in (0, 1, 2):
+                meant = f"did you mean '{PREFIX}{own}'?"
+            raise PlanningError(f"options: {shown(name)}: FATROP has no such setting; {meant}")
         if not isinstance(value, bool | int | float) or not np.isfinite(value):
             raise PlanningError(f"options: {name}: value {shown(value)}: needs a number")
         settings[own] = value

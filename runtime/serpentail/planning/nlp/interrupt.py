@@ -46,6 +46,11 @@ def stop_reason() -> str | None:
     return "time limit" if time.monotonic() >= _search.deadline else None
 
 
+def time_left() -> float:
+    """Return the time (s) until the latest end of the search of this thread; inf without one."""
+    return _search.deadline - time.monotonic()
+
+
 @contextmanager
 def stoppable(
     time_limit: float | None = None, tick: Callable[[], object] = lambda: None

@@ -161,7 +161,7 @@ def node_function(
     state_rates = ca.vertcat(*(rates[name] for name, _ in variables.states))
     residuals = _momentum(shared, point, results[1]) if algebraic else ca.SX.zeros(0)
     constraints = [
-        ca.vec(ca.SX(asked(f"path[{k}]", function, point)))
+        ca.vec(asked(f"path[{k}]", function, point))
         for k, (function, _, _) in enumerate(problem.path)
     ]
     path = ca.vertcat(ca.SX.zeros(0), *constraints)
@@ -280,7 +280,7 @@ def cost(
     unit, rates = torque_unit.mean(), problem.smoothing**2 * ca.sumsqr(point.tail_rate)
     effort = (ca.sumsqr(point.torque) + rates) / unit**2
     if callable(problem.objective):
-        return asked("objective", problem.objective, point)
+        return asked("objective", problem.objective, point, single=True)
     if problem.objective == "energy":
         power = point.torque * point.tail_rate
         return ca.sum1(ca.sqrt(power**2 + softening**2) - softening) / (unit * 10)

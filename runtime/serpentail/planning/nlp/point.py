@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...checks import did_you_mean
+from ...checks import did_you_mean, needed
 from ...errors import PlanningError
 from ...model.model import Model
 from .body import Body
@@ -42,17 +42,33 @@ class Point(SimpleNamespace):
         )
 
 
-def asked(field: str, function: Callable[[Any], Any], point: Point) -> Any:
-    """Return the result of a user's function of a point.
+def asked(
+    field: str, function: Callable[[Any], Any], point: Point, single: bool = False
+) -> "ca.SX":
+    """Return the result of a user's function of a point, a matrix.
 
-    PlanningError if the function uses a block that the point lacks.
+    single: it has to be one number. PlanningError if the function uses a block that the point
+    lacks, or its result is something else.
     """
+    import casadi as ca
+
     try:
-        return function(point)
+        value = function(point)
     except AttributeError as error:
         if error.obj is not point:
             raise
         raise PlanningError(f"{field}: {error}") from error
+    try:
+        found = ca.SX(value)
+    except (NotImplementedError, RuntimeError):
+        needs = "a result of numbers or of CasADi expressions of the point"
+        raise PlanningError(needed(field, value, needs)) from None
+    if single and found.shape != (1, 1):
+        raise PlanningError(
+            f"{field}: a result of shape {found.shape}: needs one number, such as "
+            "casadi.sumsqr(point.torque)"
+        )
+    return found
 
 
 def point_of(

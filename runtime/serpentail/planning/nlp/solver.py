@@ -1,5 +1,6 @@
 """Solving a nonlinear program by CasADi's ``nlpsol``, as a rule with IPOPT."""
 
+import re
 import threading
 import time
 from collections.abc import Mapping
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...brief import brief
-from ...checks import shown
+from ...checks import did_you_mean, shown
 from ...errors import PlanningError
 from .blas_threads import one_thread
 from .bounds import Limits
@@ -55,6 +56,7 @@ WARM_OPTIONS: dict[str, Any] = CLOSE_OPTIONS | {
     "ipopt.warm_start_mult_bound_push": 1e-8,
 }
 GUESS_OPTIONS = {"far": {}, "close": CLOSE_OPTIONS, "warm": WARM_OPTIONS}
+SOLVERS = ("ipopt", "fatrop")
 DERIVATIVES = ("grad_f", "jac_g", "hess_lag")  # which a transcription brings
 
 
@@ -86,9 +88,9 @@ def solver(
     import casadi as ca
 
     if not isinstance(name, str) or not ca.has_nlpsol(name):
-        raise PlanningError(
-            f"solver: value {shown(name)}: CasADi has no such solver here; 'ipopt' comes with it"
-        )
+        remedy = did_you_mean(name, SOLVERS) or "CasADi has no such solver here."
+        others = "There are 'ipopt', 'fatrop' and other solvers of casadi.nlpsol"
+        raise PlanningError(f"solver: value {shown(name)}: {remedy} {others}")
     settings: dict[str, Any] = {"print_time": False, "error_on_fail": False}
     if name == "ipopt":
         settings |= IPOPT_OPTIONS | GUESS_OPTIONS[guess]
@@ -98,7 +100,7 @@ def solver(
         return memoised(key, partial(_engine, nlp, name, settings))
     except RuntimeError as error:
         raise PlanningError(
-            f"options: value {shown(options)}: {name} refuses them: {_reason(error)}"
+            f"options: value {shown(options)}: {name} refuses them: {_reason(error, name)}"
         ) from error
 
 
@@ -165,6 +167,10 @@ def solve(
     )
 
 
-def _reason(error: Exception) -> str:
+def _reason(error: Exception, name: str) -> str:
+    unknown = re.search(r"Unknown option: (\w+)", str(error))
+    if unknown:
+        own = f'did you mean "{name}.{unknown[1]}"?'
+        return f'CasADi has no option "{unknown[1]}"; {own} A solver\'s own begin with its name'
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     return lines[-1] if lines else "no reason given"

@@ -136,7 +136,7 @@ def start_rows(
         first += size
     body = Body(model, variables.design, blocks.pop("design", None))
     blocks["quaternion"] = attitude.quaternion(blocks["attitude"])
-    momentum, com, com_velocity = _conserved(body, blocks)
+    momentum, com, com_velocity = conserved_of(body, blocks)
 
     # what is conserved is what the start has
     names = [name for name, _ in CONSERVED if name in blocks]
@@ -151,7 +151,7 @@ def start_rows(
     point = point_of(body, blocks, ca.vertcat(com, com_velocity), problem.legs)
     rows, paths = [residuals], np.zeros(0, int)
     for k, (function, _, _) in enumerate(problem.path):
-        values = ca.vec(ca.SX(asked(f"path[{k}]", function, point)))
+        values = ca.vec(asked(f"path[{k}]", function, point))
         if not ca.depends_on(values, torque):
             rows.append(values)
             paths = np.append(paths, np.full(values.numel(), k))
@@ -163,7 +163,7 @@ def start_rows(
     )
 
 
-def _conserved(body: Body, blocks: dict[str, Any]) -> "tuple[ca.SX, ca.SX, ca.SX]":
+def conserved_of(body: Body, blocks: dict[str, Any]) -> "tuple[ca.SX, ca.SX, ca.SX]":
     """Return the quantities of CONSERVED, from H v in body axes."""
     import casadi as ca
 

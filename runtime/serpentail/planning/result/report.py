@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from ..rounds import Round, Search
 
 TRACKED_SAMPLES = 580  # of a tracked motion
+TRACKING_COST = 0.1  # about how long tracking takes (s), of the flight's duration
 
 
 def report(search: "Search", best: "Round", planned: Trajectory) -> dict[str, Any]:
@@ -76,7 +77,8 @@ def truth(search: "Search", best: "Round", planned: Trajectory) -> dict[str, Any
         "true_when_tracked": None,
         "dyn_err": None,
     }
-    if not search.settings.track:
+    needed = TRACKING_COST * float(planned.t[-1])
+    if not search.settings.track or search.leaves_no_time(needed):
         return errors
     try:
         motion = tracked(best.model, problem, planned)

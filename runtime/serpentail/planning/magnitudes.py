@@ -1,0 +1,88 @@
+"""Duration and bounds of a plan, also with units; those that no flight needs give a warning."""
+
+import warnings
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+
+from ..checks import number, numbers, shown
+from ..errors import PlanningError, UnusualSize
+from ..magnitudes import warn_of_unusual
+from ..model.model import Model
+from ..model.parameters import total_mass
+from ..units import in_unit
+from .goal import Bounds
+
+HUGE = 1e100  # beyond it squares overflow
+LONGEST = 5.0  # s: a fall from 120 m
+HIGHEST = 1e4  # m: no plan is of a fall from higher up
+STRONGEST = 30.0  # weights at the tail's length: more torque than any motor of the body has
+DEGREES = 360.0  # of an angle's bound in rad: a larger one is not meant as degrees
+UNITS = {"angle": "rad", "rate": "rad/s", "torque": "N m", "torque_rate": "N m/s"}
+FRAMES = 6  # from a warning to the call of st.plan
+
+
+def checked_duration(model: Model, duration: Any) -> tuple[float, float]:
+    """Return least and most (s) of a duration; UnusualSize if it is longer than falls are.
+
+    PlanningError if it is so long that its computation might take minutes.
+    """
+    pair = duration if isinstance(duration, tuple | list) else (duration, duration)
+    if len(pair) != 2:
+        raise PlanningError(
+            f"duration: value {shown(duration)}: needs one number, or (least, most), in s"
+        )
+    pair = [_plain("duration", value, "s") for value in pair]
+    least, most = (number("duration", value, PlanningError, above=0) for value in pair)
+    if most < least:
+        raise PlanningError(f"duration: value {shown(duration)}: needs least <= most, in s")
+    height = model.parameters["gravity"] * most**2 / 2
+    told = f"duration: value {most:.6g} s: a body falls {height:.2g} m in this time: did you mean "
+    told += f'"{most:.6g} ms"?'
+    if height > HIGHEST:
+        raise PlanningError(f"{told} It needs a fall of at most {HIGHEST:g} m")
+    if most > LONGEST and height > 0:
+        warnings.warn(told, UnusualSize, stacklevel=FRAMES)
+    return least, most
+
+
+def checked_bounds(model: Model, bounds: Any) -> Bounds:
+    """Return bounds of every tail coordinate, None for no bound; UnusualSize for odd ones."""
+    if not isinstance(bounds, Bounds):
+        raise PlanningError(f"bounds: value {shown(bounds)}: needs a serpentail.Bounds")
+    found = {
+        entry.name: _bound(entry.name, getattr(bounds, entry.name), model.layout.nt)
+        for entry in fields(Bounds)
+    }
+    angle, torque = found["angle"], found["torque"]
+    if angle is not None and angle.max() <= DEGREES:
+        warn_of_unusual("bounds.angle", float(angle.max()), "rad", FRAMES)
+    p = model.parameters
+    usual = STRONGEST * total_mass(p) * 9.81 * p["tail_length"]
+    if torque is not None and torque.max() > usual:
+        most = f"{torque.max():.6g}"
+        told = f"bounds.torque: value {most} N m: {STRONGEST:g} times this body's weight at the "
+        told += f"end of its tail is {usual:.2g} N m: did you mean "
+        told += f'"{most} mN m"? None sets no bound'
+        warnings.warn(told, UnusualSize, stacklevel=FRAMES)
+    return Bounds(**found)
+
+
+def _bound(name: str, value: Any, tail: int) -> np.ndarray | None:
+    """Return a bound of every tail coordinate; None for no bound."""
+    if value is None:
+        return None
+    plain = _plain(f"bounds.{name}", value, UNITS[name])
+    magnitudes = numbers(f"bounds.{name}", plain, tail, PlanningError, most=HUGE)
+    if not (magnitudes > 0).all():
+        raise PlanningError(f"bounds.{name}: value {shown(value)}: needs magnitudes above 0")
+    return magnitudes
+
+
+def _plain(field: str, value: Any, unit: str) -> Any:
+    """Return a value whose texts with units are numbers in the unit."""
+    try:
+        return in_unit(value, unit)
+    except ValueError as error:
+        raise PlanningError(f"{field}: value {shown(value)}: {error}") from error

@@ -1,0 +1,66 @@
+"""Path constraints that a known start violates, found before anything is derived."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..errors import PlanningError
+from ..model.model import Model
+from .design import Design
+from .found import start_blocks
+from .nlp.body import Body
+from .nlp.coordinates import attitude, rotated
+from .nlp.point import Point, asked, point_of
+from .nlp.start import conserved_of
+from .problem import START_SLACK, PlanningProblem
+from .result.excess import SLACK
+
+if TYPE_CHECKING:
+    import casadi as ca
+
+
+def refuse_violated(model: Model, problem: PlanningProblem) -> None:
+    """PlanningError if the start violates a path constraint.
+
+    Nothing is refused that depends on torques or on a duration that is free, nor if the planner
+    chooses the start or parameters.
+    """
+    import casadi as ca
+
+    if problem.is_free or not problem.path:
+        return
+    point, unknown = _start(model, problem)
+    for k, (function, least, most) in enumerate(problem.path):
+        values = ca.vec(asked(f"path[{k}]", function, point))
+        if ca.depends_on(values, unknown):
+            continue
+        found = np.array(ca.evalf(values)).ravel()
+        limits = [abs(limit) for limit in (least, most) if np.isfinite(limit)]
+        slack = SLACK * max(limits, default=0.0) + START_SLACK
+        wrong = np.flatnonzero(~((found >= least - slack) & (found <= most + slack)))
+        if wrong.size:
+            of = f", entry {wrong[0]}" if found.size > 1 else ""
+            raise PlanningError(
+                f"path[{k}]: the start has {found[wrong[0]]:.6g}{of}, beyond ({least:.6g}, "
+                f"{most:.6g}): widen the bounds, or start inside them"
+            )
+
+
+def _start(model: Model, problem: PlanningProblem) -> "tuple[Point, ca.SX]":
+    """Return the point of a known start, and the symbols of what is not known there."""
+    import casadi as ca
+
+    # the state
+    blocks = {name: ca.SX(ca.DM(part)) for name, part in start_blocks(problem).items()}
+    blocks["quaternion"] = attitude(problem.attitude).quaternion(blocks["attitude"])
+    body = Body(model, Design(), None)
+    _, com, com_velocity = conserved_of(body, blocks)
+    blocks["drift"] = rotated(blocks["quaternion"], blocks["velocity"] - com_velocity, -1)
+
+    # torques, and times
+    torque, duration = ca.SX.sym("torque", model.layout.nt), ca.SX.sym("duration")
+    least, most = problem.duration
+    blocks |= {"torque": torque, "time": ca.SX(0)}
+    blocks["duration"] = duration if least < most else ca.SX(most)
+    point = point_of(body, blocks, ca.vertcat(com, com_velocity), problem.legs)
+    return point, ca.vertcat(torque, duration)
