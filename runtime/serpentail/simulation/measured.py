@@ -12,7 +12,7 @@ from ..model.model import Model
 from ..model.passive import stored_energy
 from ..motion.origin import origin
 from ..motion.trajectory import Trajectory
-from .audit import BALANCED, audited, warnings_of
+from .audit import BALANCED, allowance, audited, warnings_of
 from .compiled_run import Samples
 from .ground import Ground
 from .methods import ADAPTIVE, FIXED
@@ -110,14 +110,16 @@ class Measures:
             return info | {"failure": str(samples.failure)}
         if not samples.ledger.size:  # a part of a run
             return info
+        eps = float(np.finfo(self.model.parameter_vector.dtype).eps)
         books = audited(
             self.model,
             self.model.parameters,
             samples.ledger,
             samples.t[-1] - samples.t[0],
             self._ends(),
+            allowance(info, eps),
+            self._all,
         )
-        eps = float(np.finfo(self.model.parameter_vector.dtype).eps)
         return info | books.info() | {"warnings": warnings_of(books, info, eps)}
 
     def _ends(self) -> dict[str, np.ndarray]:
@@ -127,5 +129,13 @@ class Measures:
             rows.append((*self.model.energy(q, v), self.model.momentum(q, v)[0]))
         columns = zip(*rows, strict=True)
         ends = {name: np.array(each, float) for name, each in zip(BALANCED, columns, strict=True)}
-        tails = self.samples.q[[0, -1]][:, self.model.layout.tail_q]
-        return ends | {"stored": stored_energy(self.model.parameters, tails)}
+        return ends | {"stored": self._stored(self.samples.q[[0, -1]])}
+
+    def _all(self, _: np.ndarray) -> dict[str, np.ndarray]:
+        """Return the same at all samples."""
+        measures = self("kinetic") | self("linear_momentum")
+        return measures | {"stored": self._stored(self.samples.q)}
+
+    def _stored(self, q: np.ndarray) -> np.ndarray:
+        """Return the energy (K,) that the tail stores."""
+        return np.asarray(stored_energy(self.model.parameters, q[:, self.model.layout.tail_q]))
