@@ -55,9 +55,16 @@ def test_the_values_that_a_new_scene_shows_are_the_defaults(run):
     run("new", "rat.toml", "--contacts", "feet")
     text = Path("rat.toml").read_text()
     shown, count = re.subn(r"(?m)^# (\w+ = )", r"\1", text)
-    assert count == 8
+    assert count == 7
     Path("all.toml").write_text(shown)
     assert load_scene("all.toml").parameters == load_scene("rat.toml").parameters
+
+
+def test_the_drop_of_a_new_scene_stands(run):
+    run("new", "rat.toml", "--contacts", "feet", "tail", "torso")
+    told = json.loads(run("simulate", "rat.toml", "--json", "-")[1])
+    assert told["standing_end"] is True and told["warnings"] == []
+    assert told["peak_ground_force_weights"] < 15
 
 
 def test_a_copy_of_an_example(run):

@@ -118,7 +118,7 @@ def of_groups(told):
 
 
 def test_each_foot_touches_by_the_forces_at_the_samples():
-    """The right foot at samples 1 and 2, the left one from sample 2 on, a tenth of a second apart."""
+    """The right foot at samples 1 and 2, the left one from sample 2 on, 0.1 s apart."""
     model = scene_of("tail_support_jump").model
     t, forces = np.linspace(0, 0.5, 6), np.zeros((6, 18, 3))
     forces[1:3, 2, 2], forces[2:, 4, 2], forces[:, 9, 2] = 0.5, 0.2, 1

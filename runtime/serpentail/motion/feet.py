@@ -1,8 +1,8 @@
 """When each foot touches, by the forces at a motion's samples; events know both feet together."""
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..attitude import Array
 from .forces import feet
 from .trajectory import Trajectory
 
@@ -23,6 +23,6 @@ def feet_times(motion: Trajectory, kind: str, which: int) -> dict[str, float | N
     return found
 
 
-def _touching(motion: Trajectory) -> dict[str, Array]:
+def _touching(motion: Trajectory) -> dict[str, NDArray[np.bool_]]:
     """Return for each foot the samples (K,) at which the ground pushes it."""
-    return {name: (foot.forces[..., 2] > 0).any(axis=1) for name, foot in feet(motion).items()}
+    return {name: np.asarray((foot.forces[..., 2] > 0).any(axis=1)) for name, foot in feet(motion).items()}

@@ -6,7 +6,7 @@ not balance is an error of the integration.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -62,20 +62,28 @@ class Audit:
         }
 
 
+class Between(NamedTuple):
+    """The largest imbalance that is not looked into, and what a function of runs' marks returns.
+
+    It returns energies and momenta at all samples, at least of the runs that are marked.
+    """
+
+    allowed: float
+    samples: Callable[[np.ndarray], Arrays]
+
+
 def audited(
     model: Model,
     values: Mapping[str, Any],
     ledger: np.ndarray,
     span: Any,
     ends: Arrays,
-    allowed: float,
-    samples: Callable[[np.ndarray], Arrays],
+    between: "Between",
 ) -> Audit:
     """Return the audit of runs with these parameters and ledgers (..., entries), of a span (s).
 
     ends, at the start and at the end: kinetic, potential and the part of it that the tail stores
-    (..., 2), linear_momentum (..., 2, 3). samples: returns the same at all samples, at least of the
-    runs that are marked; it is called for those whose share is not within ``allowed`` by the ends.
+    (..., 2), linear_momentum (..., 2, 3). between: the same at all samples, where it is needed.
     """
     work, impulses = named(model, ledger)
     kinetic, potential, momentum = (ends[name] for name in BALANCED)
@@ -94,12 +102,13 @@ def audited(
         if model.fixed:
             return all_of_it
         lost = _lost_within(values, ends, work)
-        return np.where(flies, lost / np.fmax(_held_within(values, seen) + worked, TINY), all_of_it)
+        within = lost / np.fmax(_held_within(values, seen) + worked, TINY)
+        return np.where(flies, within, all_of_it)
 
     found = share(ends)
-    doubtful = found > allowed
+    doubtful = found > between.allowed
     if np.any(doubtful):  # from rest to rest, both ends hold nothing
-        found = np.where(doubtful, share(samples(doubtful)), found)
+        found = np.where(doubtful, share(between.samples(doubtful)), found)
     momenta = np.linalg.norm(momentum, axis=-1).max(axis=-1) + weight * span
     momenta = momenta + sum(np.linalg.norm(each, axis=-1) for each in impulses.values())
     relative = np.maximum(found, np.linalg.norm(moved, axis=-1) / np.fmax(momenta, TINY))
@@ -107,7 +116,7 @@ def audited(
 
 
 def _held(values: Mapping[str, Any], seen: Arrays, weight: np.ndarray) -> np.ndarray:
-    """Return the most energy of runs, at least what lifts an animal at rest by its tail's length."""
+    """Return the most energy of runs, with what lifts the animal by its tail's length."""
     return _most(seen["kinetic"]) + weight * values["tail_length"] + _most(seen["stored"])
 
 

@@ -12,13 +12,14 @@ from ..model.model import Model
 from ..model.passive import stored_energy
 from ..motion.origin import origin
 from ..motion.trajectory import Trajectory
-from .audit import BALANCED, allowance, audited, warnings_of
+from .audit import BALANCED, Between, allowance, audited, warnings_of
 from .compiled_run import Samples
 from .ground import Ground
 from .methods import ADAPTIVE, FIXED
 
 # numbers whose eighth power a real can hold
 MODEST = {np.dtype(real): float(np.finfo(real).max) ** 0.125 for real in (np.float32, np.float64)}
+INTERRUPTED = "interrupted"  # the failure of a run that Ctrl-C ended, whose error has no words
 MEASURES = {"energy": ("kinetic", "potential"), "momentum": ("linear_momentum", "angular_momentum")}
 
 
@@ -107,7 +108,7 @@ class Measures:
         samples = self.samples
         info = samples.info | origin(self.model)
         if samples.failure is not None:
-            return info | {"failure": str(samples.failure)}
+            return info | {"failure": str(samples.failure) or INTERRUPTED}
         if not samples.ledger.size:  # a part of a run
             return info
         eps = float(np.finfo(self.model.parameter_vector.dtype).eps)
@@ -117,8 +118,7 @@ class Measures:
             samples.ledger,
             samples.t[-1] - samples.t[0],
             self._ends(),
-            allowance(info, eps),
-            self._all,
+            Between(allowance(info, eps), self._all),
         )
         return info | books.info() | {"warnings": warnings_of(books, info, eps)}
 

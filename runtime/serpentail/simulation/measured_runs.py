@@ -11,7 +11,7 @@ from ..model.kernel import RunKernel
 from ..model.passive import stored_energy
 from ..model.workers import in_turn
 from ..motion.trajectory import Trajectory
-from .audit import BALANCED, Audit, allowance, audited, warnings_of
+from .audit import BALANCED, Audit, Between, allowance, audited, warnings_of
 from .compiled_run import Memory
 from .measured import MEASURES, certain_runs
 from .methods import IntegrationMethod
@@ -132,10 +132,8 @@ class MeasuredRuns:
                 ends["kinetic"][k, 1], ends["potential"][k, 1] = model.energy(*state)
                 ends["linear_momentum"][k, 1] = model.momentum(*state)[0]
         span = self.outcomes.ends - self.memory.start.start
-        allowed = allowance(self.method.info, self._eps)
-        return audited(
-            self.model, values, self.outcomes.ledger, span, ends, allowed, self._all
-        )
+        between = Between(allowance(self.method.info, self._eps), self._all)
+        return audited(self.model, values, self.outcomes.ledger, span, ends, between)
 
     def _all(self, of: np.ndarray) -> dict[str, np.ndarray]:
         """Return what an audit needs of all samples of the runs that are marked."""

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from ..brief import brief
 from ..checks import finite_array, number, one_of, refusal, shown
 from ..errors import SimulationError
+from ..magnitudes import warn_of_degrees
 from ..model.model import Model
 from .piecewise import Piecewise, blends, checked_nodes, linear, spline
 
@@ -75,8 +76,7 @@ class Reference:
         Parameters
         ----------
         model : Model
-            The model, which determines how a segment's bend is shared by its links: each of n links
-            takes 1/n of it; an arc takes all of it.
+            The model: each of a segment's n links takes 1/n of its bend; an arc takes all of it.
         times : array_like, shape (K,)
             Increasing times (s).
         bends : array_like, shape (K, m, 2) or (K, m)
@@ -93,8 +93,16 @@ class Reference:
         ------
         SimulationError
             An argument is wrong.
+
+        Warns
+        -----
+        UnusualSize
+            A bend is beyond a whole turn: degrees, most likely.
         """
-        angles = shared_among_links(model, finite_array("bends", bends, SimulationError))
+        checked = finite_array("bends", bends, SimulationError)
+        angles = shared_among_links(model, checked)
+        if model.manifest["scene"]["coordinates"] != "polar":
+            warn_of_degrees("bends", checked, calls=2)
         return cls(times, angles, blend)
 
 
