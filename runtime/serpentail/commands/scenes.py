@@ -17,8 +17,9 @@ def examples(arguments: argparse.Namespace) -> Outcome:
 
     found, lines = examples(), []
     for name, path in example_paths().items():
-        without = "" if "simulate" in tables_of(path) else " (model only: not for `simulate`)"
-        lines.append(f"{name:<30}{found[name]}{without}")
+        tables = tables_of(path)
+        verbs = [verb for verb in ("simulate", "plan", "identify") if verb in tables]
+        lines.append(f"{name:<30}{found[name]} ({', '.join(verbs) or 'model only'})")
     return Outcome(found, "\n".join(lines))
 
 

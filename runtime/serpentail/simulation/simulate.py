@@ -1,5 +1,7 @@
 """``simulate``: checks and prepares one run or many, and makes them."""
 
+from __future__ import annotations
+
 import time
 from dataclasses import replace
 from functools import partial

@@ -2,6 +2,7 @@
 what these promise.
 """
 
+import inspect
 import os
 import signal
 import subprocess
@@ -36,6 +37,21 @@ def test_steps_that_do_not_suffice_are_told():
     assert caught.value.trajectory.t[-1] < 0.2
     with pytest.raises(st.SimulationError, match="steps that are too short"):
         fly(rtol=1e-10, least_step=0.01)
+
+
+def test_an_interrupted_motion_says_so():
+    def law(t, q, v):
+        if t > 0.1:
+            raise KeyboardInterrupt
+        return np.zeros(4)
+
+    with pytest.raises(KeyboardInterrupt) as caught:
+        fly(controller=law)
+    assert repr(caught.value.motion).endswith("failed: interrupted>")
+
+
+def test_signatures_are_short():
+    assert "q0: 'ArrayLike', v0: 'ArrayLike'" in str(inspect.signature(st.simulate))
 
 
 def test_a_torque_that_is_far_too_large_is_told():
