@@ -125,6 +125,7 @@ def kick(folder: Path) -> None:
         motion.filmstrip(folder / "kick_film.png", frames=KICK)
         motion.save(folder / "kick.npz")
     show(folder / "kick_film.png")
+    print("  in this scene only the feet touch the ground: tail and torso pass through it")
     told = scene.summary(motion)
     leap = "take-off {take_off_s:.3f} s, apex {apex_m:.3f} m, landing {recontact_s:.3f} s".format(
         **told

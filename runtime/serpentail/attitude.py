@@ -1,5 +1,7 @@
 """Rotations: quaternions, rotation matrices and angles, and conversions between them."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import Any
 

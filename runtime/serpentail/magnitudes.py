@@ -1,9 +1,12 @@
 """Magnitudes that no animal or robot has: most of them are slips of units."""
 
 import math
+import sys
 import warnings
 from collections.abc import Iterator, Sequence
 from typing import Any
+
+import numpy as np
 
 from .errors import UnusualSize
 from .units import DEEPEST, plain
@@ -26,6 +29,26 @@ def warn_of_unusual(field: str, value: Any, unit: str | Sequence[str], calls: in
         if most < abs(number) < 1e300:
             told = f"{field}{place}: value {number:.6g} {its_unit}: beyond {words}, "
             told += f'which no animal or robot has: did you mean "{number:.6g} {meant}"?'
+            warnings.warn(told, UnusualSize, stacklevel=calls + 1)
+
+
+def warn_of_degrees(field: str, angles: np.ndarray, first: int = 0, calls: int = 1) -> None:
+    """Warn of the first angle (rad) beyond a whole turn that a caller outside the package gives.
+
+    Within it, angles are those of a motion. first: index of the first angle; ``calls`` as above.
+    """
+    most, words, _ = LARGEST["rad"]
+    if np.vdot(angles, angles) <= most**2:
+        return
+    caller = sys._getframe(calls).f_globals.get("__name__", "")
+    for index in np.argwhere(np.abs(angles) > most)[:1].tolist():
+        if caller.partition(".")[0] != __name__.partition(".")[0]:
+            number = f"{angles[tuple(index)]:.6g}"
+            place = "".join(f"[{k}]" for k in (*index[:-1], index[-1] + first))
+            told = (
+                f"{field}{place}: value {number} rad: beyond {words}, which no joint of an animal"
+            )
+            told += f" or robot turns: did you mean np.radians({number})?"
             warnings.warn(told, UnusualSize, stacklevel=calls + 1)
 
 

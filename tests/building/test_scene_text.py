@@ -54,6 +54,12 @@ def test_what_is_nested_without_end_is_refused():
         scene_text({"a": deep})
 
 
+@pytest.mark.parametrize(("letter", "word"), [("m", "segments"), ("n", "links")])
+def test_the_letters_of_sizes_are_told_their_words(letter, word):
+    with pytest.raises(st.ModelError, match=f"did you mean '{word}'\\?"):
+        st.build(**{letter: 2})
+
+
 def test_options_are_what_the_generator_knows():
     keys = {"tail" if key == "kind" else key for key in KEYS}
     left = {"description", "parameters", "plan", "simulate", "phase", "identify", "sweep"}

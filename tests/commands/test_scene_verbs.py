@@ -30,7 +30,23 @@ def test_examples_are_the_scenes_of_the_checkout(run):
     status, out, err = run("examples", "--json", "-")
     assert (status, err) == (0, "")
     assert sorted(json.loads(out)) == sorted(path.stem for path in SCENES.glob("*.toml"))
-    assert "kick " in run("examples")[1]
+    lines = run("examples")[1].splitlines()
+    ends = {line.split()[0]: line.rpartition(" (")[2] for line in lines}
+    assert (ends["kick"], ends["contact_m1_n3"]) == ("simulate)", "model only)")
+    for path in SCENES.glob("*.toml"):
+        assert ("simulate" in ends[path.stem]) == ("simulate" in tomllib.loads(path.read_text()))
+
+
+@pytest.mark.parametrize("verb", ["verify", "info"])
+def test_a_name_that_is_no_model_is_told_what_is_like_it(run, verb):
+    status, _, err = run(verb, "kick_an_land")
+    assert status and "did you mean 'kick_and_land'?" in err
+
+
+def test_an_option_that_cannot_write_names_its_file_once(run):
+    err = run("simulate", "cat", "--set", "duration=0.02", "--view", "/proc/x.html")[2]
+    (told,) = [line for line in err.splitlines() if "--view" in line]
+    assert told.count("x.html") == 1 and "could not be written: " in told
 
 
 @pytest.mark.parametrize(
@@ -55,9 +71,16 @@ def test_the_values_that_a_new_scene_shows_are_the_defaults(run):
     run("new", "rat.toml", "--contacts", "feet")
     text = Path("rat.toml").read_text()
     shown, count = re.subn(r"(?m)^# (\w+ = )", r"\1", text)
-    assert count == 8
+    assert count == 7
     Path("all.toml").write_text(shown)
     assert load_scene("all.toml").parameters == load_scene("rat.toml").parameters
+
+
+def test_the_drop_of_a_new_scene_stands(run):
+    run("new", "rat.toml", "--contacts", "feet", "tail", "torso")
+    told = json.loads(run("simulate", "rat.toml", "--json", "-")[1])
+    assert told["standing_end"] is True and told["warnings"] == []
+    assert told["peak_ground_force_weights"] < 15
 
 
 def test_a_copy_of_an_example(run):

@@ -20,7 +20,7 @@ CODEGEN, RUNTIME = ROOT / "codegen" / "serpentail_codegen", ROOT / "runtime" / "
 MADE = ("generated/", "output/", "include/", "src/", "example/")  # folders that commands make
 # files that commands make
 YOURS = ("fall.c", "articulated_m3_n4.h", "rat.toml", "drop.toml", "study.toml", "lizard.toml")
-YOURS += ("flight.png", "./fall")
+YOURS += ("flight.png", "swing.png", "./fall")
 YOURS += ("f.c", "rat.c", "rat_host.c", "rat.h")
 
 every_document = pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)

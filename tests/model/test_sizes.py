@@ -25,6 +25,10 @@ STRANGE = {
         {"torso_mass": 1e-5, "torso_inertia": [1e-9] * 3},
         "torso_mass: value 1e-05 kg: below 0.1 g, .* are the units kg and m",
     ),
+    "a tail of grams": (
+        {"tail_mass": 5.0},
+        r'tail_mass: value 5 kg: 47\.3 times the torso_mass of 0\.10572 kg, .* mean "5 g"\?',
+    ),
     "millimetres": (
         {"tail_length": 194.66},
         'tail_length: value 194.66 m: beyond 100 m, .* did you mean "194.66 mm"',
@@ -51,6 +55,7 @@ def test_what_no_animal_has_is_told_to_who_gives_it(model, change, words):
     [
         {"torso_mass": "0.15 g", "torso_inertia": [1e-9] * 3, "tail_mass": "10 mg"},  # a gecko
         {"torso_mass": "6000 kg", "torso_inertia": [5000, 3000, 5000.0]},
+        {"tail_mass": 1.0},  # 9.5 times as heavy as its torso
         {"link_radius": "0.2 mm", "tail_length": "25 mm"},
         {"link_radius": 0, "gravity": 0, "tail_mount": [0, 0, 0]},
         {"torso_mass": 1.0},  # ten times as heavy, with the same inertia: a study of one parameter

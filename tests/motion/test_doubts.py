@@ -193,6 +193,15 @@ def test_bends_beyond_half_a_turn(kind, parts):
         assert all("segment 2 is bent by 3.21 rad at t = 2 s" in each for each in told)
 
 
+@pytest.mark.parametrize(("bend", "degrees"), [(12.5, False), (12.6, True)])
+def test_bends_of_more_than_two_turns_are_taken_for_degrees(bend, degrees):
+    model = st.load(model_folder(2, 3, functions=["energy", "momentum", "rollout"]))
+    q = at_height(model, 1.0)
+    q[:, 7] = bend / 3
+    told = the(made(model, q).warnings, "tail: segment 1")
+    assert ("degrees" in told) is degrees and "damp it more" in told
+
+
 # Where the model is, and where it is not.
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+import serpentail as st
 from serpentail.motion.summary import summary
 
 from .conftest import at_height, made, scene_of
@@ -111,6 +112,44 @@ def test_who_falls_on_its_back_and_rolls_onto_its_feet_stands_but_has_not_landed
     )
 
 
+def of_groups(told):
+    """Return what is told of groups, without the single feet."""
+    return {name: value for name, value in told.items() if "_foot" not in name}
+
+
+def test_each_foot_touches_by_the_forces_at_the_samples():
+    """The right foot at samples 1 and 2, the left one from sample 2 on, 0.1 s apart."""
+    model = scene_of("tail_support_jump").model
+    t, forces = np.linspace(0, 0.5, 6), np.zeros((6, 18, 3))
+    forces[1:3, 2, 2], forces[2:, 4, 2], forces[:, 9, 2] = 0.5, 0.2, 1
+    told = summary(model, made(model, at_height(model, 0.1, 6), t=t, forces=forces))
+    spans = {side: told["touching_s"][side] for side in ("right_foot", "left_foot")}
+    assert spans == pytest.approx({"right_foot": 0.2, "left_foot": 0.3})
+    down, up = told["first_touch_down_s"], told["last_take_off_s"]
+    assert (down["right_foot"], down["left_foot"]) == pytest.approx((0.1, 0.2))
+    assert up["right_foot"] == pytest.approx(0.3) and up["left_foot"] is None
+
+
+def test_each_foot_of_a_hop_by_a_threshold_of_its_forces():
+    """The legs straighten at different times; a foot's force counts as zero below 1e-12 N."""
+    scene = scene_of("kick")
+    gamma, delta = scene.legs.curve.at(0.0)[0][:2]
+    times = [0, 0.05, 0.07, 0.12]
+    legs = st.Legs(times, gamma, delta - np.array([[0, 0], [0, 0], [1, 0], [1, 1]]))
+    motion = st.simulate(scene.model, scene.q0, scene.v0, legs=legs, t_span=0.3)
+    told = summary(scene.model, motion)
+    for first, side in enumerate(("right_foot", "left_foot")):
+        sizes = np.linalg.norm(motion.contact.forces[:, 3 * first : 3 * first + 3], axis=2)
+        pushed = sizes.max(axis=1) > 1e-12
+        edges = np.flatnonzero(np.diff(pushed)) + 1
+        assert len(edges)
+        assert told["last_take_off_s"][side] == motion.t[edges[~pushed[edges]]][-1]
+        assert told["touching_s"][side] == pytest.approx(
+            sum(pushed[:-1]) * (motion.t[1] - motion.t[0])
+        )
+    assert told["last_take_off_s"]["right_foot"] != told["last_take_off_s"]["left_foot"]
+
+
 def test_touching_times_by_hand():
     """Feet touch from the start to 0.3, from 0.6 to 0.7, and from 0.9 on; the tail never leaves.
 
@@ -121,12 +160,13 @@ def test_touching_times_by_hand():
     t, forces = np.linspace(0, 1, 3), np.zeros((3, 18, 3))
     forces[0, [1, 7], 2] = 0.5
     told = summary(model, made(model, at_height(model, 0.1), t=t, forces=forces, events=events))
-    assert told["touching_s"] == pytest.approx({"feet": 0.5, "tail": 1.0})
-    assert told["first_touch_down_s"] == {"feet": 0.6, "tail": None}
-    assert told["last_take_off_s"] == {"feet": 0.7, "tail": None}
+    assert of_groups(told["touching_s"]) == pytest.approx({"feet": 0.5, "tail": 1.0})
+    assert of_groups(told["first_touch_down_s"]) == {"feet": 0.6, "tail": None}
+    assert of_groups(told["last_take_off_s"]) == {"feet": 0.7, "tail": None}
     assert told["landed"] is told["landing_group"] is told["recontact_s"] is None
     quiet = made(model, at_height(model, 0.1), t=t, events=events)
-    assert summary(model, quiet)["touching_s"] == pytest.approx({"feet": 0.5, "tail": 0.0})
+    told = summary(model, quiet)["touching_s"]
+    assert told == {"feet": pytest.approx(0.5), "tail": 0, "right_foot": 0, "left_foot": 0}
 
 
 def test_touching_times_of_the_leap(leap):
@@ -154,4 +194,4 @@ def test_who_starts_in_the_ground_but_is_not_pushed_flies(rat):
     points = np.full((3, 6, 3), -1e-3)
     motion = made(rat, at_height(rat, 0.1), points=points, events=[down("feet", 1.5)])
     told = summary(rat, motion)
-    assert told["recontact_s"] == 1.5 and told["touching_s"] == {"feet": 0.5}
+    assert told["recontact_s"] == 1.5 and of_groups(told["touching_s"]) == {"feet": 0.5}

@@ -134,6 +134,55 @@ def test_the_energy_of_a_fall_hides_no_loss():
     assert still.info["warnings"] == [] and still.info["imbalance"]["relative"] < 1e-9
 
 
+def swing(model, duration=0.45):
+    """Return a tail's way 0, 90, -60, 0 degrees, from rest to rest."""
+    pitch = np.radians([0, 90, -60, 0])
+    times = np.linspace(0, duration, 4)
+    return st.Pfl(model, st.Reference.of_bends(model, times, np.tile(pitch[:, None], (1, 2))))
+
+
+def swings(rtol, runs):
+    """Return a model, and single flights from rest to rest or those of rollouts."""
+    model = animal()
+    q, v = np.eye(1, model.nq, 3)[0], np.zeros(model.nv)
+    how = {"controller": swing(model), "t_span": 0.45, "rtol": rtol, "atol": rtol}
+    if runs == 1:
+        return model, [st.simulate(model, q, v, **how)]
+    return model, list(st.simulate(model, np.tile(q, (runs, 1)), v, **how))
+
+
+@pytest.mark.parametrize("runs", [1, 3])
+@pytest.mark.parametrize("rtol", [1e-6, 1e-8, 1e-10])
+def test_a_swing_from_rest_to_rest_balances(rtol, runs):
+    """Both ends and the net work are about zero; what was moved is the energy in between."""
+    model, found = swings(rtol, runs)
+    for run in found:
+        lost = abs(run.info["imbalance"]["energy_J"]) / inner_energy(model, run).max()
+        assert run.info["warnings"] == [] and lost < 10 * rtol
+        assert run.info["imbalance"]["relative"] == pytest.approx(lost, rel=0.1)
+
+
+@pytest.mark.parametrize("runs", [1, 3])
+def test_a_fault_in_a_swing_from_rest_to_rest_is_found(runs, monkeypatch):
+    """Work that is wrong by twice and by half the allowed share of the swing's energy."""
+    from serpentail.simulation import audit
+
+    named = audit.named
+    for share, warnings in ((2.0, 1), (0.5, 0)):
+        model, found = swings(1e-8, runs)
+        wrong = share * 100 * 1e-8 * inner_energy(model, found[0]).max()
+
+        def worked(*given, wrong=wrong):
+            work, impulses = named(*given)
+            return work | {"torques": work["torques"] + wrong}, impulses
+
+        monkeypatch.setattr(audit, "named", worked)
+        for run in found:
+            assert len(run.info["warnings"]) == warnings
+            assert run.info["imbalance"]["energy_J"] == pytest.approx(-wrong, rel=0.1)
+        monkeypatch.undo()
+
+
 def test_flights_balance_in_lanes_as_singly(monkeypatch):
     from serpentail.simulation import parallel_runs
 

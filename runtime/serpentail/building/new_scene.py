@@ -34,7 +34,8 @@ friction = "cone"
 """
 GROUND = """\
 # mu = 1.0                                           # friction
-# K_n = 1000.0                                       # N/m^1.5, stiffness of the ground
+K_n = 300.0                                          # N/m^1.5, stiffness: soft, default 1000
+D_n = 1.0                                            # s, damping; default 0.75
 """
 
 FLIGHT = """
@@ -59,8 +60,8 @@ duration = 0.6        # s
 output_step = 0.001   # s
 
 [simulate.start]
-height = 0.12         # m, of B
-pitch = 0.2           # rad
+height = 0.06         # m, of B
+pitch = 0.12          # rad, nose up
 
 [simulate.controller]
 kind = "damping"
@@ -68,8 +69,8 @@ damping = 1e-3        # N m s, of each joint coordinate
 """
 LEGS = """
 [simulate.legs]
-gamma = 3.67          # rad, of the thighs against the torso
-delta = -0.26         # rad, of the knees
+gamma = 3.67          # rad, where thighs point: 0 forward, pi/2 up; 210 deg levels the soles
+delta = -0.26         # rad, where shanks point: 0 forward, -pi/2 down, which stretches the legs
 """
 
 

@@ -53,7 +53,10 @@ def write(arguments: argparse.Namespace, option: str, make: Callable[[str], obje
     try:
         make(path)
     except Exception as error:  # whatever a picture or a disk fails by, the report is out
-        reason = " ".join(str(error).split()) or type(error).__name__
+        cause = error.__cause__ if isinstance(error.__cause__, Exception) else error
+        cause = cause.__cause__ if isinstance(cause.__cause__, OSError) else cause
+        refused = cause.strerror if isinstance(cause, OSError) else None  # without the path again
+        reason = refused or " ".join(str(error).split()) or type(error).__name__
         print(f"--{option} {path}: could not be written: {reason:.300}", file=sys.stderr)
         return False
     return True

@@ -23,10 +23,12 @@ def info(arguments: argparse.Namespace) -> Outcome:
 def model_of(place: str) -> "Model":
     """Return the model of a generated folder, else of a scene file or an example."""
     from ..building.build import build
-    from ..building.examples import example_paths
+    from ..building.examples import example_paths, scene_path
     from ..model.load import load
 
     scene = Path(place).suffix == ".toml" or (place in example_paths() and not Path(place).exists())
+    if not scene and not Path(place).exists():
+        scene_path(place)  # names what is like it
     return build(place) if scene else load(place)
 
 

@@ -12,10 +12,15 @@ from .outcome import Outcome
 
 def examples(arguments: argparse.Namespace) -> Outcome:
     """Return the scenes that come with the package."""
-    from ..building.examples import examples
+    from ..building.examples import example_paths, examples
+    from ..building.source import tables_of
 
-    found = examples()
-    return Outcome(found, "\n".join(f"{name:<30}{words}" for name, words in found.items()))
+    found, lines = examples(), []
+    for name, path in example_paths().items():
+        tables = tables_of(path)
+        verbs = [verb for verb in ("simulate", "plan", "identify") if verb in tables]
+        lines.append(f"{name:<30}{found[name]} ({', '.join(verbs) or 'model only'})")
+    return Outcome(found, "\n".join(lines))
 
 
 def new(arguments: argparse.Namespace) -> Outcome:

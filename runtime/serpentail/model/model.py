@@ -1,5 +1,7 @@
 """``Model``: a generated folder, its parameters and its compiled C."""
 
+from __future__ import annotations
+
 import ctypes
 from collections.abc import Mapping
 from contextlib import suppress
@@ -42,7 +44,7 @@ def _unpickled(
     parameters: Mapping[str, object],
     profile: str,
     options: tuple[bool, int | None],
-) -> "Model":
+) -> Model:
     """Return a pickled model: its files are those of the manifest that it was pickled with."""
     from .load import model_from
 
@@ -171,7 +173,7 @@ class Model(Functions, StepMethods):
         """Return in words what the tail is made of, such as "3 x 4 links"."""
         return words_of(self.links, self.segments)
 
-    def with_parameters(self, **changes: ArrayLike) -> "Model":
+    def with_parameters(self, **changes: ArrayLike) -> Model:
         """Return this model with other parameters; nothing is compiled.
 
         Parameters
@@ -198,18 +200,18 @@ class Model(Functions, StepMethods):
         warn_of_sizes(self.manifest, varied.parameters)
         return varied
 
-    def _varied(self, changes: Mapping[str, Any]) -> "Model":
+    def _varied(self, changes: Mapping[str, Any]) -> Model:
         """Return this model with other parameters, whose sizes are not doubted."""
         return self._twin(resolve(self.manifest, merged(self._independent(), changes)))
 
-    def _twin(self, parameters: Mapping[str, Any]) -> "Model":
+    def _twin(self, parameters: Mapping[str, Any]) -> Model:
         """Return a model of the same code with these parameters."""
         return Model(self.checked, parameters, self.library, self.profile, self.batch_library)
 
-    def __copy__(self) -> "Model":
+    def __copy__(self) -> Model:
         return self._twin(self.parameters)
 
-    def __deepcopy__(self, _: dict[int, Any]) -> "Model":
+    def __deepcopy__(self, _: dict[int, Any]) -> Model:
         return self._twin(self.parameters)  # nothing in it changes
 
     def parameters_of_runs(self, changes: Mapping[str, object] | None, runs: int) -> RunParameters:
@@ -258,7 +260,7 @@ class Model(Functions, StepMethods):
         )
 
     @kept
-    def casadi(self) -> "CasadiFunctions":
+    def casadi(self) -> CasadiFunctions:
         """The model's functions as ``casadi.Function``, by name; needs the extra "plan".
 
         ``model.casadi.energy`` has the model's parameters folded in. ``symbolic(name)`` and

@@ -1,5 +1,7 @@
 """Converts the paper's polar angles (phi, theta) of continuum segments to bends (a, b) and back."""
 
+from __future__ import annotations
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 

@@ -12,6 +12,7 @@ from .parameters import UNITS, Values
 
 UNLIKE = 1e4  # from here on H may be off by 1e-12 of its diagonal: docs/stability.md
 SMALLEST = {"torso_mass": (1e-4, "0.1 g"), "tail_length": (1e-3, "1 mm")}
+HEAVIEST = 10.0  # times the torso: a tail; those of animals weigh less than half of it
 DENSEST = 1e6  # kg/m^3: 44 times osmium, because studies may change a mass but not its inertia
 
 
@@ -25,7 +26,7 @@ def warn_of_sizes(manifest: dict, values: Values, calls: int = 2) -> None:
         largest = float(np.max(np.abs(value), initial=0.0))
         warn_of_unusual(name, largest, units[name], calls + 1)
     free = "torso_inertia" in values
-    for told in (*_too_small(values, units), *(_too_dense(values) if free else ())):
+    for told in (*_too_small(values, units), *(_unlike_torsos(values) if free else ())):
         warnings.warn(told, UnusualSize, stacklevel=calls + 1)
     if free:
         warn_of_unlike(values, calls + 1)
@@ -38,6 +39,18 @@ def _too_small(values: Values, units: dict[str, str]) -> Iterator[str]:
         if smallest < least:
             told = f"{name}: value {smallest:.6g} {units[name]}: below {words}, which no animal or"
             yield f"{told} robot has: are the units kg and m?"
+
+
+def _unlike_torsos(values: Values) -> Iterator[str]:
+    """Yield lines about a torso's mass besides its inertia and its tail."""
+    yield from _too_dense(values)
+    masses, tails = np.broadcast_arrays(values["torso_mass"], values["tail_mass"])
+    for k in np.flatnonzero(tails > HEAVIEST * masses)[:1]:
+        mass, tail = masses.flat[k], tails.flat[k]
+        if mass >= SMALLEST["torso_mass"][0]:  # else this is told
+            told = f"tail_mass: value {tail:.6g} kg: {tail / mass:.3g} times the torso_mass of"
+            told += f" {mass:.6g} kg, more than {HEAVIEST:g} times, which no animal or robot has:"
+            yield f'{told} did you mean "{tail:.6g} g"?'
 
 
 def _too_dense(values: Values) -> Iterator[str]:

@@ -23,6 +23,7 @@ SUNK = 0.1  # of the way from the torso's centre to its surface
 MOST_WEIGHTS = 20.0  # body weights: a larger force of the ground counts as an impact; our choice
 # rad, of a segment: beyond half a turn its end points back into it, and plans may go just so far
 MOST_BEND = 1.02 * np.pi
+DEGREES = 4 * np.pi  # rad, of a segment: two whole turns; degrees are the likely cause
 KNEES = 3  # hip, D and knee come first in a leg, and are no contacts
 AT_ONCE = 4096  # samples
 
@@ -139,10 +140,12 @@ def _bends(model: Model, motion: "Trajectory") -> list[str]:
     told = []
     for segment, k in enumerate(bends.argmax(axis=0)):
         if bends[k, segment] > MOST_BEND:
+            remedy = "damp it more, or give its reference smaller bends"
+            if bends[k, segment] > DEGREES:
+                remedy = "are degrees given in place of radians (np.radians)? If not, damp it more"
             told.append(
                 f"tail: segment {segment + 1} is bent by {bends[k, segment]:.3g} rad at t = "
-                f"{motion.t[k]:.4g} s, more than {MOST_BEND:.3g}: damp it more, or give its "
-                "reference smaller bends"
+                f"{motion.t[k]:.4g} s, more than {MOST_BEND:.3g}: {remedy}"
             )
     return told
 

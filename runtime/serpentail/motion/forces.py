@@ -6,7 +6,10 @@ import numpy as np
 
 from ..model.model import Model
 from .body import weight
+from .contact import Contact
 from .trajectory import Trajectory
+
+FEET = ("right_foot", "left_foot")
 
 
 def in_weights(model: Model, force: float | None) -> float | None:
@@ -24,12 +27,18 @@ def peaks(motion: Trajectory) -> dict[str, float] | None:
     """The largest force (N) on each group, and on each foot; None in flight."""
     if motion.contact is None:
         return None
-    parts = {group: motion.contact.of(group) for group in motion.contact.groups}
-    if "feet" in parts:
-        feet = parts["feet"].forces
-        for name, foot in zip(("right_foot", "left_foot"), np.split(feet, 2, axis=1), strict=True):
-            parts[name] = replace(parts["feet"], forces=foot)
+    groups = {group: motion.contact.of(group) for group in motion.contact.groups}
+    parts = groups | feet(motion)
     return {name: float(part.total.max()) for name, part in parts.items()}
+
+
+def feet(motion: Trajectory) -> dict[str, Contact]:
+    """Return the points of the right and of the left foot; nothing without feet."""
+    if motion.contact is None or "feet" not in motion.contact.groups:
+        return {}
+    both = motion.contact.of("feet")
+    sides = np.split(both.forces, 2, axis=1)
+    return {name: replace(both, forces=side) for name, side in zip(FEET, sides, strict=True)}
 
 
 def peak_force(motion: Trajectory, group: str) -> float | None:

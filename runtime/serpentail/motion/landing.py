@@ -11,6 +11,7 @@ from ..attitude import Array, rotation_matrix
 from ..model.layout import QUATERNION, VELOCITY
 from ..model.model import Model
 from .body import weight
+from .feet import feet_times, feet_touching
 from .trajectory import Trajectory
 
 # standing is: upright, at rest, its weight on the feet
@@ -83,22 +84,27 @@ def touches(motion: Trajectory) -> dict[str, Spans] | None:
 
 
 def touching_time(motion: Trajectory) -> dict[str, float] | None:
-    """For how long (s) each group touches the ground in all."""
+    """For how long (s) each group, and each foot by the samples, touches the ground in all."""
     spans = touches(motion)
     if spans is None:
         return None
-    return {group: float(sum(b - a for a, b in each)) for group, each in spans.items()}
+    of_groups = {group: float(sum(b - a for a, b in each)) for group, each in spans.items()}
+    return of_groups | feet_touching(motion)
 
 
 def times_of(motion: Trajectory, kind: str, which: int) -> dict[str, float | None] | None:
-    """Time (s) of each group's event of a kind, by its place: 0 the first, -1 the last one."""
+    """Time (s) of each group's event of a kind, by its place: 0 the first, -1 the last one.
+
+    That of a foot is a sample.
+    """
     if not knows_events(motion):
         return None
     found: dict[str, list[float]] = {group: [] for group in _groups(motion)}
     for event in events(motion):
         if event["kind"] == kind:
             found[event["group"]].append(event["time"])
-    return {group: times[which] if times else None for group, times in found.items()}
+    of_groups = {group: times[which] if times else None for group, times in found.items()}
+    return of_groups | feet_times(motion, kind, which)
 
 
 def _groups(motion: Trajectory) -> list[str]:

@@ -77,6 +77,7 @@ def _real_time_factor(motion: Trajectory) -> float | None:
 
 
 SAMPLES = "at the samples, which may miss the peak of an impact or of legs that start to move"
+ONE_FOOT = "of each foot by the samples"
 NUMBERS = (
     Number("model", "", "name of the model", lambda model, motion: model.name),
     Number(
@@ -176,15 +177,15 @@ NUMBERS = (
         lambda model, motion: motion.info.get("impulse_N_s") or None,
     ),
     Number(
-        "touching_s", "s", "total time for which each group touched the ground",
+        "touching_s", "s", f"total time for which each group touched the ground; {ONE_FOOT}",
         lambda model, motion: touching_time(motion),
     ),
     Number(
-        "first_touch_down_s", "s", "first touch-down of each group",
+        "first_touch_down_s", "s", f"first touch-down of each group; {ONE_FOOT}",
         lambda model, motion: times_of(motion, "touch_down", 0),
     ),
     Number(
-        "last_take_off_s", "s", "last take-off of each group",
+        "last_take_off_s", "s", f"last take-off of each group; {ONE_FOOT}",
         lambda model, motion: times_of(motion, "take_off", -1),
     ),
     # the books

@@ -1,5 +1,7 @@
 """``Trajectory``: a sampled motion with torques, energies and momenta; it can be saved."""
 
+from __future__ import annotations
+
 import dataclasses
 import json
 import os

@@ -1,5 +1,7 @@
 """``leg_joints``: the joints of both legs along a motion, to draw them."""
 
+from __future__ import annotations
+
 import numpy as np
 from numpy.typing import ArrayLike
 

@@ -1,5 +1,7 @@
 """``Sequence``: one motion of several phases; each begins at the end of the one before."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any

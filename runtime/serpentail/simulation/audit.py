@@ -4,9 +4,9 @@ Work and impulses are added up inside the integrator, by the same weights as the
 not balance is an error of the integration.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -32,7 +32,8 @@ class Audit:
     work (J): of torques, damping, the ground on the points, and the drives of the legs. impulses
     (..., 3), N s, world: of the ground on each group of points. energy (J) and momentum (..., 3), N
     s: changes that these and gravity do not explain. relative: the larger of both relative to what
-    was moved; in flights, the energy is that about the centre of mass.
+    was moved; in flights, the energy is that about the centre of mass. Where the ends and the net
+    work are small besides the imbalance, what was moved is the largest energy of all samples.
     """
 
     work: Arrays
@@ -61,18 +62,31 @@ class Audit:
         }
 
 
+class Between(NamedTuple):
+    """The largest imbalance that is not looked into, and what a function of runs' marks returns.
+
+    It returns energies and momenta at all samples, at least of the runs that are marked.
+    """
+
+    allowed: float
+    samples: Callable[[np.ndarray], Arrays]
+
+
 def audited(
-    model: Model, values: Mapping[str, Any], ledger: np.ndarray, span: Any, ends: Arrays
+    model: Model,
+    values: Mapping[str, Any],
+    ledger: np.ndarray,
+    span: Any,
+    ends: Arrays,
+    between: "Between",
 ) -> Audit:
     """Return the audit of runs with these parameters and ledgers (..., entries), of a span (s).
 
     ends, at the start and at the end: kinetic, potential and the part of it that the tail stores
-    (..., 2), linear_momentum (..., 2, 3).
+    (..., 2), linear_momentum (..., 2, 3). between: the same at all samples, where it is needed.
     """
     work, impulses = named(model, ledger)
-    kinetic, potential, momentum = (
-        ends[name] for name in ("kinetic", "potential", "linear_momentum")
-    )
+    kinetic, potential, momentum = (ends[name] for name in BALANCED)
     weight = np.asarray(total_mass(values)) * values["gravity"]
     energy = np.diff(kinetic + potential)[..., 0] - sum(work.values())
     pull = np.zeros((*energy.shape, 3))
@@ -80,40 +94,59 @@ def audited(
     moved = momentum[..., 1, :] - momentum[..., 0, :] - pull - sum(impulses.values())
     moved = 0 * moved if model.fixed else moved  # its base gives a tail any momentum
 
-    # relative to what was moved; for an animal at rest, to its weight
-    stored = ends["stored"]
     worked = sum(np.abs(each) for each in work.values())
-    energies = kinetic.max(axis=-1) + weight * values["tail_length"] + stored.max(axis=-1) + worked
-    share = np.abs(energy) / np.fmax(energies, TINY)
-    if not model.fixed:
-        flies = ~np.any([np.any(each != 0, axis=-1) for each in impulses.values()], axis=0)
-        share = np.where(flies, _within(values, kinetic, momentum, stored, work), share)
+    flies = ~np.any([np.any(each != 0, axis=-1) for each in impulses.values()], axis=0)
+
+    def share(seen: Arrays) -> np.ndarray:
+        all_of_it = np.abs(energy) / np.fmax(_held(values, seen, weight) + worked, TINY)
+        if model.fixed:
+            return all_of_it
+        lost = _lost_within(values, ends, work)
+        within = lost / np.fmax(_held_within(values, seen) + worked, TINY)
+        return np.where(flies, within, all_of_it)
+
+    found = share(ends)
+    doubtful = found > between.allowed
+    if np.any(doubtful):  # from rest to rest, both ends hold nothing
+        found = np.where(doubtful, share(between.samples(doubtful)), found)
     momenta = np.linalg.norm(momentum, axis=-1).max(axis=-1) + weight * span
     momenta = momenta + sum(np.linalg.norm(each, axis=-1) for each in impulses.values())
-    relative = np.maximum(share, np.linalg.norm(moved, axis=-1) / np.fmax(momenta, TINY))
+    relative = np.maximum(found, np.linalg.norm(moved, axis=-1) / np.fmax(momenta, TINY))
     return Audit(work, impulses, energy, moved, relative)
 
 
-def _within(
-    values: Mapping[str, Any],
-    kinetic: np.ndarray,
-    momentum: np.ndarray,
-    stored: np.ndarray,
-    work: Arrays,
-) -> np.ndarray:
-    """Return the imbalance of a flight's energy about its centre of mass, relative to that energy.
+def _held(values: Mapping[str, Any], seen: Arrays, weight: np.ndarray) -> np.ndarray:
+    """Return the most energy of runs, with what lifts the animal by its tail's length."""
+    return _most(seen["kinetic"]) + weight * values["tail_length"] + _most(seen["stored"])
 
-    The energy of the fall is larger and would hide it. The balance of momentum checks the fall.
+
+def _held_within(values: Mapping[str, Any], seen: Arrays) -> np.ndarray:
+    """Return the most energy of flights about their centre of mass.
+
+    The energy of the fall is larger and would hide an imbalance; the balance of momentum checks the
+    fall. Less energy than that of a torso that turns at 1 rad/s counts as that.
     """
-    fall = np.sum(momentum**2, axis=-1) / (2 * np.asarray(total_mass(values))[..., None])
-    inner = np.fmax(kinetic - fall, 0.0)
-    change = np.abs(np.diff(inner + stored)[..., 0] - sum(work.values()))
-    # rounding errors of the difference do not count; less energy than that of a torso that turns at
-    # 1 rad/s counts as that
-    change = np.fmax(change - DIFFERENCE * np.finfo(kinetic.dtype).eps * kinetic.max(axis=-1), 0.0)
     least = 0.5 * np.min(np.asarray(values["torso_inertia"])[..., :3], axis=-1)
-    moved = inner.max(axis=-1) + stored.max(axis=-1) + sum(np.abs(each) for each in work.values())
-    return change / np.fmax(moved + least, TINY)
+    return _most(_inner(values, seen)) + _most(seen["stored"]) + least
+
+
+def _lost_within(values: Mapping[str, Any], ends: Arrays, work: Arrays) -> np.ndarray:
+    """Return the change of that energy without the work; rounding errors do not count."""
+    kinetic = ends["kinetic"]
+    change = np.diff(_inner(values, ends) + ends["stored"])[..., 0] - sum(work.values())
+    rounding = DIFFERENCE * np.finfo(kinetic.dtype).eps * kinetic.max(axis=-1)
+    return np.fmax(np.abs(change) - rounding, 0.0)
+
+
+def _inner(values: Mapping[str, Any], seen: Arrays) -> np.ndarray:
+    """Return the kinetic energy about the centre of mass."""
+    mass = np.asarray(total_mass(values))[..., None]
+    return np.fmax(seen["kinetic"] - np.sum(seen["linear_momentum"] ** 2, axis=-1) / (2 * mass), 0)
+
+
+def _most(energy: np.ndarray) -> np.ndarray:
+    """Return the largest value of each run; samples after its end are nan."""
+    return np.fmax.reduce(energy, axis=-1)
 
 
 def named(model: Model, ledger: np.ndarray) -> tuple[Arrays, Arrays]:
@@ -128,13 +161,18 @@ def named(model: Model, ledger: np.ndarray) -> tuple[Arrays, Arrays]:
     return works, impulses
 
 
+def allowance(info: Mapping[str, Any], eps: float) -> float:
+    """Return the largest relative imbalance that the method of a run explains."""
+    if "rtol" not in info:
+        return FIXED_STEPS
+    return max(TOLERANCES * max(info["rtol"], info["atol"]), ROUNDINGS * eps)
+
+
 def warnings_of(audit: Audit, info: Mapping[str, Any], eps: float) -> list[str]:
     """Return warnings about imbalance and missed touches, from the audit and info of one run."""
     found = []
-    allowed, remedy = FIXED_STEPS, "take a shorter step"
-    if "rtol" in info:
-        allowed = max(TOLERANCES * max(info["rtol"], info["atol"]), ROUNDINGS * eps)
-        remedy = "take a smaller rtol"
+    allowed = allowance(info, eps)
+    remedy = "take a smaller rtol" if "rtol" in info else "take a shorter step"
     if not audit.relative <= allowed:
         found.append(
             f"{100 * audit.relative:.2g} % of what was moved is not accounted for (energy "

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ..checks import shown
 from ..errors import ModelError, SimulationError
 from ..model.model import Model
 from ..model.parameters import RunParameters
@@ -18,6 +19,8 @@ from .limits import MOST_STEPS, refuse_endless
 from .methods import SCIPY, IntegrationMethod, checked_method, chosen, step_counts
 from .records import Records
 from .start import EPS, Start
+
+DURATIONS = ("duration", "t_end", "tf", "span", "T", "time")  # what others call t_span
 
 
 def prepared(
@@ -57,6 +60,7 @@ def choose(
         if not model.contacts:
             decay = FastestDecay(acting, start.runs, parameters)(start.q0)
         name, reason = chosen(settings, available, decay, model.fixed)
+    refuse_misplaced(model, settings)
     method = checked_method(name, settings, available, single)
     span, most_steps = start.end - start.start, method.settings.get("most_steps", MOST_STEPS)
     for each in ("step", "most_step"):
@@ -68,6 +72,16 @@ def choose(
         steps = step_counts(interval, 1e-12 * interval, method.settings["step"])
         return replace(method, reason=reason, settings={"step": start.interval / int(steps[0])})
     return replace(method, reason=reason)
+
+
+def refuse_misplaced(model: Model, settings: dict[str, Any]) -> None:
+    """SimulationError about a setting that belongs elsewhere."""
+    for key, value in settings.items():
+        if key in model.parameters:
+            given = f"model.with_parameters({key}={shown(value)})"
+            raise SimulationError(f"{key}: is a parameter of the model: simulate {given}")
+        if key in DURATIONS:
+            raise SimulationError(f"{key}: is no setting: the duration is t_span={shown(value)}")
 
 
 def still_chosen(run: CompiledRun, name: str) -> bool:

@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 
 from ..errors import SimulationError
+from ..magnitudes import LARGEST
 from ..model.kept import kept
 from ..model.kernel import address_of, aligned
-from ..model.library import PAUSED, STOPPED_AT_EVENT, WHY
+from ..model.library import PAUSED, STEP_TOO_SMALL, STOPPED_AT_EVENT, TOO_MANY_STEPS, WHY
 from ..model.model import Model
 from ..model.parameters import RunParameters
 from .acting import Acting
@@ -25,6 +26,7 @@ from .start import Start
 MOST_STEPS = 2**31 - 1  # that the C interface counts
 PAUSE = 100  # steps before the first check for signals, such as Ctrl-C
 PAUSE_S = 0.05  # s between checks: the time between pauses grows to this
+STEPS = (STEP_TOO_SMALL, TOO_MANY_STEPS)  # statuses: the steps became too short
 COUNTS = ("steps", "rejected", "evaluations", "factorisations")
 
 
@@ -204,7 +206,7 @@ class CompiledRun:
             info["unfelt"] = record.unfelt
         failure = self.actuation.error
         if failure is None and status not in (0, STOPPED_AT_EVENT):
-            failure = failed(status, record.t)
+            failure = failed(status, record.t, self._extremes())
         stop = self._stop() if status == STOPPED_AT_EVENT else None
         ledger = self.state["ledger"].copy()
         return Outcome(record.done, record.t, ledger, info, failure, stop)
@@ -212,6 +214,15 @@ class CompiledRun:
     def samples(self, status: int) -> Samples:
         """Return the samples written, with the meaning of a status."""
         return self.memory.samples(self.k, self.outcome(status))
+
+    def _extremes(self) -> tuple[float, float]:
+        """Return the largest torque (N m) and rate of a tail coordinate (rad/s) so far."""
+        tau, v = (self.memory.out[name][self.k, : self.record.done] for name in ("tau", "v"))
+        rates = (v, self.state["v"])
+        tail = self.model.layout.tail_v
+        return float(np.abs(tau).max(initial=0)), max(
+            float(np.abs(each[..., tail]).max(initial=0)) for each in rates
+        )
 
     def _stop(self) -> dict[str, Any] | None:
         """Return the state at which the run stopped, if that is not a sample."""
@@ -255,6 +266,14 @@ def start_members(method: IntegrationMethod) -> dict[str, Any]:
     return members
 
 
-def failed(status: int, t: float) -> SimulationError:
-    """Return the error that a status of the C interface means."""
-    return SimulationError(f"at t = {t:.6g} s {WHY[status]}")
+def failed(status: int, t: float, extremes: tuple[float, float] = (0, 0)) -> SimulationError:
+    """Return the error that a status of the C interface means.
+
+    extremes: largest torque (N m) and rate of a tail coordinate (rad/s) so far.
+    """
+    torque, rate = extremes
+    words = f"at t = {t:.6g} s {WHY[status]}"
+    if status in STEPS and torque and rate > LARGEST["rad/s"][0]:
+        words += f" Torques reach {torque:.3g} N m, and a joint {rate:.3g} rad/s: is a torque far"
+        words += " too large?"
+    return SimulationError(words)

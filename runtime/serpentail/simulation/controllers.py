@@ -1,5 +1,7 @@
 """Torque laws for ``simulate``, and their checks."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import repeat
@@ -143,7 +145,7 @@ class Phases:
     >>> law = st.Phases([(0.0, None), (0.4, st.Pfl(model, plan))])  # doctest: +SKIP
     """
 
-    phases: Iterable[tuple[float, "Controller"]]
+    phases: Iterable[tuple[float, Controller]]
     __repr__ = brief
 
     def __post_init__(self) -> None:

@@ -12,13 +12,14 @@ from ..model.model import Model
 from ..model.passive import stored_energy
 from ..motion.origin import origin
 from ..motion.trajectory import Trajectory
-from .audit import BALANCED, audited, warnings_of
+from .audit import BALANCED, Between, allowance, audited, warnings_of
 from .compiled_run import Samples
 from .ground import Ground
 from .methods import ADAPTIVE, FIXED
 
 # numbers whose eighth power a real can hold
 MODEST = {np.dtype(real): float(np.finfo(real).max) ** 0.125 for real in (np.float32, np.float64)}
+INTERRUPTED = "interrupted"  # the failure of a run that Ctrl-C ended, whose error has no words
 MEASURES = {"energy": ("kinetic", "potential"), "momentum": ("linear_momentum", "angular_momentum")}
 
 
@@ -107,17 +108,18 @@ class Measures:
         samples = self.samples
         info = samples.info | origin(self.model)
         if samples.failure is not None:
-            return info | {"failure": str(samples.failure)}
+            return info | {"failure": str(samples.failure) or INTERRUPTED}
         if not samples.ledger.size:  # a part of a run
             return info
+        eps = float(np.finfo(self.model.parameter_vector.dtype).eps)
         books = audited(
             self.model,
             self.model.parameters,
             samples.ledger,
             samples.t[-1] - samples.t[0],
             self._ends(),
+            Between(allowance(info, eps), self._all),
         )
-        eps = float(np.finfo(self.model.parameter_vector.dtype).eps)
         return info | books.info() | {"warnings": warnings_of(books, info, eps)}
 
     def _ends(self) -> dict[str, np.ndarray]:
@@ -127,5 +129,13 @@ class Measures:
             rows.append((*self.model.energy(q, v), self.model.momentum(q, v)[0]))
         columns = zip(*rows, strict=True)
         ends = {name: np.array(each, float) for name, each in zip(BALANCED, columns, strict=True)}
-        tails = self.samples.q[[0, -1]][:, self.model.layout.tail_q]
-        return ends | {"stored": stored_energy(self.model.parameters, tails)}
+        return ends | {"stored": self._stored(self.samples.q[[0, -1]])}
+
+    def _all(self, _: np.ndarray) -> dict[str, np.ndarray]:
+        """Return the same at all samples."""
+        measures = self("kinetic") | self("linear_momentum")
+        return measures | {"stored": self._stored(self.samples.q)}
+
+    def _stored(self, q: np.ndarray) -> np.ndarray:
+        """Return the energy (K,) that the tail stores."""
+        return np.asarray(stored_energy(self.model.parameters, q[:, self.model.layout.tail_q]))

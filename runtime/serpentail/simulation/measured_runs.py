@@ -1,6 +1,6 @@
 """Energies, momenta and books of many runs, most of them when somebody asks."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from threading import Event
 from typing import Any
 
@@ -11,7 +11,7 @@ from ..model.kernel import RunKernel
 from ..model.passive import stored_energy
 from ..model.workers import in_turn
 from ..motion.trajectory import Trajectory
-from .audit import BALANCED, Audit, audited, warnings_of
+from .audit import BALANCED, Audit, Between, allowance, audited, warnings_of
 from .compiled_run import Memory
 from .measured import MEASURES, certain_runs
 from .methods import IntegrationMethod
@@ -124,7 +124,7 @@ class MeasuredRuns:
         q, values = self.memory.out["q"], self.memory.parameters.values
         tail = self.model.layout.tail_q
         tails = (q[:, 0, tail], q[each, last, tail])
-        ends["stored"] = np.stack([stored_energy(values, tail) for tail in tails], axis=1)
+        ends["stored"] = self._stored(tails)
         ends["kinetic"][list(self.outcomes.failures)] = np.nan
         for k, stop in self.outcomes.stops.items():  # between samples
             if k not in self.outcomes.failures:
@@ -132,11 +132,29 @@ class MeasuredRuns:
                 ends["kinetic"][k, 1], ends["potential"][k, 1] = model.energy(*state)
                 ends["linear_momentum"][k, 1] = model.momentum(*state)[0]
         span = self.outcomes.ends - self.memory.start.start
-        return audited(self.model, values, self.outcomes.ledger, span, ends)
+        between = Between(allowance(self.method.info, self._eps), self._all)
+        return audited(self.model, values, self.outcomes.ledger, span, ends, between)
+
+    def _all(self, of: np.ndarray) -> dict[str, np.ndarray]:
+        """Return what an audit needs of all samples of the runs that are marked."""
+        done = self.outcomes.done
+        self._measure(lambda k: [(int(done[k]), 0)] if of[k] else [])
+        tails = self.memory.out["q"][:, :, self.model.layout.tail_q]
+        seen = {name: self.arrays[name].astype(float) for name in BALANCED}
+        return seen | {"stored": self._stored(tails.swapaxes(0, 1))}
+
+    def _stored(self, tails: Iterable[np.ndarray]) -> np.ndarray:
+        """Return the energy (runs, samples) that tails store, given as (runs, 2m) by sample."""
+        values = self.memory.parameters.values
+        return np.stack([stored_energy(values, tail) for tail in tails], axis=1)
+
+    @property
+    def _eps(self) -> float:
+        return float(np.finfo(self.memory.records.dtype).eps)
 
     def _warnings(self, books: Audit) -> list[list[str]]:
         """Return the warnings of each run that did not fail."""
-        eps, failed = float(np.finfo(self.memory.records.dtype).eps), set(self.failed)
+        eps, failed = self._eps, set(self.failed)
         told = self.method.info, self.outcomes.told
         return [
             [] if k in failed else warnings_of(books.of(k), told[0] | told[1].get(k, {}), eps)

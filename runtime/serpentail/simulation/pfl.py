@@ -1,5 +1,7 @@
 """``Pfl``: torques that make a tail follow a reference, by partial feedback linearisation."""
 
+from __future__ import annotations
+
 from copy import copy
 from typing import Any, Self
 

@@ -1,5 +1,7 @@
 """Schedules over time: angles of the legs, and reference angles of the tail."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -11,6 +13,7 @@ from numpy.typing import ArrayLike
 from ..brief import brief
 from ..checks import finite_array, number, one_of, refusal, shown
 from ..errors import SimulationError
+from ..magnitudes import warn_of_degrees
 from ..model.model import Model
 from .piecewise import Piecewise, blends, checked_nodes, linear, spline
 
@@ -24,8 +27,7 @@ class Reference:
     Parameters
     ----------
     times : array_like, shape (K,)
-        Increasing times (s), two or more. The angles are held before the first and after the
-        last.
+        Increasing times (s), two or more; before the first and after the last, angles are held.
     angles : array_like, shape (K, 2m)
         Tail coordinates (rad).
     blend : {"quintic", "spline", "linear"}, default "quintic"
@@ -75,8 +77,7 @@ class Reference:
         Parameters
         ----------
         model : Model
-            The model, which determines how a segment's bend is shared by its links: each of n links
-            takes 1/n of it; an arc takes all of it.
+            The model: each of a segment's n links takes 1/n of its bend; an arc takes all of it.
         times : array_like, shape (K,)
             Increasing times (s).
         bends : array_like, shape (K, m, 2) or (K, m)
@@ -93,18 +94,25 @@ class Reference:
         ------
         SimulationError
             An argument is wrong.
+
+        Warns
+        -----
+        UnusualSize
+            A bend is beyond a whole turn: degrees, most likely.
         """
-        angles = shared_among_links(model, finite_array("bends", bends, SimulationError))
-        return cls(times, angles, blend)
+        checked = finite_array("bends", bends, SimulationError)
+        if model.manifest["scene"]["coordinates"] != "polar":
+            warn_of_degrees("bends", checked, calls=2)
+        return cls(times, shared_among_links(model, checked), blend)
 
 
 def shared_among_links(model: Model, bends: np.ndarray) -> np.ndarray:
     """Return tail coordinates (K, 2m) of bends of the segments, (K, m, 2) or (K, m), rad."""
     m = model.segments
     if bends.shape[1:] not in ((m,), (m, 2)):
-        shape = f"(times, {m}) or (times, {m}, 2)"
         raise SimulationError(
-            f"bends has shape {bends.shape}: give {shape}: pitch, or pitch and yaw, of each segment"
+            f"bends has shape {bends.shape}: give (times, {m}) or (times, {m}, 2): pitch, or pitch "
+            "and yaw, of each segment"
         )
     both = bends if bends.ndim == 3 else np.stack([bends, 0 * bends], axis=-1)
     return both.reshape(len(bends), model.layout.nt) / np.repeat(model.joints_each, 2)
@@ -284,8 +292,8 @@ def _move(field: str, move: Mapping[str, float], last: Node) -> list[Node]:
         needs = "a duration above 0, and another angle than before"
         raise SimulationError(f"{field}: takes {duration!r} s: needs {needs}")
     if at < end:
-        remedy = f"the move before it ends at {end:.6g} s: move it after that"
-        raise SimulationError(f"{field}.at: value {shown(at)}: {remedy}")
+        remedy = f"value {shown(at)}: the move before it ends at {end:.6g} s: move it after that"
+        raise SimulationError(f"{field}.at: {remedy}")
     # a move that follows at once begins at the last node
     if at == end:
         return [(at + duration, goal)]

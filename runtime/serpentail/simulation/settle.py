@@ -1,5 +1,7 @@
 """``settle``: lets a model come to rest on the ground, as a start for other runs."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import numpy as np

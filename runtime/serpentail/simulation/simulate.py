@@ -1,5 +1,7 @@
 """``simulate``: checks and prepares one run or many, and makes them."""
 
+from __future__ import annotations
+
 import time
 from dataclasses import replace
 from functools import partial
@@ -9,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import SimulationError
+from ..magnitudes import warn_of_degrees
 from ..model.cores import checked_threads
 from ..model.model import Model
 from ..motion.trajectory import Trajectory
@@ -107,6 +110,11 @@ def simulate(
         After Ctrl-C. Its attribute ``motion`` is the motion so far: a Trajectory, or Rollouts in
         which unfinished runs have errors.
 
+    Warns
+    -----
+    UnusualSize
+        A tail's angle at the start is beyond a whole turn: degrees, most likely.
+
     Notes
     -----
     k starts give ``Rollouts``. One method is chosen for all runs. The SimulationError of a run
@@ -149,15 +157,24 @@ def simulate(
         threads = _threads(model, start, settings.pop("threads", None))
         parts = prepared(model, start, controller, method, settings)
         if start.many:
+            _doubt(model, start)
             clocks = read_clocks()
             return run_parallel(*parts, threads).rollouts(spent(clocks))
         run = CompiledRun(*parts)
+    _doubt(model, run.start)
     clocks = read_clocks()
     samples = integrate(run, watch)
     info = samples.info | run.method.info | spent(clocks)
     motion = trajectory_or_error(model, replace(samples, info=info), run.ground)
     let_wait(model, asked, run)
     return motion
+
+
+def _doubt(model: Model, start: Start) -> None:
+    """Warn the caller of ``simulate`` of a tail that starts at degrees."""
+    if model.manifest["scene"]["coordinates"] != "polar":
+        tails = start.q0[:, start.tail]
+        warn_of_degrees("q0", tails if start.many else tails[0], start.tail.start, calls=3)
 
 
 def _threads(model: Model, start: Start, asked: int | None) -> int | None:

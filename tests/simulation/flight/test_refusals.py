@@ -61,6 +61,8 @@ def test_wrong_start_is_named(model, start, words):
             {"method": "euler"},
             "method: value 'euler': needs 'auto' or 'rk4' or 'tsit5' or 'dop853' or 'lsoda'",
         ),
+        ({"gravity": 1.6}, r"gravity: .*simulate model\.with_parameters\(gravity=1\.6\)"),
+        ({"duration": 1}, "duration: is no setting: the duration is t_span=1"),
         ({"method": "rk4", "rtol": 1e-6}, "rk4 has no setting 'rtol'; it has step, output_step"),
         ({"step": 1e-6, "rtol": 1e-6}, "rk4 has no setting 'rtol'; it has step, output_step"),
         (

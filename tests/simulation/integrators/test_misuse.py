@@ -2,6 +2,7 @@
 what these promise.
 """
 
+import inspect
 import os
 import signal
 import subprocess
@@ -36,6 +37,56 @@ def test_steps_that_do_not_suffice_are_told():
     assert caught.value.trajectory.t[-1] < 0.2
     with pytest.raises(st.SimulationError, match="steps that are too short"):
         fly(rtol=1e-10, least_step=0.01)
+
+
+def test_an_interrupted_motion_says_so():
+    def law(t, q, v):
+        if t > 0.1:
+            raise KeyboardInterrupt
+        return np.zeros(4)
+
+    with pytest.raises(KeyboardInterrupt) as caught:
+        fly(controller=law)
+    assert repr(caught.value.motion).endswith("failed: interrupted>")
+
+
+def test_signatures_are_short():
+    assert "q0: 'ArrayLike', v0: 'ArrayLike'" in str(inspect.signature(st.simulate))
+
+
+def test_a_torque_that_is_far_too_large_is_told():
+    def law(t, q, v):
+        return [5.0, 0, 0, 0]
+
+    words = r"not enough.* Torques reach 5 N m, and a joint \S+ rad/s: is a torque far too large\?$"
+    with pytest.raises(st.SimulationError, match=words) as caught:
+        fly(controller=law, most_steps=2000)
+    assert float(str(caught.value).split("a joint ")[1].split()[0]) > 1000
+
+
+def test_degrees_at_the_start_are_told():
+    """In one row or in one of several."""
+    q, v = np.eye(1, model().nq, 3)[0], np.zeros(model().nv)
+    upright = q.copy()
+    words = r"q0\[{}8\]: value 30 rad: .* did you mean np\.radians\(30\)\?"
+    q[8] = 30.0
+    with pytest.warns(st.UnusualSize, match=words.format("")) as caught:
+        st.simulate(model(), q, v, t_span=1e-3)
+    with pytest.warns(st.UnusualSize, match=words.format(r"1\]\[")):
+        st.simulate(model(), [upright, q], v, t_span=1e-3)
+    assert {each.filename for each in caught} == {__file__}
+
+
+@pytest.mark.parametrize("shape", [(2,), (2, 2)])
+def test_bends_in_degrees_are_told(shape):
+    bends = np.zeros((2, *shape))
+    bends[1].flat[0] = 90
+    place = r"\[1\]\[0\]" + r"\[0\]" * (len(shape) - 1)
+    with pytest.warns(
+        st.UnusualSize, match=rf"bends{place}: value 90 rad: .*radians\(90\)"
+    ) as caught:
+        st.Reference.of_bends(model(), [0, 0.3], bends)
+    assert [each.filename for each in caught] == [__file__]
 
 
 def test_exception_in_a_function_is_itself():

@@ -1,5 +1,7 @@
 """`model.step`: checks what it is given, and has steps of many runs made in lanes and threads."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -32,14 +34,14 @@ LANES_LEAST = 4 * MIN_STATES_PER_THREAD  # states of a batch; a step evaluates f
 class Stepping:
     """What advances runs of a model: its compiled C with workspaces, and shared parameters."""
 
-    def __init__(self, model: "Model"):
+    def __init__(self, model: Model):
         assert model.library is not None
         self.dtype = model.parameter_vector.dtype
         self.singly = SingleSteps(model.manifest, model.library, self.dtype)
         self.lanes: dict[str, LaneSteps] = {}  # by method, made when it is first used
         self.alike = np.zeros((0, len(model.parameter_vector)), self.dtype)
 
-    def parameters(self, model: "Model", given: object, runs: int) -> np.ndarray:
+    def parameters(self, model: Model, given: object, runs: int) -> np.ndarray:
         """Return the parameters (runs, scalars) of runs, changes among them checked."""
         if isinstance(given, RunParameters):
             if len(given.vectors) != runs:
@@ -54,7 +56,7 @@ class Stepping:
             self.alike = alike = np.tile(model.parameter_vector, (runs, 1))
         return alike[:runs]
 
-    def maker(self, model: "Model", held: Held) -> tuple[SingleSteps | LaneSteps, int]:
+    def maker(self, model: Model, held: Held) -> tuple[SingleSteps | LaneSteps, int]:
         """Return what makes steps of runs, and the number of runs that is worth a thread."""
         kind, batches = LANES[held.method], model.batch_library
         entry = model.manifest.get(kind.entry)
@@ -80,7 +82,7 @@ class Settings:
     threads: Any = None
 
     @classmethod
-    def named(cls, given: Mapping[str, Any]) -> "Settings":
+    def named(cls, given: Mapping[str, Any]) -> Settings:
         """Return settings by their names; SimulationError for an unknown name."""
         for name in given:
             if line := none_of("step: setting", name, list(cls.__dataclass_fields__)):
@@ -89,7 +91,7 @@ class Settings:
 
 
 def step(
-    model: "Model",
+    model: Model,
     given: tuple[ArrayLike, ArrayLike, ArrayLike],
     h: object,
     settings: Mapping[str, Any],
@@ -126,7 +128,7 @@ def step(
     return tuple(array if many else array[0] for array in moved.values())
 
 
-def _method(model: "Model", asked: object) -> str:
+def _method(model: Model, asked: object) -> str:
     """Return the method; ModelError names what it would need of the scene."""
     model.refuse_fixed("step")
     name = "implicit_euler" if model.contacts else "rk4"
@@ -142,13 +144,13 @@ def _method(model: "Model", asked: object) -> str:
     return name
 
 
-def _implicit(model: "Model") -> bool:
+def _implicit(model: Model) -> bool:
     """Tell whether the model's rollout has implicit steps."""
     return "implicit_euler" in model.manifest.get("simulation", {}).get("methods", {})
 
 
 def _states(
-    model: "Model", given: tuple[ArrayLike, ArrayLike, ArrayLike], asked: Settings
+    model: Model, given: tuple[ArrayLike, ArrayLike, ArrayLike], asked: Settings
 ) -> tuple[dict[str, np.ndarray], int, bool]:
     """Return the arrays of a call, how many runs they have, and whether with a batch axis."""
     values: dict[str, Any] = dict(zip(("q", "v", "tau"), given, strict=True))
