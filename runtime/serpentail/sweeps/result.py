@@ -63,7 +63,7 @@ class Sweep:
         return len(self.entries)
 
     def __getitem__(self, k: int) -> dict[str, Any]:
-        """Return the row of point k; KeyError if it has none yet."""
+        """Return the row of point k; KeyError if it has none yet, IndexError if k is no point."""
         entry = self.entries[range(len(self))[k]]
         found = self.store.rows([entry.key])
         if not found:
@@ -113,14 +113,14 @@ class Sweep:
         Raises
         ------
         SweepError
-            The function returned no motion.
+            There is no such point, or the function returned no motion.
         SerpentailError
             What the run raises.
         """
         from .bundles import model_of
         from .runs import run_point
 
-        entry = self.entries[range(len(self))[k]]
+        entry = self.entries[whole(f"{len(self)} points; row", k, 0, len(self) - 1)]
         _, motion = run_point(entry.job, model_of(entry.bundle, entry.job), entry.point)
         if motion is None:
             raise SweepError(
