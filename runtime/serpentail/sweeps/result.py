@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..brief import brief
 from ..errors import SweepError
-from .axes import Axes
+from .axes import Axes, checked_row
 from .driver import Spent
 from .groups import Entry
 from .store import Row, Store
@@ -120,7 +120,7 @@ class Sweep:
         from .bundles import model_of
         from .runs import run_point
 
-        entry = self.entries[whole(f"{len(self)} points; row", k, 0, len(self) - 1)]
+        entry = self.entries[checked_row(k, len(self))]
         _, motion = run_point(entry.job, model_of(entry.bundle, entry.job), entry.point)
         if motion is None:
             raise SweepError(
