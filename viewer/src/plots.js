@@ -9,6 +9,8 @@ const DASHES = [[], [6, 4], [2, 3], [9, 3, 2, 3]];
 const digits = (value, largest) =>
   Number((Math.abs(value) < 1e-6 * largest ? 0 : value).toPrecision(4)).toString();
 
+const LEAST_PART = 1e-3; // of the largest value: the axis spans this or more, not rounding alone
+
 class Plot {
   constructor(holder, meta, runs, seek) {
     Object.assign(this, { meta, runs, curves: meta.curves });
@@ -23,7 +25,9 @@ class Plot {
       ...this.size(),
       scales: {
         x: { time: false },
-        y: meta.compressed ? { distr: 4, asinh: meta.compressed } : {},
+        y: meta.compressed
+          ? { distr: 4, asinh: meta.compressed }
+          : { range: (_, low, high) => this.range(low, high) },
       },
       series: [{}, ...this.curves.map((curve, i) => this.look(curve, i))],
       axes: [
@@ -60,6 +64,13 @@ class Plot {
 
   dash(curve) {
     return this.alone ? [] : DASHES[curve.column % DASHES.length];
+  }
+
+  range(low, high) {
+    if (low === null || high === null) return [null, null];
+    const least = Math.max(this.meta.least, LEAST_PART * this.largest);
+    const more = Math.max(least - (high - low), 0) / 2;
+    return uPlot.rangeNum(low - more, high + more, 0.1, true);
   }
 
   axis(more) {
