@@ -11,6 +11,15 @@ const digits = (value, largest) =>
 
 const LEAST_PART = 1e-3; // of the largest value: the axis spans this or more, not rounding alone
 
+// Labels of an axis, with as many decimals as its step needs.
+const ticks = (_plot, values, _axis, _space, step) => {
+  const decimals = Math.min(Math.max(2 - Math.floor(Math.log10(step)), 0), 20);
+  return values.map((value) => {
+    const rounded = Number(value.toFixed(decimals));
+    return rounded && Math.abs(rounded) < 1e-3 ? rounded.toExponential() : rounded.toString();
+  });
+};
+
 class Plot {
   constructor(holder, meta, runs, seek) {
     Object.assign(this, { meta, runs, curves: meta.curves });
@@ -32,7 +41,7 @@ class Plot {
       series: [{}, ...this.curves.map((curve, i) => this.look(curve, i))],
       axes: [
         this.axis({ size: 26, values: (_, times) => times.map((time) => `${time} s`) }),
-        this.axis({ size: 56 }),
+        this.axis({ size: 56, ...(meta.compressed ? {} : { values: ticks }) }),
       ],
       legend: { show: false },
       cursor: { show: false },
