@@ -19,11 +19,11 @@ def slid(contacts, speed, **changes):
     names = ["contact_points", "contact_dynamics", "rollout", "energy", "momentum", "implicit"]
     model = st.build("contact_m1_n3", contacts=contacts, functions=names, **changes)
     settings = {"legs": LEGS, "controller": st.Damping(1e-3)}
-    q, v, bristles = st.settle(model, at_height(model, 0.06, 1)[0], rounds=3, duration=0.4, **settings)
-    v[0] = speed
-    motion = st.simulate(
-        model, q, v, bristles0=bristles, t_span=0.8, output_step=2e-3, **settings
+    q, v, bristles = st.settle(
+        model, at_height(model, 0.06, 1)[0], rounds=3, duration=0.4, **settings
     )
+    v[0] = speed
+    motion = st.simulate(model, q, v, bristles0=bristles, t_span=0.8, output_step=2e-3, **settings)
     return summary(model, motion)["slip_m"]
 
 

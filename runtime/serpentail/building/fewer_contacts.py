@@ -21,7 +21,9 @@ def with_contacts(tables: Mapping[str, Any], contacts: Any) -> dict[str, Any]:
     scene = dict(tables) | {"contacts": contacts}
     if not isinstance(contacts, list | tuple):  # which the generator refuses
         return scene
-    lacking = [group for group in NEEDED if group not in contacts and (group != ANY or not contacts)]
+    lacking = [
+        group for group in NEEDED if group not in contacts and (group != ANY or not contacts)
+    ]
     if ANY in lacking:
         scene.pop("friction", None)
     without = [name for group in lacking for name in NEEDED[group]]

@@ -33,9 +33,7 @@ def _torso_ways(motion: Trajectory) -> Array:
     """Return the ways (K - 1, 1, 2) of the material of the torso's lowest point, rolling aside."""
     assert motion.contact is not None
     arms = motion.contact.of("torso").points[:, 0] - motion.q[:, POSITION]
-    turning = np.einsum(
-        "kij,kj->ki", rotation_matrix(motion.q[:, QUATERNION]), motion.v[:, OMEGA]
-    )
+    turning = np.einsum("kij,kj->ki", rotation_matrix(motion.q[:, QUATERNION]), motion.v[:, OMEGA])
     speeds = (motion.v[:, VELOCITY] + np.cross(turning, arms))[:, :2]
     ways: Array = (speeds[1:] + speeds[:-1]) / 2 * np.diff(motion.t)[:, None]
     return ways[:, None]

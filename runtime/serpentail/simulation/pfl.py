@@ -38,8 +38,8 @@ class Pfl:
     feedforward : bool, default True
         Whether to use q_t_ddot_r, which the paper leaves out.
     torque : float, str or sequence, optional
-        Largest torque of the motors (N m, or a text such as "1 mN m"), one number or one for each tail coordinate. Default:
-        no limit.
+        Largest torque of the motors (N m, or a text such as "1 mN m"), one number or one for
+        each tail coordinate. Default: no limit.
 
     Raises
     ------

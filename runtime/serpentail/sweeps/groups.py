@@ -155,9 +155,7 @@ def _of_scene(scene: Any, axes: Axes, job: Job) -> tuple[Find, Units]:
 
     # which other names are parameters, and which of these need other code
     others = [name for name in axes.names if name not in {*keys, *shape}]
-    if isinstance(job.run, str):  # before a model is made
-        names = Parameters.__annotations__
-        _refuse_unknown([name for name in others if name not in names], job.run, names)
+    _refuse_misspelt(others, job.run)
     made = tables | {name: first[name] for name in shape}
     checked, left = built(made, path.stem, {name: first[name] for name in others})
     known = {entry["name"] for entry in checked.manifest["parameters"]}
@@ -209,6 +207,13 @@ def _refuse_shapes(model: Model, axes: Axes) -> None:
                 f"over: {name}: values are {what}: needs {size} numbers at each point, such as "
                 f"st.random([-1] * {size}, [1] * {size})"
             )
+
+
+def _refuse_misspelt(names: list[str], run: Any) -> None:
+    """SweepError for a name that no model has as a parameter, before a model is made."""
+    known = Parameters.__annotations__
+    if isinstance(run, str):
+        _refuse_unknown([name for name in names if name not in known], run, known)
 
 
 def _refuse_unknown(names: list[str], run: str, known: Collection[str]) -> None:
