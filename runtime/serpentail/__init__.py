@@ -18,6 +18,7 @@ _HOME = {
         ["Damping", "TorqueTable", "TorqueCurve", "NativeTorque", "Phases"],
         "simulation.controllers",
     ),
+    "Sampled": "simulation.sampled",
     "Piecewise": "simulation.piecewise",
     **dict.fromkeys(["Legs", "Reference"], "simulation.schedules"),
     "Contact": "motion.contact",

@@ -2,6 +2,7 @@
 
 import math
 import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,11 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as some
 
 import serpentail as st
+from serpentail.building.fewer_contacts import FUNCTIONS, NEEDED
 from serpentail.building.options import Parameters, SceneKeys
 from serpentail.building.scene_text import scene_text
 from serpentail_codegen.scene.parameters import PARAMETERS
 from serpentail_codegen.scene.passive import PASSIVE
 from serpentail_codegen.scene.scene import KEYS
+from serpentail_codegen.scene.signatures.table import NEEDS
 
 TEXTS = some.text(some.characters(codec="utf-8"))
 VALUES = some.recursive(
@@ -66,3 +69,22 @@ def test_options_are_what_the_generator_knows():
     assert set(SceneKeys.__annotations__) == keys - left
     names = [parameter.name for parameter in (*PARAMETERS, *PASSIVE)]
     assert list(Parameters.__annotations__) == names
+
+
+def test_what_belongs_to_contacts_is_what_the_generator_says():
+    wanted = {group: [p.name for p in PARAMETERS if p.needs == group] for group in NEEDED}
+    assert {group: [*names] for group, names in NEEDED.items()} == wanted
+    assert {p.needs for p in PARAMETERS} == {"", *NEEDED}
+    of_functions = {name: group for group, names in FUNCTIONS.items() for name in names}
+    assert of_functions == NEEDS
+
+
+@pytest.mark.parametrize("contacts", [[], ["feet"], ["tail"], ["torso"]])
+def test_a_robot_file_serves_with_fewer_contacts(contacts):
+    scene = Path(__file__).parents[2] / "scenes" / "contact_m1_n3.toml"
+    model = st.build(scene, contacts=contacts)
+    assert list(model.contacts) == contacts
+    assert ("mu" in model.parameters) == bool(contacts)
+    assert ("hip" in model.parameters) == ("feet" in contacts)
+    with pytest.raises(st.ModelError, match="mu: no such parameter"):
+        st.build(scene, contacts=[], mu=0.5)

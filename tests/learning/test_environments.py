@@ -120,3 +120,12 @@ def test_starts_are_spread_as_asked_for(flyer, walker):
     assert (seen[:, 2] < -np.cos(0.3)).all()
     points, _ = walker.contact_points(lying.worlds.q, lying.worlds.v, lying.worlds.given["legs"])
     np.testing.assert_allclose(points[..., 2].min(axis=1), 1e-3, atol=1e-9)
+
+
+def test_settings_may_be_texts_with_units(flyer):
+    texts = {"torque": "20 mN m", "tilt": "90 deg", "step": "1 ms", "height": "30 cm"}
+    plain = {"torque": 0.02, "tilt": np.pi / 2, "step": 1e-3, "height": 0.3}
+    first, second = (st.environments(flyer, "righting", 3, **each) for each in (texts, plain))
+    np.testing.assert_array_equal(first.reset(seed=1)[0], second.reset(seed=1)[0])
+    actions = np.full((3, flyer.layout.nt), 0.5)
+    np.testing.assert_array_equal(first.step(actions)[0], second.step(actions)[0])

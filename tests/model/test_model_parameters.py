@@ -216,3 +216,17 @@ def test_stops_of_a_run_that_exclude_each_other(elastic):
     with pytest.raises(st.ModelError, match="is not below tail_stop_upper 2 of tail coordinate 1"):
         lower = np.array([[0, 0, 0, 0], [0, 3, 0, 0]])
         RunParameters.checked(elastic, values, {"tail_stop_lower": lower}, 2)
+
+
+@pytest.mark.parametrize(
+    ("given", "end"),
+    [
+        ({"torso_inertia": "1 g cm2"}, "none above the sum of the other two; here is 1 number"),
+        ({"torso_inertia": [1e-5, 1e-5, 9e-5]}, "the other two; here 9e-05 is above 2e-05"),
+        ({"torso_inertia": [1e-5, 1e-5, 0]}, "above 0, none above the sum of the other two"),
+        ({"tail_mount": [1, 2]}, "needs 3 finite numbers (m); here are 2 numbers"),
+        ({"tail_mount": [1, 2, np.nan]}, "needs 3 finite numbers (m)"),
+    ],
+)
+def test_what_failed_of_several_rules_is_told(manifest, given, end):
+    assert refusal(manifest, given).endswith(end)

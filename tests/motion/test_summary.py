@@ -39,6 +39,7 @@ OF_THE_GROUND = [
     "peak_tail_force_N",
     "ground_impulse_N_s",
     "impulse_N_s",
+    "slip_m",
 ]
 
 

@@ -119,3 +119,12 @@ def test_torques_keep_their_limit(method):
     law = st.Pfl(model, reference, torque=(1e-3, 2e-3))
     wanted = [law(*state) for state in zip(tight.t, tight.q, tight.v, strict=True)]
     np.testing.assert_allclose(tight.tau[1:-1], wanted[1:-1], rtol=1e-9, atol=1e-12)
+
+
+def test_a_limit_may_be_a_text_with_a_unit():
+    model, reference = rat(), ([0.0, 0.1], np.zeros((2, 2)))
+    texts = "1 mN m", ["1 mN m", "0.2 N mm"]
+    for text, wanted in zip(texts, ([1e-3, 1e-3], [1e-3, 2e-4]), strict=True):
+        assert st.Pfl(model, reference, torque=text).torque.tolist() == wanted
+    with pytest.raises(st.SimulationError, match="Pfl: torque: value '1 g': a mass where a torque"):
+        st.Pfl(model, reference, torque="1 g")

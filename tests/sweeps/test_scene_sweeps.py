@@ -126,6 +126,36 @@ def test_slips_in_a_scene_are_told(study, capsys, old, new, words):
     assert re.search(words, err), err
 
 
+def test_a_scene_without_a_sweep_is_told_in_one_line(study, capsys):
+    study.write_text(SCENE[: SCENE.index("[sweep]")])
+    status, out, err = told(capsys, study)
+    assert status == 2 and out is None
+    assert "has no table [sweep]; add one, with a table [sweep.over]" in err
+
+
+@pytest.mark.parametrize("row", ["8", "-1"])
+def test_a_row_that_is_not_there_is_told_before_anything_runs(study, capsys, row):
+    status, out, err = told(capsys, study, "--row", row, "--view", study.with_name("page.html"))
+    assert status == 2 and out is None and f"row {row}: there are 8, 0 to 7" in err
+    assert not study.with_suffix(".db").exists()
+
+
+@pytest.mark.parametrize("row", [99, -1, True, 0.0])
+def test_a_point_that_is_not_there_has_no_motion(study, row):
+    found = st.sweep(study, {"tail_mass": st.grid([0.003])})
+    with pytest.raises(st.SweepError, match=f"row {row}: there are 1, 0 to 0"):
+        found.motion(row)
+
+
+def test_a_misspelt_parameter_is_told_before_a_model_is_made(study, monkeypatch):
+    def never(*_):
+        raise AssertionError("a model was made")
+
+    monkeypatch.setattr("serpentail.sweeps.groups.built", never)
+    with pytest.raises(st.SweepError, match="did you mean 'tail_length'"):
+        st.sweep(study, {"tail_lenght": st.grid([0.1])})
+
+
 def test_the_schema_knows_sweeps(study, capsys):
 
     assert cli.main(["schema"]) == 0

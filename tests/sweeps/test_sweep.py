@@ -185,3 +185,14 @@ def test_progress_tells_how_many_are_left():
     told = [each for each in told if each.stage == "sweep"]
     assert told[-1].ended and any("of 40" in each.what for each in told)
     assert any(each.left is not None for each in told[:-1])
+
+
+def test_a_start_of_a_wrong_shape_is_refused_before_it_runs(model):
+    settings = {"q0": [0, 0, 0.3, 1, 0, 0, 0, 0, 0]}
+    with pytest.raises(st.SweepError, match=r"over: v0: values are of shape \(\): needs 8 numbers"):
+        st.sweep(model, {"v0": st.random(-1, 1)}, points=2, settings=settings)
+    with pytest.raises(st.SweepError, match=r"over: q0: values are not numbers: needs 9 numbers"):
+        st.sweep(model, {"q0": st.grid(["up"])}, settings={"v0": [0] * 8})
+    low, high = [-1] * 8, [1] * 8
+    rows = st.sweep(model, {"v0": st.random(low, high)}, points=2, settings=settings).rows()
+    assert [row["error"] for row in rows] == [None, None]

@@ -1,5 +1,6 @@
 """The page in a real browser: it needs nothing else, seeks, switches, obeys keys, fits a phone."""
 
+import dataclasses
 import time
 from io import BytesIO
 
@@ -239,3 +240,32 @@ def test_a_damaged_page_says_so(browser, pages, tmp_path):
     WebDriverWait(browser, 60).until(lambda b: b.execute_script("return serpentail.error"))
     ready, said = browser.execute_script("return [serpentail.ready, serpentail.error]")
     assert not ready and "damaged" in said and "could not be opened" in text(browser, "notes")
+
+
+SPY = """
+  window.labels = new Map();
+  const write = CanvasRenderingContext2D.prototype.fillText;
+  CanvasRenderingContext2D.prototype.fillText = function (text, ...more) {
+    if (!window.labels.has(this.canvas)) window.labels.set(this.canvas, new Set());
+    if (!/s$/.test(text)) window.labels.get(this.canvas).add(text);
+    return write.call(this, text, ...more);
+  };
+"""
+
+
+def test_the_axes_of_a_motion_at_rest_do_not_show_rounding(browser, tmp_path):
+    """Its height varies by the rounding of a float: labels differ, over 1 mm or more."""
+    kick = simulated("kick")
+    q, v = np.repeat(kick.q[:1], len(kick.t), axis=0), np.zeros_like(kick.v)
+    q[:, 2] = 0.109 + 1e-8 * np.sin(20 * kick.t)
+    rest = dataclasses.replace(kick, q=q, v=v)
+    added = browser.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": SPY})
+    try:
+        driver = opened(browser, rest.view(tmp_path / "rest.html"))
+        time.sleep(SETTLED)
+        drawn = driver.execute_script("return [...labels.values()].map((each) => [...each])")
+    finally:
+        browser.execute_cdp_cmd("Page.removeScriptToEvaluateOnNewDocument", added)
+    height, tilt = (sorted(map(float, each)) for each in drawn[:2])
+    assert len(height) > 1 and 0.4e-3 < np.ptp(height) < 3e-3 and height[0] < 0.109 < height[-1]
+    assert len(tilt) > 1 and 0.04 < np.ptp(tilt) < 0.3

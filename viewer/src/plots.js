@@ -9,6 +9,17 @@ const DASHES = [[], [6, 4], [2, 3], [9, 3, 2, 3]];
 const digits = (value, largest) =>
   Number((Math.abs(value) < 1e-6 * largest ? 0 : value).toPrecision(4)).toString();
 
+const LEAST_PART = 1e-3; // of the largest value: the axis spans this or more, not rounding alone
+
+// Labels of an axis, with as many decimals as its step needs.
+const ticks = (_plot, values, _axis, _space, step) => {
+  const decimals = Math.min(Math.max(2 - Math.floor(Math.log10(step)), 0), 20);
+  return values.map((value) => {
+    const rounded = Number(value.toFixed(decimals));
+    return rounded && Math.abs(rounded) < 1e-3 ? rounded.toExponential() : rounded.toString();
+  });
+};
+
 class Plot {
   constructor(holder, meta, runs, seek) {
     Object.assign(this, { meta, runs, curves: meta.curves });
@@ -23,12 +34,14 @@ class Plot {
       ...this.size(),
       scales: {
         x: { time: false },
-        y: meta.compressed ? { distr: 4, asinh: meta.compressed } : {},
+        y: meta.compressed
+          ? { distr: 4, asinh: meta.compressed }
+          : { range: (_, low, high) => this.range(low, high) },
       },
       series: [{}, ...this.curves.map((curve, i) => this.look(curve, i))],
       axes: [
         this.axis({ size: 26, values: (_, times) => times.map((time) => `${time} s`) }),
-        this.axis({ size: 56 }),
+        this.axis({ size: 56, ...(meta.compressed ? {} : { values: ticks }) }),
       ],
       legend: { show: false },
       cursor: { show: false },
@@ -60,6 +73,13 @@ class Plot {
 
   dash(curve) {
     return this.alone ? [] : DASHES[curve.column % DASHES.length];
+  }
+
+  range(low, high) {
+    if (low === null || high === null) return [null, null];
+    const least = Math.max(this.meta.least, LEAST_PART * this.largest);
+    const more = Math.max(least - (high - low), 0) / 2;
+    return uPlot.rangeNum(low - more, high + more, 0.1, true);
   }
 
   axis(more) {

@@ -27,6 +27,7 @@ from ..model.parameters import merged
 from ..model.reading import regular_bytes
 from ..model.snapshot import restored, snapshot
 from .examples import tables_of_scene
+from .fewer_contacts import with_contacts
 from .generator import generate, identity
 from .options import Options, separated
 from .scene_text import scene_text
@@ -70,7 +71,9 @@ def build(
     threads : int, optional
         As of ``load``.
     **options
-        Keys of a scene, which replace those of the file, and parameters by name (SI). Common keys
+        Keys of a scene, which replace those of the file, and parameters by name (SI). If
+        ``contacts`` leaves out a group of the file, such as ``contacts=[]`` for flights, so are
+        the file's parameters and functions of that group. Common keys
         are ``tail`` ("articulated", "continuum" or "mixed"), ``segments`` (m, or one table for
         each segment), ``links`` (n), ``functions`` (names, or "all"), ``contacts``, ``samples``,
         ``friction``, ``coordinates``, ``bend_range`` (rad), ``real``, ``emission``, ``profile``,
@@ -111,6 +114,8 @@ def build(
         chosen = built(keys, _name(keys), parameters)
     else:
         tables, path = tables_of_scene(scene)
+        if "contacts" in keys:
+            tables = with_contacts(tables, keys["contacts"])
         chosen = built(tables | keys, path.stem, parameters)
     return model_from(*chosen, compiled=compiled, threads=threads)
 

@@ -11,6 +11,7 @@ LATER = ("executor", "retry_failed", "limit")  # of running alone
 
 def sweep(arguments: argparse.Namespace) -> Outcome:
     """Run the missing points of a scene's sweep, and return how far it is."""
+    from ..sweeps.axes import axes_of, checked_row
     from ..sweeps.scene import arguments_of
     from ..sweeps.sweep import posed
     from ..sweeps.sweep import sweep as swept
@@ -19,6 +20,9 @@ def sweep(arguments: argparse.Namespace) -> Outcome:
     if arguments.export is not None:
         checked(arguments.export)
     given = arguments_of(arguments.scene)
+    if arguments.view is not None:  # before anything runs
+        points = len(axes_of(given["over"], given.get("points"), given.get("seed", 0)))
+        checked_row(arguments.row, points)
     if arguments.store is not None:
         given["store"] = arguments.store
     if arguments.status:

@@ -27,8 +27,9 @@ def environment(model: Model, task: str, **settings: Any) -> "Environment":
     task : {"righting", "landing", "self_recovery"}
         "righting": in the air, from any tilt; "landing": the same, and onto the feet;
         "self_recovery": on the ground, from the back.
-    torque : float, default 0.02
-        Largest torque (N m); an action of 1 asks for it.
+    torque : float or str, default 0.02
+        Largest torque (N m); an action of 1 asks for it. This and the settings below with a unit
+        may be texts, such as "20 mN m" or "90 deg".
     step : float
         Step of the integrator (s). Default: 1e-3 in flight, 2e-4 with contacts.
     substeps : int

@@ -7,15 +7,20 @@ from typing import Any
 import numpy as np
 
 from ..attitude import from_angles
-from ..checks import number, whole_number
+from ..checks import number, numbers_in, shown, whole_number
 from ..errors import ModelError, SimulationError
 from ..model.layout import OMEGA, QUATERNION
 from ..model.model import Model
+from ..units import in_unit
 
 Array = np.ndarray
 MOST_SUBSTEPS = 1000
 LEG_ANGLES = np.radians([210.0, -40.0])  # gamma and delta of both legs, all the time
 ABOVE = 1e-3  # m: how far the lowest point of an animal that lies begins above the ground
+UNITS = {  # of settings, which may be texts with units
+    "torque": "N m", "step": "s", "duration": "s", "angle": "rad",
+    "tilt": "rad", "spin": "rad/s", "height": "m",
+}  # fmt: skip
 DRAWS = 5  # numbers in [0, 1) that a start takes
 
 
@@ -35,8 +40,8 @@ class Task:
             needs = ", ".join(map(repr, self.contacts)) or "none, because it is a flight"
             has = ", ".join(map(repr, model.contacts)) or "none"
             raise ModelError(
-                f"{self.name}: {model.name} has contacts {has}: needs {needs}: change `contacts` "
-                "of the scene, then generate it again"
+                f"{self.name}: {model.name} has contacts {has}: needs {needs}: build it with "
+                f"contacts={list(self.contacts)}, or change `contacts` of the scene"
             )
         settings: dict[str, Any] = {"angle": float(np.pi / np.max(model.joints_each))}
         settings |= self.settings
@@ -46,16 +51,36 @@ class Task:
                 f"{self.name} has no setting {', '.join(map(repr, unknown))}; it has "
                 f"{', '.join(settings)}"
             )
-        settings |= given
+        settings |= {name: _measured(name, value) for name, value in given.items()}
         for name in ("torque", "step", "duration", "angle"):
             settings[name] = number(name, settings[name], SimulationError, above=0)
         for name, most in (("tilt", np.pi), ("spin", np.inf), ("height", np.inf)):
             if name in settings:
-                settings[name] = number(name, settings[name], SimulationError, least=0, most=most)
+                settings[name] = _up_to(name, settings[name], most)
         settings["substeps"] = whole_number(
             "substeps", settings["substeps"], SimulationError, least=1, most=MOST_SUBSTEPS
         )
         return settings
+
+
+def _measured(name: str, value: Any) -> Any:
+    """Return a setting with a text such as "20 mN m" as a number in SI."""
+    try:
+        return in_unit(value, UNITS[name]) if name in UNITS else value
+    except ValueError as reason:
+        raise SimulationError(f"{name}: value {shown(value)}: {reason}") from None
+
+
+def _up_to(name: str, value: Any, most: float) -> float:
+    """Return a setting from 0 to the largest one; of an angle, the error names radians."""
+    try:
+        return number(name, value, SimulationError, least=0, most=most)
+    except SimulationError as error:
+        given = numbers_in(value)
+        if UNITS[name] != "rad" or given is None or given.shape != ():
+            raise
+        remedy = f', or "{given:g} deg"' if most < given <= np.degrees(most) else ""
+        raise SimulationError(f"{error} rad{remedy}") from None
 
 
 def thrown(

@@ -22,7 +22,7 @@ TOTALS = {
 CHECKS = {  # of rows (K, size), for each one
     "positive": (lambda x: (x > 0).all(axis=1), "above 0"),
     "not_negative": (lambda x: (x >= 0).all(axis=1), "0 or above"),
-    "finite": (lambda x: np.ones(len(x), bool), "finite"),
+    "finite": (lambda x: np.ones(len(x), bool), ""),
     "body_inertia": (
         lambda x: (x > 0).all(axis=1) & (2 * x.max(axis=1) <= x.sum(axis=1) * (1 + 1e-12)),
         "above 0, none above the sum of the other two",
@@ -231,7 +231,8 @@ def checked_value(
     kind += f", {size // pieces} of each piece of the tail" if pieces else ""
     of_all = "per" in fields[name]  # one number may be given for all coordinates
     kind += ", or one for all," if of_all else ""
-    needs, shape = f"needs {kind} ({unit}), {words}", (size,) if size > 1 or pieces else ()
+    needs = f"needs {kind} ({unit}){', ' if words else ''}{words}"
+    shape = (size,) if size > 1 or pieces else ()
     if runs is not None:
         needs, shape = f"{needs}, for each of {runs} runs", (runs, *shape)
     try:
@@ -243,13 +244,28 @@ def checked_value(
     if of_all and numbers is not None and numbers.shape == shape[:-1]:
         numbers = np.repeat(numbers[..., None], size, axis=-1)
     if numbers is None or numbers.shape != shape:
-        return f"{name}: value {shown(value)}: {needs}"
+        return f"{name}: value {shown(value)}: {needs}{_counted(numbers)}"
     # the first run with a wrong value
     rows = numbers.reshape(-1, size)
     with np.errstate(over="ignore"):
         wrong = np.flatnonzero(~(np.isfinite(rows).all(axis=1) & holds(rows)))
     if not len(wrong):
         return numbers
+    needs += _broken(rows[wrong[0]])
     if runs is None:
         return f"{name}: value {shown(value)}: {needs}"
     return f"{name} of run {wrong[0]}: value {shown(numbers[wrong[0]].tolist())}: {needs}"
+
+
+def _counted(numbers: np.ndarray | None) -> str:
+    """Return the end of a line about a wrong number of numbers; "" for other values."""
+    if numbers is None or numbers.ndim > 1:
+        return ""
+    return "; here is 1 number" if numbers.size == 1 else f"; here are {numbers.size} numbers"
+
+
+def _broken(row: np.ndarray) -> str:
+    """Return the end of a line about moments of inertia of no body; "" for other numbers."""
+    if len(row) != 3 or not (np.isfinite(row).all() and (row > 0).all()):
+        return ""
+    return f"; here {row.max():g} is above {row.sum() - row.max():g}"

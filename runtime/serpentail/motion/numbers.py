@@ -28,6 +28,7 @@ from .landing import (
     turned,
     upright,
 )
+from .slip import slip
 from .table import as_markdown
 from .trajectory import Trajectory
 
@@ -179,6 +180,11 @@ NUMBERS = (
     Number(
         "touching_s", "s", f"total time for which each group touched the ground; {ONE_FOOT}",
         lambda model, motion: touching_time(motion),
+    ),
+    Number(
+        "slip_m", "m",
+        "longest path that a point of each group slips while the ground pushes it, at the samples",
+        slip,
     ),
     Number(
         "first_touch_down_s", "s", f"first touch-down of each group; {ONE_FOOT}",

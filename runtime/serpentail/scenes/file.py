@@ -34,6 +34,7 @@ NEEDS = {
     "simulate": "start and duration",
     "plan": "start and duration",
     "identify": "tables [[identify.marker]]",
+    "sweep": "a table [sweep.over]",
 }
 UNSAID = {"base": "free", "weightless": False}  # manifests leave these out
 

@@ -23,6 +23,7 @@ class Acting:
         self, records: Records, controller: object, start: Start, legs: Piecewise | None = None
     ):
         self.records = records
+        self.span = start.start, start.end
         given = controllers_of(controller, start.runs if start.many else None)
         if len(given) == 1 and start.runs > 1 and self._of(given[0], legs, None).keeps:
             given = given * start.runs
@@ -46,7 +47,7 @@ class Acting:
     def _of(self, controller: Controller, legs: Piecewise | None, k: int | None) -> Actuation:
         """Return the actuation of run k, or of all; SimulationError if it is impossible."""
         try:
-            return Actuation(self.records, controller, legs)
+            return Actuation(self.records, controller, self.span, legs)
         except SimulationError as error:
             if k is None:
                 raise

@@ -18,7 +18,13 @@ from .records import CFunction, Records
 class Actuation:
     """Controllers and legs as a C record, times to stop at, and errors of a user's function."""
 
-    def __init__(self, records: Records, controller: Controller, legs: Piecewise | None = None):
+    def __init__(
+        self,
+        records: Records,
+        controller: Controller,
+        span: tuple[float, float],
+        legs: Piecewise | None = None,
+    ):
         self.records = records
         self.error: BaseException | None = None
         self.ctrl_c = CtrlC()
@@ -32,7 +38,7 @@ class Actuation:
         if self.of_python:  # the user's: SciPy's methods work with their own
             self.float_errors = np.geterr()
         # times at which something is not smooth; steps end there
-        stops = {*self._kinks(begins)}
+        stops = {*self._kinks(begins, span)}
         members = {}
         if legs is not None:
             stops |= {*legs.kinks(2).tolist()}
@@ -83,13 +89,17 @@ class Actuation:
             return parts
         return Parts(user=parts.pfl)
 
-    def _kinks(self, begins: list[float]) -> list[float]:
-        """Return the times at which phases begin, or at which their torques are not smooth."""
+    def _kinks(self, begins: list[float], span: tuple[float, float]) -> list[float]:
+        """Return the times at which phases begin, or at which their torques are not smooth.
+
+        span: start and end of the run (s).
+        """
         later = begins[1:]
         times = [*later]
         # the first phase acts before its begin, too
         for begin, end, parts in zip([-np.inf, *later], [*later, np.inf], self.parts, strict=True):
-            times += [t for t in parts.kinks() if begin < t < end]
+            ticks = parts.ticks(max(begin, span[0]), min(end, span[1]))
+            times += [t for t in (*parts.kinks(), *ticks) if begin < t < end]
         return times
 
     def _controller(self, parts: Parts) -> ctypes.Structure:

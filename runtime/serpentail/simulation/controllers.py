@@ -16,10 +16,11 @@ from ..errors import SimulationError
 from .parts import Parts, TorqueFunction
 from .pfl import Pfl
 from .piecewise import Piecewise, checked_nodes, linear
+from .sampled import Sampled
 
 CHOICES = (
-    "None, Damping, TorqueTable, TorqueCurve, Pfl, Mpc, Phases, NativeTorque or a function "
-    "(t, q, v)"
+    "None, Damping, TorqueTable, TorqueCurve, Pfl, Mpc, Sampled, Phases, NativeTorque or a "
+    "function (t, q, v)"
 )
 
 
@@ -168,7 +169,7 @@ class Phases:
         object.__setattr__(self, "phases", tuple(zip(times.tolist(), acting, strict=True)))
 
 
-Single = Damping | TorqueTable | TorqueCurve | Pfl | NativeTorque | TorqueFunction
+Single = Damping | TorqueTable | TorqueCurve | Pfl | Sampled | NativeTorque | TorqueFunction
 Controller = Single | Phases | None
 
 

@@ -21,12 +21,13 @@ class OwnState:
     """State of a C function during a run.
 
     begin: called with the record of a run that begins, and the controller's clock (s). told:
-    returns what the run's info has of it. stops: times (s) at which steps must end.
+    returns what the run's info has of it. stops: called with the span of the run on that clock (s);
+    returns the times (s) at which steps must end.
     """
 
     begin: Callable[[Any, float], None]
     told: Callable[[], dict[str, Any]]
-    stops: list[float]
+    stops: Callable[[float, float], list[float]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +66,10 @@ class Parts:
             times += self.torques.kinks(2).tolist()
         if self.pfl is not None:
             times += self.pfl.curve.kinks(3).tolist()
-        if self.own is not None:
-            times += [self.clock + stop for stop in self.own.stops]
         return times
+
+    def ticks(self, start: float, end: float) -> list[float]:
+        """Return the times of the run, from start to end, at which steps end for its own state."""
+        if self.own is None:
+            return []
+        return [self.clock + t for t in self.own.stops(start - self.clock, end - self.clock)]

@@ -8,10 +8,11 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import number, numbers, refusal
+from ..checks import number, numbers, refusal, shown
 from ..errors import SimulationError
 from ..model.layout import TORSO_V
 from ..model.model import Model
+from ..units import in_unit
 from .piecewise import Piecewise, checked_nodes, spline
 from .schedules import Reference
 
@@ -39,9 +40,10 @@ class Pfl:
         Gain of the error's rate (1/s), Table 1.
     feedforward : bool, default True
         Whether to use q_t_ddot_r, which the paper leaves out.
-    torque : float or sequence of float, optional
-        Largest torque of the motors (N m), one number or one for each tail coordinate. Default:
-        no limit, also if the reference is a plan with bounds: give ``plan.problem.bounds.torque``.
+    torque : float, str or sequence, optional
+        Largest torque of the motors (N m, or a text such as "1 mN m"), one number or one for
+        each tail coordinate. Default: no limit, also if the reference is a plan with bounds: give
+        ``plan.problem.bounds.torque``.
 
     Raises
     ------
@@ -125,7 +127,10 @@ class Pfl:
 
 def _limit(torque: Any, size: int) -> np.ndarray:
     """Return the largest torques (2m,)."""
-    limit = numbers("Pfl: torque", torque, size, SimulationError)
+    try:
+        limit = numbers("Pfl: torque", in_unit(torque, "N m"), size, SimulationError)
+    except ValueError as reason:
+        raise SimulationError(f"Pfl: torque: value {shown(torque)}: {reason}") from None
     if not (limit > 0).all():
         raise refusal("Pfl: torque", torque, "torques above 0, in N m", SimulationError)
     return limit

@@ -25,6 +25,14 @@ def whole(field: str, value: Any, least: int, most: int) -> int:
     raise refusal(field, value, f"a whole number from {least} to {most}", SweepError)
 
 
+def checked_row(k: Any, points: int) -> int:
+    """Return the number of one of some points; SweepError if there is no such point."""
+    is_whole = isinstance(k, int | np.integer) and not isinstance(k, bool)
+    if is_whole and 0 <= k < points:
+        return int(k)
+    raise SweepError(f"row {shown(k)}: there are {points}, 0 to {points - 1}")
+
+
 @dataclass(frozen=True)
 class Axes:
     """The axes of a sweep by their names; points, seed: of those that are spread."""

@@ -9,7 +9,8 @@ from typing import Any
 
 from .. import __version__
 from ..building.build import built
-from ..checks import Refusals, did_you_mean, shown
+from ..building.options import Parameters
+from ..checks import Refusals, did_you_mean, numbers_in, shown
 from ..errors import IdentificationError, PlanningError, SimulationError, SweepError
 from ..model.model import Model
 from ..model.parameters import independent
@@ -66,6 +67,8 @@ def entries_of(what: Any, axes: Axes, job: Job, of: Any) -> tuple[Axes, list[Ent
     else:
         find, units = _without_model(job), {}
     axes = axes.measured(units)
+    if isinstance(what, Model):
+        _refuse_shapes(what, axes)
     found: dict[str, Entry] = {}
     besides = as_json(of)
     for number, point in enumerate(axes):
@@ -152,6 +155,7 @@ def _of_scene(scene: Any, axes: Axes, job: Job) -> tuple[Find, Units]:
 
     # which other names are parameters, and which of these need other code
     others = [name for name in axes.names if name not in {*keys, *shape}]
+    _refuse_misspelt(others, job.run)
     made = tables | {name: first[name] for name in shape}
     checked, left = built(made, path.stem, {name: first[name] for name in others})
     known = {entry["name"] for entry in checked.manifest["parameters"]}
@@ -190,6 +194,26 @@ def _refuse_keys(job: Job, values: Mapping[str, Any]) -> None:
     refused = Refusals(SweepError)
     read(changed(job.table, values), TABLES[job.run][0], job.run, refused)
     refused.tell()
+
+
+def _refuse_shapes(model: Model, axes: Axes) -> None:
+    """SweepError for a start whose values at the first point have a wrong shape."""
+    first = next(iter(axes))
+    for name, size in zip(STARTS, (model.nq, model.nv), strict=True):
+        given = numbers_in(first.get(name))
+        if name in first and (given is None or given.shape != (size,)):
+            what = "not numbers" if given is None else f"of shape {given.shape}"
+            raise SweepError(
+                f"over: {name}: values are {what}: needs {size} numbers at each point, such as "
+                f"st.random([-1] * {size}, [1] * {size})"
+            )
+
+
+def _refuse_misspelt(names: list[str], run: Any) -> None:
+    """SweepError for a name that no model has as a parameter, before a model is made."""
+    known = Parameters.__annotations__
+    if isinstance(run, str):
+        _refuse_unknown([name for name in names if name not in known], run, known)
 
 
 def _refuse_unknown(names: list[str], run: str, known: Collection[str]) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..brief import brief
 from ..errors import SweepError
-from .axes import Axes
+from .axes import Axes, checked_row
 from .driver import Spent
 from .groups import Entry
 from .store import Row, Store
@@ -63,7 +63,7 @@ class Sweep:
         return len(self.entries)
 
     def __getitem__(self, k: int) -> dict[str, Any]:
-        """Return the row of point k; KeyError if it has none yet."""
+        """Return the row of point k; KeyError if it has none yet, IndexError if k is no point."""
         entry = self.entries[range(len(self))[k]]
         found = self.store.rows([entry.key])
         if not found:
@@ -113,14 +113,14 @@ class Sweep:
         Raises
         ------
         SweepError
-            The function returned no motion.
+            There is no such point, or the function returned no motion.
         SerpentailError
             What the run raises.
         """
         from .bundles import model_of
         from .runs import run_point
 
-        entry = self.entries[range(len(self))[k]]
+        entry = self.entries[checked_row(k, len(self))]
         _, motion = run_point(entry.job, model_of(entry.bundle, entry.job), entry.point)
         if motion is None:
             raise SweepError(

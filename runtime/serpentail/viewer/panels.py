@@ -5,13 +5,14 @@ from typing import Any
 
 from ..motion.trajectory import Trajectory
 
+LEAST = {"height": 1e-3, "tilt": 0.1, "bends": 0.1}  # that an axis spans, in its unit
 ENERGIES = ("total", "kinetic", "potential")
 
 
 def panels(
     names: Sequence[str], motions: Sequence[Trajectory], weight: float
 ) -> list[dict[str, Any]]:
-    """Return the panels: title and curves.
+    """Return the panels: title, curves, and the least span of the axis.
 
     For forces also the weight (N) where the scale changes.
     """
@@ -32,7 +33,8 @@ def panels(
                 curves.append({"run": run, "array": array, "column": column, "label": words})
         if curves:
             compressed = weight if array == "force" else 0
-            found.append({"title": title, "curves": curves, "compressed": compressed})
+            panel = {"title": title, "curves": curves, "compressed": compressed}
+            found.append(panel | {"least": LEAST.get(array, 0)})
     return found
 
 

@@ -159,7 +159,7 @@ class Mpc:
             raise refusal("Mpc: tail coordinates", nt, needs, SimulationError)
         memory = Memory(self.task)
         native = NativeTorque(kernel().mpc_simulated, ctypes.addressof(memory.run))
-        own = OwnState(memory.begin_run, lambda: {"mpc": memory.info()}, self.stops())
+        own = OwnState(memory.begin_run, lambda: {"mpc": memory.info()}, lambda *_: self.stops())
         return Parts(np.full(nt, self.plan.problem.damping), native=native, own=own)
 
     def write_c(self, folder: str | PathLike[str] = ".") -> list[Path]:
