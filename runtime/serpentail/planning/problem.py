@@ -158,17 +158,15 @@ def _partly_free(field: str, value: Any, size: int) -> np.ndarray | None:
     if np.ma.is_masked(value):
         raise PlanningError(f"{field}: has masked entries: give None where it is free")
     try:
-        array = np.array([np.nan if entry is None else float(entry) for entry in value])
-        free = np.array([entry is None for entry in value])
-    except (TypeError, ValueError, OverflowError):
-        raise PlanningError(
-            f"{field}: value {shown(value)}: needs {size} numbers, None where free"
-        ) from None
-    if array.shape != (size,) or not np.isfinite(array[~free]).all():
+        entries = [*value]
+    except TypeError:
+        entries = [value]
+    array = numbers_in([0.0 if entry is None else entry for entry in entries])
+    if array is None or array.shape != (size,) or not np.isfinite(array).all():
         raise PlanningError(
             f"{field}: value {shown(value)}: needs {size} finite numbers, None where free"
         )
-    return array
+    return np.where([entry is None for entry in entries], np.nan, array)
 
 
 def _start_inside(values: np.ndarray, bound: np.ndarray | None, name: str, unit: str) -> None:
