@@ -24,11 +24,10 @@ PANELS = {  # the quantity of each line of panels, and its factor
 
 
 def draw(rows: list[dict], path: Path) -> tuple[Figure, np.ndarray]:
-    """Draw righted shares with their standard errors, energies and durations, against the shape of
-    a tail.
+    """Draw righted shares, energies and durations against the shape of a tail.
 
-    Energies and durations are medians with quartiles of the plans that right the animal. All other
-    properties vary in each bin as in the whole sample.
+    Energies and durations are medians of the plans that right the animal. Bands are standard
+    errors. All other properties vary in each bin as in the whole sample.
     """
 
     def make() -> tuple[Figure, np.ndarray]:
@@ -69,7 +68,8 @@ def _draw(
             error = factor * np.sqrt(share * (1 - share) / len(here))
             found.append((middle, *(factor * share + e for e in (0, -error, error))))
         elif len(righted) >= FEWEST:
-            found.append((middle, *np.percentile(righted, [50, 25, 75])))
+            error = 50 / np.sqrt(len(righted))  # of a median's rank, in percent
+            found.append((middle, *np.percentile(righted, [50, 50 - error, 50 + error])))
     if found:
         middles, height, low, high = np.array(found).T
         color, label = look
