@@ -4,7 +4,7 @@ Each returns the value in a form to work with, or raises the given error. The er
 the value and what the field needs.
 """
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from difflib import get_close_matches
 from operator import index
 from typing import Any, TypeVar
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from .errors import SerpentailError, StateError
+from .units import in_unit
 
 Error = type[Exception]
 T = TypeVar("T")
@@ -155,6 +156,14 @@ def numbers(
         needs = f"one or {size} {_words('numbers', bounds)}{_no_text(value)}"
         raise refusal(field, value, needs, error)
     return np.broadcast_to(numbers, (size,)).copy()
+
+
+def measured(field: str, value: Any, unit: str | Sequence[str], error: Error) -> Any:
+    """Return a value with each text such as "20 mN m", in arrays too, as a number in the unit."""
+    try:
+        return in_unit(value, unit)
+    except ValueError as reason:
+        raise error(f"{field}: value {shown(value)}: {reason}") from None
 
 
 def numbers_in(value: object) -> NDArray[np.float64] | None:

@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 
 from ..attitude import from_angles
-from ..checks import number, numbers_in, shown, whole_number
+from ..checks import measured, number, numbers_in, whole_number
 from ..errors import ModelError, SimulationError
 from ..model.layout import OMEGA, QUATERNION
 from ..model.model import Model
-from ..units import in_unit
 
 Array = np.ndarray
 MOST_SUBSTEPS = 1000
@@ -51,7 +50,9 @@ class Task:
                 f"{self.name} has no setting {', '.join(map(repr, unknown))}; it has "
                 f"{', '.join(settings)}"
             )
-        settings |= {name: _measured(name, value) for name, value in given.items()}
+        settings |= given
+        for name in (name for name in given if name in UNITS):
+            settings[name] = measured(name, given[name], UNITS[name], SimulationError)
         for name in ("torque", "step", "duration", "angle"):
             settings[name] = number(name, settings[name], SimulationError, above=0)
         for name, most in (("tilt", np.pi), ("spin", np.inf), ("height", np.inf)):
@@ -61,14 +62,6 @@ class Task:
             "substeps", settings["substeps"], SimulationError, least=1, most=MOST_SUBSTEPS
         )
         return settings
-
-
-def _measured(name: str, value: Any) -> Any:
-    """Return a setting with a text such as "20 mN m" as a number in SI."""
-    try:
-        return in_unit(value, UNITS[name]) if name in UNITS else value
-    except ValueError as reason:
-        raise SimulationError(f"{name}: value {shown(value)}: {reason}") from None
 
 
 def _up_to(name: str, value: Any, most: float) -> float:

@@ -6,12 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import number, numbers, shown
+from ..checks import measured, number, numbers, shown
 from ..errors import PlanningError, UnusualSize
 from ..magnitudes import warn_of_unusual
 from ..model.model import Model
 from ..model.parameters import total_mass
-from ..units import in_unit
 from .goal import Bounds
 
 HUGE = 1e100  # beyond it squares overflow
@@ -33,7 +32,7 @@ def checked_duration(model: Model, duration: Any) -> tuple[float, float]:
         raise PlanningError(
             f"duration: value {shown(duration)}: needs one number, or (least, most), in s"
         )
-    pair = [_plain("duration", value, "s") for value in pair]
+    pair = [measured("duration", value, "s", PlanningError) for value in pair]
     least, most = (number("duration", value, PlanningError, above=0) for value in pair)
     if most < least:
         raise PlanningError(f"duration: value {shown(duration)}: needs least <= most, in s")
@@ -73,16 +72,8 @@ def _bound(name: str, value: Any, tail: int) -> np.ndarray | None:
     """Return a bound of every tail coordinate; None for no bound."""
     if value is None:
         return None
-    plain = _plain(f"bounds.{name}", value, UNITS[name])
+    plain = measured(f"bounds.{name}", value, UNITS[name], PlanningError)
     magnitudes = numbers(f"bounds.{name}", plain, tail, PlanningError, most=HUGE)
     if not (magnitudes > 0).all():
         raise PlanningError(f"bounds.{name}: value {shown(value)}: needs magnitudes above 0")
     return magnitudes
-
-
-def _plain(field: str, value: Any, unit: str) -> Any:
-    """Return a value whose texts with units are numbers in the unit."""
-    try:
-        return in_unit(value, unit)
-    except ValueError as error:
-        raise PlanningError(f"{field}: value {shown(value)}: {error}") from error

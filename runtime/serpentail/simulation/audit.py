@@ -78,7 +78,7 @@ def audited(
     ledger: np.ndarray,
     span: Any,
     ends: Arrays,
-    between: "Between",
+    between: Between,
 ) -> Audit:
     """Return the audit of runs with these parameters and ledgers (..., entries), of a span (s).
 

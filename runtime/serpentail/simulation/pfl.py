@@ -8,11 +8,10 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import number, numbers, refusal, shown
+from ..checks import measured, number, numbers, refusal
 from ..errors import SimulationError
 from ..model.layout import TORSO_V
 from ..model.model import Model
-from ..units import in_unit
 from .piecewise import Piecewise, checked_nodes, spline
 from .schedules import Reference
 
@@ -127,10 +126,8 @@ class Pfl:
 
 def _limit(torque: Any, size: int) -> np.ndarray:
     """Return the largest torques (2m,)."""
-    try:
-        limit = numbers("Pfl: torque", in_unit(torque, "N m"), size, SimulationError)
-    except ValueError as reason:
-        raise SimulationError(f"Pfl: torque: value {shown(torque)}: {reason}") from None
+    plain = measured("Pfl: torque", torque, "N m", SimulationError)
+    limit = numbers("Pfl: torque", plain, size, SimulationError)
     if not (limit > 0).all():
         raise refusal("Pfl: torque", torque, "torques above 0, in N m", SimulationError)
     return limit

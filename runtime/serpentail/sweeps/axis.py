@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import finite_array, one_of, refusal, shown
+from ..checks import finite_array, measured, one_of, refusal, shown
 from ..errors import SweepError
 from ..units import MEASURES, in_unit
 
@@ -200,10 +200,7 @@ def in_units(field: str, value: Any, unit: str | Sequence[str] | None = None) ->
     None stands for SI, whatever the text measures.
     """
     if unit is not None:
-        try:
-            return in_unit(value, unit)
-        except ValueError as reason:
-            raise SweepError(f"{field}: value {shown(value)}: {reason}") from None
+        return measured(field, value, unit, SweepError)
     if isinstance(value, list | tuple):
         return [in_units(field, each) for each in value]
     if not isinstance(value, str):
