@@ -258,10 +258,9 @@ def test_c_example_runs_at_a_bend(tmp_path):
     subprocess.run(["cc", *strict, *sources, "-lm", "-o", tmp_path / "example"], check=True)
     run = subprocess.run([tmp_path / "example"], capture_output=True, text=True, check=True)
     printed = [float(line.split(" = ")[1]) for line in run.stdout.splitlines()]
-    q = np.array([0, 0, 0, 1.0, 0, 0, 0, 0, 0.5, 0, 0.5])
-    np.testing.assert_allclose(
-        printed, polar.forward_dynamics(q, np.zeros(10), np.zeros(4)), rtol=1e-6, atol=1e-6
-    )
+    q, v, tau = np.array([0, 0, 0, 1.0, 0, 0, 0, 0, 0.5, 0, 0.5]), np.zeros(10), np.zeros(4)
+    v[3], tau[0] = 1, 1e-4
+    np.testing.assert_allclose(printed, polar.forward_dynamics(q, v, tau), rtol=1e-6, atol=1e-6)
 
 
 @pytest.mark.parametrize("name", VALUES)
