@@ -32,6 +32,7 @@ class Figure(NamedTuple):
 
 
 FIGURES = (
+    Figure("peak of a core", "peak", "vector_gf", "flops/ns", most=True),
     Figure(
         *("v_dot, from C", "speed", "ns", "ns"),
         (("speed", PINOCCHIO), ("other_peers", CASADI)),
@@ -90,6 +91,7 @@ def about(report: dict) -> str:
     told = "" if comparable(report) else f", of another processor ({place}), so not shown"
     return (
         f"Before: the same benchmark of the code before, as benchmarks/before.json has it{told}. "
+        "If the peak of a core differs from before, so does its clock: compare ratios then. "
         "Peer's best: of all peers and compilers. Limit: operations that are needed, at the core's "
         "peak of multiply-adds, of scalars for v_dot from C, else of vectors: no code can be "
         "faster, most cannot come near."
@@ -107,7 +109,7 @@ def present(report: dict) -> Iterator[tuple[Figure, dict]]:
     for figure in FIGURES:
         for row in report.get(figure.measure, []):
             if figure.function in (None, row.get("function")):
-                of = row.get("model", row.get("scene"))
+                of = row.get("model", row.get("scene", "any"))
                 found = {"processor": row["processor"], "what": figure.name, "of": of}
                 yield figure, found | {"figure": figure, "value": float(row[figure.column])}
 

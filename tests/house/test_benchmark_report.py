@@ -46,7 +46,8 @@ def test_the_closing_table_has_before_peer_and_limit(monkeypatch, tmp_path):
     slower["speed"][0]["ns"], slower["rollout_rates"][0]["6000 in a call, 1/s"] = 150.0, 7160.5
     (tmp_path / "before.json").write_text(json.dumps(closing.figures(slower)))
     assert "so not shown" not in closing.about(REPORT)
-    eight, four, flights = closing.closing(REPORT)
+    peak, eight, four, flights = closing.closing(REPORT)
+    assert (peak["what"], peak["value"], peak["times faster"]) == ("peak of a core", 80.0, "1.00x")
     assert (eight["before"], eight["value"], eight["times faster"]) == (150.0, 100.0, "1.50x")
     assert (eight["peer's best"], eight["peer / ours"]) == (80.0, "0.80x")
     assert (eight["limit"], eight["left"], eight["of the peak"]) == (50.0, "2.0x", "50%")
@@ -71,7 +72,7 @@ def test_the_table_of_the_benchmarks_page_has_both_processors_in_a_cell():
     assert rows == [
         "| **forward dynamics, one call from C**, us | 0.1 / 0.16 |  |  |  |",
         "| Pinocchio, as its documentation shows it | 20x / 12x |  |  |  |",
-        "| own summation of the tied columns on its types | 5x / 3.1x |  |  |  |",
+        "| Pinocchio's data types, coupled joints summed by hand | 5x / 3.1x |  |  |  |",
     ]
 
 
