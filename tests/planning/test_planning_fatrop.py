@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import serpentail as st
+from examples import righting
 from serpentail.attitude import tilt_deg
 from serpentail.checks import Refusals
 from serpentail.planning.condensed import fatrop
@@ -131,24 +132,36 @@ def test_states_have_a_finer_mesh_than_torques():
     assert sorted(set(plan.mesh.controls)) == [*range(12)]
 
 
-FIRST_MESHES = [  # segments, what is given, intervals, control intervals
-    (1, {}, 12, 12),
-    (1, {"intervals": 6}, 6, 6),
-    (1, {"controls": 5}, 5, 5),
-    (1, {"intervals": 24}, 24, 12),
-    (3, {}, 48, 12),
-    (3, {"controls": 5}, 20, 5),
-    (3, {"controls": 5, "intervals": 10}, 10, 5),
-    (6, {}, 144, 12),
+FIRST_MESHES = [  # segments, what is given, intervals of each first mesh, control intervals
+    (1, {}, (12, 144), 12),
+    (1, {"intervals": 6}, (6,), 6),
+    (1, {"controls": 5}, (5, 60), 5),
+    (1, {"most_intervals": 100}, (12,), 12),
+    (1, {"intervals": 24}, (24,), 12),
+    (3, {}, (48, 144), 12),
+    (3, {"controls": 5}, (20, 60), 5),
+    (3, {"controls": 5, "intervals": 10}, (10,), 5),
+    (6, {}, (144,), 12),
 ]
 
 
 @pytest.mark.parametrize(("segments", "given", "intervals", "controls"), FIRST_MESHES)
 def test_first_meshes_are_finer_for_longer_tails(segments, given, intervals, controls):
-    settings = SimpleNamespace(**{"intervals": None, "controls": None} | given)
-    search = SimpleNamespace(model=SimpleNamespace(segments=segments), settings=settings)
-    mesh = STAGED.mesh(search)
-    assert (mesh.intervals, mesh.controls[-1] + 1) == (intervals, controls)
+    settings = {"intervals": None, "controls": None, "most_intervals": None} | given
+    model = SimpleNamespace(segments=segments)
+    meshes = STAGED.meshes(SimpleNamespace(model=model, settings=SimpleNamespace(**settings)))
+    assert tuple(mesh.intervals for mesh in meshes) == intervals
+    assert {mesh.controls[-1] + 1 for mesh in meshes} == {controls}
+
+
+@pytest.mark.slow
+def test_a_search_that_fails_begins_again_from_a_finer_mesh():
+    model, found = rat(2), []
+    settings = {"start": righting.tumbling(model, 22), "duration": (0.3, 0.58), "track": False}
+    settings |= {"solver": "fatrop", "bounds": righting.bounds(model, 2 * np.pi)}
+    assert not st.plan(model, **settings, most_intervals=100).success  # too few for a second mesh
+    plan = st.plan(model, **settings, watch=lambda each: found.append(each.mesh.intervals))
+    assert plan.success and found[0] == 12 and 144 in found[1:]
 
 
 def test_planning_again_from_a_plan_takes_fewer_iterations():

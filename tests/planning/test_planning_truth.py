@@ -6,8 +6,11 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import BPoly
 
 import serpentail as st
+from serpentail.planning.nlp.coordinates import attitude
 from serpentail.planning.nlp.rules import collocation_rule
-from tests.support.tumbling import DURATION, planned, rat, rate, start
+from serpentail.planning.result.full_state import full_state
+from tests.support.models import model_folder
+from tests.support.tumbling import DURATION, FUNCTIONS, planned, rat, rate, start
 
 WEAK = st.Bounds(angle=np.pi / 3, torque=1.5e-3)  # N m: an eighth of what the plan would like
 
@@ -130,3 +133,17 @@ def test_errors_of_tracking_are_those_of_a_simulation_that_tracks():
     tail = np.column_stack([np.interp(plan.trajectory.t, run.t, angle) for angle in run.tail.T])
     error = np.abs(tail - plan.trajectory.tail).max()
     assert plan.report["tracked_tail_error_rad"] == pytest.approx(error, rel=0.01)
+
+
+def test_arcs_are_bent_as_far_as_their_range_at_most():
+    model = st.load(model_folder(1, None, bend_range=1.0, functions=FUNCTIONS))
+    at_rest, tail = start(model), np.array([[0.3, 0.4], [0.9, 1.2], [0.0, 0.0]])
+    blocks = {
+        "tail": tail,
+        "tail_rate": np.zeros((3, 2)),
+        "torso_rate": np.zeros((3, 3)),
+        "attitude": np.tile([1.0, 0.0, 0.0, 0.0], (3, 1)),
+    }
+    q, _ = full_state(model, at_rest, attitude("quaternion"), np.zeros(3), blocks)
+    np.testing.assert_allclose(q[:, 7:], [[0.3, 0.4], [0.6, 0.8], [0.0, 0.0]], rtol=1e-11)
+    model.energy(q, np.zeros((3, model.nv)))  # takes them

@@ -13,7 +13,8 @@ from .nlp.interrupt import stoppable
 from .paths_at_start import refuse_violated
 from .problem import PlanningProblem
 from .result.plan import Plan
-from .rounds import Round, Search
+from .round import Round
+from .rounds import Search
 from .settings import PlanSettings
 from .softening import SOFTENING
 

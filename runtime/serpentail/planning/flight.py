@@ -11,11 +11,13 @@ from ..model.model import Model
 from ..model.parameters import total_mass
 from ..motion.trajectory import Trajectory
 from ..simulation.controllers import Controller
+from ..simulation.methods import MIN_ROUNDINGS
 from ..simulation.schedules import Legs
 from ..simulation.simulate import end_state, simulate
 
 State = tuple[np.ndarray, np.ndarray]  # q, v
 UP = POSITION.start + 2
+RTOL = 1e-10  # of the true end of a plan, where rounding errors allow it
 
 
 def flight(
@@ -39,14 +41,12 @@ def flight(
     return _lowered(model, motion, lift)
 
 
-def end_of_flight(
-    model: Model, start: State, controller: Controller, duration: float, step: float
-) -> State:
-    """Return q (nq,), v (nv,) at the end of a flight by RK4 with steps (s)."""
+def end_of_flight(model: Model, start: State, controller: Controller, duration: float) -> State:
+    """Return q (nq,), v (nv,) at the end of a flight by Tsit5."""
+    rtol = max(RTOL, MIN_ROUNDINGS * np.finfo(model.parameter_vector.dtype).eps)
     if not model.contacts:
-        return end_state(model, *start, controller=controller, duration=duration, step=step)
-    settings = {"method": "rk4", "step": step, "output_step": duration}
-    motion = flight(model, start, controller, duration, **settings)
+        return end_state(model, *start, controller=controller, duration=duration, rtol=rtol)
+    motion = flight(model, start, controller, duration, rtol=rtol, output_step=duration)
     return motion.q[-1], motion.v[-1]
 
 

@@ -124,7 +124,8 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
         Degree of "radau" and "lobatto", from 1 to 5. Default: 3.
     intervals : int, optional
         Number of intervals of the first mesh. Default: 12. With the solver "fatrop" each control
-        interval has 1 if the tail has up to two segments, 4 up to four segments, else 12.
+        interval has 1 if the tail has up to two segments, 4 up to four segments, else 12; a
+        search that finds no true plan begins again with 12.
     most_intervals : int, optional
         Largest number of intervals. Default: 200, or 400 with the solver "fatrop".
     controls : int, optional

@@ -7,12 +7,10 @@ model deviates from the plan are split for the next round.
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 
 import numpy as np
 
 from ..model.model import Model
-from .flight import State
 from .found import chosen, flown, guessed
 from .nlp.coordinates import attitude
 from .nlp.equations import Equations
@@ -25,12 +23,13 @@ from .nlp.rules import collocation_rule
 from .nlp.solver import Solution
 from .nlp.transcription import torque_unit
 from .problem import PlanningProblem
-from .result.curve import Curve, curve
-from .result.excess import SLACK, Excess, exceeded, excess, largest
+from .result.curve import curve
+from .result.excess import SLACK, exceeded, excess, largest
 from .result.full_state import com_at_start, full_state
 from .result.plan import Plan, sampled
 from .result.report import report
 from .result.truth import end_errors, local_errors, open_loop
+from .round import Round
 from .settings import PlanSettings
 from .softening import softening_of
 from .ways import Begin, way_of
@@ -38,35 +37,6 @@ from .ways import Begin, way_of
 FIRST_PUSH = 0.05  # of the torques' unit: takes the first guess out of a plane of symmetry
 DURATIONS = (1.0, 0.5, 0.75, 0.25)  # of guesses, in turn, from the least (0) to the most (1)
 OVERRUN = 0.1  # of a time limit: how far work after the search may exceed it
-
-
-@dataclass(frozen=True, eq=False)
-class Round:
-    """One solution on one mesh: q, v planned at the ends of intervals, and true at the last end.
-
-    model, problem: with the parameters and the start of the solution.
-    errors: true errors there, as of ``end_errors``; excess: over bounds, by intervals.
-    softening: of the objective.
-    """
-
-    model: Model
-    problem: PlanningProblem
-    nlp: Program
-    solution: Solution
-    curve: Curve
-    planned: tuple[np.ndarray, np.ndarray]
-    true: tuple[np.ndarray, np.ndarray]
-    errors: dict[str, float]
-    excess: Excess
-    softening: float
-
-    @property
-    def start(self) -> State:
-        """The start."""
-        return self.problem.q0, self.problem.v0
-
-    def __str__(self) -> str:
-        return f"{self.nlp.mesh.intervals} intervals, {self.errors['attitude']:.2g} deg off"
 
 
 class Search:
@@ -100,11 +70,16 @@ class Search:
         """Parameters of the program."""
         return np.append(self.conserved, self.softening[0])
 
-    def _first(self) -> Round:
-        """Return the best solution on the first mesh, from all guesses, and more if these fail."""
-        settings, guess = self.settings, self.settings.guess
-        same_rule = isinstance(guess, Plan) and guess.rule is self.rule
-        nlp = self._transcribed(guess.mesh if same_rule else self.way.mesh(self))
+    def _first_meshes(self) -> tuple[Mesh, ...]:
+        """Return the first mesh, and finer ones to begin with if no plan of that becomes true."""
+        guess = self.settings.guess
+        if isinstance(guess, Plan) and guess.rule is self.rule:
+            return (guess.mesh,)
+        return self.way.meshes(self)
+
+    def _first(self, mesh: Mesh) -> Round:
+        """Return the best solution on a mesh, from all guesses, and more if these fail."""
+        settings, nlp = self.settings, self._transcribed(mesh)
         solutions = [self._solved_given(nlp)]
         for k in range(1, settings.multi_start + settings.retries):
             enough = k >= settings.multi_start and any(entry.success for entry in solutions)
@@ -114,8 +89,18 @@ class Search:
         return self._round(nlp, min(solutions, key=lambda entry: (not entry.success, entry.value)))
 
     def rounds(self) -> Iterator[Round]:
+        """Make rounds on one first mesh after the other until a plan is true."""
+        softening = self.softening
+        for mesh in self._first_meshes():
+            self.softening = softening
+            for last in self._rounds(mesh):
+                yield last
+            if self._is_true(last) or self._stopped():
+                break
+
+    def _rounds(self, mesh: Mesh) -> Iterator[Round]:
         """Make rounds: intervals that are wrong are split until the end is right."""
-        last = self._first()
+        last = self._first(mesh)
         yield last
         for _ in range(self.settings.rounds + len(self.softening) - 1):
             if not last.solution.success or self._stopped():
@@ -150,9 +135,13 @@ class Search:
             return 0.0
         return max(self._off(found), largest(found.excess)[0] / SLACK)
 
+    def _is_true(self, found: Round) -> bool:
+        """Tell whether a round is solved and nothing in it is wrong."""
+        return bool(found.solution.success and self._wrong(found) <= 1)
+
     def plan(self, best: Round, rounds: int, begun: float) -> Plan:
         """Return the plan of a round; rounds: their number so far; begun: the clock's time then."""
-        success = bool(best.solution.success and self._wrong(best) <= 1)
+        success = self._is_true(best)
         trajectory = sampled(best.model, best.problem, best.curve)
         summary = {"success": success} | report(self, best, trajectory)
         summary |= {

@@ -27,8 +27,8 @@ FATROP = "fatrop"
 INTERVALS, MOST = 12, 200  # of a sparse program: of its first mesh, and the most
 CONTROL_INTERVALS, MOST_STAGED = 12, 400  # of stages: control intervals, and the most intervals
 # (most segments, intervals in each control interval at first): with fewer, optima of long tails
-# exploit the errors of the mesh
-PIECES = ((2, 1), (4, 4), (np.inf, 12))
+# exploit the errors of the mesh; a search that fails begins again with FINE
+PIECES, FINE = ((2, 1), (4, 4), (np.inf, 12)), 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,14 +45,14 @@ class Begin:
 
 @dataclass(frozen=True, eq=False)
 class Way:
-    """How to make the first mesh, the program of a mesh, its solver, to solve it, and to carry
+    """How to make first meshes, the program of a mesh, its solver, to solve it, and to carry
     multipliers to another mesh.
 
     most: intervals of a mesh.
     """
 
     most: int
-    mesh: "Callable[[Search], Mesh]"
+    meshes: "Callable[[Search], tuple[Mesh, ...]]"
     program: "Callable[[Search, Mesh], Any]"
     engine: "Callable[[Search, Any, str], Any]"
     solved: "Callable[[Search, Any, Any, Begin], Solution]"
@@ -92,17 +92,21 @@ def _beyond(search: "Search") -> str | None:
     return lacking(search.model)
 
 
-def _sparse_mesh(search: "Search") -> Mesh:
+def _sparse_meshes(search: "Search") -> tuple[Mesh, ...]:
     settings = search.settings
-    return uniform(settings.intervals or INTERVALS, settings.controls)
+    return (uniform(settings.intervals or INTERVALS, settings.controls),)
 
 
-def _staged_mesh(search: "Search") -> Mesh:
+def _staged_meshes(search: "Search") -> tuple[Mesh, ...]:
     """States have a mesh of their own: several intervals in each control interval."""
     settings = search.settings
-    pieces = next(count for most, count in PIECES if search.model.segments <= most)
-    intervals = settings.intervals or (settings.controls or CONTROL_INTERVALS) * pieces
-    return uniform(intervals, settings.controls or min(CONTROL_INTERVALS, intervals))
+    if settings.intervals:
+        controls = settings.controls or min(CONTROL_INTERVALS, settings.intervals)
+        return (uniform(settings.intervals, controls),)
+    controls, most = settings.controls or CONTROL_INTERVALS, settings.most_intervals or MOST_STAGED
+    pieces = next(count for segments, count in PIECES if search.model.segments <= segments)
+    first, finer = (uniform(controls * each, controls) for each in (pieces, FINE))
+    return (first, finer) if first.intervals < finer.intervals <= most else (first,)
 
 
 def _sparse_program(search: "Search", mesh: Mesh) -> Transcription:
@@ -134,7 +138,7 @@ def _not_carried(_multipliers: Multipliers, _old: Program, _new: Program) -> Non
     """FATROP's interface takes no multipliers."""
 
 
-SPARSE = Way(MOST, _sparse_mesh, _sparse_program, _sparse_engine, _sparse_solved, carried)
+SPARSE = Way(MOST, _sparse_meshes, _sparse_program, _sparse_engine, _sparse_solved, carried)
 STAGED = Way(
-    MOST_STAGED, _staged_mesh, _staged_program, _staged_engine, _staged_solved, _not_carried
+    MOST_STAGED, _staged_meshes, _staged_program, _staged_engine, _staged_solved, _not_carried
 )

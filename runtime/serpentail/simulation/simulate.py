@@ -209,11 +209,11 @@ def end_state(
     *,
     controller: Controller,
     duration: float,
-    step: float,
+    rtol: float,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return q (nq,) and v (nv,) at the end of a run by "rk4", without energies and momenta."""
+    """Return q (nq,) and v (nv,) at the end of a run by "tsit5", without energies and momenta."""
     start = Start.checked(model, (q0, v0), duration, duration)
-    samples = integrate(CompiledRun(*prepared(model, start, controller, "rk4", {"step": step})))
+    samples = integrate(CompiledRun(*prepared(model, start, controller, "tsit5", {"rtol": rtol})))
     if samples.failure is not None:
         raise samples.failure
     return samples.q[-1], samples.v[-1]

@@ -12,6 +12,7 @@ from ...model.model import Model
 from ..nlp.coordinates import COM_ENTRIES, IDENTITY_POSE, Attitude
 
 State = tuple[np.ndarray, np.ndarray]  # q, v
+ROUNDING = 1e-12  # relative, of a bend
 
 
 def full_state(
@@ -23,7 +24,8 @@ def full_state(
 ) -> State:
     """Return q (K, nq), v (K, nv) at times (K,) s from the start (q0, v0)."""
     quaternion = coordinates.as_quaternion(blocks["attitude"])
-    tail, tail_rate, omega = blocks["tail"], blocks["tail_rate"], blocks["torso_rate"]
+    tail, tail_rate = _within_range(model, blocks["tail"]), blocks["tail_rate"]
+    omega = blocks["torso_rate"]
     R, H = rotation_matrix(quaternion), model.mass_matrix(_at_identity(tail))
     if "drift" in blocks:
         h = np.einsum("kji,j->ki", R, model.momentum(*start)[1])
@@ -35,6 +37,19 @@ def full_state(
         position, velocity = _falling(model, start, times, (R, H), rates)
     q = np.column_stack([position, quaternion, tail])
     return q, np.column_stack([velocity, omega, tail_rate])
+
+
+def _within_range(model: Model, tail: np.ndarray) -> np.ndarray:
+    """Return tails (K, 2m) whose arcs are bent as far as the model's range at most.
+
+    A plan keeps its bounds at nodes, and may exceed them a little elsewhere.
+    """
+    most = (1 - ROUNDING) * model.manifest["scene"].get("bend_range", np.inf)
+    pairs = tail.reshape(len(tail), -1, 2)
+    bends = np.linalg.norm(pairs, axis=2)
+    beyond = (np.array(model.kinds) == "continuum") & (bends > most)
+    scale = np.divide(most, bends, out=np.ones_like(bends), where=beyond)
+    return (pairs * scale[..., None]).reshape(tail.shape)
 
 
 def _at_identity(tail: np.ndarray) -> np.ndarray:

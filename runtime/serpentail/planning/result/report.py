@@ -18,7 +18,8 @@ from .excess import largest
 from .truth import attitude_errors, work
 
 if TYPE_CHECKING:
-    from ..rounds import Round, Search
+    from ..round import Round
+    from ..rounds import Search
 
 TRACKED_SAMPLES = 580  # of a tracked motion
 TRACKING_COST = 0.1  # about how long tracking takes (s), of the flight's duration

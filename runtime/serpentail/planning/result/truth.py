@@ -1,4 +1,4 @@
-"""The true motion under a plan's torques, integrated in small steps.
+"""The true motion under a plan's torques, integrated by Tsit5 in C.
 
 Its end shows the plan's error; its intervals show where the mesh is too coarse.
 """
@@ -9,13 +9,13 @@ from ...attitude import angle_deg, tilt_deg
 from ...errors import SimulationError
 from ...model.layout import OMEGA, QUATERNION, TAIL_Q, TAIL_V
 from ...model.model import Model
+from ...motion.resample import smooth
 from ...simulation.controllers import TorqueCurve
 from ...simulation.piecewise import Piecewise
 from ..flight import end_of_flight, flight
 from ..problem import PlanningProblem
 from .curve import Curve
 
-LONGEST_STEP = 1e-4  # s, of RK4
 SAMPLE = 1e-3  # s, the most between samples of a flight
 SHORT_INTERVAL = 0.02  # s: rates of shorter ones are weighed as if they were as long
 
@@ -25,13 +25,12 @@ def applied(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return q, v after applying planned torques from the state q, v; nan if they diverge.
 
-    RK4 in C, with the plan's own polynomials as torques; steps end where the polynomials join.
+    The plan's own polynomials are the torques; steps end where the polynomials join.
     """
     duration = float(torques.times[-1])
-    step = min(LONGEST_STEP, np.diff(torques.times).min() / 4)
     law = TorqueCurve(torques, damping)
     try:
-        return end_of_flight(model, (q, v), law, duration, step)
+        return end_of_flight(model, (q, v), law, duration)
     except SimulationError:  # bent or rotating beyond the model's range
         return np.full_like(q, np.nan), np.full_like(v, np.nan)
 
@@ -93,23 +92,20 @@ def work(
     torques = planned_torques(curve)
     law, sample = TorqueCurve(torques, damping), min(SAMPLE, curve.duration / 4)
     try:
-        motion = flight(model, start, law, curve.duration, method="rk4", output_step=sample)
+        motion = flight(model, start, law, curve.duration, method="tsit5", output_step=sample)
     except SimulationError:
         return np.nan, np.nan
     counts = np.ceil(np.diff(curve.ends) / sample).astype(int)
     widths = np.repeat(np.diff(curve.ends) / counts, counts)
     nodes, weights = np.polynomial.legendre.leggauss(4)
     starts = np.cumsum(widths) - widths
-    times = starts[:, None] + widths[:, None] * (1 + nodes) / 2
-
-    def power(t: np.ndarray) -> np.ndarray:
-        return np.abs(torques.at(t)[0] * motion.resample(t).v[:, TAIL_V]).sum(axis=1)
-
+    between = (starts[:, None] + widths[:, None] * (1 + nodes) / 2).ravel()
     # the largest may be where torques jump, just before or after
-    joints = np.nextafter(curve.ends[1:], 0)
-    between, before, after = power(times.ravel()), power(joints), power(curve.ends[:-1])
-    energy = np.outer(widths, weights / 2).ravel() @ between
-    return float(energy), float(np.concatenate([between, before, after]).max())
+    times = np.concatenate([between, np.nextafter(curve.ends[1:], 0), curve.ends[:-1]])
+    rates = smooth(motion.t, motion.v[:, TAIL_V], times)
+    power = np.abs(torques.at(times)[0] * rates).sum(axis=1)
+    energy = np.outer(widths, weights / 2).ravel() @ power[: between.size]
+    return float(energy), float(power.max())
 
 
 def local_errors(
