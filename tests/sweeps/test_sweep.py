@@ -1,12 +1,15 @@
 """Rows of sweeps are what the runs themselves return, however and wherever they are made."""
 
 from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from contextlib import nullcontext
 from multiprocessing import get_context
 
 import numpy as np
 import pytest
 
 import serpentail as st
+from serpentail.sweeps import driver
+from serpentail.sweeps.executors import Place
 from serpentail.sweeps.result import Status
 from tests.support import swept
 
@@ -81,6 +84,23 @@ def test_a_block_that_a_worker_lost_runs_again(model):
     assert len(found) == 4 and all(row["error"] is None for row in found.rows())
     with Forgetful(99) as executor, pytest.raises(st.SweepError, match="the worker has died"):
         flights(model, 2, executor=executor, limit=60)
+
+
+def test_an_executor_that_is_gone_is_named_in_one_line(model, monkeypatch):
+    with ThreadPoolExecutor(1) as executor:
+        pass  # it takes no more work
+    told = r"its workers are gone.*after shutdown"
+    with pytest.raises(st.SweepError, match=told):
+        flights(model, 2, executor=executor, limit=60)
+
+    def lost():
+        raise ConnectionResetError("reset by the scheduler")
+
+    with ThreadPoolExecutor(1) as executor:
+        place = Place(executor.submit, lost)
+        monkeypatch.setattr(driver, "place_of", lambda _: nullcontext(place))
+        with pytest.raises(st.SweepError, match=r"are gone.*reset by the scheduler"):
+            flights(model, 2, limit=60)
 
 
 def test_a_second_call_runs_what_is_missing_only(model, tmp_path):

@@ -4,6 +4,7 @@ import time
 from collections import deque
 from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from math import ceil
 from typing import Any, NamedTuple
@@ -126,15 +127,17 @@ class Driver:
         waiting: dict[Future, Work] = {}
         lost: deque[Work] = deque()
         jobs = {id(group): group.job.pickled() for group in self.groups}
-        blocks = self._blocks(place)
+        blocks = self._blocks()
         try:
             while True:
-                self.spent.workers = place.workers()
+                with _reached():
+                    self.spent.workers = place.workers()
                 while len(waiting) < AHEAD * self.spent.workers:
                     work = lost.popleft() if lost else next(blocks, None)
                     if work is None:
                         break
-                    waiting[place.submit(run_block, self._block(work, jobs))] = work
+                    with _reached():
+                        waiting[place.submit(run_block, self._block(work, jobs))] = work
                 if not waiting:
                     return
                 ready, _ = wait(waiting, LOOK_S, FIRST_COMPLETED)
@@ -152,7 +155,7 @@ class Driver:
             for future in waiting:
                 future.cancel()
 
-    def _blocks(self, place: Place) -> Iterator[Work]:
+    def _blocks(self) -> Iterator[Work]:
         """Yield points of the groups in turn."""
         while True:
             left = [group for group in self.groups if group.left]
@@ -160,7 +163,7 @@ class Driver:
                 return
             for group in left:
                 if group.left:
-                    yield group, group.take(place.workers()), 0
+                    yield group, group.take(self.spent.workers), 0
 
     def _block(self, work: Work, jobs: dict[int, bytes]) -> Block:
         """Return points as they travel."""
@@ -175,7 +178,7 @@ class Driver:
             return future.result()
         except (Exception, CancelledError) as reason:  # whatever an executor loses work by
             if tries + 1 >= TRIES or not place.alive():
-                raise SweepError(f"{GONE} ({type(reason).__name__}: {reason!s:.300})") from reason
+                raise _gone(reason) from reason
             return None
 
     # ---- rows ------------------------------------------------------------------------------------
@@ -204,3 +207,17 @@ class Driver:
 GONE = (
     "executor: its workers are gone: finished rows are kept, and the same call resumes from there"
 )
+
+
+def _gone(reason: BaseException) -> SweepError:
+    words = " ".join(str(reason).split())
+    return SweepError(f"{GONE} ({type(reason).__name__}: {words:.300})")
+
+
+@contextmanager
+def _reached() -> Iterator[None]:
+    """Ask an executor; what it raises, whatever that is, tells that it is gone."""
+    try:
+        yield
+    except Exception as reason:
+        raise _gone(reason) from reason
