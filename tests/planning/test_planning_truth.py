@@ -147,3 +147,14 @@ def test_arcs_are_bent_as_far_as_their_range_at_most():
     q, _ = full_state(model, at_rest, attitude("quaternion"), np.zeros(3), blocks)
     np.testing.assert_allclose(q[:, 7:], [[0.3, 0.4], [0.6, 0.8], [0.0, 0.0]], rtol=1e-11)
     model.energy(q, np.zeros((3, model.nv)))  # takes them
+
+
+def test_a_guess_that_leaves_the_range_serves_until_there():
+    model = st.load(model_folder(1, None, bend_range=1.0, functions=FUNCTIONS))
+    q, v = start(model)
+    v[6], damping = 20.0, 1e-5  # rad/s, N m s/rad
+    with pytest.raises(st.SimulationError, match="bend_range"):
+        st.simulate(model, q, v, t_span=0.4, controller=st.Damping(damping))
+    settings = {"bounds": st.Bounds(angle=0.7, torque=0.05), "guess_damping": damping}
+    plan = st.plan(model, start=(q, v), duration=(0.3, 1.0), track=False, **settings)
+    assert plan.success and np.hypot(*plan.trajectory.tail.T).max() < 1

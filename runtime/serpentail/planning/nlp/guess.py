@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...attitude import rotation_matrix
+from ...errors import SimulationError
 from ...model.layout import OMEGA, POSITION, TAIL_Q, TAIL_V, VELOCITY
 from ...model.model import Model
 from ...model.parameters import total_mass
@@ -42,11 +43,16 @@ def passive(
 ) -> Motion:
     """Return the motion whose tail only damps (Eq. 47), the paper's guess (Sect. 3.2), and a push.
 
-    push (n, 2m): torques, N m.
+    push (n, 2m): torques, N m.  A flight that leaves the model's range serves until there.
     """
     times = np.linspace(0, duration, len(push))
     law = TorqueTable(times, push, max(damping, problem.damping))
-    motion = flight(model, (problem.q0, problem.v0), law, duration)
+    try:
+        motion = flight(model, (problem.q0, problem.v0), law, duration)
+    except SimulationError as error:
+        if error.trajectory is None or len(error.trajectory.t) < 2:
+            raise
+        motion = error.trajectory
     return of_trajectory(model, motion, attitude(problem.attitude), problem.damping)
 
 
