@@ -132,7 +132,8 @@ def is_true(row: dict) -> bool:
 
 def table(rates: dict[str, dict[str, list[dict]]]) -> list[str]:
     """Return the rates as the lines of a table in Markdown: for each way how many plans are true,
-    the median of the CPU time and the time within which 95 % were made, and the median error.
+    the median of the CPU time and the time within which 95 % were made, and the median error;
+    plans without a flight rank last, and the median is nan where half the plans have none.
     """
     heads = (f"{way}: true | CPU, s: median, 95 % | error, deg" for way in WAYS)
     lines = [f"| starts | of | {' | '.join(heads)} |", "|---" * (2 + 3 * len(WAYS)) + "|"]
@@ -142,6 +143,7 @@ def table(rates: dict[str, dict[str, list[dict]]]) -> list[str]:
             middle, most = np.percentile([row["cpu_s"] for row in rows], (50, 95))
             errors = [row["open_loop_attitude_error_deg"] for row in rows]
             error = np.median(np.nan_to_num(errors, nan=np.inf))  # nan: it has no flight
-            cells += [str(sum(map(is_true, rows))), f"{middle:.2g}, {most:.2g}", f"{error:.2g}"]
+            told = f"{error:.2g}" if np.isfinite(error) else "nan"
+            cells += [str(sum(map(is_true, rows))), f"{middle:.2g}, {most:.2g}", told]
         lines.append(f"| {' | '.join(cells)} |")
     return lines

@@ -14,7 +14,7 @@ FAILED = start(5.0, converged=False, error=np.nan)
 RATES = {
     "several": {
         "IPOPT": [start(0.2), start(0.1), start(0.4, error=3.0), start(0.3)],
-        "FATROP": [start(0.1)] * 4,
+        "FATROP": [start(0.1), start(0.1), start(0.1, error=np.nan), start(0.1)],
         "paper": [start(1.0, error=2.0)] * 4,
     },
     "none": {way: [FAILED] for way in WAYS},
@@ -30,7 +30,7 @@ def test_rates_are_drawn_for_each_kind_and_way(tmp_path):
     _, (shares, times, errors) = draw_rates(RATES, tmp_path / "rates.png")
     ipopts, fatrops, papers = shares.get_lines()
     np.testing.assert_array_equal(ipopts.get_xdata(), [75, 0])
-    np.testing.assert_array_equal(fatrops.get_xdata(), [100, 0])
+    np.testing.assert_array_equal(fatrops.get_xdata(), [75, 0])
     np.testing.assert_array_equal(papers.get_xdata(), [0, 0])
     assert [label.get_text() for label in shares.get_yticklabels()] == ["several: 4", "none: 1"]
     np.testing.assert_allclose(times.get_lines()[0].get_xdata(), [0.25, 5.0])
@@ -40,7 +40,7 @@ def test_rates_are_drawn_for_each_kind_and_way(tmp_path):
 
 def test_a_table_has_a_line_for_each_kind():
     several, none = table(RATES)[2:]
-    assert several.startswith("| several | 4 | 3 | 0.25, 0.39 | 0.001 | 4 | 0.1, 0.1 | ")
+    assert several.startswith("| several | 4 | 3 | 0.25, 0.39 | 0.001 | 3 | 0.1, 0.1 | 0.001 | ")
     assert several.endswith("| 0 | 1, 1 | 2 |") and none.startswith("| none | 1 | 0 | 5, 5 | nan |")
     assert {line.count("|") for line in table(RATES)} == {12}
 
