@@ -2,6 +2,7 @@
 
 import os
 import shlex
+import signal
 from pathlib import Path
 
 import pytest
@@ -25,9 +26,11 @@ def pytest_addoption(parser):
 
 
 def pytest_configure(config):
-    """Choose the compiler of all processes."""
+    """Choose the compiler of all processes, and let Ctrl-C reach them also in the background."""
     if config.getoption("--quick"):
         os.environ.setdefault("CC", QUICK)
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as for `make test &` in a script
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture
