@@ -1,18 +1,11 @@
 """Options of the test run, and how it compiles its models."""
 
 import os
-import shlex
 import signal
-from pathlib import Path
 
 import pytest
 
-from tests.support.models import BUILD
-
-QUICK = shlex.quote(str(Path(__file__).parent / "support" / "cc_quick"))
-
-# One cache for all processes and runs, separate from the developer's own.
-os.environ["SERPENTAIL_CACHE"] = str(BUILD / "cache")
+from tests.support.models import QUICK, choose_compiler
 
 
 def pytest_addoption(parser):
@@ -27,8 +20,7 @@ def pytest_addoption(parser):
 
 def pytest_configure(config):
     """Choose the compiler of all processes, and let Ctrl-C reach them also in the background."""
-    if config.getoption("--quick"):
-        os.environ.setdefault("CC", QUICK)
+    choose_compiler(config.getoption("--quick"))
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as for `make test &` in a script
         signal.signal(signal.SIGINT, signal.default_int_handler)
 

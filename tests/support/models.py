@@ -7,6 +7,7 @@ the generator makes all of them again. No test writes to them: a test that must 
 import hashlib
 import json
 import os
+import shlex
 import shutil
 import sys
 import time
@@ -21,7 +22,15 @@ from serpentail_codegen.scene.parse import scene_for
 from serpentail_codegen.scene.scene import Scene
 
 BUILD = Path(__file__).parents[2] / ".build"
+QUICK = shlex.quote(str(Path(__file__).with_name("cc_quick")))
 KEPT = 3600.0  # s: models of another generator stay that long, because its tests may still run
+
+
+def choose_compiler(quick: bool) -> None:
+    """Let all processes share one cache, and compile without optimisation unless CC is set."""
+    os.environ["SERPENTAIL_CACHE"] = str(BUILD / "cache")  # not the developer's own
+    if quick:
+        os.environ.setdefault("CC", QUICK)
 
 
 def model_folder(segments: int, links: int | None, **options) -> Path:

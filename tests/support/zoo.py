@@ -1,0 +1,165 @@
+"""The models that tests share: each has all functions, and is generated and compiled once.
+
+A test asks for one by name: ``zoo.model("m1_n3")``.  It takes another size only where the size is
+its point.  ``python -m tests.support.zoo`` makes all of them, side by side; a run of few tests
+makes those that it asks for.
+"""
+
+import argparse
+import os
+import time
+from concurrent.futures import ProcessPoolExecutor
+from functools import cache
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import serpentail as st
+from serpentail_codegen.scene.parse import parse_scene
+from serpentail_codegen.scene.scene import Scene
+from serpentail_codegen.scene.signatures.table import VALUES
+from tests.support import models
+
+GROUND = {"contacts": ["feet", "tail", "torso"]}
+# what differs from coordinate to coordinate shows an exchange of two of them
+ELASTIC = {
+    "tail_stiffness": [0.004, 0.006, 0.005, 0.003],
+    "tail_rest": [0.15, -0.1, 0.2, 0.05],
+    "tail_damping": [2e-4, 3e-4, 1e-4, 4e-4],
+    "tail_stop_lower": [-0.5, -0.4, -0.6, -0.45],
+    "tail_stop_upper": [0.6, 0.5, 0.4, 0.55],
+    "tail_stop_stiffness": [0.05, 0.04, 0.06, 0.03],
+}
+TORSO = {"torso_mass": 0.11, "torso_inertia": [7e-5, 4e-5, 7.5e-5]}
+MOUNTED = {"tail_mount": [0.002, -0.04, 0], "mount_angles": [0.3, -0.6, 0.9]}
+OWN_LINKS = [
+    {"links": 3, "length": 0.06, "mass": 1.5e-3, "link_inertia": [4e-8, 2e-9, 3e-8]},
+    {
+        "links": 2,
+        "link_lengths": "30, 25 mm",
+        "link_masses": [5e-4, 4e-4],
+        "link_centers": "14, 12 mm",
+        "link_inertias": [[3e-8, 2e-9, 4e-8], [2e-8, 1e-9, 1e-8]],
+    },
+    {"links": 2, "length": 0.02, "mass": "0.2 g", "link_inertia": "2, 1, 2 g mm^2"},
+]
+OWN_ARCS = [{"length": "60 mm", "mass": "1.5 g"}, {"length": 0.09, "mass": 0.0011}]
+# links and arcs alternate, so that the numbers of each kind differ from those of segments
+MIXED = [
+    {"kind": "continuum", **OWN_ARCS[0]},
+    {"kind": "articulated", **OWN_LINKS[1]},
+    {"kind": "continuum", **OWN_ARCS[1]},
+    {"kind": "articulated", **OWN_LINKS[0]},
+]
+
+
+def _links(segments: int, links: int, **keys: Any) -> dict[str, Any]:
+    """Return the scene of a tail of equal links."""
+    return {"kind": "articulated", "segments": segments, "links": links, **keys}
+
+
+def _arcs(segments: int, **keys: Any) -> dict[str, Any]:
+    """Return the scene of a tail of equal arcs."""
+    return {"kind": "continuum", "segments": segments, **keys}
+
+
+def _own(kind: str, segments: list, **keys: Any) -> dict[str, Any]:
+    """Return the scene of a tail whose segments differ, on a tilted mount."""
+    samples = {} if kind == "articulated" else {"samples": 3}
+    return {"kind": kind, "segments": segments, "parameters": TORSO | MOUNTED, **samples, **keys}
+
+
+ZOO: dict[str, dict[str, Any]] = {
+    # tails of links, in the form that the generator chooses
+    "m1_n1": _links(1, 1),
+    "m1_n3": _links(1, 3),
+    "m2_n2": _links(2, 2),
+    "m3_n4": _links(3, 4),
+    # every form of one tail
+    "straight": _links(2, 2, emission="straight"),
+    "loops": _links(2, 2, emission="loops"),
+    "lanes": _links(2, 2, emission="lanes"),
+    "segments": _links(2, 2, emission="segments"),
+    # tails of arcs
+    "arcs1": _arcs(1),
+    "arcs2": _arcs(2),
+    "arcs3": _arcs(3),
+    "arcs2_loops": _arcs(2, emission="loops"),
+    "polar": _arcs(1, coordinates="polar", functions=[*VALUES, "rollout"]),  # it has no others
+    # segments that differ, on a tilted mount
+    "own_links": _own("articulated", OWN_LINKS),
+    "own_arcs": _own("continuum", OWN_ARCS),
+    "mixed": _own("mixed", MIXED),
+    # springs, damping and stops
+    "elastic": _links(2, 2, parameters=ELASTIC),
+    "elastic_arcs": _arcs(2, parameters=ELASTIC),
+    "elastic_ground": _links(2, 2, parameters=ELASTIC, **GROUND),
+    # on the ground
+    "ground_m1_n1": _links(1, 1, **GROUND),
+    "ground": _links(1, 3, **GROUND),
+    "ground_m2_n2": _links(2, 2, **GROUND),
+    "ground_arcs": _arcs(2, **GROUND),
+    "ground_mixed": _own("mixed", MIXED, **GROUND),
+    "feet": _links(1, 3, contacts=["feet"]),
+    "feet_tail": _links(1, 3, contacts=["feet", "tail"]),
+    "box": _links(1, 3, friction="box", **GROUND),
+    "smooth": _links(1, 3, friction="smooth", **GROUND),
+    "paper": _links(1, 3, friction="paper", **GROUND),
+    # a torso that never moves
+    "fixed": _links(2, 2, base="fixed"),
+    "fixed_arcs": _arcs(2, base="fixed"),
+    "fixed_mixed": _own("mixed", MIXED, base="fixed", parameters=MOUNTED),
+    # other numbers
+    "weightless": _links(1, 3, weightless=True),
+    "single": _links(2, 2, real="float"),
+    "single_ground": _links(1, 3, real="float", **GROUND),
+    "baked": _links(1, 3, baked=True),
+    # it lacks all that a test wants to miss
+    "bare": _links(1, 1, functions=["forward_dynamics"]),
+}
+
+
+def scene(name: str, **changes: Any) -> Scene:
+    """Return the scene of a model by its name, with some keys changed."""
+    return parse_scene({"functions": "all"} | ZOO[name] | changes, name)
+
+
+def folder(name: str) -> Path:
+    """Return the generated folder of a model by its name."""
+    return models.folder_of(scene(name))
+
+
+@cache
+def model(name: str) -> st.Model:
+    """Return a compiled model by its name; tests share it."""
+    return st.load(folder(name))
+
+
+def make(names: list[str], jobs: int) -> None:
+    """Generate and compile models, side by side."""
+    context = get_context("fork")
+    with ProcessPoolExecutor(jobs, mp_context=context) as pool:
+        for _ in pool.map(_made, names):
+            pass
+
+
+def _made(name: str) -> None:
+    model(name)
+
+
+def main() -> None:
+    """Make all models."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument(
+        "--quick", action="store_true", help="without optimisation, unless CC is set"
+    )
+    parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="models at the same time")
+    options = parser.parse_args()
+    models.choose_compiler(options.quick)
+    begun = time.monotonic()
+    make(list(ZOO), options.jobs)
+    print(f"{len(ZOO)} models for tests: {time.monotonic() - begun:.0f} s")
+
+
+if __name__ == "__main__":
+    main()
