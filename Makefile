@@ -2,9 +2,10 @@
 PYTHON ?= python3
 VENV   := .venv
 PY     := $(VENV)/bin/python
-# what is installed: what the demo uses, the page of runs, all the rest
+# what is installed: what the demo uses, the page of runs, what the quick tests need, all the rest
 DRAWS  := $(VENV)/.draws
 PAGED  := $(VENV)/.paged
+TESTED := $(VENV)/.tested
 READY  := $(VENV)/.ready
 UV     ?= $(shell command -v uv)
 
@@ -48,8 +49,8 @@ help:
 	@echo
 	@echo "  make setup                                 .venv with everything, by uv where it is on PATH"
 	@echo "  make demo                                  the paper's rat: generate, compile, simulate, draw"
-	@echo "  make test                                  the quick tests;  make test-all: every test, models optimised"
-	@echo "  make test-slow                             what make test leaves out, as CI runs it"
+	@echo "  make test                                  the quick tests: what takes at most 5 s"
+	@echo "  make test-slow                             the rest, with every extra;  make test-all: both, models optimised"
 	@echo "  make test   ROOM=simulation                the tests of one room, a folder of tests/"
 	@echo "  make test-portable                         motions and plans, as on a processor with AVX2, without AVX-512"
 	@echo "  make model  TAIL=articulated M=3 N=4       -> generated/articulated_m3_n4"
@@ -101,10 +102,15 @@ $(PAGED): $(PAGE) | $(DRAWS)
 	@$(TELL_PAGE)
 	@touch $@
 
+$(TESTED): $(DRAWS) $(PAGE)
+	$(INSTALL) --editable '.[test]'
+	@$(TELL_PAGE)
+	@touch $(PAGED) $@
+
 $(READY): $(DRAWS) $(PAGE)
 	$(INSTALL) --editable '.[$(EXTRAS)]'
 	@$(TELL_PAGE)
-	@touch $(PAGED) $@
+	@touch $(PAGED) $(TESTED) $@
 
 demo: $(DRAWS)
 	$(PY) examples/demo.py
@@ -114,7 +120,9 @@ demo: $(DRAWS)
 test test-portable test-slow test-all: export PYTHONDONTWRITEBYTECODE :=
 test test-portable test-slow test-all: export PYTHONPYCACHEPREFIX := $(CURDIR)/.build/bytecode
 
-test: $(READY)
+# The models that tests share are made side by side, before the tests that need them.
+test: $(TESTED)
+	$(if $(ROOM),,$(PY) -m tests.support.zoo --quick)
 	$(PY) -m pytest --quick -m "not slow" $(WORKERS) $(if $(ROOM),tests/$(ROOM))
 
 # The rooms whose numbers hang most on how sums round, as on a processor with AVX2 and no AVX-512.
@@ -128,6 +136,7 @@ test-slow: test-portable
 
 # Every test, with models compiled as a user's are.
 test-all: test-portable
+	$(PY) -m tests.support.zoo
 	$(PY) -m pytest $(WORKERS)
 
 lint: $(READY)

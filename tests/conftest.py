@@ -1,11 +1,20 @@
-"""Options of the test run, and how it compiles its models."""
+"""Options of the test run, how it compiles its models, and what it could not test."""
 
 import os
+import re
 import signal
+from importlib.util import find_spec
 
 import pytest
 
 from tests.support.models import QUICK, choose_compiler
+
+# of extras that `make test` does not install
+LIBRARIES = (
+    *("fmpy", "imageio_ffmpeg", "jax", "mujoco", "pinocchio", "pyarrow", "selenium", "sphinx"),
+    *("torch", "viser", "ziglang"),
+)
+LACKS = re.compile(r"could not import '(\w+)")
 
 
 def pytest_addoption(parser):
@@ -23,6 +32,27 @@ def pytest_configure(config):
     choose_compiler(config.getoption("--quick"))
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as for `make test &` in a script
         signal.signal(signal.SIGINT, signal.default_int_handler)
+    if os.environ.get("CI") and missing():
+        raise pytest.UsageError(f"in CI every test runs, but {', '.join(missing())} is missing")
+
+
+def missing():
+    """Return the libraries of extras that are not installed."""
+    return [name for name in LIBRARIES if find_spec(name) is None]
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_terminal_summary(terminalreporter):
+    """Tell in one line which libraries were not there, instead of one for each of their tests."""
+    skipped = terminalreporter.stats.get("skipped", [])
+    lacking = [report for report in skipped if LACKS.search(str(report.longrepr))]
+    if lacking:
+        names = sorted({LACKS.search(str(report.longrepr))[1] for report in lacking})
+        terminalreporter.stats["skipped"] = [r for r in skipped if r not in lacking]
+        terminalreporter.write_line(
+            f"not tested: {len(lacking)} tests, files and folders that need {', '.join(names)}; "
+            "`make setup` installs them"
+        )
 
 
 @pytest.fixture
