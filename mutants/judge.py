@@ -161,14 +161,13 @@ def packed(recorder: Recorder, mutation: Mutation, most: float) -> Iterator[list
 
 def rows(recorder: Recorder, mutation: Mutation) -> Iterator[list[str]]:
     """Yield the tests of each file that run a mutated line: first files whose path shares most
-    words with the mutant's, then those that take less; last the files that must be recorded to
-    know.  Where none runs the line, those of the nearest files.
+    words with the mutant's, then those that take less, then those that must be recorded to know.
+    Where none runs the line, those of the nearest files.
     """
     waiting = recorder.files()
 
-    def rank(file: str) -> tuple[bool, int, float]:
-        cost = recorder.cost(file)
-        return cost == float("inf"), -nearness(mutation.path, file), cost
+    def rank(file: str) -> tuple[int, float]:
+        return -nearness(mutation.path, file), recorder.cost(file)
 
     found = False
     while waiting:
