@@ -11,7 +11,6 @@ import pytest
 from serpentail.model.kernel import Kernel
 from serpentail_codegen.scene.signatures.table import DERIVATIVES
 from tests.references.metrics import block_error
-from tests.support import zoo
 from tests.support.derivative_models import (
     FIRST,
     NEGLIGIBLE,
@@ -23,13 +22,14 @@ from tests.support.derivative_models import (
 )
 from tests.support.rows import row
 
-from .compared import QUICK, ROUNDING, called, every_free, limit, marked
+from .compared import QUICK, ROUNDING, called, every_free, limit, marked, model_of
 
 PASSIVE = ["elastic", "elastic_arcs"]
 FIXED = ["fixed", "fixed_arcs", "fixed_mixed"]
 every_model = pytest.mark.parametrize(
     "name", marked([*PASSIVE, *FIXED], quick=["mixed", "elastic", "fixed_mixed"])
 )
+free_or_passive = pytest.mark.parametrize("name", marked(PASSIVE, quick=["mixed", "elastic"]))
 
 
 def test_every_derivative_function_is_compared():
@@ -39,7 +39,7 @@ def test_every_derivative_function_is_compared():
 
 @every_model
 def test_first_derivatives_are_those_of_a_complex_step(name):
-    model = zoo.model(name)
+    model = model_of(name)
     names, singles = zip(*of_every_kind(model), strict=True)
     stack = {argument: np.array([s[argument] for s in singles]) for argument in singles[0]}
     step = cache(lambda function, argument: complex_step(model, function, stack, argument))
@@ -60,7 +60,7 @@ def test_first_derivatives_are_those_of_a_complex_step(name):
 def test_batches_are_those_of_single_states(name, monkeypatch):
     """In the C of many states side by side, with a rest."""
     monkeypatch.setattr("serpentail.model.batch.MIN_BATCH", 1)
-    model = zoo.model(name)
+    model = model_of(name)
     singles = [state for _, state in of_every_kind(model)]
     singles = [singles[k % len(singles)] for k in range(model.batch_library.states + 1)]
     stack = {argument: np.array([s[argument] for s in singles]) for argument in singles[0]}
@@ -83,7 +83,7 @@ def test_position_and_velocity_of_the_torso_matter_to_nothing_but_its_energy(nam
     """Every column of the position is zero, to the last bit, and so is the velocity's but in the
     momentum.
     """
-    model = zoo.model(name)
+    model = model_of(name)
     mass = model.parameters["torso_mass"] + model.parameters["tail_mass"]
     for at, state in of_every_kind(model):
         with row(at):
@@ -105,7 +105,7 @@ def test_position_and_velocity_of_the_torso_matter_to_nothing_but_its_energy(nam
 @every_free
 def test_energy_and_momentum_change_by_the_torques_and_gravity(name):
     """The chain rule along a motion: d(energy)/dt = tau^T q_t_dot, d(momentum)/dt = m g."""
-    model = zoo.model(name)
+    model = model_of(name)
     weight = (model.parameters["torso_mass"] + model.parameters["tail_mass"]) * 9.8
     for at, state in of_every_kind(model):
         v, most = state["v"], limit(model, "forward", state)
@@ -126,7 +126,7 @@ def test_forces_follow_from_the_energies_by_lagrange(name):
     """C = d(H v)/dq v - dT/dq + dU/dq on the tail's coordinates; aq is d(H v)/dq where the
     multiplier is v.
     """
-    model = zoo.model(name)
+    model = model_of(name)
     for at, state in of_every_kind(model):
         gradients, v = called(model, "energy_derivatives", state), state["v"]
         aq = called(model, "inverse_dynamics_hessian", state | {"multiplier": v})["aq"]
@@ -141,10 +141,10 @@ def test_forces_follow_from_the_energies_by_lagrange(name):
 # ---- products with Jacobians ---------------------------------------------------------------------
 
 
-@every_free
+@free_or_passive
 def test_products_are_those_with_the_jacobians(name):
     """From the left and from the right, by sweeps that never form a Jacobian."""
-    model, rng = zoo.model(name), np.random.default_rng(3)
+    model, rng = model_of(name), np.random.default_rng(3)
     for at, state in of_every_kind(model):
         weights, H = state["multiplier"], model.mass_matrix(state["q"])
         for function in ("inverse", "forward"):
@@ -169,7 +169,7 @@ def test_products_are_those_with_the_jacobians(name):
 @every_free
 def test_hessians_are_symmetric_and_linear_in_multipliers(name):
     """And affine in accelerations; the position of the torso has none."""
-    model = zoo.model(name)
+    model = model_of(name)
     hessian = lambda state: called(model, "inverse_dynamics_hessian", state)  # noqa: E731
     for at, state in of_every_kind(model):
         other = state["multiplier"][::-1].copy()
@@ -193,7 +193,7 @@ def test_hessians_contracted_with_velocities(name):
     """C is quadratic in v but for gravity, and H v_dot linear in v_dot: so Euler's theorem on
     homogeneous functions.
     """
-    model = zoo.model(name)
+    model = model_of(name)
     weightless = model.with_parameters(gravity=0.0)
     for at, state in of_every_kind(model):
         blocks = called(model, "inverse_dynamics_hessian", state)
@@ -232,13 +232,13 @@ def hessian_by_casadi(model):
     return ca.Function("hessian", arguments, [ca.jacobian(gradient, x)])
 
 
-@pytest.mark.parametrize("name", marked(PASSIVE, quick=["mixed", "elastic"]))
+@free_or_passive
 def test_hessians_are_casadis(name):
     """By the numbers of the quaternion, brought to turns: the force depends on the direction of the
     quaternion alone, so the second derivative along it, by which the exponential map leaves the
     tangent, is zero.
     """
-    model = zoo.model(name)
+    model = model_of(name)
     nq, nv = model.nq, model.nv
     q, v, a = (slice(k * nv, (k + 1) * nv) for k in range(3))
     for at, state in of_every_kind(model):
