@@ -10,23 +10,14 @@ import casadi
 import numpy as np
 import pytest
 
-import serpentail as st
 from tests.references.exact_continuum import ExactContinuum
 from tests.references.metrics import BLOCKS, equilibrated_condition
 from tests.references.parameters import TABLE_1, random_states
-from tests.support.models import model_folder
+from tests.support import zoo
+from tests.support.rows import row
 
-BENDS = (
-    0.0,
-    1e-300,
-    1e-8,
-    1e-3,
-    0.1,
-    1.0,
-    pi,
-    6.28,
-)  # rad, of every segment; the range ends at 2 pi
-QUICK = {1: (0.0, 6.28), 2: ()}  # by segments; the others are in the slow suite
+# rad, of every segment; the range ends at 2 pi
+BENDS = {1: (1e-300, 1e-8, 1e-3, 0.1, 1.0, pi), 2: (0.0, 1e-3, 6.28)}
 INPUTS = {
     "bias_force": ("q", "v"),
     "inverse_dynamics": ("q", "v", "v_dot"),
@@ -35,14 +26,9 @@ INPUTS = {
 # of the largest derivative in the same rows: smaller blocks of columns are compared with that
 NEGLIGIBLE = 1e-6
 every_bend = pytest.mark.parametrize(
-    ("segments", "bend"),
-    [
-        pytest.param(
-            m, bend, marks=[] if bend in QUICK[m] else pytest.mark.slow, id=f"m{m}-{bend:.3g}"
-        )
-        for m in (1, 2)
-        for bend in BENDS
-    ],
+    ("segments", "bends"),
+    [(1, (0.0, 6.28)), *(pytest.param(*x, marks=pytest.mark.slow) for x in BENDS.items())],
+    ids=["quick", "m1", "m2"],
 )
 
 
@@ -123,9 +109,9 @@ def exact(segments):
     return Unrounded(segments)
 
 
-@cache
 def model(segments):
-    return st.load(model_folder(segments, None), compiled=False)
+    """The continuum in CasADi."""
+    return zoo.model(f"arcs{segments}")
 
 
 def state(segments, bend):
@@ -168,12 +154,12 @@ def blockwise_error(values, reference, rows, columns):
     NEGLIGIBLE.
     """
     errors = []
-    for row in rows:
-        floor = NEGLIGIBLE * np.abs(reference[row]).max()
+    for block in rows:
+        floor = NEGLIGIBLE * np.abs(reference[block]).max()
         for column in columns:
-            expected = reference[row, column]
+            expected = reference[block, column]
             scale = max(np.abs(expected).max(), floor)
-            errors.append(np.abs(values[row, column] - expected).max() / scale)
+            errors.append(np.abs(values[block, column] - expected).max() / scale)
     return np.max(errors)  # not a number, if one of them is none
 
 
@@ -188,53 +174,49 @@ def first_derivative_error(segments, name, at):
 
 
 @every_bend
-def test_first_derivatives_of_the_mass_matrix(segments, bend):
-    q = state(segments, bend)["q"]
-    H = exact(segments).mass_matrix(q).astype(float)
-    reference = exact(segments).jacobian(exact(segments).mass_matrix, q).astype(float)
-    scale = np.sqrt(np.outer(np.diag(H), np.diag(H)))
-    error = derivatives(segments, "mass_matrix", q).reshape(reference.shape) - reference
-    assert np.max(np.abs(error) / scale[:, :, None]) <= 1e-14
+def test_first_derivatives(segments, bends):
+    for bend in bends:
+        at = state(segments, bend)
+        H = exact(segments).mass_matrix(at["q"]).astype(float)
+        limits = {
+            "bias_force": 1e-13,
+            "inverse_dynamics": 1e-13,
+            "forward_dynamics": 5e-15 * equilibrated_condition(H),
+        }
+        for name, limit in limits.items():
+            with row(name, bend):
+                assert first_derivative_error(segments, name, at) <= limit
+        expected = exact(segments).jacobian(exact(segments).mass_matrix, at["q"]).astype(float)
+        error = derivatives(segments, "mass_matrix", at["q"]).reshape(expected.shape) - expected
+        scale = np.sqrt(np.outer(np.diag(H), np.diag(H)))
+        with row("mass_matrix", bend):
+            assert np.max(np.abs(error) / scale[:, :, None]) <= 1e-14
 
 
 @every_bend
-@pytest.mark.parametrize("name", ["bias_force", "inverse_dynamics"])
-def test_first_derivatives_of_forces(segments, bend, name):
-    assert first_derivative_error(segments, name, state(segments, bend)) <= 1e-13
-
-
-@every_bend
-def test_first_derivatives_of_accelerations(segments, bend):
-    at = state(segments, bend)
-    condition = equilibrated_condition(exact(segments).mass_matrix(at["q"]).astype(float))
-    assert first_derivative_error(segments, "forward_dynamics", at) <= 5e-15 * condition
-
-
-@every_bend
-def test_second_derivatives_of_a_sum_of_forces(segments, bend):
+def test_second_derivatives_of_a_sum_of_forces(segments, bends):
     """By bends, angular velocity and bend rates; each block of forces has the same weight in the
     sum.
     """
-    q, v, v_dot, _ = state(segments, bend).values()
-    weights = equal_weights(exact(segments).inverse_dynamics(q, v, v_dot).astype(float))
-    bends = 2 * segments
+    tail = 2 * segments
+    blocks = [slice(0, tail), slice(tail, tail + 3), slice(tail + 3, None)]
+    for bend in bends:
+        q, v, v_dot, _ = state(segments, bend).values()
+        weights = equal_weights(exact(segments).inverse_dynamics(q, v, v_dot).astype(float))
 
-    def arguments(x, joined):
-        return joined([q[:7], x[:bends]]), joined([v[:3], x[bends:]]), v_dot
+        def arguments(x, joined, q=q, v=v, v_dot=v_dot):
+            return joined([q[:7], x[:tail]]), joined([v[:3], x[tail:]]), v_dot
 
-    x = np.concatenate([q[7:], v[3:]])
-    reference = exact(segments).hessian(
-        lambda x: exact(segments).power(weights, *arguments(x, np.concatenate)), x
-    )
-    x_symbol = casadi.SX.sym("x", len(x))
-    force = model(segments).casadi.inverse_dynamics(
-        *arguments(x_symbol, lambda parts: casadi.vertcat(*parts))
-    )
-    hessian = casadi.Function(
-        "hessian", [x_symbol], [casadi.hessian(casadi.dot(weights, force), x_symbol)[0]]
-    )
-    blocks = [slice(0, bends), slice(bends, bends + 3), slice(bends + 3, None)]
-    assert blockwise_error(np.array(hessian(x)), reference.astype(float), blocks, blocks) <= 1e-13
+        def power(x, weights=weights, arguments=arguments):
+            return exact(segments).power(weights, *arguments(x, np.concatenate))
+
+        x, symbol = np.concatenate([q[7:], v[3:]]), casadi.SX.sym("x", 2 * tail + 3)
+        given = arguments(symbol, lambda parts: casadi.vertcat(*parts))
+        total = casadi.dot(weights, model(segments).casadi.inverse_dynamics(*given))
+        hessian = casadi.Function("hessian", [symbol], [casadi.hessian(total, symbol)[0]])
+        expected = exact(segments).hessian(power, x).astype(float)
+        with row(bend):
+            assert blockwise_error(np.array(hessian(x)), expected, blocks, blocks) <= 1e-13
 
 
 def equal_weights(force):
