@@ -4,10 +4,13 @@ polar angles.
 
 import subprocess
 
+import casadi
 import numpy as np
 import pytest
 
 import serpentail as st
+from tests.references.body_set import MP, Animal, Arc, moved
+from tests.references.body_set import exact as exact_numbers
 from tests.references.exact_continuum import ExactContinuum
 from tests.references.metrics import block_error, equilibrated_condition, mass_matrix_error
 from tests.references.parameters import TABLE_1
@@ -16,6 +19,7 @@ from tests.support.models import model_folder
 from tests.support.rows import row
 
 BENDS = (0.0, 1e-300, 1e-16, 1e-8, 1e-4, 1e-2, 0.5, 2.0, np.pi, 5.0, 2 * np.pi)
+SHIFT = MP.mpf(10) ** -7
 
 
 @pytest.fixture(scope="module")
@@ -42,6 +46,71 @@ def test_every_bend_is_right_to_rounding(exact):
             assert block_error(model.bias_force(q, v), exact.bias_force(q, v)) <= 2e-14
             v_dot = model.forward_dynamics(q, v, tau), exact.forward_dynamics(q, v, tau)
             assert block_error(*v_dot) <= 5e-15 * equilibrated_condition(H)
+
+
+@pytest.mark.parametrize(
+    "bends", [BENDS[::5], pytest.param(BENDS[1::2], marks=pytest.mark.slow)], ids=["some", "others"]
+)
+def test_derivatives_are_right_at_every_bend(bends):
+    """First and second ones along a direction in which all but the torso's place changes: of
+    compiled functions and of CasADi's expressions, against differences of 60 digits.
+    """
+    model = zoo.model("arcs1")
+    body = Arc(TABLE_1["tail_mass"], TABLE_1["tail_length"])
+    given = {name: TABLE_1[name] for name in ("torso_mass", "torso_inertia", "tail_mount")}
+    animal, rng = Animal(segments=(body,), **given), np.random.default_rng(6)
+    for bend in bends:
+        q, v, tau = bent(bend)
+        (by_q, by_v), (v_dot, weights) = rng.normal(size=(2, 2, 8))
+        by_q[:3], by_v[:3] = 0, 0
+        sides = [
+            animal.inverse_dynamics(
+                moved(exact_numbers(q), by_q, h), exact_numbers(v) + h * exact_numbers(by_v), v_dot
+            )
+            for h in (-SHIFT, 0 * SHIFT, SHIFT)
+        ]
+        first = ((sides[2] - sides[0]) / (2 * SHIFT)).astype(float)
+        second = ((sides[2] - 2 * sides[1] + sides[0]) / SHIFT**2).astype(float) @ weights
+        dq, dv = model.inverse_dynamics_derivatives(q, v, v_dot)
+        qq, qv, vv, _ = model.inverse_dynamics_hessian(q, v, v_dot, weights)
+        curved = by_q @ qq @ by_q + 2 * by_q @ qv @ by_v + by_v @ vv @ by_v
+        most = (1e-12 if bend >= 1e-8 else 1e-5) * abs(second)  # what differences are right to
+        with row(bend):
+            near(dq @ by_q + dv @ by_v, first, 1e-12)
+            assert abs(curved - second) <= most
+            slope, curve, of_motion = along_by_casadi(
+                model, (q, v, v_dot, tau), by_q, by_v, weights
+            )
+            near(slope, first, 1e-12)
+            assert abs(curve - second) <= most
+            dq, dv, _ = model.forward_dynamics_derivatives(q, v, tau)
+            condition = equilibrated_condition(model.mass_matrix(q))
+            near(of_motion, dq @ by_q + dv @ by_v, 1e-13 * condition)
+
+
+def near(found, expected, limit):
+    assert block_error(found, expected) <= limit
+
+
+def along_by_casadi(model, state, by_q, by_v, weights):
+    """The slope of forces, weights times their second derivative, and the slope of v_dot."""
+    q, v, v_dot, tau = state
+    s = casadi.SX.sym("s")
+    angle = np.linalg.norm(by_q[3:6])
+    c, k = casadi.cos(s * angle / 2), casadi.sin(s * angle / 2) / angle
+    turn = by_q[3:6]
+    w, e = q[3], q[4:7]
+    there = [
+        w * c - k * (e @ turn),
+        *(c * e[i] + k * (w * turn + np.cross(e, turn))[i] for i in range(3)),
+    ]
+    place = casadi.vertcat(*q[:3], *there, q[7:] + s * by_q[6:])
+    force = model.casadi.inverse_dynamics(place, v + s * by_v, v_dot)
+    motion = model.casadi.forward_dynamics(place, v + s * by_v, tau)
+    slope = casadi.jacobian(force, s)
+    curve = casadi.jacobian(casadi.jacobian(casadi.dot(weights, force), s), s)
+    found = casadi.Function("along", [s], [slope, curve, casadi.jacobian(motion, s)])(0)
+    return found[0].full().ravel(), float(found[1]), found[2].full().ravel()
 
 
 def test_beyond_the_range_is_refused():
