@@ -5,7 +5,7 @@ steps, and which vectors they take and give.
 import random
 from fractions import Fraction
 from functools import cache, partial
-from itertools import chain, combinations
+from itertools import combinations
 
 import mpmath
 import numpy as np
