@@ -86,33 +86,3 @@ def test_derivatives_of_dynamics_are_pinocchios(name):
         for key, inverse in zip(("dq", "dv"), by_force, strict=True):
             with row(at, "forward", key):
                 assert_pinocchios(found[key], -np.linalg.solve(H, inverse), model.nv, limit)
-
-
-def test_forward_dynamics_derivatives_are_those_of_pinocchios_articulated_bodies():
-    """With one link a segment the chain needs no reduction: computeABADerivatives gives the
-    Jacobians at once.
-    """
-    model = zoo.model("m1_n1")
-    peer = chain(model)
-    for at, state in of_every_kind(model):
-        Q, T = peer._full_configuration(state["q"])
-        V, omega = T @ state["v"], state["v"][3:6]
-        tau = np.concatenate([np.zeros(6), state["tau"]])
-        by_Q, by_V, by_tau = (
-            np.array(x) for x in pin.computeABADerivatives(peer.model, peer.data, Q, V, tau)
-        )
-        by_tau = np.triu(by_tau) + np.triu(by_tau, 1).T
-        A, V_q, turning, of_omega = np.array(peer.data.ddq), *(0 * T for _ in range(3))
-        V_q[:3, 3:6] = skew(V[:3])
-        # v_dot = T^-1 (A + [omega x V; 0])
-        turning[:3, :3] = skew(omega)
-        of_omega[:3, 3:6] = -skew(V[:3])
-        acceleration = A[:3] + np.cross(omega, V[:3])
-        dq = T.T @ (by_Q @ T + by_V @ V_q + turning @ V_q)
-        dq[:3, 3:6] -= T[:3, :3].T @ skew(acceleration)
-        dv = T.T @ (by_V @ T + turning @ T + of_omega)
-        expected = {"dq": dq, "dv": dv, "dtau": (T.T @ by_tau)[:, 6:]}
-        limit = 10 * SOLVED * equilibrated_condition(model.mass_matrix(state["q"]))
-        for key, found in called(model, "forward_dynamics_derivatives", state).items():
-            with row(at, key):
-                assert_pinocchios(found, expected[key], model.nv, limit)

@@ -209,17 +209,6 @@ def test_external_loads_balance():
     assert np.abs(residual).max() <= 1e-12 * np.abs(load).max()
 
 
-def test_a_flight_far_from_straight_is_that_of_the_bend_form():
-    q, v = np.array([0, 0, 0, 1.0, 0, 0, 0, 0.4, 1.5]), np.array([0, 0, 2.0, 6, 1, -2, 3.0, 1.0])
-    polar, bend = (
-        st.simulate(zoo.model(name), *start, t_span=0.05, step=1e-4)
-        for name, start in (("polar", (q, v)), ("arcs1", in_bend(q, v)))
-    )
-    end = in_bend(polar.q[-1], polar.v[-1])
-    np.testing.assert_allclose(end[0], bend.q[-1], atol=1e-10)
-    np.testing.assert_allclose(end[1], bend.v[-1], atol=1e-8)
-
-
 def test_the_c_example_runs_at_a_bend(tmp_path):
     polar = zoo.model("polar")
     sources = [polar.folder / "example" / "main.c", polar.folder / "src" / f"{polar.name}.c"]

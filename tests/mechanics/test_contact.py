@@ -18,7 +18,6 @@ from tests.references.parameters import random_states
 from tests.support import zoo
 from tests.support.rows import row
 
-FRICTION = ("cone", "box", "smooth", "paper")
 LAWS = ["ground", "box", "smooth", "paper"]  # all laws of friction on one tail
 TAILS = ["ground_m2_n2", "ground_arcs", "ground_mixed"]
 every_model = pytest.mark.parametrize("name", [*LAWS, *TAILS])
