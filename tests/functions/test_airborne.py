@@ -1,10 +1,9 @@
 """Rates of airborne states are those of the full animal; their derivatives are those of a complex
-step, and of CasADi's operations.
+step.
 """
 
 from itertools import pairwise
 
-import casadi as ca
 import numpy as np
 import pytest
 
@@ -133,46 +132,6 @@ def test_derivatives_are_those_of_a_complex_step(name):
             assert not np.delete(H[-nt:], np.r_[4 : 4 + nt], axis=1).any()
             twice = all_three(model, arguments | {"weights": 2 * arguments["weights"]})[2][2]
             np.testing.assert_array_equal(twice, 2 * H)
-
-
-def by_casadi(model):
-    """CasADi's y, J and Hessian of mu^T y, of the full animal's symbolic functions."""
-    nt = model.nv - 6
-    x, tau = ca.SX.sym("x", 4 + 2 * nt), ca.SX.sym("tau", nt)
-    h, mu = ca.SX.sym("h", 3), ca.SX.sym("mu", 7 + 2 * nt)
-    q = ca.vertcat(ca.SX.zeros(3), x[: 4 + nt])
-
-    # B's velocity and omega from the momenta, which are linear in them
-    v = ca.vertcat(ca.SX.sym("v", 6), x[4 + nt :])
-    linear, angular = model.casadi.momentum(q, v)
-    both = ca.vertcat(linear, angular - h)
-    rest = ca.substitute(both, v[:6], ca.SX.zeros(6))
-    motion = ca.solve(ca.jacobian(both, v[:6]), -rest)
-    v_dot = model.casadi.forward_dynamics(q, ca.vertcat(motion, x[4 + nt :]), tau)
-    a, b, c = (motion[3 + k] / 2 for k in range(3))
-    w, i, j, k = (x[n] for n in range(4))
-    turning = [-i * a - j * b - k * c, w * a + j * c - k * b, w * b + k * a - i * c]
-    turning.append(w * c + i * b - j * a)
-    y = ca.vertcat(*turning, x[4 + nt :], v_dot[6:], motion[3:])
-    z = ca.vertcat(x, tau)
-    H, _ = ca.hessian(ca.dot(mu, y), z)
-    return ca.Function("rates", [x, tau, h, mu], [y, ca.jacobian(y, z), H])
-
-
-@pytest.mark.parametrize("name", ["m1_n3", "arcs1"])
-def test_derivatives_are_those_of_casadi(name):
-    model, function = zoo.model(name), by_casadi(zoo.model(name))
-    nt = model.nv - 6
-    by, of = blocks(4, nt, nt, nt), blocks(4, nt, nt, 3)
-    for at, (q, _, _), arguments in calls(model):
-        if at.startswith("scaled"):
-            y, J, H = (np.array(a) for a in function(*arguments.values()))
-            found = all_three(model, arguments)[2]
-            limit = 10 * ROUNDING * condition(model, q)
-            with row(at):
-                np.testing.assert_allclose(found[0], y.ravel(), rtol=1e-9)
-                assert worst(found[1], J, of, by) <= limit
-                assert worst(found[2], H, by, by) <= limit
 
 
 def one_call(model):
