@@ -12,12 +12,10 @@ from serpentail_codegen.functions.catalogue import CATALOGUE
 from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.functions.sweeps.doubling import is_doubled
 from serpentail_codegen.functions.tail import Tail
-from serpentail_codegen.ir.builder import Builder
+from serpentail_codegen.ir.dataflow import inlined
 from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.ir.ldl import ldl_factor, ldl_solve
-from serpentail_codegen.ir.program import Factor, Solve, padded, statements
-from serpentail_codegen.ir.step import Step
-from serpentail_codegen.ir.tape import Tape
+from serpentail_codegen.ir.program import Factor, Solve, statements
 from serpentail_codegen.passes.unrolled_ldl import unrolled_ldl
 from serpentail_codegen.targets.c.form import RULE, fastest
 from tests.support import zoo
@@ -171,62 +169,22 @@ def test_matrices_beyond_the_limit_keep_their_loops():
     assert unrolled_ldl(long, 12) == long
 
 
-@pytest.mark.parametrize("wide", [0, 3])
-def test_an_elimination_written_out_solves(wide):
-    lanes = max(wide, 1)
-    for rows in (1, 2, 5, 9, 12):
-        rng = np.random.default_rng(rows)
-        half = rng.normal(size=(rows, rows))
-        matrix, b = half @ half.T + rows * np.eye(rows), rng.normal(size=(rows, lanes))
-        whole, flat = elimination(rows, wide), np.zeros((rows, padded(rows)))
-        flat[:, :rows] = matrix
-        values = {f"b{k}": b[:, k].tolist() for k in range(lanes)} | {
-            "given": flat.ravel().tolist()
-        }
-        straight = unrolled_ldl(whole, 12)
-        assert not any(isinstance(s, Factor | Solve) for s, _ in statements(straight.body))
-        found, same = (outputs(p, values)["out"].reshape(rows, -1) for p in (whole, straight))
-        with row(rows):
-            np.testing.assert_allclose(found, np.linalg.solve(matrix, b), rtol=1e-11)
-            np.testing.assert_array_equal(found, same)
-            values["given"][0] = -1.0
-            guards = Run(straight, Numbers(np), values).guards
-            assert min(float(np.min(x)) for _, x in guards) < 0
-
-
-def elimination(rows, wide):
-    """A program that solves with a matrix, for one vector or for several side by side."""
-    d = Builder("solve", "Solve.")
-    A, given = d.array("A", padded(rows), rows), d.array("given", padded(rows), rows, role="input")
-    x = d.wide("x", rows, wide) if wide else d.array("x", rows)
-    rights = [d.array(f"b{k}", rows, role="input") for k in range(max(wide, 1))]
-    out = d.array("out", rows * max(wide, 1), role="output")
-    d.copy(A.part(0, A.length), given.part(0, given.length))
-    if wide:
-        at = d.wide("at", wide, wide)
-        d.unit(at.part(0, wide), 0)
-        columns = {f"b{k}": rights[k][0] for k in range(wide)}
-        lanes = {f"at{k}": at.part(k, 1) for k in range(wide)}
-        d.apply(spread(rows, wide), columns | lanes, x=x[0])
-    else:
-        d.copy(x[0], rights[0][0])
-    d.factor(A, rows)
-    d.solve(A, x[0])
-    for k in range(rows):
-        for lane in range(max(wide, 1)):
-            d.copy(out.part(k * max(wide, 1) + lane, 1), x.lane(k, lane) if wide else x.part(k, 1))
-    return d.finish()
-
-
-def spread(rows, wide):
-    """The step that puts columns into lanes."""
-    tape, results = Tape(), []
-    columns = [[tape.input(c * rows + k) for k in range(rows)] for c in range(wide)]
-    at = [tape.input(wide * rows + c) for c in range(wide)]
-    for k in range(rows):
-        total = tape.const(0)
-        for c in range(wide):
-            total = tape.add(total, tape.mul(at[c], columns[c][k]))
-        results.append(total)
-    inputs = (*((f"b{c}", rows) for c in range(wide)), *((f"at{c}", 1) for c in range(wide)))
-    return Step("spread", "Spread.", inputs, (("x", rows),), tuple(tape.nodes), tuple(results))
+def test_eliminations_written_out_are_the_same():
+    """Bit for bit, of one right-hand side and of several side by side; pivots are guarded."""
+    for size in ((1, 1), (2, 1), (3, 2), (4, 1)):
+        for name in (FUNCTION, "forward_dynamics_derivatives", "pfl"):
+            whole = inlined(assemble(CATALOGUE[name], Tail(*size), "lanes"))
+            straight = unrolled_ldl(whole, 12)
+            given = arguments(whole)
+            with row(name, size):
+                assert any(isinstance(s, Factor) for s, _ in statements(whole.body))
+                assert not any(isinstance(s, Factor | Solve) for s, _ in statements(straight.body))
+                found = outputs(straight, given)
+                for key, expected in outputs(whole, given).items():
+                    np.testing.assert_array_equal(found[key], expected)
+                wrong = given | {"torso_inertia": [-1e3] * 3}
+                pivots, same = (
+                    [float(np.min(x)) for _, x in Run(p, Numbers(np), wrong).guards]
+                    for p in (whole, straight)
+                )
+                assert min(pivots) < 0 and min(same) < 0
