@@ -15,7 +15,6 @@ from serpentail_codegen.functions.plain import FUNCTIONS
 from serpentail_codegen.functions.sweeps.pieces import each_segment, mechanism
 from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.scene.shape import Run, Shape
-from serpentail_codegen.targets.c.straight import straight_line
 from tests.functions.test_columns import arguments, outputs
 from tests.references.metrics import block_error, force_error, mass_matrix_error
 from tests.support import zoo
@@ -110,18 +109,6 @@ def test_steps_are_those_of_a_stretch():
     assert kinds == ["link", "arc"]
     with pytest.raises(ValueError, match="segments"):
         mechanism(draft).pose()
-
-
-def test_a_mixed_tail_costs_no_more_than_both_kinds():
-    """Two segments of three links and an arc; links alone cost about as much."""
-    tails = Tail(3, 3, shape=Shape(links=9)), Tail(3, 5, "mixed", shape=COUNTED)
-    for name in ("mass_matrix", "bias_force", "forward_dynamics"):
-        links, both, arcs = (
-            straight_line(assemble(FUNCTIONS[name], tail), "double", "x").operations
-            for tail in (*tails, Tail(3, 5, "continuum", shape=Shape(arcs=3)))
-        )
-        with row(name):
-            assert 0.9 * links < both < arcs
 
 
 # ---- models --------------------------------------------------------------------------------------

@@ -133,13 +133,6 @@ def test_mujoco_with_these_torques_accelerates_alike():
         assert block_error(pair.elastic.forward_dynamics(q, v, tau), expected) < 1e-9
 
 
-def test_batches_are_those_of_single_states(pair):
-    q, v, _, tau = random_states(pair.plain.segments, 5, 21, "random")
-    rows = pair.elastic.forward_dynamics(q, v, tau)
-    for found, *state in zip(rows, q, v, tau, strict=True):
-        assert block_error(found, pair.elastic.forward_dynamics(*state)) < 1e-11
-
-
 def test_energy_has_what_springs_and_stops_store(pair):
     for q, v, _, _ in pair.states():
         kinetic, potential = pair.plain.energy(q, v)
