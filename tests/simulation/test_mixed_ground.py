@@ -9,20 +9,33 @@ import serpentail as st
 from serpentail_codegen.functions.catalogue import CATALOGUE
 from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.functions.tail import Tail
+from serpentail_codegen.scene.parse import parse_scene
 from serpentail_codegen.scene.shape import Shape
 from tests.functions.test_columns import arguments, outputs
-from tests.mechanics.test_contact import CASES, near_ground, touching
+from tests.mechanics.test_contact import near_ground
+from tests.support.models import folder_of
 
 FUNCTIONS = ("energy", "momentum", "rollout", "implicit", "tail_points", "center_of_mass")
+SEGMENTS = [
+    {"kind": "articulated", "links": 2, "length": 0.08, "mass": 0.0015},
+    {"kind": "continuum", "length": 0.06, "mass": 0.001},
+    {"kind": "articulated", "links": 3, "link_lengths": [0.03, 0.02, 0.02], "mass": 0.0008},
+]
 G = 9.8
 DAMPED = {"controller": st.Damping(1e-3)}
 
 
+@cache
+def touching(contacts, functions):
+    """Links, an arc and links that touch the ground."""
+    keys = {"kind": "mixed", "segments": SEGMENTS, "samples": 3}
+    keys |= {"contacts": list(contacts), "functions": list(functions)}
+    return st.load(folder_of(parse_scene(keys, "rat")))
+
+
 def rat():
-    """Links, an arc and links; the tail and the torso touch the ground."""
-    segments, _, options = CASES["mixed"]
-    functions = (*FUNCTIONS, "forward_dynamics")
-    return touching(segments, None, ("tail", "torso"), functions, **options)
+    """The tail and the torso touch the ground."""
+    return touching(("tail", "torso"), (*FUNCTIONS, "forward_dynamics"))
 
 
 def start(model):
@@ -81,8 +94,7 @@ def test_touch_downs_are_where_points_of_the_tail_reach_the_ground():
 
 def test_batches_are_those_of_single_states():
     """So many states that they are evaluated side by side."""
-    segments, _, options = CASES["mixed"]
-    model = touching(segments, None, **options)
+    model = touching(("feet", "tail", "torso"), ("contact_dynamics",))
     states = near_ground(model, 3, 1000)
     together = model.contact_dynamics(*states)
     alone = [model.contact_dynamics(*(rows[k] for rows in states)) for k in range(50)]
