@@ -1,0 +1,256 @@
+"""The model that was checked is the model that runs, whatever becomes of its folder: it is compiled
+from a private copy in the cache.
+"""
+
+import copy
+import importlib.util
+import json
+import os
+import pickle
+import py_compile
+import shutil
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import serpentail as st
+from serpentail.simulation import parallel_runs
+from serpentail_codegen.targets.write import write_folder
+from tests.support import zoo
+from tests.support.models import model_folder
+
+from ..support.rows import row
+
+Q, V, TAU = [0, 0, 0, 1, 0, 0, 0, 0.3, -0.2], [0.5] * 8, [0.1, 0.2]
+RACE_S, RACERS = 1.5, 3  # s that loads and generations of one folder go on
+
+
+FUNCTIONS = ["mass_matrix", "forward_dynamics", "energy", "momentum", "rollout"]
+
+
+def of_links(links):
+    """What the generator writes of a model called tail, as the zoo has none: texts, manifest."""
+    folder = model_folder(1, links, name="tail", functions=FUNCTIONS)
+    manifest = json.loads((folder / "manifest.json").read_text())
+    return {name: (folder / name).read_text() for name in manifest["files"]}, manifest
+
+
+def put(folder, made):
+    """Write such a model to a folder, as the generator does."""
+    write_folder(folder, *made)
+    return folder
+
+
+def agree(model):
+    """Check that CasADi and C are of one model."""
+    found = model.casadi.mass_matrix(Q).full()
+    np.testing.assert_allclose(found, model.mass_matrix(Q), rtol=1e-12, atol=1e-18)
+
+
+@pytest.fixture
+def cache(tmp_path, monkeypatch):
+    """An empty cache."""
+    monkeypatch.setenv("SERPENTAIL_CACHE", str(tmp_path / "cache"))
+    return tmp_path / "cache"
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """Where models called tail come and go."""
+    return tmp_path / "tail"
+
+
+# Python's bytecode
+
+
+@pytest.fixture
+def bytecode(monkeypatch):
+    """Let Python keep what it compiles, as it does for a user."""
+    monkeypatch.setattr(sys, "dont_write_bytecode", False)
+    monkeypatch.setattr(sys, "pycache_prefix", None)
+
+
+def test_casadi_functions_are_of_their_text_when_times_are_kept(folder, bytecode):
+    """As after `rsync -t`, `tar`, or two generations within a second."""
+    module, seen = folder / "tail_casadi.py", []
+    for files, manifest in (of_links(1), of_links(2)):
+        put(folder, (files | {module.name: files[module.name].ljust(60_000, "#")}, manifest))
+        seen.append(module.stat())
+        os.utime(module, ns=(seen[0].st_atime_ns, seen[0].st_mtime_ns))
+        agree(st.load(folder))
+    assert seen[0].st_size == seen[1].st_size
+
+
+def test_planted_bytecode_is_not_run(folder, tmp_path, bytecode):
+    put(folder, of_links(1))
+    module = folder / "tail_casadi.py"
+    status = module.stat()
+    planted = tmp_path / "planted.py"
+    planted.write_text("raise KeyError('planted')\n".ljust(status.st_size, "#"))
+    os.utime(planted, ns=(status.st_atime_ns, status.st_mtime_ns))
+    compiled = importlib.util.cache_from_source(str(module))
+    py_compile.compile(str(planted), cfile=compiled)
+    agree(st.load(folder))
+    assert [str(path) for path in folder.rglob("*.pyc")] == [compiled]
+
+
+# What is compiled or built later
+
+
+def test_late_code_is_of_the_model_and_needs_nothing_of_the_cache(folder, cache, monkeypatch):
+    """Batches, runs side by side and CasADi functions; what was deleted there is written again."""
+    monkeypatch.setattr(parallel_runs, "worth_batching", lambda *_: True)
+    rng = np.random.default_rng(4)
+    q, v = rng.normal(size=(1000, 9)), rng.normal(size=(1000, 8))
+    model = st.load(put(folder, of_links(1)))
+    put(folder, of_links(2))
+    shutil.rmtree(cache)
+    expected = [model.forward_dynamics(*state, TAU) for state in zip(q[:9], v[:9], strict=True)]
+    found = model.forward_dynamics(q, v, TAU)[:9]
+    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
+    shutil.rmtree(folder)
+    shutil.rmtree(cache)
+    settings = {"t_span": 0.01, "method": "rk4", "step": 1e-3}
+    runs = st.simulate(model, np.tile(Q, (9, 1)), 0.1 * v[:9], **settings)
+    assert runs.info["abreast"] == 8
+    alone = st.simulate(model, Q, 0.1 * v[8], **settings)
+    np.testing.assert_allclose(runs.q[8], alone.q, rtol=0, atol=1e-9)
+    for each in (model, model.with_parameters(tail_mass=0.005), copy.deepcopy(model)):
+        agree(each)
+
+
+def test_module_is_executed_from_the_text_that_was_checked(folder):
+    model = st.load(put(folder, of_links(1)))
+    (folder / "tail_casadi.py").write_text("raise KeyError('edited')\n")
+    agree(model)
+
+
+# Pickles
+
+UNPICKLE = (
+    "import pathlib, pickle, sys; model = pickle.loads(pathlib.Path(sys.argv[1]).read_bytes()); "
+    f"print(model.mass_matrix({Q}).tobytes().hex())"
+)
+
+
+def test_pickle_is_of_the_model_that_was_pickled(folder, cache, tmp_path):
+    model = st.load(put(folder, of_links(1)), {"tail_mass": 0.005})
+    (tmp_path / "pickled").write_bytes(pickle.dumps(model))
+    put(folder, of_links(2))
+    twin = pickle.loads((tmp_path / "pickled").read_bytes())
+    np.testing.assert_array_equal(twin.mass_matrix(Q), model.mass_matrix(Q))
+    assert twin.folder == model.folder and twin.parameters == model.parameters
+    command = [sys.executable, "-c", UNPICKLE, str(tmp_path / "pickled")]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == model.mass_matrix(Q).tobytes().hex()
+
+
+def test_pickle_without_its_snapshot_takes_the_same_folder_and_no_other(folder, cache):
+    model = st.load(put(folder, of_links(1)))
+    pickled = pickle.dumps(model)
+    (snapshot,) = (cache / "models").iterdir()
+    (snapshot / "src" / "tail.c").write_text("int other;\n")
+    assert pickle.loads(pickled).checked.files == model.checked.files
+    put(snapshot, of_links(2))
+    assert pickle.loads(pickled).checked.files == model.checked.files
+    shutil.rmtree(cache / "models")
+    np.testing.assert_array_equal(pickle.loads(pickled).mass_matrix(Q), model.mass_matrix(Q))
+    shutil.rmtree(cache)
+    put(folder, of_links(2))
+    with pytest.raises(st.ModelError, match="generated again since the model was pickled"):
+        pickle.loads(pickled)
+    shutil.rmtree(folder)
+    with pytest.raises(st.ModelError, match="is not a generated folder"):
+        pickle.loads(pickled)
+
+
+def test_models_without_c_need_no_cache(monkeypatch, tmp_path):
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("SERPENTAIL_CACHE", str(tmp_path / "file" / "cache"))
+    model = st.load(zoo.folder("bare"), compiled=False)
+    found, expected = (
+        each.casadi.forward_dynamics(Q, V, TAU).full()
+        for each in (pickle.loads(pickle.dumps(model)), model)
+    )
+    np.testing.assert_array_equal(found, expected)
+
+
+# Snapshots
+
+
+def test_snapshots_are_for_the_user_alone_and_see_no_planted_header(cache, tmp_path):
+    folder = shutil.copytree(zoo.folder("bare"), tmp_path / "bare")
+    for place in ("include", "src"):
+        (folder / place / "math.h").write_text("#error planted\n")
+    before = os.umask(0)
+    try:
+        st.load(folder)
+    finally:
+        os.umask(before)
+    assert not list(cache.rglob("math.h"))
+    (snapshot,) = (cache / "models").iterdir()
+    assert snapshot.stat().st_mode & 0o777 == 0o700
+
+
+DAMAGES = {
+    "header": lambda place: (place / "include" / "math.h").write_text("#error planted\n"),
+    "text": lambda place: (place / "src" / "bare.c").write_text("int other;\n"),
+    "lost": lambda place: (place / "src" / "bare.c").unlink(),
+    "file": lambda place: (shutil.rmtree(place), place.write_text("")),
+    "pipe": lambda place: (shutil.rmtree(place), os.mkfifo(place)),
+    "pipe for text": lambda place: (
+        (place / "src" / "bare.c").unlink(),
+        os.mkfifo(place / "src" / "bare.c"),
+    ),
+}
+
+
+def test_damaged_snapshot_is_replaced(cache):
+    model, expected = st.load(zoo.folder("bare")), zoo.model("bare").forward_dynamics(Q, V, TAU)
+    for name, damage in DAMAGES.items():
+        with row(name):
+            (snapshot,) = (cache / "models").iterdir()
+            shutil.rmtree(cache / "libraries")
+            damage(snapshot)
+            found = st.load(zoo.folder("bare")).forward_dynamics(Q, V, TAU)
+            np.testing.assert_array_equal(found, expected)
+            files = {p.relative_to(snapshot).as_posix() for p in snapshot.rglob("*") if p.is_file()}
+            assert files == {*model.checked.files, "manifest.json"}
+            assert not list((cache / "parts").iterdir())
+
+
+# Loads while the folder is generated again
+
+LOADS = f"""
+import sys, time, numpy as np, serpentail as st
+count, seen, end = 0, set(), time.monotonic() + {RACE_S}
+while time.monotonic() < end:
+    model = st.load(sys.argv[1])
+    mass = model.mass_matrix({Q})
+    assert abs(mass[0, 0] - model.parameters["torso_mass"] - model.parameters["tail_mass"]) < 1e-12
+    if count % 4 == 0:
+        np.testing.assert_allclose(model.casadi.mass_matrix({Q}), mass, rtol=1e-12, atol=1e-18)
+    count += 1
+    seen.add(model.links)
+print(count, len(seen))
+"""
+
+
+def test_loads_while_the_folder_changes_are_of_one_generation(folder):
+    """No mixture of two models, and no charge that somebody changed the files."""
+    both = [of_links(1), of_links(2)]
+    for made in both:
+        st.load(put(folder, made))
+    command = [sys.executable, "-c", LOADS, str(folder)]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    racers, generations = [subprocess.Popen(command, **pipes) for _ in range(RACERS)], 0
+    while any(racer.poll() is None for racer in racers):
+        put(folder, both[generations % 2])
+        generations += 1
+    answers = [racer.communicate() for racer in racers]
+    assert [error for _, error in answers] == [""] * RACERS
+    counts = [tuple(map(int, words.split())) for words, _ in answers]
+    assert sum(count for count, _ in counts) > 3 * RACERS and generations > 10
+    assert max(seen for _, seen in counts) == 2
