@@ -1,49 +1,38 @@
-"""A model with all that other tools differentiate, random states of it, and PyTorch."""
-
-import os
-from importlib import import_module
+"""A model with all that other tools differentiate, and random states of it."""
 
 import numpy as np
 import pytest
 
-import serpentail as st
+from ..support import zoo
 
-from ..support.models import model_folder
-
-NAMES = ["forward_dynamics", "forward_dynamics_derivatives", "inverse_dynamics", "mass_matrix"]
 RUNS = 21
+FUNCTIONS = ("forward_dynamics", "inverse_dynamics")
+REFUSED = [  # by both tools: arguments, and what is told of them
+    ({"q": np.zeros(10)}, r"forward_dynamics: q has shape \(10,\), not \(\.\.\., 11\)"),
+    ({"v": np.zeros((5, 10))}, r"leading axes differ \(\(21, 11\), \(5, 10\), \(21, 4\)\)"),
+    ({"tau": np.zeros(4, complex)}, r"forward_dynamics: tau: type .*complex128"),
+    ({"tau": np.zeros(4, bool)}, r"forward_dynamics: tau: type .*bool"),
+]
 
 
 @pytest.fixture(scope="session")
 def model():
-    names = [*NAMES, "inverse_dynamics_derivatives"]
-    return st.load(model_folder(2, 2, functions=names))
+    return zoo.model("m2_n2")
 
 
 @pytest.fixture(scope="session")
-def states(model):
+def states():
     """q whose quaternions are of any norm, v and tau, RUNS of each."""
     rng = np.random.default_rng(4)
-    q, v = 0.4 * rng.normal(size=(RUNS, model.nq)), rng.normal(size=(RUNS, model.nv))
+    q, v = 0.4 * rng.normal(size=(RUNS, 11)), rng.normal(size=(RUNS, 10))
     q[:, 3] += 1.5
-    return q, v, 1e-3 * rng.normal(size=(RUNS, 2 * model.segments))
+    return q, v, 1e-3 * rng.normal(size=(RUNS, 4))
 
 
-@pytest.fixture(scope="session")
-def jax():
-    found = import_module("jax")
-    found.config.update("jax_enable_x64", True)
-    return found
-
-
-@pytest.fixture(scope="session")
-def torch():
-    """PyTorch, which is not in the extra "dev": with libraries for graphics cards it is 5 GB."""
-    try:
-        return import_module("torch")
-    except ImportError:
-        why = 'needs PyTorch, 5 GB that "dev" does not bring: pip install "serpentail[torch]"'
-        (pytest.fail if os.environ.get("CI") else pytest.skip)(why)
+def arguments(states, name):
+    """Arguments of a function: its last is tau or v_dot."""
+    q, v, tau = states
+    return (q, v, tau if name == "forward_dynamics" else 3 * np.roll(v, 1, axis=0))
 
 
 def by_differences(function, x, h=1e-3):
@@ -53,6 +42,14 @@ def by_differences(function, x, h=1e-3):
         values = [np.asarray(function(x + k * unit)) for k in (-2, -1, 1, 2)]
         columns.append((values[0] - 8 * values[1] + 8 * values[2] - values[3]) / (12 * h))
     return np.stack(columns, axis=-1)
+
+
+def jacobians(function, given):
+    """Jacobians of a function by each of its arguments, by differences."""
+    return [
+        by_differences(lambda x, k=k: function(*given[:k], x, *given[k + 1 :]), given[k])
+        for k in range(len(given))
+    ]
 
 
 def assert_near(found, expected, digits):
