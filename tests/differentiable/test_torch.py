@@ -47,6 +47,7 @@ def test_gradients_are_those_by_differences(model, functions, states):
                 assert_near(each.grad, weights @ jacobian, 1e-9)
 
 
+@pytest.mark.slow  # 5 s: they import much of PyTorch
 @pytest.mark.filterwarnings("ignore:The .grad attribute:UserWarning")  # what opcheck reads
 def test_checks_of_pytorch_pass(functions, states):
     for name in FUNCTIONS:
