@@ -3,11 +3,9 @@ from a private copy in the cache.
 """
 
 import copy
-import importlib.util
 import json
 import os
 import pickle
-import py_compile
 import shutil
 import subprocess
 import sys
@@ -16,6 +14,8 @@ import numpy as np
 import pytest
 
 import serpentail as st
+from serpentail.model import manifest
+from serpentail.model.reading import Held
 from serpentail.simulation import parallel_runs
 from serpentail_codegen.targets.write import write_folder
 from tests.support import zoo
@@ -24,7 +24,6 @@ from tests.support.models import model_folder
 from ..support.rows import row
 
 Q, V, TAU = [0, 0, 0, 1, 0, 0, 0, 0.3, -0.2], [0.5] * 8, [0.1, 0.2]
-RACE_S, RACERS = 1.5, 3  # s that loads and generations of one folder go on
 
 
 FUNCTIONS = ["mass_matrix", "forward_dynamics", "energy", "momentum", "rollout"]
@@ -33,8 +32,8 @@ FUNCTIONS = ["mass_matrix", "forward_dynamics", "energy", "momentum", "rollout"]
 def of_links(links):
     """What the generator writes of a model called tail, as the zoo has none: texts, manifest."""
     folder = model_folder(1, links, name="tail", functions=FUNCTIONS)
-    manifest = json.loads((folder / "manifest.json").read_text())
-    return {name: (folder / name).read_text() for name in manifest["files"]}, manifest
+    content = json.loads((folder / "manifest.json").read_text())
+    return {name: (folder / name).read_text() for name in content["files"]}, content
 
 
 def put(folder, made):
@@ -60,40 +59,6 @@ def cache(tmp_path, monkeypatch):
 def folder(tmp_path):
     """Where models called tail come and go."""
     return tmp_path / "tail"
-
-
-# Python's bytecode
-
-
-@pytest.fixture
-def bytecode(monkeypatch):
-    """Let Python keep what it compiles, as it does for a user."""
-    monkeypatch.setattr(sys, "dont_write_bytecode", False)
-    monkeypatch.setattr(sys, "pycache_prefix", None)
-
-
-def test_casadi_functions_are_of_their_text_when_times_are_kept(folder, bytecode):
-    """As after `rsync -t`, `tar`, or two generations within a second."""
-    module, seen = folder / "tail_casadi.py", []
-    for files, manifest in (of_links(1), of_links(2)):
-        put(folder, (files | {module.name: files[module.name].ljust(60_000, "#")}, manifest))
-        seen.append(module.stat())
-        os.utime(module, ns=(seen[0].st_atime_ns, seen[0].st_mtime_ns))
-        agree(st.load(folder))
-    assert seen[0].st_size == seen[1].st_size
-
-
-def test_planted_bytecode_is_not_run(folder, tmp_path, bytecode):
-    put(folder, of_links(1))
-    module = folder / "tail_casadi.py"
-    status = module.stat()
-    planted = tmp_path / "planted.py"
-    planted.write_text("raise KeyError('planted')\n".ljust(status.st_size, "#"))
-    os.utime(planted, ns=(status.st_atime_ns, status.st_mtime_ns))
-    compiled = importlib.util.cache_from_source(str(module))
-    py_compile.compile(str(planted), cfile=compiled)
-    agree(st.load(folder))
-    assert [str(path) for path in folder.rglob("*.pyc")] == [compiled]
 
 
 # What is compiled or built later
@@ -223,34 +188,24 @@ def test_damaged_snapshot_is_replaced(cache):
 
 # Loads while the folder is generated again
 
-LOADS = f"""
-import sys, time, numpy as np, serpentail as st
-count, seen, end = 0, set(), time.monotonic() + {RACE_S}
-while time.monotonic() < end:
-    model = st.load(sys.argv[1])
-    mass = model.mass_matrix({Q})
-    assert abs(mass[0, 0] - model.parameters["torso_mass"] - model.parameters["tail_mass"]) < 1e-12
-    if count % 4 == 0:
-        np.testing.assert_allclose(model.casadi.mass_matrix({Q}), mass, rtol=1e-12, atol=1e-18)
-    count += 1
-    seen.add(model.links)
-print(count, len(seen))
-"""
 
-
-def test_loads_while_the_folder_changes_are_of_one_generation(folder):
+def test_a_folder_that_is_exchanged_while_it_is_read(folder, monkeypatch):
     """No mixture of two models, and no charge that somebody changed the files."""
-    both = [of_links(1), of_links(2)]
-    for made in both:
-        st.load(put(folder, made))
-    command = [sys.executable, "-c", LOADS, str(folder)]
-    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    racers, generations = [subprocess.Popen(command, **pipes) for _ in range(RACERS)], 0
-    while any(racer.poll() is None for racer in racers):
-        put(folder, both[generations % 2])
-        generations += 1
-    answers = [racer.communicate() for racer in racers]
-    assert [error for _, error in answers] == [""] * RACERS
-    counts = [tuple(map(int, words.split())) for words, _ in answers]
-    assert sum(count for count, _ in counts) > 3 * RACERS and generations > 10
-    assert max(seen for _, seen in counts) == 2
+    read, exchanges = Held.read, []
+
+    def exchanging(self, name):
+        if name != "manifest.json" and len(exchanges) < most:
+            exchanges.append(name)
+            put(folder, of_links(1 + len(exchanges) % 2))
+        return read(self, name)
+
+    monkeypatch.setattr(Held, "read", exchanging)
+    for most in (1, 4):
+        exchanges.clear()
+        model = st.load(put(folder, of_links(1)), compiled=False)
+        assert model.links == 1 + most % 2 and len(exchanges) == most
+        assert model.checked.files["src/tail.c"] == (folder / "src" / "tail.c").read_bytes()
+    most = 1000
+    monkeypatch.setattr(manifest, "MOST_READS", 3)
+    with pytest.raises(st.ModelError, match="keeps changing"):
+        st.load(folder, compiled=False)
