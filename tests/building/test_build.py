@@ -79,15 +79,6 @@ def test_parameters_that_shape_the_code_make_another_model(generations):
     assert len(generations) == 5
 
 
-def test_springs_are_built_into_the_dynamics():
-    options = {"functions": ["forward_dynamics"], "tail_stiffness": 0.02}
-    elastic, plain = st.build(**TINY | options), zoo.model("bare")
-    q = [0, 0, 0, 1, 0, 0, 0, 0.1, 0.1]
-    found = elastic.forward_dynamics(q, np.zeros(8), np.zeros(2))
-    wanted = plain.forward_dynamics(q, np.zeros(8), [-0.002] * 2)
-    np.testing.assert_allclose(found, wanted, rtol=1e-12)
-
-
 def test_a_scene_file_is_built_by_its_content(generations, tmp_path):
     scene = tmp_path / "own.toml"
     text = 'kind = "articulated"\nsegments = 1\nlinks = 1\nfunctions = ["energy"]\n'
@@ -199,14 +190,3 @@ def test_processes_build_each_model_once(cache):
     assert len(list((cache / "builds").iterdir())) == len(list((cache / "models").iterdir())) == 2
     locks = [path.name for path in (cache / "locks").iterdir()]
     assert len(locks) == 2 and not list((cache / "parts").iterdir())
-
-
-def test_a_build_that_is_killed_leaves_nothing_in_the_way(cache, generations):
-    program = f"import serpentail as st; print('begun', flush=True); st.build(**{TINY})"
-    for seconds in (0.1, 0.5):
-        with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE) as process:
-            process.stdout.readline()
-            with pytest.raises(subprocess.TimeoutExpired):
-                process.wait(seconds)
-            process.kill()
-    assert made(**TINY).generated == ("energy",)

@@ -3,17 +3,13 @@
 import ctypes
 import json
 import os
-import pickle
-import shutil
 import time
 
-import numpy as np
 import pytest
 
 import serpentail as st
 from serpentail import cli
 from serpentail.model import bound, compiler
-from tests.support import zoo
 from tests.support.file_faults import HOUR, age
 
 from ...support.rows import row
@@ -57,21 +53,6 @@ def test_what_is_in_use_stays(model, monkeypatch):
     for library in libraries:
         used(library.parent, 1)
     assert built(model, 4).exists() and not any(library.exists() for library in libraries)
-
-
-def test_a_loaded_model_outlives_its_entries(cache):
-    """On POSIX a library that is mapped stays; what comes late is made again."""
-    model = st.load(zoo.folder("bare"))
-    expected = model.forward_dynamics(*STATE)
-    shutil.rmtree(cache)
-    np.testing.assert_array_equal(model.forward_dynamics(*STATE), expected)
-    batch = np.tile(STATE[0], (1000, 1)), *STATE[1:]
-    np.testing.assert_allclose(model.forward_dynamics(*batch)[7], expected, rtol=1e-9, atol=1e-12)
-    external = model.casadi.external("forward_dynamics", folded=True)
-    np.testing.assert_allclose(external(*STATE).full()[:, 0], expected, rtol=1e-12)
-    shutil.rmtree(cache)
-    twin = pickle.loads(pickle.dumps(model))
-    np.testing.assert_array_equal(twin.forward_dynamics(*STATE), expected)
 
 
 def test_parts_of_killed_builds_go(model, cache):
@@ -120,10 +101,3 @@ def test_command_tells_and_empties(model, cache, capsys):
     assert left == {*folders, "mine.txt", "libraries/mine"}
     loaded.twice.restype, loaded.twice.argtypes = ctypes.c_double, [ctypes.c_double]
     assert loaded.twice(21.0) == 42.0
-
-
-def test_command_where_there_is_no_cache(cache, capsys):
-    for arguments in (["cache"], ["cache", "--clean"]):
-        assert cli.main(arguments) == 0
-        assert capsys.readouterr().out.splitlines()[0].split() == ["folder", str(cache)]
-    assert not cache.exists()

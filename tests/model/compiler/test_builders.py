@@ -7,7 +7,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import threading
 import time
 from pathlib import Path
 
@@ -55,31 +54,6 @@ def test_processes_with_a_cold_cache_compile_once(cache, script):
     sources = {line.split(" -c ")[1].split()[0] for line in compiled}
     assert len(compiled) == len(sources) and sum(" -shared " in line for line in lines) == 1
     assert sum("--version" in line for line in lines) == 1
-
-
-def test_processes_without_locks_end_with_one_library(model, cache, script, tmp_path):
-    """All meet before they link."""
-    cache.mkdir()
-    (cache / "locks").touch()  # where the folder of the locks should be
-    here = f"$(ls {tmp_path} | grep -c here)"
-    wait = f"for n in $(seq 600); do [ {here} -ge 3 ] && break; sleep 0.1; done"
-    script(f'case "$*" in *-shared*) touch {tmp_path}/$$.here; {wait};; esac')
-    (source,), include = model
-    crowd = [started(COMPILE, source, include) for _ in range(3)]
-    answers = [process.communicate() for process in crowd]
-    assert len(list(tmp_path.glob("*.here"))) == 3
-    (library,) = libraries(cache)
-    assert answers == [(f"{library}\n", "")] * 3 and call_twice(library) == 42.0
-
-
-def test_threads_compile_once(model, script):
-    calls = script()
-    threads = [threading.Thread(target=compiler.compile_library, args=model) for _ in range(8)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert calls.read_text().count(" -c ") == 1
 
 
 def test_killed_holder_frees_the_lock_and_leaves_no_library(model, cache, script):

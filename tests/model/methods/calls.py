@@ -86,3 +86,64 @@ def assert_close(found, expected, rtol, atol):
     """Compare outputs; atol is a part of the largest number of each."""
     for one, other in zip(found, expected, strict=True):
         np.testing.assert_allclose(one, other, rtol=rtol, atol=atol * np.abs(other).max())
+
+
+# Forms of arrays
+
+
+def apart(array):
+    """The numbers of an array with gaps between them."""
+    wide = np.full((*array.shape, 3), np.nan, array.dtype)
+    wide[..., 1] = array
+    return wide[..., 1]
+
+
+def misaligned(array):
+    """The numbers of an array where no number begins at a multiple of its size."""
+    memory = np.zeros(array.nbytes + 1, np.uint8)
+    memory[1:] = array.reshape(-1).view(np.uint8)
+    return memory[1:].view(array.dtype).reshape(array.shape)
+
+
+def locked(array):
+    array = array.copy()
+    array.setflags(write=False)
+    return array
+
+
+class Subclass(np.ndarray):
+    """Such as matrices are."""
+
+
+SOUND = {  # ways to give the same numbers
+    "plain": np.array,
+    "strided": apart,
+    "backward": lambda a: a[..., ::-1].copy()[..., ::-1],
+    "misaligned": misaligned,
+    "read only": locked,
+    "swapped": lambda a: a.astype(a.dtype.newbyteorder()),
+    "long": np.longdouble,
+    "list": lambda a: a.tolist(),
+    "masked": np.ma.masked_array,
+    "subclass": lambda a: a.view(Subclass),
+    "tuple": lambda a: tuple(map(tuple, a.tolist())) if a.ndim == 2 else tuple(a.tolist()),
+    "Fortran order": np.asfortranarray,
+}
+FORMS = SOUND | {
+    "single": np.float32,
+    "whole": lambda a: np.rint(a).astype(np.int64) + 1,
+    "column": lambda a: a[:, None],
+    "short": lambda a: a[..., :-1],
+    "long by one": lambda a: np.append(a, 0.0),
+    "nothing": lambda a: a[..., :0],
+    "scalar": lambda _: np.float64(1.0),
+    "nan": lambda a: np.where(np.arange(a.shape[-1]) == 1, np.nan, a),
+    "infinite": lambda a: np.where(np.arange(a.shape[-1]) == 1, -np.inf, a),
+    "zero": np.zeros_like,
+    "huge": lambda a: 1e200 * a.astype(float),
+    "complex": lambda a: a + 0j,
+    "times": lambda a: a.astype("datetime64[s]"),
+    "text": lambda a: a.astype(str),
+    "objects": lambda a: a.astype(object),
+    "none": lambda _: None,
+}

@@ -3,9 +3,7 @@
 import copy
 import gc
 import math
-import os
 import pickle
-import subprocess
 import sys
 import threading
 import weakref
@@ -159,26 +157,6 @@ def test_copies_are_models(model):
             for name in CALLS:
                 with row(original, k, name):
                     assert_same(call(twin, name, given), call(original, name, given))
-
-
-def test_pickled_model_goes_to_another_process(monkeypatch, tmp_path):
-    monkeypatch.chdir(zoo.folder("bare").parent)
-    model, given = (
-        st.load("bare", {"tail_mass": 0.05}, profile="reproducible"),
-        state(sizes=sizes(1, 1)),
-    )
-    arguments = [given[name] for name in ("q", "v", "tau")]
-    (tmp_path / "model").write_bytes(pickle.dumps((model, arguments)))
-    program = (
-        "import pathlib, pickle; model, q = pickle.loads(pathlib.Path('model').read_bytes()); "
-        "print(model.profile, model.forward_dynamics(*q).tobytes().hex())"
-    )
-    command = [sys.executable, "-c", program]
-    done = subprocess.run(
-        command, cwd=tmp_path, env=os.environ, check=True, capture_output=True, text=True
-    )
-    expected = model.forward_dynamics(*arguments).tobytes().hex()
-    assert done.stdout.split() == ["reproducible", expected]
 
 
 def test_one_state_costs_few_calls(model):

@@ -69,6 +69,12 @@ def test_wrong_shape_is_named_with_the_right_one(model):
             refuse(model, name, state() | {argument: np.zeros(shape)}, re.escape(words))
 
 
+def test_a_wrong_number_of_arguments(model):
+    for arguments in ([], [np.zeros(3)] * 2, [np.zeros(3)] * 12):
+        with pytest.raises(TypeError, match="forward_dynamics takes q, v, tau"):
+            model.kernel("forward_dynamics")(*arguments)
+
+
 def test_not_finite_entry_is_named_with_its_place(model):
     for name, argument, bad in of_arguments([np.nan, np.inf, -np.inf]):
         one, batch = state(), states(9)
