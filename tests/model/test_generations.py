@@ -159,26 +159,22 @@ def test_snapshots_are_for_the_user_alone_and_see_no_planted_header(cache, tmp_p
     assert snapshot.stat().st_mode & 0o777 == 0o700
 
 
-DAMAGES = {
-    "header": lambda place: (place / "include" / "math.h").write_text("#error planted\n"),
-    "text": lambda place: (place / "src" / "bare.c").write_text("int other;\n"),
-    "lost": lambda place: (place / "src" / "bare.c").unlink(),
-    "file": lambda place: (shutil.rmtree(place), place.write_text("")),
-    "pipe": lambda place: (shutil.rmtree(place), os.mkfifo(place)),
-    "pipe for text": lambda place: (
-        (place / "src" / "bare.c").unlink(),
-        os.mkfifo(place / "src" / "bare.c"),
-    ),
-}
+DAMAGES = [  # of the whole, of a file, and beside it
+    *(("", lambda path: path.write_text("")), ("", os.mkfifo)),
+    *(("src/bare.c", lambda path: path.write_text("int other;\n")), ("src/bare.c", os.mkfifo)),
+    *(("src/bare.c", lambda _: None), ("include/math.h", lambda path: path.write_text("#error"))),
+]
 
 
 def test_damaged_snapshot_is_replaced(cache):
     model, expected = st.load(zoo.folder("bare")), zoo.model("bare").forward_dynamics(Q, V, TAU)
-    for name, damage in DAMAGES.items():
-        with row(name):
-            (snapshot,) = (cache / "models").iterdir()
+    (snapshot,) = (cache / "models").iterdir()
+    for k, (name, put_in_place) in enumerate(DAMAGES):
+        with row(k, name):
             shutil.rmtree(cache / "libraries")
-            damage(snapshot)
+            path = snapshot / name
+            shutil.rmtree(path) if path.is_dir() else path.unlink(missing_ok=True)
+            put_in_place(path)
             found = st.load(zoo.folder("bare")).forward_dynamics(Q, V, TAU)
             np.testing.assert_array_equal(found, expected)
             files = {p.relative_to(snapshot).as_posix() for p in snapshot.rglob("*") if p.is_file()}
