@@ -100,15 +100,19 @@ UNPICKLE = (
 )
 
 
-def test_pickle_is_of_the_model_that_was_pickled(folder, cache, tmp_path):
-    model = st.load(put(folder, of_links(1)), {"tail_mass": 0.005})
+def test_pickle_is_of_the_model_that_was_pickled(folder, cache, tmp_path, monkeypatch):
+    """Elsewhere, too, although it was loaded by a relative path."""
+    monkeypatch.chdir(tmp_path)
+    put(folder, of_links(1))
+    model = st.load("tail", {"tail_mass": 0.005}, profile="reproducible", threads=3)
     (tmp_path / "pickled").write_bytes(pickle.dumps(model))
     put(folder, of_links(2))
     twin = pickle.loads((tmp_path / "pickled").read_bytes())
     np.testing.assert_array_equal(twin.mass_matrix(Q), model.mass_matrix(Q))
-    assert twin.folder == model.folder and twin.parameters == model.parameters
+    assert (twin.folder, twin.profile, twin.batch_library.threads) == (folder, "reproducible", 3)
+    assert twin.parameters == model.parameters
     command = [sys.executable, "-c", UNPICKLE, str(tmp_path / "pickled")]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    done = subprocess.run(command, capture_output=True, text=True, check=True, cwd="/")
     assert done.stdout.strip() == model.mass_matrix(Q).tobytes().hex()
 
 

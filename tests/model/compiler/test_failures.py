@@ -1,6 +1,5 @@
 """Whatever goes wrong with a compiler or its sources is named, and leaves no library."""
 
-import ctypes
 import os
 import pickle
 import shutil
@@ -101,22 +100,6 @@ def test_long_report_loses_its_middle(model):
         compiler.compile_library([source], include)
     assert "mistake_9_" in str(caught.value) and "characters left out" in str(caught.value)
     assert len(str(caught.value)) < 2 * compiler.LONGEST_REPORT < len(caught.value.stderr)
-
-
-def test_sources_are_compiled_at_the_same_time(model, script, tmp_path):
-    """Each compiler waits until the other one has begun, and the library has what both made."""
-    (source,), include = model
-    other = source.with_name("thrice.c")
-    other.write_text("double twice(double);\ndouble thrice(double x) { return twice(x) + x; }\n")
-    begun = tmp_path / "begun"
-    begun.mkdir()
-    both = f'[ "$(ls {begun} | wc -l)" = 2 ]'
-    wait = f"for i in $(seq 600); do {both} && break; sleep 0.1; done; {both} || exit 9"
-    script(f'case "$*" in *" -c "*) touch {begun}/$$; {wait};; esac')
-    library = compiler.compile_library([source, other], include)
-    assert call_twice(library) == 42.0
-    assert ctypes.CDLL(str(library)).thrice is not None
-    assert len(list(begun.iterdir())) == 2
 
 
 def test_sources_that_change_meanwhile_are_not_kept(model, script, cache):

@@ -160,6 +160,7 @@ def test_where_it_cannot_be_had_or_calls_are_long_ctypes_serves(model, monkeypat
             for function in CALLS:
                 with row(name, function):
                     found = call(other, function, state())
+                    call(other, function, state(2))
                     assert_same(found, call(model, function, state()))
                     assert other.kernels[function].fast in (calls.declined, None)
 

@@ -17,7 +17,6 @@ from tests.support import zoo
 from ...support.rows import row
 from .calls import (
     CALLS,
-    NQ,
     NV,
     POINTS,
     SIZES,
@@ -57,16 +56,6 @@ def test_profiles_agree_to_rounding(users_compiler, name):
             assert_close(call(exact, function, given), call(fast, function, given), 1e-9, 1e-12)
     with pytest.raises(st.SerpentailError, match="profile: value 'quick'"):
         st.load(folder, profile="quick")
-
-
-def test_models_do_not_disturb_each_other(model):
-    heavy = model.with_parameters(tail_mass=1.0)
-    q = states(20)["q"]
-    calls = [(model, NQ), (zoo.model("m1_n1"), 9), (heavy, NQ)]
-    alone = [[one.mass_matrix(row[:size]) for row in q] for one, size in calls]
-    mixed = [[one.mass_matrix(row[:size]) for one, size in calls] for row in q]
-    for expected, found in zip(alone, zip(*mixed, strict=True), strict=True):
-        assert_same(found, expected)
 
 
 # Names
