@@ -124,7 +124,7 @@ def test_a_run_that_fails_leaves_its_neighbours(model):
             values["v"][2, 3:6] = 3 / H  # rad/s: farther than the search for contacts allows
         else:
             values["v"][2, 6:] = 1e200
-        with pytest.raises(st.SimulationError, match=r"step of run 2: .*too long"):
+        with pytest.raises(st.SimulationError, match=r"step of run 2: [^(]*too long[^(]*$"):
             stepped(model, values)
         values["v"][1] = values["v"][2]
         with pytest.raises(st.SimulationError, match=rf"run 1: .*\(2 of {count} runs failed\)"):
