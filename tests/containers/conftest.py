@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from tests.motion.trajectory.analytic import motion
+from tests.motion.analytic import motion
 from tests.support.models import model_folder
 
 WANTED = ["energy", "momentum", "rollout", "implicit"]

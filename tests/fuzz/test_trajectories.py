@@ -7,7 +7,7 @@ from hypothesis import assume
 from hypothesis import strategies as some
 
 import serpentail as st
-from tests.motion.trajectory.analytic import fields, motion
+from tests.motion.analytic import fields, motion
 
 from .searching import answer
 from .strange import FORMS, strange
