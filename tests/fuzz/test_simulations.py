@@ -35,7 +35,8 @@ def start(model):
 
 def test_a_run_from_a_strange_state_is_made_or_refused(model, search):
     def law(name, value, method):
-        answer(st.simulate, model, **start(model) | {name: value, "method": method})
+        most = {"most_steps": 10_000} if method in ("tsit5", "ros34pw2") else {}
+        answer(st.simulate, model, **start(model) | {name: value, "method": method} | most)
 
     value = strange((model.nq,)) | strange((model.nv,))
     search(law, name=some.sampled_from(["q0", "v0"]), value=value, method=METHODS)

@@ -1,7 +1,7 @@
-"""Ways to have work done elsewhere: in children, in pools of them, in threads.
+"""Ways to have work done elsewhere: in children, in pools of them, in threads, in forks.
 
-``python -m tests.processes.ways WAY FOLDER`` does every job here, then there, and prints as JSON
-what came of each there: "same", what it gave instead, or "hung".
+``python -m tests.processes.ways FOLDER WAY ...`` does every job here, then there by each way, and
+prints as JSON what came of each: "same", what it gave instead, or "hung".
 """
 
 import json
@@ -15,18 +15,10 @@ import joblib
 
 import serpentail as st
 
-from .jobs import JOBS
+from .forks import LIMIT, MOMENTS
+from .jobs import JOBS, done
 
-LIMIT = 30.0  # s a job: some take one where processors are busy, a job that hangs for ever
 TWICE = 2  # of each job: both workers of a pool, or both threads, at the same time
-
-
-def done(model: st.Model, name: str) -> str:
-    """Return the digest of a job, or what it raised."""
-    try:
-        return JOBS[name](model)
-    except Exception as error:
-        return repr(error)
 
 
 def _told(pipe, model: st.Model) -> None:
@@ -74,6 +66,14 @@ def by_futures(make: Callable[[int], futures.Executor], model: st.Model) -> Iter
             yield [each.result(LIMIT) for each in asked]
 
 
+def by_forks(moment: Callable[[st.Model], str], model: st.Model) -> Iterator[list[str]]:
+    """Have a child do the jobs that is forked at a moment."""
+    said = moment(model)
+    found = json.loads(said) if said.startswith("{") else dict.fromkeys(JOBS, said)
+    for name in JOBS:
+        yield [found[name]]
+
+
 WAYS = {
     "fork": partial(by_children, "fork"),
     "spawn": partial(by_children, "spawn"),
@@ -82,17 +82,19 @@ WAYS = {
     "joblib threads": partial(by_joblib, "threading"),
     "process pool": partial(by_futures, futures.ProcessPoolExecutor),
     "thread pool": partial(by_futures, futures.ThreadPoolExecutor),
+    **{name: partial(by_forks, moment) for name, moment in MOMENTS.items()},
 }
 
 
-def main(way: str, folder: str) -> None:
-    """Print what came of each job."""
+def main(folder: str, *ways: str) -> None:
+    """Print what came of each job, by each way."""
     model = st.load(folder)
     expected = [done(model, name) for name in JOBS]
-    outcome = {}
-    for name, here, found in zip(JOBS, expected, WAYS[way](model), strict=True):
-        outcome[name] = ["same" if each == here else f"{each}, not {here}" for each in found]
-        print(json.dumps({name: outcome[name]}), flush=True)
+    for way in ways:
+        outcome = {}
+        for name, here, found in zip(JOBS, expected, WAYS[way](model), strict=True):
+            outcome[name] = ["same" if each == here else f"{each}, not {here}" for each in found]
+        print(json.dumps({way: outcome}), flush=True)
 
 
 if __name__ == "__main__":
