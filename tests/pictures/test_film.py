@@ -190,8 +190,10 @@ def test_a_stop_by_the_user_ends_the_encoder(tmp_path, monkeypatch):
         yield np.zeros((64, 64, 3), np.uint8)
         raise KeyboardInterrupt
 
-    path = tmp_path / "a.mp4"
-    monkeypatch.setattr(encode, "encoder", lambda: "cat")  # it reads until it is ended
+    script, path = tmp_path / "ffmpeg", tmp_path / "a.mp4"
+    script.touch(0o700)
+    script.write_text("#!/bin/sh\nexec cat > /dev/null\n")  # until it is ended
+    monkeypatch.setattr(encode, "encoder", lambda: str(script))
     monkeypatch.setattr(subprocess, "Popen", kept)
     with pytest.raises(KeyboardInterrupt):
         encode.write_mp4(path, stopped())

@@ -16,7 +16,7 @@ from .jobs import JOBS
 from .ways import WAYS
 
 LIMIT = 500.0  # s, then all processes of a test are killed
-QUICK = ("process pool", "thread pool", "at rest", "beside rollouts", "beside the compiler")
+QUICK = ("fork", "threads", "at rest", "beside rollouts", "beside the compiler")
 BESIDE = [name for name in MOMENTS if name.startswith("beside")]  # where chance decides
 
 

@@ -11,11 +11,9 @@ import pytest
 from PIL import Image
 
 import serpentail as st
-from benchmarks.pages import FRAMES
-from tests.support import zoo
 from tests.support.page import need
 
-from .conftest import flown, simulated
+from .conftest import simulated
 
 pytest.importorskip("selenium")
 from selenium.webdriver import ActionChains
@@ -23,7 +21,7 @@ from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.ui import WebDriverWait
 
 from tests.support import chromium
-from tests.support.chromium import opened, processor_seconds, requests
+from tests.support.chromium import opened, requests
 
 pytestmark = pytest.mark.slow  # Chromium is no part of a newcomer's installation
 PHONE = (375, 740)
@@ -174,16 +172,6 @@ def test_keys(browser, pages, kick):
     driver.execute_script("document.getElementById('play').focus()")
     press(driver, " ", on="#play")  # the focused button's own key, once
     assert text(driver, "play") == "Pause"
-
-
-def test_two_cores_play_12_bodies_at_15_frames_a_second(browser, tmp_path):
-    """By processor time, which other work on the machine hardly changes."""
-    path = flown(zoo.model("m3_n4"), samples=600).view(tmp_path / "long.html")
-    driver = opened(browser, path)
-    begun = processor_seconds(driver)
-    frames = 3.0 * driver.execute_async_script(FRAMES, 3.0)
-    assert text(driver, "play") == "Pause" and 0 < value(driver) < 0.2
-    assert frames > 3 and (processor_seconds(driver) - begun) / frames < 2 / 15
 
 
 def test_other_motions_open(browser, tmp_path, flight, single):
