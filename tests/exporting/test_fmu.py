@@ -17,7 +17,6 @@ from fmpy.validation import validate_fmu
 FLIGHTS = ("m2_n2", "arcs2")
 LEGS = np.array([3.7, -0.7, 3.7, -0.7, 0, -0.5, 0, -0.5])  # rad, rad/s: crouched, stretching
 SPAN, STEP = 0.05, 5e-4  # s, of a landing
-CHANGED = {"torso_mass": 0.11, "torso_inertia": (7e-5, 4e-5, 6e-5)}
 
 
 @pytest.fixture
@@ -82,11 +81,8 @@ def test_it_flies_as_the_model_does(name, fmu):
     q, v, tau = state(model)
     settings = {"t_span": 0.2, "output_step": 0.01}
     run = st.simulate(model, q, v, controller=lambda *_: tau, rtol=1e-11, **settings)
-    # the second limit is by CVode's own tolerance
-    for kind, most, more in (
-        ("CoSimulation", 1e-7, {}),
-        ("ModelExchange", 1e-5, {"solver": "CVode"}),
-    ):
+    exchange = ("ModelExchange", 1e-5, {"solver": "CVode"})  # the limit is its own tolerance's
+    for kind, most, more in (("CoSimulation", 1e-7, {}), exchange):
         rows = fmpy.simulate_fmu(
             str(path),
             fmi_type=kind,
@@ -154,7 +150,7 @@ def test_a_state_is_kept_stored_and_restored(fmu, opened):
 
 @pytest.mark.parametrize("name", FLIGHTS)
 def test_parameters_are_those_of_the_model_and_can_be_tuned(name, opened, tmp_path):
-    model = zoo.model(name).with_parameters(**CHANGED)
+    model = zoo.model(name).with_parameters(torso_mass=0.11, torso_inertia=(7e-5, 4e-5, 6e-5))
     path = st.export(model, "fmu", tmp_path / "rat.fmu")
     described = fmpy.read_model_description(str(path))
     start = {each.name: float(each.start) for each in described.modelVariables if each.start}

@@ -41,7 +41,7 @@ def test_arguments_that_are_wrong(model, here):
         ((model, "urdf", ""), r"path: value '': .*\.urdf"),
         ((model, "urdf", "x.urdf/"), r"path: value 'x\.urdf/': .*\.urdf"),
         ((model, "urdf", 3), "path: value 3: "),
-        ((model, "urdf", "a\0.urdf"), r"path: value .*\.urdf"),
+        ((model, "urdf", "a\0.urdf"), r"path: value .*: needs .*\.urdf"),
         ((model, "urdf", "/dev/null/x.urdf"), "path: value .*another file"),
     ):
         with row(given), pytest.raises(st.ExportError, match=words):

@@ -208,7 +208,6 @@ import sys
 from pathlib import Path
 from examples.front import GOES_ON, run
 from examples.studies.parts import made
-from tests.support import zoo
 from tests.support.tiny_study import plans_without_end
 
 def main(folder):
