@@ -1,6 +1,4 @@
-"""Laws of sampled motions: interpolation against analytic motions, files bit by bit, angles by
-inversion.
-"""
+"""An analytic motion: a torque-free top in parabolic flight, its tail swinging in sines."""
 
 import dataclasses
 
