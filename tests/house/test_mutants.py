@@ -14,6 +14,7 @@ from mutants import judge, processes, python_source, sample, template_source
 from mutants.mutation import Mutation
 from mutants.recorded import NO_JUDGES, own_lines
 from mutants.results import Verdict, argument, arguments, report, score
+from tests.support.rows import row
 
 ROOT = Path(__file__).parents[2]
 TOLD = '''"""Docs 1 < 2."""
@@ -31,7 +32,6 @@ def f(x: Literal[3]) -> Literal[4]:
 
 
 def python(text):
-    """The changes of a text of Python, after the head that every test shares."""
     return {m.change for m in python_source.mutations("a.py", text.encode())}
 
 
@@ -39,68 +39,77 @@ def template(text):
     return {m.change for m in template_source.mutations("a.c.jinja", text.encode())}
 
 
-@pytest.mark.parametrize(
-    ("text", "changes"),
-    [
-        ("a < b", {"a < b -> a <= b", "a < b -> a >= b"}),
-        ("x = a + b", {"a + b -> a - b"}),
-        ("x = 'a' + b", set()),
-        ("x = a and b", {"a and b -> a or b"}),
-        ("x = not a", {"not a -> a"}),
-        ("x = 3", {"3 -> 4"}),
-        ("x = 2.0", {"2.0 -> 3.0"}),
-        ("x = 0.0", {"0.0 -> 1.0"}),
-        ("x = True", {"True -> False"}),
-        ("x = f(a, b)", {"f(a, b) -> f(b, a)"}),
-        ("x = f(a, b=c)", {"f(a, b=c) -> f(a)"}),
-        ("x.y = z", {"x.y = z -> pass"}),
-        ("x += y", {"x += y -> pass", "x += y -> x -= y"}),
-        ("f()", {"f() -> pass"}),
-        ("if x:\n    y = z", {"x -> not x"}),
-        ("x = [a for a in b if c]", {"[a for a in b if c] -> [a for a in b]"}),
-        ("def f():\n    return x", {"return x -> return None"}),
-        (TOLD, {'raise StateError(f"{x + 1}: needs 3") -> pass'.replace('"', "'")}),
-    ],
-)
-def test_python_changes_where_it_runs(text, changes):
-    assert python(text) == changes | ({f"{text} -> pass"} if text == "a < b" else set())
+PYTHON = {
+    "a < b": {"a < b -> a <= b", "a < b -> a >= b", "a < b -> pass"},
+    "x = a + b": {"a + b -> a - b"},
+    "x = 'a' + b": set(),
+    "x = a and b": {"a and b -> a or b"},
+    "x = not a": {"not a -> a"},
+    "x = 3": {"3 -> 4"},
+    "x = 2.0": {"2.0 -> 3.0"},
+    "x = 0.0": {"0.0 -> 1.0"},
+    "x = True": {"True -> False"},
+    "x = f(a, b)": {"f(a, b) -> f(b, a)"},
+    "x = f(a, b=c)": {"f(a, b=c) -> f(a)"},
+    "x.y = z": {"x.y = z -> pass"},
+    "x += y": {"x += y -> pass", "x += y -> x -= y"},
+    "f()": {"f() -> pass"},
+    "if x:\n    y = z": {"x -> not x"},
+    "x = [a for a in b if c]": {"[a for a in b if c] -> [a for a in b]"},
+    "def f():\n    return x": {"return x -> return None"},
+    TOLD: {"raise StateError(f'{x + 1}: needs 3') -> pass"},
+}
+TEMPLATES = {
+    "  x = a + b;": {" + -> -", "x = a + b; -> ;"},
+    "  const real x = a * b;": {"* -> /"},
+    "  real *const x = a;": set(),
+    "  if (a < {{ 0 | number }}) {": {"< -> <=", "< -> >=", "0 -> 1"},
+    "/* a < 3 */ {# 4 #}": set(),
+    '#include "a.h"\n#define A 3': set(),
+    "{% if has.contacts %}": {"has.contacts -> not (has.contacts)"},
+    "  f(a, 1);": {"1 -> 2", "f(a, 1); -> ;"},
+    "  return a;": set(),
+    "  if (!a) {": {"! -> (nothing)", "!a -> !(!a)"},
+}
 
 
-@pytest.mark.parametrize(
-    ("text", "changes"),
-    [
-        ("  x = a + b;", {" + -> -", "x = a + b; -> ;"}),
-        ("  const real x = a * b;", {"* -> /"}),
-        ("  real *const x = a;", set()),
-        ("  if (a < {{ 0 | number }}) {", {"< -> <=", "< -> >=", "0 -> 1"}),
-        ("/* a < 3 */ {# 4 #}", set()),
-        ('#include "a.h"\n#define A 3', set()),
-        ("{% if has.contacts %}", {"has.contacts -> not (has.contacts)"}),
-        ("  f(a, 1);", {"1 -> 2", "f(a, 1); -> ;"}),
-        ("  return a;", set()),
-        ("  if (!a) {", {"! -> (nothing)", "!a -> !(!a)"}),
-    ],
-)
-def test_templates_change_where_they_emit_code(text, changes):
-    found = {change for change in template(text) if "->" in change}
-    conditions = {"a < {{ 0 | number }} -> !(a < {{ 0 | number }})"}
-    assert {change.strip() for change in found} - conditions == {c.strip() for c in changes}
+def test_what_runs_is_changed_and_not_what_only_tells():
+    for text, changes in PYTHON.items():
+        with row(text):
+            assert python(text) == changes
+    for text, changes in TEMPLATES.items():
+        with row(text):
+            found = {change.strip() for change in template(text) if "->" in change}
+            found -= {"a < {{ 0 | number }} -> !(a < {{ 0 | number }})"}
+            assert found == {change.strip() for change in changes}
 
 
-def test_every_mutant_of_the_sources_is_a_program_of_its_own():
-    for part in ("generator", "runtime"):
-        found = sample.of_part(ROOT, part)
-        assert len({mutation.key for mutation in found}) == len(found) > 5000
+def test_mutants_of_sources_are_programs_of_their_own():
+    """Of a few sources, spread over all."""
+    files = [p for part in ("generator", "runtime") for p in sources(part)[::15]]
+    for path in files:
+        found, source = [*sample.of_file(ROOT, path)], (ROOT / path).read_bytes()
+        assert len({mutation.key for mutation in found}) == len(found)
         for mutation in found[::40]:
-            source = (ROOT / mutation.path).read_bytes()
             assert ast.dump(ast.parse(mutation.of(source))) != ast.dump(ast.parse(source))
 
 
-def test_a_sample_is_of_all_parts_and_grows():
-    few, many = sample.drawn(ROOT, 30, 7), sample.drawn(ROOT, 60, 7)
-    assert many[:30] == few != sample.drawn(ROOT, 30, 8)
+def sources(part):
+    folder, suffix = sample.PARTS[part]
+    return sorted(p.relative_to(ROOT).as_posix() for p in (ROOT / folder).rglob(f"*{suffix}"))
+
+
+def test_a_sample_is_of_all_parts_and_grows(tmp_path):
+    for part in sample.PARTS:
+        for name in sources(part)[3:9:2]:
+            (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+            (tmp_path / name).write_bytes((ROOT / name).read_bytes())
+    few, many = sample.drawn(tmp_path, 30, 7), sample.drawn(tmp_path, 60, 7)
+    assert many[:30] == few != sample.drawn(tmp_path, 30, 8)
     parts = [sample.part_of(mutation.path) for mutation in few]
     assert [parts.count(part) for part in sample.PARTS] == [10, 10, 10]
+    (path,) = {mutation.path for mutation in sample.drawn(tmp_path, 30, 7, few[0].path)}
+    assert path == few[0].path
 
 
 @pytest.mark.parametrize(
