@@ -12,7 +12,6 @@ from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import numpy as np
 import pytest
 
 import serpentail as st
@@ -178,15 +177,12 @@ def test_a_path_that_cannot_be_is_told(name, tmp_path):
     assert (tmp_path / "file").read_bytes() == OLD
 
 
-def test_a_path_without_a_name_is_told():
+def test_a_path_is_checked_before_the_work(tmp_path):
     for path in ("", ".", "/"):
         with row(path), pytest.raises(st.NotWritten, match="folder"):
             flight(samples=20).save(path)
         with row(path), pytest.raises(FileNotFoundError, match="no trajectory file"):
             st.Trajectory.load(path)
-
-
-def test_a_path_is_checked_before_the_work(tmp_path):
     (tmp_path / "file").write_bytes(OLD)
     for path, error in [
         (tmp_path / "a\0b", st.NotWritten),
@@ -199,14 +195,3 @@ def test_a_path_is_checked_before_the_work(tmp_path):
     refuse_unwritable(tmp_path / "new" / "folder" / "run.npz")
     refuse_unusable(tmp_path / "new")
     unchanged(tmp_path, "file")
-
-
-def test_what_was_written_is_read_again_after_a_refusal(full, tmp_path, monkeypatch):
-    motion = flight(samples=20)
-    motion.save(tmp_path / "run")
-    with monkeypatch.context() as patch:
-        full(100, errno.ENOSPC)
-        with pytest.raises(st.NotWritten):
-            flight(samples=30).save(tmp_path / "run")
-        patch.undo()
-    np.testing.assert_array_equal(st.Trajectory.load(tmp_path / "run").q, motion.q)

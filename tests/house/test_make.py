@@ -1,7 +1,6 @@
 """The front door: make builds what is asked for, once, and says in one line what it cannot do."""
 
 import json
-import os
 import re
 import shlex
 import shutil
@@ -56,18 +55,6 @@ def test_options_of_make_are_those_of_the_generator(tree, make):
             command = done.stdout.split(" && ")[0].replace("$(", " ").replace(")", " ")
             assert done.returncode == 0 and wanted in " ".join(shlex.split(command))
     assert not (tree / "generated").exists()
-
-
-def test_programs_of_make_use_the_folder_that_the_generator_names(tree, make):
-    for order, name in [
-        (("verify", "TAIL=continuum", "FUNCTIONS=all"), "continuum_m1_all"),
-        (("embedded", "SCENE=scenes/contact_m1_n3.toml"), "contact_m1_n3_float"),
-    ]:
-        *_, program = make("-n", *order).stdout.splitlines()
-        asked = re.search(r'"\$\((.*)\)"', program)[1]
-        own = os.environ | {"PYTHONPATH": str(tree / "codegen")}
-        told = subprocess.check_output(asked, shell=True, cwd=tree, env=own, text=True)
-        assert told == f"generated/{name}\n"
 
 
 def test_a_wrong_option_is_one_readable_line_and_nothing_is_made(tree, make):

@@ -15,7 +15,7 @@ from stress import call_fuzz, drops, poses, scene_fuzz, stress_plots
 from stress.call_fuzz import Fault, Target
 from stress.figures import Figure, table
 from stress.poses import Point
-from stress.subjects import Errors, Subject, changed, errors, exact_of, judged, roundings, state
+from stress.subjects import Errors, Subject, changed, errors, exact_of, judged, state
 from tests.references.metrics import mass_matrix_error
 from tests.support import zoo
 from tests.support.rows import row
@@ -169,14 +169,6 @@ def test_coiled_tails_keep_the_limits_of_their_compiler():
         assert all(figure.passed for figure in figures), figures
 
 
-def test_compilers_that_fuse_are_told_from_others(monkeypatch):
-    monkeypatch.setenv("CC", str(Path(zoo.__file__).with_name("cc_quick")))
-    assert roundings.__wrapped__() == 2
-    monkeypatch.setenv("CC", "cc")
-    if " fma " in Path("/proc/cpuinfo").read_text():
-        assert roundings.__wrapped__() == 1
-
-
 def test_vjp_of_a_model_with_contacts_is_that_of_flight():
     flight, standing, rng = zoo.model("m1_n3"), zoo.model("feet_tail"), np.random.default_rng(5)
     arguments = [rng.normal(size=n) for n in (flight.nq, flight.nv, 2, flight.nv)]
@@ -227,9 +219,6 @@ def test_arguments_that_the_fuzz_once_broke_are_refused():
     ]:
         with row(convert.__name__, values), pytest.raises(st.StateError):
             convert(*values)
-
-
-def test_rotations_take_quaternions_of_any_norm():
-    q = np.array([0.5, 0.5, -0.5, 0.5])
-    for size in (1e-300, 1e-160, 1.0, 1e160, 1e300):
+    for size in (1e-300, 1e-160, 1e160, 1e300):  # quaternions of any norm are rotations
+        q = np.array([0.5, 0.5, -0.5, 0.5])
         np.testing.assert_allclose(st.rotation_matrix(q * size), st.rotation_matrix(q), atol=1e-15)
