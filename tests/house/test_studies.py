@@ -9,7 +9,7 @@ import serpentail as st
 from examples import learning
 from examples.studies import morphology_study as study
 from examples.studies.righting_figures import draw_rates
-from examples.studies.righting_kinds import KINDS, WAYS, is_true, rows_of, table, titles
+from examples.studies.righting_kinds import WAYS, is_true, table
 from tests.support import zoo
 
 
@@ -82,19 +82,6 @@ def test_plans_that_are_true_are_drawn_and_counted_for_each_kind_and_way(tmp_pat
     several, none = table(RATES)[2:]
     assert several.startswith("| several | 4 | 3 | 0.25, 0.39 | 0.001 | 3 | 0.1, 0.1 | 0.001 | ")
     assert several.endswith("| 0 | 1, 1 | 2 |") and none.startswith("| none | 1 | 0 | 5, 5 | nan |")
-
-
-def test_each_kind_has_its_starts_in_every_way():
-    found = titles(200)
-    assert set(found) == {(name, way) for name in KINDS for way in WAYS}
-    rows = {
-        title: [{"start": k} for k in make.args[2]]
-        for makes in found.values()
-        for title, make in makes.items()
-    }
-    for name, ways in rows_of(200, rows).items():
-        for way in ways.values():
-            assert [each["start"] for each in way] == list(range(1, 200 // KINDS[name].fewer + 1))
 
 
 @pytest.mark.slow
