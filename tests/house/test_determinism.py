@@ -139,10 +139,15 @@ def test_hashes_tell_what_changed(made, tmp_path):
 
 def test_files_of_an_earlier_generation_go_and_others_stay(tmp_path):
     folder = tmp_path / "folder"
-    write_folder(folder, {"a.txt": "a", "deep/b.txt": "b"}, {})
+    write_folder(folder, {"a.txt": "a\n", "deep/b.txt": "b"}, {})
     (folder / "mine.txt").write_text("mine")
-    assert set(write_folder(folder, {"a.txt": "a", "c.txt": "c"}, {})) == {"c.txt", "manifest.json"}
+    now = {"a.txt": "a\n", "c.txt": "c"}
+    assert set(write_folder(folder, now, {})) == {"c.txt", "manifest.json"}
     assert set(texts(folder)) == {"a.txt", "c.txt", "manifest.json", "mine.txt"}
+    (folder / "a.txt").write_bytes(b"a\r\n")  # compared byte by byte
+    assert write_folder(folder, now, {}) == ["a.txt"] and not write_folder(folder, now, {})
+    assert write_folder(folder, now | {"c.txt": "\u00e4"}, {}) == ["c.txt", "manifest.json"]
+    assert (folder / "c.txt").read_bytes() == "\u00e4".encode()
 
 
 def test_damaged_manifest_does_no_harm(tmp_path):
@@ -157,14 +162,3 @@ def test_damaged_manifest_does_no_harm(tmp_path):
             write_folder(folder, {"a.txt": "a"}, {})
             assert set(texts(folder)) == {"a.txt", "manifest.json"}
             assert outside.read_text() == "outside"
-
-
-def test_text_is_compared_byte_by_byte(tmp_path):
-    write_folder(tmp_path / "folder", {"text": "a\n"}, {})
-    path = tmp_path / "folder" / "text"
-    path.write_bytes(b"a\r\n")
-    assert write_folder(path.parent, {"text": "a\n"}, {}) == ["text"]
-    assert path.read_bytes() == b"a\n"
-    assert not write_folder(path.parent, {"text": "a\n"}, {})
-    assert write_folder(path.parent, {"text": "\u00e4"}, {}) == ["text", "manifest.json"]
-    assert path.read_bytes() == "\u00e4".encode()

@@ -57,31 +57,22 @@ def test_the_estimate_is_of_what_is_left():
     assert str(st.Progress("plan", "rat", 0.25, 10.0, ended=True)) == "plan rat: 10.0 s"
 
 
-def stages(stream, clock):
-    """A stage of half a second, and one of a minute."""
-    hook = Told(stream)
-    with st.progress(hook):
-        with Stage("compile", "short") as stage:
-            clock(0.5)
-            stage.tell(0.5)
-        with Stage("derive", "long") as stage:
-            for part in range(60):
-                clock(1)
-                stage.tell(part / 60)
-
-
-def test_a_pipe_has_few_lines(clock):
-    stream = io.StringIO()
-    stages(stream, clock)
-    lines = stream.getvalue().splitlines()
+def test_a_pipe_has_few_lines_and_a_terminal_one_that_ends_empty(clock):
+    """Of a stage of half a second, and one of a minute."""
+    texts = []
+    for stream in (io.StringIO(), Terminal()):
+        with st.progress(Told(stream)):
+            with Stage("compile", "short") as stage:
+                clock(0.5)
+                stage.tell(0.5)
+            with Stage("derive", "long") as stage:
+                for part in range(60):
+                    clock(1)
+                    stage.tell(part / 60)
+        texts.append(stream.getvalue())
+    lines, text = texts[0].splitlines(), texts[1]
     assert lines[0] == "derive long: 1 s so far" and lines[-1] == "derive long: 60.0 s"
     assert len(lines) == 2 + 5 and lines[1] == "derive long: 17%, 11 s, 55 s left"
-
-
-def test_a_terminal_has_one_line_that_ends_empty(clock):
-    stream = Terminal()
-    stages(stream, clock)
-    text = stream.getvalue()
     assert "\n" not in text and "short" not in text and text.count("derive long") == 60
     assert text.rsplit("\r", 2)[1].isspace() and text.endswith("\r")
 
@@ -99,20 +90,15 @@ def test_a_part_of_another_stage_is_told_to_functions_alone(clock):
     assert [now.depth for now in told] == [0, 1, 1, 0]
 
 
-def test_nobody_is_told_by_default(clock, capsys):
-    with Stage("derive", "long") as stage:
-        clock(60)
-        stage.tell(0.5)
-    assert capsys.readouterr() == ("", "")
-
-
-def test_the_log_has_the_end_of_each_stage(caplog):
+def test_nobody_is_told_by_default_and_the_log_of_the_ends(clock, caplog, capsys):
     with caplog.at_level(logging.INFO, "serpentail"):
-        with Stage("compile", "rat.c"):
-            pass
+        with Stage("compile", "rat.c") as stage:
+            clock(60)
+            stage.tell(0.5)
         with pytest.raises(KeyError), Stage("derive", "rat"):
             raise KeyError
-    assert caplog.messages == ["compile rat.c: 0.0 s", "derive rat: 0.0 s, ended by KeyError"]
+    assert caplog.messages == ["compile rat.c: 60.0 s", "derive rat: 0.0 s, ended by KeyError"]
+    assert capsys.readouterr() == ("", "")
 
 
 def start(model):
