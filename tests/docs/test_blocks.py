@@ -17,6 +17,7 @@ from tests.docs.running import run_page
 from tests.support.rows import row
 
 QUICK = {"autodiff", "contact", "continuum_forms", "learning", "python"}
+NEEDS = {"autodiff": ["jax"], "export": ["pinocchio"], "viewing": ["imageio_ffmpeg", "viser"]}
 ELSEWHERE = {"recipes"}  # tests/exporting/test_recipes.py
 RUNNING = {
     name
@@ -43,6 +44,8 @@ def page(name):
 
 @pytest.mark.parametrize("name", [page(name) for name in sorted(RUNNING)])
 def test_the_blocks_of_a_page_run(name, tmp_path):
+    for library in NEEDS.get(name, []):
+        pytest.importorskip(library)
     ran = run_page(PAGES[name], tmp_path)
     for check in TOLD.get(name, []):
         check(ran)

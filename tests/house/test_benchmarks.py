@@ -80,6 +80,7 @@ def test_the_report_compares_with_before_peers_limits_and_targets(monkeypatch, t
 
 
 def test_an_interrupted_run_resumes_with_what_is_missing(tmp_path, monkeypatch):
+    pytest.importorskip("selenium")
     from benchmarks import measures  # with every peer: seconds for each worker, were it above
 
     ran, broken = [], [True]
