@@ -12,7 +12,6 @@ import pytest
 
 import serpentail as st
 from tests.docs.blocks import ROOT
-from tests.support.page import need
 from tests.support.rows import row
 
 CLASSES = (st.Model, st.Trajectory, st.Plan, st.Rollouts, st.Mpc, st.Sweep, st.Identification)
@@ -92,24 +91,6 @@ def test_pages_fetch_nothing_from_elsewhere_and_links_lead_somewhere(site):
     for sheet in site.rglob("*.css"):
         text = sheet.read_text(encoding="utf-8")
         assert re.findall(r"@import[^;]*//|url\([\"']?(?:https?:)?//", text) == [], sheet
-
-
-@pytest.mark.slow
-def test_a_browser_shows_the_pages_from_the_disk_alone(site):
-    pytest.importorskip("selenium")
-    from tests.support.chromium import chromium, need_chromium, requests
-
-    need(need_chromium)
-    with chromium() as driver:
-        for width in (1280, 390):
-            metrics = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 500}
-            driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
-            for name in ("index", "planning", "benchmarks", "api/serpentail.plan", "gallery/index"):
-                driver.get((site / f"{name}.html").as_uri())
-                wide = "return document.documentElement.scrollWidth - window.innerWidth"
-                assert driver.execute_script(wide) <= 0, (name, width)
-        asked = requests(driver)
-        assert asked and all(url.startswith(("file:", "data:")) for url in asked)
 
 
 def test_links_lead_somewhere_from_any_page():

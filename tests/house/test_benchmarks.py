@@ -15,7 +15,6 @@ from benchmarks.comparison import faster
 from benchmarks.first_table import block
 from benchmarks.peak import best_chains
 from benchmarks.peers import build, compilers
-from benchmarks.processors import Processor
 from benchmarks.targets import judged
 from serpentail.model.compiler import compile_library
 from tests.support import as_on
@@ -77,35 +76,6 @@ def test_the_report_compares_with_before_peers_limits_and_targets(monkeypatch, t
     assert "| speed | AVX-512, (1, 3) | serpentail, ns | 100 | 200 | 2 |" in again
     verdicts = [(line["model"], line["verdict"]) for line in judged(REPORT)]
     assert ("(1, 3)", "met") in verdicts and ("(1, 3)", "MISSED") in verdicts
-
-
-def test_an_interrupted_run_resumes_with_what_is_missing(tmp_path, monkeypatch):
-    pytest.importorskip("selenium")
-    from benchmarks import measures  # with every peer: seconds for each worker, were it above
-
-    ran, broken = [], [True]
-
-    def speed(_scratch):
-        ran.append("speed")
-        return [{"model": "(1, 3)", "ns": 1.5}]
-
-    def drift(_scratch):
-        ran.append("drift")
-        if broken.pop():
-            raise KeyboardInterrupt
-        return [{"model": "(1, 3)", "change": 1e-10}]
-
-    speed.__doc__ = drift.__doc__ = "What is measured."
-    found = {"speed": measures.Measure(speed, True), "drift": measures.Measure(drift)}
-    monkeypatch.setattr(measures, "MEASURES", found)
-    monkeypatch.setattr(measures.processors, "processors", lambda: [Processor("AVX2")])
-    with pytest.raises(KeyboardInterrupt):
-        measures.bench(tmp_path, tuple(found))
-    broken.append(False)
-    measures.bench(tmp_path, tuple(found))
-    assert ran == ["speed", "drift", "drift"]
-    told = json.loads((tmp_path / "report.json").read_text())
-    assert told["speed"] == [{"processor": "AVX2", "model": "(1, 3)", "ns": 1.5}]
 
 
 def test_a_machine_stands_for_the_processors_that_it_has():
