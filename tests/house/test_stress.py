@@ -30,7 +30,7 @@ def numbers(few, many):
     return pytest.mark.parametrize("count", [few, pytest.param(many, marks=pytest.mark.slow)])
 
 
-@numbers(150, 10_000)
+@numbers(150, 4000)
 def test_random_calls_are_answered_or_refused(count, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for seed, model in enumerate(map(zoo.model, KINDS.values())):
@@ -46,7 +46,7 @@ def test_the_fuzz_sees_bare_errors_and_results_that_are_no_numbers():
     assert isinstance(found[0], Fault)
 
 
-@numbers(100, 2000)
+@numbers(100, 1000)
 def test_mutated_scene_files_are_read_or_refused(count, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     dice, model = random.Random(count), zoo.model("ground")
