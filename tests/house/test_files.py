@@ -108,9 +108,9 @@ def unchanged(folder, *names):
 
 @each_writer
 def test_a_device_that_refuses_leaves_the_old_file(name, full, tmp_path):
-    """At half of the file, at the first byte, at the last byte."""
+    """At half of the file; of one kind at the first byte and at the last byte, too."""
     for part, code in [(0.5, "EIO"), (0.0, "ENOSPC"), (1.0, "ENOSPC")][
-        : 1 if name in QUICK[1:] else 3
+        : 3 if name == "run.npz" else 1
     ]:
         with row(name, part, code):
             number = getattr(errno, code)
@@ -159,7 +159,7 @@ def test_a_limit_of_the_system_leaves_the_old_file(names, tmp_path):
     unchanged(tmp_path, *names)
 
 
-@each_writer
+@pytest.mark.parametrize("name", QUICK)
 def test_a_path_that_cannot_be_is_told(name, tmp_path):
     (tmp_path / "file").write_bytes(OLD)
     (tmp_path / "folders" / name).mkdir(parents=True)
@@ -169,7 +169,7 @@ def test_a_path_that_cannot_be_is_told(name, tmp_path):
         (tmp_path / f"a\0b{Path(name).suffix}", r"^'[^\n]*NUL"),
         (tmp_path / f"a\0b/c{Path(name).suffix}", r"^'[^\n]*NUL"),
     ]
-    for place, words in places[: 1 if name in QUICK[1:] else 4]:
+    for place, words in places[: 4 if name == "run.npz" else 1]:
         with row(place), pytest.raises(st.NotWritten, match=words):
             WRITERS[name](flight(samples=20), place)
     assert not any((tmp_path / "folders" / name).iterdir())
