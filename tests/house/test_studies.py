@@ -1,4 +1,4 @@
-"""The study of what a tail is worth: its cones, its starts, its figure."""
+"""Studies and the example that learns: their models, figures and tables, of made-up rows."""
 
 import numpy as np
 import pytest
@@ -6,11 +6,14 @@ from scipy.integrate import quad
 from scipy.spatial.transform import Rotation
 
 import serpentail as st
+from examples import learning
 from examples.studies import morphology_study as study
-from examples.studies.morphology_figures import draw
+from examples.studies.righting_figures import draw_rates
+from examples.studies.righting_kinds import WAYS, is_true, table
+from tests.support import zoo
 
 
-@pytest.mark.parametrize("taper", [0.1, 0.6, 1.0])
+@pytest.mark.parametrize("taper", [0.1, 1.0])
 def test_links_of_a_cone_are_those_of_its_integrals(taper):
     length, mass = 0.15, 0.004
     links = study.cone(length, mass, taper)
@@ -51,19 +54,34 @@ def test_tails_of_all_numbers_of_segments_take_the_links():
     np.testing.assert_array_equal(v[3:6], [12.0, 1.0, -2.0])
 
 
-def test_figure_and_table_show_the_rows(tmp_path):
-    random, rows = np.random.default_rng(1), []
-    for segments in study.SEGMENTS:
-        for _ in range(48):
-            length = random.uniform(0.5, 1.5)
-            row = {"segments": segments, "length": length, "mass": 1.0, "taper": 0.5}
-            row |= {"righted": length > 1, "energy_J": length / 1e3, "duration_s": 0.5}
-            rows.append(row)
-    _, axes = draw(rows, tmp_path / "figure.png")
-    shares = axes[0, 0].lines[0].get_ydata()
-    assert shares[0] == 0 and shares[-1] == 100
-    x, energy = axes[1, 0].lines[0].get_data()
-    np.testing.assert_allclose(energy, x, atol=0.1)
-    assert (tmp_path / "figure.png").stat().st_size > 10_000
-    lines = study.table(rows).splitlines()
-    assert len(lines) == 2 + len(study.SEGMENTS) and "500 ms" in lines[-1]
+def solved(cpu_s, converged=True, error=1e-3):
+    return {"cpu_s": cpu_s, "converged": converged, "open_loop_attitude_error_deg": error}
+
+
+FAILED = solved(5.0, converged=False, error=np.nan)
+
+
+def test_a_plan_is_true_if_it_converged_and_ends_where_it_should():
+    assert is_true(solved(1.0)) and not is_true(solved(1.0, error=0.011))
+    assert not is_true(solved(1.0, converged=False)) and not is_true(FAILED)
+
+
+def test_rates_are_drawn_for_each_kind_however_few_have_a_plan(tmp_path):
+    few = {"IPOPT": [solved(0.2), solved(0.1), solved(0.4, error=3.0), solved(0.3)]}
+    few |= {"FATROP": [solved(0.1)] * 4, "paper": [solved(1.0, error=2.0)] * 4}
+    rates = {"several": few, "none": {way: [FAILED] for way in WAYS}}
+    _, (shares, times, errors) = draw_rates(rates, tmp_path / "rates.png")
+    found = [line.get_xdata().tolist() for line in shares.get_lines()]
+    assert found == [[75, 0], [100, 0], [0, 0]]
+    np.testing.assert_allclose(times.get_lines()[0].get_xdata(), [0.25, 5.0])
+    np.testing.assert_allclose(errors.get_lines()[2].get_xdata(), [2.0, np.nan])
+    several, none = table(rates)[2:]
+    assert several.startswith("| several | 4 | 3 | 0.25, 0.39 | ") and "nan" in none
+
+
+@pytest.mark.slow
+def test_a_policy_learns_to_right_the_rat(capsys):
+    worlds = st.environments(zoo.model("m1_n3"), "righting", 512, step=2e-3, substeps=3)
+    _, tilts = learning.learn(worlds, rounds=60)
+    assert np.mean(tilts[:10]) > 35 and np.mean(tilts[-10:]) < 0.8 * np.mean(tilts[:10])
+    assert "round  60: the backs are tilted by" in capsys.readouterr().out
