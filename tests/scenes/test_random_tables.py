@@ -2,8 +2,6 @@
 
 import copy
 import datetime
-import tomllib
-from functools import cache
 from pathlib import Path
 
 import pytest
@@ -16,8 +14,7 @@ from serpentail.scenes import plan, plan_keys, simulate, simulate_keys
 from serpentail_codegen.scene.parse import parse_scene
 from serpentail_codegen.scene.problems import SceneError
 from serpentail_codegen.scene.scene import KEYS, NAMES
-from tests.scenes.conftest import SIMPLE
-from tests.support.models import folder_of
+from tests.support import zoo
 from tests.support.posed import posed
 
 Q = [0, 0, 0.3, 1, 0, 0, 0, 0.1, 0.1]
@@ -71,18 +68,17 @@ def places(table, keys):
 
 
 def changed(table, path, value):
-    """A copy of a table with a value at a path."""
+    """A copy of a table with a value at a path; missing tables are made."""
     part = table = copy.deepcopy(table)
     for key in path[:-1]:
-        part = part[key]
+        part = part.setdefault(key, {}) if isinstance(part, dict) else part[key]
     part[path[-1]] = value
     return table
 
 
 def anything(table, keys):
-    """Tables with any value at one or two places."""
-    places_of = some.sampled_from(places(table, keys))
-    return some.builds(changed, some.just(table), places_of, VALUES)
+    """A table with any value at one place."""
+    return some.builds(changed, some.just(table), some.sampled_from(places(table, keys)), VALUES)
 
 
 def one_line(error):
@@ -91,14 +87,11 @@ def one_line(error):
     assert lines and all(lines) and max(map(len, lines)) < 900
 
 
-@cache
-def simple():
-    """The model of the simple scene."""
-    return st.load(folder_of(parse_scene(tomllib.loads(SIMPLE), "simple")))
-
-
 many = settings(
-    max_examples=300, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck)
+    max_examples=150, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck)
+)
+unusual = pytest.mark.filterwarnings(
+    "ignore::RuntimeWarning", "ignore::serpentail.errors.UnusualSize"
 )
 
 
@@ -111,25 +104,25 @@ def test_the_generator_takes_or_refuses_any_table(table):
         one_line(error)
 
 
+@unusual
 @many
 @given(anything(SIMULATE, simulate_keys.SIMULATE.keys))
-@pytest.mark.filterwarnings("ignore::RuntimeWarning", "ignore::serpentail.errors.UnusualSize")
 def test_the_runtime_takes_or_refuses_any_motion(table):
     if isinstance(table.get("start"), dict):
         table["start"].pop("settle", None)  # which takes as long as it takes
     try:
-        simulate.scenario_of(simple(), table, Path())
+        simulate.scenario_of(zoo.model("feet_tail"), table, Path())
     except st.SerpentailError as error:
         one_line(error)
 
 
+@unusual
 @many
-@pytest.mark.filterwarnings("ignore::serpentail.errors.UnusualSize")
 @given(anything(PLAN, plan_keys.PLAN.keys))
 def test_the_runtime_takes_or_refuses_any_plan(table):
     try:
         arguments = plan.plan_arguments(table)
-        settings = posed(simple(), **arguments)[1]
+        settings = posed(zoo.model("feet_tail"), **arguments)[1]
         collocation_rule(settings.rule, settings.degree)
     except st.PlanningError as error:
         one_line(error)
