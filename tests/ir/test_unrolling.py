@@ -9,7 +9,7 @@ import pytest
 from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.functions.plain import FUNCTIONS
 from serpentail_codegen.functions.tail import Tail
-from serpentail_codegen.ir.interpret import Numbers, Run, unroll
+from serpentail_codegen.ir.interpret import Run, unroll
 from serpentail_codegen.ir.tape import live_nodes
 from tests.references.parameters import TABLE_1, random_states
 from tests.support.algebras import FLOATS, RATIONAL
@@ -79,25 +79,3 @@ def test_unrolling_and_baking_are_exact_in_rational_arithmetic():
             names = [array.name for array in p.of_role("parameters")]
             assert unrolled_values(p, arguments, RATIONAL) == interpreted
             assert unrolled_values(p, arguments, RATIONAL, fixed=names) == interpreted
-
-
-def test_a_batch_is_its_states_one_by_one():
-    tail = TAILS["m2_n3"]
-    for name, function in FUNCTIONS.items():
-        p = assemble(function, tail)
-        one = arguments_of(p, tail, float)
-        inputs = {array.name for array in p.of_role("input")}
-        other = {key: [0.9 * x if key in inputs else x for x in xs] for key, xs in one.items()}
-        both = {
-            key: [
-                np.array(pair) if key in inputs else pair[0]
-                for pair in zip(xs, other[key], strict=True)
-            ]
-            for key, xs in one.items()
-        }
-        batch = interpreted_values(p, both, Numbers(np, float))
-        for k, arguments in enumerate((one, other)):
-            for key, expected in interpreted_values(p, arguments, FLOATS).items():
-                values, scale = [np.broadcast_to(x, 2)[k] for x in batch[key]], np.abs(expected)
-                limits = {"rtol": 1e-9, "atol": 1e-12 * np.max(scale)}
-                np.testing.assert_allclose(values, expected, err_msg=name, **limits)

@@ -4,16 +4,14 @@ import json
 import math
 from math import pi
 
-import jsonschema
 import pytest
 
 from serpentail_codegen.pipeline import tail_of
 from serpentail_codegen.scene.parameters import PARAMETERS, SINGLE
-from serpentail_codegen.scene.parse import parse_scene, scene_for, scene_to_dict
+from serpentail_codegen.scene.parse import parse_scene, scene_to_dict
 from serpentail_codegen.scene.passive import PASSIVE, PASSIVE_NAMES
 from serpentail_codegen.scene.resolve import resolve_parameters
 from serpentail_codegen.scene.scene import GROUPS
-from serpentail_codegen.scene.schema import scene_schema
 from serpentail_codegen.scene.shape import EQUAL
 from tests.support.rows import row
 from tests.support.scenes import VALID
@@ -184,14 +182,3 @@ def test_what_a_passive_tail_lacks_or_excludes_is_told(refuse):
     polar = {"kind": "continuum", "segments": 1, "coordinates": "polar"}
     problems = refuse(polar | {"parameters": {"tail_damping": 1e-3}})
     assert set(problems) == {"parameters.tail_damping"}
-
-
-def test_the_schema_has_the_passive_tail():
-    valid, table = (
-        jsonschema.Draft7Validator(scene_schema()).is_valid,
-        scene_to_dict(scene_for("continuum", 2)),
-    )
-    for value in (0.1, "0.1 N m/rad", [0.1, "0.1 N m/rad", 0, 0]):
-        assert valid(table | {"parameters": {"tail_stiffness": value}}), value
-    for value in (-0.1, "0.1 N m", [0.1, -1.0], [0.1]):
-        assert not valid(table | {"parameters": {"tail_stiffness": value}}), value

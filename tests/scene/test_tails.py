@@ -4,8 +4,6 @@ import numpy as np
 import pytest
 
 from serpentail_codegen.scene.parse import parse_scene, scene_to_dict
-from serpentail_codegen.scene.scene import KINDS
-from serpentail_codegen.scene.schema import scene_schema
 from tests.support.rows import row
 
 CONE = {"length": "0.2 m", "radii": "4, 1 mm", "density": "1.2 g/cm^3"}
@@ -168,11 +166,6 @@ def test_a_continuum_scene(refuse, read):
     for value in (100, 1e-9, "180 deg"):
         found = read(table(3, "continuum", bend_range=value))
         assert found.bend_range == (np.pi if isinstance(value, str) else value)
-
-
-def test_the_schema_knows_kinds_of_segments():
-    tables = scene_schema()["properties"]["segments"]["anyOf"][1]["items"]["properties"]
-    assert tables["kind"] == {"enum": [kind for kind in KINDS if kind != "mixed"]}
 
 
 def test_segments_that_cannot_be_are_refused(refuse):

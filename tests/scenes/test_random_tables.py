@@ -10,7 +10,8 @@ from hypothesis import strategies as some
 
 import serpentail as st
 from serpentail.planning.nlp.rules import collocation_rule
-from serpentail.scenes import plan, plan_keys, simulate, simulate_keys
+from serpentail.scenes import plan, plan_keys, simulate_keys
+from serpentail.scenes.simulate import scenario_of
 from serpentail_codegen.scene.parse import parse_scene
 from serpentail_codegen.scene.problems import SceneError
 from serpentail_codegen.scene.scene import KEYS, NAMES
@@ -81,12 +82,6 @@ def anything(table, keys):
     return some.builds(changed, some.just(table), some.sampled_from(places(table, keys)), VALUES)
 
 
-def one_line(error):
-    """Refuse an error that says nothing, or too much."""
-    lines = str(error).splitlines()
-    assert lines and all(lines) and max(map(len, lines)) < 900
-
-
 many = settings(
     max_examples=150, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck)
 )
@@ -95,34 +90,29 @@ unusual = pytest.mark.filterwarnings(
 )
 
 
-@many
-@given(anything(GENERATE, (*KEYS, *NAMES)))
-def test_the_generator_takes_or_refuses_any_table(table):
-    try:
-        parse_scene(table, "x")
-    except SceneError as error:
-        one_line(error)
-
-
 @unusual
 @many
-@given(anything(SIMULATE, simulate_keys.SIMULATE.keys))
-def test_the_runtime_takes_or_refuses_any_motion(table):
-    if isinstance(table.get("start"), dict):
-        table["start"].pop("settle", None)  # which takes as long as it takes
-    try:
-        simulate.scenario_of(zoo.model("feet_tail"), table, Path())
-    except st.SerpentailError as error:
-        one_line(error)
+@given(
+    anything(GENERATE, (*KEYS, *NAMES)),
+    anything(SIMULATE, simulate_keys.SIMULATE.keys),
+    anything(PLAN, plan_keys.PLAN.keys),
+)
+def test_any_table_is_taken_or_refused(scene, motion, task):
+    if isinstance(motion.get("start"), dict):
+        motion["start"].pop("settle", None)  # which takes as long as it takes
 
-
-@unusual
-@many
-@given(anything(PLAN, plan_keys.PLAN.keys))
-def test_the_runtime_takes_or_refuses_any_plan(table):
-    try:
-        arguments = plan.plan_arguments(table)
-        settings = posed(zoo.model("feet_tail"), **arguments)[1]
+    def planned():
+        settings = posed(zoo.model("feet_tail"), **plan.plan_arguments(task))[1]
         collocation_rule(settings.rule, settings.degree)
-    except st.PlanningError as error:
-        one_line(error)
+
+    works = [
+        (SceneError, lambda: parse_scene(scene, "x")),
+        (st.SerpentailError, lambda: scenario_of(zoo.model("feet_tail"), motion, Path())),
+        (st.PlanningError, planned),
+    ]
+    for refusal, work in works:
+        try:
+            work()
+        except refusal as error:
+            lines = str(error).splitlines()
+            assert lines and all(lines) and max(map(len, lines)) < 900

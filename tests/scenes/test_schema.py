@@ -53,6 +53,9 @@ def test_segments_of_their_own(valid):
         two | {"parameters": {"link_masses": "1, 2 g"}},
         one | {"parameters": {"link_inertias": [[1, 1, 1]]}},
         one | {"base": "fixed", "weightless": True},
+        *(one | {"parameters": {"tail_stiffness": x}} for x in (0.1, "0.1 N m/rad")),
+        one | {"parameters": {"tail_stiffness": [0.1, "0.1 N m/rad", 0, 0]}},
+        {"kind": "mixed", "segments": [{"kind": "continuum", "length": 1, "mass": 1}]},
     ]
     bad = [
         {"segments": 1},
@@ -62,10 +65,12 @@ def test_segments_of_their_own(valid):
         {"segments": [LINK], "taper": {"density": 1000}},
         two | {"parameters": {"link_masses": 1}},
         two | {"base": "floating"},
+        *(two | {"parameters": {"tail_stiffness": x}} for x in (-0.1, "0.1 N m", [1, -1], [1])),
+        {"kind": "mixed", "segments": [{"kind": "mixed", "length": 1, "mass": 1}]},
     ]
     for keys in (*good, *bad):
         with row(keys):
-            assert valid({"kind": "articulated", **keys}) is (keys in good)
+            assert valid({"kind": "articulated"} | keys) is (keys in good)
 
 
 def test_what_is_right_is_valid(valid):
