@@ -4,10 +4,11 @@ import json
 import math
 from math import pi
 
+import numpy as np
 import pytest
 
 from serpentail_codegen.pipeline import tail_of
-from serpentail_codegen.scene.parameters import PARAMETERS, SINGLE
+from serpentail_codegen.scene.parameters import PARAMETERS
 from serpentail_codegen.scene.parse import parse_scene, scene_to_dict
 from serpentail_codegen.scene.passive import PASSIVE, PASSIVE_NAMES
 from serpentail_codegen.scene.resolve import resolve_parameters
@@ -118,13 +119,14 @@ def test_parameters_are_physical(refuse, refuse_rows):
 
 def test_single_precision_holds_its_parameters(refuse, read):
     one = {"kind": "articulated", "segments": 1, "links": 1, "real": "float"}
-    for value in (1e-50, 1e300, SINGLE[0] * (1 - 1e-15), SINGLE[1] * (1 + 1e-15)):
+    least, most = float(np.finfo(np.float32).tiny), float(np.finfo(np.float32).max)
+    for value in (1e-50, 1e300, least * (1 - 1e-15), most * (1 + 1e-15)):
         for parameters in ({"gravity": value}, {"tail_mount": [0, value, -1]}):
             with row(parameters):
                 (name,) = parameters
                 assert set(refuse(one | {"parameters": parameters})) == {f"parameters.{name}"}
                 assert read(one | {"real": "double", "parameters": parameters})
-    for value in (0.0, *SINGLE):
+    for value in (0.0, least, most):
         assert read(one | {"parameters": {"gravity": value}}).parameters["gravity"] == value
 
 
