@@ -44,7 +44,7 @@ def test_a_scale_keeps_shape_and_froude_number():
 def test_a_mass_scales_by_published_exponents():
     a, b = parsed().parameters, parsed({"mass": "2.5 kg"}).parameters
     ratio = 2.5 / (a["torso_mass"] + a["tail_mass"])
-    assert b["torso_mass"] + b["tail_mass"] == pytest.approx(2.5)
+    assert b["torso_mass"] + b["tail_mass"] == pytest.approx(2.5) and b["gravity"] == a["gravity"]
     assert b["tail_length"] / a["tail_length"] == pytest.approx(ratio ** (1 / 3))
     assert b["L_a2m"] / a["L_a2m"] == pytest.approx(ratio**0.35)
     assert b["D_f"] / a["D_f"] == pytest.approx(ratio**0.15)
