@@ -116,10 +116,13 @@ def test_what_is_no_body_is_refused(refuse_rows):
         ({"torso": one | {"sides": "1 kg", "density": 1}}, ".torso.sides", "mm"),
         ({"torso": {"shape": "box", "density": 1}}, ".torso.sides", "three"),
         ({"torso": one | {"density": 1, "x": 1}}, ".torso.x", "sides"),
-        ({"torso": one | {"density": 1e6}}, ".torso.density", "100000"),
+        ({"torso": one | {"density": 1.1e5}}, ".torso.density", "100000"),
+        ({"torso": one | {"density": 9e-4}}, ".torso.density", "0.001"),
     ]
     refuse_rows((RAT | {"body": body}, f"body{field}", words) for body, field, words in rows)
     twice = RAT | {"body": {"torso": BOX}, "parameters": {"torso_mass": 1.0}}
     refuse_rows([(twice, "parameters.torso_mass", "body.torso")])
     for body in ({"scale": 0.001}, {"scale": 1000}, {"mass": 1e-9}):
         assert parsed(body).unscaled
+    for density in (1e-3, 1e5):
+        assert parsed({"torso": one | {"density": density}}).parameters["torso_mass"] == density

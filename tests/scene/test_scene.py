@@ -119,7 +119,8 @@ def test_contacts_bring_their_parameters_and_functions(read):
     assert scene.functions == tuple(name for name in ALL if name in DEFAULT + DEFAULT_ON_GROUND)
     own = dict(scene.parameters).keys() - dict(read(VALID).parameters)
     assert own == {p.name for p in PARAMETERS if p.needs}
-    assert scene.parameters["L_a2m"] == 0.035
+    legs = [scene.parameters[f"L_{link}"] for link in ("h2d", "d2k", "k2a", "a2m", "m2t")]
+    assert legs == [0.008, 0.024, 0.032, 0.035, 0.016]
     assert scene.parameters["delta_m"] == pytest.approx(math.radians(30))
     assert parse_scene(scene_to_dict(scene), "other") == scene
     tail = read(VALID + 'contacts = ["tail"]\nfriction = "box"\n')

@@ -77,6 +77,8 @@ def test_a_scaled_kick_is_the_kick_at_another_scale(tmp_path):
     changed = st.scenario(path, changes={"duration": 0.1, "torso_mass": 0.2})
     assert changed.duration == pytest.approx(scale**0.5 * 0.1)
     assert changed.model.parameters["torso_mass"] == 0.2
+    path.write_text(path.read_text().replace("mu = 1.0", "mu = 0.3"))  # a folder has its own
+    assert st.scenario(path, zoo.folder("feet")).model.parameters["mu"] == 1.0
 
 
 def test_a_plan_has_the_size_of_its_body():
