@@ -72,6 +72,12 @@ WRONG = [
     ("", "", '[simulate.controller]\nkind = "damping"\ndamping = -1.0\n', "damping: value -1.0"),
     ("", "", '[simulate.controller]\nkind = "damping"\nkp = 1.0\n', "'kp': .*'damping'"),
     ("", "", '[[simulate.controller]]\nkind = "none"\n', r"simulate.controller\[0\]: .*begin"),
+    (
+        "",
+        "",
+        '[[simulate.controller]]\nbegin = 0\nkind = "pdf"\n',
+        r"simulate.controller\[0\].kind: value 'pdf'",
+    ),
     ("duration", "duration = 1\ncontroller = []", "", r"simulate.controller: value \[\]: .*begin"),
     ("duration", "duration = 1\ncontroller = 3", "", r"simulate.controller: value 3"),
     ("", "", "[simulate.reference]\ntimes = [0.0]\n", "simulate.reference: .*times and bends"),
