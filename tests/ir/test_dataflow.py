@@ -212,18 +212,18 @@ def test_arguments_that_are_not_bound_are_named():
             b.call(PROGRAMS["nested"], **bound)
 
 
-def test_what_is_called_twice_has_arrays_of_its_own_each_time():
+def test_what_is_called_several_times_has_arrays_of_its_own_each_time():
     b, a, y, z = outer()
     w, total = b.array("w", 1), b.array("total", 1, role="output")
-    b.call(PROGRAMS["nested"], x=a, y=y, u=z, w=w)
-    b.copy(total[0], w[0])
-    b.call(PROGRAMS["nested"], x=a, y=y, u=z, w=w)
-    b.copy(total[0], w[0], adds=True)
+    b.fill(total[0], 0)
+    for _ in range(3):
+        b.call(PROGRAMS["nested"], x=a, y=y, u=z, w=w)
+        b.copy(total[0], w[0], adds=True)
     names = [array.name for array in inlined(b.finish()).arrays]
     assert len(set(names)) == len(names)
     inner = PROGRAMS["nested"]
     expected = outputs(inner, numbers(inner))["w"][0]
-    assert given_to(b.finish(), inner)["total"] == [2 * expected]
+    assert given_to(b.finish(), inner)["total"] == [3 * expected]
 
 
 def test_parameters_are_shared():
