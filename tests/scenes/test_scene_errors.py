@@ -227,7 +227,7 @@ def test_a_folder_of_another_scene_is_refused(scene):
 def test_a_scene_without_a_motion(scene):
     path = Path(scene())
     path.write_text(path.read_text().split("[simulate]")[0])
-    for name, words in {path: r"\[simulate\]", "righting_m1_n3": "serpentail plan"}.items():
+    for name, words in {path: r"\[simulate\]", "righting_m1_n3": "serpentail plan`$"}.items():
         with pytest.raises(st.SimulationError, match=words):
             st.scenario(name)
     with pytest.raises(st.SimulationError, match="cannot be read"):

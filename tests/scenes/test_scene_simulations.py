@@ -94,7 +94,9 @@ def test_a_plan_has_the_size_of_its_body():
 
 @cache
 def of_scene(name):
-    """The generated folder of a scene of the repository: three segments, all groups."""
+    """The generated folder of a scene of the repository: three segments, all groups; no other
+    test needs it, and it takes long.
+    """
     return folder_of(load_scene(SCENES / f"{name}.toml"))
 
 
