@@ -43,6 +43,7 @@ COMPARED = (
     "momentum",
     "center_of_mass",
 )
+PLAIN = "only for equal segments on a torso that moves"
 POINTS = ("tail_points", "tail_point_jacobians")
 
 
@@ -59,6 +60,8 @@ class Reference:
 
     def opened(self, model: st.Model):
         """Return the reference for a model's tail; ImportError, or ValueError where it refuses."""
+        if not plain(model):
+            raise ValueError(PLAIN)
         chain = getattr(import_module(f"tests.references.{self.module}"), self.chain)
         sizes = (model.segments, model.links) if self.kind == "articulated" else (model.segments,)
         return chain(parameters(model), *sizes)
@@ -75,6 +78,11 @@ class Reference:
                 continue
             yield name, name, [s for s in cases if s.kind != "folded"], STRICT_LIMIT
             yield f"{name}, folded", name, [s for s in cases if s.kind == "folded"], FOLDED_LIMIT
+
+
+def plain(model: st.Model) -> bool:
+    """Tell if segments are equal, on a torso that moves: what the references know."""
+    return isinstance(model.manifest["scene"]["segments"], int) and not model.fixed
 
 
 REFERENCES = (
@@ -184,7 +192,10 @@ def split_check(model: st.Model, cases: list[State], parent: Path) -> Check:
         "With equal halves, 2 m segments of n links are m segments of 2 n: H = G^T H G, C = G^T C, "
         "G repeating angles."
     )
-    functions, sizes = ["mass_matrix", "bias_force"], partner_sizes(model)
+    functions = ["mass_matrix", "bias_force"]
+    if not plain(model):
+        return Check(name, text, 0.0, 0.0, omitted=PLAIN)
+    sizes = partner_sizes(model)
     if sizes is None:
         return Check(name, text, 0.0, 0.0, omitted="no even m or n of links")
     if not set(functions) <= set(model.kernels):

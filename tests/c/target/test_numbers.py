@@ -108,7 +108,7 @@ def test_c_computes_what_the_program_means_bit_for_bit(models):
 )
 def test_optimised_c_computes_the_same_bits(name):
     library = library_of(model_of(name), "-O2")
-    for function in known_functions(library.model):
+    for function in [name for name in NAMES if name in known_functions(library.model)]:
         with row(function):
             assert_means_the_program(library, function, states_of(library.model)[0])
 
