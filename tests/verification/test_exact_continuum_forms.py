@@ -6,10 +6,8 @@ from itertools import product
 import casadi as ca
 import mpmath
 import numpy as np
-import pytest
 from scipy.spatial.transform import Rotation
 
-from tests.references.exact_chain import ExactChain
 from tests.references.exact_continuum import ExactContinuum
 from tests.references.metrics import block_error, mass_matrix_error
 from tests.references.parameters import KINDS, TABLE_1
@@ -107,36 +105,6 @@ def test_two_halves_are_one_segment():
                 assert block_error(force, whole.inverse_dynamics(q, v, v_dot)) <= 1e-15
                 assert_same_float64(halves.energy(q_halves, T @ v), whole.energy(q, v))
                 assert_same_float64(halves.tail_points(q_halves, 3), whole.tail_points(q, 6))
-
-
-@pytest.mark.parametrize(("segments", "counts"), [(1, (16, 32)), (2, (8, 16))])
-def test_chain_of_massive_points_converges_at_first_order(segments, counts):
-    q, v, v_dot, _ = states_of(segments, "random")[0]
-    continuum = ExactContinuum(TABLE_1, segments)
-    reference = [
-        continuum.mass_matrix(q),
-        continuum.inverse_dynamics(q, v, v_dot),
-        *continuum.momentum(q, v),
-    ]
-    errors = []
-    for links in counts:
-        values = chain_quantities(segments, links, (q, v, v_dot))
-        errors.append(
-            [np.linalg.norm(x - x_ref) for x, x_ref in zip(values, reference, strict=True)]
-        )
-    np.testing.assert_allclose(np.array(errors[:-1]) / errors[1:], 2.0, atol=0.2)
-
-
-def chain_quantities(segments, links, state):
-    """H, H v_dot + C and momenta of links without inertia of their own, each turned by 1/n of its
-    segment's bend.
-    """
-    chain = ExactChain({**TABLE_1, "link_inertia": (0.0, 0.0, 0.0)}, segments, links)
-    share = np.concatenate([np.ones(6), np.full(2 * segments, 1 / links)])
-    (q, v, v_dot), scale = state, np.concatenate([[1.0], share])
-    q, v, v_dot = scale * q, share * v, share * v_dot
-    mass = chain.mass_matrix(q) * np.outer(share, share)
-    return [mass, share * chain.inverse_dynamics(q, v, v_dot), *chain.momentum(q, v)]
 
 
 def lagrange(segments):
