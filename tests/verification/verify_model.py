@@ -22,7 +22,7 @@ from serpentail.verification.errors import block_error, differences, matrix_erro
 from serpentail.verification.law import VALUE_LIMIT, Law, rid_of
 from serpentail.verification.report import Check, as_short_text, as_text, check, laws, summary
 from serpentail.verification.states import State, arguments, outputs, states
-from serpentail_codegen.functions.catalogue import CATALOGUE
+from serpentail_codegen.functions.catalogue import CATALOGUE, function_of
 from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.pipeline import generate, tail_of
@@ -130,11 +130,11 @@ def interpreter_laws(model: st.Model) -> Iterator[Law]:
 def interpreted(model: st.Model, name: str) -> Callable:
     """Return the law's error: the C against the program, run on Python's floats."""
     scene = parse_scene(model.manifest["scene"], model.name)
-    function = CATALOGUE[name]
-    assembled = cache(lambda: assemble(function, tail_of(scene)))
+    assembled = cache(lambda: assemble(function_of(name, tail_of(scene)), tail_of(scene)))
 
     def error(model: st.Model, s: State) -> float:
-        inputs = {a.name: getattr(s, a.name).tolist() for a in function.inputs}
+        arrays = assembled().of_role("input")
+        inputs = {a.name: getattr(s, a.name).tolist() for a in arrays}
         inputs |= {key: np.ravel(value).tolist() for key, value in parameters(model).items()}
         values = Run(assembled(), Numbers(), inputs).values
         shapes = {key: x.shape for key, x in outputs(model, name, s).items()}
