@@ -124,7 +124,7 @@ ZOO: dict[str, dict[str, Any]] = {
     "single_ground": _links(1, 3, real="float", **GROUND),
     "baked": _links(1, 3, baked=True),
     # the same bits everywhere; the second is small, for many compilers, emulators and watchers
-    "reproducible": _links(1, 3, profile="reproducible"),
+    "reproducible": _links(1, 3, profile="reproducible", **GROUND),
     "small": _links(1, 1, real="float", profile="reproducible", emission="loops", functions=FEW)
     | GROUND,
     # it lacks all that a test wants to miss

@@ -13,6 +13,8 @@ from hypothesis import strategies as st
 
 import serpentail
 from serpentail.model.compiler import compile_library
+from serpentail.model.kernel import ArgumentRecord
+from serpentail.model.library import NOT_FINITE
 from serpentail_codegen.targets.c.batch import STATES
 from tests.support import zoo
 from tests.support.rows import row
@@ -59,6 +61,28 @@ def test_any_number_of_states_gives_what_each_gives_alone(name, monkeypatch):
                 out = evaluated(model, function, arrays)
                 assert out.dtype == expected.dtype and np.isfinite(out).all()
                 assert (np.abs(out - expected[:count]) <= 3e3 * digits * scale).all()
+
+
+def test_states_whose_lanes_fail_are_evaluated_again_one_by_one(monkeypatch):
+    """As if the lanes of the second group of states failed, and none of them alone."""
+    monkeypatch.setattr("serpentail.model.batch.MIN_BATCH", 1)
+    model, failures = serpentail.load(zoo.folder("m1_n1")), []
+    q, lanes = states(model, 37)["q"], model.batch_library.states
+    function = model.batch_library.entry("mass_matrix", 37)
+
+    def failing(address):
+        record = ArgumentRecord.from_address(address)
+        if failures:
+            return function(address)
+        record.count, record.failed = lanes, lanes
+        failures.append(function(address))
+        return NOT_FINITE
+
+    monkeypatch.setattr(model.batch_library, "entry", lambda name, count: failing)
+    monkeypatch.setattr(model.batch_library, "threads", 1)
+    expected = [model.mass_matrix(one) for one in q]
+    np.testing.assert_allclose(model.mass_matrix(q), expected, rtol=1e-12, atol=1e-18)
+    assert failures == [0]
 
 
 @pytest.mark.parametrize("name", ["ground_m1_n1", *slow("arcs1", "loops", "ground_arcs")])

@@ -25,8 +25,8 @@ SLOW = [
     ("polar", "gcc", FAST),
     ("polar", "clang", ("-O3",)),
     ("bare", "gcc", ("-O3",)),
-    ("fixed", "clang", FAST),
-    ("fixed_arcs", "clang", ("-O1",)),
+    ("arcs1", "clang", ("-O1",)),
+    ("segments", "clang", FAST),
     ("small", "clang", ("-O2",)),
     ("small", "gcc", ("-O2",)),
     ("baked", "gcc", ("-O0",)),
@@ -48,7 +48,7 @@ def test_status_ok_implies_finite_outputs(name, compiler, level):
         assert call.put or call.status == OK, call  # what is ordinary is answered
     assert not broken, f"{len(broken)} of {count} calls, such as {broken[:5]}"
     assert count > 500 and {OK, NOT_FINITE, NOT_POSITIVE_DEFINITE} <= told.keys()
-    assert (OUT_OF_RANGE in told) == (name in ("polar", "fixed_arcs"))
+    assert (OUT_OF_RANGE in told) == (name in ("polar", "arcs1"))
 
 
 def told(compiler, folder, source, *flags):

@@ -204,5 +204,9 @@ def test_automatic_form_is_straight_until_the_code_grows_large():
         manifest = Model(folder_of(scene)).manifest
         forms[segments, links] = manifest["functions"]["forward_dynamics"]["emission"]
     assert forms == sizes
+    # what is only sometimes run is not written out
+    touching = model_of("ground_m1_n1").manifest["functions"]
+    assert touching["implicit_solve"]["emission"] == "loops"
+    assert touching["forward_dynamics"]["emission"] == "straight"
     asked = model_of("small").manifest["functions"]
     assert asked["forward_dynamics"]["emission"] == "loops"
