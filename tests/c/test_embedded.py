@@ -70,9 +70,15 @@ def test_forward_dynamics_keeps_its_budget(tmp_path):
     """Of a form and a size, which are the point: instructions, flash and stack."""
     from embedded import size_tables
 
-    sizes = [("m4", "m1_n3", "loops", 7000), ("m4", "m1_n3", "straight", 3500)]
-    sizes += [("m7", "m3_n4", "loops", 22000), ("m7", "m3_n4", "straight", 22000)]
-    for name, of, emission, instructions in sizes:
+    sizes = [
+        ("m4", "m1_n3", "loops", 7000, 6 * 1024),
+        ("m4", "m1_n3", "straight", 3500, np.inf),
+        ("m4", "m3_n4", "loops", 22000, 6 * 1024),
+        ("m7", "m1_n3", "loops", 7000, 6 * 1024),
+        ("m7", "m3_n4", "loops", 22000, np.inf),
+        ("m7", "m3_n4", "straight", 22000, np.inf),
+    ]
+    for name, of, emission, instructions, flash in sizes:
         with row(name, of, emission):
             real, functions = boards.BOARDS[name].real, ["forward_dynamics"]
             scene = zoo.scene(of, functions=functions, emission=emission, real=real)
@@ -80,8 +86,7 @@ def test_forward_dynamics_keeps_its_budget(tmp_path):
             found = compared(folder, name, place, "fast")["forward_dynamics"]
             assert found.instructions <= instructions and found.stack <= 2560
             built = image.build(folder, board(name), place)
-            flash = size_tables.flash(built, "forward_dynamics")
-            assert flash == found.flash and (emission != "loops" or flash <= 6 * 1024)
+            assert size_tables.flash(built, "forward_dynamics") == found.flash <= flash
 
 
 # Predictive control

@@ -14,6 +14,7 @@ from tests.support import zoo
 from tests.support.faults import (
     SLIGHT_FAULT,
     TAKING_MORE,
+    alone,
     broken,
     failed,
     laws_broken,
@@ -70,7 +71,7 @@ def test_every_slight_fault_is_not_what_the_program_means():
 
 def test_every_slight_fault_disagrees_with_references():
     """Those of all functions together, too: of another animal, which obeys the laws."""
-    model = zoo.model("m1_n3")
+    model = alone("m1_n3")
     inertia = [x * (1 + SLIGHT_FAULT) for x in model.parameters["torso_inertia"]]
     other = model.with_parameters(torso_inertia=inertia)
     other.parameters = model.parameters
@@ -250,7 +251,7 @@ def test_faults_of_a_tail_with_stops_break_its_law_of_flight(monkeypatch):
 
 
 def test_casadi_functions_that_are_slightly_wrong_fail():
-    model = zoo.model("m1_n1")
+    model = alone("m1_n1")
     heavier = model.with_parameters(torso_mass=model.parameters["torso_mass"] * (1 + SLIGHT_FAULT))
     faulty = copy.copy(model)
     faulty.__dict__["casadi"] = heavier.casadi

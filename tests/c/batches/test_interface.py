@@ -1,6 +1,7 @@
 """Batches share compiled lanes, threads and arrays, and name the state that is wrong."""
 
 import threading
+from functools import cache
 
 import numpy as np
 import pytest
@@ -12,6 +13,12 @@ from tests.support.rows import row
 
 from . import ground
 from .tails import alone, given, states
+
+
+@cache
+def model_of(name):
+    """A model that other files of tests do not have: once it has lanes, they are used."""
+    return st.load(zoo.folder(name))
 
 
 @pytest.fixture(autouse=True)
@@ -32,7 +39,7 @@ def test_a_few_states_compile_nothing_and_many_do_once(monkeypatch):
 
 
 def test_parameters_count_in_batches_and_a_single_state_is_repeated():
-    heavy = zoo.model("m1_n1").with_parameters(torso_mass=1.0, link_radius=0.01)
+    heavy = model_of("m1_n1").with_parameters(torso_mass=1.0, link_radius=0.01)
     values = states(heavy, 30)
     found = heavy.forward_dynamics(*given(heavy, values, "forward_dynamics"))
     np.testing.assert_allclose(found, alone(heavy, "forward_dynamics", values), rtol=1e-9)
@@ -52,18 +59,18 @@ WRONG = [
 
 
 def test_the_state_that_is_wrong_is_named():
-    found = zoo.model("m1_n1")
+    found = model_of("m1_n1")
     for count in (20, 1500):
         for name, where, value, words in WRONG:
             values = states(found, count)
             values[name][13, where] = value
             with row(count, name, where), pytest.raises(st.StateError, match=words):
                 found.bias_force(values["q"], values["v"])
-    bent = states(zoo.model("arcs2"), 20)["q"]
+    bent = states(model_of("arcs2"), 20)["q"]
     bent[17, 9] = 7.0
     with pytest.raises(st.StateError, match="segment 2 of state 17 is bent by 7"):
-        zoo.model("arcs2").mass_matrix(bent)
-    touching = zoo.model("ground")
+        model_of("arcs2").mass_matrix(bent)
+    touching = model_of("ground")
     values = ground.states(touching, ground.TOUCHING * 4)
     values["bristles"][7, 3] = np.nan
     with pytest.raises(st.StateError, match=r"bristles\[3\] of state 7: value nan"):
@@ -71,7 +78,7 @@ def test_the_state_that_is_wrong_is_named():
 
 
 def test_threads_share_a_model():
-    found, name = zoo.model("m1_n1"), "forward_dynamics"
+    found, name = model_of("m1_n1"), "forward_dynamics"
     batches = [given(found, states(found, 600, seed), name) for seed in range(6)]
     expected, results = [found.forward_dynamics(*batch) for batch in batches], [None] * 6
 
@@ -87,7 +94,7 @@ def test_threads_share_a_model():
 
 
 def test_what_a_batch_returns_begins_at_a_cache_line():
-    found, name = zoo.model("m1_n1"), "forward_dynamics_derivatives"
+    found, name = model_of("m1_n1"), "forward_dynamics_derivatives"
     values = states(found, 20)
     for output in getattr(found, name)(*given(found, values, name)):
         assert output.ctypes.data % 64 == 0 and output.flags.c_contiguous and output.flags.writeable

@@ -3,6 +3,7 @@ not.
 """
 
 import ctypes
+from functools import cache
 
 import mpmath
 import numpy as np
@@ -47,7 +48,7 @@ def values_of(model, count):
 
 @pytest.mark.parametrize("name", [*FREE, *slow(*FREE_SLOW), *TOUCHING, *slow(*TOUCHING_SLOW)])
 def test_any_number_of_states_gives_what_each_gives_alone(name, monkeypatch):
-    model = zoo.model(name)
+    model = serpentail.load(zoo.folder(name))  # its own: later calls would be in lanes
     values, lanes = values_of(model, 37), STATES[model.manifest["real"]]
     own = GROUND if model.contacts else batched(model)
     for function in [name for name in batched(model) if name in own]:
@@ -96,6 +97,12 @@ def test_the_reproducible_profile_gives_the_same_bits(name, monkeypatch):
             np.testing.assert_array_equal(together, alone(model, function, values))
 
 
+@cache
+def on_the_ground():
+    """A model that only this file has."""
+    return serpentail.load(zoo.folder("ground_m2_n2"))
+
+
 @settings(deadline=None, max_examples=40)
 @drawn(
     touching=st.lists(st.sampled_from(ground.TOUCHING), min_size=8, max_size=17),
@@ -103,10 +110,12 @@ def test_the_reproducible_profile_gives_the_same_bits(name, monkeypatch):
 )
 def test_forces_are_those_of_the_law_in_any_mixture(touching, seed):
     """Eq. 36 and Coulomb's cone, from the places and velocities of the points alone."""
-    model = zoo.model("ground_m2_n2")
+    model = on_the_ground()
     values, p = ground.states(model, touching, seed), model.parameters
-    places, moves = model.contact_points(*given(model, values, "contact_points"))
-    _, rates, forces = model.contact_dynamics(*given(model, values, "contact_dynamics"))
+    with pytest.MonkeyPatch.context() as patch:
+        in_lanes(patch)
+        places, moves = model.contact_points(*given(model, values, "contact_points"))
+        _, rates, forces = model.contact_dynamics(*given(model, values, "contact_dynamics"))
     depth = np.maximum(-places[..., 2], 0)
     normal = p["K_n"] * np.sqrt(depth) * np.maximum(depth - p["D_n"] * moves[..., 2], 0)
     np.testing.assert_allclose(forces[..., 2], normal, rtol=1e-9, atol=1e-12)
