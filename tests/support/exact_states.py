@@ -1,4 +1,4 @@
-"""States of the 40-digit continuum, and the comparisons of its tests."""
+"""States of tails in 40 digits, and the comparisons of their tests."""
 
 from math import pi
 
@@ -7,18 +7,9 @@ from scipy.spatial.transform import Rotation
 
 from tests.references.parameters import random_states
 
-SIZES = [1, 2]
-
-
 BENDS = [1e-300, 1e-16, 1e-8, 1e-3, 1.0, pi, 2 * pi, 10.0]
-
-
 ROUNDING = np.finfo(float).eps
-
-
 RESIDUE = 1e-25
-
-
 UPRIGHT = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 
 
@@ -46,3 +37,13 @@ def assert_same_float64(x, x_ref):
     np.testing.assert_array_equal(
         *(np.where(np.abs(values) < floor, 0.0, values) for values in (x, x_ref))
     )
+
+
+def assert_same_quantities(tail, other, state):
+    """Every quantity of two tails is the same float64 at one state."""
+    q, v, v_dot, tau = state
+    assert_same_float64(tail.mass_matrix(q), other.mass_matrix(q))
+    assert_same_float64(tail.inverse_dynamics(q, v, v_dot), other.inverse_dynamics(q, v, v_dot))
+    assert_same_float64(tail.forward_dynamics(q, v, tau), other.forward_dynamics(q, v, tau))
+    assert_same_float64(tail.energy(q, v), other.energy(q, v))
+    assert_same_float64(tail.momentum(q, v), other.momentum(q, v))
