@@ -9,14 +9,16 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from tests.identification.flights import elastic, flown, placed, start, tracks
+from tests.identification.flights import flown, placed, start, tracks
+from tests.support import zoo
+from tests.support.rows import row
 
-TIMES = np.linspace(0, 0.1, 21)
+TIMES = np.linspace(0, 0.05, 11)
 
 
 @pytest.fixture(scope="module")
 def found():
-    model = elastic(1, 3)
+    model = zoo.model("m1_n3")
     data = tracks(model, TIMES, flown(model, TIMES, start(model)), 3e-4, gaps=0.1)
     return st.identify(model, data, placed(model), torques=st.TorquePrior(1e-3, 0.05))
 
@@ -40,14 +42,14 @@ def test_the_page_has_the_measured_markers_and_their_gaps(found, tmp_path):
     np.testing.assert_allclose(columns, seen.reshape(len(TIMES), -1), rtol=1e-6)
 
 
-def test_markers_of_another_shape_are_refused(found, tmp_path):
-    with pytest.raises(st.ViewError, match=r"markers: shape \(3, 2\): needs \(21, M, 3\)"):
-        st.view(found.trajectory, tmp_path / "page.html", markers=[np.zeros((3, 2))])
-
-
-def test_a_page_needs_markers_of_each_motion(found, tmp_path):
-    with pytest.raises(st.ViewError, match="markers: 2 entries: needs one of each of 1 motions"):
-        st.view(found.trajectory, tmp_path / "page.html", markers=[np.zeros((21, 1, 3))] * 2)
+def test_markers_that_do_not_fit_a_page_are_refused(found, tmp_path):
+    """Of another shape, and of more motions than there are."""
+    for words, markers in (
+        (r"markers: shape \(3, 2\): needs \(11, M, 3\)", [np.zeros((3, 2))]),
+        ("markers: 2 entries: needs one of each of 1", [np.zeros((11, 1, 3))] * 2),
+    ):
+        with row(words), pytest.raises(st.ViewError, match=words):
+            st.view(found.trajectory, tmp_path / "page.html", markers=markers)
 
 
 def test_the_figure_has_residuals_torques_and_power(found, tmp_path):

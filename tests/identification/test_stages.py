@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 
 from serpentail.identification import stages
-from tests.identification.flights import elastic, flown, start
+from tests.identification.flights import flown, start
+from tests.support import zoo
 
 
-@pytest.mark.parametrize(("segments", "links"), [(1, 3), (2, 2), (1, None)])
-def test_ends_are_those_of_scipy(segments, links):
-    model = elastic(segments, links)
+@pytest.mark.parametrize("name", ["m1_n3", "elastic", "arcs2"])
+def test_ends_are_those_of_scipy(name):
+    model = zoo.model(name)
     times = np.linspace(0, 0.05, 41)
     states = flown(model, times, start(model))
     spans, begin = np.diff(times), states[:-1]
@@ -28,9 +29,9 @@ def interval(model, x, torques, span=0.004):
     return stages.solved(model, np.array([span]), begin, over, guess)[0], over
 
 
-@pytest.mark.parametrize(("segments", "links"), [(1, 3), (2, None)])
-def test_derivatives_are_central_differences(segments, links):
-    model = elastic(segments, links)
+@pytest.mark.parametrize("name", ["m1_n3", "elastic_arcs"])
+def test_derivatives_are_central_differences(name):
+    model = zoo.model(name)
     rng = np.random.default_rng(0)
     x, torques = start(model), 1e-3 * rng.standard_normal((2, model.layout.nt))
     columns = np.eye(len(model.parameter_vector))
@@ -54,13 +55,13 @@ def test_derivatives_are_central_differences(segments, links):
             np.testing.assert_allclose(
                 found.by_torque[0, end, :, k], wanted, atol=1e-6 * np.abs(wanted).max()
             )
-    for name, column in (("torso_mass", 1), ("tail_mount", 5)):
-        value = np.array(model.parameters[name], float)
+    for of, column in (("torso_mass", 1), ("tail_mount", 5)):
+        value = np.array(model.parameters[of], float)
         small = 1e-6 * max(np.abs(value).max(), 1e-3)
         unit = np.eye(3)[0] if value.ndim else 1.0
         ends = []
         for sign in (1, -1):
-            other = model.with_parameters(**{name: value + sign * small * unit})
+            other = model.with_parameters(**{of: value + sign * small * unit})
             ends.append(interval(other, x, torques)[0])
         wanted = change(*ends, small)
         np.testing.assert_allclose(
