@@ -20,7 +20,7 @@ SCENE = """
 kind = "articulated"
 segments = 1
 links = 1
-functions = ["forward_dynamics", "rollout", "energy", "momentum"]
+functions = ["forward_dynamics", "rollout", "energy", "momentum", "tail_points"]
 
 [simulate]
 duration = 0.1

@@ -57,19 +57,19 @@ def test_rows_are_those_of_single_runs(model):
 def test_all_executors_make_the_same_rows(model):
     wanted = flights(model, 2).rows()
     with ThreadPoolExecutor(2) as threads, ProcessPoolExecutor(1, get_context("spawn")) as pool:
-        for executor in ("processes:2", threads, pool):
+        for executor in (threads, pool, "processes:2"):
             found = flights(model, 2, executor=executor)
             for row, other in zip(found.rows(), wanted, strict=True):
                 np.testing.assert_allclose(row["q_end"], other["q_end"], rtol=0, atol=1e-9)
-    assert not supervision._all and not supervision._idle  # no process is left
+        assert not supervision._all and not supervision._idle  # none is left of its own
 
 
-def test_points_that_hang_crash_or_raise_are_rows(tmp_path):
+def test_points_that_hang_crash_or_raise_are_rows(worker, tmp_path):
     run = partial(swept.troubled, 0.0, str(tmp_path / "log"))
     failing = {swept.HANGS[0]: "TimeLimit", swept.RAISES[0]: "ValueError: no such number"}
     failing |= dict.fromkeys(swept.CRASHES, "ProcessEnded")
     over = {"number_of": st.grid([1, *failing, 2])}
-    found = st.sweep(None, over, run, limit=1.0, executor="processes:1")
+    found = st.sweep(None, over, run, limit=1.0, executor=worker)
     for row in found.rows():
         if row["number_of"] in failing:
             assert row["error"].startswith(failing[row["number_of"]])
@@ -146,11 +146,11 @@ def test_failures_are_rows_and_can_be_run_again(model, tmp_path):
     assert st.sweep(model, axes, **given, retry_failed=True).spent.points == 4
 
 
-def test_functions_are_run_with_and_without_a_model(model, tmp_path):
-    found = st.sweep(None, {"x": st.grid([3, 4])}, swept.square, executor="processes:1")
+def test_functions_are_run_with_and_without_a_model(model, worker, tmp_path):
+    found = st.sweep(None, {"x": st.grid([3, 4])}, swept.square, executor=worker)
     assert [row["square"] for row in found.rows()] == [9, 16]
     axes = {"tail_mass": st.grid([0.002]), "span": st.grid([0.1, 0.2])}
-    found = st.sweep(model, axes, swept.fly, executor="processes:1")
+    found = st.sweep(model, axes, swept.fly, executor=worker)
     for row in found.rows():
         assert row["mass"] == 0.002 and "motion" not in row
         # the centre of mass falls so, and the torso, whose tail is light, nearly so
@@ -158,22 +158,23 @@ def test_functions_are_run_with_and_without_a_model(model, tmp_path):
     page = found.view(1, tmp_path / "page.html")
     assert page.read_text(encoding="utf-8").startswith("<!")
     with pytest.raises(st.SweepError, match="returned no motion"):
-        st.sweep(None, {"x": st.grid([3])}, swept.square, executor="processes:1").motion(0)
+        st.sweep(None, {"x": st.grid([3])}, swept.square, executor=worker).motion(0)
 
 
-def test_what_function_rows_depend_on_is_part_of_their_keys(tmp_path):
-    given = {"store": tmp_path / "s.db", "executor": "processes:1"}
+def test_what_function_rows_depend_on_is_part_of_their_keys(worker, tmp_path):
+    given = {"store": tmp_path / "s.db", "executor": worker}
     for of, points in (("1", 1), ("1", 0), ("2", 1)):
         assert (
             st.sweep(None, {"x": st.grid([1])}, swept.square, of=of, **given).spent.points == points
         )
 
 
-def test_plans_are_rows(model):
+def test_plans_are_rows(model, worker):
     axes = {"duration": st.grid([0.4, 0.5])}
     settings = {"q0": Q0, "v0": [0, 0, 1, 2, 0, 0, 0, 0], "goal": st.Goal(torso_rate=None)}
     settings["intervals"] = 4
-    found = st.sweep(model, axes, "plan", settings=settings | {"track": False, "tolerance": None})
+    settings |= {"track": False, "tolerance": None}
+    found = st.sweep(model, axes, "plan", settings=settings, executor=worker)
     assert [row["duration_s"] for row in found.rows()] == [0.4, 0.5]
     assert all(row["error"] is None and "success" in row for row in found.rows())
 
@@ -212,10 +213,10 @@ def test_what_cannot_be_is_refused_in_one_line(model):
         assert "\n" not in str(caught.value)
 
 
-def test_progress_tells_how_many_are_left():
+def test_progress_tells_how_many_are_left(worker):
     told = []
     with st.progress(told.append):
-        st.sweep(None, {"x": st.grid(range(40))}, swept.square, executor="processes:1")
+        st.sweep(None, {"x": st.grid(range(40))}, swept.square, executor=worker)
     told = [each for each in told if each.stage == "sweep"]
     assert told[-1].ended and any("of 40" in each.what for each in told)
     assert any(each.left is not None for each in told[:-1])
