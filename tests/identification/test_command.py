@@ -1,23 +1,28 @@
-"""The verb identify: of a scene and a recording, and tables that are wrong."""
+"""The verb identify, and what is drawn of an identification: its page, residuals and torques."""
 
+import base64
+import gzip
 import json
 import re
 
 import numpy as np
+import pytest
 
+import serpentail as st
 from examples import front
-from serpentail import cli, write_markers
+from serpentail import cli
 from tests.identification.flights import flown, placed, scene, start, tracks
 from tests.support import zoo
 from tests.support.rows import row
 
+TIMES = np.linspace(0, 0.05, 11)
 SCENE = front.ROOT / "scenes" / "identify_tail.toml"
 
 
 def test_it_finds_what_the_recording_was_made_with(tmp_path, capsys):
     model, times = zoo.model("m1_n1"), np.linspace(0, 0.15, 31)
     data = tracks(model, times, flown(model, times, start(model)), 5e-4, gaps=0.1)
-    recording, study = write_markers(data, tmp_path / "run.trc"), tmp_path / "study.toml"
+    recording, study = st.write_markers(data, tmp_path / "run.trc"), tmp_path / "study.toml"
     table = ["[parameters]", 'tail_length = "19 cm"', "[identify]", 'estimate = ["tail_length"]']
     study.write_text(scene(placed(model), *table))
     page, motion = tmp_path / "page.html", tmp_path / "motion.npz"
@@ -53,3 +58,51 @@ def test_wrong_tables_are_told(tmp_path, capsys):
         with row(words):
             assert cli.main(["identify", str(study), "none.trc"]) == 2
             assert re.search(words, capsys.readouterr().err)
+
+
+@pytest.fixture(scope="module")
+def found():
+    model = zoo.model("m1_n3")
+    data = tracks(model, TIMES, flown(model, TIMES, start(model)), 3e-4, gaps=0.1)
+    return st.identify(model, data, placed(model), torques=st.TorquePrior(1e-3, 0.05))
+
+
+def unpacked(text, rows):
+    """Columns of floats, as viewer/src/data.js reads them."""
+    planes = np.frombuffer(gzip.decompress(base64.b64decode(text)), np.uint8).reshape(4, -1)
+    steps = sum(planes[k].astype(np.uint32) << np.uint32(8 * k) for k in range(4))
+    bits = np.cumsum(steps.reshape(-1, rows), axis=1, dtype=np.uint32)
+    return bits.view(np.float32).T
+
+
+def test_the_page_has_the_measured_markers_and_their_gaps(found, tmp_path):
+    page = found.view(tmp_path / "page.html").read_text()
+    data = json.loads(re.search(r'<script[^>]*id="data"[^>]*>(.*?)</script>', page, re.DOTALL)[1])
+    (run,) = data["runs"]
+    assert run["markers"] == 7
+    seen = found.trials[0].tracks.positions
+    assert np.isnan(seen).any()
+    columns = unpacked(run["arrays"]["markers"], run["rows"])
+    np.testing.assert_allclose(columns, seen.reshape(len(TIMES), -1), rtol=1e-6)
+
+
+def test_markers_that_do_not_fit_a_page_are_refused(found, tmp_path):
+    """Of another shape, and of more motions than there are."""
+    for words, markers in (
+        (r"markers: shape \(3, 2\): needs \(11, M, 3\)", [np.zeros((3, 2))]),
+        ("markers: 2 entries: needs one of each of 1", [np.zeros((11, 1, 3))] * 2),
+    ):
+        with row(words), pytest.raises(st.ViewError, match=words):
+            st.view(found.trajectory, tmp_path / "page.html", markers=markers)
+
+
+def test_the_figure_has_residuals_torques_and_power(found, tmp_path):
+    _, axes = found.plot(tmp_path / "residuals.png")
+    assert [each.get_ylabel() for each in axes] == ["residual [mm]", "torque [mN m]", "power [mW]"]
+    curves = [line.get_ydata() for line in axes[0].lines[:-1]]
+    distance = 1e3 * np.linalg.norm(found.trials[0].residuals, axis=2)
+    np.testing.assert_allclose(np.array(curves).T, distance)
+    np.testing.assert_allclose(axes[2].lines[1].get_ydata(), 1e3 * found.trials[0].power[:, 1])
+    assert (tmp_path / "residuals.png").stat().st_size > 1000
+    with pytest.raises(st.IdentificationError, match="trial: value 1: needs 0 to 0"):
+        found.plot(trial=1)

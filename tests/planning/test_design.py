@@ -215,23 +215,6 @@ def test_slopes_are_those_of_ordinary_plans(chosen):
         assert slope == pytest.approx((high - low) / (2 * h), rel=1e-3)
 
 
-def test_a_price_shortens_the_tail(chosen):
-    """The objective may count a parameter, and h follows from it: two numbers at once."""
-    unit = 1e-3
-
-    def priced(point):
-        effort = ca.sumsqr(point.torque / unit) + ca.sumsqr(3e-4 * point.tail_rate / unit)
-        return effort + 40 * point.parameters["tail_length"] / point.duration
-
-    design = {"tail_length": RANGE, "tail_mass": (0.003, 0.005)}
-    plan = again(objective=priced, guess=chosen, design=design)
-    assert plan.report["converged"]
-    assert plan.design["tail_length"] < chosen.design["tail_length"] - 0.005
-    wanted = rat().with_parameters(**plan.design).momentum(*plan.start)[1]
-    kept = np.tile(wanted, (len(plan.trajectory.t), 1))
-    np.testing.assert_allclose(plan.trajectory.angular_momentum, kept, rtol=1e-6)
-
-
 def test_formulations_choose_the_same(chosen, freed):
     for formulation in ("translation-free", "full"):
         plan = again(formulation=formulation, guess=chosen, **LENGTH)

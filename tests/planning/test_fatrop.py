@@ -13,16 +13,12 @@ import pytest
 import serpentail as st
 from examples import righting
 from serpentail.attitude import tilt_deg
-from serpentail.checks import Refusals
 from serpentail.planning.condensed import fatrop
 from serpentail.planning.condensed.stages import stages_of
 from serpentail.planning.nlp.bounds import limits
 from serpentail.planning.nlp.equations import equations_of_motion
-from serpentail.planning.nlp.mesh import uniform
-from serpentail.planning.nlp.rules import collocation_rule
 from serpentail.planning.nlp.solver import solve, solver
 from serpentail.planning.nlp.transcription import transcription_of
-from serpentail.planning.problem import checked_problem
 from serpentail.planning.result.truth import planned_torques
 from serpentail.planning.ways import STAGED
 from tests.support import zoo
@@ -165,33 +161,7 @@ def test_planning_again_from_a_plan_takes_fewer_iterations():
     assert other.report["converged"]
 
 
-def run(**changes):
-    """FATROP's status of a problem, some of whose task has been changed, from rest."""
-    model, refused = rat(), Refusals(st.PlanningError)
-    task = (start(model), st.Goal(), DURATION, st.Bounds(angle=np.pi / 3))
-    settings = {"objective": "effort", "smoothing": 3e-4, "damping": 0.0, "path": ()}
-    settings |= {"legs": None, "clearance": None, "formulation": "airborne"}
-    problem = checked_problem(model, task, settings | {"attitude": "quaternion"}, refused)
-    stages = stages_of(model, problem, uniform(6), collocation_rule("radau", 3))
-    first = np.concatenate([problem.q0[3:], problem.v0[6:] / 10])
-    w = np.zeros(stages.indices.size)
-    w[0], w[stages.indices.states] = DURATION, first
-    owned = fatrop.task_of(stages, first, np.zeros(10), 1.0)
-    for name, value in changes.items():
-        owned.arrays[name] = value
-        setattr(owned.task, name, value.ctypes.data)
-    variables, states = fatrop.packed(stages, w)
-    outcome, found, *_ = fatrop._run(owned, variables, states, fatrop.options_of({}, "far"))
-    return fatrop.STATUSES[outcome.status], found, variables
-
-
-def test_what_cannot_begin_is_told_and_its_guess_returned():
-    """Magnitudes below zero, which ``Bounds`` refuses, make least limits above the largest."""
-    for name in ("most_torque", "most_angle"):
-        status, found, variables = run(**{name: np.array([-1.0, 1.0])})
-        assert status == "No_Room_Between_Bounds", name
-        np.testing.assert_array_equal(found, variables)
-    assert run(momentum=np.full(3, 1e6))[0] == "No_Collocation_Of_Guess"
+def test_a_guess_without_collocation_is_told_and_returned():
     plan = planned({})
     p, engine = conserved(plan), fatrop.engine_of({}, "close")
     p[:3] = 1e6

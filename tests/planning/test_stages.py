@@ -87,37 +87,24 @@ def test_the_end_is_that_of_the_equations_of_motion():
 
 
 NODE = ctypes.CFUNCTYPE(ctypes.c_int, *(ctypes.c_void_p,) * 6)
-SLOPES = ctypes.CFUNCTYPE(ctypes.c_int, *(ctypes.c_void_p,) * 7)
-CURVATURE = ctypes.CFUNCTYPE(ctypes.c_int, *(ctypes.c_void_p,) * 9)
 
 
-def broken(number: float, status: int) -> dict:
-    """Functions of a node of (1, 3) that give one number everywhere."""
-
-    def filled(address, count):
-        numbers = ctypes.cast(address, ctypes.POINTER(ctypes.c_double))
-        np.ctypeslib.as_array(numbers, (count,))[:] = number
+def filling(number, status):
+    """A function of a node of (1, 3) that gives one number everywhere, and its status."""
 
     def node(*pointers):
-        filled(pointers[4], 11)
+        numbers = ctypes.cast(pointers[4], ctypes.POINTER(ctypes.c_double))
+        np.ctypeslib.as_array(numbers, (11,))[:] = number
         return status
 
-    def slopes(*pointers):
-        filled(pointers[5], 110)
-        return node(*pointers)
-
-    def curvature(*pointers):
-        filled(pointers[7], 100)
-        return slopes(*pointers[:4], *pointers[5:])
-
-    return {"rates": NODE(node), "slopes": SLOPES(slopes), "curvature": CURVATURE(curvature)}
+    return NODE(node)
 
 
 def test_a_stage_without_numbers_has_no_results_until_it_has_them_again():
     model, x = rat(), state(2)
-    for number, status in ((np.nan, 0), (np.inf, 0), (1e300, 0), (0.0, 1)):
-        functions = broken(number, status)
-        with row(number, status), first_stage(model, x, H, functions=functions) as stage:
+    for given in ((np.nan, 0), (np.inf, 0), (1e300, 0), (0.0, 1)):
+        functions = dict.fromkeys(("rates", "slopes", "curvature"), filling(*given))
+        with row(*given), first_stage(model, x, H, functions=functions) as stage:
             v = variables(stage, x)
             assert stage.values(v) is None and stage.slopes(v) is None
             assert stage.hessian(v, np.ones(1000)) is None
@@ -172,22 +159,6 @@ def slopes(code, stage, w):
     stages = stage.all[:6]
     assert all(own.sloped for own in stages)
     return [np.ctypeslib.as_array(own.Jr, (own.results, own.variables)).copy() for own in stages]
-
-
-def test_helpers_evaluate_stages_side_by_side():
-    """A node waits until another thread is in one, too: alone it would wait in vain."""
-    together, seen = threading.Barrier(2), set()
-
-    def node(*_pointers):
-        if threading.get_ident() not in seen:
-            seen.add(threading.get_ident())
-            together.wait(LIMIT)
-        return 1
-
-    functions = {"rates": NODE(node), "slopes": NODE(node), "curvature": NODE(node)}
-    with program(functions=functions) as (code, stage, w), helpers.helped(code, stage.program, 1):
-        code.program_slopes(stage.program, w.ctypes.data)
-    assert len(seen) == 2 and not together.broken
 
 
 @pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")

@@ -5,12 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from scipy.interpolate import BPoly
 
 import serpentail as st
 from serpentail.attitude import angle_deg
 from serpentail.planning.nlp.coordinates import attitude
-from serpentail.planning.nlp.rules import collocation_rule
 from serpentail.planning.result.full_state import full_state
 from serpentail.planning.result.truth import local_errors, open_loop
 from tests.references.passive import PassiveTail
@@ -191,16 +189,6 @@ def test_torques_that_no_model_survives_are_an_infinite_error():
     assert np.isnan(np.concatenate(open_loop(model, wild, 0.0, origin))).all()
     errors = local_errors(model, wild, 0.0, *(np.tile(x, (len(wild.ends), 1)) for x in origin))
     assert np.isfinite(errors).all() and errors.max() == np.pi
-
-
-def test_bernstein_coefficients_are_those_of_scipy_and_bound_the_polynomial():
-    for name in ("radau", "lobatto", "hermite-simpson", "trapezoidal"):
-        rule, s = collocation_rule(name), np.linspace(0, 1, 201)
-        values = np.random.default_rng(0).normal(size=len(rule.nodes))
-        coefficients, own = rule.bernstein() @ values, rule.basis(s) @ values
-        wanted = BPoly(coefficients[:, None], [0, 1])(s)
-        np.testing.assert_allclose(wanted, own, atol=1e-13, err_msg=name)
-        assert np.abs(own).max() <= np.abs(coefficients).max() + 1e-13
 
 
 def test_arcs_are_bent_as_far_as_their_range_at_most():

@@ -3,6 +3,8 @@
 It shares with the controller only the model's functions of CasADi.
 """
 
+from functools import cache
+
 import casadi as ca
 import numpy as np
 from scipy.optimize import lsq_linear
@@ -22,6 +24,7 @@ def plan_of(seed: int = 0, **settings) -> st.Plan:
     return st.plan(model, start=start(model, seed), **(common | settings))
 
 
+@cache
 def airborne(model: st.Model):
     """Return the function (x, tau, h) -> (x_dot, omega); omega carries the part of h that the tail
     does not.
