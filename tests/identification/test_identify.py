@@ -192,7 +192,7 @@ def squares(model, names, trials, prior=None):
 
 @pytest.mark.parametrize(("names", "prior"), [(KNOWN, None), (UNKNOWN, PRIOR)])
 def test_errors_are_as_large_as_told(names, prior):
-    total, freedom, _ = squares(zoo.model("m1_n3"), names, 4, prior)
+    total, freedom, _ = squares(zoo.model("m1_n3"), names, 3, prior)
     assert chi2.ppf(RARE, freedom) < total < chi2.ppf(1 - RARE, freedom)
 
 

@@ -84,7 +84,7 @@ def test_too_few_markers_are_refused(flight):
     with pytest.raises(st.IdentificationError, match="at most 3 at once, on a line"):
         st.identify(model, line, dict.fromkeys(names, st.Marker(torso=(0, 0, 0))))
     torso = {name: placed(model)[name] for name in ("nose", "left", "right")}
-    data = tracks(model, TIMES[:8], states[:8], 1e-2)
+    data = tracks(model, TIMES[:8], states[:8])
     how = {"torques": st.TorquePrior(0.5, 0.02), "noise": 1e-2}
     with pytest.raises(st.IdentificationError, match="do not determine tail coordinate"):
         st.identify(model, data, torso, **how)

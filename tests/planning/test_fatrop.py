@@ -88,9 +88,9 @@ def test_optima_are_those_of_ipopt(seed):
 
 
 def test_least_time_and_energy_are_found():
-    settings = {"objective": "time", "duration": (0.2, 0.5), "tolerance": 0.01}
+    settings = {"objective": "time", "duration": (0.2, 0.5)}
     plan, other = planned(settings), planned(settings, solver="ipopt")
-    assert plan.success and other.success
+    assert plan.report["converged"] and other.report["converged"]
     assert plan.report["objective"] <= 1.05 * other.report["objective"]
     near = planned({"objective": "energy"}, solver="ipopt")
     plan = planned({"objective": "energy"}, guess=near)
@@ -188,12 +188,17 @@ def of_tail(name: str, solver: str) -> st.Plan:
 
 
 @pytest.mark.parametrize(
-    "name", ["elastic", "own_arcs", *(pytest.param(k, marks=SLOW) for k in ("own_links", "mixed"))]
+    "name",
+    [
+        "elastic",
+        "arcs2",
+        *(pytest.param(k, marks=SLOW) for k in ("own_links", "own_arcs", "mixed")),
+    ],
 )
 def test_tails_of_all_kinds_are_planned_and_controlled(name):
     near, plan, model = of_tail(name, "ipopt"), of_tail(name, "fatrop"), zoo.model(name)
     assert near.report["dynamics"] == "compiled"
-    check_optimum(near, rel=5e-8)
+    check_optimum(near, rel=2e-7)
     assert plan.report["converged"] and plan.report["open_loop_attitude_error_deg"] < 1.0
 
     q, v = start(model)

@@ -57,7 +57,7 @@ class Reference:
         self.begin, self.width = t, (end - t) / self.N
         horizon = min(settings.horizon, plan.duration)
         self.steps = int(np.ceil(horizon / self.N / settings.step - 1e-9))
-        d = ca.SX.sym("d", self.N * self.nt)
+        d = ca.MX.sym("d", self.N * self.nt)
         r = self._residuals(np.concatenate([q[3:7], q[7:], v[6:]]), d, end)
         self.of = ca.Function("residuals", [d], [r, ca.jacobian(r, d)])
 

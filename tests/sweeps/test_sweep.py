@@ -56,7 +56,7 @@ def test_rows_are_those_of_single_runs(model):
 
 def test_all_executors_make_the_same_rows(model):
     wanted = flights(model, 2).rows()
-    with ThreadPoolExecutor(2) as threads, ProcessPoolExecutor(1, get_context("spawn")) as pool:
+    with ThreadPoolExecutor(1) as threads, ProcessPoolExecutor(1, get_context("spawn")) as pool:
         for executor in (threads, pool, "processes:2"):
             found = flights(model, 2, executor=executor)
             for row, other in zip(found.rows(), wanted, strict=True):
