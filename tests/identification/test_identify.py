@@ -202,7 +202,7 @@ def test_errors_are_as_large_as_told(names, prior):
     [("elastic", WANTED, None), ("elastic_arcs", WANTED, None), ("arcs1", UNKNOWN, PRIOR)],
 )
 def test_intervals_cover_the_truth_in_many_trials(model, names, prior):
-    own, trials = elastic(model) if names is WANTED else zoo.model(model), 60
+    own, trials = elastic(model) if names is WANTED else zoo.model(model), 40
     total, freedom, covered = squares(own, names, trials, prior)
     assert chi2.ppf(RARE, freedom) < total < chi2.ppf(1 - RARE, freedom)
     least, most = binom.ppf([RARE, 1 - RARE], trials, 0.95)

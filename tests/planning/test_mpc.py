@@ -104,9 +104,7 @@ def test_more_steps_end_where_none_lowers_the_sum_any_more():
 
 WRONG = {
     "tail heavier": {"tail_mass": 1.15},
-    "tail lighter": {"tail_mass": 0.85},
     "torso slower": {"torso_inertia": 1.15},
-    "torso faster": {"torso_inertia": 0.85},
 }
 
 
@@ -133,11 +131,6 @@ def test_bodies_unlike_the_planned_one_end_upright(plan):
             assert np.abs(controlled.tau).max() <= TORQUE
             info = controlled.info["mpc"]
             assert info["ticks"] == 40 and info["failed"] == 0
-
-
-def test_the_planned_body_flies_as_planned(plan):
-    motion = st.simulate(rat(), *start(rat(), 1), controller=st.Mpc(rat(), plan), t_span=DURATION)
-    np.testing.assert_allclose(motion.q[-1, 3:], plan.trajectory.q[-1, 3:], atol=5e-3)
 
 
 def flown(mpc: st.Mpc, body: st.Model, ticks: int, rate: float):

@@ -61,13 +61,6 @@ def test_plans_of_least_time_are_shorter_straight_and_at_their_bounds():
     np.testing.assert_allclose(middles, sum(outer) / 2, atol=1e-8)
 
 
-def test_energy_plans_take_less_energy():
-    least = planned(objective="energy", guess=planned(**COARSE), **COARSE)
-    assert least.report["converged"]
-    assert least.report["energy_J"] < planned(**COARSE).report["energy_J"]
-
-
-@pytest.mark.slow
 def test_energy_plans_from_passive_flight_are_true():
     """|power| has a kink: its rounding is lowered from round to round."""
     settings = {"start": start(rat(), 2), "duration": (0.3, 0.5), "track": False}
