@@ -85,9 +85,10 @@ def test_too_few_markers_are_refused(flight):
         st.identify(model, line, dict.fromkeys(names, st.Marker(torso=(0, 0, 0))))
     torso = {name: placed(model)[name] for name in ("nose", "left", "right")}
     data = tracks(model, TIMES[:8], states[:8])
-    how = {"torques": st.TorquePrior(0.5, 0.02), "noise": 1e-2}
+    prior = st.TorquePrior(0.5, 0.02)
+    assert st.identify(model, data, torso, torques=prior, noise=1e-5).success
     with pytest.raises(st.IdentificationError, match="do not determine tail coordinate"):
-        st.identify(model, data, torso, **how)
+        st.identify(model, data, torso, torques=prior, noise=3e-5)
 
 
 def swapped(data, a, b, frames=slice(None)):

@@ -14,7 +14,9 @@ from serpentail.planning import rounds, ways
 from serpentail.planning.condensed import fatrop
 from serpentail.planning.nlp import interrupt, solver, transcription
 from serpentail.planning.nlp.blas_threads import _blas, one_thread
+from serpentail.planning.nlp.equations import equations_of_motion
 from serpentail.planning.nlp.multipliers import carried
+from serpentail.planning.nlp.transcription import transcription_of
 from serpentail.planning.result import report as result_report
 from tests.support.tumbling import AGAIN, planned, rat, start
 
@@ -58,6 +60,23 @@ def test_a_plan_of_the_same_size_lends_its_multipliers_and_no_other(monkeypatch)
     for settings, guess in (({}, "warm"), ({"rule": "lobatto"}, "close")):
         del begun[:]
         assert again(guess=plan, **settings).report["converged"] and begun[0] == guess
+
+
+def test_multipliers_are_carried_to_another_mesh():
+    """The solver, given none, finds the same ones there; on the mesh itself they stay."""
+    programs, solutions, plan = [], [], None
+    for intervals in (24, 36):
+        # One of several optima: the other mesh begins at the first one's.
+        plan = again(intervals=intervals, guess=plan, bounds=st.Bounds(angle=0.45))
+        own = (rat(), plan.problem, plan.mesh, plan.rule, equations_of_motion(rat()))
+        programs.append(transcription_of(*own))
+        solutions.append(plan.solution.multipliers)
+    assert np.abs(solutions[0][0]).max() > 1e-3  # a bound is active
+    kept = carried(solutions[0], programs[0], programs[0])
+    for found, given in zip(kept, solutions[0], strict=True):
+        np.testing.assert_allclose(found, given, atol=1e-12)
+    for found, wanted in zip(carried(solutions[0], *programs), solutions[1], strict=True):
+        assert np.linalg.norm(found - wanted) < 1e-3 * np.linalg.norm(wanted)
 
 
 def test_refinement_goes_on_from_the_multipliers(monkeypatch):

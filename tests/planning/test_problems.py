@@ -50,9 +50,9 @@ def test_damping_is_part_of_the_motion():
 
 def test_plans_of_least_time_are_shorter_straight_and_at_their_bounds():
     """From passive flight: a plan of least effort comes before."""
-    settings = {"start": start(rat()), "duration": (0.1, 0.6), "bounds": SOFT, "track": False}
-    plan = st.plan(rat(), objective="time", **settings)
-    assert plan.success and plan.duration < 0.9 * DURATION
+    settings = {"start": start(rat()), "duration": (0.1, DURATION), "bounds": SOFT, "track": False}
+    plan, calm = (st.plan(rat(), objective=name, **settings) for name in ("time", "effort"))
+    assert plan.success and plan.duration < 0.95 * calm.duration
     assert plan.report["objective"] == plan.duration
     assert np.abs(plan.trajectory.tau).max() > 0.9 * 0.005
     ends = plan.curve.ends
@@ -69,7 +69,9 @@ def test_energy_plans_from_passive_flight_are_true():
         for objective in ("energy", "effort")
     ]
     assert all(plan.success for plan in plans)
-    assert plans[0].report["energy_J"] < 0.95 * plans[1].report["energy_J"]
+    energy = plans[0].report["energy_J"]
+    assert energy < 0.95 * plans[1].report["energy_J"]
+    assert plans[0].report["objective"] == pytest.approx(energy, rel=0.2)
 
 
 def test_rate_bounds_hold_at_the_nodes():

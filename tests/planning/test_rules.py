@@ -3,6 +3,7 @@
 import casadi
 import numpy as np
 import pytest
+from scipy.interpolate import BPoly
 
 import serpentail as st
 from serpentail.attitude import from_angles, rotation_matrix
@@ -35,6 +36,10 @@ def test_rules_are_exact_up_to_their_order_and_no_further():
                 np.testing.assert_allclose(found.integrals(s) @ rates, s**power, atol=2e-12)
                 wanted = power * s ** (power - 1)
                 np.testing.assert_allclose(found.basis(s) @ rates, wanted, atol=2e-11)
+            values = np.random.default_rng(0).normal(size=len(found.nodes))
+            coefficients = found.bernstein() @ values  # beyond which no polynomial goes
+            inside = BPoly(coefficients[:, None], [0, 1])(s)
+            np.testing.assert_allclose(inside, found.basis(s) @ values, atol=1e-11)
 
 
 def test_known_rules():
