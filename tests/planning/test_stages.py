@@ -7,10 +7,8 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 import serpentail as st
-from serpentail.attitude import quaternion_rate
 from serpentail.planning.condensed import fatrop, helpers
 from serpentail.planning.condensed.fatrop import kernel
 from tests.support.rows import row
@@ -62,28 +60,6 @@ def test_derivatives_are_central_differences():
             np.testing.assert_array_equal(found, found.T)
             wanted = mu @ np.moveaxis(differences(stage.slopes, v), 0, 1)
             np.testing.assert_allclose(found, wanted, atol=1e-5 * np.abs(found).max())
-
-
-def test_the_end_is_that_of_the_equations_of_motion():
-    """By SciPy, of the model's own forward dynamics; omega carries the angular momentum."""
-    model = rat()
-    nt, x = model.layout.nt, state(model.layout.nt)
-    with first_stage(model, x, H, degree=5) as stage:
-        end = stage.values(variables(stage, x, 0.0))[: len(x)]
-
-    def slope(_t, y):
-        c, tail, rate = np.split(y, [4, 4 + nt])
-        q = np.concatenate([np.zeros(3), c / np.linalg.norm(c), tail])
-        still = np.concatenate([np.zeros(6), rate])
-        own = np.column_stack([model.momentum(q, each)[1] for each in np.eye(model.nv)[3:6]])
-        omega = np.linalg.solve(own, H - model.momentum(q, still)[1])
-        velocity = np.concatenate([np.zeros(3), omega, rate])
-        rates = model.forward_dynamics(q, velocity, np.zeros(nt))[6:]
-        return np.concatenate([quaternion_rate(c, omega), rate, rates])
-
-    si = np.concatenate([x[: 4 + nt], 10 * x[4 + nt :]])
-    true = solve_ivp(slope, (0, 0.4 / 6), si, "DOP853", rtol=1e-11, atol=1e-12).y[:, -1]
-    np.testing.assert_allclose(end * np.repeat([1, 1, 10], [4, nt, nt]), true, atol=2e-6)
 
 
 NODE = ctypes.CFUNCTYPE(ctypes.c_int, *(ctypes.c_void_p,) * 6)
