@@ -219,9 +219,8 @@ def test_torques_of_elastic_tails_less_what_springs_and_stops_ask_for_move_one_w
     """By SciPy's DOP853, with the reference's forces of springs, damping and stops."""
     model, bare = zoo.model("elastic"), zoo.model("m2_n2")
     own, nq = PassiveTail(zoo.ELASTIC, 4), bare.nq
-    bounds = st.Bounds(angle=np.pi / 3)
-    plan = st.plan(model, start=start(model), duration=DURATION, bounds=bounds)
-    assert plan.success and plan.report["dynamics"] == "compiled"
+    plan = st.plan(model, start=start(model), **AGAIN | {"intervals": 16, "track": True})
+    assert plan.report["converged"] and plan.report["dynamics"] == "compiled"
     assert plan.report["open_loop_attitude_error_deg"] < 0.5
     assert plan.report["tracked_attitude_error_deg"] < 0.5
 
