@@ -78,8 +78,8 @@ def test_every_form_of_a_model_has_lanes(name):
     model = zoo.model(name)
     (q, v), nt = starts(model, 19), model.layout.nt
     law = st.TorqueTable(TABLE.times, np.array(TABLE.torques)[:, :nt], 1e-6)
-    for method, settings in METHODS.items():
-        settings = settings | {"t_span": 0.05, "controller": law}
+    for method, own in METHODS.items():
+        settings = own | {"t_span": 0.05, "controller": law}
         found = st.simulate(model, q, v, **settings)
         assert found.info["abreast"] == (16 if name == "single" else 8)
         with row(method):
