@@ -75,7 +75,7 @@ def missed(tail, count, how):
     """
     late = 6e-3 if how["method"] == "implicit_euler" else 3e-3
     q, v, times = grazes(tail, count)
-    runs, misses = flown(animal(tail), q, v, output_step=CLOCK, **how), []
+    runs, misses = flown(animal(tail), q, v, output_step=5e-4, **how), []
     for run, time in zip(runs, times, strict=True):
         downs = [event["time"] for event in run.events if event["kind"] == "touch_down"]
         pushed = sum(np.abs(each[2]) for each in map(np.array, run.info["impulse_N_s"].values()))
